@@ -1,0 +1,187 @@
+//! The arming machine: who may let current flow.
+//!
+//! ```text
+//!              arm                start
+//!  Disarmed ---------->  Armed  ---------->  Running
+//!     ^  ^                 |  |                |  |
+//!     |  |   stop, done    |  |   stop, done   |  |
+//!     |  +-----------------+--|----------------+  |
+//!     |                       |                   |
+//!     |  clear (a person)     v      trip         |
+//!     +-------------------  Tripped  <------------+
+//! ```
+//!
+//! In `Disarmed` and `Tripped` the amplifier is disabled. In `Armed` it is enabled and commanded zero. Only `clear`
+//! leaves `Tripped`, and it leads to `Disarmed`: a new run must be armed anew.
+
+use std::fmt;
+
+/// State of the arming machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum State {
+    /// Amplifier disabled, no program.
+    #[default]
+    Disarmed,
+    /// Amplifier enabled, zero current, no program.
+    Armed,
+    /// A program commands current, below the interlocks.
+    Running,
+    /// An interlock switched everything off; waits for a person.
+    Tripped,
+}
+
+/// What may happen to the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// The amplifier was enabled.
+    Arm,
+    /// A program was handed over.
+    Start,
+    /// The program ended, or a person stopped it.
+    Stop,
+    /// An interlock tripped.
+    Trip,
+    /// A person cleared the trip.
+    Clear,
+}
+
+impl State {
+    /// The state after `change`, or `None` where the diagram has no such arrow.
+    pub fn after(self, change: Change) -> Option<State> {
+        match (self, change) {
+            (State::Disarmed, Change::Arm) => Some(State::Armed),
+            (State::Armed, Change::Start) => Some(State::Running),
+            (State::Armed | State::Running, Change::Stop) => Some(State::Disarmed),
+            (State::Armed | State::Running, Change::Trip) => Some(State::Tripped),
+            (State::Tripped, Change::Clear) => Some(State::Disarmed),
+            _ => None,
+        }
+    }
+
+    /// The name used in recordings.
+    pub fn name(self) -> &'static str {
+        match self {
+            State::Disarmed => "disarmed",
+            State::Armed => "armed",
+            State::Running => "running",
+            State::Tripped => "tripped",
+        }
+    }
+}
+
+/// Why the interlocks tripped, with the value that crossed its limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trip {
+    /// |position| beyond the soft limit, both in metres.
+    Travel {
+        /// The measured position.
+        position_m: f64,
+        /// The soft limit.
+        limit_m: f64,
+    },
+    /// |command| beyond the peak current.
+    PeakCurrent {
+        /// The command.
+        command_a: f64,
+        /// The limit.
+        limit_a: f64,
+    },
+    /// The motor's thermal current (square root of the filtered square) beyond its continuous rating.
+    ContinuousCurrent {
+        /// The thermal current.
+        thermal_a: f64,
+        /// The limit.
+        limit_a: f64,
+    },
+    /// The command was not a number, or infinite.
+    CommandNotFinite,
+    /// The probe said that its reading is not valid.
+    ProbeInvalid,
+    /// The reading is older than allowed.
+    ProbeStale {
+        /// Its age.
+        age_s: f64,
+        /// The limit.
+        limit_s: f64,
+    },
+    /// The reading did not move while the current did.
+    ProbeStuck {
+        /// How long.
+        unchanged_s: f64,
+        /// The limit.
+        limit_s: f64,
+    },
+    /// Too many ticks missed within one second.
+    Overruns {
+        /// How many.
+        count: u32,
+        /// The limit.
+        limit: u32,
+    },
+    /// The amplifier reported a fault or refused a command; the code is the device's own.
+    Amplifier {
+        /// The device's number.
+        code: i64,
+    },
+}
+
+impl Trip {
+    /// The short reason used in JSON and recordings.
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Trip::Travel { .. } => "travel",
+            Trip::PeakCurrent { .. } => "peak_current",
+            Trip::ContinuousCurrent { .. } => "continuous_current",
+            Trip::CommandNotFinite => "command_not_finite",
+            Trip::ProbeInvalid => "probe_invalid",
+            Trip::ProbeStale { .. } => "probe_stale",
+            Trip::ProbeStuck { .. } => "probe_stuck",
+            Trip::Overruns { .. } => "overruns",
+            Trip::Amplifier { .. } => "amplifier",
+        }
+    }
+
+    /// The value that crossed the limit, and the limit, where there are such.
+    pub fn value_and_limit(&self) -> Option<(f64, f64)> {
+        match *self {
+            Trip::Travel { position_m, limit_m } => Some((position_m, limit_m)),
+            Trip::PeakCurrent { command_a, limit_a } => Some((command_a, limit_a)),
+            Trip::ContinuousCurrent { thermal_a, limit_a } => Some((thermal_a, limit_a)),
+            Trip::ProbeStale { age_s, limit_s } => Some((age_s, limit_s)),
+            Trip::ProbeStuck { unchanged_s, limit_s } => Some((unchanged_s, limit_s)),
+            Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
+            Trip::CommandNotFinite | Trip::ProbeInvalid | Trip::Amplifier { .. } => None,
+        }
+    }
+}
+
+impl fmt::Display for Trip {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Trip::Travel { position_m, limit_m } => {
+                write!(f, "travel: {:.1} um is beyond the soft limit of {:.1} um", position_m * 1e6, limit_m * 1e6)
+            }
+            Trip::PeakCurrent { command_a, limit_a } => {
+                write!(f, "peak current: a command of {command_a:.3} A is beyond {limit_a:.3} A")
+            }
+            Trip::ContinuousCurrent { thermal_a, limit_a } => {
+                write!(f, "continuous current: the motor's thermal current {thermal_a:.3} A is beyond {limit_a:.3} A")
+            }
+            Trip::CommandNotFinite => write!(f, "the command was not a finite number"),
+            Trip::ProbeInvalid => write!(f, "the probe's reading was not valid"),
+            Trip::ProbeStale { age_s, limit_s } => {
+                write!(f, "the probe's reading is {:.3} ms old, {:.3} ms are allowed", age_s * 1e3, limit_s * 1e3)
+            }
+            Trip::ProbeStuck { unchanged_s, limit_s } => write!(
+                f,
+                "the probe's reading did not move for {:.1} ms ({:.1} ms are allowed) while the current did",
+                unchanged_s * 1e3,
+                limit_s * 1e3
+            ),
+            Trip::Overruns { count, limit } => {
+                write!(f, "{count} ticks missed within a second, {limit} are allowed")
+            }
+            Trip::Amplifier { code } => write!(f, "the amplifier reported a fault or refused a command (code {code})"),
+        }
+    }
+}

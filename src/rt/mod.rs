@@ -1,0 +1,3 @@
+//! The real-time loop.
+pub mod arming;
+pub mod record;

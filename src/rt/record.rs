@@ -1,0 +1,107 @@
+//! What the loop says of itself: one [`TickRecord`] a tick and an [`Event`] at every change. Plain copies without
+//! allocation, so that they can leave the tick through a wait-free ring.
+
+use bench_hal::Validity;
+
+use super::arming::{State, Trip};
+
+/// All signals of one tick, taken together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TickRecord {
+    /// Number of the tick; a gap means ticks missed (see `missed_ticks`) or records lost.
+    pub tick: u64,
+    /// When the tick was due, in nanoseconds since the loop started.
+    pub scheduled_ns: u64,
+    /// When it began (equal to `scheduled_ns` in virtual pace).
+    pub woke_ns: u64,
+    /// When its command was written (equal to `scheduled_ns` in virtual pace).
+    pub done_ns: u64,
+    /// Reference r in metres.
+    pub reference_m: f64,
+    /// Measurement y in metres.
+    pub position_m: f64,
+    /// What the program asked for, in amperes, before the interlocks.
+    pub requested_a: f64,
+    /// Command u in amperes as the amplifier gives it: after the interlocks, quantised and limited.
+    pub command_a: f64,
+    /// The probe's own count of measurements.
+    pub probe_sequence: u64,
+    /// Age of the measurement in nanoseconds.
+    pub probe_age_ns: u64,
+    /// Whether the measurement may be used.
+    pub validity: Validity,
+    /// State of the arming machine after the tick.
+    pub state: State,
+    /// See [`flag`].
+    pub flags: u32,
+    /// Scheduled ticks that passed unserved right before this one.
+    pub missed_ticks: u32,
+}
+
+/// Bits of [`TickRecord::flags`].
+pub mod flag {
+    /// The program was running and the loop closed (or the excitation on): neither quiet before nor quiet after.
+    pub const ACTIVE: u32 = 1;
+    /// The amplifier gives another current than was asked for.
+    pub const LIMITED: u32 = 2;
+    /// This tick began more than one period late; `missed_ticks` says how many were lost.
+    pub const OVERRUN: u32 = 4;
+    /// The reading was not valid.
+    pub const INVALID: u32 = 8;
+    /// The interlocks tripped in this tick.
+    pub const TRIPPED: u32 = 16;
+}
+
+/// Something changed at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// The tick at which it took effect.
+    pub tick: u64,
+    /// What happened.
+    pub kind: EventKind,
+}
+
+/// What an [`Event`] tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EventKind {
+    /// An order of the supervisor was taken.
+    Order(OrderKind),
+    /// The arming machine went from one state to another.
+    State {
+        /// State before.
+        from: State,
+        /// State after.
+        to: State,
+    },
+    /// The interlocks tripped.
+    Trip(Trip),
+    /// The program came to its end.
+    Completed,
+    /// Records did not fit into the ring since the last event of this kind.
+    Lost {
+        /// How many.
+        records: u64,
+    },
+}
+
+/// Orders, as they appear in a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OrderKind {
+    /// Enable the amplifier.
+    Arm,
+    /// Run the program that came with the order.
+    Start,
+    /// Zero current, disarm.
+    Stop,
+    /// A person clears a trip.
+    Clear,
+}
+
+/// What goes through the ring from the loop to the recorder.
+#[derive(Clone, Copy, Debug)]
+pub enum Published {
+    /// The signals of a tick.
+    Tick(TickRecord),
+    /// A change.
+    Event(Event),
+}
