@@ -1,5 +1,7 @@
 //! `bench`: a controller daemon for a precision-motion test bench.
-pub mod identify;
-pub mod recording;
-pub mod report;
+pub mod config;
+pub mod control;
+pub mod excitation;
+pub mod plant;
 pub mod rt;
+pub mod sim;

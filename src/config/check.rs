@@ -1,0 +1,183 @@
+//! Checks a merged TOML tree against the schema made from the types: unknown keys with the nearest valid one, missing
+//! keys, types and ranges, each with its path.
+
+use serde_json::{Map, Value as Json};
+use toml::{Table, Value};
+
+use super::quantity::{self, Quantity};
+
+/// Something wrong at a path.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Finding {
+    /// Dotted path of the key.
+    pub path: String,
+    /// What is wrong, with value, limit and remedy.
+    pub what: String,
+}
+
+/// All that is wrong with `value`.
+pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
+    let mut findings = Findings(Vec::new());
+    node(schema, schema, value, "", &mut findings);
+    findings.0
+}
+
+struct Findings(Vec<Finding>);
+
+impl Findings {
+    fn add(&mut self, path: &str, what: String) {
+        self.0.push(Finding { path: path.to_string(), what });
+    }
+}
+
+fn node(root: &Json, schema: &Json, value: &Value, path: &str, out: &mut Findings) {
+    let keywords = flatten(root, schema);
+    if let Some(variants) = keywords.get("oneOf").and_then(Json::as_array) {
+        return variant(root, variants, value, path, out);
+    }
+    match value {
+        Value::Table(entries) if is(&keywords, "object") => table(root, &keywords, entries, path, out),
+        Value::Array(items) if is(&keywords, "array") => array(root, &keywords, items, path, out),
+        Value::Integer(n) if is(&keywords, "integer") || is(&keywords, "number") => {
+            range(&keywords, *n as f64, path, out);
+        }
+        Value::Float(x) if is(&keywords, "number") => range(&keywords, *x, path, out),
+        Value::String(word) if is(&keywords, "string") => text(&keywords, word, path, out),
+        Value::Boolean(_) if is(&keywords, "boolean") => {}
+        other => out.add(path, wrong_type(&keywords, other)),
+    }
+}
+
+/// The keywords of a node together with those of what it refers to.
+fn flatten(root: &Json, schema: &Json) -> Map<String, Json> {
+    let mut keywords = schema.as_object().cloned().unwrap_or_default();
+    let target = schema.get("$ref").and_then(Json::as_str).and_then(|r| root.pointer(r.strip_prefix('#')?));
+    for (key, value) in target.map(|target| flatten(root, target)).unwrap_or_default() {
+        match (keywords.get_mut(&key), value) {
+            (Some(Json::Object(mine)), Json::Object(theirs)) => mine.extend(theirs),
+            (Some(Json::Array(mine)), Json::Array(theirs)) => mine.extend(theirs),
+            (Some(_), _) => {}
+            (None, value) => {
+                keywords.insert(key, value);
+            }
+        }
+    }
+    keywords
+}
+
+/// One of several tables told apart by a constant tag, or one of several words.
+fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut Findings) {
+    let Some(tag) = variants.iter().find_map(tag_of) else {
+        let words: Vec<&str> = variants.iter().filter_map(constant).collect();
+        if !value.as_str().is_some_and(|word| words.contains(&word)) {
+            out.add(path, not_one_of(&value.to_string(), &words));
+        }
+        return;
+    };
+    let word = value.get(&tag).and_then(Value::as_str);
+    let chosen = variants.iter().find(|v| word.is_some() && constant(&v["properties"][&tag]) == word);
+    match chosen {
+        Some(chosen) => node(root, chosen, value, path, out),
+        None => {
+            let words: Vec<&str> = variants.iter().filter_map(|v| constant(&v["properties"][&tag])).collect();
+            let given = value.get(&tag).map_or("missing".to_string(), Value::to_string);
+            out.add(&join(path, &tag), not_one_of(&given, &words));
+        }
+    }
+}
+
+fn table(root: &Json, keywords: &Map<String, Json>, entries: &Table, path: &str, out: &mut Findings) {
+    let none = Map::new();
+    let properties = keywords.get("properties").and_then(Json::as_object).unwrap_or(&none);
+    for (key, value) in entries {
+        match properties.get(key) {
+            Some(schema) => node(root, schema, value, &join(path, key), out),
+            None => out.add(&join(path, key), unknown_key(key, properties)),
+        }
+    }
+    let required = keywords.get("required").and_then(Json::as_array).into_iter().flatten();
+    for key in required.filter_map(Json::as_str).filter(|key| !entries.contains_key(*key)) {
+        out.add(&join(path, key), "is missing; this kind of table needs it".into());
+    }
+}
+
+fn array(root: &Json, keywords: &Map<String, Json>, items: &[Value], path: &str, out: &mut Findings) {
+    let least = keywords.get("minItems").and_then(Json::as_u64).unwrap_or(0);
+    let most = keywords.get("maxItems").and_then(Json::as_u64).unwrap_or(u64::MAX);
+    if !(least..=most).contains(&(items.len() as u64)) {
+        out.add(path, format!("has {} entries; {least} to {most} are allowed", items.len()));
+    }
+    for (index, item) in items.iter().enumerate() {
+        if let Some(schema) = keywords.get("items") {
+            node(root, schema, item, &join(path, &index.to_string()), out);
+        }
+    }
+}
+
+fn range(keywords: &Map<String, Json>, x: f64, path: &str, out: &mut Findings) {
+    let limit = |key: &str| keywords.get(key).and_then(Json::as_f64);
+    let (low, high) = (limit("minimum"), limit("maximum"));
+    if !x.is_finite() || low.is_some_and(|low| x < low) || high.is_some_and(|high| x > high) {
+        let bound = |b: Option<f64>| b.map_or("any".to_string(), |b| format!("{b}"));
+        out.add(path, format!("is {x}; allowed is {} to {}", bound(low), bound(high)));
+    }
+}
+
+fn text(keywords: &Map<String, Json>, word: &str, path: &str, out: &mut Findings) {
+    let words: Vec<&str> =
+        keywords.get("enum").and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str).collect();
+    if !words.is_empty() && !words.contains(&word) {
+        out.add(path, not_one_of(&format!("{word:?}"), &words));
+    }
+}
+
+fn join(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
+}
+
+fn is(keywords: &Map<String, Json>, kind: &str) -> bool {
+    match keywords.get("type") {
+        Some(Json::String(one)) => one == kind,
+        Some(Json::Array(several)) => several.iter().any(|one| one == kind),
+        _ => false,
+    }
+}
+
+fn constant(schema: &Json) -> Option<&str> {
+    schema.get("const").and_then(Json::as_str)
+}
+
+/// The property that holds a constant in this variant.
+fn tag_of(variant: &Json) -> Option<String> {
+    let properties = variant.get("properties")?.as_object()?;
+    properties.iter().find(|(_, schema)| constant(schema).is_some()).map(|(key, _)| key.clone())
+}
+
+fn unknown_key(key: &str, properties: &Map<String, Json>) -> String {
+    let nearest = nearest(key, properties.keys().map(String::as_str));
+    match nearest {
+        Some(nearest) => format!("is not a setting; the nearest is `{nearest}`"),
+        None => "is not a setting; this table has none".into(),
+    }
+}
+
+/// The candidate most like `word`.
+pub(super) fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    candidates.max_by(|a, b| strsim::jaro_winkler(word, a).total_cmp(&strsim::jaro_winkler(word, b)))
+}
+
+fn not_one_of(given: &str, words: &[&str]) -> String {
+    format!("is {given}; allowed is {}", words.join(", "))
+}
+
+fn wrong_type(keywords: &Map<String, Json>, given: &Value) -> String {
+    let wanted = ["number", "integer", "string", "boolean", "array", "object"].into_iter().find(|t| is(keywords, t));
+    let wanted = wanted.map_or("something else", |t| if t == "object" { "table" } else { t });
+    let si = given.as_str().filter(|_| wanted == "number").and_then(|text| quantity::parse(text).ok());
+    match si {
+        Some(Quantity::Bare(x) | Quantity::Metres(x) | Quantity::Ratio(x)) => {
+            format!("is the text {given}, not a number; settings are in SI units: write {x}")
+        }
+        None => format!("is {given}, {} where a {wanted} belongs", given.type_str()),
+    }
+}

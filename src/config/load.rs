@@ -1,0 +1,255 @@
+//! From layers of TOML to a checked [`Config`].
+
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use super::check::{self, Finding};
+use super::place::line_of;
+use super::profiles::{self, Embedded};
+use super::{Config, ReferenceSettings, schema};
+
+/// What a person asked for: a profile or file, and single settings over it.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// A profile's name or the path of a TOML file; the default profile if absent.
+    pub config: Option<String>,
+    /// `KEY=VALUE`, the later one wins.
+    pub sets: Vec<String>,
+}
+
+/// Why a configuration is refused. Nothing has moved yet when it is.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// Neither a profile nor a file.
+    #[error("no {what} and no file is called `{name}`; there are {known}; a file is named with its path")]
+    NotFound {
+        /// Profile or controller.
+        what: &'static str,
+        /// What was asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// The file is there but cannot be read.
+    #[error("cannot read {path}: {why}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: String,
+    },
+    /// The text is not TOML.
+    #[error("{place} is not TOML: {why}")]
+    Syntax {
+        /// File or flag.
+        place: String,
+        /// The parser's words, with line and column.
+        why: String,
+    },
+    /// Keys, types, ranges or their combination are wrong.
+    #[error("refused:\n{}", .0.join("\n"))]
+    Refused(
+        /// A line a finding, with its place.
+        Vec<String>,
+    ),
+}
+
+/// One layer of settings, with the text it came from.
+struct Layer {
+    name: String,
+    text: String,
+    table: Table,
+}
+
+/// Loads, merges and checks a configuration.
+pub fn load(source: &Source) -> Result<Config, ConfigError> {
+    let layers = layers(source)?;
+    let mut merged = Table::new();
+    for layer in &layers {
+        lay(&mut merged, &layer.table, same_kind);
+    }
+    let findings = check::check(&schema(), &Value::Table(merged.clone()));
+    refuse(&layers, findings)?;
+    let config: Config = merged.try_into().map_err(|e: toml::de::Error| ConfigError::Refused(vec![e.to_string()]))?;
+    refuse(&layers, cross_checks(&config))?;
+    Ok(config)
+}
+
+fn refuse(layers: &[Layer], findings: Vec<Finding>) -> Result<(), ConfigError> {
+    if findings.is_empty() {
+        return Ok(());
+    }
+    Err(ConfigError::Refused(
+        findings.iter().map(|f| format!("  {}: `{}` {}", place(layers, &f.path), f.path, f.what)).collect(),
+    ))
+}
+
+/// The last layer that sets `path`, with the line; or the last layer that sets something around it.
+fn place(layers: &[Layer], path: &str) -> String {
+    let mut path = path;
+    loop {
+        for layer in layers.iter().rev() {
+            if let Some(line) = line_of(&layer.text, path) {
+                return if layer.name == "--set" { layer.name.clone() } else { format!("{} line {line}", layer.name) };
+            }
+        }
+        match path.rsplit_once('.') {
+            Some((outer, _)) => path = outer,
+            None => return "the configuration".into(),
+        }
+    }
+}
+
+fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
+    let embedded = |name: &str| profiles::find(profiles::PROFILES, name);
+    let mut layers = Vec::new();
+    if let Some(base) = embedded(profiles::DEFAULT) {
+        layers.push(parse(format!("profile {}", base.name), base.text.to_string())?);
+    }
+    match source.config.as_deref() {
+        None | Some(profiles::DEFAULT) => {}
+        Some(name) => match embedded(name) {
+            Some(profile) => layers.push(parse(format!("profile {name}"), profile.text.to_string())?),
+            None => layers.push(parse(name.to_string(), read(name, profiles::PROFILES, "profile")?)?),
+        },
+    }
+    if !source.sets.is_empty() {
+        layers.push(sets(&source.sets)?);
+    }
+    Ok(layers)
+}
+
+fn read(name: &str, known: &[Embedded], what: &'static str) -> Result<String, ConfigError> {
+    let path = Path::new(name);
+    if !path.exists() {
+        return Err(ConfigError::NotFound { what, name: name.into(), known: profiles::names(known) });
+    }
+    std::fs::read_to_string(path).map_err(|e| ConfigError::Unreadable { path: path.into(), why: e.to_string() })
+}
+
+/// Loads a TOML file of its own type, an embedded one by its name or any by its path, checked against the type's schema.
+pub(crate) fn typed<T>(name: &str, known: &[Embedded], what: &'static str) -> Result<T, ConfigError>
+where
+    T: serde::de::DeserializeOwned + schemars::JsonSchema,
+{
+    let layer = match profiles::find(known, name) {
+        Some(embedded) => parse(format!("{what} {name}"), embedded.text.to_string())?,
+        None => parse(name.to_string(), read(name, known, what)?)?,
+    };
+    let schema = schemars::schema_for!(T).to_value();
+    let findings = check::check(&schema, &Value::Table(layer.table.clone()));
+    refuse(std::slice::from_ref(&layer), findings)?;
+    layer.table.try_into().map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
+}
+
+fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
+    match text.parse::<Table>() {
+        Ok(table) => Ok(Layer { name, text, table }),
+        Err(e) => Err(ConfigError::Syntax { place: name, why: e.to_string() }),
+    }
+}
+
+/// All `--set KEY=VALUE` as one layer. A value that is not TOML is text: `control.controller=slow`.
+fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
+    let mut table = Table::new();
+    for set in sets {
+        let wrong = |why: &str| ConfigError::Syntax { place: format!("--set {set}"), why: why.into() };
+        let (key, text) =
+            set.split_once('=').ok_or_else(|| wrong("write KEY=VALUE, as in plant.mass_asymmetry=0.05"))?;
+        let (key, text) = (key.trim(), text.trim());
+        let parsed = format!("value = {text}").parse::<Table>().ok().and_then(|mut t| t.remove("value"));
+        let value = parsed.unwrap_or_else(|| Value::String(text.trim_matches('"').into()));
+        let nested = key.rsplit('.').fold(value, |inner, part| {
+            let mut outer = Table::new();
+            outer.insert(part.to_string(), inner);
+            Value::Table(outer)
+        });
+        match nested {
+            Value::Table(layer) if !key.split('.').any(str::is_empty) => lay(&mut table, &layer, |_, _| true),
+            _ => return Err(wrong("the key has an empty part")),
+        }
+    }
+    let text = toml::to_string(&table).unwrap_or_default();
+    Ok(Layer { name: "--set".into(), text, table })
+}
+
+/// Lays `over` upon `base`: tables that `joins` accepts are merged key by key, all else takes the old value's place.
+fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
+    for (key, value) in over {
+        match (base.get_mut(key), value) {
+            (Some(Value::Table(old)), Value::Table(new)) if joins(old, new) => lay(old, new, joins),
+            _ => {
+                base.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+/// Tables of another `kind` or `model` have other keys: the new one replaces the old one.
+fn same_kind(old: &Table, new: &Table) -> bool {
+    ["kind", "model"].iter().all(|tag| match (old.get(*tag), new.get(*tag)) {
+        (Some(old), Some(new)) => old == new,
+        _ => true,
+    })
+}
+
+/// What no single setting can say: relations between settings.
+fn cross_checks(config: &Config) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut must = |good: bool, path: &str, what: String| {
+        if !good {
+            findings.push(Finding { path: path.into(), what });
+        }
+    };
+    let nyquist_hz = config.servo.rate_hz / 2.0;
+    let chirp = &config.chirp;
+    must(
+        chirp.start_hz < chirp.stop_hz,
+        "chirp.stop_hz",
+        format!("is {} Hz, but the sweep starts at {} Hz; it must end above its start", chirp.stop_hz, chirp.start_hz),
+    );
+    must(
+        chirp.stop_hz < nyquist_hz,
+        "chirp.stop_hz",
+        format!("is {} Hz; it must stay below half the servo rate, {nyquist_hz} Hz", chirp.stop_hz),
+    );
+    must(
+        chirp.fade_in_s + chirp.fade_out_s <= chirp.duration_s,
+        "chirp.duration_s",
+        format!("is {} s, shorter than both fades, {} s", chirp.duration_s, chirp.fade_in_s + chirp.fade_out_s),
+    );
+    must(
+        chirp.amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz),
+        "chirp.amplitude",
+        "has frequencies that do not rise from point to point".into(),
+    );
+    must(
+        config.interlock.soft_limit_m < config.sim.stop_m,
+        "interlock.soft_limit_m",
+        format!("is {} m; it must lie inside the stop at {} m", config.interlock.soft_limit_m, config.sim.stop_m),
+    );
+    must(
+        config.interlock.soft_limit_m <= config.probe.range_m / 2.0,
+        "interlock.soft_limit_m",
+        format!("is {} m, beyond what the probe sees, {} m", config.interlock.soft_limit_m, config.probe.range_m / 2.0),
+    );
+    must(
+        config.motor.continuous_force_n <= config.motor.peak_force_n,
+        "motor.continuous_force_n",
+        format!("is {} N, above the peak force of {} N", config.motor.continuous_force_n, config.motor.peak_force_n),
+    );
+    must(
+        config.interlock.probe_stale_s * config.servo.rate_hz >= 1.0,
+        "interlock.probe_stale_s",
+        format!("is {} s, shorter than a tick of {} s", config.interlock.probe_stale_s, config.servo.period_s()),
+    );
+    if let ReferenceSettings::Sine { frequency_hz, .. } = config.control.reference {
+        must(
+            frequency_hz < nyquist_hz,
+            "control.reference.frequency_hz",
+            format!("is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz"),
+        );
+    }
+    findings
+}

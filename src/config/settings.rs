@@ -1,0 +1,407 @@
+//! The types of a configuration. Ranges stand here and nowhere else.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Everything a run depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "bench configuration")]
+pub struct Config {
+    /// What this configuration is, in words.
+    pub title: String,
+    /// The real-time loop.
+    #[serde(rename = "loop")]
+    pub servo: LoopSettings,
+    /// The mechanics.
+    pub plant: PlantSettings,
+    /// The voice coil motor.
+    pub motor: MotorSettings,
+    /// The current amplifier.
+    pub amplifier: AmplifierSettings,
+    /// The displacement probe.
+    pub probe: ProbeSettings,
+    /// What trips.
+    pub interlock: InterlockSettings,
+    /// The simulated rig.
+    pub sim: SimSettings,
+    /// The excitation of `bench chirp`.
+    pub chirp: ChirpSettings,
+    /// How the frequency response is estimated.
+    pub identify: IdentifySettings,
+    /// The closed loop of `bench control`.
+    pub control: ControlSettings,
+}
+
+/// The real-time loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoopSettings {
+    /// Servo rate in ticks per second.
+    #[schemars(range(min = 1.0, max = 100000.0))]
+    pub rate_hz: f64,
+    /// Whole periods between a measurement and the moment its command acts.
+    #[schemars(range(min = 0, max = 8))]
+    pub computing_delay_periods: u32,
+    /// SCHED_FIFO priority of the loop's thread in real time.
+    #[schemars(range(min = 1, max = 98))]
+    pub priority: i32,
+    /// Processor to bind the loop's thread to; left to the scheduler if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0, max = 1023))]
+    pub cpu: Option<usize>,
+}
+
+impl LoopSettings {
+    /// Length of a tick in seconds.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+}
+
+/// A model of the mechanics. A new model is one variant here and one file in `plant/`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "model", rename_all = "snake_case")]
+pub enum PlantSettings {
+    /// The simple representative 4-DoF mechanism of Eq. (2-5).
+    Sr4dof(Sr4dofSettings),
+}
+
+/// The SR4DoF mechanism (Fig 2-2): motion stage 1, secondary stages 2 and 3, intermediate stages 4 and 5.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sr4dofSettings {
+    /// Beam length L in metres.
+    #[schemars(range(min = 0.001, max = 1.0))]
+    pub beam_length_m: f64,
+    /// Beam height H (out of plane) in metres.
+    #[schemars(range(min = 0.0001, max = 1.0))]
+    pub beam_height_m: f64,
+    /// Beam thickness T (in plane) in metres.
+    #[schemars(range(min = 0.00001, max = 0.1))]
+    pub beam_thickness_m: f64,
+    /// Young's modulus E in pascals.
+    #[schemars(range(min = 1e6, max = 1e13))]
+    pub youngs_modulus_pa: f64,
+    /// Poisson ratio nu; the beams' bending stiffness takes the plate modulus E/(1 - nu^2).
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub poisson_ratio: f64,
+    /// Mass m1 of the motion stage in kilograms.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub motion_stage_mass_kg: f64,
+    /// Mass m3 of a secondary stage in kilograms.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub secondary_stage_mass_kg: f64,
+    /// Mass m4 = m5 of an intermediate stage in kilograms.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub intermediate_stage_mass_kg: f64,
+    /// Stiffness k4 = k5 of each X bearing in newtons per metre.
+    #[schemars(range(min = 1e-3, max = 1e9))]
+    pub spring_stiffness_n_per_m: f64,
+    /// Mass asymmetry D = m2/m3 - 1, a ratio.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub mass_asymmetry: f64,
+    /// Static Y displacement Y1o of the motion stage in metres.
+    #[schemars(range(min = -0.5, max = 0.5))]
+    pub operating_point_m: f64,
+    /// Damping of the modes.
+    pub damping: DampingSettings,
+}
+
+/// Damping, proportional to mass and stiffness or the same in every mode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum DampingSettings {
+    /// Rayleigh damping through two measured ratios: zeta(w) = mass_per_s/(2 w) + stiffness_s w/2.
+    Measured {
+        /// The lower of the two.
+        first: DampingPoint,
+        /// The upper of the two.
+        second: DampingPoint,
+    },
+    /// Rayleigh damping C = mass_per_s M + stiffness_s K.
+    Rayleigh {
+        /// Coefficient of the mass matrix in 1/s.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        mass_per_s: f64,
+        /// Coefficient of the stiffness matrix in s.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        stiffness_s: f64,
+    },
+    /// The same damping ratio in every mode.
+    Uniform {
+        /// The ratio.
+        #[schemars(range(min = 0.0, max = 0.99))]
+        ratio: f64,
+    },
+}
+
+/// A damping ratio measured at a frequency.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DampingPoint {
+    /// Where it was measured, in rad/s.
+    #[schemars(range(min = 1e-3, max = 1e6))]
+    pub omega_rad_s: f64,
+    /// What was measured.
+    #[schemars(range(min = 0.0, max = 0.99))]
+    pub ratio: f64,
+}
+
+/// The voice coil motor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotorSettings {
+    /// Force constant in newtons per ampere; positive current gives positive force.
+    #[schemars(range(min = 1e-6, max = 1e4))]
+    pub force_constant_n_per_a: f64,
+    /// Peak force in newtons: a command beyond it trips.
+    #[schemars(range(min = 1e-3, max = 1e6))]
+    pub peak_force_n: f64,
+    /// Continuous force in newtons: the thermal current may not exceed it.
+    #[schemars(range(min = 1e-3, max = 1e6))]
+    pub continuous_force_n: f64,
+    /// Thermal time constant of the winding in seconds.
+    #[schemars(range(min = 0.01, max = 10000.0))]
+    pub thermal_time_constant_s: f64,
+}
+
+impl MotorSettings {
+    /// The current of the peak force in amperes.
+    pub fn peak_current_a(&self) -> f64 {
+        self.peak_force_n / self.force_constant_n_per_a
+    }
+
+    /// The current of the continuous force in amperes.
+    pub fn continuous_current_a(&self) -> f64 {
+        self.continuous_force_n / self.force_constant_n_per_a
+    }
+}
+
+/// The current amplifier: the current follows the limited command through a first order lag.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AmplifierSettings {
+    /// Bandwidth of the current loop in hertz.
+    #[schemars(range(min = 1.0, max = 1e6))]
+    pub bandwidth_hz: f64,
+    /// Largest current in amperes.
+    #[schemars(range(min = 1e-3, max = 1000.0))]
+    pub current_limit_a: f64,
+    /// Largest change of the current's set-point in amperes per second.
+    #[schemars(range(min = 1e-3, max = 1e9))]
+    pub slew_limit_a_per_s: f64,
+}
+
+/// The displacement probe.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeSettings {
+    /// Full range in metres; readings go from minus to plus half of it.
+    #[schemars(range(min = 1e-9, max = 1.0))]
+    pub range_m: f64,
+}
+
+/// What trips: zero current in the same tick, amplifier disabled.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InterlockSettings {
+    /// Travel in either direction, in metres.
+    #[schemars(range(min = 1e-9, max = 1.0))]
+    pub soft_limit_m: f64,
+    /// Largest age of a reading in seconds.
+    #[schemars(range(min = 1e-6, max = 10.0))]
+    pub probe_stale_s: f64,
+    /// Longest time in seconds for which a reading may not change while the current does.
+    #[schemars(range(min = 1e-4, max = 100.0))]
+    pub probe_stuck_s: f64,
+    /// The change of current in amperes that a reading must answer.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub probe_stuck_current_a: f64,
+    /// Ticks that may be missed within one second.
+    #[schemars(range(min = 0, max = 1000000))]
+    pub overruns_per_s: u32,
+}
+
+/// The simulated rig beyond the plant's model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimSettings {
+    /// Seed of noise and disturbance.
+    #[schemars(range(min = 0, max = 9223372036854775807i64))]
+    pub seed: u64,
+    /// White noise of the probe, RMS a reading, in metres.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub probe_noise_rms_m: f64,
+    /// Quantisation of the probe in metres; 0 for none.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub probe_quantisation_m: f64,
+    /// Mechanical stop on either side, in metres.
+    #[schemars(range(min = 1e-9, max = 1.0))]
+    pub stop_m: f64,
+    /// Stiffness of the stop in newtons per metre.
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub stop_stiffness_n_per_m: f64,
+    /// Damping of the stop in newton-seconds per metre.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub stop_damping_n_s_per_m: f64,
+    /// Modes of the rig that the plant's model leaves out.
+    pub unmodelled: Vec<UnmodelledMode>,
+    /// Lines of the floor's acceleration in X.
+    pub floor: Vec<FloorLine>,
+}
+
+/// A mode of the rig that the plant's model leaves out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UnmodelledMode {
+    /// Natural frequency in hertz.
+    #[schemars(range(min = 0.01, max = 1e5))]
+    pub frequency_hz: f64,
+    /// Damping ratio.
+    #[schemars(range(min = 0.0, max = 0.99))]
+    pub damping_ratio: f64,
+    /// Residue from force to displacement in 1/kg, with its sign.
+    #[schemars(range(min = -1e6, max = 1e6))]
+    pub residue_per_kg: f64,
+}
+
+/// White noise through the band-pass 2 zeta w s/(s^2 + 2 zeta w s + w^2), scaled to an RMS acceleration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FloorLine {
+    /// Centre frequency in hertz.
+    #[schemars(range(min = 0.01, max = 1e5))]
+    pub frequency_hz: f64,
+    /// Damping ratio: the line's full width at half power is 2 zeta times its frequency.
+    #[schemars(range(min = 1e-4, max = 0.99))]
+    pub damping_ratio: f64,
+    /// RMS of the line in m/s^2.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub acceleration_rms_m_per_s2: f64,
+}
+
+/// How a sweep's frequency runs over time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sweep {
+    /// f(t) = f0 + (f1 - f0) t/T.
+    Linear,
+    /// f(t) = f0 (f1/f0)^(t/T).
+    Logarithmic,
+}
+
+/// The excitation of `bench chirp`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChirpSettings {
+    /// Linear or logarithmic.
+    pub sweep: Sweep,
+    /// First frequency in hertz.
+    #[schemars(range(min = 1e-4, max = 50000.0))]
+    pub start_hz: f64,
+    /// Last frequency in hertz, below half the servo rate.
+    #[schemars(range(min = 1e-4, max = 50000.0))]
+    pub stop_hz: f64,
+    /// Length of the sweep in seconds.
+    #[schemars(range(min = 0.001, max = 100000.0))]
+    pub duration_s: f64,
+    /// Zero current before the sweep, in seconds.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub quiet_before_s: f64,
+    /// Zero current after the sweep, in seconds: long enough for the stage to come to rest.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub quiet_after_s: f64,
+    /// Length of the cosine fade at the start, in seconds.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub fade_in_s: f64,
+    /// Length of the cosine fade at the end, in seconds.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub fade_out_s: f64,
+    /// Amplitude over frequency: straight lines on logarithmic axes, constant outside; one point is a flat sweep.
+    #[schemars(length(min = 1, max = 64))]
+    pub amplitude: Vec<AmplitudePoint>,
+}
+
+/// The amplitude of the excitation at a frequency.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AmplitudePoint {
+    /// Frequency in hertz, rising from point to point.
+    #[schemars(range(min = 1e-4, max = 1e5))]
+    pub frequency_hz: f64,
+    /// Amplitude in amperes.
+    #[schemars(range(min = 1e-9, max = 1000.0))]
+    pub current_a: f64,
+}
+
+/// How the frequency response is estimated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IdentifySettings {
+    /// Half-width of the average over frequency, as a ratio of the frequency.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub resolution_ratio: f64,
+    /// Smallest half-width in bins of the record's transform.
+    #[schemars(range(min = 2, max = 10000))]
+    pub min_half_width_bins: usize,
+}
+
+/// The closed loop of `bench control`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ControlSettings {
+    /// `fast`, `slow`, or the path of a TOML file with sections.
+    pub controller: String,
+    /// Zero current before the loop closes, in seconds; the mean position over it is the origin of the reference.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub settle_s: f64,
+    /// Length of the run after the loop closed, in seconds.
+    #[schemars(range(min = 0.001, max = 1000000.0))]
+    pub duration_s: f64,
+    /// What to follow.
+    pub reference: ReferenceSettings,
+}
+
+/// A reference, relative to where the stage rests when the loop closes; zero before its start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ReferenceSettings {
+    /// Stay where the loop closed.
+    Hold,
+    /// A step.
+    Step {
+        /// Height in metres.
+        #[schemars(range(min = -1.0, max = 1.0))]
+        amplitude_m: f64,
+        /// When, in seconds after the loop closed.
+        #[schemars(range(min = 0.0, max = 1000000.0))]
+        at_s: f64,
+    },
+    /// From 0 to a height at a constant speed, then stay.
+    Ramp {
+        /// Height in metres.
+        #[schemars(range(min = -1.0, max = 1.0))]
+        amplitude_m: f64,
+        /// Speed in metres per second.
+        #[schemars(range(min = 1e-12, max = 100.0))]
+        speed_m_per_s: f64,
+        /// When, in seconds after the loop closed.
+        #[schemars(range(min = 0.0, max = 1000000.0))]
+        at_s: f64,
+    },
+    /// A sine that starts at zero.
+    Sine {
+        /// Amplitude in metres.
+        #[schemars(range(min = -1.0, max = 1.0))]
+        amplitude_m: f64,
+        /// Frequency in hertz, below half the servo rate.
+        #[schemars(range(min = 1e-4, max = 50000.0))]
+        frequency_hz: f64,
+    },
+    /// A CSV file with the columns `time_s,reference_m`; straight lines between its points.
+    File {
+        /// Path of the file.
+        path: String,
+    },
+}

@@ -1,0 +1,180 @@
+//! Controllers as TOML: a list of sections, micrometres in, amperes out.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Section;
+use super::section::SectionError;
+use crate::config::{ConfigError, profiles, typed};
+
+/// A controller file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "bench controller")]
+pub struct ControllerFile {
+    /// What it is, in words.
+    pub title: String,
+    /// The cascade, first to last. One section at least carries the gain in amperes per micrometre.
+    #[schemars(length(min = 1, max = 32))]
+    pub section: Vec<SectionSettings>,
+}
+
+/// A section as a person writes it. A new kind is one variant and one arm below.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SectionSettings {
+    /// K.
+    Gain {
+        /// K in amperes per micrometre.
+        #[schemars(range(min = -1e12, max = 1e12))]
+        gain_a_per_um: f64,
+    },
+    /// K/s.
+    Integrator {
+        /// K in amperes per micrometre and second.
+        #[schemars(range(min = -1e12, max = 1e12))]
+        gain_a_per_um: f64,
+    },
+    /// (s + z)/(s + p): a lead for z < p, a lag for z > p.
+    ZeroPole {
+        /// z in rad/s.
+        #[schemars(range(min = -1e6, max = 1e6))]
+        zero_rad_s: f64,
+        /// p in rad/s.
+        #[schemars(range(min = -1e6, max = 1e6))]
+        pole_rad_s: f64,
+    },
+    /// 1/(s + p).
+    Pole {
+        /// p in rad/s.
+        #[schemars(range(min = -1e6, max = 1e6))]
+        pole_rad_s: f64,
+    },
+    /// w^2/(s^2 + 2 zeta w s + w^2).
+    PolePair {
+        /// w in rad/s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        omega_rad_s: f64,
+        /// zeta.
+        #[schemars(range(min = -10.0, max = 10.0))]
+        damping_ratio: f64,
+    },
+    /// (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2).
+    Biquad {
+        /// wz in rad/s.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        zeros_rad_s: f64,
+        /// zz.
+        #[schemars(range(min = -10.0, max = 10.0))]
+        zeros_damping_ratio: f64,
+        /// wp in rad/s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        poles_rad_s: f64,
+        /// zp.
+        #[schemars(range(min = -10.0, max = 10.0))]
+        poles_damping_ratio: f64,
+        /// Where the discrete section is exact, in rad/s.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 1e-3, max = 1e6))]
+        prewarp_rad_s: Option<f64>,
+    },
+    /// Any section of second order or less, by falling powers of s.
+    Coefficients {
+        /// Of the numerator: one to three numbers.
+        #[schemars(length(min = 1, max = 3))]
+        numerator: Vec<f64>,
+        /// Of the denominator: one to three numbers.
+        #[schemars(length(min = 1, max = 3))]
+        denominator: Vec<f64>,
+        /// Where the discrete section is exact, in rad/s.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 1e-3, max = 1e6))]
+        prewarp_rad_s: Option<f64>,
+    },
+}
+
+/// A controller that is refused. Nothing has moved yet when it is.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ControllerError {
+    /// The file is not there, not TOML, or its keys, types and ranges are wrong.
+    #[error(transparent)]
+    File(#[from] ConfigError),
+    /// A section that no controller may have.
+    #[error("{name}: section {number} {why}")]
+    Section {
+        /// The controller.
+        name: String,
+        /// Which section, from 1.
+        number: usize,
+        /// What is wrong.
+        why: SectionError,
+    },
+    /// A prewarping frequency above half the servo rate.
+    #[error(
+        "{name}: section {number} is prewarped at {prewarp_rad_s} rad/s; at this servo rate it must lie below {limit_rad_s:.1} rad/s"
+    )]
+    Prewarp {
+        /// The controller.
+        name: String,
+        /// Which section, from 1.
+        number: usize,
+        /// As given.
+        prewarp_rad_s: f64,
+        /// Half the servo rate.
+        limit_rad_s: f64,
+    },
+}
+
+/// The sections of `fast`, `slow` or a file, checked for a servo rate.
+pub fn load(name: &str, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
+    let file: ControllerFile = typed(name, profiles::CONTROLLERS, "controller")?;
+    let limit_rad_s = std::f64::consts::PI * rate_hz;
+    let mut sections = Vec::with_capacity(file.section.len());
+    for (index, settings) in file.section.iter().enumerate() {
+        let (name, number) = (name.to_string(), index + 1);
+        let section = section(settings).checked();
+        let section = section.map_err(|why| ControllerError::Section { name: name.clone(), number, why })?;
+        match section.prewarp_rad_s {
+            Some(prewarp_rad_s) if prewarp_rad_s >= limit_rad_s => {
+                return Err(ControllerError::Prewarp { name, number, prewarp_rad_s, limit_rad_s });
+            }
+            _ => sections.push(section),
+        }
+    }
+    Ok(sections)
+}
+
+fn section(settings: &SectionSettings) -> Section {
+    let plain = |numerator, denominator| Section { numerator, denominator, prewarp_rad_s: None };
+    let pair = |w: f64, zeta: f64| [w * w, 2.0 * zeta * w, 1.0];
+    match *settings {
+        SectionSettings::Gain { gain_a_per_um } => plain([gain_a_per_um, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        SectionSettings::Integrator { gain_a_per_um } => plain([gain_a_per_um, 0.0, 0.0], [0.0, 1.0, 0.0]),
+        SectionSettings::ZeroPole { zero_rad_s, pole_rad_s } => plain([zero_rad_s, 1.0, 0.0], [pole_rad_s, 1.0, 0.0]),
+        SectionSettings::Pole { pole_rad_s } => plain([1.0, 0.0, 0.0], [pole_rad_s, 1.0, 0.0]),
+        SectionSettings::PolePair { omega_rad_s: w, damping_ratio } => plain([w * w, 0.0, 0.0], pair(w, damping_ratio)),
+        SectionSettings::Biquad {
+            zeros_rad_s,
+            zeros_damping_ratio,
+            poles_rad_s,
+            poles_damping_ratio,
+            prewarp_rad_s,
+        } => Section {
+            numerator: pair(zeros_rad_s, zeros_damping_ratio),
+            denominator: pair(poles_rad_s, poles_damping_ratio),
+            prewarp_rad_s,
+        },
+        SectionSettings::Coefficients { ref numerator, ref denominator, prewarp_rad_s } => {
+            Section { numerator: rising(numerator), denominator: rising(denominator), prewarp_rad_s }
+        }
+    }
+}
+
+/// Coefficients by falling powers, as written, to rising ones, as kept.
+fn rising(falling: &[f64]) -> [f64; 3] {
+    let mut rising = [0.0; 3];
+    for (slot, c) in rising.iter_mut().zip(falling.iter().rev()) {
+        *slot = *c;
+    }
+    rising
+}

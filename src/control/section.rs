@@ -1,0 +1,165 @@
+//! A continuous first or second order section, H(s) = (b2 s^2 + b1 s + b0)/(a2 s^2 + a1 s + a0).
+
+use nalgebra::Complex;
+
+use super::Biquad;
+
+/// Coefficients of a section by rising power of s; s in rad/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// b0, b1, b2.
+    pub numerator: [f64; 3],
+    /// a0, a1, a2.
+    pub denominator: [f64; 3],
+    /// Frequency in rad/s at which the discrete section has exactly the continuous response; none for low frequencies.
+    pub prewarp_rad_s: Option<f64>,
+}
+
+/// What makes a section useless as a part of a controller.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SectionError {
+    /// More zeros than poles: infinite gain at high frequency.
+    #[error("is improper: its numerator has order {numerator}, its denominator {denominator}; add a pole")]
+    Improper {
+        /// Order of the numerator.
+        numerator: usize,
+        /// Order of the denominator.
+        denominator: usize,
+    },
+    /// A pole in the right half plane, or more than one at the origin.
+    #[error(
+        "is unstable: it has a pole at {re_rad_s:.4} {im_rad_s:+.4}j rad/s; poles must lie left of the imaginary axis, one at the origin excepted"
+    )]
+    Unstable {
+        /// Real part.
+        re_rad_s: f64,
+        /// Imaginary part.
+        im_rad_s: f64,
+    },
+    /// A coefficient that is not a number, or a denominator of zeros.
+    #[error("has a denominator of zeros or a coefficient that is not finite")]
+    Degenerate,
+}
+
+impl Section {
+    /// H(s).
+    pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
+        let at = |c: &[f64; 3]| (s * c[2] + c[1]) * s + c[0];
+        at(&self.numerator) / at(&self.denominator)
+    }
+
+    /// Refuses what is improper or unstable.
+    pub fn checked(self) -> Result<Section, SectionError> {
+        let finite = self.numerator.iter().chain(&self.denominator).all(|c| c.is_finite());
+        let (Some(denominator), true) = (order(&self.denominator), finite) else {
+            return Err(SectionError::Degenerate);
+        };
+        let numerator = order(&self.numerator).unwrap_or(0);
+        if numerator > denominator {
+            return Err(SectionError::Improper { numerator, denominator });
+        }
+        let poles = self.poles();
+        let at_origin = poles.iter().filter(|pole| pole.norm() == 0.0).count();
+        match poles.iter().find(|pole| pole.re >= 0.0 && (pole.norm() > 0.0 || at_origin > 1)) {
+            Some(pole) => Err(SectionError::Unstable { re_rad_s: pole.re, im_rad_s: pole.im }),
+            None => Ok(self),
+        }
+    }
+
+    /// Roots of the denominator.
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        let [a0, a1, a2] = self.denominator;
+        match order(&self.denominator) {
+            Some(2) => quadratic_roots(a2, a1, a0).to_vec(),
+            Some(1) => vec![Complex::new(-a0 / a1, 0.0)],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Tustin's rule, s = c (z - 1)/(z + 1), with c = 2/T, or c = w/tan(w T/2) where the section is prewarped at w.
+    pub fn tustin(&self, period_s: f64) -> Biquad {
+        let c = match self.prewarp_rad_s {
+            Some(w) => w / libm::tan(w * period_s / 2.0),
+            None => 2.0 / period_s,
+        };
+        // Times (z + 1)^2: s -> c (z^2 - 1), s^2 -> c^2 (z - 1)^2. Powers of z^-1 from z^2 downwards.
+        let map = |p: &[f64; 3]| {
+            let (p1, p2) = (p[1] * c, p[2] * c * c);
+            [p[0] + p1 + p2, 2.0 * (p[0] - p2), p[0] - p1 + p2]
+        };
+        if self.numerator[2] == 0.0 && self.denominator[2] == 0.0 {
+            // First order: without the common factor (z + 1), which would be a mode at half the sampling rate.
+            let map = |p: &[f64; 3]| [p[0] + p[1] * c, p[0] - p[1] * c, 0.0];
+            return Biquad::new(map(&self.numerator), map(&self.denominator));
+        }
+        Biquad::new(map(&self.numerator), map(&self.denominator))
+    }
+}
+
+fn order(coefficients: &[f64; 3]) -> Option<usize> {
+    coefficients.iter().rposition(|c| *c != 0.0)
+}
+
+/// Roots of a x^2 + b x + c without cancellation.
+fn quadratic_roots(a: f64, b: f64, c: f64) -> [Complex<f64>; 2] {
+    let discriminant = b * b - 4.0 * a * c;
+    if discriminant < 0.0 {
+        let (re, im) = (-b / (2.0 * a), (-discriminant).sqrt() / (2.0 * a));
+        return [Complex::new(re, im), Complex::new(re, -im)];
+    }
+    let q = -0.5 * (b + discriminant.sqrt().copysign(b));
+    if q == 0.0 { [Complex::new(0.0, 0.0); 2] } else { [q / a, c / q].map(|root| Complex::new(root, 0.0)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn section(numerator: [f64; 3], denominator: [f64; 3]) -> Section {
+        Section { numerator, denominator, prewarp_rad_s: None }
+    }
+
+    #[test]
+    fn tustin_is_the_continuous_response_at_the_warped_frequency() {
+        // H(z) at exp(j w T) equals H(s) at j (2/T) tan(w T/2): the definition of the rule.
+        let notch = section([270_400.0, 10.4, 1.0], [308_025.0, 111.0, 1.0]);
+        let lead = section([88.7, 1.0, 0.0], [625.0, 1.0, 0.0]);
+        let integrator = section([51_110.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        for period_s in [2e-4, 1e-3] {
+            for h in [notch, lead, integrator] {
+                for w in [1.0, 100.0, 520.0, 1500.0] {
+                    let angle: f64 = w * period_s;
+                    let z = Complex::new(angle.cos(), angle.sin());
+                    let warped = Complex::new(0.0, 2.0 / period_s * (angle / 2.0).tan());
+                    let (discrete, continuous) = (h.tustin(period_s).response(z), h.response(warped));
+                    assert!((discrete - continuous).norm() < 1e-9 * continuous.norm(), "{h:?} at {w}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_prewarped_section_is_exact_at_its_frequency() {
+        let mut notch = section([270_400.0, 10.4, 1.0], [308_025.0, 111.0, 1.0]);
+        let (w, period_s) = (520.0, 1e-3);
+        let z = Complex::new(f64::cos(w * period_s), f64::sin(w * period_s));
+        let continuous = notch.response(Complex::new(0.0, w));
+        let plain = (notch.tustin(period_s).response(z) - continuous).norm() / continuous.norm();
+        notch.prewarp_rad_s = Some(w);
+        let warped = (notch.tustin(period_s).response(z) - continuous).norm() / continuous.norm();
+        assert!(warped < 1e-10 && plain > 0.1, "prewarped {warped}, plain {plain}");
+    }
+
+    #[test]
+    fn improper_and_unstable_sections_are_refused() {
+        assert!(matches!(section([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]).checked(), Err(SectionError::Improper { .. })));
+        assert!(matches!(section([1.0, 0.0, 0.0], [-5.0, 1.0, 0.0]).checked(), Err(SectionError::Unstable { .. })));
+        assert!(matches!(section([1.0, 0.0, 0.0], [25.0, -1.0, 1.0]).checked(), Err(SectionError::Unstable { .. })));
+        assert!(matches!(section([1.0, 0.0, 0.0], [25.0, 0.0, 1.0]).checked(), Err(SectionError::Unstable { .. })));
+        assert!(matches!(section([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]).checked(), Err(SectionError::Unstable { .. })));
+        assert!(matches!(section([1.0, 0.0, 0.0], [0.0; 3]).checked(), Err(SectionError::Degenerate)));
+        assert!(matches!(section([f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.0]).checked(), Err(SectionError::Degenerate)));
+        assert!(section([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).checked().is_ok(), "one integrator is allowed");
+        assert!(section([1.0, 2.0, 3.0], [25.0, 1.0, 1.0]).checked().is_ok());
+    }
+}

@@ -1,0 +1,170 @@
+//! The plant as a loop sees it: amplifier and modes, exactly discretised for a set-point held over each period.
+//!
+//! The current follows the set-point through the amplifier's lag, i' = wa (u - i); each mode has the force of that
+//! current, q'' + 2 zeta w q' + w^2 q = b Kf i + f, with f whatever else acts on the mode (floor, stop), held as well. One
+//! matrix exponential a mode carries its state over a period without error, whatever the period's length.
+//!
+//! States of a mode are q and q'/w, so that both are of one size.
+
+use nalgebra::{Complex, DMatrix, Matrix5, Vector2};
+
+use super::{Mode, exponential};
+use crate::config::AmplifierSettings;
+
+/// One mode over one period: x+ = A x + current i + setpoint u + force f, y = output q.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// A, row by row.
+    pub a: [[f64; 2]; 2],
+    /// Effect of the current at the period's start, per ampere.
+    pub current: [f64; 2],
+    /// Effect of the set-point held over the period, per ampere.
+    pub setpoint: [f64; 2],
+    /// Effect of another modal force held over the period.
+    pub force: [f64; 2],
+    /// Displacement at the probe per unit of q.
+    pub output: f64,
+    /// Velocity at the probe per unit of q'/w.
+    pub output_rate: f64,
+    /// Modal force per m/s^2 of the floor.
+    pub floor: f64,
+}
+
+/// Amplifier and modes over one period.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampled {
+    /// Length of the period in seconds.
+    pub period_s: f64,
+    /// The current's share that is left after a period: exp(-wa T).
+    pub lag: f64,
+    /// One block a mode.
+    pub blocks: Vec<Block>,
+}
+
+impl Sampled {
+    /// Discretises `modes`, driven through `amplifier` and a motor of `force_constant_n_per_a`.
+    pub fn new(modes: &[Mode], amplifier: &AmplifierSettings, force_constant_n_per_a: f64, period_s: f64) -> Sampled {
+        let lag_rad_s = 2.0 * std::f64::consts::PI * amplifier.bandwidth_hz;
+        let blocks = modes.iter().map(|mode| block(mode, lag_rad_s, force_constant_n_per_a, period_s)).collect();
+        Sampled { period_s, lag: libm::exp(-lag_rad_s * period_s), blocks }
+    }
+
+    /// Response in metres per ampere from set-point to position sampled at the period's start, at z = exp(j w T).
+    /// Computing delay is the caller's: multiply by z^-n.
+    pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
+        let current = (z - self.lag).inv() * (1.0 - self.lag);
+        let of = |block: &Block| {
+            let [[a11, a12], [a21, a22]] = block.a;
+            let drive = |i: usize| current * block.current[i] + block.setpoint[i];
+            let determinant = (z - a11) * (z - a22) - a12 * a21;
+            ((z - a22) * drive(0) + drive(1) * a12) * block.output / determinant
+        };
+        self.blocks.iter().map(of).sum()
+    }
+
+    /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ...].
+    pub fn state_space(&self) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+        let n = 1 + 2 * self.blocks.len();
+        let (mut a, mut b, mut c) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1), DMatrix::zeros(1, n));
+        a[(0, 0)] = self.lag;
+        b[(0, 0)] = 1.0 - self.lag;
+        for (index, block) in self.blocks.iter().enumerate() {
+            let first = 1 + 2 * index;
+            for row in 0..2 {
+                a[(first + row, first)] = block.a[row][0];
+                a[(first + row, first + 1)] = block.a[row][1];
+                a[(first + row, 0)] = block.current[row];
+                b[(first + row, 0)] = block.setpoint[row];
+            }
+            c[(0, first)] = block.output;
+        }
+        (a, b, c)
+    }
+}
+
+/// exp(F T) with the states [q, q'/w, i, u, f].
+fn block(mode: &Mode, lag_rad_s: f64, force_constant_n_per_a: f64, period_s: f64) -> Block {
+    let w = mode.omega_rad_s;
+    let mut rate = Matrix5::zeros();
+    rate[(0, 1)] = w;
+    rate[(1, 0)] = -w;
+    rate[(1, 1)] = -2.0 * mode.damping_ratio * w;
+    rate[(1, 2)] = mode.force_gain * force_constant_n_per_a / w;
+    rate[(1, 4)] = 1.0 / w;
+    rate[(2, 2)] = -lag_rad_s;
+    rate[(2, 3)] = lag_rad_s;
+    let over = exponential(&(rate * period_s));
+    let column = |j: usize| Vector2::new(over[(0, j)], over[(1, j)]).into();
+    Block {
+        a: [[over[(0, 0)], over[(0, 1)]], [over[(1, 0)], over[(1, 1)]]],
+        current: column(2),
+        setpoint: column(3),
+        force: column(4),
+        output: mode.sensor_gain,
+        output_rate: mode.sensor_gain * w,
+        floor: mode.floor_gain,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+
+    fn mode() -> Mode {
+        let shape = DVector::zeros(1);
+        Mode { omega_rad_s: 184.0, damping_ratio: 0.009, shape, force_gain: 0.7, sensor_gain: 0.6, floor_gain: 1.0 }
+    }
+
+    fn amplifier() -> AmplifierSettings {
+        AmplifierSettings { bandwidth_hz: 1000.0, current_limit_a: 1.0, slew_limit_a_per_s: 1.0 }
+    }
+
+    #[test]
+    fn a_mode_swings_freely_as_in_closed_form() {
+        let (mode, period_s) = (mode(), 2e-4);
+        let block = Sampled::new(std::slice::from_ref(&mode), &amplifier(), 11.12, period_s).blocks[0];
+        // Displaced and let go: q(t) = exp(-zeta w t) (cos wd t + zeta/sqrt(1 - zeta^2) sin wd t).
+        let (mut x, zeta) = ([1.0, 0.0], mode.damping_ratio);
+        let damped = (1.0 - zeta * zeta).sqrt();
+        for tick in 1..=10_000 {
+            x = [0, 1].map(|row| block.a[row][0] * x[0] + block.a[row][1] * x[1]);
+            let phase = mode.omega_rad_s * damped * period_s * f64::from(tick);
+            let exact = (-zeta * mode.omega_rad_s * period_s * f64::from(tick)).exp()
+                * (phase.cos() + zeta / damped * phase.sin());
+            // Ten thousand steps, each rounded at 1e-16.
+            assert!((x[0] - exact).abs() < 1e-11, "tick {tick}: {} for {exact}", x[0]);
+        }
+    }
+
+    #[test]
+    fn halving_the_period_changes_nothing_at_the_common_instants() {
+        let coarse = Sampled::new(&[mode()], &amplifier(), 11.12, 1e-3);
+        let fine = Sampled::new(&[mode()], &amplifier(), 11.12, 1e-3 / 4.0);
+        let ((a, b, _), (fa, fb, _)) = (coarse.state_space(), fine.state_space());
+        let four = &fa * &fa * &fa * &fa;
+        let held = (&fa * &fa * &fa + &fa * &fa + &fa + DMatrix::identity(3, 3)) * fb;
+        assert!((four - a).amax() < 1e-14 && (held - &b).amax() < 1e-14 * b.amax().max(1.0));
+    }
+
+    #[test]
+    fn the_response_is_that_of_the_state_space() {
+        let sampled = Sampled::new(&[mode()], &amplifier(), 11.12, 2e-4);
+        let (a, b, c) = sampled.state_space();
+        let complex = |m: DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
+        for angle in [1e-4, 0.03, 0.5, 3.0] {
+            let z = Complex::new(f64::cos(angle), f64::sin(angle));
+            let resolvent = (DMatrix::identity(3, 3) * z - complex(a.clone())).lu().solve(&complex(b.clone())).unwrap();
+            let direct = (complex(c.clone()) * resolvent)[(0, 0)];
+            assert!((sampled.response(z) - direct).norm() < 1e-9 * direct.norm(), "at {angle}");
+        }
+    }
+
+    #[test]
+    fn at_low_frequency_the_response_is_the_static_compliance() {
+        let sampled = Sampled::new(&[mode()], &amplifier(), 11.12, 2e-4);
+        let compliance = 0.7 * 0.6 * 11.12 / (184.0 * 184.0);
+        let z = Complex::new(1.0, 1e-9);
+        assert!((sampled.response(z).re / compliance - 1.0).abs() < 1e-6);
+    }
+}

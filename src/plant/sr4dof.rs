@@ -1,0 +1,104 @@
+//! The simple representative 4-DoF mechanism of Fig 2-2, derived from its kinematic constraints.
+//!
+//! Degrees of freedom z = [x1, y1, y2, y3]; a = 0.6 Y1o/L (Eq. 2-6), as each parallelogram takes half of Y1o. The four
+//! parallelograms, linearised about the operating point (Eq. 2-4):
+//!
+//! ```text
+//!  x2 = x1 + a (y1 - y2)        x3 = x1 - a (y1 - y3)
+//!  x4 = x1 + a y1 - 2 a y2      x5 = x1 - a y1 + 2 a y3       y4 = y5 = 0
+//! ```
+//!
+//! The force P acts in X on stage 4, the probe sees x1. The sum over masses and springs gives Eq. (2-5) as printed.
+
+use super::structure::Assembly;
+use super::{PlantError, Structure, damping};
+use crate::config::Sr4dofSettings;
+
+const NONE: [f64; 4] = [0.0; 4];
+const X1: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
+const Y1: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
+const Y2: [f64; 4] = [0.0, 0.0, 1.0, 0.0];
+const Y3: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+const Y12: [f64; 4] = [0.0, 1.0, -1.0, 0.0];
+const Y13: [f64; 4] = [0.0, 1.0, 0.0, -1.0];
+
+pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
+    let a = 0.6 * s.operating_point_m / s.beam_length_m;
+    let m3 = s.secondary_stage_mass_kg;
+    let k = parallelogram_stiffness_n_per_m(s);
+    let x4 = [1.0, a, -2.0 * a, 0.0];
+    let x5 = [1.0, -a, 0.0, 2.0 * a];
+    let mut parts = Assembly::new(4);
+    parts.mass(s.motion_stage_mass_kg, &X1, &Y1);
+    parts.mass(m3 * (1.0 + s.mass_asymmetry), &[1.0, a, -a, 0.0], &Y2);
+    parts.mass(m3, &[1.0, -a, 0.0, a], &Y3);
+    parts.mass(s.intermediate_stage_mass_kg, &x4, &NONE);
+    parts.mass(s.intermediate_stage_mass_kg, &x5, &NONE);
+    for along in [&Y12, &Y2, &Y13, &Y3] {
+        parts.spring(k, along);
+    }
+    parts.spring(s.spring_stiffness_n_per_m, &x4);
+    parts.spring(s.spring_stiffness_n_per_m, &x5);
+    let mut structure = parts.finish(&x4, &X1);
+    structure.damping = damping::matrix(&structure, &s.damping)?;
+    Ok(structure)
+}
+
+/// Bending stiffness of a parallelogram of two beams in Y: 24 E I/(L^3 (1 - nu^2)), I = H T^3/12.
+fn parallelogram_stiffness_n_per_m(s: &Sr4dofSettings) -> f64 {
+    let cube = |x: f64| x * x * x;
+    let second_moment_m4 = s.beam_height_m * cube(s.beam_thickness_m) / 12.0;
+    let plate_modulus_pa = s.youngs_modulus_pa / (1.0 - s.poisson_ratio * s.poisson_ratio);
+    24.0 * plate_modulus_pa * second_moment_m4 / cube(s.beam_length_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{PlantSettings, Source, load};
+    use nalgebra::Matrix4;
+    use proptest::prelude::*;
+
+    /// Eq. (2-5) as printed, for m4 = m5, k4 = k5 and four equal parallelograms k.
+    fn printed(s: &Sr4dofSettings) -> (Matrix4<f64>, Matrix4<f64>) {
+        let a = 0.6 * s.operating_point_m / s.beam_length_m;
+        let (m1, m3, m4) = (s.motion_stage_mass_kg, s.secondary_stage_mass_kg, s.intermediate_stage_mass_kg);
+        let (m2, m5, k4, k5) =
+            (m3 * (1.0 + s.mass_asymmetry), m4, s.spring_stiffness_n_per_m, s.spring_stiffness_n_per_m);
+        let i = s.beam_height_m * s.beam_thickness_m.powi(3) / 12.0;
+        let k = 24.0 * s.youngs_modulus_pa * i / (s.beam_length_m.powi(3) * (1.0 - s.poisson_ratio.powi(2)));
+        let a2 = a * a;
+        #[rustfmt::skip]
+        let mass = Matrix4::new(
+            m1 + m2 + m3 + m4 + m5, a * (m2 + m4 - m3 - m5), -a * (m2 + 2.0 * m4), a * (m3 + 2.0 * m5),
+            a * (m2 + m4 - m3 - m5), m1 + a2 * (m2 + m3 + m4 + m5), -a2 * (m2 + 2.0 * m4), -a2 * (m3 + 2.0 * m5),
+            -a * (m2 + 2.0 * m4), -a2 * (m2 + 2.0 * m4), m2 + a2 * m2 + 4.0 * a2 * m4, 0.0,
+            a * (m3 + 2.0 * m5), -a2 * (m3 + 2.0 * m5), 0.0, m3 + a2 * m3 + 4.0 * a2 * m5,
+        );
+        #[rustfmt::skip]
+        let stiffness = Matrix4::new(
+            k4 + k5, a * (k4 - k5), -2.0 * a * k4, 2.0 * a * k5,
+            a * (k4 - k5), 2.0 * k + a2 * (k4 + k5), -2.0 * a2 * k4 - k, -2.0 * a2 * k5 - k,
+            -2.0 * a * k4, -2.0 * a2 * k4 - k, 4.0 * a2 * k4 + 2.0 * k, 0.0,
+            2.0 * a * k5, -2.0 * a2 * k5 - k, 0.0, 4.0 * a2 * k5 + 2.0 * k,
+        );
+        (mass, stiffness)
+    }
+
+    proptest! {
+        #[test]
+        fn the_constraints_give_the_printed_matrices(
+            point in -0.15..0.15f64, asymmetry in -0.5..0.5f64, m1 in 0.01..2.0f64, m3 in 0.001..0.5f64, m4 in 0.01..2.0f64, k4 in 1.0..1e5f64,
+        ) {
+            let PlantSettings::Sr4dof(mut s) = load(&Source::default()).unwrap().plant;
+            s.operating_point_m = point * s.beam_length_m;
+            (s.mass_asymmetry, s.motion_stage_mass_kg, s.secondary_stage_mass_kg) = (asymmetry, m1, m3);
+            (s.intermediate_stage_mass_kg, s.spring_stiffness_n_per_m) = (m4, k4);
+            let ours = structure(&s).unwrap();
+            let (mass, stiffness) = printed(&s);
+            // Ten sums of products, each rounded: some 1e-15 of the largest element.
+            prop_assert!((ours.mass - mass).amax() <= 1e-14 * mass.amax());
+            prop_assert!((ours.stiffness - stiffness).amax() <= 1e-14 * stiffness.amax());
+        }
+    }
+}
