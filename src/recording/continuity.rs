@@ -1,0 +1,138 @@
+//! Which ticks are missing between those that are there, and why. Writer and reader count by the same rule.
+
+use crate::rt::record::{Event, EventKind, TickRecord};
+
+/// Ticks missing between two neighbouring records.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// The last tick before the gap.
+    pub after_tick: u64,
+    /// The first tick behind it.
+    pub before_tick: u64,
+    /// Ticks the loop says it missed: overruns.
+    pub missed: u64,
+    /// Ticks nobody answers for: records lost.
+    pub lost: u64,
+}
+
+/// A tick number that is not above the one before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct NotAbove(pub u64);
+
+/// A running account of ticks, overruns and losses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Continuity {
+    first_and_last: Option<(u64, u64)>,
+    ticks: u64,
+    overruns: u64,
+    lost_in_gaps: u64,
+    lost_announced: u64,
+}
+
+impl Continuity {
+    /// Takes in the next tick; returns the gap before it, if there is one.
+    pub(super) fn tick(&mut self, record: &TickRecord) -> Result<Option<Gap>, NotAbove> {
+        let gap = match self.first_and_last {
+            Some((_, last)) if record.tick <= last => return Err(NotAbove(last)),
+            Some((_, last)) => gap(last, record),
+            None => None,
+        };
+        self.first_and_last = Some((self.first_and_last.map_or(record.tick, |(first, _)| first), record.tick));
+        self.ticks += 1;
+        self.overruns += u64::from(record.missed_ticks);
+        self.lost_in_gaps += gap.map_or(0, |g| g.lost);
+        Ok(gap)
+    }
+
+    /// Takes in an event: the loop announces what it could not hand over.
+    pub(super) fn event(&mut self, event: &Event) {
+        if let EventKind::Lost { records } = event.kind {
+            self.lost_announced = self.lost_announced.saturating_add(records);
+        }
+    }
+
+    pub(super) fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    pub(super) fn first_tick(&self) -> Option<u64> {
+        self.first_and_last.map(|(first, _)| first)
+    }
+
+    pub(super) fn last_tick(&self) -> Option<u64> {
+        self.first_and_last.map(|(_, last)| last)
+    }
+
+    /// Scheduled ticks that passed unserved, as the loop counts them.
+    pub(super) fn overruns(&self) -> u64 {
+        self.overruns
+    }
+
+    /// Records lost. The same loss shows as a gap and is announced by the loop, so the larger count stands: gaps alone
+    /// do not see lost events or a lost end, announcements alone could be lost themselves.
+    pub(super) fn lost_records(&self) -> u64 {
+        self.lost_in_gaps.max(self.lost_announced)
+    }
+}
+
+fn gap(last: u64, record: &TickRecord) -> Option<Gap> {
+    let absent = record.tick - last - 1;
+    let missed = absent.min(u64::from(record.missed_ticks));
+    (absent > 0).then_some(Gap { after_tick: last, before_tick: record.tick, missed, lost: absent - missed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn follow(ticks: &[(u64, u32)]) -> (Continuity, Vec<Gap>) {
+        let mut account = Continuity::default();
+        let mut gaps = Vec::new();
+        for &(tick, missed_ticks) in ticks {
+            let record = TickRecord { tick, missed_ticks, ..TickRecord::default() };
+            gaps.extend(account.tick(&record).expect("increasing"));
+        }
+        (account, gaps)
+    }
+
+    #[test]
+    fn consecutive_ticks_have_no_gap_wherever_they_begin() {
+        let (account, gaps) = follow(&[(7, 0), (8, 0), (9, 0)]);
+        assert_eq!((account.ticks(), account.overruns(), account.lost_records()), (3, 0, 0));
+        assert_eq!((account.first_tick(), account.last_tick()), (Some(7), Some(9)));
+        assert!(gaps.is_empty());
+    }
+
+    #[test]
+    fn a_gap_the_loop_answers_for_is_an_overrun_and_not_a_loss() {
+        let (account, gaps) = follow(&[(0, 0), (4, 3)]);
+        assert_eq!((account.overruns(), account.lost_records()), (3, 0));
+        assert_eq!(gaps, [Gap { after_tick: 0, before_tick: 4, missed: 3, lost: 0 }]);
+    }
+
+    #[test]
+    fn what_the_loop_does_not_answer_for_is_lost() {
+        let (account, gaps) = follow(&[(0, 0), (4, 1), (10, 0)]);
+        assert_eq!((account.overruns(), account.lost_records()), (1, 2 + 5));
+        assert_eq!(gaps[0], Gap { after_tick: 0, before_tick: 4, missed: 1, lost: 2 });
+        assert_eq!(gaps[1], Gap { after_tick: 4, before_tick: 10, missed: 0, lost: 5 });
+    }
+
+    #[test]
+    fn a_loss_that_is_announced_and_seen_counts_once() {
+        let (mut account, _) = follow(&[(0, 0), (6, 0)]);
+        account.event(&Event { tick: 6, kind: EventKind::Lost { records: 5 } });
+        assert_eq!(account.lost_records(), 5);
+        account.event(&Event { tick: 6, kind: EventKind::Lost { records: 2 } });
+        assert_eq!(account.lost_records(), 7, "two events were lost besides five ticks");
+    }
+
+    #[test]
+    fn ticks_that_repeat_or_go_back_are_refused() {
+        let (mut account, _) = follow(&[(3, 0)]);
+        for tick in [3, 2, 0] {
+            assert_eq!(account.tick(&TickRecord { tick, ..TickRecord::default() }), Err(NotAbove(3)));
+        }
+        assert_eq!(account.ticks(), 1);
+    }
+}

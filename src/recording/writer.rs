@@ -1,0 +1,252 @@
+//! Writes one run of the loop into an MCAP file.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use mcap::records::MessageHeader;
+use mcap::write::{Metadata, NoSeek};
+use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions};
+use prost::Message;
+
+use super::continuity::Continuity;
+use super::digest::Digest;
+use super::messages;
+use super::schema::descriptor_set;
+use super::timing::{Quantiles, Tally};
+use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
+use crate::rt::record::{Event, Published, TickRecord};
+
+/// A chunk is closed and handed to the operating system at every multiple of this scheduled time, whatever the rate:
+/// what dies with the process is half a second at most. At 5 kHz a chunk holds 2500 ticks, some 260 kB before
+/// compression; shorter chunks would compress worse and swell the index.
+const CHUNK_NS: u64 = 500_000_000;
+
+/// A chunk is also closed when it holds this much, so that no rate and no flood of events makes it grow without bound.
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// What is known of a run before its first tick. The system has it before [`Recorder::create`] returns, so that a recording
+/// cut off anywhere still tells what was measured.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Header {
+    /// The whole effective configuration.
+    pub config_toml: String,
+    /// Period of the loop, from which an event gets its time.
+    pub period_ns: u64,
+    /// The program's version, the host, how the loop is scheduled, when it began.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// What a finished recording holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Totals {
+    /// The file.
+    pub path: PathBuf,
+    /// Ticks recorded.
+    pub ticks: u64,
+    /// Events recorded.
+    pub events: u64,
+    /// Number of the first tick, if there is one.
+    pub first_tick: Option<u64>,
+    /// Number of the last tick, if there is one.
+    pub last_tick: Option<u64>,
+    /// Scheduled ticks that passed unserved.
+    pub overruns: u64,
+    /// Records lost on the way from the loop: the larger of what the loop announced and what gaps in the tick numbers
+    /// show.
+    pub lost_records: u64,
+    /// Woke - scheduled.
+    pub lateness: Quantiles,
+    /// Done - woke.
+    pub compute: Quantiles,
+    /// Two runs are bit for bit the same in `/loop` and `/event` if and (but for one chance in 2^64) only if these are.
+    pub loop_digest: u64,
+}
+
+/// An open recording.
+pub struct Recorder {
+    path: PathBuf,
+    mcap: mcap::Writer<NoSeek<BufWriter<Box<dyn Write + Send>>>>,
+    /// Ids of the channels, in the order of [`Topic::ALL`].
+    channels: [u16; 3],
+    /// Messages written on each.
+    written: [u64; 3],
+    period_ns: u64,
+    chunk_ends_ns: u64,
+    encoded: Vec<u8>,
+    account: Continuity,
+    tally: Tally,
+    digest: Digest,
+}
+
+impl Recorder {
+    /// Makes the file and writes everything of `header` to it. A file that exists is never touched.
+    pub fn create(path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
+        let file = File::create_new(path).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
+            _ => RecordingError::Create { path: path.into(), source },
+        })?;
+        Recorder::over(Box::new(file), path, header)
+    }
+
+    /// Records to any place that takes bytes; `path` only names it in messages.
+    pub fn over(out: Box<dyn Write + Send>, path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
+        let failed = |source| RecordingError::Write { path: path.into(), ticks: 0, source };
+        let mut mcap = options().create(NoSeek::new(BufWriter::new(out))).map_err(failed)?;
+        let channels = write_head(&mut mcap, header).map_err(failed)?;
+        Ok(Recorder {
+            path: path.into(),
+            mcap,
+            channels,
+            written: [0; 3],
+            period_ns: header.period_ns,
+            chunk_ends_ns: CHUNK_NS,
+            encoded: Vec::new(),
+            account: Continuity::default(),
+            tally: Tally::new(),
+            digest: Digest::default(),
+        })
+    }
+
+    /// Writes what the loop published. After an error the recording is cut off; nothing more can be written.
+    pub fn record(&mut self, published: &Published) -> Result<(), RecordingError> {
+        match published {
+            Published::Tick(tick) => self.tick(tick),
+            Published::Event(event) => self.event(event),
+        }
+    }
+
+    /// Adds results as (name, media type, content), completes the file and says what is in it.
+    pub fn finish(mut self, attachments: &[(&str, &str, &[u8])]) -> Result<Totals, RecordingError> {
+        self.close_second()?;
+        let written = self.write_end(attachments);
+        written.map_err(|source| self.failed(source))?;
+        Ok(self.totals())
+    }
+
+    /// Ticks recorded so far.
+    pub fn ticks(&self) -> u64 {
+        self.account.ticks()
+    }
+
+    fn tick(&mut self, tick: &TickRecord) -> Result<(), RecordingError> {
+        if self.tally.is_over(tick) {
+            self.close_second()?;
+        }
+        self.close_chunk_if_due(tick.scheduled_ns)?;
+        let order = |after| RecordingError::Order { path: self.path.clone(), tick: tick.tick, after };
+        self.account.tick(tick).map_err(|e| order(e.0))?;
+        self.tally.add(tick);
+        self.write(Topic::Loop, tick.scheduled_ns, &messages::Loop::from(tick))
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
+        self.account.event(event);
+        let scheduled_ns = event.tick.saturating_mul(self.period_ns);
+        self.write(Topic::Event, scheduled_ns, &messages::Event::from(event))
+    }
+
+    fn close_second(&mut self) -> Result<(), RecordingError> {
+        match self.tally.close(&self.account) {
+            Some((last_ns, timing)) => self.write(Topic::Timing, last_ns, &timing),
+            None => Ok(()),
+        }
+    }
+
+    fn close_chunk_if_due(&mut self, scheduled_ns: u64) -> Result<(), RecordingError> {
+        if scheduled_ns < self.chunk_ends_ns {
+            return Ok(());
+        }
+        self.chunk_ends_ns = (scheduled_ns / CHUNK_NS + 1).saturating_mul(CHUNK_NS);
+        self.mcap.flush().map_err(|source| self.failed(source))
+    }
+
+    fn write(&mut self, topic: Topic, log_time: u64, message: &impl Message) -> Result<(), RecordingError> {
+        self.encoded.clear();
+        // A Vec takes any length: `encode_raw` is `encode` without asking for the length first.
+        message.encode_raw(&mut self.encoded);
+        let header = self.next_header(topic, log_time);
+        self.mcap.write_to_known_channel(&header, &self.encoded).map_err(|source| self.failed(source))?;
+        if topic != Topic::Timing {
+            self.digest.add(topic as u8, &self.encoded);
+        }
+        Ok(())
+    }
+
+    /// Messages of a channel are numbered without a gap: a chunk that vanishes from a file is noticed.
+    fn next_header(&mut self, topic: Topic, log_time: u64) -> MessageHeader {
+        let count = &mut self.written[topic as usize];
+        let sequence = *count as u32;
+        *count += 1;
+        MessageHeader { channel_id: self.channels[topic as usize], sequence, log_time, publish_time: log_time }
+    }
+
+    fn write_end(&mut self, attachments: &[(&str, &str, &[u8])]) -> McapResult<()> {
+        for (name, media_type, data) in attachments {
+            attach(&mut self.mcap, name, media_type, data)?;
+        }
+        self.mcap.finish().map(|_| ())
+    }
+
+    fn totals(&self) -> Totals {
+        let (lateness, compute) = self.tally.totals();
+        Totals {
+            path: self.path.clone(),
+            ticks: self.account.ticks(),
+            events: self.written[Topic::Event as usize],
+            first_tick: self.account.first_tick(),
+            last_tick: self.account.last_tick(),
+            overruns: self.account.overruns(),
+            lost_records: self.account.lost_records(),
+            lateness,
+            compute,
+            loop_digest: self.digest.value(),
+        }
+    }
+
+    fn failed(&self, source: McapError) -> RecordingError {
+        RecordingError::Write { path: self.path.clone(), ticks: self.account.ticks(), source }
+    }
+}
+
+/// Whole chunks are put together in memory and appended, never sought back into: a cut file has no half-made chunk
+/// before its last one.
+fn options() -> WriteOptions {
+    WriteOptions::new()
+        .compression(Some(Compression::Lz4))
+        .chunk_size(Some(CHUNK_BYTES))
+        .disable_seeking(true)
+        .library(concat!("bench ", env!("CARGO_PKG_VERSION")))
+}
+
+fn write_head<W: Write + io::Seek>(mcap: &mut mcap::Writer<W>, header: &Header) -> McapResult<[u16; 3]> {
+    let mut metadata = header.metadata.clone();
+    metadata.insert("period_ns".into(), header.period_ns.to_string());
+    mcap.write_metadata(&Metadata { name: METADATA_RECORD.into(), metadata })?;
+    attach(mcap, CONFIG_ATTACHMENT, "application/toml", header.config_toml.as_bytes())?;
+    let schema = descriptor_set();
+    let mut channels = [0; 3];
+    for topic in Topic::ALL {
+        let id = mcap.add_schema(topic.schema_name(), "protobuf", &schema)?;
+        channels[topic as usize] = mcap.add_channel(id, topic.name(), "protobuf", &BTreeMap::new())?;
+    }
+    mcap.flush()?;
+    Ok(channels)
+}
+
+fn attach<W: Write + io::Seek>(
+    mcap: &mut mcap::Writer<W>,
+    name: &str,
+    media_type: &str,
+    data: &[u8],
+) -> McapResult<()> {
+    mcap.attach(&Attachment {
+        log_time: 0,
+        create_time: 0,
+        name: name.into(),
+        media_type: media_type.into(),
+        data: Cow::Borrowed(data),
+    })
+}
