@@ -1,0 +1,105 @@
+//! Streams the ticks and events of a recording, a chunk at a time.
+
+use std::path::{Path, PathBuf};
+
+use prost::Message;
+
+use super::messages;
+use super::walk::{Part, Stop, Walk};
+use super::{RecordingError, Topic};
+use crate::rt::record::{Event, Published, TickRecord};
+
+/// Ticks and events of a recording, read as they are asked for.
+pub(super) struct Stream {
+    path: PathBuf,
+    walk: Walk,
+    chunk: Vec<Published>,
+    next: usize,
+    /// How many there are still to come, by the first reading.
+    left: u64,
+}
+
+impl Iterator for Stream {
+    type Item = Result<Published, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.left = self.left.checked_sub(1)?;
+        while self.next == self.chunk.len() {
+            if let Err(error) = self.read_chunk() {
+                self.left = 0;
+                return Some(Err(error));
+            }
+        }
+        self.next += 1;
+        Some(Ok(self.chunk[self.next - 1]))
+    }
+}
+
+impl Stream {
+    /// A stream of the first `left` ticks and events of the file under `walk`.
+    pub(super) fn new(path: &Path, walk: Walk, left: u64) -> Stream {
+        Stream { path: path.into(), walk, chunk: Vec::new(), next: 0, left }
+    }
+
+    /// Fills `chunk` anew. An error behind some good records is met again after them, if they are not the last wanted.
+    fn read_chunk(&mut self) -> Result<(), RecordingError> {
+        self.chunk.clear();
+        self.next = 0;
+        let chunk = &mut self.chunk;
+        let stepped = self.walk.step(&mut |part| match part {
+            Part::Message { topic: topic @ (Topic::Loop | Topic::Event), data } => {
+                published(topic, data).map(|p| chunk.push(p))
+            }
+            _ => Ok(()),
+        });
+        match stepped {
+            Ok(true) => Ok(()),
+            _ if !self.chunk.is_empty() => Ok(()),
+            Err(Stop::Read(source)) => Err(RecordingError::Read { path: self.path.clone(), source }),
+            _ => Err(self.changed()),
+        }
+    }
+
+    fn changed(&self) -> RecordingError {
+        let what = "the file was changed since it was opened".into();
+        RecordingError::Damaged { path: self.path.clone(), at_byte: self.walk.offset, ticks: 0, what }
+    }
+}
+
+/// The ticks of a recording, see [`super::Recording::ticks`].
+pub struct Ticks(Stream);
+
+impl Ticks {
+    pub(super) fn of(stream: Stream) -> Ticks {
+        Ticks(stream)
+    }
+}
+
+impl Iterator for Ticks {
+    type Item = Result<TickRecord, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.0.next()? {
+                Ok(Published::Tick(tick)) => return Some(Ok(tick)),
+                Ok(Published::Event(_)) => {}
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}
+
+/// The loop's own record of a message on `/loop` or `/event`.
+pub(super) fn published(topic: Topic, data: &[u8]) -> Result<Published, String> {
+    if topic == Topic::Loop {
+        let message: messages::Loop = decode(data)?;
+        return TickRecord::try_from(&message).map(Published::Tick).map_err(|e| e.to_string());
+    }
+    let message: messages::Event = decode(data)?;
+    Event::try_from(&message).map(Published::Event).map_err(|e| e.to_string())
+}
+
+/// A message of its bytes.
+pub(super) fn decode<M: Message + Default>(data: &[u8]) -> Result<M, String> {
+    M::decode(data).map_err(|e| e.to_string())
+}

@@ -1,0 +1,269 @@
+//! Goes through an MCAP file record by record and hands out only what its checks have vouched for.
+//!
+//! What `mcap` checks when asked, and is asked for here: a chunk's CRC over its uncompressed content *before* the first
+//! message leaves it, an attachment's CRC, the CRC from the beginning of the file to the end of the data section, the
+//! CRC of the summary, the magic bytes at both ends. A CRC field of zero means *not checked* to `mcap`; for chunks and
+//! attachments that is refused here. What `mcap` does not check and this module does: that a channel's messages are
+//! numbered without a gap, and the few lengths on which `mcap` would panic.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read};
+
+use mcap::records::{Metadata, Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, parse_record};
+
+use super::{Topic, error};
+
+/// Bytes asked of the system at a time.
+const READ_BYTES: usize = 64 << 10;
+/// No record of a recording is larger; a larger one is a damaged length, for which no memory is claimed.
+const RECORD_BYTES: usize = 256 << 20;
+/// As above, of a chunk after decompression: memory that is claimed on the word of its header.
+const CHUNK_BYTES: usize = 64 << 20;
+
+/// Something in the file that can be trusted.
+pub(super) enum Part<'a> {
+    Message { topic: Topic, data: &'a [u8] },
+    Attachment { name: String, media_type: String, data: &'a [u8] },
+    Metadata(Metadata),
+}
+
+/// Who receives the parts; what it refuses is damage.
+pub(super) type Take<'a> = dyn FnMut(Part<'_>) -> Result<(), String> + 'a;
+
+/// Why a walk ended before the end of a complete file.
+pub(super) enum Stop {
+    /// The file ends early.
+    Cut,
+    /// Something is wrong with its bytes.
+    Damaged(String),
+    /// It is no MCAP file.
+    NotMcap,
+    /// It cannot be read.
+    Read(io::Error),
+}
+
+/// A walk through one file.
+pub(super) struct Walk {
+    file: File,
+    reader: LinearReader,
+    bytes_read: u64,
+    /// Where the record under way begins.
+    pub(super) offset: u64,
+    pub(super) contents: Contents,
+}
+
+/// What the records seen so far have defined.
+#[derive(Default)]
+pub(super) struct Contents {
+    schemas: BTreeMap<u16, String>,
+    /// Topic and schema name of every channel.
+    pub(super) channels: BTreeMap<u16, (String, String)>,
+    topics: BTreeMap<u16, Topic>,
+    messages: [u64; 3],
+    data_ended: bool,
+}
+
+impl Walk {
+    pub(super) fn new(file: File) -> Walk {
+        let options = LinearReaderOptions::default()
+            .with_emit_chunks(true)
+            .with_check_finishes_after_end_magic(true)
+            .with_validate_data_section_crc(true)
+            .with_validate_summary_section_crc(true)
+            .with_record_length_limit(RECORD_BYTES);
+        let reader = LinearReader::new_with_options(options);
+        Walk { file, reader, bytes_read: 0, offset: 0, contents: Contents::default() }
+    }
+
+    /// Goes one record on (a whole chunk at a time); `false` at the end of a complete file.
+    pub(super) fn step(&mut self, take: &mut Take) -> Result<bool, Stop> {
+        while let Some(event) = self.reader.next_event() {
+            match event {
+                Ok(LinearReadEvent::ReadRequest(need)) => self.fill(need)?,
+                Ok(LinearReadEvent::Record { opcode, data }) => {
+                    let next = self.offset.max(mcap::MAGIC.len() as u64) + 9 + data.len() as u64;
+                    self.contents.record(opcode, data, take).map_err(Stop::Damaged)?;
+                    self.offset = next;
+                    return Ok(true);
+                }
+                Err(e) => return Err(self.stop(e)),
+            }
+        }
+        if self.contents.data_ended {
+            Ok(false)
+        } else {
+            Err(Stop::Damaged("the end of its data is not marked".into()))
+        }
+    }
+
+    fn fill(&mut self, need: usize) -> Result<(), Stop> {
+        let buffer = self.reader.insert(need.clamp(READ_BYTES, 16 * READ_BYTES));
+        let read = loop {
+            match self.file.read(buffer) {
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                other => break other.map_err(Stop::Read)?,
+            }
+        };
+        self.reader.notify_read(read);
+        self.bytes_read += read as u64;
+        Ok(())
+    }
+
+    fn stop(&self, error: McapError) -> Stop {
+        match error {
+            McapError::UnexpectedEof if self.bytes_read < mcap::MAGIC.len() as u64 => Stop::NotMcap,
+            McapError::UnexpectedEof => Stop::Cut,
+            McapError::BadMagic if self.offset == 0 => Stop::NotMcap,
+            McapError::BadMagic => Stop::Damaged("the file does not end as an MCAP file does".into()),
+            other => Stop::Damaged(error::why(&other)),
+        }
+    }
+}
+
+impl Contents {
+    fn record(&mut self, opcode: u8, data: &[u8], take: &mut Take) -> Result<(), String> {
+        match opcode {
+            op::DATA_END => self.data_ended = true,
+            _ if self.data_ended => {} // the summary repeats what came before
+            op::CHUNK => self.chunk(data, take)?,
+            op::ATTACHMENT => attachment(data, take)?,
+            op::METADATA => metadata(data, take)?,
+            op::MESSAGE => return Err("a message outside of the chunks, where no CRC covers it".into()),
+            op::SCHEMA | op::CHANNEL => self.define(opcode, data)?,
+            _ => {} // indexes, and what a later version of MCAP may add
+        }
+        Ok(())
+    }
+
+    /// Takes a chunk apart with a reader of its own, which checks the CRC before it yields a record.
+    fn chunk(&mut self, chunk: &[u8], take: &mut Take) -> Result<(), String> {
+        vet_chunk(chunk)?;
+        let mut reader = chunk_reader(chunk);
+        while let Some(event) = reader.next_event() {
+            match event.map_err(|e| error::why(&e))? {
+                LinearReadEvent::Record { opcode: op::MESSAGE, data } => self.message(data, take)?,
+                LinearReadEvent::Record { opcode, data } => self.define(opcode, data)?,
+                LinearReadEvent::ReadRequest(_) => reader.notify_read(0), // all of it was given: this is its end
+            }
+        }
+        Ok(())
+    }
+
+    fn define(&mut self, opcode: u8, data: &[u8]) -> Result<(), String> {
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
+            return Ok(());
+        }
+        match parse_record(opcode, data).map_err(|e| error::why(&e))? {
+            Record::Schema { header, .. } => drop(self.schemas.insert(header.id, header.name)),
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let ours = |t: &Topic| t.name() == channel.topic && t.schema_name() == schema;
+                self.topics.extend(Topic::ALL.into_iter().find(ours).map(|t| (channel.id, t)));
+                self.channels.insert(channel.id, (channel.topic, schema));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A message is its channel (u16), its number there (u32), two times (u64) and its data.
+    fn message(&mut self, message: &[u8], take: &mut Take) -> Result<(), String> {
+        let Some((header, data)) = message.split_first_chunk::<22>() else {
+            return Err("a message without a header".into());
+        };
+        let [c0, c1, n0, n1, n2, n3, ..] = *header;
+        let Some(&topic) = self.topics.get(&u16::from_le_bytes([c0, c1])) else {
+            return Ok(()); // of another program's channel
+        };
+        self.count(topic, u32::from_le_bytes([n0, n1, n2, n3]))?;
+        take(Part::Message { topic, data })
+    }
+
+    fn count(&mut self, topic: Topic, number: u32) -> Result<(), String> {
+        let expected = self.messages[topic as usize] as u32;
+        self.messages[topic as usize] += 1;
+        if number == expected {
+            return Ok(());
+        }
+        Err(format!("message {expected} of {} is missing, {number} follows", topic.name()))
+    }
+
+    /// Whether the channel with the ticks is there.
+    pub(super) fn has_loop(&self) -> bool {
+        self.topics.values().any(|t| *t == Topic::Loop)
+    }
+}
+
+fn chunk_reader(chunk: &[u8]) -> LinearReader {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(CHUNK_BYTES);
+    let mut reader = LinearReader::new_with_options(options);
+    let room = reader.insert(9 + chunk.len());
+    room[0] = op::CHUNK;
+    room[1..9].copy_from_slice(&(chunk.len() as u64).to_le_bytes());
+    room[9..].copy_from_slice(chunk);
+    reader.notify_read(9 + chunk.len());
+    reader
+}
+
+/// Refuses what `mcap` would take unchecked (no CRC) or panic at (a length beyond the end of an uncompressed chunk).
+fn vet_chunk(chunk: &[u8]) -> Result<(), String> {
+    let Record::Chunk { header, data } = parse_record(op::CHUNK, chunk).map_err(|e| error::why(&e))? else {
+        return Err("a chunk that is none".into());
+    };
+    match header.compression.as_str() {
+        _ if header.uncompressed_crc == 0 => Err("a chunk without a CRC".into()),
+        "" if !is_framed(&data) => Err("a record that reaches beyond its chunk".into()),
+        _ => Ok(()),
+    }
+}
+
+/// Whether `records` is a row of (opcode, length u64, content) to its very end.
+fn is_framed(mut records: &[u8]) -> bool {
+    while let Some((head, rest)) = records.split_first_chunk::<9>() {
+        let [_, length @ ..] = *head;
+        match usize::try_from(u64::from_le_bytes(length)).ok().and_then(|n| rest.get(n..)) {
+            Some(next) => records = next,
+            None => return false,
+        }
+    }
+    records.is_empty()
+}
+
+fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
+    if !attachment_is_framed(data) {
+        return Err("an attachment shorter than its own header".into());
+    }
+    match parse_record(op::ATTACHMENT, data).map_err(|e| error::why(&e))? {
+        Record::Attachment { crc: 0, .. } => Err("an attachment without a CRC".into()),
+        Record::Attachment { header, data, .. } => {
+            take(Part::Attachment { name: header.name, media_type: header.media_type, data: &data })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Two times (u64), name and media type (each with its length u32), the length of the content (u64), the content, a CRC
+/// (u32): `mcap` panics where the record ends between the length and the CRC.
+fn attachment_is_framed(record: &[u8]) -> bool {
+    let after_string = |rest: &[u8]| {
+        let (length, text) = rest.split_first_chunk::<4>()?;
+        text.get(u32::from_le_bytes(*length) as usize..).map(<[u8]>::len)
+    };
+    let tail = |remaining: usize| &record[record.len() - remaining..];
+    let after_name = record.get(16..).and_then(after_string);
+    after_name.and_then(|n| after_string(tail(n))).is_some_and(|n| n >= 8 + 4)
+}
+
+fn metadata(data: &[u8], take: &mut Take) -> Result<(), String> {
+    match parse_record(op::METADATA, data).map_err(|e| error::why(&e))? {
+        Record::Metadata(metadata) => take(Part::Metadata(metadata)),
+        _ => Ok(()),
+    }
+}

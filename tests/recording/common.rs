@@ -1,0 +1,81 @@
+//! Runs to record, and short ways to write and read them.
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use bench::recording::{Header, Recorder, Totals};
+use bench::rt::arming::{State, Trip};
+use bench::rt::record::{Event, EventKind, OrderKind, Published, TickRecord};
+use bench_hal::Validity;
+
+/// 5 kHz.
+pub const PERIOD_NS: u64 = 200_000;
+
+pub const CONFIG: &str = "profile = \"stage\"\n[loop]\nservo_rate_hz = 5000\n";
+
+pub fn header() -> Header {
+    let metadata = [("version", "0.1.0"), ("host", "test"), ("policy", "virtual")];
+    Header {
+        config_toml: CONFIG.into(),
+        period_ns: PERIOD_NS,
+        metadata: BTreeMap::from(metadata.map(|(k, v)| (k.to_string(), v.to_string()))),
+    }
+}
+
+/// A tick as the simulator gives it: a moving stage, a noisy probe, a command; all from the number, so every run is the
+/// same.
+pub fn tick(number: u64) -> TickRecord {
+    let t = number as f64 * 2e-4;
+    let noise = (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / 2f64.powi(53) - 0.5;
+    let scheduled_ns = number * PERIOD_NS;
+    TickRecord {
+        tick: number,
+        scheduled_ns,
+        woke_ns: scheduled_ns,
+        done_ns: scheduled_ns,
+        reference_m: 1e-4 * (30.0 * t).sin(),
+        position_m: 1e-4 * (30.0 * t - 0.1).sin() + 1e-8 * noise,
+        requested_a: 0.2 * (30.0 * t).cos() + 1e-3 * noise,
+        command_a: 0.2 * (30.0 * t).cos(),
+        probe_sequence: number + 1,
+        probe_age_ns: 50_000,
+        validity: Validity::Valid,
+        state: State::Running,
+        flags: 1,
+        missed_ticks: 0,
+    }
+}
+
+/// A whole run of `ticks` ticks: order, state and end as events among them.
+pub fn run(ticks: u64) -> Vec<Published> {
+    let event = |tick, kind| Published::Event(Event { tick, kind });
+    let mut run = vec![
+        event(0, EventKind::Order(OrderKind::Arm)),
+        event(0, EventKind::State { from: State::Disarmed, to: State::Armed }),
+    ];
+    run.extend((0..ticks).map(|n| Published::Tick(tick(n))));
+    run.push(event(ticks - 1, EventKind::Trip(Trip::Travel { position_m: 4.1e-3, limit_m: 4e-3 })));
+    run
+}
+
+/// Writes `run` and finishes with one result.
+pub fn write(path: &Path, run: &[Published]) -> Totals {
+    let mut recorder = Recorder::create(path, &header()).expect("a fresh file");
+    run.iter().for_each(|p| recorder.record(p).expect("a good disk"));
+    recorder.finish(&[("result.json", "application/json", b"{\"outcome\":\"completed\"}")]).expect("a good disk")
+}
+
+/// All bits of a tick: `==` takes -0.0 for 0.0 and no NaN for itself.
+pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4]) {
+    let floats = [t.reference_m, t.position_m, t.requested_a, t.command_a].map(f64::to_bits);
+    (TickRecord { reference_m: 0.0, position_m: 0.0, requested_a: 0.0, command_a: 0.0, ..*t }, floats)
+}
+
+pub fn ticks_of(run: &[Published]) -> Vec<TickRecord> {
+    let tick = |p: &Published| if let Published::Tick(t) = p { Some(*t) } else { None };
+    run.iter().filter_map(tick).collect()
+}
+
+pub fn events_of(run: &[Published]) -> Vec<Event> {
+    let event = |p: &Published| if let Published::Event(e) = p { Some(*e) } else { None };
+    run.iter().filter_map(event).collect()
+}

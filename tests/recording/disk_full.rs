@@ -1,0 +1,91 @@
+//! A full disk: `/dev/full` answers every write with the system's own "no space left".
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bench::recording::{Recorder, Recording, RecordingError, spawn};
+use bench::rt::record::Published;
+use rtrb::RingBuffer;
+
+use crate::common::{header, tick};
+
+fn dev_full() -> File {
+    OpenOptions::new().write(true).open("/dev/full").expect("Linux has /dev/full")
+}
+
+/// A disk with room for so many bytes.
+struct SmallDisk {
+    file: File,
+    room: usize,
+    full: File,
+}
+
+impl Write for SmallDisk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.room == 0 {
+            return self.full.write(bytes);
+        }
+        let written = self.file.write(&bytes[..bytes.len().min(self.room)])?;
+        self.room -= written;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+#[test]
+fn a_disk_that_is_full_from_the_start_is_told_at_once_with_a_remedy() {
+    let refused = Recorder::over(Box::new(dev_full()), Path::new("full.mcap"), &header()).err().expect("full");
+    assert!(matches!(refused, RecordingError::Write { ticks: 0, .. }), "{refused:?}");
+    let text = refused.to_string();
+    assert!(text.contains("full.mcap") && text.contains("No space left") && text.contains("free space"), "{text}");
+}
+
+#[test]
+fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let path = dir.path().join("filled.mcap");
+    let disk = SmallDisk { file: File::create_new(&path).expect("fresh"), room: 1 << 20, full: dev_full() };
+    let recorder = Recorder::over(Box::new(disk), &path, &header()).expect("room for the head");
+    let (mut ring, consumer) = RingBuffer::new(1024);
+    let handle = spawn(recorder, consumer).expect("a thread");
+    let health = handle.health();
+
+    // 40,000 ticks of some 90 bytes are more than three times the room.
+    let mut failed_after = None;
+    for n in 0..40_000 {
+        push(&mut ring, Published::Tick(tick(n)));
+        failed_after = failed_after.or(health.failed().then_some(n));
+    }
+    let failed_after = failed_after.expect("the failure shows while the loop still runs");
+    assert!((5_000..25_000).contains(&failed_after), "1 MiB are some 11,000 ticks; told at {failed_after}");
+    drop(ring);
+
+    let error = handle.join().err().expect("the disk was full");
+    assert!(error.to_string().contains("No space left"), "{error}");
+    assert!(health.failed());
+    assert_eq!(health.written() + health.thrown_away(), 40_000, "every record is accounted for");
+    assert!(health.thrown_away() >= 15_000, "{}", health.thrown_away());
+    what_was_written_is_readable(&path, health.written());
+}
+
+/// The loop's end: never waits for the recorder, so a full ring here means that the thread stopped draining.
+fn push(ring: &mut rtrb::Producer<Published>, published: Published) {
+    let patience = Instant::now() + Duration::from_secs(10);
+    while ring.is_full() {
+        assert!(Instant::now() < patience, "the ring is not emptied any more");
+        std::thread::sleep(Duration::from_micros(100));
+    }
+    ring.push(published).expect("has room");
+}
+
+fn what_was_written_is_readable(path: &Path, written: u64) {
+    let recording = Recording::open(path).expect("readable up to where the disk was full");
+    assert!(recording.truncated());
+    // The chunk in which the disk filled up (2500 ticks) is lost.
+    assert!((written - 2 * 2500..=written).contains(&recording.tick_count()), "{}", recording.tick_count());
+    assert_eq!(recording.ticks().expect("readable").count() as u64, recording.tick_count());
+}
