@@ -1,1 +1,23 @@
-//! Room: identify.
+//! From recorded signals to a frequency response function (FRF) that says how far it can be trusted.
+//!
+//! ```text
+//! Signals -> drift removed -> FFT of the whole record -> local H1 in each neighbourhood of bins -> Frf -> CSV, plot
+//! ```
+//!
+//! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
+//! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
+//!
+//! Sign convention of both estimators: y = H u, so a lag of the output is a negative phase.
+
+mod band;
+mod error;
+mod frf;
+pub mod local;
+mod signals;
+mod spectrum;
+pub mod welch;
+
+pub use error::IdentifyError;
+pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD};
+pub use local::EstimatorSettings;
+pub use signals::Signals;

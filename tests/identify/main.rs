@@ -1,0 +1,8 @@
+//! What the identification room promises, against analytic plants and against scipy.
+
+mod accuracy;
+mod bad_data;
+mod noise;
+mod python;
+mod stage;
+mod welch;
