@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod bad_data;
+mod csv;
 mod noise;
 mod python;
 mod stage;
