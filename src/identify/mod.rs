@@ -20,6 +20,6 @@ mod spectrum;
 pub mod welch;
 
 pub use error::IdentifyError;
-pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD};
+pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, wrapped_phase_rad};
 pub use local::EstimatorSettings;
 pub use signals::Signals;

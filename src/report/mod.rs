@@ -1,1 +1,21 @@
-//! Room: report.
+//! What a person looks at: plots as self-contained SVG.
+//!
+//! ```text
+//! bode -> trace (checked, unwrapped by phase) -> panel (axis: scales and ticks, curve: thinned out) -> canvas (SVG)
+//! ```
+//!
+//! Text stays text in the SVG, in the viewer's own sans-serif: no font is needed to make a plot.
+
+mod axis;
+pub mod bode;
+mod canvas;
+mod curve;
+mod error;
+mod header;
+mod panel;
+pub mod phase;
+mod trace;
+
+pub use bode::bode_svg;
+pub use error::ReportError;
+pub use trace::{Curve, Trace};

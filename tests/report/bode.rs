@@ -1,0 +1,277 @@
+use bench::identify::Frf;
+use bench::report::{Curve, ReportError, Trace, bode_svg};
+use nalgebra::Complex;
+use proptest::prelude::*;
+
+use crate::pictures::{self, bode, flat, frequencies, keep, measured, model, short_and_noisy};
+use crate::stage::SampledPlant;
+use crate::svg::{self, Words};
+
+const MEASURED: &str = "#0072B2";
+const MODEL: &str = "#D55E00";
+/// Of the page, in its units.
+const WIDTH: f64 = 10_000.0;
+const HEIGHT: f64 = 8_800.0;
+/// Edges of the panels.
+const LEFT: f64 = 840.0;
+const RIGHT: f64 = 9_740.0;
+
+const RUN: &str = "stage · operating point 8 % of L · asymmetry +10 % · chirp 0.1 to 500 Hz in 110 s at 5 kHz · 600 000 ticks, \
+                   0 overruns, 0 lost · seed 1 · run-0007.mcap";
+
+fn texts(svg: &str) -> Vec<String> {
+    svg::words(svg).into_iter().map(|words| words.text).collect()
+}
+
+fn assert_shows(svg: &str, expected: &[&str]) {
+    let texts = texts(svg);
+    for text in expected {
+        assert!(texts.iter().any(|shown| shown == text), "{text:?} is not among {texts:?}");
+    }
+}
+
+/// No text is cut off by the page or runs into another, no curve leaves the page, no coordinate is no number.
+fn assert_tidy(svg: &str) {
+    let words = svg::words(svg);
+    for word in &words {
+        let inside = word.left >= 0.0 && word.right <= WIDTH && word.top >= 0.0 && word.bottom <= HEIGHT;
+        assert!(inside, "{word:?} leaves the page");
+    }
+    for (k, a) in words.iter().enumerate() {
+        assert!(words[k + 1..].iter().all(|b| !overlap(a, b)), "{a:?} runs into another");
+    }
+    for kind in ["polyline", "polygon"] {
+        for (x, y) in svg::points(svg, kind, "").concat() {
+            assert!((LEFT..=RIGHT).contains(&x) && (0.0..=HEIGHT).contains(&y), "({x}, {y})");
+        }
+    }
+    assert!(!svg.contains("NaN") && !svg.contains("inf"));
+}
+
+fn overlap(a: &Words, b: &Words) -> bool {
+    a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom
+}
+
+#[test]
+fn the_plot_of_a_run_names_its_axes_with_units_and_its_curves_in_a_legend() {
+    let svg = bode("bode-run.svg", &measured(), Some(&SampledPlant::stage()), RUN);
+    assert_tidy(&svg);
+    assert_shows(&svg, &["FRF from current to displacement", "Magnitude (m/A)", "Phase (deg)", "Coherence"]);
+    assert_shows(&svg, &["Frequency (Hz)", "1", "10", "100", "10⁻⁴", "10⁻⁶", "0", "measured (band: ±2σ)"]);
+    assert!(texts(&svg).join(" ").contains("run-0007.mcap"));
+}
+
+#[test]
+fn the_plot_of_8700_frequencies_stays_below_400_kilobytes() {
+    let frf = measured();
+    let svg = bode("bode-run.svg", &frf, Some(&SampledPlant::stage()), RUN);
+    println!("{} frequencies in {} bytes", frf.len(), svg.len());
+    assert!(frf.len() > 8000 && (50_000..400_000).contains(&svg.len()), "{} bytes", svg.len());
+}
+
+#[test]
+fn a_peak_narrower_than_a_pixel_is_drawn_to_its_top() {
+    let frequency_hz = frequencies(1.0, 1000.0, 100_000);
+    let mut response = vec![Complex::from(1e-4); 100_000];
+    // Neither the first nor the last of the 112 samples of its pixel column.
+    response[50_050] = Complex::from(1e-3);
+    let trace = [Trace { name: "peak", curve: Curve::Model { frequency_hz: &frequency_hz, response: &response } }];
+    let svg = bode_svg(&trace, "", "").unwrap();
+    let curves = svg::points(&svg, "polyline", MODEL);
+    // Legend, magnitude, phase. The axis is 1.12 decades high, the peak one decade of it.
+    let ys = curves[1].iter().map(|point| point.1);
+    let (top, bottom) = ys.fold((f64::MAX, f64::MIN), |(top, bottom), y| (y.min(top), y.max(bottom)));
+    let frame = svg::points(&svg, "polyline", "#5A5A5A")[0].iter().map(|p| p.1).fold(f64::MIN, f64::max);
+    let panel = frame - svg::points(&svg, "polyline", "#5A5A5A")[0][0].1;
+    assert!(((bottom - top) / panel - 1.0 / 1.12).abs() < 0.01, "{} of {panel}", bottom - top);
+    // In the middle of the axis.
+    let peak = curves[1].iter().find(|point| point.1 == top).unwrap();
+    assert!((peak.0 - 5290.0).abs() < 10.0, "{peak:?}");
+    assert!(curves[1].len() < 4000);
+}
+
+#[test]
+fn a_measured_curve_lies_within_its_band_and_both_within_the_frame() {
+    let svg =
+        bode("bode-short-and-noisy.svg", &short_and_noisy(), Some(&SampledPlant::stage()), "8 s at 4 mA and less");
+    assert_tidy(&svg);
+    let frames = svg::points(&svg, "polyline", "#5A5A5A");
+    assert_eq!(frames.len(), 3);
+    let inside = |point: &(f64, f64), frame: &[(f64, f64)]| {
+        point.0 >= frame[0].0 && point.0 <= frame[1].0 && point.1 >= frame[0].1 && point.1 <= frame[2].1
+    };
+    let legend = 1;
+    for points in svg::points(&svg, "polyline", MEASURED).iter().skip(legend) {
+        assert!(points.iter().all(|point| frames.iter().any(|frame| inside(point, frame))));
+    }
+    // One polygon in the legend, one each around magnitude and phase, none around coherence.
+    assert_eq!(svg::points(&svg, "polygon", MEASURED).len(), 3);
+}
+
+#[test]
+fn where_two_sigma_reach_zero_the_curve_is_faint_and_has_no_say_in_the_axis() {
+    let mut frf = flat();
+    for k in 40..60 {
+        frf.response[k] = Complex::from(1e-9);
+        frf.magnitude_sigma[k] = 1e-9;
+    }
+    let svg = bode_svg(&[Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "").unwrap();
+    assert!(svg.contains(&format!("opacity=\"0.3\" stroke=\"{MEASURED}\"")));
+    assert!(!texts(&svg).iter().any(|text| text.contains("10⁻⁹")), "{:?}", texts(&svg));
+}
+
+#[test]
+fn a_flat_response_gets_a_decade_and_half_a_turn_of_axis() {
+    let svg = bode("bode-flat.svg", &flat(), None, "all equal");
+    assert_tidy(&svg);
+    assert_shows(&svg, &["10⁻⁴", "5·10⁻⁵", "2·10⁻⁴", "\u{2212}90", "0", "90", "1", "10", "100"]);
+}
+
+/// The first column of the phase is that of the lowest frequency: at DC the stage follows the current.
+#[test]
+fn the_phase_begins_at_0_and_runs_on_below_minus_360_degrees_where_zeros_are_not_minimum_phase() {
+    let svg = bode("bode-run.svg", &measured(), Some(&SampledPlant::stage()), RUN);
+    assert_shows(&svg, &["0", "\u{2212}180", "\u{2212}360", "\u{2212}540"]);
+    let left = |point: &(f64, f64)| point.0 == LEFT;
+    let begins = svg::points(&svg, "polyline", MEASURED).concat().into_iter().filter(left).nth(2).unwrap().1;
+    let mut zero =
+        svg::words(&svg).into_iter().filter(|words| words.text == "0").map(|words| (words.top + words.bottom) / 2.0);
+    assert!(zero.any(|y| (y - begins).abs() < 20.0), "begins at {begins}");
+}
+
+#[test]
+fn frequencies_without_input_leave_a_gap_and_a_lone_frequency_is_a_dot() {
+    let mut frf = flat();
+    frf.resolution_hz = frf.frequency_hz.iter().map(|f| 0.05 * f).collect();
+    let keep_only = |column: &mut Vec<f64>| {
+        let kept = |k: usize| k < 40 || k == 50 || k > 60;
+        *column = column.iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, value)| *value).collect();
+    };
+    for column in [
+        &mut frf.frequency_hz,
+        &mut frf.coherence,
+        &mut frf.magnitude_sigma,
+        &mut frf.phase_sigma_rad,
+        &mut frf.resolution_hz,
+    ] {
+        keep_only(column);
+    }
+    frf.response.truncate(frf.frequency_hz.len());
+    let svg = bode("bode-gap.svg", &frf, None, "no input from 6 to 16 Hz but at one frequency");
+    // Legend, then in each of three panels the stretches below, between (a point) and above.
+    assert_eq!(svg::points(&svg, "polyline", MEASURED).len(), 1 + 3 * 3);
+    assert!(svg.matches("<circle").count() >= 3);
+}
+
+#[test]
+fn a_model_over_a_measured_curve_is_dashed_so_that_both_are_seen_and_alone_it_is_not() {
+    let frf = flat();
+    let response = vec![Complex::from(1.5e-4); frf.len()];
+    let curve = Curve::Model { frequency_hz: &frf.frequency_hz, response: &response };
+    let model = Trace { name: "model", curve };
+    let alone = bode_svg(std::slice::from_ref(&model), "", "").unwrap();
+    assert_eq!(svg::points(&alone, "polyline", MODEL).len(), 3);
+    let both = bode_svg(&[model, Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "").unwrap();
+    // 890 pixels in each of two panels, 30 in the legend; a dash every 11 pixels: 81 + 81 + 3, and 6 of the 11 drawn.
+    let dashes = svg::points(&both, "polyline", MODEL);
+    assert_eq!(dashes.len(), 165);
+    assert!(dashes.iter().filter(|dash| dash[dash.len() - 1].0 - dash[0].0 == 60.0).count() > 150);
+}
+
+#[test]
+fn models_alone_make_a_plot_without_coherence() {
+    let frequency_hz = frequencies(0.5, 1000.0, 3000);
+    let (stage, first) = (SampledPlant::stage(), SampledPlant::new(&[(183.9, 0.4715, 0.0088)]));
+    let (whole, alone) = (model(&stage, &frequency_hz), model(&first, &frequency_hz));
+    let curve = |response| Curve::Model { frequency_hz: &frequency_hz, response };
+    let traces = [Trace { name: "stage", curve: curve(&whole) }, Trace { name: "first mode", curve: curve(&alone) }];
+    let svg = bode_svg(&traces, "Model", "stage, 8 % of L").unwrap();
+    keep("bode-models.svg", &svg);
+    assert_tidy(&svg);
+    assert_shows(&svg, &["stage", "first mode", "1000"]);
+    assert!(!texts(&svg).contains(&"Coherence".to_owned()));
+}
+
+#[test]
+fn a_narrow_band_has_labels_too() {
+    let frequency_hz = frequencies(80.0, 90.0, 500);
+    let response = model(&SampledPlant::stage(), &frequency_hz);
+    let trace =
+        [Trace { name: "close modes", curve: Curve::Model { frequency_hz: &frequency_hz, response: &response } }];
+    let svg = bode_svg(&trace, "Close modes", "").unwrap();
+    keep("bode-narrow.svg", &svg);
+    assert_tidy(&svg);
+    assert_shows(&svg, &["80", "82", "84", "86", "88", "90"]);
+}
+
+#[test]
+fn a_single_frequency_is_a_plot_as_well() {
+    let trace =
+        [Trace { name: "one", curve: Curve::Model { frequency_hz: &[29.3], response: &[Complex::from(1e-4)] } }];
+    assert_tidy(&bode_svg(&trace, "One", "").unwrap());
+}
+
+#[test]
+fn long_titles_and_many_names_are_wrapped_and_letters_that_mean_something_to_svg_are_escaped() {
+    let frf = flat();
+    let name = "a measured response with a <long> name & more";
+    let traces: Vec<Trace> = (0..5).map(|_| Trace { name, curve: Curve::Measured(&frf) }).collect();
+    let svg = bode_svg(&traces, &"title ".repeat(40), &"x".repeat(500)).unwrap();
+    keep("bode-long.svg", &svg);
+    assert_tidy(&svg);
+    assert!(svg.contains("&lt;long&gt; name &amp; more") && !svg.contains("<long>"));
+}
+
+fn draw(curve: Curve) -> ReportError {
+    bode_svg(&[Trace { name: "bad", curve }], "", "").unwrap_err()
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_by_name() {
+    let one = [Complex::from(1.0)];
+    let two = [Complex::from(1.0), Complex::from(f64::NAN)];
+    assert_eq!(bode_svg(&[], "", "").unwrap_err(), ReportError::NoTrace);
+    assert_eq!(draw(Curve::Measured(&Frf::default())), ReportError::Empty { name: "bad".into() });
+    let error = draw(Curve::Model { frequency_hz: &[1.0, 2.0], response: &one });
+    assert_eq!(error.to_string(), "the trace \"bad\" has 2 frequencies, but a column of 1 values");
+    for frequency_hz in [[0.0, 1.0], [2.0, 1.0], [-1.0, 1.0], [f64::NAN, 1.0], [1.0, f64::INFINITY]] {
+        let error = draw(Curve::Model { frequency_hz: &frequency_hz, response: &two });
+        assert!(matches!(error, ReportError::Frequency { .. }), "{error}");
+    }
+    let error = draw(Curve::Model { frequency_hz: &[1.0, 2.0], response: &two });
+    assert!(error.to_string().contains("not finite at 2 Hz"), "{error}");
+    let error = draw(Curve::Model { frequency_hz: &[1.0], response: &[Complex::from(0.0)] });
+    assert_eq!(error, ReportError::NoMagnitude);
+    let ragged = Frf { coherence: vec![1.0], ..flat() };
+    assert!(matches!(draw(Curve::Measured(&ragged)), ReportError::Lengths { values: 1, .. }));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_the_response_there_is_a_tidy_plot_or_an_error_and_never_a_panic(
+        rows in prop::collection::vec((1e-3..1e3_f64, -12.0..2.0_f64, -4.0..4.0_f64, -14.0..3.0_f64, 0.0..1.0_f64), 1..80),
+        from_hz in -3.0..3.0_f64,
+    ) {
+        let mut frf = Frf::default();
+        let mut frequency_hz = 10_f64.powf(from_hz);
+        for (step, magnitude, phase, sigma, coherence) in rows {
+            frequency_hz += step;
+            frf.frequency_hz.push(frequency_hz);
+            frf.response.push(Complex::from_polar(10_f64.powf(magnitude), phase));
+            frf.coherence.push(coherence);
+            frf.magnitude_sigma.push(10_f64.powf(sigma));
+            frf.phase_sigma_rad.push(10_f64.powf(sigma - magnitude).min(1.8));
+            frf.resolution_hz.push(step);
+        }
+        let model = Curve::Model { frequency_hz: &frf.frequency_hz, response: &frf.response };
+        let traces = [Trace { name: "any", curve: Curve::Measured(&frf) }, Trace { name: "model", curve: model }];
+        assert_tidy(&bode_svg(&traces, "Any", "any").unwrap());
+    }
+}
+
+#[test]
+fn the_picture_of_the_stage_is_kept_without_its_model_as_well() {
+    assert_tidy(&pictures::bode("bode-measured.svg", &measured(), None, RUN));
+}
