@@ -16,6 +16,28 @@ pub struct Source {
     pub config: Option<String>,
     /// `KEY=VALUE`, the later one wins.
     pub sets: Vec<String>,
+    /// What it is for.
+    pub purpose: Purpose,
+}
+
+/// What a configuration is for: relations between settings that a command does not use do not stand in its way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Purpose {
+    /// Models, margins, replay.
+    #[default]
+    Model,
+    /// An excitation.
+    Chirp,
+    /// A closed loop.
+    Control,
+    /// Whatever may come.
+    All,
+}
+
+impl Purpose {
+    fn includes(self, other: Purpose) -> bool {
+        self == other || self == Purpose::All
+    }
 }
 
 /// Why a configuration is refused. Nothing has moved yet when it is.
@@ -64,15 +86,23 @@ struct Layer {
 
 /// Loads, merges and checks a configuration.
 pub fn load(source: &Source) -> Result<Config, ConfigError> {
-    let layers = layers(source)?;
+    checked(&layers(source)?, source.purpose)
+}
+
+/// The configuration that travels with a recording: whole, over nothing.
+pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
+    checked(&[parse(name.to_string(), text.to_string())?], Purpose::Model)
+}
+
+fn checked(layers: &[Layer], purpose: Purpose) -> Result<Config, ConfigError> {
     let mut merged = Table::new();
-    for layer in &layers {
+    for layer in layers {
         lay(&mut merged, &layer.table, same_kind);
     }
     let findings = check::check(&schema(), &Value::Table(merged.clone()));
-    refuse(&layers, findings)?;
+    refuse(layers, findings)?;
     let config: Config = merged.try_into().map_err(|e: toml::de::Error| ConfigError::Refused(vec![e.to_string()]))?;
-    refuse(&layers, cross_checks(&config))?;
+    refuse(layers, cross_checks(&config, purpose))?;
     Ok(config)
 }
 
@@ -128,15 +158,20 @@ fn read(name: &str, known: &[Embedded], what: &'static str) -> Result<String, Co
     std::fs::read_to_string(path).map_err(|e| ConfigError::Unreadable { path: path.into(), why: e.to_string() })
 }
 
-/// Loads a TOML file of its own type, an embedded one by its name or any by its path, checked against the type's schema.
-pub(crate) fn typed<T>(name: &str, known: &[Embedded], what: &'static str) -> Result<T, ConfigError>
+/// The text of an embedded file by its name, or of any file by its path.
+pub(crate) fn text_of(name: &str, known: &[Embedded], what: &'static str) -> Result<String, ConfigError> {
+    match profiles::find(known, name) {
+        Some(embedded) => Ok(embedded.text.to_string()),
+        None => read(name, known, what),
+    }
+}
+
+/// TOML of a type of its own, checked against the type's schema.
+pub(crate) fn typed<T>(name: &str, text: &str) -> Result<T, ConfigError>
 where
     T: serde::de::DeserializeOwned + schemars::JsonSchema,
 {
-    let layer = match profiles::find(known, name) {
-        Some(embedded) => parse(format!("{what} {name}"), embedded.text.to_string())?,
-        None => parse(name.to_string(), read(name, known, what)?)?,
-    };
+    let layer = parse(name.to_string(), text.to_string())?;
     let schema = schemars::schema_for!(T).to_value();
     let findings = check::check(&schema, &Value::Table(layer.table.clone()));
     refuse(std::slice::from_ref(&layer), findings)?;
@@ -195,61 +230,61 @@ fn same_kind(old: &Table, new: &Table) -> bool {
 }
 
 /// What no single setting can say: relations between settings.
-fn cross_checks(config: &Config) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    let mut must = |good: bool, path: &str, what: String| {
-        if !good {
-            findings.push(Finding { path: path.into(), what });
-        }
-    };
-    let nyquist_hz = config.servo.rate_hz / 2.0;
-    let chirp = &config.chirp;
-    must(
-        chirp.start_hz < chirp.stop_hz,
-        "chirp.stop_hz",
-        format!("is {} Hz, but the sweep starts at {} Hz; it must end above its start", chirp.stop_hz, chirp.start_hz),
-    );
-    must(
-        chirp.stop_hz < nyquist_hz,
-        "chirp.stop_hz",
-        format!("is {} Hz; it must stay below half the servo rate, {nyquist_hz} Hz", chirp.stop_hz),
-    );
-    must(
-        chirp.fade_in_s + chirp.fade_out_s <= chirp.duration_s,
-        "chirp.duration_s",
-        format!("is {} s, shorter than both fades, {} s", chirp.duration_s, chirp.fade_in_s + chirp.fade_out_s),
-    );
-    must(
-        chirp.amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz),
-        "chirp.amplitude",
-        "has frequencies that do not rise from point to point".into(),
-    );
-    must(
-        config.interlock.soft_limit_m < config.sim.stop_m,
-        "interlock.soft_limit_m",
-        format!("is {} m; it must lie inside the stop at {} m", config.interlock.soft_limit_m, config.sim.stop_m),
-    );
-    must(
-        config.interlock.soft_limit_m <= config.probe.range_m / 2.0,
-        "interlock.soft_limit_m",
-        format!("is {} m, beyond what the probe sees, {} m", config.interlock.soft_limit_m, config.probe.range_m / 2.0),
-    );
-    must(
-        config.motor.continuous_force_n <= config.motor.peak_force_n,
-        "motor.continuous_force_n",
-        format!("is {} N, above the peak force of {} N", config.motor.continuous_force_n, config.motor.peak_force_n),
-    );
-    must(
-        config.interlock.probe_stale_s * config.servo.rate_hz >= 1.0,
-        "interlock.probe_stale_s",
-        format!("is {} s, shorter than a tick of {} s", config.interlock.probe_stale_s, config.servo.period_s()),
-    );
-    if let ReferenceSettings::Sine { frequency_hz, .. } = config.control.reference {
-        must(
-            frequency_hz < nyquist_hz,
-            "control.reference.frequency_hz",
-            format!("is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz"),
-        );
+fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
+    let mut relations = Relations(Vec::new());
+    relations.rig(config);
+    if purpose.includes(Purpose::Chirp) {
+        relations.chirp(config);
     }
-    findings
+    if purpose.includes(Purpose::Control) {
+        relations.control(config);
+    }
+    relations.0
+}
+
+struct Relations(Vec<Finding>);
+
+impl Relations {
+    fn must(&mut self, good: bool, path: &str, what: String) {
+        if !good {
+            self.0.push(Finding { path: path.into(), what });
+        }
+    }
+
+    fn rig(&mut self, config: &Config) {
+        let (soft_m, stop_m, seen_m) = (config.interlock.soft_limit_m, config.sim.stop_m, config.probe.range_m / 2.0);
+        let path = "interlock.soft_limit_m";
+        self.must(soft_m < stop_m, path, format!("is {soft_m} m; it must lie inside the stop at {stop_m} m"));
+        self.must(soft_m <= seen_m, path, format!("is {soft_m} m, beyond what the probe sees, {seen_m} m"));
+        let (continuous_n, peak_n) = (config.motor.continuous_force_n, config.motor.peak_force_n);
+        let what = format!("is {continuous_n} N, above the peak force of {peak_n} N");
+        self.must(continuous_n <= peak_n, "motor.continuous_force_n", what);
+        let (stale_s, period_s) = (config.interlock.probe_stale_s, config.servo.period_s());
+        let what = format!("is {stale_s} s, shorter than a tick of {period_s} s");
+        self.must(stale_s >= period_s, "interlock.probe_stale_s", what);
+    }
+
+    fn chirp(&mut self, config: &Config) {
+        let (chirp, nyquist_hz) = (&config.chirp, config.servo.rate_hz / 2.0);
+        let (start_hz, stop_hz) = (chirp.start_hz, chirp.stop_hz);
+        let what = format!("is {stop_hz} Hz, where the sweep starts; a sweep needs two frequencies");
+        self.must(start_hz != stop_hz, "chirp.stop_hz", what);
+        for (path, hz) in [("chirp.start_hz", start_hz), ("chirp.stop_hz", stop_hz)] {
+            let what = format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
+            self.must(hz < nyquist_hz, path, what);
+        }
+        let fades_s = chirp.fade_in_s + chirp.fade_out_s;
+        let what = format!("is {} s, shorter than both fades, {fades_s} s", chirp.duration_s);
+        self.must(fades_s <= chirp.duration_s, "chirp.duration_s", what);
+        let rising = chirp.amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        self.must(rising, "chirp.amplitude", "has frequencies that do not rise from point to point".into());
+    }
+
+    fn control(&mut self, config: &Config) {
+        let nyquist_hz = config.servo.rate_hz / 2.0;
+        if let ReferenceSettings::Sine { frequency_hz, .. } = config.control.reference {
+            let what = format!("is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
+            self.must(frequency_hz < nyquist_hz, "control.reference.frequency_hz", what);
+        }
+    }
 }

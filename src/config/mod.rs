@@ -19,8 +19,8 @@ pub mod profiles;
 pub mod quantity;
 mod settings;
 
-pub(crate) use load::typed;
-pub use load::{ConfigError, Source, load};
+pub use load::{ConfigError, Purpose, Source, load, whole};
+pub(crate) use load::{text_of, typed};
 pub use settings::*;
 
 /// The JSON schema of a configuration, made from the types.

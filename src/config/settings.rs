@@ -359,6 +359,9 @@ pub struct ControlSettings {
     /// Length of the run after the loop closed, in seconds.
     #[schemars(range(min = 0.001, max = 1000000.0))]
     pub duration_s: f64,
+    /// Seconds after the last change of the reference from which on the steady state is measured.
+    #[schemars(range(min = 0.0, max = 1000000.0))]
+    pub steady_after_s: f64,
     /// What to follow.
     pub reference: ReferenceSettings,
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Section;
 use super::section::SectionError;
-use crate::config::{ConfigError, profiles, typed};
+use crate::config::{self, ConfigError, profiles};
 
 /// A controller file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -125,23 +125,37 @@ pub enum ControllerError {
     },
 }
 
-/// The sections of `fast`, `slow` or a file, checked for a servo rate.
-pub fn load(name: &str, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
-    let file: ControllerFile = typed(name, profiles::CONTROLLERS, "controller")?;
-    let limit_rad_s = std::f64::consts::PI * rate_hz;
-    let mut sections = Vec::with_capacity(file.section.len());
-    for (index, settings) in file.section.iter().enumerate() {
-        let (name, number) = (name.to_string(), index + 1);
-        let section = section(settings).checked();
-        let section = section.map_err(|why| ControllerError::Section { name: name.clone(), number, why })?;
-        match section.prewarp_rad_s {
-            Some(prewarp_rad_s) if prewarp_rad_s >= limit_rad_s => {
-                return Err(ControllerError::Prewarp { name, number, prewarp_rad_s, limit_rad_s });
-            }
-            _ => sections.push(section),
-        }
+/// A controller as text, as it travels with a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ControllerText {
+    /// `fast`, `slow` or the file.
+    pub name: String,
+    /// TOML.
+    pub text: String,
+}
+
+impl ControllerText {
+    /// Finds `fast`, `slow` or a file.
+    pub fn find(name: &str) -> Result<Self, ControllerError> {
+        Ok(ControllerText { name: name.into(), text: config::text_of(name, profiles::CONTROLLERS, "controller")? })
     }
-    Ok(sections)
+
+    /// The sections, checked for a servo rate.
+    pub fn sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
+        let file: ControllerFile = config::typed(&self.name, &self.text)?;
+        let limit_rad_s = std::f64::consts::PI * rate_hz;
+        let checked = |(index, settings): (usize, &SectionSettings)| {
+            let (name, number) = (self.name.clone(), index + 1);
+            match section(settings).checked() {
+                Err(why) => Err(ControllerError::Section { name, number, why }),
+                Ok(Section { prewarp_rad_s: Some(prewarp_rad_s), .. }) if prewarp_rad_s >= limit_rad_s => {
+                    Err(ControllerError::Prewarp { name, number, prewarp_rad_s, limit_rad_s })
+                }
+                Ok(section) => Ok(section),
+            }
+        };
+        file.section.iter().enumerate().map(checked).collect()
+    }
 }
 
 fn section(settings: &SectionSettings) -> Section {

@@ -21,7 +21,7 @@ mod step_figures;
 pub use biquad::Biquad;
 pub use closed_loop::ClosedLoop;
 pub use controller::Controller;
-pub use file::{ControllerError, ControllerFile, load};
+pub use file::{ControllerError, ControllerFile, ControllerText};
 pub use margins::{Crossing, Margins};
 pub use section::Section;
 pub use step_figures::{StepFigures, step_figures};

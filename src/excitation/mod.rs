@@ -7,7 +7,7 @@ mod chirp;
 mod reference;
 
 pub use chirp::{Chirp, ChirpError};
-pub use reference::{Reference, ReferenceError, reference};
+pub use reference::{Reference, ReferenceError, reference, reference_text};
 
 /// A current over time.
 pub trait Excitation: Send {

@@ -1,7 +1,5 @@
 //! References for the closed loop, in metres relative to where the stage rests when the loop closes.
 
-use std::path::Path;
-
 use crate::config::ReferenceSettings;
 
 /// A reference over time, from the tick at which the loop closes.
@@ -33,8 +31,20 @@ pub enum ReferenceError {
     },
 }
 
-/// The reference of the settings at a period of the loop. A new kind is one struct and one arm.
-pub fn reference(settings: &ReferenceSettings, period_s: f64) -> Result<Box<dyn Reference>, ReferenceError> {
+/// The text of the file that the settings name, if they name one: it travels with a recording.
+pub fn reference_text(settings: &ReferenceSettings) -> Result<Option<String>, ReferenceError> {
+    let ReferenceSettings::File { path } = settings else { return Ok(None) };
+    let text = std::fs::read_to_string(path);
+    text.map(Some).map_err(|e| ReferenceError::Unreadable { path: path.into(), why: e.to_string() })
+}
+
+/// The reference of the settings at a period of the loop, with the text of its file if it has one. A new kind is one struct
+/// and one arm.
+pub fn reference(
+    settings: &ReferenceSettings,
+    text: Option<&str>,
+    period_s: f64,
+) -> Result<Box<dyn Reference>, ReferenceError> {
     let tick = |seconds: f64| libm::round(seconds / period_s) as u64;
     Ok(match settings {
         ReferenceSettings::Hold => Box::new(Step { amplitude_m: 0.0, at_tick: 0 }),
@@ -48,7 +58,7 @@ pub fn reference(settings: &ReferenceSettings, period_s: f64) -> Result<Box<dyn 
         ReferenceSettings::Sine { amplitude_m, frequency_hz } => {
             Box::new(Sine { amplitude_m: *amplitude_m, cycles_per_tick: frequency_hz * period_s })
         }
-        ReferenceSettings::File { path } => Box::new(Table::read(path, period_s)?),
+        ReferenceSettings::File { path } => Box::new(Table::parse(path, text.unwrap_or_default(), period_s)?),
     })
 }
 
@@ -99,9 +109,7 @@ struct Table {
 }
 
 impl Table {
-    fn read(path: &str, period_s: f64) -> Result<Table, ReferenceError> {
-        let text = std::fs::read_to_string(Path::new(path))
-            .map_err(|e| ReferenceError::Unreadable { path: path.into(), why: e.to_string() })?;
+    fn parse(path: &str, text: &str, period_s: f64) -> Result<Table, ReferenceError> {
         let wrong = |line: usize, why: String| ReferenceError::Line { path: path.into(), line, why };
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -140,8 +148,12 @@ impl Reference for Table {
 mod tests {
     use super::*;
 
+    fn made(settings: &ReferenceSettings) -> Result<Box<dyn Reference>, ReferenceError> {
+        reference(settings, reference_text(settings)?.as_deref(), 1e-3)
+    }
+
     fn at(settings: ReferenceSettings, tick: u64) -> f64 {
-        reference(&settings, 1e-3).unwrap().at_m(tick)
+        made(&settings).unwrap().at_m(tick)
     }
 
     #[test]
@@ -179,10 +191,10 @@ mod tests {
             let file = tempfile::NamedTempFile::new().unwrap();
             std::fs::write(file.path(), text).unwrap();
             let settings = ReferenceSettings::File { path: file.path().display().to_string() };
-            let error = reference(&settings, 1e-3).err().unwrap();
+            let error = made(&settings).err().unwrap();
             assert!(matches!(error, ReferenceError::Line { line: l, .. } if l == line), "{text:?}: {error}");
         }
         let missing = ReferenceSettings::File { path: "/nonexistent".into() };
-        assert!(matches!(reference(&missing, 1e-3), Err(ReferenceError::Unreadable { .. })));
+        assert!(matches!(made(&missing), Err(ReferenceError::Unreadable { .. })));
     }
 }

@@ -118,6 +118,25 @@ impl Recorder {
         }
     }
 
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Adds a file to the recording.
+    pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), RecordingError> {
+        let written = attach(&mut self.mcap, name, media_type, data);
+        written.map_err(|source| self.failed(source))
+    }
+
+    /// Says what is in the file after the last tick, which is readable from now on: results can be computed from it
+    /// before they are added.
+    pub fn complete(&mut self) -> Result<Totals, RecordingError> {
+        self.close_second()?;
+        self.mcap.flush().map_err(|source| self.failed(source))?;
+        Ok(self.totals())
+    }
+
     /// Adds results as (name, media type, content), completes the file and says what is in it.
     pub fn finish(mut self, attachments: &[(&str, &str, &[u8])]) -> Result<Totals, RecordingError> {
         self.close_second()?;

@@ -3,5 +3,4 @@ mod common;
 mod damage;
 mod disk_full;
 mod round_trip;
-mod speed;
 mod thread;

@@ -1,0 +1,102 @@
+//! What is made from the recording of an excitation: the frequency response as CSV and as a Bode plot.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::CliError;
+use crate::config::Config;
+use crate::identify::csv;
+use crate::recording::Recording;
+use crate::report::{Curve, Trace, bode_svg};
+use crate::session::{Analysis, AnalysisError, analyse};
+
+/// The files that were made and what the response shows.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Made {
+    frf_csv: String,
+    plot: String,
+    frequencies: usize,
+    /// Median coherence over the band.
+    coherence_median: f64,
+    filled_ticks: u64,
+    modes: [(); 0],
+    zeros: [(); 0],
+    cnmp: &'static str,
+    why: &'static str,
+}
+
+impl From<AnalysisError> for CliError {
+    fn from(error: AnalysisError) -> Self {
+        CliError::Failed(error.to_string())
+    }
+}
+
+/// Analyses a recording; the files stand beside it under its name.
+pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliError> {
+    let analysis = analyse(recording, config)?;
+    let csv_path = free(recording.path(), "frf", "csv");
+    csv::write_new(&csv_path, &analysis.frf).map_err(|e| CliError::Failed(e.to_string()))?;
+    let plot_path = free(recording.path(), "bode", "svg");
+    write_new(&plot_path, &plot(&analysis, config, recording)?)?;
+    Ok(Made {
+        frf_csv: csv_path.display().to_string(),
+        plot: plot_path.display().to_string(),
+        frequencies: analysis.frf.len(),
+        coherence_median: median(&analysis.frf.coherence),
+        filled_ticks: analysis.filled_ticks,
+        modes: [],
+        zeros: [],
+        cnmp: "undecided",
+        why: "this version estimates the frequency response; it does not fit modes and zeros to it",
+    })
+}
+
+impl Made {
+    pub fn text(&self) -> String {
+        let filled = if self.filled_ticks > 0 {
+            format!(", {} missing ticks filled in", self.filled_ticks)
+        } else {
+            String::new()
+        };
+        format!(
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n  plot       {}\n",
+            self.frf_csv, self.frequencies, self.coherence_median, self.plot
+        )
+    }
+}
+
+fn plot(analysis: &Analysis, config: &Config, recording: &Recording) -> Result<String, CliError> {
+    let measured = Trace { name: "measured", curve: Curve::Measured(&analysis.frf) };
+    let frequency_hz = &analysis.frf.frequency_hz;
+    let model = Trace { name: "model", curve: Curve::Model { frequency_hz, response: &analysis.model } };
+    let chirp = &config.chirp;
+    let started = recording.metadata().get("started").map_or("", String::as_str);
+    let subtitle = format!(
+        "current set-point to displacement, with hold, amplifier and delay; chirp {} to {} Hz in {} s at {} Hz; {started}",
+        chirp.start_hz, chirp.stop_hz, chirp.duration_s, config.servo.rate_hz
+    );
+    bode_svg(&[measured, model], &config.title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))
+}
+
+/// `NAME_what.ext` beside the recording, with -2, -3, ... where that is taken.
+fn free(recording: &Path, what: &str, extension: &str) -> PathBuf {
+    let stem = recording.file_stem().unwrap_or_default().to_string_lossy();
+    let numbered = |n: u32| if n == 1 { String::new() } else { format!("-{n}") };
+    let path = |n: u32| recording.with_file_name(format!("{stem}_{what}{}.{extension}", numbered(n)));
+    (1..).map(path).find(|path| !path.exists()).unwrap_or_else(|| path(1))
+}
+
+fn write_new(path: &Path, text: &str) -> Result<(), CliError> {
+    let failed = |e: std::io::Error| {
+        CliError::Failed(format!("cannot write {}: {e}; free some space or choose another folder", path.display()))
+    };
+    std::fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

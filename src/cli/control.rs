@@ -1,0 +1,182 @@
+//! `bench control`: close the loop with a reference.
+
+use serde::Serialize;
+
+use super::margins::{closed_loop, text as margins_text};
+use super::options::{BenchOptions, print_json, print_text};
+use super::run_options::{RunOptions, RunReport};
+use super::{CliError, Outcome};
+use crate::config::{Config, Purpose, ReferenceSettings, quantity};
+use crate::control::{ClosedLoop, Margins, StepFigures, step_figures};
+use crate::excitation::{reference, reference_text};
+use crate::recording::Recording;
+use crate::session::{Measured, Plan, measure};
+
+/// Which controller.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[group(multiple = false)]
+pub(super) struct Choice {
+    /// The fast controller of the thesis, Eq. (6-7)
+    #[arg(long)]
+    fast: bool,
+    /// The slow controller of the thesis, Eq. (6-6)
+    #[arg(long)]
+    slow: bool,
+    /// A TOML file with sections
+    #[arg(long, value_name = "FILE")]
+    controller: Option<String>,
+}
+
+impl Choice {
+    /// The setting that the choice stands for.
+    pub fn sets(&self) -> Vec<String> {
+        let name = match (self.fast, self.slow, &self.controller) {
+            (true, _, _) => Some("fast"),
+            (_, true, _) => Some("slow"),
+            (_, _, Some(file)) => Some(file.as_str()),
+            _ => None,
+        };
+        name.map(|name| format!("control.controller={}", toml::Value::from(name))).into_iter().collect()
+    }
+}
+
+/// Which loop, and what it follows.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    bench: BenchOptions,
+    #[command(flatten)]
+    choice: Choice,
+    #[command(flatten)]
+    run: RunOptions,
+    /// What to follow: step, hold, ramp, sine, or a CSV file with time_s,reference_m
+    #[arg(long, value_name = "KIND|FILE")]
+    reference: Option<String>,
+    /// Height of step and ramp, amplitude of the sine: 50um or metres [default: 50um]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    amplitude: Option<String>,
+    /// Frequency of the sine in hertz [default: 1]
+    #[arg(long, value_name = "HZ")]
+    frequency: Option<f64>,
+    /// Speed of the ramp in metres per second [default: 1e-4]
+    #[arg(long, value_name = "M/S")]
+    speed: Option<f64>,
+    /// Seconds with the loop closed
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+}
+
+impl Args {
+    /// The settings that the options stand for.
+    fn sets(&self) -> Result<Vec<String>, CliError> {
+        let mut sets = self.choice.sets();
+        let amplitude =
+            self.amplitude.as_deref().map(quantity::metres).transpose().map_err(|e| CliError::Usage(e.to_string()))?;
+        let mut set = |key: &str, value: String| sets.push(format!("control.{key}={value}"));
+        if let Some(duration) = self.duration {
+            set("duration_s", format!("{duration:?}"));
+        }
+        let height = format!("{:?}", amplitude.unwrap_or(50e-6));
+        match self.reference.as_deref() {
+            None if self.amplitude.is_some() => set("reference.amplitude_m", height),
+            None => {}
+            Some("hold") => set("reference", "{ kind = \"hold\" }".into()),
+            Some("step") => set("reference", format!("{{ kind = \"step\", amplitude_m = {height}, at_s = 0.2 }}")),
+            Some("ramp") => {
+                let speed = self.speed.unwrap_or(1e-4);
+                set(
+                    "reference",
+                    format!("{{ kind = \"ramp\", amplitude_m = {height}, speed_m_per_s = {speed:?}, at_s = 0.2 }}"),
+                );
+            }
+            Some("sine") => {
+                let frequency = self.frequency.unwrap_or(1.0);
+                set(
+                    "reference",
+                    format!("{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency:?} }}"),
+                );
+            }
+            Some(path) => set("reference", format!("{{ kind = \"file\", path = {} }}", toml::Value::from(path))),
+        }
+        Ok(sets)
+    }
+}
+
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    run: RunReport,
+    predicted: Predicted,
+    measured: Option<Measured>,
+}
+
+#[derive(Debug, Serialize)]
+struct Predicted {
+    #[serde(flatten)]
+    margins: Margins,
+    #[serde(flatten)]
+    step: Option<StepFigures>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let config = args.bench.load(Purpose::Control, &args.sets()?)?;
+    let closed_loop = closed_loop(&config)?;
+    let margins = closed_loop.margins(false);
+    let step = if margins.stable { predicted_step(&config, &closed_loop)? } else { None };
+    let predicted = Predicted { margins, step };
+    let plan = Plan::control(config.clone())?;
+    let mut run = args.run.run(&plan, "control")?;
+    let totals = run.totals()?;
+    let report = RunReport::new(&run, &totals, args.run.pace);
+    let measured = match report.outcome {
+        "completed" => measure(&Recording::open(&run.path)?, &config)?,
+        _ => None,
+    };
+    let report = Report { run: report, predicted, measured };
+    let json = serde_json::to_string_pretty(&report).map_err(|e| CliError::Failed(e.to_string()))?;
+    run.finish(&json)?;
+    if args.bench.json {
+        print_json(&report)?
+    } else {
+        print_text(&text(&report, &config))?
+    }
+    Ok(report.run.exit())
+}
+
+/// The step by the linear model, if the reference is one.
+fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Result<Option<StepFigures>, CliError> {
+    let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else { return Ok(None) };
+    let period_s = config.servo.period_s();
+    let text = reference_text(&config.control.reference)?;
+    let reference = reference(&config.control.reference, text.as_deref(), period_s)?;
+    let ticks = (config.control.duration_s / period_s) as usize;
+    let positions = closed_loop.simulate(ticks, |tick| reference.at_m(tick as u64));
+    let from = ((at_s / period_s).round() as usize).min(positions.len());
+    Ok((amplitude_m != 0.0 && from < ticks).then(|| step_figures(&positions[from..], amplitude_m, period_s)))
+}
+
+fn text(report: &Report, config: &Config) -> String {
+    let milliseconds = |s: Option<f64>| s.map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
+    let predicted = report.predicted.step.map_or(String::new(), |step| {
+        format!(
+            "  predicted  settling {}, overshoot {:.1} %\n",
+            milliseconds(step.settling_time_s),
+            step.overshoot_percent
+        )
+    });
+    let measured = report.measured.as_ref().map_or(
+        "  measured   nothing: the run did not reach a steady state\n".to_string(),
+        |m| {
+            let step = m.step.map_or(String::new(), |step| {
+                format!("settling {}, overshoot {:.1} %; ", milliseconds(step.settling_time_s), step.overshoot_percent)
+            });
+            format!(
+                "  measured   {step}steady state: mean error {:+.4} um, sigma {:.4} um\n",
+                m.steady_state_mean_error_m * 1e6,
+                m.steady_state_sigma_m * 1e6
+            )
+        },
+    );
+    format!("{}{predicted}{measured}{}", margins_text(config, &report.predicted.margins), report.run.text(config))
+}

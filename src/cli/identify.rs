@@ -1,0 +1,57 @@
+//! `bench identify`: the analysis of `bench chirp`, from a recording.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::analysis_output::{Made, make};
+use super::options::{print_json, print_text};
+use super::{CliError, Outcome};
+use crate::recording::Recording;
+use crate::session::{Kind, Plan};
+
+/// Which recording.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    /// The recording (MCAP) of a chirp
+    recording: PathBuf,
+    /// One JSON object on standard output, nothing else there
+    #[arg(long)]
+    json: bool,
+}
+
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report {
+    recording: String,
+    ticks: u64,
+    overruns: u64,
+    lost_records: u64,
+    truncated: bool,
+    #[serde(flatten)]
+    made: Made,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let recording = Recording::open(&args.recording)?;
+    let plan = Plan::of(&recording)?;
+    if plan.kind != Kind::Chirp {
+        let what = "is the recording of a closed loop; this version analyses open-loop chirps only";
+        return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
+    }
+    let report = Report {
+        recording: args.recording.display().to_string(),
+        ticks: recording.tick_count(),
+        overruns: recording.overruns(),
+        lost_records: recording.lost_records(),
+        truncated: recording.truncated(),
+        made: make(&recording, &plan.config)?,
+    };
+    if args.json {
+        print_json(&report)?
+    } else {
+        print_text(&report.made.text())?
+    }
+    let whole = report.overruns + report.lost_records == 0 && !report.truncated;
+    Ok(if whole { Outcome::Done } else { Outcome::Impaired })
+}

@@ -1,0 +1,65 @@
+//! The command line: one file a subcommand.
+
+mod analysis_output;
+mod chirp;
+mod config;
+mod control;
+mod identify;
+mod margins;
+mod model;
+mod options;
+mod outcome;
+mod progress;
+mod recover;
+mod replay;
+mod run_options;
+mod table;
+
+use clap::{Parser, Subcommand};
+
+pub use outcome::{CliError, Outcome};
+
+/// A controller daemon for a precision-motion test bench.
+///
+/// Without a configuration every command works on the simulated stage of the thesis. Exit codes: 0 done, 1 failed (a trip of
+/// the interlocks included), 2 wrong usage or configuration, 3 done, but with overruns or lost records.
+#[derive(Debug, Parser)]
+#[command(name = "bench", version, max_term_width = 110)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Excite the stage, record, estimate its frequency response: recording, CSV and Bode plot
+    Chirp(chirp::Args),
+    /// Close the loop with a reference: recording, predicted and measured figures
+    Control(control::Args),
+    /// The mechanics by the model: modes, residues, signs, zeros
+    Model(model::Args),
+    /// Crossover, phase, gain and modulus margin of a controller with the model
+    Margins(margins::Args),
+    /// The analysis of `bench chirp`, from a recording
+    Identify(identify::Args),
+    /// Run the recorded probe through the same loop and compare every command bit for bit
+    Replay(replay::Args),
+    /// Make a cut-off recording readable and say what was lost
+    Recover(recover::Args),
+    /// The effective settings, their validation, their schema
+    Config(config::Args),
+}
+
+/// Runs a parsed command line.
+pub fn run(cli: Cli) -> Result<Outcome, CliError> {
+    match cli.command {
+        Command::Chirp(args) => chirp::run(&args),
+        Command::Control(args) => control::run(&args),
+        Command::Model(args) => model::run(&args),
+        Command::Margins(args) => margins::run(&args),
+        Command::Identify(args) => identify::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Recover(args) => recover::run(&args),
+        Command::Config(args) => config::run(&args),
+    }
+}

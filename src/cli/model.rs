@@ -1,0 +1,139 @@
+//! `bench model`: what the mechanics are, by the model.
+
+use clap::Subcommand;
+use serde::Serialize;
+
+use super::options::{BenchOptions, print_json, print_text};
+use super::table::table;
+use super::{CliError, Outcome};
+use crate::config::{Config, PlantSettings, Purpose};
+use crate::plant::{self, Modal, Zero};
+
+/// What to compute.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum What {
+    /// Modes, residues, signs and zeros at one operating point
+    Modes(BenchOptions),
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let What::Modes(options) = &args.what;
+    let config = options.load(Purpose::Model, &[])?;
+    let modes = Modes::of(&config, options.profile())?;
+    if options.json {
+        print_json(&modes)?
+    } else {
+        print_text(&modes.text())?
+    }
+    Ok(Outcome::Done)
+}
+
+#[derive(Debug, Serialize)]
+struct Modes {
+    profile: String,
+    model: &'static str,
+    operating_point_m: f64,
+    mass_asymmetry: f64,
+    modes: Vec<ModeJson>,
+    zeros: Vec<ZeroJson>,
+    damped_zeros: Vec<ZeroJson>,
+    cnmp_pairs: usize,
+    damped_cnmp_pairs: usize,
+    sign_sequence: String,
+    dominant_sequence: String,
+    phase_drop_deg: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct ModeJson {
+    omega_rad_s: f64,
+    frequency_hz: f64,
+    damping_ratio: f64,
+    residue: f64,
+    sign: char,
+    shape: Vec<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct ZeroJson {
+    re_rad_s: f64,
+    im_rad_s: f64,
+    kind: &'static str,
+}
+
+impl Modes {
+    fn of(config: &Config, profile: &str) -> Result<Modes, CliError> {
+        let structure = plant::build(&config.plant)?;
+        let modal = Modal::of(&structure)?;
+        let (undamped, damped) = (plant::undamped_zeros(&structure)?, plant::damped_zeros(&structure)?);
+        let PlantSettings::Sr4dof(settings) = &config.plant;
+        Ok(Modes {
+            profile: profile.into(),
+            model: "sr4dof",
+            operating_point_m: settings.operating_point_m,
+            mass_asymmetry: settings.mass_asymmetry,
+            modes: modes(&modal),
+            zeros: zeros(&undamped),
+            damped_zeros: zeros(&damped),
+            cnmp_pairs: plant::cnmp_pairs(&undamped),
+            damped_cnmp_pairs: plant::cnmp_pairs(&damped),
+            sign_sequence: plant::sign_sequence(&modal),
+            dominant_sequence: plant::dominant_sequence(&modal, &undamped),
+            phase_drop_deg: plant::phase_drop_deg(&undamped),
+        })
+    }
+
+    fn text(&self) -> String {
+        let mode = |(i, m): (usize, &ModeJson)| {
+            vec![
+                (i + 1).to_string(),
+                format!("{:.3}", m.omega_rad_s),
+                format!("{:.4}", m.frequency_hz),
+                format!("{:.5}", m.damping_ratio),
+                format!("{:+.6}", m.residue),
+                m.sign.to_string(),
+                m.shape.iter().map(|x| format!("{x:+.4}")).collect::<Vec<_>>().join(" "),
+            ]
+        };
+        let zero = |z: &ZeroJson| vec![format!("{:+.4}", z.re_rad_s), format!("{:+.4}", z.im_rad_s), z.kind.into()];
+        let header = ["mode", "rad/s", "Hz", "damping", "residue 1/kg", "sign", "shape [x1 y1 y2 y3]"];
+        let modes = table(&header, &self.modes.iter().enumerate().map(mode).collect::<Vec<_>>());
+        let zero_table =
+            |zeros: &[ZeroJson]| table(&["re rad/s", "im rad/s", "kind"], &zeros.iter().map(zero).collect::<Vec<_>>());
+        format!(
+            "{} at Y1o = {:.4} mm, mass asymmetry {:+.2} %\n\n{modes}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns {}   dominant modes {}   CNMP pairs {} ({} with damping)   phase drop {} deg\n",
+            self.profile,
+            self.operating_point_m * 1e3,
+            self.mass_asymmetry * 100.0,
+            zero_table(&self.zeros),
+            zero_table(&self.damped_zeros),
+            self.sign_sequence,
+            self.dominant_sequence,
+            self.cnmp_pairs,
+            self.damped_cnmp_pairs,
+            self.phase_drop_deg,
+        )
+    }
+}
+
+fn modes(modal: &Modal) -> Vec<ModeJson> {
+    let of = |(mode, sign): (&plant::Mode, plant::Sign)| ModeJson {
+        omega_rad_s: mode.omega_rad_s,
+        frequency_hz: mode.omega_rad_s / (2.0 * std::f64::consts::PI),
+        damping_ratio: mode.damping_ratio,
+        residue: mode.residue_per_kg(),
+        sign: sign.symbol(),
+        shape: mode.shape.iter().copied().collect(),
+    };
+    modal.modes.iter().zip(modal.signs()).map(of).collect()
+}
+
+fn zeros(zeros: &[Zero]) -> Vec<ZeroJson> {
+    zeros.iter().map(|zero| ZeroJson { re_rad_s: zero.s.re, im_rad_s: zero.s.im, kind: zero.kind.name() }).collect()
+}

@@ -1,0 +1,81 @@
+//! The options that all commands on a bench share.
+
+use clap::Args;
+use serde::Serialize;
+
+use super::CliError;
+use crate::config::quantity::{self, Quantity};
+use crate::config::{Config, PlantSettings, Purpose, Source, load};
+
+/// Which bench.
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct BenchOptions {
+    /// A TOML file, or a profile by name
+    #[arg(long, value_name = "FILE|NAME")]
+    pub config: Option<String>,
+    /// Override one setting, repeatable: --set plant.mass_asymmetry=0.05
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub sets: Vec<String>,
+    /// Static Y displacement of the motion stage: 8% of the beam length, 3.8mm, or metres
+    #[arg(long, value_name = "Y", allow_hyphen_values = true)]
+    pub operating_point: Option<String>,
+    /// Mass asymmetry m2/m3 - 1: 10% or 0.1
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    pub asymmetry: Option<String>,
+    /// Seed of noise and disturbance
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// One JSON object on standard output, nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl BenchOptions {
+    /// The profile's name, or the file.
+    pub fn profile(&self) -> &str {
+        self.config.as_deref().unwrap_or(crate::config::profiles::DEFAULT)
+    }
+
+    /// The effective configuration; `more` are settings that the command's own options stand for.
+    pub fn load(&self, purpose: Purpose, more: &[String]) -> Result<Config, CliError> {
+        let mut source = Source { config: self.config.clone(), sets: self.sets.clone(), purpose };
+        let usage = |e: quantity::QuantityError| CliError::Usage(e.to_string());
+        if let Some(text) = &self.asymmetry {
+            source.sets.push(format!("plant.mass_asymmetry={:?}", quantity::ratio(text).map_err(usage)?));
+        }
+        if let Some(seed) = self.seed {
+            source.sets.push(format!("sim.seed={seed}"));
+        }
+        source.sets.extend_from_slice(more);
+        if let Some(text) = &self.operating_point {
+            let metres = match quantity::parse(text).map_err(usage)? {
+                Quantity::Bare(metres) | Quantity::Metres(metres) => metres,
+                Quantity::Ratio(ratio) => ratio * beam_length_m(&load(&source)?),
+            };
+            source.sets.push(format!("plant.operating_point_m={metres:?}"));
+        }
+        Ok(load(&source)?)
+    }
+}
+
+fn beam_length_m(config: &Config) -> f64 {
+    let PlantSettings::Sr4dof(plant) = &config.plant;
+    plant.beam_length_m
+}
+
+/// Prints the one JSON object of a command.
+pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
+    print_text(&format!("{text}\n"))
+}
+
+/// Prints to standard output; a reader that has gone is no error of ours.
+pub(super) fn print_text(text: &str) -> Result<(), CliError> {
+    use std::io::Write;
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CliError::Failed(format!("cannot write to standard output: {e}")))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,76 @@
+//! How a command ended, and its exit code.
+
+use std::process::ExitCode;
+
+use crate::config::ConfigError;
+use crate::control::ControllerError;
+use crate::excitation::{ChirpError, ReferenceError};
+use crate::identify::IdentifyError;
+use crate::plant::PlantError;
+use crate::recording::RecordingError;
+
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// All done.
+    Done,
+    /// Ran, but did not reach its end: tripped, stopped, different.
+    Failed,
+    /// Wrong usage or configuration; nothing moved.
+    Usage,
+    /// Done, but with overruns or lost records.
+    Impaired,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> ExitCode {
+        ExitCode::from(match outcome {
+            Outcome::Done => 0,
+            Outcome::Failed => 1,
+            Outcome::Usage => 2,
+            Outcome::Impaired => 3,
+        })
+    }
+}
+
+/// Why a command gave up.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// The configuration is refused.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The controller is refused.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    /// The reference is refused.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The chirp would trip an interlock.
+    #[error(transparent)]
+    Chirp(#[from] ChirpError),
+    /// The model cannot be analysed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// Another mistake in the call.
+    #[error("{0}")]
+    Usage(String),
+    /// The recording cannot be written or read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The data do not carry the analysis.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// Something else went wrong on the way.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl CliError {
+    /// Usage and configuration are the caller's, all else is a failure.
+    pub fn outcome(&self) -> Outcome {
+        match self {
+            CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
+            _ => Outcome::Usage,
+        }
+    }
+}

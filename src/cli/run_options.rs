@@ -1,0 +1,156 @@
+//! What `bench chirp` and `bench control` have in common: where the run is recorded, at what pace, and how it ended.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::progress::Progress;
+use super::{CliError, Outcome};
+use crate::config::Config;
+use crate::recording::{Quantiles, Totals};
+use crate::rt::arming::Trip;
+use crate::rt::thread::Pace;
+use crate::session::{Plan, Run, SessionError};
+use crate::sim::SimulatedRig;
+
+/// Where and how to run.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct RunOptions {
+    /// Pace of the loop
+    #[arg(long, value_enum, default_value = "virtual")]
+    pub pace: Pace,
+    /// Folder for the recording and what is made from it
+    #[arg(long, value_name = "DIR", default_value = "recordings")]
+    pub out: PathBuf,
+}
+
+impl RunOptions {
+    /// Runs a plan on the rig of its configuration, with progress on a terminal.
+    pub fn run(&self, plan: &Plan, what: &'static str) -> Result<Run, CliError> {
+        let rig = Box::new(SimulatedRig::new(&plan.config)?);
+        let progress = Progress::new(what);
+        let run = crate::session::run(plan, rig, self.pace, &self.out, &mut |done, total| progress.show(done, total));
+        progress.close();
+        run.map_err(|error| match error {
+            SessionError::Plan(plan) => CliError::from(plan),
+            other => CliError::Failed(other.to_string()),
+        })
+    }
+}
+
+impl From<crate::session::PlanError> for CliError {
+    fn from(error: crate::session::PlanError) -> Self {
+        CliError::Usage(error.to_string())
+    }
+}
+
+/// How a run went, as `bench chirp` and `bench control` both tell it.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct RunReport {
+    pub outcome: &'static str,
+    pub trip: Option<TripJson>,
+    pub ticks: u64,
+    pub overruns: u64,
+    pub lost_records: u64,
+    pub recording: String,
+    /// Equal for two runs whose loops saw and did the same, bit for bit.
+    pub loop_digest: String,
+    pub timing: Timing,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct TripJson {
+    reason: &'static str,
+    tick: u64,
+    text: String,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Timing {
+    pace: &'static str,
+    policy: String,
+    memory_locked: bool,
+    cpu: Option<usize>,
+    refused: Vec<String>,
+    lateness_ns: QuantilesJson,
+    compute_ns: QuantilesJson,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct QuantilesJson {
+    p50: u64,
+    p99: u64,
+    p9999: u64,
+    max: u64,
+}
+
+impl From<&Quantiles> for QuantilesJson {
+    fn from(q: &Quantiles) -> Self {
+        QuantilesJson { p50: q.p50_ns, p99: q.p99_ns, p9999: q.p9999_ns, max: q.max_ns }
+    }
+}
+
+impl RunReport {
+    pub fn new(run: &Run, totals: &Totals, pace: Pace) -> Self {
+        let trip = |(trip, tick): (Trip, u64)| TripJson { reason: trip.reason(), tick, text: trip.to_string() };
+        RunReport {
+            outcome: match (run.ended.trip.is_some(), run.ended.completed) {
+                (true, _) => "tripped",
+                (false, true) => "completed",
+                (false, false) => "stopped",
+            },
+            trip: run.ended.trip.map(trip),
+            ticks: totals.ticks,
+            overruns: totals.overruns,
+            // A loss at the very end leaves no gap: the loop's own count tells.
+            lost_records: totals.lost_records.max(run.ended.lost_records),
+            recording: run.path.display().to_string(),
+            loop_digest: format!("{:016x}", totals.loop_digest),
+            timing: Timing {
+                pace: pace.name(),
+                policy: run.scheduling.policy.clone(),
+                memory_locked: run.scheduling.memory_locked,
+                cpu: run.scheduling.cpu,
+                refused: run.scheduling.refused.clone(),
+                lateness_ns: (&totals.lateness).into(),
+                compute_ns: (&totals.compute).into(),
+            },
+        }
+    }
+
+    pub fn exit(&self) -> Outcome {
+        match self.outcome {
+            "completed" if self.overruns + self.lost_records == 0 => Outcome::Done,
+            "completed" => Outcome::Impaired,
+            _ => Outcome::Failed,
+        }
+    }
+
+    /// How the run went, for people.
+    pub fn text(&self, config: &Config) -> String {
+        let seconds = self.ticks as f64 * config.servo.period_s();
+        let trip = self.trip.as_ref().map_or(String::new(), |t| {
+            let at_s = t.tick as f64 * config.servo.period_s();
+            format!("\n  TRIPPED at tick {} ({at_s:.4} s): {}; zero current, amplifier disabled", t.tick, t.text)
+        });
+        let refused: String = self.timing.refused.iter().map(|line| format!("\n  not granted: {line}")).collect();
+        let t = &self.timing;
+        let timing = match t.pace {
+            "virtual" => "virtual pace (no timing to report)".to_string(),
+            _ => format!(
+                "{}, memory {}; lateness p50 {:.1} us, p99 {:.1} us, max {:.1} us; compute p50 {:.1} us, max {:.1} us",
+                t.policy,
+                if t.memory_locked { "locked" } else { "not locked" },
+                t.lateness_ns.p50 as f64 / 1e3,
+                t.lateness_ns.p99 as f64 / 1e3,
+                t.lateness_ns.max as f64 / 1e3,
+                t.compute_ns.p50 as f64 / 1e3,
+                t.compute_ns.max as f64 / 1e3
+            ),
+        };
+        format!(
+            "{}: {} ticks ({seconds:.2} s at {} Hz), {} overruns, {} lost records\n  {timing}{refused}{trip}\n  recording  {}\n",
+            self.outcome, self.ticks, config.servo.rate_hz, self.overruns, self.lost_records, self.recording
+        )
+    }
+}

@@ -1,0 +1,111 @@
+//! The two paces of the loop. The pace is the only difference between a study and a rig.
+
+use bench_hal::Tick;
+use nix::sys::time::TimeSpec;
+use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
+
+use super::outlet::Outlet;
+
+/// When a tick began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moment {
+    /// The tick to serve.
+    pub tick: Tick,
+    /// When it really began, in nanoseconds since the loop started.
+    pub woke_ns: u64,
+    /// Scheduled ticks before it that passed unserved.
+    pub missed: u32,
+}
+
+/// Where ticks come from.
+pub trait Clock {
+    /// Waits for the tick `number`, or, where that has passed by more than a period, for none: then the moment is that of
+    /// the latest tick due, and says how many were missed.
+    fn wait(&mut self, number: u64, outlet: &Outlet) -> Moment;
+
+    /// Nanoseconds since the loop started, asked within `tick`. *In the tick.*
+    fn now_ns(&self, tick: Tick) -> u64;
+
+    /// Begins the schedule anew, so that the tick `number` is due one period from now.
+    fn restart(&mut self, number: u64);
+}
+
+/// Scheduled time of a tick.
+fn tick(number: u64, period_s: f64) -> Tick {
+    Tick { number, scheduled_ns: (number as f64 * period_s * 1e9).round() as u64 }
+}
+
+/// Back to back, as fast as the machine goes; every tick begins and ends when it is due. Waits for room in the ring, so
+/// that nothing is lost.
+#[derive(Clone, Copy, Debug)]
+pub struct Virtual {
+    /// Length of a tick in seconds.
+    pub period_s: f64,
+}
+
+impl Clock for Virtual {
+    fn wait(&mut self, number: u64, outlet: &Outlet) -> Moment {
+        while !outlet.has_room() && !outlet.is_abandoned() {
+            std::thread::yield_now();
+        }
+        let tick = tick(number, self.period_s);
+        Moment { tick, woke_ns: tick.scheduled_ns, missed: 0 }
+    }
+
+    fn now_ns(&self, tick: Tick) -> u64 {
+        tick.scheduled_ns
+    }
+
+    fn restart(&mut self, _number: u64) {}
+}
+
+/// By the system's monotonic clock, slept for in absolute time.
+#[derive(Clone, Copy, Debug)]
+pub struct Realtime {
+    period_s: f64,
+    /// The clock's reading, in nanoseconds, at the loop's time zero.
+    origin_ns: i128,
+}
+
+impl Realtime {
+    /// A clock whose tick 0 is due one period from now.
+    pub fn new(period_s: f64) -> Self {
+        let mut clock = Realtime { period_s, origin_ns: 0 };
+        clock.restart(0);
+        clock
+    }
+
+    fn elapsed_ns(&self) -> i128 {
+        monotonic_ns() - self.origin_ns
+    }
+}
+
+/// The monotonic clock; it cannot fail on Linux, where it always exists.
+fn monotonic_ns() -> i128 {
+    clock_gettime(ClockId::CLOCK_MONOTONIC)
+        .map_or(0, |t| i128::from(t.tv_sec()) * 1_000_000_000 + i128::from(t.tv_nsec()))
+}
+
+impl Clock for Realtime {
+    fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
+        let due = self.origin_ns + i128::from(tick(number, self.period_s).scheduled_ns);
+        let until = TimeSpec::new((due / 1_000_000_000) as i64, (due % 1_000_000_000) as i64);
+        // A signal may end the sleep early: sleep on until the time has come.
+        while monotonic_ns() < due {
+            let _ = clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &until);
+        }
+        let woke_ns = self.elapsed_ns().max(0) as u64;
+        let late_ns = woke_ns.saturating_sub(tick(number, self.period_s).scheduled_ns);
+        let missed = (late_ns as f64 * 1e-9 / self.period_s) as u32;
+        Moment { tick: tick(number + u64::from(missed), self.period_s), woke_ns, missed }
+    }
+
+    fn now_ns(&self, _tick: Tick) -> u64 {
+        self.elapsed_ns().max(0) as u64
+    }
+
+    fn restart(&mut self, number: u64) {
+        let due = tick(number, self.period_s).scheduled_ns;
+        self.origin_ns = monotonic_ns() + (self.period_s * 1e9) as i128 - i128::from(due);
+    }
+}

@@ -1,0 +1,22 @@
+//! One run of the bench, from arming to the closed file.
+//!
+//! ```text
+//!  Plan (config -> program, texts)  ->  run: loop thread + recorder thread, tokio supervising from outside  ->  Run
+//!                                                                                    Recording -> replay
+//! ```
+//!
+//! tokio never stands in the loop's way: it watches counters, signals and the recorder's health, and talks to the loop
+//! through the ring of orders alone.
+
+mod analysis;
+mod measure;
+mod name;
+mod plan;
+mod replay;
+mod run;
+
+pub use analysis::{Analysis, AnalysisError, analyse};
+pub use measure::{Measured, measure};
+pub use plan::{Kind, Plan, PlanError};
+pub use replay::{Difference, ReplayError, Replayed, replay};
+pub use run::{Run, SessionError, run};

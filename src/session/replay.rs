@@ -1,0 +1,198 @@
+//! The recorded probe through the same loop.
+//!
+//! Rig and clock are those of the recording: every reading, every moment, every order at its tick. What the loop decides
+//! from them must be what it decided then, bit for bit.
+
+use std::sync::Arc;
+
+use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use super::plan::{Plan, PlanError};
+use crate::recording::{Recording, RecordingError};
+use crate::rt::clock::{Clock, Moment};
+use crate::rt::interlock::Interlocks;
+use crate::rt::outlet::{Outlet, SLOTS_PER_TICK};
+use crate::rt::program::Program;
+use crate::rt::record::{Event, EventKind, OrderKind, Published, TickRecord};
+use crate::rt::servo::{Connections, Order, Progress, Servo};
+
+/// A recording that cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// No plan can be made from it.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// It cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// It has gaps: what the loop saw there is not known.
+    #[error(
+        "{lost} records are missing from the recording, the first after tick {after}: what the loop saw there is not known, so nothing after it can be replayed"
+    )]
+    Gap {
+        /// How many.
+        lost: u64,
+        /// Last tick before the first gap.
+        after: u64,
+    },
+}
+
+/// A tick at which the replay differs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Which tick.
+    pub tick: u64,
+    /// What the amplifier was told then.
+    pub recorded_a: f64,
+    /// What it would be told now.
+    pub replayed_a: f64,
+}
+
+/// What a replay showed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replayed {
+    /// Ticks compared.
+    pub ticks: u64,
+    /// Ticks that differ in command, request, reference, state or flags.
+    pub different: u64,
+    /// The first of them.
+    pub first: Option<Difference>,
+}
+
+/// Replays a recording.
+pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
+    if let Some(gap) = recording.gaps().iter().find(|gap| gap.lost > 0) {
+        return Err(ReplayError::Gap { lost: recording.lost_records(), after: gap.after_tick });
+    }
+    let plan = Plan::of(recording)?;
+    let (published, records) = RingBuffer::new(64);
+    let (orders, taken) = RingBuffer::new(64);
+    let (spent, collected) = RingBuffer::new(64);
+    let connections =
+        Connections { orders: taken, spent, outlet: Outlet::new(published), progress: Arc::new(Progress::default()) };
+    let (to_rig, readings) = RingBuffer::new(4);
+    let rig = Box::new(RecordedRig { current: TickRecord::default(), readings, status: AmplifierStatus::Disabled });
+    let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
+    let program = plan.program()?;
+    let mut comparison = Comparison {
+        servo,
+        orders,
+        to_rig,
+        records,
+        collected,
+        program: Some(program),
+        replayed: Replayed { ticks: 0, different: 0, first: None },
+    };
+    let mut events = recording.events().iter().peekable();
+    for record in recording.ticks()? {
+        let record = record?;
+        while let Some(event) = events.next_if(|event| event.tick <= record.tick) {
+            comparison.order(event);
+        }
+        comparison.tick(&record);
+    }
+    Ok(comparison.replayed)
+}
+
+struct Comparison {
+    servo: Servo,
+    orders: Producer<Order>,
+    to_rig: Producer<TickRecord>,
+    records: Consumer<Published>,
+    collected: Consumer<Box<dyn Program>>,
+    program: Option<Box<dyn Program>>,
+    replayed: Replayed,
+}
+
+impl Comparison {
+    fn order(&mut self, event: &Event) {
+        let EventKind::Order(kind) = event.kind else { return };
+        let order = match kind {
+            OrderKind::Arm => Some(Order::Arm),
+            OrderKind::Start => self.program.take().map(Order::Start),
+            OrderKind::Stop => Some(Order::Stop),
+            OrderKind::Clear => Some(Order::Clear),
+        };
+        // The loop empties its ring at every tick.
+        let _ = order.map(|order| self.orders.push(order));
+    }
+
+    fn tick(&mut self, recorded: &TickRecord) {
+        let tick = Tick { number: recorded.tick, scheduled_ns: recorded.scheduled_ns };
+        let moment = Moment { tick, woke_ns: recorded.woke_ns, missed: recorded.missed_ticks };
+        // The rig takes its record within this very tick.
+        let _ = self.to_rig.push(*recorded);
+        self.servo.tick(&moment, &RecordedClock(recorded.done_ns));
+        while self.collected.pop().is_ok() {}
+        while let Ok(published) = self.records.pop() {
+            if let Published::Tick(now) = published {
+                self.compare(recorded, &now);
+            }
+        }
+    }
+
+    fn compare(&mut self, recorded: &TickRecord, now: &TickRecord) {
+        let bits = |r: &TickRecord| [r.command_a, r.requested_a, r.reference_m].map(f64::to_bits);
+        self.replayed.ticks += 1;
+        if bits(recorded) != bits(now) || (recorded.state, recorded.flags) != (now.state, now.flags) {
+            self.replayed.different += 1;
+            let difference = Difference { tick: now.tick, recorded_a: recorded.command_a, replayed_a: now.command_a };
+            self.replayed.first.get_or_insert(difference);
+        }
+    }
+}
+
+/// Says what the probe said, and takes commands as the amplifier took them.
+struct RecordedRig {
+    current: TickRecord,
+    readings: Consumer<TickRecord>,
+    status: AmplifierStatus,
+}
+
+impl CurrentAmplifier for RecordedRig {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        self.status = AmplifierStatus::Enabled;
+        Ok(())
+    }
+
+    /// The same request is answered as it was then; another one is given as it is, which the comparison will show.
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        let same = current_a.to_bits() == self.current.requested_a.to_bits();
+        Ok(if same { self.current.command_a } else { current_a })
+    }
+
+    fn disable(&mut self) {
+        self.status = AmplifierStatus::Disabled;
+    }
+
+    fn status(&self) -> AmplifierStatus {
+        self.status
+    }
+}
+
+impl DisplacementProbe for RecordedRig {
+    fn latest(&mut self, _now: Tick) -> Reading {
+        if let Ok(record) = self.readings.pop() {
+            self.current = record;
+        }
+        let r = &self.current;
+        Reading { position_m: r.position_m, sequence: r.probe_sequence, age_ns: r.probe_age_ns, validity: r.validity }
+    }
+}
+
+struct RecordedClock(u64);
+
+impl Clock for RecordedClock {
+    fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
+        Moment { tick: Tick { number, scheduled_ns: 0 }, woke_ns: 0, missed: 0 }
+    }
+
+    fn now_ns(&self, _tick: Tick) -> u64 {
+        self.0
+    }
+
+    fn restart(&mut self, _number: u64) {}
+}
+
+const _: () = assert!(SLOTS_PER_TICK <= 64, "the ring of a replay holds what a tick publishes");
