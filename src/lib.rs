@@ -1,7 +1,60 @@
 //! `bench`: a controller daemon for a precision-motion test bench.
+//!
+//! A real-time loop drives a voice coil motor through a current amplifier and reads a displacement probe, behind a hardware
+//! boundary ([`bench_hal`]) with a simulated or a real stage behind it.
+//!
+//! ```text
+//!  bench-config/*.toml
+//!        |
+//!     config ----> plant ----> sim (a rig that obeys the model)
+//!        |           |            |  implements
+//!        v           v            v
+//!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe)
+//!                             |
+//!                             v  wait-free ring
+//!                         recording (MCAP) ----> identify ----> report
+//!                                   \______ session (one run, its analysis, its replay) ______ cli
+//! ```
+//!
+//! Imports point towards what stands earlier in this picture. [`cli`] sees all, nobody sees it.
+//!
+//! | to find | look in |
+//! |---|---|
+//! | the loop on one screen | [`rt::servo`] |
+//! | the interlocks and the arming machine | [`rt::interlock`], [`rt::arming`] |
+//! | the fast and the slow controller | `bench-config/controllers/`, run by [`control::Controller`] |
+//! | margins of a loop | [`control::ClosedLoop`] |
+//! | zeros, signs, sequence of dominant modes | [`plant`] |
+//! | what the simulated stage does | [`sim`] |
+//! | how a frequency response is estimated | [`identify`] |
+//! | what stands in a recording | [`recording`] and `recordings/README.md` |
+//!
+//! # To add one
+//!
+//! | a new | one file | one line |
+//! |---|---|---|
+//! | profile | `bench-config/NAME.toml`: what differs from `stage.toml` | in [`config::profiles::PROFILES`] |
+//! | controller | `bench-config/controllers/NAME.toml`, or any file with `--controller` | in [`config::profiles::CONTROLLERS`] |
+//! | kind of section | none | a variant and its arm in `control/file.rs` |
+//! | plant | `plant/NAME.rs`: settings to [`plant::Structure`] | a variant of [`config::PlantSettings`] and its arm in [`plant::build`] |
+//! | excitation | `excitation/NAME.rs` with [`excitation::Excitation`] | where [`session::Plan::program`] chooses |
+//! | reference | a struct in `excitation/reference.rs` | a variant of [`config::ReferenceSettings`] and its arm |
+//! | device | below `hal/src/`, with the traits of [`bench_hal`] | where the command line makes the rig |
+//!
+//! # Conventions
+//!
+//! SI units inside, and in names: `_m _a _n _hz _rad_s _s _ns`, ratios bare. Positive current gives positive force, positive
+//! force positive displacement; u = C (r - y). Micrometres appear in controllers' gains, which are printed in amperes per
+//! micrometre, and in what a person reads.
+
+pub mod cli;
 pub mod config;
 pub mod control;
 pub mod excitation;
+pub mod identify;
 pub mod plant;
+pub mod recording;
+pub mod report;
 pub mod rt;
+pub mod session;
 pub mod sim;
