@@ -1,0 +1,126 @@
+//! What a tick costs. `cargo bench --bench loop` prints the time of one tick, and of the whole command.
+//!
+//! Figures asked for: below 250 ns for interlocks and fast controller alone, below 1 us with the simulated rig and the
+//! record, below 2 s for `bench chirp` as a whole (120 s at 5 kHz, analysis and plot included).
+
+use std::hint::black_box;
+use std::process::Command;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bench::config::{Config, Source, load};
+use bench::control::{Controller, ControllerText};
+use bench::recording::{self, Header, Recorder};
+use bench::rt::clock::Virtual;
+use bench::rt::interlock::Interlocks;
+use bench::rt::outlet::Outlet;
+use bench::rt::program::{Decision, Program};
+use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench::rt::thread::run;
+use bench::session::Plan;
+use bench::sim::SimulatedRig;
+use bench_hal::{Reading, Tick, Validity};
+use criterion::{Criterion, criterion_group, criterion_main};
+use rtrb::RingBuffer;
+
+fn stage() -> Config {
+    load(&Source::default()).expect("the default profile is valid")
+}
+
+/// Reading and command past the interlocks, error through the fast controller.
+fn check_and_control(c: &mut Criterion) {
+    let config = stage();
+    let sections = ControllerText::find("fast").and_then(|text| text.sections(5000.0)).expect("embedded");
+    let mut controller = Controller::new(&sections, 2e-4);
+    let mut interlocks = Interlocks::new(&config);
+    let mut number = 0;
+    c.bench_function("tick: check + fast controller", |b| {
+        b.iter(|| {
+            number += 1;
+            let position_m = if number % 2 == 0 { 30e-9 } else { -30e-9 };
+            let reading = Reading { position_m, sequence: number, age_ns: 0, validity: Validity::Valid };
+            let now = Tick { number, scheduled_ns: number * 200_000 };
+            let checked = interlocks.check_reading(black_box(&reading), now);
+            let command_a = controller.update(-reading.position_m);
+            let passed = interlocks.check_command(command_a);
+            interlocks.note(command_a);
+            black_box((checked.is_ok(), passed.is_ok(), command_a))
+        });
+    });
+}
+
+/// A program cut to a number of ticks.
+struct First(Box<dyn Program>, u64);
+
+impl Program for First {
+    fn decide(&mut self, tick: u64, position_m: f64) -> Decision {
+        self.0.decide(tick, position_m)
+    }
+    fn ticks(&self) -> u64 {
+        self.1
+    }
+}
+
+/// The whole loop as `bench chirp` and `bench control` run it: simulated rig, interlocks, program, ring, recorder.
+fn rig_and_record(c: &mut Criterion) {
+    let mut group = c.benchmark_group("tick: rig + loop + record");
+    group.sample_size(10).measurement_time(Duration::from_secs(8));
+    let mut config = stage();
+    config.control.duration_s = 1e6;
+    config.chirp.duration_s = 1000.0;
+    for (name, plan) in
+        [("chirp", Plan::chirp(config.clone())), ("fast", Plan::control(config.clone()).expect("embedded"))]
+    {
+        let header = Header { config_toml: String::new(), period_ns: 200_000, ..Header::default() };
+        group.bench_function(name, |b| {
+            b.iter_custom(|ticks| {
+                let folder = tempfile::tempdir().expect("temporary folder");
+                let recorder = Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
+                let (producer, consumer) = RingBuffer::new(1 << 16);
+                let (mut orders, taken) = RingBuffer::new(4);
+                let (spent, _kept) = RingBuffer::new(4);
+                let connections = Connections {
+                    orders: taken,
+                    spent,
+                    outlet: Outlet::new(producer),
+                    progress: Arc::new(Progress::default()),
+                };
+                let rig = Box::new(SimulatedRig::new(&config).expect("valid"));
+                let servo = Servo::new(rig, Interlocks::new(&config), connections);
+                let program = Box::new(First(plan.program().expect("valid"), ticks));
+                for order in [Order::Arm, Order::Start(program)] {
+                    assert!(orders.push(order).is_ok());
+                }
+                let recorder = recording::spawn(recorder, consumer).expect("a thread");
+                let start = Instant::now();
+                let ended = run(servo, Virtual { period_s: 2e-4 }, 0);
+                recorder.join().and_then(|recorder| recorder.finish(&[])).expect("a whole file");
+                assert!(ended.completed);
+                start.elapsed()
+            });
+        });
+    }
+    group.finish();
+}
+
+/// The command as a person types it.
+fn whole_command(c: &mut Criterion) {
+    let mut group = c.benchmark_group("command");
+    group.sample_size(10).measurement_time(Duration::from_secs(20));
+    group.bench_function("bench chirp", |b| {
+        b.iter_custom(|times| {
+            let folder = tempfile::tempdir().expect("temporary folder");
+            let start = Instant::now();
+            for _ in 0..times {
+                let done =
+                    Command::new(env!("CARGO_BIN_EXE_bench")).args(["chirp", "--json"]).current_dir(&folder).output();
+                assert!(done.expect("runs").status.success());
+            }
+            start.elapsed()
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, check_and_control, rig_and_record, whole_command);
+criterion_main!(benches);
