@@ -12,14 +12,14 @@ use crate::recording::Recording;
 use crate::report::{Curve, Trace, bode_svg};
 use crate::session::{Analysis, AnalysisError, analyse};
 
-/// The files that were made and what the response shows.
+/// The files that were made and what the response shows; `null` where the run gave no response.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Made {
-    frf_csv: String,
-    plot: String,
+    frf_csv: Option<String>,
+    plot: Option<String>,
     frequencies: usize,
     /// Median coherence over the band.
-    coherence_median: f64,
+    coherence_median: Option<f64>,
     filled_ticks: u64,
     modes: [(); 0],
     zeros: [(); 0],
@@ -41,20 +41,27 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
     let plot_path = free(recording.path(), "bode", "svg");
     write_new(&plot_path, &plot(&analysis, config, recording)?)?;
     Ok(Made {
-        frf_csv: csv_path.display().to_string(),
-        plot: plot_path.display().to_string(),
+        frf_csv: Some(csv_path.display().to_string()),
+        plot: Some(plot_path.display().to_string()),
         frequencies: analysis.frf.len(),
         coherence_median: median(&analysis.frf.coherence),
         filled_ticks: analysis.filled_ticks,
-        modes: [],
-        zeros: [],
-        cnmp: "undecided",
-        why: "this version estimates the frequency response; it does not fit modes and zeros to it",
+        ..Made::nothing("this version estimates the frequency response; it does not fit modes and zeros to it")
     })
 }
 
 impl Made {
+    /// Nothing was made.
+    pub fn nothing(why: &'static str) -> Made {
+        let (frf_csv, plot, coherence_median) = (None, None, None);
+        let (frequencies, filled_ticks, modes, zeros) = (0, 0, [], []);
+        Made { frf_csv, plot, frequencies, coherence_median, filled_ticks, modes, zeros, cnmp: "undecided", why }
+    }
+
     pub fn text(&self) -> String {
+        let (Some(frf_csv), Some(plot), Some(coherence)) = (&self.frf_csv, &self.plot, self.coherence_median) else {
+            return format!("  no frequency response: {}\n", self.why);
+        };
         let filled = if self.filled_ticks > 0 {
             format!(", {} missing ticks filled in", self.filled_ticks)
         } else {
@@ -62,7 +69,7 @@ impl Made {
         };
         format!(
             "  response   {} ({} frequencies, median coherence {:.4}{filled})\n  plot       {}\n",
-            self.frf_csv, self.frequencies, self.coherence_median, self.plot
+            frf_csv, self.frequencies, coherence, plot
         )
     }
 }
@@ -95,8 +102,8 @@ fn write_new(path: &Path, text: &str) -> Result<(), CliError> {
     std::fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)
 }
 
-fn median(values: &[f64]) -> f64 {
+fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    sorted.get(sorted.len() / 2).copied()
 }

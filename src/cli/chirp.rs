@@ -53,7 +53,7 @@ struct Report {
     run: RunReport,
     expected_travel_m: f64,
     #[serde(flatten)]
-    made: Option<Made>,
+    made: Made,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -64,8 +64,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let totals = run.totals()?;
     let report = RunReport::new(&run, &totals, args.run.pace);
     let made = match report.outcome {
-        "completed" => Some(make(&Recording::open(&run.path)?, &config)?),
-        _ => None,
+        "completed" => make(&Recording::open(&run.path)?, &config)?,
+        _ => Made::nothing("the run did not come to its end"),
     };
     let report = Report { run: report, expected_travel_m, made };
     let json = serde_json::to_string_pretty(&report).map_err(|e| CliError::Failed(e.to_string()))?;
@@ -97,6 +97,6 @@ fn text(report: &Report, config: &Config) -> String {
         config.chirp.duration_s,
         report.expected_travel_m * 1e6,
         report.run.text(config),
-        report.made.as_ref().map_or(String::new(), Made::text),
+        report.made.text(),
     )
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::choice::Choice;
 use super::margins::{closed_loop, text as margins_text};
 use super::options::{BenchOptions, print_json, print_text};
 use super::run_options::{RunOptions, RunReport};
@@ -11,34 +12,6 @@ use crate::control::{ClosedLoop, Margins, StepFigures, step_figures};
 use crate::excitation::{reference, reference_text};
 use crate::recording::Recording;
 use crate::session::{Measured, Plan, measure};
-
-/// Which controller.
-#[derive(Clone, Debug, Default, clap::Args)]
-#[group(multiple = false)]
-pub(super) struct Choice {
-    /// The fast controller of the thesis, Eq. (6-7)
-    #[arg(long)]
-    fast: bool,
-    /// The slow controller of the thesis, Eq. (6-6)
-    #[arg(long)]
-    slow: bool,
-    /// A TOML file with sections
-    #[arg(long, value_name = "FILE")]
-    controller: Option<String>,
-}
-
-impl Choice {
-    /// The setting that the choice stands for.
-    pub fn sets(&self) -> Vec<String> {
-        let name = match (self.fast, self.slow, &self.controller) {
-            (true, _, _) => Some("fast"),
-            (_, true, _) => Some("slow"),
-            (_, _, Some(file)) => Some(file.as_str()),
-            _ => None,
-        };
-        name.map(|name| format!("control.controller={}", toml::Value::from(name))).into_iter().collect()
-    }
-}
 
 /// Which loop, and what it follows.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,6 +1,6 @@
 //! `bench margins`: how far a loop is from trouble.
 
-use super::control::Choice;
+use super::choice::Choice;
 use super::options::{BenchOptions, print_json, print_text};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};

@@ -2,6 +2,7 @@
 
 mod analysis_output;
 mod chirp;
+mod choice;
 mod config;
 mod control;
 mod identify;

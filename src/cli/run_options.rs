@@ -17,11 +17,15 @@ use crate::sim::SimulatedRig;
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct RunOptions {
     /// Pace of the loop
-    #[arg(long, value_enum, default_value = "virtual")]
+    #[arg(long, value_name = "virtual|realtime", value_parser = pace, default_value = "virtual")]
     pub pace: Pace,
     /// Folder for the recording and what is made from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
+}
+
+fn pace(text: &str) -> Result<Pace, String> {
+    [Pace::Virtual, Pace::Realtime].into_iter().find(|p| p.name() == text).ok_or("allowed is virtual, realtime".into())
 }
 
 impl RunOptions {

@@ -335,16 +335,25 @@ pub struct AmplitudePoint {
     pub current_a: f64,
 }
 
-/// How the frequency response is estimated.
+/// How the frequency response is estimated: H1, averaged in one of two ways.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct IdentifySettings {
-    /// Half-width of the average over frequency, as a ratio of the frequency.
-    #[schemars(range(min = 0.0, max = 0.5))]
-    pub resolution_ratio: f64,
-    /// Smallest half-width in bins of the record's transform.
-    #[schemars(range(min = 2, max = 10000))]
-    pub min_half_width_bins: usize,
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum IdentifySettings {
+    /// Over neighbouring frequencies of the transform of the whole record: no leakage where it begins and ends at rest.
+    Local {
+        /// Half-width of the average, as a ratio of the frequency.
+        #[schemars(range(min = 0.0, max = 0.1))]
+        resolution_ratio: f64,
+        /// Smallest half-width in bins of the record's transform.
+        #[schemars(range(min = 2, max = 10000))]
+        min_half_width_bins: usize,
+    },
+    /// Over segments in time (Welch): Hann windows, half overlapped.
+    Welch {
+        /// Length of a segment in seconds.
+        #[schemars(range(min = 0.001, max = 100000.0))]
+        segment_s: f64,
+    },
 }
 
 /// The closed loop of `bench control`.

@@ -12,7 +12,7 @@ use super::servo::Servo;
 use crate::config::LoopSettings;
 
 /// `virtual` or `realtime`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {
     /// Ticks back to back: studies, tests.

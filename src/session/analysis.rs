@@ -2,10 +2,9 @@
 
 use nalgebra::Complex;
 
-use crate::config::Config;
+use crate::config::{Config, IdentifySettings};
 use crate::control::ClosedLoop;
-use crate::identify::local::estimate;
-use crate::identify::{EstimatorSettings, Frf, IdentifyError, Signals};
+use crate::identify::{EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use crate::plant::{self, Modal, PlantError};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
@@ -58,16 +57,25 @@ pub struct Analysis {
 /// Analyses a recording made with `config`.
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
     let (signals, filled_ticks) = signals(recording, config.servo.rate_hz)?;
-    let settings = EstimatorSettings {
-        min_half_width_bins: config.identify.min_half_width_bins as f64,
-        resolution_ratio: config.identify.resolution_ratio,
-    };
     let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
-    let frf = estimate(&signals, (start_hz.min(stop_hz), start_hz.max(stop_hz)), &settings)?;
+    let frf = response(&signals, (start_hz.min(stop_hz), start_hz.max(stop_hz)), &config.identify)?;
     let modal = Modal::of(&plant::build(&config.plant)?)?;
     let chain = ClosedLoop::new(config, modal.modes, Vec::new());
     let model = frf.frequency_hz.iter().map(|f| chain.sampled_plant(2.0 * std::f64::consts::PI * f)).collect();
     Ok(Analysis { frf, model, filled_ticks })
+}
+
+/// H1 as configured.
+fn response(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings) -> Result<Frf, IdentifyError> {
+    match *settings {
+        IdentifySettings::Local { resolution_ratio, min_half_width_bins } => {
+            let min_half_width_bins = min_half_width_bins as f64;
+            local::estimate(signals, band_hz, &EstimatorSettings { min_half_width_bins, resolution_ratio })
+        }
+        IdentifySettings::Welch { segment_s } => {
+            welch::estimate(signals, band_hz, libm::round(segment_s * signals.rate_hz) as usize)
+        }
+    }
 }
 
 /// Command and position of every tick of the run.
