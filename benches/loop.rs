@@ -14,7 +14,6 @@ use bench::recording::{self, Header, Recorder};
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
 use bench::rt::outlet::Outlet;
-use bench::rt::program::{Decision, Program};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
 use bench::rt::thread::run;
 use bench::session::Plan;
@@ -49,58 +48,49 @@ fn check_and_control(c: &mut Criterion) {
     });
 }
 
-/// A program cut to a number of ticks.
-struct First(Box<dyn Program>, u64);
-
-impl Program for First {
-    fn decide(&mut self, tick: u64, position_m: f64) -> Decision {
-        self.0.decide(tick, position_m)
-    }
-    fn ticks(&self) -> u64 {
-        self.1
-    }
-}
+/// Ticks of a run: two minutes, so that opening and closing the file do not count.
+const TICKS: u64 = 600_000;
 
 /// The whole loop as `bench chirp` and `bench control` run it: simulated rig, interlocks, program, ring, recorder.
 fn rig_and_record(c: &mut Criterion) {
     let mut group = c.benchmark_group("tick: rig + loop + record");
     group.sample_size(10).measurement_time(Duration::from_secs(8));
     let mut config = stage();
-    config.control.duration_s = 1e6;
-    config.chirp.duration_s = 1000.0;
-    for (name, plan) in
-        [("chirp", Plan::chirp(config.clone())), ("fast", Plan::control(config.clone()).expect("embedded"))]
-    {
-        let header = Header { config_toml: String::new(), period_ns: 200_000, ..Header::default() };
+    config.control.duration_s = TICKS as f64 / config.servo.rate_hz;
+    let plans = [("chirp", Plan::chirp(config.clone())), ("fast", Plan::control(config.clone()).expect("embedded"))];
+    for (name, plan) in plans {
         group.bench_function(name, |b| {
             b.iter_custom(|ticks| {
-                let folder = tempfile::tempdir().expect("temporary folder");
-                let recorder = Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
-                let (producer, consumer) = RingBuffer::new(1 << 16);
-                let (mut orders, taken) = RingBuffer::new(4);
-                let (spent, _kept) = RingBuffer::new(4);
-                let connections = Connections {
-                    orders: taken,
-                    spent,
-                    outlet: Outlet::new(producer),
-                    progress: Arc::new(Progress::default()),
-                };
-                let rig = Box::new(SimulatedRig::new(&config).expect("valid"));
-                let servo = Servo::new(rig, Interlocks::new(&config), connections);
-                let program = Box::new(First(plan.program().expect("valid"), ticks));
-                for order in [Order::Arm, Order::Start(program)] {
-                    assert!(orders.push(order).is_ok());
-                }
-                let recorder = recording::spawn(recorder, consumer).expect("a thread");
-                let start = Instant::now();
-                let ended = run(servo, Virtual { period_s: 2e-4 }, 0);
-                recorder.join().and_then(|recorder| recorder.finish(&[])).expect("a whole file");
-                assert!(ended.completed);
-                start.elapsed()
+                let (elapsed, served) = one_run(&config, &plan);
+                elapsed.mul_f64(ticks as f64 / served as f64)
             });
         });
     }
     group.finish();
+}
+
+/// Time and ticks of one run, the last record written.
+fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let header = Header { period_ns: 200_000, ..Header::default() };
+    let recorder = Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
+    let (producer, consumer) = RingBuffer::new(1 << 16);
+    let (mut orders, taken) = RingBuffer::new(4);
+    let (spent, _kept) = RingBuffer::new(4);
+    let progress = Arc::new(Progress::default());
+    let connections = Connections { orders: taken, spent, outlet: Outlet::new(producer), progress };
+    let rig = Box::new(SimulatedRig::new(config).expect("valid"));
+    let servo = Servo::new(rig, Interlocks::new(config), connections);
+    for order in [Order::Arm, Order::Start(plan.program().expect("valid"))] {
+        assert!(orders.push(order).is_ok());
+    }
+    let recorder = recording::spawn(recorder, consumer).expect("a thread");
+    let start = Instant::now();
+    let ended = run(servo, Virtual { period_s: config.servo.period_s() }, 0);
+    let mut recorder = recorder.join().expect("a whole recording");
+    let ticks = recorder.complete().expect("a whole recording").ticks;
+    assert!(ended.completed);
+    (start.elapsed(), ticks)
 }
 
 /// The command as a person types it.

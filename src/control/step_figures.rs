@@ -38,8 +38,7 @@ mod tests {
             let overshoot = 100.0 * (-std::f64::consts::PI * zeta / (1.0 - zeta * zeta).sqrt()).exp();
             assert!((figures.overshoot_percent - overshoot).abs() < 0.01, "{figures:?}");
             // The last time |1 - y| passes 2 %, found on the closed form itself.
-            let settled =
-                (0..1_000_000).map(|k| f64::from(k) * 1e-6).filter(|t| (1.0 - y(*t)).abs() > 0.02).last().unwrap();
+            let settled = (0..1_000_000).map(|k| f64::from(k) * 1e-6).rfind(|t| (1.0 - y(*t)).abs() > 0.02).unwrap();
             assert!((figures.settling_time_s.unwrap() - settled).abs() < 2.0 * period_s, "{figures:?} {settled}");
         }
     }
