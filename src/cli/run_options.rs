@@ -67,6 +67,7 @@ pub(super) struct TripJson {
     reason: &'static str,
     tick: u64,
     text: String,
+    remedy: &'static str,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -96,7 +97,12 @@ impl From<&Quantiles> for QuantilesJson {
 
 impl RunReport {
     pub fn new(run: &Run, totals: &Totals, pace: Pace) -> Self {
-        let trip = |(trip, tick): (Trip, u64)| TripJson { reason: trip.reason(), tick, text: trip.to_string() };
+        let trip = |(trip, tick): (Trip, u64)| TripJson {
+            reason: trip.reason(),
+            tick,
+            text: trip.to_string(),
+            remedy: trip.remedy(),
+        };
         RunReport {
             outcome: match (run.ended.trip.is_some(), run.ended.completed) {
                 (true, _) => "tripped",
@@ -135,7 +141,10 @@ impl RunReport {
         let seconds = self.ticks as f64 * config.servo.period_s();
         let trip = self.trip.as_ref().map_or(String::new(), |t| {
             let at_s = t.tick as f64 * config.servo.period_s();
-            format!("\n  TRIPPED at tick {} ({at_s:.4} s): {}; zero current, amplifier disabled", t.tick, t.text)
+            format!(
+                "\n  TRIPPED at tick {} ({at_s:.4} s): {}; zero current, amplifier disabled\n  remedy     {}",
+                t.tick, t.text, t.remedy
+            )
         });
         let refused: String = self.timing.refused.iter().map(|line| format!("\n  not granted: {line}")).collect();
         let t = &self.timing;

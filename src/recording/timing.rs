@@ -51,7 +51,8 @@ impl Spread {
     }
 }
 
-/// Lateness (woke - scheduled) and compute time (done - woke) together.
+/// Lateness and compute time (done - woke) together. Lateness is woke - due: a tick that passed unserved was due a period
+/// earlier, so the tick that is served in its place is late by all periods missed.
 struct Pair {
     lateness: Spread,
     compute: Spread,
@@ -62,8 +63,9 @@ impl Pair {
         Pair { lateness: Spread::new(), compute: Spread::new() }
     }
 
-    fn add(&mut self, tick: &TickRecord) {
-        self.lateness.add(tick.woke_ns.saturating_sub(tick.scheduled_ns));
+    fn add(&mut self, tick: &TickRecord, period_ns: u64) {
+        let missed_ns = u64::from(tick.missed_ticks).saturating_mul(period_ns);
+        self.lateness.add(tick.woke_ns.saturating_add(missed_ns).saturating_sub(tick.scheduled_ns));
         self.compute.add(tick.done_ns.saturating_sub(tick.woke_ns));
     }
 }
@@ -78,6 +80,7 @@ struct Second {
 
 /// Makes a [`Timing`] of every second of scheduled time in which there are ticks, and the quantiles of all.
 pub(super) struct Tally {
+    period_ns: u64,
     second: Option<Second>,
     within: Pair,
     all: Pair,
@@ -86,8 +89,8 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    pub(super) fn new() -> Tally {
-        Tally { second: None, within: Pair::new(), all: Pair::new(), reported_overruns: 0, reported_lost: 0 }
+    pub(super) fn new(period_ns: u64) -> Tally {
+        Tally { period_ns, second: None, within: Pair::new(), all: Pair::new(), reported_overruns: 0, reported_lost: 0 }
     }
 
     /// Whether `tick` belongs to a later second than the one under way, which is then to be closed first.
@@ -97,8 +100,8 @@ impl Tally {
 
     /// Takes in a tick.
     pub(super) fn add(&mut self, tick: &TickRecord) {
-        self.within.add(tick);
-        self.all.add(tick);
+        self.within.add(tick, self.period_ns);
+        self.all.add(tick, self.period_ns);
         let number = tick.scheduled_ns / SECOND_NS;
         let second = self.second.get_or_insert(Second { number, first_tick: tick.tick, last: *tick, ticks: 0 });
         second.last = *tick;

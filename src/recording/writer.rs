@@ -57,7 +57,7 @@ pub struct Totals {
     /// Records lost on the way from the loop: the larger of what the loop announced and what gaps in the tick numbers
     /// show.
     pub lost_records: u64,
-    /// Woke - scheduled.
+    /// Woke - due; a tick in whose place others were missed was due before them.
     pub lateness: Quantiles,
     /// Done - woke.
     pub compute: Quantiles,
@@ -105,7 +105,7 @@ impl Recorder {
             chunk_ends_ns: CHUNK_NS,
             encoded: Vec::new(),
             account: Continuity::default(),
-            tally: Tally::new(),
+            tally: Tally::new(header.period_ns),
             digest: Digest::default(),
         })
     }

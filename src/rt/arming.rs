@@ -141,6 +141,27 @@ impl Trip {
         }
     }
 
+    /// What a person can do about it.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Trip::Travel { .. } => "check the loop's margins and the amplitude; the limit is interlock.soft_limit_m",
+            Trip::PeakCurrent { .. } => {
+                "check the loop's margins; the limit is motor.peak_force_n over the force constant"
+            }
+            Trip::ContinuousCurrent { .. } => "let the motor cool, lower amplitude or duration",
+            Trip::CommandNotFinite => "check the controller and its reference",
+            Trip::ProbeInvalid => "check the probe's cable, target and range",
+            Trip::ProbeStale { .. } => "check the probe's rate and connection; the limit is interlock.probe_stale_s",
+            Trip::ProbeStuck { .. } => {
+                "check the probe and the motor's connection; the limit is interlock.probe_stuck_s"
+            }
+            Trip::Overruns { .. } => {
+                "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s"
+            }
+            Trip::Amplifier { .. } => "look up the code in the amplifier's manual, clear its fault, start again",
+        }
+    }
+
     /// The value that crossed the limit, and the limit, where there are such.
     pub fn value_and_limit(&self) -> Option<(f64, f64)> {
         match *self {

@@ -207,3 +207,17 @@ fn what_was_recovered_from_a_cut_file_is_complete_and_tells_of_the_cut() {
     assert_eq!(recovered.cut.expect("was cut").of_bytes, bytes.len() as u64 * 6 / 10);
     assert_eq!(ticks_of(&published)[..whole.tick_count() as usize].last().map(|t| t.tick), Some(whole.last_tick()));
 }
+
+#[test]
+fn a_tick_in_whose_place_three_were_missed_is_late_by_three_periods_more() {
+    let folder = tempfile::tempdir().expect("temporary directory");
+    let ticks = [0, 1, 5].map(|number| {
+        let missed_ticks = if number == 5 { 3 } else { 0 };
+        let woke_ns = number * PERIOD_NS + 100;
+        Published::Tick(TickRecord { missed_ticks, woke_ns, done_ns: woke_ns + 1, ..tick(number) })
+    });
+    let totals = write(&folder.path().join("late.mcap"), &ticks);
+    assert_eq!(totals.overruns, 3);
+    assert_eq!(totals.lateness.max_ns, 3 * PERIOD_NS + 100);
+    assert_eq!(totals.lateness.p50_ns, 100);
+}
