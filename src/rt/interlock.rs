@@ -3,6 +3,8 @@
 //! A trip is latched by the arming machine, not here: these functions only say whether a reading, a tick or a command may
 //! pass. A command that is not finite is a trip, not a value to clamp.
 
+use std::collections::VecDeque;
+
 use bench_hal::{Reading, Tick, Validity};
 
 use super::arming::Trip;
@@ -22,8 +24,16 @@ pub struct Interlocks {
     thermal_a2: f64,
     last_command_a: f64,
     fresh: Freshness,
-    window_start_ns: u64,
-    window_missed: u32,
+    overruns: Overruns,
+}
+
+/// When ticks were missed within the last second. Its memory is claimed once: no more entries fit into a second than it
+/// has ticks, and none are needed beyond the limit.
+#[derive(Clone, Debug)]
+struct Overruns {
+    when: VecDeque<(u64, u32)>,
+    room: usize,
+    count: u64,
 }
 
 /// Since when the probe says the same.
@@ -53,8 +63,7 @@ impl Interlocks {
             thermal_a2: 0.0,
             last_command_a: 0.0,
             fresh: Freshness::default(),
-            window_start_ns: 0,
-            window_missed: 0,
+            overruns: Overruns::new(config.interlock.overruns_per_s, config.servo.rate_hz),
         }
     }
 
@@ -64,7 +73,7 @@ impl Interlocks {
         if reading.validity != Validity::Valid || !reading.position_m.is_finite() {
             return Err(Trip::ProbeInvalid);
         }
-        let age_ns = reading.age_ns.max(now.scheduled_ns - self.fresh.sequence_ns);
+        let age_ns = reading.age_ns.max(now.scheduled_ns.saturating_sub(self.fresh.sequence_ns));
         if age_ns > self.stale_ns {
             return Err(Trip::ProbeStale { age_s: seconds(age_ns), limit_s: seconds(self.stale_ns) });
         }
@@ -87,24 +96,22 @@ impl Interlocks {
         }
         (fresh.lowest_a, fresh.highest_a) =
             (fresh.lowest_a.min(self.last_command_a), fresh.highest_a.max(self.last_command_a));
-        let unchanged_ns = now.scheduled_ns - fresh.position_ns;
+        let unchanged_ns = now.scheduled_ns.saturating_sub(fresh.position_ns);
         if unchanged_ns > self.stuck_ns && fresh.highest_a - fresh.lowest_a > self.stuck_current_a {
             return Err(Trip::ProbeStuck { unchanged_s: seconds(unchanged_ns), limit_s: seconds(self.stuck_ns) });
         }
         Ok(())
     }
 
-    /// Are too many ticks missed? Counted over a second that begins with a missed tick. *In the tick.*
+    /// Are too many ticks missed within the second that ends now? The last current flowed through them. *In the tick.*
     pub fn check_timing(&mut self, missed: u32, now: Tick) -> Result<(), Trip> {
         if missed == 0 {
             return Ok(());
         }
-        if now.scheduled_ns - self.window_start_ns > 1_000_000_000 || self.window_missed == 0 {
-            (self.window_start_ns, self.window_missed) = (now.scheduled_ns, 0);
-        }
-        self.window_missed = self.window_missed.saturating_add(missed);
-        if self.window_missed > self.overruns_per_s {
-            return Err(Trip::Overruns { count: self.window_missed, limit: self.overruns_per_s });
+        self.heat(self.last_command_a, f64::from(missed));
+        let count = self.overruns.add(missed, now.scheduled_ns);
+        if count > self.overruns_per_s {
+            return Err(Trip::Overruns { count, limit: self.overruns_per_s });
         }
         Ok(())
     }
@@ -126,9 +133,35 @@ impl Interlocks {
 
     /// Takes note of the current that really flows from this tick on. *In the tick.*
     pub fn note(&mut self, command_a: f64) {
-        self.thermal_a2 += self.cooling * (command_a * command_a - self.thermal_a2);
+        self.heat(command_a, 1.0);
         self.last_command_a = command_a;
     }
+
+    fn heat(&mut self, current_a: f64, periods: f64) {
+        self.thermal_a2 += (self.cooling * periods).min(1.0) * (current_a * current_a - self.thermal_a2);
+    }
+}
+
+impl Overruns {
+    fn new(limit: u32, rate_hz: f64) -> Self {
+        let room = (f64::from(limit).min(rate_hz) as usize).saturating_add(2);
+        Overruns { when: VecDeque::with_capacity(room), room, count: 0 }
+    }
+
+    /// How many were missed within the second before `now_ns`, with those that were missed right now.
+    fn add(&mut self, missed: u32, now_ns: u64) -> u32 {
+        while self.when.len() == self.room || self.when.front().is_some_and(|(ns, _)| is_past(*ns, now_ns)) {
+            let (_, gone) = self.when.pop_front().unwrap_or_default();
+            self.count -= u64::from(gone);
+        }
+        self.when.push_back((now_ns, missed));
+        self.count += u64::from(missed);
+        u32::try_from(self.count).unwrap_or(u32::MAX)
+    }
+}
+
+fn is_past(ns: u64, now_ns: u64) -> bool {
+    now_ns.saturating_sub(ns) > 1_000_000_000
 }
 
 fn seconds(ns: u64) -> f64 {

@@ -4,6 +4,7 @@
 use rtrb::Producer;
 
 use super::record::{Event, EventKind, Published, TickRecord};
+use super::servo::ORDERS_PER_TICK;
 
 /// Publishes records and events without waiting.
 pub struct Outlet {
@@ -12,8 +13,10 @@ pub struct Outlet {
     unreported: u64,
 }
 
-/// Free slots that a tick can need: its record, its events, and the count of what was lost.
-pub const SLOTS_PER_TICK: usize = 8;
+/// Free slots that a tick can need: three events an order (arm orders whose amplifier does not enable make four, but each
+/// needs a clear order before the next, which makes two), a trip and its state, the program's end and its state, the record,
+/// and the count of what was lost.
+pub const SLOTS_PER_TICK: usize = 3 * ORDERS_PER_TICK + 6;
 
 impl Outlet {
     /// An outlet into `ring`.

@@ -13,6 +13,9 @@ use super::outlet::Outlet;
 use super::program::{Decision, Program};
 use super::record::{EventKind, OrderKind, TickRecord, flag};
 
+/// Orders that one tick takes; more wait for the next.
+pub const ORDERS_PER_TICK: usize = 16;
+
 /// An order to the loop, taken at a tick boundary. What it carries is whole and immutable.
 pub enum Order {
     /// Enable the amplifier.
@@ -130,7 +133,9 @@ impl Servo {
             let passed = self.interlocks.check_command(requested_a);
             let refused = |error: bench_hal::DeviceError| Trip::Amplifier { code: error.code };
             match passed.and_then(|()| self.rig.command(requested_a).map_err(refused)) {
-                Ok(given_a) => command_a = given_a,
+                Ok(given_a) if given_a.is_finite() => command_a = given_a,
+                // No driver may say so; what really flows is then unknown.
+                Ok(_) => self.trip(Trip::Amplifier { code: 0 }, tick),
                 Err(trip) => self.trip(trip, tick),
             }
         }
@@ -177,7 +182,8 @@ impl Servo {
     }
 
     fn take_orders(&mut self, tick: u64) {
-        while let Ok(order) = self.orders.pop() {
+        for _ in 0..ORDERS_PER_TICK {
+            let Ok(order) = self.orders.pop() else { return };
             self.outlet.event(tick, EventKind::Order(order.kind()));
             match order {
                 Order::Arm => self.arm(tick),
@@ -188,13 +194,15 @@ impl Servo {
         }
     }
 
-    /// Enabling may take its time; nothing moves yet, and the schedule begins anew after it.
+    /// Enabling may take its time; nothing moves yet, and the schedule begins anew after it. Where the order changes
+    /// nothing, neither does it: a schedule that begins anew in the middle of a run would hide a late tick.
     fn arm(&mut self, tick: u64) {
+        if self.state.after(Change::Arm).is_none() {
+            return;
+        }
         self.slow_order = true;
         self.change(Change::Arm, tick);
-        if self.state == State::Armed
-            && let Err(error) = self.rig.enable()
-        {
+        if let Err(error) = self.rig.enable() {
             self.trip(Trip::Amplifier { code: error.code }, tick);
         }
     }
@@ -203,7 +211,7 @@ impl Servo {
         let before = self.state;
         self.change(Change::Start, tick);
         let old = if self.state == State::Running && before != State::Running {
-            (self.run_tick, self.completed) = (0, false);
+            (self.run_tick, self.completed, self.trip) = (0, false, None);
             self.program.replace(program)
         } else {
             Some(program)
@@ -251,7 +259,7 @@ impl Servo {
         matches!(self.state, State::Disarmed | State::Tripped)
     }
 
-    /// The trip, if there was one, and its tick.
+    /// The trip since the last start, if there was one, and its tick.
     pub fn last_trip(&self) -> Option<(Trip, u64)> {
         self.trip
     }

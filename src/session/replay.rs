@@ -1,8 +1,9 @@
 //! The recorded probe through the same loop.
 //!
 //! Rig and clock are those of the recording: every reading, every moment, every order at its tick. What the loop decides
-//! from them must be what it decided then, bit for bit.
+//! from them must be what it decided then, bit for bit. What the amplifier did stands in the trips that it caused.
 
+use std::iter::Peekable;
 use std::sync::Arc;
 
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
@@ -10,11 +11,12 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::plan::{Plan, PlanError};
 use crate::recording::{Recording, RecordingError};
+use crate::rt::arming::{State, Trip};
 use crate::rt::clock::{Clock, Moment};
 use crate::rt::interlock::Interlocks;
 use crate::rt::outlet::{Outlet, SLOTS_PER_TICK};
 use crate::rt::program::Program;
-use crate::rt::record::{Event, EventKind, OrderKind, Published, TickRecord};
+use crate::rt::record::{Event, EventKind, OrderKind, Published, TickRecord, flag};
 use crate::rt::servo::{Connections, Order, Progress, Servo};
 
 /// A recording that cannot be replayed.
@@ -71,14 +73,16 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     let (spent, collected) = RingBuffer::new(64);
     let connections =
         Connections { orders: taken, spent, outlet: Outlet::new(published), progress: Arc::new(Progress::default()) };
-    let (to_rig, readings) = RingBuffer::new(4);
-    let rig = Box::new(RecordedRig { current: TickRecord::default(), readings, status: AmplifierStatus::Disabled });
+    let (to_rig, seen) = RingBuffer::new(4);
+    let (enabled, enables) = RingBuffer::new(64);
+    let rig = Box::new(RecordedRig { now: Seen::default(), seen, enables, status: AmplifierStatus::Disabled });
     let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
     let program = plan.program()?;
     let mut comparison = Comparison {
         servo,
         orders,
         to_rig,
+        enabled,
         records,
         collected,
         program: Some(program),
@@ -87,10 +91,8 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     let mut events = recording.events().iter().peekable();
     for record in recording.ticks()? {
         let record = record?;
-        while let Some(event) = events.next_if(|event| event.tick <= record.tick) {
-            comparison.order(event);
-        }
-        comparison.tick(&record);
+        let amplifier_tripped = comparison.take(&mut events, record.tick);
+        comparison.tick(&Seen { record, amplifier_tripped });
     }
     Ok(comparison.replayed)
 }
@@ -98,16 +100,42 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
 struct Comparison {
     servo: Servo,
     orders: Producer<Order>,
-    to_rig: Producer<TickRecord>,
+    to_rig: Producer<Seen>,
+    enabled: Producer<bool>,
     records: Consumer<Published>,
     collected: Consumer<Box<dyn Program>>,
     program: Option<Box<dyn Program>>,
     replayed: Replayed,
 }
 
+/// What rig and amplifier did in a tick.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    record: TickRecord,
+    /// The amplifier reported a fault, refused the command or gave nonsense.
+    amplifier_tripped: bool,
+}
+
 impl Comparison {
-    fn order(&mut self, event: &Event) {
-        let EventKind::Order(kind) = event.kind else { return };
+    /// The events up to a tick: orders for the loop, and what the amplifier did; whether it made the loop trip.
+    fn take<'a>(&mut self, events: &mut Peekable<impl Iterator<Item = &'a Event>>, tick: u64) -> bool {
+        let of_amplifier = |event: &Event| matches!(event.kind, EventKind::Trip(Trip::Amplifier { .. }));
+        let mut tripped = false;
+        while let Some(event) = events.next_if(|event| event.tick <= tick) {
+            match event.kind {
+                EventKind::Order(kind) => self.order(kind),
+                EventKind::State { from: State::Disarmed, to: State::Armed } => {
+                    let refused = events.next_if(|next| next.tick == event.tick && of_amplifier(next)).is_some();
+                    // The rig takes it within this very tick.
+                    let _ = self.enabled.push(!refused);
+                }
+                _ => tripped |= of_amplifier(event),
+            }
+        }
+        tripped
+    }
+
+    fn order(&mut self, kind: OrderKind) {
         let order = match kind {
             OrderKind::Arm => Some(Order::Arm),
             OrderKind::Start => self.program.take().map(Order::Start),
@@ -118,11 +146,12 @@ impl Comparison {
         let _ = order.map(|order| self.orders.push(order));
     }
 
-    fn tick(&mut self, recorded: &TickRecord) {
+    fn tick(&mut self, seen: &Seen) {
+        let recorded = &seen.record;
         let tick = Tick { number: recorded.tick, scheduled_ns: recorded.scheduled_ns };
         let moment = Moment { tick, woke_ns: recorded.woke_ns, missed: recorded.missed_ticks };
         // The rig takes its record within this very tick.
-        let _ = self.to_rig.push(*recorded);
+        let _ = self.to_rig.push(*seen);
         self.servo.tick(&moment, &RecordedClock(recorded.done_ns));
         while self.collected.pop().is_ok() {}
         while let Ok(published) = self.records.pop() {
@@ -143,40 +172,56 @@ impl Comparison {
     }
 }
 
-/// Says what the probe said, and takes commands as the amplifier took them.
+/// Says what the probe said, and takes or refuses commands as the amplifier did.
 struct RecordedRig {
-    current: TickRecord,
-    readings: Consumer<TickRecord>,
+    now: Seen,
+    seen: Consumer<Seen>,
+    /// Whether the amplifier could be enabled, time after time.
+    enables: Consumer<bool>,
     status: AmplifierStatus,
 }
 
+const REFUSED: DeviceError =
+    DeviceError { what: "the amplifier refused, as recorded", remedy: "see the recording's events", code: 0 };
+
 impl CurrentAmplifier for RecordedRig {
     fn enable(&mut self) -> Result<(), DeviceError> {
+        if self.enables.pop() == Ok(false) {
+            return Err(REFUSED);
+        }
         self.status = AmplifierStatus::Enabled;
         Ok(())
     }
 
     /// The same request is answered as it was then; another one is given as it is, which the comparison will show.
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
-        let same = current_a.to_bits() == self.current.requested_a.to_bits();
-        Ok(if same { self.current.command_a } else { current_a })
+        if self.now.amplifier_tripped {
+            return Err(REFUSED);
+        }
+        let record = &self.now.record;
+        let same = current_a.to_bits() == record.requested_a.to_bits();
+        Ok(if same { record.command_a } else { current_a })
     }
 
     fn disable(&mut self) {
         self.status = AmplifierStatus::Disabled;
     }
 
+    /// A fault keeps the program from deciding anything; where something was decided, it was the command that failed.
     fn status(&self) -> AmplifierStatus {
-        self.status
+        let record = &self.now.record;
+        let decided =
+            record.requested_a.to_bits() | record.reference_m.to_bits() != 0 || record.flags & flag::ACTIVE != 0;
+        if self.now.amplifier_tripped && !decided { AmplifierStatus::Fault(0) } else { self.status }
     }
 }
 
 impl DisplacementProbe for RecordedRig {
     fn latest(&mut self, _now: Tick) -> Reading {
-        if let Ok(record) = self.readings.pop() {
-            self.current = record;
+        if let Ok(seen) = self.seen.pop() {
+            self.now = seen;
         }
-        let r = &self.current;
+        let r = &self.now.record;
         Reading { position_m: r.position_m, sequence: r.probe_sequence, age_ns: r.probe_age_ns, validity: r.validity }
     }
 }

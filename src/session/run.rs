@@ -17,7 +17,7 @@ use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::outlet::Outlet;
 use crate::rt::program::Program;
-use crate::rt::servo::{Connections, Order, Progress, Servo};
+use crate::rt::servo::{Connections, ORDERS_PER_TICK, Order, Progress, Servo};
 use crate::rt::thread::{Ended, Pace, Prepared, Scheduling, prepare};
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, should the disk hang for a while.
@@ -96,7 +96,7 @@ pub fn run(
     let program = plan.program()?;
     let total_ticks = program.ticks();
     let (outlet, records) = RingBuffer::new(RING_SLOTS);
-    let (mut orders, taken) = RingBuffer::new(16);
+    let (mut orders, taken) = RingBuffer::new(ORDERS_PER_TICK);
     let (spent, _kept_until_the_end) = RingBuffer::new(16);
     let progress = Arc::new(Progress::default());
     let connections =
@@ -121,7 +121,7 @@ pub fn run(
 /// Arm and start: in the ring before the loop begins, so that they take effect at tick 0.
 fn queue(orders: &mut Producer<Order>, program: Box<dyn Program>) {
     for order in [Order::Arm, Order::Start(program)] {
-        // The ring is new and holds sixteen.
+        // The ring is new and holds more than two.
         let _ = orders.push(order);
     }
 }

@@ -22,9 +22,9 @@ use stage::Stage;
 pub struct SimulatedRig {
     stage: Stage,
     status: AmplifierStatus,
-    /// Commands on their way through the computing delay; the oldest acts first.
-    delayed_a: VecDeque<f64>,
-    delay: usize,
+    /// Commands on their way through the computing delay, each with the tick from which it acts; the oldest first.
+    delayed_a: VecDeque<(u64, f64)>,
+    delay: u64,
     acting_a: f64,
     accepted_a: f64,
     current_limit_a: f64,
@@ -40,11 +40,11 @@ pub struct SimulatedRig {
 impl SimulatedRig {
     /// A rig at rest, as configured.
     pub fn new(config: &Config) -> Result<Self, PlantError> {
-        let delay = config.servo.computing_delay_periods as usize;
+        let delay = u64::from(config.servo.computing_delay_periods);
         Ok(SimulatedRig {
             stage: Stage::new(config, &modes(config)?),
             status: AmplifierStatus::Disabled,
-            delayed_a: VecDeque::with_capacity(delay + 1),
+            delayed_a: VecDeque::with_capacity(delay as usize + 2),
             delay,
             acting_a: 0.0,
             accepted_a: 0.0,
@@ -64,10 +64,10 @@ impl SimulatedRig {
         self.stage.position_m()
     }
 
-    /// One period: the oldest command that has waited long enough begins to act.
-    fn advance(&mut self) {
-        if self.delayed_a.len() > self.delay {
-            self.acting_a = self.delayed_a.pop_front().unwrap_or(0.0);
+    /// The period after `tick`: the command that has waited long enough begins to act, and goes on until the next does.
+    fn advance(&mut self, tick: u64) {
+        while let Some((_, current_a)) = self.delayed_a.pop_front_if(|(from, _)| *from <= tick) {
+            self.acting_a = current_a;
         }
         self.stage.advance(self.acting_a);
     }
@@ -118,7 +118,10 @@ impl CurrentAmplifier for SimulatedRig {
         let within = change_a.abs() <= self.largest_change_a;
         let reached_a = if within { current_a } else { self.accepted_a + self.largest_change_a.copysign(change_a) };
         self.accepted_a = reached_a.clamp(-self.current_limit_a, self.current_limit_a);
-        self.delayed_a.push_back(self.accepted_a);
+        let from = self.tick.unwrap_or_default() + self.delay;
+        // The last word of a tick counts.
+        self.delayed_a.pop_back_if(|(other, _)| *other == from);
+        self.delayed_a.push_back((from, self.accepted_a));
         Ok(self.accepted_a)
     }
 
@@ -135,9 +138,8 @@ impl CurrentAmplifier for SimulatedRig {
 
 impl DisplacementProbe for SimulatedRig {
     fn latest(&mut self, now: Tick) -> Reading {
-        let periods = self.tick.map_or(0, |before| now.number.saturating_sub(before));
-        for _ in 0..periods {
-            self.advance();
+        for tick in self.tick.unwrap_or(now.number)..now.number {
+            self.advance(tick);
         }
         self.tick = Some(now.number);
         self.read()
