@@ -1,0 +1,125 @@
+//! A bench in real time, in a process of its own.
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use bench::recording::Recording;
+use bench::rt::record::TickRecord;
+
+/// How long a test waits for what must come: a guard against waiting for ever, no figure of merit.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// As many late ticks as this machine may have under load: what is tested here is not its timing.
+pub const PATIENT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
+/// The chirp's last frequency must lie below half the rate in any configuration.
+pub const AT_1_KHZ: [&str; 6] = ["--set", "loop.rate_hz=1000", "--set", "chirp.stop_hz=200", "--pace", "realtime"];
+pub const RATE_HZ: u64 = 1000;
+
+pub fn bench(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+/// A minute of closed loop with the slow controller, or of chirp: longer than any test lets it run.
+pub fn minute(what: &str) -> Vec<&str> {
+    let own: &[&str] = match what {
+        "control" => &["control", "--slow", "--duration", "60", "--reference", "sine", "--amplitude", "20um"],
+        _ => &["chirp", "--duration", "60", "--amplitude", "0.1", "--set", "chirp.quiet_before_s=0.1"],
+    };
+    [own, &["--json"], &AT_1_KHZ, &PATIENT].concat()
+}
+
+/// The program under way; killed if a test ends early.
+pub struct Running(Option<Child>);
+
+impl Running {
+    pub fn start(arguments: &[&str], out: &Path) -> Running {
+        let mut command = bench(arguments);
+        Running::of(command.arg("--out").arg(out).stdout(Stdio::piped()).stderr(Stdio::piped()))
+    }
+
+    pub fn of(command: &mut Command) -> Running {
+        Running(Some(command.spawn().expect("the program starts")))
+    }
+
+    pub fn pid(&self) -> libc::pid_t {
+        self.0.as_ref().expect("running").id() as libc::pid_t
+    }
+
+    pub fn signal(&self, signal: i32) {
+        // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
+        let result = unsafe { libc::kill(self.pid(), signal) };
+        assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
+    }
+
+    /// Sleeps of the loop's thread: one a tick at the most, so no more than the ticks begun (and a few before the first).
+    fn sleeps(&self) -> u64 {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.pid())).expect("a running process");
+        for task in tasks {
+            let Ok(task) = task else { continue };
+            let named = |name: &str| std::fs::read_to_string(task.path().join(name)).ok();
+            if named("comm").is_some_and(|comm| comm.trim() == "bench-loop") {
+                let status = named("status").unwrap_or_default();
+                let line = status.lines().find_map(|line| line.strip_prefix("voluntary_ctxt_switches:"));
+                return line.and_then(|n| n.trim().parse().ok()).unwrap_or(0);
+            }
+        }
+        0
+    }
+
+    /// Waits until it ends of its own.
+    pub fn until_ended(&mut self) {
+        let patience = Instant::now() + PATIENCE;
+        while self.0.as_mut().expect("running").try_wait().expect("a child of ours").is_none() {
+            assert!(Instant::now() < patience, "it goes on and on");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits until the loop has slept so often; returns how often it has.
+    pub fn until_slept(&mut self, times: u64) -> u64 {
+        let patience = Instant::now() + PATIENCE;
+        loop {
+            let sleeps = self.sleeps();
+            if sleeps >= times {
+                return sleeps;
+            }
+            let ended = self.0.as_mut().expect("running").try_wait().expect("a child of ours");
+            if ended.is_some() {
+                panic!("it ended early: {:?}", self.end());
+            }
+            assert!(Instant::now() < patience, "the loop does not run: {sleeps} sleeps");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    pub fn end(&mut self) -> Output {
+        self.0.take().expect("running").wait_with_output().expect("a child of ours")
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(child) = self.0.as_mut() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The one recording in a folder.
+pub fn recording_in(folder: &Path) -> PathBuf {
+    let files = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let mut found: Vec<PathBuf> = files.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    assert_eq!(found.len(), 1, "{found:?}");
+    found.remove(0)
+}
+
+pub fn ticks(recording: &Recording) -> Vec<TickRecord> {
+    recording.ticks().and_then(Iterator::collect).expect("readable")
+}

@@ -1,0 +1,6 @@
+//! The program itself, stopped, killed and starved from outside.
+mod common;
+mod disk;
+mod kill;
+mod replay;
+mod stop;

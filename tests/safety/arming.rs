@@ -1,0 +1,250 @@
+//! The diagram of the arming machine, arrow by arrow, in the loop itself.
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bench::rt::arming::{Change, State};
+use bench::rt::clock::{Clock, Moment, Virtual};
+use bench::rt::interlock::Interlocks;
+use bench::rt::outlet::Outlet;
+use bench::rt::program::{Decision, Program};
+use bench::rt::record::{EventKind, Published};
+use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench::rt::thread::{self, Pace};
+use bench::session::{self, Plan};
+use bench_hal::{Rig, Tick, Validity};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::faulty_rig::Fault;
+use crate::rig::{Bench, Says, Still, Told, Watched, says, stage};
+
+const STATES: [State; 4] = [State::Disarmed, State::Armed, State::Running, State::Tripped];
+
+/// Where each change leads, column by column: the diagram in `rt/arming.rs` and nothing else.
+const ARROWS: [(Change, [State; 4]); 5] = {
+    use State::{Armed, Disarmed, Running, Tripped};
+    [
+        // from:          Disarmed  Armed     Running   Tripped
+        (Change::Arm, [Armed, Armed, Running, Tripped]),
+        (Change::Start, [Disarmed, Running, Running, Tripped]),
+        (Change::Stop, [Disarmed, Disarmed, Disarmed, Tripped]),
+        (Change::Trip, [Disarmed, Tripped, Tripped, Tripped]),
+        (Change::Clear, [Disarmed, Armed, Running, Disarmed]),
+    ]
+};
+
+/// The probe fails in these ticks: a trip in the first, if the test wants one, and the one that makes `Tripped`.
+const TRIP: u64 = 20;
+const MAKE_TRIPPED: u64 = 5;
+
+fn bench_in(state: State, trip: bool) -> Bench {
+    let mut faults = Vec::new();
+    if trip {
+        faults.push((TRIP..TRIP + 1, Fault::Says(Validity::Faulty)));
+    }
+    if state == State::Tripped {
+        faults.push((MAKE_TRIPPED..MAKE_TRIPPED + 1, Fault::Says(Validity::Faulty)));
+    }
+    let mut bench = Bench::still(&stage(), &faults);
+    if state != State::Disarmed {
+        bench.order(Order::Arm);
+    }
+    if state == State::Running {
+        bench.order(Order::Start(says(|_| 0.1)));
+    }
+    bench.run(TRIP);
+    assert_eq!(bench.state(), state);
+    bench
+}
+
+#[test]
+fn every_arrow_of_the_diagram_is_there_and_no_other() {
+    for (column, from) in STATES.into_iter().enumerate() {
+        for (change, to) in ARROWS {
+            let to = to[column];
+            let mut bench = bench_in(from, change == Change::Trip);
+            let events = bench.events().len();
+            match change {
+                Change::Arm => bench.order(Order::Arm),
+                Change::Start => bench.order(Order::Start(says(|_| 0.2))),
+                Change::Stop => bench.order(Order::Stop),
+                Change::Clear => bench.order(Order::Clear),
+                Change::Trip => {}
+            }
+            let record = bench.tick();
+            assert_eq!((record.state, bench.state()), (to, to), "{change:?} in {from:?}");
+            let moved: Vec<_> = bench.events()[events..].iter().filter(|e| is_move(&e.kind)).map(|e| e.kind).collect();
+            let expected = if from == to { vec![] } else { vec![EventKind::State { from, to }] };
+            assert_eq!(moved, expected, "{change:?} in {from:?}");
+            assert_eq!(bench.is_on(), matches!(to, State::Armed | State::Running), "{change:?} in {from:?}");
+            assert_eq!(record.command_a != 0.0, to == State::Running, "{change:?} in {from:?}: {record:?}");
+            assert_eq!(from.after(change), (from != to).then_some(to), "{change:?} in {from:?}");
+        }
+    }
+}
+
+fn is_move(kind: &EventKind) -> bool {
+    matches!(kind, EventKind::State { .. })
+}
+
+#[test]
+fn a_program_at_its_end_disarms_in_the_tick_after_its_last_command() {
+    let mut bench = Bench::running(&stage(), &[], Box::new(Says(|_| 0.1, 10)));
+    bench.run(20);
+    let commands: Vec<bool> = bench.ticks().iter().map(|r| r.command_a != 0.0).collect();
+    assert_eq!(commands, [[true; 10], [false; 10]].concat());
+    assert_eq!((bench.state(), bench.is_on(), bench.handed_back), (State::Disarmed, false, 1));
+    assert!(bench.events().iter().any(|e| e.tick == 9 && e.kind == EventKind::Completed));
+    assert!(bench.servo().completed());
+}
+
+#[test]
+fn a_second_program_does_not_push_aside_the_one_that_runs() {
+    let mut bench = Bench::running(&stage(), &[], says(|tick| 0.1 + tick as f64 * 1e-3));
+    bench.run(5);
+    bench.order(Order::Start(says(|_| 5.0)));
+    let record = bench.tick();
+    assert_eq!((record.command_a, bench.handed_back), (0.1 + 5.0 * 1e-3, 1));
+}
+
+#[test]
+fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
+    let mut bench = bench_in(State::Tripped, false);
+    let trip = bench.servo().last_trip().expect("tripped");
+    let told = bench.told().len();
+    for _ in 0..50 {
+        bench.order(Order::Arm);
+        bench.order(Order::Start(says(|_| 0.1)));
+        bench.order(Order::Stop);
+        assert_eq!(bench.tick().state, State::Tripped);
+    }
+    assert!(bench.told()[told..].iter().all(|(_, told)| *told == Told::Disable), "nothing but off, again and again");
+    assert_eq!((bench.servo().last_trip(), bench.handed_back), (Some(trip), 50));
+
+    bench.order(Order::Clear);
+    assert_eq!((bench.tick().state, bench.is_on()), (State::Disarmed, false));
+    bench.order(Order::Start(says(|_| 0.1)));
+    assert_eq!((bench.tick().state, bench.is_on()), (State::Disarmed, false), "start alone does nothing");
+    bench.order(Order::Arm);
+    let armed = bench.tick();
+    assert_eq!((armed.state, armed.command_a, bench.is_on()), (State::Armed, 0.0, true));
+    bench.order(Order::Start(says(|_| 0.1)));
+    let running = bench.tick();
+    assert_eq!((running.state, running.command_a), (State::Running, 0.1));
+}
+
+#[test]
+fn a_run_after_a_cleared_trip_does_not_carry_the_old_trip_along() {
+    let mut bench = bench_in(State::Tripped, false);
+    for order in [Order::Clear, Order::Arm, Order::Start(Box::new(Says(|_| 0.1, 5)))] {
+        bench.order(order);
+    }
+    assert!(bench.servo().last_trip().is_some());
+    bench.run(10);
+    assert_eq!((bench.servo().last_trip(), bench.servo().completed()), (None, true));
+}
+
+#[test]
+fn an_arm_order_that_changes_nothing_does_not_touch_the_amplifier() {
+    for state in STATES.into_iter().filter(|state| *state != State::Disarmed) {
+        let mut bench = bench_in(state, false);
+        let told = bench.told().len();
+        bench.order(Order::Arm);
+        bench.run(3);
+        let enabled = bench.told()[told..].iter().any(|(_, told)| matches!(told, Told::Enable { .. }));
+        assert!(!enabled, "enabled anew while {state:?}");
+    }
+}
+
+/// Orders that arrive while the loop runs: handed over by its clock, between two ticks.
+struct Handing {
+    restarts: Arc<AtomicU64>,
+    orders: Producer<Order>,
+    late: Vec<(u64, Order)>,
+}
+
+impl Clock for Handing {
+    fn wait(&mut self, number: u64, outlet: &Outlet) -> Moment {
+        while self.late.first().is_some_and(|(tick, _)| *tick == number) {
+            assert!(self.orders.push(self.late.remove(0).1).is_ok());
+        }
+        Virtual { period_s: 2e-4 }.wait(number, outlet)
+    }
+    fn now_ns(&self, tick: Tick) -> u64 {
+        tick.scheduled_ns
+    }
+    fn restart(&mut self, _number: u64) {
+        self.restarts.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn the_schedule_begins_anew_after_the_amplifier_was_enabled_and_at_no_other_order() {
+    let (servo, orders, _records) = loop_around(Still::default());
+    let restarts = Arc::new(AtomicU64::new(0));
+    let program = Order::Start(Box::new(Says(|_| 0.1, 10)));
+    let late = vec![(0, Order::Arm), (1, program), (4, Order::Arm), (5, Order::Clear), (6, Order::Arm)];
+    let clock = Handing { restarts: Arc::clone(&restarts), orders, late };
+    let ended = thread::run(servo, clock, 5);
+    assert!(ended.completed && ended.trip.is_none());
+    assert_eq!(restarts.load(Ordering::Relaxed), 1, "a schedule that begins anew in a run hides a late tick");
+}
+
+fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Order>, Consumer<Published>) {
+    let (outlet, records) = RingBuffer::new(4096);
+    let (orders, taken) = RingBuffer::new(16);
+    let (spent, _) = RingBuffer::new(16);
+    let connections =
+        Connections { orders: taken, spent, outlet: Outlet::new(outlet), progress: Arc::new(Progress::default()) };
+    (Servo::new(Box::new(rig), Interlocks::new(&stage()), connections), orders, records)
+}
+
+/// A program with a mistake in it.
+struct Panics;
+
+impl Program for Panics {
+    fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
+        assert!(tick < 10, "the mistake");
+        Decision { reference_m: 0.0, requested_a: 0.1, active: true }
+    }
+    fn ticks(&self) -> u64 {
+        100
+    }
+}
+
+#[test]
+fn a_panic_in_the_loop_leaves_the_amplifier_off() {
+    let rig = Watched::new(Still::default());
+    let log = Arc::clone(&rig.log);
+    let (servo, mut orders, _records) = loop_around(rig);
+    assert!(orders.push(Order::Arm).is_ok() && orders.push(Order::Start(Box::new(Panics))).is_ok());
+    let died = std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
+    assert!(died.is_err(), "the program panics at its tenth tick");
+    let told = log.lock().expect("not poisoned").clone();
+    let currents = told.iter().filter(|(_, t)| matches!(t, Told::Command { current_a, .. } if *current_a != 0.0));
+    assert_eq!(currents.count(), 10);
+    assert_eq!(told.last().map(|(_, told)| *told), Some(Told::Disable));
+}
+
+#[test]
+fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
+    let plan = Plan::chirp(stage());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("a_file");
+    std::fs::write(&file, "in the way").expect("a file");
+    // Nobody, root included, can make a file in /proc.
+    for out in [Path::new("/proc"), &file] {
+        for pace in [Pace::Virtual, Pace::Realtime] {
+            let rig = Watched::new(Still::default());
+            let log = Arc::clone(&rig.log);
+            let error = session::run(&plan, Box::new(rig), pace, out, &mut |_, _| {}).err().expect("no recording");
+            assert!(error.to_string().contains("nothing moved"), "{error}");
+            // The loop's thread holds the log until it is gone.
+            while Arc::strong_count(&log) > 1 {
+                std::thread::yield_now();
+            }
+            let told = log.lock().expect("not poisoned").clone();
+            assert!(told.iter().all(|(_, told)| *told == Told::Disable), "{told:?}");
+        }
+    }
+}

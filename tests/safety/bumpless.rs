@@ -1,0 +1,151 @@
+//! Closing the loop makes no jump: neither an offset of the probe nor an old set-point reaches the motor.
+use std::ops::Range;
+
+use bench::config::{Config, ReferenceSettings};
+use bench::control::{Controller, ControllerText};
+use bench::excitation::reference;
+use bench::rt::arming::State;
+use bench::rt::program::{Control, Program};
+use bench::rt::record::{TickRecord, flag};
+use bench::rt::servo::Order;
+use bench::sim::SimulatedRig;
+
+use crate::faulty_rig::{Fault, FaultyRig};
+use crate::rig::{Bench, stage};
+
+const ALWAYS: Range<u64> = 0..u64::MAX;
+
+/// What the stage at rest and its probe may differ from the mean of half a second, with a probability of 1e-8 a tick:
+/// noise of 40 nm and quantisation of 30 nm/sqrt(12) at the probe, and the floor. Its 8 Hz line moves the stage (29 Hz)
+/// by a/w^2 = 24 nm, its 70 Hz line (second mode at 83 Hz, a/(83 Hz^2 - 70 Hz^2)) by 23 nm at the most: some 50 nm RMS in
+/// all, six times that for 300 nm; as much again for modes that the floor rings up by chance.
+const REST_M: f64 = 0.6e-6;
+
+fn config(controller: &str, seed: u64) -> Config {
+    let mut config = stage();
+    config.control.controller = controller.into();
+    config.sim.seed = seed;
+    config
+}
+
+fn controller(config: &Config) -> Controller {
+    let text = ControllerText::find(&config.control.controller).expect("a controller");
+    Controller::new(&text.sections(config.servo.rate_hz).expect("valid"), config.servo.period_s())
+}
+
+fn program(config: &Config, settle: u64, closed: u64) -> Control {
+    let reference = reference(&config.control.reference, None, config.servo.period_s()).expect("no file");
+    Control::new(controller(config), reference, settle, closed)
+}
+
+/// The largest command, tick by tick, that errors of one metre at most can cause: the sum of the impulse response's
+/// magnitudes.
+fn largest_gains(config: &Config, ticks: usize) -> Vec<f64> {
+    let mut controller = controller(config);
+    let impulse = (0..ticks).map(|tick| controller.update(if tick == 0 { 1.0 } else { 0.0 }).abs());
+    impulse.scan(0.0, |sum, h| Some(*sum + h).inspect(|s| *sum = *s)).collect()
+}
+
+fn closed(bench: &Bench, from: u64) -> Vec<TickRecord> {
+    bench.ticks().iter().filter(|r| r.tick >= from && r.flags & flag::ACTIVE != 0).copied().collect()
+}
+
+/// The first commands are those of a controller at rest that sees nothing but the rest's noise.
+fn makes_no_jump(config: &Config, records: &[TickRecord], offset_m: f64, what: &str) {
+    let gains = largest_gains(config, 50);
+    assert!(records.len() >= gains.len());
+    for (record, gain) in records.iter().zip(&gains) {
+        assert!(
+            (record.reference_m - offset_m).abs() < REST_M,
+            "{what}: the origin is where the stage rests: {record:?}"
+        );
+        assert!((record.position_m - record.reference_m).abs() < REST_M, "{what}: {record:?}");
+        assert!(record.command_a.abs() <= gain * REST_M, "{what}: beyond {} A: {record:?}", gain * REST_M);
+    }
+    assert!(records.iter().any(|r| r.command_a != 0.0), "{what}: the loop is closed");
+    // Were the origin zero, the offset itself would go through the controller: 300 um in place of REST_M.
+}
+
+#[test]
+fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
+    for name in ["fast", "slow"] {
+        for (seed, offset_m) in [(1, 300e-6), (2, -300e-6), (3, 0.0), (4, 850e-6)] {
+            let mut config = config(name, seed);
+            config.control.reference = ReferenceSettings::Hold;
+            let rig = SimulatedRig::new(&config).expect("a rig");
+            let mut bench = Bench::around(&config, FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(offset_m))]));
+            bench.order(Order::Arm);
+            bench.order(Order::Start(Box::new(program(&config, 2500, 2500))));
+            bench.run(5000);
+            assert_eq!(bench.trips(), []);
+            makes_no_jump(&config, &closed(&bench, 0), offset_m, &format!("{name}, offset {offset_m}"));
+        }
+    }
+}
+
+#[test]
+fn no_current_flows_while_the_origin_is_found() {
+    let config = config("fast", 1);
+    let rig = SimulatedRig::new(&config).expect("a rig");
+    let mut bench = Bench::around(&config, FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(300e-6))]));
+    bench.order(Order::Arm);
+    bench.order(Order::Start(Box::new(program(&config, 2500, 100))));
+    bench.run(2500);
+    assert!(bench.ticks().iter().all(|r| r.state == State::Running && r.command_a.to_bits() == 0));
+    let mean_m = bench.ticks().iter().map(|r| r.position_m).sum::<f64>() / 2500.0;
+    let origin_m = bench.ticks().last().expect("ticks").reference_m;
+    // A running mean of 2500 numbers of 3e-4, each step rounded at 1e-16 of it.
+    assert!((origin_m - mean_m).abs() < 1e-16, "{origin_m:e} for {mean_m:e}");
+}
+
+#[test]
+fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point() {
+    for name in ["fast", "slow"] {
+        // The first run ends on a step of 50 um, held by current; then the stage swings back and rests: 10 s are 16 time
+        // constants of its first mode (zeta w = 1.66 1/s), 50 um e^-16 = 6 pm.
+        let mut config = config(name, 5);
+        let rig = SimulatedRig::new(&config).expect("a rig");
+        let mut bench = Bench::around(&config, FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(100e-6))]));
+        bench.order(Order::Arm);
+        bench.order(Order::Start(Box::new(program(&config, 2500, 10_000))));
+        bench.run(12_500);
+        let end = *bench.ticks().last().expect("ticks");
+        assert!((end.reference_m - 150e-6).abs() < REST_M && end.command_a.abs() > 0.01, "{name}: {end:?}");
+        bench.run(50_000);
+
+        config.control.reference = ReferenceSettings::Hold;
+        let from = bench.ticks().last().expect("ticks").tick + 1;
+        bench.order(Order::Arm);
+        bench.order(Order::Start(Box::new(program(&config, 2500, 2500))));
+        bench.run(5000);
+        let second = closed(&bench, from);
+        makes_no_jump(&config, &second, 100e-6, &format!("{name}, second run"));
+
+        // Bit for bit what a new program decides that sees the same positions.
+        let mut fresh = program(&config, 2500, 2500);
+        let records = bench.ticks();
+        for (tick, record) in records.iter().filter(|r| r.tick >= from && r.state == State::Running).enumerate() {
+            let decision = fresh.decide(tick as u64, record.position_m);
+            let bits = [record.requested_a, record.reference_m].map(f64::to_bits);
+            assert_eq!([decision.requested_a, decision.reference_m].map(f64::to_bits), bits, "{name}: {record:?}");
+        }
+    }
+}
+
+#[test]
+fn a_controller_that_was_used_before_starts_from_rest() {
+    for name in ["fast", "slow"] {
+        let mut config = config(name, 6);
+        config.control.reference = ReferenceSettings::Hold;
+        let mut used = controller(&config);
+        let moved = (0..1000).map(|_| used.update(100e-6)).last();
+        assert!(moved.is_some_and(|current_a| current_a.abs() > 1e-3), "{moved:?}");
+        let hold = || reference(&ReferenceSettings::Hold, None, config.servo.period_s()).expect("no file");
+        let mut after = Control::new(used, hold(), 10, 100);
+        let mut fresh = Control::new(controller(&config), hold(), 10, 100);
+        for tick in 0..110 {
+            let position_m = 1e-6 * (tick % 3) as f64;
+            assert_eq!(after.decide(tick, position_m), fresh.decide(tick, position_m), "{name} at tick {tick}");
+        }
+    }
+}

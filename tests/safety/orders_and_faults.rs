@@ -1,0 +1,177 @@
+//! Any sequence of orders and faults: current flows in a run that was armed and started after the last trip, or not at all.
+use std::ops::Range;
+
+use bench::rt::arming::State;
+use bench::rt::record::{Event, EventKind, flag};
+use bench::rt::servo::Order;
+use bench_hal::Validity;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+use crate::faulty_rig::Fault;
+use crate::rig::{Bench, Says, Told, stage};
+
+const TICKS: u64 = 80;
+
+#[derive(Clone, Copy, Debug)]
+enum Given {
+    Arm,
+    /// A program that asks for so many amperes, for so many ticks.
+    Start(f64, u64),
+    Stop,
+    Clear,
+}
+
+fn orders() -> impl Strategy<Value = Vec<(u64, Given)>> {
+    let current = prop_oneof![
+        8 => -5.0..5.0f64,
+        1 => Just(f64::NAN),
+        1 => Just(f64::INFINITY),
+        1 => Just(11.0),
+    ];
+    let given = prop_oneof![
+        4 => Just(Given::Arm),
+        4 => (current, 1..40u64).prop_map(|(a, ticks)| Given::Start(a, ticks)),
+        1 => Just(Given::Stop),
+        3 => Just(Given::Clear),
+    ];
+    prop::collection::vec((0..TICKS, given), 0..40)
+}
+
+fn faults() -> impl Strategy<Value = Vec<(Range<u64>, Fault)>> {
+    let fault = prop_oneof![
+        Just(Fault::Says(Validity::Faulty)),
+        Just(Fault::Says(Validity::OutOfRange)),
+        Just(Fault::At(f64::NAN)),
+        Just(Fault::At(0.00095)),
+        Just(Fault::Old(2_000_000)),
+        Just(Fault::Frozen),
+        Just(Fault::Stuck),
+        Just(Fault::Faulted(9)),
+        Just(Fault::Refuses(8)),
+        Just(Fault::DoesNotEnable(7)),
+    ];
+    prop::collection::vec((0..TICKS, 1..12u64, fault).prop_map(|(at, ticks, f)| (at..at + ticks, f)), 0..4)
+}
+
+fn late() -> impl Strategy<Value = Vec<(u64, u32)>> {
+    prop::collection::vec((0..TICKS, 1..60u32), 0..3)
+}
+
+fn run(orders: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, u32)]) -> Bench {
+    let mut bench = Bench::still(&stage(), faults);
+    for step in 0..TICKS {
+        // No more than the ring takes.
+        for (_, given) in orders.iter().filter(|(at, _)| *at == step).take(16) {
+            bench.order(match *given {
+                Given::Arm => Order::Arm,
+                Given::Start(current_a, ticks) => Order::Start(Box::new(Says(move |_| current_a, ticks))),
+                Given::Stop => Order::Stop,
+                Given::Clear => Order::Clear,
+            });
+        }
+        bench.late_tick(late.iter().find(|(at, _)| *at == step).map_or(0, |(_, missed)| *missed));
+        let off = matches!(bench.state(), State::Disarmed | State::Tripped);
+        assert_eq!(bench.is_on(), !off, "the amplifier is on in {:?}", bench.state());
+    }
+    bench
+}
+
+/// Whether a current may flow after these events: by the words of the requirement, not by the machine.
+fn may_flow(events: &[Event]) -> bool {
+    let place = |wanted: &dyn Fn(&EventKind) -> bool| events.iter().rposition(|event| wanted(&event.kind));
+    let state = |wanted: State| place(&|kind| matches!(kind, EventKind::State { to, .. } if *to == wanted));
+    let trip = place(&|kind| matches!(kind, EventKind::Trip(_)));
+    let clear = place(&|kind| matches!(kind, EventKind::State { from: State::Tripped, to: State::Disarmed }));
+    let (armed, running) = (state(State::Armed), state(State::Running));
+    let off = state(State::Disarmed).max(state(State::Tripped));
+    trip <= clear && armed > trip.max(clear).max(off) && running > armed
+}
+
+fn prove(bench: &Bench) -> Result<(), TestCaseError> {
+    let (told, events) = (bench.told(), bench.events());
+    for record in bench.ticks().iter() {
+        // Completion is published after the record of its tick; everything else before it.
+        let until = events.iter().filter(|e| e.tick <= record.tick).count();
+        let completed = events[..until].iter().rposition(|e| e.kind == EventKind::Completed && e.tick == record.tick);
+        let known = &events[..completed.unwrap_or(until)];
+        let went_out = told.iter().any(|(tick, told)| {
+            *tick == record.tick && matches!(told, Told::Command { current_a, refused: false } if *current_a != 0.0)
+        });
+        let nonsense = told.iter().any(|(tick, told)| {
+            *tick == record.tick
+                && matches!(told, Told::Command { current_a, .. } if !(-9.99..=9.99).contains(current_a))
+        });
+        prop_assert!(!nonsense, "beyond the motor's peak: {record:?}");
+        if went_out {
+            prop_assert_eq!(record.state, State::Running);
+            prop_assert_eq!(record.flags & flag::TRIPPED, 0);
+            prop_assert!(may_flow(known), "{:?} after {:?}", record, known);
+        }
+        prop_assert_eq!(record.command_a != 0.0, went_out, "{:?}", record);
+    }
+    let numbers: Vec<u64> = bench.ticks().iter().map(|r| r.tick + 1).collect();
+    let missed: u64 = bench.ticks().iter().map(|r| u64::from(r.missed_ticks)).sum();
+    prop_assert_eq!(numbers.len() as u64 + missed, *numbers.last().expect("ticks"));
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 2000,
+        rng_seed: RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn current_flows_only_in_a_run_that_was_armed_and_started_after_the_last_trip(
+        orders in orders(), faults in faults(), late in late(),
+    ) {
+        prove(&run(&orders, &faults, &late))?;
+    }
+}
+
+#[test]
+fn the_property_sees_runs_trips_clears_and_completions() {
+    // The same generators must reach all that the property speaks of, or it would prove nothing.
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        rng_seed: RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let (mut with_current, mut trips, mut second_runs, mut completed) = (0, 0, 0, 0);
+    for _ in 0..500 {
+        let tree = (orders(), faults(), late()).new_tree(&mut runner).expect("generators without filters");
+        let (orders, faults, late) = proptest::strategy::ValueTree::current(&tree);
+        let bench = run(&orders, &faults, &late);
+        let events = bench.events();
+        let trip = events.iter().position(|e| matches!(e.kind, EventKind::Trip(_)));
+        let is_start = |e: &Event| matches!(e.kind, EventKind::State { to: State::Running, .. });
+        with_current += usize::from(bench.ticks().iter().any(|r| r.command_a != 0.0));
+        trips += usize::from(trip.is_some());
+        second_runs += usize::from(trip.is_some_and(|trip| events[trip..].iter().any(is_start)));
+        completed += usize::from(events.iter().any(|e| e.kind == EventKind::Completed));
+    }
+    assert!(
+        [with_current, trips, second_runs, completed].iter().all(|n| *n >= 25),
+        "of 500: {with_current} with current, {trips} trips, {second_runs} runs after one, {completed} completed"
+    );
+}
+
+#[test]
+fn in_virtual_pace_nothing_is_lost_however_many_orders_a_tick_takes() {
+    // All that the ring of orders holds, each with every event it can cause: an amplifier that does not enable.
+    let mut bench = Bench::still(&stage(), &[(0..10, Fault::DoesNotEnable(1))]);
+    bench.tick();
+    for _ in 0..8 {
+        bench.order(Order::Arm);
+        bench.order(Order::Clear);
+    }
+    let before = bench.all.len();
+    bench.tick();
+    let published = bench.all.len() - before;
+    assert!(published <= bench::rt::outlet::SLOTS_PER_TICK, "{published} in one tick");
+    // Order, state, trip, state for each arm order, order and state for each clear order; then the record.
+    assert_eq!(published, 8 * (4 + 2) + 1);
+}

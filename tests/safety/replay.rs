@@ -1,0 +1,245 @@
+//! What the loop decided, it decides again from its recording, bit for bit; and what was altered is found.
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use bench::config::{AmplitudePoint, Config, ReferenceSettings, Sweep};
+use bench::recording::{Header, Recorder, Recording};
+use bench::rt::record::{EventKind, Published, TickRecord, flag};
+use bench::rt::thread::Pace;
+use bench::session::{self, Kind, Plan, ReplayError, Replayed, replay};
+use bench::sim::SimulatedRig;
+use bench_hal::Validity;
+
+use crate::faulty_rig::{Fault, FaultyRig};
+use crate::rig::stage;
+
+fn short_chirp(sweep: Sweep) -> Plan {
+    let mut config: Config = stage();
+    (config.chirp.sweep, config.chirp.duration_s, config.chirp.fade_in_s) = (sweep, 1.0, 0.2);
+    (config.chirp.quiet_before_s, config.chirp.quiet_after_s) = (0.1, 0.1);
+    config.chirp.amplitude = vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.2 }];
+    Plan::chirp(config)
+}
+
+fn control(controller: &str) -> Plan {
+    let mut config = stage();
+    config.control.controller = controller.into();
+    config.control.duration_s = 1.0;
+    Plan::control(config).expect("a plan")
+}
+
+fn record(plan: &Plan, faults: &[(Range<u64>, Fault)], folder: &Path) -> PathBuf {
+    let rig = SimulatedRig::new(&plan.config).expect("a rig");
+    let rig = Box::new(FaultyRig::new(rig, faults));
+    let run = session::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let path = run.path.clone();
+    run.finish("{}").expect("a good disk");
+    path
+}
+
+fn replayed(path: &Path) -> Replayed {
+    replay(&Recording::open(path).expect("a recording")).expect("it can be replayed")
+}
+
+fn is_the_same(path: &Path, what: &str) {
+    let recording = Recording::open(path).expect("a recording");
+    let replayed = replayed(path);
+    assert_eq!((replayed.different, replayed.first), (0, None), "{what}");
+    assert_eq!(replayed.ticks, recording.tick_count(), "{what}: every tick is compared");
+}
+
+#[test]
+fn chirps_and_closed_loops_replay_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut hold = control("fast");
+    hold.config.control.reference = ReferenceSettings::Sine { amplitude_m: 20e-6, frequency_hz: 3.0 };
+    let plans = [short_chirp(Sweep::Linear), short_chirp(Sweep::Logarithmic), control("fast"), control("slow"), hold];
+    for plan in plans {
+        let path = record(&plan, &[], folder.path());
+        let recording = Recording::open(&path).expect("a recording");
+        let moving =
+            recording.ticks().expect("readable").filter(|r| r.as_ref().is_ok_and(|r| r.command_a != 0.0)).count();
+        assert!(moving > 4000, "something is there to compare: {moving} commands");
+        is_the_same(&path, plan.kind.name());
+    }
+}
+
+#[test]
+fn a_run_that_tripped_replays_bit_for_bit_whatever_tripped_it() {
+    const AT: u64 = 4000;
+    let once = |fault| [(AT..AT + 1, fault)];
+    let lasting = |fault| [(AT..AT + 2000, fault)];
+    let cases = [
+        (once(Fault::At(0.00095)), AT, "travel"),
+        (once(Fault::At(f64::NAN)), AT, "probe_invalid"),
+        (once(Fault::Says(Validity::Faulty)), AT, "probe_invalid"),
+        (once(Fault::Old(1_000_001)), AT, "probe_stale"),
+        (lasting(Fault::Frozen), AT + 5, "probe_stale"),
+        (once(Fault::Faulted(77)), AT, "amplifier"),
+        (once(Fault::Refuses(78)), AT, "amplifier"),
+        (once(Fault::Gives(f64::NAN)), AT, "amplifier"),
+        ([(0..1, Fault::DoesNotEnable(79))], 0, "amplifier"),
+    ];
+    for (faults, at, reason) in cases {
+        for plan in [control("fast"), short_chirp(Sweep::Linear)] {
+            let folder = tempfile::tempdir().expect("a temporary folder");
+            let path = record(&plan, &faults, folder.path());
+            let recording = Recording::open(&path).expect("a recording");
+            let trip = recording.events().iter().find_map(|e| match e.kind {
+                EventKind::Trip(trip) => Some((trip.reason(), e.tick)),
+                _ => None,
+            });
+            assert_eq!(trip, Some((reason, at)));
+            // The loop goes on for a tenth of a second after a trip.
+            assert!((at + 499..=at + 502).contains(&recording.last_tick()), "{}", recording.last_tick());
+            is_the_same(&path, &format!("{reason} in {}", plan.kind.name()));
+        }
+    }
+}
+
+#[test]
+fn a_trip_of_the_controllers_own_making_replays_bit_for_bit() {
+    // A step of 500 um through a controller of 0.1 A/um asks for 50 A.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("stiff.toml");
+    let text = "title = \"too stiff\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 0.1\n";
+    std::fs::write(&file, text).expect("a file");
+    let mut config = stage();
+    config.control.controller = file.display().to_string();
+    config.control.reference = ReferenceSettings::Step { amplitude_m: 500e-6, at_s: 0.01 };
+    let path = record(&Plan::control(config).expect("a plan"), &[], folder.path());
+    // The recording carries the controller: its file may be gone.
+    std::fs::remove_file(file).expect("it was there");
+    let recording = Recording::open(&path).expect("a recording");
+    assert!(recording.events().iter().any(|e| matches!(e.kind, EventKind::Trip(t) if t.reason() == "peak_current")));
+    is_the_same(&path, "peak current");
+}
+
+/// The recording again, its ticks passed through `alter`.
+fn rewritten(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
+    let old = Recording::open(path).expect("a recording");
+    let header = Header {
+        config_toml: old.config_toml().expect("a configuration").into(),
+        period_ns: old.period_ns().expect("a period"),
+        metadata: old.metadata().clone(),
+    };
+    let mut new = Recorder::create(to, &header).expect("a new file");
+    for attachment in old.attachments().iter().filter(|a| a.name != "config.toml") {
+        new.attach(&attachment.name, &attachment.media_type, &attachment.data).expect("a good disk");
+    }
+    let mut events = old.events().iter().peekable();
+    for record in old.ticks().expect("readable") {
+        let mut record = record.expect("readable");
+        while let Some(event) = events.next_if(|event| event.tick <= record.tick) {
+            new.record(&Published::Event(*event)).expect("a good disk");
+        }
+        alter(&mut record);
+        new.record(&Published::Tick(record)).expect("a good disk");
+    }
+    new.finish(&[]).expect("a good disk");
+}
+
+#[test]
+fn one_altered_bit_of_the_probe_is_found_at_its_tick() {
+    // The first command of a closed loop to answer a change of the reading by d is that of the same tick, b d with b the
+    // product of the sections' first coefficients. Bit 24 of a reading near 30 um is 30e-6 2^-28 = 1e-13 m; fast: b = 460 A/m
+    // (K T/2 = 5.1, pole 9e-5, the others near one), slow: b = 0.12e6 T/2 (w T/2)^2 = 1e-3 A/m. That is 5e-11 A and 1e-16 A,
+    // and the second lies below the last bit of a command of 0.1 A, 1.4e-17, by no factor at all: so bit 40 for it.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (controller, bit) in [("fast", 24), ("slow", 40)] {
+        let path = record(&control(controller), &[], folder.path());
+        let at = 5000;
+        let original = Recording::open(&path).expect("a recording");
+        let was = original.ticks().expect("readable").nth(at as usize).expect("5000 ticks").expect("readable");
+        assert!(was.flags & flag::ACTIVE != 0 && was.position_m.abs() > 1e-6, "{was:?}");
+
+        let same = folder.path().join(format!("{controller}_same.mcap"));
+        rewritten(&path, &same, |_| {});
+        is_the_same(&same, "rewritten as it was");
+
+        let altered = folder.path().join(format!("{controller}_altered.mcap"));
+        rewritten(&path, &altered, |record| {
+            if record.tick == at {
+                record.position_m = f64::from_bits(record.position_m.to_bits() ^ (1 << bit));
+            }
+        });
+        let found = replayed(&altered);
+        let first = found.first.expect("a difference");
+        assert_eq!((first.tick, first.recorded_a.to_bits()), (at, was.command_a.to_bits()), "{controller}");
+        assert!(first.replayed_a.to_bits() != was.command_a.to_bits() && found.different >= 1);
+    }
+}
+
+#[test]
+fn an_altered_command_order_or_flag_is_found_at_its_tick() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = record(&short_chirp(Sweep::Logarithmic), &[], folder.path());
+    let alterations: [fn(&mut TickRecord); 4] = [
+        |r| r.command_a = r.command_a.next_up(),
+        |r| r.requested_a = r.requested_a.next_up(),
+        |r| r.flags ^= flag::ACTIVE,
+        |r| r.reference_m = -0.0,
+    ];
+    for (n, alter) in alterations.into_iter().enumerate() {
+        let altered = folder.path().join(format!("altered_{n}.mcap"));
+        rewritten(&path, &altered, |record| {
+            if record.tick == 3000 {
+                alter(record);
+            }
+        });
+        let found = replayed(&altered);
+        assert_eq!((found.first.map(|d| d.tick), found.different), (Some(3000), 1), "alteration {n}");
+    }
+}
+
+#[test]
+fn a_cut_off_recording_replays_up_to_its_cut() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = record(&control("fast"), &[], folder.path());
+    let bytes = std::fs::read(&path).expect("just written");
+    let cut = folder.path().join("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() / 2]).expect("a good disk");
+    let recording = Recording::open(&cut).expect("readable up to there");
+    assert!(recording.truncated() && recording.tick_count() >= 2500);
+    is_the_same(&cut, "cut in the middle");
+}
+
+#[test]
+fn recordings_that_cannot_be_replayed_say_why() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, header: &Header, ticks: &[TickRecord]| {
+        let path = folder.path().join(name);
+        let mut recorder = Recorder::create(&path, header).expect("a new file");
+        ticks.iter().for_each(|t| recorder.record(&Published::Tick(*t)).expect("a good disk"));
+        recorder.finish(&[]).expect("a good disk");
+        replay(&Recording::open(&path).expect("a recording")).expect_err("it has no plan").to_string()
+    };
+    let tick = |tick| TickRecord { tick, scheduled_ns: tick * 200_000, ..TickRecord::default() };
+    let ticks = [tick(0), tick(1)];
+    let plan = control("fast");
+    let whole = plan.config_toml().expect("a configuration");
+    let kind = |kind: &str| [("run".to_string(), kind.to_string())].into();
+
+    let foreign = write("foreign.mcap", &Header { config_toml: "a = 1\n".into(), ..Header::default() }, &ticks);
+    assert!(foreign.contains("configuration"), "{foreign}");
+    let text = write("text.mcap", &Header { config_toml: "not toml".into(), ..Header::default() }, &ticks);
+    assert!(text.contains("configuration"), "{text}");
+    let header = Header { config_toml: whole.clone(), ..Header::default() };
+    let kindless = write("kindless.mcap", &header, &ticks);
+    assert!(kindless.contains("kind of run") && kindless.contains("bench chirp"), "{kindless}");
+    let header = Header { metadata: kind(Kind::Control.name()), ..header };
+    let without = write("without.mcap", &header, &ticks);
+    assert!(without.contains("controller"), "{without}");
+    let lost = write("lost.mcap", &header, &[tick(0), tick(5)]);
+    assert!(lost.contains("4 records") && lost.contains("tick 0"), "{lost}");
+}
+
+#[test]
+fn a_recording_whose_times_run_backwards_is_replayed_without_a_panic() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = record(&control("fast"), &[], folder.path());
+    let backwards = folder.path().join("backwards.mcap");
+    rewritten(&path, &backwards, |record| record.scheduled_ns = 1_000_000_000_000 - record.scheduled_ns);
+    let outcome: Result<Replayed, ReplayError> = replay(&Recording::open(&backwards).expect("a recording"));
+    assert!(outcome.is_ok(), "{outcome:?}");
+}

@@ -1,0 +1,266 @@
+//! A loop that is driven tick by tick, around a rig that writes down all it is told.
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use bench::config::{Config, Source, load};
+use bench::rt::arming::State;
+use bench::rt::clock::{Moment, Virtual};
+use bench::rt::interlock::Interlocks;
+use bench::rt::outlet::Outlet;
+use bench::rt::program::{Decision, Program};
+use bench::rt::record::{Event, EventKind, Published, TickRecord};
+use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::faulty_rig::{Fault, FaultyRig};
+
+/// The stage of the thesis.
+pub fn stage() -> Config {
+    load(&Source::default()).expect("the profile is valid")
+}
+
+/// A stage that stands still but for a nanometre, and an amplifier that gives what it is asked for.
+#[derive(Debug, Default)]
+pub struct Still {
+    enabled: bool,
+    sequence: u64,
+}
+
+impl CurrentAmplifier for Still {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        self.enabled = true;
+        Ok(())
+    }
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        let disabled = DeviceError { what: "the amplifier is disabled", remedy: "arm the loop", code: 1 };
+        if self.enabled { Ok(current_a) } else { Err(disabled) }
+    }
+    fn disable(&mut self) {
+        self.enabled = false;
+    }
+    fn status(&self) -> AmplifierStatus {
+        if self.enabled { AmplifierStatus::Enabled } else { AmplifierStatus::Disabled }
+    }
+}
+
+impl DisplacementProbe for Still {
+    fn latest(&mut self, _now: Tick) -> Reading {
+        self.sequence += 1;
+        let position_m = if self.sequence.is_multiple_of(2) { 1e-9 } else { -1e-9 };
+        Reading { position_m, sequence: self.sequence, age_ns: 0, validity: Validity::Valid }
+    }
+}
+
+/// What the amplifier was told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Told {
+    Enable { refused: bool },
+    Command { current_a: f64, refused: bool },
+    Disable,
+}
+
+/// All that the amplifier was told, each with its tick.
+pub type Log = Arc<Mutex<Vec<(u64, Told)>>>;
+
+/// Writes down every call of the amplifier.
+pub struct Watched<R> {
+    pub inner: R,
+    pub log: Log,
+    pub now: Arc<AtomicU64>,
+}
+
+impl<R> Watched<R> {
+    pub fn new(inner: R) -> Self {
+        Watched { inner, log: Log::default(), now: Arc::default() }
+    }
+
+    fn note(&self, told: Told) {
+        self.log.lock().expect("no test panics with it").push((self.now.load(Ordering::Relaxed), told));
+    }
+}
+
+impl<R: Rig> CurrentAmplifier for Watched<R> {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        let answer = self.inner.enable();
+        self.note(Told::Enable { refused: answer.is_err() });
+        answer
+    }
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        let answer = self.inner.command(current_a);
+        self.note(Told::Command { current_a, refused: answer.is_err() });
+        answer
+    }
+    fn disable(&mut self) {
+        self.inner.disable();
+        self.note(Told::Disable);
+    }
+    fn status(&self) -> AmplifierStatus {
+        self.inner.status()
+    }
+}
+
+impl<R: Rig> DisplacementProbe for Watched<R> {
+    fn latest(&mut self, now: Tick) -> Reading {
+        self.inner.latest(now)
+    }
+}
+
+/// A program that commands a function of its tick.
+pub struct Says<F>(pub F, pub u64);
+
+impl<F: FnMut(u64) -> f64 + Send> Program for Says<F> {
+    fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
+        Decision { reference_m: 0.0, requested_a: (self.0)(tick), active: true }
+    }
+    fn ticks(&self) -> u64 {
+        self.1
+    }
+}
+
+/// A program without an end.
+pub fn says(current_a: impl FnMut(u64) -> f64 + Send + 'static) -> Box<dyn Program> {
+    Box::new(Says(current_a, u64::MAX))
+}
+
+/// The loop, its rings, and everything that came out of them.
+pub struct Bench {
+    servo: Servo,
+    orders: Producer<Order>,
+    published: Consumer<Published>,
+    spent: Consumer<Box<dyn Program>>,
+    log: Log,
+    now: Arc<AtomicU64>,
+    clock: Virtual,
+    next: u64,
+    /// All that the loop published, in its order.
+    pub all: Vec<Published>,
+    /// Programs that came back.
+    pub handed_back: usize,
+}
+
+impl Bench {
+    pub fn around(config: &Config, rig: impl Rig + 'static) -> Bench {
+        let watched = Watched::new(rig);
+        let (log, now) = (Arc::clone(&watched.log), Arc::clone(&watched.now));
+        let (outlet, published) = RingBuffer::new(256);
+        let (orders, taken) = RingBuffer::new(16);
+        let (hand_back, spent) = RingBuffer::new(16);
+        let connections = Connections {
+            orders: taken,
+            spent: hand_back,
+            outlet: Outlet::new(outlet),
+            progress: Arc::new(Progress::default()),
+        };
+        Bench {
+            servo: Servo::new(Box::new(watched), Interlocks::new(config), connections),
+            orders,
+            published,
+            spent,
+            log,
+            now,
+            clock: Virtual { period_s: config.servo.period_s() },
+            next: 0,
+            all: Vec::new(),
+            handed_back: 0,
+        }
+    }
+
+    /// A stage that stands still, disarmed.
+    pub fn still(config: &Config, faults: &[(Range<u64>, Fault)]) -> Bench {
+        Bench::around(config, FaultyRig::new(Still::default(), faults))
+    }
+
+    /// A stage that stands still, with a program that runs from tick 0.
+    pub fn running(config: &Config, faults: &[(Range<u64>, Fault)], program: Box<dyn Program>) -> Bench {
+        let mut bench = Bench::still(config, faults);
+        bench.order(Order::Arm);
+        bench.order(Order::Start(program));
+        bench
+    }
+
+    /// Taken at the next tick.
+    pub fn order(&mut self, order: Order) {
+        assert!(self.orders.push(order).is_ok(), "the ring of orders is full");
+    }
+
+    pub fn tick(&mut self) -> TickRecord {
+        self.late_tick(0)
+    }
+
+    /// A tick before which `missed` passed unserved.
+    pub fn late_tick(&mut self, missed: u32) -> TickRecord {
+        let number = self.next + u64::from(missed);
+        let scheduled_ns = (number as f64 * self.clock.period_s * 1e9).round() as u64;
+        let tick = Tick { number, scheduled_ns };
+        self.now.store(number, Ordering::Relaxed);
+        self.servo.tick(&Moment { tick, woke_ns: scheduled_ns, missed }, &self.clock);
+        self.next = number + 1;
+        while let Ok(published) = self.published.pop() {
+            self.all.push(published);
+        }
+        while self.spent.pop().is_ok() {
+            self.handed_back += 1;
+        }
+        *self.ticks().last().expect("every tick publishes its record")
+    }
+
+    pub fn run(&mut self, ticks: u64) {
+        for _ in 0..ticks {
+            self.tick();
+        }
+    }
+
+    pub fn ticks(&self) -> Records<'_> {
+        Records(&self.all)
+    }
+
+    pub fn events(&self) -> Vec<Event> {
+        let event = |p: &Published| if let Published::Event(event) = p { Some(*event) } else { None };
+        self.all.iter().filter_map(event).collect()
+    }
+
+    /// State after the last tick, by the events.
+    pub fn state(&self) -> State {
+        let to = |event: &Event| if let EventKind::State { to, .. } = event.kind { Some(to) } else { None };
+        self.events().iter().rev().find_map(to).unwrap_or_default()
+    }
+
+    pub fn trips(&self) -> Vec<Event> {
+        self.events().into_iter().filter(|event| matches!(event.kind, EventKind::Trip(_))).collect()
+    }
+
+    /// All that the amplifier was told so far.
+    pub fn told(&self) -> Vec<(u64, Told)> {
+        self.log.lock().expect("no test panics with it").clone()
+    }
+
+    /// Whether the amplifier is on after all it was told.
+    pub fn is_on(&self) -> bool {
+        let told = self.told();
+        let last = told.iter().rev().find(|(_, told)| matches!(told, Told::Enable { .. } | Told::Disable));
+        matches!(last, Some((_, Told::Enable { refused: false })))
+    }
+
+    pub fn servo(&self) -> &Servo {
+        &self.servo
+    }
+}
+
+/// The records among what was published.
+pub struct Records<'a>(&'a [Published]);
+
+impl<'a> Records<'a> {
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = &'a TickRecord> + use<'a> {
+        self.0.iter().filter_map(|p| if let Published::Tick(record) = p { Some(record) } else { None })
+    }
+
+    pub fn last(&self) -> Option<&'a TickRecord> {
+        self.iter().next_back()
+    }
+
+    pub fn at(&self, tick: u64) -> TickRecord {
+        *self.iter().find(|record| record.tick == tick).expect("a record of the tick")
+    }
+}
