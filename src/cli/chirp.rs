@@ -20,16 +20,16 @@ pub(super) struct Args {
     #[command(flatten)]
     run: RunOptions,
     /// First frequency in hertz
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     start: Option<f64>,
     /// Last frequency in hertz
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     stop: Option<f64>,
     /// Length of the sweep in seconds
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     duration: Option<f64>,
     /// The same amplitude in amperes at all frequencies
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", allow_hyphen_values = true)]
     amplitude: Option<f64>,
     /// How the frequency runs over time: linear or logarithmic
     #[arg(long, value_name = "KIND")]
@@ -38,8 +38,11 @@ pub(super) struct Args {
 
 impl Args {
     fn sets(&self) -> Vec<String> {
-        let number = |key: &str, value: Option<f64>| value.map(|value| format!("chirp.{key}={value:?}"));
-        let flat = self.amplitude.map(|a| format!("chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {a:?} }}]"));
+        let number =
+            |key: &str, value: Option<f64>| value.map(|value| format!("chirp.{key}={}", toml::Value::from(value)));
+        let point =
+            |a: f64| format!("chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]", toml::Value::from(a));
+        let flat = self.amplitude.map(point);
         let sweep = self.sweep.as_ref().map(|kind| format!("chirp.sweep={}", toml::Value::from(kind.as_str())));
         let numbers = [("start_hz", self.start), ("stop_hz", self.stop), ("duration_s", self.duration)];
         numbers.into_iter().filter_map(|(key, value)| number(key, value)).chain(flat).chain(sweep).collect()

@@ -9,9 +9,11 @@ use super::run_options::{RunOptions, RunReport};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose, ReferenceSettings, quantity};
 use crate::control::{ClosedLoop, Margins, StepFigures, step_figures};
-use crate::excitation::{reference, reference_text};
 use crate::recording::Recording;
 use crate::session::{Measured, Plan, measure};
+
+/// A step is predicted over as many ticks at most: 200 s at 5 kHz, however long the run.
+const PREDICTED_TICKS: usize = 1_000_000;
 
 /// Which loop, and what it follows.
 #[derive(Clone, Debug, clap::Args)]
@@ -29,49 +31,63 @@ pub(super) struct Args {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     amplitude: Option<String>,
     /// Frequency of the sine in hertz [default: 1]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     frequency: Option<f64>,
     /// Speed of the ramp in metres per second [default: 1e-4]
-    #[arg(long, value_name = "M/S")]
+    #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
     speed: Option<f64>,
     /// Seconds with the loop closed
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     duration: Option<f64>,
 }
 
 impl Args {
     /// The settings that the options stand for.
     fn sets(&self) -> Result<Vec<String>, CliError> {
+        self.refuse_idle()?;
+        let number = |x: f64| toml::Value::from(x).to_string();
         let mut sets = self.choice.sets();
         let amplitude =
             self.amplitude.as_deref().map(quantity::metres).transpose().map_err(|e| CliError::Usage(e.to_string()))?;
         let mut set = |key: &str, value: String| sets.push(format!("control.{key}={value}"));
         if let Some(duration) = self.duration {
-            set("duration_s", format!("{duration:?}"));
+            set("duration_s", number(duration));
         }
-        let height = format!("{:?}", amplitude.unwrap_or(50e-6));
+        let height = number(amplitude.unwrap_or(50e-6));
         match self.reference.as_deref() {
             None if self.amplitude.is_some() => set("reference.amplitude_m", height),
             None => {}
             Some("hold") => set("reference", "{ kind = \"hold\" }".into()),
             Some("step") => set("reference", format!("{{ kind = \"step\", amplitude_m = {height}, at_s = 0.2 }}")),
             Some("ramp") => {
-                let speed = self.speed.unwrap_or(1e-4);
+                let speed = number(self.speed.unwrap_or(1e-4));
                 set(
                     "reference",
-                    format!("{{ kind = \"ramp\", amplitude_m = {height}, speed_m_per_s = {speed:?}, at_s = 0.2 }}"),
+                    format!("{{ kind = \"ramp\", amplitude_m = {height}, speed_m_per_s = {speed}, at_s = 0.2 }}"),
                 );
             }
             Some("sine") => {
-                let frequency = self.frequency.unwrap_or(1.0);
-                set(
-                    "reference",
-                    format!("{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency:?} }}"),
-                );
+                let frequency = number(self.frequency.unwrap_or(1.0));
+                set("reference", format!("{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency} }}"));
             }
             Some(path) => set("reference", format!("{{ kind = \"file\", path = {} }}", toml::Value::from(path))),
         }
         Ok(sets)
+    }
+
+    /// Refuses an option that the reference has no use for.
+    fn refuse_idle(&self) -> Result<(), CliError> {
+        let kind = self.reference.as_deref();
+        let high = !matches!(kind, Some(kind) if !["step", "ramp", "sine"].contains(&kind));
+        let idle = [
+            (self.amplitude.is_some() && !high, "--amplitude", "step, ramp or sine"),
+            (self.frequency.is_some() && kind != Some("sine"), "--frequency", "sine"),
+            (self.speed.is_some() && kind != Some("ramp"), "--speed", "ramp"),
+        ];
+        match idle.iter().find(|(idle, ..)| *idle) {
+            Some((_, option, kinds)) => Err(CliError::Usage(format!("{option} goes with --reference {kinds} only"))),
+            None => Ok(()),
+        }
     }
 }
 
@@ -96,7 +112,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.sets()?)?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins(false);
-    let step = if margins.stable { predicted_step(&config, &closed_loop)? } else { None };
+    let step = if margins.stable { predicted_step(&config, &closed_loop) } else { None };
     let predicted = Predicted { margins, step };
     let plan = Plan::control(config.clone())?;
     let mut run = args.run.run(&plan, "control")?;
@@ -117,16 +133,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(report.run.exit())
 }
 
-/// The step by the linear model, if the reference is one.
-fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Result<Option<StepFigures>, CliError> {
-    let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else { return Ok(None) };
-    let period_s = config.servo.period_s();
-    let text = reference_text(&config.control.reference)?;
-    let reference = reference(&config.control.reference, text.as_deref(), period_s)?;
-    let ticks = (config.control.duration_s / period_s) as usize;
-    let positions = closed_loop.simulate(ticks, |tick| reference.at_m(tick as u64));
-    let from = ((at_s / period_s).round() as usize).min(positions.len());
-    Ok((amplitude_m != 0.0 && from < ticks).then(|| step_figures(&positions[from..], amplitude_m, period_s)))
+/// The step by the linear model, if the reference is one that happens.
+fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepFigures> {
+    let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else { return None };
+    let after_s = config.control.duration_s - at_s;
+    let ticks = ((after_s * config.servo.rate_hz) as usize).min(PREDICTED_TICKS);
+    let positions = closed_loop.simulate(ticks, |_| amplitude_m);
+    (amplitude_m != 0.0 && ticks > 0).then(|| step_figures(&positions, amplitude_m, config.servo.period_s()))
 }
 
 fn text(report: &Report, config: &Config) -> String {

@@ -23,7 +23,7 @@ pub(super) struct BenchOptions {
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub asymmetry: Option<String>,
     /// Seed of noise and disturbance
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
     /// One JSON object on standard output, nothing else there
     #[arg(long)]

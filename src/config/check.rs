@@ -13,6 +13,18 @@ pub(super) struct Finding {
     pub path: String,
     /// What is wrong, with value, limit and remedy.
     pub what: String,
+    /// The key is not there: what is wrong is the table around it.
+    pub missing: bool,
+}
+
+impl Finding {
+    /// The path to look at: of the key, or of the table that lacks it.
+    pub fn at(&self) -> &str {
+        match self.path.rsplit_once('.') {
+            Some((table, _)) if self.missing => table,
+            _ => &self.path,
+        }
+    }
 }
 
 /// All that is wrong with `value`.
@@ -26,7 +38,11 @@ struct Findings(Vec<Finding>);
 
 impl Findings {
     fn add(&mut self, path: &str, what: String) {
-        self.0.push(Finding { path: path.to_string(), what });
+        self.0.push(Finding { path: path.to_string(), what, missing: false });
+    }
+
+    fn lacks(&mut self, path: &str, what: String) {
+        self.0.push(Finding { path: path.to_string(), what, missing: true });
     }
 }
 
@@ -80,8 +96,10 @@ fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut 
         Some(chosen) => node(root, chosen, value, path, out),
         None => {
             let words: Vec<&str> = variants.iter().filter_map(|v| constant(&v["properties"][&tag])).collect();
-            let given = value.get(&tag).map_or("missing".to_string(), Value::to_string);
-            out.add(&join(path, &tag), not_one_of(&given, &words));
+            match value.get(&tag) {
+                Some(given) => out.add(&join(path, &tag), not_one_of(&given.to_string(), &words)),
+                None => out.lacks(&join(path, &tag), not_one_of("missing", &words)),
+            }
         }
     }
 }
@@ -97,7 +115,7 @@ fn table(root: &Json, keywords: &Map<String, Json>, entries: &Table, path: &str,
     }
     let required = keywords.get("required").and_then(Json::as_array).into_iter().flatten();
     for key in required.filter_map(Json::as_str).filter(|key| !entries.contains_key(*key)) {
-        out.add(&join(path, key), "is missing; this kind of table needs it".into());
+        out.lacks(&join(path, key), "is missing; this kind of table needs it".into());
     }
 }
 
@@ -178,6 +196,9 @@ fn wrong_type(keywords: &Map<String, Json>, given: &Value) -> String {
         Some(Quantity::Bare(x) | Quantity::Metres(x) | Quantity::Ratio(x)) => {
             format!("is the text {given}, not a number; settings are in SI units: write {x}")
         }
-        None => format!("is {given}, {} where a {wanted} belongs", given.type_str()),
+        None => {
+            let article = if wanted.starts_with(['a', 'i']) { "an" } else { "a" };
+            format!("is {given}, {} where {article} {wanted} belongs", given.type_str())
+        }
     }
 }

@@ -7,7 +7,10 @@ use toml::{Table, Value};
 use super::check::{self, Finding};
 use super::place::line_of;
 use super::profiles::{self, Embedded};
-use super::{Config, ReferenceSettings, schema};
+use super::{Config, PlantSettings, ReferenceSettings, schema};
+
+/// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
+const CHIRP_TICKS: f64 = 2e7;
 
 /// What a person asked for: a profile or file, and single settings over it.
 #[derive(Clone, Debug, Default)]
@@ -111,7 +114,7 @@ fn refuse(layers: &[Layer], findings: Vec<Finding>) -> Result<(), ConfigError> {
         return Ok(());
     }
     Err(ConfigError::Refused(
-        findings.iter().map(|f| format!("  {}: `{}` {}", place(layers, &f.path), f.path, f.what)).collect(),
+        findings.iter().map(|f| format!("  {}: `{}` {}", place(layers, f.at()), f.path, f.what)).collect(),
     ))
 }
 
@@ -126,7 +129,7 @@ fn place(layers: &[Layer], path: &str) -> String {
         }
         match path.rsplit_once('.') {
             Some((outer, _)) => path = outer,
-            None => return "the configuration".into(),
+            None => return layers.last().map_or("the configuration".into(), |layer| layer.name.clone()),
         }
     }
 }
@@ -247,15 +250,23 @@ struct Relations(Vec<Finding>);
 impl Relations {
     fn must(&mut self, good: bool, path: &str, what: String) {
         if !good {
-            self.0.push(Finding { path: path.into(), what });
+            self.0.push(Finding { path: path.into(), what, missing: false });
         }
     }
 
     fn rig(&mut self, config: &Config) {
+        let PlantSettings::Sr4dof(plant) = &config.plant;
+        let (point_m, length_m) = (plant.operating_point_m, plant.beam_length_m);
+        let what = format!("is {point_m} m, beyond the length of the beams, {length_m} m");
+        self.must(point_m.abs() <= length_m, "plant.operating_point_m", what);
         let (soft_m, stop_m, seen_m) = (config.interlock.soft_limit_m, config.sim.stop_m, config.probe.range_m / 2.0);
         let path = "interlock.soft_limit_m";
         self.must(soft_m < stop_m, path, format!("is {soft_m} m; it must lie inside the stop at {stop_m} m"));
-        self.must(soft_m <= seen_m, path, format!("is {soft_m} m, beyond what the probe sees, {seen_m} m"));
+        self.must(
+            soft_m <= seen_m,
+            path,
+            format!("is {soft_m} m, beyond what the probe sees, {seen_m} m (half of probe.range_m)"),
+        );
         let (continuous_n, peak_n) = (config.motor.continuous_force_n, config.motor.peak_force_n);
         let what = format!("is {continuous_n} N, above the peak force of {peak_n} N");
         self.must(continuous_n <= peak_n, "motor.continuous_force_n", what);
@@ -273,6 +284,13 @@ impl Relations {
             let what = format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
             self.must(hz < nyquist_hz, path, what);
         }
+        let seconds = chirp.quiet_before_s + chirp.duration_s + chirp.quiet_after_s;
+        let ticks = seconds * config.servo.rate_hz;
+        let what = format!(
+            "is {} s, with the quiet before and after {ticks} ticks; {CHIRP_TICKS} can be analysed as one record: shorten it or lower loop.rate_hz",
+            chirp.duration_s
+        );
+        self.must(ticks <= CHIRP_TICKS, "chirp.duration_s", what);
         let fades_s = chirp.fade_in_s + chirp.fade_out_s;
         let what = format!("is {} s, shorter than both fades, {fades_s} s", chirp.duration_s);
         self.must(fades_s <= chirp.duration_s, "chirp.duration_s", what);

@@ -24,4 +24,4 @@ pub use controller::Controller;
 pub use file::{ControllerError, ControllerFile, ControllerText};
 pub use margins::{Crossing, Margins};
 pub use section::Section;
-pub use step_figures::{StepFigures, step_figures};
+pub use step_figures::{StepFigures, StepMeter, step_figures};

@@ -87,8 +87,12 @@ impl Section {
             let (p1, p2) = (p[1] * c, p[2] * c * c);
             [p[0] + p1 + p2, 2.0 * (p[0] - p2), p[0] - p1 + p2]
         };
-        if self.numerator[2] == 0.0 && self.denominator[2] == 0.0 {
-            // First order: without the common factor (z + 1), which would be a mode at half the sampling rate.
+        // Of lower order: without the common factors (z + 1), each of which would be a mode at half the sampling rate.
+        let order = order(&self.numerator).max(order(&self.denominator)).unwrap_or(0);
+        if order == 0 {
+            return Biquad::new([self.numerator[0], 0.0, 0.0], [self.denominator[0], 0.0, 0.0]);
+        }
+        if order == 1 {
             let map = |p: &[f64; 3]| [p[0] + p[1] * c, p[0] - p[1] * c, 0.0];
             return Biquad::new(map(&self.numerator), map(&self.denominator));
         }
@@ -135,6 +139,21 @@ mod tests {
                     assert!((discrete - continuous).norm() < 1e-9 * continuous.norm(), "{h:?} at {w}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_section_of_lower_order_has_no_mode_at_half_the_sampling_rate() {
+        // A common factor (z + 1) of numerator and denominator would ring at -1, +1, -1, ... for ever after an impulse.
+        let gain = section([0.3, 0.0, 0.0], [1.5, 0.0, 0.0]);
+        let pole = section([893.0, 0.0, 0.0], [893.0, 1.0, 0.0]);
+        for (h, expected) in [(gain, 0.2), (pole, 1.0)] {
+            let mut biquad = h.tustin(2e-4);
+            let response: Vec<f64> = (0..2000).map(|k| biquad.update(if k == 0 { 1.0 } else { 0.0 })).collect();
+            // The pole's memory after 2000 ticks is exp(-893 * 0.4), 1e-155 of the first sample.
+            assert!((response.iter().sum::<f64>() - expected).abs() < 1e-12 && response[1999].abs() < 1e-100);
+            let (a, ..) = biquad.state_space();
+            assert!(a.complex_eigenvalues().iter().all(|pole| pole.norm() < 0.99), "{h:?}");
         }
     }
 

@@ -11,16 +11,47 @@ pub struct StepFigures {
     pub overshoot_percent: f64,
 }
 
+/// Follows a step of `height_m` position by position, however long it takes.
+#[derive(Clone, Copy, Debug)]
+pub struct StepMeter {
+    height_m: f64,
+    /// Positions so far.
+    seen: u64,
+    /// Positions up to and with the last one outside of the band.
+    settled: u64,
+    beyond_m: f64,
+}
+
+impl StepMeter {
+    /// Before the first position.
+    pub fn new(height_m: f64) -> Self {
+        StepMeter { height_m, seen: 0, settled: 0, beyond_m: 0.0 }
+    }
+
+    /// The next position, relative to where the step started.
+    pub fn push(&mut self, position_m: f64) {
+        let error_m = position_m - self.height_m;
+        self.seen += 1;
+        if error_m.abs() > 0.02 * self.height_m.abs() {
+            self.settled = self.seen;
+        }
+        self.beyond_m = self.beyond_m.max(error_m * self.height_m.signum());
+    }
+
+    /// What the positions so far show.
+    pub fn figures(&self, period_s: f64) -> StepFigures {
+        StepFigures {
+            settling_time_s: (self.settled < self.seen).then_some(self.settled as f64 * period_s),
+            overshoot_percent: 100.0 * self.beyond_m / self.height_m.abs(),
+        }
+    }
+}
+
 /// Figures of a step of `height_m` at the first of `positions_m`, which are relative to where it started.
 pub fn step_figures(positions_m: &[f64], height_m: f64, period_s: f64) -> StepFigures {
-    let band_m = 0.02 * height_m.abs();
-    let outside = positions_m.iter().rposition(|y| (y - height_m).abs() > band_m);
-    let settled = outside.map_or(0, |last| last + 1);
-    let beyond = positions_m.iter().map(|y| (y - height_m) * height_m.signum()).fold(0.0, f64::max);
-    StepFigures {
-        settling_time_s: (settled < positions_m.len()).then_some(settled as f64 * period_s),
-        overshoot_percent: 100.0 * beyond / height_m.abs(),
-    }
+    let mut meter = StepMeter::new(height_m);
+    positions_m.iter().for_each(|y| meter.push(*y));
+    meter.figures(period_s)
 }
 
 #[cfg(test)]
