@@ -1,0 +1,162 @@
+//! `bench chirp`: what it measures on the simulated stage is what the stage is.
+
+use serde_json::{Value, json};
+
+use crate::program::{Bench, number};
+use crate::recording::Recording;
+use crate::truth;
+
+const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
+const NOISE_FREE: &str = "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[]";
+
+/// A row of the CSV, in its order.
+type Row = [f64; 7];
+
+fn rows(bench: &Bench, answer: &Value) -> Vec<Row> {
+    let text = bench.read(answer["frf_csv"].as_str().expect("a path"));
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some(HEADER));
+    let row = |line: &str| {
+        let numbers: Vec<f64> = line.split(',').map(|field| field.parse().expect("a number")).collect();
+        Row::try_from(numbers).unwrap_or_else(|_| panic!("not seven columns: {line}"))
+    };
+    lines.map(row).collect()
+}
+
+/// A row against the truth: frequency, |H|, errors of magnitude (m/A) and phase (deg), and their stated sigmas.
+struct Error {
+    frequency_hz: f64,
+    truth_m_per_a: f64,
+    magnitude: f64,
+    phase_deg: f64,
+    magnitude_sigma: f64,
+    phase_sigma_deg: f64,
+}
+
+fn errors(bench: &Bench, settings: &str, rows: &[Row]) -> Option<Vec<Error>> {
+    let frequencies: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    let config = bench.json(&format!("config show {settings}"));
+    let answers = truth::ask(&[json!({"what": "frf", "config": config, "frequency_hz": frequencies})])?;
+    let error = |(row, h): (&Row, &Value)| {
+        let (re, im) = (number(&h[0]), number(&h[1]));
+        let turns = (row[2] - im.atan2(re).to_degrees()) / 360.0;
+        Error {
+            frequency_hz: row[0],
+            truth_m_per_a: re.hypot(im),
+            magnitude: row[1] - re.hypot(im),
+            phase_deg: 360.0 * (turns - turns.round()),
+            magnitude_sigma: row[4],
+            phase_sigma_deg: row[5],
+        }
+    };
+    Some(rows.iter().zip(answers[0].as_array().expect("a list")).map(error).collect())
+}
+
+#[test]
+fn without_noise_the_response_is_the_rigs_within_half_a_per_cent_and_0_3_degrees_resonances_included() {
+    let bench = Bench::new();
+    let rows = rows(&bench, &bench.json(&format!("chirp {NOISE_FREE}")));
+    let Some(errors) = errors(&bench, NOISE_FREE, &rows) else { return };
+    let inside: Vec<&Error> = errors.iter().filter(|e| (0.5..=450.0).contains(&e.frequency_hz)).collect();
+    // Twenty to a per cent of frequency at the top of the band: the modes' peaks of 0.4 % width are well sampled.
+    assert!(inside.len() > 7000, "{}", inside.len());
+    for e in inside {
+        let relative = e.magnitude / e.truth_m_per_a;
+        assert!(relative.abs() < 0.005, "{} % of the magnitude at {} Hz", 100.0 * relative, e.frequency_hz);
+        assert!(e.phase_deg.abs() < 0.3, "{} deg at {} Hz", e.phase_deg, e.frequency_hz);
+    }
+}
+
+#[test]
+fn with_noise_the_stated_sigmas_hold_and_are_small() {
+    for seed in [1, 2] {
+        let (bench, settings) = (Bench::new(), format!("--seed {seed}"));
+        let rows = rows(&bench, &bench.json(&format!("chirp {settings}")));
+        let Some(errors) = errors(&bench, &settings, &rows) else { return };
+        // Two sigma of a Gaussian hold 95.4 %. Neighbouring bins share data, so that the share varies by some per cent;
+        // a sigma that is too large by half would hold 99.7 %, twice too large 99.99 %.
+        for (what, within) in [
+            ("magnitude", (|e: &Error| e.magnitude.abs() <= 2.0 * e.magnitude_sigma) as fn(&Error) -> bool),
+            ("phase", |e: &Error| e.phase_deg.abs() <= 2.0 * e.phase_sigma_deg),
+        ] {
+            let share = errors.iter().filter(|e| within(e)).count() as f64 / errors.len() as f64;
+            assert!((0.90..0.999).contains(&share), "seed {seed}: {share} of the errors of {what} within two sigma");
+        }
+        for e in errors.iter().filter(|e| (1.0..=200.0).contains(&e.frequency_hz)) {
+            let relative = e.magnitude_sigma / e.truth_m_per_a;
+            assert!(relative < 0.01, "seed {seed}: sigma is {relative} of |H| at {} Hz", e.frequency_hz);
+        }
+    }
+}
+
+#[test]
+fn the_answer_the_files_and_the_recording_are_as_promised() {
+    let bench = Bench::new();
+    let answer = bench.json("chirp");
+    for key in [
+        "recording",
+        "frf_csv",
+        "plot",
+        "ticks",
+        "overruns",
+        "lost_records",
+        "outcome",
+        "trip",
+        "modes",
+        "zeros",
+        "cnmp",
+        "why",
+    ] {
+        assert!(answer.get(key).is_some(), "{key} is missing: {answer}");
+    }
+    assert_eq!((&answer["outcome"], &answer["trip"]), (&json!("completed"), &Value::Null));
+    assert_eq!((&answer["overruns"], &answer["lost_records"]), (&json!(0), &json!(0)));
+    assert!(["detected", "excluded", "undecided"].contains(&answer["cnmp"].as_str().expect("a word")));
+    // 2 s of quiet, 110 s of sweep, 8 s of quiet and 0.1 s after the motor went off, at 5 kHz.
+    let ticks = number(&answer["ticks"]);
+    assert!((600_500.0..=600_501.0).contains(&ticks), "{ticks}");
+    let messages = Recording::open(&bench.path(answer["recording"].as_str().expect("a path"))).messages("/loop");
+    assert_eq!(messages.len() as f64, ticks, "a message a tick");
+    assert!(messages.iter().enumerate().all(|(index, message)| message["tick"] == index), "numbered without a gap");
+    let svg = bench.read(answer["plot"].as_str().expect("a path"));
+    for text in ["<svg", "Hz", "m/A", "deg", "oherence"] {
+        assert!(svg.contains(text), "`{text}` is not in the plot");
+    }
+}
+
+#[test]
+fn rows_rise_in_frequency_over_the_whole_band_and_are_sound() {
+    let bench = Bench::new();
+    let rows = rows(&bench, &bench.json("chirp --duration 40 --start 1 --stop 300"));
+    assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
+    let (first, last) = (rows[0][0], rows[rows.len() - 1][0]);
+    // A bin is 1/50 s wide.
+    assert!((1.0..1.03).contains(&first) && (299.5..=300.0).contains(&last), "{first} to {last} Hz");
+    for [_, magnitude, phase, coherence, magnitude_sigma, phase_sigma, resolution] in rows {
+        assert!(magnitude > 0.0 && magnitude_sigma > 0.0 && phase_sigma > 0.0 && resolution > 0.0);
+        assert!((0.0..=1.0).contains(&coherence) && phase > -180.0 && phase <= 180.0);
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run_bit_for_bit_and_another_one_does_not() {
+    let digest = |seed: u32| {
+        let answer =
+            Bench::new().json(&format!("chirp --duration 10 --start 5 --stop 100 --amplitude 0.05 --seed {seed}"));
+        answer["loop_digest"].as_str().expect("a digest").to_string()
+    };
+    let (one, again, other) = (digest(7), digest(7), digest(8));
+    assert_eq!(one, again);
+    assert_ne!(one, other);
+}
+
+#[test]
+fn identify_makes_the_same_csv_from_the_recording() {
+    let bench = Bench::new();
+    let chirp = bench.json("chirp --duration 20 --start 2 --stop 200");
+    let recording = chirp["recording"].as_str().expect("a path");
+    let identified = bench.json(&format!("identify {recording}"));
+    assert_ne!(chirp["frf_csv"], identified["frf_csv"], "nothing is overwritten");
+    let text = |answer: &Value| bench.read(answer["frf_csv"].as_str().expect("a path"));
+    assert_eq!(text(&chirp), text(&identified));
+}

@@ -1,0 +1,12 @@
+//! The thesis as a specification of the program: its tables, controllers and experiments, at the process boundary.
+//!
+//! Expected figures come from the thesis as `READING.md`'s tables of it state them, from closed forms, or from
+//! `tests/python/truth.py`, which shares no line with the program.
+
+mod chirp;
+mod control;
+mod margins;
+mod model;
+mod program;
+mod recording;
+mod truth;
