@@ -19,6 +19,8 @@
 //! Put a new driver in one file of its own below `hal/src/` and register it in one line where the profiles name devices.
 #![warn(missing_docs)]
 
+pub mod serial;
+
 use std::fmt;
 
 /// The moment a tick was scheduled for. Time enters the bench only like this, so simulation, hardware and replay run
