@@ -1,0 +1,133 @@
+//! One writer, one reader, the newest value: wait-free on both sides.
+//!
+//! Three slots: the writer owns one, the reader owns one, the third waits between them. Publishing and taking are one
+//! atomic exchange each, so neither side ever waits for the other, even if the other was stopped in the middle. (A
+//! sequence lock would let a real-time reader spin for ever on a writer that it preempted.)
+//!
+//! ```text
+//! writer: fill own slot, exchange own <-> waiting | NEW     (release: the words are in the slot before it is handed over)
+//! reader: if waiting is NEW, exchange own <-> waiting       (acquire: the words are read after it was taken over)
+//! ```
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+
+use crate::Validity;
+
+/// What the reader thread hands to the loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Measurement {
+    pub position_m: f64,
+    pub sequence: u64,
+    /// When it was made, on the probe's monotonic clock.
+    pub made_ns: u64,
+    pub validity: Validity,
+}
+
+const NEW: u8 = 4;
+const SLOT: u8 = 3;
+
+type Slot = [AtomicU64; 4];
+
+struct Shared {
+    slots: [Slot; 3],
+    /// Number of the slot in the middle, and whether the reader has not seen it yet.
+    waiting: AtomicU8,
+}
+
+/// The side that publishes.
+pub(super) struct Writer {
+    shared: Arc<Shared>,
+    own: u8,
+}
+
+/// The side that takes the newest.
+pub(super) struct Reader {
+    shared: Arc<Shared>,
+    own: u8,
+}
+
+/// A cell that holds a `Missing` measurement.
+pub(super) fn cell() -> (Writer, Reader) {
+    let slots = std::array::from_fn(|_| words(Measurement::default()).map(AtomicU64::new));
+    let shared = Arc::new(Shared { slots, waiting: AtomicU8::new(1) });
+    (Writer { shared: shared.clone(), own: 0 }, Reader { shared, own: 2 })
+}
+
+impl Writer {
+    pub(super) fn publish(&mut self, measurement: Measurement) {
+        let slot = &self.shared.slots[usize::from(self.own)];
+        slot.iter().zip(words(measurement)).for_each(|(word, value)| word.store(value, Ordering::Relaxed));
+        self.own = self.shared.waiting.swap(self.own | NEW, Ordering::AcqRel) & SLOT;
+    }
+}
+
+impl Reader {
+    pub(super) fn newest(&mut self) -> Measurement {
+        if self.shared.waiting.load(Ordering::Relaxed) & NEW != 0 {
+            self.own = self.shared.waiting.swap(self.own, Ordering::AcqRel) & SLOT;
+        }
+        let slot = &self.shared.slots[usize::from(self.own)];
+        measurement(std::array::from_fn(|word| slot[word].load(Ordering::Relaxed)))
+    }
+}
+
+fn words(measurement: Measurement) -> [u64; 4] {
+    let Measurement { position_m, sequence, made_ns, validity } = measurement;
+    [position_m.to_bits(), sequence, made_ns, validity as u64]
+}
+
+fn measurement([position, sequence, made_ns, validity]: [u64; 4]) -> Measurement {
+    let validity = match validity {
+        0 => Validity::Valid,
+        1 => Validity::OutOfRange,
+        2 => Validity::Faulty,
+        _ => Validity::Missing,
+    };
+    Measurement { position_m: f64::from_bits(position), sequence, made_ns, validity }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A measurement whose every word follows from its sequence number.
+    fn consistent(sequence: u64) -> Measurement {
+        let validity =
+            [Validity::Valid, Validity::OutOfRange, Validity::Faulty, Validity::Missing][sequence as usize % 4];
+        Measurement { position_m: sequence as f64 * 0.5, sequence, made_ns: !sequence, validity }
+    }
+
+    #[test]
+    fn before_the_first_value_there_is_none() {
+        assert_eq!(cell().1.newest(), Measurement { validity: Validity::Missing, ..Measurement::default() });
+    }
+
+    #[test]
+    fn the_newest_is_taken_and_stays_until_a_newer_one_comes() {
+        let (mut writer, mut reader) = cell();
+        (1..=5).for_each(|sequence| writer.publish(consistent(sequence)));
+        assert_eq!([reader.newest(), reader.newest()], [consistent(5); 2]);
+        writer.publish(consistent(6));
+        assert_eq!(reader.newest(), consistent(6));
+    }
+
+    #[test]
+    fn no_reading_is_torn_and_none_goes_back_while_the_writer_never_pauses() {
+        const LAST: u64 = 2_000_000;
+        let (mut writer, mut reader) = cell();
+        writer.publish(consistent(0));
+        let publishing =
+            std::thread::spawn(move || (1..=LAST).for_each(|sequence| writer.publish(consistent(sequence))));
+        let (mut before, mut changes) = (0, 0u64);
+        while before < LAST {
+            let taken = reader.newest();
+            assert_eq!(taken, consistent(taken.sequence), "torn");
+            assert!(taken.sequence >= before, "{} after {before}", taken.sequence);
+            changes += u64::from(taken.sequence != before);
+            before = taken.sequence;
+        }
+        publishing.join().unwrap();
+        assert!(changes > 1, "the two never ran at the same time");
+    }
+}
