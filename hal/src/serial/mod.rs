@@ -8,6 +8,7 @@
 //!
 //! * [`capancdt`], [`optoncdt`], [`ascii`]: what the probes say, byte by byte, for both sides of the line; no clock, no port.
 //! * [`SerialProbe`]: the driver. Its thread owns the port, asks where the protocol asks and listens where it streams.
+//! * [`device`]: pretend probes with faults on request, to rehearse and to test.
 //!
 //! # What a reading is worth
 //!
@@ -26,6 +27,7 @@
 pub mod ascii;
 pub mod capancdt;
 mod cell;
+pub mod device;
 mod error;
 mod event;
 mod exchange;

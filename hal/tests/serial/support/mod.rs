@@ -1,6 +1,8 @@
 //! What the tests of the serial probes share.
 
 pub mod naive;
+pub mod probes;
+pub mod rehearsal;
 
 use bench_hal::serial::{Decoder, Event};
 
