@@ -72,6 +72,15 @@ pub enum AmplifierStatus {
     Fault(u32),
 }
 
+/// A fault in words, for a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultText {
+    /// What happened.
+    pub what: &'static str,
+    /// What to do about it.
+    pub remedy: &'static str,
+}
+
 /// A device did not do as told. Static text only: it is made inside the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceError {
@@ -105,6 +114,22 @@ pub trait CurrentAmplifier: Send {
 
     /// The latest known state. *In the tick.*
     fn status(&self) -> AmplifierStatus;
+
+    /// The current that the amplifier says it gives, in amperes, if it says so. *In the tick.*
+    fn actual_current_a(&self) -> Option<f64> {
+        None
+    }
+
+    /// Acknowledges a fault, on a person's command only. Nothing is enabled by it. Not in the tick: may take its time.
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        Ok(())
+    }
+
+    /// What a code of [`AmplifierStatus::Fault`] means and what to do about it, in words.
+    fn explain(&self, code: u32) -> Option<FaultText> {
+        let _ = code;
+        None
+    }
 }
 
 /// A displacement probe.
@@ -138,6 +163,15 @@ impl<A: CurrentAmplifier, P: Send> CurrentAmplifier for Devices<A, P> {
     }
     fn status(&self) -> AmplifierStatus {
         self.amplifier.status()
+    }
+    fn actual_current_a(&self) -> Option<f64> {
+        self.amplifier.actual_current_a()
+    }
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        self.amplifier.reset_fault()
+    }
+    fn explain(&self, code: u32) -> Option<FaultText> {
+        self.amplifier.explain(code)
     }
 }
 
