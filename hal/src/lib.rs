@@ -16,9 +16,10 @@
 //! * After [`CurrentAmplifier::disable`] the current is zero, whatever came before.
 //! * Errors say what to do about them: a person reads [`DeviceError`] with the motor in front of him.
 //!
-//! Put a new driver in one file of its own below `hal/src/` and register it in one line where the profiles name devices.
+//! `hal/README.md` shows step by step how a driver is added, with the VESC driver ([`can::vesc`]) as the worked example.
 #![warn(missing_docs)]
 
+pub mod can;
 pub mod serial;
 
 use std::fmt;

@@ -1,0 +1,71 @@
+//! Error frames of SocketCAN (`linux/can/error.h`): what the controller says of the bus.
+//!
+//! ```text
+//! can_id   CAN_ERR_FLAG | class bits: 0x004 controller, 0x020 no acknowledge, 0x040 bus-off, 0x100 restarted, ...
+//! data[1]  controller: 0x03 overflow, 0x0C warning level, 0x30 error passive, 0x40 error active again
+//! ```
+
+/// What an error frame says, the worst first if it says several things.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// The controller has left the bus: nothing goes out, though writes succeed.
+    BusOff,
+    /// 128 or more errors: the controller may no longer mark errors of others.
+    Passive,
+    /// Frames were lost, here or in the controller.
+    Overflow,
+    /// 96 or more errors.
+    Warning,
+    /// Nobody acknowledged a frame: no other node hears this bus.
+    NoAcknowledge,
+    /// Error active again: all is well.
+    Active,
+    /// A single error on the wire; the controller repeats the frame.
+    Noise,
+}
+
+const CONTROLLER: u32 = 0x004;
+const NO_ACKNOWLEDGE: u32 = 0x020;
+const BUS_OFF: u32 = 0x040;
+const RESTARTED: u32 = 0x100;
+
+impl Condition {
+    /// Reads the class bits and data of an error frame.
+    pub fn decode(class: u32, data: &[u8]) -> Condition {
+        let controller = if class & CONTROLLER != 0 { data.get(1).copied().unwrap_or(0) } else { 0 };
+        match () {
+            () if class & BUS_OFF != 0 => Condition::BusOff,
+            () if controller & 0x30 != 0 => Condition::Passive,
+            () if controller & 0x03 != 0 => Condition::Overflow,
+            () if controller & 0x0C != 0 => Condition::Warning,
+            () if class & NO_ACKNOWLEDGE != 0 => Condition::NoAcknowledge,
+            () if controller & 0x40 != 0 || class & RESTARTED != 0 => Condition::Active,
+            () => Condition::Noise,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn error_frames_are_read_by_the_bits_of_linux_can_error_h() {
+        let cases = [
+            (0x040, [0; 8], Condition::BusOff),
+            (0x004, [0, 0x20, 0, 0, 0, 0, 0, 0], Condition::Passive),
+            (0x004, [0, 0x10, 0, 0, 0, 0, 0, 0], Condition::Passive),
+            (0x004, [0, 0x08, 0, 0, 0, 0, 0, 0], Condition::Warning),
+            (0x004, [0, 0x01, 0, 0, 0, 0, 0, 0], Condition::Overflow),
+            (0x004, [0, 0x40, 0, 0, 0, 0, 0, 0], Condition::Active),
+            (0x100, [0; 8], Condition::Active),
+            (0x020, [0; 8], Condition::NoAcknowledge),
+            (0x088, [0; 8], Condition::Noise),
+            (0x044, [0, 0x40, 0, 0, 0, 0, 0, 0], Condition::BusOff),
+        ];
+        for (class, data, condition) in cases {
+            assert_eq!(Condition::decode(class, &data), condition, "class {class:#x} {data:?}");
+        }
+        assert_eq!(Condition::decode(0x004, &[]), Condition::Noise, "short data says nothing");
+    }
+}

@@ -1,0 +1,61 @@
+//! The state of a CAN interface, asked of the kernel by netlink.
+
+use socketcan::CanInterface;
+use socketcan::nl::CanState;
+use thiserror::Error;
+
+/// What the kernel says of an interface.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Interface {
+    /// Whether it is up.
+    pub is_up: bool,
+    /// Bit rate in bit/s; `None` for a virtual interface, which has none.
+    pub bit_rate: Option<u32>,
+    /// State of the controller in words; `None` for a virtual interface.
+    pub state: Option<&'static str>,
+    /// Whether the controller takes part in the bus (error active or warning); true for a virtual interface.
+    pub is_healthy: bool,
+    /// Transmit and receive error counters, where the controller tells them.
+    pub error_counters: Option<(u16, u16)>,
+    /// Time after which the kernel restarts a controller in bus-off, in milliseconds; 0 is never.
+    pub restart_ms: Option<u32>,
+}
+
+/// The interface could not be asked.
+#[derive(Debug, Error)]
+#[error("CAN interface {name}: {cause}; `ip link show type can` lists what there is")]
+pub struct InterfaceError {
+    /// Its name.
+    pub name: String,
+    /// What the system said.
+    pub cause: String,
+}
+
+impl Interface {
+    /// Asks for the state of interface `name`.
+    pub fn read(name: &str) -> Result<Interface, InterfaceError> {
+        let error = |cause: String| InterfaceError { name: name.to_owned(), cause };
+        let interface = CanInterface::open(name).map_err(|cause| error(cause.to_string()))?;
+        let details = interface.details().map_err(|cause| error(cause.to_string()))?;
+        let can = details.can;
+        Ok(Interface {
+            is_up: details.is_up,
+            bit_rate: can.bit_timing.map(|timing| timing.bitrate),
+            state: can.state.map(words),
+            is_healthy: can.state.is_none_or(|state| matches!(state, CanState::ErrorActive | CanState::ErrorWarning)),
+            error_counters: can.berr_counter.map(|counter| (counter.txerr, counter.rxerr)),
+            restart_ms: can.restart_ms,
+        })
+    }
+}
+
+fn words(state: CanState) -> &'static str {
+    match state {
+        CanState::ErrorActive => "error active",
+        CanState::ErrorWarning => "error warning",
+        CanState::ErrorPassive => "error passive",
+        CanState::BusOff => "bus off",
+        CanState::Stopped => "stopped",
+        CanState::Sleeping => "sleeping",
+    }
+}

@@ -1,0 +1,114 @@
+//! A bus in memory that joins any number of endpoints, for tests and rehearsal.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use super::super::frame::{CanFrame, Id};
+use super::{BusError, BusEvent, CanBus, Condition, Port};
+
+/// Events that wait at an endpoint; more are lost, as in a socket nobody reads.
+const LONGEST_QUEUE: usize = 10_000;
+
+/// A bus; clones are the same bus.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryBus {
+    wire: Arc<Mutex<Wire>>,
+}
+
+#[derive(Debug, Default)]
+struct Wire {
+    mailboxes: Vec<Arc<Mailbox>>,
+    is_down: bool,
+}
+
+#[derive(Debug)]
+struct Mailbox {
+    ids: Vec<Id>,
+    queue: Mutex<VecDeque<BusEvent>>,
+    arrived: Condvar,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl MemoryBus {
+    /// A new endpoint that hears `ids`, or all if there are none.
+    pub fn connect(&self, ids: &[Id]) -> MemoryEndpoint {
+        let mailbox = Arc::new(Mailbox { ids: ids.to_vec(), queue: Mutex::default(), arrived: Condvar::new() });
+        lock(&self.wire).mailboxes.push(Arc::clone(&mailbox));
+        MemoryEndpoint { bus: self.clone(), mailbox }
+    }
+
+    /// Tells all endpoints of a condition, as their controllers would.
+    pub fn tell(&self, condition: Condition) {
+        for mailbox in &lock(&self.wire).mailboxes {
+            mailbox.put(BusEvent::Condition(condition));
+        }
+    }
+
+    /// Takes the interface down, or up again: all endpoints fail meanwhile.
+    pub fn set_down(&self, is_down: bool) {
+        lock(&self.wire).is_down = is_down;
+    }
+
+    fn carry(&self, frame: &CanFrame, from: &Arc<Mailbox>) -> Result<(), BusError> {
+        let wire = lock(&self.wire);
+        if wire.is_down {
+            return Err(BusError::Down);
+        }
+        let others = wire.mailboxes.iter().filter(|mailbox| !Arc::ptr_eq(mailbox, from));
+        others.filter(|mailbox| mailbox.hears(frame.id())).for_each(|mailbox| mailbox.put(BusEvent::Frame(*frame)));
+        Ok(())
+    }
+}
+
+impl Port for MemoryBus {
+    fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
+        Ok(Box::new(self.connect(ids)))
+    }
+}
+
+impl Mailbox {
+    fn hears(&self, id: Id) -> bool {
+        self.ids.is_empty() || self.ids.contains(&id)
+    }
+
+    fn put(&self, event: BusEvent) {
+        let mut queue = lock(&self.queue);
+        if queue.len() < LONGEST_QUEUE {
+            queue.push_back(event);
+            self.arrived.notify_one();
+        }
+    }
+}
+
+/// A connection to a [`MemoryBus`].
+#[derive(Debug)]
+pub struct MemoryEndpoint {
+    bus: MemoryBus,
+    mailbox: Arc<Mailbox>,
+}
+
+impl CanBus for MemoryEndpoint {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        self.bus.carry(frame, &self.mailbox)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
+        if lock(&self.bus.wire).is_down {
+            return Err(BusError::Down);
+        }
+        let queue = lock(&self.mailbox.queue);
+        let waiting = self.mailbox.arrived.wait_timeout_while(queue, timeout, |queue| queue.is_empty());
+        let (mut queue, _) = waiting.unwrap_or_else(PoisonError::into_inner);
+        Ok(queue.pop_front())
+    }
+}
+
+impl Drop for MemoryEndpoint {
+    fn drop(&mut self) {
+        lock(&self.bus.wire).mailboxes.retain(|mailbox| !Arc::ptr_eq(mailbox, &self.mailbox));
+    }
+}

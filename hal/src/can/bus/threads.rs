@@ -1,0 +1,63 @@
+//! The real world: the system's clock and threads around a port.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use super::super::frame::Id;
+use super::{BusError, CanBus, Claim, Host, Port, Running, Task};
+
+/// How long a task waits for a frame before it looks at the clock again: a tenth of the shortest time that matters.
+const WAIT: Duration = Duration::from_millis(1);
+
+/// A port in real time.
+#[derive(Debug)]
+pub struct Threads<P> {
+    port: P,
+    start: Instant,
+}
+
+impl<P: Port> Threads<P> {
+    /// Time begins now.
+    pub fn new(port: P) -> Threads<P> {
+        Threads { port, start: Instant::now() }
+    }
+}
+
+fn since_ns(start: Instant) -> u64 {
+    start.elapsed().as_nanos() as u64
+}
+
+impl<P: Port> Port for Threads<P> {
+    fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
+        self.port.endpoint(ids)
+    }
+
+    fn claim(&self, node: u8) -> Result<Claim, u32> {
+        self.port.claim(node)
+    }
+}
+
+impl<P: Port> Host for Threads<P> {
+    fn now_ns(&self) -> u64 {
+        since_ns(self.start)
+    }
+
+    fn sleep(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
+
+    fn start(&self, name: &str, mut task: Box<dyn Task>) -> std::io::Result<Running> {
+        let mut running = Running::default();
+        let (stop, start) = (Arc::clone(&running.stop), self.start);
+        let work = move || {
+            while !stop.load(Ordering::Acquire) {
+                if task.step(&|| since_ns(start), WAIT).is_err() {
+                    std::thread::sleep(WAIT); // a dead interface answers at once: do not burn the processor
+                }
+            }
+        };
+        running.thread = Some(std::thread::Builder::new().name(name.to_owned()).spawn(work)?);
+        Ok(running)
+    }
+}

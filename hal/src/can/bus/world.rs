@@ -1,0 +1,104 @@
+//! A bus in memory with a clock of its own: waiting is running the others.
+//!
+//! Time passes only while somebody sleeps or waits for a frame, in steps of 100 us; each step runs all tasks in the
+//! order they were started. So a test of minutes takes milliseconds, is the same each time, and asserts no wall time.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use super::super::frame::{CanFrame, Id};
+use super::{BusError, BusEvent, CanBus, Host, MemoryBus, MemoryEndpoint, Port, Running, Task};
+
+const STEP_NS: u64 = 100_000;
+
+/// Tasks with what stops them.
+type Tasks = Vec<(Arc<AtomicBool>, Box<dyn Task>)>;
+
+/// A world; clones are the same world.
+#[derive(Clone, Default)]
+pub struct World {
+    shared: Arc<Shared>,
+}
+
+#[derive(Default)]
+struct Shared {
+    bus: MemoryBus,
+    now_ns: AtomicU64,
+    tasks: Mutex<Tasks>,
+}
+
+impl World {
+    /// The bus of this world.
+    pub fn bus(&self) -> &MemoryBus {
+        &self.shared.bus
+    }
+
+    /// One step of time, then of each task. The tasks are taken out meanwhile, so a task may sleep.
+    fn advance(&self, deadline_ns: u64) {
+        let now_ns = self.now_ns();
+        let next_ns = deadline_ns.min(now_ns + STEP_NS).max(now_ns);
+        self.shared.now_ns.store(next_ns, Ordering::Release);
+        let mut tasks = std::mem::take(&mut *self.tasks());
+        tasks.retain_mut(|(stop, task)| {
+            let goes_on = !stop.load(Ordering::Acquire);
+            if goes_on {
+                let _ = task.step(&|| self.now_ns(), Duration::ZERO); // an error only makes a real host pause
+            }
+            goes_on
+        });
+        let mut kept = self.tasks();
+        tasks.append(&mut kept);
+        *kept = tasks;
+    }
+
+    fn tasks(&self) -> std::sync::MutexGuard<'_, Tasks> {
+        self.shared.tasks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Port for World {
+    fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
+        Ok(Box::new(WorldEndpoint { world: self.clone(), inner: self.shared.bus.connect(ids) }))
+    }
+}
+
+impl Host for World {
+    fn now_ns(&self) -> u64 {
+        self.shared.now_ns.load(Ordering::Acquire)
+    }
+
+    fn sleep(&self, time: Duration) {
+        let deadline_ns = self.now_ns().saturating_add(time.as_nanos() as u64);
+        while self.now_ns() < deadline_ns {
+            self.advance(deadline_ns);
+        }
+    }
+
+    fn start(&self, _name: &str, task: Box<dyn Task>) -> std::io::Result<Running> {
+        let running = Running::default();
+        self.tasks().push((Arc::clone(&running.stop), task));
+        Ok(running)
+    }
+}
+
+struct WorldEndpoint {
+    world: World,
+    inner: MemoryEndpoint,
+}
+
+impl CanBus for WorldEndpoint {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        self.inner.send(frame)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
+        let deadline_ns = self.world.now_ns().saturating_add(timeout.as_nanos() as u64);
+        loop {
+            match self.inner.receive(Duration::ZERO)? {
+                None if self.world.now_ns() < deadline_ns => self.world.advance(deadline_ns),
+                event => return Ok(event),
+            }
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Devices on a CAN bus: a CANopen drive (CiA 301, CiA 402) and a VESC.
+//!
+//! ```text
+//!  frame            one CAN frame; everything below speaks it, nothing below knows a socket
+//!  sdo nmt heartbeat emcy sync pdo cia402     codecs and state machines, without input or output
+//!  budget scale     what fits on the bus; amperes and counts
+//!  bus              where frames go: SocketCAN, or a bus in memory with real or virtual time
+//!  drive  vesc      the two drivers: bench_hal::CurrentAmplifier
+//!  device           the other end: a simulated drive, for tests and rehearsal
+//! ```
+//!
+//! # Who stops the current when
+//!
+//! | what dies | who notices | how |
+//! |---|---|---|
+//! | the loop (no more set-points) | the service thread | [`drive::DriveSettings::command_timeout`] |
+//! | this process | the drive | its heartbeat consumer (0x1016) and abort connection option (0x6007) |
+//! | the drive's processor, its power | the service thread | heartbeat, boot-up message |
+//! | the drive's power stage | the service thread | EMCY, statusword |
+//! | the bus, the adapter | both ends | error frames here, heartbeat there |
+//!
+//! A successful write proves nothing: SocketCAN accepts frames in bus-off. Only what comes in is evidence.
+
+pub mod bus;
+pub mod frame;
+
+pub use frame::{CanFrame, Id};
