@@ -21,7 +21,16 @@
 //!
 //! A successful write proves nothing: SocketCAN accepts frames in bus-off. Only what comes in is evidence.
 
+pub mod budget;
 pub mod bus;
+pub mod cia402;
+pub mod emcy;
 pub mod frame;
+pub mod heartbeat;
+pub mod nmt;
+pub mod pdo;
+pub mod scale;
+pub mod sdo;
+pub mod sync;
 
 pub use frame::{CanFrame, Id};

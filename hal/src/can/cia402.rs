@@ -1,0 +1,211 @@
+//! The state machine of a drive (CiA 402-2, 7): from power-on to current, and back.
+//!
+//! ```text
+//!            0 start                               13 fault, from everywhere
+//!              v                                       v
+//!        NotReadyToSwitchOn                    FaultReactionActive
+//!              | 1 by itself                           | 14 by itself
+//!              v            15 fault reset             v
+//!        SwitchOnDisabled <-------------------------- Fault
+//!           |  ^  ^  ^
+//!        2  |  |7 |  +-- 12 disable voltage ----------------+
+//!  shutdown |  |  |                                         |
+//!           v  |  | 9, 10                             QuickStopActive
+//!        ReadyToSwitchOn <-- 8 shutdown -----+           ^
+//!         3 |  ^ 6 shutdown                  |           | 11 quick stop
+//!           v  |                             |           |
+//!        SwitchedOn -- 4 enable operation --> OperationEnabled
+//!                   <- 5 disable operation --
+//! ```
+//!
+//! Current flows in OperationEnabled (and, braking, in QuickStopActive and FaultReactionActive). 9 and 10 are `disable
+//! voltage`: the shortest way to no current, and the one this crate takes. 15 is taken only when a person asks.
+//!
+//! Statusword 0x6041: the state stands under mask 0x4F or 0x6F. Controlword 0x6040: 0x06 shutdown, 0x07 switch on or
+//! disable operation, 0x0F enable operation, 0x02 quick stop, 0x00 disable voltage, rising bit 7 fault reset.
+
+/// Controlword: disable voltage (7, 9, 10, 12).
+pub const DISABLE_VOLTAGE: u16 = 0x00;
+/// Controlword: shutdown (2, 6, 8).
+pub const SHUTDOWN: u16 = 0x06;
+/// Controlword: switch on (3), disable operation (5).
+pub const SWITCH_ON: u16 = 0x07;
+/// Controlword: enable operation (4), and stay there.
+pub const ENABLE_OPERATION: u16 = 0x0F;
+/// Controlword: quick stop (11).
+pub const QUICK_STOP: u16 = 0x02;
+/// Controlword: fault reset (15), on the rising edge of this bit.
+pub const FAULT_RESET: u16 = 0x80;
+
+/// Statusword, bit 9: the drive listens to its controlword.
+pub const REMOTE: u16 = 1 << 9;
+/// Statusword, bit 12, in cyclic synchronous torque: the drive follows the target.
+pub const FOLLOWS_TARGET: u16 = 1 << 12;
+
+/// Mode of operation 4 of 0x6060: profile torque, with the slope 0x6087 on the way to the target.
+pub const PROFILE_TORQUE: i8 = 4;
+/// Mode of operation 10 of 0x6060: cyclic synchronous torque.
+pub const CYCLIC_TORQUE: i8 = 10;
+
+/// State of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Starting.
+    NotReadyToSwitchOn,
+    /// Waiting for `shutdown`.
+    SwitchOnDisabled,
+    /// Power may be switched on.
+    ReadyToSwitchOn,
+    /// Power is on, no current.
+    SwitchedOn,
+    /// The drive follows its target.
+    OperationEnabled,
+    /// The drive brakes, or has braked.
+    QuickStopActive,
+    /// The drive brakes because of a fault.
+    FaultReactionActive,
+    /// The drive is off because of a fault.
+    Fault,
+}
+
+impl State {
+    /// Reads a statusword: mask 0x4F tells four states, mask 0x6F the others; `None` for what the standard leaves out.
+    pub const fn decode(statusword: u16) -> Option<State> {
+        match (statusword & 0x4F, statusword & 0x6F) {
+            (0x00, _) => Some(State::NotReadyToSwitchOn),
+            (0x40, _) => Some(State::SwitchOnDisabled),
+            (0x0F, _) => Some(State::FaultReactionActive),
+            (0x08, _) => Some(State::Fault),
+            (_, 0x21) => Some(State::ReadyToSwitchOn),
+            (_, 0x23) => Some(State::SwitchedOn),
+            (_, 0x27) => Some(State::OperationEnabled),
+            (_, 0x07) => Some(State::QuickStopActive),
+            _ => None,
+        }
+    }
+
+    /// The state's bits of a statusword.
+    pub const fn bits(self) -> u16 {
+        match self {
+            State::NotReadyToSwitchOn => 0x00,
+            State::SwitchOnDisabled => 0x40,
+            State::ReadyToSwitchOn => 0x21,
+            State::SwitchedOn => 0x23,
+            State::OperationEnabled => 0x27,
+            State::QuickStopActive => 0x07,
+            State::FaultReactionActive => 0x0F,
+            State::Fault => 0x08,
+        }
+    }
+
+    /// The controlword of the next step towards OperationEnabled; `None` where only time or a person helps.
+    pub const fn towards_enabled(self) -> Option<u16> {
+        match self {
+            State::SwitchOnDisabled => Some(SHUTDOWN),
+            State::ReadyToSwitchOn => Some(SWITCH_ON),
+            State::SwitchedOn | State::OperationEnabled => Some(ENABLE_OPERATION),
+            State::QuickStopActive => Some(DISABLE_VOLTAGE),
+            State::NotReadyToSwitchOn | State::FaultReactionActive | State::Fault => None,
+        }
+    }
+
+    /// The controlword of the next single step back; `None` where the drive is off already. [`DISABLE_VOLTAGE`] takes
+    /// all steps at once.
+    pub const fn towards_disabled(self) -> Option<u16> {
+        match self {
+            State::OperationEnabled => Some(SWITCH_ON),
+            State::SwitchedOn => Some(SHUTDOWN),
+            State::ReadyToSwitchOn | State::QuickStopActive => Some(DISABLE_VOLTAGE),
+            State::SwitchOnDisabled | State::NotReadyToSwitchOn | State::FaultReactionActive | State::Fault => None,
+        }
+    }
+
+    /// Whether the power stage is certainly without current.
+    pub const fn is_off(self) -> bool {
+        !matches!(self, State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive)
+    }
+}
+
+/// What a controlword orders (CiA 402-2, table 5). Fault reset is an edge and stands apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// 0xxx x110
+    Shutdown,
+    /// 0xxx 0111, also `disable operation`
+    SwitchOn,
+    /// 0xxx 1111
+    EnableOperation,
+    /// 0xxx xx0x
+    DisableVoltage,
+    /// 0xxx x01x
+    QuickStop,
+}
+
+impl Order {
+    /// Reads a controlword; `None` while bit 7 is set.
+    pub const fn decode(controlword: u16) -> Option<Order> {
+        match controlword & 0x8F {
+            word if word & 0x80 != 0 => None,
+            word if word & 0x02 == 0 => Some(Order::DisableVoltage),
+            word if word & 0x04 == 0 => Some(Order::QuickStop),
+            word if word & 0x01 == 0 => Some(Order::Shutdown),
+            0x07 => Some(Order::SwitchOn),
+            _ => Some(Order::EnableOperation),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [State; 8] = [
+        State::NotReadyToSwitchOn,
+        State::SwitchOnDisabled,
+        State::ReadyToSwitchOn,
+        State::SwitchedOn,
+        State::OperationEnabled,
+        State::QuickStopActive,
+        State::FaultReactionActive,
+        State::Fault,
+    ];
+
+    #[test]
+    fn statuswords_are_read_under_their_masks() {
+        for state in ALL {
+            assert_eq!(State::decode(state.bits()), Some(state));
+            // Bits 4, 7 and 8 to 15 say other things.
+            assert_eq!(State::decode(state.bits() | 0xFF90), Some(state));
+        }
+        // Mask 0x4F leaves bit 5 (quick stop) open for the four states it tells.
+        assert_eq!(State::decode(0x60), Some(State::SwitchOnDisabled));
+        assert_eq!(State::decode(0x28), Some(State::Fault));
+        assert_eq!(State::decode(0x2F), Some(State::FaultReactionActive));
+        assert_eq!(State::decode(0x01), None, "ready without the quick-stop bit is no state");
+        assert_eq!(State::decode(0x48), None, "fault and switch-on disabled at once is no state");
+    }
+
+    #[test]
+    fn no_statusword_but_0x27_means_current() {
+        for word in 0..=u16::MAX {
+            let enabled = State::decode(word) == Some(State::OperationEnabled);
+            assert_eq!(enabled, word & 0x6F == 0x27);
+        }
+    }
+
+    #[test]
+    fn controlwords_are_those_of_the_standard() {
+        let words = [SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, DISABLE_VOLTAGE, QUICK_STOP].map(Order::decode);
+        use Order::*;
+        assert_eq!(words, [Shutdown, SwitchOn, EnableOperation, DisableVoltage, QuickStop].map(Some));
+        assert_eq!(Order::decode(FAULT_RESET | ENABLE_OPERATION), None);
+        assert_eq!(Order::decode(0x0D), Some(DisableVoltage), "without bit 1 there is no voltage");
+    }
+
+    #[test]
+    fn a_fault_is_never_left_by_the_way_up() {
+        assert_eq!(State::Fault.towards_enabled(), None);
+        assert!(ALL.iter().filter_map(|state| state.towards_enabled()).all(|word| word & FAULT_RESET == 0));
+        assert!(ALL.iter().filter_map(|state| state.towards_disabled()).all(|word| word & FAULT_RESET == 0));
+    }
+}

@@ -1,0 +1,134 @@
+//! Emergency messages (CiA 301, 7.2.7; codes of drives: CiA 402-2).
+//!
+//! ```text
+//! 0x080 + node   [code u16 LE, error register u8, 5 bytes of the vendor]      code 0x0000: error gone
+//! ```
+
+use super::frame::{CanFrame, Id};
+
+/// An emergency message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Emergency {
+    /// The code, see [`text`]; 0 says that the error is gone.
+    pub code: u16,
+    /// Object 0x1001, see [`register_words`].
+    pub register: u8,
+    /// Meaning in the drive's manual.
+    pub vendor: [u8; 5],
+}
+
+/// Identifier of the emergencies of `node` (1 to 127).
+pub const fn cob_id(node: u8) -> Id {
+    Id::standard(0x080 + (node & 0x7F) as u16)
+}
+
+impl Emergency {
+    /// The frame in which `node` sends it.
+    pub const fn frame(&self, node: u8) -> CanFrame {
+        let [low, high] = self.code.to_le_bytes();
+        let v = self.vendor;
+        CanFrame::new(cob_id(node), [low, high, self.register, v[0], v[1], v[2], v[3], v[4]])
+    }
+
+    /// Reads the eight bytes.
+    pub fn decode(data: &[u8]) -> Option<Emergency> {
+        let &[low, high, register, a, b, c, d, e] = data else { return None };
+        Some(Emergency { code: u16::from_le_bytes([low, high]), register, vendor: [a, b, c, d, e] })
+    }
+}
+
+/// What an error code means: the exact code where CiA 301 or CiA 402 name it, else its class.
+pub const fn text(code: u16) -> &'static str {
+    match code {
+        0x0000 => "no error, or error gone",
+        0x2310..=0x2312 => "continuous over-current at the output",
+        0x2320 | 0x2321 | 0x2330 => "short circuit or earth leakage at the output",
+        0x3110 | 0x3210 => "supply or link voltage too high",
+        0x3120 | 0x3220 => "supply or link voltage too low",
+        0x4210 => "drive too hot",
+        0x4310 => "drive too hot (excess temperature)",
+        0x5441..=0x5443 => "a contact or enable input is open",
+        0x7121 => "motor blocked",
+        0x7300..=0x73FF => "sensor of the drive failed",
+        0x8110 => "CAN overrun: frames lost",
+        0x8120 => "CAN error passive",
+        0x8130 => "heartbeat or life guard lost: the drive no longer heard its master",
+        0x8140 => "recovered from bus-off",
+        0x8150 => "COB-ID collision",
+        0x8210 => "PDO not processed: wrong length",
+        0x8220 => "PDO longer than mapped",
+        0x8240 => "unexpected SYNC length",
+        0x8250 => "RPDO timed out",
+        0x8311 => "excess torque",
+        0x8400..=0x84FF => "speed out of bounds",
+        0x8500..=0x87FF => "following error",
+        _ => class(code),
+    }
+}
+
+/// The class of a code: its upper digit or digits (CiA 301, table 26).
+const fn class(code: u16) -> &'static str {
+    match code >> 8 {
+        0x00 => "no error, or error gone",
+        0x10..=0x1F => "generic error",
+        0x20 => "current",
+        0x21 => "current at the input of the drive",
+        0x22 => "current inside the drive",
+        0x23 => "current at the output of the drive",
+        0x24..=0x2F => "current",
+        0x30 => "voltage",
+        0x31 => "mains voltage",
+        0x32 => "voltage inside the drive",
+        0x33 => "output voltage",
+        0x34..=0x3F => "voltage",
+        0x40 => "temperature",
+        0x41 => "ambient temperature",
+        0x42..=0x4F => "temperature of the drive",
+        0x50..=0x5F => "hardware of the drive",
+        0x60 => "software of the drive",
+        0x61 => "internal software of the drive",
+        0x62 => "user software of the drive",
+        0x63 => "data set of the drive",
+        0x64..=0x6F => "software of the drive",
+        0x70..=0x7F => "additional module of the drive",
+        0x80 => "monitoring",
+        0x81 => "communication",
+        0x82 => "protocol",
+        0x83..=0x8F => "monitoring",
+        0x90..=0x9F => "external error",
+        0xF0..=0xFE => "additional function of the drive",
+        0xFF => "specific to the drive",
+        _ => "reserved code",
+    }
+}
+
+/// The set bits of the error register (object 0x1001) in words.
+pub fn register_words(register: u8) -> impl Iterator<Item = &'static str> {
+    const WORDS: [&str; 8] =
+        ["generic", "current", "voltage", "temperature", "communication", "device profile", "reserved", "manufacturer"];
+    WORDS.into_iter().enumerate().filter(move |(bit, _)| register >> bit & 1 == 1).map(|(_, word)| word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_emergency_carries_code_register_and_vendor_bytes() {
+        // The bytes for over-current at the output of node 5, error register generic + current.
+        let emergency = Emergency { code: 0x2310, register: 0x03, vendor: [1, 2, 3, 4, 5] };
+        let frame = emergency.frame(5);
+        assert_eq!((frame.id(), frame.data()), (Id::standard(0x085), &[0x10, 0x23, 3, 1, 2, 3, 4, 5][..]));
+        assert_eq!(Emergency::decode(frame.data()), Some(emergency));
+        assert_eq!(Emergency::decode(&frame.data()[..7]), None);
+    }
+
+    #[test]
+    fn every_code_has_words() {
+        assert_eq!(text(0x8130), "heartbeat or life guard lost: the drive no longer heard its master");
+        assert_eq!(text(0x4299), "temperature of the drive");
+        assert_eq!(text(0xFF12), "specific to the drive");
+        assert!((0..=u16::MAX).all(|code| !text(code).is_empty()));
+        assert_eq!(register_words(0b1000_0011).collect::<Vec<_>>(), ["generic", "current", "manufacturer"]);
+    }
+}
