@@ -24,6 +24,7 @@
 pub mod budget;
 pub mod bus;
 pub mod cia402;
+pub mod device;
 pub mod emcy;
 pub mod frame;
 pub mod heartbeat;
