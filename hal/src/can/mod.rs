@@ -25,6 +25,7 @@ pub mod budget;
 pub mod bus;
 pub mod cia402;
 pub mod device;
+pub mod drive;
 pub mod emcy;
 pub mod frame;
 pub mod heartbeat;

@@ -1,0 +1,203 @@
+//! The faults of a CANopen drive, with codes that stay.
+//!
+//! ```text
+//! 0x0001_eeee   emergency message of the drive; eeee is its code
+//! 0x0002_00nn   the drive's communication
+//! 0x0003_00nn   the drive's power stage
+//! 0x0004_00nn   the bus
+//! 0x0005_00nn   this program
+//! ```
+
+use super::super::bus::{BusError, Condition};
+use super::super::emcy;
+use crate::{DeviceError, FaultText};
+
+/// Emergency messages: added to the code that the drive sent.
+pub const EMERGENCY: u32 = 0x0001_0000;
+/// No heartbeat of the drive.
+pub const HEARTBEAT_LOST: u32 = 0x0002_0001;
+/// The drive restarted by itself.
+pub const RESTARTED: u32 = 0x0002_0002;
+/// The drive left NMT operational.
+pub const NOT_OPERATIONAL: u32 = 0x0002_0003;
+/// A frame of the drive is not laid out as configured.
+pub const MALFORMED: u32 = 0x0002_0004;
+/// The drive did not take its configuration again.
+pub const NOT_CONFIGURED: u32 = 0x0002_0005;
+/// State Fault without an emergency message.
+pub const DRIVE_FAULT: u32 = 0x0003_0001;
+/// Operation is no longer enabled, and nobody asked for that.
+pub const SWITCHED_OFF: u32 = 0x0003_0002;
+/// The drive does not follow its target (bit 12 of the statusword).
+pub const TARGET_IGNORED: u32 = 0x0003_0003;
+/// No status frames.
+pub const STATUS_LOST: u32 = 0x0003_0004;
+/// The drive did not become enabled in time.
+pub const NOT_ENABLED: u32 = 0x0003_0005;
+/// The drive does not listen to its controlword (bit 9 of the statusword).
+pub const NOT_REMOTE: u32 = 0x0003_0006;
+/// The drive stays in Fault.
+pub const FAULT_REMAINS: u32 = 0x0003_0007;
+/// The CAN controller is in bus-off.
+pub const BUS_OFF: u32 = 0x0004_0001;
+/// The CAN controller is error passive.
+pub const BUS_PASSIVE: u32 = 0x0004_0002;
+/// The interface is down.
+pub const BUS_DOWN: u32 = 0x0004_0003;
+/// The interface is gone.
+pub const BUS_GONE: u32 = 0x0004_0004;
+/// Frames were lost on the way in.
+pub const OVERFLOW: u32 = 0x0004_0005;
+/// The transmit queue is full.
+pub const QUEUE_FULL: u32 = 0x0004_0006;
+/// The interface failed otherwise.
+pub const BUS_FAILED: u32 = 0x0004_0007;
+/// The loop stopped commanding.
+pub const COMMANDS_STOPPED: u32 = 0x0005_0001;
+/// The drive did not confirm that it is off.
+pub const STILL_ENABLED: u32 = 0x0005_0002;
+/// A command to a drive that is not enabled.
+pub const NOT_ARMED: u32 = 0x0005_0003;
+/// A command that is not a number.
+pub const NOT_FINITE: u32 = 0x0005_0004;
+
+/// What a code means and what to do about it.
+pub const fn fault_text(code: u32) -> FaultText {
+    let (what, remedy) = match code {
+        HEARTBEAT_LOST => {
+            ("the drive's heartbeat is lost", "check the drive's power and the CAN cable, then clear the fault")
+        }
+        RESTARTED => (
+            "the drive restarted by itself",
+            "check its supply for dips, then clear the fault: that configures it again",
+        ),
+        NOT_OPERATIONAL => {
+            ("the drive left the NMT state operational", "look for another NMT master on the bus, then clear the fault")
+        }
+        MALFORMED => (
+            "a frame of the drive is not laid out as configured",
+            "look for a second node with the same number, then clear the fault",
+        ),
+        NOT_CONFIGURED => {
+            ("the drive did not take its configuration again", "open the drive anew: the error names the object")
+        }
+        DRIVE_FAULT => (
+            "the drive is in Fault and sent no emergency message",
+            "read the drive's display or its error history 0x1003, remove the cause, then clear the fault",
+        ),
+        SWITCHED_OFF => {
+            ("the drive switched itself off", "check its enable input and its supply, then clear the fault")
+        }
+        TARGET_IGNORED => (
+            "the drive does not follow its target (bit 12 of the statusword)",
+            "check limits, limit switches and the mode of operation in the drive, then clear the fault",
+        ),
+        STATUS_LOST => ("the drive sends no status frames", "check the bus load, then clear the fault"),
+        NOT_ENABLED => {
+            ("the drive did not reach Operation Enabled in time", "check its power stage supply and its enable input")
+        }
+        NOT_REMOTE => (
+            "the drive does not listen to CAN (bit 9 of the statusword)",
+            "switch the drive from local to remote, and close its commissioning program",
+        ),
+        FAULT_REMAINS => (
+            "the drive stays in Fault after the reset",
+            "remove the cause first: read the drive's display or its error history 0x1003",
+        ),
+        BUS_OFF => (
+            "the CAN controller is in bus-off",
+            "check cable, termination and bit rate; `ip link set IFACE down` and up again, then clear the fault",
+        ),
+        BUS_PASSIVE => {
+            ("the CAN controller is error passive", "check cable, termination and bit rate, then clear the fault")
+        }
+        BUS_DOWN => ("the CAN interface is down", "`ip link set IFACE up`, then clear the fault"),
+        BUS_GONE => ("the CAN interface is gone", "plug the adapter in, then start anew"),
+        OVERFLOW => ("received CAN frames were lost", "lower the traffic on the bus, then clear the fault"),
+        QUEUE_FULL => {
+            ("the transmit queue of the CAN interface is full", "check that the drive is on the bus; lower the rate")
+        }
+        BUS_FAILED => ("the CAN interface failed", "read the kernel's messages (dmesg), then clear the fault"),
+        COMMANDS_STOPPED => (
+            "the loop stopped commanding and the drive was switched off",
+            "look for overruns; the limit is the setting command_timeout",
+        ),
+        STILL_ENABLED => (
+            "the drive did not confirm that it is off; it was told by NMT and our heartbeat was stopped",
+            "cut the drive's power, find the cause, then clear the fault",
+        ),
+        NOT_ARMED => ("the drive is not enabled", "arm first"),
+        NOT_FINITE => ("the commanded current is not a number", "this is a fault of the program; please report it"),
+        _ if code >> 16 == EMERGENCY >> 16 => (
+            emcy::text(code as u16),
+            "the drive says so in an emergency message; remove the cause, then clear the fault",
+        ),
+        _ => ("unknown fault", "please report the code"),
+    };
+    FaultText { what, remedy }
+}
+
+/// A fault as the answer to a call.
+pub(super) const fn device_error(code: u32) -> DeviceError {
+    let FaultText { what, remedy } = fault_text(code);
+    DeviceError { what, remedy, code: code as i64 }
+}
+
+/// The code of a failure of the interface.
+pub(super) const fn of_bus_error(error: BusError) -> u32 {
+    match error {
+        BusError::QueueFull => QUEUE_FULL,
+        BusError::Down => BUS_DOWN,
+        BusError::Gone => BUS_GONE,
+        BusError::Other(_) => BUS_FAILED,
+    }
+}
+
+/// The code of a condition of the controller, if it is a fault.
+pub(super) const fn of_condition(condition: Condition) -> Option<u32> {
+    match condition {
+        Condition::BusOff => Some(BUS_OFF),
+        Condition::Passive => Some(BUS_PASSIVE),
+        Condition::Overflow => Some(OVERFLOW),
+        Condition::Warning | Condition::NoAcknowledge | Condition::Active | Condition::Noise => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_has_a_text_and_a_remedy_of_its_own() {
+        let codes = [
+            HEARTBEAT_LOST,
+            RESTARTED,
+            NOT_OPERATIONAL,
+            MALFORMED,
+            NOT_CONFIGURED,
+            DRIVE_FAULT,
+            SWITCHED_OFF,
+            TARGET_IGNORED,
+            STATUS_LOST,
+            NOT_ENABLED,
+            NOT_REMOTE,
+            FAULT_REMAINS,
+            BUS_OFF,
+            BUS_PASSIVE,
+            BUS_DOWN,
+            BUS_GONE,
+            OVERFLOW,
+            QUEUE_FULL,
+            BUS_FAILED,
+            COMMANDS_STOPPED,
+            STILL_ENABLED,
+            NOT_ARMED,
+            NOT_FINITE,
+        ];
+        let whats: std::collections::HashSet<_> = codes.iter().map(|code| fault_text(*code).what).collect();
+        assert_eq!(whats.len(), codes.len());
+        assert!(codes.iter().all(|code| fault_text(*code).what != "unknown fault"));
+        assert_eq!(fault_text(EMERGENCY + 0x4210).what, "drive too hot");
+        assert_eq!(fault_text(0x0009_0000).what, "unknown fault");
+    }
+}

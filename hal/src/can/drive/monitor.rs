@@ -1,0 +1,287 @@
+//! Watches the drive: what comes in becomes status and faults, what must go out goes out. Sans-I/O.
+//!
+//! ```text
+//!  heartbeat, EMCY, status frame, error frame --handle--> fault latched, the first one counts
+//!  time --poll--> our heartbeat | heartbeat, status or commands overdue: fault | after a fault or disable:
+//!                 `disable voltage` until the drive confirms, then NMT stop and silence, so that its own watch acts
+//! ```
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::super::budget::Exchange;
+use super::super::bus::{BusError, BusEvent};
+use super::super::cia402::{DISABLE_VOLTAGE, State};
+use super::super::frame::{CanFrame, Id};
+use super::super::pdo::{self, Direction};
+use super::super::{emcy, heartbeat, nmt, sync};
+use super::faults;
+use super::settings::DriveSettings;
+use super::shared::{Intent, Shared};
+
+/// Time between repeats of `disable voltage`.
+const REPEAT_NS: u64 = 10_000_000;
+/// Time between SYNCs while nobody commands, so that a synchronous drive still tells its state.
+const IDLE_SYNC_NS: u64 = 20_000_000;
+
+/// The three identifiers that a drive sends by itself, and nothing else, reach the monitor.
+pub(super) fn heard_ids(node: u8) -> [Id; 3] {
+    [heartbeat::cob_id(node), emcy::cob_id(node), pdo::cob_id(Direction::Transmit, 1, node)]
+}
+
+/// The set-point frame, and the SYNC that makes a synchronous drive take it.
+pub(super) fn set_point(node: u8, controlword: u16, target: i16) -> CanFrame {
+    CanFrame::new(pdo::cob_id(Direction::Receive, 1, node), pdo::pack(controlword, target))
+}
+
+/// The watch after a disable: until the drive says that it is off.
+#[derive(Clone, Copy, Debug)]
+struct OffWatch {
+    since_ns: u64,
+    repeat_ns: u64,
+    status_count: u32,
+    escalated: bool,
+}
+
+/// The watch while commands are followed.
+#[derive(Clone, Copy, Debug)]
+struct OnWatch {
+    since_ns: u64,
+    commands: u32,
+    first_command_ns: Option<u64>,
+    last_command_ns: u64,
+}
+
+#[derive(Debug)]
+pub(super) struct Monitor {
+    shared: Arc<Shared>,
+    node: u8,
+    own_node: u8,
+    is_synchronous: bool,
+    heartbeat_timeout_ns: u64,
+    own_period_ns: u64,
+    status_timeout_ns: u64,
+    command_timeout_ns: u64,
+    off_timeout_ns: u64,
+    heard_ns: u64,
+    own_due_ns: u64,
+    status_ns: u64,
+    idle_sync_ns: u64,
+    intent: Intent,
+    uses: u32,
+    on: Option<OnWatch>,
+    off: Option<OffWatch>,
+}
+
+impl Monitor {
+    pub(super) fn new(settings: &DriveSettings, shared: Arc<Shared>, now_ns: u64) -> Monitor {
+        let ns = |time: Duration| time.as_nanos() as u64;
+        Monitor {
+            shared,
+            node: settings.node,
+            own_node: settings.own_node,
+            is_synchronous: matches!(settings.exchange, Exchange::Synchronous { .. }),
+            heartbeat_timeout_ns: ns(settings.heartbeat_timeout),
+            own_period_ns: ns(settings.own_heartbeat_period),
+            status_timeout_ns: ns(settings.status_timeout),
+            command_timeout_ns: ns(settings.command_timeout),
+            off_timeout_ns: ns(settings.own_heartbeat_timeout).max(3 * REPEAT_NS),
+            heard_ns: now_ns,
+            own_due_ns: now_ns,
+            status_ns: now_ns,
+            idle_sync_ns: now_ns,
+            intent: Intent::Off,
+            uses: 0,
+            on: None,
+            off: None,
+        }
+    }
+
+    /// The bus cannot be read.
+    pub(super) fn fail(&mut self, error: BusError) {
+        self.shared.latch(faults::of_bus_error(error));
+    }
+
+    /// Takes what came from the bus.
+    pub(super) fn handle(&mut self, event: &BusEvent, now_ns: u64) {
+        match event {
+            BusEvent::Condition(condition) => {
+                if let Some(code) = faults::of_condition(*condition) {
+                    self.shared.latch(code);
+                }
+            }
+            BusEvent::Frame(frame) if frame.id() == heartbeat::cob_id(self.node) => self.heartbeat(frame, now_ns),
+            BusEvent::Frame(frame) if frame.id() == emcy::cob_id(self.node) => self.emergency(frame),
+            BusEvent::Frame(frame) if frame.id() == pdo::cob_id(Direction::Transmit, 1, self.node) => {
+                self.status(frame, now_ns)
+            }
+            BusEvent::Frame(_) => {}
+        }
+    }
+
+    fn heartbeat(&mut self, frame: &CanFrame, now_ns: u64) {
+        let Some(state) = heartbeat::decode(frame.data()) else { return self.shared.latch(faults::MALFORMED) };
+        self.heard_ns = now_ns;
+        self.shared.set_nmt(state);
+        if state == nmt::State::Operational {
+            return;
+        }
+        self.shared.forget_status();
+        if state == nmt::State::BootUp {
+            self.off = None; // a drive that has just started is off
+            self.shared.set_restarted(true);
+            self.shared.latch(faults::RESTARTED);
+        } else if self.is_in_use() {
+            self.shared.latch(faults::NOT_OPERATIONAL);
+        }
+    }
+
+    fn emergency(&mut self, frame: &CanFrame) {
+        let Some(emergency) = emcy::Emergency::decode(frame.data()) else {
+            return self.shared.latch(faults::MALFORMED);
+        };
+        self.shared.set_emergency(emergency.code);
+        let matters = self.is_in_use() || self.shared.fault() == faults::DRIVE_FAULT;
+        if emergency.code != 0 && matters {
+            self.shared.latch(faults::EMERGENCY + u32::from(emergency.code));
+        }
+    }
+
+    fn status(&mut self, frame: &CanFrame, now_ns: u64) {
+        let Some((statusword, actual)) = pdo::unpack(frame.data()) else {
+            return self.shared.latch(faults::MALFORMED);
+        };
+        self.status_ns = now_ns;
+        self.shared.set_status(statusword, actual);
+        match (State::decode(statusword), self.shared.intent()) {
+            (_, Intent::Resetting) => {}
+            (Some(State::Fault | State::FaultReactionActive), _) => self.shared.latch(self.drive_fault()),
+            (None, Intent::On) => self.shared.latch(faults::MALFORMED),
+            (Some(State::OperationEnabled), Intent::On) if self.shared.follows() => {}
+            (Some(State::OperationEnabled), Intent::On) => self.shared.latch(faults::TARGET_IGNORED),
+            (Some(_), Intent::On) => self.shared.latch(faults::SWITCHED_OFF),
+            _ => {}
+        }
+    }
+
+    /// State Fault, with the emergency message if there was one.
+    fn drive_fault(&self) -> u32 {
+        match self.shared.emergency() {
+            0 => faults::DRIVE_FAULT,
+            code => faults::EMERGENCY + u32::from(code),
+        }
+    }
+
+    fn is_in_use(&self) -> bool {
+        self.shared.intent().is_in_use()
+    }
+
+    /// Lets time pass; what must go out is given to `send`.
+    pub(super) fn poll(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
+        if now_ns.saturating_sub(self.heard_ns) > self.heartbeat_timeout_ns {
+            self.shared.latch(faults::HEARTBEAT_LOST);
+            self.shared.forget_nmt();
+            self.shared.forget_status();
+        }
+        self.follow_intent(now_ns);
+        self.watch_commands(now_ns);
+        self.follow_intent(now_ns); // a fault found just now switches off just now
+        self.see_to_it_that_it_is_off(now_ns, send);
+        self.sync_while_idle(now_ns, send);
+        self.beat(now_ns, send);
+    }
+
+    /// What the caller wants, with a fault above it.
+    fn follow_intent(&mut self, now_ns: u64) {
+        let intent = match self.shared.intent() {
+            Intent::Resetting => Intent::Resetting,
+            _ if self.shared.fault() != 0 => Intent::Off,
+            wanted => wanted,
+        };
+        let uses = self.shared.uses();
+        if (intent, uses) == (self.intent, self.uses) {
+            return;
+        }
+        let was_in_use = self.intent.is_in_use() || uses != self.uses;
+        (self.intent, self.uses) = (intent, uses);
+        let commands = self.shared.commands();
+        self.on = (intent == Intent::On).then_some(OnWatch {
+            since_ns: now_ns,
+            commands,
+            first_command_ns: None,
+            last_command_ns: now_ns,
+        });
+        let status_count = self.shared.status_count();
+        let watch = OffWatch { since_ns: now_ns, repeat_ns: now_ns, status_count, escalated: false };
+        self.off = (intent == Intent::Off && was_in_use).then_some(watch);
+    }
+
+    fn watch_commands(&mut self, now_ns: u64) {
+        let commands = self.shared.commands();
+        let Some(on) = &mut self.on else { return };
+        if commands != on.commands {
+            (on.commands, on.last_command_ns) = (commands, now_ns);
+            on.first_command_ns = on.first_command_ns.or(Some(now_ns));
+        }
+        if on.first_command_ns.is_some() && now_ns.saturating_sub(on.last_command_ns) > self.command_timeout_ns {
+            self.shared.latch(faults::COMMANDS_STOPPED);
+        }
+        // A synchronous drive answers SYNCs, which begin with the first command.
+        let since_ns = if self.is_synchronous { on.first_command_ns } else { Some(on.since_ns) };
+        let overdue = |since_ns: u64| now_ns.saturating_sub(since_ns.max(self.status_ns)) > self.status_timeout_ns;
+        if since_ns.is_some_and(overdue) {
+            self.shared.latch(faults::STATUS_LOST);
+        }
+    }
+
+    /// Repeats `disable voltage` until the drive says that it is off; if it does not in time, takes the other ways.
+    fn see_to_it_that_it_is_off(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
+        let Some(mut watch) = self.off else { return };
+        if self.is_confirmed_off(&watch) {
+            self.off = None;
+            return;
+        }
+        if now_ns < watch.repeat_ns {
+            return;
+        }
+        watch.repeat_ns = now_ns + REPEAT_NS;
+        self.send_disable(send);
+        watch.escalated |= now_ns.saturating_sub(watch.since_ns) > self.off_timeout_ns;
+        if watch.escalated {
+            send(nmt::Command::Stop.frame(self.node));
+            self.shared.latch(faults::STILL_ENABLED);
+        }
+        self.off = Some(watch);
+    }
+
+    /// A status frame since the disable says off.
+    fn is_confirmed_off(&self, watch: &OffWatch) -> bool {
+        let is_off =
+            matches!(self.shared.state(), Some(State::SwitchOnDisabled | State::NotReadyToSwitchOn | State::Fault));
+        is_off && self.shared.status_count() != watch.status_count
+    }
+
+    fn send_disable(&self, send: &mut dyn FnMut(CanFrame)) {
+        send(set_point(self.node, DISABLE_VOLTAGE, 0));
+        if self.is_synchronous {
+            send(sync::FRAME);
+        }
+    }
+
+    fn sync_while_idle(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
+        let is_idle = self.is_synchronous && self.intent == Intent::Off && self.off.is_none();
+        if is_idle && now_ns >= self.idle_sync_ns {
+            self.idle_sync_ns = now_ns + IDLE_SYNC_NS;
+            send(sync::FRAME);
+        }
+    }
+
+    /// Our heartbeat; silence is the last way to stop a drive that does not confirm.
+    fn beat(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
+        let is_silent = self.off.is_some_and(|watch| watch.escalated);
+        if !is_silent && now_ns >= self.own_due_ns {
+            self.own_due_ns = now_ns + self.own_period_ns;
+            send(heartbeat::frame(self.own_node, nmt::State::Operational));
+        }
+    }
+}

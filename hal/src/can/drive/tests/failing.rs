@@ -1,0 +1,260 @@
+//! Every fault: found in the time that the settings state, current zero, and usable again when a person clears it.
+
+use super::super::super::bus::Condition;
+use super::super::super::device::DeviceFault;
+use super::*;
+
+/// Enabled, 1 A flowing for 50 ms.
+fn running(exchange: Exchange) -> Rig {
+    let mut rig = rig(exchange);
+    rig.drive.enable().unwrap();
+    assert_eq!(rig.run_ms(1.0, 50), 50, "{:x?}", rig.drive.status());
+    assert_eq!(rig.device_current_a(), 1.0);
+    rig
+}
+
+/// The fault is found within `most_ms`, the current is zero within 3 ms more and stays so whatever the loop does.
+fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
+    let found_ms = rig.run_ms(1.0, most_ms + 1);
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(code), "{}", fault_text(code).what);
+    assert!(found_ms <= most_ms, "{}: {found_ms} ms", fault_text(code).what);
+    rig.sleep_ms(3);
+    for _ in 0..300 {
+        assert_eq!(rig.device_current_a(), 0.0, "{}", fault_text(code).what);
+        assert_eq!(rig.drive.command(1.0).unwrap_err().code, i64::from(code), "a heedless loop is refused");
+        rig.sleep_ms(1);
+    }
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(code), "the first cause stays until a person clears it");
+    assert_eq!(rig.drive.enable().unwrap_err().code, i64::from(code), "a fault is not left by enabling");
+    assert_eq!(rig.device_current_a(), 0.0);
+}
+
+/// After the cause is gone: cleared by a person, off, and enabled again only when asked.
+fn recovers(rig: &mut Rig) {
+    rig.device().inject(DeviceFault::None);
+    rig.sleep_ms(50);
+    rig.drive.reset_fault().unwrap_or_else(|error| panic!("{error}: {:?}", rig.drive.last_error()));
+    assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
+    assert_eq!(rig.device_current_a(), 0.0);
+    rig.drive.enable().unwrap();
+    assert_eq!(rig.run_ms(0.5, 50), 50);
+    assert_eq!(rig.device_current_a(), 0.5);
+}
+
+/// Status frames come every 2 ms, either by the timer or at every second SYNC of 1 kHz; one step of the bus is 0.1 ms.
+const STATUS_MS: u32 = 3;
+
+#[test]
+fn faults_of_the_drive_are_found_with_the_next_status_frame() {
+    let cases = [
+        (DeviceFault::Drive(0x2310), faults::EMERGENCY + 0x2310),
+        (DeviceFault::EmergencyOnly(0x4210), faults::EMERGENCY + 0x4210),
+        (DeviceFault::TargetIgnored, faults::TARGET_IGNORED),
+        (DeviceFault::SwitchesOff, faults::SWITCHED_OFF),
+        (DeviceFault::ShortFrames, faults::MALFORMED),
+        (DeviceFault::SenselessStatus, faults::MALFORMED),
+        (DeviceFault::Reset, faults::RESTARTED),
+    ];
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        for (misbehaviour, code) in cases {
+            let mut rig = running(exchange);
+            rig.device().inject(misbehaviour);
+            finds(&mut rig, code, STATUS_MS);
+            recovers(&mut rig);
+        }
+    }
+}
+
+#[test]
+fn a_silent_drive_is_found_by_its_missing_status() {
+    // 20 ms without status; the drive still hears, so it is switched off.
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = running(exchange);
+        rig.device().inject(DeviceFault::Mute);
+        finds(&mut rig, faults::STATUS_LOST, 22);
+        recovers(&mut rig);
+    }
+}
+
+#[test]
+fn a_silent_drive_is_found_by_its_missing_heartbeat_while_it_is_off() {
+    let mut rig = rig(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::Mute);
+    rig.sleep_ms(48);
+    assert_eq!(
+        rig.drive.status(),
+        AmplifierStatus::Disabled,
+        "70 ms from the last heartbeat, which is up to 20 ms old"
+    );
+    rig.sleep_ms(23);
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::HEARTBEAT_LOST));
+    recovers(&mut rig);
+}
+
+#[test]
+fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = running(exchange);
+        rig.device().inject(DeviceFault::Unplugged);
+        assert!(rig.run_ms(1.0, 30) <= 22);
+        assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::STATUS_LOST));
+        rig.sleep_ms(71); // 70 ms after the last heartbeat heard, whatever we do
+        assert_eq!(rig.device_current_a(), 0.0);
+        recovers(&mut rig);
+    }
+}
+
+#[test]
+fn late_answers_are_found_by_the_gap_that_they_leave() {
+    let mut rig = running(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::Late(200));
+    finds(&mut rig, faults::STATUS_LOST, 22);
+    rig.sleep_ms(400);
+    recovers(&mut rig);
+}
+
+#[test]
+fn conditions_of_the_bus_are_faults() {
+    let cases = [
+        (Condition::BusOff, faults::BUS_OFF),
+        (Condition::Passive, faults::BUS_PASSIVE),
+        (Condition::Overflow, faults::OVERFLOW),
+    ];
+    for (condition, code) in cases {
+        let mut rig = running(ASYNCHRONOUS);
+        rig.world.bus().tell(Condition::Warning);
+        rig.world.bus().tell(Condition::Noise);
+        assert_eq!(rig.run_ms(1.0, 5), 5, "a warning is no fault");
+        rig.world.bus().tell(condition);
+        finds(&mut rig, code, 1);
+        recovers(&mut rig);
+    }
+}
+
+#[test]
+fn an_interface_that_goes_down_is_a_fault_and_the_drive_stops_by_itself() {
+    let mut rig = running(ASYNCHRONOUS);
+    rig.world.bus().set_down(true);
+    rig.sleep_ms(1);
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_DOWN));
+    rig.sleep_ms(72);
+    assert_eq!(rig.device_current_a(), 0.0);
+    assert!(rig.drive.reset_fault().is_err(), "still down");
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_DOWN));
+    rig.world.bus().set_down(false);
+    recovers(&mut rig);
+}
+
+#[test]
+fn a_killed_process_is_missed_by_the_drive() {
+    let mut rig = running(ASYNCHRONOUS);
+    // SIGKILL: no thread of ours runs on, nothing is sent any more.
+    rig.drive.service = Running::default();
+    rig.sleep_ms(48);
+    assert_eq!(rig.device_current_a(), 1.0, "70 ms from the last heartbeat, which is up to 20 ms old");
+    rig.sleep_ms(24);
+    assert_eq!((rig.device_current_a(), rig.device().power_state()), (0.0, State::SwitchOnDisabled));
+    let Rig { drive, world, device, _running } = rig;
+    std::mem::forget(drive);
+    let mut next = CanopenDrive::open(DriveSettings::default(), Box::new(world)).unwrap();
+    next.enable().unwrap(); // the next run starts cleanly
+    assert_eq!(device.lock().unwrap().power_state(), State::OperationEnabled);
+}
+
+#[test]
+fn a_loop_that_stops_commanding_is_switched_off() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = running(exchange);
+        rig.sleep_ms(18);
+        assert_eq!(rig.device_current_a(), 1.0, "the limit is 20 ms after the last command");
+        rig.sleep_ms(6);
+        assert_eq!(rig.device_current_a(), 0.0);
+        assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::COMMANDS_STOPPED));
+        recovers(&mut rig);
+    }
+}
+
+#[test]
+fn disable_acts_at_once_and_without_the_service() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = running(exchange);
+        rig.drive.service = Running::default(); // as if its thread hung
+        rig.drive.disable();
+        rig.world.sleep(Duration::from_micros(200)); // two steps of the bus
+        assert_eq!(rig.device_current_a(), 0.0, "{exchange:?}");
+    }
+}
+
+#[test]
+fn a_disable_that_was_lost_is_repeated() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = running(exchange);
+        rig.device().inject(DeviceFault::SetPointsIgnored);
+        rig.drive.disable();
+        rig.sleep_ms(15);
+        assert_eq!(rig.device_current_a(), 1.0);
+        rig.device().inject(DeviceFault::None);
+        rig.sleep_ms(11); // repeated every 10 ms
+        assert_eq!((rig.device_current_a(), rig.drive.status()), (0.0, AmplifierStatus::Disabled), "{exchange:?}");
+    }
+}
+
+#[test]
+fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
+    for (misbehaviour, most_ms) in [(DeviceFault::SetPointsIgnored, 85), (DeviceFault::OrdersIgnored, 175)] {
+        let mut rig = running(ASYNCHRONOUS);
+        rig.device().inject(misbehaviour);
+        rig.drive.disable();
+        rig.sleep_ms(60);
+        assert_eq!((rig.device_current_a(), rig.drive.status()), (1.0, AmplifierStatus::Disabled));
+        // 70 ms unconfirmed (+ one repeat of 10 ms): NMT stop; 70 ms later the drive misses our heartbeat.
+        rig.sleep_ms(most_ms - 60);
+        assert_eq!(rig.device_current_a(), 0.0, "{misbehaviour:?}");
+        assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::STILL_ENABLED));
+        recovers(&mut rig);
+    }
+}
+
+#[test]
+fn a_command_that_is_not_a_number_never_reaches_the_drive() {
+    let mut rig = running(ASYNCHRONOUS);
+    for nonsense in [f64::NAN, f64::INFINITY] {
+        assert_eq!(rig.drive.command(nonsense).unwrap_err().code, i64::from(faults::NOT_FINITE));
+    }
+    rig.sleep_ms(2);
+    assert_eq!(rig.device_current_a(), 1.0, "the last command stands until the loop disables");
+    rig.drive.disable();
+    assert_eq!(rig.drive.command(1.0).unwrap_err().code, i64::from(faults::NOT_ARMED));
+}
+
+#[test]
+fn a_fault_that_persists_is_not_cleared() {
+    let mut rig = running(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::Drive(0x3220));
+    rig.sleep_ms(5);
+    rig.device().inject(DeviceFault::SetPointsIgnored); // it does not hear the reset
+    assert_eq!(rig.drive.reset_fault().unwrap_err().code, i64::from(faults::FAULT_REMAINS));
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::EMERGENCY + 0x3220), "the cause, not the attempt");
+    recovers(&mut rig);
+}
+
+#[test]
+fn a_drive_in_fault_at_opening_is_opened_but_not_reset() {
+    let world = World::default();
+    let device = Arc::new(Mutex::new(Device::new(DeviceSettings::default())));
+    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    world.sleep(Duration::from_millis(1));
+    device.lock().unwrap().inject(DeviceFault::Drive(0x2310));
+    world.sleep(Duration::from_millis(5));
+    let drive = CanopenDrive::open(DriveSettings::default(), Box::new(world.clone())).unwrap();
+    world.sleep(Duration::from_millis(10));
+    let mut rig = Rig { drive, world, device, _running: running };
+    assert_eq!(
+        rig.drive.status(),
+        AmplifierStatus::Fault(faults::DRIVE_FAULT),
+        "the emergency message was before our time"
+    );
+    assert!(rig.drive.enable().is_err());
+    assert_eq!(rig.device().power_state(), State::Fault);
+    recovers(&mut rig);
+}

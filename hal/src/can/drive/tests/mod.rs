@@ -1,0 +1,69 @@
+//! The driver against the simulated drive, in virtual time.
+
+mod any_frames;
+mod bring_up;
+mod failing;
+
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use super::super::bus::{Host, World};
+use super::super::device::{Device, DeviceSettings, DeviceTask};
+use super::*;
+
+/// Driver and simulated drive on one bus.
+struct Rig {
+    drive: CanopenDrive,
+    world: World,
+    device: Arc<Mutex<Device>>,
+    _running: Running,
+}
+
+fn open(settings: DriveSettings, device: DeviceSettings) -> Result<Rig, OpenError> {
+    let world = World::default();
+    let device = Arc::new(Mutex::new(Device::new(device)));
+    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    let drive = CanopenDrive::open(settings, Box::new(world.clone()))?;
+    Ok(Rig { drive, world, device, _running: running })
+}
+
+const ASYNCHRONOUS: Exchange = Exchange::Asynchronous { status_hz: 500.0 };
+const SYNCHRONOUS: Exchange = Exchange::Synchronous { status_every: 2 };
+
+fn rig(exchange: Exchange) -> Rig {
+    open(DriveSettings { exchange, ..DriveSettings::default() }, DeviceSettings::default()).unwrap()
+}
+
+/// Why it did not open.
+fn refusal(settings: DriveSettings, device: DeviceSettings) -> String {
+    match open(settings, device) {
+        Ok(_) => panic!("this must not open"),
+        Err(error) => error.to_string(),
+    }
+}
+
+impl Rig {
+    fn device(&self) -> MutexGuard<'_, Device> {
+        self.device.lock().unwrap()
+    }
+
+    fn device_current_a(&self) -> f64 {
+        self.device().current_a()
+    }
+
+    /// A loop at 1 kHz that commands `current_a`, as long as the amplifier has no fault. The milliseconds it ran.
+    fn run_ms(&mut self, current_a: f64, most_ms: u32) -> u32 {
+        for ms in 0..most_ms {
+            if matches!(self.drive.status(), AmplifierStatus::Fault(_)) {
+                return ms;
+            }
+            let _ = self.drive.command(current_a); // refused in the tick in which the fault is found
+            self.world.sleep(Duration::from_millis(1));
+        }
+        most_ms
+    }
+
+    fn sleep_ms(&self, ms: u64) {
+        self.world.sleep(Duration::from_millis(ms));
+    }
+}

@@ -1,0 +1,89 @@
+//! What is called in the tick allocates nothing, in any state of the drive.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use bench_hal::can::budget::Exchange;
+use bench_hal::can::bus::{BusError, BusEvent, CanBus, Host, Port, Running, Task, World};
+use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
+use bench_hal::can::drive::{CanopenDrive, DriveSettings};
+use bench_hal::can::{CanFrame, Id};
+use bench_hal::{AmplifierStatus, CurrentAmplifier};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+/// A world whose endpoints can be made to swallow what is sent: the bus in memory itself allocates, a socket does not.
+struct Quiet {
+    world: World,
+    swallow: Arc<AtomicBool>,
+}
+
+impl Port for Quiet {
+    fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
+        Ok(Box::new(QuietEndpoint { inner: self.world.endpoint(ids)?, swallow: Arc::clone(&self.swallow) }))
+    }
+}
+
+impl Host for Quiet {
+    fn now_ns(&self) -> u64 {
+        self.world.now_ns()
+    }
+    fn sleep(&self, time: Duration) {
+        self.world.sleep(time);
+    }
+    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<Running> {
+        self.world.start(name, task)
+    }
+}
+
+struct QuietEndpoint {
+    inner: Box<dyn CanBus>,
+    swallow: Arc<AtomicBool>,
+}
+
+impl CanBus for QuietEndpoint {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        if self.swallow.load(Ordering::Acquire) { Ok(()) } else { self.inner.send(frame) }
+    }
+    fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
+        self.inner.receive(timeout)
+    }
+}
+
+/// All calls of a tick, without a frame leaving.
+fn tick(drive: &mut CanopenDrive, swallow: &AtomicBool) {
+    swallow.store(true, Ordering::Release);
+    assert_no_alloc(|| {
+        let _ = (drive.command(0.5), drive.command(f64::NAN));
+        let _ = (drive.status(), drive.actual_current_a());
+        if let AmplifierStatus::Fault(code) = drive.status() {
+            let _ = drive.explain(code);
+        }
+    });
+    swallow.store(false, Ordering::Release);
+}
+
+#[test]
+fn command_status_and_disable_allocate_nothing() {
+    for exchange in [Exchange::Asynchronous { status_hz: 500.0 }, Exchange::Synchronous { status_every: 1 }] {
+        let (world, swallow) = (World::default(), Arc::new(AtomicBool::new(false)));
+        let device = Arc::new(Mutex::new(Device::new(DeviceSettings::default())));
+        let _running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+        let host = Quiet { world: world.clone(), swallow: Arc::clone(&swallow) };
+        let settings = DriveSettings { exchange, ..DriveSettings::default() };
+        let mut drive = CanopenDrive::open(settings, Box::new(host)).unwrap();
+        tick(&mut drive, &swallow); // off
+        drive.enable().unwrap();
+        tick(&mut drive, &swallow); // on
+        device.lock().unwrap().inject(DeviceFault::Drive(0x2310));
+        world.sleep(Duration::from_millis(10));
+        assert_eq!(drive.status(), AmplifierStatus::Fault(0x0001_2310));
+        tick(&mut drive, &swallow); // in fault
+        swallow.store(true, Ordering::Release);
+        assert_no_alloc(|| drive.disable());
+        swallow.store(false, Ordering::Release);
+    }
+}
