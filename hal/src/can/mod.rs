@@ -34,5 +34,6 @@ pub mod pdo;
 pub mod scale;
 pub mod sdo;
 pub mod sync;
+pub mod vesc;
 
 pub use frame::{CanFrame, Id};

@@ -1,0 +1,218 @@
+//! A VESC as a current amplifier (vedderb/bldc, documentation/comm_can.md).
+//!
+//! ```text
+//! 29-bit identifier = command << 8 | node, numbers big endian
+//! to the VESC      command 1   SET_CURRENT   i32, mA                         51 A to node 23: 0x0117  00 00 C7 38
+//! from the VESC    command 9   STATUS        rpm i32, current i16 in 0.1 A, duty i16 in 1/1000
+//! ```
+//!
+//! A VESC lets go of the motor after 0.5 s without a command. The loop's commands keep it alive; nothing else does, so a
+//! loop that stands still ends with no current.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::time::Duration;
+
+use super::bus::{BusError, BusEvent, CanBus, Claim, Condition, Host, Running, Task};
+use super::frame::{CanFrame, Id};
+use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
+
+/// SET_CURRENT to `node`, in milliamperes.
+pub const fn set_current(node: u8, current_ma: i32) -> CanFrame {
+    CanFrame::new(Id::extended(1 << 8 | node as u32), current_ma.to_be_bytes())
+}
+
+/// Identifier of STATUS from `node`.
+pub const fn status_id(node: u8) -> Id {
+    Id::extended(9 << 8 | node as u32)
+}
+
+/// The motor current of a STATUS frame, in units of 0.1 A.
+pub fn status_current(data: &[u8]) -> Option<i16> {
+    let &[_, _, _, _, high, low, _, _] = data else { return None };
+    Some(i16::from_be_bytes([high, low]))
+}
+
+/// What is configured of a VESC.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VescSettings {
+    /// Its number on the bus.
+    pub node: u8,
+    /// Commands beyond this are limited, in amperes.
+    pub current_limit_a: f64,
+    /// It is lost after this time without STATUS.
+    pub status_timeout: Duration,
+}
+
+const SILENT: u32 = 1;
+const BUS_OFF: u32 = 2;
+const BUS_FAILED: u32 = 3;
+const NOT_ARMED: u32 = 4;
+const NOT_SENT: u32 = 5;
+
+const fn text(code: u32) -> FaultText {
+    let (what, remedy) = match code {
+        SILENT => ("the VESC sends no STATUS", "check its power and cable, and that CAN status 1 is on in VESC Tool"),
+        BUS_OFF => ("the CAN bus is off or passive", "check cable, termination and bit rate, then clear the fault"),
+        BUS_FAILED => ("the CAN interface failed", "`ip link set IFACE up`, then clear the fault"),
+        NOT_ARMED => ("the VESC is not enabled", "arm first"),
+        NOT_SENT => ("a command could not be sent", "check that the VESC is on the bus; lower the rate"),
+        _ => ("unknown fault", "please report the code"),
+    };
+    FaultText { what, remedy }
+}
+
+const fn error(code: u32) -> DeviceError {
+    let FaultText { what, remedy } = text(code);
+    DeviceError { what, remedy, code: code as i64 }
+}
+
+/// What the watch tells the tick.
+#[derive(Debug, Default)]
+struct Shared {
+    fault: AtomicU32,
+    is_heard: AtomicBool,
+    current_tenths: AtomicI32,
+}
+
+impl Shared {
+    fn latch(&self, code: u32) {
+        let _ = self.fault.compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire); // the first one counts
+    }
+}
+
+/// A VESC in current control.
+pub struct Vesc {
+    _watch: Running,
+    bus: Box<dyn CanBus>,
+    host: Box<dyn Host>,
+    shared: Arc<Shared>,
+    settings: VescSettings,
+    is_on: bool,
+    _claim: Claim,
+}
+
+impl Vesc {
+    /// Claims the VESC and begins to watch its STATUS. The error is text for a person.
+    pub fn open(settings: VescSettings, host: Box<dyn Host>) -> Result<Vesc, String> {
+        let limit_a = settings.current_limit_a;
+        if !(limit_a > 0.0 && limit_a <= 1000.0) {
+            return Err(format!("current_limit_a = {limit_a} cannot be: above 0, at most 1000"));
+        }
+        let claim =
+            host.claim(settings.node).map_err(|pid| format!("driven by process {pid} already; end it first"))?;
+        let status = [status_id(settings.node)];
+        let bus = host.endpoint(&status).map_err(|error| error.to_string())?;
+        let watched = host.endpoint(&status).map_err(|error| error.to_string())?;
+        let shared = Arc::new(Shared::default());
+        let timeout_ns = settings.status_timeout.as_nanos() as u64;
+        let watch = Watch { bus: watched, shared: Arc::clone(&shared), timeout_ns, heard_ns: host.now_ns() };
+        let running = host.start("can-vesc", Box::new(watch)).map_err(|error| error.to_string())?;
+        Ok(Vesc { _watch: running, bus, host, shared, settings, is_on: false, _claim: claim })
+    }
+
+    fn no_fault(&self) -> Result<(), DeviceError> {
+        match self.shared.fault.load(Ordering::Acquire) {
+            0 => Ok(()),
+            code => Err(error(code)),
+        }
+    }
+}
+
+impl CurrentAmplifier for Vesc {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        self.host.sleep(self.settings.status_timeout);
+        self.no_fault()?;
+        self.is_on = self.shared.is_heard.load(Ordering::Acquire);
+        if self.is_on { Ok(()) } else { Err(error(SILENT)) }
+    }
+
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        if let Err(error) = self.no_fault() {
+            self.disable();
+            return Err(error);
+        }
+        if !self.is_on {
+            return Err(error(NOT_ARMED));
+        }
+        let limit_a = self.settings.current_limit_a;
+        let current_ma = (current_a.clamp(-limit_a, limit_a) * 1e3) as i32; // towards zero; not a number becomes 0
+        self.bus.send(&set_current(self.settings.node, current_ma)).map_err(|_| error(NOT_SENT))?;
+        Ok(f64::from(current_ma) * 1e-3)
+    }
+
+    fn disable(&mut self) {
+        self.is_on = false;
+        let _ = self.bus.send(&set_current(self.settings.node, 0)); // unsent or unheard, 0.5 s of silence do the same
+    }
+
+    fn status(&self) -> AmplifierStatus {
+        match self.shared.fault.load(Ordering::Acquire) {
+            0 if self.is_on => AmplifierStatus::Enabled,
+            0 => AmplifierStatus::Disabled,
+            code => AmplifierStatus::Fault(code),
+        }
+    }
+
+    fn actual_current_a(&self) -> Option<f64> {
+        let is_heard = self.shared.is_heard.load(Ordering::Acquire);
+        is_heard.then(|| f64::from(self.shared.current_tenths.load(Ordering::Acquire)) * 0.1)
+    }
+
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        self.disable();
+        self.shared.fault.store(0, Ordering::Release);
+        self.host.sleep(self.settings.status_timeout);
+        self.no_fault()
+    }
+
+    fn explain(&self, code: u32) -> Option<FaultText> {
+        Some(text(code))
+    }
+}
+
+impl Drop for Vesc {
+    fn drop(&mut self) {
+        self.disable();
+    }
+}
+
+/// Listens for STATUS and for trouble.
+struct Watch {
+    bus: Box<dyn CanBus>,
+    shared: Arc<Shared>,
+    timeout_ns: u64,
+    heard_ns: u64,
+}
+
+impl Watch {
+    fn take(&mut self, event: BusEvent, now_ns: u64) {
+        match event {
+            BusEvent::Condition(Condition::BusOff | Condition::Passive) => self.shared.latch(BUS_OFF),
+            BusEvent::Condition(_) => {}
+            BusEvent::Frame(frame) => {
+                let Some(tenths) = status_current(frame.data()) else { return };
+                self.heard_ns = now_ns;
+                self.shared.current_tenths.store(i32::from(tenths), Ordering::Release);
+                self.shared.is_heard.store(true, Ordering::Release);
+            }
+        }
+    }
+}
+
+impl Task for Watch {
+    fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
+        let received = self.bus.receive(wait).inspect_err(|_| self.shared.latch(BUS_FAILED));
+        if let Ok(Some(event)) = received {
+            self.take(event, now_ns());
+        }
+        if now_ns().saturating_sub(self.heard_ns) > self.timeout_ns {
+            self.shared.is_heard.store(false, Ordering::Release);
+            self.shared.latch(SILENT);
+        }
+        received.map(|_| ())
+    }
+}
+
+#[cfg(test)]
+mod tests;
