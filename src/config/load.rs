@@ -278,7 +278,7 @@ impl Relations {
     fn chirp(&mut self, config: &Config) {
         let (chirp, nyquist_hz) = (&config.chirp, config.servo.rate_hz / 2.0);
         let (start_hz, stop_hz) = (chirp.start_hz, chirp.stop_hz);
-        let what = format!("is {stop_hz} Hz, where the sweep starts; a sweep needs two frequencies");
+        let what = format!("is {stop_hz} Hz, but the sweep starts at {start_hz} Hz; a sweep needs two frequencies");
         self.must(start_hz != stop_hz, "chirp.stop_hz", what);
         for (path, hz) in [("chirp.start_hz", start_hz), ("chirp.stop_hz", stop_hz)] {
             let what = format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
@@ -300,6 +300,17 @@ impl Relations {
 
     fn control(&mut self, config: &Config) {
         let nyquist_hz = config.servo.rate_hz / 2.0;
+        let path = "control.reference.amplitude_m";
+        let soft_m = config.interlock.soft_limit_m;
+        match config.control.reference {
+            ReferenceSettings::Step { amplitude_m, .. }
+            | ReferenceSettings::Ramp { amplitude_m, .. }
+            | ReferenceSettings::Sine { amplitude_m, .. } => {
+                let what = format!("is {amplitude_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)");
+                self.must(amplitude_m.abs() <= soft_m, path, what);
+            }
+            ReferenceSettings::Hold | ReferenceSettings::File { .. } => {}
+        }
         if let ReferenceSettings::Sine { frequency_hz, .. } = config.control.reference {
             let what = format!("is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
             self.must(frequency_hz < nyquist_hz, "control.reference.frequency_hz", what);

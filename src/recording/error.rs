@@ -63,7 +63,7 @@ pub enum RecordingError {
         source: io::Error,
     },
     /// The file does not begin as an MCAP file does.
-    #[error("{}: not an MCAP file; give a recording made by bench (*.mcap), for a CSV file see `bench identify --input`", path.display())]
+    #[error("{}: not an MCAP file; give a recording made by bench (*.mcap)", path.display())]
     NotMcap {
         /// The file.
         path: PathBuf,

@@ -189,7 +189,7 @@ impl Servo {
                 Order::Arm => self.arm(tick),
                 Order::Start(program) => self.start(program, tick),
                 Order::Stop => self.switch_off(Change::Stop, tick),
-                Order::Clear => self.change(Change::Clear, tick),
+                Order::Clear => self.clear(tick),
             }
         }
     }
@@ -204,6 +204,17 @@ impl Servo {
         self.change(Change::Arm, tick);
         if let Err(error) = self.rig.enable() {
             self.trip(Trip::Amplifier { code: error.code }, tick);
+        }
+    }
+
+    /// A person's acknowledgement reaches the amplifier too; as long as that keeps its fault, the trip stays.
+    fn clear(&mut self, tick: u64) {
+        if self.state.after(Change::Clear).is_none() {
+            return;
+        }
+        self.slow_order = true;
+        if self.rig.reset_fault().is_ok() {
+            self.change(Change::Clear, tick);
         }
     }
 

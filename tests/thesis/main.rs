@@ -1,6 +1,6 @@
 //! The thesis as a specification of the program: its tables, controllers and experiments, at the process boundary.
 //!
-//! Expected figures come from the thesis as `READING.md`'s tables of it state them, from closed forms, or from
+//! Expected figures come from the thesis (its misprints corrected where they are used), from closed forms, or from
 //! `tests/python/truth.py`, which shares no line with the program.
 
 mod chirp;
