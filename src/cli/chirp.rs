@@ -1,8 +1,8 @@
 //! `bench chirp`: excite, record, estimate the frequency response.
 
 use super::analysis_output::{Made, make};
-use super::options::{BenchOptions, print_json, print_text};
-use super::run_options::{RunOptions, RunReport};
+use super::options::BenchOptions;
+use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose, Sweep};
 use crate::excitation::Chirp;
@@ -71,13 +71,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         _ => Made::nothing("the run did not come to its end"),
     };
     let report = Report { run: report, expected_travel_m, made };
-    let json = serde_json::to_string_pretty(&report).map_err(|e| CliError::Failed(e.to_string()))?;
-    run.finish(&json)?;
-    if args.bench.json {
-        print_json(&report)?
-    } else {
-        print_text(&text(&report, &config))?
-    }
+    close(run, &report, args.bench.json, &text(&report, &config))?;
     Ok(report.run.exit())
 }
 

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::choice::Choice;
 use super::margins::{closed_loop, text as margins_text};
-use super::options::{BenchOptions, print_json, print_text};
-use super::run_options::{RunOptions, RunReport};
+use super::options::BenchOptions;
+use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose, ReferenceSettings, quantity};
 use crate::control::{ClosedLoop, Margins, StepFigures, step_figures};
@@ -123,13 +123,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         _ => None,
     };
     let report = Report { run: report, predicted, measured };
-    let json = serde_json::to_string_pretty(&report).map_err(|e| CliError::Failed(e.to_string()))?;
-    run.finish(&json)?;
-    if args.bench.json {
-        print_json(&report)?
-    } else {
-        print_text(&text(&report, &config))?
-    }
+    close(run, &report, args.bench.json, &text(&report, &config))?;
     Ok(report.run.exit())
 }
 

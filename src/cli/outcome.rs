@@ -4,10 +4,11 @@ use std::process::ExitCode;
 
 use crate::config::ConfigError;
 use crate::control::ControllerError;
-use crate::excitation::{ChirpError, ReferenceError};
+use crate::excitation::ChirpError;
 use crate::identify::IdentifyError;
 use crate::plant::PlantError;
 use crate::recording::RecordingError;
+use crate::session::PlanError;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +43,9 @@ pub enum CliError {
     /// The controller is refused.
     #[error(transparent)]
     Controller(#[from] ControllerError),
-    /// The reference is refused.
+    /// The run cannot be planned.
     #[error(transparent)]
-    Reference(#[from] ReferenceError),
+    Plan(#[from] PlanError),
     /// The chirp would trip an interlock.
     #[error(transparent)]
     Chirp(#[from] ChirpError),

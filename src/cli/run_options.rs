@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::options::print_text;
 use super::progress::Progress;
 use super::{CliError, Outcome};
 use crate::config::Config;
@@ -42,10 +43,12 @@ impl RunOptions {
     }
 }
 
-impl From<crate::session::PlanError> for CliError {
-    fn from(error: crate::session::PlanError) -> Self {
-        CliError::Usage(error.to_string())
-    }
+/// Adds the report of a run to its recording, closes the file, and prints the report as asked.
+pub(super) fn close(run: Run, report: &impl Serialize, json: bool, text: &str) -> Result<(), CliError> {
+    let results =
+        serde_json::to_string_pretty(report).map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
+    run.finish(&results)?;
+    if json { print_text(&(results + "\n")) } else { print_text(text) }
 }
 
 /// How a run went, as `bench chirp` and `bench control` both tell it.
