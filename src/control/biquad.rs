@@ -1,6 +1,10 @@
 //! A discrete section, H(z) = (b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2).
 //!
-//! The signs are those of the transfer function: y[k] = b0 x[k] + b1 x[k-1] + b2 x[k-2] - a1 y[k-1] - a2 y[k-2].
+//! The signs are those of the transfer function:
+//!
+//! ```text
+//!  y[k] = b0 x[k] + b1 x[k-1] + b2 x[k-2] - a1 y[k-1] - a2 y[k-2]
+//! ```
 
 use nalgebra::{Complex, Matrix2, RowVector2, Vector2};
 

@@ -14,7 +14,7 @@
 //! | `thread` | [`spawn`]: the recorder on a thread of its own, which a full disk does not stop |
 //! | `walk` | goes through a file and hands out only what its checks vouch for |
 //! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, accounts for gaps, streams [`Ticks`] |
-//! | `recover` | [`recover`]: what can be trusted of a cut or damaged file, as a complete one |
+//! | `recover` | [`recover()`]: what can be trusted of a cut or damaged file, as a complete one |
 //!
 //! # What a reader may rely on
 //!
