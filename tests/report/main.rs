@@ -3,7 +3,7 @@
 mod bode;
 mod phase;
 mod pictures;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "made for the tests of identify, which use all of it")]
 #[path = "../identify/stage.rs"]
 mod stage;
 mod svg;
