@@ -50,6 +50,7 @@
 pub mod cli;
 pub mod config;
 pub mod control;
+pub mod devices;
 pub mod excitation;
 pub mod identify;
 pub mod plant;

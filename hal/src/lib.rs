@@ -139,6 +139,30 @@ pub trait DisplacementProbe: Send {
     fn latest(&mut self, now: Tick) -> Reading;
 }
 
+impl<A: CurrentAmplifier + ?Sized> CurrentAmplifier for Box<A> {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        (**self).enable()
+    }
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        (**self).command(current_a)
+    }
+    fn disable(&mut self) {
+        (**self).disable();
+    }
+    fn status(&self) -> AmplifierStatus {
+        (**self).status()
+    }
+    fn actual_current_a(&self) -> Option<f64> {
+        (**self).actual_current_a()
+    }
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        (**self).reset_fault()
+    }
+    fn explain(&self, code: u32) -> Option<FaultText> {
+        (**self).explain(code)
+    }
+}
+
 /// What the loop drives: an amplifier and a probe.
 pub trait Rig: CurrentAmplifier + DisplacementProbe {}
 impl<T: CurrentAmplifier + DisplacementProbe> Rig for T {}

@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let plan = Plan::chirp(config.clone());
     let mut run = args.run.run(&plan, "chirp")?;
     let totals = run.totals()?;
-    let report = RunReport::new(&run, &totals, args.run.pace);
+    let report = RunReport::new(&run, &totals);
     let made = match report.outcome {
         "completed" => make(&Recording::open(&run.path)?, &config)?,
         _ => Made::nothing("the run did not come to its end"),
@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 fn check(config: &Config) -> Result<f64, CliError> {
     let period_s = config.servo.period_s();
     let force_constant = config.motor.force_constant_n_per_a;
-    let rig = Sampled::new(&sim::modes(config)?, &config.amplifier, force_constant, period_s);
+    let rig = Sampled::new(&sim::modes(config)?, config.amplifier.bandwidth_hz, force_constant, period_s);
     Ok(Chirp::new(&config.chirp, period_s).check(config, &rig)?)
 }
 

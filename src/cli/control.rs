@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::choice::Choice;
-use super::margins::{closed_loop, text as margins_text};
+use super::margins::{closed_loop, enough, text as margins_text};
 use super::options::BenchOptions;
 use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
@@ -112,12 +112,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.sets()?)?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins(false);
+    enough(&config, &margins)?;
     let step = if margins.stable { predicted_step(&config, &closed_loop) } else { None };
     let predicted = Predicted { margins, step };
     let plan = Plan::control(config.clone())?;
     let mut run = args.run.run(&plan, "control")?;
     let totals = run.totals()?;
-    let report = RunReport::new(&run, &totals, args.run.pace);
+    let report = RunReport::new(&run, &totals);
     let measured = match report.outcome {
         "completed" => measure(&Recording::open(&run.path)?, &config)?,
         _ => None,

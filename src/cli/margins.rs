@@ -1,5 +1,7 @@
 //! `bench margins`: how far a loop is from trouble.
 
+use serde::Serialize;
+
 use super::choice::Choice;
 use super::options::{BenchOptions, print_json, print_text};
 use super::{CliError, Outcome};
@@ -19,11 +21,22 @@ pub(super) struct Args {
     continuous: bool,
 }
 
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    margins: &'a Margins,
+    /// From a command to the position that its reading shows, in the mean, without hold and lag.
+    delay_s: f64,
+}
+
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.sets())?;
-    let margins = closed_loop(&config)?.margins(args.continuous);
+    let closed_loop = closed_loop(&config)?;
+    let margins = closed_loop.margins(args.continuous);
     if args.bench.json {
-        print_json(&margins)?
+        let delay_s = if args.continuous { 0.0 } else { closed_loop.chain().delay_s() };
+        print_json(&Report { margins: &margins, delay_s })?
     } else {
         print_text(&text(&config, &margins))?
     }
@@ -37,15 +50,49 @@ pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
     Ok(ClosedLoop::new(config, modal.modes, sections))
 }
 
+/// Refuses a loop with less than the configured modulus margin.
+pub(super) fn enough(config: &Config, margins: &Margins) -> Result<(), CliError> {
+    let least = config.control.least_modulus_margin;
+    let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
+    if least > 0.0 && !margins.stable {
+        return Err(CliError::Margin(format!(
+            "with the {name} controller at {rate_hz} Hz the closed loop is unstable and has no modulus margin, at least {least} is asked for (control.least_modulus_margin)"
+        )));
+    }
+    if margins.modulus_margin < least {
+        let margin = margins.modulus_margin;
+        return Err(CliError::Margin(format!(
+            "with the {name} controller at {rate_hz} Hz the modulus margin is {margin:.3}, at least {least} is asked for (control.least_modulus_margin)"
+        )));
+    }
+    Ok(())
+}
+
+/// Rates and delays of the chain in words.
+fn chain_text(config: &Config) -> String {
+    let (amplifier, probe) = (&config.amplifier, &config.probe);
+    let mut text = format!(
+        "{} Hz, hold, {} period(s) of computing delay, amplifier of {} Hz",
+        config.servo.rate_hz, config.servo.computing_delay_periods, amplifier.bandwidth_hz
+    );
+    if amplifier.latency_s > 0.0 {
+        text += &format!(" that acts {:.2} ms late", amplifier.latency_s * 1e3);
+    }
+    let age_ms = probe.age_at_arrival_s() * 1e3;
+    match probe.rate_hz {
+        Some(rate_hz) => text += &format!(", {rate_hz} readings a second, {age_ms:.2} ms old on arrival, held"),
+        None if age_ms > 0.0 => text += &format!(", readings {age_ms:.2} ms old"),
+        None => {}
+    }
+    text
+}
+
 /// Margins in words.
 pub(super) fn text(config: &Config, margins: &Margins) -> String {
     let or = |value: Option<f64>, unit: &str| value.map_or("none".into(), |v| format!("{v:.2} {unit}"));
     let time = match margins.continuous {
         true => "continuous time, without delay and amplifier".to_string(),
-        false => format!(
-            "{} Hz, hold, {} period(s) of computing delay, amplifier of {} Hz",
-            config.servo.rate_hz, config.servo.computing_delay_periods, config.amplifier.bandwidth_hz
-        ),
+        false => chain_text(config),
     };
     format!(
         "{} controller, {time}\n  {}\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {:.4} (peak of S {:.2} dB)\n  sensitivity bandwidth  {}\n",

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::CliError;
 use crate::config::quantity::{self, Quantity};
 use crate::config::{Config, PlantSettings, Purpose, Source, load};
+use crate::devices;
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]
@@ -54,7 +55,9 @@ impl BenchOptions {
             };
             source.sets.push(format!("plant.operating_point_m={metres:?}"));
         }
-        Ok(load(&source)?)
+        let config = load(&source)?;
+        devices::check(&config)?;
+        Ok(config)
     }
 }
 

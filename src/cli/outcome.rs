@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use crate::config::ConfigError;
 use crate::control::ControllerError;
+use crate::devices::DevicesError;
 use crate::excitation::ChirpError;
 use crate::identify::IdentifyError;
 use crate::plant::PlantError;
@@ -52,6 +53,14 @@ pub enum CliError {
     /// The model cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// The devices cannot be opened, or cannot be as configured.
+    #[error(transparent)]
+    Devices(#[from] DevicesError),
+    /// The loop's margin is too small.
+    #[error(
+        "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.least_modulus_margin if you know better; nothing moved"
+    )]
+    Margin(String),
     /// Another mistake in the call.
     #[error("{0}")]
     Usage(String),

@@ -8,18 +8,21 @@ use super::options::print_text;
 use super::progress::Progress;
 use super::{CliError, Outcome};
 use crate::config::Config;
+use crate::devices;
 use crate::recording::{Quantiles, Totals};
 use crate::rt::arming::Trip;
 use crate::rt::thread::Pace;
 use crate::session::{Plan, Run, SessionError};
-use crate::sim::SimulatedRig;
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct RunOptions {
-    /// Pace of the loop
-    #[arg(long, value_name = "virtual|realtime", value_parser = pace, default_value = "virtual")]
-    pub pace: Pace,
+    /// Pace of the loop [default: virtual on the simulated stage, realtime on devices]
+    #[arg(long, value_name = "virtual|realtime", value_parser = pace)]
+    pace: Option<Pace>,
+    /// Run on the simulated stage, with the rates, delays and steps of the configured devices
+    #[arg(long)]
+    simulate: bool,
     /// Folder for the recording and what is made from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
@@ -30,11 +33,30 @@ fn pace(text: &str) -> Result<Pace, String> {
 }
 
 impl RunOptions {
+    fn is_simulated(&self, config: &Config) -> bool {
+        self.simulate || devices::is_simulated(config)
+    }
+
+    /// The pace asked for, or that of the rig; devices cannot be hurried.
+    fn pace(&self, config: &Config) -> Result<Pace, CliError> {
+        match (self.pace, self.is_simulated(config)) {
+            (Some(Pace::Virtual), false) => Err(CliError::Usage(
+                "--pace virtual is for the simulated stage; devices have a pace of their own: leave it out, or add --simulate".into(),
+            )),
+            (Some(pace), _) => Ok(pace),
+            (None, true) => Ok(Pace::Virtual),
+            (None, false) => Ok(Pace::Realtime),
+        }
+    }
+
     /// Runs a plan on the rig of its configuration, with progress on a terminal.
     pub fn run(&self, plan: &Plan, what: &'static str) -> Result<Run, CliError> {
-        let rig = Box::new(SimulatedRig::new(&plan.config)?);
+        let pace = self.pace(&plan.config)?;
+        let is_simulated = self.is_simulated(&plan.config);
+        let opened = if is_simulated { devices::simulate(&plan.config)? } else { devices::open(&plan.config)? };
+        opened.notes.iter().for_each(|note| tracing::warn!("{note}"));
         let progress = Progress::new(what);
-        let run = crate::session::run(plan, rig, self.pace, &self.out, &mut |done, total| progress.show(done, total));
+        let run = crate::session::run(plan, opened.rig, pace, &self.out, &mut |done, total| progress.show(done, total));
         progress.close();
         run.map_err(|error| match error {
             SessionError::Plan(plan) => CliError::from(plan),
@@ -99,7 +121,7 @@ impl From<&Quantiles> for QuantilesJson {
 }
 
 impl RunReport {
-    pub fn new(run: &Run, totals: &Totals, pace: Pace) -> Self {
+    pub fn new(run: &Run, totals: &Totals) -> Self {
         let trip = |(trip, tick): (Trip, u64)| TripJson {
             reason: trip.reason(),
             tick,
@@ -120,7 +142,7 @@ impl RunReport {
             recording: run.path.display().to_string(),
             loop_digest: format!("{:016x}", totals.loop_digest),
             timing: Timing {
-                pace: pace.name(),
+                pace: run.pace.name(),
                 policy: run.scheduling.policy.clone(),
                 memory_locked: run.scheduling.memory_locked,
                 cpu: run.scheduling.cpu,

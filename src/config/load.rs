@@ -273,6 +273,11 @@ impl Relations {
         let (stale_s, period_s) = (config.interlock.probe_stale_s, config.servo.period_s());
         let what = format!("is {stale_s} s, shorter than a tick of {period_s} s");
         self.must(stale_s >= period_s, "interlock.probe_stale_s", what);
+        let oldest_s = config.probe.age_at_arrival_s() + config.probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
+        let what = format!(
+            "is {stale_s} s, but a reading may be {oldest_s} s old before the next one (probe.latency_s, transport_s, rate_hz)"
+        );
+        self.must(stale_s > oldest_s, "interlock.probe_stale_s", what);
     }
 
     fn chirp(&mut self, config: &Config) {
@@ -283,6 +288,9 @@ impl Relations {
         for (path, hz) in [("chirp.start_hz", start_hz), ("chirp.stop_hz", stop_hz)] {
             let what = format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
             self.must(hz < nyquist_hz, path, what);
+            let seen_hz = config.probe.rate_hz.unwrap_or(f64::INFINITY) / 2.0;
+            let what = format!("is {hz} Hz; the probe sees frequencies below half its rate, {seen_hz} Hz");
+            self.must(hz < seen_hz, path, what);
         }
         let seconds = chirp.quiet_before_s + chirp.duration_s + chirp.quiet_after_s;
         let ticks = seconds * config.servo.rate_hz;

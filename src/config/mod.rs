@@ -13,12 +13,14 @@
 //! documentation of each key come from them; the values come from `bench-config/stage.toml`.
 
 mod check;
+mod devices;
 mod load;
 mod place;
 pub mod profiles;
 pub mod quantity;
 mod settings;
 
+pub use devices::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
 pub(crate) use load::{text_of, typed};
 pub use settings::*;

@@ -16,12 +16,14 @@ pub const DEFAULT: &str = "stage";
 pub const PROFILES: &[Embedded] = &[
     Embedded { name: "stage", text: include_str!("../../bench-config/stage.toml") },
     Embedded { name: "chapter2", text: include_str!("../../bench-config/chapter2.toml") },
+    Embedded { name: "lab", text: include_str!("../../bench-config/lab.toml") },
 ];
 
 /// All controllers. A new one is one file and one line.
 pub const CONTROLLERS: &[Embedded] = &[
     Embedded { name: "fast", text: include_str!("../../bench-config/controllers/fast.toml") },
     Embedded { name: "slow", text: include_str!("../../bench-config/controllers/slow.toml") },
+    Embedded { name: "lab", text: include_str!("../../bench-config/controllers/lab.toml") },
 ];
 
 /// The entry called `name`.

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::devices::{AmplifierDevice, ProbeDevice};
+
 /// Everything a run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -191,6 +193,12 @@ pub struct AmplifierSettings {
     /// Largest change of the current's set-point in amperes per second.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub slew_limit_a_per_s: f64,
+    /// From the moment a command is due to the moment its set-point acts, in seconds: bus and drive. Whole periods of
+    /// computing stand in `loop.computing_delay_periods`, the current loop's own lag in `bandwidth_hz`.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub latency_s: f64,
+    /// What stands behind the interface.
+    pub device: AmplifierDevice,
 }
 
 /// The displacement probe.
@@ -200,6 +208,25 @@ pub struct ProbeSettings {
     /// Full range in metres; readings go from minus to plus half of it.
     #[schemars(range(min = 1e-9, max = 1.0))]
     pub range_m: f64,
+    /// Readings that arrive in a second, by a clock of the probe's own; absent if each tick has a reading of its very moment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.1, max = 1e6))]
+    pub rate_hz: Option<f64>,
+    /// From a measurement to the moment the probe could tell it (filters, computing), in seconds.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub latency_s: f64,
+    /// From that moment to the arrival of the whole reading (request, line), in seconds.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub transport_s: f64,
+    /// What stands behind the interface.
+    pub device: ProbeDevice,
+}
+
+impl ProbeSettings {
+    /// Age in seconds of a reading when it arrives.
+    pub fn age_at_arrival_s(&self) -> f64 {
+        self.latency_s + self.transport_s
+    }
 }
 
 /// What trips: zero current in the same tick, amplifier disabled.
@@ -362,6 +389,9 @@ pub enum IdentifySettings {
 pub struct ControlSettings {
     /// `fast`, `slow`, or the path of a TOML file with sections.
     pub controller: String,
+    /// A loop with a smaller modulus margin (1/max|S|), or an unstable one, is refused; 0 refuses none.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub least_modulus_margin: f64,
     /// Zero current before the loop closes, in seconds; the mean position over it is the origin of the reference.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub settle_s: f64,

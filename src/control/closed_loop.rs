@@ -6,7 +6,7 @@ use super::controller::continuous_response;
 use super::margins::{Margins, grid, margins};
 use super::{Controller, Section};
 use crate::config::Config;
-use crate::plant::{Mode, Sampled};
+use crate::plant::{Chain, Mode};
 
 /// Everything that decides the margins of a loop.
 #[derive(Clone, Debug)]
@@ -14,35 +14,35 @@ pub struct ClosedLoop {
     modes: Vec<Mode>,
     force_constant_n_per_a: f64,
     sections: Vec<Section>,
-    sampled: Sampled,
+    chain: Chain,
     controller: Controller,
-    delay: usize,
 }
 
 impl ClosedLoop {
     /// The loop of a configuration around `modes`.
     pub fn new(config: &Config, modes: Vec<Mode>, sections: Vec<Section>) -> ClosedLoop {
-        let period_s = config.servo.period_s();
-        let force_constant_n_per_a = config.motor.force_constant_n_per_a;
         ClosedLoop {
-            sampled: Sampled::new(&modes, &config.amplifier, force_constant_n_per_a, period_s),
-            controller: Controller::new(&sections, period_s),
-            delay: config.servo.computing_delay_periods as usize,
+            chain: Chain::new(config, &modes),
+            controller: Controller::new(&sections, config.servo.period_s()),
             modes,
-            force_constant_n_per_a,
+            force_constant_n_per_a: config.motor.force_constant_n_per_a,
             sections,
         }
     }
 
-    /// P(z) in metres per ampere at z = exp(j w T): hold, amplifier, modes and computing delay.
+    /// Hold, amplifier, modes, delays and the probe's rate.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// P in metres per ampere at z = exp(j w T): hold, amplifier, modes, delays and the probe's rate.
     pub fn sampled_plant(&self, omega_rad_s: f64) -> Complex<f64> {
-        let z = self.z(omega_rad_s);
-        self.sampled.response(z) * z.powi(-(self.delay as i32))
+        self.chain.response(omega_rad_s)
     }
 
     /// L = P C as the sampled loop has it.
     pub fn sampled_loop(&self, omega_rad_s: f64) -> Complex<f64> {
-        self.sampled_plant(omega_rad_s) * self.controller.response(self.z(omega_rad_s))
+        self.chain.response(omega_rad_s) * self.controller.response(self.z(omega_rad_s))
     }
 
     /// L = P C in continuous time, without hold, delay and amplifier.
@@ -54,7 +54,7 @@ impl ClosedLoop {
 
     /// Margins of the sampled loop, or of the continuous one.
     pub fn margins(&self, continuous: bool) -> Margins {
-        let nyquist_rad_s = std::f64::consts::PI / self.sampled.period_s;
+        let nyquist_rad_s = std::f64::consts::PI / self.chain.period_s();
         let low_rad_s = 1e-3 * self.modes.first().map_or(1.0, |mode| mode.omega_rad_s).min(nyquist_rad_s);
         if continuous {
             let highest = self.modes.last().map_or(1.0, |mode| mode.omega_rad_s).max(nyquist_rad_s);
@@ -65,35 +65,23 @@ impl ClosedLoop {
         margins(&|w| self.sampled_loop(w), &grid, self.sampled_stable(), false)
     }
 
-    /// Position (in metres, relative to the start) at each tick after a reference of `reference_m(tick)`: the linear loop
+    /// Reading (in metres, relative to the start) at each tick after a reference of `reference_m(tick)`: the linear loop
     /// from rest, without noise, disturbance and limits.
     pub fn simulate(&self, ticks: usize, reference_m: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut controller = self.controller.clone();
         controller.reset();
-        let mut states = vec![[0.0; 2]; self.sampled.blocks.len()];
-        let (mut current_a, mut delayed_a) = (0.0, vec![0.0; self.delay]);
+        let mut state = self.chain.at_rest();
         let mut positions = Vec::with_capacity(ticks);
         for tick in 0..ticks {
-            let position_m: f64 = self.sampled.blocks.iter().zip(&states).map(|(block, x)| block.output * x[0]).sum();
+            let position_m = self.chain.reading_m(&state);
             positions.push(position_m);
-            delayed_a.push(controller.update(reference_m(tick) - position_m));
-            let acting_a = delayed_a.remove(0);
-            for (block, x) in self.sampled.blocks.iter().zip(&mut states) {
-                let row = |i: usize| {
-                    block.a[i][0] * x[0]
-                        + block.a[i][1] * x[1]
-                        + block.current[i] * current_a
-                        + block.setpoint[i] * acting_a
-                };
-                *x = [row(0), row(1)];
-            }
-            current_a = acting_a + (current_a - acting_a) * self.sampled.lag;
+            self.chain.step(&mut state, controller.update(reference_m(tick) - position_m));
         }
         positions
     }
 
     fn z(&self, omega_rad_s: f64) -> Complex<f64> {
-        let (sine, cosine) = libm::sincos(omega_rad_s * self.sampled.period_s);
+        let (sine, cosine) = libm::sincos(omega_rad_s * self.chain.period_s());
         Complex::new(cosine, sine)
     }
 
@@ -109,15 +97,14 @@ impl ClosedLoop {
 
     /// All poles of the sampled closed loop lie inside the unit circle.
     fn sampled_stable(&self) -> bool {
-        let (a, b, c) = self.sampled.state_space();
+        let (a, b, c) = self.chain.state_space();
         let plant = Cascade::new(a, b, c, 0.0);
-        let delay = (0..self.delay).fold(Cascade::gain(1.0), |chain, _| chain.then(&Cascade::delay()));
         let sections = self.controller.sections().iter().map(|section| {
             let (a, b, c, d) = section.state_space();
             let matrix = |rows, columns, values: &[f64]| DMatrix::from_column_slice(rows, columns, values);
             Cascade::new(matrix(2, 2, a.as_slice()), matrix(2, 1, b.as_slice()), matrix(1, 2, c.as_slice()), d)
         });
-        let open = sections.fold(Cascade::gain(1e6), |chain, section| chain.then(&section)).then(&delay).then(&plant);
+        let open = sections.fold(Cascade::gain(1e6), |chain, section| chain.then(&section)).then(&plant);
         open.closed_poles().is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
     }
 
@@ -145,10 +132,6 @@ impl Cascade {
 
     fn gain(d: f64) -> Self {
         Cascade::new(DMatrix::zeros(0, 0), DMatrix::zeros(0, 1), DMatrix::zeros(1, 0), d)
-    }
-
-    fn delay() -> Self {
-        Cascade::new(DMatrix::zeros(1, 1), DMatrix::from_element(1, 1, 1.0), DMatrix::from_element(1, 1, 1.0), 0.0)
     }
 
     /// Controllable form in time scaled by the pole's own frequency, which keeps the entries of one size.

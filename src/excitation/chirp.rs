@@ -126,25 +126,20 @@ impl Chirp {
 
     /// Runs the whole chirp through the model: slew, heat and travel.
     fn check_course(&self, config: &Config, plant: &Sampled) -> Result<f64, ChirpError> {
-        let (mut current_a, mut before_a, mut heat_a2) = (0.0, 0.0, 0.0f64);
+        let (mut before_a, mut heat_a2) = (0.0, 0.0f64);
         let (mut slew_a, mut hottest_a2, mut travel_m, mut travel_tick) = (0.0f64, 0.0f64, 0.0f64, 0);
         let cooling = self.period_s / config.motor.thermal_time_constant_s;
-        let mut states = vec![[0.0; 2]; plant.blocks.len()];
+        let mut motion = plant.at_rest();
         for tick in 0..self.ticks {
             let command_a = self.current_a(tick);
             slew_a = slew_a.max((command_a - before_a).abs());
             before_a = command_a;
             heat_a2 += cooling * (command_a * command_a - heat_a2);
             hottest_a2 = hottest_a2.max(heat_a2);
-            let mut position_m = 0.0;
-            for (block, x) in plant.blocks.iter().zip(&mut states) {
-                let drive = |i: usize| block.current[i] * current_a + block.setpoint[i] * command_a;
-                *x = [0, 1].map(|i| block.a[i][0] * x[0] + block.a[i][1] * x[1] + drive(i));
-                position_m += block.output * x[0];
-            }
-            current_a = command_a + (current_a - command_a) * plant.lag;
-            if position_m.abs() > travel_m {
-                (travel_m, travel_tick) = (position_m.abs(), tick);
+            plant.step(&mut motion, command_a, |_| 0.0);
+            let position_m = plant.position_m(&motion).abs();
+            if position_m > travel_m {
+                (travel_m, travel_tick) = (position_m, tick);
             }
         }
         let limit_a_per_s = config.amplifier.slew_limit_a_per_s;
@@ -305,7 +300,7 @@ mod tests {
         let config = load(&Source::default()).unwrap();
         let structure = crate::plant::build(&config.plant).unwrap();
         let modes = crate::plant::Modal::of(&structure).unwrap().modes;
-        let plant = Sampled::new(&modes, &config.amplifier, config.motor.force_constant_n_per_a, PERIOD_S);
+        let plant = Sampled::new(&modes, config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a, PERIOD_S);
         let check = |change: &dyn Fn(&mut ChirpSettings)| {
             let mut s = config.chirp.clone();
             change(&mut s);

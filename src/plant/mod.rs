@@ -7,6 +7,7 @@
 //!
 //! Signs: positive current gives positive force, positive force gives positive displacement at low frequency.
 
+mod chain;
 mod damping;
 mod exponential;
 mod linear_algebra;
@@ -17,9 +18,10 @@ mod sr4dof;
 mod structure;
 mod zeros;
 
+pub use chain::Chain;
 pub(crate) use exponential::exponential;
 pub use modal::{Modal, Mode, Sign};
-pub use sampled::{Block, Sampled};
+pub use sampled::{Block, Motion, Sampled};
 pub use sequence::{dominant_sequence, sign_sequence};
 pub use structure::Structure;
 pub use zeros::{Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};

@@ -9,7 +9,6 @@
 use nalgebra::{Complex, DMatrix, Matrix5, Vector2};
 
 use super::{Mode, exponential};
-use crate::config::AmplifierSettings;
 
 /// One mode over one period: x+ = A x + current i + setpoint u + force f, y = output q.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +29,15 @@ pub struct Block {
     pub floor: f64,
 }
 
+/// Where amplifier and modes are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// The amplifier's current in amperes.
+    pub current_a: f64,
+    /// The states [q, q'/w] of each mode.
+    pub states: Vec<[f64; 2]>,
+}
+
 /// Amplifier and modes over one period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampled {
@@ -42,24 +50,64 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// Discretises `modes`, driven through `amplifier` and a motor of `force_constant_n_per_a`.
-    pub fn new(modes: &[Mode], amplifier: &AmplifierSettings, force_constant_n_per_a: f64, period_s: f64) -> Sampled {
-        let lag_rad_s = 2.0 * std::f64::consts::PI * amplifier.bandwidth_hz;
+    /// Discretises `modes`, driven through an amplifier of `bandwidth_hz` and a motor of `force_constant_n_per_a`.
+    pub fn new(modes: &[Mode], bandwidth_hz: f64, force_constant_n_per_a: f64, period_s: f64) -> Sampled {
+        let lag_rad_s = 2.0 * std::f64::consts::PI * bandwidth_hz;
         let blocks = modes.iter().map(|mode| block(mode, lag_rad_s, force_constant_n_per_a, period_s)).collect();
         Sampled { period_s, lag: libm::exp(-lag_rad_s * period_s), blocks }
     }
 
-    /// Response in metres per ampere from set-point to position sampled at the period's start, at z = exp(j w T).
-    /// Computing delay is the caller's: multiply by z^-n.
+    /// Current per ampere of set-point at the period's start, at z = exp(j w T).
+    pub fn current_response(&self, z: Complex<f64>) -> Complex<f64> {
+        (z - self.lag).inv() * (1.0 - self.lag)
+    }
+
+    /// The states [q, q'/w] of a block per ampere of set-point at the period's start, at z = exp(j w T).
+    pub fn state_response(&self, block: &Block, z: Complex<f64>) -> [Complex<f64>; 2] {
+        let current = self.current_response(z);
+        let [[a11, a12], [a21, a22]] = block.a;
+        let drive = |i: usize| current * block.current[i] + block.setpoint[i];
+        let determinant = (z - a11) * (z - a22) - a12 * a21;
+        let first = (z - a22) * drive(0) + drive(1) * a12;
+        let second = (z - a11) * drive(1) + drive(0) * a21;
+        [first / determinant, second / determinant]
+    }
+
+    /// Response in metres per ampere from set-point to position at the period's start, at z = exp(j w T). Delays are
+    /// those of [`super::Chain`].
     pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
-        let current = (z - self.lag).inv() * (1.0 - self.lag);
-        let of = |block: &Block| {
-            let [[a11, a12], [a21, a22]] = block.a;
-            let drive = |i: usize| current * block.current[i] + block.setpoint[i];
-            let determinant = (z - a11) * (z - a22) - a12 * a21;
-            ((z - a22) * drive(0) + drive(1) * a12) * block.output / determinant
-        };
-        self.blocks.iter().map(of).sum()
+        self.blocks.iter().map(|block| self.state_response(block, z)[0] * block.output).sum()
+    }
+
+    /// Everything at rest.
+    pub fn at_rest(&self) -> Motion {
+        Motion { current_a: 0.0, states: vec![[0.0; 2]; self.blocks.len()] }
+    }
+
+    /// One period on, with the set-point held; `force` is what else acts on a mode, held as well.
+    pub fn step(&self, motion: &mut Motion, setpoint_a: f64, force: impl Fn(&Block) -> f64) {
+        let current_a = motion.current_a;
+        for (block, x) in self.blocks.iter().zip(&mut motion.states) {
+            let force = force(block);
+            *x = [0, 1].map(|i| {
+                block.a[i][0] * x[0]
+                    + block.a[i][1] * x[1]
+                    + block.current[i] * current_a
+                    + block.setpoint[i] * setpoint_a
+                    + block.force[i] * force
+            });
+        }
+        motion.current_a = setpoint_a + (current_a - setpoint_a) * self.lag;
+    }
+
+    /// Displacement at the probe in metres.
+    pub fn position_m(&self, motion: &Motion) -> f64 {
+        self.blocks.iter().zip(&motion.states).map(|(block, x)| block.output * x[0]).sum()
+    }
+
+    /// Velocity at the probe in metres per second.
+    pub fn velocity_m_per_s(&self, motion: &Motion) -> f64 {
+        self.blocks.iter().zip(&motion.states).map(|(block, x)| block.output_rate * x[1]).sum()
     }
 
     /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ...].
@@ -116,14 +164,12 @@ mod tests {
         Mode { omega_rad_s: 184.0, damping_ratio: 0.009, shape, force_gain: 0.7, sensor_gain: 0.6, floor_gain: 1.0 }
     }
 
-    fn amplifier() -> AmplifierSettings {
-        AmplifierSettings { bandwidth_hz: 1000.0, current_limit_a: 1.0, slew_limit_a_per_s: 1.0 }
-    }
+    const BANDWIDTH_HZ: f64 = 1000.0;
 
     #[test]
     fn a_mode_swings_freely_as_in_closed_form() {
         let (mode, period_s) = (mode(), 2e-4);
-        let block = Sampled::new(std::slice::from_ref(&mode), &amplifier(), 11.12, period_s).blocks[0];
+        let block = Sampled::new(std::slice::from_ref(&mode), BANDWIDTH_HZ, 11.12, period_s).blocks[0];
         // Displaced and let go: q(t) = exp(-zeta w t) (cos wd t + zeta/sqrt(1 - zeta^2) sin wd t).
         let (mut x, zeta) = ([1.0, 0.0], mode.damping_ratio);
         let damped = (1.0 - zeta * zeta).sqrt();
@@ -139,8 +185,8 @@ mod tests {
 
     #[test]
     fn halving_the_period_changes_nothing_at_the_common_instants() {
-        let coarse = Sampled::new(&[mode()], &amplifier(), 11.12, 1e-3);
-        let fine = Sampled::new(&[mode()], &amplifier(), 11.12, 1e-3 / 4.0);
+        let coarse = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 1e-3);
+        let fine = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 1e-3 / 4.0);
         let ((a, b, _), (fa, fb, _)) = (coarse.state_space(), fine.state_space());
         let four = &fa * &fa * &fa * &fa;
         let held = (&fa * &fa * &fa + &fa * &fa + &fa + DMatrix::identity(3, 3)) * fb;
@@ -149,7 +195,7 @@ mod tests {
 
     #[test]
     fn the_response_is_that_of_the_state_space() {
-        let sampled = Sampled::new(&[mode()], &amplifier(), 11.12, 2e-4);
+        let sampled = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 2e-4);
         let (a, b, c) = sampled.state_space();
         let complex = |m: DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
         for angle in [1e-4, 0.03, 0.5, 3.0] {
@@ -162,7 +208,7 @@ mod tests {
 
     #[test]
     fn at_low_frequency_the_response_is_the_static_compliance() {
-        let sampled = Sampled::new(&[mode()], &amplifier(), 11.12, 2e-4);
+        let sampled = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 2e-4);
         let compliance = 0.7 * 0.6 * 11.12 / (184.0 * 184.0);
         let z = Complex::new(1.0, 1e-9);
         assert!((sampled.response(z).re / compliance - 1.0).abs() < 1e-6);

@@ -66,6 +66,8 @@ pub struct Run {
     pub path: PathBuf,
     /// How the loop ended.
     pub ended: Ended,
+    /// Its pace.
+    pub pace: Pace,
     /// How it was scheduled.
     pub scheduling: Scheduling,
     /// Whether a person (or the system) stopped it.
@@ -115,7 +117,7 @@ pub fn run(
     let ended = supervisor.watch_over(prepared, watching)?;
     let recorder = recorder.join()?;
     let ended = ended.map_err(|_| SessionError::LoopDied(path.clone()))?;
-    Ok(Run { path, ended, scheduling, stopped: supervisor.stopped, recorder })
+    Ok(Run { path, ended, pace, scheduling, stopped: supervisor.stopped, recorder })
 }
 
 /// Arm and start: in the ring before the loop begins, so that they take effect at tick 0.

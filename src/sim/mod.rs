@@ -1,20 +1,22 @@
-//! A rig that obeys the model: amplifier with limits, stage with unmodelled modes and stop, probe with noise, quantisation
-//! and range, one period of computing delay, a moving floor. Behind the hardware boundary, so that the loop cannot tell.
+//! A rig that obeys the model: amplifier with limits, steps and latency, stage with unmodelled modes and stop, probe with
+//! noise, quantisation, range, age and a rate of its own, a moving floor. Behind the hardware boundary, so that the loop
+//! cannot tell.
 //!
 //! The same seed and settings give the same readings, bit for bit, on any x86-64 or ARM machine: sums are in a fixed
 //! order, every transcendental function comes from the `libm` crate, and no library picks its kernel by the processor.
 
 mod floor;
 mod noise;
+mod probe;
+mod setpoints;
 mod stage;
 
-use std::collections::VecDeque;
-
-use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick, Validity};
+use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
 use crate::config::{Config, UnmodelledMode};
 use crate::plant::{self, Modal, Mode, PlantError};
-use noise::Gaussian;
+use probe::Probe;
+use setpoints::Setpoints;
 use stage::Stage;
 
 /// The simulated amplifier, stage and probe.
@@ -22,39 +24,35 @@ use stage::Stage;
 pub struct SimulatedRig {
     stage: Stage,
     status: AmplifierStatus,
-    /// Commands on their way through the computing delay, each with the tick from which it acts; the oldest first.
-    delayed_a: VecDeque<(u64, f64)>,
-    delay: u64,
-    acting_a: f64,
+    setpoints: Setpoints,
+    /// From a command to its action, in ticks.
+    delay: f64,
     accepted_a: f64,
     current_limit_a: f64,
     largest_change_a: f64,
-    probe_noise: Gaussian,
-    probe_noise_rms_m: f64,
-    quantum_m: f64,
-    half_range_m: f64,
-    sequence: u64,
+    current_step_a: f64,
+    probe: Probe,
+    /// All that happens, happens at ticks: no fraction of a period needs to be resolved.
+    in_step: bool,
     tick: Option<u64>,
 }
 
 impl SimulatedRig {
     /// A rig at rest, as configured.
     pub fn new(config: &Config) -> Result<Self, PlantError> {
-        let delay = u64::from(config.servo.computing_delay_periods);
+        let latency = config.amplifier.latency_s * config.servo.rate_hz;
+        let delay = f64::from(config.servo.computing_delay_periods) + latency;
         Ok(SimulatedRig {
             stage: Stage::new(config, &modes(config)?),
             status: AmplifierStatus::Disabled,
-            delayed_a: VecDeque::with_capacity(delay as usize + 2),
+            setpoints: Setpoints::new(delay),
             delay,
-            acting_a: 0.0,
             accepted_a: 0.0,
             current_limit_a: config.amplifier.current_limit_a,
             largest_change_a: config.amplifier.slew_limit_a_per_s * config.servo.period_s(),
-            probe_noise: Gaussian::new(config.sim.seed, 0),
-            probe_noise_rms_m: config.sim.probe_noise_rms_m,
-            quantum_m: config.sim.probe_quantisation_m,
-            half_range_m: config.probe.range_m / 2.0,
-            sequence: 0,
+            current_step_a: config.amplifier.device.current_step_a(),
+            probe: Probe::new(config),
+            in_step: latency == 0.0 && probe::is_immediate(config),
             tick: None,
         })
     }
@@ -64,22 +62,37 @@ impl SimulatedRig {
         self.stage.position_m()
     }
 
-    /// The period after `tick`: the command that has waited long enough begins to act, and goes on until the next does.
+    /// The period after `tick`.
     fn advance(&mut self, tick: u64) {
-        while let Some((_, current_a)) = self.delayed_a.pop_front_if(|(from, _)| *from <= tick) {
-            self.acting_a = current_a;
+        let from = tick as f64;
+        if self.in_step {
+            return self.stage.advance(self.setpoints.at(from));
         }
-        self.stage.advance(self.acting_a);
+        self.stage.shake();
+        let steps = self.stage.fine_steps();
+        for step in 0..steps {
+            let at = |step: usize| from + step as f64 / steps as f64;
+            self.advance_finely(at(step), at(step + 1));
+        }
     }
 
-    fn read(&mut self) -> Reading {
-        let noisy_m = self.stage.position_m() + self.probe_noise_rms_m * self.probe_noise.next();
-        let quantised_m =
-            if self.quantum_m > 0.0 { libm::round(noisy_m / self.quantum_m) * self.quantum_m } else { noisy_m };
-        let validity = if quantised_m.abs() <= self.half_range_m { Validity::Valid } else { Validity::OutOfRange };
-        self.sequence += 1;
-        let position_m = quantised_m.clamp(-self.half_range_m, self.half_range_m);
-        Reading { position_m, sequence: self.sequence, age_ns: 0, validity }
+    /// One fine step, and what the probe sees during it.
+    fn advance_finely(&mut self, from: f64, to: f64) {
+        let before = self.stage.place();
+        let setpoint_a = self.setpoints.mean(from, to);
+        self.stage.advance_finely(setpoint_a);
+        let (after, length_s) = (self.stage.place(), self.stage.fine_step_s());
+        self.probe.watch(to, |time| before.towards(&after, length_s, (time - from) / (to - from)));
+    }
+
+    /// The nearest step, limited in slope and size.
+    fn accept(&self, current_a: f64) -> f64 {
+        let change_a = current_a - self.accepted_a;
+        let within = change_a.abs() <= self.largest_change_a;
+        let reached_a = if within { current_a } else { self.accepted_a + self.largest_change_a.copysign(change_a) };
+        let step_a = self.current_step_a;
+        let stepped_a = if step_a > 0.0 { libm::round(reached_a / step_a) * step_a } else { reached_a };
+        stepped_a.clamp(-self.current_limit_a, self.current_limit_a)
     }
 }
 
@@ -114,21 +127,15 @@ impl CurrentAmplifier for SimulatedRig {
             let remedy = "arm the loop first";
             return Err(DeviceError { what: "the simulated amplifier is disabled", remedy, code: 0 });
         }
-        let change_a = current_a - self.accepted_a;
-        let within = change_a.abs() <= self.largest_change_a;
-        let reached_a = if within { current_a } else { self.accepted_a + self.largest_change_a.copysign(change_a) };
-        self.accepted_a = reached_a.clamp(-self.current_limit_a, self.current_limit_a);
-        let from = self.tick.unwrap_or_default() + self.delay;
-        // The last word of a tick counts.
-        self.delayed_a.pop_back_if(|(other, _)| *other == from);
-        self.delayed_a.push_back((from, self.accepted_a));
+        self.accepted_a = self.accept(current_a);
+        self.setpoints.push(self.tick.unwrap_or_default() as f64 + self.delay, self.accepted_a);
         Ok(self.accepted_a)
     }
 
     fn disable(&mut self) {
         self.status = AmplifierStatus::Disabled;
-        self.delayed_a.clear();
-        (self.acting_a, self.accepted_a) = (0.0, 0.0);
+        self.setpoints.clear();
+        self.accepted_a = 0.0;
     }
 
     fn status(&self) -> AmplifierStatus {
@@ -142,6 +149,6 @@ impl DisplacementProbe for SimulatedRig {
             self.advance(tick);
         }
         self.tick = Some(now.number);
-        self.read()
+        if self.in_step { self.probe.measure(self.stage.position_m()) } else { self.probe.latest(now.number as f64) }
     }
 }

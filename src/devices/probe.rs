@@ -1,0 +1,179 @@
+//! Probes by their settings.
+
+use std::time::Duration;
+
+use bench_hal::serial::{
+    Mounting, Polling, PortSettings, ProbeSettings, Protocol, SerialError, SerialProbe, ascii, capancdt, optoncdt,
+};
+
+use crate::config::{
+    AsciiSettings, CapancdtSettings, Config, CounterMeaning, LineSettings, MountingSettings, OptoncdtSettings, Parity,
+    PollingSettings, ProbeDevice,
+};
+
+/// A probe that cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeError {
+    /// The serial probe.
+    #[error(transparent)]
+    Serial(#[from] SerialError),
+    /// The line needs longer.
+    #[error(
+        "probe.transport_s is {transport_s} s, but {characters} characters at {baud} baud take {least_s:.6} s: raise it, or the baud rate"
+    )]
+    Transport {
+        /// As configured.
+        transport_s: f64,
+        /// What the line takes.
+        least_s: f64,
+        /// Characters on the line.
+        characters: u32,
+        /// Characters have ten or eleven bits.
+        baud: u32,
+    },
+    /// The simulated probe has no interface of its own.
+    #[error("the simulated probe stands on no interface")]
+    Simulated,
+}
+
+/// Refuses settings that make no sense, and a line that cannot be as fast as `probe.transport_s` says.
+pub fn check(config: &Config) -> Result<(), ProbeError> {
+    let Some(settings) = settings(config) else { return Ok(()) };
+    settings.protocol.decoder()?;
+    let characters = config.probe.device.characters_per_reading().unwrap_or(0);
+    let least_s = settings.port.line_time_ns(characters) as f64 * 1e-9;
+    let transport_s = config.probe.transport_s;
+    if transport_s < least_s {
+        return Err(ProbeError::Transport { transport_s, least_s, characters, baud: settings.port.baud });
+    }
+    Ok(())
+}
+
+/// Opens the probe that the configuration names; it reads from now on.
+pub fn open(config: &Config) -> Result<SerialProbe, ProbeError> {
+    Ok(SerialProbe::open(settings(config).ok_or(ProbeError::Simulated)?)?)
+}
+
+/// The driver's settings; `None` for the simulated probe.
+pub fn settings(config: &Config) -> Option<ProbeSettings> {
+    let device = &config.probe.device;
+    let (protocol, line) = (device.protocol()?, device.line()?);
+    let mut settings = ProbeSettings::new(port(line), protocol);
+    settings.latency = Duration::from_secs_f64(config.probe.latency_s);
+    settings.mounting = device.mounting().map(mounting).unwrap_or_default();
+    settings.polling = device.polling().map(polling).unwrap_or_default();
+    Some(settings)
+}
+
+/// The port of a line.
+pub fn port(line: &LineSettings) -> PortSettings {
+    PortSettings {
+        parity: match line.parity {
+            Parity::None => bench_hal::serial::Parity::None,
+            Parity::Even => bench_hal::serial::Parity::Even,
+        },
+        low_latency: line.low_latency,
+        lock_dir: line.lock_folder.clone().into(),
+        ..PortSettings::new(&line.port, line.baud)
+    }
+}
+
+fn mounting(settings: MountingSettings) -> Mounting {
+    Mounting { gain: settings.gain, offset_m: settings.offset_m }
+}
+
+fn polling(settings: PollingSettings) -> Polling {
+    let seconds = Duration::from_secs_f64;
+    Polling {
+        interval: seconds(settings.interval_s),
+        timeout: seconds(settings.timeout_s),
+        quiet: seconds(settings.quiet_s),
+    }
+}
+
+impl ProbeDevice {
+    /// What the probe speaks; `None` for the simulated one.
+    pub fn protocol(&self) -> Option<Protocol> {
+        match self {
+            ProbeDevice::Simulated(_) => None,
+            ProbeDevice::Capancdt(device) => Some(Protocol::Capancdt(capancdt(device))),
+            ProbeDevice::Optoncdt(device) => Some(Protocol::Optoncdt(optoncdt(device))),
+            ProbeDevice::Ascii(device) => Some(Protocol::Ascii(ascii(device))),
+        }
+    }
+
+    /// Its serial line.
+    pub fn line(&self) -> Option<&LineSettings> {
+        match self {
+            ProbeDevice::Simulated(_) => None,
+            ProbeDevice::Capancdt(device) => Some(&device.line),
+            ProbeDevice::Optoncdt(device) => Some(&device.line),
+            ProbeDevice::Ascii(device) => Some(&device.line),
+        }
+    }
+
+    /// How it is mounted.
+    pub fn mounting(&self) -> Option<MountingSettings> {
+        match self {
+            ProbeDevice::Simulated(_) => None,
+            ProbeDevice::Capancdt(device) => Some(device.mounting),
+            ProbeDevice::Optoncdt(device) => Some(device.mounting),
+            ProbeDevice::Ascii(device) => Some(device.mounting),
+        }
+    }
+
+    fn polling(&self) -> Option<PollingSettings> {
+        match self {
+            ProbeDevice::Capancdt(device) => Some(device.polling),
+            ProbeDevice::Ascii(device) => Some(device.polling),
+            ProbeDevice::Simulated(_) | ProbeDevice::Optoncdt(_) => None,
+        }
+    }
+
+    /// Characters on the line between the moment a probe could tell a value and the arrival of the last of them; the
+    /// request counts, for the age does from there.
+    pub fn characters_per_reading(&self) -> Option<u32> {
+        match self {
+            ProbeDevice::Simulated(_) | ProbeDevice::Ascii(_) => None,
+            ProbeDevice::Capancdt(device) => {
+                let device = capancdt(device);
+                Some((device.request().len() + device.answer(0, &[0]).len()) as u32)
+            }
+            ProbeDevice::Optoncdt(device) => Some(3 * u32::from(device.values_per_cycle)),
+        }
+    }
+}
+
+fn capancdt(device: &CapancdtSettings) -> capancdt::Settings {
+    capancdt::Settings {
+        range_m: device.sensor_range_m,
+        probe_address: device.address,
+        master_address: device.own_address,
+        counter: match device.counter {
+            CounterMeaning::NewestValue => capancdt::CounterMeaning::NewestValue,
+            CounterMeaning::OldestValue => capancdt::CounterMeaning::OldestValue,
+        },
+    }
+}
+
+fn optoncdt(device: &OptoncdtSettings) -> optoncdt::Settings {
+    let cycle = optoncdt::Cycle { values: device.values_per_cycle, displacement: device.displacement_value };
+    optoncdt::Settings { range_m: device.sensor_range_m, cycle }
+}
+
+fn ascii(device: &AsciiSettings) -> ascii::Settings {
+    ascii::Settings {
+        line: device.pattern.clone(),
+        terminator: device.terminator.clone(),
+        invalid: device.invalid.clone(),
+        over: device.over.clone(),
+        under: device.under.clone(),
+        error: device.error.clone(),
+        error_words: &[],
+        request: device.request.clone(),
+        unit_m: device.unit_m,
+        offset_m: device.zero_m,
+        lower_m: device.lower_m,
+        upper_m: device.upper_m,
+    }
+}
