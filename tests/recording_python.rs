@@ -32,6 +32,7 @@ fn tick(n: u64) -> TickRecord {
         state: [State::Running, State::Armed, State::Disarmed, State::Tripped][n as usize % 4],
         flags: n as u32 % 32,
         missed_ticks: 0,
+        actual_a: [None, Some(-0.0), Some(1e-3 * n as f64)][n as usize % 3],
     }
 }
 
@@ -57,6 +58,7 @@ fn row(t: &TickRecord) -> Value {
         hex(t.position_m),
         hex(t.requested_a),
         hex(t.command_a),
+        t.actual_a.map(hex),
         validity,
         t.state.name()
     ])

@@ -35,8 +35,9 @@ fn of_state(from: State, to: State) -> Message {
 
 fn of_trip(trip: Trip) -> Message {
     let (value, limit) = trip.value_and_limit().unwrap_or_default();
-    let code = if let Trip::Amplifier { code } = trip { code } else { 0 };
-    Message { reason: trip.reason().into(), value, limit, code, ..of("trip", trip.to_string()) }
+    let code = if let Trip::Amplifier { code, .. } = trip { code } else { 0 };
+    let remedy = trip.remedy().into();
+    Message { reason: trip.reason().into(), value, limit, code, remedy, ..of("trip", trip.to_string()) }
 }
 
 fn order_name(order: OrderKind) -> &'static str {
@@ -86,7 +87,7 @@ fn trip(message: &Message) -> Result<Trip, Unknown> {
         "probe_stuck" => Trip::ProbeStuck { unchanged_s: value, limit_s: limit },
         // Counts were u32 and come back whole: every u32 is a double.
         "overruns" => Trip::Overruns { count: value as u32, limit: limit as u32 },
-        "amplifier" => Trip::Amplifier { code },
+        "amplifier" => Trip::Amplifier { code, words: None },
         other => return Err(unknown("reason", other)),
     })
 }

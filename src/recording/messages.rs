@@ -43,6 +43,8 @@ pub struct Loop {
     pub flags: u32,
     #[prost(uint32, tag = "14")]
     pub missed_ticks: u32,
+    #[prost(double, optional, tag = "15")]
+    pub actual_a: Option<f64>,
 }
 
 /// Something changed, on channel `/event`. Which fields have a meaning depends on `kind`.
@@ -81,6 +83,9 @@ pub struct Event {
     /// How many records did not fit into the ring, of `lost`.
     #[prost(uint64, tag = "11")]
     pub records: u64,
+    /// What a person can do about it, of a trip.
+    #[prost(string, tag = "12")]
+    pub remedy: String,
 }
 
 /// A summary of up to one second of scheduled time, on channel `/timing`.
@@ -178,6 +183,7 @@ impl From<&TickRecord> for Loop {
             state: state_code(t.state) as i32,
             flags: t.flags,
             missed_ticks: t.missed_ticks,
+            actual_a: t.actual_a,
         }
     }
 }
@@ -201,6 +207,7 @@ impl TryFrom<&Loop> for TickRecord {
             state: state(m.state)?,
             flags: m.flags,
             missed_ticks: m.missed_ticks,
+            actual_a: m.actual_a,
         })
     }
 }

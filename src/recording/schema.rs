@@ -5,7 +5,7 @@ use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
     DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
-    FileDescriptorSet,
+    FileDescriptorSet, OneofDescriptorProto,
 };
 
 /// The bytes that go into each channel's schema record.
@@ -38,8 +38,13 @@ fn loop_message() -> DescriptorProto {
             ("state", Type::Enum),
             ("flags", Type::Uint32),
             ("missed_ticks", Type::Uint32),
+            ("actual_a", Type::Double),
         ],
     );
+    // Absent where the amplifier does not say: a proto3 `optional`, which descriptors write as a oneof of one.
+    let actual = &mut message.field[14];
+    (actual.proto3_optional, actual.oneof_index) = (Some(true), Some(0));
+    message.oneof_decl = vec![OneofDescriptorProto { name: Some("_actual_a".into()), options: None }];
     message.field[10].type_name = Some(".bench.Loop.Validity".into());
     message.field[11].type_name = Some(".bench.Loop.State".into());
     message.enum_type = vec![
@@ -64,6 +69,7 @@ fn event_message() -> DescriptorProto {
             ("limit", Type::Double),
             ("code", Type::Sint64),
             ("records", Type::Uint64),
+            ("remedy", Type::String),
         ],
     )
 }
@@ -168,6 +174,7 @@ mod tests {
             state: 1,
             flags: 1,
             missed_ticks: 1,
+            actual_a: Some(1.0),
         };
         let s = || "s".to_string();
         let event = Event {
@@ -182,6 +189,7 @@ mod tests {
             limit: 1.0,
             code: 1,
             records: 1,
+            remedy: s(),
         };
         let timing = Timing {
             first_tick: 1,

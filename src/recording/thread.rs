@@ -76,6 +76,7 @@ pub fn spawn(recorder: Recorder, ring: Consumer<Published>) -> Result<RecorderHa
 }
 
 fn run(mut recorder: Recorder, mut ring: Consumer<Published>, health: &Health) -> Result<Recorder, RecordingError> {
+    let _alarm = Alarm(health);
     let mut outcome = Ok(());
     loop {
         // Asked before emptying: what was pushed before the producer went is in the ring by then.
@@ -87,6 +88,17 @@ fn run(mut recorder: Recorder, mut ring: Consumer<Published>, health: &Health) -
             return outcome.map(|()| recorder);
         }
         std::thread::sleep(REST);
+    }
+}
+
+/// Says that recording has failed if its thread dies of a panic: the run shall not go on unrecorded.
+struct Alarm<'a>(&'a Health);
+
+impl Drop for Alarm<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.failed.store(true, Ordering::Release);
+        }
     }
 }
 

@@ -16,6 +16,8 @@
 
 use std::fmt;
 
+use bench_hal::{DeviceError, FaultText};
+
 /// State of the arming machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
@@ -122,7 +124,16 @@ pub enum Trip {
     Amplifier {
         /// The device's number.
         code: i64,
+        /// What it means, where the driver knows. A recording carries it as text.
+        words: Option<FaultText>,
     },
+}
+
+impl From<DeviceError> for Trip {
+    fn from(error: DeviceError) -> Trip {
+        let DeviceError { what, remedy, code } = error;
+        Trip::Amplifier { code, words: Some(FaultText { what, remedy }) }
+    }
 }
 
 impl Trip {
@@ -158,6 +169,7 @@ impl Trip {
             Trip::Overruns { .. } => {
                 "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s"
             }
+            Trip::Amplifier { words: Some(words), .. } => words.remedy,
             Trip::Amplifier { .. } => "look up the code in the amplifier's manual, clear its fault, start again",
         }
     }
@@ -202,7 +214,10 @@ impl fmt::Display for Trip {
             Trip::Overruns { count, limit } => {
                 write!(f, "{count} ticks missed within a second, {limit} are allowed")
             }
-            Trip::Amplifier { code } => write!(f, "the amplifier reported a fault or refused a command (code {code})"),
+            Trip::Amplifier { code, words: Some(words) } => write!(f, "amplifier: {} (code {code})", words.what),
+            Trip::Amplifier { code, words: None } => {
+                write!(f, "the amplifier reported a fault or refused a command (code {code})")
+            }
         }
     }
 }

@@ -24,6 +24,8 @@ pub struct TickRecord {
     pub requested_a: f64,
     /// Command u in amperes as the amplifier gives it: after the interlocks, quantised and limited.
     pub command_a: f64,
+    /// The current in amperes that the amplifier says it gives, where it says so: as of its last status.
+    pub actual_a: Option<f64>,
     /// The probe's own count of measurements.
     pub probe_sequence: u64,
     /// Age of the measurement in nanoseconds.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench_hal::{AmplifierStatus, Reading, Rig, Validity};
+use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Validity};
 use rtrb::{Consumer, Producer};
 
 use super::arming::{Change, State, Trip};
@@ -12,6 +12,13 @@ use super::interlock::Interlocks;
 use super::outlet::Outlet;
 use super::program::{Decision, Program};
 use super::record::{EventKind, OrderKind, TickRecord, flag};
+
+/// The answer of a driver to a command was not a number.
+const NONSENSE: DeviceError = DeviceError {
+    what: "the driver does not say which current it gives",
+    remedy: "this is a fault of the driver; please report it",
+    code: 0,
+};
 
 /// Orders that one tick takes; more wait for the next.
 pub const ORDERS_PER_TICK: usize = 16;
@@ -111,7 +118,9 @@ impl Servo {
         let timing = self.interlocks.check_timing(moment.missed, moment.tick);
         let reading = self.interlocks.check_reading(reading, moment.tick);
         match self.rig.status() {
-            AmplifierStatus::Fault(code) => Err(Trip::Amplifier { code: i64::from(code) }),
+            AmplifierStatus::Fault(code) => {
+                Err(Trip::Amplifier { code: i64::from(code), words: self.rig.explain(code) })
+            }
             _ => timing.and(reading),
         }
     }
@@ -131,11 +140,10 @@ impl Servo {
         let mut command_a = 0.0;
         if matches!(self.state, State::Armed | State::Running) {
             let passed = self.interlocks.check_command(requested_a);
-            let refused = |error: bench_hal::DeviceError| Trip::Amplifier { code: error.code };
-            match passed.and_then(|()| self.rig.command(requested_a).map_err(refused)) {
+            match passed.and_then(|()| self.rig.command(requested_a).map_err(Trip::from)) {
                 Ok(given_a) if given_a.is_finite() => command_a = given_a,
                 // No driver may say so; what really flows is then unknown.
-                Ok(_) => self.trip(Trip::Amplifier { code: 0 }, tick),
+                Ok(_) => self.trip(Trip::from(NONSENSE), tick),
                 Err(trip) => self.trip(trip, tick),
             }
         }
@@ -155,6 +163,7 @@ impl Servo {
             position_m: reading.position_m,
             requested_a: decision.requested_a,
             command_a,
+            actual_a: self.rig.actual_current_a(),
             probe_sequence: reading.sequence,
             probe_age_ns: reading.age_ns,
             validity: reading.validity,
@@ -203,7 +212,7 @@ impl Servo {
         self.slow_order = true;
         self.change(Change::Arm, tick);
         if let Err(error) = self.rig.enable() {
-            self.trip(Trip::Amplifier { code: error.code }, tick);
+            self.trip(Trip::from(error), tick);
         }
     }
 

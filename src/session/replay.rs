@@ -75,7 +75,8 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
         Connections { orders: taken, spent, outlet: Outlet::new(published), progress: Arc::new(Progress::default()) };
     let (to_rig, seen) = RingBuffer::new(4);
     let (enabled, enables) = RingBuffer::new(64);
-    let rig = Box::new(RecordedRig { now: Seen::default(), seen, enables, status: AmplifierStatus::Disabled });
+    let (cleared, clears) = RingBuffer::new(64);
+    let rig = Box::new(RecordedRig { now: Seen::default(), seen, enables, clears, status: AmplifierStatus::Disabled });
     let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
     let program = plan.program()?;
     let mut comparison = Comparison {
@@ -83,6 +84,7 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
         orders,
         to_rig,
         enabled,
+        cleared,
         records,
         collected,
         program: Some(program),
@@ -102,6 +104,7 @@ struct Comparison {
     orders: Producer<Order>,
     to_rig: Producer<Seen>,
     enabled: Producer<bool>,
+    cleared: Producer<()>,
     records: Consumer<Published>,
     collected: Consumer<Box<dyn Program>>,
     program: Option<Box<dyn Program>>,
@@ -128,6 +131,10 @@ impl Comparison {
                     let refused = events.next_if(|next| next.tick == event.tick && of_amplifier(next)).is_some();
                     // The rig takes it within this very tick.
                     let _ = self.enabled.push(!refused);
+                }
+                EventKind::State { from: State::Tripped, to: State::Disarmed } => {
+                    // As above.
+                    let _ = self.cleared.push(());
                 }
                 _ => tripped |= of_amplifier(event),
             }
@@ -178,6 +185,8 @@ struct RecordedRig {
     seen: Consumer<Seen>,
     /// Whether the amplifier could be enabled, time after time.
     enables: Consumer<bool>,
+    /// A clear for each that the amplifier took.
+    clears: Consumer<()>,
     status: AmplifierStatus,
 }
 
@@ -205,6 +214,14 @@ impl CurrentAmplifier for RecordedRig {
 
     fn disable(&mut self) {
         self.status = AmplifierStatus::Disabled;
+    }
+
+    fn actual_current_a(&self) -> Option<f64> {
+        self.now.record.actual_a
+    }
+
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        self.clears.pop().map_err(|_| REFUSED)
     }
 
     /// A fault keeps the program from deciding anything; where something was decided, it was the command that failed.

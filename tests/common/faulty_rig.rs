@@ -24,6 +24,8 @@ pub enum Fault {
     Refuses(i64),
     /// The amplifier cannot be enabled, with this code.
     DoesNotEnable(i64),
+    /// The amplifier keeps its fault, whoever clears it.
+    KeepsFault,
     /// The amplifier says that it gives this current, whatever it was asked for.
     Gives(f64),
 }
@@ -82,6 +84,12 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
         self.inner.disable();
     }
 
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        let tick = self.now.map_or(0, |now| now + 1);
+        let kept = self.find(tick, |fault| (*fault == Fault::KeepsFault).then_some(refusal(5)));
+        kept.map_or(Ok(()), Err)
+    }
+
     fn status(&self) -> AmplifierStatus {
         let code = self.find(self.now(), |fault| if let Fault::Faulted(code) = fault { Some(*code) } else { None });
         code.map_or(self.inner.status(), AmplifierStatus::Fault)
@@ -99,7 +107,11 @@ impl<R: Rig> DisplacementProbe for FaultyRig<R> {
                 Fault::Old(age_ns) => reading.age_ns = age_ns,
                 Fault::Frozen => reading.sequence = self.last.sequence,
                 Fault::Stuck => reading.position_m = self.last.position_m,
-                Fault::Faulted(_) | Fault::Refuses(_) | Fault::DoesNotEnable(_) | Fault::Gives(_) => {}
+                Fault::Faulted(_)
+                | Fault::Refuses(_)
+                | Fault::DoesNotEnable(_)
+                | Fault::Gives(_)
+                | Fault::KeepsFault => {}
             }
         }
         self.now = Some(now.number);

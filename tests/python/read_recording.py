@@ -28,9 +28,11 @@ def name(message, field):
 
 
 def row(message):
-    """One tick, in the order NUMBERS, DOUBLES, validity, state."""
+    """One tick, in the order NUMBERS, DOUBLES, actual_a (None where the amplifier does not say), validity, state."""
     numbers = [getattr(message, n) for n in NUMBERS]
-    return numbers + [bits(getattr(message, n)) for n in DOUBLES] + [name(message, "validity"), name(message, "state")]
+    doubles = [bits(getattr(message, n)) for n in DOUBLES]
+    actual = [bits(message.actual_a) if message.HasField("actual_a") else None]
+    return numbers + doubles + actual + [name(message, "validity"), name(message, "state")]
 
 
 def event(message):

@@ -42,6 +42,7 @@ pub fn tick(number: u64) -> TickRecord {
         state: State::Running,
         flags: 1,
         missed_ticks: 0,
+        actual_a: None,
     }
 }
 
@@ -65,9 +66,10 @@ pub fn write(path: &Path, run: &[Published]) -> Totals {
 }
 
 /// All bits of a tick: `==` takes -0.0 for 0.0 and no NaN for itself.
-pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4]) {
+pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4], Option<u64>) {
     let floats = [t.reference_m, t.position_m, t.requested_a, t.command_a].map(f64::to_bits);
-    (TickRecord { reference_m: 0.0, position_m: 0.0, requested_a: 0.0, command_a: 0.0, ..*t }, floats)
+    let rest = TickRecord { reference_m: 0.0, position_m: 0.0, requested_a: 0.0, command_a: 0.0, actual_a: None, ..*t };
+    (rest, floats, t.actual_a.map(f64::to_bits))
 }
 
 pub fn ticks_of(run: &[Published]) -> Vec<TickRecord> {

@@ -43,6 +43,7 @@ fn every_field_of_a_tick_comes_back_with_every_bit() {
         state: states[n / 4 % 4],
         flags: u32::MAX >> n,
         missed_ticks: 0,
+        actual_a: (n % 2 == 0).then_some(doubles[(n + 4) % 7]),
     };
     let put: Vec<_> = (0..28).map(odd).collect();
     let (_, got) = read_back(&put.iter().map(|t| Published::Tick(*t)).collect::<Vec<_>>());
@@ -60,7 +61,7 @@ fn every_kind_of_event_comes_back_unchanged_and_in_order() {
         Trip::ProbeStale { age_s: 0.1 + 0.2, limit_s: 0.01 },
         Trip::ProbeStuck { unchanged_s: 0.05, limit_s: 0.04 },
         Trip::Overruns { count: u32::MAX, limit: 10 },
-        Trip::Amplifier { code: i64::MIN },
+        Trip::Amplifier { code: i64::MIN, words: None },
     ];
     let states = [State::Disarmed, State::Armed, State::Running, State::Tripped];
     let orders = [OrderKind::Arm, OrderKind::Start, OrderKind::Stop, OrderKind::Clear];

@@ -135,6 +135,21 @@ fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start(
 }
 
 #[test]
+fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
+    let faults = [(100..101, Fault::Faulted(5)), (0..200, Fault::KeepsFault)];
+    let mut bench = Bench::running(&stage(), &faults, says(|_| 0.1));
+    bench.run(150);
+    assert_eq!(bench.state(), State::Tripped);
+    bench.order(Order::Clear);
+    bench.tick();
+    assert_eq!(bench.state(), State::Tripped, "the amplifier keeps its fault");
+    bench.run(100);
+    bench.order(Order::Clear);
+    bench.tick();
+    assert_eq!((bench.state(), bench.is_on()), (State::Disarmed, false));
+}
+
+#[test]
 fn a_run_after_a_cleared_trip_does_not_carry_the_old_trip_along() {
     let mut bench = bench_in(State::Tripped, false);
     for order in [Order::Clear, Order::Arm, Order::Start(Box::new(Says(|_| 0.1, 5)))] {

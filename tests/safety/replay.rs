@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use bench::config::{AmplitudePoint, Config, ReferenceSettings, Sweep};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rt::record::{EventKind, Published, TickRecord, flag};
+use bench::rt::servo::Order;
 use bench::rt::thread::Pace;
 use bench::session::{self, Kind, Plan, ReplayError, Replayed, replay};
 use bench::sim::SimulatedRig;
 use bench_hal::Validity;
 
 use crate::faulty_rig::{Fault, FaultyRig};
-use crate::rig::stage;
+use crate::rig::{Bench, stage};
 
 fn short_chirp(sweep: Sweep) -> Plan {
     let mut config: Config = stage();
@@ -190,6 +191,29 @@ fn an_altered_command_order_or_flag_is_found_at_its_tick() {
         let found = replayed(&altered);
         assert_eq!((found.first.map(|d| d.tick), found.different), (Some(3000), 1), "alteration {n}");
     }
+}
+
+#[test]
+fn clears_that_the_amplifier_refused_and_took_replay_as_they_were() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let plan = control("fast");
+    let faults = [(100..101, Fault::Faulted(77)), (0..200, Fault::KeepsFault)];
+    let mut bench = Bench::running(&plan.config, &faults, plan.program().expect("a program"));
+    bench.run(150);
+    bench.order(Order::Clear);
+    bench.run(100);
+    bench.order(Order::Clear);
+    bench.run(100);
+    let metadata = [("run".to_string(), plan.kind.name().to_string())].into();
+    let header = Header { config_toml: plan.config_toml().expect("a configuration"), metadata, ..Header::default() };
+    let path = folder.path().join("cleared.mcap");
+    let mut recorder = Recorder::create(&path, &header).expect("a new file");
+    for (name, kind, text) in plan.attachments() {
+        recorder.attach(name, kind, text.as_bytes()).expect("a good disk");
+    }
+    bench.all.iter().for_each(|published| recorder.record(published).expect("a good disk"));
+    recorder.finish(&[]).expect("a good disk");
+    is_the_same(&path, "two clears, the first one refused");
 }
 
 #[test]

@@ -99,6 +99,9 @@ impl<R: Rig> CurrentAmplifier for Watched<R> {
     fn status(&self) -> AmplifierStatus {
         self.inner.status()
     }
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        self.inner.reset_fault()
+    }
 }
 
 impl<R: Rig> DisplacementProbe for Watched<R> {

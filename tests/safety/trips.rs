@@ -296,13 +296,13 @@ fn overruns_are_counted_over_any_second_wherever_it_begins() {
 fn a_fault_of_the_amplifier_trips_with_the_code_of_the_device() {
     let faults = [(AT..AT + 1, Fault::Faulted(0x2310))];
     let trip = trips(&mut Bench::running(&stage(), &faults, constant()), AT, "amplifier");
-    assert_eq!(trip, Trip::Amplifier { code: 0x2310 });
+    assert!(matches!(trip, Trip::Amplifier { code: 0x2310, .. }), "{trip:?}");
 }
 
 #[test]
 fn an_amplifier_that_refuses_a_command_is_switched_off_in_that_tick() {
     let mut bench = Bench::running(&stage(), &[(AT..AT + 1, Fault::Refuses(-7))], constant());
-    assert_eq!(trips(&mut bench, AT, "amplifier"), Trip::Amplifier { code: -7 });
+    assert!(matches!(trips(&mut bench, AT, "amplifier"), Trip::Amplifier { code: -7, .. }));
     let in_tick: Vec<Told> = bench.told().iter().filter(|(tick, _)| *tick == AT).map(|(_, told)| *told).collect();
     assert_eq!(in_tick, [Told::Command { current_a: SOME_A, refused: true }, Told::Disable]);
     assert_eq!(bench.ticks().at(AT).requested_a, SOME_A, "the record says what was asked for");
@@ -333,7 +333,7 @@ fn an_amplifier_that_cannot_be_enabled_trips_and_the_program_behind_it_does_not_
     bench.order(Order::Arm);
     bench.order(Order::Start(constant()));
     bench.run(1 + AFTER);
-    assert_eq!(prove_that_it_is_off(&bench, AT, "amplifier"), Trip::Amplifier { code: 31 });
+    assert!(matches!(prove_that_it_is_off(&bench, AT, "amplifier"), Trip::Amplifier { code: 31, .. }));
     assert_eq!(bench.handed_back, 1, "the program is handed back unused");
 }
 
