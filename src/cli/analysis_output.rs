@@ -21,6 +21,11 @@ pub(super) struct Made {
     /// Median coherence over the band.
     coherence_median: Option<f64>,
     filled_ticks: u64,
+    /// Mean time from a command to the position that its reading shows, by the model.
+    delay_s: Option<f64>,
+    /// How much later than the model the measured response answers, and its standard deviation.
+    delay_beyond_model_s: Option<f64>,
+    delay_beyond_model_sigma_s: Option<f64>,
     modes: [(); 0],
     zeros: [(); 0],
     cnmp: &'static str,
@@ -46,6 +51,9 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         frequencies: analysis.frf.len(),
         coherence_median: median(&analysis.frf.coherence),
         filled_ticks: analysis.filled_ticks,
+        delay_s: Some(analysis.delay_s),
+        delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
+        delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
         ..Made::nothing("this version estimates the frequency response; it does not fit modes and zeros to it")
     })
 }
@@ -53,9 +61,20 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
 impl Made {
     /// Nothing was made.
     pub fn nothing(why: &'static str) -> Made {
-        let (frf_csv, plot, coherence_median) = (None, None, None);
-        let (frequencies, filled_ticks, modes, zeros) = (0, 0, [], []);
-        Made { frf_csv, plot, frequencies, coherence_median, filled_ticks, modes, zeros, cnmp: "undecided", why }
+        Made {
+            frf_csv: None,
+            plot: None,
+            frequencies: 0,
+            coherence_median: None,
+            filled_ticks: 0,
+            delay_s: None,
+            delay_beyond_model_s: None,
+            delay_beyond_model_sigma_s: None,
+            modes: [],
+            zeros: [],
+            cnmp: "undecided",
+            why,
+        }
     }
 
     pub fn text(&self) -> String {
@@ -67,8 +86,18 @@ impl Made {
         } else {
             String::new()
         };
+        let delay = match (self.delay_s, self.delay_beyond_model_s, self.delay_beyond_model_sigma_s) {
+            (Some(delay_s), Some(beyond_s), Some(sigma_s)) => format!(
+                "  delay      {:.3} ms from command to reading: {:.3} ms by the configuration, {:+.4} +- {:.4} ms beyond by the phases\n",
+                (delay_s + beyond_s) * 1e3,
+                delay_s * 1e3,
+                beyond_s * 1e3,
+                2.0 * sigma_s * 1e3
+            ),
+            _ => String::new(),
+        };
         format!(
-            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n  plot       {}\n",
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{delay}  plot       {}\n",
             frf_csv, self.frequencies, coherence, plot
         )
     }

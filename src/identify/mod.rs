@@ -6,12 +6,14 @@
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
+//! - [`delay::beyond`]: how much later than a model a response answers.
 //! - [`csv`]: the file in which an FRF leaves the bench, and comes back.
 //!
 //! Sign convention of both estimators: y = H u, so a lag of the output is a negative phase.
 
 mod band;
 pub mod csv;
+pub mod delay;
 mod error;
 mod frf;
 pub mod local;

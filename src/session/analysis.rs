@@ -4,6 +4,7 @@ use nalgebra::Complex;
 
 use crate::config::{Config, IdentifySettings};
 use crate::control::ClosedLoop;
+use crate::identify::delay::{self, Delay};
 use crate::identify::{EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use crate::plant::{self, Modal, PlantError};
 use crate::recording::{Recording, RecordingError};
@@ -12,6 +13,9 @@ use crate::rt::record::TickRecord;
 
 /// Ticks that may be filled in, as a ratio of all: each adds an error of its own.
 const FILLED_RATIO: f64 = 1e-3;
+
+/// The model's phase is believed up to so many times its last mode: beyond are modes that it leaves out.
+const LAST_MODE: f64 = 1.2;
 
 /// A recording that carries no frequency response.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +54,10 @@ pub struct Analysis {
     pub frf: Frf,
     /// The same by the model, at the same frequencies.
     pub model: Vec<Complex<f64>>,
+    /// Mean time in seconds from a command to the position that its reading shows, by the model.
+    pub delay_s: f64,
+    /// How much later than the model the chain answers, by its phases up to the last mode of the model.
+    pub beyond: Option<Delay>,
     /// Missing ticks that were filled in: the current held, the position on a straight line.
     pub filled_ticks: u64,
 }
@@ -60,9 +68,11 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
     let frf = response(&signals, (start_hz.min(stop_hz), start_hz.max(stop_hz)), &config.identify)?;
     let modal = Modal::of(&plant::build(&config.plant)?)?;
+    let last_hz = modal.modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max) / (2.0 * std::f64::consts::PI);
     let chain = ClosedLoop::new(config, modal.modes, Vec::new());
-    let model = frf.frequency_hz.iter().map(|f| chain.sampled_plant(2.0 * std::f64::consts::PI * f)).collect();
-    Ok(Analysis { frf, model, filled_ticks })
+    let model: Vec<_> = frf.frequency_hz.iter().map(|f| chain.sampled_plant(2.0 * std::f64::consts::PI * f)).collect();
+    let beyond = delay::beyond(&frf, &model, LAST_MODE * last_hz);
+    Ok(Analysis { frf, model, delay_s: chain.chain().delay_s(), beyond, filled_ticks })
 }
 
 /// H1 as configured.
