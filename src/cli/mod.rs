@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand.
 
 mod analysis_output;
+mod calibrate;
 mod chirp;
 mod choice;
 mod config;
@@ -37,6 +38,8 @@ enum Command {
     Chirp(chirp::Args),
     /// Close the loop with a reference: recording, predicted and measured figures
     Control(control::Args),
+    /// Find scale, sign, offset and delay of amplifier and probe by small static steps
+    Calibrate(calibrate::Args),
     /// The mechanics by the model: modes, residues, signs, zeros
     Model(model::Args),
     /// Crossover, phase, gain and modulus margin of a controller with the model
@@ -56,6 +59,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
     match cli.command {
         Command::Chirp(args) => chirp::run(&args),
         Command::Control(args) => control::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Model(args) => model::run(&args),
         Command::Margins(args) => margins::run(&args),
         Command::Identify(args) => identify::run(&args),

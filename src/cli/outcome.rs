@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::calibration::CalibrationError;
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::devices::DevicesError;
@@ -56,6 +57,9 @@ pub enum CliError {
     /// The devices cannot be opened, or cannot be as configured.
     #[error(transparent)]
     Devices(#[from] DevicesError),
+    /// The calibration may not be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     /// The loop's margin is too small.
     #[error(
         "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.least_modulus_margin if you know better; nothing moved"

@@ -1,12 +1,16 @@
 //! What `bench chirp` and `bench control` have in common: where the run is recorded, at what pace, and how it ended.
 
 use std::path::PathBuf;
+use std::time::SystemTime;
+
+use bench_hal::Rig;
 
 use serde::Serialize;
 
 use super::options::print_text;
 use super::progress::Progress;
 use super::{CliError, Outcome};
+use crate::calibration::{CalibratedRig, Calibration, use_of};
 use crate::config::Config;
 use crate::devices;
 use crate::recording::{Quantiles, Totals};
@@ -49,14 +53,39 @@ impl RunOptions {
         }
     }
 
+    /// The rig of a plan, corrected by `given` or by the configured calibration; and the plan with what is known of both.
+    fn open(&self, plan: &Plan, given: Option<Calibration>) -> Result<(Plan, Box<dyn Rig>), CliError> {
+        let config = &plan.config;
+        let opened = if self.is_simulated(config) { devices::simulate(config)? } else { devices::open(config)? };
+        opened.notes.iter().for_each(|note| tracing::warn!("{note}"));
+        let mut plan = plan.clone();
+        let used = match given {
+            Some(calibration) => Some((calibration, Vec::new())),
+            None => use_of(&config.calibration, &opened.amplifier, &opened.probe, SystemTime::now())?,
+        };
+        plan.devices = vec![("amplifier", opened.amplifier), ("probe", opened.probe)];
+        let Some((calibration, warnings)) = used else { return Ok((plan, opened.rig)) };
+        warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+        plan.calibration = Some(calibration.to_toml()?);
+        Ok((plan, Box::new(CalibratedRig::new(opened.rig, &calibration))))
+    }
+
     /// Runs a plan on the rig of its configuration, with progress on a terminal.
     pub fn run(&self, plan: &Plan, what: &'static str) -> Result<Run, CliError> {
+        self.run_calibrated(plan, what, None)
+    }
+
+    /// The same, with a calibration other than the configured one.
+    pub fn run_calibrated(
+        &self,
+        plan: &Plan,
+        what: &'static str,
+        calibration: Option<Calibration>,
+    ) -> Result<Run, CliError> {
         let pace = self.pace(&plan.config)?;
-        let is_simulated = self.is_simulated(&plan.config);
-        let opened = if is_simulated { devices::simulate(&plan.config)? } else { devices::open(&plan.config)? };
-        opened.notes.iter().for_each(|note| tracing::warn!("{note}"));
+        let (plan, rig) = self.open(plan, calibration)?;
         let progress = Progress::new(what);
-        let run = crate::session::run(plan, opened.rig, pace, &self.out, &mut |done, total| progress.show(done, total));
+        let run = crate::session::run(&plan, rig, pace, &self.out, &mut |done, total| progress.show(done, total));
         progress.close();
         run.map_err(|error| match error {
             SessionError::Plan(plan) => CliError::from(plan),
@@ -65,12 +94,18 @@ impl RunOptions {
     }
 }
 
-/// Adds the report of a run to its recording, closes the file, and prints the report as asked.
-pub(super) fn close(run: Run, report: &impl Serialize, json: bool, text: &str) -> Result<(), CliError> {
+/// Adds the report of a run to its recording and closes the file; returns the report as JSON.
+pub(super) fn finish(run: Run, report: &impl Serialize) -> Result<String, CliError> {
     let results =
         serde_json::to_string_pretty(report).map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
     run.finish(&results)?;
-    if json { print_text(&(results + "\n")) } else { print_text(text) }
+    Ok(results + "\n")
+}
+
+/// Adds the report of a run to its recording, closes the file, and prints the report as asked.
+pub(super) fn close(run: Run, report: &impl Serialize, json: bool, text: &str) -> Result<(), CliError> {
+    let results = finish(run, report)?;
+    print_text(if json { &results } else { text })
 }
 
 /// How a run went, as `bench chirp` and `bench control` both tell it.

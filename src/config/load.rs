@@ -47,7 +47,7 @@ impl Purpose {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     /// Neither a profile nor a file.
-    #[error("no {what} and no file is called `{name}`; there are {known}; a file is named with its path")]
+    #[error("no {what} and no file is called `{name}`; {}a file is named with its path", if known.is_empty() { String::new() } else { format!("there are {known}; ") })]
     NotFound {
         /// Profile or controller.
         what: &'static str,
@@ -167,6 +167,11 @@ pub(crate) fn text_of(name: &str, known: &[Embedded], what: &'static str) -> Res
         Some(embedded) => Ok(embedded.text.to_string()),
         None => read(name, known, what),
     }
+}
+
+/// The text of a file by its path.
+pub(crate) fn text_of_file(name: &str, what: &'static str) -> Result<String, ConfigError> {
+    read(name, &[], what)
 }
 
 /// TOML of a type of its own, checked against the type's schema.

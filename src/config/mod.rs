@@ -22,7 +22,7 @@ mod settings;
 
 pub use devices::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
-pub(crate) use load::{text_of, typed};
+pub(crate) use load::{text_of, text_of_file, typed};
 pub use settings::*;
 
 /// The JSON schema of a configuration, made from the types.

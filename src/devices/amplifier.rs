@@ -38,20 +38,29 @@ pub enum AmplifierError {
     Simulated,
 }
 
-/// Opens the amplifier that the configuration names; it is off afterwards.
-pub fn open(config: &Config) -> Result<Amplifier, AmplifierError> {
+/// Opens the amplifier that the configuration names, and tells which one it is; it is off afterwards.
+pub fn open(config: &Config) -> Result<(Amplifier, String), AmplifierError> {
     match &config.amplifier.device {
         AmplifierDevice::Simulated(_) => Err(AmplifierError::Simulated),
         AmplifierDevice::Canopen(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            Ok(Box::new(CanopenDrive::open(drive_settings(device, config), Box::new(Threads::new(port)))?))
+            let drive = CanopenDrive::open(drive_settings(device, config), Box::new(Threads::new(port)))?;
+            let identity = canopen_identity(drive.identity());
+            Ok((Box::new(drive), identity))
         }
         AmplifierDevice::Vesc(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
             let opened = Vesc::open(vesc_settings(device, config), Box::new(Threads::new(port)));
-            Ok(Box::new(opened.map_err(|why| AmplifierError::Vesc { node: device.node, why })?))
+            let vesc = opened.map_err(|why| AmplifierError::Vesc { node: device.node, why })?;
+            Ok((Box::new(vesc), format!("vesc {}", device.node)))
         }
     }
+}
+
+/// `canopen 0x0000029C-0x00000402-0x00010001-0x000004D2`: vendor, product, revision and serial number.
+fn canopen_identity(identity: [Option<u32>; 4]) -> String {
+    let words = identity.map(|number| number.map_or("?".to_string(), |number| format!("0x{number:08X}")));
+    format!("canopen {}", words.join("-"))
 }
 
 /// Refuses settings that cannot be, and a traffic that the bus does not carry, with the figures.

@@ -71,10 +71,14 @@ pub enum DevicesError {
 pub struct Opened {
     /// What the loop drives.
     pub rig: Box<dyn Rig>,
+    /// Which amplifier it is, as it says itself.
+    pub amplifier: String,
+    /// Which probe it is, as far as it can be told.
+    pub probe: String,
     /// What a person should know before the run: line settings not taken, and the like.
     pub notes: Vec<String>,
     /// Counts of the probe's reader, while the loop has the rig.
-    pub probe: Option<Watch>,
+    pub watch: Option<Watch>,
 }
 
 /// Whether the configuration names no device.
@@ -100,16 +104,19 @@ pub fn open(config: &Config) -> Result<Opened, DevicesError> {
         return Err(DevicesError::Mixed { amplifier, probe });
     }
     let mut probe = probe::open(config)?;
-    let amplifier = amplifier::open(config)?;
+    let (amplifier, amplifier_identity) = amplifier::open(config)?;
     let notes = probe.notes().iter().map(|note| format!("{}; {}", note.what, note.remedy)).collect();
     let watch = probe.watch();
     wait_for_reading(&mut probe, &watch)?;
-    Ok(Opened { rig: Box::new(Devices { amplifier, probe }), notes, probe: Some(watch) })
+    let rig = Box::new(Devices { amplifier, probe });
+    let (amplifier, probe) = (amplifier_identity, probe::identity(config));
+    Ok(Opened { rig, amplifier, probe, notes, watch: Some(watch) })
 }
 
 /// The simulated stage with the rates, delays and steps of whatever devices the configuration names.
 pub fn simulate(config: &Config) -> Result<Opened, DevicesError> {
-    Ok(Opened { rig: Box::new(SimulatedRig::new(config)?), notes: Vec::new(), probe: None })
+    let (rig, name) = (Box::new(SimulatedRig::new(config)?), || "simulated".to_string());
+    Ok(Opened { rig, amplifier: name(), probe: name(), notes: Vec::new(), watch: None })
 }
 
 /// A run that began before the first reading would trip at once.

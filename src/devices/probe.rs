@@ -54,6 +54,12 @@ pub fn open(config: &Config) -> Result<SerialProbe, ProbeError> {
     Ok(SerialProbe::open(settings(config).ok_or(ProbeError::Simulated)?)?)
 }
 
+/// Kind and port: serial probes do not say who they are. A port below /dev/serial/by-id names the adapter at least.
+pub fn identity(config: &Config) -> String {
+    let device = &config.probe.device;
+    device.line().map_or(device.kind().to_string(), |line| format!("{} {}", device.kind(), line.port))
+}
+
 /// The driver's settings; `None` for the simulated probe.
 pub fn settings(config: &Config) -> Option<ProbeSettings> {
     let device = &config.probe.device;

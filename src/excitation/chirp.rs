@@ -11,7 +11,7 @@
 
 use std::f64::consts::PI;
 
-use super::Excitation;
+use super::{Course, Excitation};
 use crate::config::{AmplitudePoint, ChirpSettings, Config, Sweep};
 use crate::plant::Sampled;
 
@@ -126,37 +126,22 @@ impl Chirp {
 
     /// Runs the whole chirp through the model: slew, heat and travel.
     fn check_course(&self, config: &Config, plant: &Sampled) -> Result<f64, ChirpError> {
-        let (mut before_a, mut heat_a2) = (0.0, 0.0f64);
-        let (mut slew_a, mut hottest_a2, mut travel_m, mut travel_tick) = (0.0f64, 0.0f64, 0.0f64, 0);
-        let cooling = self.period_s / config.motor.thermal_time_constant_s;
-        let mut motion = plant.at_rest();
-        for tick in 0..self.ticks {
-            let command_a = self.current_a(tick);
-            slew_a = slew_a.max((command_a - before_a).abs());
-            before_a = command_a;
-            heat_a2 += cooling * (command_a * command_a - heat_a2);
-            hottest_a2 = hottest_a2.max(heat_a2);
-            plant.step(&mut motion, command_a, |_| 0.0);
-            let position_m = plant.position_m(&motion).abs();
-            if position_m > travel_m {
-                (travel_m, travel_tick) = (position_m, tick);
-            }
-        }
+        let course = Course::of(self, config, plant);
         let limit_a_per_s = config.amplifier.slew_limit_a_per_s;
-        if slew_a > limit_a_per_s * self.period_s {
-            return Err(ChirpError::Slew { slew_a_per_s: slew_a / self.period_s, limit_a_per_s });
+        if course.slew_a_per_s > limit_a_per_s {
+            return Err(ChirpError::Slew { slew_a_per_s: course.slew_a_per_s, limit_a_per_s });
         }
         let limit_a = config.motor.continuous_current_a();
-        if hottest_a2 > limit_a * limit_a {
-            return Err(ChirpError::Heat { thermal_a: hottest_a2.sqrt(), limit_a });
+        if course.thermal_a > limit_a {
+            return Err(ChirpError::Heat { thermal_a: course.thermal_a, limit_a });
         }
-        if travel_m > config.interlock.soft_limit_m {
-            let time_s = travel_tick.saturating_sub(self.start_tick) as f64 * self.period_s;
+        if course.travel_m > config.interlock.soft_limit_m {
+            let time_s = course.travel_tick.saturating_sub(self.start_tick) as f64 * self.period_s;
             let frequency_hz = self.frequency_hz(time_s.min(self.settings.duration_s));
             let limit_um = config.interlock.soft_limit_m * 1e6;
-            return Err(ChirpError::Travel { travel_um: travel_m * 1e6, frequency_hz, limit_um });
+            return Err(ChirpError::Travel { travel_um: course.travel_m * 1e6, frequency_hz, limit_um });
         }
-        Ok(travel_m)
+        Ok(course.travel_m)
     }
 
     /// Envelope A(f) e(t) and sin phi at a time after the sweep's start.

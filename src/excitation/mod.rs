@@ -4,10 +4,14 @@
 //! excitation is one file with the trait and one line where `bench chirp` chooses.
 
 mod chirp;
+mod course;
 mod reference;
+mod staircase;
 
 pub use chirp::{Chirp, ChirpError};
+pub use course::Course;
 pub use reference::{Reference, ReferenceError, reference, reference_text};
+pub use staircase::Staircase;
 
 /// A current over time.
 pub trait Excitation: Send {

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::config::{Config, ReferenceSettings};
 use crate::control::{StepFigures, StepMeter};
+use crate::identify::Moments;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::flag;
 
@@ -54,43 +55,4 @@ pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured
         StepFigures { settling_time_s: figures.settling_time_s.filter(|_| seen), ..figures }
     });
     Ok(Some(Measured { step, steady_state_mean_error_m: error.mean, steady_state_sigma_m: sigma }))
-}
-
-/// Mean and standard deviation in one pass (Welford 1962).
-#[derive(Clone, Copy, Debug, Default)]
-struct Moments {
-    count: f64,
-    mean: f64,
-    squares: f64,
-}
-
-impl Moments {
-    fn push(&mut self, x: f64) {
-        self.count += 1.0;
-        let from_old = x - self.mean;
-        self.mean += from_old / self.count;
-        self.squares += from_old * (x - self.mean);
-    }
-
-    /// Standard deviation, of two values at least.
-    fn sigma(&self) -> Option<f64> {
-        (self.count > 1.0).then(|| (self.squares / (self.count - 1.0)).sqrt())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mean_and_sigma_in_one_pass_are_those_of_two_passes() {
-        let values: Vec<f64> = (0..10_000).map(|k| 5e-5 + 1e-8 * f64::sin(f64::from(k) * 1.7)).collect();
-        let mut moments = Moments::default();
-        values.iter().for_each(|x| moments.push(*x));
-        let mean = values.iter().sum::<f64>() / 1e4;
-        let sigma = (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / 9999.0).sqrt();
-        // 10,000 roundings of 1e-20 in the mean of 5e-5.
-        assert!((moments.mean - mean).abs() < 1e-16 && (moments.sigma().unwrap() / sigma - 1.0).abs() < 1e-9);
-        assert_eq!(Moments::default().sigma(), None);
-    }
 }

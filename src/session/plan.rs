@@ -3,12 +3,14 @@
 
 use crate::config::{Config, ConfigError, whole};
 use crate::control::{Controller, ControllerError, ControllerText};
-use crate::excitation::{Chirp, ReferenceError, reference, reference_text};
+use crate::excitation::{Chirp, ReferenceError, Staircase, reference, reference_text};
 use crate::recording::Recording;
 use crate::rt::program::{Control, Excite, Program};
 
 /// Name of the attachment with the controller's text.
 const CONTROLLER: &str = "controller.toml";
+/// Name of the attachment with the calibration in use.
+const CALIBRATION: &str = "calibration.toml";
 /// Name of the attachment with the reference's points.
 const REFERENCE: &str = "reference.csv";
 /// Metadata key of the kind of run.
@@ -21,6 +23,8 @@ pub enum Kind {
     Chirp,
     /// A closed loop with a reference.
     Control,
+    /// Static steps.
+    Calibrate,
 }
 
 impl Kind {
@@ -29,6 +33,7 @@ impl Kind {
         match self {
             Kind::Chirp => "chirp",
             Kind::Control => "control",
+            Kind::Calibrate => "calibrate",
         }
     }
 }
@@ -62,6 +67,10 @@ pub struct Plan {
     pub config: Config,
     /// The controller, for a closed loop.
     pub controller: Option<ControllerText>,
+    /// The calibration in use.
+    pub calibration: Option<String>,
+    /// Which devices, for the recording's metadata.
+    pub devices: Vec<(&'static str, String)>,
     /// The reference's file, if it has one.
     reference: Option<String>,
 }
@@ -69,14 +78,23 @@ pub struct Plan {
 impl Plan {
     /// An excitation.
     pub fn chirp(config: Config) -> Plan {
-        Plan { kind: Kind::Chirp, config, controller: None, reference: None }
+        Plan::excitation(Kind::Chirp, config)
+    }
+
+    /// Static steps.
+    pub fn calibrate(config: Config) -> Plan {
+        Plan::excitation(Kind::Calibrate, config)
+    }
+
+    fn excitation(kind: Kind, config: Config) -> Plan {
+        Plan { kind, config, controller: None, calibration: None, devices: Vec::new(), reference: None }
     }
 
     /// A closed loop.
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
         let reference = reference_text(&config.control.reference)?;
-        Ok(Plan { kind: Kind::Control, config, controller: Some(controller), reference })
+        Ok(Plan { controller: Some(controller), reference, ..Plan::excitation(Kind::Control, config) })
     }
 
     /// The plan of a recorded run.
@@ -89,17 +107,21 @@ impl Plan {
         let kind = match recording.metadata().get(KIND).map(String::as_str) {
             Some("chirp") => Kind::Chirp,
             Some("control") => Kind::Control,
+            Some("calibrate") => Kind::Calibrate,
             _ => return Err(PlanError::Missing("kind of run")),
         };
         let controller = text(CONTROLLER).map(|text| ControllerText { name: config.control.controller.clone(), text });
-        Ok(Plan { kind, config, controller, reference: text(REFERENCE) })
+        let calibration = text(CALIBRATION);
+        Ok(Plan { controller, calibration, reference: text(REFERENCE), ..Plan::excitation(kind, config) })
     }
 
     /// The program of the loop.
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
-        if self.kind == Kind::Chirp {
-            return Ok(Box::new(Excite(Chirp::new(&config.chirp, period_s))));
+        match self.kind {
+            Kind::Chirp => return Ok(Box::new(Excite(Chirp::new(&config.chirp, period_s)))),
+            Kind::Calibrate => return Ok(Box::new(Excite(Staircase::new(&config.calibrate, period_s)))),
+            Kind::Control => {}
         }
         let text = self.controller.as_ref().ok_or(PlanError::Missing("controller"))?;
         let controller = Controller::new(&text.sections(config.servo.rate_hz)?, period_s);
@@ -118,6 +140,7 @@ impl Plan {
     pub fn attachments(&self) -> Vec<(&'static str, &'static str, &str)> {
         let controller = self.controller.as_ref().map(|c| (CONTROLLER, "application/toml", c.text.as_str()));
         let reference = self.reference.as_ref().map(|text| (REFERENCE, "text/csv", text.as_str()));
-        controller.into_iter().chain(reference).collect()
+        let calibration = self.calibration.as_ref().map(|text| (CALIBRATION, "application/toml", text.as_str()));
+        controller.into_iter().chain(reference).chain(calibration).collect()
     }
 }

@@ -159,7 +159,7 @@ fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String
         ("cpu", cpu),
         ("refused", scheduling.refused.join("\n")),
     ];
-    pairs.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
+    pairs.into_iter().chain(plan.devices.iter().cloned()).map(|(key, value)| (key.to_string(), value)).collect()
 }
 
 /// Watches from outside: signals, progress, the recorder's health.

@@ -25,7 +25,7 @@ pub enum Fault {
     /// The amplifier cannot be enabled, with this code.
     DoesNotEnable(i64),
     /// The amplifier keeps its fault, whoever clears it.
-    KeepsFault,
+    Unclearable,
     /// The amplifier says that it gives this current, whatever it was asked for.
     Gives(f64),
 }
@@ -86,7 +86,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
-        let kept = self.find(tick, |fault| (*fault == Fault::KeepsFault).then_some(refusal(5)));
+        let kept = self.find(tick, |fault| (*fault == Fault::Unclearable).then_some(refusal(5)));
         kept.map_or(Ok(()), Err)
     }
 
@@ -111,7 +111,7 @@ impl<R: Rig> DisplacementProbe for FaultyRig<R> {
                 | Fault::Refuses(_)
                 | Fault::DoesNotEnable(_)
                 | Fault::Gives(_)
-                | Fault::KeepsFault => {}
+                | Fault::Unclearable => {}
             }
         }
         self.now = Some(now.number);

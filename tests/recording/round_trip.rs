@@ -43,7 +43,7 @@ fn every_field_of_a_tick_comes_back_with_every_bit() {
         state: states[n / 4 % 4],
         flags: u32::MAX >> n,
         missed_ticks: 0,
-        actual_a: (n % 2 == 0).then_some(doubles[(n + 4) % 7]),
+        actual_a: n.is_multiple_of(2).then_some(doubles[(n + 4) % 7]),
     };
     let put: Vec<_> = (0..28).map(odd).collect();
     let (_, got) = read_back(&put.iter().map(|t| Published::Tick(*t)).collect::<Vec<_>>());

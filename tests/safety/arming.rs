@@ -136,7 +136,7 @@ fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start(
 
 #[test]
 fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
-    let faults = [(100..101, Fault::Faulted(5)), (0..200, Fault::KeepsFault)];
+    let faults = [(100..101, Fault::Faulted(5)), (0..200, Fault::Unclearable)];
     let mut bench = Bench::running(&stage(), &faults, says(|_| 0.1));
     bench.run(150);
     assert_eq!(bench.state(), State::Tripped);

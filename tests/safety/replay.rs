@@ -197,7 +197,7 @@ fn an_altered_command_order_or_flag_is_found_at_its_tick() {
 fn clears_that_the_amplifier_refused_and_took_replay_as_they_were() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let plan = control("fast");
-    let faults = [(100..101, Fault::Faulted(77)), (0..200, Fault::KeepsFault)];
+    let faults = [(100..101, Fault::Faulted(77)), (0..200, Fault::Unclearable)];
     let mut bench = Bench::running(&plan.config, &faults, plan.program().expect("a program"));
     bench.run(150);
     bench.order(Order::Clear);

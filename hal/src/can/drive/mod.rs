@@ -54,6 +54,7 @@ pub struct CanopenDrive {
     settings: DriveSettings,
     scale: Scale,
     mode: i8,
+    identity: [Option<u32>; 4],
     last_error: Option<OpenError>,
     _claim: Claim,
 }
@@ -71,9 +72,10 @@ impl CanopenDrive {
         let monitor = Monitor::new(&settings, Arc::clone(&shared), host.now_ns());
         let task = Box::new(Service { bus: watched, monitor });
         let service = host.start("can-service", task).map_err(OpenError::Thread)?;
-        let Configured { scale, mode } = configured;
+        let Configured { scale, mode, identity } = configured;
         let last_error = None;
-        let mut drive = CanopenDrive { service, bus, host, shared, settings, scale, mode, last_error, _claim: claim };
+        let mut drive =
+            CanopenDrive { service, bus, host, shared, settings, scale, mode, identity, last_error, _claim: claim };
         drive.shared.set_restarted(false);
         drive.start()?;
         Ok(drive)
@@ -82,6 +84,11 @@ impl CanopenDrive {
     /// Mode of operation in force: 10 cyclic synchronous torque, 4 profile torque.
     pub fn mode(&self) -> i8 {
         self.mode
+    }
+
+    /// Vendor, product, revision and serial number (0x1018), as far as the drive says.
+    pub fn identity(&self) -> [Option<u32>; 4] {
+        self.identity
     }
 
     /// The smallest step of the current, in amperes.

@@ -31,6 +31,8 @@ const SUPPORTED_MODES: Address = Address::new(0x6502, 0);
 pub(super) struct Configured {
     pub(super) scale: Scale,
     pub(super) mode: i8,
+    /// Vendor, product, revision and serial number, as far as the drive says.
+    pub(super) identity: [Option<u32>; 4],
 }
 
 /// A drive to be set up.
@@ -43,16 +45,16 @@ impl Setup<'_> {
     /// All of it, in pre-operational: nothing moves and no process data flow.
     pub(super) fn run(&mut self) -> Result<Configured, OpenError> {
         self.channel.bus.send(&nmt::Command::EnterPreOperational.frame(self.settings.node))?;
-        self.check_identity()?;
+        let identity = self.check_identity()?;
         self.switch_off()?;
         let scale = self.scale()?;
         self.watch_each_other()?;
         self.map()?;
         let mode = self.choose_mode()?;
-        Ok(Configured { scale, mode })
+        Ok(Configured { scale, mode, identity })
     }
 
-    fn check_identity(&mut self) -> Result<(), OpenError> {
+    fn check_identity(&mut self) -> Result<[Option<u32>; 4], OpenError> {
         let identity = self.settings.identity;
         let fields = [
             (1, "the vendor", identity.vendor),
@@ -61,14 +63,18 @@ impl Setup<'_> {
             (4, "the serial number", identity.serial),
         ];
         self.channel.read_u32(Address::new(IDENTITY, 1))?; // every CANopen node has it: a node that answers is there
-        for (sub, field, want) in fields {
-            let Some(want) = want else { continue };
-            let have = self.channel.read_u32(Address::new(IDENTITY, sub))?;
-            if have != want {
+        let mut identity = [None; 4];
+        for ((sub, field, want), said) in fields.into_iter().zip(&mut identity) {
+            let have = match (self.channel.read_u32(Address::new(IDENTITY, sub)), want) {
+                (Err(error), None) if error.means_absent() => continue,
+                (have, _) => have?,
+            };
+            if let Some(want) = want.filter(|want| *want != have) {
                 return Err(OpenError::Identity { node: self.settings.node, field, have, want });
             }
+            *said = Some(have);
         }
-        Ok(())
+        Ok(identity)
     }
 
     /// No voltage, no target: whatever came before.

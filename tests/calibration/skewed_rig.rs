@@ -1,0 +1,78 @@
+//! A simulated stage behind an amplifier and a probe that are not what they say.
+use bench::sim::SimulatedRig;
+use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+
+/// What is wrong with the devices: current = gain (command) + offset; reading = gain (position) + offset.
+#[derive(Clone, Copy, Debug)]
+pub struct Skew {
+    pub current_gain: f64,
+    pub current_offset_a: f64,
+    pub measures_current: bool,
+    pub probe_gain: f64,
+    pub probe_offset_m: f64,
+    /// The reading hangs back by so much in the direction of motion.
+    pub backlash_m: f64,
+    /// The reading bends: position + bend position^2.
+    pub bend_per_m: f64,
+}
+
+impl Default for Skew {
+    fn default() -> Self {
+        Skew {
+            current_gain: 1.0,
+            current_offset_a: 0.0,
+            measures_current: false,
+            probe_gain: 1.0,
+            probe_offset_m: 0.0,
+            backlash_m: 0.0,
+            bend_per_m: 0.0,
+        }
+    }
+}
+
+pub struct SkewedRig {
+    pub inner: SimulatedRig,
+    pub skew: Skew,
+    actual_a: f64,
+    held_m: f64,
+}
+
+impl SkewedRig {
+    pub fn new(inner: SimulatedRig, skew: Skew) -> Self {
+        SkewedRig { inner, skew, actual_a: 0.0, held_m: 0.0 }
+    }
+
+    /// What a hand that drags something behind it reads (play of twice the backlash).
+    fn dragged_m(&mut self, position_m: f64) -> f64 {
+        self.held_m = self.held_m.clamp(position_m - self.skew.backlash_m, position_m + self.skew.backlash_m);
+        self.held_m
+    }
+}
+
+impl CurrentAmplifier for SkewedRig {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        self.inner.enable()
+    }
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        self.actual_a = self.skew.current_gain * current_a + self.skew.current_offset_a;
+        self.inner.command(self.actual_a).map(|_| current_a)
+    }
+    fn disable(&mut self) {
+        self.inner.disable();
+    }
+    fn status(&self) -> AmplifierStatus {
+        self.inner.status()
+    }
+    fn actual_current_a(&self) -> Option<f64> {
+        self.skew.measures_current.then_some(self.actual_a)
+    }
+}
+
+impl DisplacementProbe for SkewedRig {
+    fn latest(&mut self, now: Tick) -> Reading {
+        let reading = self.inner.latest(now);
+        let dragged_m = self.dragged_m(reading.position_m);
+        let bent_m = dragged_m + self.skew.bend_per_m * dragged_m * dragged_m;
+        Reading { position_m: self.skew.probe_gain * bent_m + self.skew.probe_offset_m, ..reading }
+    }
+}
