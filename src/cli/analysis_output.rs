@@ -32,6 +32,9 @@ pub(super) struct Made {
     why: &'static str,
 }
 
+/// Why nothing was made: a person wished so.
+const STOPPED: &str = "stopped before the analysis was done; the recording is whole: `bench identify` analyses it";
+
 impl From<AnalysisError> for CliError {
     fn from(error: AnalysisError) -> Self {
         CliError::Failed(error.to_string())
@@ -75,6 +78,15 @@ impl Made {
             cnmp: "undecided",
             why,
         }
+    }
+
+    /// A person stopped the analysis.
+    pub fn stopped() -> Made {
+        Made::nothing(STOPPED)
+    }
+
+    pub fn is_stopped(&self) -> bool {
+        self.why == STOPPED
     }
 
     pub fn text(&self) -> String {

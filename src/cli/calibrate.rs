@@ -13,7 +13,7 @@ use crate::config::{Config, Purpose};
 use crate::excitation::{Chirp, Course, Staircase};
 use crate::plant::{self, Modal, Sampled};
 use crate::recording::Recording;
-use crate::session::{Plan, analyse};
+use crate::session::{Plan, analyse, unless_stopped};
 use crate::sim;
 
 /// Which bench, and where the result goes.
@@ -181,9 +181,13 @@ fn measure_delay(args: &Args, config: &Config, calibration: &mut Calibration) ->
     let totals = run.totals()?;
     let report = RunReport::new(&run, &totals);
     if report.outcome == "completed" {
-        let analysis = analyse(&Recording::open(&run.path)?, config)?;
-        calibration.chain.delay_s = analysis.beyond.map(|beyond| analysis.delay_s + beyond.seconds);
-        calibration.chain.delay_sigma_s = analysis.beyond.map(|beyond| beyond.sigma_s);
+        let (path, config) = (run.path.clone(), config.clone());
+        let analysed =
+            unless_stopped(move || -> Result<_, CliError> { Ok(analyse(&Recording::open(&path)?, &config)?) });
+        let analysed = analysed.map_err(|error| CliError::Failed(error.to_string()))?.transpose()?;
+        let delay = analysed.and_then(|analysis| Some((analysis.delay_s, analysis.beyond?)));
+        calibration.chain.delay_s = delay.map(|(delay_s, beyond)| delay_s + beyond.seconds);
+        calibration.chain.delay_sigma_s = delay.map(|(_, beyond)| beyond.sigma_s);
     }
     finish(run, &report)?;
     Ok(report.recording)

@@ -8,9 +8,10 @@ use crate::config::{Config, Purpose, Sweep};
 use crate::excitation::Chirp;
 use crate::plant::Sampled;
 use crate::recording::Recording;
-use crate::session::Plan;
+use crate::session::{Plan, unless_stopped};
 use crate::sim;
 use serde::Serialize;
+use std::path::Path;
 
 /// Which bench, and how to excite it.
 #[derive(Clone, Debug, clap::Args)]
@@ -67,12 +68,19 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let totals = run.totals()?;
     let report = RunReport::new(&run, &totals);
     let made = match report.outcome {
-        "completed" => make(&Recording::open(&run.path)?, &config)?,
+        "completed" => analysed(&run.path, &config)?,
         _ => Made::nothing("the run did not come to its end"),
     };
     let report = Report { run: report, expected_travel_m, made };
     close(run, &report, args.bench.json, &text(&report, &config))?;
-    Ok(report.run.exit())
+    Ok(if report.made.is_stopped() { Outcome::Failed } else { report.run.exit() })
+}
+
+/// The analysis, which a person may stop: the recording is whole all the same.
+fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
+    let (path, config) = (path.to_path_buf(), config.clone());
+    let made = unless_stopped(move || make(&Recording::open(&path)?, &config));
+    made.map_err(|error| CliError::Failed(error.to_string()))?.unwrap_or(Ok(Made::stopped()))
 }
 
 /// Refuses a chirp that would trip an interlock, by the model of the whole rig; returns the travel to expect.

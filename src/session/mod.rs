@@ -14,9 +14,11 @@ mod name;
 mod plan;
 mod replay;
 mod run;
+mod stop;
 
 pub use analysis::{Analysis, AnalysisError, analyse};
 pub use measure::{Measured, measure};
 pub use plan::{Kind, Plan, PlanError};
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use run::{Run, SessionError, run};
+pub use stop::unless_stopped;

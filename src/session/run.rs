@@ -9,10 +9,11 @@ use std::time::{Duration, SystemTime};
 
 use bench_hal::Rig;
 use rtrb::{Producer, RingBuffer};
-use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::signal::unix::Signal;
 
 use super::name;
 use super::plan::{KIND, Plan, PlanError};
+use super::stop::signals;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::outlet::Outlet;
@@ -178,8 +179,7 @@ impl Supervisor {
         let system = |e: std::io::Error| SessionError::System { what: "start the supervisor", why: e.to_string() };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
         runtime.block_on(async {
-            let signals =
-                (signal(SignalKind::interrupt()).map_err(system)?, signal(SignalKind::terminate()).map_err(system)?);
+            let signals = signals().map_err(system)?;
             let thread = prepared.begin();
             self.until_finished(&thread, signals, watch).await;
             Ok(thread.join())
