@@ -11,6 +11,7 @@
 //!
 //! Sign convention of both estimators: y = H u, so a lag of the output is a negative phase.
 
+pub mod align;
 mod band;
 pub mod csv;
 pub mod delay;

@@ -44,15 +44,24 @@ struct Tap {
 }
 
 impl Chain {
-    /// The chain of a configuration around `modes`.
+    /// The chain of a configuration around `modes`, as the loop sees it.
     pub fn new(config: &Config, modes: &[Mode]) -> Chain {
+        Chain::over(config, modes, delays(config))
+    }
+
+    /// The same with readings that all have the mean age: without the roll-off of a free-running probe.
+    pub fn of_mean_age(config: &Config, modes: &[Mode]) -> Chain {
+        let delays = delays(config);
+        let mean_s = delays.iter().sum::<f64>() / delays.len() as f64;
+        Chain::over(config, modes, vec![mean_s])
+    }
+
+    /// The mean over `delays`.
+    fn over(config: &Config, modes: &[Mode], delays: Vec<f64>) -> Chain {
         let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
         let period_s = config.servo.period_s();
         let over = |span_s: f64| Sampled::new(modes, bandwidth_hz, force_constant, span_s);
         let held = over(period_s);
-        let computing_s = f64::from(config.servo.computing_delay_periods) * period_s;
-        let youngest_s = computing_s + config.amplifier.latency_s + config.probe.age_at_arrival_s();
-        let delays = ages(youngest_s, config.probe.rate_hz.map(|rate_hz| 1.0 / rate_hz));
         let share = 1.0 / delays.len() as f64;
         let taps = delays.iter().fold(Vec::new(), |taps, d| add(taps, tap(&held, &over, *d), share));
         Chain { held, taps, delay_s: delays.iter().sum::<f64>() * share }
@@ -142,8 +151,10 @@ pub struct ChainState {
 }
 
 /// The delays whose mean the chain is.
-fn ages(youngest_s: f64, probe_period_s: Option<f64>) -> Vec<f64> {
-    match probe_period_s {
+fn delays(config: &Config) -> Vec<f64> {
+    let computing_s = f64::from(config.servo.computing_delay_periods) * config.servo.period_s();
+    let youngest_s = computing_s + config.amplifier.latency_s + config.probe.age_at_arrival_s();
+    match config.probe.rate_hz.map(|rate_hz| 1.0 / rate_hz) {
         None => vec![youngest_s],
         Some(period_s) => (0..NODES).map(|i| youngest_s + period_s * (i as f64 + 0.5) / NODES as f64).collect(),
     }

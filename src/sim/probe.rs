@@ -8,8 +8,8 @@ use super::noise::Gaussian;
 use crate::config::Config;
 
 /// The clock of a free-running probe differs from the loop's by as much, so that readings of all ages occur, as they do
-/// where two oscillators drift past each other.
-const CLOCK_ERROR: f64 = 1e-3;
+/// where two oscillators drift past each other; no simple ratio, so that they fill the period evenly.
+const CLOCK_ERROR: f64 = 0.618_034e-3;
 
 /// The probe, with what it has measured and not yet told. Times are in ticks since the start.
 #[derive(Clone, Debug)]
