@@ -7,6 +7,7 @@
 mod claim;
 mod condition;
 mod interface;
+mod kernel;
 mod memory;
 mod socket;
 mod threads;
@@ -21,6 +22,7 @@ use thiserror::Error;
 pub use claim::Claim;
 pub use condition::Condition;
 pub use interface::{Interface, InterfaceError};
+pub use kernel::{KernelError, kernel_speaks_can};
 pub use memory::{MemoryBus, MemoryEndpoint};
 pub use socket::{PortError, SocketPort};
 pub use threads::Threads;

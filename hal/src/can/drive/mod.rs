@@ -27,7 +27,7 @@ use std::time::Duration;
 
 pub use errors::OpenError;
 pub use faults::fault_text;
-pub use inspect::{Inspection, inspect};
+pub use inspect::{ABORT_CONNECTION, Inspection, NEEDED, inspect};
 pub use settings::{DriveSettings, ExpectedIdentity, TorqueMode};
 
 use self::monitor::{Monitor, heard_ids, set_point};

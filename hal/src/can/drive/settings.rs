@@ -21,7 +21,7 @@ pub enum TorqueMode {
 
 impl TorqueMode {
     /// The mode for a drive with the supported modes of 0x6502 (bit n-1: mode n), if there is one.
-    pub(super) fn choose(self, supported: u32) -> Option<i8> {
+    pub fn choose(self, supported: u32) -> Option<i8> {
         let candidates: &[i8] = match self {
             TorqueMode::CyclicElseProfile => &[CYCLIC_TORQUE, PROFILE_TORQUE],
             TorqueMode::Cyclic => &[CYCLIC_TORQUE],

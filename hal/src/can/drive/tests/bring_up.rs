@@ -132,7 +132,19 @@ fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
     assert_eq!(seen.name.as_deref(), Some("simulated CANopen drive"), "read in four segments");
     assert_eq!(seen.identity[0], Some(0x402));
     assert_eq!((seen.state(), seen.rated_current_a), (Some(State::SwitchOnDisabled), Some(4.0)));
+    assert_eq!((seen.device_type, seen.maximum_current_ratio), (Some(0x0002_0192), Some(1.5)), "profile 402");
+    assert_eq!((seen.past_errors, seen.lacks), (vec![], vec![]));
     assert_eq!(format!("{before:?}"), format!("{:?}", device.lock().unwrap().objects()));
+}
+
+#[test]
+fn a_drive_looked_at_tells_which_objects_it_lacks() {
+    let world = World::default();
+    let lacks = vec![Address::new(0x6007, 0), Address::new(0x6502, 0), Address::new(0x1008, 0)];
+    let device = Arc::new(Mutex::new(Device::new(DeviceSettings { lacks, ..DeviceSettings::default() })));
+    let _running = DeviceTask::start(&world, device).unwrap();
+    let seen = inspect(&world, 5, Duration::from_millis(100)).unwrap();
+    assert_eq!((seen.lacks, seen.modes, seen.name), (vec![Address::new(0x6007, 0)], None, None));
 }
 
 #[test]
