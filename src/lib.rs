@@ -27,6 +27,7 @@
 //! | zeros, signs, sequence of dominant modes | [`plant`] |
 //! | what the simulated stage does | [`sim`] |
 //! | how a frequency response is estimated | [`identify`] |
+//! | what `bench doctor` looks at | [`doctor`]: one file a subject, facts apart from verdicts |
 //! | what stands in a recording | [`recording`] and `recordings/README.md` |
 //!
 //! # To add one
@@ -52,6 +53,7 @@ pub mod cli;
 pub mod config;
 pub mod control;
 pub mod devices;
+pub mod doctor;
 pub mod excitation;
 pub mod identify;
 pub mod plant;

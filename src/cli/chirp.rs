@@ -84,7 +84,7 @@ fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
 }
 
 /// Refuses a chirp that would trip an interlock, by the model of the whole rig; returns the travel to expect.
-fn check(config: &Config) -> Result<f64, CliError> {
+pub(super) fn check(config: &Config) -> Result<f64, CliError> {
     let period_s = config.servo.period_s();
     let force_constant = config.motor.force_constant_n_per_a;
     let rig = Sampled::new(&sim::modes(config)?, config.amplifier.bandwidth_hz, force_constant, period_s);

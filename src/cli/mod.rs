@@ -6,6 +6,7 @@ mod chirp;
 mod choice;
 mod config;
 mod control;
+mod doctor;
 mod identify;
 mod margins;
 mod model;
@@ -52,6 +53,8 @@ enum Command {
     Recover(recover::Args),
     /// The effective settings, their validation, their schema
     Config(config::Args),
+    /// Could a run start? System, devices, recordings, each finding with its remedy; nothing moves
+    Doctor(doctor::Args),
 }
 
 /// Runs a parsed command line.
@@ -66,5 +69,6 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Config(args) => config::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
     }
 }

@@ -141,7 +141,8 @@ pub fn reference(reference: TargetReference) -> Reference {
     }
 }
 
-fn vesc_settings(device: &VescSettings, config: &Config) -> vesc::VescSettings {
+/// The driver's settings of a VESC.
+pub fn vesc_settings(device: &VescSettings, config: &Config) -> vesc::VescSettings {
     vesc::VescSettings {
         node: device.node,
         current_limit_a: config.amplifier.current_limit_a,

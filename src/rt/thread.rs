@@ -114,8 +114,8 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> Ended {
     Ended { trip: servo.last_trip(), completed: servo.completed(), lost_records: servo.outlet().lost() }
 }
 
-/// Asks for everything that keeps the system from interrupting the loop.
-fn become_realtime(settings: &LoopSettings) -> Scheduling {
+/// Asks for everything that keeps the system from interrupting the calling thread, which is the loop's.
+pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
     let mut refused = Vec::new();
     let mut ask = |what: &str, result: nix::Result<()>, remedy: &str| match result {
         Ok(()) => true,
