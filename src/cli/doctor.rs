@@ -1,6 +1,6 @@
 //! `bench doctor`: could a run start? Nothing moves.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::chirp;
 use super::margins::{closed_loop, enough};
@@ -55,7 +55,7 @@ fn again(args: &Args) -> String {
     let one =
         |flag: &str, value: &Option<String>| value.iter().map(|v| format!(" {flag} {}", quoted(v))).collect::<String>();
     let sets: String = sets.iter().map(|set| format!(" --set {}", quoted(set))).collect();
-    let out = (args.out != PathBuf::from(OUT)).then(|| args.out.display().to_string());
+    let out = (args.out.as_path() != Path::new(OUT)).then(|| args.out.display().to_string());
     [
         one("--config", config),
         sets,

@@ -96,9 +96,10 @@ fn listen(host: &dyn Host, time: Duration, node: u8, bit_rate: u32, report: &mut
 fn held(subject: &'static str, node: u8, pid: u32) -> Finding {
     let (who, remedy) = match pid {
         0 => ("another process".into(), "end it first".into()),
-        pid => {
-            (format!("process {pid}"), format!("wait for its end, or end it: `kill {pid}` stops it with zero current"))
-        }
+        pid => (
+            format!("process {pid}"),
+            format!("wait for its end, or end it: a run stops with zero current on `kill {pid}`"),
+        ),
     };
     Finding::failure(subject, format!("node {node} is held by {who}; it was not asked anything"), remedy)
 }

@@ -111,34 +111,44 @@ fn rated_current(seen: &Inspection, settings: &DriveSettings) -> Finding {
     }
 }
 
-/// What 1000 counts are, where they refer to the maximum.
+/// The step of the current and its limit.
 fn scale(seen: &Inspection, settings: &DriveSettings, maximum_ratio: f64) -> Option<Finding> {
     let rated_a = seen.rated_current_a?;
-    let reference_a = match (settings.reference, seen.maximum_current_ratio) {
-        (Reference::Rated, _) => rated_a,
-        (Reference::Maximum, Some(ratio)) if (ratio - maximum_ratio).abs() < 0.5e-3 => rated_a * ratio,
-        (Reference::Maximum, Some(ratio)) => {
-            let what =
-                format!("the maximum (0x6072) is {ratio} of the rated current, the configuration says {maximum_ratio}");
-            let remedy = "correct amplifier.device.maximum_current_ratio: the step of the current follows from it";
-            return Some(Finding::warning(SUBJECT, what, remedy));
-        }
-        (Reference::Maximum, None) => {
-            let what = "it does not tell the maximum (0x6072) that its target refers to";
-            return Some(Finding::failure(
-                SUBJECT,
-                what,
-                "commission it first, or set amplifier.device.target_reference",
-            ));
-        }
-    };
     let limit_a = settings.current_limit_a;
-    let what = |scale: Scale| format!("a count is {:.3} mA, commands end at {limit_a} A", scale.step_a() * 1e3);
-    let refused = || {
-        let what = format!("a count is {} mA, more than the limit of {limit_a} A", reference_a);
-        Finding::failure(SUBJECT, what, "raise amplifier.current_limit_a")
+    let reference_a = match settings.reference {
+        Reference::Rated => rated_a,
+        Reference::Maximum => match maximum(seen.maximum_current_ratio, maximum_ratio) {
+            Ok(ratio) => rated_a * ratio,
+            Err(finding) => return Some(finding),
+        },
     };
-    Some(Scale::new(reference_a, limit_a).map_or_else(refused, |scale| Finding::ok(SUBJECT, what(scale))))
+    Some(match Scale::new(reference_a, limit_a) {
+        Some(scale) => {
+            Finding::ok(SUBJECT, format!("a count is {:.3} mA, commands end at {limit_a} A", scale.step_a() * 1e3))
+        }
+        None => Finding::failure(
+            SUBJECT,
+            format!("a count is {reference_a} mA, more than the limit of {limit_a} A"),
+            "raise amplifier.current_limit_a",
+        ),
+    })
+}
+
+/// The maximum that the target refers to, as a ratio of the rated current.
+fn maximum(said: Option<f64>, configured: f64) -> Result<f64, Finding> {
+    match said {
+        Some(ratio) if (ratio - configured).abs() < 0.5e-3 => Ok(ratio),
+        Some(ratio) => Err(Finding::warning(
+            SUBJECT,
+            format!("the maximum (0x6072) is {ratio} of the rated current, the configuration says {configured}"),
+            "correct amplifier.device.maximum_current_ratio: the step of the current follows from it",
+        )),
+        None => Err(Finding::failure(
+            SUBJECT,
+            "it does not tell the maximum (0x6072) that its target refers to",
+            "commission it first, or set amplifier.device.target_reference",
+        )),
+    }
 }
 
 fn mode(seen: &Inspection, settings: &DriveSettings) -> Finding {

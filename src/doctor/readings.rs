@@ -124,7 +124,9 @@ impl Tally {
 
     fn figures(&self) -> Readings {
         let count = (self.positions_m.len() as f64).max(1.0);
-        let mean_m = self.positions_m.iter().sum::<f64>() / count;
+        // From the first on: where all are the same, nothing is left to be rounded.
+        let first_m = self.positions_m.first().copied().unwrap_or_default();
+        let mean_m = first_m + self.positions_m.iter().map(|x| x - first_m).sum::<f64>() / count;
         let square_m2 = self.positions_m.iter().map(|x| (x - mean_m) * (x - mean_m)).sum::<f64>() / count;
         let farther = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
         Readings {

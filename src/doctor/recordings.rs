@@ -46,7 +46,7 @@ pub struct Space {
 pub fn gather(folder: &Path, ticks: u64) -> SpaceFacts {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
     let existing = absolute.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/")).to_path_buf();
-    let free = statvfs(&existing).map(|fs| fs.blocks_available() as u64 * fs.fragment_size() as u64);
+    let free = statvfs(&existing).map(|fs| fs.blocks_available() * fs.fragment_size());
     SpaceFacts {
         folder: folder.to_path_buf(),
         is_folder: existing.is_dir(),

@@ -63,7 +63,7 @@ fn control(answer: &Result<Margins, String>, least: f64) -> Finding {
     }
     Finding::warning(
         CONTROL,
-        format!("the closed loop is unstable by the model; no modulus margin is asked for: it would run into a trip"),
+        "the closed loop is unstable by the model; no modulus margin is asked for: it would run into a trip",
         "choose another controller (--controller FILE), or set control.least_modulus_margin to have such loops refused",
     )
 }

@@ -4,7 +4,7 @@ use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 use bench_hal::serial::{Note, SerialError};
-use nix::unistd::{AccessFlags, Gid, Group, User, eaccess, geteuid, getgroups};
+use nix::unistd::{AccessFlags, Gid, Group, User, eaccess, getegid, geteuid, getgroups};
 
 use super::finding::Finding;
 use super::system::line;
@@ -78,7 +78,11 @@ fn group_name(gid: Gid) -> String {
 fn who_am_i() -> (String, Vec<String>) {
     let uid = geteuid();
     let user = User::from_uid(uid).ok().flatten().map_or_else(|| uid.to_string(), |user| user.name);
-    (user, getgroups().unwrap_or_default().into_iter().map(group_name).collect())
+    let mut groups: Vec<String> = getgroups().unwrap_or_default().into_iter().map(group_name).collect();
+    groups.push(group_name(getegid()));
+    groups.sort();
+    groups.dedup();
+    (user, groups)
 }
 
 /// Processes with `device` open. Those of other users are seen by root only.
@@ -132,14 +136,18 @@ fn forbidden(facts: &PortFacts, device: &Path) -> Finding {
     let groups = facts.groups.join(", ");
     let what =
         format!("{user} may not open {}: group {group}, mode {mode:04o}; {user} is in {groups}", device.display());
-    let by_group = match facts.groups.contains(group) {
-        true => format!("`chmod g+rw {}`", device.display()),
-        false => format!("`sudo usermod -aG {group} {user}` and log in again"),
+    // Nobody should join root's group for a port.
+    let a_group = if group == "root" { "dialout" } else { group };
+    let by_group = match mode & 0o060 == 0o060 && group != "root" && !facts.groups.contains(group) {
+        true => format!("`sudo usermod -aG {group} {user}` and log in again"),
+        false => {
+            format!("`sudo chgrp {a_group} {0} && sudo chmod g+rw {0}`, with {user} in {a_group}", device.display())
+        }
     };
     let by_rule = facts.usb.as_ref().map_or(String::new(), |usb| {
         format!(
             "; or put this line into /etc/udev/rules.d/70-bench.rules and plug the adapter in again: {}",
-            usb.rule(group)
+            usb.rule(a_group)
         )
     });
     Finding::failure(SUBJECT, what, by_group + &by_rule)
@@ -231,10 +239,15 @@ mod tests {
     }
 
     #[test]
-    fn who_is_in_the_group_needs_other_permission_bits() {
-        let groups = vec!["dialout".to_string()];
-        let found = only(&PortFacts { may_open: false, mode: 0o600, groups, ..sound() });
-        assert_eq!(found.remedy.as_deref(), Some("`chmod g+rw /dev/ttyUSB0`"));
+    fn a_port_that_its_group_may_not_open_either_needs_other_permission_bits() {
+        let remedy = |group: &str, groups: &[&str], mode| {
+            let groups = groups.iter().map(|group| group.to_string()).collect();
+            let facts = PortFacts { may_open: false, group: group.into(), groups, mode, ..sound() };
+            only(&facts).remedy.unwrap()
+        };
+        let changed = "`sudo chgrp dialout /dev/ttyUSB0 && sudo chmod g+rw /dev/ttyUSB0`, with ada in dialout";
+        assert_eq!(remedy("dialout", &["dialout"], 0o600), changed);
+        assert_eq!(remedy("root", &["users"], 0o660), changed, "not into the group root");
     }
 
     #[test]
