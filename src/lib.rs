@@ -10,8 +10,8 @@
 //!        |           |            |  implements
 //!        v           v            v
 //!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe)
-//!                             |
-//!                             v  wait-free ring
+//!                             |                               ^  opens what the configuration names
+//!                             v  wait-free ring            devices <---- calibration
 //!                         recording (MCAP) ----> identify ----> report
 //!                                   \______ session (one run, its analysis, its replay) ______ cli
 //! ```
@@ -28,6 +28,8 @@
 //! | what the simulated stage does | [`sim`] |
 //! | how a frequency response is estimated | [`identify`] |
 //! | what `bench doctor` looks at | [`doctor`]: one file a subject, facts apart from verdicts |
+//! | which devices there are, and how they are opened | [`devices`] |
+//! | what static steps say of amplifier and probe | [`calibration`] |
 //! | what stands in a recording | [`recording`] and `recordings/README.md` |
 //!
 //! # To add one
@@ -40,7 +42,7 @@
 //! | plant | `plant/NAME.rs`: settings to [`plant::Structure`] | a variant of [`config::PlantSettings`] and its arm in [`plant::build`] |
 //! | excitation | `excitation/NAME.rs` with [`excitation::Excitation`] | where [`session::Plan::program`] chooses |
 //! | reference | a struct in `excitation/reference.rs` | a variant of [`config::ReferenceSettings`] and its arm |
-//! | device | below `hal/src/`, with the traits of [`bench_hal`] | where the command line makes the rig |
+//! | device | below `hal/src/`, with the traits of [`bench_hal`] | a variant in `config/devices.rs` and its arm in [`devices`] |
 //!
 //! # Conventions
 //!
