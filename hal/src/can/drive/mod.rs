@@ -106,7 +106,7 @@ impl CanopenDrive {
         self.shared.set_must_follow(self.mode == CYCLIC_TORQUE);
         self.bus.send(&nmt::Command::Start.frame(self.settings.node))?;
         let operational = |shared: &Shared| shared.nmt() == Some(nmt::State::Operational);
-        if self.wait_until(operational) {
+        if self.wait_for(self.settings.state_timeout, operational) {
             return Ok(());
         }
         let (node, timeout) = (self.settings.node, self.settings.state_timeout);
@@ -122,9 +122,9 @@ impl CanopenDrive {
         self.start()
     }
 
-    /// Looks until `condition` holds, `false` if it does not within the time limit.
-    fn wait_until(&self, condition: impl Fn(&Shared) -> bool) -> bool {
-        let deadline_ns = self.deadline_ns();
+    /// Looks until `condition` holds, `false` if it does not within `limit`.
+    fn wait_for(&self, limit: Duration, condition: impl Fn(&Shared) -> bool) -> bool {
+        let deadline_ns = self.host.now_ns().saturating_add(limit.as_nanos() as u64);
         while !condition(&self.shared) {
             if self.host.now_ns() >= deadline_ns {
                 return false;
@@ -158,7 +158,8 @@ impl CanopenDrive {
     /// Off, no longer watched by the drive, pre-operational.
     fn leave_in_order(&mut self) {
         self.disable();
-        let is_off = self.wait_until(|shared| shared.state().is_none_or(State::is_off) || shared.fault() != 0);
+        let settled = |shared: &Shared| shared.state().is_none_or(State::is_off) || shared.fault() != 0;
+        let is_off = self.wait_for(self.settings.state_timeout, settled);
         if is_off && self.shared.fault() == 0 {
             let mut channel = channel(&self.settings, self.bus.as_mut(), self.host.as_ref());
             let _ = channel.write(Address::new(0x1016, 1), &[0; 4]); // else it will miss us and say so: no harm

@@ -35,6 +35,7 @@ impl CanopenDrive {
 
     /// Makes the drive fit to be enabled again: configured, alive, out of Fault. The code of what prevents it.
     pub(super) fn acknowledge(&mut self) -> Result<(), u32> {
+        self.wait_for_fresh_heartbeat();
         let is_operational = self.shared.nmt() == Some(nmt::State::Operational);
         if self.shared.restarted() || !is_operational {
             self.configure_again().map_err(|error| {
@@ -44,6 +45,13 @@ impl CanopenDrive {
         }
         self.wait_for_fresh_status()?;
         self.leave_fault()
+    }
+
+    /// What the last heartbeat said may be past: the drive missed ours, or was stopped, and has not said so yet. None
+    /// may come; what that means is the caller's business.
+    fn wait_for_fresh_heartbeat(&self) {
+        self.shared.forget_nmt();
+        self.wait_for(self.settings.heartbeat_timeout, |shared| shared.nmt().is_some());
     }
 
     /// A status frame that was sent after this call began: the drive and the bus are alive now.

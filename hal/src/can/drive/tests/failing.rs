@@ -105,6 +105,22 @@ fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
 }
 
 #[test]
+fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat_said() {
+    // The drive misses us 40 ms after the last heartbeat (up to 20 ms old) it heard; we miss its own after 70 ms.
+    let settings = DriveSettings { own_heartbeat_timeout: Duration::from_millis(40), ..DriveSettings::default() };
+    let mut rig = open(settings, DeviceSettings::default()).unwrap();
+    rig.drive.enable().unwrap();
+    rig.run_ms(1.0, 50);
+    rig.device().inject(DeviceFault::Unplugged);
+    rig.sleep_ms(42);
+    assert_eq!(rig.device().nmt_state(), nmt::State::PreOperational);
+    assert_eq!(rig.drive.shared.nmt(), Some(nmt::State::Operational), "as far as we know");
+    rig.device().inject(DeviceFault::None);
+    rig.drive.reset_fault().unwrap_or_else(|error| panic!("{error}"));
+    recovers(&mut rig);
+}
+
+#[test]
 fn late_answers_are_found_by_the_gap_that_they_leave() {
     let mut rig = running(ASYNCHRONOUS);
     rig.device().inject(DeviceFault::Late(200));
