@@ -137,6 +137,16 @@ pub const fn fault_text(code: u32) -> FaultText {
     FaultText { what, remedy }
 }
 
+/// Whether `code` says of the same fault more than `first` does: an emergency message what a bare Fault is; and an adapter
+/// that is pulled out goes down before it is gone.
+pub(super) const fn explains(code: u32, first: u32) -> bool {
+    match first {
+        DRIVE_FAULT => code >> 16 == EMERGENCY >> 16,
+        BUS_DOWN => code == BUS_GONE,
+        _ => false,
+    }
+}
+
 /// A fault as the answer to a call.
 pub(super) const fn device_error(code: u32) -> DeviceError {
     let FaultText { what, remedy } = fault_text(code);

@@ -107,10 +107,10 @@ impl Shared {
         self.fault.load(Ordering::Acquire)
     }
 
-    /// Keeps the first fault, and lets the drive's emergency message say what a bare Fault is.
+    /// Keeps the first fault, but for a code that says more exactly what the first one was.
     pub(super) fn latch(&self, code: u32) {
         let kept = self.fault.compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire);
-        if kept == Err(super::faults::DRIVE_FAULT) && code >> 16 == super::faults::EMERGENCY >> 16 {
+        if kept.is_err_and(|first| super::faults::explains(code, first)) {
             self.fault.store(code, Ordering::Release);
         }
     }

@@ -1,6 +1,6 @@
 //! Every fault: found in the time that the settings state, current zero, and usable again when a person clears it.
 
-use super::super::super::bus::Condition;
+use super::super::super::bus::{BusError, Condition};
 use super::super::super::device::DeviceFault;
 use super::*;
 
@@ -159,6 +159,17 @@ fn an_interface_that_goes_down_is_a_fault_and_the_drive_stops_by_itself() {
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_DOWN));
     rig.world.bus().set_down(false);
     recovers(&mut rig);
+}
+
+#[test]
+fn an_adapter_that_is_pulled_out_is_gone_though_it_goes_down_first() {
+    let shared = Arc::new(Shared::default());
+    let mut monitor = Monitor::new(&DriveSettings::default(), Arc::clone(&shared), 0);
+    monitor.fail(BusError::Down);
+    monitor.fail(BusError::Gone);
+    assert_eq!(shared.fault(), faults::BUS_GONE, "its remedy is another: the interface does not come back by itself");
+    monitor.fail(BusError::Down);
+    assert_eq!(shared.fault(), faults::BUS_GONE);
 }
 
 #[test]
