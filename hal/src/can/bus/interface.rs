@@ -36,6 +36,9 @@ impl Interface {
     pub fn read(name: &str) -> Result<Interface, InterfaceError> {
         let error = |cause: String| InterfaceError { name: name.to_owned(), cause };
         let interface = CanInterface::open(name).map_err(|cause| error(cause.to_string()))?;
+        if !is_can(name) {
+            return Err(error("this is another kind of network interface".to_owned()));
+        }
         let details = interface.details().map_err(|cause| error(cause.to_string()))?;
         let can = details.can;
         Ok(Interface {
@@ -47,6 +50,12 @@ impl Interface {
             restart_ms: can.restart_ms,
         })
     }
+}
+
+/// Whether the hardware type of the interface is CAN, ARPHRD_CAN of `linux/if_arp.h`.
+fn is_can(name: &str) -> bool {
+    let kind = std::fs::read_to_string(format!("/sys/class/net/{name}/type"));
+    kind.is_ok_and(|kind| kind.trim() == "280")
 }
 
 fn words(state: CanState) -> &'static str {

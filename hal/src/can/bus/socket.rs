@@ -165,4 +165,10 @@ mod tests {
         let error = SocketPort::open("no-such-can", 1_000_000).unwrap_err().to_string();
         assert!(error.contains("no-such-can") && error.contains("ip link"), "{error}");
     }
+
+    #[test]
+    fn a_network_interface_of_another_kind_is_refused_as_such() {
+        let error = SocketPort::open("lo", 1_000_000).unwrap_err().to_string();
+        assert!(error.starts_with("CAN interface lo: this is another kind of network interface"), "{error}");
+    }
 }
