@@ -1,0 +1,59 @@
+//! Troubles of the bus as a kernel driver tells them: slcan, with an adapter that says what a test wants.
+
+use std::time::Duration;
+
+use bench_hal::can::Id;
+use bench_hal::can::bus::{BusEvent, CanBus, Condition, Interface, Port, SocketPort, Threads};
+use bench_hal::can::drive::{fault_text, faults};
+use bench_hal::{AmplifierStatus, CurrentAmplifier};
+
+use crate::support::adapter::Adapter;
+use crate::support::{BIT_RATE, Rig, host, settings, wait_for};
+
+/// The next condition; that the interface was down in between does not count.
+fn condition(bus: &mut dyn CanBus) -> Condition {
+    let mut found = None;
+    wait_for("a condition", || {
+        if let Ok(Some(BusEvent::Condition(condition))) = bus.receive(Duration::from_millis(100)) {
+            found = Some(condition);
+        }
+        found.is_some()
+    });
+    found.unwrap()
+}
+
+/// One test, since there is one adapter: the parts build upon each other.
+#[test]
+fn warning_is_no_fault_bus_off_latches_one_with_its_remedy_and_after_down_and_up_clearing_suffices() {
+    let adapter = Adapter::new();
+    let name = adapter.name.clone();
+    let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // nobody's: conditions only
+    let mut rig = Rig::new(&name, &Threads::new(adapter.far_side()), settings()).enabled();
+
+    adapter.says("sw096000");
+    assert_eq!(condition(listener.as_mut()), Condition::Warning);
+    rig.gives(-1.0, -1.0);
+    let seen = Interface::read(&name).unwrap();
+    assert_eq!((seen.state, seen.is_healthy, seen.bit_rate), (Some("error warning"), true, Some(BIT_RATE)));
+
+    adapter.goes_bus_off();
+    assert_eq!(condition(listener.as_mut()), Condition::BusOff);
+    assert_eq!(rig.fault(), faults::BUS_OFF);
+    let text = fault_text(faults::BUS_OFF);
+    assert_eq!(text.what, "the CAN controller is in bus-off");
+    assert!(text.remedy.contains("`ip link set IFACE down` and up again, then clear the fault"), "{}", text.remedy);
+    assert_eq!(Interface::read(&name).unwrap().state, Some("bus off"));
+    let refused = SocketPort::open(&name, BIT_RATE).unwrap_err().to_string();
+    assert!(refused.contains("is in state bus off; check cable, termination and bit rate"), "{refused}");
+    assert!(rig.drive.reset_fault().is_err(), "still off");
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_OFF));
+
+    adapter.is_set_down_and_up();
+    rig.recovers();
+
+    adapter.says("sp128000");
+    assert_eq!(condition(listener.as_mut()), Condition::Passive);
+    assert_eq!(rig.fault(), faults::BUS_PASSIVE);
+    adapter.says("sa000000");
+    rig.recovers();
+}

@@ -1,0 +1,36 @@
+//! The interface goes down, or away, while current flows.
+
+use bench_hal::CurrentAmplifier;
+use bench_hal::can::drive::{fault_text, faults};
+
+use crate::support::vcan::Vcan;
+use crate::support::{Rig, host, open, settings};
+
+#[test]
+fn an_interface_set_down_is_a_fault_the_drive_stops_by_itself_and_with_the_interface_up_clearing_suffices() {
+    let vcan = Vcan::up();
+    let mut rig = vcan.running();
+    vcan.set_up(false);
+    assert_eq!(rig.fault(), faults::BUS_DOWN);
+    let text = fault_text(faults::BUS_DOWN);
+    assert_eq!((text.what, text.remedy), ("the CAN interface is down", "`ip link set IFACE up`, then clear the fault"));
+    assert!(rig.drive.reset_fault().is_err(), "still down");
+    vcan.set_up(true);
+    rig.recovers();
+}
+
+#[test]
+fn an_adapter_pulled_out_is_a_fault_the_drive_stops_by_itself_and_starting_anew_works() {
+    let mut vcan = Vcan::up();
+    let mut rig = vcan.running();
+    vcan.unplug();
+    assert_eq!(rig.fault(), faults::BUS_GONE);
+    let text = fault_text(faults::BUS_GONE);
+    assert_eq!((text.what, text.remedy), ("the CAN interface is gone", "plug the adapter in, then start anew"));
+    let Rig { drive, far_end } = rig;
+    drop(drive);
+    vcan.plug_in();
+    let far_end = far_end.plugged_into(&host(&vcan.name));
+    let drive = open(&vcan.name, settings()).unwrap();
+    Rig { drive, far_end }.enabled();
+}

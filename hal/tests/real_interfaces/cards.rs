@@ -1,0 +1,32 @@
+//! Two CAN cards (SJA1000, emulated) on one bus.
+
+use bench_hal::can::bus::{Interface, SocketPort};
+use bench_hal::can::drive::inspect;
+use socketcan::CanInterface;
+use std::time::Duration;
+
+use crate::support::{BIT_RATE, Rig, host, settings};
+
+#[test]
+fn a_drive_on_another_card_runs_and_the_cards_tell_bit_rate_state_and_error_counters() {
+    for card in ["can0", "can1"] {
+        let interface = CanInterface::open(card).expect("two cards: use .ci/vm/run --pci");
+        interface.set_bitrate(BIT_RATE, None).unwrap();
+        interface.set_restart_ms(100).unwrap();
+        interface.bring_up().unwrap();
+    }
+    let mut rig = Rig::new("can0", &host("can1"), settings()).enabled();
+    rig.gives(-2.0, -2.0);
+    for card in ["can0", "can1"] {
+        let seen = Interface::read(card).unwrap();
+        assert!(seen.is_up && seen.is_healthy, "{seen:?}");
+        assert_eq!((seen.bit_rate, seen.state), (Some(BIT_RATE), Some("error active")));
+        assert_eq!((seen.error_counters, seen.restart_ms), (Some((0, 0)), Some(100)));
+    }
+    drop(rig.drive);
+    let seen = inspect(&host("can0"), 5, Duration::from_secs(3)).unwrap();
+    assert_eq!(seen.name.as_deref(), Some("simulated CANopen drive"));
+
+    let refused = SocketPort::open("can0", 500_000).unwrap_err().to_string();
+    assert!(refused.contains("can0 runs at 1000000 bit/s, the configuration says 500000"), "{refused}");
+}

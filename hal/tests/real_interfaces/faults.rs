@@ -1,0 +1,108 @@
+//! Every misbehaviour of a drive, over a real socket: found, no current, and usable again when a person clears it.
+
+use std::time::Duration;
+
+use bench_hal::CurrentAmplifier;
+use bench_hal::can::device::DeviceFault;
+use bench_hal::can::drive::{fault_text, faults};
+
+use crate::support::vcan::Vcan;
+use crate::support::{Rig, open, settings, wait_for};
+
+/// `misbehaviour` is found as `code`, is cleared with its cause, and the drive can be opened anew, too.
+fn is_found_and_cleared(misbehaviour: DeviceFault, code: u32) {
+    let vcan = Vcan::up();
+    let mut rig = vcan.running();
+    rig.far_end.device().inject(misbehaviour);
+    let found = rig.fault();
+    assert_eq!(found, code, "{misbehaviour:?}: {}", fault_text(found).what);
+    rig.recovers();
+    let Rig { drive, far_end } = rig;
+    drop(drive);
+    let drive = open(&vcan.name, settings()).unwrap();
+    Rig { drive, far_end }.enabled();
+}
+
+#[test]
+fn a_fault_of_the_drive_is_told_in_the_words_of_its_emergency_message() {
+    is_found_and_cleared(DeviceFault::Drive(0x4210), faults::EMERGENCY + 0x4210);
+    let text = fault_text(faults::EMERGENCY + 0x4210);
+    assert_eq!(text.what, "drive too hot");
+    assert!(text.remedy.contains("remove the cause, then clear the fault"));
+}
+
+#[test]
+fn a_drive_that_only_sends_an_emergency_message_is_found() {
+    is_found_and_cleared(DeviceFault::EmergencyOnly(0x2310), faults::EMERGENCY + 0x2310);
+}
+
+#[test]
+fn a_mute_drive_is_found() {
+    is_found_and_cleared(DeviceFault::Mute, faults::STATUS_LOST);
+}
+
+#[test]
+fn an_unplugged_drive_is_found_and_switches_itself_off() {
+    is_found_and_cleared(DeviceFault::Unplugged, faults::STATUS_LOST);
+}
+
+#[test]
+fn frames_of_a_wrong_length_are_found() {
+    is_found_and_cleared(DeviceFault::ShortFrames, faults::MALFORMED);
+}
+
+#[test]
+fn a_statusword_that_no_state_has_is_found() {
+    is_found_and_cleared(DeviceFault::SenselessStatus, faults::MALFORMED);
+}
+
+#[test]
+fn a_drive_that_does_not_follow_its_target_is_found() {
+    is_found_and_cleared(DeviceFault::TargetIgnored, faults::TARGET_IGNORED);
+}
+
+#[test]
+fn a_drive_that_switches_itself_off_is_found() {
+    is_found_and_cleared(DeviceFault::SwitchesOff, faults::SWITCHED_OFF);
+}
+
+#[test]
+fn a_drive_that_restarts_is_found_and_configured_again_when_cleared() {
+    is_found_and_cleared(DeviceFault::Reset, faults::RESTARTED);
+}
+
+#[test]
+fn a_drive_whose_answers_are_late_is_found() {
+    let vcan = Vcan::up();
+    let mut rig = vcan.running();
+    let late = Duration::from_millis(700); // longer than status_timeout
+    rig.far_end.device().inject(DeviceFault::Late(700));
+    assert_eq!(rig.fault(), faults::STATUS_LOST);
+    rig.far_end.device().inject(DeviceFault::None);
+    std::thread::sleep(2 * late); // what is on the way still comes
+    rig.recovers();
+}
+
+#[test]
+fn a_drive_that_does_not_obey_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
+    for misbehaviour in [DeviceFault::SetPointsIgnored, DeviceFault::OrdersIgnored] {
+        let vcan = Vcan::up();
+        let mut rig = vcan.running();
+        rig.far_end.device().inject(misbehaviour);
+        rig.drive.disable();
+        assert_eq!(rig.far_end.current_a(), 1.0, "{misbehaviour:?}: it does not obey");
+        rig.far_end.goes_off();
+        assert_eq!(rig.fault(), faults::STILL_ENABLED, "{misbehaviour:?}");
+        rig.recovers();
+    }
+}
+
+#[test]
+fn a_loop_that_stops_commanding_is_switched_off() {
+    let vcan = Vcan::up();
+    let mut rig = vcan.running();
+    let code = i64::from(faults::COMMANDS_STOPPED);
+    wait_for("a loop that stands still is missed", || rig.far_end.current_a() == 0.0);
+    assert_eq!(rig.drive.enable().unwrap_err().code, code);
+    rig.recovers();
+}

@@ -1,0 +1,35 @@
+//! What the kernel says of an interface, and what a person is told of one that cannot be used.
+
+use bench_hal::can::bus::{Interface, SocketPort};
+
+use crate::support::BIT_RATE;
+use crate::support::vcan::Vcan;
+
+fn refusal(name: &str) -> String {
+    SocketPort::open(name, BIT_RATE).unwrap_err().to_string()
+}
+
+#[test]
+fn a_name_that_no_interface_has_is_refused_with_the_name_and_how_to_find_the_right_one() {
+    let refused = refusal("can77");
+    assert!(refused.starts_with("CAN interface can77: "), "{refused}");
+    assert!(refused.ends_with("`ip link show type can` lists what there is"), "{refused}");
+}
+
+#[test]
+fn an_interface_that_is_down_is_refused_with_the_command_that_brings_it_up() {
+    let vcan = Vcan::down();
+    let name = &vcan.name;
+    let remedy =
+        format!("CAN interface {name} is down; bring it up with `ip link set {name} up type can bitrate 1000000`");
+    assert_eq!(refusal(name), remedy);
+    assert!(!Interface::read(name).unwrap().is_up);
+}
+
+#[test]
+fn a_virtual_interface_is_up_and_healthy_and_has_no_bit_rate() {
+    let vcan = Vcan::up();
+    let interface = Interface::read(&vcan.name).unwrap();
+    assert!(interface.is_up && interface.is_healthy, "{interface:?}");
+    assert_eq!((interface.bit_rate, interface.state), (None, None));
+}

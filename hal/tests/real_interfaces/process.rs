@@ -1,0 +1,66 @@
+//! The process dies in the middle of it.
+
+use std::process::{Child, Command};
+use std::time::Duration;
+
+use bench_hal::CurrentAmplifier;
+use bench_hal::can::bus::{BusEvent, CanBus, Port};
+use bench_hal::can::cia402::State;
+use bench_hal::can::emcy;
+
+use crate::support::vcan::Vcan;
+use crate::support::{FarEnd, Rig, host, open, refusal, settings, wait_for};
+
+/// Tells the test below that it is the process to be killed, and its interface.
+const INTERFACE: &str = "BENCH_HAL_TO_BE_KILLED_ON";
+
+#[test]
+fn a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free() {
+    if let Ok(interface) = std::env::var(INTERFACE) {
+        command_for_ever(&interface);
+    }
+    let vcan = Vcan::up();
+    let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
+    let mut emergencies = host(&vcan.name).endpoint(&[emcy::cob_id(5)]).unwrap();
+    let mut child = the_same_test_in_a_process_of_its_own(&vcan.name);
+    wait_for("the other process drives 1 A", || far_end.current_a() == 1.0);
+
+    let refused = refusal(&vcan.name, settings());
+    let holder = format!("node 5 is driven by process {} already; end it first", child.id());
+    assert!(refused.starts_with(&holder), "{refused}");
+    assert_eq!(far_end.current_a(), 1.0, "the refused one changed nothing");
+
+    child.kill().unwrap(); // SIGKILL
+    child.wait().unwrap();
+    far_end.goes_off();
+    assert_eq!(far_end.device().power_state(), State::SwitchOnDisabled);
+    assert_eq!(first_emergency(emergencies.as_mut()), 0x8130, "the drive's own heartbeat consumer says so");
+
+    let drive = open(&vcan.name, settings()).unwrap_or_else(|error| panic!("the node is free: {error}"));
+    Rig { drive, far_end }.enabled();
+}
+
+fn the_same_test_in_a_process_of_its_own(interface: &str) -> Child {
+    let name = "process::a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free";
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--exact", name, "--nocapture"]).env(INTERFACE, interface).spawn().unwrap()
+}
+
+/// What a user's process does, until it is killed. It dies with a parent that failed, too.
+fn command_for_ever(interface: &str) -> ! {
+    // SAFETY: an integer goes in, nothing is pointed to.
+    unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
+    let mut drive = open(interface, settings()).unwrap();
+    drive.enable().unwrap();
+    loop {
+        drive.command(1.0).unwrap();
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// The code of the first emergency message that came.
+fn first_emergency(bus: &mut dyn CanBus) -> u16 {
+    let event = bus.receive(Duration::from_secs(10)).unwrap();
+    let Some(BusEvent::Frame(frame)) = event else { panic!("{event:?}") };
+    emcy::Emergency::decode(frame.data()).unwrap().code
+}

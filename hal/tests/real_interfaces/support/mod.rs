@@ -1,0 +1,160 @@
+//! A drive and its simulated counterpart on real interfaces, and waiting for what they do.
+
+pub mod adapter;
+pub mod python;
+pub mod vcan;
+
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use bench_hal::can::bus::{Host, Port, Running, SocketPort, Threads};
+use bench_hal::can::cia402::State;
+use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
+use bench_hal::can::drive::{CanopenDrive, DriveSettings, OpenError};
+use bench_hal::can::heartbeat;
+use bench_hal::{AmplifierStatus, CurrentAmplifier};
+
+pub const BIT_RATE: u32 = 1_000_000;
+
+/// Nothing takes so long, even in an emulated machine; only a test that hangs meets it.
+const HANGS: Duration = Duration::from_secs(60);
+
+/// The default but for the time limits: the emulated machine may stand still for a tenth of a second.
+pub fn settings() -> DriveSettings {
+    let ms = Duration::from_millis;
+    DriveSettings {
+        heartbeat_timeout: ms(800),
+        own_heartbeat_timeout: ms(600),
+        status_timeout: ms(400),
+        command_timeout: ms(400),
+        sdo_timeout: ms(3000),
+        state_timeout: ms(5000),
+        ..DriveSettings::default()
+    }
+}
+
+/// Interface `name`, in real time.
+pub fn host(name: &str) -> Threads<SocketPort> {
+    Threads::new(SocketPort::open(name, BIT_RATE).unwrap())
+}
+
+pub fn open(name: &str, settings: DriveSettings) -> Result<CanopenDrive, OpenError> {
+    CanopenDrive::open(settings, Box::new(host(name)))
+}
+
+/// Why it did not open.
+pub fn refusal(name: &str, settings: DriveSettings) -> String {
+    open(name, settings).err().expect("this must not open").to_string()
+}
+
+pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !condition() {
+        assert!(begun.elapsed() < HANGS, "never: {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// A simulated drive at work on a bus.
+pub struct FarEnd {
+    device: Arc<Mutex<Device>>,
+    running: Running,
+}
+
+impl FarEnd {
+    /// A drive that has just got power, seen on interface `name`. Returns when its boot-up message is over: a driver that
+    /// hears it takes it for a restart.
+    pub fn new(name: &str, host: &dyn Host) -> FarEnd {
+        let mut bus = self::host(name).endpoint(&[heartbeat::cob_id(5)]).unwrap();
+        let far_end = FarEnd::again(host, Arc::new(Mutex::new(Device::new(DeviceSettings::default()))));
+        wait_for("the drive has started", || bus.receive(Duration::from_secs(1)).unwrap().is_some());
+        far_end
+    }
+
+    /// The same drive, plugged into another bus.
+    pub fn plugged_into(self, host: &dyn Host) -> FarEnd {
+        let FarEnd { device, running } = self;
+        drop(running);
+        FarEnd::again(host, device)
+    }
+
+    fn again(host: &dyn Host, device: Arc<Mutex<Device>>) -> FarEnd {
+        let running = DeviceTask::start(host, Arc::clone(&device)).unwrap();
+        FarEnd { device, running }
+    }
+
+    pub fn device(&self) -> MutexGuard<'_, Device> {
+        self.device.lock().unwrap()
+    }
+
+    pub fn current_a(&self) -> f64 {
+        self.device().current_a()
+    }
+
+    /// Waits until no current flows because the drive itself is off.
+    pub fn goes_off(&self) {
+        wait_for("the drive is off", || {
+            let device = self.device();
+            device.current_a() == 0.0 && !matches!(device.power_state(), State::OperationEnabled)
+        });
+    }
+}
+
+/// A driver in front of a simulated drive.
+pub struct Rig {
+    pub drive: CanopenDrive,
+    pub far_end: FarEnd,
+}
+
+impl Rig {
+    /// The driver on interface `name`, the drive on `far_host`.
+    pub fn new(name: &str, far_host: &dyn Host, settings: DriveSettings) -> Rig {
+        let far_end = FarEnd::new(name, far_host);
+        let drive = open(name, settings).unwrap_or_else(|error| panic!("{error}"));
+        Rig { drive, far_end }
+    }
+
+    /// A loop that commands `current_a` until `done`.
+    fn command_until(&mut self, current_a: f64, what: &str, done: impl Fn(&Rig) -> bool) {
+        wait_for(what, || {
+            let _ = self.drive.command(current_a); // refused in the tick in which a fault is found
+            done(self)
+        });
+    }
+
+    /// Commanded so, the drive gives the current, and says so itself.
+    pub fn gives(&mut self, wanted_a: f64, given_a: f64) {
+        assert_eq!(self.drive.command(wanted_a), Ok(given_a));
+        let near = |current_a: f64| (current_a - given_a).abs() < 1e-9;
+        self.command_until(wanted_a, &format!("{given_a} A flow and come back"), |rig| {
+            near(rig.far_end.current_a()) && rig.drive.actual_current_a().is_some_and(near)
+        });
+        assert_eq!(self.drive.status(), AmplifierStatus::Enabled);
+    }
+
+    pub fn enabled(mut self) -> Rig {
+        self.drive.enable().unwrap();
+        self.gives(1.0, 1.0);
+        self
+    }
+
+    /// The fault that a loop meets which commands on; afterwards it is refused and no current flows.
+    pub fn fault(&mut self) -> u32 {
+        self.command_until(1.0, "a fault", |rig| matches!(rig.drive.status(), AmplifierStatus::Fault(_)));
+        let AmplifierStatus::Fault(code) = self.drive.status() else { panic!("the fault did not stay") };
+        self.far_end.goes_off();
+        assert!(self.drive.command(1.0).is_err(), "a heedless loop is refused");
+        assert!(self.drive.enable().is_err(), "a fault is not left by enabling");
+        code
+    }
+
+    /// With the cause gone: cleared by a person, off, and enabled only when asked.
+    pub fn recovers(&mut self) {
+        self.far_end.device().inject(DeviceFault::None);
+        self.drive.reset_fault().unwrap_or_else(|error| panic!("{error}: {:?}", self.drive.last_error()));
+        assert_eq!((self.drive.status(), self.far_end.current_a()), (AmplifierStatus::Disabled, 0.0));
+        self.drive.enable().unwrap();
+        assert_eq!(self.far_end.current_a(), 0.0, "an old command does not come back");
+        self.gives(0.5, 0.5);
+    }
+}
