@@ -1,1 +1,75 @@
+//! The driver against a drive, and the simulated drive against a master, of another CANopen stack: python's canopen.
 
+use std::time::Duration;
+
+use bench_hal::can::budget::Exchange;
+use bench_hal::can::drive::{CanopenDrive, DriveSettings, ExpectedIdentity, fault_text, faults, inspect};
+use bench_hal::{AmplifierStatus, CurrentAmplifier};
+
+use crate::support::python::{PythonDrive, script};
+use crate::support::vcan::Vcan;
+use crate::support::{FarEnd, host, open, settings, wait_for};
+
+/// A loop at the pace of the script, until the drive shows `shown`.
+fn command_until(drive: &mut CanopenDrive, current_a: f64, other: &mut PythonDrive, shown: &str) {
+    wait_for(shown, || {
+        let _ = drive.command(current_a); // refused in the tick in which a fault is found
+        std::thread::sleep(Duration::from_millis(10));
+        other.shows() == shown
+    });
+}
+
+/// Up, both directions of current, and what the drive says comes back.
+fn runs(drive: &mut CanopenDrive, other: &mut PythonDrive) {
+    drive.enable().unwrap();
+    assert_eq!(other.shows(), "27 0 OPERATIONAL");
+    for (current_a, shown) in [(1.0, "27 250 OPERATIONAL"), (-2.0, "27 -500 OPERATIONAL")] {
+        command_until(drive, current_a, other, shown);
+        wait_for("the actual current", || {
+            let _ = drive.command(current_a);
+            drive.actual_current_a() == Some(current_a)
+        });
+    }
+    assert_eq!(drive.status(), AmplifierStatus::Enabled);
+}
+
+/// A fault of the drive is told, and cleared by a person.
+fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
+    other.fails(0x4210);
+    command_until(drive, 1.0, other, "08 0 OPERATIONAL");
+    let fault = AmplifierStatus::Fault(faults::EMERGENCY + 0x4210);
+    wait_for("the fault", || drive.status() == fault);
+    assert_eq!(fault_text(faults::EMERGENCY + 0x4210).what, "drive too hot");
+    assert!(drive.enable().is_err(), "a fault is not left by enabling");
+    assert_eq!(other.shows(), "08 0 OPERATIONAL");
+    drive.reset_fault().unwrap();
+    assert_eq!((drive.status(), other.shows().as_str()), (AmplifierStatus::Disabled, "40 0 OPERATIONAL"));
+}
+
+#[test]
+fn a_drive_of_other_hands_is_brought_up_runs_both_ways_fails_with_its_words_is_cleared_and_left_off() {
+    let vcan = Vcan::up();
+    let mut other = PythonDrive::new(&vcan.name);
+    let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
+    assert_eq!(seen.name.as_deref(), Some("a drive of other hands"));
+    let identity = ExpectedIdentity { vendor: Some(0x123), serial: Some(42), ..ExpectedIdentity::default() };
+    for exchange in [Exchange::Asynchronous { status_hz: 50.0 }, Exchange::Synchronous { status_every: 1 }] {
+        let settings = DriveSettings { identity, exchange, rate_hz: 100.0, ..settings() };
+        let mut drive = open(&vcan.name, settings).unwrap_or_else(|error| panic!("{exchange:?}: {error}"));
+        runs(&mut drive, &mut other);
+        fails_and_recovers(&mut drive, &mut other);
+        runs(&mut drive, &mut other);
+        drop(drive);
+        wait_for("off and pre-operational", || other.shows() == "40 0 PRE-OPERATIONAL");
+    }
+}
+
+#[test]
+fn a_master_of_other_hands_finds_configures_and_runs_the_simulated_drive_which_misses_it_when_it_falls_silent() {
+    let vcan = Vcan::up();
+    let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
+    let output = script("canopen_master.py", &vcan.name).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.contains("all well"), "{said}");
+    assert_eq!(far_end.current_a(), 0.0);
+}

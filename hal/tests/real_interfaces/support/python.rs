@@ -1,1 +1,60 @@
+//! Programs of other hands: scripts of `tests/python` with python's canopen.
 
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+/// The script `name` on `interface`, with the python of `.ci/run`.
+pub fn script(name: &str, interface: &str) -> Command {
+    let python = std::env::var_os("BENCH_PYTHON").expect("BENCH_PYTHON: a python with .ci/python-packages.txt");
+    let mut command = Command::new(python);
+    command.arg(format!("{}/tests/python/{name}", env!("CARGO_MANIFEST_DIR"))).arg(interface);
+    command
+}
+
+/// The drive of `canopen_drive.py`.
+pub struct PythonDrive {
+    process: Child,
+    questions: ChildStdin,
+    answers: BufReader<ChildStdout>,
+}
+
+impl PythonDrive {
+    /// On the bus; returns when it has started.
+    pub fn new(interface: &str) -> PythonDrive {
+        let mut command = script("canopen_drive.py", interface);
+        let mut process = command.arg("5").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let questions = process.stdin.take().unwrap();
+        let answers = BufReader::new(process.stdout.take().unwrap());
+        let mut drive = PythonDrive { process, questions, answers };
+        assert_eq!(drive.answer(), "ready");
+        drive
+    }
+
+    fn answer(&mut self) -> String {
+        let mut line = String::new();
+        self.answers.read_line(&mut line).unwrap();
+        line.trim().to_owned()
+    }
+
+    fn ask(&mut self, question: &str) -> String {
+        writeln!(self.questions, "{question}").unwrap();
+        self.answer()
+    }
+
+    /// Statusword's state (hexadecimal), target that is followed (per mille), NMT state.
+    pub fn shows(&mut self) -> String {
+        self.ask("show")
+    }
+
+    /// Emergency message and Fault.
+    pub fn fails(&mut self, code: u16) {
+        self.ask(&format!("fault {code:x}"));
+    }
+}
+
+impl Drop for PythonDrive {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
