@@ -11,7 +11,7 @@ use bench_hal::can::{CanFrame, Id, nmt};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 
 use crate::support::vcan::Vcan;
-use crate::support::{FarEnd, Rig, host, refusal, settings};
+use crate::support::{FarEnd, Rig, host, refusal, settings, wait_for};
 
 #[test]
 fn a_drive_is_brought_up_follows_quantised_currents_says_what_it_measures_and_goes_to_zero_when_disabled() {
@@ -37,9 +37,9 @@ fn closing_leaves_the_drive_off_pre_operational_and_not_watching() {
     let vcan = Vcan::up();
     let Rig { drive, far_end } = vcan.running();
     drop(drive);
+    let state = || (far_end.device().nmt_state(), far_end.device().read(Address::new(0x1016, 1)));
+    wait_for("it is pre-operational and watches nobody", || state() == (nmt::State::PreOperational, 0));
     far_end.goes_off();
-    let device = far_end.device();
-    assert_eq!((device.nmt_state(), device.read(Address::new(0x1016, 1))), (nmt::State::PreOperational, 0));
 }
 
 #[test]
