@@ -37,8 +37,10 @@ fn closing_leaves_the_drive_off_pre_operational_and_not_watching() {
     let vcan = Vcan::up();
     let Rig { drive, far_end } = vcan.running();
     drop(drive);
-    let state = || (far_end.device().nmt_state(), far_end.device().read(Address::new(0x1016, 1)));
-    wait_for("it is pre-operational and watches nobody", || state() == (nmt::State::PreOperational, 0));
+    wait_for("it is pre-operational and watches nobody", || {
+        let device = far_end.device();
+        (device.nmt_state(), device.read(Address::new(0x1016, 1))) == (nmt::State::PreOperational, 0)
+    });
     far_end.goes_off();
 }
 
