@@ -118,6 +118,16 @@ pub enum OpenError {
         /// The limit, in milliseconds.
         timeout_ms: u128,
     },
+    /// The drive cannot pace its status frames by itself.
+    #[error(
+        "node {node} has no inhibit time or event timer for its status frames, which an asynchronous exchange needs: {cause}; choose the synchronous exchange, in which the drive answers SYNC"
+    )]
+    NoTimer {
+        /// The node.
+        node: u8,
+        /// What the drive said.
+        cause: SdoError,
+    },
     /// The service thread could not be started.
     #[error("the thread that watches the drive could not be started: {0}")]
     Thread(std::io::Error),

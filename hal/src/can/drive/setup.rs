@@ -123,7 +123,7 @@ impl Setup<'_> {
         for pdo in self.pdos() {
             let cob_id_now = self.channel.read_u32(pdo.cob_id_address())?;
             for value in pdo.sequence(cob_id_now) {
-                self.write(value)?;
+                self.write(value).map_err(|error| self.no_timer(value.address, error))?;
             }
             for value in pdo.layout() {
                 self.verify(value)?;
@@ -132,6 +132,17 @@ impl Setup<'_> {
             on.map_or(Ok(()), |value| self.verify(value))?;
         }
         (2..=4).try_for_each(|number| self.silence(number))
+    }
+
+    /// Says which other exchange does without the times that a drive lacks.
+    fn no_timer(&self, address: Address, error: OpenError) -> OpenError {
+        let is_time = matches!((address.index, address.sub), (0x1800, 3 | 5));
+        match error {
+            OpenError::Sdo(cause) if is_time && cause.means_absent() => {
+                OpenError::NoTimer { node: self.settings.node, cause }
+            }
+            other => other,
+        }
     }
 
     /// Set-point: controlword and target. Status: statusword and actual value.

@@ -105,6 +105,17 @@ fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
 }
 
 #[test]
+fn a_drive_without_a_timer_for_its_status_is_refused_with_sync_as_the_way_out() {
+    for sub in [3, 5] {
+        let device = DeviceSettings { lacks: vec![Address::new(0x1800, sub)], ..DeviceSettings::default() };
+        let refused = refusal(DriveSettings::default(), device.clone());
+        let remedy = "choose the synchronous exchange, in which the drive answers SYNC";
+        assert!(refused.contains(&format!("0x1800:0{sub}")) && refused.ends_with(remedy), "{refused}");
+        assert!(open(DriveSettings { exchange: SYNCHRONOUS, ..DriveSettings::default() }, device).is_ok());
+    }
+}
+
+#[test]
 fn optional_objects_may_be_missing() {
     let lacks = [0x1801, 0x1802, 0x1803].map(|index| Address::new(index, 1)).to_vec();
     let lacks = [lacks, vec![Address::new(0x6502, 0), Address::new(0x1008, 0)]].concat();
