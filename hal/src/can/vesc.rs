@@ -99,8 +99,7 @@ impl Vesc {
         if !(limit_a > 0.0 && limit_a <= 1000.0) {
             return Err(format!("current_limit_a = {limit_a} cannot be: above 0, at most 1000"));
         }
-        let claim =
-            host.claim(settings.node).map_err(|pid| format!("driven by process {pid} already; end it first"))?;
+        let claim = host.claim(settings.node).map_err(|held| held.to_string())?;
         let status = [status_id(settings.node)];
         let bus = host.endpoint(&status).map_err(|error| error.to_string())?;
         let watched = host.endpoint(&status).map_err(|error| error.to_string())?;

@@ -26,7 +26,7 @@ fn a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free() {
     wait_for("the other process drives 1 A", || far_end.current_a() == 1.0);
 
     let refused = refusal(&vcan.name, settings());
-    let holder = format!("node 5 is driven by process {} already; end it first", child.id());
+    let holder = format!("node 5 is driven by process {} already; end that first", child.id());
     assert!(refused.starts_with(&holder), "{refused}");
     assert_eq!(far_end.current_a(), 1.0, "the refused one changed nothing");
 

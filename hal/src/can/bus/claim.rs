@@ -5,10 +5,30 @@
 //! however that ends; and it tells the holder's process number (SO_PEERCRED). A file would need a place that all users
 //! may write to, and tells the number only as long as nobody else writes it.
 
+use std::num::NonZeroU32;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener};
 
 use nix::sys::socket::{self, AddressFamily, SockFlag, SockType, UnixAddr, sockopt};
+use thiserror::Error;
+
+/// Another process drives the node.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("node {node} is driven by {} already; end that first{}, or choose another node", who(*pid), kill(*pid))]
+pub struct Held {
+    /// The node.
+    pub node: u8,
+    /// The process, if it can be found out.
+    pub pid: Option<NonZeroU32>,
+}
+
+fn who(pid: Option<NonZeroU32>) -> String {
+    pid.map_or_else(|| "another process".to_owned(), |pid| format!("process {pid}"))
+}
+
+fn kill(pid: Option<NonZeroU32>) -> String {
+    pid.map_or_else(String::new, |pid| format!(" (`kill {pid}`)"))
+}
 
 /// Holds a node until dropped.
 #[derive(Debug)]
@@ -20,25 +40,25 @@ impl Claim {
         Claim(None)
     }
 
-    /// Claims `node` on `interface`, or tells the process that has it (0 if that cannot be found out).
-    pub fn new(interface: &str, node: u8) -> Result<Claim, u32> {
+    /// Claims `node` on `interface`, or tells the process that has it.
+    pub fn new(interface: &str, node: u8) -> Result<Claim, Held> {
         let name = format!("bench-can/{interface}/{node}");
-        let address = SocketAddr::from_abstract_name(&name).map_err(|_| 0u32)?;
+        let address = SocketAddr::from_abstract_name(&name).map_err(|_| Held { node, pid: None })?;
         match UnixListener::bind_addr(&address) {
             Ok(listener) => Ok(Claim(Some(listener))),
-            Err(_) => Err(holder(&name).unwrap_or(0)),
+            Err(_) => Err(Held { node, pid: holder(&name).ok().flatten() }),
         }
     }
 }
 
 /// The process that listens under `name`.
-fn holder(name: &str) -> nix::Result<u32> {
+fn holder(name: &str) -> nix::Result<Option<NonZeroU32>> {
     let flags = SockFlag::SOCK_CLOEXEC | SockFlag::SOCK_NONBLOCK; // a full queue of callers must not make us wait
     let socket = socket::socket(AddressFamily::Unix, SockType::Stream, flags, None)?;
     let fd = std::os::fd::AsRawFd::as_raw_fd(&socket);
     socket::connect(fd, &UnixAddr::new_abstract(name.as_bytes())?)?;
     let credentials = socket::getsockopt(&socket, sockopt::PeerCredentials)?;
-    Ok(u32::try_from(credentials.pid()).unwrap_or(0))
+    Ok(u32::try_from(credentials.pid()).ok().and_then(NonZeroU32::new))
 }
 
 #[cfg(test)]
@@ -50,9 +70,18 @@ mod tests {
         let me = std::process::id();
         let interface = format!("test-{me}");
         let first = Claim::new(&interface, 5).unwrap();
-        assert_eq!(Claim::new(&interface, 5).unwrap_err(), me);
+        let held = Claim::new(&interface, 5).unwrap_err();
+        let text =
+            format!("node 5 is driven by process {me} already; end that first (`kill {me}`), or choose another node");
+        assert_eq!((held.node, held.to_string()), (5, text));
         assert!(Claim::new(&interface, 6).is_ok(), "another node is free");
         drop(first);
         assert!(Claim::new(&interface, 5).is_ok());
+    }
+
+    #[test]
+    fn a_holder_that_is_not_known_is_not_to_be_killed() {
+        let text = "node 5 is driven by another process already; end that first, or choose another node";
+        assert_eq!(Held { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller
     }
 }

@@ -19,7 +19,7 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-pub use claim::Claim;
+pub use claim::{Claim, Held};
 pub use condition::Condition;
 pub use interface::{Interface, InterfaceError};
 pub use kernel::{KernelError, kernel_speaks_can};
@@ -82,8 +82,8 @@ pub trait Port: Send + Sync {
     /// A connection that hears the identifiers `ids` (all, if there are none) and all conditions.
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError>;
 
-    /// Claims a node of this bus for this process, or names the process that has it (0: unknown).
-    fn claim(&self, node: u8) -> Result<Claim, u32> {
+    /// Claims a node of this bus for this process, or names the process that has it.
+    fn claim(&self, node: u8) -> Result<Claim, Held> {
         let _ = node;
         Ok(Claim::none())
     }

@@ -6,7 +6,7 @@ use socketcan::{CanDataFrame, CanFilter, CanFrame as Raw, CanSocket, EmbeddedFra
 use thiserror::Error;
 
 use super::super::frame::{CanFrame, Id};
-use super::{BusError, BusEvent, CanBus, Claim, Condition, Interface, InterfaceError, Port};
+use super::{BusError, BusEvent, CanBus, Claim, Condition, Held, Interface, InterfaceError, Port};
 
 /// A SocketCAN interface.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl Port for SocketPort {
         Ok(Box::new(SocketEndpoint { socket }))
     }
 
-    fn claim(&self, node: u8) -> Result<Claim, u32> {
+    fn claim(&self, node: u8) -> Result<Claim, Held> {
         Claim::new(&self.interface, node)
     }
 }

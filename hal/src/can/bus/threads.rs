@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::super::frame::Id;
-use super::{BusError, CanBus, Claim, Host, Port, Running, Task};
+use super::{BusError, CanBus, Claim, Held, Host, Port, Running, Task};
 
 /// How long a task waits for a frame before it looks at the clock again: a tenth of the shortest time that matters.
 const WAIT: Duration = Duration::from_millis(1);
@@ -33,7 +33,7 @@ impl<P: Port> Port for Threads<P> {
         self.port.endpoint(ids)
     }
 
-    fn claim(&self, node: u8) -> Result<Claim, u32> {
+    fn claim(&self, node: u8) -> Result<Claim, Held> {
         self.port.claim(node)
     }
 }

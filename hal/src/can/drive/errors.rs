@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::super::budget::BudgetError;
-use super::super::bus::BusError;
+use super::super::bus::{BusError, Held};
 use super::super::sdo::{Address, SdoError};
 
 /// Why a drive could not be opened: value, limit and next step.
@@ -23,13 +23,8 @@ pub enum OpenError {
     #[error(transparent)]
     Budget(#[from] BudgetError),
     /// Another process drives this node.
-    #[error("node {node} is driven by process {pid} already; end it first (`kill {pid}`), or choose another node")]
-    Held {
-        /// The node.
-        node: u8,
-        /// The process, 0 if unknown.
-        pid: u32,
-    },
+    #[error(transparent)]
+    Held(#[from] Held),
     /// The interface failed.
     #[error(transparent)]
     Bus(#[from] BusError),

@@ -64,7 +64,7 @@ impl CanopenDrive {
     pub fn open(settings: DriveSettings, host: Box<dyn Host>) -> Result<CanopenDrive, OpenError> {
         settings.check()?;
         let node = settings.node;
-        let claim = host.claim(node).map_err(|pid| OpenError::Held { node, pid })?;
+        let claim = host.claim(node)?;
         let mut bus = host.endpoint(&[answer_id(node)])?;
         let watched = host.endpoint(&heard_ids(node))?;
         let configured = configure(&settings, bus.as_mut(), host.as_ref())?;
