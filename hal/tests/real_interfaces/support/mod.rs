@@ -17,7 +17,7 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier};
 pub const BIT_RATE: u32 = 1_000_000;
 
 /// Nothing takes so long, even in an emulated machine; only a test that hangs meets it.
-const HANGS: Duration = Duration::from_secs(60);
+const HANGS: Duration = Duration::from_secs(30);
 
 /// The default but for the time limits: the emulated machine may stand still for a tenth of a second.
 pub fn settings() -> DriveSettings {
