@@ -1,6 +1,6 @@
 //! The process dies in the middle of it.
 
-use std::process::{Child, Command};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use bench_hal::CurrentAmplifier;
@@ -43,7 +43,8 @@ fn a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free() {
 fn the_same_test_in_a_process_of_its_own(interface: &str) -> Child {
     let name = "process::a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free";
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", name, "--nocapture"]).env(INTERFACE, interface).spawn().unwrap()
+    command.args(["--exact", name, "--nocapture"]).env(INTERFACE, interface).stdout(Stdio::null());
+    command.spawn().unwrap()
 }
 
 /// What a user's process does, until it is killed. It dies with a parent that failed, too.
