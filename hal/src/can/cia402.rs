@@ -84,6 +84,20 @@ impl State {
         }
     }
 
+    /// The name, as CiA 402 has it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            State::NotReadyToSwitchOn => "not ready to switch on",
+            State::SwitchOnDisabled => "switch on disabled",
+            State::ReadyToSwitchOn => "ready to switch on",
+            State::SwitchedOn => "switched on",
+            State::OperationEnabled => "operation enabled",
+            State::QuickStopActive => "quick stop active",
+            State::FaultReactionActive => "fault reaction active",
+            State::Fault => "fault",
+        }
+    }
+
     /// The state's bits of a statusword.
     pub const fn bits(self) -> u16 {
         match self {

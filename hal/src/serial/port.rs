@@ -124,7 +124,7 @@ fn set_timeout(terminal: &mut TTYPort, wait: Duration) -> io::Result<()> {
     terminal.set_timeout(wait).map_err(io::Error::from)
 }
 
-fn is_nothing(error: &io::Error) -> bool {
+pub(super) fn is_nothing(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock)
 }
 

@@ -5,6 +5,7 @@ mod any_bytes;
 mod ascii;
 mod capancdt;
 mod faults;
+mod line;
 mod optoncdt;
 mod ownership;
 mod support;

@@ -27,6 +27,7 @@ pub enum Condition {
 const CONTROLLER: u32 = 0x004;
 const NO_ACKNOWLEDGE: u32 = 0x020;
 const BUS_OFF: u32 = 0x040;
+const BUS_ERROR: u32 = 0x080;
 const RESTARTED: u32 = 0x100;
 
 impl Condition {
@@ -41,6 +42,22 @@ impl Condition {
             () if class & NO_ACKNOWLEDGE != 0 => Condition::NoAcknowledge,
             () if controller & 0x40 != 0 || class & RESTARTED != 0 => Condition::Active,
             () => Condition::Noise,
+        }
+    }
+}
+
+impl Condition {
+    /// Class bits and data of an error frame that says so.
+    pub fn encode(self) -> (u32, [u8; 8]) {
+        let controller = |bits: u8| (CONTROLLER, [0, bits, 0, 0, 0, 0, 0, 0]);
+        match self {
+            Condition::BusOff => (BUS_OFF, [0; 8]),
+            Condition::Passive => controller(0x30),
+            Condition::Overflow => controller(0x03),
+            Condition::Warning => controller(0x0C),
+            Condition::NoAcknowledge => (NO_ACKNOWLEDGE, [0; 8]),
+            Condition::Active => (RESTARTED, [0; 8]),
+            Condition::Noise => (BUS_ERROR, [0; 8]),
         }
     }
 }
@@ -67,5 +84,14 @@ mod tests {
             assert_eq!(Condition::decode(class, &data), condition, "class {class:#x} {data:?}");
         }
         assert_eq!(Condition::decode(0x004, &[]), Condition::Noise, "short data says nothing");
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        use Condition::*;
+        for condition in [BusOff, Passive, Overflow, Warning, NoAcknowledge, Active, Noise] {
+            let (class, data) = condition.encode();
+            assert_eq!(Condition::decode(class, &data), condition);
+        }
     }
 }

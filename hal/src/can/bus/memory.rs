@@ -68,6 +68,11 @@ impl Port for MemoryBus {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         Ok(Box::new(self.connect(ids)))
     }
+
+    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+        MemoryBus::tell(self, condition);
+        Ok(())
+    }
 }
 
 impl Mailbox {

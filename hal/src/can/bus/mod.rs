@@ -87,6 +87,9 @@ pub trait Port: Send + Sync {
         let _ = node;
         Ok(Claim::none())
     }
+
+    /// Tells every endpoint of a condition that its controller did not find, for rehearsals. Not every bus can.
+    fn tell(&self, condition: Condition) -> Result<(), BusError>;
 }
 
 /// Work that goes on beside the tick.

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use socketcan::{CanDataFrame, CanFilter, CanFrame as Raw, CanSocket, EmbeddedFrame, Frame, Socket, SocketOptions};
+use socketcan::{
+    CanDataFrame, CanErrorFrame, CanFilter, CanFrame as Raw, CanSocket, EmbeddedFrame, Frame, Socket, SocketOptions,
+};
 use thiserror::Error;
 
 use super::super::frame::{CanFrame, Id};
@@ -12,6 +14,8 @@ use super::{BusError, BusEvent, CanBus, Claim, Condition, Held, Interface, Inter
 #[derive(Clone, Debug)]
 pub struct SocketPort {
     interface: String,
+    /// A virtual interface has no controller and no wire: what is written to it only comes back to other sockets.
+    is_virtual: bool,
 }
 
 /// An interface that cannot be used as it is.
@@ -61,7 +65,7 @@ impl SocketPort {
             (false, ..) => Err(PortError::Down { name, bit_rate }),
             (_, Some(have), _) if have != bit_rate => Err(PortError::BitRate { name, have, want: bit_rate }),
             (_, _, false) => Err(PortError::Unhealthy { name, state: interface.state.unwrap_or("unknown") }),
-            _ => Ok(SocketPort { interface: name }),
+            (_, bit_rate, _) => Ok(SocketPort { interface: name, is_virtual: bit_rate.is_none() }),
         }
     }
 }
@@ -81,6 +85,17 @@ impl Port for SocketPort {
 
     fn claim(&self, node: u8) -> Result<Claim, Held> {
         Claim::new(&self.interface, node)
+    }
+
+    /// On a virtual interface only: to a wire an error frame would go out as a data frame.
+    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+        if !self.is_virtual {
+            return Err(BusError::Other(libc::EOPNOTSUPP));
+        }
+        let io = |error: std::io::Error| BusError::from_io(&error);
+        let (class, data) = condition.encode();
+        let frame = CanErrorFrame::new_error(class, &data).map_err(|_| BusError::Other(libc::EINVAL))?;
+        CanSocket::open(&self.interface).and_then(|socket| socket.write_frame(&frame)).map_err(io)
     }
 }
 

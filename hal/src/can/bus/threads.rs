@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::super::frame::Id;
-use super::{BusError, CanBus, Claim, Held, Host, Port, Running, Task};
+use super::{BusError, CanBus, Claim, Condition, Held, Host, Port, Running, Task};
 
 /// How long a task waits for a frame before it looks at the clock again: a tenth of the shortest time that matters.
 const WAIT: Duration = Duration::from_millis(1);
@@ -20,7 +20,12 @@ pub struct Threads<P> {
 impl<P: Port> Threads<P> {
     /// Time begins now.
     pub fn new(port: P) -> Threads<P> {
-        Threads { port, start: Instant::now() }
+        Threads::since(port, Instant::now())
+    }
+
+    /// Time began at `start`: for hosts that share a clock with others.
+    pub fn since(port: P, start: Instant) -> Threads<P> {
+        Threads { port, start }
     }
 }
 
@@ -35,6 +40,10 @@ impl<P: Port> Port for Threads<P> {
 
     fn claim(&self, node: u8) -> Result<Claim, Held> {
         self.port.claim(node)
+    }
+
+    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+        self.port.tell(condition)
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::super::frame::{CanFrame, Id};
-use super::{BusError, BusEvent, CanBus, Host, MemoryBus, MemoryEndpoint, Port, Running, Task};
+use super::{BusError, BusEvent, CanBus, Condition, Host, MemoryBus, MemoryEndpoint, Port, Running, Task};
 
 const STEP_NS: u64 = 100_000;
 
@@ -60,6 +60,10 @@ impl World {
 impl Port for World {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         Ok(Box::new(WorldEndpoint { world: self.clone(), inner: self.shared.bus.connect(ids) }))
+    }
+
+    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+        Port::tell(self.bus(), condition)
     }
 }
 

@@ -1,25 +1,29 @@
-//! The other end: a simulated CANopen drive, for tests and for rehearsal without hardware.
+//! The other end: a simulated CANopen drive and a simulated VESC, for tests and for rehearsal without hardware.
 //!
-//! [`Device`] is sans-I/O: [`Device::handle`] takes a frame, [`Device::poll`] the passing of time, both give frames to
-//! send. [`DeviceTask`] joins it to a bus. It is written from the standards, not from the driver, so the two check each
+//! Both are an [`ActingAmplifier`]; [`DeviceTask`] joins one to a bus. [`Device`], the drive, is sans-I/O:
+//! [`Device::handle`] takes a frame, [`Device::poll`] the passing of time, both give frames to send. It is written from the standards, not from the driver, so the two check each
 //! other: object dictionary, SDO server, NMT, heartbeat producer and consumer, PDO with the rules of their mapping, and
 //! the state machine of CiA 402.
 //!
 //! What matters of it is [`Device::current_a`]: the current that a real drive would give. It is quantised as in the
 //! drive, and zero unless operation is enabled, whatever the bus says.
 
+mod acting;
 mod dictionary;
 mod objects;
 mod pdo;
 mod power;
 mod task;
+mod vesc;
 
 use std::collections::VecDeque;
 
+pub use acting::ActingAmplifier;
 pub use dictionary::ObjectDictionary;
 pub use objects::DeviceSettings;
 pub use power::Power;
-pub use task::DeviceTask;
+pub use task::{DeviceTask, Follow, Passed};
+pub use vesc::VescDevice;
 
 use super::emcy::Emergency;
 use super::frame::CanFrame;

@@ -1,27 +1,53 @@
-//! Joins the simulated drive to a bus.
+//! Joins an acting amplifier to a bus.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::super::bus::{BusError, BusEvent, CanBus, Host, Running, Task};
 use super::super::frame::CanFrame;
-use super::Device;
+use super::ActingAmplifier;
 
 /// Frames taken in one step, so that a flooded bus cannot stop time.
 const MOST_FRAMES: usize = 256;
 
-/// A simulated drive on a bus. The device is shared: a test asks it for its current and makes it misbehave.
+/// The moment in which an acting device has just heard a frame, or has let time pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Passed {
+    /// The host's clock.
+    pub now_ns: u64,
+    /// Frames heard since the start.
+    pub received: u64,
+    /// Frames sent since the start.
+    pub sent: u64,
+}
+
+/// Sees the device after every frame and every step of time, in the device's thread.
+pub type Follow = Box<dyn FnMut(Passed, &mut dyn ActingAmplifier) + Send>;
+
+/// An acting amplifier on a bus. The device is shared: a test asks it for its current and makes it misbehave.
 pub struct DeviceTask {
     bus: Box<dyn CanBus>,
-    device: Arc<Mutex<Device>>,
+    device: Arc<Mutex<dyn ActingAmplifier>>,
+    follow: Follow,
+    passed: Passed,
     out: Vec<CanFrame>,
 }
 
 impl DeviceTask {
     /// Starts `device` on the bus of `host`; it runs until the handle is dropped.
-    pub fn start(host: &dyn Host, device: Arc<Mutex<Device>>) -> std::io::Result<Running> {
+    pub fn start<D: ActingAmplifier + 'static>(host: &dyn Host, device: Arc<Mutex<D>>) -> std::io::Result<Running> {
+        DeviceTask::start_followed(host, device, Box::new(|_, _| {}))
+    }
+
+    /// The same; `follow` sees what the device does, so that a motor can be moved by it.
+    pub fn start_followed(
+        host: &dyn Host,
+        device: Arc<Mutex<dyn ActingAmplifier>>,
+        follow: Follow,
+    ) -> std::io::Result<Running> {
         let bus = host.endpoint(&[]).map_err(std::io::Error::other)?;
-        host.start("can-device", Box::new(DeviceTask { bus, device, out: Vec::new() }))
+        let task = DeviceTask { bus, device, follow, passed: Passed::default(), out: Vec::new() };
+        host.start("can-device", Box::new(task))
     }
 
     /// Takes what has come, the first within `wait`.
@@ -29,7 +55,7 @@ impl DeviceTask {
         let mut event = self.bus.receive(wait)?;
         for _ in 0..MOST_FRAMES {
             match event {
-                Some(BusEvent::Frame(frame)) => lock(&self.device).handle(&frame, now_ns(), &mut self.out),
+                Some(BusEvent::Frame(frame)) => self.hear(&frame, now_ns()),
                 Some(BusEvent::Condition(_)) => {}
                 None => break,
             }
@@ -37,18 +63,33 @@ impl DeviceTask {
         }
         Ok(())
     }
+
+    fn hear(&mut self, frame: &CanFrame, now_ns: u64) {
+        let mut device = lock(&self.device);
+        device.handle(frame, now_ns, &mut self.out);
+        self.passed.received += 1;
+        self.passed.now_ns = now_ns;
+        (self.follow)(self.passed, &mut *device);
+    }
+
+    fn poll(&mut self, now_ns: u64) {
+        let mut device = lock(&self.device);
+        device.poll(now_ns, &mut self.out);
+        self.passed.now_ns = now_ns;
+        (self.follow)(self.passed, &mut *device);
+    }
 }
 
 impl Task for DeviceTask {
     fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
         let taken = self.take(now_ns, wait);
-        lock(&self.device).poll(now_ns(), &mut self.out);
-        let bus = &mut self.bus;
-        let sent = self.out.drain(..).try_for_each(|frame| bus.send(&frame));
+        self.poll(now_ns());
+        let (bus, passed) = (&mut self.bus, &mut self.passed);
+        let sent = self.out.drain(..).try_for_each(|frame| bus.send(&frame).map(|()| passed.sent += 1));
         taken.and(sent)
     }
 }
 
-fn lock(device: &Mutex<Device>) -> MutexGuard<'_, Device> {
+fn lock<'a>(device: &'a Mutex<dyn ActingAmplifier + 'static>) -> MutexGuard<'a, dyn ActingAmplifier + 'static> {
     device.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,55 +1,36 @@
+use std::sync::Mutex;
+
 use proptest::prelude::*;
 
 use super::super::bus::{Port, World};
+use super::super::device::{ActingAmplifier, DeviceFault, DeviceTask, VescDevice};
 use super::*;
 
 const SETTINGS: VescSettings =
     VescSettings { node: 23, current_limit_a: 60.0, status_timeout: Duration::from_millis(100) };
 
-/// A VESC as its documentation tells: STATUS every 20 ms, lets go after 0.5 s.
-struct Device {
-    bus: Box<dyn CanBus>,
-    current_ma: Arc<AtomicI32>,
-    mute: Arc<AtomicBool>,
-    commanded_ns: u64,
-    due_ns: u64,
-}
-
-impl Task for Device {
-    fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
-        if let Some(BusEvent::Frame(frame)) = self.bus.receive(wait)? {
-            self.commanded_ns = now_ns();
-            self.current_ma.store(i32::from_be_bytes(frame.data().try_into().unwrap()), Ordering::Release);
-        }
-        if now_ns() - self.commanded_ns > 500_000_000 {
-            self.current_ma.store(0, Ordering::Release);
-        }
-        if now_ns() >= self.due_ns && !self.mute.load(Ordering::Acquire) {
-            self.due_ns = now_ns() + 20_000_000;
-            let tenths = (self.current_ma.load(Ordering::Acquire) / 100) as i16;
-            let [high, low] = tenths.to_be_bytes();
-            self.bus.send(&CanFrame::new(status_id(23), [0, 0, 0, 0, high, low, 0, 0]))?;
-        }
-        Ok(())
-    }
-}
-
 struct Rig {
     vesc: Vesc,
     world: World,
-    current_ma: Arc<AtomicI32>,
-    mute: Arc<AtomicBool>,
-    _device: Running,
+    device: Arc<Mutex<VescDevice>>,
+    _running: Running,
+}
+
+impl Rig {
+    fn current_a(&self) -> f64 {
+        self.device.lock().unwrap().current_a()
+    }
+
+    fn inject(&self, fault: DeviceFault) {
+        self.device.lock().unwrap().inject(fault);
+    }
 }
 
 fn rig() -> Rig {
-    let (world, current_ma, mute) = (World::default(), Arc::<AtomicI32>::default(), Arc::<AtomicBool>::default());
-    let bus = world.endpoint(&[Id::extended(1 << 8 | 23)]).unwrap();
-    let device =
-        Device { bus, current_ma: Arc::clone(&current_ma), mute: Arc::clone(&mute), commanded_ns: 0, due_ns: 0 };
-    let running = world.start("device", Box::new(device)).unwrap();
+    let (world, device) = (World::default(), Arc::new(Mutex::new(VescDevice::new(23))));
+    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
     let vesc = Vesc::open(SETTINGS, Box::new(world.clone())).unwrap();
-    Rig { vesc, world, current_ma, mute, _device: running }
+    Rig { vesc, world, device, _running: running }
 }
 
 #[test]
@@ -71,35 +52,50 @@ fn a_vesc_follows_and_tells_its_current() {
     assert_eq!(rig.vesc.command(99.0), Ok(60.0), "limited");
     assert_eq!(rig.vesc.command(-1.2345), Ok(-1.234));
     rig.world.sleep(Duration::from_millis(40));
-    assert_eq!(rig.current_ma.load(Ordering::Acquire), -1234);
+    assert_eq!(rig.current_a(), -1.234);
     assert!((rig.vesc.actual_current_a().unwrap() + 1.2).abs() < 1e-9, "0.1 A is what STATUS tells");
     rig.vesc.disable();
     rig.world.sleep(Duration::from_millis(1));
-    assert_eq!((rig.current_ma.load(Ordering::Acquire), rig.vesc.status()), (0, AmplifierStatus::Disabled));
+    assert_eq!((rig.current_a(), rig.vesc.status()), (0.0, AmplifierStatus::Disabled));
 }
 
 #[test]
 fn a_silent_vesc_and_a_dead_bus_are_faults_until_cleared() {
-    for dead_bus in [false, true] {
+    let ways: [(u32, fn(&Rig)); 4] = [
+        (SILENT, |rig| rig.inject(DeviceFault::Mute)),
+        (SILENT, |rig| rig.inject(DeviceFault::ShortFrames)),
+        (SILENT, |rig| rig.inject(DeviceFault::Late(200))),
+        (BUS_OFF, |rig| rig.world.bus().tell(Condition::BusOff)),
+    ];
+    for (code, fail) in ways {
         let mut rig = rig();
         rig.vesc.enable().unwrap();
         rig.vesc.command(1.0).unwrap();
-        rig.mute.store(!dead_bus, Ordering::Release);
-        if dead_bus {
-            rig.world.bus().tell(Condition::BusOff);
-        }
+        fail(&rig);
         rig.world.sleep(Duration::from_millis(130));
-        let code = if dead_bus { BUS_OFF } else { SILENT };
         assert_eq!(rig.vesc.status(), AmplifierStatus::Fault(code));
         assert_eq!(rig.vesc.command(1.0).unwrap_err().code, i64::from(code));
         rig.world.sleep(Duration::from_millis(1));
-        assert_eq!(rig.current_ma.load(Ordering::Acquire), 0);
-        rig.mute.store(false, Ordering::Release);
-        rig.world.sleep(Duration::from_millis(40));
+        assert_eq!(rig.current_a(), 0.0);
+        rig.inject(DeviceFault::None);
+        rig.world.sleep(Duration::from_millis(240));
         rig.vesc.reset_fault().unwrap();
         assert_eq!(rig.vesc.status(), AmplifierStatus::Disabled, "cleared is not enabled");
         rig.vesc.enable().unwrap();
     }
+}
+
+#[test]
+fn a_vesc_that_no_longer_hears_us_lets_go_by_itself() {
+    let mut rig = rig();
+    rig.vesc.enable().unwrap();
+    rig.vesc.command(1.0).unwrap();
+    rig.world.sleep(Duration::from_millis(1));
+    rig.inject(DeviceFault::Unplugged);
+    rig.world.sleep(Duration::from_millis(490));
+    assert_eq!((rig.current_a(), rig.vesc.status()), (1.0, AmplifierStatus::Fault(SILENT)));
+    rig.world.sleep(Duration::from_millis(20));
+    assert_eq!(rig.current_a(), 0.0);
 }
 
 #[test]
@@ -108,9 +104,9 @@ fn a_loop_that_stands_still_ends_with_no_current() {
     rig.vesc.enable().unwrap();
     rig.vesc.command(2.0).unwrap();
     rig.world.sleep(Duration::from_millis(490));
-    assert_eq!(rig.current_ma.load(Ordering::Acquire), 2000);
+    assert_eq!(rig.current_a(), 2.0);
     rig.world.sleep(Duration::from_millis(20));
-    assert_eq!(rig.current_ma.load(Ordering::Acquire), 0);
+    assert_eq!(rig.current_a(), 0.0);
 }
 
 proptest! {

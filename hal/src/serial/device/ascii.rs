@@ -74,6 +74,10 @@ impl SimulatedProbe for AsciiDevice {
         self.ailing.send(lines, now_ns)
     }
 
+    fn due_ns(&self) -> Option<u64> {
+        self.sampler.next_ns
+    }
+
     fn ask_fault(&mut self, fault: Fault) {
         if fault == Fault::Reset {
             self.heard.clear();

@@ -74,6 +74,10 @@ impl SimulatedProbe for CapancdtDevice {
         self.ailing.send(Vec::new(), now_ns)
     }
 
+    fn due_ns(&self) -> Option<u64> {
+        self.sampler.next_ns
+    }
+
     fn ask_fault(&mut self, fault: Fault) {
         if fault == Fault::Reset {
             self.counter = 0;

@@ -1,7 +1,9 @@
 //! Pretend probes: the device's side of each protocol, to rehearse without hardware and to test.
 //!
-//! No clock and no port here either: whoever carries the bytes calls [`SimulatedProbe::handle`] with what the host sent
-//! and [`SimulatedProbe::poll`] often, with the time and the true position of the stage, and sends what they return.
+//! The probes know no clock and no port either: whoever carries the bytes calls [`SimulatedProbe::handle`] with what the
+//! host sent and [`SimulatedProbe::poll`] often, with the time and the true position of the stage, and sends what they
+//! return. [`ProbeTask`] does so in a thread, on a [`Line`]: a pseudo terminal or a port.
+//!
 //! Positions are those of the probe: metres from the start of its range (capaNCDT, optoNCDT) or from its zero (ASCII).
 //!
 //! A slow caller does not slow the probe down: `poll` makes all measurements that fell due since it was called last, of
@@ -10,12 +12,16 @@
 mod ascii;
 mod capancdt;
 mod fault;
+mod line;
 mod optoncdt;
+mod task;
 
 pub use self::ascii::AsciiDevice;
 pub use self::capancdt::CapancdtDevice;
 pub use self::fault::Fault;
+pub use self::line::Line;
 pub use self::optoncdt::OptoncdtDevice;
+pub use self::task::{Carried, ProbeTask, Shared};
 
 use super::{Protocol, SerialError};
 
@@ -26,6 +32,9 @@ pub trait SimulatedProbe: Send {
 
     /// Lets time pass; returns what the probe sends by itself, or has held back.
     fn poll(&mut self, now_ns: u64, position_m: f64) -> Vec<u8>;
+
+    /// When the next measurement falls due; `None` before the first call of `poll` or `handle`.
+    fn due_ns(&self) -> Option<u64>;
 
     /// Makes the probe misbehave until another fault is asked for. [`Fault::Reset`] happens once.
     fn ask_fault(&mut self, fault: Fault);

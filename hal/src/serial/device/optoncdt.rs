@@ -42,6 +42,10 @@ impl SimulatedProbe for OptoncdtDevice {
         self.ailing.send(bytes, now_ns)
     }
 
+    fn due_ns(&self) -> Option<u64> {
+        self.sampler.next_ns
+    }
+
     fn ask_fault(&mut self, fault: Fault) {
         self.cut |= fault == Fault::Reset;
         self.ailing.ask(fault);
