@@ -5,7 +5,9 @@
 //! The same seed and settings give the same readings, bit for bit, on any x86-64 or ARM machine: sums are in a fixed
 //! order, every transcendental function comes from the `libm` crate, and no library picks its kernel by the processor.
 
+mod course;
 mod floor;
+mod live;
 mod noise;
 mod probe;
 mod setpoints;
@@ -15,16 +17,17 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProb
 
 use crate::config::{Config, UnmodelledMode};
 use crate::plant::{self, Modal, Mode, PlantError};
+use course::Course;
 use probe::Probe;
-use setpoints::Setpoints;
-use stage::Stage;
+
+pub use live::LiveStage;
+pub use probe::Sensor;
 
 /// The simulated amplifier, stage and probe.
 #[derive(Clone, Debug)]
 pub struct SimulatedRig {
-    stage: Stage,
+    course: Course,
     status: AmplifierStatus,
-    setpoints: Setpoints,
     /// From a command to its action, in ticks.
     delay: f64,
     accepted_a: f64,
@@ -43,9 +46,8 @@ impl SimulatedRig {
         let latency = config.amplifier.latency_s * config.servo.rate_hz;
         let delay = f64::from(config.servo.computing_delay_periods) + latency;
         Ok(SimulatedRig {
-            stage: Stage::new(config, &modes(config)?),
+            course: Course::new(config, delay)?,
             status: AmplifierStatus::Disabled,
-            setpoints: Setpoints::new(delay),
             delay,
             accepted_a: 0.0,
             current_limit_a: config.amplifier.current_limit_a,
@@ -59,30 +61,18 @@ impl SimulatedRig {
 
     /// Where the stage really is, in metres: for tests and studies, nothing behind the boundary can see it.
     pub fn true_position_m(&self) -> f64 {
-        self.stage.position_m()
+        self.course.position_m()
     }
 
     /// The period after `tick`.
     fn advance(&mut self, tick: u64) {
-        let from = tick as f64;
         if self.in_step {
-            return self.stage.advance(self.setpoints.at(from));
+            return self.course.advance(tick);
         }
-        self.stage.shake();
-        let steps = self.stage.fine_steps();
-        for step in 0..steps {
-            let at = |step: usize| from + step as f64 / steps as f64;
-            self.advance_finely(at(step), at(step + 1));
+        for step in 0..self.course.fine_steps() {
+            let passed = self.course.advance_finely(tick, step);
+            self.probe.watch(passed.to, |time| passed.position_m(time));
         }
-    }
-
-    /// One fine step, and what the probe sees during it.
-    fn advance_finely(&mut self, from: f64, to: f64) {
-        let before = self.stage.place();
-        let setpoint_a = self.setpoints.mean(from, to);
-        self.stage.advance_finely(setpoint_a);
-        let (after, length_s) = (self.stage.place(), self.stage.fine_step_s());
-        self.probe.watch(to, |time| before.towards(&after, length_s, (time - from) / (to - from)));
     }
 
     /// The nearest step, limited in slope and size.
@@ -128,13 +118,13 @@ impl CurrentAmplifier for SimulatedRig {
             return Err(DeviceError { what: "the simulated amplifier is disabled", remedy, code: 0 });
         }
         self.accepted_a = self.accept(current_a);
-        self.setpoints.push(self.tick.unwrap_or_default() as f64 + self.delay, self.accepted_a);
+        self.course.push(self.tick.unwrap_or_default() as f64 + self.delay, self.accepted_a);
         Ok(self.accepted_a)
     }
 
     fn disable(&mut self) {
         self.status = AmplifierStatus::Disabled;
-        self.setpoints.clear();
+        self.course.clear();
         self.accepted_a = 0.0;
     }
 
@@ -149,6 +139,6 @@ impl DisplacementProbe for SimulatedRig {
             self.advance(tick);
         }
         self.tick = Some(now.number);
-        if self.in_step { self.probe.measure(self.stage.position_m()) } else { self.probe.latest(now.number as f64) }
+        if self.in_step { self.probe.measure(self.course.position_m()) } else { self.probe.latest(now.number as f64) }
     }
 }

@@ -11,12 +11,35 @@ use crate::config::Config;
 /// where two oscillators drift past each other; no simple ratio, so that they fill the period evenly.
 const CLOCK_ERROR: f64 = 0.618_034e-3;
 
-/// The probe, with what it has measured and not yet told. Times are in ticks since the start.
+/// What lies between a position and the number that a probe makes of it: noise and quantisation.
 #[derive(Clone, Debug)]
-pub(super) struct Probe {
+pub struct Sensor {
     noise: Gaussian,
     noise_rms_m: f64,
     quantum_m: f64,
+}
+
+impl Sensor {
+    /// The sensor of a configuration.
+    pub fn new(config: &Config) -> Self {
+        Sensor {
+            noise: Gaussian::new(config.sim.seed, 0),
+            noise_rms_m: config.sim.probe_noise_rms_m,
+            quantum_m: config.sim.probe_quantisation_m,
+        }
+    }
+
+    /// What is measured at `position_m`, in metres.
+    pub fn sense(&mut self, position_m: f64) -> f64 {
+        let noisy_m = position_m + self.noise_rms_m * self.noise.next();
+        if self.quantum_m > 0.0 { libm::round(noisy_m / self.quantum_m) * self.quantum_m } else { noisy_m }
+    }
+}
+
+/// The probe, with what it has measured and not yet told. Times are in ticks since the start.
+#[derive(Clone, Debug)]
+pub(super) struct Probe {
+    sensor: Sensor,
     half_range_m: f64,
     sequence: u64,
     /// From one measurement to the next.
@@ -38,9 +61,7 @@ impl Probe {
         let period = config.probe.rate_hz.map_or(1.0, |probe_hz| rate_hz / probe_hz * (1.0 + CLOCK_ERROR));
         let age = config.probe.age_at_arrival_s() * rate_hz;
         let mut probe = Probe {
-            noise: Gaussian::new(config.sim.seed, 0),
-            noise_rms_m: config.sim.probe_noise_rms_m,
-            quantum_m: config.sim.probe_quantisation_m,
+            sensor: Sensor::new(config),
             half_range_m: config.probe.range_m / 2.0,
             sequence: 0,
             period,
@@ -59,12 +80,10 @@ impl Probe {
 
     /// A measurement of `position_m`, of no age.
     pub(super) fn measure(&mut self, position_m: f64) -> Reading {
-        let noisy_m = position_m + self.noise_rms_m * self.noise.next();
-        let quantised_m =
-            if self.quantum_m > 0.0 { libm::round(noisy_m / self.quantum_m) * self.quantum_m } else { noisy_m };
-        let validity = if quantised_m.abs() <= self.half_range_m { Validity::Valid } else { Validity::OutOfRange };
+        let sensed_m = self.sensor.sense(position_m);
+        let validity = if sensed_m.abs() <= self.half_range_m { Validity::Valid } else { Validity::OutOfRange };
         self.sequence += 1;
-        let position_m = quantised_m.clamp(-self.half_range_m, self.half_range_m);
+        let position_m = sensed_m.clamp(-self.half_range_m, self.half_range_m);
         Reading { position_m, sequence: self.sequence, age_ns: 0, validity }
     }
 

@@ -61,6 +61,11 @@ impl Stage {
         }
     }
 
+    /// The current in amperes.
+    pub(super) fn current_a(&self) -> f64 {
+        self.motion.current_a
+    }
+
     /// Displacement at the probe in metres.
     pub(super) fn position_m(&self) -> f64 {
         self.whole.position_m(&self.motion)
