@@ -50,6 +50,7 @@
 //! force positive displacement; u = C (r - y). Micrometres appear in controllers' gains, which are printed in amperes per
 //! micrometre, and in what a person reads.
 
+pub mod acting;
 pub mod calibration;
 pub mod cli;
 pub mod config;

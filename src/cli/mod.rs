@@ -6,6 +6,7 @@ mod chirp;
 mod choice;
 mod config;
 mod control;
+mod device;
 mod doctor;
 mod identify;
 mod margins;
@@ -51,6 +52,8 @@ enum Command {
     Replay(replay::Args),
     /// Make a cut-off recording readable and say what was lost
     Recover(recover::Args),
+    /// Act as the configured devices, with the simulated stage behind them: a rehearsal without hardware
+    Device(device::Args),
     /// The effective settings, their validation, their schema
     Config(config::Args),
     /// Could a run start? System, devices, recordings, each finding with its remedy; nothing moves
@@ -68,6 +71,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Identify(args) => identify::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Device(args) => device::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Doctor(args) => doctor::run(&args),
     }
