@@ -1,18 +1,18 @@
-//! Set-points and the stage that they move: by whole periods, or in fine steps with every moment between them.
+//! Set-points and the stage that they move, with every moment between two steps.
 
 use super::setpoints::Setpoints;
 use super::stage::{Place, Stage};
 use crate::config::Config;
 use crate::plant::PlantError;
 
-/// The stage under its set-points. Times are in ticks since the start.
+/// The stage under its set-points. Times are in periods since the start.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
     stage: Stage,
     setpoints: Setpoints,
 }
 
-/// A fine step, and where the stage was during it.
+/// A step, and where the stage was during it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passed {
     pub(super) from: f64,
@@ -32,10 +32,10 @@ impl Passed {
 }
 
 impl Course {
-    /// At rest, without set-points; room for what `delay_ticks` hold back.
-    pub(super) fn new(config: &Config, delay_ticks: f64) -> Result<Self, PlantError> {
-        let stage = Stage::new(config, &super::modes(config)?);
-        Ok(Course { stage, setpoints: Setpoints::new(delay_ticks) })
+    /// At rest, to be carried by periods of `period_s`; room for the set-points that `delay` periods hold back.
+    pub(super) fn new(config: &Config, period_s: f64, delay: f64) -> Result<Self, PlantError> {
+        let stage = Stage::new(config, &super::modes(config)?, period_s);
+        Ok(Course { stage, setpoints: Setpoints::new(delay) })
     }
 
     /// Takes a set-point that acts from `due`.
@@ -58,20 +58,30 @@ impl Course {
         self.stage.fine_steps()
     }
 
-    /// The period after `tick`, its set-point held.
-    pub(super) fn advance(&mut self, tick: u64) {
-        self.stage.advance(self.setpoints.at(tick as f64));
+    /// The period `number`, the set-point at its start held.
+    pub(super) fn advance(&mut self, number: u64) {
+        self.stage.advance(self.setpoints.at(number as f64));
     }
 
-    /// The fine step `step` of the period after `tick`; steps come in their order.
-    pub(super) fn advance_finely(&mut self, tick: u64, step: usize) -> Passed {
+    /// The period `number`, with the mean of the set-points during it.
+    pub(super) fn pass(&mut self, number: u64) -> Passed {
+        let length_s = self.stage.period_s();
+        self.step(number as f64, number as f64 + 1.0, length_s, Stage::advance)
+    }
+
+    /// The fine step `step` of the period `number`; steps come in their order.
+    pub(super) fn pass_finely(&mut self, number: u64, step: usize) -> Passed {
         if step == 0 {
             self.stage.shake();
         }
-        let at = |step: usize| tick as f64 + step as f64 / self.stage.fine_steps() as f64;
-        let (from, to, before) = (at(step), at(step + 1), self.stage.place());
-        self.stage.advance_finely(self.setpoints.mean(from, to));
-        let (after, current_a, length_s) = (self.stage.place(), self.stage.current_a(), self.stage.fine_step_s());
-        Passed { from, to, current_a, before, after, length_s }
+        let at = |step: usize| number as f64 + step as f64 / self.stage.fine_steps() as f64;
+        let (from, to, length_s) = (at(step), at(step + 1), self.stage.fine_step_s());
+        self.step(from, to, length_s, Stage::advance_finely)
+    }
+
+    fn step(&mut self, from: f64, to: f64, length_s: f64, advance: fn(&mut Stage, f64)) -> Passed {
+        let before = self.stage.place();
+        advance(&mut self.stage, self.setpoints.mean(from, to));
+        Passed { from, to, current_a: self.stage.current_a(), before, after: self.stage.place(), length_s }
     }
 }

@@ -46,7 +46,7 @@ impl SimulatedRig {
         let latency = config.amplifier.latency_s * config.servo.rate_hz;
         let delay = f64::from(config.servo.computing_delay_periods) + latency;
         Ok(SimulatedRig {
-            course: Course::new(config, delay)?,
+            course: Course::new(config, config.servo.period_s(), delay)?,
             status: AmplifierStatus::Disabled,
             delay,
             accepted_a: 0.0,
@@ -70,7 +70,7 @@ impl SimulatedRig {
             return self.course.advance(tick);
         }
         for step in 0..self.course.fine_steps() {
-            let passed = self.course.advance_finely(tick, step);
+            let passed = self.course.pass_finely(tick, step);
             self.probe.watch(passed.to, |time| passed.position_m(time));
         }
     }

@@ -41,8 +41,8 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    pub(super) fn new(config: &Config, modes: &[Mode]) -> Self {
-        let period_s = config.servo.period_s();
+    /// The stage of a configuration, to be carried by periods of `period_s`.
+    pub(super) fn new(config: &Config, modes: &[Mode], period_s: f64) -> Self {
         let fine_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
         let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
         let sampled = |period_s| Sampled::new(modes, bandwidth_hz, force_constant, period_s);
@@ -79,6 +79,11 @@ impl Stage {
     /// Velocity at the probe in metres per second.
     fn velocity_m_per_s(&self) -> f64 {
         self.whole.velocity_m_per_s(&self.motion)
+    }
+
+    /// Length of a period in seconds.
+    pub(super) fn period_s(&self) -> f64 {
+        self.whole.period_s
     }
 
     /// Length of a fine step in seconds.
