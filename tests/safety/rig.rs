@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use bench::config::{Config, Source, load};
+use bench::recording::{Header, Recorder, Recording};
 use bench::rt::arming::State;
 use bench::rt::clock::{Moment, Virtual};
 use bench::rt::interlock::Interlocks;
@@ -11,7 +12,9 @@ use bench::rt::outlet::Outlet;
 use bench::rt::program::{Decision, Program};
 use bench::rt::record::{Event, EventKind, Published, TickRecord};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
-use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity};
+use bench_hal::{
+    AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig, Tick, Validity,
+};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};
@@ -99,8 +102,14 @@ impl<R: Rig> CurrentAmplifier for Watched<R> {
     fn status(&self) -> AmplifierStatus {
         self.inner.status()
     }
+    fn actual_current_a(&self) -> Option<f64> {
+        self.inner.actual_current_a()
+    }
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         self.inner.reset_fault()
+    }
+    fn explain(&self, code: u32) -> Option<FaultText> {
+        self.inner.explain(code)
     }
 }
 
@@ -244,6 +253,29 @@ impl Bench {
         let told = self.told();
         let last = told.iter().rev().find(|(_, told)| matches!(told, Told::Enable { .. } | Told::Disable));
         matches!(last, Some((_, Told::Enable { refused: false })))
+    }
+
+    /// All that was published so far, written as a recording and read back; with the folder that it lies in.
+    pub fn recorded(&self) -> (tempfile::TempDir, Recording) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("loop.mcap");
+        let header = Header { period_ns: (self.clock.period_s * 1e9).round() as u64, ..Header::default() };
+        let mut recorder = Recorder::create(&path, &header).expect("a new file");
+        self.all.iter().for_each(|published| recorder.record(published).expect("a good disk"));
+        recorder.finish(&[]).expect("a good disk");
+        (folder, Recording::open(&path).expect("a recording"))
+    }
+
+    /// Every tick is there or counted as missed, and the trip with its reason.
+    pub fn prove_that_the_recording_is_complete(&self, at: u64, reason: &str) {
+        let (_folder, recording) = self.recorded();
+        let last = self.ticks().last().expect("ticks").tick;
+        assert!(!recording.truncated());
+        assert_eq!((recording.first_tick(), recording.last_tick(), recording.lost_records()), (0, last, 0));
+        assert_eq!(recording.tick_count() + recording.overruns(), last + 1, "every tick is there or counted as missed");
+        let is_it =
+            |event: &Event| event.tick == at && matches!(event.kind, EventKind::Trip(trip) if trip.reason() == reason);
+        assert!(recording.events().iter().any(is_it), "the trip is in the recording: {:?}", recording.events());
     }
 
     pub fn servo(&self) -> &Servo {

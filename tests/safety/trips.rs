@@ -1,6 +1,5 @@
 //! Every reason to trip, from both sides of its limit.
 use bench::config::Config;
-use bench::recording::{Header, Recorder, Recording};
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{EventKind, flag};
 use bench::rt::servo::Order;
@@ -54,25 +53,8 @@ fn prove_that_it_is_off(bench: &Bench, at: u64, reason: &str) -> Trip {
     };
     assert_eq!(bench.events().iter().filter(|e| tripped(e)).count(), 1);
     assert_eq!(bench.servo().last_trip(), Some((trip, at)));
-    prove_that_the_recording_is_complete(bench, at, reason);
+    bench.prove_that_the_recording_is_complete(at, reason);
     trip
-}
-
-fn prove_that_the_recording_is_complete(bench: &Bench, at: u64, reason: &str) {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("trip.mcap");
-    let header = Header { period_ns: 200_000, ..Header::default() };
-    let mut recorder = Recorder::create(&path, &header).expect("a new file");
-    bench.all.iter().for_each(|published| recorder.record(published).expect("a good disk"));
-    recorder.finish(&[]).expect("a good disk");
-
-    let recording = Recording::open(&path).expect("a recording");
-    let last = bench.ticks().last().expect("ticks").tick;
-    assert!(!recording.truncated());
-    assert_eq!((recording.first_tick(), recording.last_tick(), recording.lost_records()), (0, last, 0));
-    assert_eq!(recording.tick_count() + recording.overruns(), last + 1, "every tick is there or counted as missed");
-    let trip = recording.events().iter().find(|e| matches!(e.kind, EventKind::Trip(trip) if trip.reason() == reason));
-    assert_eq!(trip.expect("the trip is in the recording").tick, at);
 }
 
 /// The tick of the first trip, every tick being late by so many; none within 40 s is a failure.
