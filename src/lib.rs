@@ -11,7 +11,7 @@
 //!        v           v            v
 //!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe)
 //!                             |                               ^  opens what the configuration names
-//!                             v  wait-free ring            devices <---- calibration
+//!                             v  wait-free ring            devices <---- calibration; acting: the other end of the wires
 //!                         recording (MCAP) ----> identify ----> report
 //!                                   \______ session (one run, its analysis, its replay) ______ cli
 //! ```
@@ -26,6 +26,7 @@
 //! | margins of a loop | [`control::ClosedLoop`] |
 //! | zeros, signs, sequence of dominant modes | [`plant`] |
 //! | what the simulated stage does | [`sim`] |
+//! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |
 //! | what `bench doctor` looks at | [`doctor`]: one file a subject, facts apart from verdicts |
 //! | which devices there are, and how they are opened | [`devices`] |
@@ -43,6 +44,7 @@
 //! | excitation | `excitation/NAME.rs` with [`excitation::Excitation`] | where [`session::Plan::program`] chooses |
 //! | reference | a struct in `excitation/reference.rs` | a variant of [`config::ReferenceSettings`] and its arm |
 //! | device | below `hal/src/`, with the traits of [`bench_hal`] | a variant in `config/devices.rs` and its arm in [`devices`] |
+//! | fault of an acting device | below `hal/src/`, where the device acts | in `acting/fault.rs` |
 //!
 //! # Conventions
 //!

@@ -189,7 +189,7 @@ fn follow(stage: Stage, journal: Journal, tally: Arc<Tally>) -> Follow {
             state = device.state();
             write("state", state, None);
         }
-        match watch.see(now_ns, current_a) {
+        match watch.see(now_ns, current_a, device.is_enabled()) {
             Some(Turned::On) => write("current on", state, None),
             Some(Turned::Off { since_s }) => write("current off", state, Some(since_s)),
             None => {}

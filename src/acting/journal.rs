@@ -59,7 +59,8 @@ impl Journal {
     }
 }
 
-/// Current on and off: zero counts as off only after a while, for a sweep passes through zero all the time.
+/// Current on and off: while the power stage is enabled, zero counts as off only after a while, for a run passes through
+/// zero all the time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CurrentWatch {
     is_on: bool,
@@ -74,16 +75,16 @@ pub(super) enum Turned {
 }
 
 impl CurrentWatch {
-    /// So long a current must be zero to be off.
-    const OFF_NS: u64 = 20_000_000;
+    /// So long a current must be zero to be off, if it could flow.
+    const OFF_NS: u64 = 250_000_000;
 
-    pub(super) fn see(&mut self, now_ns: u64, current_a: f64) -> Option<Turned> {
+    pub(super) fn see(&mut self, now_ns: u64, current_a: f64, is_enabled: bool) -> Option<Turned> {
         if current_a != 0.0 {
             self.zero_since_ns = None;
             return (!std::mem::replace(&mut self.is_on, true)).then_some(Turned::On);
         }
         let since_ns = *self.zero_since_ns.get_or_insert(now_ns);
-        let is_over = self.is_on && now_ns.saturating_sub(since_ns) >= Self::OFF_NS;
+        let is_over = self.is_on && (!is_enabled || now_ns.saturating_sub(since_ns) >= Self::OFF_NS);
         self.is_on &= !is_over;
         is_over.then_some(Turned::Off { since_s: seconds(since_ns) })
     }
@@ -94,15 +95,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_current_is_off_when_it_has_been_zero_for_a_while_and_since_it_became_zero() {
+    fn a_current_is_off_when_none_can_flow_or_when_it_has_been_zero_for_a_while() {
         let mut watch = CurrentWatch::default();
-        let ms = |ms: u64| ms * 1_000_000;
-        assert_eq!(watch.see(ms(0), 0.0), None, "off from the start is no news");
-        assert_eq!(watch.see(ms(10), 0.5), Some(Turned::On));
-        assert_eq!(watch.see(ms(11), 0.0), None, "a sweep passes through zero");
-        assert_eq!(watch.see(ms(12), -0.5), None);
-        assert_eq!([20, 39].map(|at| watch.see(ms(at), 0.0)), [None; 2]);
-        assert_eq!(watch.see(ms(40), 0.0), Some(Turned::Off { since_s: 0.02 }));
-        assert_eq!(watch.see(ms(80), 0.0), None);
+        let mut see = |ms: u64, current_a, is_enabled| watch.see(ms * 1_000_000, current_a, is_enabled);
+        assert_eq!(see(0, 0.0, false), None, "off from the start is no news");
+        assert_eq!(see(10, 0.5, true), Some(Turned::On));
+        assert_eq!(see(11, 0.0, true), None, "a sweep passes through zero");
+        assert_eq!(see(12, -0.5, true), None);
+        assert_eq!([see(20, 0.0, true), see(269, 0.0, true)], [None; 2]);
+        assert_eq!(see(270, 0.0, true), Some(Turned::Off { since_s: 0.02 }));
+        assert_eq!(see(900, 0.0, true), None);
+        assert_eq!(see(1000, 0.1, true), Some(Turned::On));
+        assert_eq!(see(1001, 0.0, false), Some(Turned::Off { since_s: 1.001 }), "at once");
     }
 }

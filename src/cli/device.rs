@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::runtime::Runtime;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::options::{BenchOptions, print_json};
 use super::{CliError, Outcome};
@@ -100,11 +101,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     args.check()?;
     let config = args.bench.load(Purpose::Model, &args.sets())?;
     let log = args.log.as_ref().map(Log::create).transpose()?;
+    let (runtime, signals) = signals().map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
     let rehearsal = Rehearsal::start(&config, &args.cast())?;
     let schedule = Schedule::new(&args.faults);
     schedule.steps().try_for_each(|(word, fault)| rehearsal.check(word, *fault))?;
     let mut session = Session { rehearsal, schedule, log, typed: listen(), args, is_over: false };
-    session.serve()?;
+    runtime.block_on(session.serve(signals))?;
     if args.bench.json {
         print_json(&session.rehearsal.summary())?;
     }
@@ -122,22 +124,16 @@ struct Session<'a> {
 
 impl Session<'_> {
     /// Serves until a signal, `quit`, or the end of the time.
-    fn serve(&mut self) -> Result<(), CliError> {
-        let failed = |e: std::io::Error| CliError::Failed(format!("cannot watch for signals: {e}"));
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-        runtime.block_on(async {
-            let mut interrupt = signal(SignalKind::interrupt()).map_err(failed)?;
-            let mut terminate = signal(SignalKind::terminate()).map_err(failed)?;
-            let mut beat = tokio::time::interval(BEAT);
-            while !self.is_over {
-                tokio::select! {
-                    _ = beat.tick() => self.look()?,
-                    _ = interrupt.recv() => self.is_over = true,
-                    _ = terminate.recv() => self.is_over = true,
-                }
+    async fn serve(&mut self, [mut interrupt, mut terminate]: [Signal; 2]) -> Result<(), CliError> {
+        let mut beat = tokio::time::interval(BEAT);
+        while !self.is_over {
+            tokio::select! {
+                _ = beat.tick() => self.look()?,
+                _ = interrupt.recv() => self.is_over = true,
+                _ = terminate.recv() => self.is_over = true,
             }
-            self.tell()
-        })
+        }
+        self.tell()
     }
 
     fn look(&mut self) -> Result<(), CliError> {
@@ -176,6 +172,16 @@ impl Session<'_> {
         }
         Ok(())
     }
+}
+
+/// From here on Ctrl-C and SIGTERM end a rehearsal in order: before anything is served that must be taken away again.
+fn signals() -> std::io::Result<(Runtime, [Signal; 2])> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let watched = {
+        let _inside = runtime.enter();
+        [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?]
+    };
+    Ok((runtime, watched))
 }
 
 /// Lines of standard input, read by a thread that ends with the program; its end is no order.

@@ -1,0 +1,212 @@
+//! `bench device` as a program: what it serves, what it says, what it refuses. (What needs a CAN interface is tested in a
+//! machine that has one.)
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use bench::config::{Config, Source, load};
+use bench_hal::serial::SerialProbe;
+use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
+
+/// How long a test waits for what must come: a guard against waiting for ever, no figure of merit.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn bench(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
+    command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn refusal(arguments: &[&str]) -> String {
+    let Output { status, stdout, stderr } = bench(arguments).output().expect("it runs");
+    let said = String::from_utf8_lossy(&stderr).into_owned();
+    assert!(status.code() == Some(2) && stdout.is_empty(), "{arguments:?}: {status:?} {said}");
+    said
+}
+
+/// `bench device probe` with a link, a log, and orders on its standard input; killed if a test ends early.
+struct Device {
+    child: Option<Child>,
+    folder: tempfile::TempDir,
+}
+
+impl Device {
+    fn start(more: &[&str]) -> Device {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut command = bench(&["device", "probe", "--config", "lab", "--json"]);
+        command.args(more).stdin(Stdio::piped());
+        command.arg("--pty").arg(folder.path().join("probe")).arg("--log").arg(folder.path().join("log"));
+        let child = Some(command.spawn().expect("it starts"));
+        let device = Device { child, folder };
+        device.until("serving", || device.link().exists());
+        device
+    }
+
+    fn child(&mut self) -> &mut Child {
+        self.child.as_mut().expect("running")
+    }
+
+    fn link(&self) -> PathBuf {
+        self.folder.path().join("probe")
+    }
+
+    fn until(&self, what: &str, mut pleases: impl FnMut() -> bool) {
+        let begun = Instant::now();
+        while !pleases() {
+            assert!(begun.elapsed() < PATIENCE, "never {what}: {:?}", self.log());
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn log(&self) -> Vec<serde_json::Value> {
+        let text = std::fs::read_to_string(self.folder.path().join("log")).unwrap_or_default();
+        text.lines().map(|line| serde_json::from_str(line).expect("a JSON object a line")).collect()
+    }
+
+    fn order(&mut self, line: &str) {
+        let stdin = self.child().stdin.as_mut().expect("piped");
+        writeln!(stdin, "{line}").expect("it listens");
+    }
+
+    fn signal(&mut self, signal: i32) {
+        // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
+        assert_eq!(unsafe { libc::kill(self.child().id() as libc::pid_t, signal) }, 0);
+    }
+
+    /// Waits for its end; its one JSON object.
+    fn end(&mut self) -> serde_json::Value {
+        let output = self.child.take().expect("running").wait_with_output().expect("a child of ours");
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).expect("one JSON object")
+    }
+
+    /// A reader of the served probe, as `bench control` would open it.
+    fn reader(&self) -> SerialProbe {
+        bench::devices::probe::open(&config(&self.link(), self.folder.path())).expect("the probe is served")
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        if let Some(child) = self.child.as_mut() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+fn config(port: &Path, locks: &Path) -> Config {
+    let sets = vec![format!("probe.device.line.port={port:?}"), format!("probe.device.line.lock_folder={locks:?}")];
+    load(&Source { config: Some("lab".into()), sets, ..Source::default() }).expect("the settings are valid")
+}
+
+fn until(probe: &mut SerialProbe, what: &str, pleases: impl Fn(&Reading) -> bool) -> Reading {
+    let begun = Instant::now();
+    loop {
+        let reading = probe.latest(Tick::default());
+        if pleases(&reading) {
+            return reading;
+        }
+        assert!(begun.elapsed() < PATIENCE, "never {what}: {reading:?} {:?}", probe.statistics());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn is_at_rest(reading: &Reading) -> bool {
+    // The floor moves the stage by a tenth of a micrometre, the sensor by as much.
+    reading.validity == Validity::Valid && reading.position_m.abs() < 3e-6
+}
+
+#[test]
+fn one_reader_after_the_other_reads_the_stage_where_it_is() {
+    let device = Device::start(&[]);
+    for _ in 0..3 {
+        until(&mut device.reader(), "at rest", is_at_rest);
+    }
+}
+
+#[test]
+fn every_protocol_is_served_and_read_in_the_stages_metres() {
+    let optoncdt = "{ kind = \"optoncdt\", sensor_range_m = 0.002, mounting = { gain = -1.0, offset_m = 0.001 }, line = { port = \"\", baud = 921600 } }";
+    let ascii = "{ kind = \"ascii\", mounting = { gain = 1.0, offset_m = 0.0 }, pattern = \"{value:8.5}\", unit_m = 1e-3, lower_m = -1e-3, upper_m = 1e-3, line = { port = \"\", baud = 230400 } }";
+    for probe in [optoncdt, ascii] {
+        let set = format!("probe.device={probe}");
+        let device = Device::start(&["--set", &set]);
+        let (port, locks) = (device.link(), device.folder.path());
+        let sets =
+            [set, format!("probe.device.line.port={port:?}"), format!("probe.device.line.lock_folder={locks:?}")];
+        let config = load(&Source { config: Some("lab".into()), sets: sets.to_vec(), ..Source::default() });
+        let mut reader = bench::devices::probe::open(&config.expect("valid")).expect("the probe is served");
+        until(&mut reader, "at rest", is_at_rest);
+    }
+}
+
+#[test]
+fn faults_come_by_the_plan_and_by_hand_and_every_one_is_in_the_log() {
+    let mut device = Device::start(&["--fault", "probe.out-of-range@0..0.2"]);
+    let mut reader = device.reader();
+    until(&mut reader, "at rest", is_at_rest);
+    device.order("fault probe.out-of-range");
+    until(&mut reader, "out of range", |reading| reading.validity == Validity::OutOfRange);
+    device.order("fault nonsense");
+    device.order("fault none");
+    until(&mut reader, "at rest", is_at_rest);
+    device.order("quit");
+    let summary = device.end();
+    assert_eq!(summary["faults"], 2);
+    assert!(summary["measurements"].as_u64() > Some(0) && summary["bytes_sent"].as_u64() > Some(0), "{summary}");
+    let told: Vec<(String, String)> = device
+        .log()
+        .iter()
+        .map(|entry| {
+            let text = |key: &str| entry[key].as_str().unwrap_or_default().to_string();
+            (text("what"), text("text"))
+        })
+        .collect();
+    let faults: Vec<&str> = told.iter().filter(|(what, _)| what == "fault").map(|(_, text)| text.as_str()).collect();
+    assert_eq!(faults, ["probe.out-of-range", "end of probe.out-of-range", "probe.out-of-range", "none"]);
+    assert!(told[0].0 == "serving" && told[0].1.contains("capancdt on /dev/pts/"), "{told:?}");
+    assert!(device.log().windows(2).all(|pair| pair[0]["time_s"].as_f64() <= pair[1]["time_s"].as_f64()));
+}
+
+#[test]
+fn it_ends_in_order_by_signal_and_by_time_and_takes_its_link_away() {
+    for signal in [Some(libc::SIGTERM), Some(libc::SIGINT), None] {
+        let mut device = Device::start(if signal.is_some() { &[] } else { &["--duration", "0.2"] });
+        let link = device.link();
+        signal.into_iter().for_each(|signal| device.signal(signal));
+        device.end();
+        assert!(!link.is_symlink());
+    }
+}
+
+#[test]
+fn its_path_is_printed_where_no_link_is_wanted() {
+    let mut child = bench(&["device", "probe", "--config", "lab", "--duration", "60"]).spawn().expect("it starts");
+    let line = BufReader::new(child.stderr.take().expect("piped")).lines().next().expect("a line").expect("text");
+    child.kill().expect("running");
+    child.wait().expect("a child of ours");
+    assert!(line.contains("capancdt on /dev/pts/"), "{line}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_anything_is_served() {
+    let missing = refusal(&["device", "amplifier", "--config", "lab", "--interface", "no-such-can"]);
+    assert!(missing.contains("no-such-can") && missing.contains("vcan0"), "{missing}");
+    assert!(refusal(&["device", "probe"]).contains("--config lab"));
+    assert!(refusal(&["device"]).contains("amplifier|probe"));
+    assert!(refusal(&["device", "stage", "--config", "lab"]).contains("amplifier"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--port", "/dev/ttyNONE9"]).contains("no such port"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--interface", "vcan0"]).contains("amplifier"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--measuring-rate", "0"]).contains("above zero"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--fault", "probe.stuck"]).contains("KIND@FROM..TO"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--fault", "probe.x@1"]).contains("there is no fault"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--fault", "amplifier.reset@1"]).contains("no amplifier"));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let taken = folder.path().join("taken");
+    std::fs::write(&taken, "").expect("a file");
+    let taken = taken.to_str().expect("text");
+    assert!(refusal(&["device", "probe", "--config", "lab", "--pty", taken]).contains("it exists"));
+    assert!(refusal(&["device", "probe", "--config", "lab", "--log", "/nonexistent/log"]).contains("/nonexistent/log"));
+}

@@ -1,0 +1,342 @@
+//! The serial driver against the acting probe and its stage over a pseudo terminal, in real time at 200 Hz. Times are
+//! generous, for a machine that does other things as well: what is tested here is what trips, not when.
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use bench::acting::probe::{End, Probe};
+use bench::acting::{ActingFault, Stage};
+use bench::config::{Config, Source, load};
+use bench::devices;
+use bench::rt::arming::State;
+use bench::rt::program::Program;
+use bench::rt::record::EventKind;
+use bench::rt::servo::Order;
+use bench::session::Plan;
+use bench_hal::serial::Watch;
+use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices, Validity};
+
+use crate::rig::Bench;
+
+const PERIOD: Duration = Duration::from_millis(5);
+/// Ticks in which a fault must have tripped: five times the longest time that the settings below allow.
+const PATIENCE: u64 = 1000;
+/// Ticks until readings must have come back.
+const RECOVERY: u64 = 2000;
+
+/// The profile `lab`, slow and patient.
+fn config(folder: &std::path::Path) -> Config {
+    let controller = folder.join("slow.toml");
+    // 154 um/A below the first mode: crossover at 1.5 rad/s, far below everything that moves.
+    let text = "title = \"slow\"\n[[section]]\nkind = \"integrator\"\ngain_a_per_um = 0.01\n";
+    std::fs::write(&controller, text).expect("a file");
+    let sets = [
+        "loop.rate_hz=200".into(),
+        "interlock.probe_stale_s=1.0".into(),
+        "interlock.probe_stuck_s=1.0".into(),
+        "interlock.probe_stuck_current_a=0.1".into(),
+        "interlock.overruns_per_s=1000000".into(),
+        format!("probe.device.line.port={:?}", folder.join("probe")),
+        format!("probe.device.line.lock_folder={folder:?}"),
+        "chirp.quiet_before_s=0.1".into(),
+        "chirp.fade_in_s=0.1".into(),
+        "chirp.fade_out_s=0.1".into(),
+        "chirp.quiet_after_s=0.1".into(),
+        "chirp.duration_s=30.0".into(),
+        "chirp.start_hz=0.5".into(),
+        "chirp.stop_hz=2.0".into(),
+        "chirp.amplitude=[{ frequency_hz = 1.0, current_a = 0.2 }]".into(),
+        format!("control.controller={controller:?}"),
+        "control.settle_s=0.1".into(),
+        "control.duration_s=30.0".into(),
+        "control.reference={ kind = \"sine\", amplitude_m = 300e-6, frequency_hz = 0.5 }".into(),
+    ];
+    let source = Source { config: Some("lab".into()), sets: sets.to_vec(), ..Source::default() };
+    load(&source).expect("the settings are valid")
+}
+
+/// An amplifier that moves the stage and never fails.
+struct Straight {
+    stage: Stage,
+    start: Instant,
+    given_a: Arc<AtomicU64>,
+    is_on: bool,
+}
+
+impl Straight {
+    fn give(&mut self, current_a: f64) {
+        self.stage.command(self.start.elapsed().as_nanos() as u64, current_a);
+        self.given_a.store(current_a.to_bits(), Ordering::Relaxed);
+    }
+}
+
+impl CurrentAmplifier for Straight {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        self.is_on = true;
+        Ok(())
+    }
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        assert!(self.is_on, "the loop commands an amplifier that it has switched off");
+        self.give(current_a);
+        Ok(current_a)
+    }
+    fn disable(&mut self) {
+        self.is_on = false;
+        self.give(0.0);
+    }
+    fn status(&self) -> AmplifierStatus {
+        if self.is_on { AmplifierStatus::Enabled } else { AmplifierStatus::Disabled }
+    }
+}
+
+/// The loop with the serial driver, an acting probe at the other end, and the stage between both.
+struct Table {
+    bench: Bench,
+    watch: Watch,
+    probe: Option<Probe>,
+    stage: Stage,
+    start: Instant,
+    next: Instant,
+    given_a: Arc<AtomicU64>,
+    config: Config,
+    _folder: Arc<tempfile::TempDir>,
+}
+
+impl Table {
+    fn new() -> Table {
+        let folder = Arc::new(tempfile::tempdir().expect("a temporary folder"));
+        let (config, start) = (config(folder.path()), Instant::now());
+        let stage = Stage::new(&config).expect("a stage");
+        Table::around(config, stage, start, folder)
+    }
+
+    fn around(config: Config, stage: Stage, start: Instant, folder: Arc<tempfile::TempDir>) -> Table {
+        let end = End::Terminal(Some(folder.path().join("probe")));
+        let now_ns = move || start.elapsed().as_nanos() as u64;
+        let acting = Probe::start(&config, &end, None, stage.clone(), now_ns).expect("a pseudo terminal");
+        let given_a = Arc::<AtomicU64>::default();
+        let amplifier = Straight { stage: stage.clone(), start, given_a: Arc::clone(&given_a), is_on: false };
+        let probe = devices::probe::open(&config).expect("the acting probe is there");
+        let watch = probe.watch();
+        let bench = Bench::around(&config, Devices { amplifier, probe });
+        let (probe, next, _folder) = (Some(acting), Instant::now(), folder);
+        let mut table = Table { bench, watch, probe, stage, start, next, given_a, config, _folder };
+        table.until_readings_come();
+        table
+    }
+
+    /// The next tick, when it is due.
+    fn tick(&mut self) {
+        self.next += PERIOD;
+        std::thread::sleep(self.next.saturating_duration_since(Instant::now()));
+        self.next = self.next.max(Instant::now() - PERIOD); // a tick that came late delays those after it
+        self.bench.tick();
+    }
+
+    fn run(&mut self, ticks: u64) {
+        (0..ticks).for_each(|_| self.tick());
+    }
+
+    fn until_readings_come(&mut self) {
+        for _ in 0..RECOVERY {
+            self.tick();
+            let last = self.bench.ticks().last().expect("a tick");
+            if last.validity == Validity::Valid && last.probe_age_ns < 100_000_000 {
+                return;
+            }
+        }
+        panic!("no readings: {:?}", self.watch.statistics());
+    }
+
+    fn ask(&self, word: &str) {
+        let Ok(ActingFault::Probe(fault)) = ActingFault::parse(word) else { panic!("{word} is a fault") };
+        self.probe.as_ref().expect("the probe is there").ask(fault);
+    }
+
+    fn begin(&mut self, word: &str) {
+        if word == HANG_UP {
+            self.probe = None;
+        } else {
+            self.ask(word);
+        }
+    }
+
+    fn program(&self, of: StateOf) -> Box<dyn Program> {
+        let plan = match of {
+            StateOf::Control => Plan::control(self.config.clone()).expect("a plan"),
+            _ => Plan::chirp(self.config.clone()),
+        };
+        plan.program().expect("a program")
+    }
+
+    /// Leads the loop into a state; a running one until a current flows.
+    fn enter(&mut self, state: StateOf) {
+        if state == StateOf::Disarmed {
+            return;
+        }
+        self.bench.order(Order::Arm);
+        self.run(2);
+        if state != StateOf::Armed {
+            self.bench.order(Order::Start(self.program(state)));
+            for _ in 0..PATIENCE {
+                self.tick();
+                if self.given_a().abs() > 0.02 {
+                    return;
+                }
+            }
+            panic!("no current flows: {:?}", self.bench.trips());
+        }
+    }
+
+    /// A person who has not noticed anything goes on to the next state: current would flow.
+    fn go_on(&mut self, state: StateOf) {
+        if state == StateOf::Disarmed {
+            self.bench.order(Order::Arm);
+        }
+        if matches!(state, StateOf::Disarmed | StateOf::Armed) && self.bench.state() != State::Tripped {
+            self.bench.order(Order::Start(self.program(StateOf::Chirp)));
+        }
+    }
+
+    fn given_a(&self) -> f64 {
+        f64::from_bits(self.given_a.load(Ordering::Relaxed))
+    }
+
+    /// Waits for the trip, and proves what it promises.
+    fn trips(&mut self, reason: &str) {
+        for _ in 0..PATIENCE {
+            self.tick();
+            if self.bench.state() == State::Tripped {
+                break;
+            }
+        }
+        self.run(20);
+        let trips = self.bench.trips();
+        let [trip] = trips[..] else { panic!("one trip: {trips:?} {:?}", self.watch.statistics()) };
+        let EventKind::Trip(why) = trip.kind else { unreachable!() };
+        assert_eq!(why.reason(), reason, "{why}");
+        assert!(self.bench.ticks().iter().all(|record| record.tick < trip.tick || record.command_a.to_bits() == 0));
+        assert!(self.given_a() == 0.0 && !self.bench.is_on(), "{} A", self.given_a());
+        self.bench.prove_that_the_recording_is_complete(trip.tick, reason);
+    }
+
+    /// The cause is removed, a person clears the trip, and a run of the loop goes on without another.
+    fn next_run_is_clean(&mut self) {
+        self.ask("probe.none");
+        self.until_readings_come();
+        if self.bench.state() == State::Tripped {
+            self.bench.order(Order::Clear);
+            self.run(1);
+        }
+        self.runs_cleanly();
+    }
+
+    fn runs_cleanly(&mut self) {
+        let trips = self.bench.trips().len();
+        assert!(!self.bench.is_on(), "cleared is not armed");
+        self.enter(StateOf::Control);
+        self.run(50);
+        assert_eq!((self.bench.state(), self.bench.trips().len()), (State::Running, trips), "{:?}", self.bench.trips());
+    }
+}
+
+/// The states in which a fault begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum StateOf {
+    Disarmed,
+    Armed,
+    Chirp,
+    Control,
+}
+
+const STATES: [StateOf; 4] = [StateOf::Disarmed, StateOf::Armed, StateOf::Chirp, StateOf::Control];
+
+/// Not a fault of the probe: its cable.
+const HANG_UP: &str = "the terminal is closed";
+
+/// Pseudo terminals and threads are plenty, processors are not: so many tables at once.
+static ROOM: Mutex<()> = Mutex::new(());
+
+/// In each state, all at once: they mostly wait.
+fn in_each_state(test: impl Fn(&mut Table, StateOf) + Sync) {
+    let _alone = ROOM.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    std::thread::scope(|scope| {
+        for state in STATES {
+            let test = &test;
+            scope.spawn(move || {
+                let mut table = Table::new();
+                table.enter(state);
+                test(&mut table, state);
+            });
+        }
+    });
+}
+
+fn trips_and_runs_again(word: &str, reason: &str) {
+    in_each_state(|table, state| {
+        table.begin(word);
+        if state == StateOf::Disarmed {
+            table.run(20);
+            assert_eq!(table.given_a(), 0.0);
+        }
+        table.go_on(state);
+        table.trips(reason);
+        table.next_run_is_clean();
+    });
+}
+
+#[test]
+fn a_probe_that_falls_silent_trips_as_stale() {
+    trips_and_runs_again("probe.silence", "probe_stale");
+}
+
+#[test]
+fn a_probe_whose_every_byte_is_damaged_trips_as_stale() {
+    trips_and_runs_again("probe.corrupt", "probe_stale");
+}
+
+#[test]
+fn a_probe_that_answers_late_trips_as_stale() {
+    trips_and_runs_again("probe.late=3s", "probe_stale");
+}
+
+#[test]
+fn a_value_that_does_not_move_while_the_current_does_trips_as_stuck() {
+    trips_and_runs_again("probe.stuck", "probe_stuck");
+}
+
+#[test]
+fn a_value_that_jumps_beyond_the_soft_limit_trips_as_travel() {
+    trips_and_runs_again("probe.jump=0.95mm", "travel");
+}
+
+#[test]
+fn a_target_out_of_range_trips_as_invalid() {
+    trips_and_runs_again("probe.out-of-range", "probe_invalid");
+}
+
+#[test]
+fn a_probe_that_restarts_is_read_on_without_a_trip() {
+    in_each_state(|table, state| {
+        table.begin("probe.reset");
+        table.run(50);
+        assert_eq!(table.bench.trips(), []);
+        assert_eq!(table.watch.statistics().restarts, 1, "{:?}", table.watch.statistics());
+        table.go_on(state);
+        table.run(50);
+        assert_eq!((table.bench.trips(), table.bench.state()), (vec![], State::Running));
+    });
+}
+
+#[test]
+fn a_closed_terminal_trips_and_is_said_and_the_probe_is_opened_anew() {
+    in_each_state(|table, state| {
+        table.begin(HANG_UP);
+        table.go_on(state);
+        table.trips("probe_invalid");
+        let said = table.watch.statistics().last_error.expect("an error").to_string();
+        assert!(said.contains("the serial port is gone") && said.contains("open the probe again"), "{said}");
+        let (config, stage, folder) = (table.config.clone(), table.stage.clone(), Arc::clone(&table._folder));
+        Table::around(config, stage, table.start, folder).runs_cleanly();
+    });
+}
