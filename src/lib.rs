@@ -9,9 +9,9 @@
 //!     config ----> plant ----> sim (a rig that obeys the model)
 //!        |           |            |  implements
 //!        v           v            v
-//!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe)
+//!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe) <== wires ==> acting (sim at the other end)
 //!                             |                               ^  opens what the configuration names
-//!                             v  wait-free ring            devices <---- calibration; acting: the other end of the wires
+//!                             v  wait-free ring            devices <---- calibration
 //!                         recording (MCAP) ----> identify ----> report
 //!                                   \______ session (one run, its analysis, its replay) ______ cli
 //! ```

@@ -89,7 +89,10 @@ pub trait Port: Send + Sync {
     }
 
     /// Tells every endpoint of a condition that its controller did not find, for rehearsals. Not every bus can.
-    fn tell(&self, condition: Condition) -> Result<(), BusError>;
+    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+        let _ = condition;
+        Err(BusError::Other(libc::EOPNOTSUPP))
+    }
 }
 
 /// Work that goes on beside the tick.

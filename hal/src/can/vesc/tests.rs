@@ -61,7 +61,8 @@ fn a_vesc_follows_and_tells_its_current() {
 
 #[test]
 fn a_silent_vesc_and_a_dead_bus_are_faults_until_cleared() {
-    let ways: [(u32, fn(&Rig)); 4] = [
+    type Way = (u32, fn(&Rig));
+    let ways: [Way; 4] = [
         (SILENT, |rig| rig.inject(DeviceFault::Mute)),
         (SILENT, |rig| rig.inject(DeviceFault::ShortFrames)),
         (SILENT, |rig| rig.inject(DeviceFault::Late(200))),
