@@ -62,7 +62,7 @@ impl Amplifier {
         let port = SocketPort::open(interface, bit_rate)?;
         // Another claim than that of the driver, which may run on this computer too.
         let claim = Claim::new(&format!("{interface}/device"), node);
-        let held = |pid| ActingError::Held { interface: interface.clone(), node, pid };
+        let held = |held| ActingError::Held { interface: interface.clone(), held };
         let host = Arc::new(Threads::since(port, start));
         Ok(Amplifier { _claim: claim.map_err(held)?, ..Amplifier::start(config, host, stage, journal)? })
     }

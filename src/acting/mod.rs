@@ -22,7 +22,7 @@ mod stage;
 
 use std::path::PathBuf;
 
-use bench_hal::can::bus::{BusError, PortError};
+use bench_hal::can::bus::{BusError, Held, PortError};
 use bench_hal::serial::SerialError;
 
 use crate::plant::PlantError;
@@ -56,14 +56,12 @@ pub enum ActingError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// Another process acts as this device.
-    #[error("process {pid} acts as node {node} of {interface} already; end it first (`kill {pid}`)")]
+    #[error("on {interface}, {held}")]
     Held {
         /// The interface.
         interface: String,
-        /// The node.
-        node: u8,
-        /// The process, 0 if unknown.
-        pid: u32,
+        /// Who.
+        held: Held,
     },
     /// The serial line.
     #[error(transparent)]

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use bench_hal::can::bus::{Host, SocketPort, Threads};
+use bench_hal::can::bus::{Held, Host, SocketPort, Threads};
 use bench_hal::can::drive::{DriveSettings, inspect};
 use bench_hal::can::vesc::VescSettings;
 
@@ -56,7 +56,7 @@ pub fn on_bus(host: &dyn Host, settings: &DriveSettings, maximum_ratio: f64, rep
     let node = settings.node;
     let _claim = match host.claim(node) {
         Ok(claim) => claim,
-        Err(pid) => return report.find([held("drive", node, pid)]),
+        Err(other) => return report.find([held("drive", other)]),
     };
     let Some(heard) = listen(host, LISTEN, node, settings.bit_rate, report) else { return };
     match inspect(host, node, settings.sdo_timeout) {
@@ -72,7 +72,7 @@ pub fn on_bus(host: &dyn Host, settings: &DriveSettings, maximum_ratio: f64, rep
 pub fn watch(host: &dyn Host, settings: &VescSettings, bit_rate: u32, report: &mut Report) {
     let _claim = match host.claim(settings.node) {
         Ok(claim) => claim,
-        Err(pid) => return report.find([held("VESC", settings.node, pid)]),
+        Err(other) => return report.find([held("VESC", other)]),
     };
     let time = LISTEN.max(3 * settings.status_timeout);
     let Some(heard) = listen(host, time, settings.node, bit_rate, report) else { return };
@@ -93,10 +93,10 @@ fn listen(host: &dyn Host, time: Duration, node: u8, bit_rate: u32, report: &mut
     }
 }
 
-fn held(subject: &'static str, node: u8, pid: u32) -> Finding {
+fn held(subject: &'static str, Held { node, pid }: Held) -> Finding {
     let (who, remedy) = match pid {
-        0 => ("another process".into(), "end it first".into()),
-        pid => (
+        None => ("another process".into(), "end it first".into()),
+        Some(pid) => (
             format!("process {pid}"),
             format!("wait for its end, or end it: a run stops with zero current on `kill {pid}`"),
         ),

@@ -4,7 +4,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bench::doctor::{Finding, Report, Verdict, on_bus, watch};
-use bench_hal::can::bus::{BusError, BusEvent, CanBus, Claim, Host, Port, Running, Task, World};
+use std::num::NonZeroU32;
+
+use bench_hal::can::bus::{BusError, BusEvent, CanBus, Claim, Held, Host, Port, Running, Task, World};
 use bench_hal::can::cia402::State;
 use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
@@ -118,19 +120,19 @@ fn a_stopped_node_is_told_from_an_absent_one_by_its_heartbeat() {
 }
 
 /// A world in which another process has every node.
-struct Held(World);
+struct Taken(World);
 
-impl Port for Held {
+impl Port for Taken {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         self.0.endpoint(ids)
     }
 
-    fn claim(&self, _node: u8) -> Result<Claim, u32> {
-        Err(4711)
+    fn claim(&self, node: u8) -> Result<Claim, Held> {
+        Err(Held { node, pid: NonZeroU32::new(4711) })
     }
 }
 
-impl Host for Held {
+impl Host for Taken {
     fn now_ns(&self) -> u64 {
         self.0.now_ns()
     }
@@ -148,7 +150,7 @@ impl Host for Held {
 fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
     let (world, _device, _running) = rig(DeviceSettings::default());
     let mut ear = world.bus().connect(&[]);
-    let report = examine(&Held(world));
+    let report = examine(&Taken(world));
     let [finding] = &report.findings[..] else { panic!("{report:?}") };
     assert_eq!(finding.verdict, Verdict::Failure);
     assert_eq!(finding.what, "node 5 is held by process 4711; it was not asked anything");
