@@ -82,6 +82,16 @@ pub fn help() -> String {
     KINDS.iter().map(line).collect()
 }
 
+/// The whole word of a fault whose device was left out, where only one of the devices `served` can have it.
+pub fn whole(word: &str, served: &[String]) -> String {
+    let kind = word.split('=').next().unwrap_or(word);
+    let known = |device: &&String| KINDS.iter().any(|(whole, ..)| *whole == format!("{device}.{kind}"));
+    match served.iter().filter(known).collect::<Vec<_>>()[..] {
+        [device] if kind != "none" => format!("{device}.{word}"),
+        _ => word.into(),
+    }
+}
+
 fn words() -> String {
     KINDS.map(|(word, ..)| word).join(", ")
 }
@@ -193,6 +203,23 @@ mod tests {
             Ok(ActingFault::Probe(Fault::Jump { every: 2, by_m: -1e-3 }))
         );
         assert_eq!(ActingFault::parse("probe.corrupt=97"), Ok(ActingFault::Probe(Fault::Corrupt { every: 97 })));
+    }
+
+    #[test]
+    fn the_device_may_be_left_out_where_only_one_can_have_the_fault() {
+        let both = ["amplifier".to_string(), "probe".to_string()];
+        let cases = [
+            ("stuck", "probe.stuck"),
+            ("fault=0x3220", "amplifier.fault=0x3220"),
+            ("late=1s", "late=1s"),
+            ("none", "none"),
+            ("probe.late", "probe.late"),
+            ("nonsense", "nonsense"),
+        ];
+        for (word, expected) in cases {
+            assert_eq!(whole(word, &both), expected);
+        }
+        assert_eq!(whole("late=1s", &both[1..]), "probe.late=1s");
     }
 
     #[test]

@@ -156,8 +156,9 @@ impl Session<'_> {
             ["quit"] => self.is_over = true,
             ["help"] => eprint!("fault KIND, quit, help; the kinds are\n{}", fault::help()),
             ["fault", word] => {
-                let fault = ActingFault::parse(word).map_err(|e| e.to_string());
-                let asked = fault.and_then(|fault| self.rehearsal.ask(word, fault).map_err(|e| e.to_string()));
+                let word = fault::whole(word, &self.args.devices);
+                let fault = ActingFault::parse(&word).map_err(|e| e.to_string());
+                let asked = fault.and_then(|fault| self.rehearsal.ask(&word, fault).map_err(|e| e.to_string()));
                 asked.unwrap_or_else(|why| eprintln!("bench device: {why}"));
             }
             _ => eprintln!("bench device: `{line}` is no order; there are fault KIND, quit, help"),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bench::acting::{ActingFault, Amplifier, Journal, Stage};
 use bench::config::{AmplifierDevice, Config, Source, load};
-use bench::devices::amplifier::drive_settings;
+use bench::devices::amplifier::{drive_settings, vesc_settings};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
 use bench::rt::record::{EventKind, Published};
@@ -13,6 +13,7 @@ use bench::session::Plan;
 use bench_hal::can::bus::{Host, World};
 use bench_hal::can::drive::CanopenDrive;
 use bench_hal::can::drive::faults::*;
+use bench_hal::can::vesc::Vesc;
 use bench_hal::{Devices, DisplacementProbe, Reading, Tick, Validity};
 
 use crate::rig::Bench;
@@ -67,7 +68,7 @@ const CASES: [Case; 12] = [
 /// Not a fault of the device: the cable of the adapter.
 const INTERFACE_DOWN: &str = "the interface is down";
 
-fn config() -> Config {
+fn config(more: &[&str]) -> Config {
     let sets = [
         "chirp.quiet_before_s=0.05",
         "chirp.fade_in_s=0.05",
@@ -79,7 +80,11 @@ fn config() -> Config {
         "control.settle_s=0.05",
         "control.reference={ kind = \"sine\", amplitude_m = 30e-6, frequency_hz = 2.0 }",
     ];
-    let source = Source { config: Some("lab".into()), sets: sets.map(Into::into).to_vec(), ..Source::default() };
+    let source = Source {
+        config: Some("lab".into()),
+        sets: sets.iter().chain(more).map(|set| set.to_string()).collect(),
+        ..Source::default()
+    };
     load(&source).expect("the profile is valid")
 }
 
@@ -125,19 +130,32 @@ struct Lab {
     config: Config,
 }
 
-/// The driver, opened on the bus, in a loop that is disarmed.
+/// The driver, opened on the bus.
+fn driver(config: &Config, world: &World) -> bench::devices::Amplifier {
+    let host = Box::new(world.clone());
+    match &config.amplifier.device {
+        AmplifierDevice::Canopen(device) => {
+            Box::new(CanopenDrive::open(drive_settings(device, config), host).expect("it opens"))
+        }
+        AmplifierDevice::Vesc(device) => Box::new(Vesc::open(vesc_settings(device, config), host).expect("it opens")),
+        AmplifierDevice::Simulated(_) => unreachable!("the settings name a device"),
+    }
+}
+
+/// The driver in a loop that is disarmed.
 fn open(config: &Config, world: &World, stage: &Stage) -> Bench {
-    let AmplifierDevice::Canopen(device) = &config.amplifier.device else {
-        unreachable!("the profile lab has a drive")
-    };
-    let amplifier = CanopenDrive::open(drive_settings(device, config), Box::new(world.clone())).expect("it opens");
+    let amplifier = driver(config, world);
     let probe = Look { world: world.clone(), stage: stage.clone(), due_ns: world.now_ns(), sequence: 0 };
     Bench::around(config, Devices { amplifier, probe })
 }
 
 impl Lab {
     fn new() -> Lab {
-        let (config, world) = (config(), World::default());
+        Lab::of(config(&[]))
+    }
+
+    fn of(config: Config) -> Lab {
+        let world = World::default();
         let stage = Stage::new(&config).expect("a stage");
         let (journal, _) = Journal::new();
         let drive = Amplifier::start(&config, Arc::new(world.clone()), stage.clone(), journal).expect("a drive");
@@ -151,6 +169,11 @@ impl Lab {
         self.bench.run(50);
         assert_eq!(self.bench.state(), State::Armed, "{:x?}", self.bench.trips());
         assert!(self.drive.is_enabled());
+    }
+
+    /// No current, and none could flow. A VESC has no such state: it holds at zero until nobody commands any more.
+    fn is_off(&self) -> bool {
+        self.drive.current_a() == 0.0 && (self.drive.kind() == "vesc" || !self.drive.is_enabled())
     }
 
     /// Running, until a current flows that is worth stopping.
@@ -266,7 +289,7 @@ impl Lab {
     }
 
     fn run_completes(&mut self) {
-        assert!(!self.drive.is_enabled(), "neither cleared nor opened is armed");
+        assert!(self.is_off(), "neither cleared nor opened is armed");
         let trips = self.bench.trips().len();
         let mut config = self.config.clone();
         config.control.duration_s = 0.3;
@@ -274,7 +297,7 @@ impl Lab {
         self.bench.order(Order::Start(program(&config, Run::Control)));
         self.bench.run(450);
         assert_eq!(self.bench.trips().len(), trips, "{:x?}", self.trip());
-        assert!(self.bench.servo().completed() && !self.drive.is_enabled());
+        assert!(self.bench.servo().completed() && self.is_off());
     }
 }
 
@@ -389,4 +412,37 @@ fn a_loop_that_dies_leaves_no_current() {
     drop(bench);
     world.sleep(Duration::from_millis(2));
     assert!(drive.current_a() == 0.0 && !drive.is_enabled(), "{}", drive.state());
+}
+
+/// A VESC, whose codes are 1: silent, 2: bus-off, 3: interface down. STATUS is missed after 100 ms, and comes every 20 ms;
+/// commands are missed by the VESC itself after 500 ms.
+const VESC: &str = "amplifier.device={ kind = \"vesc\", interface = \"can0\", bit_rate = 500000, node = 23 }";
+
+#[test]
+fn a_vesc_loses_its_current_in_time_with_every_fault_in_every_state_and_runs_again() {
+    let cases = [
+        ("amplifier.silence", (122, 1), 122 + SWITCH_OFF),
+        ("amplifier.short-frames", (122, 1), 122 + SWITCH_OFF),
+        ("amplifier.late=400ms", (122, 1), 122 + SWITCH_OFF),
+        ("amplifier.unplugged", (122, 1), 502),
+        ("amplifier.bus-off", (FRAME, 2), 502),
+        (INTERFACE_DOWN, (FRAME, 3), 502),
+    ];
+    for (word, (found, code), zero) in cases {
+        for run in [None, Some(Run::Chirp), Some(Run::Control)] {
+            let mut lab = Lab::of(config(&[VESC]));
+            match run {
+                Some(run) => lab.run_until_current_flows(run),
+                None => lab.arm(),
+            }
+            let begin = lab.last_tick();
+            lab.begin(word);
+            let ticks = lab.ticks_with_current(600);
+            assert!(ticks <= zero, "{word}: current for {ticks} ticks, {zero} are allowed");
+            lab.trips_naming(code, begin..=begin + found);
+            lab.end();
+            lab.bench.run(200); // what was held back comes late
+            lab.next_run_completes();
+        }
+    }
 }

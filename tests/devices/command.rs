@@ -147,7 +147,7 @@ fn faults_come_by_the_plan_and_by_hand_and_every_one_is_in_the_log() {
     let mut device = Device::start(&["--fault", "probe.out-of-range@0..0.2"]);
     let mut reader = device.reader();
     until(&mut reader, "at rest", is_at_rest);
-    device.order("fault probe.out-of-range");
+    device.order("fault out-of-range");
     until(&mut reader, "out of range", |reading| reading.validity == Validity::OutOfRange);
     device.order("fault nonsense");
     device.order("fault none");

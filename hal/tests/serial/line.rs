@@ -32,15 +32,14 @@ fn one_reader_after_the_other_is_served_by_the_same_probe() {
 }
 
 #[test]
-fn the_mark_of_exclusive_use_goes_with_its_reader() {
+fn the_mark_of_exclusive_use_that_a_killed_reader_leaves_is_taken_off() {
     let rehearsal = Rehearsal::new(&optoncdt(), 1000.0, still);
     let watch = shared(&rehearsal);
-    let reader = shared(&rehearsal);
+    let killed = std::fs::File::options().read(true).write(true).open(&rehearsal.path).unwrap();
     // SAFETY: the descriptor is open; TIOCEXCL takes no argument.
-    assert_eq!(unsafe { libc::ioctl(reader.as_raw_fd(), libc::TIOCEXCL) }, 0);
-    reader.clear(serialport::ClearBuffer::Input).unwrap();
-    drop(reader);
-    for _ in 0..60_000 {
+    assert_eq!(unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) }, 0);
+    drop(killed);
+    for _ in 0..10_000 {
         if !is_exclusive(&watch) {
             return;
         }

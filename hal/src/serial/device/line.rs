@@ -17,7 +17,7 @@ const UNREAD: u32 = 2048;
 const WRITE_WAIT: Duration = Duration::from_millis(5);
 /// A line that is so far behind takes no more: a probe that says more than the line carries loses the rest.
 const FULL_NS: u64 = 1_000_000_000;
-/// How often the slave of a pseudo terminal is freed of its last holder.
+/// How often the slave of a pseudo terminal is freed of the mark of a reader that was killed.
 const FREE_NS: u64 = 50_000_000;
 
 /// Where a pretend probe is connected.
@@ -118,8 +118,9 @@ impl Line {
         written.or_else(|error| if is_nothing(&error) { Ok(()) } else { Err(error) })
     }
 
-    /// Takes off the mark of exclusive use that a reader leaves on the slave: on a port it goes with the last closing, but
-    /// here the slave stays open, and the next reader would be refused. Readers keep each other out by their locks.
+    /// Takes off the mark of exclusive use that a reader leaves on the slave when it is killed: on a port it goes with the
+    /// last closing, but here the slave stays open, and the next reader would be refused. Readers keep each other out by
+    /// their locks.
     fn free_slave(&mut self, now_ns: u64) {
         let End::Terminal { slave, .. } = &self.end else { return };
         if now_ns < self.freed_ns {
