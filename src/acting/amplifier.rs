@@ -15,6 +15,7 @@ use super::journal::{CurrentWatch, Entry, Journal, Turned};
 use super::stage::{Stage, seconds};
 use crate::config::{AmplifierDevice, CanopenSettings, Config};
 use crate::devices::amplifier::reference;
+use crate::rt::thread::below_the_loop;
 
 /// An amplifier at work; dropping it takes it from the bus.
 pub struct Amplifier {
@@ -63,7 +64,7 @@ impl Amplifier {
         // Another claim than that of the driver, which may run on this computer too.
         let claim = Claim::new(&format!("{interface}/device"), node);
         let held = |held| ActingError::Held { interface: interface.clone(), held };
-        let host = Arc::new(Threads::since(port, start));
+        let host = Arc::new(Threads::since(port, start).prepared(below_the_loop(&config.servo)));
         Ok(Amplifier { _claim: claim.map_err(held)?, ..Amplifier::start(config, host, stage, journal)? })
     }
 

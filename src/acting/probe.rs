@@ -12,6 +12,7 @@ use super::link::Link;
 use super::stage::Stage;
 use crate::config::{Config, MountingSettings, ProbeDevice};
 use crate::devices::probe::port;
+use crate::rt::thread::below_the_loop;
 use crate::sim::Sensor;
 
 /// Measurements a second of a probe that speaks by itself, if the configuration does not say.
@@ -59,7 +60,8 @@ impl Probe {
             End::Terminal(Some(path)) => Some(Link::new(path, &place)?),
             _ => None,
         };
-        let task = ProbeTask::start(line, Arc::clone(&acting), now_ns, measure(config, stage));
+        let task =
+            ProbeTask::start(line, Arc::clone(&acting), now_ns, measure(config, stage), below_the_loop(&config.servo));
         let task = task.map_err(|source| ActingError::Thread { device: "probe", source })?;
         Ok(Probe { task, device: acting, place, notes, rate_hz, kind: device.kind(), link })
     }

@@ -12,6 +12,7 @@ use super::Amplifier;
 use crate::config::{
     AmplifierDevice, CanopenSettings, Config, ExchangeSettings, TargetReference, TorqueMode, VescSettings, WhenUnheard,
 };
+use crate::rt::thread::below_the_loop;
 
 /// The step of a VESC's set-point in amperes: whole milliamperes.
 const VESC_STEP_A: f64 = 1e-3;
@@ -44,13 +45,15 @@ pub fn open(config: &Config) -> Result<(Amplifier, String), AmplifierError> {
         AmplifierDevice::Simulated(_) => Err(AmplifierError::Simulated),
         AmplifierDevice::Canopen(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            let drive = CanopenDrive::open(drive_settings(device, config), Box::new(Threads::new(port)))?;
+            let host = Threads::new(port).prepared(below_the_loop(&config.servo));
+            let drive = CanopenDrive::open(drive_settings(device, config), Box::new(host))?;
             let identity = canopen_identity(drive.identity());
             Ok((Box::new(drive), identity))
         }
         AmplifierDevice::Vesc(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            let opened = Vesc::open(vesc_settings(device, config), Box::new(Threads::new(port)));
+            let host = Threads::new(port).prepared(below_the_loop(&config.servo));
+            let opened = Vesc::open(vesc_settings(device, config), Box::new(host));
             let vesc = opened.map_err(|why| AmplifierError::Vesc { node: device.node, why })?;
             Ok((Box::new(vesc), format!("vesc {}", device.node)))
         }

@@ -10,6 +10,7 @@ use crate::config::{
     AsciiSettings, CapancdtSettings, Config, CounterMeaning, LineSettings, MountingSettings, OptoncdtSettings, Parity,
     PollingSettings, ProbeDevice,
 };
+use crate::rt::thread::below_the_loop;
 
 /// A probe that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -51,7 +52,8 @@ pub fn check(config: &Config) -> Result<(), ProbeError> {
 
 /// Opens the probe that the configuration names; it reads from now on.
 pub fn open(config: &Config) -> Result<SerialProbe, ProbeError> {
-    Ok(SerialProbe::open(settings(config).ok_or(ProbeError::Simulated)?)?)
+    let settings = settings(config).ok_or(ProbeError::Simulated)?;
+    Ok(SerialProbe::open_with(settings, below_the_loop(&config.servo))?)
 }
 
 /// Kind and port: serial probes do not say who they are. A port below /dev/serial/by-id names the adapter at least.

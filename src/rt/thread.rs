@@ -142,6 +142,15 @@ pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
     Scheduling { policy, memory_locked, cpu: bound, refused }
 }
 
+/// For the threads that serve the loop's devices: right below it, where that is permitted. Where it is not, the loop's own
+/// thread says so.
+pub fn below_the_loop(settings: &LoopSettings) -> impl Fn() + Send + Sync + Clone + use<> {
+    let priority = (settings.priority - 1).max(1);
+    move || {
+        let _ = set_fifo(priority);
+    }
+}
+
 fn set_fifo(priority: i32) -> nix::Result<()> {
     let parameters = libc::sched_param { sched_priority: priority };
     // SAFETY: 0 is the calling thread, `parameters` outlives the call, and the kernel only reads it.

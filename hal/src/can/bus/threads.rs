@@ -11,10 +11,10 @@ use super::{BusError, CanBus, Claim, Condition, Held, Host, Port, Running, Task}
 const WAIT: Duration = Duration::from_millis(1);
 
 /// A port in real time.
-#[derive(Debug)]
 pub struct Threads<P> {
     port: P,
     start: Instant,
+    prepare: Arc<dyn Fn() + Send + Sync>,
 }
 
 impl<P: Port> Threads<P> {
@@ -25,7 +25,12 @@ impl<P: Port> Threads<P> {
 
     /// Time began at `start`: for hosts that share a clock with others.
     pub fn since(port: P, start: Instant) -> Threads<P> {
-        Threads { port, start }
+        Threads { port, start, prepare: Arc::new(|| {}) }
+    }
+
+    /// `prepare` runs first in each thread that is started, to give it a priority or a processor.
+    pub fn prepared(self, prepare: impl Fn() + Send + Sync + 'static) -> Threads<P> {
+        Threads { prepare: Arc::new(prepare), ..self }
     }
 }
 
@@ -58,8 +63,9 @@ impl<P: Port> Host for Threads<P> {
 
     fn start(&self, name: &str, mut task: Box<dyn Task>) -> std::io::Result<Running> {
         let mut running = Running::default();
-        let (stop, start) = (Arc::clone(&running.stop), self.start);
+        let (stop, start, prepare) = (Arc::clone(&running.stop), self.start, Arc::clone(&self.prepare));
         let work = move || {
+            prepare();
             while !stop.load(Ordering::Acquire) {
                 if task.step(&|| since_ns(start), WAIT).is_err() {
                     std::thread::sleep(WAIT); // a dead interface answers at once: do not burn the processor

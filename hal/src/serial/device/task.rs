@@ -38,17 +38,19 @@ pub struct Carried {
 
 impl ProbeTask {
     /// Starts `probe` on `line`. `now_ns` is the clock; `measure_m` tells the stage's position, in metres of the probe, at a
-    /// time at which a measurement falls due.
+    /// time at which a measurement falls due; `prepare` runs first in the thread, to give it a priority or a processor.
     pub fn start(
         line: Line,
         probe: Shared,
         now_ns: impl Fn() -> u64 + Send + 'static,
         measure_m: impl FnMut(u64) -> f64 + Send + 'static,
+        prepare: impl FnOnce() + Send + 'static,
     ) -> io::Result<ProbeTask> {
         let (stop, carried) = (Arc::<AtomicBool>::default(), Arc::<Carried>::default());
         let mut carrier = Carrier { line, probe, now_ns, measure_m, carried: Arc::clone(&carried) };
         let stopped = Arc::clone(&stop);
         let work = move || {
+            prepare();
             while !stopped.load(Relaxed) && carrier.turn().is_ok() {}
             carrier.carried.is_lost.store(true, Relaxed);
         };

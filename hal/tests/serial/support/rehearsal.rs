@@ -33,7 +33,7 @@ impl Rehearsal {
         let (path, started) = (line.path().to_owned(), Instant::now());
         let device: Shared = Arc::new(Mutex::new(simulate(protocol, rate_hz).unwrap()));
         let now_ns = move || started.elapsed().as_nanos() as u64;
-        let task = Some(ProbeTask::start(line, Arc::clone(&device), now_ns, motion).unwrap());
+        let task = Some(ProbeTask::start(line, Arc::clone(&device), now_ns, motion, || {}).unwrap());
         let locks = tempfile::tempdir().unwrap();
         Self { path, locks, started, device, task }
     }
