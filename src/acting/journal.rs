@@ -103,9 +103,9 @@ mod tests {
         assert_eq!(see(11, 0.0, true), None, "a sweep passes through zero");
         assert_eq!(see(12, -0.5, true), None);
         assert_eq!([see(20, 0.0, true), see(269, 0.0, true)], [None; 2]);
-        assert_eq!(see(270, 0.0, true), Some(Turned::Off { since_s: 0.02 }));
+        assert_eq!(see(270, 0.0, true), Some(Turned::Off { since_s: seconds(20_000_000) }));
         assert_eq!(see(900, 0.0, true), None);
         assert_eq!(see(1000, 0.1, true), Some(Turned::On));
-        assert_eq!(see(1001, 0.0, false), Some(Turned::Off { since_s: 1.001 }), "at once");
+        assert_eq!(see(1001, 0.0, false), Some(Turned::Off { since_s: seconds(1_001_000_000) }), "at once");
     }
 }
