@@ -27,6 +27,9 @@ pub(super) struct RunOptions {
     /// Run on the simulated stage, with the rates, delays and steps of the configured devices
     #[arg(long)]
     simulate: bool,
+    /// Clear a fault that the amplifier has kept, as a person's word that its cause is gone
+    #[arg(long)]
+    clear_fault: bool,
     /// Folder for the recording and what is made from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
@@ -56,8 +59,11 @@ impl RunOptions {
     /// The rig of a plan, corrected by `given` or by the configured calibration; and the plan with what is known of both.
     fn open(&self, plan: &Plan, given: Option<Calibration>) -> Result<(Plan, Box<dyn Rig>), CliError> {
         let config = &plan.config;
-        let opened = if self.is_simulated(config) { devices::simulate(config)? } else { devices::open(config)? };
+        let mut opened = if self.is_simulated(config) { devices::simulate(config)? } else { devices::open(config)? };
         opened.notes.iter().for_each(|note| tracing::warn!("{note}"));
+        if self.clear_fault {
+            opened.rig.reset_fault().map_err(|error| CliError::Failed(format!("amplifier: {error}; nothing moved")))?;
+        }
         let mut plan = plan.clone();
         let used = match given {
             Some(calibration) => Some((calibration, Vec::new())),

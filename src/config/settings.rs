@@ -249,6 +249,12 @@ pub struct InterlockSettings {
     /// The change of current in amperes that a reading must answer.
     #[schemars(range(min = 1e-6, max = 1000.0))]
     pub probe_stuck_current_a: f64,
+    /// How far the current that the amplifier measures may lie from the commands, in amperes.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub current_error_a: f64,
+    /// Over how long a time in seconds; longer than the amplifier's status is late.
+    #[schemars(range(min = 1e-4, max = 100.0))]
+    pub current_error_s: f64,
     /// Ticks that may be missed within one second.
     #[schemars(range(min = 0, max = 1000000))]
     pub overruns_per_s: u32,

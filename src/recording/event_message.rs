@@ -85,6 +85,7 @@ fn trip(message: &Message) -> Result<Trip, Unknown> {
         "probe_invalid" => Trip::ProbeInvalid,
         "probe_stale" => Trip::ProbeStale { age_s: value, limit_s: limit },
         "probe_stuck" => Trip::ProbeStuck { unchanged_s: value, limit_s: limit },
+        "current_not_followed" => Trip::CurrentNotFollowed { actual_a: value, command_a: limit },
         // Counts were u32 and come back whole: every u32 is a double.
         "overruns" => Trip::Overruns { count: value as u32, limit: limit as u32 },
         "amplifier" => Trip::Amplifier { code, words: None },

@@ -113,6 +113,13 @@ pub enum Trip {
         /// The limit.
         limit_s: f64,
     },
+    /// The current that the amplifier measures is not that of the commands.
+    CurrentNotFollowed {
+        /// What it measures.
+        actual_a: f64,
+        /// The nearest that was commanded.
+        command_a: f64,
+    },
     /// Too many ticks missed within one second.
     Overruns {
         /// How many.
@@ -147,6 +154,7 @@ impl Trip {
             Trip::ProbeInvalid => "probe_invalid",
             Trip::ProbeStale { .. } => "probe_stale",
             Trip::ProbeStuck { .. } => "probe_stuck",
+            Trip::CurrentNotFollowed { .. } => "current_not_followed",
             Trip::Overruns { .. } => "overruns",
             Trip::Amplifier { .. } => "amplifier",
         }
@@ -166,6 +174,9 @@ impl Trip {
             Trip::ProbeStuck { .. } => {
                 "check the probe and the motor's connection; the limit is interlock.probe_stuck_s"
             }
+            Trip::CurrentNotFollowed { .. } => {
+                "check that the drive takes set-points (its mode, another master on the bus); the limits are interlock.current_error_a and current_error_s"
+            }
             Trip::Overruns { .. } => {
                 "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s"
             }
@@ -182,6 +193,7 @@ impl Trip {
             Trip::ContinuousCurrent { thermal_a, limit_a } => Some((thermal_a, limit_a)),
             Trip::ProbeStale { age_s, limit_s } => Some((age_s, limit_s)),
             Trip::ProbeStuck { unchanged_s, limit_s } => Some((unchanged_s, limit_s)),
+            Trip::CurrentNotFollowed { actual_a, command_a } => Some((actual_a, command_a)),
             Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
             Trip::CommandNotFinite | Trip::ProbeInvalid | Trip::Amplifier { .. } => None,
         }
@@ -211,6 +223,9 @@ impl fmt::Display for Trip {
                 unchanged_s * 1e3,
                 limit_s * 1e3
             ),
+            Trip::CurrentNotFollowed { actual_a, command_a } => {
+                write!(f, "the amplifier measures {actual_a:.3} A, {command_a:.3} A is the nearest that was commanded")
+            }
             Trip::Overruns { count, limit } => {
                 write!(f, "{count} ticks missed within a second, {limit} are allowed")
             }

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use bench_hal::{Reading, Tick, Validity};
 
 use super::arming::Trip;
+use super::following::Following;
 use crate::config::Config;
 
 /// Limits and what must be remembered to check them.
@@ -25,6 +26,7 @@ pub struct Interlocks {
     last_command_a: f64,
     fresh: Freshness,
     overruns: Overruns,
+    following: Following,
 }
 
 /// When ticks were missed within the last second. Its memory is claimed once: no more entries fit into a second than it
@@ -63,6 +65,7 @@ impl Interlocks {
             thermal_a2: 0.0,
             last_command_a: 0.0,
             fresh: Freshness::default(),
+            following: Following::new(config.interlock.current_error_a, ns(config.interlock.current_error_s)),
             overruns: Overruns::new(config.interlock.overruns_per_s, config.servo.rate_hz),
         }
     }
@@ -114,6 +117,18 @@ impl Interlocks {
             return Err(Trip::Overruns { count, limit: self.overruns_per_s });
         }
         Ok(())
+    }
+
+    /// Does the current that the amplifier measures follow the commands? Where it measures none, nothing is said; where it is
+    /// off, everything is forgotten. *In the tick.*
+    pub fn check_current(&mut self, is_on: bool, actual_a: Option<f64>, now: Tick) -> Result<(), Trip> {
+        match actual_a {
+            Some(actual_a) if is_on => self.following.check(self.last_command_a, actual_a, now),
+            _ => {
+                self.following.reset();
+                Ok(())
+            }
+        }
     }
 
     /// May this command go out? Integrates the motor's heat, thermal' = (i^2 - thermal)/tau. *In the tick.*

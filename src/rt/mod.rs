@@ -12,6 +12,7 @@
 
 pub mod arming;
 pub mod clock;
+mod following;
 pub mod interlock;
 pub mod outlet;
 pub mod program;

@@ -117,11 +117,13 @@ impl Servo {
     fn check(&mut self, reading: &Reading, moment: &Moment) -> Result<(), Trip> {
         let timing = self.interlocks.check_timing(moment.missed, moment.tick);
         let reading = self.interlocks.check_reading(reading, moment.tick);
+        let is_on = matches!(self.state, State::Armed | State::Running);
+        let current = self.interlocks.check_current(is_on, self.rig.actual_current_a(), moment.tick);
         match self.rig.status() {
             AmplifierStatus::Fault(code) => {
                 Err(Trip::Amplifier { code: i64::from(code), words: self.rig.explain(code) })
             }
-            _ => timing.and(reading),
+            _ => timing.and(reading).and(current),
         }
     }
 

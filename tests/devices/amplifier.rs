@@ -404,6 +404,21 @@ fn a_drive_that_ignores_its_switching_off_is_stopped_by_nmt_and_one_that_ignores
 }
 
 #[test]
+fn a_drive_that_keeps_its_last_current_in_the_middle_of_a_run_is_found_by_what_it_measures() {
+    for run in [Run::Chirp, Run::Control] {
+        let mut lab = Lab::new();
+        lab.run_until_current_flows(run);
+        lab.ask("amplifier.set-points-ignored");
+        let asked = lab.last_tick();
+        // Two windows of 50 ms at 1 kHz, the status's 2 ms, and the time until commands differ by 0.1 A; then off by NMT.
+        let flowed = lab.ticks_with_current(1500);
+        let (trip, tick) = lab.trip().expect("it trips");
+        assert!(matches!(trip, Trip::CurrentNotFollowed { .. }), "{run:?}: {trip:?}");
+        assert!(tick - asked <= 1000 && flowed <= tick - asked + 85, "{run:?}: {} ticks, {flowed}", tick - asked);
+    }
+}
+
+#[test]
 fn a_loop_that_dies_leaves_no_current() {
     let mut lab = Lab::new();
     lab.run_until_current_flows(Run::Control);

@@ -61,6 +61,7 @@ fn every_kind_of_event_comes_back_unchanged_and_in_order() {
         Trip::ProbeStale { age_s: 0.1 + 0.2, limit_s: 0.01 },
         Trip::ProbeStuck { unchanged_s: 0.05, limit_s: 0.04 },
         Trip::Overruns { count: u32::MAX, limit: 10 },
+        Trip::CurrentNotFollowed { actual_a: -0.75, command_a: 0.25 },
         Trip::Amplifier { code: i64::MIN, words: None },
     ];
     let states = [State::Disarmed, State::Armed, State::Running, State::Tripped];
