@@ -11,7 +11,7 @@ use super::{CliError, Outcome};
 use crate::calibration::{AmplifierCalibration, Calibration, ChainCalibration, Fit, ProbeCalibration, fit};
 use crate::config::{Config, Purpose};
 use crate::excitation::{Chirp, Course, Staircase};
-use crate::plant::{self, Modal, Sampled};
+use crate::plant::{self, Modal, PlantError, Sampled};
 use crate::recording::Recording;
 use crate::session::{Plan, analyse, unless_stopped};
 use crate::sim;
@@ -72,6 +72,7 @@ fn shorten(config: &mut Config) {
 
 /// Refuses steps, or a chirp, that would trip an interlock by the model of the whole rig.
 fn check(config: &Config) -> Result<(), CliError> {
+    compliance_m_per_a(config)?;
     let (period_s, force_constant) = (config.servo.period_s(), config.motor.force_constant_n_per_a);
     let rig = Sampled::new(&sim::modes(config)?, config.amplifier.bandwidth_hz, force_constant, period_s);
     let course = Course::of(&Staircase::new(&config.calibrate, period_s), config, &rig);
@@ -196,6 +197,9 @@ fn measure_delay(args: &Args, config: &Config, calibration: &mut Calibration) ->
 /// The static compliance of the model, from current to displacement.
 fn compliance_m_per_a(config: &Config) -> Result<f64, CliError> {
     let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
+    if modes.iter().any(|mode| mode.omega_rad_s == 0.0) {
+        return Err(PlantError::FreeBody("a static compliance, which `bench calibrate` measures,").into());
+    }
     let static_m_per_n: f64 =
         modes.iter().map(|mode| mode.residue_per_kg() / (mode.omega_rad_s * mode.omega_rad_s)).sum();
     Ok(static_m_per_n * config.motor.force_constant_n_per_a)

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::options::{BenchOptions, print_json, print_text};
 use super::table::table;
 use super::{CliError, Outcome};
-use crate::config::{Config, PlantSettings, Purpose};
+use crate::config::{Config, Purpose};
 use crate::plant::{self, Modal, Zero};
 
 /// What to compute.
@@ -38,8 +38,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 struct Modes {
     profile: String,
     model: &'static str,
-    operating_point_m: f64,
-    mass_asymmetry: f64,
+    operating_point_m: Option<f64>,
+    mass_asymmetry: Option<f64>,
+    coordinates: Vec<String>,
     modes: Vec<ModeJson>,
     zeros: Vec<ZeroJson>,
     damped_zeros: Vec<ZeroJson>,
@@ -72,12 +73,13 @@ impl Modes {
         let structure = plant::build(&config.plant)?;
         let modal = Modal::of(&structure)?;
         let (undamped, damped) = (plant::undamped_zeros(&structure)?, plant::damped_zeros(&structure)?);
-        let PlantSettings::Sr4dof(settings) = &config.plant;
+        let plant = &config.plant;
         Ok(Modes {
             profile: profile.into(),
-            model: "sr4dof",
-            operating_point_m: settings.operating_point_m,
-            mass_asymmetry: settings.mass_asymmetry,
+            model: plant.model(),
+            operating_point_m: plant.operating_point_m(),
+            mass_asymmetry: plant.mass_asymmetry(),
+            coordinates: plant.coordinates().into_iter().map(String::from).collect(),
             modes: modes(&modal),
             zeros: zeros(&undamped),
             damped_zeros: zeros(&damped),
@@ -87,6 +89,13 @@ impl Modes {
             dominant_sequence: plant::dominant_sequence(&modal, &undamped),
             phase_drop_deg: plant::phase_drop_deg(&undamped),
         })
+    }
+
+    fn title(&self) -> String {
+        let point = self.operating_point_m.map(|m| format!("at Y1o = {:.4} mm", m * 1e3));
+        let asymmetry = self.mass_asymmetry.map(|ratio| format!("mass asymmetry {:+.2} %", ratio * 100.0));
+        let where_to: Vec<String> = point.into_iter().chain(asymmetry).collect();
+        format!("{} {}", self.profile, where_to.join(", ")).trim_end().to_string()
     }
 
     fn text(&self) -> String {
@@ -102,15 +111,14 @@ impl Modes {
             ]
         };
         let zero = |z: &ZeroJson| vec![format!("{:+.4}", z.re_rad_s), format!("{:+.4}", z.im_rad_s), z.kind.into()];
-        let header = ["mode", "rad/s", "Hz", "damping", "residue 1/kg", "sign", "shape [x1 y1 y2 y3]"];
+        let shape = format!("shape [{}]", self.coordinates.join(" "));
+        let header = ["mode", "rad/s", "Hz", "damping", "residue 1/kg", "sign", &shape];
         let modes = table(&header, &self.modes.iter().enumerate().map(mode).collect::<Vec<_>>());
         let zero_table =
             |zeros: &[ZeroJson]| table(&["re rad/s", "im rad/s", "kind"], &zeros.iter().map(zero).collect::<Vec<_>>());
         format!(
-            "{} at Y1o = {:.4} mm, mass asymmetry {:+.2} %\n\n{modes}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns {}   dominant modes {}   CNMP pairs {} ({} with damping)   phase drop {} deg\n",
-            self.profile,
-            self.operating_point_m * 1e3,
-            self.mass_asymmetry * 100.0,
+            "{}\n\n{modes}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns {}   dominant modes {}   CNMP pairs {} ({} with damping)   phase drop {} deg\n",
+            self.title(),
             zero_table(&self.zeros),
             zero_table(&self.damped_zeros),
             self.sign_sequence,

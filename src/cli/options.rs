@@ -41,17 +41,21 @@ impl BenchOptions {
     pub fn load(&self, purpose: Purpose, more: &[String]) -> Result<Config, CliError> {
         let mut source = Source { config: self.config.clone(), sets: self.sets.clone(), purpose };
         let usage = |e: quantity::QuantityError| CliError::Usage(e.to_string());
-        if let Some(text) = &self.asymmetry {
-            source.sets.push(format!("plant.mass_asymmetry={:?}", quantity::ratio(text).map_err(usage)?));
-        }
         if let Some(seed) = self.seed {
             source.sets.push(format!("sim.seed={seed}"));
         }
         source.sets.extend_from_slice(more);
-        if let Some(text) = &self.operating_point {
+        let model = (self.asymmetry.is_some() || self.operating_point.is_some()).then(|| load(&source)).transpose()?;
+        let plant = model.map(|config| config.plant);
+        if let (Some(text), Some(plant)) = (&self.asymmetry, &plant) {
+            has(plant, plant.mass_asymmetry(), "--asymmetry")?;
+            source.sets.push(format!("plant.mass_asymmetry={:?}", quantity::ratio(text).map_err(usage)?));
+        }
+        if let (Some(text), Some(plant)) = (&self.operating_point, &plant) {
+            let length_m = has(plant, plant.operating_point_m().and(plant.beam_length_m()), "--operating-point")?;
             let metres = match quantity::parse(text).map_err(usage)? {
                 Quantity::Bare(metres) | Quantity::Metres(metres) => metres,
-                Quantity::Ratio(ratio) => ratio * beam_length_m(&load(&source)?),
+                Quantity::Ratio(ratio) => ratio * length_m,
             };
             source.sets.push(format!("plant.operating_point_m={metres:?}"));
         }
@@ -61,9 +65,11 @@ impl BenchOptions {
     }
 }
 
-fn beam_length_m(config: &Config) -> f64 {
-    let PlantSettings::Sr4dof(plant) = &config.plant;
-    plant.beam_length_m
+/// What an option is about, if the model has it.
+fn has(plant: &PlantSettings, value: Option<f64>, option: &str) -> Result<f64, CliError> {
+    let model = plant.model();
+    let settings = "`bench config show` lists its settings, --set KEY=VALUE changes one";
+    value.ok_or_else(|| CliError::Usage(format!("{option} has no meaning for the model `{model}`; {settings}")))
 }
 
 /// Prints the one JSON object of a command.

@@ -107,8 +107,10 @@ fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut 
 fn table(root: &Json, keywords: &Map<String, Json>, entries: &Table, path: &str, out: &mut Findings) {
     let none = Map::new();
     let properties = keywords.get("properties").and_then(Json::as_object).unwrap_or(&none);
+    // A table of entries with names of the user's own has one schema for all of them.
+    let named = keywords.get("additionalProperties").filter(|schema| schema.is_object());
     for (key, value) in entries {
-        match properties.get(key) {
+        match properties.get(key).or(named) {
             Some(schema) => node(root, schema, value, &join(path, key), out),
             None => out.add(&join(path, key), unknown_key(key, properties)),
         }

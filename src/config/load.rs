@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::check::{self, Finding};
 use super::place::line_of;
 use super::profiles::{self, Embedded};
-use super::{Config, PlantSettings, ReferenceSettings, schema};
+use super::{Config, ReferenceSettings, relations, schema};
 
 /// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
 const CHIRP_TICKS: f64 = 2e7;
@@ -239,7 +239,7 @@ fn same_kind(old: &Table, new: &Table) -> bool {
 
 /// What no single setting can say: relations between settings.
 fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
-    let mut relations = Relations(Vec::new());
+    let mut relations = Relations(relations::plant(config));
     relations.rig(config);
     if purpose.includes(Purpose::Chirp) {
         relations.chirp(config);
@@ -260,10 +260,6 @@ impl Relations {
     }
 
     fn rig(&mut self, config: &Config) {
-        let PlantSettings::Sr4dof(plant) = &config.plant;
-        let (point_m, length_m) = (plant.operating_point_m, plant.beam_length_m);
-        let what = format!("is {point_m} m, beyond the length of the beams, {length_m} m");
-        self.must(point_m.abs() <= length_m, "plant.operating_point_m", what);
         let (soft_m, stop_m, seen_m) = (config.interlock.soft_limit_m, config.sim.stop_m, config.probe.range_m / 2.0);
         let path = "interlock.soft_limit_m";
         self.must(soft_m < stop_m, path, format!("is {soft_m} m; it must lie inside the stop at {stop_m} m"));

@@ -16,13 +16,16 @@ mod check;
 mod devices;
 mod load;
 mod place;
+mod plant;
 pub mod profiles;
 pub mod quantity;
+mod relations;
 mod settings;
 
 pub use devices::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
 pub(crate) use load::{text_of, text_of_file, typed};
+pub use plant::*;
 pub use settings::*;
 
 /// The JSON schema of a configuration, made from the types.

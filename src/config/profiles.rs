@@ -16,6 +16,9 @@ pub const DEFAULT: &str = "stage";
 pub const PROFILES: &[Embedded] = &[
     Embedded { name: "stage", text: include_str!("../../bench-config/stage.toml") },
     Embedded { name: "chapter2", text: include_str!("../../bench-config/chapter2.toml") },
+    Embedded { name: "xy", text: include_str!("../../bench-config/xy.toml") },
+    Embedded { name: "three-mass", text: include_str!("../../bench-config/three-mass.toml") },
+    Embedded { name: "four-mass", text: include_str!("../../bench-config/four-mass.toml") },
     Embedded { name: "lab", text: include_str!("../../bench-config/lab.toml") },
 ];
 
@@ -24,6 +27,9 @@ pub const CONTROLLERS: &[Embedded] = &[
     Embedded { name: "fast", text: include_str!("../../bench-config/controllers/fast.toml") },
     Embedded { name: "slow", text: include_str!("../../bench-config/controllers/slow.toml") },
     Embedded { name: "lab", text: include_str!("../../bench-config/controllers/lab.toml") },
+    Embedded { name: "xy", text: include_str!("../../bench-config/controllers/xy.toml") },
+    Embedded { name: "three-mass", text: include_str!("../../bench-config/controllers/three-mass.toml") },
+    Embedded { name: "four-mass", text: include_str!("../../bench-config/controllers/four-mass.toml") },
 ];
 
 /// The entry called `name`.

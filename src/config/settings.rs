@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::devices::{AmplifierDevice, ProbeDevice};
+use super::plant::PlantSettings;
 
 /// Everything a run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -63,95 +64,6 @@ impl LoopSettings {
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
-}
-
-/// A model of the mechanics. A new model is one variant here and one file in `plant/`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "model", rename_all = "snake_case")]
-pub enum PlantSettings {
-    /// The simple representative 4-DoF mechanism of Eq. (2-5).
-    Sr4dof(Sr4dofSettings),
-}
-
-/// The SR4DoF mechanism (Fig 2-2): motion stage 1, secondary stages 2 and 3, intermediate stages 4 and 5.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Sr4dofSettings {
-    /// Beam length L in metres.
-    #[schemars(range(min = 0.001, max = 1.0))]
-    pub beam_length_m: f64,
-    /// Beam height H (out of plane) in metres.
-    #[schemars(range(min = 0.0001, max = 1.0))]
-    pub beam_height_m: f64,
-    /// Beam thickness T (in plane) in metres.
-    #[schemars(range(min = 0.00001, max = 0.1))]
-    pub beam_thickness_m: f64,
-    /// Young's modulus E in pascals.
-    #[schemars(range(min = 1e6, max = 1e13))]
-    pub youngs_modulus_pa: f64,
-    /// Poisson ratio nu; the beams' bending stiffness takes the plate modulus E/(1 - nu^2).
-    #[schemars(range(min = 0.0, max = 0.5))]
-    pub poisson_ratio: f64,
-    /// Mass m1 of the motion stage in kilograms.
-    #[schemars(range(min = 1e-6, max = 1000.0))]
-    pub motion_stage_mass_kg: f64,
-    /// Mass m3 of a secondary stage in kilograms.
-    #[schemars(range(min = 1e-6, max = 1000.0))]
-    pub secondary_stage_mass_kg: f64,
-    /// Mass m4 = m5 of an intermediate stage in kilograms.
-    #[schemars(range(min = 1e-6, max = 1000.0))]
-    pub intermediate_stage_mass_kg: f64,
-    /// Stiffness k4 = k5 of each X bearing in newtons per metre.
-    #[schemars(range(min = 1e-3, max = 1e9))]
-    pub spring_stiffness_n_per_m: f64,
-    /// Mass asymmetry D = m2/m3 - 1, a ratio.
-    #[schemars(range(min = -0.9, max = 9.0))]
-    pub mass_asymmetry: f64,
-    /// Static Y displacement Y1o of the motion stage in metres.
-    #[schemars(range(min = -0.5, max = 0.5))]
-    pub operating_point_m: f64,
-    /// Damping of the modes.
-    pub damping: DampingSettings,
-}
-
-/// Damping, proportional to mass and stiffness or the same in every mode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum DampingSettings {
-    /// Rayleigh damping through two measured ratios: zeta(w) = mass_per_s/(2 w) + stiffness_s w/2.
-    Measured {
-        /// The lower of the two.
-        first: DampingPoint,
-        /// The upper of the two.
-        second: DampingPoint,
-    },
-    /// Rayleigh damping C = mass_per_s M + stiffness_s K.
-    Rayleigh {
-        /// Coefficient of the mass matrix in 1/s.
-        #[schemars(range(min = 0.0, max = 1e6))]
-        mass_per_s: f64,
-        /// Coefficient of the stiffness matrix in s.
-        #[schemars(range(min = 0.0, max = 1.0))]
-        stiffness_s: f64,
-    },
-    /// The same damping ratio in every mode.
-    Uniform {
-        /// The ratio.
-        #[schemars(range(min = 0.0, max = 0.99))]
-        ratio: f64,
-    },
-}
-
-/// A damping ratio measured at a frequency.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DampingPoint {
-    /// Where it was measured, in rad/s.
-    #[schemars(range(min = 1e-3, max = 1e6))]
-    pub omega_rad_s: f64,
-    /// What was measured.
-    #[schemars(range(min = 0.0, max = 0.99))]
-    pub ratio: f64,
 }
 
 /// The voice coil motor.
@@ -260,10 +172,24 @@ pub struct InterlockSettings {
     pub overruns_per_s: u32,
 }
 
+/// How the simulated stage obeys its constraints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Geometry {
+    /// Linearised about the operating point, as the model is.
+    #[default]
+    Linear,
+    /// As they are, x_i - x_j = -0.6 (y_i - y_j)^2/L: the response depends on the amplitude. Plant `sr4dof` only.
+    Quadratic,
+}
+
 /// The simulated rig beyond the plant's model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimSettings {
+    /// The constraints of the simulated stage, linearised or not.
+    #[serde(default)]
+    pub geometry: Geometry,
     /// Seed of noise and disturbance.
     #[schemars(range(min = 0, max = 9223372036854775807i64))]
     pub seed: u64,
@@ -344,10 +270,10 @@ pub struct ChirpSettings {
     #[schemars(range(min = 0.001, max = 100000.0))]
     pub duration_s: f64,
     /// Zero current before the sweep, in seconds.
-    #[schemars(range(min = 0.0, max = 1000.0))]
+    #[schemars(range(min = 0.0, max = 100000.0))]
     pub quiet_before_s: f64,
     /// Zero current after the sweep, in seconds: long enough for the stage to come to rest.
-    #[schemars(range(min = 0.0, max = 1000.0))]
+    #[schemars(range(min = 0.0, max = 100000.0))]
     pub quiet_after_s: f64,
     /// Length of the cosine fade at the start, in seconds.
     #[schemars(range(min = 0.0, max = 1000.0))]

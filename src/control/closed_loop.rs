@@ -55,7 +55,8 @@ impl ClosedLoop {
     /// Margins of the sampled loop, or of the continuous one.
     pub fn margins(&self, continuous: bool) -> Margins {
         let nyquist_rad_s = std::f64::consts::PI / self.chain.period_s();
-        let low_rad_s = 1e-3 * self.modes.first().map_or(1.0, |mode| mode.omega_rad_s).min(nyquist_rad_s);
+        let slowest = self.modes.iter().find(|mode| mode.omega_rad_s > 0.0);
+        let low_rad_s = 1e-3 * slowest.map_or(1.0, |mode| mode.omega_rad_s).min(nyquist_rad_s);
         if continuous {
             let highest = self.modes.last().map_or(1.0, |mode| mode.omega_rad_s).max(nyquist_rad_s);
             let grid = grid(low_rad_s, 10.0 * highest, &self.features());
@@ -87,7 +88,7 @@ impl ClosedLoop {
 
     /// Where the loop's response turns quickly: the plant's modes and the controller's lightly damped pairs.
     fn features(&self) -> Vec<(f64, f64)> {
-        let modes = self.modes.iter().map(|mode| (mode.omega_rad_s, mode.damping_ratio));
+        let modes = self.modes.iter().map(|mode| (mode.omega_rad_s, mode.damping_ratio)).filter(|(w, _)| *w > 0.0);
         let pairs = self.sections.iter().flat_map(|section| [section.numerator, section.denominator]).filter_map(|c| {
             let w = (c[0] / c[2]).sqrt();
             (c[2] != 0.0 && w > 0.0).then(|| (w, (c[1] / (2.0 * c[2] * w)).abs()))
@@ -160,11 +161,11 @@ impl Cascade {
         let n = 2 * modes.len();
         let (mut a, mut b, mut c) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1), DMatrix::zeros(1, n));
         for (index, mode) in modes.iter().enumerate() {
-            let (first, w) = (2 * index, mode.omega_rad_s);
-            a[(first, first + 1)] = w;
+            let (first, w, scale) = (2 * index, mode.omega_rad_s, mode.rate_scale_rad_s());
+            a[(first, first + 1)] = scale;
             a[(first + 1, first)] = -w;
             a[(first + 1, first + 1)] = -2.0 * mode.damping_ratio * w;
-            b[(first + 1, 0)] = mode.force_gain * force_constant_n_per_a / w;
+            b[(first + 1, 0)] = mode.force_gain * force_constant_n_per_a / scale;
             c[(0, first)] = mode.sensor_gain;
         }
         Cascade::new(a, b, c, 0.0)

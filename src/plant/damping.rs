@@ -8,13 +8,18 @@ use crate::config::{DampingPoint, DampingSettings};
 
 /// C of a structure: Rayleigh's mass_per_s M + stiffness_s K, or 2 zeta w in every mode.
 pub(super) fn matrix(structure: &Structure, settings: &DampingSettings) -> Result<DMatrix<f64>, PlantError> {
-    let rayleigh =
-        |(mass_per_s, stiffness_s): (f64, f64)| mass_per_s * &structure.mass + stiffness_s * &structure.stiffness;
     match settings {
-        DampingSettings::Rayleigh { mass_per_s, stiffness_s } => Ok(rayleigh((*mass_per_s, *stiffness_s))),
-        DampingSettings::Measured { first, second } => Ok(rayleigh(coefficients(first, second))),
+        DampingSettings::Rayleigh { mass_per_s, stiffness_s } => rayleigh(structure, (*mass_per_s, *stiffness_s)),
+        DampingSettings::Measured { first, second } => rayleigh(structure, coefficients(first, second)),
         DampingSettings::Uniform { ratio } => uniform(structure, *ratio),
     }
+}
+
+fn rayleigh(structure: &Structure, (mass_per_s, stiffness_s): (f64, f64)) -> Result<DMatrix<f64>, PlantError> {
+    if structure.free_bodies > 0 && mass_per_s != 0.0 {
+        return Err(PlantError::DampedFreeBody { mass_per_s });
+    }
+    Ok(mass_per_s * &structure.mass + stiffness_s * &structure.stiffness)
 }
 
 /// The two Rayleigh coefficients that give two measured ratios: zeta(w) = mass_per_s/(2 w) + stiffness_s w/2.

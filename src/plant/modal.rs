@@ -8,9 +8,9 @@ use super::{PlantError, Structure};
 /// One mode of a structure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
-    /// Undamped natural frequency in rad/s.
+    /// Undamped natural frequency in rad/s; 0 of a free body.
     pub omega_rad_s: f64,
-    /// Damping ratio.
+    /// Damping ratio; 0 of a free body.
     pub damping_ratio: f64,
     /// Shape over the degrees of freedom, of unit length, positive at the probe.
     pub shape: DVector<f64>,
@@ -26,6 +26,11 @@ impl Mode {
     /// The modal residue r = (c^T v)(q^T v)/(v^T M v) in 1/kg (Eq. 4-15 with the modal mass in it).
     pub fn residue_per_kg(&self) -> f64 {
         self.force_gain * self.sensor_gain
+    }
+
+    /// What the velocity is divided by to be of the displacement's size: w, or 1 rad/s of a free body.
+    pub fn rate_scale_rad_s(&self) -> f64 {
+        if self.omega_rad_s > 0.0 { self.omega_rad_s } else { 1.0 }
     }
 
     /// 1/(s^2 + 2 zeta w s + w^2).
@@ -57,6 +62,10 @@ impl Sign {
     }
 }
 
+/// Eigenvalues come with an error of some 1e-15 of the largest: below this ratio of it a mode is not held by its spring.
+const HELD_RATIO: f64 = 1e-12;
+/// Residues below this ratio of the largest force gain times the largest sensor gain are rounding.
+const SILENT_RATIO: f64 = 1e-13;
 /// A mode whose peak stays below this ratio of everything else at its own frequency does not show.
 const VISIBLE_RATIO: f64 = 1e-3;
 /// Damping assumed for that question where the model has less.
@@ -73,15 +82,24 @@ impl Modal {
     /// The modes of a structure whose damping matrix its shapes make diagonal.
     pub fn of(structure: &Structure) -> Result<Modal, PlantError> {
         let (values, shapes) = modes(&structure.mass, &structure.stiffness)?;
-        let floor = 1e-9 * values.amax();
+        let floor = HELD_RATIO * values.amax();
         let modes = values.iter().zip(shapes.column_iter()).enumerate().map(|(index, (&w2, shape))| {
-            if w2 <= floor {
-                return Err(PlantError::Free { number: index + 1, eigenvalue_rad2_s2: w2 });
-            }
             let shape: DVector<f64> = shape.into_owned();
-            Ok(mode(structure, w2.sqrt(), shape))
+            match index < structure.free_bodies {
+                true => Ok(mode(structure, 0.0, shape)),
+                false if w2 <= floor => Err(PlantError::Free { number: index + 1, eigenvalue_rad2_s2: w2 }),
+                false => Ok(mode(structure, w2.sqrt(), shape)),
+            }
         });
-        Ok(Modal { modes: modes.collect::<Result<_, _>>()? })
+        let modal = Modal { modes: modes.collect::<Result<_, _>>()? };
+        if modal.is_deaf() { Err(PlantError::NoResponse) } else { Ok(modal) }
+    }
+
+    /// Whether no force reaches the probe: every residue is rounding beside its two parts.
+    fn is_deaf(&self) -> bool {
+        let largest = |of: fn(&Mode) -> f64| self.modes.iter().map(|mode| of(mode).abs()).fold(0.0, f64::max);
+        let (force, sensor) = (largest(|mode| mode.force_gain), largest(|mode| mode.sensor_gain));
+        largest(Mode::residue_per_kg) <= SILENT_RATIO * force * sensor
     }
 
     /// G(s): displacement in metres per newton.
@@ -96,7 +114,10 @@ impl Modal {
             let residue = mode.residue_per_kg();
             let peak =
                 residue.abs() / (2.0 * mode.damping_ratio.max(VISIBLE_DAMPING) * mode.omega_rad_s * mode.omega_rad_s);
-            if peak <= VISIBLE_RATIO * self.others(index) {
+            // The peak of a double integrator has no end: it shows unless its residue is rounding.
+            let free = mode.omega_rad_s == 0.0;
+            let hidden = if free { self.is_rounding(residue) } else { peak <= VISIBLE_RATIO * self.others(index) };
+            if hidden {
                 Sign::None
             } else if residue > 0.0 {
                 Sign::Plus
@@ -105,6 +126,10 @@ impl Modal {
             }
         };
         self.modes.iter().enumerate().map(sign).collect()
+    }
+
+    fn is_rounding(&self, residue: f64) -> bool {
+        residue.abs() <= SILENT_RATIO * self.modes.iter().map(|mode| mode.residue_per_kg().abs()).fold(0.0, f64::max)
     }
 
     /// |G| of all modes but one, at that one's frequency.
@@ -124,7 +149,7 @@ fn mode(structure: &Structure, omega_rad_s: f64, unit_mass_shape: DVector<f64>) 
     let v = flip * unit_mass_shape;
     Mode {
         omega_rad_s,
-        damping_ratio: v.dot(&(&structure.damping * &v)) / (2.0 * omega_rad_s),
+        damping_ratio: if omega_rad_s == 0.0 { 0.0 } else { v.dot(&(&structure.damping * &v)) / (2.0 * omega_rad_s) },
         force_gain: structure.force.dot(&v),
         sensor_gain: structure.sensor.dot(&v),
         floor_gain: structure.floor.dot(&v),

@@ -4,7 +4,7 @@
 //! current, q'' + 2 zeta w q' + w^2 q = b Kf i + f, with f whatever else acts on the mode (floor, stop), held as well. One
 //! matrix exponential a mode carries its state over a period without error, whatever the period's length.
 //!
-//! States of a mode are q and q'/w, so that both are of one size.
+//! States of a mode are q and q'/w, so that both are of one size; of a free body, w = 0, they are q and q' (over 1 rad/s).
 
 use nalgebra::{Complex, DMatrix, Matrix5, Vector2};
 
@@ -130,15 +130,16 @@ impl Sampled {
     }
 }
 
-/// exp(F T) with the states [q, q'/w, i, u, f].
+/// exp(F T) with the states [q, q'/scale, i, u, f].
 fn block(mode: &Mode, lag_rad_s: f64, force_constant_n_per_a: f64, period_s: f64) -> Block {
     let w = mode.omega_rad_s;
+    let scale = mode.rate_scale_rad_s();
     let mut rate = Matrix5::zeros();
-    rate[(0, 1)] = w;
+    rate[(0, 1)] = scale;
     rate[(1, 0)] = -w;
     rate[(1, 1)] = -2.0 * mode.damping_ratio * w;
-    rate[(1, 2)] = mode.force_gain * force_constant_n_per_a / w;
-    rate[(1, 4)] = 1.0 / w;
+    rate[(1, 2)] = mode.force_gain * force_constant_n_per_a / scale;
+    rate[(1, 4)] = 1.0 / scale;
     rate[(2, 2)] = -lag_rad_s;
     rate[(2, 3)] = lag_rad_s;
     let over = exponential(&(rate * period_s));
@@ -149,7 +150,7 @@ fn block(mode: &Mode, lag_rad_s: f64, force_constant_n_per_a: f64, period_s: f64
         setpoint: column(3),
         force: column(4),
         output: mode.sensor_gain,
-        output_rate: mode.sensor_gain * w,
+        output_rate: mode.sensor_gain * scale,
         floor: mode.floor_gain,
     }
 }

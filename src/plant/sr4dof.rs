@@ -10,6 +10,7 @@
 //!
 //! The force P acts in X on stage 4, the probe sees x1. The sum over masses and springs gives Eq. (2-5) as printed.
 
+use super::beam::Beam;
 use super::structure::Assembly;
 use super::{PlantError, Structure, damping};
 use crate::config::Sr4dofSettings;
@@ -25,7 +26,7 @@ const Y13: [f64; 4] = [0.0, 1.0, 0.0, -1.0];
 pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
     let a = 0.6 * s.operating_point_m / s.beam_length_m;
     let m3 = s.secondary_stage_mass_kg;
-    let k = parallelogram_stiffness_n_per_m(s);
+    let k = Beam::from(s).parallelogram_n_per_m();
     let x4 = [1.0, a, -2.0 * a, 0.0];
     let x5 = [1.0, -a, 0.0, 2.0 * a];
     let mut parts = Assembly::new(4);
@@ -44,19 +45,12 @@ pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
     Ok(structure)
 }
 
-/// Bending stiffness of a parallelogram of two beams in Y: 24 E I/(L^3 (1 - nu^2)), I = H T^3/12.
-fn parallelogram_stiffness_n_per_m(s: &Sr4dofSettings) -> f64 {
-    let cube = |x: f64| x * x * x;
-    let second_moment_m4 = s.beam_height_m * cube(s.beam_thickness_m) / 12.0;
-    let plate_modulus_pa = s.youngs_modulus_pa / (1.0 - s.poisson_ratio * s.poisson_ratio);
-    24.0 * plate_modulus_pa * second_moment_m4 / cube(s.beam_length_m)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::{PlantSettings, Source, load};
-    use nalgebra::Matrix4;
+    use crate::plant::kinematics::Coordinate;
+    use nalgebra::{DMatrix, Matrix4};
     use proptest::prelude::*;
 
     /// Eq. (2-5) as printed, for m4 = m5, k4 = k5 and four equal parallelograms k.
@@ -85,20 +79,58 @@ mod tests {
         (mass, stiffness)
     }
 
+    /// M, K and geometric stiffness by [`Coordinate`]: stages 2 and 3 on either side of stage 1, 4 and 5 beyond them.
+    fn by_parallelograms(s: &Sr4dofSettings) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+        let (beam, y0) = (Beam::from(s), s.operating_point_m);
+        let (c, k, k4, ground) =
+            (beam.shortening_per_m(), beam.parallelogram_n_per_m(), s.spring_stiffness_n_per_m, Coordinate::ground(4));
+        let free = |index, at_m| Coordinate::free(4, index, at_m);
+        let (x1, y1, y2, y3) = (free(0, 0.0), free(1, y0), free(2, y0 / 2.0), free(3, y0 / 2.0));
+        let (x2, x3) = (x1.joined(&y2.from(&y1), -1.0, c), x1.joined(&y3.from(&y1), 1.0, c));
+        let (x4, x5) = (x2.joined(&ground.from(&y2), 1.0, c), x3.joined(&ground.from(&y3), -1.0, c));
+        let m3 = s.secondary_stage_mass_kg;
+        let (m2, m4) = (m3 * (1.0 + s.mass_asymmetry), s.intermediate_stage_mass_kg);
+        let stages = [
+            (s.motion_stage_mass_kg, &x1, &y1),
+            (m2, &x2, &y2),
+            (m3, &x3, &y3),
+            (m4, &x4, &ground),
+            (m4, &x5, &ground),
+        ];
+        let mut parts = Assembly::new(4);
+        for (kilograms, x, y) in stages {
+            parts.mass(kilograms, x.row.as_slice(), y.row.as_slice());
+        }
+        let springs = [(k, y1.from(&y2)), (k, y2.clone()), (k, y1.from(&y3)), (k, y3.clone()), (k4, x4), (k4, x5)];
+        let mut geometric = DMatrix::zeros(4, 4);
+        for (stiffness, spring) in &springs {
+            parts.spring(*stiffness, spring.row.as_slice());
+            geometric += *stiffness * spring.at_m * &spring.curve;
+        }
+        let structure = parts.finish(&X1, &X1);
+        (structure.mass, structure.stiffness, geometric)
+    }
+
     proptest! {
         #[test]
         fn the_constraints_give_the_printed_matrices(
             point in -0.15..0.15f64, asymmetry in -0.5..0.5f64, m1 in 0.01..2.0f64, m3 in 0.001..0.5f64, m4 in 0.01..2.0f64, k4 in 1.0..1e5f64,
         ) {
-            let PlantSettings::Sr4dof(mut s) = load(&Source::default()).unwrap().plant;
+            let PlantSettings::Sr4dof(mut s) = load(&Source::default()).unwrap().plant else { panic!("the default plant") };
             s.operating_point_m = point * s.beam_length_m;
             (s.mass_asymmetry, s.motion_stage_mass_kg, s.secondary_stage_mass_kg) = (asymmetry, m1, m3);
             (s.intermediate_stage_mass_kg, s.spring_stiffness_n_per_m) = (m4, k4);
             let ours = structure(&s).unwrap();
             let (mass, stiffness) = printed(&s);
             // Ten sums of products, each rounded: some 1e-15 of the largest element.
-            prop_assert!((ours.mass - mass).amax() <= 1e-14 * mass.amax());
-            prop_assert!((ours.stiffness - stiffness).amax() <= 1e-14 * stiffness.amax());
+            prop_assert!((&ours.mass - mass).amax() <= 1e-14 * mass.amax());
+            prop_assert!((&ours.stiffness - stiffness).amax() <= 1e-14 * stiffness.amax());
+            // The general way from parallelograms to coordinates, which the XY stage takes, gives the same matrices; and the
+            // static force that holds Y1o stores no force in X, so that linearising first or last is the same.
+            let (mass, stiffness, geometric) = by_parallelograms(&s);
+            prop_assert!((ours.mass - &mass).amax() <= 1e-14 * mass.amax());
+            prop_assert!((ours.stiffness - &stiffness).amax() <= 1e-14 * stiffness.amax());
+            prop_assert!(geometric.amax() <= 1e-14 * stiffness.amax(), "{geometric}");
         }
     }
 }

@@ -17,6 +17,8 @@ pub struct Structure {
     pub sensor: DVector<f64>,
     /// g: generalised force per m/s^2 of the floor, against its acceleration; coordinates are relative to the floor.
     pub floor: DVector<f64>,
+    /// Bodies that no spring holds to ground: as many of the slowest modes have the frequency zero, not just nearly so.
+    pub free_bodies: usize,
 }
 
 /// Collects masses and springs on coordinates that follow from the degrees of freedom, x_i = row_i z:
@@ -56,6 +58,7 @@ impl Assembly {
             force: DVector::from_row_slice(force),
             sensor: DVector::from_row_slice(sensor),
             floor: self.floor,
+            free_bodies: 0,
         }
     }
 }

@@ -34,7 +34,7 @@ impl Passed {
 impl Course {
     /// At rest, to be carried by periods of `period_s`; room for the set-points that `delay` periods hold back.
     pub(super) fn new(config: &Config, period_s: f64, delay: f64) -> Result<Self, PlantError> {
-        let stage = Stage::new(config, &super::modes(config)?, period_s);
+        let stage = super::stage(config, period_s)?;
         Ok(Course { stage, setpoints: Setpoints::new(delay) })
     }
 

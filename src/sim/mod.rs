@@ -5,6 +5,7 @@
 //! The same seed and settings give the same readings, bit for bit, on any x86-64 or ARM machine: sums are in a fixed
 //! order, every transcendental function comes from the `libm` crate, and no library picks its kernel by the processor.
 
+mod body;
 mod course;
 mod floor;
 mod live;
@@ -15,10 +16,12 @@ mod stage;
 
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
-use crate::config::{Config, UnmodelledMode};
+use crate::config::{Config, Geometry, UnmodelledMode};
 use crate::plant::{self, Modal, Mode, PlantError};
+use body::Body;
 use course::Course;
 use probe::Probe;
+use stage::Stage;
 
 pub use live::LiveStage;
 pub use probe::Sensor;
@@ -86,11 +89,23 @@ impl SimulatedRig {
     }
 }
 
-/// The modes of the rig: those of the plant's model and those that it leaves out.
+/// The moving stage, its plant linear or not, to be carried by periods of `period_s`.
+fn stage(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
+    match config.sim.geometry {
+        Geometry::Linear => Ok(Stage::new(config, &modes(config)?, None, period_s)),
+        Geometry::Quadratic => Ok(Stage::new(config, &unmodelled_modes(config), Some(Body::new(config)?), period_s)),
+    }
+}
+
+/// The modes of the linear rig: those of the plant's model and those that it leaves out.
 pub fn modes(config: &Config) -> Result<Vec<Mode>, PlantError> {
     let mut modes = Modal::of(&plant::build(&config.plant)?)?.modes;
-    modes.extend(config.sim.unmodelled.iter().map(unmodelled));
+    modes.extend(unmodelled_modes(config));
     Ok(modes)
+}
+
+fn unmodelled_modes(config: &Config) -> Vec<Mode> {
+    config.sim.unmodelled.iter().map(unmodelled).collect()
 }
 
 /// An unmodelled mode has a residue, but neither a shape nor a part in the floor's motion.

@@ -1,9 +1,13 @@
 //! The moving stage: amplifier current, modes, floor and mechanical stop, carried from tick to tick.
+//!
+//! With linear geometry the modes are those of the plant and those that it leaves out, exactly carried over whole periods.
+//! With quadratic geometry the plant is a [`Body`] of its own, carried in fine steps, and the modes are the others.
 
+use super::body::Body;
 use super::floor::Line;
 use super::noise::Gaussian;
 use crate::config::Config;
-use crate::plant::{Mode, Motion, Sampled};
+use crate::plant::{Load, Mode, Motion, Sampled};
 
 /// Steps of at most this length resolve the contact with the stop: its frequency against the lightest effective mass,
 /// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, turns by 0.1 rad a step.
@@ -33,6 +37,7 @@ pub(super) struct Stage {
     fine: Sampled,
     fine_steps: usize,
     motion: Motion,
+    body: Option<Body>,
     floor: Vec<Line>,
     floor_m_per_s2: f64,
     stop_m: f64,
@@ -41,15 +46,17 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// The stage of a configuration, to be carried by periods of `period_s`.
-    pub(super) fn new(config: &Config, modes: &[Mode], period_s: f64) -> Self {
-        let fine_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
+    /// A stage at rest, to be carried by periods of `period_s`: `modes`, and a body where the plant is not among them.
+    pub(super) fn new(config: &Config, modes: &[Mode], body: Option<Body>, period_s: f64) -> Self {
+        let contact_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
+        let fine_steps = body.as_ref().map_or(0, |body| body.steps(period_s)).max(contact_steps);
         let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
         let sampled = |period_s| Sampled::new(modes, bandwidth_hz, force_constant, period_s);
         let line = |(index, line)| Line::new(line, period_s, Gaussian::new(config.sim.seed, 1 + index as u64));
         let whole = sampled(period_s);
         Stage {
             motion: whole.at_rest(),
+            body,
             whole,
             fine: sampled(period_s / fine_steps as f64),
             fine_steps,
@@ -68,7 +75,8 @@ impl Stage {
 
     /// Displacement at the probe in metres.
     pub(super) fn position_m(&self) -> f64 {
-        self.whole.position_m(&self.motion)
+        let modes_m = self.whole.position_m(&self.motion);
+        self.body.as_ref().map_or(modes_m, |body| body.position_m() + modes_m)
     }
 
     /// Where it is and where it goes.
@@ -78,7 +86,8 @@ impl Stage {
 
     /// Velocity at the probe in metres per second.
     fn velocity_m_per_s(&self) -> f64 {
-        self.whole.velocity_m_per_s(&self.motion)
+        let modes_m_per_s = self.whole.velocity_m_per_s(&self.motion);
+        self.body.as_ref().map_or(modes_m_per_s, |body| body.velocity_m_per_s() + modes_m_per_s)
     }
 
     /// Length of a period in seconds.
@@ -96,11 +105,11 @@ impl Stage {
         self.fine_steps
     }
 
-    /// One period with the set-point held. Where the stop may be touched, in fine steps.
+    /// One period with the set-point held. Where the stop may be touched, and always with a body, in fine steps.
     pub(super) fn advance(&mut self, setpoint_a: f64) {
         self.shake();
         let reach_m = self.position_m().abs() + self.velocity_m_per_s().abs() * self.whole.period_s;
-        if reach_m < self.stop_m {
+        if self.body.is_none() && reach_m < self.stop_m {
             let floor_m_per_s2 = self.floor_m_per_s2;
             return self.whole.step(&mut self.motion, setpoint_a, |block| -floor_m_per_s2 * block.floor);
         }
@@ -117,6 +126,10 @@ impl Stage {
     /// One fine step, with the stop.
     pub(super) fn advance_finely(&mut self, setpoint_a: f64) {
         let (contact_n, floor_m_per_s2) = (self.contact_n(), self.floor_m_per_s2);
+        if let Some(body) = &mut self.body {
+            let load = Load { probe_n: contact_n, floor_m_per_s2 };
+            body.step(self.fine.period_s, self.motion.current_a, setpoint_a, load);
+        }
         self.fine.step(&mut self.motion, setpoint_a, |block| contact_n * block.output - floor_m_per_s2 * block.floor);
     }
 

@@ -61,7 +61,7 @@ fn a_run_of_two_seconds_has_the_digest_that_it_has_on_every_machine() {
 }
 
 /// Everything between the settings and a command.
-const PATH_OF_A_RUN: [&str; 12] = [
+const PATH_OF_A_RUN: [&str; 18] = [
     "rt",
     "sim",
     "excitation",
@@ -73,7 +73,13 @@ const PATH_OF_A_RUN: [&str; 12] = [
     "plant/exponential.rs",
     "plant/modal.rs",
     "plant/linear_algebra.rs",
+    "plant/beam.rs",
     "plant/sr4dof.rs",
+    "plant/kinematics.rs",
+    "plant/xy.rs",
+    "plant/lumped.rs",
+    "plant/by_modes.rs",
+    "plant/quadratic.rs",
 ];
 
 /// Functions of `f64` that differ from platform to platform in their last bit; `sqrt`, `abs`, `floor`, `round` do not.

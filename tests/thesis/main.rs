@@ -7,6 +7,8 @@ mod chirp;
 mod control;
 mod margins;
 mod model;
+mod plants;
 mod program;
+mod quadratic;
 mod recording;
 mod truth;

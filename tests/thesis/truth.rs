@@ -9,15 +9,20 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-/// The answers to questions, in their order; `None`, and why on standard error, where there is no Python to ask.
+/// The answers of `truth.py` to questions, in their order; `None`, and why on standard error, where there is no Python to ask.
 pub fn ask(questions: &[Value]) -> Option<Vec<Value>> {
+    ask_of("truth.py", questions)
+}
+
+/// The answers of a script in `tests/python`.
+pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
     if let Err(why) = available(&python) {
         assert!(std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"), "Python is required here: {why}");
         eprintln!("not tested: {why}\npip install numpy scipy, or set BENCH_PYTHON");
         return None;
     }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/truth.py");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
     let mut child = Command::new(&python)
         .arg(script)
         .env("OPENBLAS_NUM_THREADS", "1")
@@ -27,7 +32,7 @@ pub fn ask(questions: &[Value]) -> Option<Vec<Value>> {
         .spawn()
         .expect("has just run");
     let questions_json = serde_json::to_vec(questions).expect("JSON");
-    // truth.py reads all of its input before it writes: neither side can block the other.
+    // The script reads all of its input before it writes: neither side can block the other.
     child.stdin.take().expect("piped").write_all(&questions_json).expect("an open pipe");
     let output = child.wait_with_output().expect("an answer");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,0 +1,23 @@
+//! A plant given by its modes, G(s) = sum of r/(s^2 + 2 zeta w s + w^2) (Eq. 3-1): one degree of freedom a mode, of unit
+//! mass, all seen with weight 1, each driven with its residue.
+//!
+//! Coordinates in the order of the modes' names. What the floor does to such a plant is not known: it does nothing.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Structure;
+use crate::config::{ModalSettings, ModeSettings};
+
+pub(super) fn structure(s: &ModalSettings) -> Structure {
+    let n = s.modes.len();
+    let vector = |of: fn(&ModeSettings) -> f64| DVector::from_iterator(n, s.modes.values().map(of));
+    Structure {
+        mass: DMatrix::identity(n, n),
+        damping: DMatrix::from_diagonal(&vector(|mode| 2.0 * mode.damping_ratio * mode.omega_rad_s)),
+        stiffness: DMatrix::from_diagonal(&vector(|mode| mode.omega_rad_s * mode.omega_rad_s)),
+        force: vector(|mode| mode.residue_per_kg),
+        sensor: DVector::from_element(n, 1.0),
+        floor: DVector::zeros(n),
+        free_bodies: s.modes.values().filter(|mode| mode.omega_rad_s == 0.0).count(),
+    }
+}

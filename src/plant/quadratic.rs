@@ -1,0 +1,251 @@
+//! The SR4DoF mechanism with its constraints as they are, not linearised.
+//!
+//! With z = [x1, y1, y2, y3] about the operating point, c = 0.6/L and a = c Y1o (Eqs. 2-1 to 2-3), the four parallelograms
+//! give
+//!
+//! ```text
+//!  x2 = x1 + p(y1 - y2)      x4 = x2 - p(y2)           p(d) = a d + c d^2
+//!  x3 = x1 - p(y1 - y3)      x5 = x3 + p(y3)           y4 = y5 = 0
+//! ```
+//!
+//! and with J_i(z) the gradient of x_i, Lagrange's equations of the masses, the bent parallelograms and the X springs are
+//!
+//! ```text
+//!  M(z) z'' = J_4 P + e_1 F - K_y z - C z' - sum of k_i x_i J_i - sum of m_i J_i (J_i' z' + g)      M(z) = sum of m_i J_i J_i^T + M_y
+//! ```
+//!
+//! with P the actuator, F a force at the probe, g the floor's acceleration, J_i' z' = z'^T (d^2 x_i/dz^2) z'. The constant
+//! force that holds Y1o has no part in X, and none is stored there at rest. C is the linear structure's, so that small
+//! motions have the damping of the modes. At z = 0 this is Eq. (2-5).
+
+use nalgebra::{DMatrix, Matrix4, Vector4};
+
+use super::beam::Beam;
+use super::{PlantError, Structure, sr4dof};
+use crate::config::{PlantSettings, Sr4dofSettings};
+
+/// The mechanism.
+#[derive(Clone, Debug)]
+pub(crate) struct Quadratic {
+    slope: f64,
+    shortening_per_m: f64,
+    /// m2 to m5.
+    masses_kg: [f64; 4],
+    /// Masses that move along the coordinates themselves: m1, m1, m2, m3.
+    straight: Matrix4<f64>,
+    bending: Matrix4<f64>,
+    damping: Matrix4<f64>,
+    spring_n_per_m: f64,
+}
+
+/// Where it is and how it moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct QuadraticState {
+    /// z in metres.
+    pub place: Vector4<f64>,
+    /// z' in metres per second.
+    pub rate: Vector4<f64>,
+}
+
+/// What acts on it besides the actuator, held over a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Load {
+    /// Force on stage 1 in X, at the probe, in newtons.
+    pub probe_n: f64,
+    /// The floor's acceleration in X in m/s^2.
+    pub floor_m_per_s2: f64,
+}
+
+/// x_i of stages 2 to 5, its gradient, and the part of its acceleration that z' makes.
+struct Motion {
+    along_m: f64,
+    gradient: Vector4<f64>,
+    bend_m_per_s2: f64,
+}
+
+impl Quadratic {
+    /// The mechanism of the settings.
+    pub fn of(settings: &PlantSettings) -> Result<Quadratic, PlantError> {
+        match settings {
+            PlantSettings::Sr4dof(s) => Ok(Quadratic::new(s, &sr4dof::structure(s)?)),
+            other => Err(PlantError::NotQuadratic { model: other.model() }),
+        }
+    }
+
+    fn new(s: &Sr4dofSettings, linear: &Structure) -> Quadratic {
+        let beam = Beam::from(s);
+        let (m1, m3, m4) = (s.motion_stage_mass_kg, s.secondary_stage_mass_kg, s.intermediate_stage_mass_kg);
+        let m2 = m3 * (1.0 + s.mass_asymmetry);
+        let k = beam.parallelogram_n_per_m();
+        #[rustfmt::skip]
+        let bending = k * Matrix4::new(
+            0.0, 0.0, 0.0, 0.0,
+            0.0, 2.0, -1.0, -1.0,
+            0.0, -1.0, 2.0, 0.0,
+            0.0, -1.0, 0.0, 2.0,
+        );
+        Quadratic {
+            slope: beam.shortening_per_m() * s.operating_point_m,
+            shortening_per_m: beam.shortening_per_m(),
+            masses_kg: [m2, m3, m4, m4],
+            straight: Matrix4::from_diagonal(&Vector4::new(m1, m1, m2, m3)),
+            bending,
+            damping: square(&linear.damping),
+            spring_n_per_m: s.spring_stiffness_n_per_m,
+        }
+    }
+
+    /// One step of `step_s` by the classical Runge and Kutta rule of fourth order, with the actuator's force in newtons at
+    /// its start, middle and end. Of a mode w the step h changes the phase by (w h)^5/120 and the size by (w h)^6/144.
+    pub fn step(&self, state: &mut QuadraticState, step_s: f64, force_n: [f64; 3], load: Load) {
+        let slope = |state: QuadraticState, force_n: f64| QuadraticState {
+            place: state.rate,
+            rate: self.acceleration(&state, force_n, load),
+        };
+        let start = *state;
+        let beyond = |slope: QuadraticState, span_s: f64| QuadraticState {
+            place: start.place + slope.place * span_s,
+            rate: start.rate + slope.rate * span_s,
+        };
+        let half_s = 0.5 * step_s;
+        let k1 = slope(start, force_n[0]);
+        let k2 = slope(beyond(k1, half_s), force_n[1]);
+        let k3 = slope(beyond(k2, half_s), force_n[1]);
+        let k4 = slope(beyond(k3, step_s), force_n[2]);
+        let sixth_s = step_s / 6.0;
+        state.place += (k1.place + (k2.place + k3.place) * 2.0 + k4.place) * sixth_s;
+        state.rate += (k1.rate + (k2.rate + k3.rate) * 2.0 + k4.rate) * sixth_s;
+    }
+
+    /// z''.
+    fn acceleration(&self, state: &QuadraticState, force_n: f64, load: Load) -> Vector4<f64> {
+        let motions = self.motions(state);
+        let mut mass = self.straight;
+        let mut force = motions[2].gradient * force_n - self.bending * state.place - self.damping * state.rate;
+        // Stage 1 moves along x1 itself.
+        force[0] += load.probe_n - self.straight[(0, 0)] * load.floor_m_per_s2;
+        for (motion, m) in motions.iter().zip(self.masses_kg) {
+            mass += motion.gradient * motion.gradient.transpose() * m;
+            force -= motion.gradient * (m * (motion.bend_m_per_s2 + load.floor_m_per_s2));
+        }
+        for motion in &motions[2..] {
+            force -= motion.gradient * (self.spring_n_per_m * motion.along_m);
+        }
+        // Positive definite for any finite z, as `straight` is; a state beyond numbers stays so, and the probe says so.
+        mass.cholesky().map_or(Vector4::from_element(f64::NAN), |factor| factor.solve(&force))
+    }
+
+    /// Stages 2, 3, 4, 5.
+    fn motions(&self, state: &QuadraticState) -> [Motion; 4] {
+        let (z, v) = (&state.place, &state.rate);
+        let (x1, [y1, y2, y3], [v1, v2, v3]) = (z[0], [z[1], z[2], z[3]], [v[1], v[2], v[3]]);
+        let c = self.shortening_per_m;
+        let shortened = |d: f64| (self.slope + c * d) * d;
+        let slope = |d: f64| self.slope + 2.0 * c * d;
+        let bend = |rate: f64| 2.0 * c * rate * rate;
+        let (s12, s2, s13, s3) = (slope(y1 - y2), slope(y2), slope(y1 - y3), slope(y3));
+        let (x2, x3) = (x1 + shortened(y1 - y2), x1 - shortened(y1 - y3));
+        let (b2, b3) = (bend(v1 - v2), -bend(v1 - v3));
+        let motion = |along_m, gradient, bend_m_per_s2| Motion { along_m, gradient, bend_m_per_s2 };
+        [
+            motion(x2, Vector4::new(1.0, s12, -s12, 0.0), b2),
+            motion(x3, Vector4::new(1.0, -s13, 0.0, s13), b3),
+            motion(x2 - shortened(y2), Vector4::new(1.0, s12, -s12 - s2, 0.0), b2 - bend(v2)),
+            motion(x3 + shortened(y3), Vector4::new(1.0, -s13, 0.0, s13 + s3), b3 + bend(v3)),
+        ]
+    }
+}
+
+fn square(matrix: &DMatrix<f64>) -> Matrix4<f64> {
+    Matrix4::from_fn(|row, column| matrix[(row, column)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Source, load};
+    use nalgebra::DVector;
+
+    fn settings(sets: &[&str]) -> Sr4dofSettings {
+        let sets = sets.iter().map(|set| set.to_string()).collect();
+        match load(&Source { sets, ..Source::default() }).unwrap().plant {
+            PlantSettings::Sr4dof(s) => s,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn mechanism(s: &Sr4dofSettings) -> (Quadratic, Structure) {
+        let linear = sr4dof::structure(s).unwrap();
+        (Quadratic::new(s, &linear), linear)
+    }
+
+    /// T + V of a state, by the definition: masses times velocities, springs times elongations.
+    fn energy(s: &Sr4dofSettings, q: &Quadratic, state: &QuadraticState) -> f64 {
+        let motions = q.motions(state);
+        let x_speed = |motion: &Motion| motion.gradient.dot(&state.rate);
+        let moving: f64 = motions.iter().zip(q.masses_kg).map(|(motion, m)| m * x_speed(motion).powi(2)).sum();
+        let straight = state.rate.dot(&(q.straight * state.rate));
+        let [y1, y2, y3] = [state.place[1], state.place[2], state.place[3]];
+        let k = Beam::from(s).parallelogram_n_per_m();
+        let bent = k * ((y1 - y2).powi(2) + y2 * y2 + (y1 - y3).powi(2) + y3 * y3);
+        let springs: f64 = motions[2..].iter().map(|motion| q.spring_n_per_m * motion.along_m.powi(2)).sum();
+        0.5 * (moving + straight + bent + springs)
+    }
+
+    #[test]
+    fn small_motions_are_those_of_the_linear_structure() {
+        let s = settings(&[]);
+        let (q, linear) = mechanism(&s);
+        let inverse = linear.mass.clone().try_inverse().unwrap();
+        for axis in 0..4 {
+            for (place, rate, force_n) in [(1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0), (0.0, 0.0, 1.0)] {
+                let mut state = QuadraticState::default();
+                (state.place[axis], state.rate[axis]) = (place, rate);
+                let load = Load { probe_n: 0.3 * force_n, floor_m_per_s2: 0.2 * force_n };
+                let ours = q.acceleration(&state, force_n, load);
+                let vector = |v: &Vector4<f64>| DVector::from_column_slice(v.as_slice());
+                let mut force = &linear.force * force_n - &linear.floor * load.floor_m_per_s2;
+                force[0] += load.probe_n;
+                force -= &linear.stiffness * vector(&state.place) + &linear.damping * vector(&state.rate);
+                let expected = &inverse * force;
+                // Beyond the linear part are squares of 1e-9 m, 1e-7 of it over the 4 mm of Y1o; 1e-5 leaves room for stiff axes.
+                assert!((vector(&ours) - &expected).amax() <= 1e-5 * expected.amax(), "{ours} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn large_motions_without_damping_keep_their_energy() {
+        let s = settings(&["plant.damping={kind=\"uniform\",ratio=0.0}"]);
+        let (q, _) = mechanism(&s);
+        let mut state = QuadraticState { place: Vector4::new(5e-4, 2e-3, -1e-3, 3e-3), ..QuadraticState::default() };
+        let before = energy(&s, &q, &state);
+        let mut least = 1.0;
+        for _ in 0..50_000 {
+            q.step(&mut state, 2e-5, [0.0; 3], Load::default());
+            least = f64::min(least, energy(&s, &q, &state) / before);
+        }
+        // One second: the fastest mode, 540 rad/s, loses 2 * 540 rad * (540 * 2e-5)^5/144 = 1.1e-9 of its energy.
+        let left = energy(&s, &q, &state) / before;
+        assert!((left - 1.0).abs() < 5e-9 && least > 1.0 - 5e-9, "{left} {least}");
+        // The motion is far from linear: x4 bends by c (3 mm)^2 = 0.11 mm beside its 0.5 mm.
+        assert!(state.place.amax() > 1e-4);
+    }
+
+    #[test]
+    fn halving_the_step_changes_the_error_by_the_fourth_power() {
+        let s = settings(&[]);
+        let (q, _) = mechanism(&s);
+        let after = |steps: usize| {
+            let mut state =
+                QuadraticState { place: Vector4::new(5e-4, 2e-3, -1e-3, 3e-3), ..QuadraticState::default() };
+            let step_s = 0.02 / steps as f64;
+            (0..steps).for_each(|_| q.step(&mut state, step_s, [0.1; 3], Load::default()));
+            state.place
+        };
+        let exact = after(6400);
+        let (coarse, fine) = ((after(100) - exact).norm(), (after(200) - exact).norm());
+        // Fourth order is 16; the next term of the series shifts it by some per cent at 0.1 rad a step.
+        assert!((14.0..18.0).contains(&(coarse / fine)), "{}", coarse / fine);
+    }
+}
