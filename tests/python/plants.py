@@ -8,6 +8,7 @@ object that `bench config show --json` prints.
     pairs      the number of CNMP pairs of the XY stage at `operating_points` (ratios of L)
     geometric  the static load of the XY stage: largest element of the geometric stiffness over that of K, and the largest
                change of a frequency in hertz
+    frf        response from set-point to probe at `frequency_hz`, with hold, computing delay and amplifier
     trajectory displacement of the probe at each tick for `setpoint_a` held over each tick, quadratic constraints
 
 How it differs from bench on purpose: the XY stage has all 26 coordinates of its 13 stages and 16 constraint equations; the
@@ -180,6 +181,28 @@ def geometric(q):
     return {"ratio": abs(part).max() / abs(K).max(), "shift_hz": abs(hertz(K + part) - hertz(K)).max()}
 
 
+# From set-point to probe ---------------------------------------------------------------------------------------------
+
+
+def frf(q):
+    """One exponential takes displacements, velocities, current and the held set-point over a period."""
+    config = q["config"]
+    M, K, C, force, sensor = matrices(config["plant"])
+    n, rate = len(M), config["loop"]["rate_hz"]
+    A = np.zeros((2 * n + 2, 2 * n + 2))
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = -np.linalg.solve(M, K), -np.linalg.solve(M, C)
+    A[n : 2 * n, 2 * n] = np.linalg.solve(M, force) * config["motor"]["force_constant_n_per_a"]
+    lag = 2 * np.pi * config["amplifier"]["bandwidth_hz"]
+    A[2 * n, 2 * n], A[2 * n, 2 * n + 1] = -lag, lag
+    over = la.expm(A / rate)
+    F, g = over[:-1, :-1], over[:-1, -1]
+    z = np.exp(2j * np.pi * np.array(q["frequency_hz"]) / rate)
+    out = np.concatenate([sensor, np.zeros(n + 1)])
+    response = [out @ np.linalg.solve(at * np.eye(len(F)) - F, g) for at in z]
+    return complex_list(response * z ** -float(config["loop"]["computing_delay_periods"]))
+
+
 # SR4DoF with quadratic constraints -----------------------------------------------------------------------------------
 
 
@@ -255,7 +278,7 @@ def trajectory(q):
     return {"position_m": seen}
 
 
-ANSWERS = {f.__name__: f for f in (model, pairs, geometric, trajectory)}
+ANSWERS = {f.__name__: f for f in (model, pairs, geometric, frf, trajectory)}
 
 if __name__ == "__main__":
     json.dump([ANSWERS[q["what"]](q) for q in json.load(sys.stdin)], sys.stdout)
