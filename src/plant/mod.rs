@@ -61,7 +61,7 @@ pub enum PlantError {
     },
     /// A rigid body mode, or one that buckles, where a held stage is meant.
     #[error(
-        "mode {number} has the eigenvalue {eigenvalue_rad2_s2:.3e} rad^2/s^2, which beside the fastest mode's is zero or negative: no spring holds the stage in that direction; add one, or stiffen it"
+        "mode {number} has the eigenvalue {eigenvalue_rad2_s2:.3e} rad^2/s^2, which beside the fastest mode's cannot be told from zero, or is negative: no spring holds the stage in that direction, or another mass is too light, or another spring too stiff, to be computed with"
     )]
     Free {
         /// Which mode, from 1.
