@@ -25,6 +25,7 @@
 //! | the fast and the slow controller | `bench-config/controllers/`, run by [`control::Controller`] |
 //! | margins of a loop | [`control::ClosedLoop`] |
 //! | zeros, signs, sequence of dominant modes | [`plant`] |
+//! | how Tables 3-1 to 3-4 are read | `plant/tables.rs`, `plant/sequence.rs` |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |

@@ -86,7 +86,7 @@ impl Modes {
             cnmp_pairs: plant::cnmp_pairs(&undamped),
             damped_cnmp_pairs: plant::cnmp_pairs(&damped),
             sign_sequence: plant::sign_sequence(&modal),
-            dominant_sequence: plant::dominant_sequence(&modal, &undamped),
+            dominant_sequence: plant::dominant_sequence(&modal)?,
             phase_drop_deg: plant::phase_drop_deg(&undamped),
         })
     }

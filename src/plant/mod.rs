@@ -2,7 +2,11 @@
 //!
 //! ```text
 //!  settings -> Structure (M, C, K, vectors) -> modes (Modal) -> simulation, FRF, margins
-//!                                    \-> zeros, kinds, sequences
+//!                          |              |  sum: what shows between force and probe
+//!                          |              v
+//!                          |           sequence of dominant modes, Tables 3-1 to 3-4, step responses, break points
+//!                          v
+//!                        zeros, kinds -> loci over a setting, bounds on bandwidth and sensitivity
 //! ```
 //!
 //! | `plant.model` | made in | from |
@@ -18,30 +22,42 @@
 //! Signs: positive current gives positive force, positive force gives positive displacement at low frequency.
 
 mod beam;
+mod bounds;
+mod break_points;
 mod by_modes;
 mod chain;
 mod damping;
 mod exponential;
 mod kinematics;
 mod linear_algebra;
+mod locus;
 mod lumped;
 mod modal;
 mod quadratic;
 mod sampled;
 mod sequence;
 mod sr4dof;
+mod step;
 mod structure;
+mod sum;
+mod tables;
 mod xy;
 mod zeros;
 
+pub use bounds::{Bound, bandwidth_rad_s, guaranteed_peak, opening_angle, opening_angle_allowed};
+pub use break_points::{critical_damping, critical_residues, critical_sums, touching_damping, two_mode_break_points};
 pub use chain::Chain;
 pub(crate) use exponential::exponential;
+pub use locus::{Change, Crossing, Locus, Plane};
 pub use modal::{Modal, Mode, Sign};
 pub(crate) use quadratic::{Load, Quadratic, QuadraticState};
 pub use sampled::{Block, Motion, Sampled};
-pub use sequence::{dominant_sequence, sign_sequence};
+pub use sequence::{Dominant, Sequence, dominant_sequence, sign_sequence};
+pub use step::{InitialStep, StepResponse};
 pub use structure::Structure;
-pub use zeros::{Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
+pub use sum::{ModalSum, Term};
+pub use tables::{Place, Row, TABLES, Table, table_of};
+pub use zeros::{Kinds, Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 
 use crate::config::PlantSettings;
 

@@ -1,126 +1,322 @@
 //! The sequence of signs and the sequence of dominant modes (section 3.2.1).
+//!
+//! How the definitions are read, so that no "much larger" and no "near" is left in them:
+//!
+//! | definition | here |
+//! |---|---|
+//! | (1) | at a zero of G on the imaginary axis a mode takes over whose part has the sign that G has after it |
+//! | (2) | of several such modes those that would do it alone, with all modes that are no candidates, between the same two resonances; of several or none of these the largest part, or `[DI]` beyond the last resonance |
+//! | (3) | without a zero of G a mode takes over at its own resonance only, where its part is beyond all bounds; a double integrator is one at 0, a constant at infinity |
+//! | (4) | the same mode twice is once |
+//! | (5) | below the first event the mode that resonates there dominates; if it is a zero of G, the modes that hold the sign before it, by (2) with frequency reversed: one of them, or `[DC]` / `[-DC]` |
 
-use super::{Modal, Sign, Zero, ZeroKind};
+use super::{Modal, ModalSum, PlantError, Sign, Term, ZeroKind};
 
 /// The signs of the modes that show, slowest first: `+-+`.
 pub fn sign_sequence(modal: &Modal) -> String {
     modal.signs().iter().filter(|sign| **sign != Sign::None).map(|sign| sign.symbol()).collect()
 }
 
-/// The sequence of dominant modes of the undamped plant, as `[R]-[u]-[v]`: the slowest mode that shows is R, the next are
-/// u, v, w; beyond those modes have numbers.
-///
-/// Along rising frequency a mode takes over where G passes through zero and goes on with that mode's sign (definition 1;
-/// of several the largest), and, where nothing passed through zero, before its own resonance (definition 3).
-pub fn dominant_sequence(modal: &Modal, undamped: &[Zero]) -> String {
-    let signs = modal.signs();
-    let visible: Vec<usize> = (0..signs.len()).filter(|&i| signs[i] != Sign::None).collect();
-    let Some(&slowest) = visible.first() else { return "[]".into() };
-    let mut sequence = vec![largest(modal, &visible, 0.0, None).unwrap_or(slowest)];
-    for event in events(modal, &visible, undamped) {
-        let dominant = match event {
-            Happening::Zero(omega) => largest(modal, &visible, omega, Some(sign_after(modal, &visible, omega))),
-            Happening::Pole(mode) => Some(mode),
+/// The sequence of dominant modes of the undamped plant in words, `[R]-[u]-[v]`; `[]` where no mode shows.
+pub fn dominant_sequence(modal: &Modal) -> Result<String, PlantError> {
+    match ModalSum::visible(modal) {
+        Err(PlantError::NoResponse) => Ok("[]".into()),
+        sum => Ok(Sequence::of(&sum?)?.to_string()),
+    }
+}
+
+/// What dominates a range of frequencies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dominant {
+    /// A mode, by its place among those with a residue, slowest first.
+    Mode(usize),
+    /// The constant R.
+    Constant,
+    /// Several modes together, below all resonances: `[DC]`, or `[-DC]` where they are negative.
+    Dc {
+        /// Whether G is positive there.
+        positive: bool,
+    },
+    /// Several modes together, above all resonances, as a double integrator: `[DI]`, or `[-DI]` where its residue is negative.
+    Di {
+        /// Whether its residue is positive (G is negative there).
+        positive: bool,
+    },
+}
+
+/// What dominates, along rising frequency.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sequence {
+    /// The parts that dominate, each range one.
+    pub dominants: Vec<Dominant>,
+    names: Names,
+}
+
+/// Names of modes as in Chapter 3: `u`, `v` of two (and `R` for a constant), else `R`, `u`, `v`, `w`, and numbers from 5.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Names {
+    slowest_is_r: bool,
+}
+
+impl Sequence {
+    /// The sequence of a sum without its damping.
+    pub fn of(sum: &ModalSum) -> Result<Sequence, PlantError> {
+        let events = events(sum)?;
+        let mut dominants: Vec<Dominant> = Vec::new();
+        dominants.extend(start(sum, &events)?);
+        for (index, event) in events.iter().enumerate() {
+            let dominant = match *event {
+                Event::Resonance { mode, .. } => Dominant::Mode(mode),
+                Event::Crossing { omega_rad_s, positive_after } => {
+                    let place = Place::of(sum, omega_rad_s);
+                    let takers = takers(sum, &place, omega_rad_s, positive_after)?;
+                    match takers.only() {
+                        Some(part) => part.dominant(),
+                        None if place.above == f64::INFINITY && index + 1 == events.len() => {
+                            top(&takers, positive_after)
+                        }
+                        None => takers.largest(sum, omega_rad_s),
+                    }
+                }
+            };
+            dominants.push(dominant);
+        }
+        if sum.constant_m_per_n() != 0.0 {
+            dominants.push(Dominant::Constant);
+        }
+        dominants.dedup();
+        let slowest_is_r = sum.constant_m_per_n() == 0.0 && sum.terms().len() != 2;
+        Ok(Sequence { dominants, names: Names { slowest_is_r } })
+    }
+
+    /// The names of the parts, without brackets.
+    pub fn names(&self) -> Vec<String> {
+        self.dominants.iter().map(|dominant| self.names.of(*dominant)).collect()
+    }
+}
+
+impl std::fmt::Display for Sequence {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let bracketed: Vec<String> = self.names().iter().map(|name| format!("[{name}]")).collect();
+        f.write_str(&bracketed.join("-"))
+    }
+}
+
+impl Names {
+    fn of(self, dominant: Dominant) -> String {
+        let mode = |index: usize| match index + usize::from(!self.slowest_is_r) {
+            0 => "R".to_string(),
+            1 => "u".to_string(),
+            2 => "v".to_string(),
+            3 => "w".to_string(),
+            _ => (index + 1).to_string(),
         };
-        if let Some(mode) = dominant.filter(|mode| sequence.last() != Some(mode)) {
-            sequence.push(mode);
+        match dominant {
+            Dominant::Mode(index) => mode(index),
+            Dominant::Constant => "R".into(),
+            Dominant::Dc { positive } => if positive { "DC" } else { "-DC" }.into(),
+            Dominant::Di { positive } => if positive { "DI" } else { "-DI" }.into(),
         }
     }
-    let name = |mode: &usize| format!("[{}]", name(visible.iter().position(|i| i == mode).unwrap_or(0)));
-    sequence.iter().map(name).collect::<Vec<_>>().join("-")
 }
 
-enum Happening {
-    Zero(f64),
-    Pole(usize),
+/// What happens along the frequency axis.
+#[derive(Clone, Copy, Debug)]
+enum Event {
+    /// A mode resonates.
+    Resonance { omega_rad_s: f64, mode: usize },
+    /// G passes through zero.
+    Crossing { omega_rad_s: f64, positive_after: bool },
 }
 
-/// Zeros on the imaginary axis and poles, by frequency; a zero that hides an invisible mode is left out.
-fn events(modal: &Modal, visible: &[usize], undamped: &[Zero]) -> Vec<Happening> {
-    let omega = |mode: usize| modal.modes[mode].omega_rad_s;
-    let hidden = |w: f64| (0..modal.modes.len()).any(|i| !visible.contains(&i) && (omega(i) / w - 1.0).abs() < 1e-3);
-    let zeros = undamped.iter().filter(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0).map(|zero| zero.s.im);
-    let mut events: Vec<(f64, Happening)> = zeros
-        .filter(|w| !hidden(*w))
-        .map(|w| (w, Happening::Zero(w)))
-        .chain(visible.iter().map(|&i| (omega(i), Happening::Pole(i))))
-        .collect();
-    events.sort_by(|a, b| a.0.total_cmp(&b.0));
-    events.into_iter().map(|(_, event)| event).collect()
+impl Event {
+    fn omega_rad_s(&self) -> f64 {
+        let (Event::Resonance { omega_rad_s, .. } | Event::Crossing { omega_rad_s, .. }) = *self;
+        omega_rad_s
+    }
 }
 
-fn undamped_part(modal: &Modal, mode: usize, omega: f64) -> f64 {
-    let mode = &modal.modes[mode];
-    mode.residue_per_kg() / (mode.omega_rad_s * mode.omega_rad_s - omega * omega)
+fn events(sum: &ModalSum) -> Result<Vec<Event>, PlantError> {
+    let modes =
+        sum.terms().iter().enumerate().map(|(mode, term)| Event::Resonance { omega_rad_s: term.omega_rad_s, mode });
+    let crossings = crossings(sum)?;
+    let zeros =
+        crossings.into_iter().map(|(omega_rad_s, positive_after)| Event::Crossing { omega_rad_s, positive_after });
+    let mut events: Vec<Event> = modes.chain(zeros).collect();
+    events.sort_by(|a, b| a.omega_rad_s().total_cmp(&b.omega_rad_s()));
+    Ok(events)
 }
 
-/// The mode of the largest part of G at `omega`, of those with the given sign if there is one.
-fn largest(modal: &Modal, visible: &[usize], omega: f64, positive: Option<bool>) -> Option<usize> {
-    let part = |mode: usize| undamped_part(modal, mode, omega);
-    let fits = |mode: &usize| positive.is_none_or(|positive| (part(*mode) > 0.0) == positive);
-    visible.iter().copied().filter(fits).max_by(|&a, &b| part(a).abs().total_cmp(&part(b).abs()))
+/// The zeros of G on the imaginary axis in rad/s, and whether G is positive above each: the sign of its slope
+/// dG/d(w^2) = sum of r/(w_i^2 - w^2)^2.
+fn crossings(sum: &ModalSum) -> Result<Vec<(f64, bool)>, PlantError> {
+    let slope = |omega: f64| sum.terms().iter().map(|t| t.part(omega).powi(2) / t.residue_per_kg).sum::<f64>();
+    let zeros = sum.undamped_zeros()?;
+    let on_axis = zeros.iter().filter(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0);
+    Ok(on_axis.map(|zero| (zero.s.im, slope(zero.s.im) > 0.0)).collect())
 }
 
-/// Whether the undamped G is positive right above its zero at `omega`: G/j-derivative by its exact slope
-/// dG/d(omega) = sum of 2 omega r/(w^2 - omega^2)^2.
-fn sign_after(modal: &Modal, visible: &[usize], omega: f64) -> bool {
-    let slope = |mode: &usize| {
-        let part = undamped_part(modal, *mode, omega);
-        2.0 * omega * part * part / modal.modes[*mode].residue_per_kg()
-    };
-    visible.iter().map(slope).sum::<f64>() > 0.0
+/// A mode or the constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Part {
+    Mode(usize),
+    Constant,
 }
 
-fn name(index: usize) -> String {
-    match index {
-        0 => "R".into(),
-        1 => "u".into(),
-        2 => "v".into(),
-        3 => "w".into(),
-        _ => (index + 1).to_string(),
+impl Part {
+    fn dominant(self) -> Dominant {
+        match self {
+            Part::Mode(mode) => Dominant::Mode(mode),
+            Part::Constant => Dominant::Constant,
+        }
+    }
+
+    fn at(self, sum: &ModalSum, omega_rad_s: f64) -> f64 {
+        match self {
+            Part::Mode(mode) => sum.terms()[mode].part(omega_rad_s),
+            Part::Constant => sum.constant_m_per_n(),
+        }
+    }
+}
+
+/// Between which two resonances a frequency lies.
+struct Place {
+    below: f64,
+    above: f64,
+}
+
+impl Place {
+    fn of(sum: &ModalSum, omega_rad_s: f64) -> Place {
+        let resonances = || sum.terms().iter().map(|term| term.omega_rad_s);
+        Place {
+            below: resonances().filter(|w| *w < omega_rad_s).fold(0.0, f64::max),
+            above: resonances().filter(|w| *w > omega_rad_s).fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    fn holds(&self, omega_rad_s: f64) -> bool {
+        self.below < omega_rad_s && omega_rad_s < self.above
+    }
+}
+
+/// Candidates of definition (1), and those of them that definition (2a) leaves.
+struct Takers {
+    candidates: Vec<Part>,
+    able: Vec<Part>,
+}
+
+impl Takers {
+    fn only(&self) -> Option<Part> {
+        match (self.candidates.as_slice(), self.able.as_slice()) {
+            ([one], _) | (_, [one]) => Some(*one),
+            _ => None,
+        }
+    }
+
+    fn largest(&self, sum: &ModalSum, omega_rad_s: f64) -> Dominant {
+        let among = if self.able.is_empty() { &self.candidates } else { &self.able };
+        let size = |part: &&Part| part.at(sum, omega_rad_s).abs();
+        // G is zero and moves: it has parts of either sign. Without any, the constant would be all there is.
+        among.iter().max_by(|a, b| size(a).total_cmp(&size(b))).map_or(Dominant::Constant, |part| part.dominant())
+    }
+}
+
+/// Who can give G its sign beside the crossing at `omega_rad_s`, where `positive` is that sign.
+fn holders(sum: &ModalSum, omega_rad_s: f64, positive: bool) -> (Vec<Part>, Vec<Part>) {
+    let modes = (0..sum.terms().len()).map(Part::Mode);
+    let all = modes.chain((sum.constant_m_per_n() != 0.0).then_some(Part::Constant));
+    all.partition(|part| (part.at(sum, omega_rad_s) > 0.0) == positive)
+}
+
+/// Definitions (1) and (2a) for the crossing at `omega_rad_s`: who takes over.
+fn takers(sum: &ModalSum, place: &Place, omega_rad_s: f64, positive_after: bool) -> Result<Takers, PlantError> {
+    let (candidates, rest) = holders(sum, omega_rad_s, positive_after);
+    let able = able(sum, &candidates, &rest, place, positive_after)?;
+    Ok(Takers { candidates, able })
+}
+
+/// The candidates that, alone with the rest, cross in the same sense between the same resonances.
+fn able(
+    sum: &ModalSum,
+    candidates: &[Part],
+    rest: &[Part],
+    place: &Place,
+    positive_after: bool,
+) -> Result<Vec<Part>, PlantError> {
+    let mut able = Vec::new();
+    for candidate in candidates {
+        let parts = || rest.iter().chain([candidate]);
+        let terms: Vec<Term> = parts().filter_map(|part| term(sum, *part)).collect();
+        let constant = if parts().any(|part| *part == Part::Constant) { sum.constant_m_per_n() } else { 0.0 };
+        let crossings = crossings(&ModalSum::new(terms, constant)?)?;
+        if crossings.iter().any(|(omega, after)| place.holds(*omega) && *after == positive_after) {
+            able.push(*candidate);
+        }
+    }
+    Ok(able)
+}
+
+fn term(sum: &ModalSum, part: Part) -> Option<Term> {
+    match part {
+        Part::Mode(mode) => Some(sum.terms()[mode]),
+        Part::Constant => None,
+    }
+}
+
+/// Who dominates below the first event; nobody is named where a double integrator does, its resonance at 0 is the first event.
+fn start(sum: &ModalSum, events: &[Event]) -> Result<Option<Dominant>, PlantError> {
+    let Some(Event::Crossing { omega_rad_s, positive_after }) = events.first().copied() else { return Ok(None) };
+    let place = Place::of(sum, omega_rad_s);
+    let (candidates, rest) = holders(sum, omega_rad_s, !positive_after);
+    let able = able(sum, &candidates, &rest, &place, positive_after)?;
+    let only = Takers { candidates, able }.only();
+    Ok(Some(only.map_or(Dominant::Dc { positive: !positive_after }, Part::dominant)))
+}
+
+/// Who dominates beyond the last crossing, where several could.
+fn top(takers: &Takers, positive_after: bool) -> Dominant {
+    if takers.candidates.contains(&Part::Constant) {
+        Dominant::Constant
+    } else {
+        Dominant::Di { positive: !positive_after }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::Mode;
-    use nalgebra::{Complex, DVector};
 
-    fn modal(parts: &[(f64, f64)]) -> Modal {
-        let mode = |&(omega_rad_s, residue): &(f64, f64)| Mode {
-            omega_rad_s,
-            damping_ratio: 0.001,
-            shape: DVector::zeros(1),
-            force_gain: residue,
-            sensor_gain: 1.0,
-            floor_gain: 0.0,
-        };
-        Modal { modes: parts.iter().map(mode).collect() }
-    }
-
-    /// Zeros in u = s^2 of aR/(u + wR^2) + au/(u + wu^2) + av/(u + wv^2), from the quadratic's closed form.
-    fn zeros(parts: &[(f64, f64)]) -> Vec<Zero> {
-        let [(wr, ar), (wu, au), (wv, av)] = [parts[0], parts[1], parts[2]].map(|(w, a)| (w * w, a));
-        let (a, b, c) = (
-            ar + au + av,
-            ar * (wu + wv) + au * (wr + wv) + av * (wr + wu),
-            ar * wu * wv + au * wr * wv + av * wr * wu,
-        );
-        let root = Complex::new(b * b - 4.0 * a * c, 0.0).sqrt();
-        let mmp = |u: Complex<f64>| (u.im == 0.0 && u.re < 0.0).then(|| (-u.re).sqrt());
-        let on_axis = [(-b + root) / (2.0 * a), (-b - root) / (2.0 * a)].into_iter().filter_map(mmp);
-        on_axis.map(|w| Zero { s: Complex::new(0.0, w), kind: ZeroKind::Mmp }).collect()
+    fn sequence(parts: &[(f64, f64)], constant: f64) -> String {
+        let terms = parts.iter().map(|(w, r)| Term::undamped(*w, *r)).collect();
+        Sequence::of(&ModalSum::new(terms, constant).unwrap()).unwrap().to_string()
     }
 
     #[test]
-    fn the_two_examples_of_fig_3_11_have_the_sequences_of_the_thesis() {
-        // Eq. (3-9) without damping: a0 = 0.01 gives dual MMP zeros, a0 = 5 CNMP zeros.
-        for (a0, sequence) in [(0.01, "[R]-[u]-[R]-[v]"), (5.0, "[R]-[u]-[v]")] {
-            let parts = [(1.0, 1.0), (10.0, -a0), (11.0, a0)];
-            let modal = modal(&parts);
-            assert_eq!(sign_sequence(&modal), "+-+");
-            assert_eq!(dominant_sequence(&modal, &zeros(&parts)), sequence, "a0 = {a0}");
+    fn the_examples_of_chapter_3_have_the_sequences_of_the_thesis() {
+        // Eq. (3-4): -0.5 is the MMP case, -5 the RMP-RNMP case.
+        assert_eq!(sequence(&[(1.0, 1.0), (10.0, -0.5)], 0.0), "[u]-[v]-[u]");
+        assert_eq!(sequence(&[(1.0, 1.0), (10.0, -5.0)], 0.0), "[u]-[v]");
+        // Eq. (3-9) with a_u = -a0: dual MMP zeros, CMP-CNMP zeros, two pairs of RMP-RNMP zeros.
+        for (a0, expected) in [(0.01, "[R]-[u]-[R]-[v]"), (5.0, "[R]-[u]-[v]"), (22.0, "[R]-[u]-[v]")] {
+            assert_eq!(sequence(&[(1.0, 1.0), (10.0, -a0), (11.0, a0)], 0.0), expected, "a0 = {a0}");
         }
+    }
+
+    #[test]
+    fn several_modes_together_are_an_abstract_one() {
+        // Above both resonances neither R nor u alone turns v's sign: u + v and R + v are positive at infinity, all three
+        // are not. -2.5 + 2 > ... the sums of residues decide: R + v = -0.5, u + v = -0.5, R + u + v = 1.5.
+        assert_eq!(sequence(&[(0.0, 2.0), (1.0, 2.0), (2.0, -2.5)], 0.0), "[R]-[u]-[v]-[DI]");
+        // With more of R it does so alone.
+        assert_eq!(sequence(&[(0.0, 4.0), (1.0, 2.0), (2.0, -2.5)], 0.0), "[R]-[u]-[v]-[R]");
+        // Table 3-4: at low frequency v and R are each too small to hold the sign against u.
+        assert_eq!(sequence(&[(1.0, 1.0), (2.0, -2.8)], -0.8), "[-DC]-[u]-[v]-[R]");
+    }
+
+    #[test]
+    fn the_names_of_many_modes_go_on_with_numbers() {
+        let in_phase: Vec<(f64, f64)> = (1..=6).map(|i| (f64::from(i), 1.0)).collect();
+        assert_eq!(sequence(&in_phase, 0.0), "[R]-[u]-[v]-[w]-[5]-[6]");
+        assert_eq!(sequence(&[], 1.0), "[R]");
     }
 }

@@ -10,7 +10,7 @@
 //! Without damping this is a pencil of size n - 1 in u = s^2. One complex pair in u is a quartet in s: one pair of CNMP
 //! zeros. With damping it is linearised to twice that size.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::linear_algebra::{complement, pencil};
 use super::{PlantError, Structure};
@@ -52,34 +52,99 @@ pub struct Zero {
     pub kind: ZeroKind,
 }
 
+/// How many zeros of which kind a plant without damping has, by pairs and quartets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Kinds {
+    /// Pairs on the imaginary axis.
+    pub mmp: usize,
+    /// Pairs of one RMP and one RNMP zero.
+    pub real: usize,
+    /// Quartets of two CMP and two CNMP zeros.
+    pub quartets: usize,
+}
+
+impl Kinds {
+    /// The kinds of the zeros of a plant without damping.
+    pub fn of(zeros: &[Zero]) -> Kinds {
+        let count = |kind| zeros.iter().filter(|zero| zero.kind == kind).count();
+        Kinds { mmp: count(ZeroKind::Mmp) / 2, real: count(ZeroKind::Rnmp), quartets: count(ZeroKind::Cnmp) / 2 }
+    }
+
+    /// Zeros in the right half plane.
+    pub fn in_right_half_plane(&self) -> usize {
+        self.real + 2 * self.quartets
+    }
+}
+
+/// As the thesis's tables write it: `dual MMP`, `MMP + RMP-RNMP`, `CMP-CNMP`.
+impl std::fmt::Display for Kinds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let named = |(count, name): (usize, &str)| match count {
+            0 => None,
+            1 => Some(name.to_string()),
+            2 => Some(format!("dual {name}")),
+            _ => Some(format!("{count} x {name}")),
+        };
+        let parts = [(self.mmp, "MMP"), (self.real, "RMP-RNMP"), (self.quartets, "CMP-CNMP")];
+        let text = parts.into_iter().filter_map(named).collect::<Vec<_>>().join(" + ");
+        f.write_str(if text.is_empty() { "none" } else { &text })
+    }
+}
+
 /// A pair in u counts as complex above this ratio of imaginary part to magnitude: two equal real values come out of the
 /// eigenvalue iteration apart by the square root of the rounding (1.5e-8).
 const COMPLEX_RATIO: f64 = 1e-7;
 
 /// Zeros of the structure without its damping, slowest first.
 pub fn undamped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {
-    let [mass, _, stiffness] = projected(structure);
-    let scale = time_scale(structure);
-    let squares = pencil(&(stiffness / (scale * scale)), &mass)?;
-    let zeros = squares.iter().flat_map(|u| of_square(u * (scale * scale))).collect();
-    Ok(sorted(zeros))
+    undamped(&System::from(structure))
 }
 
 /// Zeros of the structure with its damping, slowest first. A zero in the left half plane has the kind of the undamped
 /// zero it comes from.
 pub fn damped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {
-    let [mass, damping, stiffness] = projected(structure);
+    damped(&System::from(structure))
+}
+
+/// What the zeros of R + c^T (s^2 M + s C + K)^-1 q depend on.
+pub(super) struct System<'a> {
+    pub mass: &'a DMatrix<f64>,
+    pub damping: &'a DMatrix<f64>,
+    pub stiffness: &'a DMatrix<f64>,
+    pub force: &'a DVector<f64>,
+    pub sensor: &'a DVector<f64>,
+    pub constant_m_per_n: f64,
+}
+
+impl<'a> From<&'a Structure> for System<'a> {
+    fn from(structure: &'a Structure) -> Self {
+        let Structure { mass, damping, stiffness, force, sensor, .. } = structure;
+        System { mass, damping, stiffness, force, sensor, constant_m_per_n: 0.0 }
+    }
+}
+
+/// The same with a constant beside the structure: zeros of R + c^T (s^2 M + K)^-1 q.
+pub(super) fn undamped(system: &System) -> Result<Vec<Zero>, PlantError> {
+    let scale = time_scale(system);
+    let [mass, _, stiffness] = reduced(system, scale);
+    let squares = pencil(&stiffness, &mass)?;
+    let zeros = squares.iter().flat_map(|u| of_square(u * (scale * scale))).collect();
+    Ok(sorted(zeros))
+}
+
+/// The same with damping: zeros of R + c^T (s^2 M + s C + K)^-1 q.
+pub(super) fn damped(system: &System) -> Result<Vec<Zero>, PlantError> {
+    let scale = time_scale(system);
+    let [mass, damping, stiffness] = reduced(system, scale);
     let n = mass.nrows();
-    let scale = time_scale(structure);
     let mut constant = DMatrix::identity(2 * n, 2 * n);
     let mut linear = DMatrix::zeros(2 * n, 2 * n);
-    constant.view_mut((n, n), (n, n)).copy_from(&(stiffness / (scale * scale)));
-    linear.view_mut((0, n), (n, n)).fill_with_identity();
-    linear.view_mut((0, n), (n, n)).neg_mut();
+    constant.view_mut((n, n), (n, n)).copy_from(&stiffness);
+    linear.view_mut((0, n), (n, n)).fill_diagonal(-1.0);
     linear.view_mut((n, 0), (n, n)).copy_from(&mass);
-    linear.view_mut((n, n), (n, n)).copy_from(&(damping / scale));
-    let undamped = undamped_zeros(structure)?;
-    let zeros = pencil(&constant, &linear)?.iter().map(|s| damped(s * scale, &undamped)).collect();
+    linear.view_mut((n, n), (n, n)).copy_from(&damping);
+    let undamped = undamped(system)?;
+    let zeros = pencil(&constant, &linear)?.iter().map(|s| kind_of_damped(s * scale, &undamped)).collect();
     Ok(sorted(zeros))
 }
 
@@ -94,15 +159,40 @@ pub fn phase_drop_deg(zeros: &[Zero]) -> f64 {
     180.0 * zeros.iter().filter(|zero| matches!(zero.kind, ZeroKind::Cnmp | ZeroKind::Rnmp)).count() as f64
 }
 
+/// Mass, damping and stiffness of the pencil, with time in units of 1/`scale`: projected, by motions alone or, where there
+/// is a constant beside the structure, by motions and force.
+fn reduced(system: &System, scale: f64) -> [DMatrix<f64>; 3] {
+    if system.constant_m_per_n != 0.0 {
+        return with_constant(system, scale);
+    }
+    let [mass, damping, stiffness] = projected(system);
+    [mass, damping / scale, stiffness / (scale * scale)]
+}
+
+/// With [N; m] an orthonormal basis of the motions z and forces f for which R f + c^T z = 0, and K N - q m for the
+/// stiffness: M N, C N and that. Force and probe are brought to the size of the masses.
+fn with_constant(system: &System, scale: f64) -> [DMatrix<f64>; 3] {
+    let n = system.mass.nrows();
+    let size = system.mass.norm();
+    let (force, sensor) = (size / system.force.norm(), size / system.sensor.norm());
+    let through = system.constant_m_per_n * scale * scale * force * sensor;
+    let seen = system.sensor.clone() * sensor;
+    let basis = complement(&seen.push(through));
+    let (motions, forces) = (basis.rows(0, n), basis.row(n));
+    let stiffness = system.stiffness * motions / (scale * scale) - force * system.force * forces;
+    [system.mass * motions, system.damping * motions / scale, stiffness]
+}
+
 /// N_q^T (.) N_c of mass, damping and stiffness.
-fn projected(structure: &Structure) -> [DMatrix<f64>; 3] {
-    let (output, input) = (complement(&structure.sensor), complement(&structure.force));
-    [&structure.mass, &structure.damping, &structure.stiffness].map(|matrix| input.transpose() * matrix * &output)
+fn projected(system: &System) -> [DMatrix<f64>; 3] {
+    let (output, input) = (complement(system.sensor), complement(system.force));
+    [system.mass, system.damping, system.stiffness].map(|matrix| input.transpose() * matrix * &output)
 }
 
 /// A frequency in the middle of the structure's own, so that scaled masses and stiffnesses are of one size.
-fn time_scale(structure: &Structure) -> f64 {
-    (structure.stiffness.norm() / structure.mass.norm()).sqrt()
+fn time_scale(system: &System) -> f64 {
+    let squared = system.stiffness.norm() / system.mass.norm();
+    if squared > 0.0 { squared.sqrt() } else { 1.0 }
 }
 
 fn of_square(u: Complex<f64>) -> Vec<Zero> {
@@ -120,7 +210,7 @@ fn of_square(u: Complex<f64>) -> Vec<Zero> {
     }
 }
 
-fn damped(s: Complex<f64>, undamped: &[Zero]) -> Zero {
+fn kind_of_damped(s: Complex<f64>, undamped: &[Zero]) -> Zero {
     let real = s.im.abs() <= COMPLEX_RATIO * s.norm();
     let nearest = undamped.iter().min_by(|a, b| (a.s - s).norm().total_cmp(&(b.s - s).norm()));
     let kind = match (real, s.re > 0.0) {

@@ -1,0 +1,239 @@
+//! Tables 3-1 to 3-4: from the signs and the sequence of dominant modes to the kinds of the zeros, without computing one.
+//!
+//! Signs are those of the modes in their order along frequency (Assumption A3-6: the slowest is positive; a plant whose
+//! slowest mode is negative is read with all signs turned). A pattern is what the printed sequence means in every case; it
+//! is wider than the printed words in these rows, and the kinds are the printed ones in all of them:
+//!
+//! | row | printed | also there | why |
+//! |---|---|---|---|
+//! | 3-3, 5 | `[R]-[u]-[v]-[u]-[DI]` | `[R]` at the end | where aR > \|au\| mode R takes over alone: it is a double integrator |
+//! | 3-3, 7 | `[Ru]-[v]-[DI]` | `[R]`, `[u]` at the end | where one of them outweighs v alone, definition (2b) names it |
+//! | 3-3, 8 and 9 | `[R]-[uv]...` | `[R]` between u and v | the zero between u and v is R's where R outweighs v there |
+//! | 3-4, 4 | `[DC]-[v]-[u]-[v]-[R]` | `[R]` at the start | where R > \|av\|/wv^2 the constant alone holds the sign |
+//! | 3-4, 7 | `[-DC]-[u]-[v]-[R]` | `[R]`, `[v]` at the start | where one of them outweighs u at low frequency |
+//!
+//! A misprint: in Table 3-2 the places of the MMP zeros stand one row too low (cyclically). `[v]-[u]-[v]` has them below wu,
+//! `[u]-[v]` none, `[u]-[v]-[u]` above wv.
+
+use super::{Kinds, ModalSum, Sequence};
+
+/// Between which resonances a pair of MMP zeros lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// (0, wu).
+    BelowU,
+    /// (wu, wv).
+    Between,
+    /// (wv, infinity).
+    AboveV,
+}
+
+/// One row of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// `3-1` to `3-4`.
+    pub table: &'static str,
+    /// Row of the table, from 1.
+    pub number: usize,
+    /// Signs of the modes by frequency.
+    pub signs: &'static str,
+    /// The sequence as printed.
+    pub printed: &'static str,
+    /// The kinds of the zeros as printed; one of these.
+    pub kinds: &'static [Kinds],
+    /// Where the MMP zeros lie.
+    pub mmp: &'static [Place],
+    pattern: &'static [Piece],
+}
+
+/// A piece of a pattern: one name of these, or one or more names of these.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Piece {
+    One(&'static [&'static str]),
+    Some(&'static [&'static str]),
+}
+
+impl Row {
+    /// Whether a sequence is of this row.
+    pub fn fits(&self, signs: &str, names: &[String]) -> bool {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        self.signs == signs && fits(self.pattern, &names)
+    }
+}
+
+fn fits(pattern: &[Piece], names: &[&str]) -> bool {
+    match (pattern.split_first(), names.split_first()) {
+        (None, None) => true,
+        (Some((Piece::One(of), rest)), Some((name, names))) => of.contains(name) && fits(rest, names),
+        (Some((Piece::Some(of), rest)), Some((name, names))) => {
+            of.contains(name) && (fits(rest, names) || fits(pattern, names))
+        }
+        _ => false,
+    }
+}
+
+/// A table: the rows of one class of plants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table {
+    /// `3-1` to `3-4`.
+    pub name: &'static str,
+    /// The rows as printed.
+    pub rows: &'static [Row],
+}
+
+impl Table {
+    /// The row of a plant, by its signs and its sequence; `None` where no row has that sequence.
+    pub fn row(&self, sum: &ModalSum, sequence: &Sequence) -> Option<&'static Row> {
+        let (signs, names) = (signs(sum), turned(sum, sequence));
+        self.rows.iter().find(|row| row.fits(&signs, &names))
+    }
+}
+
+/// The table for a plant's class: a double integrator and a mode, two modes, a slow mode (or double integrator) and two
+/// modes, two modes and a constant. `None` for any other.
+pub fn table_of(sum: &ModalSum) -> Option<&'static Table> {
+    let index = match (sum.terms().len(), sum.constant_m_per_n() != 0.0, sum.is_free()) {
+        (2, false, true) => 0,
+        (2, false, false) => 1,
+        (3, false, _) => 2,
+        (2, true, false) => 3,
+        _ => return None,
+    };
+    Some(&TABLES[index])
+}
+
+fn slowest_is_negative(sum: &ModalSum) -> bool {
+    sum.terms().first().is_some_and(|term| term.residue_per_kg < 0.0)
+}
+
+/// The signs along frequency, turned so that the first is positive.
+fn signs(sum: &ModalSum) -> String {
+    let turn = if slowest_is_negative(sum) { -1.0 } else { 1.0 };
+    let constant = Some(sum.constant_m_per_n()).filter(|constant| *constant != 0.0);
+    let parts = sum.terms().iter().map(|term| term.residue_per_kg).chain(constant);
+    parts.map(|part| if part * turn > 0.0 { '+' } else { '-' }).collect()
+}
+
+/// The names of a sequence, turned with the signs.
+fn turned(sum: &ModalSum, sequence: &Sequence) -> Vec<String> {
+    let turn = |name: String| match name.as_str() {
+        "DC" | "DI" => format!("-{name}"),
+        "-DC" | "-DI" => name[1..].to_string(),
+        _ => name,
+    };
+    let names = sequence.names().into_iter();
+    if slowest_is_negative(sum) { names.map(turn).collect() } else { names.collect() }
+}
+
+const fn kinds(mmp: usize, real: usize, quartets: usize) -> Kinds {
+    Kinds { mmp, real, quartets }
+}
+
+const MMP: &[Kinds] = &[kinds(1, 0, 0)];
+const REAL: &[Kinds] = &[kinds(0, 1, 0)];
+const DUAL_MMP: &[Kinds] = &[kinds(2, 0, 0)];
+const MMP_AND_REAL: &[Kinds] = &[kinds(1, 1, 0)];
+const QUARTET_OR_DUAL_REAL: &[Kinds] = &[kinds(0, 0, 1), kinds(0, 2, 0)];
+
+const R: Piece = Piece::One(&["R"]);
+const U: Piece = Piece::One(&["u"]);
+const V: Piece = Piece::One(&["v"]);
+const UV: Piece = Piece::Some(&["u", "v"]);
+const RU: Piece = Piece::Some(&["R", "u"]);
+const RUV: Piece = Piece::Some(&["R", "u", "v"]);
+
+const fn row(
+    (table, number): (&'static str, usize),
+    signs: &'static str,
+    printed: &'static str,
+    pattern: &'static [Piece],
+    kinds: &'static [Kinds],
+    mmp: &'static [Place],
+) -> Row {
+    Row { table, number, signs, printed, kinds, mmp, pattern }
+}
+
+use Place::{AboveV, BelowU, Between};
+
+/// Tables 3-1 to 3-4, in their order.
+pub const TABLES: &[Table] = &[
+    // A double integrator u and a mode v, Eq. (3-3).
+    Table {
+        name: "3-1",
+        rows: &[
+            row(("3-1", 1), "++", "[uv]", &[UV], MMP, &[Between]),
+            row(("3-1", 2), "+-", "[u]-[v]", &[U, V], REAL, &[]),
+            row(("3-1", 3), "+-", "[u]-[v]-[u]", &[U, V, U], MMP, &[AboveV]),
+        ],
+    },
+    // Two modes, Eq. (3-5).
+    Table {
+        name: "3-2",
+        rows: &[
+            row(("3-2", 1), "++", "[uv]", &[UV], MMP, &[Between]),
+            row(("3-2", 2), "+-", "[v]-[u]-[v]", &[V, U, V], MMP, &[BelowU]),
+            row(("3-2", 3), "+-", "[u]-[v]", &[U, V], REAL, &[]),
+            row(("3-2", 4), "+-", "[u]-[v]-[u]", &[U, V, U], MMP, &[AboveV]),
+        ],
+    },
+    // A double integrator R and two modes, Eq. (3-7).
+    Table {
+        name: "3-3",
+        rows: &[
+            row(("3-3", 1), "+-+", "[R]-[u]-[v]", &[R, U, V], QUARTET_OR_DUAL_REAL, &[]),
+            row(("3-3", 2), "+-+", "[R]-[u]-[R]-[v]", &[R, U, R, V], DUAL_MMP, &[Between, Between]),
+            row(("3-3", 3), "+-+", "[R]-[u]-[v]-[u]", &[R, U, V, U], MMP_AND_REAL, &[AboveV]),
+            row(("3-3", 4), "+-+", "[R]-[v]-[u]-[v]", &[R, V, U, V], DUAL_MMP, &[BelowU, BelowU]),
+            row(
+                ("3-3", 5),
+                "+-+",
+                "[R]-[u]-[v]-[u]-[DI]",
+                &[R, U, V, U, Piece::One(&["DI", "R"])],
+                DUAL_MMP,
+                &[AboveV, AboveV],
+            ),
+            row(("3-3", 6), "++-", "[Ru]-[v]", &[RU, V], MMP_AND_REAL, &[BelowU]),
+            row(
+                ("3-3", 7),
+                "++-",
+                "[Ru]-[v]-[DI]",
+                &[RU, V, Piece::One(&["DI", "R", "u"])],
+                DUAL_MMP,
+                &[BelowU, AboveV],
+            ),
+            row(("3-3", 8), "+--", "[R]-[uv]-[R]", &[R, RUV, R], DUAL_MMP, &[Between, AboveV]),
+            row(("3-3", 9), "+--", "[R]-[uv]", &[R, RU, V], MMP_AND_REAL, &[Between]),
+            row(("3-3", 10), "+++", "[Ruv]", &[RUV], DUAL_MMP, &[BelowU, Between]),
+        ],
+    },
+    // Two modes and a constant R, Eq. (3-10).
+    Table {
+        name: "3-4",
+        rows: &[
+            row(("3-4", 1), "+-+", "[u]-[v]-[R]", &[U, V, R], QUARTET_OR_DUAL_REAL, &[]),
+            row(("3-4", 2), "+-+", "[u]-[R]-[v]-[R]", &[U, R, V, R], DUAL_MMP, &[Between, Between]),
+            row(("3-4", 3), "+-+", "[v]-[u]-[v]-[R]", &[V, U, V, R], MMP_AND_REAL, &[BelowU]),
+            row(
+                ("3-4", 4),
+                "+-+",
+                "[DC]-[v]-[u]-[v]-[R]",
+                &[Piece::One(&["DC", "R"]), V, U, V, R],
+                DUAL_MMP,
+                &[BelowU, BelowU],
+            ),
+            row(("3-4", 5), "+-+", "[u]-[v]-[u]-[R]", &[U, V, U, R], DUAL_MMP, &[AboveV, AboveV]),
+            row(("3-4", 6), "+--", "[u]-[v]-[R]", &[U, V, R], MMP_AND_REAL, &[AboveV]),
+            row(
+                ("3-4", 7),
+                "+--",
+                "[-DC]-[u]-[v]-[R]",
+                &[Piece::One(&["-DC", "R", "v"]), U, V, R],
+                DUAL_MMP,
+                &[BelowU, AboveV],
+            ),
+            row(("3-4", 8), "++-", "[R]-[uv]-[R]", &[R, UV, R], DUAL_MMP, &[BelowU, Between]),
+            row(("3-4", 9), "++-", "[uv]-[R]", &[UV, R], MMP_AND_REAL, &[Between]),
+            row(("3-4", 10), "+++", "[uvR]", &[RUV], DUAL_MMP, &[Between, AboveV]),
+        ],
+    },
+];
