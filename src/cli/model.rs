@@ -1,5 +1,13 @@
 //! `bench model`: what the mechanics are, by the model.
 
+mod bounds;
+mod critical_damping;
+mod locus;
+mod sequence;
+mod step;
+
+use std::path::Path;
+
 use clap::Subcommand;
 use serde::Serialize;
 
@@ -20,18 +28,44 @@ pub(super) struct Args {
 enum What {
     /// Modes, residues, signs and zeros at one operating point
     Modes(BenchOptions),
+    /// The sequence of dominant modes, and the kinds of zeros that Tables 3-1 to 3-4 read from it
+    Sequence(BenchOptions),
+    /// Migration of the zeros as one setting varies, with the points where they meet
+    Locus(locus::Args),
+    /// What the zeros in the right half plane allow in bandwidth and sensitivity peak (Eqs. 1-2, 1-3)
+    Bounds(bounds::Args),
+    /// The response to a step: undershoot, zero crossings, reversals, and what the zeros foretell
+    Step(step::Args),
+    /// The damping that keeps all zeros of two close modes out of the right half plane (Eq. 3-16)
+    CriticalDamping(critical_damping::Args),
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let What::Modes(options) = &args.what;
-    let config = options.load(Purpose::Model, &[])?;
-    let modes = Modes::of(&config, options.profile())?;
-    if options.json {
-        print_json(&modes)?
-    } else {
-        print_text(&modes.text())?
+    match &args.what {
+        What::Modes(options) => run_modes(options)?,
+        What::Sequence(options) => sequence::run(options)?,
+        What::Locus(args) => locus::run(args)?,
+        What::Bounds(args) => bounds::run(args)?,
+        What::Step(args) => step::run(args)?,
+        What::CriticalDamping(args) => critical_damping::run(args)?,
     }
     Ok(Outcome::Done)
+}
+
+fn run_modes(options: &BenchOptions) -> Result<(), CliError> {
+    let config = options.load(Purpose::Model, &[])?;
+    let modes = Modes::of(&config, options.profile())?;
+    if options.json { print_json(&modes) } else { print_text(&modes.text()) }
+}
+
+/// Writes a table of numbers, one row a line, over whatever was there.
+fn write_csv(path: &Path, header: &str, rows: impl Iterator<Item = Vec<String>>) -> Result<(), CliError> {
+    let lines = std::iter::once(header.to_string()).chain(rows.map(|row| row.join(",")));
+    let text = lines.map(|line| line + "\n").collect::<String>();
+    let failed = |e: std::io::Error| {
+        CliError::Failed(format!("cannot write {}: {e}; free some space or choose another file", path.display()))
+    };
+    std::fs::write(path, text).map_err(failed)
 }
 
 #[derive(Debug, Serialize)]
@@ -49,6 +83,8 @@ struct Modes {
     sign_sequence: String,
     dominant_sequence: String,
     phase_drop_deg: f64,
+    /// What the zeros in the right half plane, without damping, leave to a controller.
+    bounds: Vec<bounds::BoundJson>,
 }
 
 #[derive(Debug, Serialize)]
@@ -88,6 +124,7 @@ impl Modes {
             sign_sequence: plant::sign_sequence(&modal),
             dominant_sequence: plant::dominant_sequence(&modal)?,
             phase_drop_deg: plant::phase_drop_deg(&undamped),
+            bounds: bounds::usual(&undamped),
         })
     }
 
@@ -117,7 +154,7 @@ impl Modes {
         let zero_table =
             |zeros: &[ZeroJson]| table(&["re rad/s", "im rad/s", "kind"], &zeros.iter().map(zero).collect::<Vec<_>>());
         format!(
-            "{}\n\n{modes}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns {}   dominant modes {}   CNMP pairs {} ({} with damping)   phase drop {} deg\n",
+            "{}\n\n{modes}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns {}   dominant modes {}   CNMP pairs {} ({} with damping)   phase drop {} deg\n{}",
             self.title(),
             zero_table(&self.zeros),
             zero_table(&self.damped_zeros),
@@ -126,6 +163,7 @@ impl Modes {
             self.cnmp_pairs,
             self.damped_cnmp_pairs,
             self.phase_drop_deg,
+            bounds::usual_text(&self.bounds),
         )
     }
 }
