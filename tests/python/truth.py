@@ -13,6 +13,9 @@ with bench.
     sigma     standard deviation of the error in the steady state, from the spectra of floor, noise and quantisation, and
               by how much it differs from one run of `seconds` to the next
     bands     where along `operating_points` (ratios of L) there are CNMP zeros: their limits by bisection
+    modal     zeros of constant + sum of r/(s^2 + 2 zeta w s + w^2) over `terms` [w, zeta, r], without and with damping, and
+              their kinds, from polynomials of 60 digits; needs no `config`
+    angle     the integral of Eq. (1-2) for each of `zeros`, up to its `omega_0`; needs no `config`
     crossing  the operating point (ratio of L) at which the two close modes have the same frequency
 
 How it differs from bench on purpose: M and K are typed in as Eq. (2-5) prints them, not assembled from constraints; the plant
@@ -26,8 +29,10 @@ import json
 import sys
 import tomllib
 
+import mpmath
 import numpy as np
 import scipy.linalg as la
+from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
 UM_PER_M = 1e6
@@ -183,6 +188,69 @@ def crossing(q):
 
     ratio = brentq(lambda r: np.subtract(*frequencies(r)), 0.01, 0.15)
     return {"operating_point": ratio, "frequency_hz": frequencies(ratio)[0] / (2 * np.pi)}
+
+
+# Plants given by their modes -----------------------------------------------------------------------------------------
+
+
+def product(a, b):
+    """Of two polynomials, falling powers."""
+    out = [mpmath.mpf(0)] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            out[i + j] += x * y
+    return out
+
+
+def numerator(denominators, residues, constant):
+    """Of constant + sum of residue/denominator."""
+    def rest(left_out):
+        out = [mpmath.mpf(1)]
+        for i, d in enumerate(denominators):
+            out = out if i == left_out else product(out, d)
+        return out
+
+    parts = [[r * c for c in rest(i)] for i, r in enumerate(residues)] + [[constant * c for c in rest(None)]]
+    size = max(map(len, parts))
+    padded = [[mpmath.mpf(0)] * (size - len(part)) + part for part in parts]
+    sums = [mpmath.fsum(column) for column in zip(*padded)]
+    while sums and sums[0] == 0:
+        sums.pop(0)
+    return sums
+
+
+def roots(polynomial):
+    return mpmath.polyroots(polynomial, maxsteps=500, extraprec=400) if len(polynomial) > 1 else []
+
+
+def modal(q):
+    with mpmath.workdps(60):
+        terms = [[mpmath.mpf(x) for x in term] for term in q["terms"]]
+        constant = mpmath.mpf(q["constant"])
+        residues = [r for _, _, r in terms]
+        squares = roots(numerator([[1, w * w] for w, _, _ in terms], residues, constant))
+        damped = roots(numerator([[1, 2 * z * w, w * w] for w, z, _ in terms], residues, constant))
+        complex_ones = [x for x in squares if abs(mpmath.im(x)) > mpmath.mpf(10) ** -30 * abs(x)]
+        real_ones = [mpmath.re(x) for x in squares if x not in complex_ones]
+        halves = [mpmath.sqrt(x) for x in squares]
+        return {
+            "zeros": complex_list([complex(s) for s in halves] + [complex(-s) for s in halves]),
+            "damped_zeros": complex_list([complex(s) for s in damped]),
+            "mmp": sum(x < 0 for x in real_ones),
+            "real": sum(x > 0 for x in real_ones),
+            "quartets": len(complex_ones) // 2,
+        }
+
+
+def angle(q):
+    def weight(omega, x, y):
+        return x / (x * x + (y - omega) ** 2) + x / (x * x + (y + omega) ** 2)
+
+    def one(x, y, omega_0):
+        near = [y] if 0 < y < omega_0 else None
+        return quad(weight, 0, omega_0, args=(x, y), points=near, epsabs=1e-13, epsrel=1e-12, limit=500)[0]
+
+    return [one(*zero) for zero in q["zeros"]]
 
 
 # The chain from set-point to probe -----------------------------------------------------------------------------------
@@ -491,7 +559,7 @@ def sigma(q):
     return {"sigma_m": float(np.sqrt(variance)), "relative_spread": float(spread)}
 
 
-ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing)}
+ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing, modal, angle)}
 
 if __name__ == "__main__":
     json.dump([ANSWERS[q["what"]](q) for q in json.load(sys.stdin)], sys.stdout)

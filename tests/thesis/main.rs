@@ -5,10 +5,12 @@
 
 mod chirp;
 mod control;
+mod locus;
 mod margins;
 mod model;
 mod plants;
 mod program;
 mod quadratic;
 mod recording;
+mod tables;
 mod truth;

@@ -1,4 +1,4 @@
-//! Truth from another hand: `tests/python/truth.py`, with numpy and scipy.
+//! Truth from another hand: `tests/python/truth.py`, with numpy, scipy and mpmath.
 //!
 //! `BENCH_PYTHON` names the interpreter (default `python3`). Without it or its packages a test says so and passes; with
 //! `BENCH_REQUIRE_PYTHON=1`, as in CI, it fails.
@@ -19,7 +19,7 @@ pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
     if let Err(why) = available(&python) {
         assert!(std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"), "Python is required here: {why}");
-        eprintln!("not tested: {why}\npip install numpy scipy, or set BENCH_PYTHON");
+        eprintln!("not tested: {why}\npip install numpy scipy mpmath, or set BENCH_PYTHON");
         return None;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
@@ -42,7 +42,7 @@ pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
 }
 
 fn available(python: &str) -> Result<(), String> {
-    let imports = "import sys, tomllib, numpy, scipy; assert numpy.trapezoid";
+    let imports = "import sys, tomllib, numpy, scipy, mpmath; assert numpy.trapezoid";
     match Command::new(python).args(["-c", imports]).output() {
         Err(e) => Err(format!("{python}: {e}")),
         Ok(o) if !o.status.success() => Err(String::from_utf8_lossy(&o.stderr).into_owned()),
