@@ -3,6 +3,7 @@
 mod bounds;
 mod critical_damping;
 mod locus;
+mod map;
 mod sequence;
 mod step;
 
@@ -32,6 +33,8 @@ enum What {
     Sequence(BenchOptions),
     /// Migration of the zeros as one setting varies, with the points where they meet
     Locus(locus::Args),
+    /// How many pairs of CNMP zeros there are over operating point and mass asymmetry, for SR4DoF
+    Map(map::Args),
     /// What the zeros in the right half plane allow in bandwidth and sensitivity peak (Eqs. 1-2, 1-3)
     Bounds(bounds::Args),
     /// The response to a step: undershoot, zero crossings, reversals, and what the zeros foretell
@@ -45,6 +48,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         What::Modes(options) => run_modes(options)?,
         What::Sequence(options) => sequence::run(options)?,
         What::Locus(args) => locus::run(args)?,
+        What::Map(args) => map::run(args)?,
         What::Bounds(args) => bounds::run(args)?,
         What::Step(args) => step::run(args)?,
         What::CriticalDamping(args) => critical_damping::run(args)?,

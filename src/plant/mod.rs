@@ -6,7 +6,7 @@
 //!                          |              v
 //!                          |           sequence of dominant modes, Tables 3-1 to 3-4, step responses, break points
 //!                          v
-//!                        zeros, kinds -> loci over a setting, bounds on bandwidth and sensitivity
+//!                        zeros, kinds -> loci over a setting, maps, bounds on bandwidth and sensitivity
 //! ```
 //!
 //! | `plant.model` | made in | from |
@@ -32,6 +32,7 @@ mod kinematics;
 mod linear_algebra;
 mod locus;
 mod lumped;
+mod map;
 mod modal;
 mod quadratic;
 mod sampled;
@@ -49,6 +50,7 @@ pub use break_points::{critical_damping, critical_residues, critical_sums, touch
 pub use chain::Chain;
 pub(crate) use exponential::exponential;
 pub use locus::{Change, Crossing, Locus, Plane};
+pub use map::cnmp_map;
 pub use modal::{Modal, Mode, Sign};
 pub(crate) use quadratic::{Load, Quadratic, QuadraticState};
 pub use sampled::{Block, Motion, Sampled};

@@ -24,6 +24,13 @@ const Y12: [f64; 4] = [0.0, 1.0, -1.0, 0.0];
 const Y13: [f64; 4] = [0.0, 1.0, 0.0, -1.0];
 
 pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
+    let mut structure = undamped(s);
+    structure.damping = damping::matrix(&structure, &s.damping)?;
+    Ok(structure)
+}
+
+/// The same with C = 0, whatever the damping of the settings.
+pub(super) fn undamped(s: &Sr4dofSettings) -> Structure {
     let a = 0.6 * s.operating_point_m / s.beam_length_m;
     let m3 = s.secondary_stage_mass_kg;
     let k = Beam::from(s).parallelogram_n_per_m();
@@ -40,9 +47,7 @@ pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
     }
     parts.spring(s.spring_stiffness_n_per_m, &x4);
     parts.spring(s.spring_stiffness_n_per_m, &x5);
-    let mut structure = parts.finish(&x4, &X1);
-    structure.damping = damping::matrix(&structure, &s.damping)?;
-    Ok(structure)
+    parts.finish(&x4, &X1)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 mod chirp;
 mod control;
 mod locus;
+mod map;
 mod margins;
 mod model;
 mod plants;

@@ -1,0 +1,147 @@
+//! `bench model map`: the CNMP map of the thesis.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use super::super::CliError;
+use super::super::options::{BenchOptions, print_json, print_text};
+use super::write_csv;
+use crate::config::{PlantSettings, Purpose, Sr4dofSettings, quantity};
+use crate::plant;
+
+/// The largest picture for people: lines and characters.
+const PICTURE: (usize, usize) = (60, 120);
+/// Values of a grid, at most.
+const MOST: usize = 10_000;
+
+/// Over which grid.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    bench: BenchOptions,
+    /// Operating points as ratios of the beam length: 0:0.15:31, 0%:15%:31
+    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "0%:15%:31", allow_hyphen_values = true)]
+    operating_points: Grid,
+    /// Mass asymmetries m2/m3 - 1: -0.1:0.1:41, -10%:10%:41
+    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "-10%:10%:41", allow_hyphen_values = true)]
+    asymmetries: Grid,
+    /// Write operating point, asymmetry and count to this file, one point of the map a line
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// Values at equal distances, both ends among them.
+#[derive(Clone, Debug)]
+struct Grid(Vec<f64>);
+
+impl FromStr for Grid {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Grid, String> {
+        let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
+            return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
+        };
+        let ratio = |text: &str| quantity::ratio(text).map_err(|e| e.to_string());
+        let (from, to) = (ratio(from)?, ratio(to)?);
+        let count = count.trim().parse().ok().filter(|count| (2..=MOST).contains(count));
+        let count: usize = count.ok_or(format!("COUNT is a whole number from 2 to {MOST}"))?;
+        if from == to {
+            return Err(format!("an empty sweep: FROM and TO are both {from}; give two values"));
+        }
+        let last = (count - 1) as f64;
+        let value = |k: usize| if k + 1 == count { to } else { from + (to - from) * k as f64 / last };
+        Ok(Grid((0..count).map(value).collect()))
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    operating_points: &'a [f64],
+    asymmetries: &'a [f64],
+    /// One row for each operating point.
+    cnmp_pairs: Vec<Vec<u8>>,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), CliError> {
+    let settings = settings(args)?;
+    let (points, asymmetries) = (&args.operating_points.0[..], &args.asymmetries.0[..]);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let cnmp_pairs = plant::cnmp_map(&settings, points, asymmetries, threads)?;
+    let report = Report { operating_points: points, asymmetries, cnmp_pairs };
+    if let Some(path) = &args.csv {
+        write_csv(
+            path,
+            "operating_point,mass_asymmetry,cnmp_pairs",
+            cells(&report).map(|c| c.map(|x| x.to_string()).into()),
+        )?;
+    }
+    if args.bench.json { print_json(&report) } else { print_text(&text(&report, args.bench.profile())) }
+}
+
+/// The plant, found valid at the ends of both grids.
+fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
+    if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
+        let what =
+            "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
+        return Err(CliError::Usage(what.into()));
+    }
+    let settings = sr4dof(args, &[])?;
+    let ends = |grid: &Grid| [grid.0[0], grid.0[grid.0.len() - 1]];
+    for (point, asymmetry) in ends(&args.operating_points).into_iter().zip(ends(&args.asymmetries)) {
+        let point_m = point * settings.beam_length_m;
+        let sets = [format!("plant.operating_point_m={point_m:?}"), format!("plant.mass_asymmetry={asymmetry:?}")];
+        sr4dof(args, &sets)?;
+    }
+    Ok(settings)
+}
+
+fn sr4dof(args: &Args, sets: &[String]) -> Result<Sr4dofSettings, CliError> {
+    match args.bench.load(Purpose::Model, sets)?.plant {
+        PlantSettings::Sr4dof(settings) => Ok(settings),
+        other => Err(CliError::Usage(format!(
+            "a map is over operating point and mass asymmetry, which the model `{}` does not have both; take one of `sr4dof` (--config stage, --config chapter2), or `bench model locus --vary KEY`",
+            other.model()
+        ))),
+    }
+}
+
+/// Operating point, asymmetry and count of each point of the map.
+fn cells<'a>(report: &'a Report) -> impl Iterator<Item = [f64; 3]> + 'a {
+    report.operating_points.iter().zip(&report.cnmp_pairs).flat_map(|(&point, row)| {
+        report.asymmetries.iter().zip(row).map(move |(&asymmetry, &pairs)| [point, asymmetry, f64::from(pairs)])
+    })
+}
+
+fn text(report: &Report, profile: &str) -> String {
+    let (rows, columns) = (report.operating_points.len(), report.asymmetries.len());
+    let fits = rows <= PICTURE.0 && columns <= PICTURE.1;
+    let rest = if fits { picture(report) } else { format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1) };
+    format!("{profile}: CNMP zeros without damping at {}\n{rest}", summary(report))
+}
+
+fn summary(report: &Report) -> String {
+    let all = report.operating_points.len() * report.asymmetries.len();
+    let with: Vec<[f64; 3]> = cells(report).filter(|cell| cell[2] > 0.0).collect();
+    let range = |axis: usize| {
+        let ends = with.iter().map(|cell| 100.0 * cell[axis]);
+        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        format!("{low:.3} to {high:.3} %")
+    };
+    if with.is_empty() {
+        return format!("none of {all} points");
+    }
+    format!("{} of {all} points: Y1o from {} of L, asymmetry from {}", with.len(), range(0), range(1))
+}
+
+/// A line for each operating point, a character for each asymmetry: its CNMP pairs, `.` for none.
+fn picture(report: &Report) -> String {
+    let symbol = |&pairs: &u8| if pairs == 0 { '.' } else { char::from(b'0' + pairs.min(9)) };
+    let line = |(point, row): (&f64, &Vec<u8>)| {
+        format!("{:>9.3} %  {}\n", 100.0 * point, row.iter().map(symbol).collect::<String>())
+    };
+    let lines: String = report.operating_points.iter().zip(&report.cnmp_pairs).map(line).collect();
+    let (first, last) = (report.asymmetries[0], report.asymmetries[report.asymmetries.len() - 1]);
+    format!("{:>11}  asymmetry from {:+.2} to {:+.2} %\n{lines}", "Y1o/L", 100.0 * first, 100.0 * last)
+}
