@@ -6,6 +6,8 @@ mod locus;
 mod map;
 mod sequence;
 mod step;
+mod sweep;
+mod veering;
 
 use std::path::Path;
 
@@ -35,6 +37,8 @@ enum What {
     Locus(locus::Args),
     /// How many pairs of CNMP zeros there are over operating point and mass asymmetry, for SR4DoF
     Map(map::Args),
+    /// Two close modes as one setting varies: whether their loci cross or veer, where, and how their shapes swap
+    Veering(veering::Args),
     /// What the zeros in the right half plane allow in bandwidth and sensitivity peak (Eqs. 1-2, 1-3)
     Bounds(bounds::Args),
     /// The response to a step: undershoot, zero crossings, reversals, and what the zeros foretell
@@ -49,6 +53,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         What::Sequence(options) => sequence::run(options)?,
         What::Locus(args) => locus::run(args)?,
         What::Map(args) => map::run(args)?,
+        What::Veering(args) => veering::run(args)?,
         What::Bounds(args) => bounds::run(args)?,
         What::Step(args) => step::run(args)?,
         What::CriticalDamping(args) => critical_damping::run(args)?,

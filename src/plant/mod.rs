@@ -7,6 +7,8 @@
 //!                          |           sequence of dominant modes, Tables 3-1 to 3-4, step responses, break points
 //!                          v
 //!                        zeros, kinds -> loci over a setting, maps, bounds on bandwidth and sensitivity
+//!
+//!  modes over a setting -> loci that veer or cross
 //! ```
 //!
 //! | `plant.model` | made in | from |
@@ -42,6 +44,7 @@ mod step;
 mod structure;
 mod sum;
 mod tables;
+mod veering;
 mod xy;
 mod zeros;
 
@@ -59,6 +62,7 @@ pub use step::{InitialStep, StepResponse};
 pub use structure::Structure;
 pub use sum::{ModalSum, Term};
 pub use tables::{Place, Row, TABLES, Table, table_of};
+pub use veering::{Loci, Meeting, ModesAt};
 pub use zeros::{Kinds, Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 
 use crate::config::PlantSettings;

@@ -17,6 +17,8 @@ with bench.
               their kinds, from polynomials of 60 digits; needs no `config`
     angle     the integral of Eq. (1-2) for each of `zeros`, up to its `omega_0`; needs no `config`
     crossing  the operating point (ratio of L) at which the two close modes have the same frequency
+    veering   the operating point between `limits` (ratios of L) where the third and the fourth mode are closest, their mean
+              frequency and gap there, the shares of the coordinates in their shapes there, and their MAC from limit to limit
 
 How it differs from bench on purpose: M and K are typed in as Eq. (2-5) prints them, not assembled from constraints; the plant
 is never split into modes to get a response or a sampled model: (s^2 M + s C + K) is solved as it stands, and one
@@ -188,6 +190,29 @@ def crossing(q):
 
     ratio = brentq(lambda r: np.subtract(*frequencies(r)), 0.01, 0.15)
     return {"operating_point": ratio, "frequency_hz": frequencies(ratio)[0] / (2 * np.pi)}
+
+
+def veering(q):
+    """The loci of D other than 0 do not cross, so that modes keep their order and scipy's order serves."""
+    p = q["config"]["plant"]
+
+    def pair(ratio):
+        M, K = matrices(at_point(p, ratio))[:2]
+        squares, V = la.eigh(K, M)
+        return M, np.sqrt(squares[2:4]) / (2 * np.pi), V[:, 2:4]
+
+    low, high = q["limits"]
+    found = minimize_scalar(lambda r: np.ptp(pair(r)[1]), bounds=(low, high), method="bounded", options={"xatol": 1e-10})
+    (M0, _, V0), (_, f, V), (M1, _, V1) = pair(low), pair(found.x), pair(high)
+    M = (M0 + M1) / 2
+    norms = np.outer(np.diag(V0.T @ M @ V0), np.diag(V1.T @ M @ V1))
+    return {
+        "operating_point": found.x,
+        "frequency_hz": np.mean(f),
+        "gap_hz": np.ptp(f),
+        "shares": [list(v**2 / (v @ v)) for v in V.T],
+        "mac_across": ((V0.T @ M @ V1) ** 2 / norms).tolist(),
+    }
 
 
 # Plants given by their modes -----------------------------------------------------------------------------------------
@@ -559,7 +584,7 @@ def sigma(q):
     return {"sigma_m": float(np.sqrt(variance)), "relative_spread": float(spread)}
 
 
-ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing, modal, angle)}
+ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing, veering, modal, angle)}
 
 if __name__ == "__main__":
     json.dump([ANSWERS[q["what"]](q) for q in json.load(sys.stdin)], sys.stdout)

@@ -15,3 +15,4 @@ mod quadratic;
 mod recording;
 mod tables;
 mod truth;
+mod veering;

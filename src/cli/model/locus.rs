@@ -7,9 +7,8 @@ use serde::Serialize;
 use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
+use super::sweep::Sweep;
 use super::write_csv;
-use crate::config::quantity::{self, Quantity};
-use crate::config::{Config, Purpose};
 use crate::plant::{self, Change, Locus, Modal, ModalSum, Plane};
 
 /// What varies, and where.
@@ -95,7 +94,7 @@ enum ClosedForm {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
-    let values = values(args)?;
+    let values = sweep(args).values()?;
     let plane = if args.damped { Plane::Damped } else { Plane::Undamped };
     let locus = Locus::follow(plane, &values, |value| zeros(args, value))?;
     if let Some(path) = &args.csv {
@@ -105,40 +104,12 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
 }
 
-/// The grid. A value in per cent is one of the beam length where the setting is a length.
-fn values(args: &Args) -> Result<Vec<f64>, CliError> {
-    let option = (args.vary == "plant.operating_point_m" && args.bench.operating_point.is_some())
-        || (args.vary == "plant.mass_asymmetry" && args.bench.asymmetry.is_some());
-    if option {
-        return Err(CliError::Usage(format!("--vary {} and an option that fixes it: leave out the option", args.vary)));
-    }
-    let config = args.bench.load(Purpose::Model, &[])?;
-    let number = |text: &str| match quantity::parse(text).map_err(|e| CliError::Usage(e.to_string()))? {
-        Quantity::Ratio(ratio) if args.vary.ends_with("_m") => Ok(ratio * beam_length_m(&config, &args.vary)?),
-        Quantity::Bare(value) | Quantity::Metres(value) | Quantity::Ratio(value) => Ok::<f64, CliError>(value),
-    };
-    let (from, to) = (number(&args.from)?, number(&args.to)?);
-    if from == to {
-        return Err(CliError::Usage(format!("an empty sweep: --from and --to are both {from}; give two values")));
-    }
-    let last = f64::from(args.count - 1);
-    let value = |k: u32| if k + 1 == args.count { to } else { from + (to - from) * f64::from(k) / last };
-    Ok((0..args.count).map(value).collect())
-}
-
-fn beam_length_m(config: &Config, key: &str) -> Result<f64, CliError> {
-    let plant = serde_json::to_value(&config.plant).unwrap_or_default();
-    let length_m = plant.get("beam_length_m").and_then(serde_json::Value::as_f64);
-    length_m.ok_or_else(|| CliError::Usage(format!("this plant has no beams: give {key} in metres, not in per cent")))
-}
-
-fn at(args: &Args, value: f64) -> Result<plant::Structure, CliError> {
-    let config = args.bench.load(Purpose::Model, &[format!("{}={value:?}", args.vary)])?;
-    Ok(plant::build(&config.plant)?)
+fn sweep(args: &Args) -> Sweep<'_> {
+    Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count }
 }
 
 fn zeros(args: &Args, value: f64) -> Result<Vec<plant::Zero>, CliError> {
-    let structure = at(args, value)?;
+    let structure = sweep(args).at(value)?;
     Ok(if args.damped { plant::damped_zeros(&structure)? } else { plant::undamped_zeros(&structure)? })
 }
 
@@ -175,7 +146,7 @@ fn change_json(args: &Args, change: &Change) -> Result<ChangeJson, CliError> {
 }
 
 fn closed_form(args: &Args, value: f64) -> Result<Option<ClosedForm>, CliError> {
-    let sum = ModalSum::visible(&Modal::of(&at(args, value)?)?)?;
+    let sum = ModalSum::visible(&Modal::of(&sweep(args).at(value)?)?)?;
     Ok(match (sum.terms(), args.damped) {
         ([r, u, v], false) => {
             let nearest = |to: f64, of: [f64; 2]| {
