@@ -14,6 +14,9 @@ use crate::rt::record::Published;
 /// costs next to nothing.
 const REST: Duration = Duration::from_millis(1);
 
+/// The thread's nice value.
+const NICE: libc::c_int = 15;
+
 /// What a supervisor may look at while the recorder runs.
 #[derive(Debug, Default)]
 pub struct Health {
@@ -77,6 +80,7 @@ pub fn spawn(recorder: Recorder, ring: Consumer<Published>) -> Result<RecorderHa
 
 fn run(mut recorder: Recorder, mut ring: Consumer<Published>, health: &Health) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
+    yield_to_others();
     let mut outcome = Ok(());
     loop {
         // Asked before emptying: what was pushed before the producer went is in the ring by then.
@@ -89,6 +93,13 @@ fn run(mut recorder: Recorder, mut ring: Consumer<Published>, health: &Health) -
         }
         std::thread::sleep(REST);
     }
+}
+
+/// Packing a chunk takes milliseconds, and the ring waits for seconds: whatever else runs, the kernel's own work between a
+/// serial port and its reader above all, comes first. Best effort.
+fn yield_to_others() {
+    // SAFETY: no memory is touched; 0 is the calling thread, and raising its nice value is always permitted.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
 /// Says that recording has failed if its thread dies of a panic: the run shall not go on unrecorded.
