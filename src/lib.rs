@@ -6,6 +6,8 @@
 //! ```text
 //!  bench-config/*.toml
 //!        |
+//!                  zeros, veering (what the thesis asks of a model)
+//!                    ^
 //!     config ----> plant ----> sim (a rig that obeys the model)
 //!        |           |            |  implements
 //!        v           v            v
@@ -24,8 +26,9 @@
 //! | the interlocks and the arming machine | [`rt::interlock`], [`rt::arming`] |
 //! | the fast and the slow controller | `bench-config/controllers/`, run by [`control::Controller`] |
 //! | margins of a loop | [`control::ClosedLoop`] |
-//! | zeros, signs, sequence of dominant modes | [`plant`] |
-//! | how Tables 3-1 to 3-4 are read | `plant/tables.rs`, `plant/sequence.rs` |
+//! | zeros and their kinds, sequence of dominant modes, maps | [`zeros`] |
+//! | how Tables 3-1 to 3-4 are read | `zeros/tables.rs`, `zeros/sequence.rs` |
+//! | two close modes, veering | [`veering`] |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |
@@ -68,3 +71,5 @@ pub mod report;
 pub mod rt;
 pub mod session;
 pub mod sim;
+pub mod veering;
+pub mod zeros;

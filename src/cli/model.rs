@@ -18,7 +18,8 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::table::table;
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
-use crate::plant::{self, Modal, Zero};
+use crate::plant::{self, Modal};
+use crate::zeros::{self, Zero};
 
 /// What to compute.
 #[derive(Clone, Debug, clap::Args)]
@@ -117,7 +118,7 @@ impl Modes {
     fn of(config: &Config, profile: &str) -> Result<Modes, CliError> {
         let structure = plant::build(&config.plant)?;
         let modal = Modal::of(&structure)?;
-        let (undamped, damped) = (plant::undamped_zeros(&structure)?, plant::damped_zeros(&structure)?);
+        let (undamped, damped) = (zeros::undamped_zeros(&structure)?, zeros::damped_zeros(&structure)?);
         let plant = &config.plant;
         Ok(Modes {
             profile: profile.into(),
@@ -128,11 +129,11 @@ impl Modes {
             modes: modes(&modal),
             zeros: zeros(&undamped),
             damped_zeros: zeros(&damped),
-            cnmp_pairs: plant::cnmp_pairs(&undamped),
-            damped_cnmp_pairs: plant::cnmp_pairs(&damped),
-            sign_sequence: plant::sign_sequence(&modal),
-            dominant_sequence: plant::dominant_sequence(&modal)?,
-            phase_drop_deg: plant::phase_drop_deg(&undamped),
+            cnmp_pairs: zeros::cnmp_pairs(&undamped),
+            damped_cnmp_pairs: zeros::cnmp_pairs(&damped),
+            sign_sequence: zeros::sign_sequence(&modal),
+            dominant_sequence: zeros::dominant_sequence(&modal)?,
+            phase_drop_deg: zeros::phase_drop_deg(&undamped),
             bounds: bounds::usual(&undamped),
         })
     }

@@ -4,7 +4,7 @@ use crate::config::{Sr4dofSettings, XySettings};
 
 /// The beams of a mechanism, all alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Beam {
+pub(crate) struct Beam {
     /// L.
     pub length_m: f64,
     /// H, out of plane.

@@ -26,7 +26,7 @@ pub(super) fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<(DV
 /// The finite numbers u for which `constant` + u `linear` is singular. They are taken as 1/mu from the eigenvalues mu of
 /// -constant^-1 linear, or directly where `constant` is the worse conditioned of the two; |mu| below 1e-12 of the
 /// largest counts as an infinite u.
-pub(super) fn pencil(constant: &DMatrix<f64>, linear: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, PlantError> {
+pub(crate) fn pencil(constant: &DMatrix<f64>, linear: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, PlantError> {
     if constant.is_empty() {
         return Ok(Vec::new());
     }
@@ -50,7 +50,7 @@ fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
 
 /// An orthonormal basis of what is orthogonal to `vector`, n x (n - 1): the last columns of the Householder reflection
 /// that turns `vector` into the first axis.
-pub(super) fn complement(vector: &DVector<f64>) -> DMatrix<f64> {
+pub(crate) fn complement(vector: &DVector<f64>) -> DMatrix<f64> {
     let n = vector.len();
     let norm = vector.norm();
     let mut v = vector.clone();

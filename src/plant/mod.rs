@@ -2,13 +2,9 @@
 //!
 //! ```text
 //!  settings -> Structure (M, C, K, vectors) -> modes (Modal) -> simulation, FRF, margins
-//!                          |              |  sum: what shows between force and probe
-//!                          |              v
-//!                          |           sequence of dominant modes, Tables 3-1 to 3-4, step responses, break points
-//!                          v
-//!                        zeros, kinds -> loci over a setting, maps, bounds on bandwidth and sensitivity
-//!
-//!  modes over a setting -> loci that veer or cross
+//!                          |                            |
+//!                          v                            v
+//!                       zeros (crate::zeros)         loci that veer or cross (crate::veering)
 //! ```
 //!
 //! | `plant.model` | made in | from |
@@ -24,46 +20,27 @@
 //! Signs: positive current gives positive force, positive force gives positive displacement at low frequency.
 
 mod beam;
-mod bounds;
-mod break_points;
 mod by_modes;
 mod chain;
 mod damping;
 mod exponential;
 mod kinematics;
-mod linear_algebra;
-mod locus;
+pub(crate) mod linear_algebra;
 mod lumped;
-mod map;
 mod modal;
 mod quadratic;
 mod sampled;
-mod sequence;
-mod sr4dof;
-mod step;
+pub(crate) mod sr4dof;
 mod structure;
-mod sum;
-mod tables;
-mod veering;
 mod xy;
-mod zeros;
 
-pub use bounds::{Bound, bandwidth_rad_s, guaranteed_peak, opening_angle, opening_angle_allowed};
-pub use break_points::{critical_damping, critical_residues, critical_sums, touching_damping, two_mode_break_points};
+pub(crate) use beam::Beam;
 pub use chain::Chain;
 pub(crate) use exponential::exponential;
-pub use locus::{Change, Crossing, Locus, Plane};
-pub use map::cnmp_map;
 pub use modal::{Modal, Mode, Sign};
 pub(crate) use quadratic::{Load, Quadratic, QuadraticState};
 pub use sampled::{Block, Motion, Sampled};
-pub use sequence::{Dominant, Sequence, dominant_sequence, sign_sequence};
-pub use step::{InitialStep, StepResponse};
 pub use structure::Structure;
-pub use sum::{ModalSum, Term};
-pub use tables::{Place, Row, TABLES, Table, table_of};
-pub use veering::{Loci, Meeting, ModesAt};
-pub use zeros::{Kinds, Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 
 use crate::config::PlantSettings;
 

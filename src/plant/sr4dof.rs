@@ -30,7 +30,7 @@ pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
 }
 
 /// The same with C = 0, whatever the damping of the settings.
-pub(super) fn undamped(s: &Sr4dofSettings) -> Structure {
+pub(crate) fn undamped(s: &Sr4dofSettings) -> Structure {
     let a = 0.6 * s.operating_point_m / s.beam_length_m;
     let m3 = s.secondary_stage_mass_kg;
     let k = Beam::from(s).parallelogram_n_per_m();

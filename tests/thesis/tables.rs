@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use bench::plant::{Kinds, ModalSum, Place, Row, Sequence, StepResponse, TABLES, Term, table_of};
+use bench::zeros::{Kinds, ModalSum, Place, Row, Sequence, StepResponse, TABLES, Term, table_of};
 use serde_json::{Value, json};
 
 use crate::program::Draw;

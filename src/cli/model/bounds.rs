@@ -6,7 +6,8 @@ use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use crate::config::Purpose;
-use crate::plant::{self, Bound, Zero};
+use crate::plant;
+use crate::zeros::{self, Bound, Zero};
 
 /// |S| in the band, if nothing else is asked for.
 const ALPHA: f64 = 0.5;
@@ -62,8 +63,8 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         profile: args.bench.profile().into(),
         alpha: args.alpha,
         peak: args.bandwidth.is_none().then_some(args.peak),
-        zeros: bounds(plant::undamped_zeros(&structure)?),
-        damped_zeros: bounds(plant::damped_zeros(&structure)?),
+        zeros: bounds(zeros::undamped_zeros(&structure)?),
+        damped_zeros: bounds(zeros::damped_zeros(&structure)?),
     };
     if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
 }
@@ -98,14 +99,14 @@ pub(super) fn usual_text(bounds: &[BoundJson]) -> String {
 }
 
 fn row(alpha: f64, bound: &Bound, bandwidth_rad_s: f64) -> BoundJson {
-    let angle = plant::opening_angle(bound.zero.s, bandwidth_rad_s);
+    let angle = zeros::opening_angle(bound.zero.s, bandwidth_rad_s);
     BoundJson {
         re_rad_s: bound.zero.s.re,
         im_rad_s: bound.zero.s.im,
         kind: bound.zero.kind.name(),
         bandwidth_rad_s,
         opening_angle_deg: angle.to_degrees(),
-        sensitivity_peak: plant::guaranteed_peak(alpha, angle),
+        sensitivity_peak: zeros::guaranteed_peak(alpha, angle),
     }
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::super::CliError;
 use super::super::options::{print_json, print_text};
-use crate::plant;
+use crate::zeros;
 
 /// Two close modes beside a double integrator (Eq. 3-15).
 #[derive(Clone, Debug, clap::Args)]
@@ -34,7 +34,7 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let eta = args.omega_u / args.omega_v;
-    let dampings = plant::critical_damping(eta, args.ratio).zip(plant::touching_damping(eta, args.ratio));
+    let dampings = zeros::critical_damping(eta, args.ratio).zip(zeros::touching_damping(eta, args.ratio));
     let Some((eq_3_16, touching)) = dampings else {
         return Err(CliError::Usage(format!(
             "omega_u = {} rad/s, omega_v = {} rad/s, ratio = {}: Eq. (3-16) asks for 0 < omega_u < omega_v and a ratio above (omega_v/omega_u)^2",

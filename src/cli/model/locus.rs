@@ -9,7 +9,8 @@ use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use super::sweep::Sweep;
 use super::write_csv;
-use crate::plant::{self, Change, Locus, Modal, ModalSum, Plane};
+use crate::plant::Modal;
+use crate::zeros::{self, Change, Locus, ModalSum, Plane};
 
 /// What varies, and where.
 #[derive(Clone, Debug, clap::Args)]
@@ -108,9 +109,9 @@ fn sweep(args: &Args) -> Sweep<'_> {
     Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count }
 }
 
-fn zeros(args: &Args, value: f64) -> Result<Vec<plant::Zero>, CliError> {
+fn zeros(args: &Args, value: f64) -> Result<Vec<zeros::Zero>, CliError> {
     let structure = sweep(args).at(value)?;
-    Ok(if args.damped { plant::damped_zeros(&structure)? } else { plant::undamped_zeros(&structure)? })
+    Ok(if args.damped { zeros::damped_zeros(&structure)? } else { zeros::undamped_zeros(&structure)? })
 }
 
 fn report(args: &Args, locus: &Locus) -> Result<Report, CliError> {
@@ -153,9 +154,9 @@ fn closed_form(args: &Args, value: f64) -> Result<Option<ClosedForm>, CliError> 
                 if (of[0] - to).abs() < (of[1] - to).abs() { of[0] } else { of[1] }
             };
             let b2 = r.residue_per_kg + u.residue_per_kg + v.residue_per_kg;
-            let free = plant::critical_residues(0.0, u, v);
-            let shifted = plant::critical_residues(r.omega_rad_s, u, v);
-            let sums = plant::critical_sums(r.omega_rad_s, u, v);
+            let free = zeros::critical_residues(0.0, u, v);
+            let shifted = zeros::critical_residues(r.omega_rad_s, u, v);
+            let sums = zeros::critical_sums(r.omega_rad_s, u, v);
             free.zip(shifted).zip(sums).map(|((free, shifted), sums)| ClosedForm::ThreeModes {
                 residue_r: r.residue_per_kg,
                 eq_4_5: nearest(r.residue_per_kg, free),
@@ -164,7 +165,7 @@ fn closed_form(args: &Args, value: f64) -> Result<Option<ClosedForm>, CliError> 
                 eq_4_6_shifted: nearest(b2, sums),
             })
         }
-        ([u, v], true) => plant::two_mode_break_points(u, v)
+        ([u, v], true) => zeros::two_mode_break_points(u, v)
             .map(|points| ClosedForm::TwoModes { eq_3_14_rad_s: points.map(|s| Some(s).filter(|s| s.is_finite())) }),
         _ => None,
     })

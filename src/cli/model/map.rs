@@ -9,7 +9,7 @@ use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::write_csv;
 use crate::config::{PlantSettings, Purpose, Sr4dofSettings, quantity};
-use crate::plant;
+use crate::zeros;
 
 /// The largest picture for people: lines and characters.
 const PICTURE: (usize, usize) = (60, 120);
@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let settings = settings(args)?;
     let (points, asymmetries) = (&args.operating_points.0[..], &args.asymmetries.0[..]);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let cnmp_pairs = plant::cnmp_map(&settings, points, asymmetries, threads)?;
+    let cnmp_pairs = zeros::cnmp_map(&settings, points, asymmetries, threads)?;
     let report = Report { operating_points: points, asymmetries, cnmp_pairs };
     if let Some(path) = &args.csv {
         write_csv(

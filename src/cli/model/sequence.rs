@@ -5,7 +5,8 @@ use serde::Serialize;
 use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use crate::config::Purpose;
-use crate::plant::{self, Kinds, Modal, ModalSum, Sequence};
+use crate::plant::{self, Modal};
+use crate::zeros::{self, Kinds, ModalSum, Sequence};
 
 #[derive(Debug, Serialize)]
 struct Report {
@@ -38,11 +39,11 @@ pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
 fn report(profile: &str, modal: &Modal) -> Result<Report, CliError> {
     let sum = ModalSum::visible(modal)?;
     let sequence = Sequence::of(&sum)?;
-    let row = plant::table_of(&sum).and_then(|table| table.row(&sum, &sequence));
+    let row = zeros::table_of(&sum).and_then(|table| table.row(&sum, &sequence));
     let computed = Kinds::of(&sum.undamped_zeros()?);
     Ok(Report {
         profile: profile.into(),
-        sign_sequence: plant::sign_sequence(modal),
+        sign_sequence: zeros::sign_sequence(modal),
         dominant_sequence: sequence.to_string(),
         table: row.map(|row| RowJson {
             table: row.table,

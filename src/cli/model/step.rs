@@ -8,7 +8,8 @@ use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::write_csv;
 use crate::config::Purpose;
-use crate::plant::{self, InitialStep, Kinds, Modal, ModalSum, Sequence, StepResponse};
+use crate::plant::{self, Modal};
+use crate::zeros::{InitialStep, Kinds, ModalSum, Sequence, StepResponse};
 
 /// Which step response.
 #[derive(Clone, Debug, clap::Args)]

@@ -10,7 +10,7 @@ use super::super::table::table;
 use super::sweep::Sweep;
 use super::write_csv;
 use crate::config::Purpose;
-use crate::plant::{Loci, Meeting, ModesAt};
+use crate::veering::{Loci, Meeting, ModesAt};
 
 /// What varies, and which modes.
 #[derive(Clone, Debug, clap::Args)]

@@ -13,7 +13,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Modal, PlantError, Structure};
+use crate::plant::{Modal, Mode, PlantError, Structure};
 
 /// Eigenvalues come with an error of some 1e-15 of the largest: closer than this ratio of it, two are one.
 const EQUAL_RATIO: f64 = 1e-12;
@@ -42,7 +42,7 @@ impl ModesAt {
     fn of(structure: Structure, value: f64) -> Result<ModesAt, PlantError> {
         let modal = Modal::of(&structure)?;
         let mass = structure.mass;
-        let unit = |mode: &super::Mode| &mode.shape / mode.shape.dot(&(&mass * &mode.shape)).sqrt();
+        let unit = |mode: &Mode| &mode.shape / mode.shape.dot(&(&mass * &mode.shape)).sqrt();
         let columns: Vec<_> = modal.modes.iter().map(unit).collect();
         let omega_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s).collect();
         Ok(ModesAt { value, omega_rad_s, shapes: DMatrix::from_columns(&columns), mass })

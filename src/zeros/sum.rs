@@ -5,8 +5,9 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::zeros::{self, System};
-use super::{Modal, PlantError, Sign, Zero};
+use super::Zero;
+use super::kinds::{self, System};
+use crate::plant::{Modal, Mode, PlantError, Sign};
 
 /// One mode, seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +53,7 @@ impl ModalSum {
     /// The modes of a structure that show between its actuator and its probe ([`Modal::signs`]).
     pub fn visible(modal: &Modal) -> Result<ModalSum, PlantError> {
         let shown = modal.modes.iter().zip(modal.signs()).filter(|(_, sign)| *sign != Sign::None);
-        let term = |(mode, _): (&super::Mode, Sign)| Term {
+        let term = |(mode, _): (&Mode, Sign)| Term {
             omega_rad_s: mode.omega_rad_s,
             damping_ratio: mode.damping_ratio,
             residue_per_kg: mode.residue_per_kg(),
@@ -86,12 +87,12 @@ impl ModalSum {
 
     /// Zeros without damping, slowest first.
     pub fn undamped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
-        self.by(zeros::undamped)
+        self.by(kinds::undamped)
     }
 
     /// Zeros with damping, slowest first.
     pub fn damped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
-        self.by(zeros::damped)
+        self.by(kinds::damped)
     }
 
     /// Unit masses on springs, one a mode, each pushed and seen by the root of its residue, and the constant beside them.

@@ -8,6 +8,7 @@
 
 use nalgebra::Complex;
 
+use super::matching::{Point, assigned, is_clear, padded};
 use super::{Kinds, Zero, ZeroKind};
 
 /// Which zeros are followed.
@@ -91,9 +92,6 @@ impl Locus {
         Ok(Locus { values: values.to_vec(), tracks, changes })
     }
 }
-
-/// A zero in the plane in which it is followed; `None` at infinity.
-type Point = Option<Complex<f64>>;
 
 /// Above this ratio of imaginary part to magnitude a zero is off the real axis (two equal real ones come out of the
 /// eigenvalue iteration apart by the square root of the rounding, 1.5e-8).
@@ -316,56 +314,12 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
     }
 }
 
-fn padded(points: &[Complex<f64>], count: usize) -> Vec<Point> {
-    let mut padded: Vec<Point> = points.iter().copied().map(Some).collect();
-    padded.resize(count.max(points.len()), None);
-    padded
-}
-
 /// The median magnitude.
 fn typical(samples: &[Sample]) -> f64 {
     let mut sizes: Vec<f64> =
         samples.iter().flat_map(|sample| sample.points.iter().map(|point| point.norm())).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get(sizes.len() / 2).copied().filter(|size| *size > 0.0).unwrap_or(1.0)
-}
-
-/// Distance on the sphere over which `scale` is the equator: 0 to 1.
-fn distance(a: Point, b: Point, scale: f64) -> f64 {
-    let height = |z: Complex<f64>| (1.0 + (z / scale).norm_sqr()).sqrt();
-    match (a, b) {
-        (None, None) => 0.0,
-        (Some(z), None) | (None, Some(z)) => 1.0 / height(z),
-        (Some(a), Some(b)) => ((a - b) / scale).norm() / (height(a) * height(b)),
-    }
-}
-
-/// For each of `from` its partner in `to`: the nearest pairs first.
-fn assigned(from: &[Point], to: &[Point], scale: f64) -> Vec<Point> {
-    let mut pairs: Vec<(f64, usize, usize)> = (0..from.len())
-        .flat_map(|i| (0..to.len()).map(move |j| (i, j)))
-        .map(|(i, j)| (distance(from[i], to[j], scale), i, j))
-        .collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut partner, mut taken) = (vec![None; from.len()], vec![false; to.len()]);
-    for (_, i, j) in pairs {
-        if partner[i].is_none() && !taken[j] {
-            partner[i] = Some(to[j]);
-            taken[j] = true;
-        }
-    }
-    partner.into_iter().map(Option::flatten).collect()
-}
-
-/// Whether nobody moved further than 0.4 of the way to his nearest neighbour; zeros on top of each other have none.
-fn is_clear(from: &[Point], moved: &[Point], scale: f64) -> bool {
-    let together = 1e-6;
-    let step = |i: usize| distance(from[i], moved[i], scale);
-    let neighbour = |i: usize| {
-        let others = (0..from.len()).filter(|j| *j != i).map(|j| distance(from[i], from[j], scale));
-        others.filter(|d| *d > together).fold(f64::INFINITY, f64::min)
-    };
-    (0..from.len()).all(|i| step(i) <= 0.4 * neighbour(i))
 }
 
 /// (a - b)^2 in units of the mean square: above 0 for two on the real axis, below for a conjugate pair; `None` for others.
@@ -445,7 +399,8 @@ fn through(sample: &Sample) -> (Crossing, Complex<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::{ModalSum, PlantError, Term};
+    use crate::plant::PlantError;
+    use crate::zeros::{ModalSum, Term};
 
     fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {
         (0..count).map(|i| from + (to - from) * i as f64 / (count - 1) as f64).collect()

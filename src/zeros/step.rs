@@ -211,7 +211,7 @@ fn position(term: &Term, time_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::Kinds;
+    use crate::zeros::Kinds;
 
     fn sum(parts: &[(f64, f64, f64)]) -> ModalSum {
         let term =

@@ -12,9 +12,9 @@
 //! Its determinant is a cubic in u = s^2, and no root of it is computed: the sign of the discriminant says whether two of
 //! the three are complex, which is one CNMP pair. Where rounding could turn that sign, the pencil itself decides.
 
-use super::beam::Beam;
-use super::{PlantError, cnmp_pairs, sr4dof, undamped_zeros};
+use super::{cnmp_pairs, undamped_zeros};
 use crate::config::Sr4dofSettings;
+use crate::plant::{Beam, PlantError, sr4dof};
 
 /// The discriminant's sign counts beyond this ratio to the sum of its terms' sizes, each term taken with all of its sums
 /// without cancellation (`Sized`).

@@ -12,8 +12,8 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::linear_algebra::{complement, pencil};
-use super::{PlantError, Structure};
+use crate::plant::linear_algebra::{complement, pencil};
+use crate::plant::{PlantError, Structure};
 
 /// Kinds of zeros (Fig 3-1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

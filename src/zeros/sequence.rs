@@ -10,7 +10,8 @@
 //! | (4) | the same mode twice is once |
 //! | (5) | below the first event the mode that resonates there dominates; if it is a zero of G, the modes that hold the sign before it, by (2) with frequency reversed: one of them, or `[DC]` / `[-DC]` |
 
-use super::{Modal, ModalSum, PlantError, Sign, Term, ZeroKind};
+use super::{ModalSum, Term, ZeroKind};
+use crate::plant::{Modal, PlantError, Sign};
 
 /// The signs of the modes that show, slowest first: `+-+`.
 pub fn sign_sequence(modal: &Modal) -> String {

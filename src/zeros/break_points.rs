@@ -87,7 +87,7 @@ fn applies(eta: f64, kappa: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::{Kinds, ModalSum};
+    use crate::zeros::{Kinds, ModalSum};
     use proptest::prelude::*;
 
     /// The largest real part of a complex zero of Eq. (3-15) over all sizes of the residues (golden section about the
