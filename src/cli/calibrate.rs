@@ -10,7 +10,7 @@ use super::run_options::{RunOptions, RunReport, finish};
 use super::{CliError, Outcome};
 use crate::calibration::{AmplifierCalibration, Calibration, ChainCalibration, Fit, ProbeCalibration, fit};
 use crate::config::{Config, Purpose};
-use crate::excitation::{Chirp, Course, Staircase};
+use crate::excitation::{Chirp, Extremes, Staircase};
 use crate::plant::{self, Modal, PlantError, Sampled};
 use crate::recording::Recording;
 use crate::session::{Plan, analyse, unless_stopped};
@@ -75,7 +75,7 @@ fn check(config: &Config) -> Result<(), CliError> {
     compliance_m_per_a(config)?;
     let (period_s, force_constant) = (config.servo.period_s(), config.motor.force_constant_n_per_a);
     let rig = Sampled::new(&sim::modes(config)?, config.amplifier.bandwidth_hz, force_constant, period_s);
-    let course = Course::of(&Staircase::new(&config.calibrate, period_s), config, &rig);
+    let extremes = Extremes::of(&Staircase::new(&config.calibrate, period_s), config, &rig);
     let refuse = |found: f64, limit: f64, unit: &str, what: &str| {
         (found > limit).then(|| {
             CliError::Usage(format!(
@@ -86,8 +86,8 @@ fn check(config: &Config) -> Result<(), CliError> {
     let limit_a = config.amplifier.current_limit_a.min(config.motor.peak_current_a());
     let cases = [
         refuse(config.calibrate.amplitude_a, limit_a, "A", "the limit of amplifier and motor"),
-        refuse(course.travel_m, config.interlock.soft_limit_m, "m", "the soft limit"),
-        refuse(course.thermal_a, config.motor.continuous_current_a(), "A", "the continuous current"),
+        refuse(extremes.travel_m, config.interlock.soft_limit_m, "m", "the soft limit"),
+        refuse(extremes.thermal_a, config.motor.continuous_current_a(), "A", "the continuous current"),
     ];
     match cases.into_iter().flatten().next() {
         Some(refused) => Err(refused),

@@ -11,7 +11,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Course, Excitation};
+use super::{Excitation, Extremes};
 use crate::config::{AmplitudePoint, ChirpSettings, Config, Sweep};
 use crate::plant::Sampled;
 
@@ -126,22 +126,22 @@ impl Chirp {
 
     /// Runs the whole chirp through the model: slew, heat and travel.
     fn check_course(&self, config: &Config, plant: &Sampled) -> Result<f64, ChirpError> {
-        let course = Course::of(self, config, plant);
+        let extremes = Extremes::of(self, config, plant);
         let limit_a_per_s = config.amplifier.slew_limit_a_per_s;
-        if course.slew_a_per_s > limit_a_per_s {
-            return Err(ChirpError::Slew { slew_a_per_s: course.slew_a_per_s, limit_a_per_s });
+        if extremes.slew_a_per_s > limit_a_per_s {
+            return Err(ChirpError::Slew { slew_a_per_s: extremes.slew_a_per_s, limit_a_per_s });
         }
         let limit_a = config.motor.continuous_current_a();
-        if course.thermal_a > limit_a {
-            return Err(ChirpError::Heat { thermal_a: course.thermal_a, limit_a });
+        if extremes.thermal_a > limit_a {
+            return Err(ChirpError::Heat { thermal_a: extremes.thermal_a, limit_a });
         }
-        if course.travel_m > config.interlock.soft_limit_m {
-            let time_s = course.travel_tick.saturating_sub(self.start_tick) as f64 * self.period_s;
+        if extremes.travel_m > config.interlock.soft_limit_m {
+            let time_s = extremes.travel_tick.saturating_sub(self.start_tick) as f64 * self.period_s;
             let frequency_hz = self.frequency_hz(time_s.min(self.settings.duration_s));
             let limit_um = config.interlock.soft_limit_m * 1e6;
-            return Err(ChirpError::Travel { travel_um: course.travel_m * 1e6, frequency_hz, limit_um });
+            return Err(ChirpError::Travel { travel_um: extremes.travel_m * 1e6, frequency_hz, limit_um });
         }
-        Ok(course.travel_m)
+        Ok(extremes.travel_m)
     }
 
     /// Envelope A(f) e(t) and sin phi at a time after the sweep's start.

@@ -4,12 +4,12 @@
 //! excitation is one file with the trait and one line where `bench chirp` chooses.
 
 mod chirp;
-mod course;
+mod extremes;
 mod reference;
 mod staircase;
 
 pub use chirp::{Chirp, ChirpError};
-pub use course::Course;
+pub use extremes::Extremes;
 pub use reference::{Reference, ReferenceError, reference, reference_text};
 pub use staircase::Staircase;
 

@@ -12,12 +12,8 @@
 //!
 //! and I g at any time is the position then, as long as the signal stays below some 0.8 of half the probe's rate.
 
-/// Values on either side of a time that an interpolation weighs.
-const HALF_WIDTH: i64 = 16;
-/// Kaiser's beta: side lobes of 80 dB.
-const BETA: f64 = 8.0;
-/// Steps of the table of weights between two values.
-const TABLE: usize = 2048;
+use super::kernel::weights_at;
+
 /// Repetitions: the error falls by w |time - grid| in each.
 const REPETITIONS: usize = 24;
 
@@ -61,7 +57,6 @@ struct Grid {
     from_s: f64,
     step_s: f64,
     values: Vec<f64>,
-    weights: Vec<f64>,
 }
 
 impl Grid {
@@ -69,7 +64,7 @@ impl Grid {
     fn through(readings: &Readings, from_s: f64, step_s: f64, cells: usize) -> Grid {
         let nearest = nearest(readings, from_s, step_s, cells);
         let values = nearest.iter().map(|(_, position_m)| *position_m).collect();
-        let mut grid = Grid { from_s, step_s, values, weights: weights() };
+        let mut grid = Grid { from_s, step_s, values };
         for _ in 0..REPETITIONS {
             let missed: Vec<f64> = nearest.iter().map(|(time_s, position_m)| position_m - grid.at(*time_s)).collect();
             grid.values.iter_mut().zip(&missed).for_each(|(value, missed)| *value += missed);
@@ -79,24 +74,9 @@ impl Grid {
 
     /// The interpolation at a time; beyond the ends the outermost values go on.
     fn at(&self, time_s: f64) -> f64 {
-        let place = (time_s - self.from_s) / self.step_s;
-        let before = place.floor();
-        let (share, before) = (place - before, before as i64);
         let last = self.values.len() as i64 - 1;
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for offset in 1 - HALF_WIDTH..=HALF_WIDTH {
-            let w = self.weight((share - offset as f64).abs());
-            sum += w * self.values[(before + offset).clamp(0, last) as usize];
-            weight += w;
-        }
-        sum / weight
-    }
-
-    fn weight(&self, distance: f64) -> f64 {
-        let place = distance * TABLE as f64;
-        let below = place as usize;
-        let (a, b) = (self.weights[below], self.weights[below + 1]);
-        a + (b - a) * (place - below as f64)
+        let value = |place: i64| self.values[place.clamp(0, last) as usize];
+        weights_at((time_s - self.from_s) / self.step_s).map(|(place, weight)| weight * value(place)).sum()
     }
 }
 
@@ -112,32 +92,6 @@ fn nearest(readings: &Readings, from_s: f64, step_s: f64, cells: usize) -> Vec<(
         (times[index], readings.position_m[index])
     };
     (0..cells).map(of).collect()
-}
-
-/// sinc(x) times the Kaiser window, at multiples of 1/TABLE from 0 to HALF_WIDTH and one beyond.
-fn weights() -> Vec<f64> {
-    let one = |i: usize| {
-        let x = i as f64 / TABLE as f64;
-        let inside = 1.0 - (x / HALF_WIDTH as f64) * (x / HALF_WIDTH as f64);
-        if inside < 0.0 { 0.0 } else { sinc(x) * bessel_i0(BETA * inside.sqrt()) / bessel_i0(BETA) }
-    };
-    (0..=HALF_WIDTH as usize * TABLE + 1).map(one).collect()
-}
-
-/// sin(pi x)/(pi x).
-fn sinc(x: f64) -> f64 {
-    let angle = std::f64::consts::PI * x;
-    if angle == 0.0 { 1.0 } else { libm::sin(angle) / angle }
-}
-
-/// The modified Bessel function of order 0 by its series, sum of ((x/2)^k/k!)^2.
-fn bessel_i0(x: f64) -> f64 {
-    let (mut sum, mut term) = (1.0, 1.0);
-    for k in 1..60 {
-        term *= x / (2.0 * f64::from(k));
-        sum += term * term;
-    }
-    sum
 }
 
 #[cfg(test)]

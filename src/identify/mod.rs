@@ -6,6 +6,7 @@
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
+//! - [`align::Readings`] and [`edges`]: readings and set-points of irregular times on the regular ones of a loop.
 //! - [`delay::beyond`]: how much later than a model a response answers.
 //! - [`csv`]: the file in which an FRF leaves the bench, and comes back.
 //!
@@ -15,8 +16,10 @@ pub mod align;
 mod band;
 pub mod csv;
 pub mod delay;
+pub mod edges;
 mod error;
 mod frf;
+mod kernel;
 pub mod local;
 mod moments;
 mod signals;

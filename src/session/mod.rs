@@ -9,6 +9,7 @@
 //! through the ring of orders alone.
 
 mod analysis;
+mod gathered;
 mod measure;
 mod name;
 mod plan;

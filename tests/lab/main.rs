@@ -2,3 +2,4 @@
 mod aliases;
 mod margins;
 mod measured;
+mod wires;

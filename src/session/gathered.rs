@@ -1,0 +1,136 @@
+//! The ticks of a recorded run as two signals on the loop's regular times.
+
+use super::AnalysisError;
+use crate::identify::align::Readings;
+use crate::identify::{Moments, Signals, edges};
+use crate::recording::Recording;
+use crate::rt::record::TickRecord;
+
+/// Ticks that may be filled in, as a ratio of all: each adds an error of its own.
+const FILLED_RATIO: f64 = 1e-3;
+
+/// Times that differ by less than this part of a period are the same.
+const SAME: f64 = 1e-3;
+
+/// Command and position of every tick of a run as they come, missing ones filled in.
+pub(super) struct Gathered {
+    input_a: Vec<f64>,
+    output_m: Vec<f64>,
+    /// Periods from each tick to its command.
+    late: Vec<f64>,
+    readings: Readings,
+    /// Mean, and extremes, of the time in seconds from a tick to the measurement it had: minus the age.
+    offset_s: Moments,
+    offset_range_s: (f64, f64),
+    before: Option<TickRecord>,
+    first_s: f64,
+    rate_hz: f64,
+    /// Devices answer when they are asked; the simulated stage answers at the tick itself, however late it was served.
+    on_devices: bool,
+    filled: u64,
+    allowed: u64,
+    ticks: u64,
+}
+
+impl Gathered {
+    pub(super) fn new(recording: &Recording, rate_hz: f64) -> Self {
+        let ticks = recording.tick_count();
+        Gathered {
+            input_a: Vec::new(),
+            output_m: Vec::new(),
+            late: Vec::new(),
+            readings: Readings::default(),
+            offset_s: Moments::default(),
+            offset_range_s: (f64::INFINITY, f64::NEG_INFINITY),
+            before: None,
+            first_s: 0.0,
+            rate_hz,
+            on_devices: recording.metadata().get("probe").is_some_and(|probe| probe != "simulated"),
+            filled: 0,
+            allowed: (ticks as f64 * FILLED_RATIO) as u64,
+            ticks,
+        }
+    }
+
+    pub(super) fn push(&mut self, record: &TickRecord) -> Result<(), AnalysisError> {
+        match self.before {
+            None => self.first_s = seconds(record.scheduled_ns),
+            Some(before) => self.fill(&before, record)?,
+        }
+        self.take_times(record);
+        self.input_a.push(record.command_a);
+        self.output_m.push(record.position_m);
+        self.before = Some(*record);
+        Ok(())
+    }
+
+    /// The true times of command and reading. Within a tick longer than a period an amplifier was enabled, and the schedule
+    /// began anew after it, as if it had been on time; what its reading's age is counted from is not recorded.
+    fn take_times(&mut self, record: &TickRecord) {
+        let scheduled_s = seconds(record.scheduled_ns);
+        if self.on_devices && seconds(record.done_ns.saturating_sub(record.woke_ns)) * self.rate_hz > 1.0 {
+            self.late.push(f64::NAN);
+            return;
+        }
+        let late = (seconds(record.done_ns) - scheduled_s) * self.rate_hz;
+        self.late.push(if self.on_devices { late } else { 0.0 });
+        let asked_s = if self.on_devices { seconds(record.woke_ns) } else { scheduled_s };
+        let measured_s = asked_s - seconds(record.probe_age_ns);
+        let offset_s = measured_s - scheduled_s;
+        self.readings.push(measured_s, record.position_m);
+        self.offset_s.push(offset_s);
+        self.offset_range_s = (self.offset_range_s.0.min(offset_s), self.offset_range_s.1.max(offset_s));
+    }
+
+    /// Fills the gap between two records, if it is a short one: the current held, the position on a straight line.
+    fn fill(&mut self, before: &TickRecord, after: &TickRecord) -> Result<(), AnalysisError> {
+        let missing = after.tick.saturating_sub(before.tick + 1);
+        if missing > self.allowed {
+            return Err(AnalysisError::Gaps { missing, ticks: self.ticks, allowed: self.allowed });
+        }
+        for step in 1..=missing {
+            let share = step as f64 / (missing + 1) as f64;
+            self.input_a.push(before.command_a);
+            self.late.push(f64::NAN);
+            self.output_m.push(before.position_m + share * (after.position_m - before.position_m));
+        }
+        self.filled += missing;
+        Ok(())
+    }
+
+    /// Where times differ from tick to tick, the currents as of the median time, the positions as of the mean age.
+    pub(super) fn finish(self) -> Result<(Signals, u64), AnalysisError> {
+        if self.input_a.is_empty() {
+            return Err(AnalysisError::NothingRan);
+        }
+        let (rate_hz, filled) = (self.rate_hz, self.filled);
+        let aligned = self.positions();
+        let output_m = if aligned.len() == self.output_m.len() { aligned } else { self.output_m };
+        Ok((Signals { rate_hz, input_a: currents(self.input_a, self.late), output_m }, filled))
+    }
+
+    /// The positions at the mean age, where ages differ; else none.
+    fn positions(&self) -> Vec<f64> {
+        let differ = (self.offset_range_s.1 - self.offset_range_s.0) * self.rate_hz > SAME;
+        let start_s = self.first_s + self.offset_s.mean;
+        let count = if differ { self.output_m.len() } else { 0 };
+        self.readings.at_regular_times(start_s, 1.0 / self.rate_hz, count)
+    }
+}
+
+/// The currents as of the median time; those whose own is not known (`NAN`) came then.
+fn currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
+    let mut known: Vec<f64> = late.iter().copied().filter(|late| !late.is_nan()).collect();
+    known.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (known.first(), known.last()) else { return input_a };
+    if last - first <= SAME {
+        return input_a;
+    }
+    let median = known[known.len() / 2];
+    let later: Vec<f64> = late.into_iter().map(|late| if late.is_nan() { 0.0 } else { late - median }).collect();
+    edges::at_regular_times(&input_a, &later)
+}
+
+fn seconds(ns: u64) -> f64 {
+    ns as f64 * 1e-9
+}

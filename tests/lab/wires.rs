@@ -1,0 +1,182 @@
+//! A chirp over wires: commands that go out at times that differ from tick to tick, readings of any age.
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use bench::config::Config;
+use bench::excitation::{Chirp, Excitation};
+use bench::plant::Mode;
+use bench::recording::{Header, Recorder, Recording};
+use bench::rt::arming::State;
+use bench::rt::record::{Published, TickRecord, flag};
+use bench::session::{Plan, analyse};
+use bench::sim::{self, LiveStage};
+use bench_hal::Validity;
+
+use crate::aliases::{lab, response};
+
+/// From a tick to the moment it is served, in seconds.
+const WOKE_S: f64 = 10e-6;
+
+/// Numbers from 0 to 1, the same ones each time.
+fn random(mut seed: u64) -> impl FnMut() -> f64 {
+    move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// What the two ends of the wires do to time.
+struct Wires {
+    /// From a tick to its command, in seconds, and how much that varies.
+    command_s: (f64, f64),
+    /// From one measurement to the next, and when the first one is, in seconds.
+    probe_s: (f64, f64),
+    /// From a measurement to its arrival, in seconds, and how much that varies.
+    arrival_s: (f64, f64),
+    /// How long the first tick takes: the amplifier is enabled in it, and the schedule begins anew after it.
+    enabling_s: f64,
+}
+
+/// The run of a chirp over `wires`, recorded as the loop would; and the mean age of its readings in seconds.
+fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
+    let mut stage = LiveStage::new(config).expect("a stage");
+    let (chirp, period_s) = (Chirp::new(&config.chirp, config.servo.period_s()), config.servo.period_s());
+    let metadata: BTreeMap<String, String> =
+        [("run", "chirp"), ("probe", "another")].map(|(k, v)| (k.to_string(), v.to_string())).into();
+    let config_toml = Plan::chirp(config.clone()).config_toml().expect("a configuration");
+    let path = folder.join("wires.mcap");
+    let mut recorder =
+        Recorder::create(&path, &Header { config_toml, metadata, ..Header::default() }).expect("a new file");
+    let (mut random, mut ages_s) = (random(5), 0.0);
+    // The stage's clock begins a second before the loop's.
+    let begin_s = 1.0;
+    for tick in 0..chirp.ticks() {
+        let scheduled_s = tick as f64 * period_s;
+        let woke_s = scheduled_s + WOKE_S;
+        let now_s = begin_s + woke_s;
+        let arrived_s = now_s - wires.arrival_s.0 - wires.arrival_s.1 * random();
+        let number = ((arrived_s - wires.probe_s.1) / wires.probe_s.0).floor();
+        let measured_s = wires.probe_s.1 + number * wires.probe_s.0;
+        let position_m = stage.position_m(measured_s);
+        let late_s = wires.command_s.0 + wires.command_s.1 * random();
+        let command_a = chirp.current_a(tick);
+        stage.command(begin_s + scheduled_s + late_s, command_a);
+        ages_s += now_s - measured_s;
+        let ns = |seconds: f64| (seconds * 1e9).round() as u64;
+        let record = TickRecord {
+            tick,
+            scheduled_ns: ns(scheduled_s),
+            woke_ns: ns(woke_s),
+            done_ns: ns(scheduled_s + if tick == 0 { wires.enabling_s.max(late_s) } else { late_s }),
+            position_m,
+            requested_a: command_a,
+            command_a,
+            probe_sequence: number as u64,
+            probe_age_ns: ns(now_s - measured_s + if tick == 0 { wires.enabling_s } else { 0.0 }),
+            validity: Validity::Valid,
+            state: State::Running,
+            flags: if chirp.active(tick) { flag::ACTIVE } else { 0 },
+            ..TickRecord::default()
+        };
+        recorder.record(&Published::Tick(record)).expect("a good disk");
+    }
+    recorder.finish(&[]).expect("a good disk");
+    (Recording::open(&path).expect("a recording"), ages_s / chirp.ticks() as f64)
+}
+
+/// Largest distances in percent and degrees from the closed form of the chain with the mean delays, 0.5 to 120 Hz, and the
+/// share of frequencies beyond one of either.
+fn off(config: &Config, wires: &Wires) -> (f64, f64, f64) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (recording, age_s) = recorded(config, wires, folder.path());
+    let analysis = analyse(&recording, config).expect("an analysis");
+    let mut mean = config.clone();
+    mean.amplifier.latency_s = wires.command_s.0 + 0.5 * wires.command_s.1;
+    // Readings are taken when the tick is served.
+    (mean.probe.rate_hz, mean.probe.latency_s, mean.probe.transport_s) = (None, age_s - WOKE_S, 0.0);
+    let modes: Vec<Mode> = sim::modes(config).expect("modes");
+    let points = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response);
+    // Around a resonance the estimator's own resolution counts, whatever the wires do.
+    let narrow = [(27.0, 32.0), (80.0, 88.0)];
+    let inside = |f: f64| (0.5..120.0).contains(&f) && !narrow.iter().any(|(low, high)| (*low..*high).contains(&f));
+    let ratios: Vec<_> = points
+        .filter(|(f, _)| inside(**f))
+        .map(|(f, h)| h / response(&mean, &modes, std::f64::consts::TAU * f, true))
+        .collect();
+    let (percent, degrees): (Vec<f64>, Vec<f64>) =
+        ratios.iter().map(|r| (100.0 * (r.norm() - 1.0).abs(), r.arg().to_degrees().abs())).unzip();
+    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let beyond = percent.iter().zip(&degrees).filter(|(p, d)| **p > 1.0 || **d > 1.0).count();
+    (largest(&percent), largest(&degrees), beyond as f64 / ratios.len() as f64)
+}
+
+fn quiet(more: &[&str]) -> Config {
+    let sets = [
+        "loop.rate_hz=500",
+        "sim.floor=[]",
+        "sim.probe_noise_rms_m=0",
+        "sim.probe_quantisation_m=0",
+        "interlock.probe_stale_s=0.02",
+        "chirp.stop_hz=150",
+        "chirp.duration_s=24",
+        "chirp.fade_in_s=2",
+    ];
+    lab(&[&sets[..], more].concat())
+}
+
+/// How far a run may be off: percent, degrees, and the share of its frequencies beyond one of either.
+struct Bound(f64, f64, f64);
+
+fn must_be_within(wires: &Wires, bound: &Bound) {
+    let (percent, degrees, beyond) = off(&quiet(&[]), wires);
+    assert!(
+        percent < bound.0 && degrees < bound.1 && beyond <= bound.2,
+        "{percent:.3} %, {degrees:.3} deg, {beyond:.4} beyond"
+    );
+}
+
+const STEADY: Wires = Wires { command_s: (4e-5, 0.0), probe_s: (1e-3, 3e-4), arrival_s: (3e-4, 0.0), enabling_s: 0.0 };
+
+// The estimator by itself: a chirp of 24 s resolves the slopes of the resonances to 0.2 %.
+const BY_ITSELF: Bound = Bound(0.3, 0.05, 0.0);
+
+#[test]
+fn readings_of_one_age_are_those_of_the_closed_form() {
+    must_be_within(&STEADY, &BY_ITSELF);
+}
+
+#[test]
+fn a_first_tick_of_three_periods_in_which_the_drive_is_enabled_changes_nothing() {
+    must_be_within(&Wires { enabling_s: 6e-3, ..STEADY }, &BY_ITSELF);
+}
+
+#[test]
+fn readings_that_arrive_just_before_or_after_the_tick_change_nothing() {
+    // Now and then the reading of a millisecond earlier is the newest: 36 degrees at 100 Hz.
+    must_be_within(&Wires { probe_s: (1e-3, 1.1e-4), arrival_s: (2e-4, 1e-4), ..STEADY }, &BY_ITSELF);
+}
+
+// What is held at 500 Hz has an image of 100 Hz at 400 Hz, a quarter as high, of which the stage shows a sixteenth: 1.6 %
+// that sampling at one age folds back as the closed form says, and sampling at ages of all kinds spreads as noise. The
+// average over a neighbourhood of 16 bins leaves a part of it, most where little answers, at the zero near 112 Hz.
+
+#[test]
+fn commands_that_go_out_at_any_time_within_a_fifth_of_a_period_are_undone() {
+    // Taken at the ticks they would be off by 40 % and 25 degrees.
+    must_be_within(&Wires { command_s: (4e-5, 4e-4), ..STEADY }, &Bound(1.4, 0.9, 0.01));
+}
+
+#[test]
+fn a_fast_probe_of_its_own_clock_is_undone() {
+    let probe =
+        Wires { command_s: (4e-5, 2e-5), probe_s: (0.25e-3 * 0.999_37, 0.0), arrival_s: (2e-4, 1e-4), ..STEADY };
+    must_be_within(&probe, &Bound(1.2, 0.5, 0.01));
+}
+
+#[test]
+fn a_slow_probe_of_its_own_clock_is_undone() {
+    // Ages of 1.3 to 2.9 ms: taken as of one age, 29 degrees at 100 Hz.
+    let probe =
+        Wires { command_s: (4e-5, 2e-5), probe_s: (1.54e-3 * 0.999_37, 0.0), arrival_s: (1.3e-3, 1e-4), ..STEADY };
+    must_be_within(&probe, &Bound(1.6, 1.6, 0.06));
+}
