@@ -180,6 +180,7 @@ fn all_trips() -> Vec<(&'static str, Fault, f64)> {
         ("amplifier", Fault::Refuses(4), 0.01),
         ("amplifier", Fault::DoesNotEnable(5), 0.01),
         ("amplifier", Fault::Gives(f64::NAN), 0.01),
+        ("current_not_followed", Fault::MeasuresBeyond(1.0), 0.01),
     ]
 }
 
@@ -302,6 +303,38 @@ fn allow_only(calls: &[libc::c_long]) {
 }
 
 const TICKS: u64 = 20_000;
+
+/// Other chains than the default: a drive that measures its current, delays of several ticks, a probe of its own clock with
+/// its queue, and the stage with its quadratic geometry.
+fn chains() -> Vec<(&'static str, Config)> {
+    let with = |config: Option<&str>, sets: &[&str]| {
+        let sets = sets.iter().map(|set| set.to_string()).collect();
+        load(&Source { config: config.map(str::to_string), sets, ..Source::default() }).expect("the profile is valid")
+    };
+    vec![
+        ("lab", with(Some("lab"), &["amplifier.latency_s=0.0043", "probe.latency_s=0.0027"])),
+        ("quadratic", with(None, &["sim.geometry=\"quadratic\""])),
+    ]
+}
+
+#[test]
+fn whatever_the_chain_a_tick_allocates_nothing_and_makes_no_system_call() {
+    for (name, config) in chains() {
+        let running = || Quiet::running(&config, &[(0..TICKS, Fault::MeasuresBeyond(0.0))], Box::new(Says(0.05)));
+        let mut quiet = running();
+        quiet.run(TICKS);
+        assert!(quiet.commands > TICKS - 10 && quiet.trip.is_none(), "{name}: {:?}", quiet.trip);
+        let mut quiet = running();
+        let ended = in_a_child(|| {
+            allow_only(&[]);
+            for _ in 0..TICKS {
+                quiet.bare_tick(0);
+                quiet.collect();
+            }
+        });
+        assert_eq!(ended, Ended::Exit(0), "{name}: a signal is a system call in a tick");
+    }
+}
 
 #[test]
 fn twenty_thousand_ticks_make_no_system_call() {

@@ -28,6 +28,8 @@ pub enum Fault {
     Unclearable,
     /// The amplifier says that it gives this current, whatever it was asked for.
     Gives(f64),
+    /// The amplifier measures the current that it was asked for last, in amperes, and this much more.
+    MeasuresBeyond(f64),
 }
 
 /// A rig and what goes wrong with it, by tick.
@@ -38,11 +40,12 @@ pub struct FaultyRig<R> {
     pub faults: Vec<(Range<u64>, Fault)>,
     now: Option<u64>,
     last: Reading,
+    asked_a: f64,
 }
 
 impl<R: Rig> FaultyRig<R> {
     pub fn new(inner: R, faults: &[(Range<u64>, Fault)]) -> Self {
-        FaultyRig { inner, faults: faults.to_vec(), now: None, last: Reading::default() }
+        FaultyRig { inner, faults: faults.to_vec(), now: None, last: Reading::default(), asked_a: 0.0 }
     }
 
     /// The faults of the tick under way.
@@ -70,6 +73,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        self.asked_a = current_a;
         if let Some(code) =
             self.find(self.now(), |fault| if let Fault::Refuses(code) = fault { Some(*code) } else { None })
         {
@@ -82,6 +86,11 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
 
     fn disable(&mut self) {
         self.inner.disable();
+    }
+
+    fn actual_current_a(&self) -> Option<f64> {
+        let beyond_a = |fault: &Fault| if let Fault::MeasuresBeyond(a) = fault { Some(*a) } else { None };
+        self.find(self.now(), beyond_a).map(|beyond_a| self.asked_a + beyond_a)
     }
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
@@ -111,6 +120,7 @@ impl<R: Rig> DisplacementProbe for FaultyRig<R> {
                 | Fault::Refuses(_)
                 | Fault::DoesNotEnable(_)
                 | Fault::Gives(_)
+                | Fault::MeasuresBeyond(_)
                 | Fault::Unclearable => {}
             }
         }
