@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::CliError;
+use super::modal_output::Shown;
 use crate::config::Config;
 use crate::identify::csv;
 use crate::recording::Recording;
@@ -26,10 +27,8 @@ pub(super) struct Made {
     /// How much later than the model the measured response answers, and its standard deviation.
     delay_beyond_model_s: Option<f64>,
     delay_beyond_model_sigma_s: Option<f64>,
-    modes: [(); 0],
-    zeros: [(); 0],
-    cnmp: &'static str,
-    why: &'static str,
+    #[serde(flatten)]
+    shown: Shown,
 }
 
 /// Why nothing was made: a person wished so.
@@ -57,13 +56,13 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         delay_s: Some(analysis.delay_s),
         delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
         delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
-        ..Made::nothing("this version estimates the frequency response; it does not fit modes and zeros to it")
+        shown: Shown::of(&analysis),
     })
 }
 
 impl Made {
     /// Nothing was made.
-    pub fn nothing(why: &'static str) -> Made {
+    pub fn nothing(why: &str) -> Made {
         Made {
             frf_csv: None,
             plot: None,
@@ -73,10 +72,7 @@ impl Made {
             delay_s: None,
             delay_beyond_model_s: None,
             delay_beyond_model_sigma_s: None,
-            modes: [],
-            zeros: [],
-            cnmp: "undecided",
-            why,
+            shown: Shown::nothing(why),
         }
     }
 
@@ -86,12 +82,12 @@ impl Made {
     }
 
     pub fn is_stopped(&self) -> bool {
-        self.why == STOPPED
+        self.shown.why() == STOPPED
     }
 
     pub fn text(&self) -> String {
         let (Some(frf_csv), Some(plot), Some(coherence)) = (&self.frf_csv, &self.plot, self.coherence_median) else {
-            return format!("  no frequency response: {}\n", self.why);
+            return format!("  no frequency response: {}\n", self.shown.why());
         };
         let filled = if self.filled_ticks > 0 {
             format!(", {} missing ticks filled in", self.filled_ticks)
@@ -109,8 +105,12 @@ impl Made {
             _ => String::new(),
         };
         format!(
-            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{delay}  plot       {}\n",
-            frf_csv, self.frequencies, coherence, plot
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{delay}  plot       {}\n{}",
+            frf_csv,
+            self.frequencies,
+            coherence,
+            plot,
+            self.shown.text()
         )
     }
 }

@@ -10,6 +10,7 @@ mod device;
 mod doctor;
 mod identify;
 mod margins;
+mod modal_output;
 mod model;
 mod options;
 mod outcome;

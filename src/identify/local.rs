@@ -98,17 +98,33 @@ pub fn estimate(signals: &Signals, band_hz: (f64, f64), settings: &EstimatorSett
 }
 
 /// The whole record, bin by bin.
-struct Record {
+pub(super) struct Record {
     products: Vec<Product>,
     fits: Vec<Fit>,
     bin_hz: f64,
 }
 
 impl Record {
-    fn new(signals: &Signals, settings: &EstimatorSettings, high: usize) -> Self {
+    pub(super) fn new(signals: &Signals, settings: &EstimatorSettings, high: usize) -> Self {
         let products = products(signals);
         let fits = fits(&products, settings, high);
         Self { products, fits, bin_hz: signals.rate_hz / signals.len() as f64 }
+    }
+
+    /// Every bin below the Nyquist frequency.
+    pub(super) fn products(&self) -> &[Product] {
+        &self.products
+    }
+
+    /// Distance of bins in hertz.
+    pub(super) fn bin_hz(&self) -> f64 {
+        self.bin_hz
+    }
+
+    /// The power of the noise E|N|^2 in a bin, unless the input is dead there.
+    pub(super) fn noise_power(&self, bin: usize, settings: &EstimatorSettings) -> Option<f64> {
+        self.fits[bin].response?;
+        Some(noise_power(&self.fits, bin, &weights(NOISE_WIDTH * settings.half_width(bin))))
     }
 
     /// The estimate at a bin, unless the input is dead there.
@@ -117,7 +133,8 @@ impl Record {
         let (response, coherence) = self.fits[bin].response?;
         let wider = Sums::around(&self.products, bin, &weights(2 * half_width)).response();
         let bias = (wider - response) / 3.0;
-        let variance = noise(&self.fits, bin, &weights(NOISE_WIDTH * half_width)) + bias.norm_sqr();
+        let noise = noise_power(&self.fits, bin, &weights(NOISE_WIDTH * half_width));
+        let variance = noise * self.fits[bin].gain + bias.norm_sqr();
         let (frequency_hz, resolution_hz) = (bin as f64 * self.bin_hz, self.fits[bin].width * self.bin_hz);
         Some(FrfPoint { frequency_hz, response, coherence, variance, resolution_hz })
     }
@@ -125,15 +142,15 @@ impl Record {
 
 /// What one bin of the record contributes.
 #[derive(Clone, Copy)]
-struct Product {
+pub(super) struct Product {
     input: Complex<f64>,
     output: Complex<f64>,
     /// |U|^2
-    uu: f64,
+    pub(super) uu: f64,
     /// |Y|^2
     yy: f64,
     /// Y conj(U)
-    yu: Complex<f64>,
+    pub(super) yu: Complex<f64>,
 }
 
 /// The bins below the Nyquist frequency; entry 0, the offset, is there to count from, and never used.
@@ -257,8 +274,8 @@ fn fits(products: &[Product], settings: &EstimatorSettings, high: usize) -> Vec<
     fits
 }
 
-/// E|error of H|^2 at a bin by noise, from what the fits around it have left over, weighted towards the bin.
-fn noise(fits: &[Fit], bin: usize, weights: &[f64]) -> f64 {
+/// The power of the noise at a bin, from what the fits around it have left over, weighted towards the bin.
+fn noise_power(fits: &[Fit], bin: usize, weights: &[f64]) -> f64 {
     let reach = weights.len() - 1;
     let (low, high) = (bin.saturating_sub(reach).max(1), (bin + reach + 1).min(fits.len()));
     let (mut freedom, mut residual) = (0.0, 0.0);
@@ -267,5 +284,5 @@ fn noise(fits: &[Fit], bin: usize, weights: &[f64]) -> f64 {
         freedom += w * fit.freedom;
         residual += w * fit.residual;
     }
-    residual / freedom * fits[bin].gain
+    residual / freedom
 }

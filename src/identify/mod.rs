@@ -5,6 +5,7 @@
 //! ```
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
+//! - [`blocks()`]: the same record without smoothing, for a fit.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
 //! - [`align::Readings`] and [`edges`]: readings and set-points of irregular times on the regular ones of a loop.
 //! - [`delay::beyond`]: how much later than a model a response answers.
@@ -14,6 +15,7 @@
 
 pub mod align;
 mod band;
+mod blocks;
 pub mod csv;
 pub mod delay;
 pub mod edges;
@@ -26,6 +28,7 @@ mod signals;
 mod spectrum;
 pub mod welch;
 
+pub use blocks::{Block, blocks};
 pub use error::IdentifyError;
 pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, wrapped_phase_rad};
 pub use local::EstimatorSettings;

@@ -82,9 +82,11 @@ impl Chain {
         let (sine, cosine) = libm::sincos(omega_rad_s * self.held.period_s);
         let z = Complex::new(cosine, sine);
         let current = self.held.current_response(z);
-        let states: Vec<_> = self.held.blocks.iter().map(|block| self.held.state_response(block, z)).collect();
         let of = |tap: &Tap| {
-            let moved: Complex<f64> = tap.rows.iter().zip(&states).map(|(c, x)| x[0] * c[0] + x[1] * c[1]).sum();
+            let moved: Complex<f64> = (tap.rows.iter().zip(&self.held.blocks))
+                .map(|(c, block)| (c, self.held.state_response(block, z)))
+                .map(|(c, x)| x[0] * c[0] + x[1] * c[1])
+                .sum();
             (moved + current * tap.current + tap.setpoint) * z.powi(-(tap.periods as i32))
         };
         self.taps.iter().map(of).sum()

@@ -4,13 +4,16 @@ use nalgebra::Complex;
 
 use super::gathered::Gathered;
 use crate::config::{Config, IdentifySettings};
+use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::delay::{self, Delay};
-use crate::identify::{EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
-use crate::plant::{self, Chain, Modal, PlantError};
+use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, blocks, local, welch};
+use crate::plant::{self, Chain, Modal, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
+use crate::verdict::{self, Case, Verdict, verdict};
 
-/// The model's phase is believed up to so many times its last mode: beyond are modes that it leaves out.
+/// The model's phase is believed, and a verdict given, up to so many times its last mode: beyond are modes that it leaves
+/// out.
 const LAST_MODE: f64 = 1.2;
 
 /// A recording that carries no frequency response.
@@ -56,19 +59,63 @@ pub struct Analysis {
     pub beyond: Option<Delay>,
     /// Missing ticks that were filled in: the current held, the position on a straight line.
     pub filled_ticks: u64,
+    /// The modes that the response shows, or why none are told.
+    pub fit: Result<ModalFit, FitError>,
+    /// What that says of CNMP zeros.
+    pub verdict: Verdict,
 }
 
 /// Analyses a recording made with `config`.
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
     let (signals, filled_ticks) = signals(recording, config.servo.rate_hz)?;
     let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
-    let frf = response(&signals, (start_hz.min(stop_hz), start_hz.max(stop_hz)), &config.identify)?;
-    let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
-    let last_hz = modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max) / (2.0 * std::f64::consts::PI);
-    let chain = Chain::of_mean_age(config, &modes);
+    let band_hz = (start_hz.min(stop_hz), start_hz.max(stop_hz));
+    let frf = response(&signals, band_hz, &config.identify)?;
+    let modal = Modal::of(&plant::build(&config.plant)?)?;
+    let last_rad_s = LAST_MODE * modal.modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max);
+    let chain = Chain::of_mean_age(config, &modal.modes);
     let model: Vec<_> = frf.frequency_hz.iter().map(|f| chain.response(2.0 * std::f64::consts::PI * f)).collect();
-    let beyond = delay::beyond(&frf, &model, LAST_MODE * last_hz);
-    Ok(Analysis { frf, model, delay_s: chain.delay_s(), beyond, filled_ticks })
+    let beyond = delay::beyond(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
+    let blocks = blocks(&signals, band_hz, &fine(&config.identify))?;
+    let fit = fit::fit(&blocks, &View::Bench(config));
+    let verdict = judge(&fit, &blocks, &View::Bench(config), last_rad_s, Some(&modal))?;
+    Ok(Analysis { frf, model, delay_s: chain.delay_s(), beyond, filled_ticks, fit, verdict })
+}
+
+/// What the fit says of CNMP zeros up to `up_to_rad_s`, beside the modes that the model has there.
+fn judge(
+    fit: &Result<ModalFit, FitError>,
+    blocks: &[Block],
+    view: &View<'_>,
+    up_to_rad_s: f64,
+    model: Option<&Modal>,
+) -> Result<Verdict, AnalysisError> {
+    let fit = match fit {
+        Ok(fit) => fit,
+        Err(error) => return Ok(Verdict::undecided(error.to_string())),
+    };
+    let mechanics = view.mechanics(blocks, fit.parameters.delay_s);
+    let omega_rad_s: Vec<f64> = blocks.iter().map(|block| 2.0 * std::f64::consts::PI * block.frequency_hz).collect();
+    let shows = |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
+    let expected_modes = model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
+    Ok(verdict(&Case {
+        fit,
+        zeros: verdict::zeros(fit)?,
+        up_to_rad_s,
+        expected_modes,
+        omega_rad_s: &omega_rad_s,
+        mechanics: &mechanics,
+    }))
+}
+
+/// What cuts the record into blocks: the default estimator's widths, whatever the response is estimated with.
+fn fine(settings: &IdentifySettings) -> EstimatorSettings {
+    match *settings {
+        IdentifySettings::Local { min_half_width_bins, .. } => {
+            EstimatorSettings { min_half_width_bins: min_half_width_bins as f64, ..EstimatorSettings::default() }
+        }
+        IdentifySettings::Welch { .. } => EstimatorSettings::default(),
+    }
 }
 
 /// H1 as configured.

@@ -376,3 +376,22 @@ fn current_that_flows_through_missed_ticks_heats_the_motor_as_well() {
     let at = first_trip(&mut bench, 3) as f64;
     assert!((expected - 1.0..=expected + 4.0).contains(&at), "tick {at}, expected {expected}");
 }
+
+#[test]
+fn a_measured_current_that_is_not_the_commanded_one_trips_within_its_time_and_a_close_one_does_not() {
+    let config = stage();
+    let (error_a, ticks) = (config.interlock.current_error_a, config.interlock.current_error_s * config.servo.rate_hz);
+    for sign in [-1.0, 1.0] {
+        let close = Fault::MeasuresBeyond(sign * 0.9 * error_a);
+        nothing_trips(&mut Bench::running(&config, &[(0..u64::MAX, close)], constant()), 2000);
+        let far = Fault::MeasuresBeyond(sign * 1.1 * error_a);
+        let mut bench = Bench::running(&config, &[(0..u64::MAX, far)], constant());
+        bench.run(2 * ticks as u64);
+        let at = bench.trips().first().map_or(0, |event| event.tick);
+        assert!(
+            (ticks as u64..=ticks as u64 + 3).contains(&at),
+            "{at}: judged at the end of a window of {ticks} ticks"
+        );
+        prove_that_it_is_off(&bench, at, "current_not_followed");
+    }
+}

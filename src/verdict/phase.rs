@@ -1,0 +1,121 @@
+//! A check without a model of modes: how far the phase falls beyond what the magnitude asks for.
+//!
+//! The phase of a plant without zeros in the right half plane follows from its magnitude (Bode 1945),
+//!
+//! ```text
+//! phase(w0) = (1/pi) integral of d ln|G| / dx  ln coth(|x|/2) dx,    x = ln(w/w0)
+//! ```
+//!
+//! A pair of CNMP zeros takes 360 degrees more between a frequency below it and one above, a real one in the right half plane
+//! 180. So the difference over a valley is close to a multiple of 180 degrees, or the data say nothing.
+//!
+//! Hold, amplifier and delays are taken out first: a delay turns the phase and leaves the magnitude.
+
+use nalgebra::Complex;
+
+/// Half turns, and how far the difference is from that many.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseFall {
+    /// The difference in degrees: measured less that of the magnitude, from the lower to the upper frequency.
+    pub beyond_deg: f64,
+    /// Its nearest number of half turns, falls counted positive: 2 a CNMP pair.
+    pub half_turns: i32,
+    /// From there to the difference, in degrees: 0 to 90.
+    pub off_deg: f64,
+}
+
+/// Beyond the band the magnitude goes on with the slope of so much of ln w at its ends.
+const END: f64 = 0.2;
+
+/// The fall of the phase of `response` beyond that of its magnitude between two of its frequencies, by index. Frequencies
+/// rise, responses are not zero.
+pub fn phase_fall(omega_rad_s: &[f64], response: &[Complex<f64>], from: usize, to: usize) -> PhaseFall {
+    let turned: f64 = response[from..=to].windows(2).map(|pair| (pair[1] / pair[0]).arg()).sum::<f64>();
+    let asked = minimum_phase(omega_rad_s, response, to) - minimum_phase(omega_rad_s, response, from);
+    let beyond_deg = (turned - asked).to_degrees();
+    let half_turns = -(beyond_deg / 180.0).round();
+    PhaseFall { beyond_deg, half_turns: half_turns as i32, off_deg: (beyond_deg + 180.0 * half_turns).abs() }
+}
+
+/// The phase in radians at one frequency that the magnitude asks for.
+fn minimum_phase(omega_rad_s: &[f64], response: &[Complex<f64>], at: usize) -> f64 {
+    let x: Vec<f64> = omega_rad_s.iter().map(|w| (w / omega_rad_s[at]).ln()).collect();
+    let height: Vec<f64> = response.iter().map(|h| h.norm().ln()).collect();
+    let within: f64 =
+        (1..x.len()).map(|i| (height[i] - height[i - 1]) / (x[i] - x[i - 1]) * (weight(x[i]) - weight(x[i - 1]))).sum();
+    let last = x.len() - 1;
+    let inside = |x0: f64| x.iter().position(|x| *x >= x0).unwrap_or(last);
+    let (low, high) = (inside(x[0] + END).max(1), inside(x[last] - END).min(last - 1));
+    let below = (height[low] - height[0]) / (x[low] - x[0]) * (weight(x[0]) - weight(f64::NEG_INFINITY));
+    let above = (height[last] - height[high]) / (x[last] - x[high]) * (weight(f64::INFINITY) - weight(x[last]));
+    (within + below + above) / std::f64::consts::PI
+}
+
+/// The integral of ln coth(|t|/2) from 0 to x, which is odd in x and ends at pi^2/4: with e = exp(-|x|),
+/// pi^2/4 - 2 sum of e^(2 k + 1)/(2 k + 1)^2.
+fn weight(x: f64) -> f64 {
+    let e = (-x.abs()).exp();
+    let quarter = std::f64::consts::PI * std::f64::consts::PI / 4.0;
+    // Near 0 the series is slow; there ln coth(t/2) = ln(2/t) + t^2/12 - ...
+    let size = if x.abs() < 0.1 {
+        let t = x.abs();
+        if t == 0.0 { 0.0 } else { t * ((2.0 / t).ln() + 1.0) + t.powi(3) / 36.0 }
+    } else {
+        let term = |k: i32| e.powi(2 * k + 1) / f64::from((2 * k + 1) * (2 * k + 1));
+        quarter - 2.0 * (0..120).map(term).sum::<f64>()
+    };
+    size.copysign(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(zeros: &[Complex<f64>], delay_s: f64) -> (Vec<f64>, Vec<Complex<f64>>) {
+        let omega: Vec<f64> = (0..12_000).map(|k| 1.0 * (0.0007 * f64::from(k)).exp()).collect();
+        let response = omega.iter().map(|w| {
+            let s = Complex::new(0.0, *w);
+            let mode = |w: f64, z: f64| (s * s / (w * w) + s * (2.0 * z / w) + 1.0).inv();
+            let poles = mode(180.0, 0.009) * mode(516.0, 0.004) * mode(540.0, 0.004);
+            let zeros: Complex<f64> = zeros.iter().map(|z| (s - z) * (s - z.conj()) / z.norm_sqr()).product();
+            poles * zeros * Complex::from_polar(1.0, -w * delay_s)
+        });
+        let response = response.collect();
+        (omega, response)
+    }
+
+    fn fall(zeros: &[Complex<f64>]) -> PhaseFall {
+        let (omega, response) = of(zeros, 0.0);
+        let at = |w: f64| omega.iter().position(|x| *x >= w).unwrap();
+        phase_fall(&omega, &response, at(300.0), at(900.0))
+    }
+
+    #[test]
+    fn each_pair_in_the_right_half_plane_takes_a_turn_and_the_left_one_none() {
+        let zero = Complex::new;
+        for (zeros, half_turns) in [
+            (vec![zero(-2.0, 528.0)], 0),
+            (vec![zero(-2.0, 525.0), zero(-2.0, 530.0)], 0),
+            (vec![zero(-14.9, 530.2), zero(10.7, 530.3)], 2),
+            (vec![zero(-4.0, 530.0), zero(1.0, 530.0)], 2),
+            (vec![zero(5.0, 524.0), zero(5.0, 534.0)], 4),
+        ] {
+            let fall = fall(&zeros);
+            // The slopes at the ends of the band stand for the rest of it: some degrees.
+            assert!(fall.half_turns == half_turns && fall.off_deg < 20.0, "{zeros:?}: {fall:?}");
+        }
+    }
+
+    #[test]
+    fn the_weight_is_the_integral_that_it_says() {
+        assert!((weight(f64::INFINITY) - 2.467_401_100_272_34).abs() < 1e-14);
+        for x in [0.05, 0.0999, 0.1001, 1.0, 7.0] {
+            // The midpoint rule; at 0 the logarithm costs it some half a step times ln 2.
+            let step = 1e-5;
+            let midpoint = |k: usize| (k as f64 + 0.5) * step;
+            let sum: f64 = (0..(x / step) as usize).map(|k| -(midpoint(k) / 2.0).tanh().ln() * step).sum();
+            assert!((weight(x) - sum).abs() < 1e-4, "{x}: {} {sum}", weight(x));
+            assert_eq!(weight(-x), -weight(x));
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! From a response to modes with their errors, and from these to a verdict.
+mod intervals;
+mod modes;
+mod rig;
+mod synthetic;
+mod verdicts;
