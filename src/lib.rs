@@ -6,7 +6,7 @@
 //! ```text
 //!  bench-config/*.toml
 //!        |
-//!                  zeros, veering (what the thesis asks of a model)
+//!                  zeros, veering, study (what the thesis asks of a model)
 //!                    ^
 //!     config ----> plant ----> sim (a rig that obeys the model)
 //!        |           |            |  implements
@@ -29,6 +29,7 @@
 //! | zeros and their kinds, sequence of dominant modes, maps | [`zeros`] |
 //! | how Tables 3-1 to 3-4 are read | `zeros/tables.rs`, `zeros/sequence.rs` |
 //! | two close modes, veering | [`veering`] |
+//! | tolerances: how likely CNMP zeros are, and what decides it | [`study`] |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |
@@ -72,6 +73,7 @@ pub mod report;
 pub mod rt;
 pub mod session;
 pub mod sim;
+pub mod study;
 pub mod veering;
 pub mod verdict;
 pub mod zeros;

@@ -4,6 +4,7 @@ mod analysis_output;
 mod calibrate;
 mod chirp;
 mod choice;
+mod columns;
 mod config;
 mod control;
 mod device;

@@ -6,10 +6,9 @@ mod locus;
 mod map;
 mod sequence;
 mod step;
+mod study;
 mod sweep;
 mod veering;
-
-use std::path::Path;
 
 use clap::Subcommand;
 use serde::Serialize;
@@ -38,6 +37,8 @@ enum What {
     Locus(locus::Args),
     /// How many pairs of CNMP zeros there are over operating point and mass asymmetry, for SR4DoF
     Map(map::Args),
+    /// How likely CNMP zeros are within manufacturing tolerances, and which settings decide it
+    Study(study::Args),
     /// Two close modes as one setting varies: whether their loci cross or veer, where, and how their shapes swap
     Veering(veering::Args),
     /// What the zeros in the right half plane allow in bandwidth and sensitivity peak (Eqs. 1-2, 1-3)
@@ -50,6 +51,7 @@ enum What {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
+        What::Study(args) => return study::run(args),
         What::Modes(options) => run_modes(options)?,
         What::Sequence(options) => sequence::run(options)?,
         What::Locus(args) => locus::run(args)?,
@@ -66,16 +68,6 @@ fn run_modes(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
     let modes = Modes::of(&config, options.profile())?;
     if options.json { print_json(&modes) } else { print_text(&modes.text()) }
-}
-
-/// Writes a table of numbers, one row a line, over whatever was there.
-fn write_csv(path: &Path, header: &str, rows: impl Iterator<Item = Vec<String>>) -> Result<(), CliError> {
-    let lines = std::iter::once(header.to_string()).chain(rows.map(|row| row.join(",")));
-    let text = lines.map(|line| line + "\n").collect::<String>();
-    let failed = |e: std::io::Error| {
-        CliError::Failed(format!("cannot write {}: {e}; free some space or choose another file", path.display()))
-    };
-    std::fs::write(path, text).map_err(failed)
 }
 
 #[derive(Debug, Serialize)]

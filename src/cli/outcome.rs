@@ -11,6 +11,7 @@ use crate::identify::IdentifyError;
 use crate::plant::PlantError;
 use crate::recording::RecordingError;
 use crate::session::PlanError;
+use crate::study::StudyError;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +75,9 @@ pub enum CliError {
     /// The data do not carry the analysis.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// There is no such study, or its file cannot be used.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// Something else went wrong on the way.
     #[error("{0}")]
     Failed(String),
@@ -84,6 +88,7 @@ impl CliError {
     pub fn outcome(&self) -> Outcome {
         match self {
             CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
+            CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
             _ => Outcome::Usage,
         }
     }

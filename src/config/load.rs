@@ -109,6 +109,15 @@ fn checked(layers: &[Layer], purpose: Purpose) -> Result<Config, ConfigError> {
     Ok(config)
 }
 
+/// Checks a configuration that was changed after it was loaded.
+pub(crate) fn recheck(config: &Config) -> Result<(), ConfigError> {
+    let value = Value::try_from(config).map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
+    let mut findings = check::check(&schema(), &value);
+    findings.extend(cross_checks(config, Purpose::Model));
+    let lines: Vec<String> = findings.iter().map(|f| format!("  `{}` {}", f.path, f.what)).collect();
+    if lines.is_empty() { Ok(()) } else { Err(ConfigError::Refused(lines)) }
+}
+
 fn refuse(layers: &[Layer], findings: Vec<Finding>) -> Result<(), ConfigError> {
     if findings.is_empty() {
         return Ok(());

@@ -22,10 +22,12 @@ pub mod quantity;
 mod relations;
 mod settings;
 
+pub(crate) use check::nearest;
 pub use devices::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
-pub(crate) use load::{text_of, text_of_file, typed};
+pub(crate) use load::{recheck, text_of, text_of_file, typed};
 pub use plant::*;
+pub(crate) use relations::relations_of;
 pub use settings::*;
 
 /// The JSON schema of a configuration, made from the types.

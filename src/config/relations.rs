@@ -1,25 +1,37 @@
 //! What no single setting of a plant can say.
 
 use super::check::{Finding, nearest};
-use super::{Config, Geometry, LumpedSettings, ModalSettings, PlantSettings, SpringSettings};
+use super::{Config, ConfigError, Geometry, LumpedSettings, ModalSettings, PlantSettings, SpringSettings};
 
 /// The name that no node may have.
 pub(crate) const GROUND: &str = "ground";
 
 /// All that is wrong between the settings of a plant.
 pub(super) fn plant(config: &Config) -> Vec<Finding> {
-    let mut findings = operating_point(&config.plant);
-    match &config.plant {
-        PlantSettings::Lumped(plant) => findings.extend(lumped(plant)),
-        PlantSettings::Modal(plant) => findings.extend(modal(plant)),
-        PlantSettings::Sr4dof(_) | PlantSettings::Xy(_) => {}
-    }
+    let mut findings = of(&config.plant);
     if config.sim.geometry == Geometry::Quadratic && !matches!(config.plant, PlantSettings::Sr4dof(_)) {
         let model = config.plant.model();
         let what = format!(
             "is \"quadratic\", which is simulated for the model `sr4dof` alone, not for `{model}`; take \"linear\""
         );
         findings.push(finding("sim.geometry", what));
+    }
+    findings
+}
+
+/// Refuses a plant whose settings, each within its range, do not go together.
+pub(crate) fn relations_of(plant: &PlantSettings) -> Result<(), ConfigError> {
+    let findings = of(plant);
+    let line = |finding: &Finding| format!("  `{}` {}", finding.path, finding.what);
+    if findings.is_empty() { Ok(()) } else { Err(ConfigError::Refused(findings.iter().map(line).collect())) }
+}
+
+fn of(plant: &PlantSettings) -> Vec<Finding> {
+    let mut findings = operating_point(plant);
+    match plant {
+        PlantSettings::Lumped(plant) => findings.extend(lumped(plant)),
+        PlantSettings::Modal(plant) => findings.extend(modal(plant)),
+        PlantSettings::Sr4dof(_) | PlantSettings::Xy(_) => {}
     }
     findings
 }

@@ -22,4 +22,4 @@ pub use measure::{Measured, measure};
 pub use plan::{Kind, Plan, PlanError};
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use run::{Run, SessionError, run};
-pub use stop::unless_stopped;
+pub use stop::{stoppable, unless_stopped};

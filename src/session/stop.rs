@@ -1,5 +1,8 @@
 //! A person may stop what takes its time, and files stay whole.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::SessionError;
@@ -12,20 +15,50 @@ pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
 /// Does `work` in a thread of its own and returns what it made; `None` if a person stops it before it is done. The thread
 /// is then left behind, and ends with the process: `work` must not hold what has to be closed in order.
 pub fn unless_stopped<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<Option<T>, SessionError> {
-    let system = |e: std::io::Error| SessionError::System { what: "start the analysis", why: e.to_string() };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
-    runtime.block_on(async {
+    runtime()?.block_on(async {
         let (mut interrupt, mut terminate) = signals().map_err(system)?;
         let (tell, told) = tokio::sync::oneshot::channel();
         let thread = std::thread::Builder::new().name("bench-analysis".into());
         thread.spawn(move || drop(tell.send(work()))).map_err(system)?;
-        let died = |_| SessionError::System { what: "finish the analysis", why: "its thread died of a panic".into() };
         tokio::select! {
             result = told => result.map(Some).map_err(died),
             _ = interrupt.recv() => Ok(None),
             _ = terminate.recv() => Ok(None),
         }
     })
+}
+
+/// Does `work` in a thread of its own and waits until it ends. A person who stops it sets the flag that `work` is given; it
+/// then comes to an end in order.
+pub fn stoppable<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<T, SessionError> {
+    let (runtime, stop) = (runtime()?, AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        runtime.block_on(async {
+            let (mut interrupt, mut terminate) = signals().map_err(system)?;
+            let (tell, mut told) = tokio::sync::oneshot::channel();
+            let thread = std::thread::Builder::new().name("bench-analysis".into());
+            thread.spawn_scoped(scope, || drop(tell.send(work(&stop)))).map_err(system)?;
+            loop {
+                tokio::select! {
+                    result = &mut told => return result.map_err(died),
+                    _ = interrupt.recv() => stop.store(true, Ordering::Relaxed),
+                    _ = terminate.recv() => stop.store(true, Ordering::Relaxed),
+                }
+            }
+        })
+    })
+}
+
+fn runtime() -> Result<Runtime, SessionError> {
+    tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)
+}
+
+fn system(e: std::io::Error) -> SessionError {
+    SessionError::System { what: "start the analysis", why: e.to_string() }
+}
+
+fn died(_: tokio::sync::oneshot::error::RecvError) -> SessionError {
+    SessionError::System { what: "finish the analysis", why: "its thread died of a panic".into() }
 }
 
 #[cfg(test)]
@@ -49,6 +82,22 @@ mod tests {
             assert!(outcome.unwrap().is_none());
             drop(release);
         }
+    }
+
+    #[test]
+    fn ctrl_c_and_sigterm_set_the_flag_and_wait_for_the_work() {
+        for number in [libc::SIGINT, libc::SIGTERM] {
+            let ended = stoppable(|stop| {
+                // SAFETY: no memory is touched; the handlers were installed before this thread began.
+                unsafe { libc::raise(number) };
+                while !stop.load(Ordering::Relaxed) {
+                    std::thread::yield_now();
+                }
+                "in order"
+            });
+            assert_eq!(ended.unwrap(), "in order");
+        }
+        assert!(!stoppable(|stop| stop.load(Ordering::Relaxed)).unwrap());
     }
 
     #[test]

@@ -1,14 +1,12 @@
 //! `bench model locus`: how the zeros migrate as one setting varies.
 
-use std::path::PathBuf;
-
 use serde::Serialize;
 
 use super::super::CliError;
+use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use super::sweep::Sweep;
-use super::write_csv;
 use crate::plant::Modal;
 use crate::zeros::{self, Change, Locus, ModalSum, Plane};
 
@@ -32,9 +30,8 @@ pub(super) struct Args {
     /// Follow the zeros of the plant with its damping
     #[arg(long)]
     damped: bool,
-    /// Write the tracks to this file
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -95,14 +92,13 @@ enum ClosedForm {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
+    args.table.check()?;
     let values = sweep(args).values()?;
     let plane = if args.damped { Plane::Damped } else { Plane::Undamped };
     let locus = Locus::follow(plane, &values, |value| zeros(args, value))?;
-    if let Some(path) = &args.csv {
-        write_csv(path, &header(args, &locus), (0..values.len()).map(|k| row(&locus, k)))?;
-    }
+    args.table.write(|| Column::of_rows(names(args, &locus), (0..values.len()).map(|k| row(&locus, k))))?;
     let report = report(args, &locus)?;
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+    if args.bench.json { print_json(&report) } else { print_text(&(text(&report) + &args.table.told("tracks"))) }
 }
 
 fn sweep(args: &Args) -> Sweep<'_> {
@@ -129,7 +125,7 @@ fn report(args: &Args, locus: &Locus) -> Result<Report, CliError> {
             .map(|track| TrackJson { re_rad_s: part(track, |s| s.re), im_rad_s: part(track, |s| s.im) })
             .collect(),
         changes: locus.changes.iter().map(|change| change_json(args, change)).collect::<Result<_, _>>()?,
-        csv: args.csv.as_ref().map(|path| path.display().to_string()),
+        csv: args.table.csv(),
     })
 }
 
@@ -171,17 +167,16 @@ fn closed_form(args: &Args, value: f64) -> Result<Option<ClosedForm>, CliError> 
     })
 }
 
-fn header(args: &Args, locus: &Locus) -> String {
-    let columns = (1..=locus.tracks.len()).map(|n| format!(",zero_{n}_re_rad_s,zero_{n}_im_rad_s"));
-    format!("{}{}", args.vary, columns.collect::<String>())
+fn names(args: &Args, locus: &Locus) -> Vec<String> {
+    let zero = |n: usize| ["re", "im"].map(|part| format!("zero_{n}_{part}_rad_s"));
+    [args.vary.clone()].into_iter().chain((1..=locus.tracks.len()).flat_map(zero)).collect()
 }
 
-/// A zero at infinity is `inf`.
-fn row(locus: &Locus, index: usize) -> Vec<String> {
+/// A zero at infinity is infinite in its real part.
+fn row(locus: &Locus, index: usize) -> Vec<f64> {
     let infinite = nalgebra::Complex::new(f64::INFINITY, 0.0);
     let places = locus.tracks.iter().map(|track| track[index].unwrap_or(infinite));
-    let numbers = [locus.values[index]].into_iter().chain(places.flat_map(|s| [s.re, s.im]));
-    numbers.map(|number| if number.is_finite() { format!("{number:e}") } else { "inf".into() }).collect()
+    [locus.values[index]].into_iter().chain(places.flat_map(|s| [s.re, s.im])).collect()
 }
 
 fn text(report: &Report) -> String {
@@ -207,8 +202,7 @@ fn text(report: &Report) -> String {
         [] => "the kinds of the zeros do not change\n".into(),
         changes => changes.iter().map(|change| change_text(&report.vary, change)).collect(),
     };
-    let file = report.csv.as_ref().map_or(String::new(), |path| format!("tracks in {path}\n"));
-    format!("{}: zeros {which}\n\n{}\n{changes}{file}", report.profile, table(&header, &rows))
+    format!("{}: zeros {which}\n\n{}\n{changes}", report.profile, table(&header, &rows))
 }
 
 fn change_text(key: &str, change: &ChangeJson) -> String {

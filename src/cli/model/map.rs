@@ -1,13 +1,12 @@
 //! `bench model map`: the CNMP map of the thesis.
 
-use std::path::PathBuf;
 use std::str::FromStr;
 
 use serde::Serialize;
 
 use super::super::CliError;
+use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
-use super::write_csv;
 use crate::config::{PlantSettings, Purpose, Sr4dofSettings, quantity};
 use crate::zeros;
 
@@ -27,9 +26,8 @@ pub(super) struct Args {
     /// Mass asymmetries m2/m3 - 1: -0.1:0.1:41, -10%:10%:41
     #[arg(long, value_name = "FROM:TO:COUNT", default_value = "-10%:10%:41", allow_hyphen_values = true)]
     asymmetries: Grid,
-    /// Write operating point, asymmetry and count to this file, one point of the map a line
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableOptions,
 }
 
 /// Values at equal distances, both ends among them.
@@ -65,18 +63,13 @@ struct Report<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
+    args.table.check()?;
     let settings = settings(args)?;
     let (points, asymmetries) = (&args.operating_points.0[..], &args.asymmetries.0[..]);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let cnmp_pairs = zeros::cnmp_map(&settings, points, asymmetries, threads)?;
     let report = Report { operating_points: points, asymmetries, cnmp_pairs };
-    if let Some(path) = &args.csv {
-        write_csv(
-            path,
-            "operating_point,mass_asymmetry,cnmp_pairs",
-            cells(&report).map(|c| c.map(|x| x.to_string()).into()),
-        )?;
-    }
+    args.table.write(|| columns(&report))?;
     if args.bench.json { print_json(&report) } else { print_text(&text(&report, args.bench.profile())) }
 }
 
@@ -105,6 +98,17 @@ fn sr4dof(args: &Args, sets: &[String]) -> Result<Sr4dofSettings, CliError> {
             other.model()
         ))),
     }
+}
+
+/// A row for each point of the map.
+fn columns(report: &Report) -> Vec<Column> {
+    let column = |axis: usize| cells(report).map(|cell| cell[axis]).collect();
+    let counts = report.cnmp_pairs.iter().flatten().map(|&pairs| Some(u64::from(pairs)));
+    vec![
+        Column::real("operating_point", column(0)),
+        Column::real("mass_asymmetry", column(1)),
+        Column::count("cnmp_pairs", counts),
+    ]
 }
 
 /// Operating point, asymmetry and count of each point of the map.

@@ -1,12 +1,10 @@
 //! `bench model step`: how the response to a step begins, and what the zeros foretell of it (Chapter 3).
 
-use std::path::PathBuf;
-
 use serde::Serialize;
 
 use super::super::CliError;
+use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
-use super::write_csv;
 use crate::config::Purpose;
 use crate::plant::{self, Modal};
 use crate::zeros::{InitialStep, Kinds, ModalSum, Sequence, StepResponse};
@@ -16,9 +14,8 @@ use crate::zeros::{InitialStep, Kinds, ModalSum, Sequence, StepResponse};
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// Write the response and the part of each mode to this file
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableOptions,
     /// Length of the response in the file; until the window of the zero crossings ends if absent
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
@@ -63,28 +60,29 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     if let Some(seconds) = args.duration.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
         return Err(CliError::Usage(format!("--duration is {seconds}; it is in seconds and above 0")));
     }
+    args.table.check()?;
     let config = args.bench.load(Purpose::Model, &[])?;
     let sum = ModalSum::visible(&Modal::of(&plant::build(&config.plant)?)?)?;
     let response = StepResponse::new(&sum);
     let initial = response.initial();
-    if let Some(path) = &args.csv {
-        let seconds = args.duration.unwrap_or(initial.window_s);
-        let rows = (0..args.count).map(|k| row(&response, seconds * f64::from(k) / f64::from(args.count - 1)));
-        write_csv(path, &header(&sum), rows)?;
-    }
+    let seconds = args.duration.unwrap_or(initial.window_s);
+    let rows = (0..args.count).map(|k| row(&response, seconds * f64::from(k) / f64::from(args.count - 1)));
+    args.table.write(|| Column::of_rows(names(&sum), rows))?;
     let report = report(args, &sum, &response, initial)?;
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&(text(&report) + &args.table.told("  response           ")))
+    }
 }
 
-fn header(sum: &ModalSum) -> String {
-    let modes = (1..=sum.terms().len()).map(|number| format!(",mode_{number}_m_per_n"));
-    format!("time_s,displacement_m_per_n{}", modes.collect::<String>())
+fn names(sum: &ModalSum) -> Vec<String> {
+    let modes = (1..=sum.terms().len()).map(|number| format!("mode_{number}_m_per_n"));
+    ["time_s", "displacement_m_per_n"].into_iter().map(String::from).chain(modes).collect()
 }
 
-fn row(response: &StepResponse, time_s: f64) -> Vec<String> {
-    let parts = response.parts_m(time_s);
-    let numbers = [time_s, response.position_m(time_s)].into_iter().chain(parts);
-    numbers.map(|number| format!("{number:e}")).collect()
+fn row(response: &StepResponse, time_s: f64) -> Vec<f64> {
+    [time_s, response.position_m(time_s)].into_iter().chain(response.parts_m(time_s)).collect()
 }
 
 fn report(args: &Args, sum: &ModalSum, response: &StepResponse, initial: InitialStep) -> Result<Report, CliError> {
@@ -110,7 +108,7 @@ fn report(args: &Args, sum: &ModalSum, response: &StepResponse, initial: Initial
         },
         zero_crossings_s: initial.zero_crossings_s,
         reversals_s: initial.reversals_s,
-        csv: args.csv.as_ref().map(|path| path.display().to_string()),
+        csv: args.table.csv(),
     })
 }
 
@@ -123,7 +121,7 @@ fn text(report: &Report) -> String {
     let foretold = &report.foretold;
     let end = report.end_m_per_n.map_or("goes on for ever".into(), |end| format!("{:.4} um/N", end * 1e6));
     format!(
-        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N   foretold: {}\n  zero crossings      {}{} in the first {:.3} ms   foretold: at least {}, {} where each zero in the right half plane shows\n  reversals           {}{} in the first {:.3} ms\n{}{}",
+        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N   foretold: {}\n  zero crossings      {}{} in the first {:.3} ms   foretold: at least {}, {} where each zero in the right half plane shows\n  reversals           {}{} in the first {:.3} ms\n{}",
         report.profile,
         report.dominant_sequence,
         report.zeros,
@@ -139,6 +137,5 @@ fn text(report: &Report) -> String {
         times(&report.reversals_s),
         report.initial_s * 1e3,
         if foretold.agrees { "" } else { "  NOT as foretold\n" },
-        report.csv.as_ref().map_or(String::new(), |path| format!("  response            {path}\n")),
     )
 }

@@ -1,14 +1,12 @@
 //! `bench model veering`: two close modes as one setting varies (section 4.1).
 
-use std::path::PathBuf;
-
 use serde::Serialize;
 
 use super::super::CliError;
+use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use super::sweep::Sweep;
-use super::write_csv;
 use crate::config::Purpose;
 use crate::veering::{Loci, Meeting, ModesAt};
 
@@ -32,9 +30,8 @@ pub(super) struct Args {
     /// The two modes, slowest first at the first value [default: the pair that comes closest]
     #[arg(long, value_name = "I,J", value_delimiter = ',')]
     modes: Vec<usize>,
-    /// Write all frequencies and the two shapes to this file
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -76,6 +73,7 @@ impl Shares {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
+    args.table.check()?;
     let sweep = Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count };
     let values = sweep.values()?;
     let config = args.bench.load(Purpose::Model, &[])?;
@@ -84,11 +82,14 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let pair = pair(&args.modes, loci.path()[0].omega_rad_s.len(), loci.closest_pair())?;
     let (meeting, closest) = loci.meeting(pair)?;
     let grid: Vec<&ModesAt> = values.iter().map(|&value| loci.near(value)).collect();
-    if let Some(path) = &args.csv {
-        write_csv(path, &header(&args.vary, &coordinates, &closest, pair), grid.iter().map(|at| row(at, pair)))?;
-    }
+    let names = || names(&args.vary, &coordinates, &closest, pair);
+    args.table.write(|| Column::of_rows(names(), grid.iter().map(|at| row(at, pair))))?;
     let report = report(args, coordinates, &grid, pair, (meeting, &closest));
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&(text(&report) + &args.table.told("loci and shapes")))
+    }
 }
 
 /// The two modes from 0.
@@ -135,20 +136,20 @@ fn report(
         after: Shares::of(last, pair),
         values: grid.iter().map(|at| at.value).collect(),
         frequencies_hz: (0..first.omega_rad_s.len()).map(frequencies).collect(),
-        csv: args.csv.as_ref().map(|path| path.display().to_string()),
+        csv: args.table.csv(),
     }
 }
 
-fn header(vary: &str, coordinates: &[String], at: &ModesAt, pair: [usize; 2]) -> String {
-    let frequencies = (1..=at.omega_rad_s.len()).map(|mode| format!(",mode_{mode}_hz"));
-    let shapes = pair.iter().flat_map(|mode| coordinates.iter().map(move |name| format!(",mode_{}_{name}", mode + 1)));
-    format!("{vary}{}", frequencies.chain(shapes).collect::<String>())
+fn names(vary: &str, coordinates: &[String], at: &ModesAt, pair: [usize; 2]) -> Vec<String> {
+    let frequencies = (1..=at.omega_rad_s.len()).map(|mode| format!("mode_{mode}_hz"));
+    let shapes = pair.iter().flat_map(|mode| coordinates.iter().map(move |name| format!("mode_{}_{name}", mode + 1)));
+    [vary.to_string()].into_iter().chain(frequencies).chain(shapes).collect()
 }
 
-fn row(at: &ModesAt, pair: [usize; 2]) -> Vec<String> {
+fn row(at: &ModesAt, pair: [usize; 2]) -> Vec<f64> {
     let frequencies = at.omega_rad_s.iter().map(|&w| hz(w));
     let shapes = pair.iter().flat_map(|&mode| at.shape(mode));
-    [at.value].into_iter().chain(frequencies).chain(shapes).map(|number| format!("{number:e}")).collect()
+    [at.value].into_iter().chain(frequencies).chain(shapes).collect()
 }
 
 fn text(report: &Report) -> String {
@@ -159,9 +160,8 @@ fn text(report: &Report) -> String {
         _ => "veer",
     };
     let [[uu, uv], [vu, vv]] = report.mac_across;
-    let file = report.csv.as_ref().map_or(String::new(), |path| format!("loci and shapes in {path}\n"));
     format!(
-        "{}: modes {u} and {v} over {}\n\n{}\nthey {verb} at {:.9}: {:.4} Hz, {:.3e} Hz apart\nMAC from the first value to the last: {u} to {u} {uu:.4}, {u} to {v} {uv:.4}, {v} to {u} {vu:.4}, {v} to {v} {vv:.4}\n\nshares of the coordinates in the shapes\n{}{file}",
+        "{}: modes {u} and {v} over {}\n\n{}\nthey {verb} at {:.9}: {:.4} Hz, {:.3e} Hz apart\nMAC from the first value to the last: {u} to {u} {uu:.4}, {u} to {v} {uv:.4}, {v} to {u} {vu:.4}, {v} to {v} {vv:.4}\n\nshares of the coordinates in the shapes\n{}",
         report.profile,
         report.vary,
         loci_table(report),

@@ -1,0 +1,208 @@
+//! What a study says.
+
+use serde::Serialize;
+
+use super::effects::{Cell, Effects, Share};
+use super::interval::wilson;
+use super::{Block, Failure, Results, Shard, Varied};
+
+/// Failures that are told one by one; the others are counted.
+const EXAMPLES: usize = 5;
+/// Couples that are told, the strongest first.
+const COUPLES: usize = 10;
+/// A difference counts above so many of its standard deviations, a couple above so many of its noise.
+const SIGNIFICANT: f64 = 4.0;
+
+/// The answer of a study, or of one shard of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Answer {
+    /// `plant.model`.
+    pub model: &'static str,
+    /// The nominal operating point, of a model that has one.
+    pub operating_point_m: Option<f64>,
+    /// Of the random numbers.
+    pub seed: u64,
+    /// How many draws were done.
+    pub draws: u64,
+    /// `I/N` of a part, nothing of the whole.
+    pub shard: Option<String>,
+    /// What varied.
+    pub varied: Vec<Varied>,
+    /// The draws that are not in the probabilities.
+    pub not_analysed: NotAnalysed,
+    /// CNMP pairs without damping.
+    pub cnmp_pairs: Counted,
+    /// The same with damping, if they were counted.
+    pub damped_cnmp_pairs: Option<Counted>,
+}
+
+/// Draws that could not be analysed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotAnalysed {
+    /// How many.
+    pub draws: u64,
+    /// The first of them.
+    pub examples: Vec<Failure>,
+}
+
+/// How likely each number of pairs is, and what decides whether there are any.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Counted {
+    /// From no pair to the most that were found, three at least.
+    pub probabilities: Vec<Probability>,
+    /// One pair or more.
+    pub any: Probability,
+    /// The sum of what the settings explain alone; nothing of too few draws.
+    pub share_alone: Option<f64>,
+    /// The sum of what couples explain beyond that. The rest takes three settings or more together.
+    pub share_of_couples: Option<f64>,
+    /// Each setting, the strongest first.
+    pub settings: Vec<Effect>,
+    /// The strongest couples of settings that stand out.
+    pub couples: Vec<Couple>,
+}
+
+/// The probability of a number of pairs among the draws that were analysed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Probability {
+    /// How many pairs; nothing for one or more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pairs: Option<u32>,
+    /// How many draws had them.
+    pub draws: u64,
+    /// Their ratio.
+    pub probability: f64,
+    /// Its 95 % interval by Wilson, from here
+    pub low: f64,
+    /// to here.
+    pub high: f64,
+}
+
+/// What a setting has to do with there being pairs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Effect {
+    /// The setting.
+    pub key: String,
+    /// The share of the variance of "has pairs" that it explains alone; nothing of too few draws.
+    pub share: Option<f64>,
+    /// The share's standard deviation if there were no effect.
+    pub share_noise: Option<f64>,
+    /// `+` if pairs are more likely in the upper third of the setting than in the lower one by more than chance, `-` if less,
+    /// `0` if neither.
+    pub direction: char,
+    /// The probability of pairs in the lower, the middle and the upper third.
+    pub probability_by_third: [Option<f64>; 3],
+}
+
+/// What two settings explain beyond what each explains alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Couple {
+    /// The two settings.
+    pub keys: [String; 2],
+    /// The share of the variance of "has pairs".
+    pub share: f64,
+    /// Its standard deviation if there were no effect.
+    pub share_noise: f64,
+    /// The probability of pairs where both lie on the same side of their medians,
+    pub probability_same_side: Option<f64>,
+    /// and where they lie on opposite sides.
+    pub probability_opposite_sides: Option<f64>,
+}
+
+impl Answer {
+    /// What the draws that are done say.
+    pub fn of(results: &Results) -> Answer {
+        let plan = &results.plan;
+        let failures: Vec<&Failure> = results.blocks().flat_map(|block| &block.failures).collect();
+        Answer {
+            model: plan.plant.model(),
+            operating_point_m: plan.plant.operating_point_m(),
+            seed: plan.seed,
+            draws: results.done(),
+            shard: (results.shard != Shard::WHOLE).then(|| results.shard.to_string()),
+            varied: plan.varied.clone(),
+            not_analysed: NotAnalysed {
+                draws: failures.len() as u64,
+                examples: failures.into_iter().take(EXAMPLES).cloned().collect(),
+            },
+            cnmp_pairs: counted(results, |block| &block.cnmp_pairs),
+            damped_cnmp_pairs: plan.damped.then(|| counted(results, |block| &block.damped_cnmp_pairs)),
+        }
+    }
+}
+
+fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
+    let mut effects = Effects::new(results.plan.varied.len());
+    // 0, 1, 2 and 3 pairs are always told.
+    let mut counts = vec![0; 4];
+    for block in results.blocks() {
+        for (pairs, drawn) in of(block).iter().zip(results.plan.from_draw(block.first)) {
+            let Some(pairs) = *pairs else { continue };
+            counts.resize(counts.len().max(pairs as usize + 1), 0);
+            counts[pairs as usize] += 1;
+            effects.add(&drawn.ranks, pairs > 0);
+        }
+    }
+    let all: u64 = counts.iter().sum();
+    Counted {
+        probabilities: (0..).zip(&counts).map(|(pairs, &yes)| probability(Some(pairs), yes, all)).collect(),
+        any: probability(None, all - counts[0], all),
+        share_alone: (0..results.plan.varied.len()).map(|index| Some(effects.single(index)?.value)).sum(),
+        share_of_couples: effects.couples().map(|(_, share)| Some(share?.value)).sum(),
+        settings: singles(&results.plan.varied, &effects),
+        couples: couples(&results.plan.varied, &effects),
+    }
+}
+
+fn probability(pairs: Option<u32>, yes: u64, all: u64) -> Probability {
+    let [low, high] = wilson(yes, all);
+    Probability { pairs, draws: yes, probability: if all == 0 { 0.0 } else { yes as f64 / all as f64 }, low, high }
+}
+
+fn singles(varied: &[Varied], effects: &Effects) -> Vec<Effect> {
+    let effect = |(index, one): (usize, &Varied)| {
+        let (share, thirds) = (effects.single(index), effects.thirds(index));
+        Effect {
+            key: one.key.clone(),
+            share: share.map(|share| share.value),
+            share_noise: share.map(|share| share.noise),
+            direction: share.map_or('0', |_| direction(&thirds)),
+            probability_by_third: thirds.map(finite),
+        }
+    };
+    let mut settings: Vec<Effect> = varied.iter().enumerate().map(effect).collect();
+    settings.sort_by(|a, b| b.share.unwrap_or(0.0).total_cmp(&a.share.unwrap_or(0.0)));
+    settings
+}
+
+fn direction([low, _, high]: &[Cell; 3]) -> char {
+    let (difference, sigma) = (high.probability() - low.probability(), high.sigma().hypot(low.sigma()));
+    match difference.abs() > SIGNIFICANT * sigma {
+        true if difference > 0.0 => '+',
+        true => '-',
+        false => '0',
+    }
+}
+
+fn couples(varied: &[Varied], effects: &Effects) -> Vec<Couple> {
+    let strong = |(couple, share): ([usize; 2], Option<Share>)| {
+        share.filter(|share| share.value > SIGNIFICANT * share.noise).map(|share| (couple, share))
+    };
+    let mut strongest: Vec<([usize; 2], Share)> = effects.couples().filter_map(strong).collect();
+    strongest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
+    let couple = |(couple, share): &([usize; 2], Share)| {
+        let [same, opposite] = effects.halves(*couple).map(finite);
+        Couple {
+            keys: couple.map(|index| varied[index].key.clone()),
+            share: share.value,
+            share_noise: share.noise,
+            probability_same_side: same,
+            probability_opposite_sides: opposite,
+        }
+    };
+    strongest.iter().take(COUPLES).map(couple).collect()
+}
+
+fn finite(cell: Cell) -> Option<f64> {
+    (cell.all > 0).then(|| cell.probability())
+}

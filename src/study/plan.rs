@@ -1,0 +1,281 @@
+//! What is studied: a plant, what varies of it, and how often it is drawn.
+
+use std::ops::Range;
+use std::str::FromStr;
+
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::counter::Counter;
+use super::{Deviation, StudyError, Tolerance};
+use crate::config::{Config, PlantSettings, nearest, recheck};
+
+/// Settings that may vary at once: the cells of all couples of them stay below 32 MB.
+const MOST_VARIED: usize = 256;
+/// Draws, at most: their counts stay below 1 GB.
+const MOST_DRAWS: u64 = 100_000_000;
+
+/// A setting that varies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Varied {
+    /// Its dotted path.
+    pub key: String,
+    /// Its value in the configuration.
+    pub nominal: f64,
+    /// What is added to that.
+    #[serde(flatten)]
+    pub deviation: Deviation,
+}
+
+/// All that decides the counts of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// The nominal plant.
+    pub plant: PlantSettings,
+    /// What varies, in the order of the tolerances and, within one, of the configuration.
+    pub varied: Vec<Varied>,
+    /// Of the random numbers.
+    pub seed: u64,
+    /// How many draws.
+    pub draws: u64,
+    /// Whether the zeros with damping are counted as well.
+    pub damped: bool,
+}
+
+/// The part of a study that one process does: `index` of `count`, from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Which one.
+    pub index: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+impl Shard {
+    /// The whole study.
+    pub const WHOLE: Shard = Shard { index: 1, count: 1 };
+
+    /// Its draws: the I-th of N equal parts, to one draw.
+    pub fn draws(&self, plan: &Plan) -> Range<u64> {
+        // 128 bits hold the product of any two counts of 64.
+        let limit = |part: u64| (u128::from(plan.draws) * u128::from(part) / u128::from(self.count)) as u64;
+        limit(self.index - 1)..limit(self.index)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = StudyError;
+
+    fn from_str(text: &str) -> Result<Shard, StudyError> {
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+        let shard = parts.map(|(index, count)| Shard { index, count });
+        shard.filter(Shard::is_one).ok_or_else(|| StudyError::Shard(text.into()))
+    }
+}
+
+impl Shard {
+    pub(super) fn is_one(&self) -> bool {
+        (1..=self.count).contains(&self.index)
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// What one draw gave each varied setting.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// The values.
+    pub values: Vec<f64>,
+    /// The probability of a smaller value, from 0 to 1.
+    pub ranks: Vec<f64>,
+}
+
+impl Plan {
+    /// A plan over a configuration. Refuses a nominal plant that cannot be analysed, and a tolerance one end of which leaves
+    /// what is allowed: a draw left out for that would bend the probabilities.
+    pub fn new(config: &Config, tolerances: &[Tolerance], draws: u64, damped: bool) -> Result<Plan, StudyError> {
+        if !(1..=MOST_DRAWS).contains(&draws) {
+            return Err(StudyError::Plan(format!("{draws} draws; give --draws from 1 to {MOST_DRAWS}")));
+        }
+        let varied = varied(&config.plant, tolerances)?;
+        let plan = Plan { plant: config.plant.clone(), varied, seed: config.sim.seed, draws, damped };
+        plan.check(config)?;
+        Ok(plan)
+    }
+
+    fn check(&self, config: &Config) -> Result<(), StudyError> {
+        let mut counter = Counter::new(self);
+        let nominal: Vec<f64> = self.varied.iter().map(|one| one.nominal).collect();
+        let wrong = |why: String| StudyError::Plan(format!("the nominal plant cannot be analysed: {why}"));
+        counter.count(&nominal).map_err(wrong)?;
+        for (index, one) in self.varied.iter().enumerate() {
+            for end in one.deviation.ends() {
+                let mut values = nominal.clone();
+                values[index] += end;
+                let reaches = |why: String| {
+                    StudyError::Plan(format!(
+                        "the tolerance of `{}` reaches {}: narrow it, or move the nominal value; {why}",
+                        one.key, values[index]
+                    ))
+                };
+                let plant = counter.plant(&values).map_err(reaches)?;
+                recheck(&Config { plant, ..config.clone() }).map_err(|error| reaches(error.to_string()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the draws from `first` on give the varied settings.
+    ///
+    /// One sequence of PCG (XSL RR 128/64) for the whole study: draw k takes the 2 n numbers from 2 n k on, n settings vary,
+    /// and the generator jumps there.
+    pub fn from_draw(&self, first: u64) -> impl Iterator<Item = Drawn> + '_ {
+        let mut bits = Pcg64::seed_from_u64(self.seed);
+        bits.advance(2 * self.varied.len() as u128 * u128::from(first));
+        std::iter::repeat_with(move || {
+            let drawn = self.varied.iter().map(|one| {
+                let (deviation, rank) = one.deviation.drawn([uniform(&mut bits), uniform(&mut bits)]);
+                (one.nominal + deviation, rank)
+            });
+            let (values, ranks) = drawn.unzip();
+            Drawn { values, ranks }
+        })
+    }
+}
+
+/// Uniform in [0, 1), in steps of 2^-53.
+fn uniform(bits: &mut Pcg64) -> f64 {
+    (bits.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
+fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>, StudyError> {
+    let settings = settings(plant);
+    let mut varied: Vec<Varied> = Vec::new();
+    for tolerance in tolerances {
+        let matched: Vec<&(String, Value)> = settings.iter().filter(|(key, _)| tolerance.matches(key)).collect();
+        let numbers: Vec<(&String, f64)> =
+            matched.iter().filter(|(_, value)| value.is_f64()).filter_map(|(k, v)| Some((k, v.as_f64()?))).collect();
+        if numbers.is_empty() {
+            return Err(nothing(tolerance, &settings, matched.first().map(|(key, _)| key.as_str())));
+        }
+        for (key, nominal) in numbers {
+            if varied.iter().any(|one| one.key == *key) {
+                return Err(tolerance.wrong(format!("`{key}` varies already; name each setting once")));
+            }
+            varied.push(Varied { key: key.clone(), nominal, deviation: tolerance.deviation(key, nominal)? });
+        }
+    }
+    match varied.len() {
+        0 => {
+            Err(StudyError::Plan("nothing varies; give --vary KEY=TOLERANCE, as in plant.mass_asymmetry=+-0.02".into()))
+        }
+        count if count > MOST_VARIED => {
+            Err(StudyError::Plan(format!("{count} settings would vary; {MOST_VARIED} may: name fewer")))
+        }
+        _ => Ok(varied),
+    }
+}
+
+fn nothing(tolerance: &Tolerance, settings: &[(String, Value)], no_number: Option<&str>) -> StudyError {
+    let pattern = tolerance.pattern();
+    tolerance.wrong(match no_number {
+        Some(key) => format!("`{key}` is no quantity: only those can deviate"),
+        None if !pattern.starts_with("plant.") => {
+            format!("`{pattern}` is not of the plant; a study varies settings that begin with `plant.`")
+        }
+        None => {
+            let hint = nearest(pattern, settings.iter().map(|(key, _)| key.as_str())).unwrap_or("plant");
+            format!("`{pattern}` is not a setting of this plant; the nearest is `{hint}`")
+        }
+    })
+}
+
+/// All settings of a plant, with their dotted paths.
+fn settings(plant: &PlantSettings) -> Vec<(String, Value)> {
+    let mut found = Vec::new();
+    leaves("plant", &serde_json::to_value(plant).unwrap_or_default(), &mut found);
+    found
+}
+
+fn leaves(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Object(entries) => {
+            entries.iter().for_each(|(key, value)| leaves(&format!("{path}.{key}"), value, found))
+        }
+        leaf => found.push((path.into(), leaf.clone())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Source, load};
+
+    fn plan(draws: u64, seed: u64) -> Plan {
+        let source = Source { config: Some("xy".into()), sets: vec![format!("sim.seed={seed}")], ..Source::default() };
+        let tolerances = ["plant.secondary_mass_deviation.*=+-0.15", "plant.*_stage_mass_kg=normal:1%"];
+        let tolerances: Vec<Tolerance> = tolerances.iter().map(|text| text.parse().unwrap()).collect();
+        Plan::new(&load(&source).unwrap(), &tolerances, draws, false).unwrap()
+    }
+
+    #[test]
+    fn a_draw_is_the_same_wherever_one_begins() {
+        let plan = plan(100, 7);
+        assert_eq!(plan.varied.len(), 8 + 3);
+        let whole: Vec<Drawn> = plan.from_draw(0).take(100).collect();
+        for first in [1, 17, 99] {
+            let part: Vec<Drawn> = plan.from_draw(first).take(100 - first as usize).collect();
+            assert_eq!(part, whole[first as usize..]);
+        }
+    }
+
+    #[test]
+    fn values_are_spread_as_asked_for_and_independent_of_each_other_and_of_the_seed() {
+        const N: usize = 100_000;
+        let (plan, other) = (plan(N as u64, 1), plan(N as u64, 2));
+        let columns = |plan: &Plan| {
+            let drawn: Vec<Drawn> = plan.from_draw(0).take(N).collect();
+            (0..11).map(|j| drawn.iter().map(|d| d.ranks[j] - 0.5).collect::<Vec<f64>>()).collect::<Vec<_>>()
+        };
+        let (here, there) = (columns(&plan), columns(&other));
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / N as f64;
+        for (i, a) in here.iter().enumerate() {
+            // Of a uniform rank: mean 0, variance 1/12; of N of them the mean has a sigma of sqrt(1/12/N), a product of two
+            // 1/12/sqrt(N), the variance sqrt(1/80 - 1/144)/sqrt(N). Five of them.
+            let (root, ones) = ((N as f64).sqrt(), vec![1.0; N]);
+            assert!(product(a, &ones).abs() < 5.0 * (1.0 / 12.0f64).sqrt() / root);
+            assert!((product(a, a) - 1.0 / 12.0).abs() < 5.0 * (1.0 / 80.0 - 1.0 / 144.0f64).sqrt() / root);
+            for b in here[..i].iter().chain(&there) {
+                assert!(product(a, b).abs() < 5.0 / 12.0 / root);
+            }
+        }
+        let masses: Vec<f64> = plan.from_draw(0).take(N).map(|d| d.values[8] / plan.varied[8].nominal - 1.0).collect();
+        let sigma = (masses.iter().map(|x| x * x).sum::<f64>() / N as f64).sqrt();
+        // The sigma of a sigma is sigma/sqrt(2 N).
+        assert!((sigma - 0.01).abs() < 5.0 * 0.01 / (2.0 * N as f64).sqrt(), "{sigma}");
+    }
+
+    #[test]
+    fn shards_cover_every_draw_once() {
+        for (draws, count) in [(1, 1), (10, 3), (7, 7), (3, 5), (20_000, 8), (100_000_000, 999_983)] {
+            let plan = plan(draws, 1);
+            let mut next = 0;
+            for index in 1..=count {
+                let part = Shard { index, count }.draws(&plan);
+                assert_eq!(part.start, next);
+                assert!(part.end - part.start <= draws / count + 1);
+                next = part.end;
+            }
+            assert_eq!(next, draws);
+        }
+        for text in ["3/2", "0/2", "1/0", "1", "a/b", "-1/2", "1/2/3", ""] {
+            assert_eq!(text.parse::<Shard>(), Err(StudyError::Shard(text.into())));
+        }
+    }
+}

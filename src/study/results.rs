@@ -1,0 +1,121 @@
+//! What the draws gave.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Plan, Shard};
+
+/// Draws of a block: what a worker takes at a time, and what at most is lost on a thread that is killed.
+pub(super) const BLOCK: u64 = 500;
+
+/// CNMP pairs of one draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Count {
+    /// Of the zeros without damping.
+    pub pairs: u32,
+    /// Of those with damping, if they are counted.
+    pub damped_pairs: Option<u32>,
+}
+
+/// A draw that could not be analysed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Its number, from 0.
+    pub draw: u64,
+    /// Why.
+    pub why: String,
+}
+
+/// The counts of some draws in a row; `None` where a draw could not be analysed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Block {
+    /// The number of its first draw.
+    pub first: u64,
+    /// CNMP pairs without damping.
+    pub cnmp_pairs: Vec<Option<u32>>,
+    /// The same with damping; empty if not counted.
+    pub damped_cnmp_pairs: Vec<Option<u32>>,
+    /// Why some are missing.
+    pub failures: Vec<Failure>,
+}
+
+impl Block {
+    pub(super) fn new(first: u64) -> Block {
+        Block { first, cnmp_pairs: Vec::new(), damped_cnmp_pairs: Vec::new(), failures: Vec::new() }
+    }
+
+    /// Adds what the next draw gave.
+    pub(super) fn push(&mut self, counted: Result<Count, String>, damped: bool) {
+        if damped {
+            self.damped_cnmp_pairs.push(counted.as_ref().ok().and_then(|count| count.damped_pairs));
+        }
+        let draw = self.first + self.cnmp_pairs.len() as u64;
+        self.cnmp_pairs.push(counted.as_ref().ok().map(|count| count.pairs));
+        self.failures.extend(counted.err().map(|why| Failure { draw, why }));
+    }
+
+    /// Whether it is one of a shard's blocks, and whole.
+    fn fits(&self, plan: &Plan, wanted: &Range<u64>) -> bool {
+        let length = (wanted.end - wanted.start) as usize;
+        let damped = if plan.damped { length } else { 0 };
+        self.cnmp_pairs.len() == length && self.damped_cnmp_pairs.len() == damped
+    }
+}
+
+/// What is done of a shard, by its blocks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Results {
+    /// Of which study.
+    pub plan: Plan,
+    /// Which part of it.
+    pub shard: Shard,
+    blocks: BTreeMap<u64, Block>,
+}
+
+impl Results {
+    /// Nothing yet.
+    pub fn none(plan: Plan, shard: Shard) -> Results {
+        Results { plan, shard, blocks: BTreeMap::new() }
+    }
+
+    /// The ranges of draws that are the shard's blocks.
+    fn ranges(&self) -> impl Iterator<Item = Range<u64>> + use<> {
+        let all = self.shard.draws(&self.plan);
+        let end = all.end;
+        all.step_by(BLOCK as usize).map(move |first| first..end.min(first + BLOCK))
+    }
+
+    /// The ranges of draws that are still to do.
+    pub fn missing(&self) -> Vec<Range<u64>> {
+        self.ranges().filter(|range| !self.blocks.contains_key(&range.start)).collect()
+    }
+
+    /// Adds a block; says whether it is one.
+    pub fn add(&mut self, block: Block) -> bool {
+        let draws = self.shard.draws(&self.plan);
+        let aligned = draws.contains(&block.first) && (block.first - draws.start).is_multiple_of(BLOCK);
+        let range = block.first..draws.end.min(block.first.saturating_add(BLOCK));
+        let good = aligned && block.fits(&self.plan, &range);
+        if good {
+            self.blocks.insert(block.first, block);
+        }
+        good
+    }
+
+    /// Adds the blocks of another shard of the same study.
+    pub(super) fn absorb(&mut self, other: Results) {
+        self.blocks.extend(other.blocks);
+    }
+
+    /// How many draws are done.
+    pub fn done(&self) -> u64 {
+        self.blocks().map(|block| block.cnmp_pairs.len() as u64).sum()
+    }
+
+    /// What is done, in the order of the draws.
+    pub fn blocks(&self) -> impl Iterator<Item = &Block> {
+        self.blocks.values()
+    }
+}
