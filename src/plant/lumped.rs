@@ -7,6 +7,13 @@ use super::{PlantError, Structure, damping};
 use crate::config::LumpedSettings;
 
 pub(super) fn structure(s: &LumpedSettings) -> Result<Structure, PlantError> {
+    let mut structure = undamped(s);
+    structure.damping = damping::matrix(&structure, &s.damping)?;
+    Ok(structure)
+}
+
+/// The same with C = 0, whatever the damping of the settings.
+pub(super) fn undamped(s: &LumpedSettings) -> Structure {
     let n = s.nodes.len();
     let place = |name: &str| s.nodes.keys().position(|node| node == name);
     let mut parts = Assembly::new(n);
@@ -28,6 +35,5 @@ pub(super) fn structure(s: &LumpedSettings) -> Result<Structure, PlantError> {
     let weights = |of: fn(&crate::config::NodeSettings) -> f64| s.nodes.values().map(of).collect::<Vec<_>>();
     let mut structure = parts.finish(&weights(|node| node.actuator), &weights(|node| node.sensor));
     structure.free_bodies = s.free().len();
-    structure.damping = damping::matrix(&structure, &s.damping)?;
-    Ok(structure)
+    structure
 }

@@ -104,3 +104,13 @@ pub fn build(settings: &PlantSettings) -> Result<Structure, PlantError> {
         PlantSettings::Modal(settings) => Ok(by_modes::structure(settings)),
     }
 }
+
+/// The same with C = 0, whatever the damping of the settings.
+pub fn undamped(settings: &PlantSettings) -> Structure {
+    match settings {
+        PlantSettings::Sr4dof(settings) => sr4dof::undamped(settings),
+        PlantSettings::Xy(settings) => xy::undamped(settings),
+        PlantSettings::Lumped(settings) => lumped::undamped(settings),
+        PlantSettings::Modal(settings) => by_modes::undamped(settings),
+    }
+}

@@ -87,9 +87,13 @@ mod tests {
     /// M, K and geometric stiffness by [`Coordinate`]: stages 2 and 3 on either side of stage 1, 4 and 5 beyond them.
     fn by_parallelograms(s: &Sr4dofSettings) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let (beam, y0) = (Beam::from(s), s.operating_point_m);
-        let (c, k, k4, ground) =
-            (beam.shortening_per_m(), beam.parallelogram_n_per_m(), s.spring_stiffness_n_per_m, Coordinate::ground(4));
-        let free = |index, at_m| Coordinate::free(4, index, at_m);
+        let (c, k, k4, ground) = (
+            beam.shortening_per_m(),
+            beam.parallelogram_n_per_m(),
+            s.spring_stiffness_n_per_m,
+            Coordinate::ground(4, true),
+        );
+        let free = |index, at_m| Coordinate::free(4, true, index, at_m);
         let (x1, y1, y2, y3) = (free(0, 0.0), free(1, y0), free(2, y0 / 2.0), free(3, y0 / 2.0));
         let (x2, x3) = (x1.joined(&y2.from(&y1), -1.0, c), x1.joined(&y3.from(&y1), 1.0, c));
         let (x4, x5) = (x2.joined(&ground.from(&y2), 1.0, c), x3.joined(&ground.from(&y3), -1.0, c));
@@ -110,7 +114,7 @@ mod tests {
         let mut geometric = DMatrix::zeros(4, 4);
         for (stiffness, spring) in &springs {
             parts.spring(*stiffness, spring.row.as_slice());
-            geometric += *stiffness * spring.at_m * &spring.curve;
+            geometric += *stiffness * spring.at_m * spring.curve.as_ref().unwrap();
         }
         let structure = parts.finish(&X1, &X1);
         (structure.mass, structure.stiffness, geometric)

@@ -20,6 +20,8 @@
 //! along their beams, and what moves across those gives way by the static force times the constraint's curvature. The
 //! static solution is that of equal stiffness in all parallelograms; no force acts in X.
 
+use nalgebra::DMatrix;
+
 use super::beam::Beam;
 use super::kinematics::Coordinate;
 use super::structure::Assembly;
@@ -47,6 +49,13 @@ struct Stages {
 }
 
 pub(super) fn structure(s: &XySettings) -> Result<Structure, PlantError> {
+    let mut structure = undamped(s);
+    structure.damping = damping::matrix(&structure, &s.damping)?;
+    Ok(structure)
+}
+
+/// The same with C = 0, whatever the damping of the settings.
+pub(super) fn undamped(s: &XySettings) -> Structure {
     let beam = Beam::from(s);
     let stages = Stages::of(s, beam.shortening_per_m());
     let mut parts = Assembly::new(N);
@@ -63,23 +72,26 @@ pub(super) fn structure(s: &XySettings) -> Result<Structure, PlantError> {
     if s.geometric_stiffness {
         structure.stiffness += geometric_stiffness(&springs, k, &loaded.y);
     }
-    structure.damping = damping::matrix(&structure, &s.damping)?;
-    Ok(structure)
+    structure
 }
 
 /// The sum of static forces times curves: k d curve of each parallelogram bent by d, less F curve of the holding force F,
 /// which follows from the equilibrium in y_ms.
-fn geometric_stiffness(springs: &[Coordinate], k: f64, held: &Coordinate) -> nalgebra::DMatrix<f64> {
+fn geometric_stiffness(springs: &[Coordinate], k: f64, held: &Coordinate) -> DMatrix<f64> {
     let pull_n: f64 = springs.iter().map(|spring| k * spring.at_m * spring.row[Y_MS]).sum();
     let holding_n = pull_n / held.row[Y_MS];
-    let bent = springs.iter().fold(nalgebra::DMatrix::zeros(N, N), |sum, d| sum + k * d.at_m * &d.curve);
-    bent - holding_n * &held.curve
+    let add = |sum: DMatrix<f64>, (force_n, along): (f64, &Coordinate)| match &along.curve {
+        Some(curve) => sum + force_n * curve,
+        None => sum,
+    };
+    let bent = springs.iter().map(|d| (k * d.at_m, d));
+    bent.chain([(-holding_n, held)]).fold(DMatrix::zeros(N, N), add)
 }
 
 impl Stages {
     fn of(s: &XySettings, c: f64) -> Stages {
         let (y0, half) = (s.operating_point_m, s.operating_point_m / 2.0);
-        let free = |index, at_m| Coordinate::free(N, index, at_m);
+        let free = |index, at_m| Coordinate::free(N, s.geometric_stiffness, index, at_m);
         let (side_top, side_bottom) = match s.layout {
             XyLayout::Pinwheel => (1.0, -1.0),
             XyLayout::MirrorAway => (1.0, 1.0),
@@ -134,7 +146,7 @@ fn across_y(
     side: f64,
     c: f64,
 ) -> (Stage, Stage, Stage) {
-    let ground = Coordinate::ground(N);
+    let ground = Coordinate::ground(N, motion.x.curve.is_some());
     let inner = Stage { x: motion.x.joined(&inner_y.from(&motion.y), at, c), y: inner_y };
     // In Y the intermediate stage is held: its row is zero, as the outer module is not bent at rest. Its curve, which the
     // line after the next finds, would change only the curve of its x, along which no static force acts.
@@ -153,7 +165,7 @@ fn across_x(
     side: f64,
     c: f64,
 ) -> (Stage, Stage, Stage) {
-    let ground = Coordinate::ground(N);
+    let ground = Coordinate::ground(N, motion.x.curve.is_some());
     let inner = Stage { y: motion.y.joined(&inner_x.from(&motion.x), at, c), x: inner_x };
     let outer = Stage { x: ground.joined(&outer_y, side, c), y: outer_y };
     // To first order the intermediate stage follows the inner one in Y, as the inner module is not bent at rest.

@@ -132,7 +132,7 @@ impl Answer {
 }
 
 fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
-    let mut effects = Effects::new(results.plan.varied.len());
+    let mut effects = Effects::new(results.plan.varied.len(), results.done());
     // 0, 1, 2 and 3 pairs are always told.
     let mut counts = vec![0; 4];
     for block in results.blocks() {

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::{Count, Plan};
 use crate::config::{LumpedSettings, ModalSettings, PlantSettings, Sr4dofSettings, XySettings, relations_of};
-use crate::plant::{self, Modal, PlantError};
+use crate::plant::{self, Modal, PlantError, Structure};
 use crate::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
 
 /// A plant whose settings can be put in by their paths.
@@ -26,7 +26,7 @@ impl<'a> Counter<'a> {
         Counter { plan, settings, pointers: plan.varied.iter().map(|one| pointer(&one.key)).collect() }
     }
 
-    /// The count of a draw; or why it cannot be analysed, as `bench model modes` would say of that plant.
+    /// The count of a draw; or why its plant cannot be analysed.
     pub fn count(&mut self, values: &[f64]) -> Result<Count, String> {
         let plant = self.plant(values)?;
         relations_of(&plant).map_err(|error| error.to_string())?;
@@ -34,14 +34,12 @@ impl<'a> Counter<'a> {
     }
 
     fn pairs(&self, plant: &PlantSettings) -> Result<Count, PlantError> {
-        let structure = plant::build(plant)?;
-        Modal::of(&structure)?;
-        let pairs = cnmp_pairs(&undamped_zeros(&structure)?) as u32;
-        let damped_pairs = match self.plan.damped {
-            true => Some(cnmp_pairs(&damped_zeros(&structure)?) as u32),
-            false => None,
-        };
-        Ok(Count { pairs, damped_pairs })
+        if self.plan.damped {
+            let structure = plant::build(plant)?;
+            let damped_pairs = Some(cnmp_pairs(&damped_zeros(&structure)?) as u32);
+            return Ok(Count { damped_pairs, ..undamped(&structure)? });
+        }
+        undamped(&plant::undamped(plant))
     }
 
     /// The plant with these values.
@@ -61,4 +59,10 @@ impl<'a> Counter<'a> {
         };
         plant.map_err(|error| error.to_string())
     }
+}
+
+/// The modes are asked first: what cannot move, is not held or does not respond has no zeros to count.
+fn undamped(structure: &Structure) -> Result<Count, PlantError> {
+    Modal::of(structure)?;
+    Ok(Count { pairs: cnmp_pairs(&undamped_zeros(structure)?) as u32, damped_pairs: None })
 }

@@ -18,12 +18,14 @@
 //!
 //! The term in `noise` takes away what C means of few draws differ by chance (Kelley's epsilon squared, Proc. Natl. Acad. Sci.
 //! 21, 554, 1935): without an effect S is 0 on average, with a standard deviation of sqrt(2 (C - 1))/N. Within a class the
-//! effect is averaged: of a straight line 1/C^2 of the share is lost.
+//! effect is averaged, so that S is a lower bound: a straight line loses 1/C^2 of its share, and a couple with C x C classes
+//! up to 1/C of the variance, where the border between pairs and none runs through C of them.
 
 /// Classes of one setting: a multiple of three.
 pub(super) const CLASSES: usize = 15;
-/// Classes of each setting of a couple: even.
-const COUPLE_CLASSES: usize = 8;
+/// Classes of each setting of a couple, even numbers: as many as leave this many draws in each.
+const COUPLE_CLASSES: std::ops::RangeInclusive<usize> = 4..=32;
+const DRAWS_IN_COUPLE_CLASS: f64 = 50.0;
 /// Fewer draws than this in a class tell nothing.
 const LEAST_IN_CLASS: u64 = 10;
 
@@ -66,17 +68,21 @@ pub(super) struct Share {
 #[derive(Clone, Debug)]
 pub(super) struct Effects {
     settings: usize,
+    couple_classes: usize,
     single: Vec<[Cell; CLASSES]>,
-    couples: Vec<[Cell; COUPLE_CLASSES * COUPLE_CLASSES]>,
+    couples: Vec<Vec<Cell>>,
 }
 
 impl Effects {
-    pub fn new(settings: usize) -> Effects {
-        let couples = settings * settings.saturating_sub(1) / 2;
+    /// For so many settings and draws.
+    pub fn new(settings: usize, draws: u64) -> Effects {
+        let classes = 2 * ((draws as f64 / DRAWS_IN_COUPLE_CLASS).sqrt() / 2.0) as usize;
+        let couple_classes = classes.clamp(*COUPLE_CLASSES.start(), *COUPLE_CLASSES.end());
         Effects {
             settings,
             single: vec![[Cell::default(); CLASSES]; settings],
-            couples: vec![[Cell::default(); COUPLE_CLASSES * COUPLE_CLASSES]; couples],
+            couple_classes,
+            couples: couples(settings).map(|_| vec![Cell::default(); couple_classes * couple_classes]).collect(),
         }
     }
 
@@ -85,9 +91,9 @@ impl Effects {
         for (cells, &rank) in self.single.iter_mut().zip(ranks) {
             cells[class(rank, CLASSES)].add(yes);
         }
-        let classes: Vec<usize> = ranks.iter().map(|&rank| class(rank, COUPLE_CLASSES)).collect();
+        let classes: Vec<usize> = ranks.iter().map(|&rank| class(rank, self.couple_classes)).collect();
         for (cells, (i, j)) in self.couples.iter_mut().zip(couples(self.settings)) {
-            cells[classes[i] * COUPLE_CLASSES + classes[j]].add(yes);
+            cells[classes[i] * self.couple_classes + classes[j]].add(yes);
         }
     }
 
@@ -107,15 +113,15 @@ impl Effects {
 
     /// What each couple explains beyond its two settings alone.
     pub fn couples(&self) -> impl Iterator<Item = ([usize; 2], Option<Share>)> + '_ {
-        couples(self.settings).zip(&self.couples).map(|((i, j), cells)| ([i, j], couple(cells)))
+        couples(self.settings).zip(&self.couples).map(|((i, j), cells)| ([i, j], couple(cells, self.couple_classes)))
     }
 
     /// The draws in which both settings of a couple lie in the same half, and in which they lie in different ones.
     pub fn halves(&self, [i, j]: [usize; 2]) -> [Cell; 2] {
         let place = couples(self.settings).position(|couple| couple == (i, j));
         let cells = place.map_or(&[][..], |place| &self.couples[place]);
-        let half = COUPLE_CLASSES / 2;
-        let same = |place: usize| (place / COUPLE_CLASSES < half) == (place % COUPLE_CLASSES < half);
+        let (classes, half) = (self.couple_classes, self.couple_classes / 2);
+        let same = |place: usize| (place / classes < half) == (place % classes < half);
         [true, false].map(|wanted| {
             Cell::sum(cells.iter().enumerate().filter(|(place, _)| same(*place) == wanted).map(|(_, cell)| cell))
         })
@@ -130,8 +136,7 @@ fn couples(settings: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..settings).flat_map(move |i| (i + 1..settings).map(move |j| (i, j)))
 }
 
-fn couple(cells: &[Cell; COUPLE_CLASSES * COUPLE_CLASSES]) -> Option<Share> {
-    let n = COUPLE_CLASSES;
+fn couple(cells: &[Cell], n: usize) -> Option<Share> {
     let spread = Spread::of(cells)?;
     let line = |cells: Vec<&Cell>| Cell::sum(cells);
     let rows: Vec<Cell> = (0..n).map(|i| line(cells[i * n..(i + 1) * n].iter().collect())).collect();
@@ -176,7 +181,7 @@ mod tests {
 
     fn effects(seed: u64, settings: usize, yes: impl Fn(&[f64]) -> bool) -> Effects {
         let mut bits = Pcg64::seed_from_u64(seed);
-        let mut effects = Effects::new(settings);
+        let mut effects = Effects::new(settings, N as u64);
         for _ in 0..N {
             let ranks: Vec<f64> = (0..settings).map(|_| (bits.next_u64() >> 11) as f64 / (1u64 << 53) as f64).collect();
             effects.add(&ranks, yes(&ranks));
@@ -199,19 +204,19 @@ mod tests {
 
     #[test]
     fn the_shares_are_those_of_closed_forms() {
-        // The sigma of a share S of N draws is some 2 sqrt(S)/sqrt(N) (S is a squared correlation): 0.01 and below; the classes
-        // of a straight line take away 1/15^2 of the share, and what the diagonal within 8 x 8 cells mixes 1/8 of the couple's.
+        // The sigma of a share S of N draws is some 2 sqrt(S)/sqrt(N) (S is a squared correlation): 0.01 and below. With 40,000
+        // draws there are 28 classes: a border through the couple's cells takes 1/28 of the variance.
         //
         // x > 1/2 decides alone.
         are(|x| x[0] > 0.5, [1.0, 0.0, 0.0], [0.0; 3], 0.005);
         // Two signs alike: neither of the two alone, both together all.
         are(|x| (x[0] > 0.5) == (x[1] > 0.5), [0.0; 3], [1.0, 0.0, 0.0], 0.005);
         // x + y > 1: E[Y|x] = x, of variance 1/12, of 1/4; the couple takes the rest.
-        are(|x| x[0] + x[1] > 1.0, [1.0 / 3.0, 1.0 / 3.0, 0.0], [1.0 / 3.0, 0.0, 0.0], 0.06);
-        // x > 13/15 and y > 1/2: the edge of a class of fifteen, but of none of eight.
+        are(|x| x[0] + x[1] > 1.0, [1.0 / 3.0, 1.0 / 3.0, 0.0], [1.0 / 3.0, 0.0, 0.0], 0.04);
+        // x > 13/15 and y > 1/2: the edge of a class of fifteen, but of none of 28.
         let (a, b) = (2.0 / 15.0, 0.5);
         let singles = share_of_and(a, b);
-        are(|x| x[0] > 1.0 - a && x[1] > b, singles, [1.0 - singles[0] - singles[1], 0.0, 0.0], 0.1);
+        are(|x| x[0] > 1.0 - a && x[1] > b, singles, [1.0 - singles[0] - singles[1], 0.0, 0.0], 0.04);
     }
 
     /// Shares of x > 1 - a and y > 1 - b where both are needed: p = a b.
@@ -250,7 +255,7 @@ mod tests {
 
     #[test]
     fn too_few_draws_or_all_alike_tell_nothing() {
-        let mut few = Effects::new(2);
+        let mut few = Effects::new(2, 149);
         (0..149).for_each(|k| few.add(&[0.5, 0.5], k % 2 == 0));
         assert_eq!(few.single(0), None);
         assert!(few.couples().all(|(_, share)| share.is_none()));

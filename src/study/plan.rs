@@ -12,8 +12,8 @@ use super::counter::Counter;
 use super::{Deviation, StudyError, Tolerance};
 use crate::config::{Config, PlantSettings, nearest, recheck};
 
-/// Settings that may vary at once: the cells of all couples of them stay below 32 MB.
-const MOST_VARIED: usize = 256;
+/// Settings that may vary at once: the classes of all couples of them stay below 40 MB.
+const MOST_VARIED: usize = 64;
 /// Draws, at most: their counts stay below 1 GB.
 const MOST_DRAWS: u64 = 100_000_000;
 
