@@ -18,11 +18,11 @@
 //!
 //! The term in `noise` takes away what C means of few draws differ by chance (Kelley's epsilon squared, Proc. Natl. Acad. Sci.
 //! 21, 554, 1935): without an effect S is 0 on average, with a standard deviation of sqrt(2 (C - 1))/N. Within a class the
-//! effect is averaged, so that S is a lower bound: a straight line loses 1/C^2 of its share, and a couple with C x C classes
-//! up to 1/C of the variance, where the border between pairs and none runs through C of them.
+//! effect is averaged, so that S is a lower bound: a straight line loses 1/C^2 of its share; a step within a class up to 1/C of the
+//! variance, and so does a border between pairs and none that runs through C of a couple's C x C classes.
 
-/// Classes of one setting: a multiple of three.
-pub(super) const CLASSES: usize = 15;
+/// Classes of one setting: a multiple of two and of three.
+const CLASSES: usize = 18;
 /// Classes of each setting of a couple, even numbers: as many as leave this many draws in each.
 const COUPLE_CLASSES: std::ops::RangeInclusive<usize> = 4..=32;
 const DRAWS_IN_COUPLE_CLASS: f64 = 50.0;
@@ -213,8 +213,8 @@ mod tests {
         are(|x| (x[0] > 0.5) == (x[1] > 0.5), [0.0; 3], [1.0, 0.0, 0.0], 0.005);
         // x + y > 1: E[Y|x] = x, of variance 1/12, of 1/4; the couple takes the rest.
         are(|x| x[0] + x[1] > 1.0, [1.0 / 3.0, 1.0 / 3.0, 0.0], [1.0 / 3.0, 0.0, 0.0], 0.04);
-        // x > 13/15 and y > 1/2: the edge of a class of fifteen, but of none of 28.
-        let (a, b) = (2.0 / 15.0, 0.5);
+        // x > 5/6 and y > 1/2: the edge of a class of 18, but of none of 28.
+        let (a, b) = (1.0 / 6.0, 0.5);
         let singles = share_of_and(a, b);
         are(|x| x[0] > 1.0 - a && x[1] > b, singles, [1.0 - singles[0] - singles[1], 0.0, 0.0], 0.04);
     }
@@ -255,8 +255,8 @@ mod tests {
 
     #[test]
     fn too_few_draws_or_all_alike_tell_nothing() {
-        let mut few = Effects::new(2, 149);
-        (0..149).for_each(|k| few.add(&[0.5, 0.5], k % 2 == 0));
+        let mut few = Effects::new(2, 159);
+        (0..159).for_each(|k| few.add(&[0.5, 0.5], k % 2 == 0));
         assert_eq!(few.single(0), None);
         assert!(few.couples().all(|(_, share)| share.is_none()));
         assert_eq!(effects(1, 1, |_| true).single(0), None);

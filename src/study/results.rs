@@ -87,7 +87,7 @@ impl Results {
         all.step_by(BLOCK as usize).map(move |first| first..end.min(first + BLOCK))
     }
 
-    /// The ranges of draws that are still to do.
+    /// The ranges of draws that are still to do, block by block; of a shard that is not joined from others.
     pub fn missing(&self) -> Vec<Range<u64>> {
         self.ranges().filter(|range| !self.blocks.contains_key(&range.start)).collect()
     }
@@ -104,9 +104,15 @@ impl Results {
         good
     }
 
-    /// Adds the blocks of another shard of the same study.
+    /// Adds the blocks of another shard of the same study, which begin where they do there.
     pub(super) fn absorb(&mut self, other: Results) {
         self.blocks.extend(other.blocks);
+    }
+
+    /// Whether all draws are done.
+    pub fn is_done(&self) -> bool {
+        let draws = self.shard.draws(&self.plan);
+        self.done() == draws.end - draws.start
     }
 
     /// How many draws are done.

@@ -54,7 +54,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     args.table.check()?;
     let results = if args.join.is_empty() { drawn(args)? } else { joined(&args.join)? };
-    if !results.missing().is_empty() {
+    if !results.is_done() {
         eprintln!("bench: {}", stopped(args, &results));
         return Ok(Outcome::Failed);
     }
