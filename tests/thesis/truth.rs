@@ -17,9 +17,9 @@ pub fn ask(questions: &[Value]) -> Option<Vec<Value>> {
 /// The answers of a script in `tests/python`.
 pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
-    if let Err(why) = available(&python) {
+    if let Err(why) = available(&python, script) {
         assert!(std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"), "Python is required here: {why}");
-        eprintln!("not tested: {why}\npip install numpy scipy mpmath, or set BENCH_PYTHON");
+        eprintln!("not tested: {why}\npip install -r .ci/python-packages.txt, or set BENCH_PYTHON");
         return None;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
@@ -41,8 +41,11 @@ pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
     Some(answers)
 }
 
-fn available(python: &str) -> Result<(), String> {
-    let imports = "import sys, tomllib, numpy, scipy, mpmath; assert numpy.trapezoid";
+fn available(python: &str, script: &str) -> Result<(), String> {
+    let imports = match script {
+        "tables.py" => "import pyarrow.parquet",
+        _ => "import sys, tomllib, numpy, scipy, mpmath; assert numpy.trapezoid",
+    };
     match Command::new(python).args(["-c", imports]).output() {
         Err(e) => Err(format!("{python}: {e}")),
         Ok(o) if !o.status.success() => Err(String::from_utf8_lossy(&o.stderr).into_owned()),
