@@ -18,15 +18,15 @@ mod file;
 mod interval;
 mod plan;
 mod results;
-mod run;
 mod tolerance;
+mod workers;
 
 pub use answer::{Answer, Counted, Couple, Effect, NotAnalysed, Probability};
 pub use file::{Opened, StudyFile, joined};
 pub use plan::{Drawn, Plan, Shard, Varied};
 pub use results::{Block, Count, Failure, Results};
-pub use run::run;
 pub use tolerance::{Deviation, Tolerance};
+pub use workers::count;
 
 /// Why there is no study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -12,7 +12,7 @@ use crate::config::Purpose;
 use crate::session::stoppable;
 use crate::study::{
     Answer, Block, Counted, Couple, Deviation, Effect, Opened, Plan, Probability, Results, Shard, StudyError,
-    StudyFile, Tolerance, Varied, joined, run as count,
+    StudyFile, Tolerance, Varied, count, joined,
 };
 
 /// What varies, and how often it is drawn.

@@ -9,7 +9,7 @@ use super::{Block, Plan};
 
 /// Counts the CNMP pairs of the draws in `ranges` on up to `threads` threads (at least one), and gives each block to `take` as
 /// it is done, in any order. Ends early when `stop` is set, without the blocks under way, or with the first error of `take`.
-pub fn run<E>(
+pub fn count<E>(
     plan: &Plan,
     ranges: &[Range<u64>],
     threads: usize,
