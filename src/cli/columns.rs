@@ -102,7 +102,7 @@ impl Column {
     /// The shortest text that reads as the same number; `inf` at infinity, nothing of what is missing.
     fn cell(&self, row: usize) -> String {
         match &self.numbers {
-            Numbers::Real(numbers) => format!("{:?}", numbers[row]),
+            Numbers::Real(numbers) => format!("{:e}", numbers[row]),
             Numbers::Count(numbers) => numbers[row].map_or(String::new(), |number| number.to_string()),
         }
     }
