@@ -1,6 +1,8 @@
 //! `bench model`: what the mechanics are, by the model.
 
 mod bounds;
+mod conditions;
+mod conditions_text;
 mod critical_damping;
 mod locus;
 mod map;
@@ -41,6 +43,8 @@ enum What {
     Study(study::Args),
     /// Two close modes as one setting varies: whether their loci cross or veer, where, and how their shapes swap
     Veering(veering::Args),
+    /// Which of Conditions C4-1 to C4-4y hold for two close modes, by how much, and what the propositions make of it
+    Conditions(conditions::Args),
     /// What the zeros in the right half plane allow in bandwidth and sensitivity peak (Eqs. 1-2, 1-3)
     Bounds(bounds::Args),
     /// The response to a step: undershoot, zero crossings, reversals, and what the zeros foretell
@@ -57,6 +61,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         What::Locus(args) => locus::run(args)?,
         What::Map(args) => map::run(args)?,
         What::Veering(args) => veering::run(args)?,
+        What::Conditions(args) => conditions::run(args)?,
         What::Bounds(args) => bounds::run(args)?,
         What::Step(args) => step::run(args)?,
         What::CriticalDamping(args) => critical_damping::run(args)?,

@@ -11,18 +11,23 @@
 //! they cross, or they veer within the step and exchange their shapes, which only smaller steps tell apart. Where
 //! eigenvalues are equal to rounding every basis of their modes is one; the one nearest to the step before is taken.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::plant::{Modal, Mode, PlantError, Structure};
+use crate::zeros::Term;
 
 /// Eigenvalues come with an error of some 1e-15 of the largest: closer than this ratio of it, two are one.
 const EQUAL_RATIO: f64 = 1e-12;
+/// Ten times what rounding leaves of one mode's gain in another's.
+const ROUNDED_GAIN: f64 = 1e-14;
 /// A MAC above this leaves no other partner.
 const CLEAR_MAC: f64 = 0.5;
 /// Steps below this ratio of the range are halved no more.
 const SMALLEST_STEP: f64 = 1e-12;
 /// Ratio of the range at which the basis of modes is taken that are equal at the first value.
 const FIRST_LOOK: f64 = 1e-3;
+/// A mode with less than this of the largest residue, at all values, does not show.
+const SHOWN_RATIO: f64 = 1e-9;
 /// Steps of the golden section: 0.618^80 is 2e-17.
 const GOLDEN_STEPS: usize = 80;
 
@@ -35,17 +40,60 @@ pub struct ModesAt {
     pub omega_rad_s: Vec<f64>,
     /// Shapes of unit modal mass, one a column, degrees of freedom x modes; signs go on from value to value.
     shapes: DMatrix<f64>,
-    mass: DMatrix<f64>,
+    structure: Structure,
 }
 
 impl ModesAt {
     fn of(structure: Structure, value: f64) -> Result<ModesAt, PlantError> {
         let modal = Modal::of(&structure)?;
-        let mass = structure.mass;
-        let unit = |mode: &Mode| &mode.shape / mode.shape.dot(&(&mass * &mode.shape)).sqrt();
+        let unit = |mode: &Mode| &mode.shape / mode.shape.dot(&(&structure.mass * &mode.shape)).sqrt();
         let columns: Vec<_> = modal.modes.iter().map(unit).collect();
         let omega_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s).collect();
-        Ok(ModesAt { value, omega_rad_s, shapes: DMatrix::from_columns(&columns), mass })
+        Ok(ModesAt { value, omega_rad_s, shapes: DMatrix::from_columns(&columns), structure })
+    }
+
+    /// The plant at this value.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// row^T v for the shape v of unit modal mass, in 1/sqrt(kg): what a mode gives of a displacement row^T z, and takes of
+    /// a force along it.
+    pub fn gain(&self, mode: usize, row: &DVector<f64>) -> f64 {
+        row.dot(&self.shapes.column(mode))
+    }
+
+    /// v^T M w of a mode here with a mode there, both of unit modal mass: the cosine between them, with its sign.
+    pub fn cosine(&self, mode: usize, there: &ModesAt, other: usize) -> f64 {
+        let mass = 0.5 * (&self.structure.mass + &there.structure.mass);
+        self.shapes.column(mode).dot(&(mass * there.shapes.column(other)))
+    }
+
+    /// Damping ratio v^T C v/(2 w) of a mode; 0 of a free body.
+    pub fn damping_ratio(&self, mode: usize) -> f64 {
+        let (w, shape) = (self.omega_rad_s[mode], self.shapes.column(mode));
+        if w == 0.0 { 0.0 } else { shape.dot(&(&self.structure.damping * shape)) / (2.0 * w) }
+    }
+
+    /// The undamped modes as seen between a force along `force` and a displacement along `sensor` (Eq. 4-15), each in its
+    /// place. What is rounding of a gain is 0: a mode that does not show has no sign.
+    pub fn terms(&self, force: &DVector<f64>, sensor: &DVector<f64>) -> Vec<Term> {
+        let (force, sensor) = (self.gains(force), self.gains(sensor));
+        let term = |(mode, w): (usize, &f64)| Term::undamped(*w, force[mode] * sensor[mode]);
+        self.omega_rad_s.iter().enumerate().map(term).collect()
+    }
+
+    /// Gains of all modes. A shape has of each other one some 1e-15 of the largest eigenvalue over the distance between the
+    /// two: what is not more than ten times that is 0.
+    fn gains(&self, row: &DVector<f64>) -> Vec<f64> {
+        let gains: Vec<f64> = (0..self.omega_rad_s.len()).map(|mode| self.gain(mode, row)).collect();
+        let largest = self.omega_rad_s.iter().fold(0.0, |largest: f64, w| largest.max(w * w));
+        let leak = |i: usize, j: usize| {
+            let distance = (self.omega_rad_s[i] - self.omega_rad_s[j]) * (self.omega_rad_s[i] + self.omega_rad_s[j]);
+            if i == j { 1.0 } else { largest / distance.abs() }
+        };
+        let rounding = |i: usize| ROUNDED_GAIN * (0..gains.len()).map(|j| gains[j].abs() * leak(i, j)).sum::<f64>();
+        (0..gains.len()).map(|i| if gains[i].abs() <= rounding(i) { 0.0 } else { gains[i] }).collect()
     }
 
     /// The shape of a mode over the degrees of freedom, of unit length.
@@ -61,7 +109,11 @@ impl ModesAt {
 
     /// MAC of a mode here with a mode there.
     pub fn mac(&self, mode: usize, there: &ModesAt, other: usize) -> f64 {
-        let (v, w, mass) = (self.shapes.column(mode), there.shapes.column(other), 0.5 * (&self.mass + &there.mass));
+        let (v, w, mass) = (
+            self.shapes.column(mode),
+            there.shapes.column(other),
+            0.5 * (&self.structure.mass + &there.structure.mass),
+        );
         let product = v.dot(&(&mass * w));
         product * product / (v.dot(&(&mass * v)) * w.dot(&(&mass * w)))
     }
@@ -82,7 +134,7 @@ impl ModesAt {
     fn following(mut self, before: &ModesAt) -> ModesAt {
         self.turn_equal_modes(before);
         let places = partners(before, &self);
-        let mass = 0.5 * (&before.mass + &self.mass);
+        let mass = 0.5 * (&before.structure.mass + &self.structure.mass);
         let mut shapes = self.shapes.select_columns(&places);
         for (index, mut shape) in shapes.column_iter_mut().enumerate() {
             let flip = before.shapes.column(index).dot(&(&mass * &shape)) < 0.0;
@@ -108,7 +160,7 @@ impl ModesAt {
 
     fn turn(&mut self, before: &ModesAt, first: usize, count: usize) {
         let group = self.shapes.columns(first, count).into_owned();
-        let reach = before.shapes.transpose() * &self.mass * &group;
+        let reach = before.shapes.transpose() * &self.structure.mass * &group;
         let mut order: Vec<usize> = (0..reach.nrows()).collect();
         order.sort_by(|&i, &j| reach.row(j).norm_squared().total_cmp(&reach.row(i).norm_squared()));
         order.truncate(count);
@@ -237,6 +289,42 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         pairs.min_by(|a, b| relative(*a).total_cmp(&relative(*b)))
     }
 
+    /// The pairs of held modes that are closest inside the range, not at an end of it: first those that both show between the
+    /// plant's actuator and its probe, and of these the smallest relative distance first.
+    pub fn meeting_pairs(&self) -> Vec<[usize; 2]> {
+        let shown = self.shown();
+        let n = shown.len();
+        let inside = |pair: &[usize; 2]| {
+            let closest = self.closest(*pair);
+            closest != 0 && closest + 1 != self.path.len()
+        };
+        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| [i, j]));
+        let held = |mode: &usize| self.path.iter().all(|at| at.omega_rad_s[*mode] > 0.0);
+        let mut pairs: Vec<[usize; 2]> = pairs.filter(|pair| pair.iter().all(held)).filter(inside).collect();
+        let distance = |pair: &[usize; 2]| {
+            let at = &self.path[self.closest(*pair)];
+            at.gap_rad_s(*pair) / (at.omega_rad_s[pair[0]] + at.omega_rad_s[pair[1]])
+        };
+        let hidden = |pair: &[usize; 2]| pair.iter().any(|mode| !shown[*mode]);
+        pairs.sort_by(|a, b| hidden(a).cmp(&hidden(b)).then(distance(a).total_cmp(&distance(b))));
+        pairs
+    }
+
+    /// Whether each mode shows somewhere on the path: more than `SHOWN_RATIO` of the largest residue.
+    fn shown(&self) -> Vec<bool> {
+        let n = self.path[0].omega_rad_s.len();
+        let mut largest = vec![0.0f64; n];
+        for at in &self.path {
+            let terms = at.terms(&at.structure.force, &at.structure.sensor);
+            largest
+                .iter_mut()
+                .zip(&terms)
+                .for_each(|(largest, term)| *largest = largest.max(term.residue_per_kg.abs()));
+        }
+        let most = largest.iter().copied().fold(0.0, f64::max);
+        largest.iter().map(|largest| *largest > SHOWN_RATIO * most).collect()
+    }
+
     /// Where two modes have the closest frequencies (the veering point), by golden section around the closest values of
     /// the path.
     pub fn meeting(&mut self, pair: [usize; 2]) -> Result<(Meeting, ModesAt), E> {
@@ -276,19 +364,23 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
 
     /// A value between those of the path, and the gap of two modes there.
     fn probe(&mut self, pair: [usize; 2], value: f64) -> Result<(f64, f64), E> {
+        Ok((value, self.at(value)?.gap_rad_s(pair)))
+    }
+
+    /// The modes at any value of the range, followed from those before it.
+    pub fn at(&mut self, value: f64) -> Result<&ModesAt, E> {
         let rising = self.path[0].value < self.path[self.path.len() - 1].value;
         let index = self.path.partition_point(|at| if rising { at.value <= value } else { at.value >= value });
-        // The bracket lies on the path, so that some value comes before.
+        // The range is that of the path, so that some value comes before.
         let known = self.path[index.max(1) - 1].value == value;
         let index = if known { index.max(1) - 1 } else { self.extend(index.max(1), value)? };
-        Ok((value, self.path[index].gap_rad_s(pair)))
+        Ok(&self.path[index])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DVector;
     use proptest::prelude::*;
 
     fn structure(mass: DMatrix<f64>, stiffness: DMatrix<f64>) -> Result<Structure, PlantError> {

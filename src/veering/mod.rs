@@ -1,5 +1,17 @@
 //! Two modes of close frequencies (Chapter 4): loci that approach each other as a setting varies, and part or cross.
+//!
+//! ```text
+//!  Structure -> loci, veering point -> close modes (Eq. 4-1) -> conditions C4-1 to C4-4y -> propositions P4-1 to P4-2y
+//! ```
 
+mod close_modes;
+pub mod conditions;
+mod course;
 mod loci;
+#[cfg(test)]
+mod properties;
+pub mod propositions;
 
+pub use close_modes::{CloseModes, Remainder};
+pub use course::{AsConfigured, Course, Lie, Ports, Station, station};
 pub use loci::{Loci, Meeting, ModesAt};

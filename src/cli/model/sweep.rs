@@ -30,6 +30,11 @@ impl Sweep<'_> {
         Ok((0..self.count).map(value).collect())
     }
 
+    /// A value as typed, read as those of the range are.
+    pub fn value(&self, text: &str) -> Result<f64, CliError> {
+        self.number(&self.bench.load(Purpose::Model, &[])?, text)
+    }
+
     /// The plant at a value.
     pub fn at(&self, value: f64) -> Result<Structure, CliError> {
         let config = self.bench.load(Purpose::Model, &[format!("{}={value:?}", self.vary)])?;

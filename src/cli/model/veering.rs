@@ -93,7 +93,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// The two modes from 0.
-fn pair(asked: &[usize], count: usize, closest: Option<[usize; 2]>) -> Result<[usize; 2], CliError> {
+pub(super) fn pair(asked: &[usize], count: usize, closest: Option<[usize; 2]>) -> Result<[usize; 2], CliError> {
     let places = |&[i, j]: &[usize; 2]| i != j && [i, j].iter().all(|mode| (1..=count).contains(mode));
     match asked {
         [] => closest.ok_or_else(|| {
@@ -106,7 +106,7 @@ fn pair(asked: &[usize], count: usize, closest: Option<[usize; 2]>) -> Result<[u
     }
 }
 
-fn hz(omega_rad_s: f64) -> f64 {
+pub(super) fn hz(omega_rad_s: f64) -> f64 {
     omega_rad_s / (2.0 * std::f64::consts::PI)
 }
 
