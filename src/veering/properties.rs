@@ -66,13 +66,16 @@ impl System {
     }
 
     fn course(&self) -> Course {
-        // No value at d = 0 and not symmetric about it.
-        let grid: Vec<f64> = (0..25).map(|k| -5.0 + 11.0 * f64::from(k) / 24.0).collect();
-        let mut loci = Loci::follow(&grid, |d| self.at(d)).unwrap();
+        let mut loci = Loci::follow(&grid(), |d| self.at(d)).unwrap();
         let pair = loci.path()[0].omega_rad_s.iter().enumerate().filter(|(_, w)| (90.0..112.0).contains(&(*w * *w)));
         let pair: Vec<usize> = pair.map(|(mode, _)| mode).collect();
         Course::along(&mut loci, [pair[0], pair[1]], &AsConfigured).unwrap()
     }
+}
+
+/// Without a value at d = 0, and not symmetric about it.
+fn grid() -> Vec<f64> {
+    (0..25).map(|k| -5.0 + 11.0 * f64::from(k) / 24.0).collect()
 }
 
 /// How often a proposition foretold something, and was right by Eq. (4-1) and by the plant.
@@ -171,7 +174,9 @@ fn as_printed_with_signs_at_one_value_only_they_are_wrong_for_some_systems() {
             assert!(foretold != Foretold::Absent || !quartet);
         }
     }
-    println!("{asked:?} {wrong:?}");
+    // Of some 700 systems that P4-2 is sure of, and 400 of P4-2y, 40: their residues turn on the way.
+    assert!(asked[0] > 500 && asked[1] == asked[0] && asked[2] > 250, "{asked:?}");
+    assert!(wrong.iter().all(|wrong| (20..80).contains(wrong)), "{wrong:?}");
 }
 
 #[test]
@@ -200,29 +205,42 @@ fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
     system
 }
 
+/// What P4-1 says of a plant, at the values of the grid where b2-hat is nearer to b22-hat than to b21-hat: how many are
+/// asked, how many wrong, and for the wrong ones the largest margin over A4-5's ratio.
+fn near_the_upper_limit(course: &Course) -> (usize, usize, f64) {
+    let on_grid = course.stations.iter().filter(|station| grid().contains(&station.value));
+    let apart = on_grid.filter_map(|station| Some((station.modes?, p4_1(station)?)));
+    apart.fold((0, 0, 0.0), |(asked, wrong, furthest): (usize, usize, f64), (modes, p)| {
+        let c = c4_2(&modes);
+        if !c4_1(&modes).holds || 2.0 * c.figure < c.limits[0] + c.limits[1] {
+            return (asked, wrong, furthest);
+        }
+        let over = c.margin.abs() / modes.remainder.integrator_ratio;
+        let is_wrong = p.foretold.is_contradicted_by(p.plant);
+        (asked + 1, wrong + usize::from(is_wrong), if is_wrong { furthest.max(over) } else { furthest })
+    })
+}
+
 #[test]
-fn beside_held_modes_they_hold_as_far_as_the_remainder_is_a_double_integrator() {
-    for (below, above) in [(0.5, 300.0), (1.0, 100.0), (2.0, 50.0), (4.0, 25.0), (6.0, 16.0)] {
-        let (mut dice, mut first, mut tallies, mut remainder) =
-            (Dice::new(4), Tally::default(), <[Tally; 3]>::default(), 0.0f64);
-        let mut furthest = 0.0f64;
+fn beside_held_modes_p4_1_errs_by_less_than_the_remainder_departs_from_a_double_integrator() {
+    // Dual MMP zeros and their meeting lie between the modes, where the remainder is known to that ratio, and b22-hat is
+    // where they meet. Of b21-hat this says nothing: zeros meet there outside, where the remainder may be anything.
+    for (below, above) in [(0.5, 300.0), (2.0, 50.0), (4.0, 25.0), (6.0, 16.0)] {
+        let (mut dice, mut sum, mut tallies) = (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
         for _ in 0..300 {
             let course = with_held_modes(&mut dice, below, above).course();
-            for station in &course.stations {
-                let Some(p) = p4_1(station) else { continue };
-                first.add(&p);
-                let m = station.modes.unwrap();
-                remainder = remainder.max(m.remainder.integrator_ratio);
-                if p.foretold.is_contradicted_by(p.plant) {
-                    furthest = furthest.max(p.premises[1].margin.abs() / m.remainder.integrator_ratio);
-                }
-            }
+            let (asked, wrong, furthest) = near_the_upper_limit(&course);
+            sum = (sum.0 + asked, sum.1 + wrong, sum.2.max(furthest));
             for side in [Side::Before, Side::After] {
-                for (tally, proposition) in tallies.iter_mut().zip(&Stretch::of(&course, side).propositions()) {
-                    tally.add(proposition);
-                }
+                let all = Stretch::of(&course, side).propositions();
+                tallies.iter_mut().zip(&all).for_each(|(tally, proposition)| tally.add(proposition));
             }
         }
-        println!("{below} {above}: integrator {remainder} furthest {furthest} P4-1 {first:?}\n {tallies:?}");
+        assert!(sum.0 > 500 && sum.1 < sum.0 / 50 && sum.2 < 1.0, "{below} {above}: {sum:?}");
+        let [p4_2, p4_2x, p4_2y] = tallies;
+        assert!(p4_2.wrong_by_plant == 0 && p4_2.appear > 20, "{below} {above}: {p4_2:?}");
+        assert!(p4_2y.wrong_by_plant == 0 && p4_2y.appear > 8, "{below} {above}: {p4_2y:?}");
+        // P4-2x errs where the others have a quartet of their own with the two: beyond b21-hat.
+        assert!(p4_2x.wrong_by_plant < p4_2x.absent / 30 && p4_2x.absent > 400, "{below} {above}: {p4_2x:?}");
     }
 }

@@ -12,9 +12,15 @@
 //! |b21-hat| < |b22-hat|. Either an end is between the two already, or b2-hat passes from above |b22-hat| to below it, and
 //! just below it is between them.
 //!
+//! The premises as printed, with signs at one value only, were wrong for 40 of some 700 random systems of Eq. (4-1) that P4-2 was
+//! sure of, and for 40 of 400 of P4-2y; read as here, for none (`properties.rs`). P4-2 and P4-2y are not necessary: fixed
+//! frequencies and other residues give zeros without any veering.
+//!
 //! A plant is not Eq. (4-1). Its own zeros stand beside those of the equation in every answer; where the two differ, the
-//! Assumptions A4-4 and A4-5 do not hold well enough, and [`super::Remainder`] says by how much. P4-2y does not need them:
-//! two zeros between two poles that stay side by side, with residues that keep their signs, can only leave by meeting.
+//! Assumptions A4-4 and A4-5 do not hold well enough, and [`super::Remainder`] says by how much. Towards b22-hat, where zeros
+//! meet between the modes, P4-1 errs at no larger margin than A4-5's ratio. Towards b21-hat they meet outside, where the
+//! other modes may be anything, and no local figure bounds the error. P4-2y needs neither assumption: two zeros between two
+//! poles that stay side by side, with residues that keep their signs, can only leave by meeting.
 
 use super::conditions::{Condition, c4_1, c4_2, c4_3, c4_4, c4_4y};
 use super::{Course, Lie, Meeting, Station};
