@@ -6,6 +6,9 @@ mod conditions_text;
 mod critical_damping;
 mod locus;
 mod map;
+mod placement;
+mod placement_text;
+mod ports;
 mod sequence;
 mod step;
 mod study;
@@ -45,6 +48,8 @@ enum What {
     Veering(veering::Args),
     /// Which of Conditions C4-1 to C4-4y hold for two close modes, by how much, and what the propositions make of it
     Conditions(conditions::Args),
+    /// Actuator and probe among the shapes of two close modes, and where to put them so that no CNMP zeros appear
+    Placement(placement::Args),
     /// What the zeros in the right half plane allow in bandwidth and sensitivity peak (Eqs. 1-2, 1-3)
     Bounds(bounds::Args),
     /// The response to a step: undershoot, zero crossings, reversals, and what the zeros foretell
@@ -62,6 +67,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         What::Map(args) => map::run(args)?,
         What::Veering(args) => veering::run(args)?,
         What::Conditions(args) => conditions::run(args)?,
+        What::Placement(args) => placement::run(args)?,
         What::Bounds(args) => bounds::run(args)?,
         What::Step(args) => step::run(args)?,
         What::CriticalDamping(args) => critical_damping::run(args)?,

@@ -3,7 +3,7 @@
 //! Coordinates in the order of the nodes' names. The floor moves along the same line.
 
 use super::structure::Assembly;
-use super::{PlantError, Structure, damping};
+use super::{PlantError, Port, Structure, damping};
 use crate::config::LumpedSettings;
 
 pub(super) fn structure(s: &LumpedSettings) -> Result<Structure, PlantError> {
@@ -36,4 +36,10 @@ pub(super) fn undamped(s: &LumpedSettings) -> Structure {
     let mut structure = parts.finish(&weights(|node| node.actuator), &weights(|node| node.sensor));
     structure.free_bodies = s.free().len();
     structure
+}
+
+/// The displacement of each node.
+pub(super) fn ports(s: &LumpedSettings) -> Vec<Port> {
+    let row = |index: usize| (0..s.nodes.len()).map(|other| f64::from(u8::from(other == index))).collect::<Vec<_>>();
+    s.nodes.keys().enumerate().map(|(index, name)| Port::new(name, &row(index))).collect()
 }

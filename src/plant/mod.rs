@@ -28,6 +28,7 @@ mod kinematics;
 pub(crate) mod linear_algebra;
 mod lumped;
 mod modal;
+mod port;
 mod quadratic;
 mod sampled;
 pub(crate) mod sr4dof;
@@ -38,6 +39,7 @@ pub(crate) use beam::Beam;
 pub use chain::Chain;
 pub(crate) use exponential::exponential;
 pub use modal::{Modal, Mode, Sign};
+pub use port::Port;
 pub(crate) use quadratic::{Load, Quadratic, QuadraticState};
 pub use sampled::{Block, Motion, Sampled};
 pub use structure::Structure;
@@ -112,5 +114,15 @@ pub fn undamped(settings: &PlantSettings) -> Structure {
         PlantSettings::Xy(settings) => xy::undamped(settings),
         PlantSettings::Lumped(settings) => lumped::undamped(settings),
         PlantSettings::Modal(settings) => by_modes::undamped(settings),
+    }
+}
+
+/// Where a force may act on the model and a probe may look, in the model's order; none for a plant given by its modes.
+pub fn ports(settings: &PlantSettings) -> Vec<Port> {
+    match settings {
+        PlantSettings::Sr4dof(settings) => sr4dof::ports(settings),
+        PlantSettings::Xy(settings) => xy::ports(settings),
+        PlantSettings::Lumped(settings) => lumped::ports(settings),
+        PlantSettings::Modal(_) => Vec::new(),
     }
 }

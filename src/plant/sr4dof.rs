@@ -12,7 +12,7 @@
 
 use super::beam::Beam;
 use super::structure::Assembly;
-use super::{PlantError, Structure, damping};
+use super::{PlantError, Port, Structure, damping};
 use crate::config::Sr4dofSettings;
 
 const NONE: [f64; 4] = [0.0; 4];
@@ -27,6 +27,15 @@ pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
     let mut structure = undamped(s);
     structure.damping = damping::matrix(&structure, &s.damping)?;
     Ok(structure)
+}
+
+/// The displacements of the five stages in X, and of those that move in Y.
+pub(super) fn ports(s: &Sr4dofSettings) -> Vec<Port> {
+    let a = 0.6 * s.operating_point_m / s.beam_length_m;
+    let [x2, x3] = [[1.0, a, -a, 0.0], [1.0, -a, 0.0, a]];
+    let [x4, x5] = [[1.0, a, -2.0 * a, 0.0], [1.0, -a, 0.0, 2.0 * a]];
+    let rows = [("x1", X1), ("x2", x2), ("x3", x3), ("x4", x4), ("x5", x5), ("y1", Y1), ("y2", Y2), ("y3", Y3)];
+    rows.into_iter().map(|(name, row)| Port::new(name, &row)).collect()
 }
 
 /// The same with C = 0, whatever the damping of the settings.

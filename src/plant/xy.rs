@@ -25,7 +25,7 @@ use nalgebra::DMatrix;
 use super::beam::Beam;
 use super::kinematics::Coordinate;
 use super::structure::Assembly;
-use super::{PlantError, Structure, damping};
+use super::{PlantError, Port, Structure, damping};
 use crate::config::{XyLayout, XySettings};
 
 /// Degrees of freedom.
@@ -73,6 +73,21 @@ pub(super) fn undamped(s: &XySettings) -> Structure {
         structure.stiffness += geometric_stiffness(&springs, k, &loaded.y);
     }
     structure
+}
+
+/// The displacements of the thirteen stages in X and in Y; the row of one that cannot move is zero.
+pub(super) fn ports(s: &XySettings) -> Vec<Port> {
+    let stages = Stages::of(s, Beam::from(s).shortening_per_m());
+    let named = |names: [&'static str; 4], four: [Stage; 4]| names.into_iter().zip(four);
+    let motion = std::iter::once(("ms", stages.motion));
+    let all = motion
+        .chain(named(["XL", "XR", "YT", "YB"], stages.intermediate))
+        .chain(named(["sL", "sR", "sT", "sB"], stages.inner))
+        .chain(named(["gL", "gR", "gT", "gB"], stages.outer));
+    let both = |(name, stage): (&str, Stage)| {
+        [("x", stage.x.row), ("y", stage.y.row)].map(|(axis, row)| Port::new(&format!("{axis}_{name}"), row.as_slice()))
+    };
+    all.flat_map(both).collect()
 }
 
 /// The sum of static forces times curves: k d curve of each parallelogram bent by d, less F curve of the holding force F,

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! bode -> trace (checked, unwrapped by phase) -> panel (axis: scales and ticks, curve: thinned out) -> canvas (SVG)
+//! quadrants (actuator and probe in the plane of two shapes) -> canvas
 //! ```
 //!
 //! Text stays text in the SVG, in the viewer's own sans-serif: no font is needed to make a plot.
@@ -14,8 +15,10 @@ mod error;
 mod header;
 mod panel;
 pub mod phase;
+mod quadrants;
 mod trace;
 
 pub use bode::bode_svg;
 pub use error::ReportError;
+pub use quadrants::{QuadrantPanel, quadrants_svg};
 pub use trace::{Curve, Trace};

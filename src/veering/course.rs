@@ -11,20 +11,10 @@ const BISECTIONS: usize = 44;
 /// Modes with a residue below this ratio of the largest do not part zeros from those of the two modes.
 const SILENT_RATIO: f64 = 1e-9;
 
-/// Where a force acts and what a probe sees, in the degrees of freedom of a plant that changes with the setting.
-pub trait Ports {
-    /// Generalised force per newton, and displacement per unit of each degree of freedom, at a value of the setting.
-    fn of(&self, at: &ModesAt) -> [DVector<f64>; 2];
-}
-
-/// The actuator and the probe of the plant's own settings.
-#[derive(Clone, Copy, Debug)]
-pub struct AsConfigured;
-
-impl Ports for AsConfigured {
-    fn of(&self, at: &ModesAt) -> [DVector<f64>; 2] {
-        [at.structure().force.clone(), at.structure().sensor.clone()]
-    }
+/// The actuator and the probe of the plant's own settings: generalised force per newton, and displacement per unit of each
+/// degree of freedom.
+pub fn as_configured(at: &ModesAt) -> [DVector<f64>; 2] {
+    [at.structure().force.clone(), at.structure().sensor.clone()]
 }
 
 /// How the zeros of the two modes lie.
@@ -66,22 +56,28 @@ pub struct Course {
 }
 
 impl Course {
-    /// The course of two modes along the loci, which are refined where they are closest.
-    pub fn along<E, F>(loci: &mut Loci<F>, pair: [usize; 2], ports: &impl Ports) -> Result<Course, E>
+    /// The course of two modes along the loci, which are refined where they are closest, between the force and the probe
+    /// that `ports` gives at a value.
+    pub fn along<E, F>(
+        loci: &mut Loci<F>,
+        pair: [usize; 2],
+        ports: impl Fn(&ModesAt) -> [DVector<f64>; 2],
+    ) -> Result<Course, E>
     where
         E: From<PlantError>,
         F: FnMut(f64) -> Result<Structure, E>,
     {
         let (meeting, at) = loci.meeting(pair)?;
         let closest_value = at.value;
-        let mut stations = loci.path().iter().map(|at| station(at, pair, ports)).collect::<Result<Vec<_>, _>>()?;
+        let mut stations = loci.path().iter().map(|at| station(at, pair, ports(at))).collect::<Result<Vec<_>, _>>()?;
         let rising = stations[0].value < stations[stations.len() - 1].value;
         let lies: [Lies; 2] = [|station| station.equation, |station| Some(station.plant)];
         for lie in lies {
             let steps: Vec<[Station; 2]> = stations.windows(2).map(|step| [step[0].clone(), step[1].clone()]).collect();
             for step in steps.iter().filter(|step| hides(step, lie)) {
                 fill(step, lie, BISECTIONS, &mut stations, &mut |value| {
-                    station(loci.at(value)?, pair, ports).map_err(E::from)
+                    let at = loci.at(value)?;
+                    station(at, pair, ports(at)).map_err(E::from)
                 })?;
             }
             stations.sort_by(|a, b| if rising { a.value.total_cmp(&b.value) } else { b.value.total_cmp(&a.value) });
@@ -99,9 +95,8 @@ impl Course {
     }
 }
 
-/// The station of two modes at one value.
-pub fn station(at: &ModesAt, pair: [usize; 2], ports: &impl Ports) -> Result<Station, PlantError> {
-    let [force, sensor] = ports.of(at);
+/// The station of two modes at one value, between a force and a probe.
+pub fn station(at: &ModesAt, pair: [usize; 2], [force, sensor]: [DVector<f64>; 2]) -> Result<Station, PlantError> {
     let terms = at.terms(&force, &sensor);
     let zeros = undamped_zeros(&Structure { force, sensor, ..at.structure().clone() })?;
     let modes = if at.are_equal(pair) { None } else { CloseModes::of(&terms, pair) };

@@ -85,7 +85,7 @@ impl ModesAt {
 
     /// Gains of all modes. A shape has of each other one some 1e-15 of the largest eigenvalue over the distance between the
     /// two: what is not more than ten times that is 0.
-    fn gains(&self, row: &DVector<f64>) -> Vec<f64> {
+    pub(super) fn gains(&self, row: &DVector<f64>) -> Vec<f64> {
         let gains: Vec<f64> = (0..self.omega_rad_s.len()).map(|mode| self.gain(mode, row)).collect();
         let largest = self.omega_rad_s.iter().fold(0.0, |largest: f64, w| largest.max(w * w));
         let leak = |i: usize, j: usize| {

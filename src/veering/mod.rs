@@ -2,16 +2,23 @@
 //!
 //! ```text
 //!  Structure -> loci, veering point -> close modes (Eq. 4-1) -> conditions C4-1 to C4-4y -> propositions P4-1 to P4-2y
+//!                        |
+//!                        v
+//!                  quadrants and octants (picture) -> where to put actuator and probe (placement)
 //! ```
 
 mod close_modes;
 pub mod conditions;
 mod course;
 mod loci;
+mod picture;
+mod placement;
 #[cfg(test)]
 mod properties;
 pub mod propositions;
 
 pub use close_modes::{CloseModes, Remainder};
-pub use course::{AsConfigured, Course, Lie, Ports, Station, station};
+pub use course::{Course, Lie, Station, as_configured, station};
 pub use loci::{Loci, Meeting, ModesAt};
+pub use picture::Picture;
+pub use placement::{Trial, trial};

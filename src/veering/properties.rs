@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 use super::conditions::{c4_1, c4_2, c4_3, c4_4, c4_4y};
 use super::propositions::{Foretold, Proposition, Side, Stretch, p4_1};
-use super::{AsConfigured, CloseModes, Course, Lie, Loci, Meeting, Station};
+use super::{CloseModes, Course, Lie, Loci, Meeting, Station, as_configured};
 use crate::plant::{PlantError, Structure};
 use crate::zeros::{Kinds, Term};
 
@@ -69,7 +69,7 @@ impl System {
         let mut loci = Loci::follow(&grid(), |d| self.at(d)).unwrap();
         let pair = loci.path()[0].omega_rad_s.iter().enumerate().filter(|(_, w)| (90.0..112.0).contains(&(*w * *w)));
         let pair: Vec<usize> = pair.map(|(mode, _)| mode).collect();
-        Course::along(&mut loci, [pair[0], pair[1]], &AsConfigured).unwrap()
+        Course::along(&mut loci, [pair[0], pair[1]], as_configured).unwrap()
     }
 }
 

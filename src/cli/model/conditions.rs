@@ -12,7 +12,7 @@ use crate::config::Purpose;
 use crate::plant::Structure;
 use crate::veering::conditions::{Condition, c4_1, c4_2, deciding_residue, pattern};
 use crate::veering::propositions::{Foretold, Proposition, Side, Stretch, p4_1};
-use crate::veering::{AsConfigured, CloseModes, Course, Lie, Loci, Meeting, ModesAt, Station};
+use crate::veering::{CloseModes, Course, Lie, Loci, Meeting, ModesAt, Station, as_configured};
 
 /// What varies, which modes, and where to look closely.
 #[derive(Clone, Debug, clap::Args)]
@@ -144,8 +144,8 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let values = sweep.values()?;
     let mut loci = Loci::follow(&values, |value| sweep.at(value))?;
     let pair = meeting_pair(&args.modes, &loci)?;
-    let course = Course::along(&mut loci, pair, &AsConfigured)?;
-    veers(&course, pair)?;
+    let course = Course::along(&mut loci, pair, as_configured)?;
+    veers(course.meeting, course.stations[course.closest].value, pair)?;
     let value = explained(args, &sweep, &course)?;
     let at = loci.at(value)?.clone();
     let report = report(args, &values, &course, pair, &at)?;
@@ -169,11 +169,10 @@ pub(super) fn meeting_pair<F: FnMut(f64) -> Result<Structure, CliError>>(
 }
 
 /// Refuses a range without a veering point.
-pub(super) fn veers(course: &Course, [i, j]: [usize; 2]) -> Result<(), CliError> {
-    if course.meeting != Meeting::AtTheEnd {
+pub(super) fn veers(meeting: Meeting, value: f64, [i, j]: [usize; 2]) -> Result<(), CliError> {
+    if meeting != Meeting::AtTheEnd {
         return Ok(());
     }
-    let value = course.stations[course.closest].value;
     Err(CliError::Usage(format!(
         "modes {} and {} neither veer nor cross in the range: they are closest at its end, {value}; move --from or --to beyond it, or name two others with --modes",
         i + 1,
@@ -204,7 +203,7 @@ fn own(args: &Args) -> Result<Option<f64>, CliError> {
 
 fn report(args: &Args, values: &[f64], course: &Course, pair: [usize; 2], at: &ModesAt) -> Result<Report, CliError> {
     let closest = &course.stations[course.closest];
-    let here = crate::veering::station(at, pair, &AsConfigured)?;
+    let here = crate::veering::station(at, pair, as_configured(at))?;
     let on_grid = course.stations.iter().filter(|station| values.contains(&station.value));
     let met = course.stations[course.closest].modes;
     let [low_hz, high_hz] = met.map_or([hz(at.omega_rad_s[pair[0]]); 2], |modes| frequencies_hz(&modes));

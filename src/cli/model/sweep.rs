@@ -37,8 +37,12 @@ impl Sweep<'_> {
 
     /// The plant at a value.
     pub fn at(&self, value: f64) -> Result<Structure, CliError> {
-        let config = self.bench.load(Purpose::Model, &[format!("{}={value:?}", self.vary)])?;
-        Ok(plant::build(&config.plant)?)
+        Ok(plant::build(&self.config(value)?.plant)?)
+    }
+
+    /// The configuration at a value.
+    pub fn config(&self, value: f64) -> Result<Config, CliError> {
+        self.bench.load(Purpose::Model, &[format!("{}={value:?}", self.vary)])
     }
 
     fn refuse_options(&self) -> Result<(), CliError> {
