@@ -28,8 +28,8 @@
 //! | margins of a loop | [`control::ClosedLoop`] |
 //! | zeros and their kinds, sequence of dominant modes, maps | [`zeros`] |
 //! | how Tables 3-1 to 3-4 are read | `zeros/tables.rs`, `zeros/sequence.rs` |
-//! | two close modes, veering | [`veering`] |
 //! | tolerances: how likely CNMP zeros are, and what decides it | [`study`] |
+//! | two close modes, veering, conditions and propositions of Chapter 4, placement of actuator and probe | [`veering`] |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |

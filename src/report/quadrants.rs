@@ -100,7 +100,7 @@ fn captions(canvas: &Canvas, picture: &Picture, (x, y): (f64, f64)) -> Result<()
         quadrant.map_or("on a line".into(), |quadrant| format!("in {}", NUMERALS[quadrant - 1]))
     };
     let [actuator, probe] = picture.quadrants().map(place);
-    let turned = format!("{:+.1}°", picture.turn_rad().to_degrees() + 0.0).replace('-', "−");
+    let turned = format!("{:+.1}°", (picture.turn_rad().to_degrees() * 10.0).round() / 10.0 + 0.0).replace('-', "−");
     let (signs, verdict) = match picture.signs() {
         None => ("the modes cross".into(), ""),
         Some([r, u, v]) => {

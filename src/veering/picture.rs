@@ -144,3 +144,53 @@ fn unit([x, y]: [f64; 2]) -> [f64; 2] {
     let length = x.hypot(y);
     if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::{PI, TAU};
+
+    fn picture(b: f64, c: f64, remainder: f64) -> Picture {
+        let (actuator, sensor) = ([b.cos(), b.sin()], [c.cos(), c.sin()]);
+        let residues = [remainder, actuator[0] * sensor[0], actuator[1] * sensor[1]];
+        let shapes = [[1.0, 0.0], [0.0, 1.0]];
+        Picture { value: 0.0, shapes, actuator, sensor, residues_per_kg: Some(residues) }
+    }
+
+    proptest! {
+        #[test]
+        fn signs_alternate_on_the_arc_of_the_closed_form(
+            b in 0.0..TAU, c in 0.0..TAU, sign in 0..2usize, from in -1.5..1.5f64, to in -1.5..1.5f64,
+        ) {
+            let remainder = [1.0, -1.0][sign];
+            // -sign cos(2 t - b - c) > |cos(b - c)|: an arc about 2 t = b + c + pi (or b + c), of half-width acos |cos(b - c)|.
+            let centre = b + c + if remainder > 0.0 { PI } else { 0.0 };
+            let half = (b - c).cos().abs().acos();
+            let ends = [2.0 * from.min(to), 2.0 * from.max(to)];
+            let reach = |k: i32| {
+                let middle = centre + TAU * f64::from(k);
+                (middle + half - ends[0]).min(ends[1] - middle + half)
+            };
+            let reach = (-4..=4).map(reach).fold(f64::NEG_INFINITY, f64::max).min(half);
+            // The turn is gone through in steps of up to 3/720.
+            prop_assume!(reach.abs() > 0.01);
+            prop_assert_eq!(picture(b, c, remainder).alternates_over(from, to), reach > 0.0);
+        }
+
+        #[test]
+        fn a_probe_in_the_quadrant_to_avoid_has_alternating_signs_and_no_other(
+            b in 0.0..TAU, c in 0.0..TAU, sign in 0..2usize,
+        ) {
+            let picture = picture(b, c, [1.0, -1.0][sign]);
+            let [_, probe] = picture.quadrants();
+            prop_assume!(picture.avoid().is_some() && probe.is_some());
+            let signs: String = picture.signs().unwrap().iter().collect();
+            let alternate = signs == "+-+" || signs == "-+-";
+            prop_assert_eq!(probe == picture.avoid(), alternate);
+            // Section 4.2.4: from octant A to C or F, across the plane of u alone, or across those of R and v.
+            let across = picture.across().unwrap();
+            prop_assert_eq!(across == [false, true, false] || across == [true, false, true], alternate);
+        }
+    }
+}

@@ -4,6 +4,7 @@
 //! `tests/python/truth.py`, which shares no line with the program.
 
 mod chirp;
+mod conditions;
 mod control;
 mod locus;
 mod map;

@@ -147,8 +147,9 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let course = Course::along(&mut loci, pair, as_configured)?;
     veers(course.meeting, course.stations[course.closest].value, pair)?;
     let value = explained(args, &sweep, &course)?;
+    let closest = loci.at(course.stations[course.closest].value)?.clone();
     let at = loci.at(value)?.clone();
-    let report = report(args, &values, &course, pair, &at)?;
+    let report = report(args, &values, &course, pair, [&closest, &at])?;
     if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
 }
 
@@ -201,20 +202,23 @@ fn own(args: &Args) -> Result<Option<f64>, CliError> {
     Ok(config.pointer(&format!("/{}", args.vary.replace('.', "/"))).and_then(serde_json::Value::as_f64))
 }
 
-fn report(args: &Args, values: &[f64], course: &Course, pair: [usize; 2], at: &ModesAt) -> Result<Report, CliError> {
-    let closest = &course.stations[course.closest];
+fn report(
+    args: &Args,
+    values: &[f64],
+    course: &Course,
+    pair: [usize; 2],
+    [closest, at]: [&ModesAt; 2],
+) -> Result<Report, CliError> {
     let here = crate::veering::station(at, pair, as_configured(at))?;
     let on_grid = course.stations.iter().filter(|station| values.contains(&station.value));
-    let met = course.stations[course.closest].modes;
-    let [low_hz, high_hz] = met.map_or([hz(at.omega_rad_s[pair[0]]); 2], |modes| frequencies_hz(&modes));
     Ok(Report {
         profile: args.bench.profile().into(),
         vary: args.vary.clone(),
         modes: pair.map(|mode| mode + 1),
         meeting: course.meeting.name(),
         value: closest.value,
-        frequency_hz: 0.5 * (low_hz + high_hz),
-        gap_hz: high_hz - low_hz,
+        frequency_hz: hz(0.5 * (closest.omega_rad_s[pair[0]] + closest.omega_rad_s[pair[1]])),
+        gap_hz: hz(closest.gap_rad_s(pair)),
         cnmp_bands: course.bands(),
         assumptions: assumptions(at, pair, &here),
         here: explain(&here),

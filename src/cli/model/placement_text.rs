@@ -40,7 +40,7 @@ fn pictures_text(pictures: &[PictureJson]) -> String {
         vec![
             when.to_string(),
             format!("{:.6}", p.value),
-            format!("{:+.2}", p.turn_deg),
+            format!("{:+.2}", (p.turn_deg * 100.0).round() / 100.0 + 0.0),
             pair(p.actuator),
             numeral(p.actuator_quadrant),
             pair(p.sensor),
