@@ -314,7 +314,12 @@ fn on_signs(modes: &CloseModes) -> String {
     let (condition, residues) = (c4_1(modes), modes.residues_per_kg());
     let which = deciding_residue(residues);
     let (name, value) = (["R", "u", "v"][which], residues[which]);
-    let signs: String = residues.iter().map(|r| if *r < 0.0 { '-' } else { '+' }).collect();
+    let sign = |r: &f64| match r.total_cmp(&0.0) {
+        _ if *r == 0.0 => '0',
+        std::cmp::Ordering::Less => '-',
+        _ => '+',
+    };
+    let signs: String = residues.iter().map(sign).collect();
     let size = condition.margin.abs() * 100.0;
     let wanted = if pattern(residues) > 0.0 { "+-+" } else { "-+-" };
     match condition.holds {
@@ -332,7 +337,7 @@ fn on_gap(modes: &CloseModes) -> String {
     let (condition, figure, [low, high]) = (c4_2(modes), modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
     match condition {
         _ if !modes.are_opposed() => {
-            "C4-2 fails: modes u and v have the same sign, so that no gap between them gives CMP-CNMP zeros".into()
+            "C4-2 fails: the residues of modes u and v do not have opposite signs, so that no gap between them gives CMP-CNMP zeros".into()
         }
         Condition { holds: true, .. } => format!(
             "C4-2 holds by {:.1} % of |b22|: to break it move the modes apart, wv^2 - wu^2 times {:.3} or more, or together, times {:.3} or less",

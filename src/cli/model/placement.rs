@@ -11,7 +11,7 @@ use super::conditions::{meeting_pair, veers};
 use super::placement_text::text;
 use super::ports::Weights;
 use super::sweep::Sweep;
-use crate::plant::{PlantError, Port};
+use crate::plant::{PlantError, Port, Structure};
 use crate::report::{QuadrantPanel, quadrants_svg};
 use crate::veering::{Loci, ModesAt, Picture, Trial, trial};
 
@@ -130,16 +130,27 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let pair = meeting_pair(&args.modes, &loci)?;
     let (meeting, closest) = loci.meeting(pair)?;
     veers(meeting, closest.value, pair)?;
-    let mut at: Vec<&ModesAt> = values.iter().map(|value| loci.near(*value)).collect();
-    let rising = values[0] < values[values.len() - 1];
-    let place = at.partition_point(|at| if rising { at.value < closest.value } else { at.value > closest.value });
-    if at.get(place).is_none_or(|at| at.value != closest.value) {
-        at.insert(place, &closest);
-    }
-    let ports = at.iter().map(|at| places_at(&sweep, at.value)).collect::<Result<Vec<_>, _>>()?;
-    let tried = Tried { path: at, ports, closest: place, pair };
+    let (path, place) = with_closest(&loci, &values, &closest);
+    let ports = path.iter().map(|at| places_at(&sweep, at.value)).collect::<Result<Vec<_>, _>>()?;
+    let tried = Tried { path, ports, closest: place, pair };
     let report = report(args, &tried, &chosen, meeting.name())?;
     if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+}
+
+/// The modes at the values of the grid and at the veering point, and the place of that one among them.
+fn with_closest<'a, F: FnMut(f64) -> Result<Structure, CliError>>(
+    loci: &'a Loci<F>,
+    values: &[f64],
+    closest: &'a ModesAt,
+) -> (Vec<&'a ModesAt>, usize) {
+    let mut path: Vec<&ModesAt> = values.iter().map(|value| loci.near(*value)).collect();
+    let rising = values[0] < values[values.len() - 1];
+    let before = |at: &&ModesAt| if rising { at.value < closest.value } else { at.value > closest.value };
+    let place = path.partition_point(before);
+    if path.get(place).is_none_or(|at| at.value != closest.value) {
+        path.insert(place, closest);
+    }
+    (path, place)
 }
 
 /// The places of the plant; a plant given by its modes has none.
