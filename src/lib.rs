@@ -15,7 +15,7 @@
 //!                             |                               ^  opens what the configuration names
 //!                             v  wait-free ring            devices <---- calibration
 //!                         recording (MCAP) ----> identify ----> report
-//!                                   \______ session (one run, its analysis, its replay) ______ cli
+//!                                   \______ session (one run, its analysis, its replay) ______ figures ______ cli
 //! ```
 //!
 //! Imports point towards what stands earlier in this picture. [`cli`] sees all, nobody sees it.
@@ -30,6 +30,7 @@
 //! | how Tables 3-1 to 3-4 are read | `zeros/tables.rs`, `zeros/sequence.rs` |
 //! | tolerances: how likely CNMP zeros are, and what decides it | [`study`] |
 //! | two close modes, veering, conditions and propositions of Chapter 4, placement of actuator and probe | [`veering`] |
+//! | a figure or table of the thesis | [`figures`]: one line a figure in `figures/registry.rs` |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |
@@ -66,6 +67,7 @@ pub mod devices;
 pub mod doctor;
 pub mod excitation;
 pub mod fit;
+pub mod figures;
 pub mod identify;
 pub mod plant;
 pub mod recording;

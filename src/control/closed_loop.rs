@@ -66,6 +66,11 @@ impl ClosedLoop {
         margins(&|w| self.sampled_loop(w), &grid, self.sampled_stable(), false)
     }
 
+    /// Frequencies in rad/s that follow every resonance of plant and controller.
+    pub fn frequencies(&self, low_rad_s: f64, high_rad_s: f64) -> Vec<f64> {
+        grid(low_rad_s, high_rad_s, &self.features())
+    }
+
     /// Reading (in metres, relative to the start) at each tick after a reference of `reference_m(tick)`: the linear loop
     /// from rest, without noise, disturbance and limits.
     pub fn simulate(&self, ticks: usize, reference_m: impl Fn(usize) -> f64) -> Vec<f64> {

@@ -41,6 +41,6 @@ impl Controller {
 }
 
 /// C(s) in amperes per metre of continuous sections.
-pub(super) fn continuous_response(sections: &[Section], s: Complex<f64>) -> Complex<f64> {
+pub fn continuous_response(sections: &[Section], s: Complex<f64>) -> Complex<f64> {
     sections.iter().map(|section| section.response(s)).product::<Complex<f64>>() * UM_PER_M
 }

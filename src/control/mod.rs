@@ -20,8 +20,9 @@ mod step_figures;
 
 pub use biquad::Biquad;
 pub use closed_loop::ClosedLoop;
-pub use controller::Controller;
+pub use controller::{Controller, continuous_response};
 pub use file::{ControllerError, ControllerFile, ControllerText};
+pub(crate) use margins::grid;
 pub use margins::{Crossing, Margins};
 pub use section::Section;
 pub use step_figures::{StepFigures, StepMeter, step_figures};

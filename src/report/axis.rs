@@ -37,6 +37,22 @@ impl Axis {
         self.start + part.clamp(0.0, 1.0) * (self.end - self.start)
     }
 
+    /// The pixel of a value, beyond the ends of the axis too; not a number for values that a logarithmic axis cannot show.
+    pub fn place(&self, value: f64) -> f64 {
+        let part = if self.logarithmic {
+            if value > 0.0 { libm::log(value / self.low) / libm::log(self.high / self.low) } else { f64::NAN }
+        } else {
+            (value - self.low) / (self.high - self.low)
+        };
+        self.start + part * (self.end - self.start)
+    }
+
+    /// Ticks of an even axis, so many pixels apart at least, labelled in plain numbers.
+    pub fn even_ticks(&self, pixels: f64) -> Vec<Tick> {
+        let count = ((self.end - self.start).abs() / pixels).max(1.0);
+        self.linear_ticks(nice_step((self.high - self.low) / count), plain)
+    }
+
     /// Ticks of a frequency axis, labelled in plain numbers.
     pub fn frequency_ticks(&self) -> Vec<Tick> {
         let decades = self.decades();

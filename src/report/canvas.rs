@@ -57,6 +57,11 @@ impl Canvas<'_> {
         self.0.draw(&Circle::new(at(centre), units(radius), colour.filled())).map_err(failed)
     }
 
+    pub fn ring(&self, centre: (f64, f64), radius: f64, colour: RGBAColor, width: f64) -> Result<(), ReportError> {
+        let style = colour.stroke_width(units(width) as u32);
+        self.0.draw(&Circle::new(at(centre), units(radius), style)).map_err(failed)
+    }
+
     pub fn text(&self, text: &str, position: (f64, f64), form: TextForm) -> Result<(), ReportError> {
         let style = if form.bold { FontStyle::Bold } else { FontStyle::Normal };
         let turn = if form.upward { FontTransform::Rotate270 } else { FontTransform::None };

@@ -10,9 +10,9 @@ use super::trace::Line;
 
 const QUIET_INK: RGBColor = RGBColor(95, 95, 95);
 const TITLE_SIZE: f64 = 17.0;
-const TEXT_SIZE: f64 = 12.5;
+pub(super) const TEXT_SIZE: f64 = 12.5;
 /// A character is so wide on average at most, in parts of the font's size, in any usual sans-serif: normal, and bold.
-const CHARACTER: f64 = 0.58;
+pub(super) const CHARACTER: f64 = 0.58;
 const BOLD_CHARACTER: f64 = 0.68;
 const SWATCH: f64 = 30.0;
 
@@ -55,12 +55,16 @@ impl Header {
     }
 }
 
-/// Entries side by side, on a new row where the right edge is reached.
-fn entries(lines: &[Line], (left, right): (f64, f64), top: f64) -> Vec<(f64, f64)> {
+fn entries(lines: &[Line], edges: (f64, f64), top: f64) -> Vec<(f64, f64)> {
+    let width = |line: &Line| SWATCH + 8.0 + CHARACTER * TEXT_SIZE * label(line).chars().count() as f64 + 24.0;
+    flow(&lines.iter().map(width).collect::<Vec<_>>(), edges, top)
+}
+
+/// Where entries of these widths begin: side by side, on a new row where the right edge is reached.
+pub(super) fn flow(widths: &[f64], (left, right): (f64, f64), top: f64) -> Vec<(f64, f64)> {
     let (mut x, mut y) = (left, top);
     let mut entries = Vec::new();
-    for line in lines {
-        let width = SWATCH + 8.0 + CHARACTER * TEXT_SIZE * label(line).chars().count() as f64 + 24.0;
+    for width in widths {
         if x > left && x + width > right {
             (x, y) = (left, y + 20.0);
         }
@@ -89,7 +93,7 @@ fn label(line: &Line) -> String {
 }
 
 /// Rows of at most so many characters, broken between words, or within one that is longer than a row.
-fn wrapped(text: &str, most: usize) -> Vec<String> {
+pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut rows = Vec::new();
     for line in text.lines() {
         let mut row = String::new();

@@ -12,7 +12,9 @@ use super::trace::{Line, Shown};
 const FRAME: RGBColor = RGBColor(90, 90, 90);
 const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(234, 234, 234);
-pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
+pub(super) use super::colours::INK;
+/// From the frame to the middle of what stands along the vertical axis.
+const LABEL_LEFT: f64 = 66.0;
 const LABEL_SIZE: f64 = 12.0;
 pub(super) const LINE_WIDTH: f64 = 1.4;
 /// Lengths in pixels of a dash and of the space after it.
@@ -60,7 +62,7 @@ impl Panel {
         for tick in ticks.x.iter().filter(|_| ticks.frequencies) {
             write(canvas, tick, (self.x.pixel(tick.value), b + 6.0), (HPos::Center, VPos::Top))?;
         }
-        let middle = (18.0, (t + b) / 2.0);
+        let middle = (self.left - LABEL_LEFT, (t + b) / 2.0);
         let anchor = (HPos::Center, VPos::Center);
         canvas.text(ticks.label, middle, TextForm { size: 13.0, colour: INK, bold: false, anchor, upward: true })
     }

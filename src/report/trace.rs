@@ -3,6 +3,7 @@
 use nalgebra::Complex;
 use plotters::style::RGBColor;
 
+use super::colours::{BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION};
 use super::{ReportError, phase};
 use crate::identify::{Frf, wrapped_phase_rad};
 
@@ -12,10 +13,9 @@ const BAND_SIGMAS: f64 = 2.0;
 const LEADING_SIGMAS: f64 = 4.0;
 /// Measured frequencies further apart than this many resolutions leave a gap between them.
 const GAP_RESOLUTIONS: f64 = 2.0;
-/// Okabe and Ito's colours, which the colour-blind can tell apart: those of measured curves, those of models.
-const MEASURED: [RGBColor; 4] =
-    [RGBColor(0, 114, 178), RGBColor(0, 158, 115), RGBColor(204, 121, 167), RGBColor(86, 180, 233)];
-const MODEL: [RGBColor; 3] = [RGBColor(213, 94, 0), RGBColor(40, 40, 40), RGBColor(230, 159, 0)];
+/// Colours of measured curves, and of models.
+const MEASURED: [RGBColor; 4] = [BLUE, GREEN, PURPLE, SKY];
+const MODEL: [RGBColor; 3] = [VERMILION, INK, ORANGE];
 
 /// A curve with a name for the legend.
 #[derive(Clone, Debug)]

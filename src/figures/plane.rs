@@ -1,0 +1,114 @@
+//! Charts in the plane of s: poles, zeros, and where zeros migrate.
+
+use nalgebra::Complex;
+
+use super::FigureError;
+use super::model::Varied;
+use crate::report::colours::{BLUE, Colour, GREY, INK};
+use crate::report::{Chart, Mark, Pen, Scale, Symbol};
+use crate::zeros::{Change, Locus, ModalSum, Plane, Zero};
+
+/// A chart of the plane of s in rad/s, with its imaginary and real axis.
+pub(super) fn plane(heading: &str, re: (f64, f64), im: (f64, f64)) -> Chart {
+    Chart::new(
+        heading,
+        Scale::linear("Real part of s (rad/s)").within(re.0, re.1),
+        Scale::linear("Imaginary part of s (rad/s)").within(im.0, im.1),
+    )
+    .line("", Pen::solid(GREY).thin(), vec![(re.0, 0.0), (re.1, 0.0)])
+    .line("", Pen::solid(GREY).thin(), vec![(0.0, im.0), (0.0, im.1)])
+}
+
+/// Poles of a sum in the upper half plane.
+pub(super) fn poles(sum: &ModalSum) -> Vec<(f64, f64)> {
+    let pole = |w: f64, zeta: f64| (-zeta * w, w * (1.0 - zeta * zeta).max(0.0).sqrt());
+    sum.terms().iter().map(|term| pole(term.omega_rad_s, term.damping_ratio)).collect()
+}
+
+/// Zeros in the upper half plane, the real axis included.
+pub(super) fn places(zeros: &[Zero]) -> Vec<(f64, f64)> {
+    zeros.iter().filter(|zero| zero.s.im >= 0.0).map(|zero| (zero.s.re, zero.s.im)).collect()
+}
+
+/// Which part of the plane is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// All zeros mirrored into the first quadrant.
+    Quadrant,
+    /// The upper half, of zeros without damping: one track stands for s and -s.
+    Upper,
+    /// Zeros with damping, each by itself.
+    Damped,
+}
+
+/// Zeros of a plant over a setting, dense where they meet.
+pub(super) fn locus(varied: &Varied, plane: Plane, values: &[f64]) -> Result<Locus, FigureError> {
+    follow(plane, values, |value| {
+        let sum = varied.sum(value)?;
+        Ok(if plane == Plane::Undamped { sum.undamped_zeros()? } else { sum.damped_zeros()? })
+    })
+}
+
+/// Follows zeros twice: the second time with values close to those where they meet, beside which they run as the root of
+/// the distance.
+pub(super) fn follow(
+    plane: Plane,
+    values: &[f64],
+    mut zeros: impl FnMut(f64) -> Result<Vec<Zero>, FigureError>,
+) -> Result<Locus, FigureError> {
+    let first = Locus::follow(plane, values, &mut zeros)?;
+    let (low, high) = (values[0].min(values[values.len() - 1]), values[0].max(values[values.len() - 1]));
+    let mut all = values.to_vec();
+    for change in &first.changes {
+        let beside = (0..28).map(|k| (high - low) * 0.5f64.powi(k) * 0.05);
+        all.extend(beside.flat_map(|step| [change.value - step, change.value + step]));
+    }
+    all.retain(|value| (low..=high).contains(value));
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    if values[0] > values[values.len() - 1] {
+        all.reverse();
+    }
+    Locus::follow(plane, &all, zeros)
+}
+
+/// The tracks of a locus as lines of one pen.
+pub(super) fn tracks(mut chart: Chart, name: &str, pen: Pen, locus: &Locus, part: Part) -> Chart {
+    let mut name = name;
+    for track in &locus.tracks {
+        for points in views(track, part) {
+            chart = chart.mark(Mark::Line { name: name.into(), pen, points, directed: false });
+            name = "";
+        }
+    }
+    chart
+}
+
+/// A track as it is seen: without damping one of a pair s, -s stands for both.
+fn views(track: &[Option<Complex<f64>>], part: Part) -> Vec<Vec<(f64, f64)>> {
+    let seen = |of: fn(Complex<f64>) -> (f64, f64)| {
+        track.iter().map(|s| s.map_or((f64::NAN, f64::NAN), of)).collect::<Vec<_>>()
+    };
+    match part {
+        Part::Quadrant => vec![seen(|s| (s.re.abs(), s.im.abs()))],
+        Part::Damped => vec![seen(|s| (s.re, s.im))],
+        Part::Upper => vec![seen(|s| (s.re, s.im)), seen(|s| (-s.re, -s.im))],
+    }
+}
+
+/// Where zeros meet, on the axes.
+pub(super) fn changes(chart: Chart, locus: &Locus) -> Chart {
+    let finite = |change: &&Change| change.s.re.is_finite() && change.s.norm() > 0.0;
+    let points: Vec<(f64, f64)> = locus.changes.iter().filter(finite).map(|c| (c.s.re, c.s.im)).collect();
+    if points.is_empty() { chart } else { chart.points("zeros meet", INK, Symbol::Dot, points) }
+}
+
+/// Poles and zeros of one plant.
+pub(super) fn pole_zero(chart: Chart, names: (&str, &str), colour: Colour, sum: &ModalSum, zeros: &[Zero]) -> Chart {
+    chart.points(names.0, INK, Symbol::Cross, poles(sum)).points(
+        names.1,
+        if colour == INK { BLUE } else { colour },
+        Symbol::Ring,
+        places(zeros),
+    )
+}
