@@ -12,8 +12,8 @@
 
 mod bode;
 //mod chapter1;
-//mod chapter2;
-//mod chapter3;
+mod chapter2;
+mod chapter3;
 //mod chapter4;
 mod chapter6;
 mod content;
@@ -23,7 +23,7 @@ mod model;
 mod page;
 mod plane;
 mod registry;
-//mod tables;
+mod tables;
 mod write;
 
 pub use content::{Comparison, Content, Verdict};

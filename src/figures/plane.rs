@@ -6,7 +6,7 @@ use super::FigureError;
 use super::model::Varied;
 use crate::report::colours::{BLUE, Colour, GREY, INK};
 use crate::report::{Chart, Mark, Pen, Scale, Symbol};
-use crate::zeros::{Change, Locus, ModalSum, Plane, Zero};
+use crate::zeros::{Change, Locus, ModalSum, Plane, Zero, damped_zeros, undamped_zeros};
 
 /// A chart of the plane of s in rad/s, with its imaginary and real axis.
 pub(super) fn plane(heading: &str, re: (f64, f64), im: (f64, f64)) -> Chart {
@@ -44,8 +44,8 @@ pub(super) enum Part {
 /// Zeros of a plant over a setting, dense where they meet.
 pub(super) fn locus(varied: &Varied, plane: Plane, values: &[f64]) -> Result<Locus, FigureError> {
     follow(plane, values, |value| {
-        let sum = varied.sum(value)?;
-        Ok(if plane == Plane::Undamped { sum.undamped_zeros()? } else { sum.damped_zeros()? })
+        let structure = varied.structure(value)?;
+        Ok(if plane == Plane::Undamped { undamped_zeros(&structure)? } else { damped_zeros(&structure)? })
     })
 }
 

@@ -1,6 +1,9 @@
 //! All figures and tables: one line each, in the order of the thesis.
 
+use super::chapter2::*;
+use super::chapter3::*;
 use super::chapter6::*;
+use super::tables::*;
 use super::{Content, FigureError, Workshop};
 
 /// A figure or table of the thesis.
@@ -64,6 +67,42 @@ const fn not(number: &'static str, title: &'static str, why: &'static str) -> En
 
 /// All entries.
 pub const FIGURES: &[Entry] = &[
+    not("2-1", "Double parallelogram flexure module (DPFM)", "a drawing of the mechanism without figures"),
+    not("2-2", "Simple representative flexure mechanism", "a drawing of the mechanism; its stages stand in Fig 2-3"),
+    draw("2-3", "Mode shapes of the SR4DoF", fig_2_3),
+    draw("2-4", "G(s) for different operating points and mass asymmetry", fig_2_4),
+    draw("2-5", "Contour map of the Δ function", fig_2_5),
+    draw("2-6", "Eigenvalue loci and eigenvector elements of the 3rd and 4th modes", fig_2_6),
+    draw("table-2-2", "Eigenvectors of the SR4DoF mechanism at 5 % of L", table_2_2),
+    draw("table-2-3", "Deviations of masses that cause different phase drops", table_2_3),
+    not(
+        "3-1",
+        "Definition of all types of zeros",
+        "a drawing of names; `bench model modes` prints the kind of each zero",
+    ),
+    draw("3-2", "Migration of zeros (double integrator + single mode)", fig_3_2),
+    draw("3-3", "Bode plot of G(s) in decomposed modes showing MMP zeros", fig_3_3),
+    draw("3-4", "Decomposed modes under different modal residues (double integrator + single mode)", fig_3_4),
+    draw("3-5", "Numerical comparison: MMP case and RMP-RNMP case", fig_3_5),
+    draw("3-6", "Nyquist plot of G(s): MMP case and RMP-RNMP case", fig_3_6),
+    not(
+        "3-7",
+        "Example of second order modes in the negative direction",
+        "a drawing of a cart without parameters, and a Nyquist plot of a loop without controller; Fig 3-14 shows such loops",
+    ),
+    draw("3-8", "Migration of zeros (two second order modes)", fig_3_8),
+    draw("3-9", "The locus of zeros under different values of αu/αv", fig_3_9),
+    draw("3-10", "The family of the zero locus of G(s)", fig_3_10),
+    draw("3-11", "Decomposed modes under different modal residues (double integrator + two modes)", fig_3_11),
+    draw("3-12", "Numerical example of a system with CNMP zeros, under different α0", fig_3_12),
+    draw("3-13", "Nyquist plot of G(s) showing the phase change", fig_3_13),
+    draw("3-14", "Nyquist plot of open loop transfer functions under different situations", fig_3_14),
+    draw("3-15", "Migration of zeros with non-zero damping ratios (two modes)", fig_3_15),
+    draw("3-16", "Migration of zeros under different damping ratios (two modes with a remainder)", fig_3_16),
+    draw("table-3-1", "Sequences of dominant modes and zero types (double integrator + mode)", table_3_1),
+    draw("table-3-2", "Sequences of dominant modes and zero types (two modes)", table_3_2),
+    draw("table-3-3", "Sequences of dominant modes and zero types (double integrator + two modes)", table_3_3),
+    draw("table-3-4", "Sequences of dominant modes and zero types (two modes + constant)", table_3_4),
     not("6-1", "Classic control loop with unity feedback", "a block diagram without figures"),
     draw("6-2", "Characteristics of a controller with a bandwidth below the first resonance", fig_6_2),
     draw("6-3", "Properties of the numerical set 7.98, −1.65, 1.52", fig_6_3),

@@ -36,21 +36,29 @@ pub(super) fn ports(s: &Sr4dofSettings) -> Vec<Port> {
     let [x4, x5] = [[1.0, a, -2.0 * a, 0.0], [1.0, -a, 0.0, 2.0 * a]];
     let rows = [("x1", X1), ("x2", x2), ("x3", x3), ("x4", x4), ("x5", x5), ("y1", Y1), ("y2", Y2), ("y3", Y3)];
     rows.into_iter().map(|(name, row)| Port::new(name, &row)).collect()
+/// Displacements x and y of the stages 1 to 5 (Fig 2-2), over the degrees of freedom [x1, y1, y2, y3].
+pub(crate) fn stages(s: &Sr4dofSettings) -> [[[f64; 4]; 2]; 5] {
+    let a = 0.6 * s.operating_point_m / s.beam_length_m;
+    [
+        [X1, Y1],
+        [[1.0, a, -a, 0.0], Y2],
+        [[1.0, -a, 0.0, a], Y3],
+        [[1.0, a, -2.0 * a, 0.0], NONE],
+        [[1.0, -a, 0.0, 2.0 * a], NONE],
+    ]
 }
 
 /// The same with C = 0, whatever the damping of the settings.
 pub(crate) fn undamped(s: &Sr4dofSettings) -> Structure {
-    let a = 0.6 * s.operating_point_m / s.beam_length_m;
     let m3 = s.secondary_stage_mass_kg;
     let k = Beam::from(s).parallelogram_n_per_m();
-    let x4 = [1.0, a, -2.0 * a, 0.0];
-    let x5 = [1.0, -a, 0.0, 2.0 * a];
+    let rows = stages(s);
+    let (x4, x5) = (rows[3][0], rows[4][0]);
+    let (m1, m2, m4) = (s.motion_stage_mass_kg, m3 * (1.0 + s.mass_asymmetry), s.intermediate_stage_mass_kg);
     let mut parts = Assembly::new(4);
-    parts.mass(s.motion_stage_mass_kg, &X1, &Y1);
-    parts.mass(m3 * (1.0 + s.mass_asymmetry), &[1.0, a, -a, 0.0], &Y2);
-    parts.mass(m3, &[1.0, -a, 0.0, a], &Y3);
-    parts.mass(s.intermediate_stage_mass_kg, &x4, &NONE);
-    parts.mass(s.intermediate_stage_mass_kg, &x5, &NONE);
+    for (kilograms, [x, y]) in [m1, m2, m3, m4, m4].into_iter().zip(&rows) {
+        parts.mass(kilograms, x, y);
+    }
     for along in [&Y12, &Y2, &Y13, &Y3] {
         parts.spring(k, along);
     }

@@ -85,6 +85,11 @@ impl Axis {
         self.linear_ticks(step, plain)
     }
 
+    /// The same, at whole multiples of 30 degrees where there is less than half a turn.
+    pub fn degree_ticks(&self) -> Vec<Tick> {
+        if self.high - self.low < 185.0 { self.linear_ticks(30.0, plain) } else { self.phase_ticks() }
+    }
+
     /// Ticks at whole multiples of a step.
     pub fn linear_ticks(&self, step: f64, label: impl Fn(f64) -> String) -> Vec<Tick> {
         let (first, last) = ((self.low / step - 1e-9).ceil() as i64, (self.high / step + 1e-9).floor() as i64);

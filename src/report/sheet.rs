@@ -300,7 +300,7 @@ fn ticks(scale: &Scale, axis: &Axis, pixels: f64) -> Vec<Tick> {
     match scale.kind {
         ScaleKind::Logarithmic if pixels == TICK.0 => axis.frequency_ticks(),
         ScaleKind::Logarithmic => axis.magnitude_ticks(),
-        ScaleKind::Degrees => axis.phase_ticks(),
+        ScaleKind::Degrees => axis.degree_ticks(),
         ScaleKind::Linear => axis.even_ticks(pixels),
         ScaleKind::Blank => Vec::new(),
     }

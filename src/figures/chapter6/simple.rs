@@ -96,14 +96,14 @@ pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
         loops.iter().enumerate().map(|(k, of)| Curve::new(&name(k), pen(k), open(of, 0.1, 100.0))).collect();
     let ts: Vec<Curve> = ls.iter().map(|l| Curve::new(&l.name, l.pen, closed(&l.points))).collect();
     let (a, a_phase) = bode("(a) Open loop L = P C", W, "|L|", &ls[1..2]);
-    let (c, _) = bode("(c) Closed loop T = L/(1 + L)", W, "|T|", &ts);
+    let (c, c_phase) = bode("(c) Closed loop T = L/(1 + L)", W, "|T|", &ts);
     let b = ls.iter().fold(critical(nyquist("(b) Nyquist plot of L", (-1.6, 3.4), (-2.5, 2.5), "L")), |chart, l| {
         chart.directed(&l.name, l.pen, l.polar())
     });
     let d = Chart::new(
         "(d) Step response of T",
         Scale::linear("Time (s)").within(0.0, 12.0),
-        Scale::linear("Position over height of the step (1)"),
+        Scale::linear("Position/step (1)"),
     )
     .line("ζ = 0.01", pen(1), step(&loops[1], 12.0));
     let margins: Vec<_> = loops.iter().map(|of| of.margins(true)).collect();
@@ -117,8 +117,8 @@ pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
         .setting("plant of Eq. (6-1), w = 10 rad/s, damping ratio 0.01 where no other is named; controller of Eq. (6-2); continuous time, the step sampled at 5 kHz")
         .assumed("damping ratios of the other two curves: 0.001 and 0.05")
         .row(190.0, [a, c])
-        .row(150.0, [a_phase, d])
-        .row(420.0, [b])
+        .row(160.0, [a_phase, c_phase])
+        .row(400.0, [b, d])
         .compare(Comparison::within("crossover as a ratio of the first resonance", 0.1, 1, margins[1].crossover_rad_s.unwrap_or(f64::NAN) / 10.0, "", 0.05))
         .compare(Comparison::holds("modulus margin with damping 0.001, 0.01, 0.05", "unchanged regardless of the damping ratio", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02: the circle of the resonance grows away from -1"))
         .compare(Comparison::holds("peak of |T| at the resonance with damping 0.001, 0.01, 0.05, in dB", "the smaller the damping, the closer to 0 dB", decibels[0].abs() < decibels[1].abs() && decibels[1].abs() < decibels[2].abs(), &listed(&decibels, 2)))
@@ -256,7 +256,7 @@ pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
         .row(150.0, [gain, phase])
         .row(430.0, [wide, near])
         .compare(Comparison::within("crossover (printed: around 4)", 4.0, 0, margins[1].crossover_rad_s.unwrap_or(f64::NAN), "rad/s", 0.5))
-        .compare(Comparison::within("modulus margin (printed: around 0.5)", 0.5, 1, moduli[1], "", 0.05))
+        .compare(Comparison::within("modulus margin (printed: around 0.5)", 0.5, 1, moduli[1], "", 0.05).remark("with Eq. (6-4) exactly as printed; the thesis gives crossover and margin as round figures"))
         .compare(Comparison::holds("modulus margin with damping 0.0005, 0.001, 0.002, 0.01", "unchanged", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02"))
         .compare(Comparison::holds("closed loop", "stable", margins.iter().all(|m| m.stable), if margins.iter().all(|m| m.stable) { "stable with all four" } else { "unstable" }))
         .file(file, &text)
@@ -315,7 +315,7 @@ pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
             "a stability problem: the circle of mode v cannot be turned to a safe place",
             !margins[1].stable || margins[1].modulus_margin < 0.5 * margins[0].modulus_margin,
             &verdict(&margins[1]),
-        )))
+        ).remark("with the printed numbers the loop stays stable, but the circle of mode v has turned towards -1 and the modulus margin falls")))
 }
 
 fn verdict(margins: &crate::control::Margins) -> String {

@@ -88,14 +88,16 @@ fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
     let of = closed_loop(&model, which.name(), None)?;
     let l = Curve::new("", pen(which), open(&of, 1.0, 3000.0));
     let (gain, phase) = bode("(a) Bode plot of L", W, "|L|", std::slice::from_ref(&l));
-    let nyquist =
-        critical(nyquist("(b) Nyquist plot of L", (-2.5, 2.5), (-2.5, 2.5), "L")).directed("", l.pen, l.polar());
+    let size = l.points.iter().filter(|(w, _)| *w > 60.0).map(|(_, l)| l.norm()).fold(1.5, f64::max);
+    let polar = |heading: &str, size: f64| {
+        critical(nyquist(heading, (-size, size), (-size, size), "L")).directed("", l.pen, l.polar())
+    };
+    let (wide, near) = (polar("(b) Nyquist plot of L", 1.05 * size), polar("(b) the same near −1", 1.5));
     let margins = of.margins(true);
     let content = Content::new(&format!("Open loop of the {} controller, {equation}, with the model of the stage.", which.name()))
         .setting("profile stage, mass asymmetry +10 %, operating point 8 % of L; continuous time, without hold, delay and amplifier")
-        .row(230.0, [gain])
-        .row(190.0, [phase])
-        .row(470.0, [nyquist]);
+        .row(220.0, [gain, phase])
+        .row(410.0, [wide, near]);
     let content = with_margins(content, which, &margins, "");
     Ok(content.command(model.command("margins", &format!("--{} --continuous", which.name()))))
 }
@@ -183,11 +185,7 @@ pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
         .fold(f64::INFINITY, f64::min);
     let (a, a_phase) = bode("(a) Closed loop T = L/(1 + L)", W, "|T|", &curves);
     let b = steps.into_iter().fold(
-        Chart::new(
-            "(b) Step response",
-            Scale::linear("Time (s)").within(0.0, 0.4),
-            Scale::linear("Position over height of the step (1)"),
-        ),
+        Chart::new("(b) Step response", Scale::linear("Time (s)").within(0.0, 0.4), Scale::linear("Position/step (1)")),
         |chart, (which, course)| chart.line(which.name(), pen(which), course),
     );
     Ok(content.row(230.0, [a]).row(180.0, [a_phase]).row(280.0, [b]).compare(Comparison::holds(
