@@ -11,10 +11,10 @@
 //! stand below it. To add one: a function that gives a [`Content`], and a line in `registry.rs`.
 
 mod bode;
-//mod chapter1;
+mod chapter1;
 mod chapter2;
 mod chapter3;
-//mod chapter4;
+mod chapter4;
 mod chapter6;
 mod content;
 mod error;

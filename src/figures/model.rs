@@ -63,12 +63,6 @@ impl Model {
         format!("bench {what}{}{sets}{more}", profile.unwrap_or_default())
     }
 
-    /// Profile and settings in words.
-    pub fn words(&self) -> String {
-        let sets: String = self.sets.iter().map(|set| format!(", {set}")).collect();
-        format!("profile {}{sets}", self.profile.unwrap_or("stage"))
-    }
-
     /// The effective configuration.
     pub fn config(&self) -> Result<Config, FigureError> {
         let source = Source { config: self.profile.map(String::from), sets: self.sets.clone(), ..Source::default() };

@@ -1,7 +1,9 @@
 //! All figures and tables: one line each, in the order of the thesis.
 
+use super::chapter1::*;
 use super::chapter2::*;
 use super::chapter3::*;
+use super::chapter4::*;
 use super::chapter6::*;
 use super::tables::*;
 use super::{Content, FigureError, Workshop};
@@ -67,6 +69,15 @@ const fn not(number: &'static str, title: &'static str, why: &'static str) -> En
 
 /// All entries.
 pub const FIGURES: &[Entry] = &[
+    not("1-1", "A comparison between different mechanisms", "drawings and photographs"),
+    not(
+        "1-2",
+        "The XY flexure mechanism and its system identification",
+        "a drawing, and a measurement whose data are not printed; Table 2-3 has the phase drops of its model",
+    ),
+    draw("1-3", "Geometric illustration of the opening angle", fig_1_3),
+    draw("1-4", "Geometric illustration of NMP zeros' limitation", fig_1_4),
+    not("1-5", "Illustration of research framework and related tasks", "a diagram of chapters"),
     not("2-1", "Double parallelogram flexure module (DPFM)", "a drawing of the mechanism without figures"),
     not("2-2", "Simple representative flexure mechanism", "a drawing of the mechanism; its stages stand in Fig 2-3"),
     draw("2-3", "Mode shapes of the SR4DoF", fig_2_3),
@@ -103,6 +114,48 @@ pub const FIGURES: &[Entry] = &[
     draw("table-3-2", "Sequences of dominant modes and zero types (two modes)", table_3_2),
     draw("table-3-3", "Sequences of dominant modes and zero types (double integrator + two modes)", table_3_3),
     draw("table-3-4", "Sequences of dominant modes and zero types (two modes + constant)", table_3_4),
+    draw("4-1", "3 DoF spring mass model", fig_4_1),
+    draw("4-2", "The parabola of CMP-CNMP zeros", fig_4_2),
+    not("4-3", "Spring-mass system with lever arms", "a drawing of a system without parameters"),
+    draw("4-4", "Change of sequence of the dominant mode due to curve veering", fig_4_4),
+    not(
+        "4-5",
+        "The spaces divided by the eigenvectors",
+        "drawn by `bench model placement`, for the sensor and actuator vectors of any profile; the thesis prints none",
+    ),
+    draw("4-6", "Dynamic properties with different values of k", fig_4_6),
+    draw("4-7", "Lumped parameter flexure model: the close modes", fig_4_7),
+    draw("4-8", "Dynamic properties of the SR4DoF flexure mechanism", fig_4_8),
+    draw("4-9", "Four DoF mass-spring model: the two modes of interest", fig_4_9),
+    draw("4-10", "Dynamic properties of the 4 DoF model", fig_4_10),
+    not("5-1", "Simple representative 4 DoF model", "a drawing, as Fig 2-2"),
+    draw("5-2", "Complex non-minimum phase zero map", fig_5_2),
+    not("5-3", "Illustration of geometric evolution", "drawings of designs"),
+    not("5-4", "Examples of un-modeled modes in Design-2", "shapes by finite elements of a part that is not printed"),
+    not("5-5", "Examples of un-modeled modes in Design-4", "shapes by finite elements of a part that is not printed"),
+    not("5-6", "Mode shapes of Design-4x", "shapes by finite elements of a part that is not printed"),
+    not("5-7", "Virtual pulley with long cable", "a drawing"),
+    not("5-8", "Experimental setup hardware", "a photograph"),
+    not(
+        "5-9",
+        "Experimental frequency response, asymmetry 10 %, operating point 8 %",
+        "a measurement whose data are not printed; Fig 6-7 has the same conditions on the simulated rig",
+    ),
+    not(
+        "5-10",
+        "Simulation and experimental results of the CNMP map",
+        "150 measurements whose data are not printed, over the map of Fig 5-2",
+    ),
+    not(
+        "5-11",
+        "Experimental frequency response, asymmetry 0 %, operating point 8 %",
+        "a measurement whose data are not printed; `bench chirp --asymmetry -2%` makes it on the simulated rig, with the estimated initial asymmetry",
+    ),
+    not(
+        "table-5-1",
+        "FEA results of each design",
+        "frequencies by finite elements of parts that are not printed; the unmodelled modes of Design-4x stand in the profile stage",
+    ),
     not("6-1", "Classic control loop with unity feedback", "a block diagram without figures"),
     draw("6-2", "Characteristics of a controller with a bandwidth below the first resonance", fig_6_2),
     draw("6-3", "Properties of the numerical set 7.98, −1.65, 1.52", fig_6_3),
