@@ -14,17 +14,27 @@ pub(super) struct Curve {
     pub pen: Pen,
     /// Frequency (rad/s or Hz) and value.
     pub points: Vec<(f64, Complex<f64>)>,
+    /// Phase of the first point, where it is known from lower frequencies.
+    first_deg: Option<f64>,
 }
 
 impl Curve {
     pub fn new(name: &str, pen: Pen, points: Vec<(f64, Complex<f64>)>) -> Curve {
-        Curve { name: name.into(), pen, points }
+        Curve { name: name.into(), pen, points, first_deg: None }
     }
 
     /// Frequencies in hertz instead of rad/s.
     pub fn in_hertz(mut self) -> Curve {
         self.points.iter_mut().for_each(|point| point.0 /= std::f64::consts::TAU);
         self
+    }
+
+    /// A range of it; its phase goes on from below.
+    pub fn part(&self, low: f64, high: f64) -> Curve {
+        let inside = |w: f64| (low..=high).contains(&w);
+        let points = self.points.iter().filter(|(w, _)| inside(*w)).copied().collect();
+        let first_deg = self.phase_deg().into_iter().find(|(w, _)| inside(*w)).map(|(_, phase)| phase);
+        Curve { first_deg, ..Curve::new(&self.name, self.pen, points) }
     }
 
     pub fn magnitude(&self) -> Vec<(f64, f64)> {
@@ -35,7 +45,11 @@ impl Curve {
     pub fn phase_deg(&self) -> Vec<(f64, f64)> {
         let wrapped: Vec<f64> = self.points.iter().map(|(_, value)| value.arg().to_degrees()).collect();
         let phases = unwrapped_deg(&wrapped, &vec![true; wrapped.len()]);
-        let turn = if phases.first().is_some_and(|first| *first > 90.0) { 360.0 } else { 0.0 };
+        let turn = match (phases.first(), self.first_deg) {
+            (Some(first), Some(known)) => 360.0 * ((first - known) / 360.0).round(),
+            (Some(first), None) if *first > 90.0 => 360.0,
+            _ => 0.0,
+        };
         self.points.iter().zip(phases).map(|((w, _), phase)| (*w, phase - turn)).collect()
     }
 

@@ -81,7 +81,7 @@ pub(super) fn fig_1_4(_: &Workshop) -> Result<Content, FigureError> {
     let z2 = Complex::new(1.4, 1.4);
     let smaller = bandwidth_rad_s(z2, angle);
     let (centre_2, radius_2) = circle_of(smaller, angle);
-    let outside = vec![(-3.0, -6.0), (9.0, -6.0), (9.0, 6.0), (-3.0, 6.0)];
+    let outside = vec![(-99.0, -99.0), (99.0, -99.0), (99.0, 99.0), (-99.0, 99.0)];
     let chart = plane("", (-3.0, 9.0), (-4.5, 4.5)).equal();
     let chart = chart
         .mark(Mark::Area { name: "zeros here cost less".into(), colour: BLUE, strength: 0.12, outline: outside })

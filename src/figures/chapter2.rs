@@ -57,7 +57,7 @@ fn shape_chart(heading: &str, mode: &Mode, rows: &[[[f64; 4]; 2]; 5]) -> Chart {
     let moves: Vec<(f64, f64)> = rows.iter().map(|[x, y]| (along(x), along(y))).collect();
     let largest = moves.iter().map(|m| m.0.hypot(m.1)).fold(0.0, f64::max);
     let mut chart =
-        Chart::new(heading, Scale::blank("X").within(-5.2, 5.2), Scale::blank("Y").within(-1.6, 2.6)).equal();
+        Chart::new(heading, Scale::blank("X").within(-5.2, 5.2), Scale::blank("Y").within(-1.4, 2.6)).equal();
     let beams = [3, 1, 0, 2, 4].map(|k: usize| REST[k]);
     chart = chart.line("", Pen::solid(GREY).thin(), beams.to_vec());
     for (k, (place, motion)) in REST.iter().zip(&moves).enumerate() {
@@ -70,7 +70,7 @@ fn shape_chart(heading: &str, mode: &Mode, rows: &[[[f64; 4]; 2]; 5]) -> Chart {
                 outline: boxed(*place),
             })
             .line("", Pen::solid(INK).thin(), boxed(*place))
-            .text(*place, (0.0, 22.0), &(k + 1).to_string());
+            .text(*place, (0.0, if motion.1 < -0.1 * largest { -24.0 } else { 24.0 }), &(k + 1).to_string());
         chart = arrow(chart, *place, to);
     }
     chart
@@ -86,7 +86,7 @@ pub(super) fn fig_2_3(_: &Workshop) -> Result<Content, FigureError> {
     let mut content = Content::new("Mode shapes 2 to 4 of the SR4DoF: each stage in its place at the operating point, arrows in proportion to its motion, the longest arrow of each mode equally long.")
         .setting(format!("{PLANT}; operating point 5 % of L, asymmetry 0"))
         .assumed("the drawing of the stages; the thesis draws the mechanism")
-        .row(170.0, [chart(1, 'a'), chart(2, 'b'), chart(3, 'c')])
+        .row(190.0, [chart(1, 'a'), chart(2, 'b'), chart(3, 'c')])
         .command(model.command("model modes", ""));
     for (k, printed) in [(1, 27.6), (2, 153.2), (3, 154.3)] {
         let computed = modal.modes[k].omega_rad_s / TAU;
@@ -107,7 +107,7 @@ pub(super) fn fig_2_4(_: &Workshop) -> Result<Content, FigureError> {
     let mut content = Content::new("The transfer function G(s) from the force on stage 4 to the displacement of stage 1 at three operating points, without and with mass asymmetry.")
         .setting(format!("{PLANT}; damping ratio 0.001 in all modes"))
         .assumed("operating points between the printed ends of 0 and 5 % of L: 2.5 %");
-    let (mut gains, mut phases) = (Vec::new(), Vec::new());
+    let (mut gains, mut phases, mut near, mut near_phases) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (heading, asymmetry, drop) in [("Asymmetry 0 %", 0.0, 0.0), ("Asymmetry 5 %", 0.05, 360.0)] {
         let curve = |(point, colour): &(f64, Colour)| {
             let sum = chapter2(*point, asymmetry).sum()?;
@@ -118,6 +118,10 @@ pub(super) fn fig_2_4(_: &Workshop) -> Result<Content, FigureError> {
         let (gain, phase) = bode(heading, "Frequency (Hz)", "|G| (m/N)", &curves);
         gains.push(gain);
         phases.push(phase);
+        let close: Vec<Curve> = curves.iter().map(|curve| curve.part(145.0, 160.0)).collect();
+        let (gain, phase) = bode(&format!("{heading}, the close modes"), "Frequency (Hz)", "|G| (m/N)", &close);
+        near.push(gain);
+        near_phases.push(phase);
         let model = chapter2(0.05, asymmetry);
         let computed = phase_drop_deg(&undamped_zeros(&model.structure()?)?);
         content = content
@@ -130,7 +134,7 @@ pub(super) fn fig_2_4(_: &Workshop) -> Result<Content, FigureError> {
             ))
             .command(model.command("model modes", ""));
     }
-    Ok(content.row(240.0, gains).row(200.0, phases))
+    Ok(content.row(220.0, gains).row(160.0, phases).row(220.0, near).row(180.0, near_phases))
 }
 
 /// The discriminant of Eq. (2-8), b3^4 times the product of (ui - uj)^2 over the three zeros u = s^2, and whether two of them
@@ -151,14 +155,14 @@ fn discriminant(settings: &Sr4dofSettings) -> Result<(f64, bool), FigureError> {
 
 /// Light to dark, alike for the colour-blind and in print.
 const SHADES: [(&str, Colour); 6] = [
-    ("below 10⁻⁶", Colour(8, 64, 129)),
-    ("10⁻⁶ to 10⁻⁴", Colour(43, 140, 190)),
-    ("10⁻⁴ to 10⁻³", Colour(78, 179, 211)),
-    ("10⁻³ to 10⁻²", Colour(123, 204, 196)),
-    ("10⁻² to 10⁻¹", Colour(186, 228, 188)),
-    ("above 10⁻¹", Colour(240, 249, 220)),
+    ("below 0.01", Colour(8, 64, 129)),
+    ("0.01 to 0.03", Colour(43, 140, 190)),
+    ("0.03 to 0.1", Colour(78, 179, 211)),
+    ("0.1 to 0.3", Colour(123, 204, 196)),
+    ("0.3 to 1", Colour(186, 228, 188)),
+    ("above 1", Colour(240, 249, 220)),
 ];
-const LIMITS: [f64; 5] = [1e-6, 1e-4, 1e-3, 1e-2, 1e-1];
+const LIMITS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 
 /// Edges of cells around values at equal distances.
 fn edges(values: &[f64]) -> Vec<f64> {
@@ -203,7 +207,7 @@ pub(super) fn fig_2_5(_: &Workshop) -> Result<Content, FigureError> {
     let mut cuts = Chart::new(
         "(b) Cuts through Δ, in place of the 3D view",
         Scale::linear("Operating point (% of L)").within(0.0, 15.0),
-        Scale::linear("Δ over its value at asymmetry 5 %, 0 % of L").within(-0.25, 1.1),
+        Scale::linear("Δ/Δ(5 %, 0 % of L)").within(-0.6, 2.6),
     )
     .line("", Pen::solid(GREY).thin(), vec![(0.0, 0.0), (15.0, 0.0)]);
     let five = discriminant(&there(0.0, 0.05))?.0;

@@ -116,7 +116,7 @@ pub(super) fn fig_4_2(_: &Workshop) -> Result<Content, FigureError> {
     };
     let curve = |residue: f64| even(-3.0, 1.0, 201).into_iter().map(|x| (x, parabola(residue, x))).collect::<Vec<_>>();
     let marked = |chart: Chart| {
-        chart.points("", INK, Symbol::Dot, vec![(-1.0, 1.0), (-2.0, 2.0)]).text((-1.0, 1.0), (16.0, 8.0), "Pu").text(
+        chart.points("", INK, Symbol::Dot, vec![(-1.0, 1.0), (-2.0, 2.0)]).text((-1.0, 1.0), (-14.0, 14.0), "Pu").text(
             (-2.0, 2.0),
             (16.0, -8.0),
             "Pv",
@@ -234,22 +234,19 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    fn curves(&self, band: (f64, f64)) -> Result<Vec<Curve>, FigureError> {
+    fn curves(&self) -> Result<Vec<Curve>, FigureError> {
         let varied = self.model.varied(self.key)?;
         let curve = |(name, value, colour): &(String, f64, Colour)| {
-            let mut curve = Curve::new(
-                name,
-                Pen::solid(*colour),
-                response(&varied.sum(*value)?, band.0 * self.per, band.1 * self.per)?,
-            );
-            curve.points.iter_mut().for_each(|point| point.0 /= self.per);
-            Ok(curve)
+            let points = response(&varied.sum(*value)?, self.band.0 * self.per, self.band.1 * self.per)?;
+            let points = points.into_iter().map(|(w, g)| (w / self.per, g)).collect();
+            Ok(Curve::new(name, Pen::solid(*colour), points))
         };
         self.cases.iter().map(curve).collect()
     }
 
     fn bode(&self, heading: &str, band: (f64, f64)) -> Result<(Chart, Chart), FigureError> {
-        Ok(bode(heading, self.frequency, "|G| (m/N)", &self.curves(band)?))
+        let parts: Vec<Curve> = self.curves()?.iter().map(|curve| curve.part(band.0, band.1)).collect();
+        Ok(bode(heading, self.frequency, "|G| (m/N)", &parts))
     }
 
     fn locus(&self) -> Result<Locus, FigureError> {
@@ -286,18 +283,18 @@ pub(super) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> {
     let study = Study {
         model: &model,
         key: K,
-        values: even(0.0, 0.06, 121),
+        values: even(0.0, 0.13, 131),
         cases: vec![("k = 0".into(), 0.0, BLUE), ("k = 0.02".into(), 0.02, VERMILION)],
         band: (0.1, 2.0),
         per: 1.0,
         frequency: W,
-        re: (-0.03, 0.03),
-        im: (1.03, 1.13),
+        re: (-0.035, 0.035),
+        im: (1.02, 1.12),
     };
     let (a, a_phase) = study.bode("(a) Bode plot", study.band)?;
     let (near, near_phase) = study.bode("(a) the close modes", (1.0, 1.15))?;
     let locus = study.locus()?;
-    let map = study.map("(b) Poles and zeros of the close modes, k from 0 to 0.06 N/m", &locus)?;
+    let map = study.map("(b) Poles and zeros of the close modes, k from 0 to 0.13 N/m", &locus)?;
     let quartet = undamped_zeros(&three_mass(0.02).structure()?)?;
     let zero = quartet
         .iter()
@@ -308,7 +305,7 @@ pub(super) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> {
     let words: Vec<String> = back.iter().map(|k| signed(*k, 5)).collect();
     Ok(Content::new("Three masses of Fig 4-1a without and with a coupling near the veering point: Bode plot, and the migration of poles and zeros.")
         .setting("profile three-mass: mb = 10 kg, mv = 1.01 kg, β as printed in section 4.4.1; damping ratio 0.001 in the Bode plot, none in (b)")
-        .assumed("the migration is followed on to k = 0.06 N/m")
+        .assumed("the migration is followed on to k = 0.13 N/m")
         .row(200.0, [a, near])
         .row(160.0, [a_phase, near_phase])
         .row(380.0, [map])
@@ -317,7 +314,7 @@ pub(super) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> {
         .compare(Comparison::unprinted("CNMP zero at k = 0.02 N/m", format!("{} + {}j rad/s", signed(zero.re, 4), signed(zero.im, 4))))
         .compare(Comparison::holds("as k grows further", "the zeros move back onto the imaginary axis", back.len() >= 2, &format!("they leave and come back at k = {} N/m", words.join(", "))))
         .command(three_mass(0.02).command("model modes", ""))
-        .command(model.command("model locus", &format!("--vary {K} --from 0 --to 0.06"))))
+        .command(model.command("model locus", &format!("--vary {K} --from 0 --to 0.13"))))
 }
 
 fn sr4dof(asymmetry: f64) -> Model {
@@ -408,7 +405,7 @@ pub(super) fn fig_4_9(_: &Workshop) -> Result<Content, FigureError> {
         .setting("profile four-mass")
         .assumed("k23 from 0 to 300 N/m")
         .row(340.0, [drawn(chart, "modes of m2 and m3", Pen::solid(VERMILION), &pair, (1.0, 1.0))])
-        .compare(Comparison::words("the loci are", "veering", pair.meeting))
+        .compare(Comparison::words("the loci are", "veering", pair.meeting).remark("the printed masses and springs are symmetric (1 with 4, 2 with 3), and the two modes of different symmetry: they cross, the special case of veering of section 4.1"))
         .compare(Comparison::unprinted("veering point", format!("k23 = {} N/m, {} rad/s", signed(pair.value, 2), signed(pair.omega_rad_s, 4))))
         .command(model.command("model veering", &format!("--vary {K23} --from 0 --to 300"))))
 }

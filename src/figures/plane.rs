@@ -8,6 +8,9 @@ use crate::report::colours::{BLUE, Colour, GREY, INK};
 use crate::report::{Chart, Mark, Pen, Scale, Symbol};
 use crate::zeros::{Change, Locus, ModalSum, Plane, Zero, damped_zeros, undamped_zeros};
 
+/// Beyond every frame.
+const FAR: f64 = 1e9;
+
 /// A chart of the plane of s in rad/s, with its imaginary and real axis.
 pub(super) fn plane(heading: &str, re: (f64, f64), im: (f64, f64)) -> Chart {
     Chart::new(
@@ -15,8 +18,8 @@ pub(super) fn plane(heading: &str, re: (f64, f64), im: (f64, f64)) -> Chart {
         Scale::linear("Real part of s (rad/s)").within(re.0, re.1),
         Scale::linear("Imaginary part of s (rad/s)").within(im.0, im.1),
     )
-    .line("", Pen::solid(GREY).thin(), vec![(re.0, 0.0), (re.1, 0.0)])
-    .line("", Pen::solid(GREY).thin(), vec![(0.0, im.0), (0.0, im.1)])
+    .line("", Pen::solid(GREY).thin(), vec![(-FAR, 0.0), (FAR, 0.0)])
+    .line("", Pen::solid(GREY).thin(), vec![(0.0, -FAR), (0.0, FAR)])
 }
 
 /// Poles of a sum in the upper half plane.

@@ -23,7 +23,7 @@ const SWATCH: f64 = 26.0;
 /// Part of an axis left free beside what is drawn.
 const MARGIN: f64 = 0.05;
 /// Pixels a labelled tick takes at least, along and up.
-const TICK: (f64, f64) = (84.0, 44.0);
+const TICK: (f64, f64) = (64.0, 40.0);
 const SYMBOL: f64 = 4.5;
 /// Pixels between the arrow heads of a line, and their size.
 const ARROWS: (f64, f64) = (170.0, 7.0);
@@ -269,6 +269,8 @@ impl Cell<'_> {
                 let corner = |x, y| frame.nearest(self.at((x, y)));
                 let (a, c) = (corner(x[from], edges[0]), corner(x[to], edges[1]));
                 if let Some((_, colour)) = colours.get(run[0]) {
+                    // Half a pixel into the next row, which comes on top: no seam between them.
+                    let c = frame.nearest((c.0, c.1 - 0.5));
                     canvas.area(&[a, (c.0, a.1), c, (a.0, c.1)], (*colour).into())?;
                 }
                 from = to;

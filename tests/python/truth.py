@@ -15,6 +15,9 @@ with bench.
     bands     where along `operating_points` (ratios of L) there are CNMP zeros: their limits by bisection
     modal     zeros of constant + sum of r/(s^2 + 2 zeta w s + w^2) over `terms` [w, zeta, r], without and with damping, and
               their kinds, from polynomials of 60 digits; needs no `config`
+    points    real and imaginary part at each of `omega_rad_s` in continuous time: of the `plant` in m/N, or of the `loop`
+    course    the response of the sum of r/(s^2 + 2 zeta w s + w^2) over `terms` [w, zeta, r] to a unit step, at each of `time_s`;
+              needs no `config`
     angle     the integral of Eq. (1-2) for each of `zeros`, up to its `omega_0`; needs no `config`
     crossing  the operating point (ratio of L) at which the two close modes have the same frequency
     veering   the operating point between `limits` (ratios of L) where the third and the fourth mode are closest, their mean
@@ -524,6 +527,14 @@ def margins(q):
     }
 
 
+def points(q):
+    config, s = q["config"], 1j * np.array(q["omega_rad_s"])
+    plant = continuous_plant(config, s)
+    if q["of"] == "plant":
+        return complex_list(plant / config["motor"]["force_constant_n_per_a"])
+    return complex_list(plant * continuous_controller(config, s))
+
+
 # Time and noise ------------------------------------------------------------------------------------------------------
 
 
@@ -552,6 +563,17 @@ def step(q):
         "settling_time_s": settled / config["loop"]["rate_hz"] if settled < ticks else None,
         "overshoot_percent": 100 * max(0.0, float(y.max() - 1)),
     }
+
+
+def course(q):
+    terms = q["terms"]
+    A = la.block_diag(*[[[0, 1], [-w * w, -2 * zeta * w]] for w, zeta, _ in terms])
+    B = np.concatenate([[0.0, r] for _, _, r in terms])
+    C = np.tile([1.0, 0.0], len(terms))
+    # The step is one state more, which stands at 1.
+    whole = np.zeros((len(A) + 1, len(A) + 1))
+    whole[:-1, :-1], whole[:-1, -1] = A, B
+    return [float(C @ la.expm(whole * t)[:-1, -1]) for t in q["time_s"]]
 
 
 def sigma(q):
@@ -584,7 +606,7 @@ def sigma(q):
     return {"sigma_m": float(np.sqrt(variance)), "relative_spread": float(spread)}
 
 
-ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing, veering, modal, angle)}
+ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing, veering, modal, angle, points, course)}
 
 if __name__ == "__main__":
     json.dump([ANSWERS[q["what"]](q) for q in json.load(sys.stdin)], sys.stdout)

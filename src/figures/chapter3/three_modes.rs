@@ -1,6 +1,6 @@
 //! Figs 3-9 to 3-14: a double integrator (or a slow mode) and two close modes.
 
-use super::super::bode::{Curve, bode, circle, critical, nyquist, origin};
+use super::super::bode::{Curve, bode, critical, nyquist, origin};
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, geometric, kinds, response};
 use super::super::plane::{Part, changes, locus, plane, tracks};
@@ -20,7 +20,7 @@ fn pair(au: f64, av: f64) -> Model {
 
 /// The zeros depend on the ratios of the residues only: R from large to small is v from small to large.
 fn ratios() -> Vec<f64> {
-    geometric(1e4, 1e-4, 141)
+    geometric(1e4, 1e-4, 401)
 }
 
 pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
@@ -68,7 +68,7 @@ pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
 }
 
 pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
-    let mut chart = plane("", (0.0, 2.2), (0.0, 2.2)).equal();
+    let mut chart = plane("", (0.0, 3.3), (0.0, 2.1)).equal();
     let families: [(&str, Colour, &[f64]); 3] = [
         (
             "αu < 0, αv > 0",
@@ -82,28 +82,23 @@ pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
         let sign = if name == "αv < 0" { -1.0 } else { 1.0 };
         let mut name = name;
         for ratio in family {
-            let locus = locus(&pair(ratio * sign, sign).varied(KEY)?, Plane::Undamped, &geometric(1e3, 1e-3, 61))?;
+            let locus = locus(&pair(ratio * sign, sign).varied(KEY)?, Plane::Undamped, &geometric(1e5, 1e-5, 321))?;
             chart = tracks(chart, name, Pen { width: 1.1, ..Pen::solid(colour) }, &locus, Part::Quadrant);
             name = "";
         }
     }
-    // Complex zeros of all ratios lie between the circles through wu and through wv only where R vanishes; two loci are circles.
-    let arc = |radius: f64| {
-        circle((0.0, 0.0), radius).into_iter().filter(|(x, y)| *x >= 0.0 && *y >= 0.0).collect::<Vec<_>>()
-    };
-    let chart = chart
-        .line("|s| = wu, |s| = wv", Pen::dashed(INK).thin(), arc(0.9))
-        .line("", Pen::dashed(INK).thin(), arc(1.1))
-        .points("poles", INK, Symbol::Cross, vec![(0.0, 0.9), (0.0, 1.1)]);
-    Ok(Content::new("The family of the loci over αu/αv. First quadrant; the other three mirror it.")
+    let even = locus(&pair(-1.0, 1.0).varied(KEY)?, Plane::Undamped, &geometric(1e5, 1e-5, 321))?;
+    chart = tracks(chart, "αu = −αv", Pen { width: 2.4, ..Pen::solid(INK) }, &even, Part::Quadrant);
+    let complex = even.tracks.iter().flatten().flatten().filter(|s| s.re.abs() > 1e-3 && s.im.abs() > 1e-3);
+    let (low, high) =
+        complex.map(|s| s.norm()).fold((f64::INFINITY, 0.0f64), |(low, high), r| (low.min(r), high.max(r)));
+    let chart = chart.points("poles", INK, Symbol::Cross, vec![(0.0, 0.9), (0.0, 1.1)]);
+    Ok(Content::new("The family of the loci over αu/αv. First quadrant; the other three mirror it. Loci leave the axes for αu < 0 < αv only; for αu = −αv the locus is a circle.")
         .setting("Eq. (3-7), as Fig 3-9")
-        .assumed("wu = 0.9, wv = 1.1 rad/s; 24 ratios αu/αv from −6 to 10")
-        .row(560.0, [chart])
-        .compare(Comparison::unprinted(
-            "loci",
-            "off both axes for αu < 0 < αv only; they fill the quadrant as αu/αv varies",
-        ))
-        .command(pair(-0.85, 1.0).command("model locus", &format!("--vary {KEY} --from 1e3 --to 1e-3 --count 1001"))))
+        .assumed("wu = 0.9, wv = 1.1 rad/s; 25 ratios αu/αv from −6 to 10")
+        .row(600.0, [chart])
+        .compare(Comparison::unprinted("|s| of the complex zeros for αu = −αv", format!("{} to {} rad/s; the root of wu wv is {}", signed(low, 6), signed(high, 6), signed(0.99f64.sqrt(), 6))))
+        .command(pair(-1.0, 1.0).command("model locus", &format!("--vary {KEY} --from 1e5 --to 1e-5 --count 1001"))))
 }
 
 /// Eq. (3-7) with wu = 10, wv = 11 rad/s, αR = 1, αu = −α0, αv = α0.
@@ -146,10 +141,10 @@ pub(in super::super) fn fig_3_11(_: &Workshop) -> Result<Content, FigureError> {
     }
     // Crossings of mode R with u and v in size, 1/w^2 = a/|w^2 - wx^2|.
     let small = [
-        ("P1", 10.0 / 1.01f64.sqrt(), (-14.0, 0.0)),
-        ("P2", 10.0 / 0.99f64.sqrt(), (-2.0, 14.0)),
-        ("P3", 11.0 / 1.01f64.sqrt(), (2.0, 14.0)),
-        ("P4", 11.0 / 0.99f64.sqrt(), (14.0, 0.0)),
+        ("P1", 10.0 / 1.01f64.sqrt(), (-14.0, -12.0)),
+        ("P2", 10.0 / 0.99f64.sqrt(), (14.0, 14.0)),
+        ("P3", 11.0 / 1.01f64.sqrt(), (-14.0, 14.0)),
+        ("P4", 11.0 / 0.99f64.sqrt(), (16.0, -12.0)),
     ];
     let large = [("P5", 10.0 / 1.3f64.sqrt(), 0.0)];
     for (name, w, aside) in small {
@@ -196,9 +191,9 @@ pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
     let model = Model::modes(&[ModeOf("R", 0.0, 1.0, 0.0), ModeOf("u", 10.0, -1.0, 0.0), ModeOf("v", 11.0, 1.0, 0.0)]);
     let locus_of = locus(&model.varied(KEY)?, Plane::Undamped, &geometric(1e3, 1e-3, 141))?;
     let places = |size: f64| Ok::<_, FigureError>(super::super::plane::places(&equal_pair(size)?.undamped_zeros()?));
-    let mut map = plane("(c) Migration of the zeros, mode R as a double integrator", (-50.0, 50.0), (-3.0, 35.0));
+    let mut map = plane("(c) Migration of the zeros, mode R as a double integrator", (-34.0, 34.0), (-2.0, 18.0));
     map = changes(tracks(map, "zeros", Pen::solid(INK), &locus_of, Part::Upper), &locus_of);
-    let sizes = [(0.04, BLUE), (0.5, PURPLE), (2.0, GREEN), (5.0, ORANGE), (21.0, VERMILION)];
+    let sizes = [(0.5, BLUE), (5.0, GREEN), (10.0, PURPLE), (15.0, ORANGE), (21.0, VERMILION)];
     let mut starts = zero_line(step_chart("(d) Beginning of the step response", 0.5));
     for (size, colour) in sizes {
         map = map.points(&format!("α0 = {size}"), colour, Symbol::Ring, places(size)?);

@@ -43,11 +43,6 @@ fn measured(workshop: &Workshop) -> Result<(Curve, Curve), FigureError> {
     Ok((Curve::new("measured by a chirp", Pen::solid(BLUE), points(&analysis.frf.response)), model))
 }
 
-fn between(curve: &Curve, low: f64, high: f64) -> Curve {
-    let points = curve.points.iter().filter(|(w, _)| (low..=high).contains(w)).copied().collect();
-    Curve::new(&curve.name, curve.pen, points)
-}
-
 /// Where a response is largest between two frequencies.
 fn peak_rad_s(curve: &Curve, low: f64, high: f64) -> f64 {
     let inside = curve.points.iter().filter(|(w, _)| (low..=high).contains(w));
@@ -58,8 +53,8 @@ pub(in super::super) fn fig_6_7(workshop: &Workshop) -> Result<Content, FigureEr
     let model = Model::stage();
     let (modal, sum) = (model.modal()?, model.sum()?);
     let (ours, theirs) = measured(workshop)?;
-    let whole = [between(&ours, 6.0, 2000.0), between(&theirs, 6.0, 2000.0)];
-    let near = [between(&ours, 400.0, 700.0), between(&theirs, 400.0, 700.0)];
+    let whole = [ours.part(6.0, 2000.0), theirs.part(6.0, 2000.0)];
+    let near = [ours.part(400.0, 700.0), theirs.part(400.0, 700.0)];
     let (a, a_phase) = bode("(a) From current to displacement", W, "Magnitude (µm/A)", &whole);
     let (b, b_phase) = bode("(b) The close modes", W, "Magnitude (µm/A)", &near);
     let [.., u, v] = sum.terms() else { return Err(FigureError::Run("three modes".into())) };
@@ -220,7 +215,7 @@ pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureE
     for (which, letters) in [(Which::Slow, ["a", "b"]), (Which::Fast, ["c", "d"])] {
         let of = closed_loop(&Model::stage(), which.name(), None)?;
         let model = Curve::new("model", Pen::dashed(INK).thin(), open(&of, 6.0, 2500.0));
-        let l = between(&measured_loop(workshop, which)?, 6.0, 2500.0);
+        let l = measured_loop(workshop, which)?.part(6.0, 2500.0);
         let (crossover, phase) = measured_margins(&l).unwrap_or((f64::NAN, f64::NAN));
         let smallest = l.points.iter().map(|(_, l)| (l + 1.0).norm()).fold(f64::INFINITY, f64::min);
         polar.push(

@@ -1,0 +1,49 @@
+//! All figures, made once.
+
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use bench::figures::{Content, Made, Workshop, make_all, selected};
+use bench::report::{Chart, Mark};
+
+/// Where they are kept, to look at.
+pub fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("figures")
+}
+
+/// Every entry of the registry, as `bench figures` makes it.
+pub fn all() -> &'static [Made] {
+    static ALL: OnceLock<Vec<Made>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        let runs = tempfile::tempdir().expect("a temporary folder");
+        let entries = selected(&[]).expect("all");
+        make_all(&entries, &folder(), &Workshop::new(runs.path()), &mut |_, _| {}).expect("all can be made")
+    })
+}
+
+/// What one figure shows.
+pub fn content(number: &str) -> &'static Content {
+    let made = all().iter().find(|made| made.entry.number == number).expect("in the registry");
+    &made.outcome.as_ref().expect("is computed").0
+}
+
+/// A chart of a figure by the beginning of its heading.
+pub fn chart(number: &str, heading: &str) -> &'static Chart {
+    let charts = content(number).rows.iter().flat_map(|row| &row.charts);
+    charts.into_iter().find(|chart| chart.heading.starts_with(heading)).expect("a chart of that heading")
+}
+
+/// The lines of a chart that carry a curve: not those that only mark the axes.
+pub fn curves(chart: &Chart) -> Vec<(&str, &[(f64, f64)])> {
+    let line = |mark: &'_ Mark| matches!(mark, Mark::Line { points, .. } if points.len() > 10);
+    let pair = |mark| match mark {
+        &Mark::Line { ref name, ref points, .. } => (name.as_str(), points.as_slice()),
+        _ => ("", &[][..]),
+    };
+    chart.marks.iter().filter(|mark| line(mark)).map(pair).collect()
+}
+
+/// Points of a curve, evenly picked.
+pub fn picked(points: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
+    (0..count).map(|k| points[(k * (points.len() - 1)) / (count - 1)]).collect()
+}
