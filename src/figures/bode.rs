@@ -29,12 +29,25 @@ impl Curve {
         self
     }
 
-    /// A range of it; its phase goes on from below.
+    /// A range of it, to its very ends; its phase goes on from below.
     pub fn part(&self, low: f64, high: f64) -> Curve {
         let inside = |w: f64| (low..=high).contains(&w);
-        let points = self.points.iter().filter(|(w, _)| inside(*w)).copied().collect();
+        let mut points: Vec<_> = self.points.iter().filter(|(w, _)| inside(*w)).copied().collect();
         let first_deg = self.phase_deg().into_iter().find(|(w, _)| inside(*w)).map(|(_, phase)| phase);
+        if let Some(value) = self.between(low).filter(|_| points.first().is_some_and(|point| point.0 > low)) {
+            points.insert(0, (low, value));
+        }
+        if let Some(value) = self.between(high).filter(|_| points.last().is_some_and(|point| point.0 < high)) {
+            points.push((high, value));
+        }
         Curve { first_deg, ..Curve::new(&self.name, self.pen, points) }
+    }
+
+    /// On the straight line between the two points around a frequency.
+    fn between(&self, w: f64) -> Option<Complex<f64>> {
+        let after = self.points.partition_point(|point| point.0 <= w);
+        let (before, after) = (self.points.get(after.checked_sub(1)?)?, self.points.get(after)?);
+        Some(before.1 + (after.1 - before.1) * ((w - before.0) / (after.0 - before.0)))
     }
 
     pub fn magnitude(&self) -> Vec<(f64, f64)> {

@@ -207,7 +207,7 @@ pub(super) fn fig_2_5(_: &Workshop) -> Result<Content, FigureError> {
     let mut cuts = Chart::new(
         "(b) Cuts through Δ, in place of the 3D view",
         Scale::linear("Operating point (% of L)").within(0.0, 15.0),
-        Scale::linear("Δ/Δ(5 %, 0 % of L)").within(-0.6, 2.6),
+        Scale::linear("Δ/Δ(5 %, 0 % of L)").within(-0.75, 2.6),
     )
     .line("", Pen::solid(GREY).thin(), vec![(0.0, 0.0), (15.0, 0.0)]);
     let five = discriminant(&there(0.0, 0.05))?.0;

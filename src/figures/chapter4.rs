@@ -109,12 +109,12 @@ pub(super) fn fig_4_2(_: &Workshop) -> Result<Content, FigureError> {
     let axes = |heading: &str| {
         Chart::new(
             heading,
-            Scale::linear("x = s² (rad²/s²)").within(-3.0, 1.0),
+            Scale::linear("x = s² (rad²/s²)").within(-3.0, 3.0),
             Scale::linear("N(x)").within(-2.0, 4.0),
         )
-        .line("", Pen::solid(GREY).thin(), vec![(-3.0, 0.0), (1.0, 0.0)])
+        .line("", Pen::solid(GREY).thin(), vec![(-3.0, 0.0), (3.0, 0.0)])
     };
-    let curve = |residue: f64| even(-3.0, 1.0, 201).into_iter().map(|x| (x, parabola(residue, x))).collect::<Vec<_>>();
+    let curve = |residue: f64| even(-3.0, 3.0, 301).into_iter().map(|x| (x, parabola(residue, x))).collect::<Vec<_>>();
     let marked = |chart: Chart| {
         chart.points("", INK, Symbol::Dot, vec![(-1.0, 1.0), (-2.0, 2.0)]).text((-1.0, 1.0), (-14.0, 14.0), "Pu").text(
             (-2.0, 2.0),

@@ -52,27 +52,63 @@ pub(super) fn locus(varied: &Varied, plane: Plane, values: &[f64]) -> Result<Loc
     })
 }
 
-/// Follows zeros twice: the second time with values close to those where they meet, beside which they run as the root of
-/// the distance.
+/// Follows zeros again with more values: close to where they meet, beside which they run as the root of the distance, and
+/// where they move far from one value to the next.
 pub(super) fn follow(
     plane: Plane,
     values: &[f64],
     mut zeros: impl FnMut(f64) -> Result<Vec<Zero>, FigureError>,
 ) -> Result<Locus, FigureError> {
-    let first = Locus::follow(plane, values, &mut zeros)?;
-    let (low, high) = (values[0].min(values[values.len() - 1]), values[0].max(values[values.len() - 1]));
-    let mut all = values.to_vec();
-    for change in &first.changes {
-        let beside = (0..28).map(|k| (high - low) * 0.5f64.powi(k) * 0.05);
-        all.extend(beside.flat_map(|step| [change.value - step, change.value + step]));
+    let mut locus = Locus::follow(plane, values, &mut zeros)?;
+    let meetings: Vec<f64> = locus.changes.iter().flat_map(|change| beside(change.value, values)).collect();
+    for round in 0..REFINEMENTS {
+        let mut all: Vec<f64> = locus.values.iter().copied().chain(between(&locus)).collect();
+        if round == 0 {
+            all.extend(&meetings);
+        }
+        locus = Locus::follow(plane, &ordered(all, values), &mut zeros)?;
     }
-    all.retain(|value| (low..=high).contains(value));
+    Ok(locus)
+}
+
+/// Rounds of refinement.
+const REFINEMENTS: usize = 3;
+/// A zero may move by so much of its magnitude from one value to the next.
+const STRIDE: f64 = 0.03;
+
+/// Values to both sides of a meeting, nearer and nearer.
+fn beside(value: f64, values: &[f64]) -> Vec<f64> {
+    let range = (values[values.len() - 1] - values[0]).abs();
+    let size = if value == 0.0 { range } else { value.abs().min(range) };
+    (2..40).flat_map(|k| [value - size * 0.5f64.powi(k), value + size * 0.5f64.powi(k)]).collect()
+}
+
+/// Values between those where some zero moved too far.
+fn between(locus: &Locus) -> Vec<f64> {
+    let far = |k: &usize| {
+        let moved = |track: &Vec<Option<Complex<f64>>>| match (track[*k], track[k + 1]) {
+            (Some(a), Some(b)) => (a - b).norm() > STRIDE * (a.norm() + b.norm()),
+            _ => false,
+        };
+        locus.tracks.iter().any(moved)
+    };
+    let middle = |k: usize| {
+        let (a, b) = (locus.values[k], locus.values[k + 1]);
+        if a * b > 0.0 { (a * b).sqrt().copysign(a) } else { 0.5 * (a + b) }
+    };
+    (0..locus.values.len() - 1).filter(far).map(middle).collect()
+}
+
+/// In the order of `values` and within their ends, each once.
+fn ordered(mut all: Vec<f64>, values: &[f64]) -> Vec<f64> {
+    let (first, last) = (values[0], values[values.len() - 1]);
+    all.retain(|value| (first.min(last)..=first.max(last)).contains(value));
     all.sort_by(f64::total_cmp);
     all.dedup();
-    if values[0] > values[values.len() - 1] {
+    if first > last {
         all.reverse();
     }
-    Locus::follow(plane, &all, zeros)
+    all
 }
 
 /// The tracks of a locus as lines of one pen.

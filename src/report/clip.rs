@@ -68,7 +68,8 @@ impl Frame {
                 leaves = f64::min(leaves, room / towards);
             }
         }
-        let at = |t: f64| (from.0 + t * dx, from.1 + t * dy);
+        // Of ends far away the sum is rounded: the frame has the last word.
+        let at = |t: f64| self.nearest((from.0 + t * dx, from.1 + t * dy));
         let start = if enters > 0.0 { at(enters) } else { from };
         let end = if leaves < 1.0 { at(leaves) } else { to };
         (enters <= leaves).then_some((start, end))

@@ -23,7 +23,7 @@ const SWATCH: f64 = 26.0;
 /// Part of an axis left free beside what is drawn.
 const MARGIN: f64 = 0.05;
 /// Pixels a labelled tick takes at least, along and up.
-const TICK: (f64, f64) = (64.0, 40.0);
+const TICK: (f64, f64) = (74.0, 40.0);
 const SYMBOL: f64 = 4.5;
 /// Pixels between the arrow heads of a line, and their size.
 const ARROWS: (f64, f64) = (170.0, 7.0);

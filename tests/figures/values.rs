@@ -147,7 +147,7 @@ fn the_parabolas_of_fig_4_2_are_those_of_eq_4_3_and_touch_the_line_where_zeros_m
     }
     for (_, points) in curves(chart("4-2", "(b)")).into_iter().filter(|(name, _)| name.starts_with("αR")) {
         let least = points.iter().map(|point| point.1.abs()).fold(f64::MAX, f64::min);
-        // A grid of 0.02 stands 0.01 beside the point of contact at most, where N is up to 34 times its square.
+        // A grid of 0.02 stands 0.01 beside the point of contact at most, where N is up to 5.83 times its square.
         assert!(points.iter().all(|point| point.1 > -1e-9) && least < 4e-3, "{least}");
     }
 }

@@ -335,11 +335,17 @@ pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
         let curve =
             Curve::new("L", Pen::solid(colour), control::grid(1.5, 200.0, &features).into_iter().map(at).collect());
         let size = curve.points.iter().filter(|(w, _)| *w > 8.0).map(|(_, l)| l.norm()).fold(1.4, f64::max);
-        charts.push(critical(nyquist(name, (-size, size), (-1.05 * size, 1.05 * size), "L")).directed(
-            "",
-            curve.pen,
-            curve.polar(),
-        ));
+        let polar = |heading: &str, size: f64| {
+            critical(nyquist(heading, (-size, size), (-1.05 * size, 1.05 * size), "L")).directed(
+                "",
+                curve.pen,
+                curve.polar(),
+            )
+        };
+        charts.push(polar(name, size));
+        if pair.is_some() {
+            charts.push(polar("the same near −1", 1.5));
+        }
         content = content
             .compare(Comparison::unprinted(
                 name,
@@ -352,5 +358,6 @@ pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
             .file(file, &text)
             .command(model.command("margins", &format!("--continuous --controller {file}")));
     }
-    Ok(content.row(330.0, charts))
+    let second = charts.split_off(2);
+    Ok(content.row(380.0, charts).row(380.0, second))
 }
