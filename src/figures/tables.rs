@@ -124,7 +124,7 @@ pub(super) fn table_2_3(_: &Workshop) -> Result<Content, FigureError> {
         .assumed(format!("the places of the labels a to h, which only Fig 1-2a would tell: {}, the first in alphabetical order of the 145 out of 40320 labellings that give all three rows in the pinwheel", words.join(", ")));
     for (row, (printed, point, _)) in TABLE_2_3.iter().enumerate() {
         let settings = labelled(&base, row, &labels);
-        let masses = serde_json::to_value(&settings.secondary_mass_deviation).unwrap_or_default();
+        let masses = serde_json::to_value(settings.secondary_mass_deviation).unwrap_or_default();
         let mut model = Model::profile("xy").set(&format!("plant.operating_point_m={:?}", settings.operating_point_m));
         for place in PLACES {
             let deviation = masses.get(place).and_then(serde_json::Value::as_f64).unwrap_or_default();

@@ -230,7 +230,9 @@ impl Cell<'_> {
                 inside.into_iter().try_for_each(|at| draw_symbol(canvas, *colour, *symbol, at))
             }
             Mark::Area { colour, strength, outline, .. } => {
-                let corners: Vec<_> = outline.iter().map(|point| self.frame().nearest(self.at(*point))).collect();
+                // A logarithmic axis has no place for values of 0 and below.
+                let places = outline.iter().map(|point| self.at(*point)).filter(|(x, y)| !(x.is_nan() || y.is_nan()));
+                let corners: Vec<_> = places.map(|place| self.frame().nearest(place)).collect();
                 if corners.len() < 3 { Ok(()) } else { canvas.area(&corners, colour.mix_with(*strength)) }
             }
             Mark::Cells { x, y, rows, colours } => self.cells(canvas, (x, y), rows, colours),
@@ -288,6 +290,9 @@ impl Cell<'_> {
         text: &str,
         colour: Colour,
     ) -> Result<(), ReportError> {
+        if at.0.is_nan() || at.1.is_nan() {
+            return Ok(());
+        }
         let half = (0.5 * CHARACTER * TEXT_SIZE * text.chars().count() as f64 + 3.0, 0.6 * TEXT_SIZE + 2.0);
         let Frame { left, right, top, bottom } = self.frame();
         let within = |x: f64, low: f64, high: f64| if low < high { x.clamp(low, high) } else { 0.5 * (low + high) };

@@ -35,12 +35,14 @@ pub fn chart(number: &str, heading: &str) -> &'static Chart {
 
 /// The lines of a chart that carry a curve: not those that only mark the axes.
 pub fn curves(chart: &Chart) -> Vec<(&str, &[(f64, f64)])> {
-    let line = |mark: &'_ Mark| matches!(mark, Mark::Line { points, .. } if points.len() > 10);
-    let pair = |mark| match mark {
-        &Mark::Line { ref name, ref points, .. } => (name.as_str(), points.as_slice()),
-        _ => ("", &[][..]),
-    };
-    chart.marks.iter().filter(|mark| line(mark)).map(pair).collect()
+    chart.marks.iter().filter_map(curve).collect()
+}
+
+fn curve(mark: &Mark) -> Option<(&str, &[(f64, f64)])> {
+    match mark {
+        Mark::Line { name, points, .. } if points.len() > 10 => Some((name, points)),
+        _ => None,
+    }
 }
 
 /// Points of a curve, evenly picked.

@@ -309,9 +309,12 @@ fn controller(gain: f64, pair: Option<(f64, f64, f64)>) -> String {
     )
 }
 
+/// Name, file of the controller, size of the residues, additional zeros and poles, colour.
+type Case = (&'static str, &'static str, f64, Option<(f64, f64, f64)>, Colour);
+
 pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
     let zeta = 0.01;
-    let cases: [(&str, &str, f64, Option<(f64, f64, f64)>, Colour); 3] = [
+    let cases: [Case; 3] = [
         ("Dual MMP", "3-14a.controller.toml", 0.3, None, BLUE),
         ("CMP-CNMP", "3-14b.controller.toml", 1.65, None, VERMILION),
         ("Dual MMP, with an additional pole-zero pair", "3-14c.controller.toml", 0.3, Some((11.0, 13.0, zeta)), GREEN),
