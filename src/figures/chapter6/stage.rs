@@ -83,7 +83,7 @@ fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
     let of = closed_loop(&model, which.name(), None)?;
     let l = Curve::new("", pen(which), open(&of, 1.0, 3000.0));
     let (gain, phase) = bode("(a) Bode plot of L", W, "|L|", std::slice::from_ref(&l));
-    let size = l.points.iter().filter(|(w, _)| *w > 60.0).map(|(_, l)| l.norm()).fold(1.5, f64::max);
+    let size = l.points.iter().filter(|(w, _)| *w > 60.0).map(|(_, l)| l.norm()).fold(6.0, f64::max);
     let polar = |heading: &str, size: f64| {
         critical(nyquist(heading, (-size, size), (-size, size), "L")).directed("", l.pen, l.polar())
     };
