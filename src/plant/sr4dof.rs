@@ -31,11 +31,11 @@ pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
 
 /// The displacements of the five stages in X, and of those that move in Y.
 pub(super) fn ports(s: &Sr4dofSettings) -> Vec<Port> {
-    let a = 0.6 * s.operating_point_m / s.beam_length_m;
-    let [x2, x3] = [[1.0, a, -a, 0.0], [1.0, -a, 0.0, a]];
-    let [x4, x5] = [[1.0, a, -2.0 * a, 0.0], [1.0, -a, 0.0, 2.0 * a]];
-    let rows = [("x1", X1), ("x2", x2), ("x3", x3), ("x4", x4), ("x5", x5), ("y1", Y1), ("y2", Y2), ("y3", Y3)];
+    let [[x1, _], [x2, _], [x3, _], [x4, _], [x5, _]] = stages(s);
+    let rows = [("x1", x1), ("x2", x2), ("x3", x3), ("x4", x4), ("x5", x5), ("y1", Y1), ("y2", Y2), ("y3", Y3)];
     rows.into_iter().map(|(name, row)| Port::new(name, &row)).collect()
+}
+
 /// Displacements x and y of the stages 1 to 5 (Fig 2-2), over the degrees of freedom [x1, y1, y2, y3].
 pub(crate) fn stages(s: &Sr4dofSettings) -> [[[f64; 4]; 2]; 5] {
     let a = 0.6 * s.operating_point_m / s.beam_length_m;
