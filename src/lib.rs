@@ -14,7 +14,7 @@
 //!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe) <== wires ==> acting (sim at the other end)
 //!                             |                               ^  opens what the configuration names
 //!                             v  wait-free ring            devices <---- calibration
-//!                         recording (MCAP) ----> identify ----> report
+//!                         recording (MCAP) ----> identify ----> fit ----> verdict ----> report
 //!                                   \______ session (one run, its analysis, its replay) ______ figures ______ cli
 //! ```
 //!
@@ -34,6 +34,8 @@
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | how a frequency response is estimated | [`identify`] |
+//! | how modes are fitted, and their number found | [`fit`] |
+//! | whether there are CNMP zeros | [`verdict`] |
 //! | what `bench doctor` looks at | [`doctor`]: one file a subject, facts apart from verdicts |
 //! | which devices there are, and how they are opened | [`devices`] |
 //! | what static steps say of amplifier and probe | [`calibration`] |

@@ -1,0 +1,71 @@
+//! What the analysis of a default chirp costs, 600,500 ticks: `cargo bench --bench identify` prints the time of Welch's
+//! estimator, of the local one, and of all that `bench chirp` makes of them, modes and verdict included.
+//! `benches/welch_scipy.py` measures scipy's csd on as many samples beside the first.
+
+use bench::config::{Config, Source, load};
+use bench::excitation::{Chirp, Excitation};
+use bench::fit::{View, fit};
+use bench::identify::{EstimatorSettings, Signals, blocks, local, welch};
+use bench::sim::SimulatedRig;
+use bench::verdict::{Case, Verdict, verdict, zeros};
+use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+use criterion::{Criterion, criterion_group, criterion_main};
+
+/// Samples of a segment.
+const SEGMENT: usize = 16_384;
+const BAND_HZ: (f64, f64) = (0.1, 500.0);
+/// Half-width of the average as a ratio of frequency, for some 2,000 frequencies.
+const WIDE: f64 = 0.003;
+
+fn config() -> Config {
+    let sets = ["plant.operating_point_m=0.0038", "plant.mass_asymmetry=0.1"].map(String::from).to_vec();
+    load(&Source { sets, ..Source::default() }).expect("the profile is valid")
+}
+
+/// The default chirp on the simulated stage.
+fn signals(config: &Config) -> Signals {
+    let chirp = Chirp::new(&config.chirp, config.servo.period_s());
+    let mut rig = SimulatedRig::new(config).expect("a rig");
+    rig.enable().expect("an amplifier");
+    let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
+    for number in 0..chirp.ticks() {
+        let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;
+        output_m.push(rig.latest(Tick { number, scheduled_ns }).position_m);
+        input_a.push(rig.command(chirp.current_a(number)).expect("enabled"));
+    }
+    Signals { rate_hz: config.servo.rate_hz, input_a, output_m }
+}
+
+fn judged(signals: &Signals, config: &Config) -> Verdict {
+    let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
+    let view = View::Bench(config);
+    let fit = fit(&blocks, &view).expect("modes");
+    let omega: Vec<f64> = blocks.iter().map(|block| std::f64::consts::TAU * block.frequency_hz).collect();
+    verdict(&Case {
+        fit: &fit,
+        zeros: zeros(&fit).expect("zeros"),
+        up_to_rad_s: 650.0,
+        expected_modes: Some(3),
+        omega_rad_s: &omega,
+        mechanics: &view.mechanics(&blocks, fit.parameters.delay_s),
+    })
+}
+
+fn identify(c: &mut Criterion) {
+    let config = config();
+    let signals = signals(&config);
+    let wide = EstimatorSettings { resolution_ratio: WIDE, ..EstimatorSettings::default() };
+    let mut group = c.benchmark_group("identify");
+    group.sample_size(10);
+    group.bench_function("welch", |b| b.iter(|| welch::estimate(&signals, BAND_HZ, SEGMENT).expect("excited")));
+    group.bench_function("local, 2000 frequencies", |b| {
+        b.iter(|| local::estimate(&signals, BAND_HZ, &wide).expect("excited"))
+    });
+    group.bench_function("local, modes and verdict", |b| {
+        b.iter(|| (local::estimate(&signals, BAND_HZ, &wide).expect("excited"), judged(&signals, &config)))
+    });
+    group.finish();
+}
+
+criterion_group!(benches, identify);
+criterion_main!(benches);
