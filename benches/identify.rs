@@ -40,13 +40,12 @@ fn judged(signals: &Signals, config: &Config) -> Verdict {
     let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
     let view = View::Bench(config);
     let fit = fit(&blocks, &view).expect("modes");
-    let omega: Vec<f64> = blocks.iter().map(|block| std::f64::consts::TAU * block.frequency_hz).collect();
     verdict(&Case {
         fit: &fit,
         zeros: zeros(&fit).expect("zeros"),
         up_to_rad_s: 650.0,
         expected_modes: Some(3),
-        omega_rad_s: &omega,
+        blocks: &blocks,
         mechanics: &view.mechanics(&blocks, fit.parameters.delay_s),
     })
 }

@@ -95,17 +95,9 @@ fn judge(
         Err(error) => return Ok(Verdict::undecided(error.to_string())),
     };
     let mechanics = view.mechanics(blocks, fit.parameters.delay_s);
-    let omega_rad_s: Vec<f64> = blocks.iter().map(|block| 2.0 * std::f64::consts::PI * block.frequency_hz).collect();
     let shows = |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
     let expected_modes = model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
-    Ok(verdict(&Case {
-        fit,
-        zeros: verdict::zeros(fit)?,
-        up_to_rad_s,
-        expected_modes,
-        omega_rad_s: &omega_rad_s,
-        mechanics: &mechanics,
-    }))
+    Ok(verdict(&Case { fit, zeros: verdict::zeros(fit)?, up_to_rad_s, expected_modes, blocks, mechanics: &mechanics }))
 }
 
 /// What cuts the record into blocks: the default estimator's widths, whatever the response is estimated with.

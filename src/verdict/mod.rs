@@ -19,6 +19,7 @@ pub use zeros::{UncertainZero, zeros};
 use nalgebra::Complex;
 
 use crate::fit::{FittedMode, ModalFit};
+use crate::identify::Block;
 use crate::zeros::ZeroKind;
 
 /// A zero is on a side if it is on the other with a probability below this.
@@ -29,6 +30,8 @@ const TRUEST: f64 = 1e-4;
 const MISFIT: f64 = 4.0;
 /// The phase must be so close to a number of half turns, in degrees.
 const CLEAR_DEG: f64 = 60.0;
+/// A response stands out of the noise with so many times its power.
+const CLEAR_POWER: f64 = 20.0;
 /// A residue of the other sign with a probability above this is of no known sign.
 const UNKNOWN_SIGN: f64 = 1e-3;
 
@@ -85,15 +88,15 @@ pub struct Case<'a> {
     pub up_to_rad_s: f64,
     /// Modes that the model has there, of those that show between its actuator and its probe.
     pub expected_modes: Option<usize>,
-    /// Frequencies of the response, rising, in rad/s.
-    pub omega_rad_s: &'a [f64],
-    /// The response of the mechanics alone: hold, amplifier and delays taken out.
+    /// The response, frequencies rising.
+    pub blocks: &'a [Block],
+    /// What it shows of the mechanics alone: hold, amplifier and delays taken out.
     pub mechanics: &'a [Complex<f64>],
 }
 
 /// Weighs the witnesses.
 pub fn verdict(case: &Case<'_>) -> Verdict {
-    let within = |w: f64| w <= case.up_to_rad_s && w >= case.omega_rad_s.first().copied().unwrap_or(0.0);
+    let within = |w: f64| w <= case.up_to_rad_s && w >= case.blocks.first().map_or(0.0, omega);
     let zeros: Vec<UncertainZero> = case.zeros.iter().filter(|zero| within(zero.s.norm())).copied().collect();
     let modes: Vec<FittedMode> = case.fit.modes().into_iter().filter(|mode| within(mode.omega_rad_s.value)).collect();
     let phase = fall(case, &modes);
@@ -195,10 +198,19 @@ fn signs(modes: &[FittedMode]) -> String {
 }
 
 /// The phase from well below the first of the band's modes to its end.
+///
+/// Beyond the end the magnitude is believed for as long as it stands out of the noise.
 fn fall(case: &Case<'_>, modes: &[FittedMode]) -> Option<PhaseFall> {
     let [first, .., _] = modes else { return None };
     let low = 0.5 * first.omega_rad_s.value;
-    let from = case.omega_rad_s.iter().position(|w| *w >= low)?;
-    let to = case.omega_rad_s.iter().rposition(|w| *w <= case.up_to_rad_s)?;
-    (from < to).then(|| phase_fall(case.omega_rad_s, case.mechanics, from, to))
+    let from = case.blocks.iter().position(|block| omega(block) >= low)?;
+    let to = case.blocks.iter().rposition(|block| omega(block) <= case.up_to_rad_s)?;
+    let clear = |block: &&Block| block.response.norm_sqr() > CLEAR_POWER * block.variance;
+    let reach = to + 1 + case.blocks[to + 1..].iter().take_while(clear).count();
+    let omega_rad_s: Vec<f64> = case.blocks[..reach].iter().map(omega).collect();
+    (from < to).then(|| phase_fall(&omega_rad_s, &case.mechanics[..reach], from, to))
+}
+
+fn omega(block: &Block) -> f64 {
+    2.0 * std::f64::consts::PI * block.frequency_hz
 }

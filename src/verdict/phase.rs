@@ -24,8 +24,10 @@ pub struct PhaseFall {
     pub off_deg: f64,
 }
 
-/// Beyond the band the magnitude goes on with the slope of so much of ln w at its ends.
-const END: f64 = 0.2;
+/// Beyond the band the magnitude goes on with the slope of so much of ln w at its ends ...
+const END: f64 = 0.6;
+/// ... between frequencies so far apart in ln w.
+const LAG: f64 = 0.15;
 
 /// The fall of the phase of `response` beyond that of its magnitude between two of its frequencies, by index. Frequencies
 /// rise, responses are not zero.
@@ -44,11 +46,22 @@ fn minimum_phase(omega_rad_s: &[f64], response: &[Complex<f64>], at: usize) -> f
     let within: f64 =
         (1..x.len()).map(|i| (height[i] - height[i - 1]) / (x[i] - x[i - 1]) * (weight(x[i]) - weight(x[i - 1]))).sum();
     let last = x.len() - 1;
-    let inside = |x0: f64| x.iter().position(|x| *x >= x0).unwrap_or(last);
-    let (low, high) = (inside(x[0] + END).max(1), inside(x[last] - END).min(last - 1));
-    let below = (height[low] - height[0]) / (x[low] - x[0]) * (weight(x[0]) - weight(f64::NEG_INFINITY));
-    let above = (height[last] - height[high]) / (x[last] - x[high]) * (weight(f64::INFINITY) - weight(x[last]));
+    let below = end_slope(&x, &height, x[0], x[0] + END) * (weight(x[0]) - weight(f64::NEG_INFINITY));
+    let above = end_slope(&x, &height, x[last] - END, x[last]) * (weight(f64::INFINITY) - weight(x[last]));
     (within + below + above) / std::f64::consts::PI
+}
+
+/// The median slope of the height between x values that lie [`LAG`] apart, from `low` to `high`: neither noise nor a
+/// resonance at the end of the band turns it.
+fn end_slope(x: &[f64], height: &[f64], low: f64, high: f64) -> f64 {
+    let first = x.partition_point(|x| *x < low);
+    let slope = |i: usize| {
+        let j = x.partition_point(|other| *other < x[i] + LAG);
+        (j < x.len() && x[j] <= high).then(|| (height[j] - height[i]) / (x[j] - x[i]))
+    };
+    let mut slopes: Vec<f64> = (first..x.len()).map_while(slope).collect();
+    slopes.sort_by(f64::total_cmp);
+    slopes.get(slopes.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The integral of ln coth(|t|/2) from 0 to x, which is odd in x and ends at pi^2/4: with e = exp(-|x|),

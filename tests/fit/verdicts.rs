@@ -72,14 +72,13 @@ fn a_chain_that_answers_later_than_believed_is_never_taken_for_cnmp_zeros() {
 fn judged(modes: &[bench::zeros::Term], sigma_m_per_n: f64, expected: usize) -> Verdict {
     let blocks = blocks(modes, 0.0, sigma_m_per_n, 12);
     let fit = fit(&blocks, &View::Bare).expect("modes");
-    let omega: Vec<f64> = blocks.iter().map(|b| std::f64::consts::TAU * b.frequency_hz).collect();
     let mechanics: Vec<Complex<f64>> = blocks.iter().map(|b| b.response).collect();
     verdict(&Case {
         fit: &fit,
         zeros: zeros(&fit).expect("zeros"),
         up_to_rad_s: std::f64::consts::TAU * 110.0,
         expected_modes: Some(expected),
-        omega_rad_s: &omega,
+        blocks: &blocks,
         mechanics: &mechanics,
     })
 }
