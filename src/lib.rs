@@ -15,7 +15,7 @@
 //!                             |                               ^  opens what the configuration names
 //!                             v  wait-free ring            devices <---- calibration
 //!                         recording (MCAP) ----> identify ----> fit ----> verdict ----> report
-//!                                   \______ session (one run, its analysis, its replay) ______ figures ______ cli
+//!                                   \______ session (one run, its analysis, its replay) ___ run_report, figures ___ cli
 //! ```
 //!
 //! Imports point towards what stands earlier in this picture. [`cli`] sees all, nobody sees it.
@@ -36,6 +36,7 @@
 //! | how a frequency response is estimated | [`identify`] |
 //! | how modes are fitted, and their number found | [`fit`] |
 //! | whether there are CNMP zeros | [`verdict`] |
+//! | the pictures and the page of a run | [`run_report`] |
 //! | what `bench doctor` looks at | [`doctor`]: one file a subject, facts apart from verdicts |
 //! | which devices there are, and how they are opened | [`devices`] |
 //! | what static steps say of amplifier and probe | [`calibration`] |
@@ -75,6 +76,7 @@ pub mod plant;
 pub mod recording;
 pub mod report;
 pub mod rt;
+pub mod run_report;
 pub mod session;
 pub mod sim;
 pub mod study;

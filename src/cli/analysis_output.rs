@@ -1,5 +1,6 @@
-//! What is made from the recording of an excitation: the frequency response as CSV and as a Bode plot.
+//! What is made from the recording of an excitation: the frequency response as CSV, its pictures, and the page of the run.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -10,14 +11,19 @@ use super::modal_output::Shown;
 use crate::config::Config;
 use crate::identify::csv;
 use crate::recording::Recording;
-use crate::report::{Curve, Trace, bode_svg};
-use crate::session::{Analysis, AnalysisError, analyse};
+use crate::run_report::{AnalysedRun, KINDS, page, pictures};
+use crate::session::{AnalysisError, analyse};
 
 /// The files that were made and what the response shows; `null` where the run gave no response.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Made {
     frf_csv: Option<String>,
+    /// The Bode plot.
     plot: Option<String>,
+    /// All pictures by name; `null` where the data carry none.
+    plots: BTreeMap<&'static str, Option<String>>,
+    /// The page of the run.
+    report: Option<String>,
     frequencies: usize,
     /// Median coherence over the band.
     coherence_median: Option<f64>,
@@ -45,11 +51,21 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
     let analysis = analyse(recording, config)?;
     let csv_path = free(recording.path(), "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf).map_err(|e| CliError::Failed(e.to_string()))?;
-    let plot_path = free(recording.path(), "bode", "svg");
-    write_new(&plot_path, &plot(&analysis, config, recording)?)?;
+    let run = AnalysedRun { analysis: &analysis, config, recording };
+    let pictures = pictures(&run).map_err(|e| CliError::Failed(e.to_string()))?;
+    let mut plots = no_plots();
+    for picture in &pictures {
+        let path = free(recording.path(), picture.kind, "svg");
+        write_new(&path, &picture.svg)?;
+        plots.insert(picture.kind, Some(path.display().to_string()));
+    }
+    let report_path = free(recording.path(), "report", "html");
+    write_new(&report_path, &page(&run, &pictures))?;
     Ok(Made {
         frf_csv: Some(csv_path.display().to_string()),
-        plot: Some(plot_path.display().to_string()),
+        plot: plots.get("bode").cloned().flatten(),
+        plots,
+        report: Some(report_path.display().to_string()),
         frequencies: analysis.frf.len(),
         coherence_median: median(&analysis.frf.coherence),
         filled_ticks: analysis.filled_ticks,
@@ -66,6 +82,8 @@ impl Made {
         Made {
             frf_csv: None,
             plot: None,
+            plots: no_plots(),
+            report: None,
             frequencies: 0,
             coherence_median: None,
             filled_ticks: 0,
@@ -85,8 +103,13 @@ impl Made {
         self.shown.why() == STOPPED
     }
 
+    fn plots_text(&self) -> String {
+        self.plots.values().flatten().map(|path| format!("  plot       {path}\n")).collect()
+    }
+
     pub fn text(&self) -> String {
-        let (Some(frf_csv), Some(plot), Some(coherence)) = (&self.frf_csv, &self.plot, self.coherence_median) else {
+        let (Some(frf_csv), Some(report), Some(coherence)) = (&self.frf_csv, &self.report, self.coherence_median)
+        else {
             return format!("  no frequency response: {}\n", self.shown.why());
         };
         let filled = if self.filled_ticks > 0 {
@@ -105,27 +128,19 @@ impl Made {
             _ => String::new(),
         };
         format!(
-            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{delay}  plot       {}\n{}",
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{delay}{}  report     {report}\n{}",
             frf_csv,
             self.frequencies,
             coherence,
-            plot,
+            self.plots_text(),
             self.shown.text()
         )
     }
 }
 
-fn plot(analysis: &Analysis, config: &Config, recording: &Recording) -> Result<String, CliError> {
-    let measured = Trace { name: "measured", curve: Curve::Measured(&analysis.frf) };
-    let frequency_hz = &analysis.frf.frequency_hz;
-    let model = Trace { name: "model", curve: Curve::Model { frequency_hz, response: &analysis.model } };
-    let chirp = &config.chirp;
-    let started = recording.metadata().get("started").map_or("", String::as_str);
-    let subtitle = format!(
-        "current set-point to displacement, with hold, amplifier and delay; chirp {} to {} Hz in {} s at {} Hz; {started}",
-        chirp.start_hz, chirp.stop_hz, chirp.duration_s, config.servo.rate_hz
-    );
-    bode_svg(&[measured, model], &config.title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))
+/// Every name, and no picture.
+fn no_plots() -> BTreeMap<&'static str, Option<String>> {
+    KINDS.into_iter().map(|kind| (kind, None)).collect()
 }
 
 /// `NAME_what.ext` beside the recording, with -2, -3, ... where that is taken.

@@ -1,39 +1,18 @@
 //! All figures on one page of HTML that needs nothing from elsewhere.
 
 use super::{Comparison, Content, Made, Verdict};
-
-const STYLE: &str = "\
-:root{color-scheme:light dark;--ink:#222;--quiet:#5f5f5f;--paper:#fff;--line:#d0d0d0;--code:#f3f3f1;--link:#00588a;--bad:#b04a00}
-@media (prefers-color-scheme:dark){:root{--ink:#e6e6e6;--quiet:#a8a8a8;--paper:#16181b;--line:#3c4046;--code:#22262b;--link:#7cc0ee;--bad:#ffb066}}
-*{box-sizing:border-box}
-body{margin:0 auto;max-width:1080px;padding:1.5rem;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,sans-serif}
-h1,h2,h3{line-height:1.25}
-h2{margin-top:3rem;border-bottom:1px solid var(--line)}
-h3{margin-top:2.5rem}
-a{color:var(--link)}
-nav ul{columns:2;padding-left:1.2rem;margin:.3rem 0 1rem}
-nav li{break-inside:avoid;font-size:.92rem}
-nav p{margin:.6rem 0 0;font-weight:600}
-figure{margin:1rem 0}
-figure svg{display:block;width:100%;height:auto;background:#fff;border-radius:4px}
-figcaption,.quiet{color:var(--quiet);font-size:.95rem}
-table{border-collapse:collapse;width:100%;font-size:.92rem;margin:1rem 0}
-th,td{border-bottom:1px solid var(--line);padding:.3rem .6rem;text-align:left;vertical-align:top}
-td.n{font-variant-numeric:tabular-nums}
-.differs{color:var(--bad);font-weight:600}
-pre{background:var(--code);padding:.6rem .8rem;overflow-x:auto;font-size:.85rem;white-space:pre-wrap;overflow-wrap:anywhere}
-ul.facts{padding-left:1.2rem;font-size:.95rem}
-@media (max-width:700px){nav ul{columns:1}}
-";
+use crate::report::page::{document, escaped, picture, table};
 
 /// The page, as an HTML document.
 pub fn page(all: &[Made]) -> String {
     let contents: String = chapters(all).iter().map(|(name, made)| contents(name, made)).collect();
     let body: String = chapters(all).iter().map(|(name, made)| chapter(name, made)).collect();
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Figures and tables of the thesis, computed</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>Figures and tables of the thesis, computed</h1>\n<p>L. Cui, <cite>On the Complex Non-Minimum Phase Zeros in Flexure Mechanisms</cite>. Each figure under its number, drawn by <code>bench figures</code> from what the other commands compute; printed figures beside ours. Commands run in the folder of this page. A difference is computed less printed; it agrees within half of the last printed digit, unless a remark gives another tolerance.</p>\n{}<nav>\n{contents}</nav>\n{body}</body>\n</html>\n",
+    let title = "Figures and tables of the thesis, computed";
+    let body = format!(
+        "<h1>{title}</h1>\n<p>L. Cui, <cite>On the Complex Non-Minimum Phase Zeros in Flexure Mechanisms</cite>. Each figure under its number, drawn by <code>bench figures</code> from what the other commands compute; printed figures beside ours. Commands run in the folder of this page. A difference is computed less printed; it agrees within half of the last printed digit, unless a remark gives another tolerance.</p>\n{}<nav>\n{contents}</nav>\n{body}",
         summary(all)
-    )
+    );
+    document(title, &body)
 }
 
 /// How many figures agree.
@@ -80,14 +59,9 @@ fn section(made: &Made) -> String {
 }
 
 fn figure(heading: &str, content: &Content, svg: Option<&str>) -> String {
-    let drawn = escaped(&content.drawn);
     match svg {
-        None => format!("<p>{drawn}</p>\n"),
-        Some(svg) => {
-            let label = format!("<svg role=\"img\" aria-label=\"{}\" ", escaped(heading));
-            let svg = svg.replacen("<svg ", &label, 1);
-            format!("<figure>\n{}\n<figcaption>{drawn}</figcaption>\n</figure>\n", svg.trim_end())
-        }
+        None => format!("<p>{}</p>\n", escaped(&content.drawn)),
+        Some(svg) => picture(svg, heading, &content.drawn),
     }
 }
 
@@ -105,9 +79,7 @@ fn comparisons(compared: &[Comparison]) -> String {
         return String::new();
     }
     let rows: String = compared.iter().map(comparison).collect();
-    format!(
-        "<table>\n<thead><tr><th>Figure</th><th>Printed</th><th>Computed</th><th>Difference</th><th>Verdict</th></tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n"
-    )
+    table(&["Figure", "Printed", "Computed", "Difference", "Verdict"], &rows)
 }
 
 fn comparison(row: &Comparison) -> String {
@@ -145,18 +117,12 @@ fn commands(commands: &[String]) -> String {
     format!("<pre><code>{}</code></pre>\n", escaped(&commands.join("\n")))
 }
 
-/// Text that means nothing to HTML.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn what_means_something_to_html_is_escaped() {
-        assert_eq!(escaped("<a href=\"x\">'&'"), "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#39;");
         let row = Comparison::words("|S| < 1 & more", "<b>", "<b>");
         assert!(comparison(&row).contains("|S| &lt; 1 &amp; more") && !comparison(&row).contains("<b>"));
     }

@@ -13,12 +13,14 @@
 
 mod merged;
 mod refine;
+mod response;
 mod search;
 mod view;
 
 use nalgebra::DMatrix;
 
 pub use refine::Parameters;
+pub use response::UncertainPole;
 pub use search::Order;
 pub use view::View;
 

@@ -1,8 +1,10 @@
-//! What a person looks at: plots as self-contained SVG.
+//! What a person looks at: plots as self-contained SVG, pages as self-contained HTML.
 //!
 //! ```text
 //! sheet -> chart (axes, marks, in values) -> clip -> panel -> canvas
 //! bode -> trace (checked, unwrapped by phase) -> panel (axis: scales and ticks, curve: thinned out) -> canvas (SVG)
+//! pole_zero (ellipse: intervals), stability, responses (Nyquist, coherence) -> sheet
+//! page (HTML) <- pictures, tables, number (digits by the error)
 //! quadrants (actuator and probe in the plane of two shapes) -> canvas
 //! ```
 //!
@@ -15,17 +17,26 @@ mod chart;
 mod clip;
 pub mod colours;
 mod curve;
+pub mod ellipse;
 mod error;
 mod header;
+pub mod number;
+pub mod page;
 mod panel;
 pub mod phase;
+mod pole_zero;
 mod quadrants;
+mod responses;
 mod sheet;
+mod stability;
 mod trace;
 
 pub use bode::bode_svg;
 pub use chart::{Chart, Mark, Pen, Scale, ScaleKind, Stroke, Symbol};
 pub use error::ReportError;
+pub use pole_zero::{Place, PoleZeroMap, pole_zero_svg};
 pub use quadrants::{QuadrantPanel, quadrants_svg};
+pub use responses::{coherence_svg, nyquist_svg};
 pub use sheet::{Row, sheet_svg};
+pub use stability::{OrderedMode, Stays, stability_svg, stays};
 pub use trace::{Curve, Trace};

@@ -17,8 +17,6 @@ pub(super) use super::colours::INK;
 const LABEL_LEFT: f64 = 66.0;
 const LABEL_SIZE: f64 = 12.0;
 pub(super) const LINE_WIDTH: f64 = 1.4;
-/// Lengths in pixels of a dash and of the space after it.
-const DASH: (f64, f64) = (6.0, 5.0);
 /// Radius of the dots that mark points.
 const DOT: f64 = 2.0;
 /// How much of a faint stroke, and of a band, covers what is below.
@@ -122,7 +120,7 @@ impl Panel {
 
 /// A line as it is drawn for a trace: in one, or in dashes.
 pub(super) fn dashes(line: &Line, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
-    if line.dashed { curve::dashed(points, DASH) } else { vec![points.to_vec()] }
+    line.dashes.map_or_else(|| vec![points.to_vec()], |dashes| curve::dashed(points, dashes))
 }
 
 fn write(canvas: &Canvas, tick: &Tick, position: (f64, f64), anchor: (HPos, VPos)) -> Result<(), ReportError> {

@@ -16,6 +16,8 @@ const GAP_RESOLUTIONS: f64 = 2.0;
 /// Colours of measured curves, and of models.
 const MEASURED: [RGBColor; 4] = [BLUE, GREEN, PURPLE, SKY];
 const MODEL: [RGBColor; 3] = [VERMILION, INK, ORANGE];
+/// Dashes of one model after the other, and the spaces between: of two that coincide both are seen.
+const DASHES: [(f64, f64); 2] = [(6.0, 5.0), (2.5, 3.0)];
 
 /// A curve with a name for the legend.
 #[derive(Clone, Debug)]
@@ -44,8 +46,8 @@ pub enum Curve<'a> {
 pub(super) struct Line<'a> {
     pub name: &'a str,
     pub colour: RGBColor,
-    /// Drawn in dashes, so that what lies below is seen.
-    pub dashed: bool,
+    /// Lengths in pixels of its dashes and of the space after them, so that what lies below is seen.
+    pub dashes: Option<(f64, f64)>,
     pub frequency_hz: &'a [f64],
     pub magnitude: Vec<f64>,
     /// Unwrapped.
@@ -80,7 +82,8 @@ pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportErr
     }
     align_phases(&mut lines);
     let any_measured = lines.iter().any(|line| line.measured.is_some());
-    lines.iter_mut().for_each(|line| line.dashed = any_measured && line.measured.is_none());
+    let models = lines.iter_mut().filter(|line| any_measured && line.measured.is_none());
+    models.zip(DASHES.iter().cycle()).for_each(|(line, dashes)| line.dashes = Some(*dashes));
     if lines.is_empty() { Err(ReportError::NoTrace) } else { Ok(lines) }
 }
 
@@ -99,7 +102,7 @@ impl<'a> Line<'a> {
         let phase_deg = phase::unwrapped_deg(&wrapped, &leading);
         let begins = (0..response.len()).map(|k| k == 0 || measured.is_some_and(|frf| gap(frf, k))).collect();
         let name = trace.name;
-        Ok(Self { name, colour, dashed: false, frequency_hz, magnitude, phase_deg, firm, leading, begins, measured })
+        Ok(Self { name, colour, dashes: None, frequency_hz, magnitude, phase_deg, firm, leading, begins, measured })
     }
 
     /// Magnitude with its band.
@@ -125,7 +128,8 @@ impl<'a> Line<'a> {
     }
 }
 
-fn gap(frf: &Frf, k: usize) -> bool {
+/// Whether a gap lies between a measured frequency and the one before it.
+pub(super) fn gap(frf: &Frf, k: usize) -> bool {
     frf.frequency_hz[k] - frf.frequency_hz[k - 1] > GAP_RESOLUTIONS * frf.resolution_hz[k].max(frf.resolution_hz[k - 1])
 }
 

@@ -63,6 +63,8 @@ pub struct Analysis {
     pub fit: Result<ModalFit, FitError>,
     /// What that says of CNMP zeros.
     pub verdict: Verdict,
+    /// Modes and zeros up to here count for the verdict, in rad/s.
+    pub judged_up_to_rad_s: f64,
 }
 
 /// Analyses a recording made with `config`.
@@ -79,7 +81,16 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     let blocks = blocks(&signals, band_hz, &fine(&config.identify))?;
     let fit = fit::fit(&blocks, &View::Bench(config));
     let verdict = judge(&fit, &blocks, &View::Bench(config), last_rad_s, Some(&modal))?;
-    Ok(Analysis { frf, model, delay_s: chain.delay_s(), beyond, filled_ticks, fit, verdict })
+    Ok(Analysis {
+        frf,
+        model,
+        delay_s: chain.delay_s(),
+        beyond,
+        filled_ticks,
+        fit,
+        verdict,
+        judged_up_to_rad_s: last_rad_s,
+    })
 }
 
 /// What the fit says of CNMP zeros up to `up_to_rad_s`, beside the modes that the model has there.

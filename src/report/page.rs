@@ -1,0 +1,88 @@
+//! Pages of HTML that need nothing from elsewhere, in light and in dark.
+
+const STYLE: &str = "\
+:root{color-scheme:light dark;--ink:#222;--quiet:#5f5f5f;--paper:#fff;--line:#d0d0d0;--code:#f3f3f1;--link:#00588a;--bad:#b04a00;--good:#1f7a4d}
+@media (prefers-color-scheme:dark){:root{--ink:#e6e6e6;--quiet:#a8a8a8;--paper:#16181b;--line:#3c4046;--code:#22262b;--link:#7cc0ee;--bad:#ffb066;--good:#6fd3a2}}
+*{box-sizing:border-box}
+body{margin:0 auto;max-width:1080px;padding:1.5rem;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,sans-serif}
+h1,h2,h3{line-height:1.25}
+h2{margin-top:3rem;border-bottom:1px solid var(--line)}
+h3{margin-top:2.5rem}
+a{color:var(--link)}
+nav ul{columns:2;padding-left:1.2rem;margin:.3rem 0 1rem}
+nav li{break-inside:avoid;font-size:.92rem}
+nav p{margin:.6rem 0 0;font-weight:600}
+figure{margin:1rem 0}
+figure svg{display:block;width:100%;height:auto;background:#fff;border-radius:4px}
+figcaption,.quiet{color:var(--quiet);font-size:.95rem}
+table{border-collapse:collapse;width:100%;font-size:.92rem;margin:1rem 0}
+th,td{border-bottom:1px solid var(--line);padding:.3rem .6rem;text-align:left;vertical-align:top}
+td.n{font-variant-numeric:tabular-nums}
+.differs{color:var(--bad);font-weight:600}
+pre{background:var(--code);padding:.6rem .8rem;overflow-x:auto;font-size:.85rem;white-space:pre-wrap;overflow-wrap:anywhere}
+ul.facts{padding-left:1.2rem;font-size:.95rem}
+.verdict{font-size:1.15rem;border-left:.35rem solid var(--quiet);padding:.2rem 0 .2rem 1rem}
+.verdict.detected{border-color:var(--bad)}
+.verdict.excluded{border-color:var(--good)}
+.verdict strong{font-size:1.4rem}
+.wide{overflow-x:auto}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem;font-size:.95rem}
+dt{color:var(--quiet)}
+dd{margin:0;overflow-wrap:anywhere}
+@media (max-width:700px){nav ul{columns:1}}
+";
+
+/// A page: its title, and what stands on it, as HTML.
+pub fn document(title: &str, body: &str) -> String {
+    let title = escaped(title);
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+    )
+}
+
+/// An SVG within the page, with words for those who do not see it and words below it.
+pub fn picture(svg: &str, label: &str, caption: &str) -> String {
+    let labelled = format!("<svg role=\"img\" aria-label=\"{}\" ", escaped(label));
+    let svg = svg.replacen("<svg ", &labelled, 1);
+    format!("<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n", svg.trim_end(), escaped(caption))
+}
+
+/// A table of rows that are HTML already: see [`row`].
+pub fn table(header: &[&str], rows: &str) -> String {
+    let header: String = header.iter().map(|cell| format!("<th>{}</th>", escaped(cell))).collect();
+    format!("<table>\n<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n")
+}
+
+/// A row of a table.
+pub fn row(cells: &[String]) -> String {
+    let cells: String = cells.iter().map(|cell| format!("<td class=\"n\">{}</td>", escaped(cell))).collect();
+    format!("<tr>{cells}</tr>\n")
+}
+
+/// Names and what they stand for.
+pub fn facts(pairs: &[(String, String)]) -> String {
+    let pair = |(name, text): &(String, String)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(text));
+    format!("<dl>\n{}</dl>\n", pairs.iter().map(pair).collect::<String>())
+}
+
+/// Text that means nothing to HTML.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_means_something_to_html_is_escaped() {
+        assert_eq!(escaped("<a href=\"x\">'&'"), "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#39;");
+        let all = document(
+            "<t>",
+            &(row(&["<r>".into()]) + &picture("<svg x=\"1\"/>", "\"<l>", "<c>") + &table(&["<h>"], "")),
+        );
+        for raw in ["<t>", "<r>", "<l>", "<c>", "<h>", "\"\""] {
+            assert!(!all.contains(raw), "{raw}: {all}");
+        }
+    }
+}

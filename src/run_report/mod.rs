@@ -1,0 +1,46 @@
+//! What a person gets of a run: its pictures, and one page with all of them that needs nothing from elsewhere.
+//!
+//! ```text
+//! session::Analysis, config, recording -> pictures (report::*) -> page (report::page)
+//! ```
+
+mod page;
+mod pictures;
+
+pub use page::page;
+pub use pictures::{KINDS, Picture, pictures};
+
+use crate::config::Config;
+use crate::recording::Recording;
+use crate::session::Analysis;
+
+/// A run that was analysed.
+#[derive(Clone, Copy, Debug)]
+pub struct AnalysedRun<'a> {
+    /// What it shows.
+    pub analysis: &'a Analysis,
+    /// What it was made with.
+    pub config: &'a Config,
+    /// Where it was recorded.
+    pub recording: &'a Recording,
+}
+
+impl AnalysedRun<'_> {
+    /// What was excited, and when, in a line.
+    fn subtitle(&self) -> String {
+        let chirp = &self.config.chirp;
+        format!(
+            "current set-point to displacement, with hold, amplifier and delay; chirp {} to {} Hz in {} s at {} Hz; {}",
+            chirp.start_hz,
+            chirp.stop_hz,
+            chirp.duration_s,
+            self.config.servo.rate_hz,
+            self.said("started")
+        )
+    }
+
+    /// What the recording says of itself under a name.
+    fn said(&self, name: &str) -> &str {
+        self.recording.metadata().get(name).map_or("", String::as_str)
+    }
+}

@@ -1,0 +1,170 @@
+//! The pictures and the page of a run, by the program itself.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use serde_json::{Value, json};
+
+use crate::{svg, truth};
+
+/// A title that would break a page, and a picture, that did not escape it.
+const TITLE: &str = "a <b> & \"c\"";
+const KINDS: [&str; 5] = ["bode", "coherence", "nyquist", "pole_zero", "stability"];
+
+struct Run {
+    folder: tempfile::TempDir,
+    answer: Value,
+}
+
+impl Run {
+    fn of(arguments: &[&str]) -> Run {
+        let folder = tempfile::tempdir().unwrap();
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_bench")).args(arguments).current_dir(folder.path()).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        Run { answer: serde_json::from_slice(&output.stdout).unwrap(), folder }
+    }
+
+    fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join(relative)
+    }
+
+    fn pictures(&self) -> Vec<(&'static str, String)> {
+        let read = |kind| std::fs::read_to_string(self.path(self.answer["plots"][kind].as_str().unwrap())).unwrap();
+        KINDS.iter().map(|kind| (*kind, read(*kind))).collect()
+    }
+
+    fn page(&self) -> String {
+        std::fs::read_to_string(self.path(self.answer["report"].as_str().unwrap())).unwrap()
+    }
+}
+
+/// One chirp for all tests, of a stage with CNMP zeros.
+fn run() -> &'static Run {
+    static RUN: OnceLock<Run> = OnceLock::new();
+    let title = format!("title={}", toml::Value::from(TITLE));
+    RUN.get_or_init(|| Run::of(&["chirp", "--operating-point", "8%", "--asymmetry", "10%", "--set", &title, "--json"]))
+}
+
+#[test]
+fn every_picture_and_the_page_stand_beside_the_recording_under_its_name() {
+    let answer = &run().answer;
+    let recording = Path::new(answer["recording"].as_str().unwrap());
+    let stem = recording.file_stem().unwrap().to_string_lossy();
+    let beside = |what: &str| recording.with_file_name(format!("{stem}_{what}")).display().to_string();
+    for kind in KINDS {
+        assert_eq!(answer["plots"][kind], beside(&format!("{kind}.svg")));
+    }
+    assert_eq!(answer["plot"], answer["plots"]["bode"]);
+    assert_eq!(answer["report"], beside("report.html"));
+}
+
+#[test]
+fn identify_overwrites_neither_pictures_nor_page() {
+    let again = Run::of(&[
+        "identify",
+        "--json",
+        &run().path(run().answer["recording"].as_str().unwrap()).display().to_string(),
+    ]);
+    assert_ne!(again.answer["report"], run().answer["report"]);
+    assert!(again.page().contains("detected"));
+}
+
+#[test]
+fn pictures_say_what_is_along_their_axes_and_in_which_unit() {
+    let labels: [(&str, &[&str]); 5] = [
+        ("bode", &["Magnitude (m/A)", "Phase (deg)", "Coherence", "Frequency (Hz)"]),
+        ("coherence", &["Coherence (ratio)", "1 less coherence (ratio)", "Frequency (Hz)"]),
+        ("nyquist", &["Real part of H (um/A)", "Imaginary part of H (um/A)"]),
+        ("pole_zero", &["Real part of s (rad/s)", "Imaginary part of s (rad/s)", "imaginary axis"]),
+        ("stability", &["Order (number of modes)", "Frequency (Hz)"]),
+    ];
+    for ((kind, picture), (named, labels)) in run().pictures().iter().zip(labels) {
+        assert_eq!(*kind, named);
+        for label in labels {
+            assert!(picture.contains(label), "{kind}: {label}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_no_number_or_outside_of_its_picture() {
+    for (kind, picture) in run().pictures() {
+        for nothing in ["NaN", "inf"] {
+            assert!(!picture.contains(nothing), "{kind}: {nothing}");
+        }
+        // In tenths of a pixel.
+        let (width, height) = size(&picture);
+        let inside = |(x, y): &(f64, f64)| (0.0..=width).contains(x) && (0.0..=height).contains(y);
+        for element in ["polyline", "polygon"] {
+            assert!(
+                svg::points(&picture, element, "").concat().iter().all(inside),
+                "{kind}: a {element} leaves the page"
+            );
+        }
+        for words in svg::words(&picture) {
+            let within =
+                words.left >= -1.0 && words.right <= width + 1.0 && words.top >= -1.0 && words.bottom <= height + 1.0;
+            assert!(within, "{kind}: {words:?}");
+        }
+    }
+}
+
+fn size(picture: &str) -> (f64, f64) {
+    let view = picture.split("viewBox=\"0 0 ").nth(1).unwrap().split('"').next().unwrap();
+    let (width, height) = view.split_once(' ').unwrap();
+    (width.parse().unwrap(), height.parse().unwrap())
+}
+
+#[test]
+fn pictures_and_page_are_well_formed_by_other_programs() {
+    let answer = &run().answer;
+    let mut files: Vec<Value> = KINDS.iter().map(|kind| answer["plots"][kind].clone()).collect();
+    files.push(answer["report"].clone());
+    let files: Vec<Value> = files.iter().map(|file| json!(run().path(file.as_str().unwrap()))).collect();
+    let Some(answers) = truth::ask_of("pages.py", &files) else { return };
+    for (file, answer) in files.iter().zip(answers) {
+        assert_eq!(answer["errors"], json!([]), "{file}");
+        assert!(answer["elements"].as_u64().is_some_and(|count| count > 20), "{file}: {answer}");
+    }
+}
+
+#[test]
+fn the_page_says_the_verdict_and_why_before_anything_else_and_holds_all_of_the_run() {
+    let (page, answer) = (run().page(), &run().answer);
+    let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("`{text}` is not on the page"));
+    assert_eq!(answer["cnmp"], "detected");
+    assert!(at("<strong>detected</strong>") < at(answer["why"].as_str().unwrap()));
+    let order = ["<strong>", "<h2>Modes", "<h2>Zeros", "<svg", "<h2>The loop", "<h2>Configuration"].map(at);
+    assert!(order.is_sorted(), "{order:?}");
+    assert_eq!(page.matches("<svg ").count(), KINDS.len());
+    let modes = answer["modes"].as_array().unwrap().len();
+    let zeros = answer["zeros"].as_array().unwrap().len();
+    assert_eq!(page.matches("<tr><td").count(), modes + zeros, "a row a mode and a zero");
+    for text in ["virtual", "CNMP", "±", "prefers-color-scheme:dark"] {
+        at(text);
+    }
+}
+
+#[test]
+fn the_page_needs_nothing_from_elsewhere_and_escapes_the_title() {
+    let page = run().page();
+    for load in ["src=", "<link", "<script", "@import", "url(", "href="] {
+        assert!(!page.contains(load), "{load}");
+    }
+    for (at, _) in page.match_indices("http") {
+        assert!(page[at..].starts_with("http://www.w3.org/2000/svg"), "{}", &page[at..at + 60]);
+    }
+    assert!(page.contains("<h1>a &lt;b&gt; &amp; &quot;c&quot;</h1>") && !page.contains("<b>"));
+}
+
+#[test]
+fn where_no_mode_is_told_the_page_says_so_and_has_no_map() {
+    // A millionth of an ampere moves the stage by less than the probe's noise.
+    let run = Run::of(&["chirp", "--amplitude", "1e-6", "--duration", "20", "--start", "1", "--stop", "300", "--json"]);
+    assert_eq!((&run.answer["cnmp"], &run.answer["plots"]["pole_zero"]), (&json!("undecided"), &Value::Null));
+    let page = run.page();
+    assert!(page.contains("<strong>undecided</strong>") && !page.contains("<h2>Modes"), "{}", run.answer["why"]);
+    assert_eq!(page.matches("<svg ").count(), 3);
+}
