@@ -72,7 +72,7 @@ impl PoleZeroMap {
             self.poles.iter().chain(&self.zeros).chain(&self.others).filter(|place| !holds(frame, place)).count();
         let heading = match beyond {
             0 => "Upper half of the plane of s".into(),
-            n => format!("Upper half of the plane of s; {n} poles and zeros beyond the frame"),
+            n => format!("Upper half of the plane of s, but {n} beyond"),
         };
         self.marked(plane(&heading, frame), true, false)
     }
@@ -98,9 +98,9 @@ impl PoleZeroMap {
         }
         chart = chart.points(name("pole"), INK, Symbol::Cross, points(&self.poles));
         if !self.others.is_empty() {
-            chart = chart.points(name("zero beyond the verdict's band"), GREY, Symbol::Ring, points(&self.others));
+            chart = chart.points(name("zero that is not judged"), GREY, Symbol::Ring, points(&self.others));
         }
-        for (right, text) in [(false, "zero, left"), (true, "zero, right of the axis")] {
+        for (right, text) in [(false, "zero left"), (true, "zero right of the axis")] {
             let side: Vec<Place> = self.zeros.iter().filter(|zero| (zero.s.re > 0.0) == right).copied().collect();
             if side.is_empty() {
                 continue;
@@ -143,7 +143,7 @@ fn heading(zero: &Place) -> String {
     let sigmas = if sigmas > 1000.0 { "over 1000".into() } else { format!("{sigmas:.1}") };
     let side = if zero.s.re > 0.0 { "right" } else { "left" };
     let hz = zero.s.norm() / (2.0 * std::f64::consts::PI);
-    format!("Zero at {hz:.2} Hz: {sigmas} sigma {side} of the axis")
+    format!("Zero at {hz:.2} Hz, {sigmas} σ {side} of the axis")
 }
 
 /// A chart of the plane of s with its imaginary and real axis.

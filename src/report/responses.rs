@@ -101,7 +101,9 @@ fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
 /// When there is no frequency.
 pub fn coherence_svg(frf: &Frf, title: &str, subtitle: &str) -> Result<String, ReportError> {
     super::trace::lines(&[Trace { name: "coherence", curve: Curve::Measured(frf) }])?;
-    let frequency = || Scale::logarithmic("Frequency (Hz)");
+    let ends = frf.frequency_hz.first().zip(frf.frequency_hz.last()).filter(|(first, last)| first < last);
+    let frequency =
+        || Scale { range: ends.map(|(first, last)| (*first, *last)), ..Scale::logarithmic("Frequency (Hz)") };
     let series = |of: fn(f64) -> f64| {
         let point = |k: usize| (frf.frequency_hz[k], of(frf.coherence[k]));
         let gapped = |k: usize| (k > 0 && gap(frf, k)).then_some((f64::NAN, f64::NAN)).into_iter().chain([point(k)]);

@@ -62,7 +62,7 @@ fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Ch
     let highest = orders.len().max(9) as f64 + 1.0;
     let mut chart = Chart::new(
         "",
-        Scale::logarithmic("Frequency (Hz)").within(band_hz.0, band_hz.1),
+        Scale::logarithmic("Frequency (Hz)").within(from_hz(orders, band_hz), band_hz.1),
         Scale::linear("Order (number of modes)").within(0.0, highest),
     );
     let mut name = "mode of the fit";
@@ -80,6 +80,13 @@ fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Ch
     kinds
         .into_iter()
         .fold(chart, |chart, (kind, name, colour, symbol)| chart.points(name, colour, symbol, places(orders, kind)))
+}
+
+/// Half of the lowest mode that swings, or the band's lower end where that is higher: below is nothing to see.
+fn from_hz(orders: &[Vec<OrderedMode>], band_hz: (f64, f64)) -> f64 {
+    let swinging = orders.iter().flatten().map(|mode| mode.frequency_hz).filter(|f| *f > 0.0);
+    let lowest = swinging.fold(band_hz.1, f64::min);
+    band_hz.0.max(0.5 * lowest)
 }
 
 /// The modes of a kind: frequency in hertz, and order.

@@ -1,6 +1,7 @@
 //! From a response to modes with their errors, and from these to a verdict.
 mod intervals;
 mod modes;
+mod response;
 mod rig;
 mod synthetic;
 mod verdicts;

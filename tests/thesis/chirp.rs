@@ -97,6 +97,8 @@ fn the_answer_the_files_and_the_recording_are_as_promised() {
         "recording",
         "frf_csv",
         "plot",
+        "plots",
+        "report",
         "ticks",
         "overruns",
         "lost_records",
