@@ -72,7 +72,7 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         delay_s: Some(analysis.delay_s),
         delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
         delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
-        shown: Shown::of(&analysis),
+        shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
     })
 }
 
@@ -144,21 +144,21 @@ fn no_plots() -> BTreeMap<&'static str, Option<String>> {
 }
 
 /// `NAME_what.ext` beside the recording, with -2, -3, ... where that is taken.
-fn free(recording: &Path, what: &str, extension: &str) -> PathBuf {
+pub(super) fn free(recording: &Path, what: &str, extension: &str) -> PathBuf {
     let stem = recording.file_stem().unwrap_or_default().to_string_lossy();
     let numbered = |n: u32| if n == 1 { String::new() } else { format!("-{n}") };
     let path = |n: u32| recording.with_file_name(format!("{stem}_{what}{}.{extension}", numbered(n)));
     (1..).map(path).find(|path| !path.exists()).unwrap_or_else(|| path(1))
 }
 
-fn write_new(path: &Path, text: &str) -> Result<(), CliError> {
+pub(super) fn write_new(path: &Path, text: &str) -> Result<(), CliError> {
     let failed = |e: std::io::Error| {
         CliError::Failed(format!("cannot write {}: {e}; free some space or choose another folder", path.display()))
     };
     std::fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)
 }
 
-fn median(values: &[f64]) -> Option<f64> {
+pub(super) fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied()

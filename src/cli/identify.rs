@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::analysis_output::{Made, make};
+use super::identify_table::{self, TableOptions};
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
 use crate::recording::Recording;
@@ -13,8 +14,10 @@ use crate::session::{Kind, Plan};
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
-    /// The recording (MCAP) of a chirp
+    /// The recording (MCAP) of a chirp, or a CSV of other hands with --input and --output
     recording: PathBuf,
+    #[command(flatten)]
+    table: TableOptions,
     /// One JSON object on standard output, nothing else there
     #[arg(long)]
     json: bool,
@@ -33,6 +36,9 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    if args.table.is_meant(&args.recording) {
+        return identify_table::run(&args.recording, &args.table, args.json);
+    }
     let recording = Recording::open(&args.recording)?;
     let plan = Plan::of(&recording)?;
     if plan.kind != Kind::Chirp {

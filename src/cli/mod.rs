@@ -11,6 +11,7 @@ mod device;
 mod doctor;
 mod figures;
 mod identify;
+mod identify_table;
 mod margins;
 mod modal_output;
 mod model;
@@ -51,7 +52,7 @@ enum Command {
     Margins(margins::Args),
     /// The figures and tables of the thesis, computed: one SVG a figure and one page of HTML
     Figures(figures::Args),
-    /// The analysis of `bench chirp`, from a recording
+    /// The analysis of `bench chirp`, from a recording or from a CSV of other hands
     Identify(identify::Args),
     /// Run the recorded probe through the same loop and compare every command bit for bit
     Replay(replay::Args),

@@ -3,9 +3,8 @@
 use serde::Serialize;
 
 use super::table::table;
-use crate::fit::FittedMode;
-use crate::session::Analysis;
-use crate::verdict::UncertainZero;
+use crate::fit::{FittedMode, ModalFit};
+use crate::verdict::{UncertainZero, Verdict};
 
 /// The part of the report that a fit makes; its names are a contract.
 #[derive(Clone, Debug, Serialize)]
@@ -61,10 +60,8 @@ fn hz(omega_rad_s: f64) -> f64 {
 }
 
 impl Shown {
-    /// What an analysis shows.
-    pub(super) fn of(analysis: &Analysis) -> Shown {
-        let verdict = &analysis.verdict;
-        let fit = analysis.fit.as_ref().ok();
+    /// What a fit and its verdict show.
+    pub(super) fn of(fit: Option<&ModalFit>, verdict: &Verdict) -> Shown {
         Shown {
             modes: fit.map_or(Vec::new(), |fit| fit.modes().iter().map(mode).collect()),
             zeros: verdict.zeros.iter().map(zero).collect(),
@@ -95,6 +92,11 @@ impl Shown {
 
     pub(super) fn why(&self) -> &str {
         &self.why
+    }
+
+    /// The power of what the modes leave over that of the noise.
+    pub(super) fn chi2(&self) -> Option<f64> {
+        self.fit_chi2_per_freedom
     }
 
     /// For people: intervals hold the truth with 95 %.

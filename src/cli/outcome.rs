@@ -8,6 +8,7 @@ use crate::control::ControllerError;
 use crate::devices::DevicesError;
 use crate::excitation::ChirpError;
 use crate::identify::IdentifyError;
+use crate::identify::table::TableError;
 use crate::plant::PlantError;
 use crate::recording::RecordingError;
 use crate::session::PlanError;
@@ -75,6 +76,9 @@ pub enum CliError {
     /// The data do not carry the analysis.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// The table is no record.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// There is no such study, or its file cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -88,6 +92,10 @@ impl CliError {
     pub fn outcome(&self) -> Outcome {
         match self {
             CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
+            CliError::Table(TableError::NoColumn { .. } | TableError::Ambiguous { .. } | TableError::Same { .. }) => {
+                Outcome::Usage
+            }
+            CliError::Table(_) => Outcome::Failed,
             CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
             _ => Outcome::Usage,
         }

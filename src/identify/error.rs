@@ -81,6 +81,18 @@ pub enum IdentifyError {
         /// Half the sampling rate.
         limit_hz: f64,
     },
+    /// Too few periods to average.
+    #[error(
+        "{periods} whole periods, of which {skip} are left out: {least} must remain, the last of which only shows the drift; record more periods, leave out fewer, or check the length of the period"
+    )]
+    Periods {
+        /// Whole periods in the record.
+        periods: usize,
+        /// Periods that are left out.
+        skip: usize,
+        /// Periods that must remain.
+        least: usize,
+    },
     /// No bin of the FFT falls into the band.
     #[error(
         "no frequency of this record lies between {low_hz} and {high_hz} Hz, its bins are {bin_hz} Hz apart and begin at {bin_hz} Hz: widen the band or use a longer record or segment"

@@ -6,9 +6,12 @@
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
 //! - [`blocks()`]: the same record without smoothing, for a fit.
+//! - [`periodic::estimate`]: periods of one excitation, averaged.
+//! - [`with_distortion`]: what is alike in every period and yet no response.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
 //! - [`align::Readings`] and [`edges`]: readings and set-points of irregular times on the regular ones of a loop.
 //! - [`delay::beyond`]: how much later than a model a response answers.
+//! - [`table`]: records of other hands, a CSV with named columns.
 //! - [`csv`]: the file in which an FRF leaves the bench, and comes back.
 //!
 //! Sign convention of both estimators: y = H u, so a lag of the output is a negative phase.
@@ -18,17 +21,21 @@ mod band;
 mod blocks;
 pub mod csv;
 pub mod delay;
+mod distortion;
 pub mod edges;
 mod error;
 mod frf;
 mod kernel;
 pub mod local;
 mod moments;
+pub mod periodic;
 mod signals;
 mod spectrum;
+pub mod table;
 pub mod welch;
 
 pub use blocks::{Block, blocks};
+pub use distortion::with_distortion;
 pub use error::IdentifyError;
 pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, wrapped_phase_rad};
 pub use local::EstimatorSettings;

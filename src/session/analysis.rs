@@ -94,7 +94,7 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
 }
 
 /// What the fit says of CNMP zeros up to `up_to_rad_s`, beside the modes that the model has there.
-fn judge(
+pub(super) fn judge(
     fit: &Result<ModalFit, FitError>,
     blocks: &[Block],
     view: &View<'_>,

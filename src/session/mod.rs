@@ -9,6 +9,7 @@
 //! through the ring of orders alone.
 
 mod analysis;
+mod foreign;
 mod gathered;
 mod measure;
 mod name;
@@ -18,6 +19,7 @@ mod run;
 mod stop;
 
 pub use analysis::{Analysis, AnalysisError, analyse};
+pub use foreign::{ForeignAnalysis, analyse_signals};
 pub use measure::{Measured, measure};
 pub use plan::{Kind, Plan, PlanError};
 pub use replay::{Difference, ReplayError, Replayed, replay};

@@ -1,0 +1,212 @@
+//! `bench identify` on a CSV of other hands: any input, any output, no model beside them.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::analysis_output::{free, median, write_new};
+use super::modal_output::Shown;
+use super::options::{print_json, print_text};
+use super::{CliError, Outcome};
+use crate::identify::periodic::Repetition;
+use crate::identify::table::{self, Clock, Columns};
+use crate::identify::{Signals, csv};
+use crate::report::{Curve, Trace, bode_svg};
+use crate::session::{ForeignAnalysis, analyse_signals};
+
+/// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
+const WHOLE_SAMPLES: f64 = 1e-3;
+
+/// What the columns of a CSV mean.
+#[derive(Clone, Debug, clap::Args)]
+#[group(id = "table")]
+pub(super) struct TableOptions {
+    /// Column of the force, or of what stands for it, in any unit: the file is a CSV
+    #[arg(long, value_name = "COLUMN", requires = "output")]
+    input: Option<String>,
+    /// Column of the displacement, or of what stands for it, in any unit
+    #[arg(long, value_name = "COLUMN", requires = "input")]
+    output: Option<String>,
+    /// Column of the times in seconds, which must be regular
+    #[arg(long, value_name = "COLUMN", requires = "input", conflicts_with = "rate")]
+    time: Option<String>,
+    /// Samples per second, for a CSV without times
+    #[arg(long, value_name = "HZ", requires = "input", allow_hyphen_values = true)]
+    rate: Option<f64>,
+    /// The record repeats: samples a period (2500) or seconds (1s). Without it the record begins and ends at rest
+    #[arg(long, value_name = "SAMPLES|S", requires = "input")]
+    period: Option<String>,
+    /// Periods at the beginning that are left out, in which the plant still settles
+    #[arg(long, value_name = "N", requires = "period")]
+    skip_periods: Option<usize>,
+    /// Frequencies to look at, in hertz: 11:250. Without it all up to half the rate
+    #[arg(long, value_name = "LOW:HIGH", requires = "input", allow_hyphen_values = true)]
+    band: Option<String>,
+    /// Folder of the results; the CSV's own without it
+    #[arg(long, value_name = "FOLDER", requires = "input")]
+    out: Option<PathBuf>,
+}
+
+/// The JSON object of the command: that of a recording, and what only a CSV has.
+#[derive(Debug, Serialize)]
+struct Report {
+    recording: String,
+    input: String,
+    output: String,
+    ticks: usize,
+    overruns: u64,
+    lost_records: u64,
+    truncated: bool,
+    rate_hz: f64,
+    band_hz: (f64, f64),
+    /// Periods that were averaged; `null` of a record that does not repeat.
+    periods: Option<usize>,
+    frf_csv: String,
+    plot: String,
+    frequencies: usize,
+    /// Median coherence over the band.
+    coherence_median: Option<f64>,
+    #[serde(flatten)]
+    shown: Shown,
+}
+
+impl TableOptions {
+    /// Whether a file is to be read as a CSV: by the options, or by its name.
+    pub(super) fn is_meant(&self, path: &Path) -> bool {
+        self.input.is_some() || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+    }
+
+    fn columns(&self, path: &Path) -> Result<Columns, CliError> {
+        let there = || Ok::<_, CliError>(table::names(path)?.join(", "));
+        let (Some(input), Some(output)) = (self.input.clone(), self.output.clone()) else {
+            let text = format!("which columns of {}? --input COLUMN --output COLUMN of {}", path.display(), there()?);
+            return Err(CliError::Usage(text));
+        };
+        let clock = match (&self.time, self.rate) {
+            (Some(time), _) => Clock::Column(time.clone()),
+            (None, Some(rate_hz)) => Clock::RateHz(rate_hz),
+            (None, None) => {
+                let text = format!("when were the lines sampled? --time COLUMN (of {}) or --rate HZ", there()?);
+                return Err(CliError::Usage(text));
+            }
+        };
+        Ok(Columns { input, output, clock })
+    }
+
+    fn band_hz(&self, rate_hz: f64) -> Result<(f64, f64), CliError> {
+        let Some(text) = &self.band else { return Ok((0.0, rate_hz / 2.0)) };
+        let limits = text.split_once(':').and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)));
+        limits
+            .ok_or_else(|| CliError::Usage(format!("--band {text}: it must be two frequencies in hertz, as in 11:250")))
+    }
+
+    fn repetition(&self, rate_hz: f64) -> Result<Option<Repetition>, CliError> {
+        let Some(text) = &self.period else { return Ok(None) };
+        let wrong = || {
+            CliError::Usage(format!(
+                "--period {text}: it must be a whole number of samples, or seconds that make one at {rate_hz} Hz, as in 2500 or 1s"
+            ))
+        };
+        let samples: f64 = match text.strip_suffix('s') {
+            Some(seconds) => seconds.parse::<f64>().map_err(|_| wrong())? * rate_hz,
+            None => text.parse().map_err(|_| wrong())?,
+        };
+        // A NaN compares as false, and so fails.
+        let whole = samples >= 1.0 && samples < 1e15 && (samples - samples.round()).abs() <= WHOLE_SAMPLES;
+        let period = samples.round() as usize;
+        if whole { Ok(Some(Repetition { period, skip: self.skip_periods.unwrap_or(0) })) } else { Err(wrong()) }
+    }
+}
+
+/// Analyses a CSV; the files stand beside it, or in the folder asked for, under its name.
+pub(super) fn run(path: &Path, options: &TableOptions, json: bool) -> Result<Outcome, CliError> {
+    let columns = options.columns(path)?;
+    let signals = table::read(path, &columns)?;
+    signals.check()?;
+    let band_hz = options.band_hz(signals.rate_hz)?;
+    let analysis = analyse_signals(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
+    let beside = match &options.out {
+        Some(folder) => in_folder(folder, path)?,
+        None => path.to_owned(),
+    };
+    let report = report(path, &columns, &signals, band_hz, &analysis, &beside)?;
+    if json {
+        print_json(&report)?
+    } else {
+        print_text(&report.text())?
+    }
+    Ok(Outcome::Done)
+}
+
+/// The path under which a file would stand in a folder, which is made if it is not there.
+fn in_folder(folder: &Path, path: &Path) -> Result<PathBuf, CliError> {
+    let failed = |e| CliError::Failed(format!("cannot make the folder {}: {e}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    Ok(folder.join(path.file_name().unwrap_or_default()))
+}
+
+fn report(
+    path: &Path,
+    columns: &Columns,
+    signals: &Signals,
+    band_hz: (f64, f64),
+    analysis: &ForeignAnalysis,
+    beside: &Path,
+) -> Result<Report, CliError> {
+    let csv_path = free(beside, "frf", "csv");
+    csv::write_new(&csv_path, &analysis.frf).map_err(|e| CliError::Failed(e.to_string()))?;
+    let plot_path = free(beside, "bode", "svg");
+    write_new(&plot_path, &plot(path, columns, analysis)?)?;
+    Ok(Report {
+        recording: path.display().to_string(),
+        input: columns.input.clone(),
+        output: columns.output.clone(),
+        ticks: signals.len(),
+        overruns: 0,
+        lost_records: 0,
+        truncated: false,
+        rate_hz: signals.rate_hz,
+        band_hz,
+        periods: analysis.periods,
+        frf_csv: csv_path.display().to_string(),
+        plot: plot_path.display().to_string(),
+        frequencies: analysis.frf.len(),
+        coherence_median: median(&analysis.frf.coherence),
+        shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
+    })
+}
+
+fn plot(path: &Path, columns: &Columns, analysis: &ForeignAnalysis) -> Result<String, CliError> {
+    let measured = Trace { name: "measured", curve: Curve::Measured(&analysis.frf) };
+    let curve = Curve::Model { frequency_hz: &analysis.frf.frequency_hz, response: &analysis.fitted };
+    let fitted = (!analysis.fitted.is_empty()).then_some(Trace { name: "fit", curve });
+    let traces: Vec<Trace> = [measured].into_iter().chain(fitted).collect();
+    let title = path.file_name().unwrap_or_default().to_string_lossy();
+    let subtitle =
+        format!("{} to {}; units are those of the columns, m/A stands for them", columns.input, columns.output);
+    bode_svg(&traces, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let periods = self.periods.map_or(String::new(), |count| format!(", {count} periods averaged"));
+        format!(
+            "  record     {}: {} samples at {} Hz from `{}` to `{}`{periods}\n  response   {} ({} frequencies, median coherence \
+             {:.4})\n  plot       {}\n  residues   in `{}` per `{}` and s^2, where the table says 1/kg\n  misfit     {:.1} times the power \
+             of the noise\n{}",
+            self.recording,
+            self.ticks,
+            self.rate_hz,
+            self.input,
+            self.output,
+            self.frf_csv,
+            self.frequencies,
+            self.coherence_median.unwrap_or(0.0),
+            self.plot,
+            self.output,
+            self.input,
+            self.shown.chi2().unwrap_or(0.0),
+            self.shown.text()
+        )
+    }
+}
