@@ -112,7 +112,7 @@ impl TableOptions {
             None => text.parse().map_err(|_| wrong())?,
         };
         // A NaN compares as false, and so fails.
-        let whole = samples >= 1.0 && samples < 1e15 && (samples - samples.round()).abs() <= WHOLE_SAMPLES;
+        let whole = (1.0..1e15).contains(&samples) && (samples - samples.round()).abs() <= WHOLE_SAMPLES;
         let period = samples.round() as usize;
         if whole { Ok(Some(Repetition { period, skip: self.skip_periods.unwrap_or(0) })) } else { Err(wrong()) }
     }

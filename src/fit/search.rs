@@ -25,6 +25,8 @@ const FREE: Term = Term { omega_rad_s: 0.0, damping_ratio: 0.0, residue_per_kg: 
 const DELAYS_A_PERIOD: f64 = 6.0;
 /// At most so many.
 const MOST_DELAYS: f64 = 2000.0;
+/// Where one mode for all below the blocks begins: its frequency as a ratio of the lowest, and its damping ratio.
+const BELOW: (f64, f64) = (0.3, 0.4);
 /// A mode is seen whose residue is so many of its errors.
 const SEEN: f64 = 5.0;
 
@@ -89,7 +91,8 @@ pub(super) fn orders(view: &View<'_>, blocks: &[Block]) -> Vec<Order> {
 /// the others take their place without a rise of chi^2 that says otherwise.
 pub(super) fn without_the_needless(sum: Parameters, view: &View<'_>, blocks: &[Block]) -> Parameters {
     let needed = threshold(blocks.len());
-    let (mut now, mut seen) = refine(sum, view, blocks, 0.0);
+    let (now, seen) = refine(sum, view, blocks, 0.0);
+    let (mut now, mut seen) = with_one_below(now, seen, view, blocks);
     while now.modes.len() > 1 {
         let Some(place) = weakest(&now, &seen, blocks) else { break };
         let mut fewer = now.clone();
@@ -102,6 +105,23 @@ pub(super) fn without_the_needless(sum: Parameters, view: &View<'_>, blocks: &[B
         (now, seen) = (next, there);
     }
     now
+}
+
+/// The sum with one mode in the place of all that lie below the blocks, if it does as well: friction takes a free body for
+/// several, none of which can be told from the others.
+fn with_one_below(sum: Parameters, seen: Seen, view: &View<'_>, blocks: &[Block]) -> (Parameters, Seen) {
+    let low_rad_s = 2.0 * std::f64::consts::PI * blocks[0].frequency_hz;
+    let (below, above): (Vec<Term>, Vec<Term>) = sum.modes.iter().partition(|mode| mode.omega_rad_s < low_rad_s);
+    if below.len() < 2 {
+        return (sum, seen);
+    }
+    let residue_per_kg = below.iter().map(|mode| mode.residue_per_kg).sum();
+    let one = Term { omega_rad_s: BELOW.0 * low_rad_s, damping_ratio: BELOW.1, residue_per_kg };
+    let start = Parameters { modes: [one].into_iter().chain(above).collect(), ..sum.clone() };
+    let (next, there) = refine(start, view, blocks, 0.0);
+    let misfit = (seen.chi2 / (2 * blocks.len()) as f64).max(1.0);
+    let worse = (there.chi2 - seen.chi2) / ((below.len() - 1) as f64 * threshold(blocks.len()) * misfit);
+    if worse <= 1.0 { (next, there) } else { (sum, seen) }
 }
 
 /// The mode whose residue is the smallest part of its error, if it is below five; where the modes cannot even be told

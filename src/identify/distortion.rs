@@ -24,10 +24,9 @@ const FITS: usize = 3;
 const SHARPEST: f64 = 1e-3;
 /// Singular values below this are those of parameters that say the same.
 const ALIKE: f64 = 1e-10;
-/// Up to so many times the noise, what is rough is noise.
-const NOTHING: f64 = 4.0;
 
-/// The blocks with the power of distortion in their variances; as they are where there is none, or too few lines to tell.
+/// The blocks with the power of distortion in their variances; as they are where there are too few lines to
+/// tell. Where modes are closer than the lines of one curve, their difference from it is counted too.
 pub fn with_distortion(blocks: &[Block]) -> Vec<Block> {
     if blocks.len() < 2 * REACH + 1 {
         return blocks.to_vec();
@@ -37,12 +36,12 @@ pub fn with_distortion(blocks: &[Block]) -> Vec<Block> {
         let near = &rough[k.saturating_sub(REACH)..(k + REACH + 1).min(rough.len())];
         near.iter().sum::<f64>() / near.len() as f64
     };
-    let power: Vec<f64> = (0..blocks.len()).map(|k| around(k) * blocks[k].response.norm_sqr()).collect();
-    let mut ratios: Vec<f64> = power.iter().zip(blocks).map(|(power, block)| power / block.variance).collect();
-    ratios.sort_by(f64::total_cmp);
     // A response of zero makes 0/0, and max() then keeps the noise.
-    let with = |(block, power): (&Block, &f64)| Block { variance: block.variance.max(*power), ..*block };
-    if ratios[ratios.len() / 2] > NOTHING { blocks.iter().zip(&power).map(with).collect() } else { blocks.to_vec() }
+    let with = |(k, block): (usize, &Block)| Block {
+        variance: block.variance.max(around(k) * block.response.norm_sqr()),
+        ..*block
+    };
+    blocks.iter().enumerate().map(with).collect()
 }
 
 /// What the curve around a line leaves, per degree of freedom.

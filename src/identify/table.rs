@@ -115,7 +115,7 @@ pub enum TableError {
     },
     /// Samples are missing, or the rate changes.
     #[error(
-        "{path}, line {line}: {step_s} s after the line before, where the median step is {median_s} s; fill the gap, cut the file there, or give --rate instead of --time if only the stamps are rough"
+        "{path}, line {line}: {step_s:.9} s after the line before, where the median step is {median_s:.9} s; fill the gap, cut the file there, or give --rate instead of --time if only the stamps are rough"
     )]
     Irregular {
         /// The file.

@@ -20,6 +20,8 @@ const STEEPEST: f64 = 1.0;
 const END: f64 = 0.25;
 /// An answer earlier than this part of a sample, and than five of its sigma, comes before its cause.
 const EARLY_SAMPLES: f64 = 0.5;
+/// Modes that leave so many times the power of the noise explain what was measured.
+const EXPLAINED: f64 = 4.0;
 /// Sigma that count as sure.
 const SURE: f64 = 5.0;
 
@@ -46,12 +48,9 @@ pub fn analyse_signals(
     repetition: Option<Repetition>,
 ) -> Result<ForeignAnalysis, AnalysisError> {
     let (frf, blocks, periods) = response(signals, band_hz, repetition)?;
-    let mut fit = fit::fit(&weighted(&blocks, repetition), &View::Bare);
-    if let (Ok(fit), Some(_)) = (&mut fit, repetition) {
-        fit.chi2_per_freedom = chi2_per_freedom(fit, &blocks);
-    }
+    let fit = if repetition.is_some() { fit_of_periods(&blocks) } else { fit::fit(&blocks, &View::Bare) };
     let fitted = fit.as_ref().map_or(Vec::new(), |fit| fitted(fit, &frf.frequency_hz));
-    let verdict = match doubt(signals.rate_hz, &frf, &fit) {
+    let verdict = match doubt(signals.rate_hz, &frf, &blocks, &fit) {
         Some(why) => Verdict::undecided(why),
         None => judge(&fit, &blocks, &View::Bare, 2.0 * std::f64::consts::PI * band_hz.1, None)?,
     };
@@ -71,10 +70,16 @@ fn response(
     Ok((local::estimate(signals, band_hz, &settings)?, blocks(signals, band_hz, &settings)?, None))
 }
 
-/// The blocks as they count in a fit: where periods show the noise alone, distortion is added. Without periods the noise is
+/// The modes that periods show. Where they leave more than the noise, distortion counts as well; without periods the noise is
 /// taken from neighbouring frequencies, and distortion is in it.
-fn weighted(blocks: &[Block], repetition: Option<Repetition>) -> Vec<Block> {
-    if repetition.is_some() { with_distortion(blocks) } else { blocks.to_vec() }
+fn fit_of_periods(blocks: &[Block]) -> Result<ModalFit, FitError> {
+    let fit = fit::fit(blocks, &View::Bare);
+    if fit.as_ref().is_ok_and(|fit| fit.chi2_per_freedom <= EXPLAINED) {
+        return fit;
+    }
+    let mut fit = fit::fit(&with_distortion(blocks), &View::Bare)?;
+    fit.chi2_per_freedom = chi2_per_freedom(&fit, blocks);
+    Ok(fit)
 }
 
 /// What a fit leaves over the noise alone, whatever it was weighted with.
@@ -98,8 +103,29 @@ fn fitted(fit: &ModalFit, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
 }
 
 /// Why the data carry no verdict, whatever the fit says of them.
-fn doubt(rate_hz: f64, frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
-    incoherent(frf).or_else(|| grows(frf)).or_else(|| early(rate_hz, fit.as_ref().ok()?))
+fn doubt(rate_hz: f64, frf: &Frf, blocks: &[Block], fit: &Result<ModalFit, FitError>) -> Option<String> {
+    let swapped = || grows(frf).or_else(|| explained_the_other_way(blocks, fit));
+    incoherent(frf).or_else(swapped).or_else(|| early(rate_hz, fit.as_ref().ok()?))
+}
+
+/// Modes that do not explain the response, but do explain its inverse.
+fn explained_the_other_way(blocks: &[Block], fit: &Result<ModalFit, FitError>) -> Option<String> {
+    let explained = |fit: &ModalFit| fit.chi2_per_freedom <= EXPLAINED;
+    if fit.as_ref().is_ok_and(explained) {
+        return None;
+    }
+    let inverse = |block: &Block| Block {
+        response: block.response.inv(),
+        variance: block.variance / block.response.norm_sqr().powi(2),
+        ..*block
+    };
+    let inverse: Vec<Block> = blocks.iter().map(inverse).filter(|b| b.variance.is_normal()).collect();
+    let other = fit::fit(&inverse, &View::Bare).ok()?;
+    explained(&other).then(|| {
+        "modes explain how the input answers the output, and not how the output answers the input: they are swapped (--input, \
+         --output)"
+            .into()
+    })
 }
 
 fn incoherent(frf: &Frf) -> Option<String> {

@@ -1,0 +1,84 @@
+//! Averages over periods: exact, and as sure as they say.
+use bench::identify::IdentifyError;
+use bench::identify::periodic::{Repetition, estimate};
+
+use crate::python;
+use crate::signals::{PERIOD, multisine, response};
+
+const BAND_HZ: (f64, f64) = (5.0, 200.0);
+
+fn whole(skip: usize) -> Repetition {
+    Repetition { period: PERIOD, skip }
+}
+
+fn lines(step: usize) -> Vec<usize> {
+    (5..=200).step_by(step).collect()
+}
+
+#[test]
+fn the_response_is_exact_in_spite_of_drift_and_of_a_first_period_that_settles() {
+    let mut signals = multisine(&lines(1), 8, 3e-3, 0.0, 1);
+    signals.output_m[..PERIOD].iter_mut().enumerate().for_each(|(n, y)| *y += 1e-2 * (-(n as f64) / 30.0).exp());
+    let periods = estimate(&signals, BAND_HZ, whole(1)).unwrap();
+    assert_eq!((periods.count, periods.frf.len()), (6, 196));
+    for (f, h) in periods.frf.frequency_hz.iter().zip(&periods.frf.response) {
+        let exact = response(*f);
+        // 1000 roundings of samples of 0.02, in a line of 1e-6 times 500: 1e-15 x 0.02 x sqrt(1000)/5e-4.
+        assert!((h - exact).norm() < 1e-10 + 1e-9 * exact.norm(), "{f} Hz: {h} is not {exact}");
+    }
+}
+
+#[test]
+fn only_excited_lines_are_told() {
+    let periods = estimate(&multisine(&lines(5), 6, 0.0, 1e-7, 2), BAND_HZ, whole(0)).unwrap();
+    let hz: Vec<f64> = lines(5).iter().map(|f| *f as f64).collect();
+    assert_eq!(periods.frf.frequency_hz, hz);
+    assert!(periods.frf.resolution_hz.iter().all(|width| *width == 1.0));
+}
+
+#[test]
+fn the_errors_are_as_large_as_they_say() {
+    let (mut ratio, mut count) = (0.0, 0.0);
+    for seed in 0..20 {
+        let periods = estimate(&multisine(&lines(1), 12, 0.0, 1e-6, seed), BAND_HZ, whole(1)).unwrap();
+        for block in &periods.blocks {
+            ratio += (block.response - response(block.frequency_hz)).norm_sqr() / block.variance;
+            count += 1.0;
+        }
+    }
+    // Of P = 10 periods (P - 1)/(P - 2) = 1.125, with a relative error of 1.5/sqrt(3920) = 2.4 %; the drift that is taken off has
+    // an error of its own, shared by neighbouring periods, which the mean has less of than the scatter.
+    let mean: f64 = ratio / count;
+    assert!((0.95..1.22).contains(&mean), "{mean}");
+}
+
+#[test]
+fn response_and_variance_are_those_of_numpy() {
+    let signals = multisine(&lines(3), 7, 1e-3, 1e-6, 3);
+    let rows: String = signals.input_a.iter().zip(&signals.output_m).map(|(u, y)| format!("{u:e} {y:e}\n")).collect();
+    let arguments = [PERIOD.to_string(), "2".into(), "5".into(), "200".into(), "3".into()];
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let Some(theirs) = python::numbers("periodic.py", &arguments, &rows) else { return };
+    let ours = estimate(&signals, BAND_HZ, whole(2)).unwrap().blocks;
+    assert_eq!(theirs.len(), ours.len());
+    for (row, block) in theirs.iter().zip(&ours) {
+        let off = (block.response.re - row[1]).hypot(block.response.im - row[2]) / row[1].hypot(row[2]);
+        // FFTs of other hands differ by roundings of the largest line, 1e3 times the smallest.
+        assert!(block.frequency_hz == row[0] && off < 1e-9, "{row:?}: {block:?}");
+        assert!((block.variance / row[3] - 1.0).abs() < 1e-6, "{row:?}: {block:?}");
+    }
+}
+
+#[test]
+fn periods_that_are_none_are_refused() {
+    let signals = multisine(&lines(1), 8, 0.0, 1e-7, 4);
+    let refused = |period, skip| estimate(&signals, BAND_HZ, Repetition { period, skip }).unwrap_err();
+    for (period, skip) in [(0, 0), (1, 0), (7, 0), (8001, 0), (usize::MAX, 0)] {
+        assert!(matches!(refused(period, skip), IdentifyError::Setting { name: "period", .. }), "{period}");
+    }
+    for (period, skip) in [(PERIOD, 4), (PERIOD, usize::MAX), (2000, 0), (8000, 0)] {
+        assert!(matches!(refused(period, skip), IdentifyError::Periods { .. }), "{period} {skip}");
+    }
+    // A band between lines that the period has.
+    assert!(estimate(&signals, (5.2, 5.8), whole(0)).is_err());
+}
