@@ -15,7 +15,7 @@
 //!                             |                               ^  opens what the configuration names
 //!                             v  wait-free ring            devices <---- calibration
 //!                         recording (MCAP) ----> identify ----> fit ----> verdict ----> report
-//!                                   \______ session (one run, its analysis, its replay) ___ run_report, figures ___ cli
+//!                                   \______ session (one run, its analysis, its replay) ___ run_report, figures, campaign ___ cli
 //! ```
 //!
 //! Imports point towards what stands earlier in this picture. [`cli`] sees all, nobody sees it.
@@ -33,6 +33,7 @@
 //! | a figure or table of the thesis | [`figures`]: one line a figure in `figures/registry.rs` |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
+//! | a grid of chirps, and what all verdicts together say of the stage | [`campaign`] |
 //! | how a frequency response is estimated | [`identify`] |
 //! | how modes are fitted, and their number found | [`fit`] |
 //! | whether there are CNMP zeros | [`verdict`] |
@@ -63,6 +64,7 @@
 
 pub mod acting;
 pub mod calibration;
+pub mod campaign;
 pub mod cli;
 pub mod config;
 pub mod control;

@@ -2,6 +2,8 @@
 
 mod analysis_output;
 mod calibrate;
+mod campaign;
+mod campaign_output;
 mod chirp;
 mod choice;
 mod columns;
@@ -21,6 +23,7 @@ mod progress;
 mod recover;
 mod replay;
 mod run_options;
+mod spaced;
 mod table;
 
 use clap::{Parser, Subcommand};
@@ -44,6 +47,8 @@ enum Command {
     Chirp(chirp::Args),
     /// Close the loop with a reference: recording, predicted and measured figures
     Control(control::Args),
+    /// One chirp at each point of a grid of operating points and asymmetries: dots over the map, offset, recommendation
+    Campaign(campaign::Args),
     /// Find scale, sign, offset and delay of amplifier and probe by small static steps
     Calibrate(calibrate::Args),
     /// The mechanics by the model: modes, residues, signs, zeros
@@ -71,6 +76,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
     match cli.command {
         Command::Chirp(args) => chirp::run(&args),
         Command::Control(args) => control::run(&args),
+        Command::Campaign(args) => campaign::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Model(args) => model::run(&args),
         Command::Margins(args) => margins::run(&args),

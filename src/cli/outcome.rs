@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use crate::calibration::CalibrationError;
+use crate::campaign::{AnswerError, CampaignError};
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::devices::DevicesError;
@@ -82,6 +83,12 @@ pub enum CliError {
     /// There is no such study, or its file cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
+    /// The campaign's grid or folder is refused, or its files cannot be written.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// The campaign's points are there, but the model cannot be analysed.
+    #[error(transparent)]
+    Answer(#[from] AnswerError),
     /// Something else went wrong on the way.
     #[error("{0}")]
     Failed(String),
@@ -96,6 +103,7 @@ impl CliError {
                 Outcome::Usage
             }
             CliError::Table(_) => Outcome::Failed,
+            CliError::Campaign(CampaignError::File { .. }) => Outcome::Failed,
             CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
             _ => Outcome::Usage,
         }

@@ -16,7 +16,24 @@ pub(super) fn plant(config: &Config) -> Vec<Finding> {
         );
         findings.push(finding("sim.geometry", what));
     }
+    findings.extend(asymmetry_offset(config));
     findings
+}
+
+/// Least m2/m3 - 1 of the simulated stage: the least that `plant.mass_asymmetry` may be.
+const LEAST_ASYMMETRY: f64 = -0.9;
+
+fn asymmetry_offset(config: &Config) -> Option<Finding> {
+    let offset = config.sim.asymmetry_offset;
+    let model = config.plant.model();
+    let Some(asymmetry) = config.plant.mass_asymmetry() else {
+        let what = format!("is {offset}, but the model `{model}` has no mass asymmetry; set 0");
+        return (offset != 0.0).then(|| finding("sim.asymmetry_offset", what));
+    };
+    let what = format!(
+        "is {offset}, which with plant.mass_asymmetry = {asymmetry} is below {LEAST_ASYMMETRY}: too little is left of m2"
+    );
+    (asymmetry + offset < LEAST_ASYMMETRY).then(|| finding("sim.asymmetry_offset", what))
 }
 
 /// Refuses a plant whose settings, each within its range, do not go together.

@@ -190,6 +190,11 @@ pub struct SimSettings {
     /// The constraints of the simulated stage, linearised or not.
     #[serde(default)]
     pub geometry: Geometry,
+    /// What the simulated stage has of mass asymmetry m2/m3 - 1 beyond `plant.mass_asymmetry`, which nobody knows of: an
+    /// initial asymmetry by manufacture (section 5.2.2). Plant `sr4dof` only.
+    #[serde(default)]
+    #[schemars(range(min = -0.5, max = 0.5))]
+    pub asymmetry_offset: f64,
     /// Seed of noise and disturbance.
     #[schemars(range(min = 0, max = 9223372036854775807i64))]
     pub seed: u64,

@@ -20,9 +20,10 @@ pub(super) struct Body {
 impl Body {
     /// At rest at the operating point.
     pub(super) fn new(config: &Config) -> Result<Body, PlantError> {
-        let linear = Modal::of(&build(&config.plant)?)?;
+        let made = super::as_made(config);
+        let linear = Modal::of(&build(&made)?)?;
         Ok(Body {
-            mechanism: Quadratic::of(&config.plant)?,
+            mechanism: Quadratic::of(&made)?,
             state: QuadraticState::default(),
             fastest_rad_s: linear.modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max),
             lag_rad_s: 2.0 * std::f64::consts::PI * config.amplifier.bandwidth_hz,

@@ -16,7 +16,7 @@ mod stage;
 
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
-use crate::config::{Config, Geometry, UnmodelledMode};
+use crate::config::{Config, Geometry, PlantSettings, UnmodelledMode};
 use crate::plant::{self, Modal, Mode, PlantError};
 use body::Body;
 use course::Course;
@@ -99,9 +99,18 @@ fn stage(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
 
 /// The modes of the linear rig: those of the plant's model and those that it leaves out.
 pub fn modes(config: &Config) -> Result<Vec<Mode>, PlantError> {
-    let mut modes = Modal::of(&plant::build(&config.plant)?)?.modes;
+    let mut modes = Modal::of(&plant::build(&as_made(config))?)?.modes;
     modes.extend(unmodelled_modes(config));
     Ok(modes)
+}
+
+/// The plant as the simulated stage was made: with an asymmetry that its configuration does not know of.
+pub fn as_made(config: &Config) -> PlantSettings {
+    let mut plant = config.plant.clone();
+    if let PlantSettings::Sr4dof(settings) = &mut plant {
+        settings.mass_asymmetry += config.sim.asymmetry_offset;
+    }
+    plant
 }
 
 fn unmodelled_modes(config: &Config) -> Vec<Mode> {

@@ -226,8 +226,8 @@ fn checked<'a>(header: &str, line: &'a str) -> Option<&'a str> {
     (sum == checksum(header, json)).then_some(json)
 }
 
-/// A line for each setting in which two headers differ.
-fn differences(theirs: &str, ours: &str) -> Vec<String> {
+/// A line for each setting in which two headers differ, both JSON.
+pub(crate) fn differences(theirs: &str, ours: &str) -> Vec<String> {
     let [theirs, ours] = [theirs, ours].map(|text| serde_json::from_str::<Value>(text).unwrap_or_default());
     let mut found = Vec::new();
     differ("", &theirs, &ours, &mut found);

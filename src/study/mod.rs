@@ -22,6 +22,7 @@ mod tolerance;
 mod workers;
 
 pub use answer::{Answer, Counted, Couple, Effect, NotAnalysed, Probability};
+pub(crate) use file::differences;
 pub use file::{Opened, StudyFile, joined};
 pub use plan::{Drawn, Plan, Shard, Varied};
 pub use results::{Block, Count, Failure, Results};

@@ -17,6 +17,7 @@ pub use phase::{PhaseFall, phase_fall};
 pub use zeros::{UncertainZero, zeros};
 
 use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
 
 use crate::fit::{FittedMode, ModalFit};
 use crate::identify::Block;
@@ -36,7 +37,8 @@ const CLEAR_POWER: f64 = 20.0;
 const UNKNOWN_SIGN: f64 = 1e-3;
 
 /// What can be said of CNMP zeros.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Cnmp {
     /// There are.
     Detected,

@@ -1,19 +1,16 @@
 //! `bench model map`: the CNMP map of the thesis.
 
-use std::str::FromStr;
-
 use serde::Serialize;
 
 use super::super::CliError;
 use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
-use crate::config::{PlantSettings, Purpose, Sr4dofSettings, quantity};
+use super::super::spaced::Spaced;
+use crate::config::{PlantSettings, Purpose, Sr4dofSettings};
 use crate::zeros;
 
 /// The largest picture for people: lines and characters.
 const PICTURE: (usize, usize) = (60, 120);
-/// Values of a grid, at most.
-const MOST: usize = 10_000;
 
 /// Over which grid.
 #[derive(Clone, Debug, clap::Args)]
@@ -22,36 +19,12 @@ pub(super) struct Args {
     bench: BenchOptions,
     /// Operating points as ratios of the beam length: 0:0.15:31, 0%:15%:31
     #[arg(long, value_name = "FROM:TO:COUNT", default_value = "0%:15%:31", allow_hyphen_values = true)]
-    operating_points: Grid,
+    operating_points: Spaced,
     /// Mass asymmetries m2/m3 - 1: -0.1:0.1:41, -10%:10%:41
     #[arg(long, value_name = "FROM:TO:COUNT", default_value = "-10%:10%:41", allow_hyphen_values = true)]
-    asymmetries: Grid,
+    asymmetries: Spaced,
     #[command(flatten)]
     table: TableOptions,
-}
-
-/// Values at equal distances, both ends among them.
-#[derive(Clone, Debug)]
-struct Grid(Vec<f64>);
-
-impl FromStr for Grid {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Grid, String> {
-        let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
-            return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
-        };
-        let ratio = |text: &str| quantity::ratio(text).map_err(|e| e.to_string());
-        let (from, to) = (ratio(from)?, ratio(to)?);
-        let count = count.trim().parse().ok().filter(|count| (2..=MOST).contains(count));
-        let count: usize = count.ok_or(format!("COUNT is a whole number from 2 to {MOST}"))?;
-        if from == to {
-            return Err(format!("an empty sweep: FROM and TO are both {from}; give two values"));
-        }
-        let last = (count - 1) as f64;
-        let value = |k: usize| if k + 1 == count { to } else { from + (to - from) * k as f64 / last };
-        Ok(Grid((0..count).map(value).collect()))
-    }
 }
 
 #[derive(Debug, Serialize)]
@@ -81,7 +54,7 @@ fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
         return Err(CliError::Usage(what.into()));
     }
     let settings = sr4dof(args, &[])?;
-    let ends = |grid: &Grid| [grid.0[0], grid.0[grid.0.len() - 1]];
+    let ends = |grid: &Spaced| [grid.0[0], grid.0[grid.0.len() - 1]];
     for (point, asymmetry) in ends(&args.operating_points).into_iter().zip(ends(&args.asymmetries)) {
         let point_m = point * settings.beam_length_m;
         let sets = [format!("plant.operating_point_m={point_m:?}"), format!("plant.mass_asymmetry={asymmetry:?}")];

@@ -1,0 +1,238 @@
+//! `bench campaign`: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2).
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use super::campaign_output::Report;
+use super::chirp::check;
+use super::options::{BenchOptions, print_json, print_text};
+use super::progress::Progress;
+use super::spaced::Spaced;
+use super::{CliError, Outcome};
+use crate::campaign::{Answer, Found, Grid, Place, Point, Store, Tolerances, picture, work};
+use crate::config::{Config, Purpose, profiles};
+use crate::devices;
+use crate::recording::Recording;
+use crate::rt::thread::Pace;
+use crate::session::{self, Analysis, AnalysisError, Plan, Run, analyse, stoppable};
+use crate::verdict::{Cnmp, Verdict};
+
+/// Section 5.2.2 was identified at 1 kHz; the sweep has to stay below half of that.
+const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
+
+/// Over which grid, and where it is kept.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    bench: BenchOptions,
+    /// Operating points as ratios of the beam length
+    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "0%:8%:15", allow_hyphen_values = true)]
+    operating_points: Spaced,
+    /// Mass asymmetries m2/m3 - 1 that are put on
+    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "-10%:10%:10", allow_hyphen_values = true)]
+    asymmetries: Spaced,
+    /// Folder of the campaign: what is done is kept there, and the same command goes on from it
+    #[arg(long, value_name = "DIR", default_value = "campaign")]
+    out: PathBuf,
+    /// Run on the simulated stage, with the rates, delays and steps of the configured devices
+    #[arg(long)]
+    simulate: bool,
+    /// Keep the recording of each point as well, some 9 MB
+    #[arg(long)]
+    keep_recordings: bool,
+    /// How exactly an asymmetry can be put on, for the recommendation [default: half a step of 0.5 g]
+    #[arg(long, value_name = "RATIO")]
+    asymmetry_tolerance: Option<f64>,
+    /// How exactly an operating point can be set, as a ratio of the beam length
+    #[arg(long, value_name = "RATIO", default_value_t = 0.002)]
+    operating_point_tolerance: f64,
+    /// Points at a time [default: one a processor]; the results do not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let config = config(args)?;
+    let grid = Grid::new(args.operating_points.0.clone(), args.asymmetries.0.clone(), &config)?;
+    let tolerances = tolerances(args, &grid, &config)?;
+    let Found { store, mut done, dropped } = Store::open(&args.out, &grid, &config)?;
+    dropped.iter().for_each(|why| eprintln!("bench: {why}; the point is measured again"));
+    let missing: Vec<Place> = grid.places().filter(|place| done.iter().all(|(there, _)| there != place)).collect();
+    if !done.is_empty() {
+        eprintln!("bench: {} of {} points are done already", done.len(), done.len() + missing.len());
+    }
+    let bench = Bench { config: &config, grid: &grid, keep: args.keep_recordings };
+    let worked = stoppable(|stop| fill(&bench, &store, &missing, &mut done, threads(args), stop));
+    worked.map_err(|error| CliError::Failed(error.to_string()))??;
+    done.sort_by_key(|(place, _)| *place);
+    let all = grid.places().count();
+    if done.len() < all {
+        let (done, folder) = (done.len(), args.out.display());
+        eprintln!(
+            "bench: stopped after {done} of {all} points; started again with the same arguments it goes on from {folder}"
+        );
+        return Ok(Outcome::Failed);
+    }
+    let answer = Answer::of(&config, &grid, &done, tolerances)?;
+    let report = Report::of(&answer, &draw(args, &config, &answer)?, args.bench.profile());
+    if args.bench.json {
+        print_json(&report)?
+    } else {
+        print_text(&report.text())?
+    }
+    Ok(Outcome::Done)
+}
+
+/// Measures what is missing, with progress on a terminal.
+fn fill(
+    bench: &Bench<'_>,
+    store: &Store,
+    missing: &[Place],
+    done: &mut Vec<(Place, Point)>,
+    threads: usize,
+    stop: &AtomicBool,
+) -> Result<(), CliError> {
+    let (progress, mut count) = (Progress::new("campaign"), 0);
+    progress.show(count, missing.len() as u64);
+    let measure = |place| bench.measure(place, &store.recordings(place));
+    let worked = work(missing, threads, stop, measure, |place, point| {
+        store.add(place, &point)?;
+        done.push((place, point));
+        count += 1;
+        progress.show(count, missing.len() as u64);
+        Ok(())
+    });
+    progress.close();
+    worked
+}
+
+/// Draws the picture into the folder; where it is.
+fn draw(args: &Args, config: &Config, answer: &Answer<'_>) -> Result<PathBuf, CliError> {
+    let path = args.out.join("campaign.svg");
+    let failed = |error: &dyn std::fmt::Display| {
+        CliError::Failed(format!("cannot draw {}: {error}; the points are kept", path.display()))
+    };
+    let svg = picture(&config.title, answer).map_err(|error| failed(&error))?;
+    std::fs::write(&path, svg).map_err(|error| failed(&error))?;
+    Ok(path)
+}
+
+/// The configuration of the campaign: of the simulated stage, without what the grid varies.
+fn config(args: &Args) -> Result<Config, CliError> {
+    let usage = |what: &str| Err(CliError::Usage(what.into()));
+    if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
+        return usage(
+            "--operating-point and --asymmetry fix what a campaign varies: leave them out, or take `bench chirp`",
+        );
+    }
+    let mut bench = args.bench.clone();
+    let named = bench.config.as_deref().is_some_and(|name| name != profiles::DEFAULT);
+    let rate = bench.sets.iter().any(|set| set.trim_start().starts_with("loop.rate_hz"));
+    if !named && !rate {
+        bench.sets.splice(0..0, RATE.map(String::from));
+    }
+    let config = bench.load(Purpose::Chirp, &[])?;
+    if !args.simulate && !devices::is_simulated(&config) {
+        return usage(
+            "the configuration names devices: between the points of a campaign a person would have to set the operating point \
+             and put masses on, which this version does not ask for; add --simulate, or run `bench chirp --operating-point Y \
+             --asymmetry D` at each point",
+        );
+    }
+    if config.calibration.file.is_some() {
+        return usage(
+            "`calibration.file` is set, but the simulated stage of a campaign needs no correction; leave it out",
+        );
+    }
+    Ok(config)
+}
+
+fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, CliError> {
+    let half_a_step = || 0.5 * grid.mass_step(config);
+    let tolerances = Tolerances {
+        asymmetry: args.asymmetry_tolerance.unwrap_or_else(half_a_step),
+        operating_point: args.operating_point_tolerance,
+    };
+    for (what, value) in
+        [("--asymmetry-tolerance", tolerances.asymmetry), ("--operating-point-tolerance", tolerances.operating_point)]
+    {
+        if !(value > 0.0 && value < 1.0) {
+            return Err(CliError::Usage(format!("{what} is {value}; it is a ratio between 0 and 1, as in 0.004")));
+        }
+    }
+    Ok(tolerances)
+}
+
+fn threads(args: &Args) -> usize {
+    args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+}
+
+/// The simulated stage at any point of a grid.
+struct Bench<'a> {
+    config: &'a Config,
+    grid: &'a Grid,
+    keep: bool,
+}
+
+impl Bench<'_> {
+    /// A chirp at a point, checked, run and analysed as `bench chirp` does it; none where a person stopped the run.
+    fn measure(&self, place: Place, folder: &Path) -> Result<Option<Point>, CliError> {
+        let config = self.grid.config(self.config, place)?;
+        check(&config)?;
+        // What a process left there that was killed has no result.
+        remove(folder)?;
+        let plan = Plan::chirp(config);
+        let rig = devices::simulate(&plan.config)?.rig;
+        let run = session::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {});
+        let run = run.map_err(|error| CliError::Failed(error.to_string()))?;
+        let point = if run.stopped { None } else { Some(point(run, &plan.config)?) };
+        if point.is_none() || !self.keep {
+            remove(folder)?;
+        }
+        Ok(point)
+    }
+}
+
+/// What a run says; the recording is closed with that in it.
+fn point(mut run: Run, config: &Config) -> Result<Point, CliError> {
+    let loop_digest = format!("{:016x}", run.totals()?.loop_digest);
+    let analysis = match run.ended.trip {
+        Some((trip, tick)) => Err(format!("the run tripped at tick {tick}: {trip}; {}", trip.remedy())),
+        None => match analyse(&Recording::open(&run.path)?, config) {
+            Err(AnalysisError::Recording(error)) => return Err(error.into()),
+            other => other.map_err(|error| error.to_string()),
+        },
+    };
+    let point = match analysis {
+        Ok(analysis) => said(&analysis, loop_digest),
+        Err(why) => {
+            let (modes_hz, signs, zeros_rad_s) = Default::default();
+            Point { cnmp: Cnmp::Undecided, why, modes_hz, signs, zeros_rad_s, loop_digest }
+        }
+    };
+    super::run_options::finish(run, &point)?;
+    Ok(point)
+}
+
+fn said(analysis: &Analysis, loop_digest: String) -> Point {
+    let Verdict { cnmp, why, zeros, .. } = analysis.verdict.clone();
+    let modes = analysis.fit.as_ref().map(|fit| fit.modes()).unwrap_or_default();
+    let hz = |omega_rad_s: f64| omega_rad_s / (2.0 * std::f64::consts::PI);
+    Point {
+        cnmp,
+        why,
+        modes_hz: modes.iter().map(|mode| hz(mode.omega_rad_s.value)).collect(),
+        signs: modes.iter().map(|mode| if mode.residue_per_kg.value > 0.0 { '+' } else { '-' }).collect(),
+        zeros_rad_s: zeros.iter().map(|zero| [zero.s.re, zero.s.im]).collect(),
+        loop_digest,
+    }
+}
+
+fn remove(folder: &Path) -> Result<(), CliError> {
+    match std::fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(CliError::Failed(format!("cannot remove {}: {e}; remove it and start again", folder.display())))
+        }
+        _ => Ok(()),
+    }
+}
