@@ -14,7 +14,7 @@
 use super::Region;
 
 /// 95 % quantile of chi-squared with one degree of freedom.
-const CHI2_95: f64 = 3.841_458_820_694_124;
+pub(super) const CHI2_95: f64 = 3.841_458_820_694_124;
 
 /// What was said at a point: yes or no.
 #[derive(Clone, Copy, Debug, PartialEq)]

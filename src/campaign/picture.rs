@@ -1,5 +1,6 @@
 //! The measured dots over the model's map (Fig 5-10), and how likely each offset is.
 
+use super::offset::CHI2_95;
 use super::{Answer, Offset};
 use crate::plant::PlantError;
 use crate::report::colours::{BLUE, Colour, GREEN, INK, PAPER, VERMILION};
@@ -30,7 +31,7 @@ pub fn picture(title: &str, answer: &Answer<'_>) -> Result<String, PictureError>
     let mut maps = vec![map(answer, "(a) The model as configured", 0.0)?];
     let mut rows = Vec::new();
     if let Some(offset) = &answer.offset {
-        let heading = format!("(b) With an initial asymmetry of {:+.2} %, which fits best", 100.0 * offset.best);
+        let heading = format!("(b) The model with {:+.2} % of initial asymmetry", 100.0 * offset.best);
         maps.push(map(answer, &heading, offset.best)?);
         rows.push(Row::new(150.0, vec![likelihood(offset)]));
     }
@@ -40,8 +41,10 @@ pub fn picture(title: &str, answer: &Answer<'_>) -> Result<String, PictureError>
 }
 
 fn map(answer: &Answer<'_>, heading: &str, offset: f64) -> Result<Chart, PictureError> {
-    let x = Scale::linear("Intended mass asymmetry (%)");
-    let mut chart = Chart::new(heading, x, Scale::linear("Operating point (% of L)")).mark(cells(answer, offset)?);
+    let [(left, right), (low, high)] = frame(answer).map(|(low, high)| (100.0 * low, 100.0 * high));
+    let x = Scale::linear("Intended mass asymmetry (%)").within(left, right);
+    let y = Scale::linear("Operating point (% of L)").within(low, high);
+    let mut chart = Chart::new(heading, x, y).mark(cells(answer, offset)?);
     for (cnmp, colour, symbol) in [
         (Cnmp::Detected, VERMILION, Symbol::Dot),
         (Cnmp::Excluded, BLUE, Symbol::Ring),
@@ -64,9 +67,8 @@ fn dots(answer: &Answer<'_>, cnmp: Cnmp) -> Vec<(f64, f64)> {
 }
 
 fn cells(answer: &Answer<'_>, offset: f64) -> Result<Mark, PictureError> {
-    let (low, high) = ends(&answer.grid.asymmetries);
-    let margin = 0.05 * (high - low);
-    let (low, width) = (low - margin, high - low + 2.0 * margin);
+    let [(low, high), _] = frame(answer);
+    let width = high - low;
     let asymmetries: Vec<f64> = (0..COLUMNS).map(|k| low + width * (k as f64 + 0.5) / COLUMNS as f64).collect();
     let shifted: Vec<f64> = asymmetries.iter().map(|asymmetry| asymmetry + offset).collect();
     let undamped = cnmp_map(answer.settings, &answer.region.operating_points, &shifted, 1)?;
@@ -86,6 +88,13 @@ fn cells(answer: &Answer<'_>, offset: f64) -> Result<Mark, PictureError> {
     })
 }
 
+/// Ends of both axes, ratios: the asymmetries of the grid with a margin, the operating points of the map.
+fn frame(answer: &Answer<'_>) -> [(f64, f64); 2] {
+    let (low, high) = ends(&answer.grid.asymmetries);
+    let margin = 0.05 * (high - low);
+    [(low - margin, high + margin), ends(&answer.region.operating_points)]
+}
+
 /// Edges of the cells around rising values, in per cent.
 fn edges(values: &[f64]) -> Vec<f64> {
     let (low, high) = ends(values);
@@ -102,11 +111,11 @@ fn likelihood(offset: &Offset) -> Chart {
     let level = |step: &super::Step| step.log_likelihood - highest;
     let corners = |step: &super::Step| [(100.0 * step.from, level(step)), (100.0 * step.to, level(step))];
     let lowest = offset.steps.iter().map(level).fold(-3.0, f64::min);
-    let limit = -1.92;
+    let limit = -0.5 * CHI2_95;
     let [low, high] = offset.interval.map(|end| 100.0 * end);
     let (from, to) = (100.0 * offset.searched[0], 100.0 * offset.searched[1]);
     Chart::new(
-        "(c) How likely each initial asymmetry is, by the verdicts",
+        "(c) Which initial asymmetry fits the verdicts best",
         Scale::linear("Initial asymmetry (%)").within(from, to),
         Scale::linear("log likelihood").within(1.08 * lowest, -0.05 * lowest),
     )

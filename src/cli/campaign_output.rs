@@ -138,7 +138,8 @@ impl Report {
 
     fn recommendation_text(&self) -> String {
         let Some(best) = self.recommendation else {
-            return "recommended nothing: with every asymmetry of the range some operating point has CNMP zeros\n"
+            return "recommended nothing: with every asymmetry of the range, and some initial one of the interval, an operating point has \
+                    CNMP zeros\n"
                 .into();
         };
         let asymmetry = format!("recommended asymmetry {:+.2} %", 100.0 * best.asymmetry);
