@@ -110,7 +110,7 @@ fn spectra(samples: &[f64], Repetition { period, skip }: Repetition, count: usiz
     (0..count).map(of).collect()
 }
 
-/// By how much a signal drifts over the period from `start` on: the mean of x[n + period] - x[n] for n around `start`, as far to
+/// By how much a signal drifts over the period from `start` on: the mean of `x[n + period] - x[n]` for n around `start`, as far to
 /// both sides as there are samples.
 fn drift(samples: &[f64], start: usize, period: usize) -> f64 {
     let reach = (period / DRIFT_PART).min(start).min(samples.len().saturating_sub(start + period + 1));

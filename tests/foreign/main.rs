@@ -6,6 +6,7 @@ mod program;
 mod python;
 
 mod motor_bench;
+mod once;
 mod periodic;
 mod refused;
 mod signals;
