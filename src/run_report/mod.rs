@@ -26,11 +26,11 @@ pub struct AnalysedRun<'a> {
 }
 
 impl AnalysedRun<'_> {
-    /// What was excited, and when, in a line.
+    /// What was excited, and when, in two lines.
     fn subtitle(&self) -> String {
         let chirp = &self.config.chirp;
         format!(
-            "current set-point to displacement, with hold, amplifier and delay; chirp {} to {} Hz in {} s at {} Hz; {}",
+            "current set-point to displacement, with hold, amplifier and delay;\nchirp {} to {} Hz in {} s at {} Hz; {}",
             chirp.start_hz,
             chirp.stop_hz,
             chirp.duration_s,
