@@ -94,9 +94,10 @@ pub(super) struct Seen {
 
 impl Seen {
     pub(super) fn of(parameters: &Parameters, view: &View<'_>, blocks: &[Block]) -> Seen {
-        let part = |m: &Term| view.mode((m.omega_rad_s, m.damping_ratio), parameters.delay_s, blocks);
+        let nodes = view.nodes(parameters.delay_s, blocks);
+        let part = |m: &Term| view.mode((m.omega_rad_s, m.damping_ratio), &nodes);
         let parts: Vec<_> = parameters.modes.iter().map(part).collect();
-        let constant = view.constant(parameters.delay_s, blocks);
+        let constant = view.constant(&nodes);
         let left: Vec<_> = (0..blocks.len())
             .map(|b| {
                 let modes: Complex<f64> =
@@ -108,32 +109,39 @@ impl Seen {
         Seen { parts, constant, left, chi2 }
     }
 
-    /// How block `b` of the model changes with a parameter.
-    fn slope(&self, parameters: &Parameters, entry: Entry, b: usize, block: &Block) -> Complex<f64> {
+    /// How block `b` of the model changes with each parameter, in the order of [`Parameters::entries`].
+    fn slopes(&self, parameters: &Parameters, b: usize, block: &Block, slopes_out: &mut Vec<Complex<f64>>) {
         let omega = 2.0 * std::f64::consts::PI * block.frequency_hz;
-        let of = |k: usize| (self.parts[k][b] * parameters.modes[k].residue_per_kg, &parameters.modes[k]);
-        match entry {
-            Entry::Omega(k) => of(k).0 * slopes(of(k).1, omega)[0] * of(k).1.omega_rad_s,
-            Entry::Damping(k) => of(k).0 * slopes(of(k).1, omega)[1] * of(k).1.damping_ratio,
-            Entry::Residue(k) => self.parts[k][b],
-            Entry::Remainder => self.constant[b],
-            Entry::Delay => (self.left[b] - block.response) * Complex::new(0.0, omega),
+        slopes_out.clear();
+        for (mode, part) in parameters.modes.iter().zip(&self.parts) {
+            if mode.omega_rad_s != 0.0 {
+                let [by_omega, by_damping] = slopes(mode, omega);
+                let moved = part[b] * mode.residue_per_kg;
+                slopes_out.push(moved * by_omega * mode.omega_rad_s);
+                slopes_out.push(moved * by_damping * mode.damping_ratio);
+            }
+            slopes_out.push(part[b]);
         }
+        slopes_out.push(self.constant[b]);
+        slopes_out.push((self.left[b] - block.response) * Complex::new(0.0, omega));
     }
 
     /// J^T W J and J^T W e.
-    fn normal(&self, parameters: &Parameters, entries: &[Entry], blocks: &[Block]) -> (DMatrix<f64>, DVector<f64>) {
-        let n = entries.len();
+    fn normal(&self, parameters: &Parameters, blocks: &[Block]) -> (DMatrix<f64>, DVector<f64>) {
+        let n = parameters.entries().len();
         let (mut square, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        let mut row = vec![Complex::new(0.0, 0.0); n];
+        let (mut row, mut scaled) = (Vec::with_capacity(n), vec![[0.0; 2]; n]);
         for (b, block) in blocks.iter().enumerate() {
-            let weight = 2.0 / block.variance;
-            row.iter_mut().zip(entries).for_each(|(slope, entry)| *slope = self.slope(parameters, *entry, b, block));
-            for i in 0..n {
-                let scaled = row[i].conj() * weight;
-                right[i] += (scaled * self.left[b]).re;
-                for j in 0..=i {
-                    square[(i, j)] += (scaled * row[j]).re;
+            let weight = (2.0 / block.variance).sqrt();
+            self.slopes(parameters, b, block, &mut row);
+            scaled.iter_mut().zip(&row).for_each(|(scaled, slope)| *scaled = [slope.re * weight, slope.im * weight]);
+            let left = self.left[b] * weight;
+            for (i, [re, im]) in scaled.iter().enumerate() {
+                right[i] += re * left.re + im * left.im;
+                // Columns lie together: the lower triangle, column by column.
+                let column = &mut square.column_mut(i);
+                for (j, [other_re, other_im]) in scaled.iter().enumerate().skip(i) {
+                    column[j] += re * other_re + im * other_im;
                 }
             }
         }
@@ -145,10 +153,14 @@ impl Seen {
 /// Where the steps end, the last of which lowers chi^2 by less than `coarse` of it: the parameters, and what is left of the
 /// blocks there.
 pub(super) fn refine(start: Parameters, view: &View<'_>, blocks: &[Block], coarse: f64) -> (Parameters, Seen) {
-    let entries = if start.modes.is_empty() { Vec::new() } else { start.entries() };
+    if start.modes.is_empty() {
+        let seen = Seen::of(&start, view, blocks);
+        return (start, seen);
+    }
+    let entries = start.entries();
     let (mut best, mut damping) = (start, 1e-3);
     let mut seen = Seen::of(&best, view, blocks);
-    let mut normal = seen.normal(&best, &entries, blocks);
+    let mut normal = seen.normal(&best, blocks);
     for _ in 0..STEPS {
         let Some(step) = step(&normal, damping) else { break };
         let next = best.moved(&entries, &step);
@@ -160,7 +172,7 @@ pub(super) fn refine(start: Parameters, view: &View<'_>, blocks: &[Block], coars
             if done {
                 break;
             }
-            normal = seen.normal(&best, &entries, blocks);
+            normal = seen.normal(&best, blocks);
         } else if damping > 1e8 || normal.1.dot(&step) < NOTHING {
             break;
         } else {
@@ -196,7 +208,7 @@ fn scaled(square: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
 /// `None` where the data do not determine them.
 pub(super) fn covariance(parameters: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<DMatrix<f64>> {
     let entries = parameters.entries();
-    let (scale, unit) = scaled(&seen.normal(parameters, &entries, blocks).0)?;
+    let (scale, unit) = scaled(&seen.normal(parameters, blocks).0)?;
     let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
     let natural = |i: usize| {
         scale[i]

@@ -22,11 +22,11 @@ impl ModalFit {
     pub fn response(&self, view: &View<'_>, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
         let at = |f: &f64| Block { frequency_hz: *f, spread_hz: 0.0, response: Complex::new(0.0, 0.0), variance: 1.0 };
         let points: Vec<Block> = frequency_hz.iter().map(at).collect();
-        let delay_s = self.parameters.delay_s;
-        let mut sum = view.constant(delay_s, &points);
+        let nodes = view.nodes(self.parameters.delay_s, &points);
+        let mut sum = view.constant(&nodes);
         sum.iter_mut().for_each(|h| *h *= self.parameters.remainder_m_per_n);
         for term in &self.parameters.modes {
-            let part = view.mode((term.omega_rad_s, term.damping_ratio), delay_s, &points);
+            let part = view.mode((term.omega_rad_s, term.damping_ratio), &nodes);
             sum.iter_mut().zip(part).for_each(|(h, part)| *h += part * term.residue_per_kg);
         }
         sum

@@ -182,7 +182,7 @@ fn one_more(
 
 /// Where to begin with a first mode: at the delays with which it lowers chi^2 most, and the residue that does.
 fn starts(term: Term, seen: &Seen, view: &View<'_>, blocks: &[Block]) -> Vec<Parameters> {
-    let part = view.mode((term.omega_rad_s, term.damping_ratio), 0.0, blocks);
+    let part = view.mode((term.omega_rad_s, term.damping_ratio), &view.nodes(0.0, blocks));
     let step_s = blocks.last().map_or(0.0, |last| 1.0 / (DELAYS_A_PERIOD * last.frequency_hz));
     let half_period_s =
         std::f64::consts::PI / term.omega_rad_s.max(2.0 * std::f64::consts::PI * blocks[0].frequency_hz);
@@ -201,18 +201,18 @@ fn starts(term: Term, seen: &Seen, view: &View<'_>, blocks: &[Block]) -> Vec<Par
 
 /// Modes that would lower chi^2, the best first, one for each place; a free body among them.
 fn candidates(seen: &Seen, view: &View<'_>, blocks: &[Block], now: &Parameters) -> Vec<Term> {
-    let mut found: Vec<(f64, Term)> = Vec::new();
+    let (mut found, nodes): (Vec<(f64, Term)>, _) = (Vec::new(), view.nodes(now.delay_s, blocks));
     for place in worst(seen, blocks, now.modes.is_empty()) {
         let omega_rad_s = 2.0 * std::f64::consts::PI * blocks[place].frequency_hz;
         let tried = DAMPINGS.map(|damping_ratio| {
-            let part = view.mode((omega_rad_s, damping_ratio), now.delay_s, blocks);
+            let part = view.mode((omega_rad_s, damping_ratio), &nodes);
             let (gain, residue_per_kg) = projected(seen, blocks, &part, 0.0);
             (gain, Term { omega_rad_s, damping_ratio, residue_per_kg })
         });
         found.extend(tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)));
     }
     if now.modes.iter().all(|mode| mode.omega_rad_s > 0.0) {
-        let part = view.mode((0.0, 0.0), now.delay_s, blocks);
+        let part = view.mode((0.0, 0.0), &nodes);
         let (gain, residue_per_kg) = projected(seen, blocks, &part, 0.0);
         found.push((gain, Term { residue_per_kg, ..FREE }));
     }

@@ -19,53 +19,76 @@ pub enum View<'a> {
     Bare,
 }
 
+/// Where a block is looked at: at two frequencies that share its moments, or at the one that it has.
+pub(super) struct Nodes(Vec<(Node, Option<Node>)>);
+
+struct Node {
+    s: Complex<f64>,
+    /// exp(s T) of a bench.
+    z: Complex<f64>,
+    /// exp(-s tau).
+    late: Complex<f64>,
+}
+
+impl Nodes {
+    /// The mean of a response over each block, late.
+    fn over(&self, response: impl Fn(&Node) -> Complex<f64>) -> Vec<Complex<f64>> {
+        let late = |node: &Node| response(node) * node.late;
+        let mean = |(one, other): &(Node, Option<Node>)| match other {
+            Some(other) => (late(one) + late(other)) * 0.5,
+            None => late(one),
+        };
+        self.0.iter().map(mean).collect()
+    }
+}
+
 impl View<'_> {
-    /// The response of a mode of residue 1, `delay_s` later, over each block.
-    pub(super) fn mode(
-        &self,
-        (omega_rad_s, damping_ratio): (f64, f64),
-        delay_s: f64,
-        blocks: &[Block],
-    ) -> Vec<Complex<f64>> {
+    /// Where `blocks` are looked at, `delay_s` later.
+    pub(super) fn nodes(&self, delay_s: f64, blocks: &[Block]) -> Nodes {
+        let turn = |angle: f64| {
+            let (sine, cosine) = libm::sincos(angle);
+            Complex::new(cosine, sine)
+        };
+        let period_s = match self {
+            View::Bench(config) => config.servo.period_s(),
+            View::Bare => 0.0,
+        };
+        let node = |hz: f64| {
+            let omega_rad_s = 2.0 * std::f64::consts::PI * hz;
+            let s = Complex::new(0.0, omega_rad_s);
+            Node { s, z: turn(omega_rad_s * period_s), late: turn(-omega_rad_s * delay_s) }
+        };
+        let of = |block: &Block| match block.spread_hz {
+            0.0 => (node(block.frequency_hz), None),
+            spread_hz => (node(block.frequency_hz - spread_hz), Some(node(block.frequency_hz + spread_hz))),
+        };
+        Nodes(blocks.iter().map(of).collect())
+    }
+
+    /// The response of a mode of residue 1 over each block.
+    pub(super) fn mode(&self, (omega_rad_s, damping_ratio): (f64, f64), nodes: &Nodes) -> Vec<Complex<f64>> {
         let shape = DVector::zeros(0);
         let mode = Mode { omega_rad_s, damping_ratio, shape, force_gain: 1.0, sensor_gain: 1.0, floor_gain: 0.0 };
         match self {
             View::Bench(config) => {
                 let chain = Chain::of_mean_age(config, &[mode]);
-                over(blocks, |w| chain.response(w) * late(w, delay_s))
+                nodes.over(|node| chain.response_at(node.z))
             }
-            View::Bare => over(blocks, |w| mode.resonance(Complex::new(0.0, w)) * late(w, delay_s)),
+            View::Bare => nodes.over(|node| mode.resonance(node.s)),
         }
     }
 
     /// What the blocks show of the mechanics alone, in m/N: hold, motor, amplifier and delays taken out, and `delay_s` more.
     /// What sampling folds back stays.
     pub fn mechanics(&self, blocks: &[Block], delay_s: f64) -> Vec<Complex<f64>> {
-        let constant = self.constant(delay_s, blocks);
+        let constant = self.constant(&self.nodes(delay_s, blocks));
         blocks.iter().zip(constant).map(|(block, constant)| block.response / constant).collect()
     }
 
-    /// The response of a constant compliance of 1 m/N, `delay_s` later, over each block.
-    pub(super) fn constant(&self, delay_s: f64, blocks: &[Block]) -> Vec<Complex<f64>> {
-        self.mode((FAR_RAD_S, 1.0), delay_s, blocks).into_iter().map(|h| h * (FAR_RAD_S * FAR_RAD_S)).collect()
+    /// The response of a constant compliance of 1 m/N over each block.
+    pub(super) fn constant(&self, nodes: &Nodes) -> Vec<Complex<f64>> {
+        self.mode((FAR_RAD_S, 1.0), nodes).into_iter().map(|h| h * (FAR_RAD_S * FAR_RAD_S)).collect()
     }
-}
-
-fn late(omega_rad_s: f64, delay_s: f64) -> Complex<f64> {
-    if delay_s == 0.0 { Complex::new(1.0, 0.0) } else { Complex::from_polar(1.0, -omega_rad_s * delay_s) }
-}
-
-/// The mean over each block: at two frequencies that share its moments.
-fn over(blocks: &[Block], response: impl Fn(f64) -> Complex<f64>) -> Vec<Complex<f64>> {
-    let at = |block: &Block| {
-        let omega = |f: f64| 2.0 * std::f64::consts::PI * f;
-        if block.spread_hz == 0.0 {
-            return response(omega(block.frequency_hz));
-        }
-        let sides = [-1.0, 1.0].map(|side| response(omega(block.frequency_hz + side * block.spread_hz)));
-        (sides[0] + sides[1]) * 0.5
-    };
-    blocks.iter().map(at).collect()
 }
 
 /// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, which sampling alters by what it folds

@@ -80,7 +80,11 @@ impl Chain {
     /// Response in metres per ampere from command to reading, at w.
     pub fn response(&self, omega_rad_s: f64) -> Complex<f64> {
         let (sine, cosine) = libm::sincos(omega_rad_s * self.held.period_s);
-        let z = Complex::new(cosine, sine);
+        self.response_at(Complex::new(cosine, sine))
+    }
+
+    /// The same at z = exp(j w T).
+    pub fn response_at(&self, z: Complex<f64>) -> Complex<f64> {
         let current = self.held.current_response(z);
         let of = |tap: &Tap| {
             let moved: Complex<f64> = (tap.rows.iter().zip(&self.held.blocks))
