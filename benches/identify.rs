@@ -7,7 +7,7 @@ use bench::excitation::{Chirp, Excitation};
 use bench::fit::{View, fit};
 use bench::identify::{EstimatorSettings, Signals, blocks, local, welch};
 use bench::sim::SimulatedRig;
-use bench::verdict::{Case, Verdict, verdict, zeros};
+use bench::verdict::{Case, Verdict, verdict};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use criterion::{Criterion, criterion_group, criterion_main};
 
@@ -40,14 +40,8 @@ fn judged(signals: &Signals, config: &Config) -> Verdict {
     let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
     let view = View::Bench(config);
     let fit = fit(&blocks, &view).expect("modes");
-    verdict(&Case {
-        fit: &fit,
-        zeros: zeros(&fit).expect("zeros"),
-        up_to_rad_s: 650.0,
-        expected_modes: Some(3),
-        blocks: &blocks,
-        mechanics: &view.mechanics(&blocks, fit.parameters.delay_s),
-    })
+    verdict(&Case { fit: &fit, view: &view, blocks: &blocks, up_to_rad_s: 650.0, expected_modes: Some(3) })
+        .expect("zeros")
 }
 
 fn identify(c: &mut Criterion) {

@@ -10,7 +10,7 @@ use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, blo
 use crate::plant::{self, Chain, Modal, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
-use crate::verdict::{self, Case, Verdict, verdict};
+use crate::verdict::{Case, Verdict, verdict};
 
 /// The model's phase is believed, and a verdict given, up to so many times its last mode: beyond are modes that it leaves
 /// out.
@@ -105,10 +105,9 @@ pub(super) fn judge(
         Ok(fit) => fit,
         Err(error) => return Ok(Verdict::undecided(error.to_string())),
     };
-    let mechanics = view.mechanics(blocks, fit.parameters.delay_s);
     let shows = |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
     let expected_modes = model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
-    Ok(verdict(&Case { fit, zeros: verdict::zeros(fit)?, up_to_rad_s, expected_modes, blocks, mechanics: &mechanics }))
+    Ok(verdict(&Case { fit, view, blocks, up_to_rad_s, expected_modes })?)
 }
 
 /// What cuts the record into blocks: the default estimator's widths, whatever the response is estimated with.

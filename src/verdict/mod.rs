@@ -16,11 +16,11 @@ mod zeros;
 pub use phase::{PhaseFall, phase_fall};
 pub use zeros::{UncertainZero, zeros};
 
-use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
-use crate::fit::{FittedMode, ModalFit};
+use crate::fit::{FittedMode, ModalFit, View};
 use crate::identify::Block;
+use crate::plant::PlantError;
 use crate::zeros::ZeroKind;
 
 /// A zero is on a side if it is on the other with a probability below this.
@@ -80,33 +80,31 @@ impl Verdict {
 }
 
 /// What the verdict is about.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Case<'a> {
     /// The modes that were fitted.
     pub fit: &'a ModalFit,
-    /// The zeros of the fit.
-    pub zeros: Vec<UncertainZero>,
+    /// Through what the mechanics were seen.
+    pub view: &'a View<'a>,
+    /// What they were fitted to, frequencies rising.
+    pub blocks: &'a [Block],
     /// Zeros and modes up to here count, in rad/s.
     pub up_to_rad_s: f64,
     /// Modes that the model has there, of those that show between its actuator and its probe.
     pub expected_modes: Option<usize>,
-    /// The response, frequencies rising.
-    pub blocks: &'a [Block],
-    /// What it shows of the mechanics alone: hold, amplifier and delays taken out.
-    pub mechanics: &'a [Complex<f64>],
 }
 
-/// Weighs the witnesses.
-pub fn verdict(case: &Case<'_>) -> Verdict {
+/// Weighs the witnesses. Fails where the zeros of the fit cannot be computed.
+pub fn verdict(case: &Case<'_>) -> Result<Verdict, PlantError> {
     let within = |w: f64| w <= case.up_to_rad_s && w >= case.blocks.first().map_or(0.0, omega);
-    let zeros: Vec<UncertainZero> = case.zeros.iter().filter(|zero| within(zero.s.norm())).copied().collect();
+    let zeros: Vec<UncertainZero> = zeros(case.fit)?.into_iter().filter(|zero| within(zero.s.norm())).collect();
     let modes: Vec<FittedMode> = case.fit.modes().into_iter().filter(|mode| within(mode.omega_rad_s.value)).collect();
     let phase = fall(case, &modes);
     let (cnmp, why) = match doubt(case, &modes).or_else(|| unclear(&zeros)) {
         Some(doubt) => (Cnmp::Undecided, doubt),
         None => weigh(&zeros, &modes, phase),
     };
-    Verdict { cnmp, why, zeros, phase }
+    Ok(Verdict { cnmp, why, zeros, phase })
 }
 
 /// Why the data carry no verdict.
@@ -210,7 +208,8 @@ fn fall(case: &Case<'_>, modes: &[FittedMode]) -> Option<PhaseFall> {
     let clear = |block: &&Block| block.response.norm_sqr() > CLEAR_POWER * block.variance;
     let reach = to + 1 + case.blocks[to + 1..].iter().take_while(clear).count();
     let omega_rad_s: Vec<f64> = case.blocks[..reach].iter().map(omega).collect();
-    (from < to).then(|| phase_fall(&omega_rad_s, &case.mechanics[..reach], from, to))
+    let mechanics = case.view.mechanics(&case.blocks[..reach], case.fit.parameters.delay_s);
+    (from < to).then(|| phase_fall(&omega_rad_s, &mechanics, from, to))
 }
 
 fn omega(block: &Block) -> f64 {
