@@ -8,7 +8,8 @@
 //! 3. the phase, which falls by a turn more than the magnitude asks for at each CNMP pair, whatever the modes ([`phase_fall`]).
 //!
 //! A verdict needs data that carry it: as many modes seen as the model has there, and errors that noise explains. Beyond
-//! the band of the verdict nothing is said.
+//! the band of the verdict nothing is said. Every comparison asks what must hold, not what must not, so that a figure that
+//! is not a number (a covariance that broke down, a bin of nothing) ends as undecided.
 
 mod phase;
 mod zeros;
@@ -110,7 +111,8 @@ pub fn verdict(case: &Case<'_>) -> Result<Verdict, PlantError> {
 /// Why the data carry no verdict.
 fn doubt(case: &Case<'_>, modes: &[FittedMode]) -> Option<String> {
     let misfit = case.fit.chi2_per_freedom;
-    if misfit > MISFIT {
+    let described = misfit <= MISFIT;
+    if !described {
         return Some(format!(
             "the modes leave {misfit:.1} times the power of the noise: the stage is not the sum of modes that was fitted; \
              excite less, so that its geometry stays linear, or look at the plot where they differ"
@@ -124,7 +126,8 @@ fn doubt(case: &Case<'_>, modes: &[FittedMode]) -> Option<String> {
             case.up_to_rad_s / (2.0 * std::f64::consts::PI)
         ));
     }
-    let unsigned = modes.iter().find(|mode| mode.sign_error_probability() > UNKNOWN_SIGN)?;
+    let signed = |mode: &FittedMode| mode.sign_error_probability() <= UNKNOWN_SIGN;
+    let unsigned = modes.iter().find(|mode| !signed(mode))?;
     Some(format!(
         "the sign of the residue at {:.2} Hz is not known; excite more there, or for longer",
         unsigned.omega_rad_s.value / (2.0 * std::f64::consts::PI)
@@ -134,8 +137,8 @@ fn doubt(case: &Case<'_>, modes: &[FittedMode]) -> Option<String> {
 /// A zero of which nobody can say on which side of the imaginary axis it is.
 fn unclear(zeros: &[UncertainZero]) -> Option<String> {
     let near = |zero: &&UncertainZero| zero.s.re.abs() < TRUEST * zero.s.norm();
-    let unsure = |zero: &&UncertainZero| zero.rhp_probability > SURE && zero.rhp_probability < 1.0 - SURE;
-    let zero = zeros.iter().find(|zero| near(zero) || unsure(zero))?;
+    let sure = |zero: &&UncertainZero| zero.rhp_probability <= SURE || zero.rhp_probability >= 1.0 - SURE;
+    let zero = zeros.iter().find(|zero| near(zero) || !sure(zero))?;
     Some(format!(
         "the zero {:.3} +- {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, \
          or for longer",
@@ -155,7 +158,8 @@ fn weigh(zeros: &[UncertainZero], modes: &[FittedMode], phase: Option<PhaseFall>
         return (Cnmp::Undecided, "fewer than two modes are seen: there is no valley to look at".into());
     };
     let turns = (2 * pairs + real) as i32;
-    if phase.off_deg > CLEAR_DEG || phase.half_turns != turns {
+    let agree = phase.off_deg <= CLEAR_DEG && phase.half_turns == turns;
+    if !agree {
         return (Cnmp::Undecided, contradiction(turns, phase));
     }
     if pairs == 0 {

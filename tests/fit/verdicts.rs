@@ -82,6 +82,32 @@ fn judged_by(fit: &ModalFit, blocks: &[Block], expected: usize) -> Verdict {
 }
 
 #[test]
+fn what_is_not_a_number_is_never_sure() {
+    let blocks = blocks(&stage(), 0.0, 1e-9, 12);
+    let good = fit(&blocks, &View::Bare).expect("modes");
+    assert_eq!(judged_by(&good, &blocks, 3).cnmp, Cnmp::Detected);
+    let mut unknown = good.clone();
+    unknown.covariance.fill(f64::NAN);
+    let mut misfit = good.clone();
+    misfit.chi2_per_freedom = f64::NAN;
+    for fit in [unknown, misfit] {
+        assert_eq!(judged_by(&fit, &blocks, 3).cnmp, Cnmp::Undecided);
+    }
+    // A response of nothing has no phase, and no logarithm of its magnitude.
+    let mut dead = blocks.clone();
+    let valley = dead.iter().position(|block| block.frequency_hz > 84.0).expect("in the band");
+    dead[valley].response = Complex::new(0.0, 0.0);
+    assert_eq!(judged_by(&good, &dead, 3).cnmp, Cnmp::Undecided);
+    // The same of a stage without CNMP zeros, which half a turn of nothing must not exclude.
+    let calm = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
+    let mut blocks = crate::synthetic::blocks(&calm, 0.0, 1e-9, 12);
+    let fit = fit(&blocks, &View::Bare).expect("modes");
+    assert_eq!(judged_by(&fit, &blocks, 2).cnmp, Cnmp::Excluded);
+    blocks[valley].response = Complex::new(0.0, 0.0);
+    assert_eq!(judged_by(&fit, &blocks, 2).cnmp, Cnmp::Undecided);
+}
+
+#[test]
 fn the_words_of_an_undecided_verdict_name_what_is_missing() {
     assert_eq!(judged(&stage(), 1e-9, 3).cnmp, Cnmp::Detected);
     let unseen = judged(&stage(), 1e-9, 4);
