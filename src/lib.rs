@@ -35,6 +35,7 @@
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | a grid of chirps, and what all verdicts together say of the stage | [`campaign`] |
 //! | how a frequency response is estimated | [`identify`] |
+//! | a plant identified under control | [`identify::joint`], `session/closed_loop.rs` |
 //! | how modes are fitted, and their number found | [`fit`] |
 //! | whether there are CNMP zeros | [`verdict`] |
 //! | the pictures and the page of a run | [`run_report`] |

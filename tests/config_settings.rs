@@ -131,7 +131,7 @@ fn an_unknown_kind_is_refused_with_the_kinds_there_are() {
     refused_file("[plant]\nmodel = \"sr5dof\"\n", &["mine.toml line 2", "`plant.model`", "\"sr5dof\"", "sr4dof"]);
     refused_set("plant.damping.kind=foo", &["`plant.damping.kind`", "\"foo\"", "measured, rayleigh, uniform"]);
     refused_set("chirp.sweep=up", &["`chirp.sweep`", "linear, logarithmic"]);
-    refused_set("control.reference.kind=foo", &["hold, step, ramp, sine, file"]);
+    refused_set("control.reference.kind=foo", &["hold, step, ramp, sine, chirp, file"]);
     refused_set("plant=3", &["`plant.model` is missing", "sr4dof"]);
 }
 

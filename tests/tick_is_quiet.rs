@@ -3,7 +3,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use bench::config::{AmplitudePoint, Config, ReferenceSettings, Source, Sweep, load};
+use bench::config::{AmplitudePoint, Config, ReferenceSettings, Source, Sweep, TravelPoint, load};
 use bench::control::{Controller, ControllerText};
 use bench::excitation::{Chirp, reference};
 use bench::rt::clock::{Clock, Moment, Realtime, Virtual};
@@ -40,6 +40,10 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
         ReferenceSettings::Step { amplitude_m: 50e-6, at_s: 0.1 },
         ReferenceSettings::Ramp { amplitude_m: 50e-6, speed_m_per_s: 1e-4, at_s: 0.1 },
         ReferenceSettings::Sine { amplitude_m: 20e-6, frequency_hz: 3.0 },
+        ReferenceSettings::Chirp {
+            amplitude: vec![TravelPoint { frequency_hz: 1.0, amplitude_m: 1e-6 }],
+            travel_m: 20e-6,
+        },
         ReferenceSettings::File { path: "points.csv".into() },
     ];
     let mut programs: Vec<(String, Box<dyn Program>)> = Vec::new();
@@ -47,7 +51,7 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
         let sections = ControllerText::find(name).expect("found").sections(config.servo.rate_hz).expect("valid");
         for settings in &references {
             let points = "time_s,reference_m\n0.0,0.0\n0.2,1e-5\n0.4,2e-5\n";
-            let reference = reference(settings, Some(points), period_s).expect("valid");
+            let reference = reference(settings, &config.chirp, Some(points), period_s).expect("valid");
             let program = Control::new(Controller::new(&sections, period_s), reference, 500, 4500);
             programs.push((format!("{name}, {settings:?}"), Box::new(program)));
         }

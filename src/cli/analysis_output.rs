@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::CliError;
+use super::loop_output::LoopMade;
 use super::modal_output::Shown;
 use crate::config::Config;
-use crate::identify::csv;
+use crate::identify::{Unit, csv};
 use crate::recording::Recording;
 use crate::run_report::{AnalysedRun, KINDS, page, pictures};
 use crate::session::{AnalysisError, analyse};
@@ -35,6 +36,9 @@ pub(super) struct Made {
     delay_beyond_model_sigma_s: Option<f64>,
     #[serde(flatten)]
     shown: Shown,
+    /// The loop around the plant, where it was closed.
+    #[serde(rename = "loop", skip_serializing_if = "Option::is_none")]
+    closed: Option<LoopMade>,
 }
 
 /// Why nothing was made: a person wished so.
@@ -50,7 +54,7 @@ impl From<AnalysisError> for CliError {
 pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliError> {
     let analysis = analyse(recording, config)?;
     let csv_path = free(recording.path(), "frf", "csv");
-    csv::write_new(&csv_path, &analysis.frf).map_err(|e| CliError::Failed(e.to_string()))?;
+    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
     let run = AnalysedRun { analysis: &analysis, config, recording };
     let pictures = pictures(&run).map_err(|e| CliError::Failed(e.to_string()))?;
     let mut plots = no_plots();
@@ -73,6 +77,7 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
         delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
+        closed: analysis.closed.as_ref().map(|closed| LoopMade::of(closed, recording.path())).transpose()?,
     })
 }
 
@@ -91,6 +96,7 @@ impl Made {
             delay_beyond_model_s: None,
             delay_beyond_model_sigma_s: None,
             shown: Shown::nothing(why),
+            closed: None,
         }
     }
 
@@ -128,10 +134,11 @@ impl Made {
             _ => String::new(),
         };
         format!(
-            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{delay}{}  report     {report}\n{}",
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{}{delay}{}  report     {report}\n{}",
             frf_csv,
             self.frequencies,
             coherence,
+            self.closed.as_ref().map_or(String::new(), LoopMade::text),
             self.plots_text(),
             self.shown.text()
         )

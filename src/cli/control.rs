@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::analysis_output::Made;
+use super::chirp::analysed;
 use super::choice::Choice;
 use super::margins::{closed_loop, enough, text as margins_text};
 use super::options::BenchOptions;
@@ -24,10 +26,11 @@ pub(super) struct Args {
     choice: Choice,
     #[command(flatten)]
     run: RunOptions,
-    /// What to follow: step, hold, ramp, sine, or a CSV file with time_s,reference_m
+    /// What to follow: step, hold, ramp, sine, chirp (identification in closed loop), or a CSV file with time_s,reference_m
     #[arg(long, value_name = "KIND|FILE")]
     reference: Option<String>,
-    /// Height of step and ramp, amplitude of the sine: 50um or metres [default: 50um]
+    /// Height of step and ramp, amplitude of the sine: 50um or metres [default: 50um]; of a chirp the largest travel, by
+    /// the model [default: 20um]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     amplitude: Option<String>,
     /// Frequency of the sine in hertz [default: 1]
@@ -36,7 +39,7 @@ pub(super) struct Args {
     /// Speed of the ramp in metres per second [default: 1e-4]
     #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
     speed: Option<f64>,
-    /// Seconds with the loop closed
+    /// Seconds with the loop closed; of a chirp the length of its sweep
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     duration: Option<f64>,
 }
@@ -50,7 +53,8 @@ impl Args {
         let amplitude =
             self.amplitude.as_deref().map(quantity::metres).transpose().map_err(|e| CliError::Usage(e.to_string()))?;
         let mut set = |key: &str, value: String| sets.push(format!("control.{key}={value}"));
-        if let Some(duration) = self.duration {
+        let swept = self.reference.as_deref() == Some("chirp");
+        if let Some(duration) = self.duration.filter(|_| !swept) {
             set("duration_s", number(duration));
         }
         let height = number(amplitude.unwrap_or(50e-6));
@@ -70,17 +74,22 @@ impl Args {
                 let frequency = number(self.frequency.unwrap_or(1.0));
                 set("reference", format!("{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency} }}"));
             }
+            Some("chirp") => {
+                let travel = number(amplitude.unwrap_or(20e-6));
+                set("reference", format!("{{ kind = \"chirp\", travel_m = {travel} }}"));
+            }
             Some(path) => set("reference", format!("{{ kind = \"file\", path = {} }}", toml::Value::from(path))),
         }
+        sets.extend(self.duration.filter(|_| swept).map(|duration| format!("chirp.duration_s={}", number(duration))));
         Ok(sets)
     }
 
     /// Refuses an option that the reference has no use for.
     fn refuse_idle(&self) -> Result<(), CliError> {
         let kind = self.reference.as_deref();
-        let high = !matches!(kind, Some(kind) if !["step", "ramp", "sine"].contains(&kind));
+        let high = !matches!(kind, Some(kind) if !["step", "ramp", "sine", "chirp"].contains(&kind));
         let idle = [
-            (self.amplitude.is_some() && !high, "--amplitude", "step, ramp or sine"),
+            (self.amplitude.is_some() && !high, "--amplitude", "step, ramp, sine or chirp"),
             (self.frequency.is_some() && kind != Some("sine"), "--frequency", "sine"),
             (self.speed.is_some() && kind != Some("ramp"), "--speed", "ramp"),
         ];
@@ -98,6 +107,9 @@ struct Report {
     run: RunReport,
     predicted: Predicted,
     measured: Option<Measured>,
+    /// What a swept reference shows of plant and loop.
+    #[serde(flatten)]
+    made: Option<Made>,
 }
 
 #[derive(Debug, Serialize)]
@@ -119,13 +131,21 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut run = args.run.run(&plan, "control")?;
     let totals = run.totals()?;
     let report = RunReport::new(&run, &totals);
-    let measured = match report.outcome {
-        "completed" => measure(&Recording::open(&run.path)?, &config)?,
-        _ => None,
+    let completed = report.outcome == "completed";
+    let swept = matches!(config.control.reference, ReferenceSettings::Chirp { .. });
+    let measured = match completed && !swept {
+        true => measure(&Recording::open(&run.path)?, &config)?,
+        false => None,
     };
-    let report = Report { run: report, predicted, measured };
+    let made = match (swept, completed) {
+        (true, true) => Some(analysed(&run.path, &plan.config)?),
+        (true, false) => Some(Made::nothing("the run did not come to its end")),
+        (false, _) => None,
+    };
+    let report = Report { run: report, predicted, measured, made };
     close(run, &report, args.bench.json, &text(&report, &config))?;
-    Ok(report.run.exit())
+    let stopped = report.made.as_ref().is_some_and(Made::is_stopped);
+    Ok(if stopped { Outcome::Failed } else { report.run.exit() })
 }
 
 /// The step by the linear model, if the reference is one that happens.
@@ -146,6 +166,10 @@ fn text(report: &Report, config: &Config) -> String {
             step.overshoot_percent
         )
     });
+    if let Some(made) = &report.made {
+        let margins = margins_text(config, &report.predicted.margins);
+        return format!("{margins}{}{}", report.run.text(config), made.text());
+    }
     let measured = report.measured.as_ref().map_or(
         "  measured   nothing: the run did not reach a steady state\n".to_string(),
         |m| {

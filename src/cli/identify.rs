@@ -41,8 +41,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     let recording = Recording::open(&args.recording)?;
     let plan = Plan::of(&recording)?;
-    if plan.kind != Kind::Chirp {
-        let what = "is the recording of a closed loop; this version analyses open-loop chirps only";
+    if plan.kind == Kind::Calibrate {
+        let what = "is the recording of static steps, which `bench calibrate` analyses";
         return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
     }
     let report = Report {

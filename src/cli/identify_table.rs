@@ -10,8 +10,8 @@ use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
 use crate::identify::periodic::Repetition;
 use crate::identify::table::{self, Clock, Columns};
-use crate::identify::{Signals, csv};
-use crate::report::{Curve, Trace, bode_svg};
+use crate::identify::{Signals, Unit, csv};
+use crate::report::{Curve, Trace, response_svg};
 use crate::session::{ForeignAnalysis, analyse_signals};
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
@@ -154,7 +154,7 @@ fn report(
     beside: &Path,
 ) -> Result<Report, CliError> {
     let csv_path = free(beside, "frf", "csv");
-    csv::write_new(&csv_path, &analysis.frf).map_err(|e| CliError::Failed(e.to_string()))?;
+    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
     let plot_path = free(beside, "bode", "svg");
     write_new(&plot_path, &plot(path, columns, analysis)?)?;
     Ok(Report {
@@ -182,9 +182,8 @@ fn plot(path: &Path, columns: &Columns, analysis: &ForeignAnalysis) -> Result<St
     let fitted = (!analysis.fitted.is_empty()).then_some(Trace { name: "fit", curve });
     let traces: Vec<Trace> = [measured].into_iter().chain(fitted).collect();
     let title = path.file_name().unwrap_or_default().to_string_lossy();
-    let subtitle =
-        format!("{} to {}; units are those of the columns, m/A stands for them", columns.input, columns.output);
-    bode_svg(&traces, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))
+    let subtitle = format!("{} to {}; units are those of the columns", columns.input, columns.output);
+    response_svg(Unit::Bare, &traces, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))
 }
 
 impl Report {

@@ -14,6 +14,7 @@ mod doctor;
 mod figures;
 mod identify;
 mod identify_table;
+mod loop_output;
 mod margins;
 mod modal_output;
 mod model;

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::check::{self, Finding};
 use super::place::line_of;
 use super::profiles::{self, Embedded};
-use super::{Config, ReferenceSettings, relations, schema};
+use super::{Config, ReferenceSettings, TravelPoint, relations, schema};
 
 /// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
 const CHIRP_TICKS: f64 = 2e7;
@@ -250,7 +250,8 @@ fn same_kind(old: &Table, new: &Table) -> bool {
 fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     let mut relations = Relations(relations::plant(config));
     relations.rig(config);
-    if purpose.includes(Purpose::Chirp) {
+    let swept = matches!(config.control.reference, ReferenceSettings::Chirp { .. });
+    if purpose.includes(Purpose::Chirp) || swept && purpose.includes(Purpose::Control) {
         relations.chirp(config);
     }
     if purpose.includes(Purpose::Control) {
@@ -316,6 +317,17 @@ impl Relations {
         self.must(rising, "chirp.amplitude", "has frequencies that do not rise from point to point".into());
     }
 
+    /// A swept reference.
+    fn swept(&mut self, config: &Config, amplitude: &[TravelPoint], travel_m: f64) {
+        let soft_m = config.interlock.soft_limit_m;
+        let largest_m = amplitude.iter().map(|point| point.amplitude_m).fold(travel_m, f64::max);
+        let what = format!("reaches {largest_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)");
+        self.must(largest_m <= soft_m, "control.reference", what);
+        let rising = amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        let what = "has frequencies that do not rise from point to point";
+        self.must(rising, "control.reference.amplitude", what.into());
+    }
+
     fn control(&mut self, config: &Config) {
         let nyquist_hz = config.servo.rate_hz / 2.0;
         let path = "control.reference.amplitude_m";
@@ -326,6 +338,9 @@ impl Relations {
             | ReferenceSettings::Sine { amplitude_m, .. } => {
                 let what = format!("is {amplitude_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)");
                 self.must(amplitude_m.abs() <= soft_m, path, what);
+            }
+            ReferenceSettings::Chirp { ref amplitude, travel_m } => {
+                self.swept(config, amplitude, travel_m);
             }
             ReferenceSettings::Hold | ReferenceSettings::File { .. } => {}
         }

@@ -382,11 +382,35 @@ pub enum ReferenceSettings {
         #[schemars(range(min = 1e-4, max = 50000.0))]
         frequency_hz: f64,
     },
+    /// The sweep of `[chirp]` with its quiets, in metres: for identification in closed loop. The run lasts as long as the
+    /// sweep, whatever `control.duration_s` says.
+    Chirp {
+        /// Amplitude over frequency: straight lines on logarithmic axes, constant outside. Without a point it is planned from
+        /// the model: the command has the amplitude of `[chirp]` where the stage moves by no more than `travel_m`.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        #[schemars(length(max = 64))]
+        amplitude: Vec<TravelPoint>,
+        /// Amplitude in metres by which a planned sweep moves the stage at most.
+        #[schemars(range(min = 1e-9, max = 1.0))]
+        travel_m: f64,
+    },
     /// A CSV file with the columns `time_s,reference_m`; straight lines between its points.
     File {
         /// Path of the file.
         path: String,
     },
+}
+
+/// The amplitude of a swept reference at a frequency.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TravelPoint {
+    /// Frequency in hertz, rising from point to point.
+    #[schemars(range(min = 1e-4, max = 1e5))]
+    pub frequency_hz: f64,
+    /// Amplitude in metres.
+    #[schemars(range(min = 1e-12, max = 1.0))]
+    pub amplitude_m: f64,
 }
 
 /// The static steps of `bench calibrate`, and the chirp that it measures the delay by.

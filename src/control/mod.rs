@@ -17,6 +17,7 @@ mod file;
 mod margins;
 mod section;
 mod step_figures;
+mod swept;
 
 pub use biquad::Biquad;
 pub use closed_loop::ClosedLoop;
@@ -26,3 +27,4 @@ pub(crate) use margins::grid;
 pub use margins::{Crossing, Margins};
 pub use section::Section;
 pub use step_figures::{StepFigures, StepMeter, step_figures};
+pub use swept::swept_reference;

@@ -111,6 +111,12 @@ impl Chirp {
         }
     }
 
+    /// Its lowest and its highest frequency in hertz.
+    pub fn band_hz(&self) -> (f64, f64) {
+        let (start_hz, stop_hz) = (self.settings.start_hz, self.settings.stop_hz);
+        (start_hz.min(stop_hz), start_hz.max(stop_hz))
+    }
+
     /// Refuses a chirp that would trip an interlock by the model of the plant; returns the travel to expect in metres.
     pub fn check(&self, config: &Config, plant: &Sampled) -> Result<f64, ChirpError> {
         let amplitude_a = self.settings.amplitude.iter().map(|p| p.current_a).fold(0.0, f64::max);
@@ -161,7 +167,7 @@ impl Chirp {
     }
 
     /// A(f): straight lines over ln f, constant beyond the ends.
-    fn amplitude_a(&self, ln_frequency: f64) -> f64 {
+    pub(crate) fn amplitude_a(&self, ln_frequency: f64) -> f64 {
         let after = self.amplitude.partition_point(|(ln_f, _)| *ln_f <= ln_frequency);
         let ln_a = match (after.checked_sub(1).and_then(|i| self.amplitude.get(i)), self.amplitude.get(after)) {
             (Some(&(f0, a0)), Some(&(f1, a1))) => a0 + (a1 - a0) * (ln_frequency - f0) / (f1 - f0),

@@ -1,6 +1,7 @@
 //! References for the closed loop, in metres relative to where the stage rests when the loop closes.
 
-use crate::config::ReferenceSettings;
+use super::{Chirp, Excitation};
+use crate::config::{AmplitudePoint, ChirpSettings, ReferenceSettings, TravelPoint};
 
 /// A reference over time, from the tick at which the loop closes.
 pub trait Reference: Send {
@@ -38,10 +39,11 @@ pub fn reference_text(settings: &ReferenceSettings) -> Result<Option<String>, Re
     text.map(Some).map_err(|e| ReferenceError::Unreadable { path: path.into(), why: e.to_string() })
 }
 
-/// The reference of the settings at a period of the loop, with the text of its file if it has one. A new kind is one struct
-/// and one arm.
+/// The reference of the settings at a period of the loop, with the sweep that one of its kinds follows and the text of its
+/// file if it has one. A new kind is one struct and one arm.
 pub fn reference(
     settings: &ReferenceSettings,
+    chirp: &ChirpSettings,
     text: Option<&str>,
     period_s: f64,
 ) -> Result<Box<dyn Reference>, ReferenceError> {
@@ -57,6 +59,9 @@ pub fn reference(
         }
         ReferenceSettings::Sine { amplitude_m, frequency_hz } => {
             Box::new(Sine { amplitude_m: *amplitude_m, cycles_per_tick: frequency_hz * period_s })
+        }
+        ReferenceSettings::Chirp { amplitude, .. } => {
+            Box::new(Swept(Chirp::new(&in_metres(chirp, amplitude), period_s)))
         }
         ReferenceSettings::File { path } => Box::new(Table::parse(path, text.unwrap_or_default(), period_s)?),
     })
@@ -100,6 +105,21 @@ impl Reference for Sine {
         let cycles = tick as f64 * self.cycles_per_tick;
         self.amplitude_m * libm::sin(2.0 * std::f64::consts::PI * (cycles - libm::floor(cycles)))
     }
+}
+
+/// A sweep whose amplitudes are metres where those of the motor are amperes.
+struct Swept(Chirp);
+
+impl Reference for Swept {
+    fn at_m(&self, tick: u64) -> f64 {
+        self.0.current_a(tick)
+    }
+}
+
+/// The sweep with other amplitudes, in metres.
+pub fn in_metres(chirp: &ChirpSettings, amplitude: &[TravelPoint]) -> ChirpSettings {
+    let point = |p: &TravelPoint| AmplitudePoint { frequency_hz: p.frequency_hz, current_a: p.amplitude_m };
+    ChirpSettings { amplitude: amplitude.iter().map(point).collect(), ..chirp.clone() }
 }
 
 /// Points of a file, joined by straight lines; the first value before them, the last one after.
@@ -149,7 +169,8 @@ mod tests {
     use super::*;
 
     fn made(settings: &ReferenceSettings) -> Result<Box<dyn Reference>, ReferenceError> {
-        reference(settings, reference_text(settings)?.as_deref(), 1e-3)
+        let chirp = crate::config::load(&Default::default()).unwrap().chirp;
+        reference(settings, &chirp, reference_text(settings)?.as_deref(), 1e-3)
     }
 
     fn at(settings: ReferenceSettings, tick: u64) -> f64 {

@@ -12,11 +12,15 @@ use std::path::{Path, PathBuf};
 use nalgebra::Complex;
 use thiserror::Error;
 
-use super::Frf;
+use super::{Frf, Unit};
 
 /// Columns of the file, in this order.
 pub const HEADER: &str =
     "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
+
+/// Columns of a ratio, as of a sensitivity: the same, but for the unit.
+pub const BARE_HEADER: &str =
+    "frequency_hz,magnitude,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
 
 const COLUMNS: usize = 7;
 
@@ -54,8 +58,12 @@ pub enum CsvError {
 }
 
 /// The FRF as text.
-pub fn to_string(frf: &Frf) -> String {
-    let mut text = format!("{HEADER}\n");
+pub fn to_string(frf: &Frf, unit: Unit) -> String {
+    let header = match unit {
+        Unit::MetresPerAmpere => HEADER,
+        Unit::Bare => BARE_HEADER,
+    };
+    let mut text = format!("{header}\n");
     for k in 0..frf.len() {
         row(&mut text, frf, k);
     }
@@ -76,13 +84,13 @@ fn row(text: &mut String, frf: &Frf, k: usize) {
 ///
 /// # Errors
 /// When the file exists already, or cannot be written.
-pub fn write_new(path: &Path, frf: &Frf) -> Result<(), CsvError> {
+pub fn write_new(path: &Path, frf: &Frf, unit: Unit) -> Result<(), CsvError> {
     let failed = |source: io::Error| match source.kind() {
         io::ErrorKind::AlreadyExists => CsvError::Exists { path: path.to_owned() },
         _ => CsvError::Io { path: path.to_owned(), source },
     };
     let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
-    file.write_all(to_string(frf).as_bytes()).and_then(|()| file.sync_all()).map_err(failed)
+    file.write_all(to_string(frf, unit).as_bytes()).and_then(|()| file.sync_all()).map_err(failed)
 }
 
 /// Reads an FRF from a file.

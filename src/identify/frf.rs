@@ -7,6 +7,15 @@ use nalgebra::Complex;
 /// Standard deviation of a phase of which nothing is known: uniform over one turn, pi/sqrt(3) rad = 103.9 deg.
 pub const PHASE_SIGMA_LIMIT_RAD: f64 = PI / 1.732_050_807_568_877_2;
 
+/// What the magnitude of a response counts in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// From current to displacement.
+    MetresPerAmpere,
+    /// A ratio, or in units that a person knows.
+    Bare,
+}
+
 /// A measured frequency response. All columns have one entry a frequency, frequencies rise, every entry is finite.
 ///
 /// A frequency at which the input had no energy is left out rather than filled in.

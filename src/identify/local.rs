@@ -32,7 +32,7 @@ use super::spectrum::RealFft;
 use super::{Frf, FrfPoint, IdentifyError, Signals, band};
 
 /// The noise is averaged with weights so many times as wide as those of the response.
-const NOISE_WIDTH: usize = 4;
+pub(super) const NOISE_WIDTH: usize = 4;
 /// Input below this part of its root mean square over all bins is rounding, not excitation.
 const DEAD_RATIO: f64 = 1e-9;
 
@@ -60,12 +60,12 @@ impl EstimatorSettings {
     }
 
     /// Half-width of the neighbourhood of a bin, in bins.
-    fn half_width(&self, bin: usize) -> usize {
+    pub(super) fn half_width(&self, bin: usize) -> usize {
         self.min_half_width_bins.max(self.resolution_ratio * bin as f64).round() as usize
     }
 
     /// The bin after this one at which to report.
-    fn next(&self, bin: usize) -> usize {
+    pub(super) fn next(&self, bin: usize) -> usize {
         bin + (self.resolution_ratio * bin as f64).round().max(1.0) as usize
     }
 }
@@ -132,12 +132,17 @@ impl Record {
         let half_width = settings.half_width(bin);
         let (response, coherence) = self.fits[bin].response?;
         let wider = Sums::around(&self.products, bin, &weights(2 * half_width)).response();
-        let bias = (wider - response) / 3.0;
+        let bias = drop_of_smoothing(response, wider);
         let noise = noise_power(&self.fits, bin, &weights(NOISE_WIDTH * half_width));
         let variance = noise * self.fits[bin].gain + bias.norm_sqr();
         let (frequency_hz, resolution_hz) = (bin as f64 * self.bin_hz, self.fits[bin].width * self.bin_hz);
         Some(FrfPoint { frequency_hz, response, coherence, variance, resolution_hz })
     }
+}
+
+/// What smoothing takes off an estimate, by one of twice the half-width.
+pub(super) fn drop_of_smoothing(response: Complex<f64>, wider: Complex<f64>) -> Complex<f64> {
+    (wider - response) / 3.0
 }
 
 /// What one bin of the record contributes.
@@ -169,7 +174,7 @@ fn products(signals: &Signals) -> Vec<Product> {
 }
 
 /// The weights w_0 .. w_(h-1) on either side of a bin.
-fn weights(half_width: usize) -> Vec<f64> {
+pub(super) fn weights(half_width: usize) -> Vec<f64> {
     let angle = core::f64::consts::FRAC_PI_2 / half_width as f64;
     (0..half_width).map(|j| libm::cos(angle * j as f64).powi(2)).collect()
 }

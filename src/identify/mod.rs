@@ -6,6 +6,7 @@
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
 //! - [`blocks()`]: the same record without smoothing, for a fit.
+//! - [`joint::estimate`]: plant, loop and sensitivities of a stage under control.
 //! - [`periodic::estimate`]: periods of one excitation, averaged.
 //! - [`with_distortion`]: what is alike in every period and yet no response.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
@@ -25,6 +26,7 @@ mod distortion;
 pub mod edges;
 mod error;
 mod frf;
+pub mod joint;
 mod kernel;
 pub mod local;
 mod moments;
@@ -37,7 +39,7 @@ pub mod welch;
 pub use blocks::{Block, blocks};
 pub use distortion::with_distortion;
 pub use error::IdentifyError;
-pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, wrapped_phase_rad};
+pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
 pub use local::EstimatorSettings;
 pub use moments::Moments;
 pub use signals::Signals;

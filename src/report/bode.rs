@@ -8,6 +8,7 @@ use super::canvas::{self, Canvas, TextForm};
 use super::header::Header;
 use super::panel::{INK, Panel, Ticks};
 use super::trace::{self, Line, Shown, Trace};
+use crate::identify::Unit;
 
 /// Size of the page in pixels.
 const SIZE: (f64, f64) = (1000.0, 880.0);
@@ -31,18 +32,28 @@ const MARGIN: f64 = 0.06;
 /// # Errors
 /// When there is nothing to draw, or a trace is not sound: see [`ReportError`].
 pub fn bode_svg(traces: &[Trace], title: &str, subtitle: &str) -> Result<String, ReportError> {
+    response_svg(Unit::MetresPerAmpere, traces, title, subtitle)
+}
+
+/// The same of responses in another unit.
+///
+/// # Errors
+/// As [`bode_svg`].
+pub fn response_svg(unit: Unit, traces: &[Trace], title: &str, subtitle: &str) -> Result<String, ReportError> {
     let mut lines = trace::lines(traces)?;
     // Stable: measured traces first, so that models come to lie on top.
     lines.sort_by_key(|line| line.measured.is_none());
     let header = Header::new(title, subtitle, &lines, (LEFT, RIGHT));
     let magnitudes = magnitude_range(&lines).ok_or(ReportError::NoMagnitude)?;
-    let plot = Plot { frequencies: frequency_range(&lines), magnitudes, phases: phase_range(&lines), lines, header };
+    let plot =
+        Plot { frequencies: frequency_range(&lines), magnitudes, phases: phase_range(&lines), lines, header, unit };
     canvas::page(SIZE, |canvas| plot.draw(canvas))
 }
 
 struct Plot<'a> {
     lines: Vec<Line<'a>>,
     header: Header,
+    unit: Unit,
     frequencies: (f64, f64),
     magnitudes: (f64, f64),
     phases: (f64, f64),
@@ -79,7 +90,11 @@ impl Plot<'_> {
 
     fn magnitude(&self, canvas: &Canvas, (top, bottom): (f64, f64)) -> Result<(), ReportError> {
         let (panel, x) = self.panel((top, bottom), Axis::logarithmic(self.magnitudes, (bottom, top)));
-        let (y, label) = (panel.y.magnitude_ticks(), "Magnitude (m/A)");
+        let label = match self.unit {
+            Unit::MetresPerAmpere => "Magnitude (m/A)",
+            Unit::Bare => "Magnitude",
+        };
+        let y = panel.y.magnitude_ticks();
         panel.frame(canvas, &Ticks { x: &x, y: &y, label, frequencies: false })?;
         self.lines.iter().try_for_each(|line| panel.curve(canvas, line, |k| line.magnitude(k)))
     }

@@ -28,9 +28,18 @@ pub struct AnalysedRun<'a> {
 impl AnalysedRun<'_> {
     /// What was excited, and when, in two lines.
     fn subtitle(&self) -> String {
+        format!("current set-point to displacement, with hold, amplifier and delay;\n{}", self.occasion())
+    }
+
+    /// How the stage was excited, and when.
+    fn occasion(&self) -> String {
         let chirp = &self.config.chirp;
+        let how = match self.analysis.closed {
+            Some(_) => format!("under the {} controller, reference swept", self.config.control.controller),
+            None => "chirp".into(),
+        };
         format!(
-            "current set-point to displacement, with hold, amplifier and delay;\nchirp {} to {} Hz in {} s at {} Hz; {}",
+            "{how} {} to {} Hz in {} s at {} Hz; {}",
             chirp.start_hz,
             chirp.stop_hz,
             chirp.duration_s,

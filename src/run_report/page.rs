@@ -31,7 +31,7 @@ pub fn page(run: &AnalysedRun<'_>, pictures: &[Picture]) -> String {
         verdict(run),
         modes(run),
         zeros(run),
-        loop_facts(run) + &configuration(run),
+        margins(run) + &loop_facts(run) + &configuration(run),
     );
     document(title, &body)
 }
@@ -115,6 +115,28 @@ fn section(heading: &str, words: &str, header: &[&str], rows: &str) -> String {
         "<section>\n<h2>{heading}</h2>\n<p class=\"quiet\">{words}</p>\n<div class=\"wide\">{}</div>\n</section>\n",
         table(header, rows)
     )
+}
+
+/// What the measured loop dares, beside the model.
+fn margins(run: &AnalysedRun<'_>) -> String {
+    let Some(closed) = &run.analysis.closed else { return String::new() };
+    let (measured, predicted) = (&closed.margins, &closed.predicted);
+    let hz = |w: Option<f64>| w.map_or("none in the band".into(), |w| format!("{:.2} Hz", w / HERTZ));
+    let deg = |text: Option<String>| text.map_or("none in the band".into(), |text| format!("{text} deg"));
+    let known = |e: Estimate| interval(e.value, SIGMAS_95_LINE * e.sigma);
+    let header = ["", "Measured", "By the model"];
+    let rows = [
+        row(&["Crossover".into(), hz(measured.crossover_rad_s), hz(predicted.crossover_rad_s)]),
+        row(&[
+            "Phase margin".into(),
+            deg(measured.phase_margin_deg.map(known)),
+            deg(predicted.phase_margin_deg.map(|margin| format!("{margin:.2}"))),
+        ]),
+        row(&["Modulus margin".into(), known(measured.modulus_margin), format!("{:.4}", predicted.modulus_margin)]),
+    ];
+    let words = "The phase margin measured is that at the crossover, the one by the model the smallest of all. Intervals hold the truth \
+                 with 95 %.";
+    section("The closed loop", words, &header, &rows.concat())
 }
 
 /// How the loop was scheduled and what it kept.

@@ -1,15 +1,19 @@
 //! The pictures of a run.
 
+use nalgebra::Complex;
+
 use super::AnalysedRun;
 use crate::fit::{ModalFit, Order, UncertainPole, View};
+use crate::identify::Unit;
 use crate::report::{
     Curve, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg, nyquist_svg, pole_zero_svg,
-    stability_svg,
+    response_svg, stability_svg,
 };
+use crate::session::ClosedResponses;
 use crate::verdict::{self, UncertainZero};
 
-/// The names of all pictures, as files and in JSON; the last two need modes.
-pub const KINDS: [&str; 5] = ["bode", "coherence", "nyquist", "pole_zero", "stability"];
+/// The names of all pictures, as files and in JSON; two need modes, the last two a closed loop.
+pub const KINDS: [&str; 7] = ["bode", "coherence", "nyquist", "pole_zero", "stability", "loop", "sensitivity"];
 /// The part of a Nyquist plot around two close modes reaches so many of their distances to either side.
 const AROUND: f64 = 1.5;
 const HERTZ: f64 = 2.0 * std::f64::consts::PI;
@@ -38,6 +42,9 @@ pub fn pictures(run: &AnalysedRun<'_>) -> Result<Vec<Picture>, ReportError> {
     if let (Some(fit), Some(map)) = (fit, &map) {
         all.push(pole_zero(run, map)?);
         all.push(stability(run, fit)?);
+    }
+    if let Some(closed) = &run.analysis.closed {
+        all.extend(around(run, closed)?);
     }
     Ok(all)
 }
@@ -85,6 +92,39 @@ fn responses(
              circles hold the truth with 95 %. Delay, hold and amplifier turn the curve clockwise with frequency.",
             nyquist_svg(&traces, part_hz, title, &subtitle)?,
         ),
+    ])
+}
+
+/// The loop and its sensitivities, measured over model.
+fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2], ReportError> {
+    let frequency_hz = &closed.loop_gain.frequency_hz;
+    let by_model = |of: fn(Complex<f64>) -> Complex<f64>| closed.model_loop.iter().map(|l| of(*l)).collect::<Vec<_>>();
+    let (sensitivity, complementary) = (by_model(|l| (l + 1.0).inv()), by_model(|l| l / (l + 1.0)));
+    let measured = |name, frf| Trace { name, curve: Curve::Measured(frf) };
+    let model = |name, response| Trace { name, curve: Curve::Model { frequency_hz, response } };
+    let picture = |kind, heading, caption: &str, traces: &[Trace]| {
+        let subtitle = format!("the loop as sampled, with hold, amplifier and delay;\n{}", run.occasion());
+        let svg = response_svg(Unit::Bare, traces, &run.config.title, &subtitle)?;
+        Ok(Picture { kind, heading, caption: caption.into(), svg })
+    };
+    Ok([
+        picture(
+            "loop",
+            "Loop",
+            "L = P C from error to displacement, measured with its band of two sigma, and by the model.",
+            &[measured("L measured", &closed.loop_gain), model("L by the model", &closed.model_loop)],
+        )?,
+        picture(
+            "sensitivity",
+            "Sensitivities",
+            "S from reference to error and T from reference to displacement. The peak of S is the inverse of the modulus margin.",
+            &[
+                measured("S measured", &closed.sensitivity),
+                measured("T measured", &closed.complementary),
+                model("S by the model", &sensitivity),
+                model("T by the model", &complementary),
+            ],
+        )?,
     ])
 }
 

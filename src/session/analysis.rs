@@ -2,7 +2,9 @@
 
 use nalgebra::Complex;
 
-use super::gathered::Gathered;
+use super::closed_loop::{self, ClosedLoopError, ClosedResponses};
+use super::gathered::{Gathered, Ran};
+use super::plan::{KIND, Kind};
 use crate::config::{Config, IdentifySettings};
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::delay::{self, Delay};
@@ -10,6 +12,7 @@ use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, blo
 use crate::plant::{self, Chain, Modal, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
+use crate::rt::record::flag;
 use crate::verdict::{Case, Verdict, verdict};
 
 /// The model's phase is believed, and a verdict given, up to so many times its last mode: beyond are modes that it leaves
@@ -28,6 +31,9 @@ pub enum AnalysisError {
     /// The model cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// A closed loop whose controller is not known, or whose reference did not sweep.
+    #[error(transparent)]
+    Loop(#[from] ClosedLoopError),
     /// No program ran.
     #[error("in this recording no program ran: there is no excitation to analyse")]
     NothingRan,
@@ -65,20 +71,44 @@ pub struct Analysis {
     pub verdict: Verdict,
     /// Modes and zeros up to here count for the verdict, in rad/s.
     pub judged_up_to_rad_s: f64,
+    /// The loop around the plant, of a recording under control.
+    pub closed: Option<ClosedResponses>,
 }
 
-/// Analyses a recording made with `config`.
+/// Analyses a recording made with `config`: of an excitation, or of a closed loop whose reference was swept.
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
-    let (signals, filled_ticks) = signals(recording, config.servo.rate_hz)?;
+    let closed = recording.metadata().get(KIND).is_some_and(|kind| kind == Kind::Control.name());
+    let Ran { loop_signals, filled_ticks } = ran(recording, config.servo.rate_hz, closed)?;
     let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
     let band_hz = (start_hz.min(stop_hz), start_hz.max(stop_hz));
-    let frf = response(&signals, band_hz, &config.identify)?;
+    let seen = if closed {
+        closed_loop::seen(&loop_signals, band_hz, recording, config)?
+    } else {
+        open_loop(&loop_signals.signals, band_hz, &config.identify)?
+    };
+    shown(seen, config, filled_ticks)
+}
+
+/// A response in both its forms.
+pub(super) struct Seen {
+    pub(super) frf: Frf,
+    pub(super) blocks: Vec<Block>,
+    pub(super) closed: Option<ClosedResponses>,
+}
+
+fn open_loop(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings) -> Result<Seen, AnalysisError> {
+    let (frf, blocks) = (response(signals, band_hz, settings)?, blocks(signals, band_hz, &fine(settings))?);
+    Ok(Seen { frf, blocks, closed: None })
+}
+
+/// What a response shows beside the model.
+fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, AnalysisError> {
+    let Seen { frf, blocks, closed } = seen;
     let modal = Modal::of(&plant::build(&config.plant)?)?;
     let last_rad_s = LAST_MODE * modal.modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max);
     let chain = Chain::of_mean_age(config, &modal.modes);
     let model: Vec<_> = frf.frequency_hz.iter().map(|f| chain.response(2.0 * std::f64::consts::PI * f)).collect();
     let beyond = delay::beyond(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
-    let blocks = blocks(&signals, band_hz, &fine(&config.identify))?;
     let fit = fit::fit(&blocks, &View::Bench(config));
     let verdict = judge(&fit, &blocks, &View::Bench(config), last_rad_s, Some(&modal))?;
     Ok(Analysis {
@@ -90,6 +120,7 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
         fit,
         verdict,
         judged_up_to_rad_s: last_rad_s,
+        closed,
     })
 }
 
@@ -133,12 +164,12 @@ fn response(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings)
     }
 }
 
-/// Command and position of every tick of the run.
-fn signals(recording: &Recording, rate_hz: f64) -> Result<(Signals, u64), AnalysisError> {
+/// Every tick of the run, or those with the loop closed.
+fn ran(recording: &Recording, rate_hz: f64, closed: bool) -> Result<Ran, AnalysisError> {
     let mut gathered = Gathered::new(recording, rate_hz);
     for record in recording.ticks()? {
         let record = record?;
-        if record.state == State::Running {
+        if record.state == State::Running && (!closed || record.flags & flag::ACTIVE != 0) {
             gathered.push(&record)?;
         }
     }

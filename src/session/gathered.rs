@@ -1,7 +1,8 @@
-//! The ticks of a recorded run as two signals on the loop's regular times.
+//! The ticks of a recorded run as signals on the loop's regular times.
 
 use super::AnalysisError;
 use crate::identify::align::Readings;
+use crate::identify::joint::LoopSignals;
 use crate::identify::{Moments, Signals, edges};
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
@@ -12,10 +13,19 @@ const FILLED_RATIO: f64 = 1e-3;
 /// Times that differ by less than this part of a period are the same.
 const SAME: f64 = 1e-3;
 
+/// A run on regular times.
+pub(super) struct Ran {
+    /// Reference, command and position.
+    pub(super) loop_signals: LoopSignals,
+    /// Ticks that were filled in.
+    pub(super) filled_ticks: u64,
+}
+
 /// Command and position of every tick of a run as they come, missing ones filled in.
 pub(super) struct Gathered {
     input_a: Vec<f64>,
     output_m: Vec<f64>,
+    reference_m: Vec<f64>,
     /// Periods from each tick to its command.
     late: Vec<f64>,
     readings: Readings,
@@ -38,6 +48,7 @@ impl Gathered {
         Gathered {
             input_a: Vec::new(),
             output_m: Vec::new(),
+            reference_m: Vec::new(),
             late: Vec::new(),
             readings: Readings::default(),
             offset_s: Moments::default(),
@@ -60,6 +71,7 @@ impl Gathered {
         self.take_times(record);
         self.input_a.push(record.command_a);
         self.output_m.push(record.position_m);
+        self.reference_m.push(record.reference_m);
         self.before = Some(*record);
         Ok(())
     }
@@ -90,23 +102,26 @@ impl Gathered {
         }
         for step in 1..=missing {
             let share = step as f64 / (missing + 1) as f64;
+            let between = |from: f64, to: f64| from + share * (to - from);
             self.input_a.push(before.command_a);
             self.late.push(f64::NAN);
-            self.output_m.push(before.position_m + share * (after.position_m - before.position_m));
+            self.output_m.push(between(before.position_m, after.position_m));
+            self.reference_m.push(between(before.reference_m, after.reference_m));
         }
         self.filled += missing;
         Ok(())
     }
 
     /// Where times differ from tick to tick, the currents as of the median time, the positions as of the mean age.
-    pub(super) fn finish(self) -> Result<(Signals, u64), AnalysisError> {
+    pub(super) fn finish(self) -> Result<Ran, AnalysisError> {
         if self.input_a.is_empty() {
             return Err(AnalysisError::NothingRan);
         }
-        let (rate_hz, filled) = (self.rate_hz, self.filled);
+        let (rate_hz, filled_ticks) = (self.rate_hz, self.filled);
         let aligned = self.positions();
         let output_m = if aligned.len() == self.output_m.len() { aligned } else { self.output_m };
-        Ok((Signals { rate_hz, input_a: currents(self.input_a, self.late), output_m }, filled))
+        let signals = Signals { rate_hz, input_a: currents(self.input_a, self.late), output_m };
+        Ok(Ran { loop_signals: LoopSignals { signals, reference_m: self.reference_m }, filled_ticks })
     }
 
     /// The positions at the mean age, where ages differ; else none.

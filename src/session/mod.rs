@@ -9,6 +9,7 @@
 //! through the ring of orders alone.
 
 mod analysis;
+mod closed_loop;
 mod foreign;
 mod gathered;
 mod measure;
@@ -19,6 +20,7 @@ mod run;
 mod stop;
 
 pub use analysis::{Analysis, AnalysisError, analyse};
+pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};
 pub use foreign::{ForeignAnalysis, analyse_signals};
 pub use measure::{Measured, measure};
 pub use plan::{Kind, Plan, PlanError};

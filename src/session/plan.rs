@@ -1,11 +1,13 @@
 //! What a run will do: made from the configuration and the texts it names, all of which travel with the recording, so that
 //! the same plan can be made again from it.
 
-use crate::config::{Config, ConfigError, whole};
-use crate::control::{Controller, ControllerError, ControllerText};
-use crate::excitation::{Chirp, ReferenceError, Staircase, reference, reference_text};
+use crate::config::{Config, ConfigError, ReferenceSettings, TravelPoint, whole};
+use crate::control::{ClosedLoop, Controller, ControllerError, ControllerText, swept_reference};
+use crate::excitation::{Chirp, Excitation, ReferenceError, Staircase, reference, reference_text};
+use crate::plant::PlantError;
 use crate::recording::Recording;
 use crate::rt::program::{Control, Excite, Program};
+use crate::sim;
 
 /// Name of the attachment with the controller's text.
 const CONTROLLER: &str = "controller.toml";
@@ -50,6 +52,9 @@ pub enum PlanError {
     /// The reference is refused.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// The model that a swept reference is planned from cannot be analysed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
     /// A recording without what a plan needs.
     #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
     Missing(&'static str),
@@ -75,6 +80,16 @@ pub struct Plan {
     reference: Option<String>,
 }
 
+/// The amplitudes of a swept reference that has none, by the model of the whole rig.
+fn planned(config: &Config, controller: &ControllerText) -> Result<Option<Vec<TravelPoint>>, PlanError> {
+    let ReferenceSettings::Chirp { amplitude, travel_m } = &config.control.reference else { return Ok(None) };
+    if !amplitude.is_empty() {
+        return Ok(None);
+    }
+    let closed_loop = ClosedLoop::new(config, sim::modes(config)?, controller.sections(config.servo.rate_hz)?);
+    Ok(Some(swept_reference(&closed_loop, &Chirp::new(&config.chirp, config.servo.period_s()), *travel_m)))
+}
+
 impl Plan {
     /// An excitation.
     pub fn chirp(config: Config) -> Plan {
@@ -90,9 +105,14 @@ impl Plan {
         Plan { kind, config, controller: None, calibration: None, devices: Vec::new(), reference: None }
     }
 
-    /// A closed loop.
-    pub fn control(config: Config) -> Result<Plan, PlanError> {
+    /// A closed loop. A swept reference without amplitudes gets them here, from the model, so that they travel with the
+    /// recording.
+    pub fn control(mut config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
+        let planned = planned(&config, &controller)?;
+        if let (ReferenceSettings::Chirp { amplitude, .. }, Some(planned)) = (&mut config.control.reference, planned) {
+            *amplitude = planned;
+        }
         let reference = reference_text(&config.control.reference)?;
         Ok(Plan { controller: Some(controller), reference, ..Plan::excitation(Kind::Control, config) })
     }
@@ -125,9 +145,13 @@ impl Plan {
         }
         let text = self.controller.as_ref().ok_or(PlanError::Missing("controller"))?;
         let controller = Controller::new(&text.sections(config.servo.rate_hz)?, period_s);
-        let reference = reference(&config.control.reference, self.reference.as_deref(), period_s)?;
+        let reference = reference(&config.control.reference, &config.chirp, self.reference.as_deref(), period_s)?;
         let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
-        let (settle, closed) = (ticks(config.control.settle_s), ticks(config.control.duration_s));
+        let closed = match config.control.reference {
+            ReferenceSettings::Chirp { .. } => Chirp::new(&config.chirp, period_s).ticks(),
+            _ => ticks(config.control.duration_s),
+        };
+        let settle = ticks(config.control.settle_s);
         Ok(Box::new(Control::new(controller, reference, settle, closed)))
     }
 

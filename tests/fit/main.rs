@@ -4,4 +4,5 @@ mod modes;
 mod response;
 mod rig;
 mod synthetic;
+mod under_control;
 mod verdicts;

@@ -3,7 +3,7 @@ use bench::config::{Config, Source, load};
 use bench::plant;
 use bench::recording::Recording;
 use bench::rt::thread::Pace;
-use bench::session::{self, Analysis, Plan, analyse};
+use bench::session::{self, Analysis, AnalysisError, Plan, analyse};
 use bench::sim::SimulatedRig;
 use bench::zeros::{cnmp_pairs, damped_zeros};
 
@@ -15,13 +15,18 @@ pub fn config(sets: &[String]) -> Config {
 
 /// The analysis of a run with `config`, believing `believed`.
 pub fn analysed(config: &Config, believed: &Config) -> Analysis {
+    analysed_run(&Plan::chirp(config.clone()), believed).expect("an analysis")
+}
+
+/// The analysis of a run by `plan`, believing `believed`.
+pub fn analysed_run(plan: &Plan, believed: &Config) -> Result<Analysis, AnalysisError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let plan = Plan::chirp(config.clone());
+    let config = &plan.config;
     let rig = Box::new(SimulatedRig::new(config).expect("a rig"));
-    let run = session::run(&plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
+    let run = session::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
-    analyse(&Recording::open(&path).expect("a recording"), believed).expect("an analysis")
+    analyse(&Recording::open(&path).expect("a recording"), believed)
 }
 
 /// CNMP pairs of the model with damping.

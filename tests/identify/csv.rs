@@ -1,5 +1,5 @@
 use bench::identify::csv::{self, CsvError};
-use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
+use bench::identify::{EstimatorSettings, Frf, FrfPoint, Unit, local};
 use nalgebra::Complex;
 
 use crate::stage;
@@ -20,7 +20,7 @@ fn frf(responses: &[(f64, f64)]) -> Frf {
 
 #[test]
 fn the_file_has_the_header_of_the_contract_and_one_row_a_frequency() {
-    let text = csv::to_string(&frf(&[(0.0, -2e-4), (1e-4, 0.0)]));
+    let text = csv::to_string(&frf(&[(0.0, -2e-4), (1e-4, 0.0)]), Unit::MetresPerAmpere);
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
         lines[0],
@@ -35,7 +35,7 @@ fn the_file_has_the_header_of_the_contract_and_one_row_a_frequency() {
 
 #[test]
 fn phases_are_wrapped_to_180_degrees_of_which_only_the_positive_one_is_written() {
-    let text = csv::to_string(&frf(&[(-1e-4, -0.0), (-1e-4, 0.0), (-1e-4, -1e-9), (1e-4, 0.0)]));
+    let text = csv::to_string(&frf(&[(-1e-4, -0.0), (-1e-4, 0.0), (-1e-4, -1e-9), (1e-4, 0.0)]), Unit::MetresPerAmpere);
     let phases: Vec<f64> = text.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse().unwrap()).collect();
     assert_eq!((phases[0], phases[1], phases[3]), (180.0, 180.0, 0.0));
     assert!((-180.0..-179.9).contains(&phases[2]));
@@ -47,7 +47,7 @@ fn a_measured_response_comes_back_from_its_file_as_it_was() {
     let path = directory.path().join("frf.csv");
     let signals = stage::with_noise(&stage::clean_run(), 1);
     let frf = local::estimate(&signals, (0.5, 450.0), &EstimatorSettings::default()).unwrap();
-    csv::write_new(&path, &frf).unwrap();
+    csv::write_new(&path, &frf, Unit::MetresPerAmpere).unwrap();
     let back = csv::read(&path).unwrap();
     let exact = |frf: &Frf| {
         (frf.frequency_hz.clone(), frf.coherence.clone(), frf.magnitude_sigma.clone(), frf.resolution_hz.clone())
@@ -64,9 +64,9 @@ fn a_measured_response_comes_back_from_its_file_as_it_was() {
 fn a_file_that_exists_is_never_overwritten() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("frf.csv");
-    csv::write_new(&path, &frf(&[(1e-4, 0.0)])).unwrap();
+    csv::write_new(&path, &frf(&[(1e-4, 0.0)]), Unit::MetresPerAmpere).unwrap();
     let before = std::fs::read(&path).unwrap();
-    let error = csv::write_new(&path, &frf(&[(2e-4, 0.0)])).unwrap_err();
+    let error = csv::write_new(&path, &frf(&[(2e-4, 0.0)]), Unit::MetresPerAmpere).unwrap_err();
     assert!(matches!(error, CsvError::Exists { .. }));
     assert!(error.to_string().contains("frf.csv exists already and is not overwritten"), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), before);

@@ -3,6 +3,7 @@
 mod accuracy;
 mod bad_data;
 mod csv;
+mod joint;
 mod noise;
 mod python;
 mod stage;

@@ -34,7 +34,8 @@ fn controller(config: &Config) -> Controller {
 }
 
 fn program(config: &Config, settle: u64, closed: u64) -> Control {
-    let reference = reference(&config.control.reference, None, config.servo.period_s()).expect("no file");
+    let reference =
+        reference(&config.control.reference, &config.chirp, None, config.servo.period_s()).expect("no file");
     Control::new(controller(config), reference, settle, closed)
 }
 
@@ -140,7 +141,8 @@ fn a_controller_that_was_used_before_starts_from_rest() {
         let mut used = controller(&config);
         let moved = (0..1000).map(|_| used.update(100e-6)).last();
         assert!(moved.is_some_and(|current_a| current_a.abs() > 1e-3), "{moved:?}");
-        let hold = || reference(&ReferenceSettings::Hold, None, config.servo.period_s()).expect("no file");
+        let hold =
+            || reference(&ReferenceSettings::Hold, &config.chirp, None, config.servo.period_s()).expect("no file");
         let mut after = Control::new(used, hold(), 10, 100);
         let mut fresh = Control::new(controller(&config), hold(), 10, 100);
         for tick in 0..110 {
