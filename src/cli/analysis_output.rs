@@ -71,7 +71,7 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         plots,
         report: Some(report_path.display().to_string()),
         frequencies: analysis.frf.len(),
-        coherence_median: median(&analysis.frf.coherence),
+        coherence_median: analysis.frf.median_coherence(),
         filled_ticks: analysis.filled_ticks,
         delay_s: Some(analysis.delay_s),
         delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
@@ -163,10 +163,4 @@ pub(super) fn write_new(path: &Path, text: &str) -> Result<(), CliError> {
         CliError::Failed(format!("cannot write {}: {e}; free some space or choose another folder", path.display()))
     };
     std::fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)
-}
-
-pub(super) fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
 }

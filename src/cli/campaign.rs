@@ -12,6 +12,7 @@ use super::{CliError, Outcome};
 use crate::campaign::{Answer, Found, Grid, Place, Point, Store, Tolerances, picture, work};
 use crate::config::{Config, Purpose, profiles};
 use crate::devices;
+use crate::fit::FittedMode;
 use crate::recording::Recording;
 use crate::rt::thread::Pace;
 use crate::session::{self, Analysis, AnalysisError, Plan, Run, analyse, stoppable};
@@ -217,12 +218,11 @@ fn point(mut run: Run, config: &Config) -> Result<Point, CliError> {
 fn said(analysis: &Analysis, loop_digest: String) -> Point {
     let Verdict { cnmp, why, zeros, .. } = analysis.verdict.clone();
     let modes = analysis.fit.as_ref().map(|fit| fit.modes()).unwrap_or_default();
-    let hz = |omega_rad_s: f64| omega_rad_s / (2.0 * std::f64::consts::PI);
     Point {
         cnmp,
         why,
-        modes_hz: modes.iter().map(|mode| hz(mode.omega_rad_s.value)).collect(),
-        signs: modes.iter().map(|mode| if mode.residue_per_kg.value > 0.0 { '+' } else { '-' }).collect(),
+        modes_hz: modes.iter().map(|mode| mode.frequency_hz().value).collect(),
+        signs: modes.iter().map(FittedMode::sign).collect(),
         zeros_rad_s: zeros.iter().map(|zero| [zero.s.re, zero.s.im]).collect(),
         loop_digest,
     }

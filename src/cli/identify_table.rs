@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::analysis_output::{free, median, write_new};
+use super::analysis_output::{free, write_new};
 use super::modal_output::Shown;
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
@@ -171,7 +171,7 @@ fn report(
         frf_csv: csv_path.display().to_string(),
         plot: plot_path.display().to_string(),
         frequencies: analysis.frf.len(),
-        coherence_median: median(&analysis.frf.coherence),
+        coherence_median: analysis.frf.median_coherence(),
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
     })
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::table::table;
-use crate::fit::{FittedMode, ModalFit};
+use crate::fit::{FittedMode, ModalFit, SIGMAS_95};
 use crate::verdict::{UncertainZero, Verdict};
 
 /// The part of the report that a fit makes; its names are a contract.
@@ -115,11 +115,11 @@ impl Shown {
         let row = |m: &ModeJson| {
             vec![
                 format!("{:.4}", m.frequency_hz),
-                format!("{:.1e}", 2.0 * m.frequency_hz_sigma),
+                format!("{:.1e}", SIGMAS_95 * m.frequency_hz_sigma),
                 format!("{:.6}", m.damping_ratio),
-                format!("{:.1e}", 2.0 * m.damping_ratio_sigma),
+                format!("{:.1e}", SIGMAS_95 * m.damping_ratio_sigma),
                 format!("{:+.6}", m.residue),
-                format!("{:.1e}", 2.0 * m.residue_sigma),
+                format!("{:.1e}", SIGMAS_95 * m.residue_sigma),
                 m.sign.to_string(),
             ]
         };
@@ -130,7 +130,7 @@ impl Shown {
         let row = |z: &ZeroJson| {
             vec![
                 format!("{:+.3} +- {:.3}j", z.re_rad_s, z.im_rad_s),
-                format!("{:.1e}", 2.0 * z.covariance[0][0].sqrt()),
+                format!("{:.1e}", SIGMAS_95 * z.covariance[0][0].sqrt()),
                 z.kind.into(),
                 format!("{:.2} %", 100.0 * z.rhp_probability),
             ]
@@ -141,13 +141,13 @@ impl Shown {
 
 fn mode(mode: &FittedMode) -> ModeJson {
     ModeJson {
-        frequency_hz: hz(mode.omega_rad_s.value),
-        frequency_hz_sigma: hz(mode.omega_rad_s.sigma),
+        frequency_hz: mode.frequency_hz().value,
+        frequency_hz_sigma: mode.frequency_hz().sigma,
         damping_ratio: mode.damping_ratio.value,
         damping_ratio_sigma: mode.damping_ratio.sigma,
         residue: mode.residue_per_kg.value,
         residue_sigma: mode.residue_per_kg.sigma,
-        sign: if mode.residue_per_kg.value > 0.0 { '+' } else { '-' },
+        sign: mode.sign(),
         sign_error_probability: mode.sign_error_probability(),
     }
 }

@@ -58,6 +58,9 @@ pub enum FitError {
     },
 }
 
+/// Standard deviations to either side that hold 95 % of a normal distribution.
+pub const SIGMAS_95: f64 = 1.959_963_984_540_054;
+
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
@@ -65,6 +68,18 @@ pub struct Estimate {
     pub value: f64,
     /// Its standard deviation.
     pub sigma: f64,
+}
+
+impl Estimate {
+    /// The same in another unit.
+    pub fn scaled(self, factor: f64) -> Estimate {
+        Estimate { value: self.value * factor, sigma: self.sigma * factor.abs() }
+    }
+
+    /// Probability that a number of a normal distribution is below zero.
+    pub fn below_zero_probability(self) -> f64 {
+        0.5 * libm::erfc(self.value / (self.sigma * std::f64::consts::SQRT_2))
+    }
 }
 
 /// One mode as fitted.
@@ -81,13 +96,18 @@ pub struct FittedMode {
 impl FittedMode {
     /// Probability that the residue has the other sign, for errors of a normal distribution.
     pub fn sign_error_probability(&self) -> f64 {
-        below_zero(Estimate { value: self.residue_per_kg.value.abs(), ..self.residue_per_kg })
+        Estimate { value: self.residue_per_kg.value.abs(), ..self.residue_per_kg }.below_zero_probability()
     }
-}
 
-/// Probability that a number of a normal distribution is below zero.
-pub fn below_zero(number: Estimate) -> f64 {
-    0.5 * libm::erfc(number.value / (number.sigma * std::f64::consts::SQRT_2))
+    /// The sign of its residue.
+    pub fn sign(&self) -> char {
+        if self.residue_per_kg.value > 0.0 { '+' } else { '-' }
+    }
+
+    /// Undamped natural frequency in hertz.
+    pub fn frequency_hz(&self) -> Estimate {
+        self.omega_rad_s.scaled(0.5 * std::f64::consts::FRAC_1_PI)
+    }
 }
 
 /// The modes that a response shows.

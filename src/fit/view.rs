@@ -95,6 +95,6 @@ impl View<'_> {
 /// back, a part in a thousand of a slope.
 pub(super) fn slopes(term: &Term, omega_rad_s: f64) -> [Complex<f64>; 2] {
     let (s, w, zeta) = (Complex::new(0.0, omega_rad_s), term.omega_rad_s, term.damping_ratio);
-    let resonance = (s * s + s * (2.0 * zeta * w) + w * w).inv();
+    let resonance = term.resonance(s);
     [-resonance * (s * (2.0 * zeta) + 2.0 * w), -resonance * s * (2.0 * w)]
 }

@@ -62,6 +62,13 @@ impl Frf {
         self.frequency_hz.is_empty()
     }
 
+    /// Half of the frequencies have at least this coherence.
+    pub fn median_coherence(&self) -> Option<f64> {
+        let mut sorted = self.coherence.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied()
+    }
+
     /// Phase in radians, in (-pi, pi].
     pub fn phase_rad(&self, index: usize) -> f64 {
         wrapped_phase_rad(self.response[index])

@@ -2,8 +2,6 @@
 
 /// Of a normal distribution in the plane, 95 % lie within so many sigmas: sqrt(-2 ln 0.05).
 pub const SIGMAS_95_PLANE: f64 = 2.447_746_830_680_816;
-/// On a line, between so many to either side.
-pub const SIGMAS_95_LINE: f64 = 1.959_963_984_540_054;
 const CORNERS: usize = 72;
 
 /// An ellipse by its axes: half their lengths, the longer first, and the angle of that one from the first part on.

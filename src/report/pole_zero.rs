@@ -4,9 +4,10 @@ use nalgebra::Complex;
 
 use super::chart::{Chart, Pen, Scale, Symbol};
 use super::colours::{BLUE, Colour, GREY, INK, VERMILION};
-use super::ellipse::{Ellipse, SIGMAS_95_LINE, SIGMAS_95_PLANE};
+use super::ellipse::{Ellipse, SIGMAS_95_PLANE};
 use super::sheet::{Row, sheet_svg};
 use super::{ReportError, number};
+use crate::fit::SIGMAS_95;
 
 /// Zeros enlarged at most: those nearest to the imaginary axis, in their sigmas.
 const ENLARGED: usize = 3;
@@ -172,7 +173,7 @@ fn ellipse(chart: Chart, name: &str, zero: &Place, origin: Complex<f64>) -> Char
 /// The 95 % intervals of a pole's two parts.
 fn crossed(chart: Chart, pole: &Place) -> Chart {
     let Complex { re, im } = pole.s;
-    let half = |part: usize| SIGMAS_95_LINE * sigma(pole, part);
+    let half = |part: usize| SIGMAS_95 * sigma(pole, part);
     let pen = Pen { width: 0.9, ..Pen::solid(INK) };
     chart.line("", pen, vec![(re - half(0), im), (re + half(0), im)]).line(
         "",

@@ -1,8 +1,8 @@
 //! The page of a run: the verdict and its reasons first.
 
 use super::{AnalysedRun, Picture};
-use crate::fit::{Estimate, FittedMode};
-use crate::report::ellipse::SIGMAS_95_LINE;
+use crate::fit::{Estimate, FittedMode, SIGMAS_95};
+
 use crate::report::number::{interval, percent};
 use crate::report::page::{document, escaped, facts, picture, row, table};
 use crate::verdict::UncertainZero;
@@ -55,11 +55,11 @@ fn evidence(run: &AnalysedRun<'_>) -> Vec<(String, String)> {
     let fall = analysis.verdict.phase.map(|p| format!("{:.1} deg beyond what the magnitude asks for", -p.beyond_deg));
     let fitted = fit.map(|fit| {
         let delay = fit.delay_s();
-        format!("{} ms", interval(milli * delay.value, milli * SIGMAS_95_LINE * delay.sigma))
+        format!("{} ms", interval(milli * delay.value, milli * SIGMAS_95 * delay.sigma))
     });
     let by_phase = analysis
         .beyond
-        .map(|delay| format!("{} ms", interval(milli * delay.seconds, milli * SIGMAS_95_LINE * delay.sigma_s)));
+        .map(|delay| format!("{} ms", interval(milli * delay.seconds, milli * SIGMAS_95 * delay.sigma_s)));
     let pairs = [
         ("Judged up to", Some(judged)),
         ("Power that the fit leaves", power),
@@ -79,12 +79,12 @@ fn modes(run: &AnalysedRun<'_>) -> String {
 }
 
 fn mode(mode: &FittedMode) -> String {
-    let scaled = |e: Estimate, factor: f64| interval(e.value * factor, SIGMAS_95_LINE * e.sigma * factor);
+    let scaled = |e: Estimate, factor: f64| interval(e.value * factor, SIGMAS_95 * e.sigma * factor);
     row(&[
         scaled(mode.omega_rad_s, 1.0 / HERTZ),
         scaled(mode.damping_ratio, 100.0),
         scaled(mode.residue_per_kg, 1.0),
-        if mode.residue_per_kg.value > 0.0 { "+".into() } else { "\u{2212}".into() },
+        if mode.sign() == '+' { "+".into() } else { "\u{2212}".into() },
         percent(mode.sign_error_probability()),
     ])
 }
@@ -100,7 +100,7 @@ fn zeros(run: &AnalysedRun<'_>) -> String {
 }
 
 fn zero(zero: &UncertainZero) -> String {
-    let part = |value: f64, k: usize| interval(value, SIGMAS_95_LINE * zero.covariance[k][k].sqrt());
+    let part = |value: f64, k: usize| interval(value, SIGMAS_95 * zero.covariance[k][k].sqrt());
     row(&[
         format!("{:.3}", zero.s.norm() / HERTZ),
         part(zero.s.re, 0),
@@ -123,7 +123,7 @@ fn margins(run: &AnalysedRun<'_>) -> String {
     let (measured, predicted) = (&closed.margins, &closed.predicted);
     let hz = |w: Option<f64>| w.map_or("none in the band".into(), |w| format!("{:.2} Hz", w / HERTZ));
     let deg = |text: Option<String>| text.map_or("none in the band".into(), |text| format!("{text} deg"));
-    let known = |e: Estimate| interval(e.value, SIGMAS_95_LINE * e.sigma);
+    let known = |e: Estimate| interval(e.value, SIGMAS_95 * e.sigma);
     let header = ["", "Measured", "By the model"];
     let rows = [
         row(&["Crossover".into(), hz(measured.crossover_rad_s), hz(predicted.crossover_rad_s)]),

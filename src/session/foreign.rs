@@ -8,8 +8,7 @@ use super::analysis::judge;
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::periodic::{self, Repetition};
 use crate::identify::{Block, EstimatorSettings, Frf, Signals, blocks, local, with_distortion};
-use crate::verdict::Verdict;
-use crate::zeros::ModalSum;
+use crate::verdict::{MISFIT, Verdict};
 
 /// Half of the frequencies must have at least this coherence.
 const LEAST_COHERENCE: f64 = 0.5;
@@ -20,8 +19,6 @@ const STEEPEST: f64 = 1.0;
 const END: f64 = 0.25;
 /// An answer earlier than this part of a sample, and than five of its sigma, comes before its cause.
 const EARLY_SAMPLES: f64 = 0.5;
-/// Modes that leave so many times the power of the noise explain what was measured.
-const EXPLAINED: f64 = 4.0;
 /// Sigma that count as sure.
 const SURE: f64 = 5.0;
 
@@ -49,7 +46,7 @@ pub fn analyse_signals(
 ) -> Result<ForeignAnalysis, AnalysisError> {
     let (frf, blocks, periods) = response(signals, band_hz, repetition)?;
     let fit = if repetition.is_some() { fit_of_periods(&blocks) } else { fit::fit(&blocks, &View::Bare) };
-    let fitted = fit.as_ref().map_or(Vec::new(), |fit| fitted(fit, &frf.frequency_hz));
+    let fitted = fit.as_ref().map_or(Vec::new(), |fit| fit.response(&View::Bare, &frf.frequency_hz));
     let verdict = match doubt(signals.rate_hz, &frf, &blocks, &fit) {
         Some(why) => Verdict::undecided(why),
         None => judge(&fit, &blocks, &View::Bare, 2.0 * std::f64::consts::PI * band_hz.1, None)?,
@@ -74,7 +71,7 @@ fn response(
 /// taken from neighbouring frequencies, and distortion is in it.
 fn fit_of_periods(blocks: &[Block]) -> Result<ModalFit, FitError> {
     let fit = fit::fit(blocks, &View::Bare);
-    if fit.as_ref().is_ok_and(|fit| fit.chi2_per_freedom <= EXPLAINED) {
+    if fit.as_ref().is_ok_and(|fit| fit.chi2_per_freedom <= MISFIT) {
         return fit;
     }
     let mut fit = fit::fit(&with_distortion(blocks), &View::Bare)?;
@@ -85,21 +82,10 @@ fn fit_of_periods(blocks: &[Block]) -> Result<ModalFit, FitError> {
 /// What a fit leaves over the noise alone, whatever it was weighted with.
 fn chi2_per_freedom(fit: &ModalFit, blocks: &[Block]) -> f64 {
     let frequency_hz: Vec<f64> = blocks.iter().map(|block| block.frequency_hz).collect();
-    let fitted = fitted(fit, &frequency_hz);
+    let fitted = fit.response(&View::Bare, &frequency_hz);
     let left = |(block, h): (&Block, &Complex<f64>)| 2.0 * (block.response - h).norm_sqr() / block.variance;
     let freedom = (2 * blocks.len()).saturating_sub(fit.covariance.nrows()).max(1);
     blocks.iter().zip(&fitted).map(left).sum::<f64>() / freedom as f64
-}
-
-/// The response of a fit at some frequencies.
-fn fitted(fit: &ModalFit, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
-    let parameters = &fit.parameters;
-    let Ok(sum) = ModalSum::new(parameters.modes.clone(), parameters.remainder_m_per_n) else { return Vec::new() };
-    let at = |f: &f64| {
-        let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * f);
-        sum.response(s) * (-s * parameters.delay_s).exp()
-    };
-    frequency_hz.iter().map(at).collect()
 }
 
 /// Why the data carry no verdict, whatever the fit says of them.
@@ -110,7 +96,7 @@ fn doubt(rate_hz: f64, frf: &Frf, blocks: &[Block], fit: &Result<ModalFit, FitEr
 
 /// Modes that do not explain the response, but do explain its inverse.
 fn explained_the_other_way(blocks: &[Block], fit: &Result<ModalFit, FitError>) -> Option<String> {
-    let explained = |fit: &ModalFit| fit.chi2_per_freedom <= EXPLAINED;
+    let explained = |fit: &ModalFit| fit.chi2_per_freedom <= MISFIT;
     if fit.as_ref().is_ok_and(explained) {
         return None;
     }
@@ -129,9 +115,7 @@ fn explained_the_other_way(blocks: &[Block], fit: &Result<ModalFit, FitError>) -
 }
 
 fn incoherent(frf: &Frf) -> Option<String> {
-    let mut sorted = frf.coherence.clone();
-    sorted.sort_by(f64::total_cmp);
-    let median = *sorted.get(sorted.len() / 2)?;
+    let median = frf.median_coherence()?;
     (median < LEAST_COHERENCE).then(|| {
         format!(
             "the input explains {:.0} % of the output's power at half of the frequencies or less: these are not cause and \

@@ -19,7 +19,7 @@ pub use zeros::{UncertainZero, zeros};
 
 use serde::{Deserialize, Serialize};
 
-use crate::fit::{FittedMode, ModalFit, View};
+use crate::fit::{FittedMode, ModalFit, SIGMAS_95, View};
 use crate::identify::Block;
 use crate::plant::PlantError;
 use crate::zeros::ZeroKind;
@@ -29,7 +29,7 @@ const SURE: f64 = 1e-3;
 /// No fit of a bench is truer than this ratio: a zero closer to the imaginary axis is on neither side.
 const TRUEST: f64 = 1e-4;
 /// A fit that leaves so many times the power of the noise does not describe the stage.
-const MISFIT: f64 = 4.0;
+pub(crate) const MISFIT: f64 = 4.0;
 /// The phase must be so close to a number of half turns, in degrees.
 const CLEAR_DEG: f64 = 60.0;
 /// A response stands out of the noise with so many times its power.
@@ -130,7 +130,7 @@ fn doubt(case: &Case<'_>, modes: &[FittedMode]) -> Option<String> {
     let unsigned = modes.iter().find(|mode| !signed(mode))?;
     Some(format!(
         "the sign of the residue at {:.2} Hz is not known; excite more there, or for longer",
-        unsigned.omega_rad_s.value / (2.0 * std::f64::consts::PI)
+        unsigned.frequency_hz().value
     ))
 }
 
@@ -143,7 +143,7 @@ fn unclear(zeros: &[UncertainZero]) -> Option<String> {
         "the zero {:.3} +- {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, \
          or for longer",
         zero.s.re,
-        2.0 * zero.covariance[0][0].sqrt(),
+        SIGMAS_95 * zero.covariance[0][0].sqrt(),
         zero.s.norm() / (2.0 * std::f64::consts::PI),
         100.0 * zero.rhp_probability
     ))
@@ -198,7 +198,7 @@ fn alternate(modes: &[FittedMode]) -> bool {
 
 /// Signs of the residues, slowest mode first.
 fn signs(modes: &[FittedMode]) -> String {
-    modes.iter().map(|mode| if mode.residue_per_kg.value > 0.0 { '+' } else { '-' }).collect()
+    modes.iter().map(FittedMode::sign).collect()
 }
 
 /// The phase from well below the first of the band's modes to its end.

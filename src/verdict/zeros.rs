@@ -9,7 +9,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::fit::{Entry, Estimate, ModalFit, below_zero};
+use crate::fit::{Entry, Estimate, ModalFit};
 use crate::plant::PlantError;
 use crate::zeros::{ModalSum, Term, ZeroKind};
 
@@ -39,22 +39,20 @@ fn uncertain(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZero {
     let real = s.im == 0.0;
     let covariance =
         if real { [[product(0, 0), 0.0], [0.0, 0.0]] } else { [0, 1].map(|i| [0, 1].map(|j| product(i, j))) };
-    let rhp_probability = below_zero(Estimate { value: -s.re, sigma: covariance[0][0].sqrt() });
+    let rhp_probability = Estimate { value: -s.re, sigma: covariance[0][0].sqrt() }.below_zero_probability();
     UncertainZero { s, covariance, rhp_probability, kind }
 }
 
 /// d(Re z)/d theta and d(Im z)/d theta, 2 x parameters.
 fn rows(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
     let modes = &fit.parameters.modes;
-    let resonance =
-        |t: &Term| (z * z + z * (2.0 * t.damping_ratio * t.omega_rad_s) + t.omega_rad_s * t.omega_rad_s).inv();
-    let by_square = |t: &Term| -resonance(t) * resonance(t) * t.residue_per_kg;
+    let by_square = |t: &Term| -t.resonance(z) * t.resonance(z) * t.residue_per_kg;
     let by_z: Complex<f64> =
         modes.iter().map(|t| by_square(t) * (z * 2.0 + 2.0 * t.damping_ratio * t.omega_rad_s)).sum();
     let by = |entry: &Entry| match *entry {
         Entry::Omega(k) => by_square(&modes[k]) * (z * (2.0 * modes[k].damping_ratio) + 2.0 * modes[k].omega_rad_s),
         Entry::Damping(k) => by_square(&modes[k]) * z * (2.0 * modes[k].omega_rad_s),
-        Entry::Residue(k) => resonance(&modes[k]),
+        Entry::Residue(k) => modes[k].resonance(z),
         Entry::Remainder => Complex::new(1.0, 0.0),
         Entry::Delay => Complex::new(0.0, 0.0),
     };

@@ -26,6 +26,12 @@ impl Term {
         Term { omega_rad_s, damping_ratio: 0.0, residue_per_kg }
     }
 
+    /// 1/(s^2 + 2 zeta w s + w^2) in s^2.
+    pub fn resonance(&self, s: Complex<f64>) -> Complex<f64> {
+        let (w, zeta) = (self.omega_rad_s, self.damping_ratio);
+        (s * s + s * (2.0 * zeta * w) + w * w).inv()
+    }
+
     /// Its part of the undamped G at s = j `omega_rad_s`, in m/N.
     pub fn part(&self, omega_rad_s: f64) -> f64 {
         self.residue_per_kg / ((self.omega_rad_s - omega_rad_s) * (self.omega_rad_s + omega_rad_s))
@@ -78,10 +84,7 @@ impl ModalSum {
 
     /// G(s) in m/N.
     pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
-        let part = |t: &Term| {
-            let (w, zeta) = (t.omega_rad_s, t.damping_ratio);
-            (s * s + s * (2.0 * zeta * w) + w * w).inv() * t.residue_per_kg
-        };
+        let part = |t: &Term| t.resonance(s) * t.residue_per_kg;
         self.terms.iter().map(part).sum::<Complex<f64>>() + self.constant_m_per_n
     }
 
