@@ -75,6 +75,7 @@ pub mod excitation;
 pub mod figures;
 pub mod fit;
 pub mod identify;
+mod kept;
 pub mod plant;
 pub mod recording;
 pub mod report;

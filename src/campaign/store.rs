@@ -6,7 +6,7 @@
 //! the process ends.
 
 use std::fs::{File, TryLockError};
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -14,6 +14,7 @@ use serde_json::Value;
 
 use super::{CampaignError, Grid, Place};
 use crate::config::Config;
+use crate::kept::write_whole;
 use crate::study::differences;
 use crate::verdict::Cnmp;
 
@@ -139,15 +140,8 @@ fn name(place: Place) -> String {
     format!("{:04}-{:04}", place.row, place.column)
 }
 
-/// Writes a file as a whole: under another name, to the disk, and then in its place.
 fn write(path: &Path, text: &str) -> Result<(), CampaignError> {
-    let partial = path.with_extension("partial");
-    let written = File::create(&partial).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        std::fs::rename(&partial, path)
-    });
-    written.map_err(|e| failed("write", path, &e))
+    write_whole(path, text).map_err(|e| failed("write", path, &e))
 }
 
 /// Refuses what is no campaign, or one of other settings.

@@ -13,6 +13,7 @@ use crate::campaign::{Answer, Found, Grid, Place, Point, Store, Tolerances, pict
 use crate::config::{Config, Purpose, profiles};
 use crate::devices;
 use crate::fit::FittedMode;
+use crate::kept::write_whole;
 use crate::recording::Recording;
 use crate::rt::thread::Pace;
 use crate::session::{self, Analysis, AnalysisError, Plan, Run, analyse, stoppable};
@@ -114,7 +115,7 @@ fn draw(args: &Args, config: &Config, answer: &Answer<'_>) -> Result<PathBuf, Cl
         CliError::Failed(format!("cannot draw {}: {error}; the points are kept", path.display()))
     };
     let svg = picture(&config.title, answer).map_err(|error| failed(&error))?;
-    std::fs::write(&path, svg).map_err(|error| failed(&error))?;
+    write_whole(&path, &svg).map_err(|error| failed(&error))?;
     Ok(path)
 }
 

@@ -4,6 +4,7 @@ use super::chapter1::*;
 use super::chapter2::*;
 use super::chapter3::*;
 use super::chapter4::*;
+use super::chapter5::*;
 use super::chapter6::*;
 use super::tables::*;
 use super::{Content, FigureError, Workshop};

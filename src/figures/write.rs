@@ -1,8 +1,9 @@
 //! Makes figures and writes them: whole files only, each under another name until it is whole.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{Content, Entry, FigureError, Make, Workshop, page};
+use crate::kept::write_whole;
 use crate::report::sheet_svg;
 
 /// A figure that was made, or why there is none.
@@ -52,11 +53,8 @@ fn made(entry: &'static Entry, folder: &Path, workshop: &Workshop) -> Result<Mad
     Ok(Made { entry, outcome: Ok((content, svg)) })
 }
 
-/// Writes a file as a whole: under another name first, so that a stop leaves the old one or the new one.
 fn write(path: &Path, text: &str) -> Result<(), FigureError> {
-    let partial = PathBuf::from(format!("{}.partial", path.display()));
-    std::fs::write(&partial, text).map_err(|e| failed(&partial, &e))?;
-    std::fs::rename(&partial, path).map_err(|e| failed(path, &e))
+    write_whole(path, text).map_err(|e| failed(path, &e))
 }
 
 fn failed(path: &Path, error: &std::io::Error) -> FigureError {
