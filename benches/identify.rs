@@ -5,7 +5,7 @@
 use bench::config::{Config, Source, load};
 use bench::excitation::{Chirp, Excitation};
 use bench::fit::{View, fit};
-use bench::identify::{EstimatorSettings, Signals, blocks, local, welch};
+use bench::identify::{BlockSettings, Estimator, EstimatorSettings, Signals, blocks, local, welch};
 use bench::sim::SimulatedRig;
 use bench::verdict::{Case, Verdict, verdict};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
@@ -14,8 +14,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 /// Samples of a segment.
 const SEGMENT: usize = 16_384;
 const BAND_HZ: (f64, f64) = (0.1, 500.0);
-/// Half-width of the average as a ratio of frequency, for some 2,000 frequencies.
-const WIDE: f64 = 0.003;
+/// Of a logarithmic grid.
+const FREQUENCIES: usize = 2000;
 
 fn config() -> Config {
     let sets = ["plant.operating_point_m=0.0038", "plant.mass_asymmetry=0.1"].map(String::from).to_vec();
@@ -37,7 +37,7 @@ fn signals(config: &Config) -> Signals {
 }
 
 fn judged(signals: &Signals, config: &Config) -> Verdict {
-    let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
+    let blocks = blocks(signals, BAND_HZ, &BlockSettings::default()).expect("excited");
     let view = View::Bench(config);
     let fit = fit(&blocks, &view).expect("modes");
     verdict(&Case { fit: &fit, view: &view, blocks: &blocks, up_to_rad_s: 650.0, expected_modes: Some(3) })
@@ -47,15 +47,17 @@ fn judged(signals: &Signals, config: &Config) -> Verdict {
 fn identify(c: &mut Criterion) {
     let config = config();
     let signals = signals(&config);
-    let wide = EstimatorSettings { resolution_ratio: WIDE, ..EstimatorSettings::default() };
+    let settings = EstimatorSettings { frequencies: Some(FREQUENCIES), ..EstimatorSettings::default() };
     let mut group = c.benchmark_group("identify");
     group.sample_size(10);
-    group.bench_function("welch", |b| b.iter(|| welch::estimate(&signals, BAND_HZ, SEGMENT).expect("excited")));
+    group.bench_function("welch", |b| {
+        b.iter(|| welch::estimate(&signals, BAND_HZ, SEGMENT, Estimator::H1).expect("excited"))
+    });
     group.bench_function("local, 2000 frequencies", |b| {
-        b.iter(|| local::estimate(&signals, BAND_HZ, &wide).expect("excited"))
+        b.iter(|| local::estimate(&signals, BAND_HZ, &settings).expect("excited"))
     });
     group.bench_function("local, modes and verdict", |b| {
-        b.iter(|| (local::estimate(&signals, BAND_HZ, &wide).expect("excited"), judged(&signals, &config)))
+        b.iter(|| (local::estimate(&signals, BAND_HZ, &settings).expect("excited"), judged(&signals, &config)))
     });
     group.finish();
 }

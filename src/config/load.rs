@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::check::{self, Finding};
 use super::place::line_of;
 use super::profiles::{self, Embedded};
-use super::{Config, ReferenceSettings, TravelPoint, relations, schema};
+use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, relations, schema};
 
 /// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
 const CHIRP_TICKS: f64 = 2e7;
@@ -253,6 +253,7 @@ fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     let swept = matches!(config.control.reference, ReferenceSettings::Chirp { .. });
     if purpose.includes(Purpose::Chirp) || swept && purpose.includes(Purpose::Control) {
         relations.chirp(config);
+        relations.identify(config);
     }
     if purpose.includes(Purpose::Control) {
         relations.control(config);
@@ -326,6 +327,12 @@ impl Relations {
         let rising = amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
         let what = "has frequencies that do not rise from point to point";
         self.must(rising, "control.reference.amplitude", what.into());
+    }
+
+    fn identify(&mut self, config: &Config) {
+        let IdentifySettings::Local(local) = &config.identify else { return };
+        let rising = local.resolution.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        self.must(rising, "identify.resolution", "has frequencies that do not rise from point to point".into());
     }
 
     fn control(&mut self, config: &Config) {

@@ -7,8 +7,9 @@
 
 use nalgebra::Complex;
 
-use super::local::Record;
-use super::{EstimatorSettings, IdentifyError, Signals, band};
+use super::averaged::Record;
+use super::error::check_setting;
+use super::{IdentifyError, Signals, band};
 
 /// The mean response over a few neighbouring bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,24 +24,51 @@ pub struct Block {
     pub variance: f64,
 }
 
+/// How wide blocks are, and over how many bins their noise is averaged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BlockSettings {
+    /// Half-width in bins, at least, of the average whose residual is the noise: 2 to 10000.
+    pub min_half_width_bins: f64,
+    /// Width of a block as a ratio of frequency, and half-width of that average, where it is more: 0 to 0.1.
+    pub resolution_ratio: f64,
+}
+
+impl Default for BlockSettings {
+    fn default() -> Self {
+        Self { min_half_width_bins: 4.0, resolution_ratio: 0.0005 }
+    }
+}
+
+impl BlockSettings {
+    pub(super) fn check(&self) -> Result<(), IdentifyError> {
+        check_setting("min_half_width_bins", self.min_half_width_bins, 2.0, 1e4)?;
+        check_setting("resolution_ratio", self.resolution_ratio, 0.0, 0.1)
+    }
+
+    /// The first bin after a block.
+    pub(super) fn next(&self, bin: usize) -> usize {
+        bin + (self.resolution_ratio * bin as f64).floor().max(1.0) as usize
+    }
+
+    /// Half-width of the neighbourhood of a bin, in bins.
+    pub(super) fn half_width(&self, bin: usize) -> usize {
+        self.min_half_width_bins.max(self.resolution_ratio * bin as f64).round() as usize
+    }
+}
+
 /// The blocks of a record that begins and ends at rest, each `settings.resolution_ratio` of its frequency wide and one bin
 /// at least; those without input or without any noise are left out. Frequencies rise.
 ///
 /// # Errors
 /// Those of [`super::local::estimate`].
-pub fn blocks(
-    signals: &Signals,
-    band_hz: (f64, f64),
-    settings: &EstimatorSettings,
-) -> Result<Vec<Block>, IdentifyError> {
+pub fn blocks(signals: &Signals, band_hz: (f64, f64), settings: &BlockSettings) -> Result<Vec<Block>, IdentifyError> {
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
     let record = Record::new(signals, settings, *bins.end());
     let (mut blocks, mut low) = (Vec::new(), *bins.start());
     while low <= *bins.end() {
-        let count = (settings.resolution_ratio * low as f64).floor().max(1.0) as usize;
-        let high = (low + count - 1).min(*bins.end());
+        let high = (settings.next(low) - 1).min(*bins.end());
         blocks.extend(block(&record, low, high, settings));
         low = high + 1;
     }
@@ -51,7 +79,7 @@ pub fn blocks(
     }
 }
 
-fn block(record: &Record, low: usize, high: usize, settings: &EstimatorSettings) -> Option<Block> {
+fn block(record: &Record, low: usize, high: usize, settings: &BlockSettings) -> Option<Block> {
     let middle = (low + high) / 2;
     let noise = record.noise_power(middle, settings)?;
     let products = &record.products()[low..=high];

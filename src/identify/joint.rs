@@ -13,7 +13,7 @@
 //! T = sum w Y conj(R) / sum w |R|^2           S = sum w E conj(R) / sum w |R|^2
 //! ```
 //!
-//! over neighbouring bins of the whole record, with the weights and widths of [`super::local`]. Where the loop is tight, U
+//! over neighbouring bins of the whole record, with weights cos^2 over the widths of [`super::blocks()`]. Where the loop is tight, U
 //! has the plant's poles as zeros, and what is averaged is 1/P, which has no peak: smoothing takes less off a resonance than
 //! in open loop.
 //!
@@ -27,9 +27,9 @@
 
 use nalgebra::Complex;
 
-use super::local::{NOISE_WIDTH, drop_of_smoothing, weights};
+use super::averaged::{NOISE_WIDTH, weights};
 use super::spectrum::RealFft;
-use super::{Block, EstimatorSettings, Frf, FrfPoint, IdentifyError, Signals, band};
+use super::{Block, BlockSettings, Frf, FrfPoint, IdentifyError, Signals, band};
 
 /// An instrument below this part of its root mean square over all bins is rounding.
 const DEAD_RATIO: f64 = 1e-9;
@@ -65,7 +65,7 @@ pub struct Joint {
 pub fn estimate(
     loop_signals: &LoopSignals,
     band_hz: (f64, f64),
-    settings: &EstimatorSettings,
+    settings: &BlockSettings,
 ) -> Result<Joint, IdentifyError> {
     let signals = &loop_signals.signals;
     settings.check()?;
@@ -183,7 +183,7 @@ impl<'a> Instrumental<'a> {
         input: &'a [Complex<f64>],
         output: &'a [Complex<f64>],
         high: usize,
-        settings: &EstimatorSettings,
+        settings: &BlockSettings,
     ) -> Self {
         let mut this = Instrumental { spectra, input, output, fits: vec![Fit::default()] };
         let end = (high + NOISE_WIDTH * settings.half_width(high) + 1).min(output.len());
@@ -235,7 +235,7 @@ impl<'a> Instrumental<'a> {
     }
 
     /// The power of the noise at a bin, from what is left over around it.
-    fn noise_power(&self, bin: usize, settings: &EstimatorSettings) -> f64 {
+    fn noise_power(&self, bin: usize, settings: &BlockSettings) -> f64 {
         let table = weights(NOISE_WIDTH * settings.half_width(bin));
         let reach = table.len() - 1;
         let near = bin.saturating_sub(reach).max(1)..(bin + reach + 1).min(self.fits.len());
@@ -246,7 +246,7 @@ impl<'a> Instrumental<'a> {
         left / freedom
     }
 
-    fn frf(&self, bins: &core::ops::RangeInclusive<usize>, settings: &EstimatorSettings) -> Frf {
+    fn frf(&self, bins: &core::ops::RangeInclusive<usize>, settings: &BlockSettings) -> Frf {
         let grid = core::iter::successors(Some(*bins.start()), |bin| Some(settings.next(*bin)));
         let mut frf = Frf::default();
         for point in grid.take_while(|bin| bins.contains(bin)).filter_map(|bin| self.point(bin, settings)) {
@@ -255,11 +255,12 @@ impl<'a> Instrumental<'a> {
         frf
     }
 
-    fn point(&self, bin: usize, settings: &EstimatorSettings) -> Option<FrfPoint> {
+    fn point(&self, bin: usize, settings: &BlockSettings) -> Option<FrfPoint> {
         let fit = &self.fits[bin];
         let response = fit.response?;
         let wider = self.around(bin, &weights(2 * settings.half_width(bin)));
-        let bias = drop_of_smoothing(response, wider.yr / wider.ur);
+        // What an average takes off grows with the square of its width: an estimate of twice that shows three times as much.
+        let bias = (wider.yr / wider.ur - response) / 3.0;
         let variance = self.noise_power(bin, settings) * fit.sums.gain() + bias.norm_sqr();
         Some(FrfPoint {
             frequency_hz: bin as f64 * self.spectra.bin_hz,
@@ -270,11 +271,10 @@ impl<'a> Instrumental<'a> {
         })
     }
 
-    fn blocks(&self, bins: &core::ops::RangeInclusive<usize>, settings: &EstimatorSettings) -> Vec<Block> {
+    fn blocks(&self, bins: &core::ops::RangeInclusive<usize>, settings: &BlockSettings) -> Vec<Block> {
         let (mut blocks, mut low) = (Vec::new(), *bins.start());
         while low <= *bins.end() {
-            let count = (settings.resolution_ratio * low as f64).floor().max(1.0) as usize;
-            let high = (low + count - 1).min(*bins.end());
+            let high = (settings.next(low) - 1).min(*bins.end());
             blocks.extend(self.block(low, high, settings));
             low = high + 1;
         }
@@ -282,7 +282,7 @@ impl<'a> Instrumental<'a> {
     }
 
     /// The response over a few bins: their mean, weighted with U conj(R), whose magnitude stands for its moments.
-    fn block(&self, low: usize, high: usize, settings: &EstimatorSettings) -> Option<Block> {
+    fn block(&self, low: usize, high: usize, settings: &BlockSettings) -> Option<Block> {
         let middle = (low + high) / 2;
         self.fits[middle].response?;
         let mut sums = Sums::default();

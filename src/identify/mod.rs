@@ -1,12 +1,14 @@
 //! From recorded signals to a frequency response function (FRF) that says how far it can be trusted.
 //!
 //! ```text
-//! Signals -> drift removed -> FFT of the whole record -> local H1 in each neighbourhood of bins -> Frf -> CSV, plot
+//! Signals -> drift removed -> FFT of the whole record -> a curve through each neighbourhood of bins -> Frf -> CSV, plot
 //! ```
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
 //! - [`blocks()`]: the same record without smoothing, for a fit.
 //! - [`joint::estimate`]: plant, loop and sensitivities of a stage under control.
+//! - [`response`]: as the configuration chooses.
+//! - [`repeated::estimate`]: repetitions of one excitation, each at rest at its ends, averaged.
 //! - [`periodic::estimate`]: periods of one excitation, averaged.
 //! - [`with_distortion`]: what is alike in every period and yet no response.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
@@ -15,28 +17,39 @@
 //! - [`table`]: records of other hands, a CSV with named columns.
 //! - [`csv`]: the file in which an FRF leaves the bench, and comes back.
 //!
-//! Sign convention of both estimators: y = H u, so a lag of the output is a negative phase.
+//! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
 
 pub mod align;
+mod averaged;
 mod band;
 mod blocks;
+mod configured;
 pub mod csv;
+mod curve;
 pub mod delay;
 mod distortion;
 pub mod edges;
 mod error;
+mod estimator;
 mod frf;
 pub mod joint;
 mod kernel;
 pub mod local;
 mod moments;
+mod noise_floor;
 pub mod periodic;
+mod record;
+pub mod repeated;
+mod resolution;
 mod signals;
 mod spectrum;
+mod squares;
 pub mod table;
 pub mod welch;
 
-pub use blocks::{Block, blocks};
+pub use crate::config::{Curve, Estimator, ResolutionPoint};
+pub use blocks::{Block, BlockSettings, blocks};
+pub use configured::response;
 pub use distortion::with_distortion;
 pub use error::IdentifyError;
 pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};

@@ -1,4 +1,4 @@
-//! H1 by Welch's method: Hann windows, half overlapping, as every analyser does it.
+//! H1, H2 and Hv by Welch's method: Hann windows, half overlapping, as every analyser does it.
 //!
 //! For records that do not begin and end at rest, and for comparison: the spectra are those of `scipy.signal.welch` and
 //! `scipy.signal.csd` with their defaults and `nperseg = segment`. Leakage smears narrow modes over some 1.5
@@ -12,8 +12,9 @@ use core::ops::RangeInclusive;
 
 use nalgebra::Complex;
 
+use super::estimator::by_coherence;
 use super::spectrum::RealFft;
-use super::{Frf, FrfPoint, IdentifyError, Signals, band};
+use super::{Estimator, Frf, FrfPoint, IdentifyError, Signals, band};
 
 /// Shorter segments have no bins to speak of.
 const LEAST_SEGMENT: usize = 8;
@@ -37,21 +38,26 @@ pub struct Spectra {
     pub segments: usize,
 }
 
-/// H1 = S_uy / S_uu at the frequencies of `band_hz`, from segments of `segment` samples.
+/// H1 = S_uy / S_uu, H2 = S_yy / S_yu or Hv between them at the frequencies of `band_hz`, from segments of `segment` samples.
 ///
 /// With n segments' worth of independent averages and the coherence C, E|error of H|^2 = |H|^2 (1 - C) / (C (n - 1));
 /// half overlapping Hann windows give n = K / (1 + 2 (K - 1)/K / 36) of K segments.
 ///
 /// # Errors
 /// When the signals, the band or the segment allow no estimate: see [`IdentifyError`].
-pub fn estimate(signals: &Signals, band_hz: (f64, f64), segment: usize) -> Result<Frf, IdentifyError> {
+pub fn estimate(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    segment: usize,
+    estimator: Estimator,
+) -> Result<Frf, IdentifyError> {
     let spectra = spectra(signals, segment)?;
     let bins = band::bins(band_hz, signals.rate_hz, segment)?;
     let least = segment + segment.div_ceil(2);
     if spectra.segments < 2 {
         return Err(IdentifyError::TooShort { samples: signals.len(), least });
     }
-    let frf = frf(&spectra, bins, HANN_BANDWIDTH_BINS * signals.rate_hz / segment as f64);
+    let frf = frf(&spectra, estimator, bins, HANN_BANDWIDTH_BINS * signals.rate_hz / segment as f64);
     if frf.is_empty() { Err(IdentifyError::NotExcited { low_hz: band_hz.0, high_hz: band_hz.1 }) } else { Ok(frf) }
 }
 
@@ -128,7 +134,7 @@ impl Sums {
     }
 }
 
-fn frf(spectra: &Spectra, bins: RangeInclusive<usize>, resolution_hz: f64) -> Frf {
+fn frf(spectra: &Spectra, estimator: Estimator, bins: RangeInclusive<usize>, resolution_hz: f64) -> Frf {
     let mut frf = Frf::default();
     for k in bins {
         let (input, output, cross) = (spectra.input[k], spectra.output[k], spectra.cross[k]);
@@ -137,7 +143,8 @@ fn frf(spectra: &Spectra, bins: RangeInclusive<usize>, resolution_hz: f64) -> Fr
         let coherence = if output > 0.0 { response.norm() * (cross.norm() / output) } else { 0.0 };
         let unexplained = (output / input * (1.0 - coherence)).max(0.0);
         let variance = unexplained / (averages(spectra.segments) - 1.0);
-        frf.push(FrfPoint { frequency_hz: spectra.frequency_hz[k], response, coherence, variance, resolution_hz });
+        let h1 = FrfPoint { frequency_hz: spectra.frequency_hz[k], response, coherence, variance, resolution_hz };
+        frf.push(by_coherence(h1, estimator));
     }
     frf
 }

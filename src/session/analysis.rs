@@ -8,7 +8,7 @@ use super::plan::{KIND, Kind};
 use crate::config::{Config, IdentifySettings};
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::delay::{self, Delay};
-use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, blocks, local, welch};
+use crate::identify::{Block, BlockSettings, Frf, IdentifyError, Signals, blocks, response};
 use crate::plant::{self, Chain, Modal, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
@@ -97,7 +97,8 @@ pub(super) struct Seen {
 }
 
 fn open_loop(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings) -> Result<Seen, AnalysisError> {
-    let (frf, blocks) = (response(signals, band_hz, settings)?, blocks(signals, band_hz, &fine(settings))?);
+    let frf = response(signals, band_hz, settings)?;
+    let blocks = blocks(signals, band_hz, &BlockSettings::from(settings))?;
     Ok(Seen { frf, blocks, closed: None })
 }
 
@@ -139,29 +140,6 @@ pub(super) fn judge(
     let shows = |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
     let expected_modes = model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
     Ok(verdict(&Case { fit, view, blocks, up_to_rad_s, expected_modes })?)
-}
-
-/// What cuts the record into blocks: the default estimator's widths, whatever the response is estimated with.
-fn fine(settings: &IdentifySettings) -> EstimatorSettings {
-    match *settings {
-        IdentifySettings::Local { min_half_width_bins, .. } => {
-            EstimatorSettings { min_half_width_bins: min_half_width_bins as f64, ..EstimatorSettings::default() }
-        }
-        IdentifySettings::Welch { .. } => EstimatorSettings::default(),
-    }
-}
-
-/// H1 as configured.
-fn response(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings) -> Result<Frf, IdentifyError> {
-    match *settings {
-        IdentifySettings::Local { resolution_ratio, min_half_width_bins } => {
-            let min_half_width_bins = min_half_width_bins as f64;
-            local::estimate(signals, band_hz, &EstimatorSettings { min_half_width_bins, resolution_ratio })
-        }
-        IdentifySettings::Welch { segment_s } => {
-            welch::estimate(signals, band_hz, libm::round(segment_s * signals.rate_hz) as usize)
-        }
-    }
 }
 
 /// Every tick of the run, or those with the loop closed.

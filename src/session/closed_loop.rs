@@ -4,11 +4,11 @@ use nalgebra::Complex;
 
 use super::analysis::{AnalysisError, Seen};
 use super::plan::{Plan, PlanError};
-use crate::config::{Config, IdentifySettings, ReferenceSettings};
+use crate::config::{Config, ReferenceSettings};
 use crate::control::{ClosedLoop, ControllerError, Margins};
 use crate::fit::Estimate;
 use crate::identify::joint::{self, Joint, LoopSignals};
-use crate::identify::{EstimatorSettings, Frf};
+use crate::identify::{BlockSettings, Frf};
 use crate::plant::{self, Modal};
 use crate::recording::Recording;
 
@@ -70,7 +70,7 @@ pub(super) fn seen(
 ) -> Result<Seen, AnalysisError> {
     swept(&config.control.reference)?;
     let Joint { plant, blocks, complementary, sensitivity, loop_gain } =
-        joint::estimate(signals, band_hz, &resolution(&config.identify))?;
+        joint::estimate(signals, band_hz, &BlockSettings::from(&config.identify))?;
     let model = model(recording, config)?;
     let model_loop = loop_gain.frequency_hz.iter().map(|f| model.sampled_loop(TURN * f)).collect();
     let margins = margins(&loop_gain, &sensitivity);
@@ -91,16 +91,6 @@ fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
         ReferenceSettings::Sine { .. } => "sine",
     };
     Err(ClosedLoopError::Reference { kind })
-}
-
-/// The widths of the estimate; segments are not for a loop.
-fn resolution(settings: &IdentifySettings) -> EstimatorSettings {
-    match *settings {
-        IdentifySettings::Local { resolution_ratio, min_half_width_bins } => {
-            EstimatorSettings { min_half_width_bins: min_half_width_bins as f64, resolution_ratio }
-        }
-        IdentifySettings::Welch { .. } => EstimatorSettings::default(),
-    }
 }
 
 /// The loop of the recorded controller around the configured model.

@@ -1,4 +1,4 @@
-use bench::identify::{EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
+use bench::identify::{Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use proptest::prelude::*;
 
 /// Fit for any estimator.
@@ -10,7 +10,7 @@ fn good() -> Signals {
 
 fn refusal(signals: &Signals, band_hz: (f64, f64)) -> IdentifyError {
     let local = local::estimate(signals, band_hz, &EstimatorSettings::default()).unwrap_err();
-    let welch = welch::estimate(signals, band_hz, 16).unwrap_err();
+    let welch = welch::estimate(signals, band_hz, 16, Estimator::H1).unwrap_err();
     // Both say the same, but for the distance of their bins.
     assert_eq!(std::mem::discriminant(&local), std::mem::discriminant(&welch), "{local} / {welch}");
     local
@@ -26,7 +26,7 @@ fn assert_says(error: &IdentifyError, parts: &[&str]) {
 #[test]
 fn the_signals_that_these_tests_spoil_are_good_before() {
     assert!(local::estimate(&good(), (10.0, 400.0), &EstimatorSettings::default()).is_ok());
-    assert!(welch::estimate(&good(), (70.0, 400.0), 16).is_ok());
+    assert!(welch::estimate(&good(), (70.0, 400.0), 16, Estimator::H1).is_ok());
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn a_band_that_is_upside_down_or_no_number_is_refused() {
 fn a_band_between_two_bins_is_refused_with_their_distance() {
     let error = local::estimate(&good(), (11.0, 14.0), &EstimatorSettings::default()).unwrap_err();
     assert_says(&error, &["between 11 and 14 Hz", "5 Hz apart", "longer record"]);
-    let error = welch::estimate(&good(), (70.0, 100.0), 16).unwrap_err();
+    let error = welch::estimate(&good(), (70.0, 100.0), 16, Estimator::H1).unwrap_err();
     assert_says(&error, &["between 70 and 100 Hz", "62.5 Hz apart"]);
 }
 
@@ -105,13 +105,19 @@ fn settings_out_of_bounds_are_refused_with_name_value_and_bounds() {
         &local::estimate(&good(), (10.0, 400.0), &one).unwrap_err(),
         &["min_half_width_bins is 1", "2 to 10000"],
     );
-    assert_says(&welch::estimate(&good(), (10.0, 400.0), 7).unwrap_err(), &["segment is 7", "8 to 200"]);
-    assert_says(&welch::estimate(&good(), (10.0, 400.0), 201).unwrap_err(), &["segment is 201", "8 to 200"]);
+    assert_says(&welch::estimate(&good(), (10.0, 400.0), 7, Estimator::H1).unwrap_err(), &["segment is 7", "8 to 200"]);
+    assert_says(
+        &welch::estimate(&good(), (10.0, 400.0), 201, Estimator::H1).unwrap_err(),
+        &["segment is 201", "8 to 200"],
+    );
 }
 
 #[test]
 fn a_single_segment_knows_no_noise_and_is_refused_with_the_length_it_takes() {
-    assert_says(&welch::estimate(&good(), (10.0, 400.0), 150).unwrap_err(), &["200 samples", "at least 225"]);
+    assert_says(
+        &welch::estimate(&good(), (10.0, 400.0), 150, Estimator::H1).unwrap_err(),
+        &["200 samples", "at least 225"],
+    );
 }
 
 /// Values of all kinds, most of them ordinary.
@@ -158,11 +164,11 @@ proptest! {
     ) {
         let samples = if lengths_agree { input_a.len() } else { outputs.len() };
         let signals = Signals { rate_hz, input_a, output_m: outputs[..samples].to_vec() };
-        let settings = EstimatorSettings { min_half_width_bins: half_width, resolution_ratio: ratio };
+        let settings = EstimatorSettings { min_half_width_bins: half_width, resolution_ratio: ratio, ..EstimatorSettings::default() };
         if let Ok(frf) = local::estimate(&signals, band_hz, &settings) {
             assert_sound(&frf, band_hz);
         }
-        if let Ok(frf) = welch::estimate(&signals, band_hz, segment) {
+        if let Ok(frf) = welch::estimate(&signals, band_hz, segment, Estimator::H1) {
             assert_sound(&frf, band_hz);
         }
     }

@@ -6,5 +6,6 @@ mod csv;
 mod joint;
 mod noise;
 mod python;
+mod seeds;
 mod stage;
 mod welch;

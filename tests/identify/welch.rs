@@ -1,4 +1,4 @@
-use bench::identify::{Signals, welch};
+use bench::identify::{Estimator, Signals, welch};
 use nalgebra::Complex;
 
 use crate::python;
@@ -70,7 +70,8 @@ fn the_error_of_welch_is_within_2_sigma_in_about_95_percent_of_the_bins() {
     let mut dice = Dice::new(5);
     let input_a: Vec<f64> = (0..200_000).map(|_| dice.normal()).collect();
     let output_m = input_a.iter().map(|u| 1e-4 * u + 0.5e-4 * dice.normal()).collect();
-    let frf = welch::estimate(&Signals { rate_hz: 1000.0, input_a, output_m }, (1.0, 499.0), 2000).unwrap();
+    let frf =
+        welch::estimate(&Signals { rate_hz: 1000.0, input_a, output_m }, (1.0, 499.0), 2000, Estimator::H1).unwrap();
     let within = |k: &usize| (frf.response[*k].norm() - 1e-4).abs() <= 2.0 * frf.magnitude_sigma[*k];
     let share = (0..frf.len()).filter(within).count() as f64 / frf.len() as f64;
     // 95.4 % of 997 bins, two neighbours of which share some: +- 2.5 % is over three standard deviations.

@@ -1,0 +1,71 @@
+//! The power of the noise over frequency: of what curves leave, or of how repetitions differ.
+
+use super::EstimatorSettings;
+use super::curve;
+use super::record::{Record, Scatter};
+
+/// What curves leave is averaged with weights so many times as wide as theirs.
+const NOISE_WIDTH: f64 = 2.0;
+
+/// What is known of the noise at one place.
+struct Rest {
+    place: f64,
+    /// sum w |e|^2
+    residual: f64,
+    /// The same, expected for noise of power 1.
+    freedom: f64,
+}
+
+/// The noise along a band.
+pub(super) struct NoiseFloor {
+    rests: Vec<Rest>,
+    /// Half-width of the mean over that of the response.
+    width: f64,
+}
+
+impl NoiseFloor {
+    /// The noise of a record between two places, and somewhat beyond.
+    pub(super) fn of(record: &Record, (low, high): (f64, f64), settings: &EstimatorSettings) -> Self {
+        match &record.scatter {
+            Some(scatter) => Self { rests: repeated(scatter), width: 1.0 },
+            None => Self { rests: left(record, (low, high), settings), width: NOISE_WIDTH },
+        }
+    }
+
+    /// E|N|^2 in a bin around a place, weighted towards it.
+    pub(super) fn power(&self, place: f64, half_width: f64) -> f64 {
+        let reach = self.width * half_width;
+        let low = self.rests.partition_point(|rest| rest.place <= place - reach);
+        let near = self.rests[low..].iter().take_while(|rest| rest.place < place + reach);
+        let (residual, freedom) = near.fold((0.0, 0.0), |(residual, freedom), rest| {
+            let w = libm::cos(core::f64::consts::FRAC_PI_2 * (rest.place - place) / reach).powi(2);
+            (residual + w * rest.residual, freedom + w * rest.freedom)
+        });
+        residual / freedom
+    }
+}
+
+/// What the curves of `settings` leave, half-width by half-width.
+fn left(record: &Record, (low, high): (f64, f64), settings: &EstimatorSettings) -> Vec<Rest> {
+    let reach = |place: f64| NOISE_WIDTH * settings.half_width(place, record.bin_hz);
+    let mut place = (low - reach(low)).max(1.0);
+    let end = (high + reach(high)).min(record.last_bin() as f64);
+    let mut rests = Vec::new();
+    while place <= end {
+        let half_width = settings.half_width(place, record.bin_hz);
+        let fitted = curve::fit(&record.window(place, half_width), settings);
+        rests.extend(fitted.map(|f| Rest { place, residual: f.residual, freedom: f.freedom }));
+        place += half_width;
+    }
+    rests
+}
+
+/// How repetitions differ, bin by bin.
+fn repeated(scatter: &Scatter) -> Vec<Rest> {
+    let rest = |(bin, power): (usize, &f64)| Rest {
+        place: bin as f64,
+        residual: power * scatter.freedom,
+        freedom: scatter.freedom,
+    };
+    scatter.power.iter().enumerate().skip(1).filter(|(_, power)| power.is_finite()).map(rest).collect()
+}

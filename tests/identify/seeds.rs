@@ -1,0 +1,152 @@
+//! Bias and coverage over many seeds, of the default estimator on the simulated stage as configured by default: its noise, its
+//! floor, its quantisation, its unmodelled modes, at 5 kHz. The truth is written apart from the library.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bench::config::{Config, Source, load};
+use bench::excitation::{Chirp, Excitation};
+use bench::identify::{Frf, Signals, response};
+use bench::sim::SimulatedRig;
+use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+
+use crate::stage::SampledPlant;
+
+const BAND_HZ: (f64, f64) = (0.5, 450.0);
+/// Three of the stage's runs a second on a core: 200 are 30 to 60 seconds on two.
+const SEEDS: u64 = 200;
+const SEEDS_OF_BIAS: usize = 50;
+const WORKERS: usize = 2;
+
+fn config(sets: &[&str]) -> Config {
+    load(&Source { sets: sets.iter().map(|set| set.to_string()).collect(), ..Source::default() }).expect("valid")
+}
+
+/// The default chirp on the simulated stage of a configuration.
+fn run(config: &Config) -> Signals {
+    let chirp = Chirp::new(&config.chirp, config.servo.period_s());
+    let mut rig = SimulatedRig::new(config).expect("a rig");
+    rig.enable().expect("an amplifier");
+    let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
+    for number in 0..chirp.ticks() {
+        let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;
+        output_m.push(rig.latest(Tick { number, scheduled_ns }).position_m);
+        input_a.push(rig.command(chirp.current_a(number)).expect("enabled"));
+    }
+    Signals { rate_hz: config.servo.rate_hz, input_a, output_m }
+}
+
+fn estimated(sets: &[&str]) -> Frf {
+    let config = config(sets);
+    response(&run(&config), BAND_HZ, &config.identify).expect("excited")
+}
+
+/// What `of` makes of the seeds 1 to [`SEEDS`], in their order.
+fn over_seeds<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let (next, all) = (AtomicU64::new(1), Mutex::new(Vec::new()));
+    let work = || {
+        while let Some(seed) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|seed| *seed <= SEEDS) {
+            let one = of(seed);
+            all.lock().unwrap().push((seed, one));
+        }
+    };
+    std::thread::scope(|scope| (0..WORKERS).for_each(|_| drop(scope.spawn(work))));
+    let mut all = all.into_inner().unwrap();
+    all.sort_by_key(|(seed, _)| *seed);
+    all.into_iter().map(|(_, one)| one).collect()
+}
+
+/// Errors of one frequency: relative of the magnitude, in degrees of the phase, and both in their sigmas.
+#[derive(Clone, Copy)]
+struct Error {
+    magnitude: f64,
+    phase_deg: f64,
+    in_sigmas: [f64; 2],
+}
+
+fn errors(frf: &Frf, plant: &SampledPlant) -> Vec<Error> {
+    let error = |(k, f): (usize, &f64)| {
+        let truth = plant.response(*f);
+        let off = frf.response[k] / truth;
+        let in_sigmas =
+            [(frf.response[k].norm() - truth.norm()) / frf.magnitude_sigma[k], off.arg() / frf.phase_sigma_rad[k]];
+        Error { magnitude: off.norm() - 1.0, phase_deg: off.arg().to_degrees(), in_sigmas }
+    };
+    frf.frequency_hz.iter().enumerate().map(error).collect()
+}
+
+/// The mean of so many errors at one frequency, and its own sigma by their scatter.
+fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    (mean, (values.map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0) / count).sqrt())
+}
+
+const QUIET: [&str; 3] = ["sim.probe_noise_rms_m=0.0", "sim.probe_quantisation_m=0.0", "sim.floor=[]"];
+
+#[test]
+fn without_noise_the_default_estimate_is_within_0_2_percent_and_0_1_degrees_of_the_stage() {
+    let frf = estimated(&QUIET);
+    let errors = errors(&frf, &SampledPlant::stage());
+    let worst = |of: fn(&Error) -> f64| errors.iter().map(of).map(f64::abs).fold(0.0, f64::max);
+    let (magnitude, phase_deg) = (worst(|e| e.magnitude), worst(|e| e.phase_deg));
+    println!("{} frequencies, off by up to {:.4} % and {phase_deg:.4} degrees", frf.len(), 100.0 * magnitude);
+    assert!(magnitude < 0.002 && phase_deg < 0.1, "{magnitude} {phase_deg}");
+    assert!((frf.frequency_hz[0] - 0.5).abs() < 1e-9 && frf.frequency_hz[frf.len() - 1] > 449.0 && frf.len() > 2000);
+}
+
+#[test]
+fn over_seeds_the_bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_bands_hold_the_truth_as_often() {
+    let plant = SampledPlant::stage();
+    let frequency_hz = estimated(&[]).frequency_hz;
+    let all = over_seeds(|seed| errors(&estimated(&[&format!("sim.seed={seed}")]), &plant));
+    assert!(all.iter().all(|errors| errors.len() == frequency_hz.len()));
+    assert_unbiased(&frequency_hz, &all[..SEEDS_OF_BIAS]);
+    assert_covered(&frequency_hz, &all);
+}
+
+/// The mean over 50 seeds still has a seventh of the noise. At the antiresonance near 250 Hz that is 0.1 % and 0.06 degrees, and
+/// the greatest of some thousand means lies at three to four of their sigmas: nowhere may a mean be beyond its bound by more
+/// than four, and 99 in a hundred are within it as they are.
+fn assert_unbiased(frequency_hz: &[f64], all: &[Vec<Error>]) {
+    let (mut within, mut worst) = (0, (0.0_f64, 0.0_f64));
+    for (k, f) in frequency_hz.iter().enumerate() {
+        let (magnitude, magnitude_sigma) = mean(all.iter().map(|errors| errors[k].magnitude));
+        let (phase_deg, phase_sigma_deg) = mean(all.iter().map(|errors| errors[k].phase_deg));
+        assert!(magnitude.abs() < 0.002 + 4.0 * magnitude_sigma, "{} % at {f} Hz", 100.0 * magnitude);
+        assert!(phase_deg.abs() < 0.1 + 4.0 * phase_sigma_deg, "{phase_deg} degrees at {f} Hz");
+        within += usize::from(magnitude.abs() < 0.002 && phase_deg.abs() < 0.1);
+        worst = (worst.0.max(magnitude.abs()), worst.1.max(phase_deg.abs()));
+    }
+    let share = within as f64 / frequency_hz.len() as f64;
+    println!(
+        "mean over {} seeds: up to {:.3} % and {:.3} degrees; within 0.2 % and 0.1 degrees {share:.4} of {} frequencies",
+        all.len(),
+        100.0 * worst.0,
+        worst.1,
+        frequency_hz.len()
+    );
+    assert!(share > 0.99, "{share}");
+}
+
+/// Ranges of frequency: between the modes, and around each of R, u, v and the unmodelled ones.
+const RANGES_HZ: [f64; 16] =
+    [0.5, 2.0, 5.0, 8.0, 12.0, 28.5, 30.0, 65.0, 75.0, 81.0, 87.0, 200.0, 233.0, 270.0, 286.0, 450.1];
+
+/// The share is of bins and seeds. A range of n independent bins and 200 seeds has a standard deviation of
+/// sqrt(0.95 0.05/(200 n)): 0.6 % of the five or so around a mode.
+fn assert_covered(frequency_hz: &[f64], all: &[Vec<Error>]) {
+    let share = |low_hz: f64, high_hz: f64, of: usize| {
+        let inside = |k: &usize| (low_hz..high_hz).contains(&frequency_hz[*k]);
+        let bins: Vec<usize> = (0..frequency_hz.len()).filter(inside).collect();
+        let held = all.iter().flat_map(|errors| bins.iter().map(|k| errors[*k].in_sigmas[of]));
+        held.filter(|error| error.abs() <= 1.96).count() as f64 / (bins.len() * all.len()) as f64
+    };
+    let ranges = RANGES_HZ.windows(2).map(|range| (range[0], range[1]));
+    for (low_hz, high_hz) in ranges.chain([(0.5, 450.1)]) {
+        let (magnitude, phase) = (share(low_hz, high_hz, 0), share(low_hz, high_hz, 1));
+        println!("{low_hz} to {high_hz} Hz: 95 % bands hold magnitude {magnitude:.4}, phase {phase:.4}");
+        assert!((0.93..0.97).contains(&magnitude), "{low_hz} to {high_hz} Hz: {magnitude}");
+        assert!((0.93..0.97).contains(&phase), "{low_hz} to {high_hz} Hz: {phase}");
+    }
+}
