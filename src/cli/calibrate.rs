@@ -9,8 +9,8 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::run_options::{RunOptions, RunReport, finish};
 use super::{CliError, Outcome};
 use crate::calibration::{AmplifierCalibration, Calibration, ChainCalibration, Fit, ProbeCalibration, fit};
-use crate::config::{Config, Purpose};
-use crate::excitation::{Chirp, Extremes, Staircase};
+use crate::config::{Config, ExcitationKind, Purpose};
+use crate::excitation::{self, Extremes, Staircase};
 use crate::plant::{self, Modal, PlantError, Sampled};
 use crate::recording::Recording;
 use crate::session::{Plan, analyse, unless_stopped};
@@ -62,8 +62,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(if report.calibration.is_some() { report.run.exit() } else { Outcome::Failed })
 }
 
-/// The delay's chirp is that of `[chirp]`, faster.
+/// The delay's chirp is that of `[chirp]`, faster, once, whatever else is used otherwise.
 fn shorten(config: &mut Config) {
+    config.excitation.kind = ExcitationKind::Chirp;
+    config.chirp.repetitions = 1;
     let chirp = &mut config.chirp;
     let share = config.calibrate.chirp_duration_s / chirp.duration_s;
     chirp.duration_s = config.calibrate.chirp_duration_s;
@@ -91,7 +93,7 @@ fn check(config: &Config) -> Result<(), CliError> {
     ];
     match cases.into_iter().flatten().next() {
         Some(refused) => Err(refused),
-        None => Ok(Chirp::new(&config.chirp, period_s).check(config, &rig).map(drop)?),
+        None => Ok(excitation::check(&excitation::of(config), config, &rig).map(drop)?),
     }
 }
 

@@ -1,11 +1,12 @@
 //! `bench chirp`: excite, record, estimate the frequency response.
 
 use super::analysis_output::{Made, make};
+use super::chirp_plan::{Expected, shape, show};
 use super::options::BenchOptions;
 use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
-use crate::config::{Config, Purpose, Sweep};
-use crate::excitation::Chirp;
+use crate::config::{Config, Purpose};
+use crate::excitation::{self, Extremes};
 use crate::plant::Sampled;
 use crate::recording::Recording;
 use crate::session::{Plan, unless_stopped};
@@ -20,6 +21,9 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     run: RunOptions,
+    /// What to excite with: chirp, multisine, stepped_sine or prbs
+    #[arg(long, value_name = "KIND")]
+    excitation: Option<String>,
     /// First frequency in hertz
     #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     start: Option<f64>,
@@ -35,18 +39,35 @@ pub(super) struct Args {
     /// How the frequency runs over time: linear or logarithmic
     #[arg(long, value_name = "KIND")]
     sweep: Option<String>,
+    /// Amplitude over frequency for the same displacement everywhere, by the model or by an FRF measured before; a stepped sine
+    /// takes the model if neither this nor --amplitude is given
+    #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
+    shape: Option<String>,
+    /// Only say what the run would do: travel, current, heat, duration; nothing moves
+    #[arg(long)]
+    plan: bool,
 }
 
 impl Args {
     fn sets(&self) -> Vec<String> {
+        let text = |key: &str, value: &Option<String>| {
+            value.as_ref().map(|value| format!("{key}={}", toml::Value::from(value.as_str())))
+        };
         let number =
             |key: &str, value: Option<f64>| value.map(|value| format!("chirp.{key}={}", toml::Value::from(value)));
         let point =
             |a: f64| format!("chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]", toml::Value::from(a));
-        let flat = self.amplitude.map(point);
-        let sweep = self.sweep.as_ref().map(|kind| format!("chirp.sweep={}", toml::Value::from(kind.as_str())));
+        let binary = |a: f64| format!("prbs.amplitude_a={}", toml::Value::from(a));
+        let flat = self.amplitude.map(point).into_iter().chain(self.amplitude.map(binary));
+        let words = text("chirp.sweep", &self.sweep).into_iter().chain(text("excitation.kind", &self.excitation));
         let numbers = [("start_hz", self.start), ("stop_hz", self.stop), ("duration_s", self.duration)];
-        numbers.into_iter().filter_map(|(key, value)| number(key, value)).chain(flat).chain(sweep).collect()
+        numbers.into_iter().filter_map(|(key, value)| number(key, value)).chain(flat).chain(words).collect()
+    }
+
+    /// The settings, with the amplitude shaped as asked for.
+    fn config(&self) -> Result<Config, CliError> {
+        let config = self.bench.load(Purpose::Chirp, &self.sets())?;
+        shape(config, self.shape.as_deref(), self.amplitude.is_some())
     }
 }
 
@@ -56,13 +77,17 @@ struct Report {
     #[serde(flatten)]
     run: RunReport,
     expected_travel_m: f64,
+    expected: Expected,
     #[serde(flatten)]
     made: Made,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = args.bench.load(Purpose::Chirp, &args.sets())?;
-    let expected_travel_m = check(&config)?;
+    let config = args.config()?;
+    let expected = Expected::of(&check(&config)?);
+    if args.plan {
+        return show(&config, &expected, args.bench.json);
+    }
     let plan = Plan::chirp(config.clone());
     let mut run = args.run.run(&plan, "chirp")?;
     let totals = run.totals()?;
@@ -71,7 +96,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         "completed" => analysed(&run.path, &config)?,
         _ => Made::nothing("the run did not come to its end"),
     };
-    let report = Report { run: report, expected_travel_m, made };
+    let report = Report { run: report, expected_travel_m: expected.travel_m, expected, made };
     close(run, &report, args.bench.json, &text(&report, &config))?;
     Ok(if report.made.is_stopped() { Outcome::Failed } else { report.run.exit() })
 }
@@ -83,23 +108,21 @@ pub(super) fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
     made.map_err(|error| CliError::Failed(error.to_string()))?.unwrap_or(Ok(Made::stopped()))
 }
 
-/// Refuses a chirp that would trip an interlock, by the model of the whole rig; returns the travel to expect.
-pub(super) fn check(config: &Config) -> Result<f64, CliError> {
-    let period_s = config.servo.period_s();
-    let force_constant = config.motor.force_constant_n_per_a;
-    let rig = Sampled::new(&sim::modes(config)?, config.amplifier.bandwidth_hz, force_constant, period_s);
-    Ok(Chirp::new(&config.chirp, period_s).check(config, &rig)?)
+/// Refuses an excitation that would trip an interlock, by the model of the whole rig; returns what to expect.
+pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
+    Ok(excitation::check(&excitation::of(config), config, &rig(config)?)?)
+}
+
+/// The model of the whole rig.
+pub(super) fn rig(config: &Config) -> Result<Sampled, CliError> {
+    let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
+    Ok(Sampled::new(&sim::modes(config)?, bandwidth_hz, force_constant, config.servo.period_s()))
 }
 
 fn text(report: &Report, config: &Config) -> String {
-    let sweep = match config.chirp.sweep {
-        Sweep::Linear => "linear",
-        Sweep::Logarithmic => "logarithmic",
-    };
-    let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
     format!(
-        "{sweep} chirp, {start_hz} to {stop_hz} Hz in {} s; expected travel {:.0} um\n{}{}",
-        config.chirp.duration_s,
+        "{}; expected travel {:.0} um\n{}{}",
+        excitation::words(config),
         report.expected_travel_m * 1e6,
         report.run.text(config),
         report.made.text(),

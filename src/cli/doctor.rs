@@ -36,7 +36,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The very checks that `bench chirp` and `bench control` make before they open a device.
 fn runs(args: &Args) -> Runs {
-    let chirp = || chirp::check(&args.bench.load(Purpose::Chirp, &[])?);
+    let chirp = || Ok(chirp::check(&args.bench.load(Purpose::Chirp, &[])?)?.travel_m);
     let control = || loop_margins(&args.bench.load(Purpose::Control, &[])?);
     let words = |error: CliError| error.to_string();
     Runs { chirp: chirp().map_err(words), control: control().map_err(words) }

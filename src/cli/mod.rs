@@ -5,6 +5,7 @@ mod calibrate;
 mod campaign;
 mod campaign_output;
 mod chirp;
+mod chirp_plan;
 mod choice;
 mod columns;
 mod config;

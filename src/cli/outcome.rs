@@ -7,7 +7,7 @@ use crate::campaign::{AnswerError, CampaignError};
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::devices::DevicesError;
-use crate::excitation::ChirpError;
+use crate::excitation::ExcitationError;
 use crate::identify::IdentifyError;
 use crate::identify::table::TableError;
 use crate::plant::PlantError;
@@ -51,9 +51,9 @@ pub enum CliError {
     /// The run cannot be planned.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The chirp would trip an interlock.
+    /// The excitation would trip an interlock.
     #[error(transparent)]
-    Chirp(#[from] ChirpError),
+    Excitation(#[from] ExcitationError),
     /// The model cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::check::{self, Finding};
 use super::place::line_of;
 use super::profiles::{self, Embedded};
-use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, relations, schema};
+use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, excited, relations, schema};
 
 /// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
 const CHIRP_TICKS: f64 = 2e7;
@@ -92,9 +92,19 @@ pub fn load(source: &Source) -> Result<Config, ConfigError> {
     checked(&layers(source)?, source.purpose)
 }
 
-/// The configuration that travels with a recording: whole, over nothing.
+/// Tables that recordings of earlier versions lack, which ran a chirp: they are those of the default profile.
+const LATER: [&str; 5] = ["excitation", "multisine", "stepped_sine", "prbs", "shape"];
+
+/// The configuration that travels with a recording: whole, over nothing but the tables that are newer than it may be.
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
-    checked(&[parse(name.to_string(), text.to_string())?], Purpose::Model)
+    let mut layers = Vec::new();
+    if let Some(base) = profiles::find(profiles::PROFILES, profiles::DEFAULT) {
+        let mut base = parse(format!("profile {}", base.name), base.text.to_string())?;
+        base.table.retain(|key, _| LATER.contains(&key));
+        layers.push(base);
+    }
+    layers.push(parse(name.to_string(), text.to_string())?);
+    checked(&layers, Purpose::Model)
 }
 
 fn checked(layers: &[Layer], purpose: Purpose) -> Result<Config, ConfigError> {
@@ -304,13 +314,13 @@ impl Relations {
             let what = format!("is {hz} Hz; the probe sees frequencies below half its rate, {seen_hz} Hz");
             self.must(hz < seen_hz, path, what);
         }
-        let seconds = chirp.quiet_before_s + chirp.duration_s + chirp.quiet_after_s;
-        let ticks = seconds * config.servo.rate_hz;
+        let (ticks, path, value) = excited::ticks(config);
+        let unit = if path.ends_with("_s") { " s" } else { "" };
         let what = format!(
-            "is {} s, with the quiet before and after {ticks} ticks; {CHIRP_TICKS} can be analysed as one record: shorten it or lower loop.rate_hz",
-            chirp.duration_s
+            "is {value}{unit}, with the quiet before and after {ticks} ticks; {CHIRP_TICKS} can be analysed as one record: shorten it or lower loop.rate_hz"
         );
-        self.must(ticks <= CHIRP_TICKS, "chirp.duration_s", what);
+        self.must(ticks <= CHIRP_TICKS, path, what);
+        self.0.extend(excited::excitation(config));
         let fades_s = chirp.fade_in_s + chirp.fade_out_s;
         let what = format!("is {} s, shorter than both fades, {fades_s} s", chirp.duration_s);
         self.must(fades_s <= chirp.duration_s, "chirp.duration_s", what);

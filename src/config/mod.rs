@@ -14,6 +14,8 @@
 
 mod check;
 mod devices;
+mod excitation;
+mod excited;
 mod load;
 mod place;
 mod plant;
@@ -24,6 +26,7 @@ mod settings;
 
 pub(crate) use check::nearest;
 pub use devices::*;
+pub use excitation::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
 pub(crate) use load::{recheck, text_of, text_of_file, typed};
 pub use plant::*;

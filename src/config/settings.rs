@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::devices::{AmplifierDevice, ProbeDevice};
+use super::excitation::{ExcitationSettings, MultisineSettings, PrbsSettings, ShapeSettings, SteppedSineSettings};
 use super::plant::PlantSettings;
 
 /// Everything a run depends on.
@@ -28,8 +29,18 @@ pub struct Config {
     pub interlock: InterlockSettings,
     /// The simulated rig.
     pub sim: SimSettings,
-    /// The excitation of `bench chirp`.
+    /// Which excitation `bench chirp` uses.
+    pub excitation: ExcitationSettings,
+    /// The chirp; and band, quiet, fades and amplitude over frequency of every excitation.
     pub chirp: ChirpSettings,
+    /// The multisine.
+    pub multisine: MultisineSettings,
+    /// The stepped sine.
+    pub stepped_sine: SteppedSineSettings,
+    /// The pseudo-random binary sequence.
+    pub prbs: PrbsSettings,
+    /// What `bench chirp --shape` aims at.
+    pub shape: ShapeSettings,
     /// How the frequency response is estimated.
     pub identify: IdentifySettings,
     /// The closed loop of `bench control`.
@@ -286,9 +297,17 @@ pub struct ChirpSettings {
     /// Length of the cosine fade at the end, in seconds.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub fade_out_s: f64,
+    /// How often the chirp, its quiet included, is run; the analysis takes their mean.
+    #[serde(default = "once")]
+    #[schemars(range(min = 1, max = 10000))]
+    pub repetitions: u32,
     /// Amplitude over frequency: straight lines on logarithmic axes, constant outside; one point is a flat sweep.
     #[schemars(length(min = 1, max = 64))]
     pub amplitude: Vec<AmplitudePoint>,
+}
+
+fn once() -> u32 {
+    1
 }
 
 /// The amplitude of the excitation at a frequency.

@@ -10,8 +10,8 @@
 use std::f64::consts::PI;
 
 use super::ClosedLoop;
-use crate::config::TravelPoint;
-use crate::excitation::Chirp;
+use crate::config::{ChirpSettings, TravelPoint};
+use crate::excitation::Amplitude;
 
 /// Points over the band; a configuration holds 64.
 const POINTS: usize = 48;
@@ -20,22 +20,24 @@ const BETWEEN: usize = 32;
 
 /// The amplitudes in metres over the band of `chirp`, whose own are those of the command in amperes; the stage moves by
 /// `travel_m` at most.
-pub fn swept_reference(closed_loop: &ClosedLoop, chirp: &Chirp, travel_m: f64) -> Vec<TravelPoint> {
-    let (start_hz, stop_hz) = chirp.band_hz();
+pub fn swept_reference(closed_loop: &ClosedLoop, chirp: &ChirpSettings, travel_m: f64) -> Vec<TravelPoint> {
+    let (start_hz, stop_hz) = (chirp.start_hz.min(chirp.stop_hz), chirp.start_hz.max(chirp.stop_hz));
+    let amplitude = Amplitude::new(&chirp.amplitude);
     let at = |x: f64| start_hz * libm::pow(stop_hz / start_hz, x);
     let step = 1.0 / (POINTS - 1) as f64;
     let near = |i: usize| {
         (0..=2 * BETWEEN).map(move |j| (i as f64 - 1.0 + j as f64 / BETWEEN as f64) * step).map(|x| x.clamp(0.0, 1.0))
     };
-    let least = |i: usize| near(i).map(|x| allowed(closed_loop, chirp, travel_m, at(x))).fold(f64::INFINITY, f64::min);
+    let least =
+        |i: usize| near(i).map(|x| allowed(closed_loop, &amplitude, travel_m, at(x))).fold(f64::INFINITY, f64::min);
     (0..POINTS).map(|i| TravelPoint { frequency_hz: at(i as f64 * step), amplitude_m: least(i) }).collect()
 }
 
 /// The reference's amplitude that moves command and position as far as they may, but never further than they.
-fn allowed(closed_loop: &ClosedLoop, chirp: &Chirp, travel_m: f64, frequency_hz: f64) -> f64 {
+fn allowed(closed_loop: &ClosedLoop, command: &Amplitude, travel_m: f64, frequency_hz: f64) -> f64 {
     let omega_rad_s = 2.0 * PI * frequency_hz;
     let (plant, loop_gain) = (closed_loop.sampled_plant(omega_rad_s), closed_loop.sampled_loop(omega_rad_s));
     let complementary = loop_gain / (loop_gain + 1.0);
-    let by_command_m = chirp.amplitude_a(libm::log(frequency_hz)) * (plant / complementary).norm();
+    let by_command_m = command.at(libm::log(frequency_hz)) * (plant / complementary).norm();
     by_command_m.min(travel_m / complementary.norm())
 }

@@ -4,6 +4,7 @@ use super::finding::Finding;
 use crate::config::Config;
 use crate::control::Margins;
 use crate::devices;
+use crate::excitation::{self, Excitation};
 
 /// Subject of what concerns `bench chirp` alone.
 pub const CHIRP: &str = "chirp";
@@ -21,9 +22,8 @@ pub struct Runs {
 
 /// Ticks of the longer of both runs.
 pub fn longest_ticks(config: &Config) -> u64 {
-    let chirp_s = config.chirp.quiet_before_s + config.chirp.duration_s + config.chirp.quiet_after_s;
     let control_s = config.control.settle_s + config.control.duration_s;
-    (chirp_s.max(control_s) * config.servo.rate_hz).ceil() as u64
+    excitation::of(config).ticks().max((control_s * config.servo.rate_hz).ceil() as u64)
 }
 
 /// A loop has two devices or none.

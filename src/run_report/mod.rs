@@ -11,6 +11,7 @@ pub use page::page;
 pub use pictures::{KINDS, Picture, pictures};
 
 use crate::config::Config;
+use crate::excitation::{swept_words, words};
 use crate::recording::Recording;
 use crate::session::Analysis;
 
@@ -33,19 +34,11 @@ impl AnalysedRun<'_> {
 
     /// How the stage was excited, and when.
     fn occasion(&self) -> String {
-        let chirp = &self.config.chirp;
         let how = match self.analysis.closed {
-            Some(_) => format!("under the {} controller, reference swept", self.config.control.controller),
-            None => "chirp".into(),
+            Some(_) => swept_words(self.config),
+            None => words(self.config),
         };
-        format!(
-            "{how} {} to {} Hz in {} s at {} Hz; {}",
-            chirp.start_hz,
-            chirp.stop_hz,
-            chirp.duration_s,
-            self.config.servo.rate_hz,
-            self.said("started")
-        )
+        format!("{how} at {} Hz; {}", self.config.servo.rate_hz, self.said("started"))
     }
 
     /// What the recording says of itself under a name.

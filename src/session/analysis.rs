@@ -4,8 +4,10 @@ use nalgebra::Complex;
 
 use super::closed_loop::{self, ClosedLoopError, ClosedResponses};
 use super::gathered::{Gathered, Ran};
+use super::patterns::{Taken, taken};
 use super::plan::{KIND, Kind};
-use crate::config::{Config, IdentifySettings};
+use crate::config::Config;
+use crate::excitation::{self, Excitation};
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::delay::{self, Delay};
 use crate::identify::{Block, BlockSettings, Frf, IdentifyError, Signals, blocks, response};
@@ -84,7 +86,7 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     let seen = if closed {
         closed_loop::seen(&loop_signals, band_hz, recording, config)?
     } else {
-        open_loop(&loop_signals.signals, band_hz, &config.identify)?
+        open_loop(loop_signals.signals, band_hz, config)?
     };
     shown(seen, config, filled_ticks)
 }
@@ -96,9 +98,14 @@ pub(super) struct Seen {
     pub(super) closed: Option<ClosedResponses>,
 }
 
-fn open_loop(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings) -> Result<Seen, AnalysisError> {
-    let frf = response(signals, band_hz, settings)?;
-    let blocks = blocks(signals, band_hz, &BlockSettings::from(settings))?;
+fn open_loop(signals: Signals, band_hz: (f64, f64), config: &Config) -> Result<Seen, AnalysisError> {
+    let (frf, blocks) = match taken(signals, &excitation::of(config).pattern(), band_hz)? {
+        Taken::Lines(frf, blocks) => (frf, blocks),
+        Taken::Record(signals) => {
+            let frf = response(&signals, band_hz, &config.identify)?;
+            (frf, blocks(&signals, band_hz, &BlockSettings::from(&config.identify))?)
+        }
+    };
     Ok(Seen { frf, blocks, closed: None })
 }
 

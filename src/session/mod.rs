@@ -14,6 +14,7 @@ mod foreign;
 mod gathered;
 mod measure;
 mod name;
+mod patterns;
 mod plan;
 mod replay;
 mod run;

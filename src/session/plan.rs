@@ -3,7 +3,7 @@
 
 use crate::config::{Config, ConfigError, ReferenceSettings, TravelPoint, whole};
 use crate::control::{ClosedLoop, Controller, ControllerError, ControllerText, swept_reference};
-use crate::excitation::{Chirp, Excitation, ReferenceError, Staircase, reference, reference_text};
+use crate::excitation::{self, Chirp, Excitation, ReferenceError, Staircase, reference, reference_text};
 use crate::plant::PlantError;
 use crate::recording::Recording;
 use crate::rt::program::{Control, Excite, Program};
@@ -87,7 +87,7 @@ fn planned(config: &Config, controller: &ControllerText) -> Result<Option<Vec<Tr
         return Ok(None);
     }
     let closed_loop = ClosedLoop::new(config, sim::modes(config)?, controller.sections(config.servo.rate_hz)?);
-    Ok(Some(swept_reference(&closed_loop, &Chirp::new(&config.chirp, config.servo.period_s()), *travel_m)))
+    Ok(Some(swept_reference(&closed_loop, &config.chirp, *travel_m)))
 }
 
 impl Plan {
@@ -139,7 +139,7 @@ impl Plan {
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
         match self.kind {
-            Kind::Chirp => return Ok(Box::new(Excite(Chirp::new(&config.chirp, period_s)))),
+            Kind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
             Kind::Calibrate => return Ok(Box::new(Excite(Staircase::new(&config.calibrate, period_s)))),
             Kind::Control => {}
         }

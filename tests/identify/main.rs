@@ -3,8 +3,8 @@
 mod accuracy;
 mod bad_data;
 mod csv;
-mod joint;
 mod curves;
+mod joint;
 mod noise;
 mod python;
 mod repeated;

@@ -1,0 +1,164 @@
+//! What a run would do, before it does it, and the amplitude that suits it.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::chirp::rig;
+use super::options::{print_json, print_text};
+use super::{CliError, Outcome};
+use crate::config::{AmplitudePoint, Config, ExcitationKind};
+use crate::excitation::{Cap, Extremes, LARGEST_SPAN, of, shaped, words};
+use crate::identify::csv;
+use crate::plant::{self, Chain, Modal};
+
+/// Frequencies at which the model is looked at, beside those of its modes: 0.2 % apart over four decades.
+const GRID: usize = 4000;
+/// An FRF that ends this near to the band's ends is constant beyond.
+const NEAR: f64 = 1.1;
+
+/// What a run would do by the model.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Expected {
+    pub travel_m: f64,
+    current_a: f64,
+    rms_current_a: f64,
+    thermal_current_a: f64,
+    slew_a_per_s: f64,
+    duration_s: f64,
+}
+
+impl Expected {
+    pub fn of(extremes: &Extremes) -> Expected {
+        Expected {
+            travel_m: extremes.travel_m,
+            current_a: extremes.current_a,
+            rms_current_a: extremes.rms_current_a,
+            thermal_current_a: extremes.thermal_a,
+            slew_a_per_s: extremes.slew_a_per_s,
+            duration_s: extremes.duration_s,
+        }
+    }
+}
+
+/// The JSON object of `bench chirp --plan`.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    excitation: String,
+    expected: &'a Expected,
+    limits: Limits,
+    amplitude: &'a [AmplitudePoint],
+}
+
+/// What trips, or what the amplifier cannot follow.
+#[derive(Debug, Serialize)]
+struct Limits {
+    travel_m: f64,
+    current_a: f64,
+    thermal_current_a: f64,
+    slew_a_per_s: f64,
+}
+
+/// Prints what a run would do.
+pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<Outcome, CliError> {
+    let limits = Limits {
+        travel_m: config.interlock.soft_limit_m,
+        current_a: config.amplifier.current_limit_a.min(config.motor.peak_current_a()),
+        thermal_current_a: config.motor.continuous_current_a(),
+        slew_a_per_s: config.amplifier.slew_limit_a_per_s,
+    };
+    let report = Report { excitation: words(config), expected, limits, amplitude: &config.chirp.amplitude };
+    if json {
+        print_json(&report)?;
+    } else {
+        print_text(&text(&report))?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn text(report: &Report<'_>) -> String {
+    let (e, l) = (report.expected, &report.limits);
+    let points: String = (report.amplitude.iter())
+        .map(|p| format!("\n               {:10.4} Hz {:9.5} A", p.frequency_hz, p.current_a))
+        .collect();
+    format!(
+        "{}; nothing moves\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n  amplitude{points}\n",
+        report.excitation,
+        e.duration_s,
+        e.travel_m * 1e6,
+        l.travel_m * 1e6,
+        e.current_a,
+        l.current_a,
+        e.rms_current_a,
+        e.thermal_current_a,
+        l.thermal_current_a,
+        e.slew_a_per_s,
+        l.slew_a_per_s,
+    )
+}
+
+/// The configuration with an amplitude over frequency that moves the stage alike everywhere, by `source`: `model`, or the
+/// CSV of an FRF. A stepped sine takes the model by itself, unless its amplitude is `given`.
+pub(super) fn shape(mut config: Config, source: Option<&str>, given: bool) -> Result<Config, CliError> {
+    let kind = config.excitation.kind;
+    let automatic = (kind == ExcitationKind::SteppedSine && !given).then_some("model");
+    let Some(source) = source.or(automatic) else { return Ok(config) };
+    if kind == ExcitationKind::Prbs {
+        let what = "--shape has no meaning for a binary sequence, which has one amplitude: set prbs.amplitude_a, or take another --excitation";
+        return Err(CliError::Usage(what.into()));
+    }
+    let response = if source == "model" { by_model(&config)? } else { by_file(&config, Path::new(source))? };
+    let travel_m = config.shape.travel_m.unwrap_or(config.interlock.soft_limit_m / 3.0);
+    let span = if kind == ExcitationKind::Multisine { LARGEST_SPAN } else { f64::INFINITY };
+    config.chirp.amplitude = shaped(&response, travel_m, Cap::of(&config), span);
+    if kind == ExcitationKind::Multisine {
+        lower_to(&mut config, travel_m)?;
+    }
+    Ok(config)
+}
+
+/// The lines of a multisine add up: all of them smaller, until the sum moves the stage no farther.
+fn lower_to(config: &mut Config, travel_m: f64) -> Result<(), CliError> {
+    let share = (travel_m / Extremes::of(&of(config), config, &rig(config)?).travel_m).min(1.0);
+    config.chirp.amplitude.iter_mut().for_each(|point| point.current_a *= share);
+    Ok(())
+}
+
+fn band_hz(config: &Config) -> (f64, f64) {
+    let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
+    (start_hz.min(stop_hz), start_hz.max(stop_hz))
+}
+
+/// Frequency in hertz and |G| of the chain of the model over the band.
+fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
+    let modal = Modal::of(&plant::build(&config.plant)?)?;
+    let chain = Chain::of_mean_age(config, &modal.modes);
+    let (low_hz, high_hz) = band_hz(config);
+    let grid = (0..=GRID).map(|k| low_hz * libm::pow(high_hz / low_hz, k as f64 / GRID as f64));
+    let modes = modal.modes.iter().map(|mode| mode.omega_rad_s / (2.0 * PI));
+    let mut frequencies: Vec<f64> = grid.chain(modes.filter(|f| (low_hz..high_hz).contains(f))).collect();
+    frequencies.sort_by(f64::total_cmp);
+    frequencies.dedup();
+    Ok(frequencies.into_iter().map(|f| (f, chain.response(2.0 * PI * f).norm())).collect())
+}
+
+/// The same of an FRF that was measured before.
+fn by_file(config: &Config, path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
+    let frf =
+        csv::read(path).map_err(|e| CliError::Usage(format!("--shape {}: {e}; or give `model`", path.display())))?;
+    let (low_hz, high_hz) = band_hz(config);
+    let rows = frf.frequency_hz.iter().zip(&frf.response).map(|(f, h)| (*f, h.norm()));
+    let inside: Vec<(f64, f64)> = rows.filter(|(f, _)| (low_hz..=high_hz).contains(f)).collect();
+    match (inside.first(), inside.last()) {
+        (Some((first, _)), Some((last, _)))
+            if *first <= low_hz * NEAR && *last * NEAR >= high_hz && inside.len() > 1 =>
+        {
+            Ok(inside)
+        }
+        _ => Err(CliError::Usage(format!(
+            "--shape {}: it does not cover the band from {low_hz} to {high_hz} Hz; narrow the band with --start and --stop, or take `model`",
+            path.display()
+        ))),
+    }
+}

@@ -1,0 +1,108 @@
+//! A Fourier transform that is the same on every machine, bit for bit: a replay makes the same multisine again.
+//!
+//! The crates' transforms choose their kernel by the processor and their twiddles come from the platform's libm. This one has
+//! neither choice, and runs a few times before a run.
+//!
+//! ```text
+//! X_k = sum_n x_n exp(2 pi i k n / N)        N a power of two: Cooley, Tukey
+//! k n = (k^2 + n^2 - (k - n)^2)/2            any other N: a convolution (Bluestein)
+//! ```
+
+use std::f64::consts::PI;
+
+use nalgebra::Complex;
+
+/// X_k = sum over n of `x[n]` exp(2 pi i k n / N), in place. N is the length, a power of two or 0.
+pub(super) fn transform(x: &mut [Complex<f64>]) {
+    let n = x.len();
+    if n < 2 || !n.is_power_of_two() {
+        return;
+    }
+    let turns: Vec<Complex<f64>> = (0..n / 2).map(|k| turn(2.0 * PI * k as f64 / n as f64)).collect();
+    let shift = usize::BITS - n.trailing_zeros();
+    for k in 0..n {
+        let other = k.reverse_bits() >> shift;
+        if other > k {
+            x.swap(k, other);
+        }
+    }
+    let mut half = 1;
+    while half < n {
+        let stride = n / (2 * half);
+        for pair in x.chunks_exact_mut(2 * half) {
+            let (low, high) = pair.split_at_mut(half);
+            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
+                let turned = *b * turns[k * stride];
+                (*a, *b) = (*a + turned, *a - turned);
+            }
+        }
+        half *= 2;
+    }
+}
+
+/// The samples of sum over k of Re(`lines[k]` exp(2 pi i k n / N)) for n = 0 .. N, any N.
+pub(super) fn samples(lines: &[Complex<f64>], n: usize) -> Vec<f64> {
+    if n == 0 {
+        return Vec::new();
+    }
+    // exp(i pi k^2/N); k^2 counts modulo 2 N, exactly.
+    let chirp = |k: usize| turn(PI * ((k as u128 * k as u128) % (2 * n as u128)) as f64 / n as f64);
+    let length = (n + lines.len()).next_power_of_two();
+    let mut a = vec![Complex::new(0.0, 0.0); length];
+    let mut b = a.clone();
+    for (k, line) in lines.iter().enumerate() {
+        a[k] = line * chirp(k);
+    }
+    for k in 0..n {
+        b[k] = chirp(k).conj();
+    }
+    for k in 1..lines.len() {
+        b[length - k] = chirp(k).conj();
+    }
+    transform(&mut a);
+    transform(&mut b);
+    // The inverse of a transform is its conjugate's conjugate over its length.
+    let mut product: Vec<Complex<f64>> = a.iter().zip(&b).map(|(a, b)| (a * b).conj()).collect();
+    transform(&mut product);
+    (0..n).map(|k| (product[k].conj() * chirp(k)).re / length as f64).collect()
+}
+
+/// exp(i angle).
+pub(super) fn turn(angle: f64) -> Complex<f64> {
+    let (sine, cosine) = libm::sincos(angle);
+    Complex::new(cosine, sine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(count: usize) -> Vec<Complex<f64>> {
+        (0..count).map(|k| turn(k as f64 * k as f64) * (1.0 + k as f64 % 3.0)).collect()
+    }
+
+    #[test]
+    fn samples_are_the_sum_of_the_lines_whatever_the_length() {
+        for (count, n) in [(1, 1), (3, 7), (12, 25), (40, 100), (30, 64), (50, 127)] {
+            let lines = lines(count);
+            for (at, sample) in samples(&lines, n).into_iter().enumerate() {
+                let term =
+                    |(k, line): (usize, &Complex<f64>)| (line * turn(2.0 * PI * ((k * at) % n) as f64 / n as f64)).re;
+                let sum: f64 = lines.iter().enumerate().map(term).sum();
+                // Three transforms of up to 256 numbers: some 10 roundings of a sum of up to 150.
+                assert!((sample - sum).abs() < 150.0 * 1e-14, "{count} lines, sample {at} of {n}: {sample} for {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_transform_keeps_the_power_and_takes_no_length_that_it_cannot() {
+        let mut x = lines(64);
+        let power = |x: &[Complex<f64>]| x.iter().map(|x| x.norm_sqr()).sum::<f64>();
+        let before = power(&x);
+        transform(&mut x);
+        assert!((power(&x) / (64.0 * before) - 1.0).abs() < 1e-13);
+        transform(&mut []);
+        assert!(samples(&[], 3).iter().all(|x| *x == 0.0) && samples(&lines(2), 0).is_empty());
+    }
+}
