@@ -31,6 +31,7 @@
 //! | tolerances: how likely CNMP zeros are, and what decides it | [`study`] |
 //! | two close modes, veering, conditions and propositions of Chapter 4, placement of actuator and probe | [`veering`] |
 //! | a figure or table of the thesis | [`figures`]: one line a figure in `figures/registry.rs` |
+//! | what excites the stage, and what that would do to it | [`excitation`] |
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | a grid of chirps, and what all verdicts together say of the stage | [`campaign`] |
@@ -52,7 +53,7 @@
 //! | controller | `bench-config/controllers/NAME.toml`, or any file with `--controller` | in [`config::profiles::CONTROLLERS`] |
 //! | kind of section | none | a variant and its arm in `control/file.rs` |
 //! | plant | `plant/NAME.rs`: settings to [`plant::Structure`] | a variant of [`config::PlantSettings`] and its arm in [`plant::build`] |
-//! | excitation | `excitation/NAME.rs` with [`excitation::Excitation`] | where [`session::Plan::program`] chooses |
+//! | excitation | `excitation/NAME.rs` with [`excitation::Excitation`], its table in `config/excitation.rs` | a variant of [`config::ExcitationKind`] and its arm in [`excitation::of`] |
 //! | reference | a struct in `excitation/reference.rs` | a variant of [`config::ReferenceSettings`] and its arm |
 //! | device | below `hal/src/`, with the traits of [`bench_hal`] | a variant in `config/devices.rs` and its arm in [`devices`] |
 //! | fault of an acting device | below `hal/src/`, where the device acts | in `acting/fault.rs` |

@@ -3,9 +3,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use bench::config::{AmplitudePoint, Config, ReferenceSettings, Source, Sweep, TravelPoint, load};
+use bench::config::{AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Source, Sweep, TravelPoint, load};
 use bench::control::{Controller, ControllerText};
-use bench::excitation::{Chirp, reference};
+use bench::excitation::{Chirp, of, reference};
 use bench::rt::clock::{Clock, Moment, Realtime, Virtual};
 use bench::rt::interlock::Interlocks;
 use bench::rt::outlet::Outlet;
@@ -62,7 +62,25 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
         (chirp.fade_in_s, chirp.amplitude) = (0.2, vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.2 }]);
         programs.push((format!("{sweep:?} chirp"), Box::new(Excite(Chirp::new(&chirp, period_s)))));
     }
+    for kind in [ExcitationKind::Chirp, ExcitationKind::Multisine, ExcitationKind::SteppedSine, ExcitationKind::Prbs] {
+        programs.push((format!("{kind:?} by its settings"), Box::new(Excite(of(&short(config, kind))))));
+    }
     programs
+}
+
+/// An excitation of nearly a second; the chirp comes twice.
+fn short(config: &Config, kind: ExcitationKind) -> Config {
+    let mut config = config.clone();
+    config.excitation.kind = kind;
+    let chirp = &mut config.chirp;
+    (chirp.start_hz, chirp.stop_hz, chirp.duration_s, chirp.repetitions) = (50.0, 150.0, 0.4, 2);
+    (chirp.quiet_before_s, chirp.quiet_after_s, chirp.fade_in_s, chirp.fade_out_s) = (0.02, 0.02, 0.05, 0.05);
+    chirp.amplitude = vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.2 }];
+    let (multisine, prbs, sines) = (&mut config.multisine, &mut config.prbs, &mut config.stepped_sine);
+    (multisine.period_s, multisine.periods) = (0.1, 7);
+    (prbs.order, prbs.clock_divider, prbs.periods, prbs.settle_periods) = (8, 2, 7, 1);
+    (sines.count, sines.settle_s, sines.measure_s) = (3, 0.12, 0.12);
+    config
 }
 
 /// A loop with its rings, and what comes out of them.

@@ -48,6 +48,7 @@ struct Report<'a> {
     excitation: String,
     expected: &'a Expected,
     limits: Limits,
+    /// Over frequency; none of a binary sequence.
     amplitude: &'a [AmplitudePoint],
 }
 
@@ -68,7 +69,11 @@ pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<O
         thermal_current_a: config.motor.continuous_current_a(),
         slew_a_per_s: config.amplifier.slew_limit_a_per_s,
     };
-    let report = Report { excitation: words(config), expected, limits, amplitude: &config.chirp.amplitude };
+    let amplitude = match config.excitation.kind {
+        ExcitationKind::Prbs => &[],
+        _ => config.chirp.amplitude.as_slice(),
+    };
+    let report = Report { excitation: words(config), expected, limits, amplitude };
     if json {
         print_json(&report)?;
     } else {
@@ -80,10 +85,10 @@ pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<O
 fn text(report: &Report<'_>) -> String {
     let (e, l) = (report.expected, &report.limits);
     let points: String = (report.amplitude.iter())
-        .map(|p| format!("\n               {:10.4} Hz {:9.5} A", p.frequency_hz, p.current_a))
+        .map(|p| format!("  amplitude    {:10.4} Hz {:9.5} A\n", p.frequency_hz, p.current_a))
         .collect();
     format!(
-        "{}; nothing moves\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n  amplitude{points}\n",
+        "{}; nothing moves\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n{points}",
         report.excitation,
         e.duration_s,
         e.travel_m * 1e6,

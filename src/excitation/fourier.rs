@@ -53,8 +53,8 @@ pub(super) fn samples(lines: &[Complex<f64>], n: usize) -> Vec<f64> {
     for (k, line) in lines.iter().enumerate() {
         a[k] = line * chirp(k);
     }
-    for k in 0..n {
-        b[k] = chirp(k).conj();
+    for (k, b) in b.iter_mut().enumerate().take(n) {
+        *b = chirp(k).conj();
     }
     for k in 1..lines.len() {
         b[length - k] = chirp(k).conj();

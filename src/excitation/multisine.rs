@@ -22,8 +22,8 @@ use crate::config::{Config, Lines, MultisineSettings};
 const GROUP: usize = 4;
 /// Rounds of clipping.
 const ROUNDS: u32 = 100;
-/// The signal is clipped at this part of its peak at first, and ever less.
-const CLIP: f64 = 0.75;
+/// The signal is clipped at the first part of its peak, in the end at the second.
+const CLIP: (f64, f64) = (0.5, 0.97);
 /// Samples to a turn of the fastest line while its phases are sought: peaks between them are 4 % higher at most.
 const OVERSAMPLING: usize = 8;
 
@@ -92,7 +92,7 @@ fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
         if peak < lowest {
             (best, lowest) = (phases.clone(), peak);
         }
-        let level = peak * (CLIP + (0.98 - CLIP) * f64::from(round) / f64::from(ROUNDS));
+        let level = peak * (CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS));
         signal.iter_mut().for_each(|u| *u = Complex::new(u.re.clamp(-level, level), 0.0));
         transform(&mut signal);
         for ((k, _), phase) in lines.iter().zip(&mut phases) {
@@ -113,4 +113,106 @@ fn sum(lines: &[(usize, f64)], phases: &[Complex<f64>], signal: &mut [Complex<f6
     }
     transform(signal);
     signal.iter().fold(0.0f64, |peak, u| peak.max(u.re.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{AmplitudePoint, Source, load};
+    use crate::excitation::Excitation;
+
+    /// Periods of a second at 5 kHz, lines from 20 to 219 Hz.
+    fn config(lines: Lines, seed: u64, amplitude: &[(f64, f64)]) -> Config {
+        let mut config = load(&Source::default()).unwrap();
+        (config.chirp.start_hz, config.chirp.stop_hz) = (20.0, 219.0);
+        let point = |&(frequency_hz, current_a): &(f64, f64)| AmplitudePoint { frequency_hz, current_a };
+        config.chirp.amplitude = amplitude.iter().map(point).collect();
+        (config.multisine.period_s, config.multisine.lines, config.multisine.seed) = (1.0, lines, seed);
+        config
+    }
+
+    const FLAT: [(f64, f64); 1] = [(1.0, 0.7)];
+
+    /// The amplitude of each line, by another transform.
+    fn amplitudes(table: &[f64]) -> Vec<f64> {
+        let fft = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(table.len());
+        let (mut input, mut output) = (table.to_vec(), fft.make_output_vec());
+        fft.process(&mut input, &mut output).unwrap();
+        output.iter().map(|line| 2.0 * line.norm() / table.len() as f64).collect()
+    }
+
+    fn crest_factor(table: &[f64]) -> f64 {
+        let rms = (table.iter().map(|u| u * u).sum::<f64>() / table.len() as f64).sqrt();
+        table.iter().fold(0.0f64, |peak, u| peak.max(u.abs())) / rms
+    }
+
+    #[test]
+    fn a_full_flat_one_has_its_lines_alike_nothing_else_and_half_the_crest_of_random_phases() {
+        for seed in 1..=8 {
+            let multisine = multisine(&config(Lines::Full, seed, &FLAT));
+            let table = multisine.table();
+            assert_eq!(table.len(), 5000);
+            let amplitudes = amplitudes(table);
+            let a = amplitudes[20];
+            for (k, amplitude) in amplitudes.iter().enumerate() {
+                let expected = if (20..=219).contains(&k) { a } else { 0.0 };
+                // Transforms of 16384 and 5000 numbers: some 14 roundings of the sum of 200 lines.
+                assert!((amplitude - expected).abs() < 1e-12 * a.max(0.1), "line {k}: {amplitude} for {expected}");
+            }
+            let peak = table.iter().fold(0.0f64, |peak, u| peak.max(u.abs()));
+            assert!((peak / 0.7 - 1.0).abs() < 1e-12, "the largest current is the amplitude: {peak}");
+            // The peak of 200 random phases is near sqrt(2 ln 5000) = 4.1 sigma at most, and 3 at least; a sine has 1.41.
+            let crest = crest_factor(table);
+            assert!((1.41..1.8).contains(&crest), "seed {seed}: {crest}");
+        }
+    }
+
+    #[test]
+    fn lines_follow_the_amplitude_over_frequency() {
+        let points = [(30.0, 0.1), (60.0, 0.4), (120.0, 0.05)];
+        let amplitudes = amplitudes(multisine(&config(Lines::Full, 3, &points)).table());
+        // ln A is straight over ln f: A = 0.1 (f/30)^2 up to 60 Hz, 0.4 (f/60)^-3 up to 120 Hz.
+        let expected = |f: f64| match f {
+            ..=30.0 => 0.1,
+            ..=60.0 => 0.1 * (f / 30.0).powi(2),
+            ..=120.0 => 0.4 * (f / 60.0).powi(-3),
+            _ => 0.05,
+        };
+        for k in 20..=219usize {
+            let ratio = amplitudes[k] / amplitudes[60] / (expected(k as f64) / 0.4);
+            assert!((ratio - 1.0).abs() < 1e-10, "line {k}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn lines_left_out_are_zero_even_ones_and_one_in_each_group_of_four_odd_ones() {
+        for (lines, left) in [(Lines::Odd, 100), (Lines::OddRandom, 75)] {
+            let amplitudes = amplitudes(multisine(&config(lines, 5, &FLAT)).table());
+            let excited: Vec<usize> = (0..amplitudes.len()).filter(|k| amplitudes[*k] > 1e-3).collect();
+            assert_eq!(excited.len(), left, "{lines:?}");
+            assert!(excited.iter().all(|k| k % 2 == 1 && (20..=219).contains(k)));
+            assert!((0..amplitudes.len()).all(|k| excited.contains(&k) || amplitudes[k] < 1e-13), "{lines:?}");
+            for group in 0..25 {
+                let first = 21 + 8 * group;
+                let within = excited.iter().filter(|k| (first..first + 8).contains(*k)).count();
+                assert_eq!(within, left / 25, "{lines:?}, group {group}");
+            }
+        }
+        let out = |seed| lines(&config(Lines::OddRandom, seed, &FLAT).multisine, 20..=219);
+        assert_ne!(out(1), out(2), "others with another seed");
+    }
+
+    #[test]
+    fn the_same_seed_is_the_same_current_and_another_is_another() {
+        let at = |seed: u64, tick: u64| multisine(&config(Lines::Full, seed, &FLAT)).current_a(tick).to_bits();
+        assert_eq!(at(1, 30_000), at(1, 30_000));
+        assert_ne!(at(1, 30_000), at(2, 30_000));
+    }
+
+    #[test]
+    fn a_band_without_a_line_is_no_current_and_no_panic() {
+        let mut config = config(Lines::Full, 1, &FLAT);
+        (config.chirp.start_hz, config.chirp.stop_hz) = (20.2, 20.8);
+        assert!(multisine(&config).table().iter().all(|u| *u == 0.0));
+    }
 }

@@ -53,3 +53,65 @@ fn sequence(settings: &PrbsSettings) -> Vec<bool> {
     };
     (0..length).map(|_| step()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Source, load};
+
+    fn settings(order: u32, clock_divider: u32) -> Config {
+        let mut config = load(&Source::default()).unwrap();
+        (config.prbs.order, config.prbs.clock_divider, config.prbs.amplitude_a) = (order, clock_divider, 0.5);
+        config
+    }
+
+    /// |U_k|^2 of a period.
+    fn powers(table: &[f64]) -> Vec<f64> {
+        let fft = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(table.len());
+        let (mut input, mut output) = (table.to_vec(), fft.make_output_vec());
+        fft.process(&mut input, &mut output).unwrap();
+        output.iter().map(|line| line.norm_sqr()).collect()
+    }
+
+    #[test]
+    fn its_autocorrelation_has_two_values() {
+        for order in 7..=11 {
+            let bits: Vec<i64> =
+                prbs(&settings(order, 1)).table().iter().map(|u| if *u > 0.0 { 1 } else { -1 }).collect();
+            let length = (1usize << order) - 1;
+            assert_eq!(bits.len(), length);
+            for shift in 0..length {
+                let sum: i64 = (0..length).map(|k| bits[k] * bits[(k + shift) % length]).sum();
+                assert_eq!(sum, if shift == 0 { length as i64 } else { -1 }, "order {order}, shift {shift}");
+            }
+        }
+    }
+
+    #[test]
+    fn its_spectrum_is_flat_at_every_order() {
+        for order in 7..=20 {
+            let table = prbs(&settings(order, 1)).table().to_vec();
+            // The transform of the autocorrelation: L + 1 at every line but 0, where the one step more of + leaves 1.
+            let (length, powers) = (table.len() as f64, powers(&table));
+            assert!((powers[0] / 0.25 - 1.0).abs() < 1e-6, "order {order}: {}", powers[0]);
+            for (k, power) in powers.iter().enumerate().skip(1) {
+                assert!((power / (0.25 * (length + 1.0)) - 1.0).abs() < 1e-9, "order {order}, line {k}: {power}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_of_several_ticks_gives_the_spectrum_of_a_hold() {
+        let (order, divider) = (9, 3);
+        let table = prbs(&settings(order, divider)).table().to_vec();
+        let length = f64::from((1u32 << order) - 1);
+        assert_eq!(table.len() as f64, 3.0 * length);
+        for (k, power) in powers(&table).into_iter().enumerate().skip(1) {
+            // |sum of exp(-i w n) for n = 0, 1, 2| = sin(3 w/2)/sin(w/2).
+            let half = std::f64::consts::PI * k as f64 / table.len() as f64;
+            let hold = ((3.0 * half).sin() / half.sin()).powi(2);
+            let expected = 0.25 * if (k as f64) % length == 0.0 { 1.0 } else { length + 1.0 } * hold;
+            assert!((power - expected).abs() < 1e-9 * length, "line {k}: {power} for {expected}");
+        }
+    }
+}

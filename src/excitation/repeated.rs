@@ -43,3 +43,25 @@ impl Excitation for Repeated {
         Pattern::Repeated { period: self.chirp.ticks() as usize, count: self.count as usize }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Source, load};
+
+    #[test]
+    fn every_repetition_is_the_chirp_bit_for_bit_and_then_there_is_nothing() {
+        let mut settings = load(&Source::default()).unwrap().chirp;
+        (settings.duration_s, settings.quiet_before_s, settings.quiet_after_s, settings.repetitions) =
+            (6.0, 0.1, 0.2, 3);
+        let chirp = Chirp::new(&settings, 1e-3);
+        let repeated = Repeated::new(chirp.clone(), &settings);
+        assert_eq!(repeated.ticks(), 3 * 6300);
+        assert_eq!(repeated.pattern(), Pattern::Repeated { period: 6300, count: 3 });
+        for tick in 0..20_000 {
+            let once = if tick < 3 * 6300 { chirp.current_a(tick % 6300) } else { 0.0 };
+            assert_eq!(repeated.current_a(tick).to_bits(), once.to_bits(), "{tick}");
+            assert_eq!(repeated.active(tick), tick < 3 * 6300 && chirp.active(tick % 6300));
+        }
+    }
+}

@@ -78,3 +78,57 @@ fn off(curve: &[(f64, f64)], kept: &[(f64, f64)]) -> impl Iterator<Item = f64> {
         a0 + (a1 - a0) * (f - f0) / (f1 - f0) - a
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::excitation::Amplitude;
+
+    const CAP: Cap = Cap { current_a: 2.0, slew_a_per_s: 4000.0 };
+
+    /// |1e-4 w0^2/(s^2 + 2 zeta w0 s + w0^2)| and |1 + s^2/wz^2| together: resonance at 30 Hz, zero at 80 Hz.
+    fn gain(f: f64) -> f64 {
+        let (x, z) = (f / 30.0, f / 80.0);
+        let resonance = ((1.0 - x * x).powi(2) + (2.0 * 0.009 * x).powi(2)).sqrt();
+        1e-4 * ((1.0 - z * z).powi(2) + 1e-6).sqrt() / resonance
+    }
+
+    fn response() -> Vec<(f64, f64)> {
+        (0..=4000).map(|k| 0.1 * 5000f64.powf(f64::from(k) / 4000.0)).map(|f| (f, gain(f))).collect()
+    }
+
+    #[test]
+    fn the_displacement_is_alike_where_the_current_suffices_and_the_current_full_where_not() {
+        let points = shaped(&response(), 100e-6, CAP, f64::INFINITY);
+        assert!((10..=MOST_POINTS).contains(&points.len()), "{}", points.len());
+        let amplitude = Amplitude::new(&points);
+        for (f, gain) in response() {
+            let (current_a, cap_a) = (amplitude.at(f.ln()), 2f64.min(4000.0 / (2.0 * std::f64::consts::PI * f)));
+            let wanted_a = cap_a.min(100e-6 / gain);
+            // Never above, by rounding of a logarithm; below by twice what the simplification may miss.
+            let ratio = current_a / wanted_a;
+            assert!((0.9..=1.0 + 1e-9).contains(&ratio), "{f} Hz: {current_a} of {wanted_a} A");
+        }
+        let at = |f: f64| amplitude.at(f.ln());
+        // At the resonance Q = 55.6, less by 1 - (30/80)^2: 4.77 mm/A and 21 mA; at the zero all that there is.
+        assert!((0.019..0.0212).contains(&at(30.0)) && at(80.0) > 1.8, "{} {}", at(30.0), at(80.0));
+    }
+
+    #[test]
+    fn the_largest_is_no_more_times_the_least_than_asked_for() {
+        let points = shaped(&response(), 100e-6, CAP, 50.0);
+        let least = points.iter().map(|p| p.current_a).fold(f64::INFINITY, f64::min);
+        let most = points.iter().map(|p| p.current_a).fold(0.0, f64::max);
+        assert!((45.0..=50.0 + 1e-6).contains(&(most / least)), "{}", most / least);
+    }
+
+    #[test]
+    fn a_response_of_noise_or_of_zero_still_gives_few_sound_points() {
+        let noisy: Vec<(f64, f64)> = (1..3000).map(|k| (f64::from(k), 1e-6 * (1.0 + f64::from(k * k % 97)))).collect();
+        let points = shaped(&noisy, 1e-4, CAP, f64::INFINITY);
+        assert_eq!(points.len(), MOST_POINTS);
+        assert!(points.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz));
+        let dead = shaped(&[(1.0, 0.0), (10.0, 0.0)], 1e-4, CAP, f64::INFINITY);
+        assert_eq!(dead.iter().map(|p| (p.current_a * 1e9).round() / 1e9).collect::<Vec<_>>(), [2.0, 2.0]);
+    }
+}

@@ -16,6 +16,9 @@ use super::envelope::{Amplitude, fade};
 use super::{Excitation, Pattern, Window};
 use crate::config::{BLOCKS_PER_SINE, Config};
 
+/// Ticks of a block at least.
+const LEAST_BLOCK: f64 = 16.0;
+
 /// Sines one after the other, with quiet before and after.
 #[derive(Clone, Debug)]
 pub struct SteppedSine {
@@ -89,9 +92,10 @@ impl SteppedSine {
 
 /// Whole turns q and ticks m of a block of `least_s` at least, whose frequency q rate/m is next to the one asked for.
 fn block(frequency_hz: f64, least_s: f64, rate_hz: f64) -> (u64, u64) {
-    let turns = libm::ceil(frequency_hz * least_s - 1e-9).max(1.0);
-    let block = libm::round(turns * rate_hz / frequency_hz).max(1.0);
-    (turns as u64, (block as u64).max(8))
+    let turns = libm::ceil(frequency_hz * least_s.max(LEAST_BLOCK / rate_hz) - 1e-9).max(1.0);
+    let block = libm::round(turns * rate_hz / frequency_hz).max(LEAST_BLOCK) as u64;
+    // Next to half the rate the nearest would be that itself, which has no phase.
+    ((turns as u64).min((block - 1) / 2), block)
 }
 
 impl Excitation for SteppedSine {
@@ -126,5 +130,79 @@ impl Excitation for SteppedSine {
             periods: BLOCKS_PER_SINE as usize,
         };
         Pattern::Stepped(self.sines.iter().map(window).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{AmplitudePoint, Source, Spacing, load};
+
+    fn config(spacing: Spacing, start_hz: f64, stop_hz: f64) -> Config {
+        let mut config = load(&Source::default()).unwrap();
+        (config.chirp.start_hz, config.chirp.stop_hz, config.chirp.quiet_before_s) = (start_hz, stop_hz, 0.1);
+        config.chirp.amplitude = [(10.0, 0.2), (100.0, 0.02)]
+            .map(|(frequency_hz, current_a)| AmplitudePoint { frequency_hz, current_a })
+            .to_vec();
+        let settings = &mut config.stepped_sine;
+        (settings.count, settings.spacing, settings.settle_s, settings.measure_s) = (9, spacing, 0.3, 0.2);
+        config
+    }
+
+    fn windows(sines: &SteppedSine) -> Vec<Window> {
+        match sines.pattern() {
+            Pattern::Stepped(windows) => windows,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn each_window_is_whole_periods_of_one_sine_of_its_amplitude() {
+        for (spacing, start_hz, stop_hz) in [(Spacing::Linear, 7.3, 431.0), (Spacing::Logarithmic, 431.0, 7.3)] {
+            let config = config(spacing, start_hz, stop_hz);
+            let sines = SteppedSine::new(&config);
+            for (window, asked_hz) in windows(&sines).iter().zip(config.stepped_sine.frequencies_hz(start_hz, stop_hz))
+            {
+                let frequency_hz = window.turns as f64 * 5000.0 / window.period as f64;
+                // The nearest whole number of ticks is half a tick off at most.
+                assert!(
+                    (frequency_hz / asked_hz - 1.0).abs() <= 0.51 / window.period as f64,
+                    "{frequency_hz} {asked_hz}"
+                );
+                assert!(window.periods == 6 && (window.period * window.periods) as f64 >= 0.2 * 5000.0 - 6.0);
+                // 0.2 A (10 Hz/f) between 10 and 100 Hz.
+                let amplitude_a = 0.2 * 10.0 / asked_hz.clamp(10.0, 100.0);
+                for n in 0..window.period * window.periods {
+                    let turns = (n * window.turns % window.period) as f64 / window.period as f64;
+                    let expected_a = amplitude_a * (2.0 * PI * turns).sin();
+                    let current_a = sines.current_a((window.start + n) as u64);
+                    assert!((current_a - expected_a).abs() < 1e-12 * amplitude_a.max(0.1), "{asked_hz} Hz, tick {n}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn it_jumps_nowhere_and_rises_from_zero_and_falls_back_to_it() {
+        let sines = SteppedSine::new(&config(Spacing::Logarithmic, 20.0, 200.0));
+        let signal: Vec<f64> = (0..sines.ticks()).map(|tick| sines.current_a(tick)).collect();
+        // Both sines and both envelopes at their steepest: 2 (2 pi f A + pi A/(2 x 0.15 s))/rate, f A up to 2 + 2 Hz A.
+        let largest = signal.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        assert!((0.001..0.012).contains(&largest), "{largest}");
+        let active: Vec<u64> = (0..sines.ticks()).filter(|tick| sines.active(*tick)).collect();
+        assert_eq!((active[0], signal[0], signal[500]), (500, 0.0, 0.0));
+        let end = active.len() + 500;
+        assert!(signal[end..].iter().all(|u| *u == 0.0) && signal.len() - end == 40_000, "8 s of quiet");
+        assert_eq!(active, (500..end as u64).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn settings_at_their_limits_make_no_panic() {
+        let mut config = config(Spacing::Linear, 2499.0, 1e-4);
+        (config.stepped_sine.settle_s, config.stepped_sine.measure_s) = (0.001, 0.001);
+        let sines = SteppedSine::new(&config);
+        for tick in (0..sines.ticks()).step_by(9973).chain([0, u64::MAX]) {
+            assert!(sines.current_a(tick).abs() <= 0.4, "{tick}");
+        }
     }
 }

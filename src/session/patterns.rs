@@ -14,6 +14,9 @@ use crate::excitation::{Pattern, Window};
 use crate::identify::periodic::{self, Periods, Repetition};
 use crate::identify::{Block, Frf, IdentifyError, Signals};
 
+/// Lines to either side over which the noise is averaged for a fit.
+const NEIGHBOURS: usize = 4;
+
 /// What the lines of a run show, or the record to be estimated as a whole.
 pub(super) enum Taken {
     /// A record from rest to rest.
@@ -31,10 +34,20 @@ pub(super) fn taken(signals: Signals, pattern: &Pattern, band_hz: (f64, f64)) ->
             let whole = part(&signals, *start, (skip + periods) * period);
             let repetition = Repetition { period: *period, skip: *skip };
             let Periods { frf, blocks, .. } = periodic::estimate(&whole, band_hz, repetition)?;
-            Ok(Taken::Lines(frf, blocks))
+            Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks)))
         }
         Pattern::Stepped(windows) => stepped(&signals, windows, band_hz),
     }
+}
+
+/// The blocks with the mean variance of the lines around each: the noise of a line alone, by the scatter of a few periods, comes
+/// out far too small now and then, and a fit would take such a line for a mode.
+fn with_noise_of_neighbours(blocks: &[Block]) -> Vec<Block> {
+    let around = |k: usize| {
+        let near = &blocks[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(blocks.len())];
+        near.iter().map(|block| block.variance).sum::<f64>() / near.len() as f64
+    };
+    blocks.iter().enumerate().map(|(k, block)| Block { variance: around(k), ..*block }).collect()
 }
 
 /// The samples of a signal from `start` on, as far as there are.
@@ -57,7 +70,9 @@ fn mean(signals: &Signals, period: usize, count: usize) -> Signals {
 fn stepped(signals: &Signals, windows: &[Window], (low_hz, high_hz): (f64, f64)) -> Result<Taken, IdentifyError> {
     let (mut frf, mut blocks) = (Frf::default(), Vec::new());
     let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
-    let mut rising: Vec<&Window> = windows.iter().collect();
+    // A run that was stopped has those that it came to.
+    let whole = |window: &&Window| window.start + window.period * window.periods <= signals.len();
+    let mut rising: Vec<&Window> = windows.iter().filter(whole).collect();
     rising.sort_by(|a, b| hz(a).total_cmp(&hz(b)));
     // Frequencies that fit whole ticks may fall together.
     rising.dedup_by(|a, b| hz(a) <= hz(b));
@@ -72,7 +87,10 @@ fn stepped(signals: &Signals, windows: &[Window], (low_hz, high_hz): (f64, f64))
             Err(error) => return Err(error),
         }
     }
-    if blocks.is_empty() { Err(IdentifyError::NotExcited { low_hz, high_hz }) } else { Ok(Taken::Lines(frf, blocks)) }
+    if blocks.is_empty() {
+        return Err(IdentifyError::NotExcited { low_hz, high_hz });
+    }
+    Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks)))
 }
 
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {

@@ -1,0 +1,9 @@
+//! Whatever excites the stage, it shows the same stage; and what a plan says, the run does.
+mod averages;
+mod identified;
+mod plans;
+#[path = "../thesis/program.rs"]
+mod program;
+mod rig;
+#[path = "../thesis/truth.rs"]
+mod truth;

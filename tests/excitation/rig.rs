@@ -1,0 +1,64 @@
+//! The simulated stage at 1 kHz, and runs on it.
+use std::path::{Path, PathBuf};
+
+use bench::config::{Config, Purpose, Source, load};
+use bench::recording::Recording;
+use bench::rt::thread::Pace;
+use bench::session::{self, Analysis, Plan, analyse};
+use bench::sim::SimulatedRig;
+
+/// 1 kHz, up to 400 Hz.
+const HERE: [&str; 2] = ["loop.rate_hz=1000", "chirp.stop_hz=400.0"];
+/// Nothing but the plant.
+pub const SILENT: [&str; 3] = ["sim.probe_noise_rms_m=0", "sim.probe_quantisation_m=0", "sim.floor=[]"];
+
+/// Each kind with settings that show the modes of the stage: lines no farther apart than a mode is wide.
+pub const KINDS: [(&str, &[&str]); 3] = [
+    ("multisine", &["multisine.periods=8"]),
+    ("prbs", &["prbs.order=14", "prbs.clock_divider=1", "prbs.periods=8", "prbs.amplitude_a=0.5"]),
+    (
+        "stepped_sine",
+        &[
+            "chirp.start_hz=26.0",
+            "chirp.stop_hz=92.0",
+            "stepped_sine.count=133",
+            "stepped_sine.spacing=linear",
+            "stepped_sine.settle_s=8.0",
+            "stepped_sine.measure_s=1.0",
+            "chirp.amplitude=[{ frequency_hz = 1.0, current_a = 0.04 }]",
+        ],
+    ),
+];
+
+pub fn config(sets: &[&str]) -> Config {
+    let sets = HERE.iter().chain(sets).map(|set| set.to_string()).collect();
+    load(&Source { sets, purpose: Purpose::Chirp, ..Source::default() }).expect("valid settings")
+}
+
+/// A configuration of a kind with `more`.
+pub fn of_kind((kind, sets): (&str, &[&str]), more: &[&str]) -> Config {
+    let kind = format!("excitation.kind={kind}");
+    config(&[&[kind.as_str()], sets, more].concat())
+}
+
+pub fn recorded(config: &Config, folder: &Path) -> PathBuf {
+    let plan = Plan::chirp(config.clone());
+    let rig = Box::new(SimulatedRig::new(config).expect("a rig"));
+    let run = session::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    assert!(run.ended.completed, "{:?}", run.ended);
+    let path = run.path.clone();
+    run.finish("{}").expect("a good disk");
+    path
+}
+
+pub fn analysed(config: &Config) -> Analysis {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = recorded(config, folder.path());
+    analyse(&Recording::open(&path).expect("a recording"), config).expect("an analysis")
+}
+
+/// The largest displacement that the probe saw, in metres.
+pub fn travel_m(path: &Path) -> f64 {
+    let recording = Recording::open(path).expect("a recording");
+    recording.ticks().expect("ticks").map(|record| record.expect("whole").position_m.abs()).fold(0.0, f64::max)
+}
