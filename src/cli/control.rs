@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::analysis_output::Made;
 use super::chirp::analysed;
+use super::chirp_plan::Expected;
 use super::choice::Choice;
 use super::margins::{closed_loop, enough, text as margins_text};
 use super::options::BenchOptions;
@@ -107,6 +108,8 @@ struct Report {
     run: RunReport,
     predicted: Predicted,
     measured: Option<Measured>,
+    /// What a swept reference does by the model.
+    expected: Option<Expected>,
     /// What a swept reference shows of plant and loop.
     #[serde(flatten)]
     made: Option<Made>,
@@ -142,7 +145,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         (true, false) => Some(Made::nothing("the run did not come to its end")),
         (false, _) => None,
     };
-    let report = Report { run: report, predicted, measured, made };
+    let expected = plan.foreseen.as_ref().map(Expected::of);
+    let report = Report { run: report, predicted, measured, expected, made };
     close(run, &report, args.bench.json, &text(&report, &config))?;
     let stopped = report.made.as_ref().is_some_and(Made::is_stopped);
     Ok(if stopped { Outcome::Failed } else { report.run.exit() })
@@ -168,7 +172,9 @@ fn text(report: &Report, config: &Config) -> String {
     });
     if let Some(made) = &report.made {
         let margins = margins_text(config, &report.predicted.margins);
-        return format!("{margins}{}{}", report.run.text(config), made.text());
+        let travel_um = report.expected.map_or(0.0, |expected| expected.travel_m * 1e6);
+        let run = report.run.text(config);
+        return format!("{margins}  expected   travel of {travel_um:.1} um by the model\n{run}{}", made.text());
     }
     let measured = report.measured.as_ref().map_or(
         "  measured   nothing: the run did not reach a steady state\n".to_string(),

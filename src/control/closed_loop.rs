@@ -74,16 +74,20 @@ impl ClosedLoop {
     /// Reading (in metres, relative to the start) at each tick after a reference of `reference_m(tick)`: the linear loop
     /// from rest, without noise, disturbance and limits.
     pub fn simulate(&self, ticks: usize, reference_m: impl Fn(usize) -> f64) -> Vec<f64> {
+        self.course(ticks, reference_m).map(|(_, position_m)| position_m).collect()
+    }
+
+    /// The same with the command in amperes of each tick before its reading.
+    pub fn course(&self, ticks: usize, reference_m: impl Fn(usize) -> f64) -> impl Iterator<Item = (f64, f64)> {
         let mut controller = self.controller.clone();
         controller.reset();
         let mut state = self.chain.at_rest();
-        let mut positions = Vec::with_capacity(ticks);
-        for tick in 0..ticks {
+        (0..ticks).map(move |tick| {
             let position_m = self.chain.reading_m(&state);
-            positions.push(position_m);
-            self.chain.step(&mut state, controller.update(reference_m(tick) - position_m));
-        }
-        positions
+            let command_a = controller.update(reference_m(tick) - position_m);
+            self.chain.step(&mut state, command_a);
+            (command_a, position_m)
+        })
     }
 
     fn z(&self, omega_rad_s: f64) -> Complex<f64> {

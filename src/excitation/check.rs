@@ -82,8 +82,20 @@ pub fn check(
 ) -> Result<Extremes, ExcitationError> {
     span(config)?;
     let extremes = Extremes::of(excitation, config, plant);
-    current(config, &extremes)?;
-    let setting = setting(config);
+    let frequency_hz = excitation.frequency_at_hz(extremes.travel_tick);
+    within(&extremes, config, frequency_hz, setting(config))?;
+    Ok(extremes)
+}
+
+/// Refuses what would trip an interlock; `frequency_hz` is the one excited where the travel is largest, `setting` the one to
+/// lower.
+pub fn within(
+    extremes: &Extremes,
+    config: &Config,
+    frequency_hz: Option<f64>,
+    setting: &'static str,
+) -> Result<(), ExcitationError> {
+    current(config, extremes, setting)?;
     let limit_a_per_s = config.amplifier.slew_limit_a_per_s;
     if extremes.slew_a_per_s > limit_a_per_s {
         return Err(ExcitationError::Slew { slew_a_per_s: extremes.slew_a_per_s, limit_a_per_s, setting });
@@ -93,19 +105,18 @@ pub fn check(
         return Err(ExcitationError::Heat { thermal_a: extremes.thermal_a, limit_a, setting });
     }
     if extremes.travel_m > config.interlock.soft_limit_m {
-        let frequency_hz = excitation.frequency_at_hz(extremes.travel_tick);
         let (travel_um, limit_um) = (extremes.travel_m * 1e6, config.interlock.soft_limit_m * 1e6);
         return Err(ExcitationError::Travel { travel_um, frequency_hz, limit_um, setting });
     }
-    Ok(extremes)
+    Ok(())
 }
 
-fn current(config: &Config, extremes: &Extremes) -> Result<(), ExcitationError> {
+fn current(config: &Config, extremes: &Extremes, setting: &'static str) -> Result<(), ExcitationError> {
     let limits = [
         (config.motor.peak_current_a(), "the motor's peak current"),
         (config.amplifier.current_limit_a, "the amplifier's limit"),
     ];
-    let (current_a, setting) = (extremes.current_a, setting(config));
+    let current_a = extremes.current_a;
     match limits.into_iter().find(|(limit_a, _)| current_a > *limit_a) {
         Some((limit_a, what)) => Err(ExcitationError::Current { current_a, limit_a, what, setting }),
         None => Ok(()),

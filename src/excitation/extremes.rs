@@ -5,7 +5,7 @@ use crate::config::Config;
 use crate::plant::Sampled;
 
 /// The extremes of an excitation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
     /// Largest current in amperes.
     pub current_a: f64,
@@ -26,33 +26,34 @@ pub struct Extremes {
 impl Extremes {
     /// Runs the whole excitation through the model of the plant.
     pub fn of(excitation: &(impl Excitation + ?Sized), config: &Config, plant: &Sampled) -> Extremes {
-        let ticks = excitation.ticks();
-        let (mut current_a, mut slew_a_per_s, mut travel_m, mut travel_tick) = (0.0f64, 0.0f64, 0.0, 0);
-        let (mut before_a, mut square_a2, mut heat_a2, mut hottest_a2) = (0.0, 0.0, 0.0, 0.0f64);
-        let cooling = plant.period_s / config.motor.thermal_time_constant_s;
         let mut motion = plant.at_rest();
-        for tick in 0..ticks {
+        let course = (0..excitation.ticks()).map(|tick| {
             let command_a = excitation.current_a(tick);
-            current_a = current_a.max(command_a.abs());
-            slew_a_per_s = slew_a_per_s.max((command_a - before_a).abs() / plant.period_s);
+            plant.step(&mut motion, command_a, |_| 0.0);
+            (command_a, plant.position_m(&motion))
+        });
+        Extremes::over(course, config)
+    }
+
+    /// Of a course of command (A) and position (m), one pair a tick.
+    pub fn over(course: impl Iterator<Item = (f64, f64)>, config: &Config) -> Extremes {
+        let period_s = config.servo.period_s();
+        let cooling = period_s / config.motor.thermal_time_constant_s;
+        let (mut before_a, mut square_a2, mut heat_a2, mut ticks) = (0.0, 0.0, 0.0, 0);
+        let mut extremes = Extremes::default();
+        for (tick, (command_a, position_m)) in (0..).zip(course) {
+            extremes.current_a = extremes.current_a.max(command_a.abs());
+            extremes.slew_a_per_s = extremes.slew_a_per_s.max((command_a - before_a).abs() / period_s);
             before_a = command_a;
             square_a2 += command_a * command_a;
             heat_a2 += cooling * (command_a * command_a - heat_a2);
-            hottest_a2 = hottest_a2.max(heat_a2);
-            plant.step(&mut motion, command_a, |_| 0.0);
-            let position_m = plant.position_m(&motion).abs();
-            if position_m > travel_m {
-                (travel_m, travel_tick) = (position_m, tick);
+            extremes.thermal_a = extremes.thermal_a.max(heat_a2.sqrt());
+            if position_m.abs() > extremes.travel_m {
+                (extremes.travel_m, extremes.travel_tick) = (position_m.abs(), tick);
             }
+            ticks = tick + 1;
         }
-        Extremes {
-            current_a,
-            rms_current_a: (square_a2 / ticks.max(1) as f64).sqrt(),
-            slew_a_per_s,
-            thermal_a: hottest_a2.sqrt(),
-            travel_m,
-            travel_tick,
-            duration_s: ticks as f64 * plant.period_s,
-        }
+        let rms_current_a = (square_a2 / ticks.max(1) as f64).sqrt();
+        Extremes { rms_current_a, duration_s: ticks as f64 * period_s, ..extremes }
     }
 }

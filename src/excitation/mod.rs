@@ -23,7 +23,7 @@ mod shape;
 mod staircase;
 mod stepped_sine;
 
-pub use check::{ExcitationError, LARGEST_SPAN, check};
+pub use check::{ExcitationError, LARGEST_SPAN, check, within};
 pub use chirp::Chirp;
 pub use envelope::Amplitude;
 pub use extremes::Extremes;

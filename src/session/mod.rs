@@ -19,6 +19,7 @@ mod plan;
 mod replay;
 mod run;
 mod stop;
+mod swept;
 
 pub use analysis::{Analysis, AnalysisError, analyse};
 pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};

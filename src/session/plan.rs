@@ -1,13 +1,15 @@
 //! What a run will do: made from the configuration and the texts it names, all of which travel with the recording, so that
 //! the same plan can be made again from it.
 
-use crate::config::{Config, ConfigError, ReferenceSettings, TravelPoint, whole};
-use crate::control::{ClosedLoop, Controller, ControllerError, ControllerText, swept_reference};
-use crate::excitation::{self, Chirp, Excitation, ReferenceError, Staircase, reference, reference_text};
+use super::swept;
+use crate::config::{Config, ConfigError, ReferenceSettings, whole};
+use crate::control::{Controller, ControllerError, ControllerText};
+use crate::excitation::{
+    self, Chirp, Excitation, ExcitationError, Extremes, ReferenceError, Staircase, reference, reference_text,
+};
 use crate::plant::PlantError;
 use crate::recording::Recording;
 use crate::rt::program::{Control, Excite, Program};
-use crate::sim;
 
 /// Name of the attachment with the controller's text.
 const CONTROLLER: &str = "controller.toml";
@@ -55,6 +57,9 @@ pub enum PlanError {
     /// The model that a swept reference is planned from cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// A swept reference that the interlocks would trip.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
     /// A recording without what a plan needs.
     #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
     Missing(&'static str),
@@ -76,18 +81,10 @@ pub struct Plan {
     pub calibration: Option<String>,
     /// Which devices, for the recording's metadata.
     pub devices: Vec<(&'static str, String)>,
+    /// What a swept reference would do by the model.
+    pub foreseen: Option<Extremes>,
     /// The reference's file, if it has one.
     reference: Option<String>,
-}
-
-/// The amplitudes of a swept reference that has none, by the model of the whole rig.
-fn planned(config: &Config, controller: &ControllerText) -> Result<Option<Vec<TravelPoint>>, PlanError> {
-    let ReferenceSettings::Chirp { amplitude, travel_m } = &config.control.reference else { return Ok(None) };
-    if !amplitude.is_empty() {
-        return Ok(None);
-    }
-    let closed_loop = ClosedLoop::new(config, sim::modes(config)?, controller.sections(config.servo.rate_hz)?);
-    Ok(Some(swept_reference(&closed_loop, &config.chirp, *travel_m)))
 }
 
 impl Plan {
@@ -102,19 +99,16 @@ impl Plan {
     }
 
     fn excitation(kind: Kind, config: Config) -> Plan {
-        Plan { kind, config, controller: None, calibration: None, devices: Vec::new(), reference: None }
+        Plan { kind, config, controller: None, calibration: None, devices: Vec::new(), foreseen: None, reference: None }
     }
 
     /// A closed loop. A swept reference without amplitudes gets them here, from the model, so that they travel with the
     /// recording.
-    pub fn control(mut config: Config) -> Result<Plan, PlanError> {
+    pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
-        let planned = planned(&config, &controller)?;
-        if let (ReferenceSettings::Chirp { amplitude, .. }, Some(planned)) = (&mut config.control.reference, planned) {
-            *amplitude = planned;
-        }
+        let (config, foreseen) = swept::planned(config, &controller)?;
         let reference = reference_text(&config.control.reference)?;
-        Ok(Plan { controller: Some(controller), reference, ..Plan::excitation(Kind::Control, config) })
+        Ok(Plan { controller: Some(controller), reference, foreseen, ..Plan::excitation(Kind::Control, config) })
     }
 
     /// The plan of a recorded run.

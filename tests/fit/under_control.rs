@@ -90,7 +90,25 @@ fn a_planned_sweep_keeps_travel_and_current() {
     // steady state it is planned by, by a tenth at this rate.
     assert!((5e-6..11.5e-6).contains(&travel_m), "{travel_m}");
     assert!((0.5..3.3).contains(&current_a), "{current_a}");
+    let foreseen = plan.foreseen.expect("a course");
+    assert!((foreseen.travel_m - travel_m).abs() < 0.5e-6 && (foreseen.current_a / current_a - 1.0).abs() < 0.02);
     assert_eq!(bench::session::replay(&recording).expect("a replay").different, 0);
+}
+
+#[test]
+fn a_sweep_that_would_trip_an_interlock_is_refused_before_anything_moves() {
+    let point = |set: &str| format!("control.reference={{ kind = \"chirp\", travel_m = 1e-6, amplitude = [{set}] }}");
+    for (amplitude, limit) in [
+        ("{ frequency_hz = 1.0, amplitude_m = 800e-6 }", "the motor's peak current"),
+        // 600 um ask for 4 A at standstill, the motor stands 2.3.
+        (
+            "{ frequency_hz = 30.0, amplitude_m = 600e-6 }, { frequency_hz = 60.0, amplitude_m = 1e-6 }",
+            "thermal current",
+        ),
+    ] {
+        let error = Plan::control(config(&[&point(amplitude)])).unwrap_err().to_string();
+        assert!(error.contains(limit) && error.contains("control.reference"), "{error}");
+    }
 }
 
 #[test]
