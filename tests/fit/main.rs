@@ -3,6 +3,7 @@ mod intervals;
 mod modes;
 mod response;
 mod rig;
+mod stage;
 mod synthetic;
 mod under_control;
 mod verdicts;

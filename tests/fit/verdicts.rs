@@ -1,11 +1,14 @@
 //! Verdicts on the simulated stage: never a wrong one, and few that say nothing.
-use bench::fit::{ModalFit, View, fit};
+use bench::config::Config;
+use bench::fit::{Estimate, ModalFit, View, fit};
 use bench::identify::Block;
 use bench::plant::{self, Modal};
+use bench::session::Analysis;
 use bench::verdict::{Case, Cnmp, Verdict, verdict};
 use nalgebra::Complex;
 
 use crate::rig::{analysed, config, truth};
+use crate::stage::{model, stands_for};
 use crate::synthetic::{blocks, normal, stage, term};
 
 /// Points of the plane of section 5.2.2, operating point from 0 to 8 % of L and asymmetry from -10 to +10 %, by seed.
@@ -26,7 +29,11 @@ fn tally(count: usize, seed: u64, more: &[&str]) -> [usize; 3] {
     for mut sets in points(count, seed) {
         sets.extend(more.iter().map(|set| set.to_string()));
         let config = config(&sets);
-        let (said, pairs) = (analysed(&config, &config).verdict, truth(&config));
+        let analysis = analysed(&config, &config);
+        if more.is_empty() {
+            modes_are_true(&config, &analysis);
+        }
+        let (said, pairs) = (analysis.verdict, truth(&config));
         let index = match said.cnmp {
             Cnmp::Detected => 0,
             Cnmp::Excluded => 1,
@@ -36,6 +43,30 @@ fn tally(count: usize, seed: u64, more: &[&str]) -> [usize; 3] {
         tally[index] += 1;
     }
     tally
+}
+
+/// Every mode of the model whose residue stands five sigma out is there, true to 0.05 % in frequency, 5 % in damping and 3 % in
+/// residue with its sign; of one that is not, the verdict says so.
+fn modes_are_true(config: &Config, analysis: &Analysis) {
+    let modes = analysis.fit.as_ref().expect("modes").modes();
+    let sigma = modes.iter().map(|mode| mode.residue_per_kg.sigma).fold(0.0, f64::max);
+    for [omega, damping, residue] in model(config) {
+        let Some(mode) = stands_for(&modes, omega) else {
+            let told = analysis.verdict.why.contains("are seen") || residue.abs() < 5.0 * sigma;
+            assert!(told, "{omega} rad/s, {residue} 1/kg: {:?}", analysis.verdict.why);
+            continue;
+        };
+        if residue.abs() < 5.0 * mode.residue_per_kg.sigma {
+            continue;
+        }
+        let off = |e: Estimate, truth: f64| (e.value / truth - 1.0).abs();
+        assert!(off(mode.omega_rad_s, omega) < 5e-4, "{omega}: {mode:?}");
+        // Of a mode that just shows, the figures are as good as they say.
+        assert!(off(mode.damping_ratio, damping) < 0.05_f64.max(4.0 * mode.damping_ratio.sigma / damping), "{mode:?}");
+        let known = 4.0 * mode.residue_per_kg.sigma / residue.abs();
+        assert!(off(mode.residue_per_kg, residue) < 0.03_f64.max(known), "{residue}: {mode:?}");
+        assert_eq!(mode.sign() == '+', residue > 0.0);
+    }
 }
 
 #[test]
