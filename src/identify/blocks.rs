@@ -2,14 +2,19 @@
 //! the next and no curve may be smoothed.
 //!
 //! In a block, `H = sum Y conj(U) / sum |U|^2` is the mean of H over its bins, weighted with |U|^2, whatever the shape of H,
-//! with the variance S / sum |U|^2, S being the power of the noise in a bin. A model is compared with it by its mean at
+//! with the variance S / sum |U|^2, S being the power of the noise in a bin, by what rational curves leave around it: an average
+//! would take the top of a resonance for noise, and the fit would trust what lies beside it too much. A model is compared with it by its mean at
 //! f -+ spread, which has the block's first three moments: an error of the fourth order in width over width of a mode.
 
 use nalgebra::Complex;
 
-use super::averaged::Record;
 use super::error::check_setting;
-use super::{IdentifyError, Signals, band};
+use super::noise_floor::NoiseFloor;
+use super::record::Record;
+use super::{EstimatorSettings, IdentifyError, Signals, band};
+
+/// A rational curve, whose residual is the noise, needs so many times the bins that an average would.
+const CURVE_WIDER: f64 = 4.0;
 
 /// The mean response over a few neighbouring bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +50,12 @@ impl BlockSettings {
         check_setting("resolution_ratio", self.resolution_ratio, 0.0, 0.1)
     }
 
+    /// The curves whose residual is the noise.
+    fn curves(&self) -> EstimatorSettings {
+        let default = EstimatorSettings::default();
+        EstimatorSettings { min_half_width_bins: CURVE_WIDER * self.min_half_width_bins, ..default }
+    }
+
     /// The first bin after a block.
     pub(super) fn next(&self, bin: usize) -> usize {
         bin + (self.resolution_ratio * bin as f64).floor().max(1.0) as usize
@@ -65,11 +76,12 @@ pub fn blocks(signals: &Signals, band_hz: (f64, f64), settings: &BlockSettings) 
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    let record = Record::new(signals, settings, *bins.end());
+    let record = Record::new(signals);
+    let floor = NoiseFloor::of(&record, (*bins.start() as f64, *bins.end() as f64), &settings.curves());
     let (mut blocks, mut low) = (Vec::new(), *bins.start());
     while low <= *bins.end() {
         let high = (settings.next(low) - 1).min(*bins.end());
-        blocks.extend(block(&record, low, high, settings));
+        blocks.extend(block(&record, low, high, &floor, settings));
         low = high + 1;
     }
     if blocks.is_empty() {
@@ -79,19 +91,19 @@ pub fn blocks(signals: &Signals, band_hz: (f64, f64), settings: &BlockSettings) 
     }
 }
 
-fn block(record: &Record, low: usize, high: usize, settings: &BlockSettings) -> Option<Block> {
-    let middle = (low + high) / 2;
-    let noise = record.noise_power(middle, settings)?;
-    let products = &record.products()[low..=high];
-    let sum = |of: &dyn Fn(usize) -> f64| (0..products.len()).map(|j| products[j].uu * of(j)).sum::<f64>();
+fn block(record: &Record, low: usize, high: usize, floor: &NoiseFloor, settings: &BlockSettings) -> Option<Block> {
+    let middle = 0.5 * (low + high) as f64;
+    let noise = floor.power(middle, settings.curves().half_width(middle, record.bin_hz));
+    let power: Vec<f64> = (low..=high).map(|bin| record.input_power(bin)).collect();
+    let sum = |of: &dyn Fn(usize) -> f64| (0..power.len()).map(|j| power[j] * of(j)).sum::<f64>();
     let uu = sum(&|_| 1.0);
     let centre = sum(&|j| j as f64) / uu;
     let spread = (sum(&|j| (j as f64 - centre) * (j as f64 - centre)) / uu).sqrt();
-    let response = products.iter().map(|p| p.yu).sum::<Complex<f64>>() / uu;
+    let response = (low..=high).map(|bin| record.cross(bin)).sum::<Complex<f64>>() / uu;
     let variance = noise / uu;
     let block = Block {
-        frequency_hz: (low as f64 + centre) * record.bin_hz(),
-        spread_hz: spread * record.bin_hz(),
+        frequency_hz: (low as f64 + centre) * record.bin_hz,
+        spread_hz: spread * record.bin_hz,
         response,
         variance,
     };

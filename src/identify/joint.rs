@@ -27,10 +27,11 @@
 
 use nalgebra::Complex;
 
-use super::averaged::{NOISE_WIDTH, weights};
 use super::spectrum::RealFft;
 use super::{Block, BlockSettings, Frf, FrfPoint, IdentifyError, Signals, band};
 
+/// The noise is averaged with weights so many times as wide as those of the response.
+const NOISE_WIDTH: usize = 4;
 /// An instrument below this part of its root mean square over all bins is rounding.
 const DEAD_RATIO: f64 = 1e-9;
 
@@ -123,6 +124,12 @@ impl Spectra {
             bin_hz: signals.rate_hz / signals.len() as f64,
         }
     }
+}
+
+/// The weights w_0 .. w_(h-1) on either side of a bin.
+fn weights(half_width: usize) -> Vec<f64> {
+    let angle = core::f64::consts::FRAC_PI_2 / half_width as f64;
+    (0..half_width).map(|j| libm::cos(angle * j as f64).powi(2)).collect()
 }
 
 fn difference(from: &[Complex<f64>], what: &[Complex<f64>]) -> Spectrum {

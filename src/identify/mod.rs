@@ -20,7 +20,6 @@
 //! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
 
 pub mod align;
-mod averaged;
 mod band;
 mod blocks;
 mod configured;

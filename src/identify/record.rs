@@ -61,6 +61,16 @@ impl Record {
         swapped
     }
 
+    /// |U|^2 of a bin.
+    pub(super) fn input_power(&self, bin: usize) -> f64 {
+        self.input[bin].norm_sqr()
+    }
+
+    /// Y conj(U) of a bin.
+    pub(super) fn cross(&self, bin: usize) -> Complex<f64> {
+        self.output[bin] * self.input[bin].conj()
+    }
+
     /// The highest bin below the Nyquist frequency.
     pub(super) fn last_bin(&self) -> usize {
         self.input.len() - 1
