@@ -10,6 +10,7 @@
 //! - [`response`]: as the configuration chooses.
 //! - [`repeated::estimate`]: repetitions of one excitation, each at rest at its ends, averaged.
 //! - [`periodic::estimate`]: periods of one excitation, averaged.
+//! - [`harmonics`], [`linearity`]: what stands between the lines of a multisine: distortion, odd and even, beside noise.
 //! - [`with_distortion`]: what is alike in every period and yet no response.
 //! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
 //! - [`align::Readings`] and [`edges`]: readings and set-points of irregular times on the regular ones of a loop.
@@ -31,8 +32,10 @@ pub mod edges;
 mod error;
 mod estimator;
 mod frf;
+pub mod harmonics;
 pub mod joint;
 mod kernel;
+pub mod linearity;
 pub mod local;
 mod moments;
 mod noise_floor;

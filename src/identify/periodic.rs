@@ -30,7 +30,7 @@ const EXCITED_RATIO: f64 = 0.01;
 /// So many sigma of its own scatter the amplitude of an excited line is above zero.
 const EXCITED_SIGMA: f64 = 5.0;
 /// Rounding leaves no response truer than this ratio: 10^4 sums of doubles.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// How a record repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,19 +57,29 @@ pub struct Periods {
 /// # Errors
 /// When the signals, the band or the periods allow no estimate: see [`IdentifyError`].
 pub fn estimate(signals: &Signals, band_hz: (f64, f64), repetition: Repetition) -> Result<Periods, IdentifyError> {
-    signals.check()?;
-    let count = count(signals.len(), repetition)?;
-    let bins = band::bins(band_hz, signals.rate_hz, repetition.period)?;
-    let input = spectra(&signals.input_a, repetition, count);
-    let output = spectra(&signals.output_m, repetition, count);
-    let lines: Vec<Line> = bins.map(|k| Line::of(k, &input, &output)).collect();
+    let lines = lines(signals, band_hz, repetition)?;
     let line_hz = signals.rate_hz / repetition.period as f64;
+    let count = lines.first().map_or(0, |line| line.input.len());
     let mut periods = Periods { frf: Frf::default(), blocks: Vec::new(), count };
     for line in excited(&lines) {
         periods.take(line, line_hz);
     }
     let (low_hz, high_hz) = band_hz;
     if periods.blocks.is_empty() { Err(IdentifyError::NotExcited { low_hz, high_hz }) } else { Ok(periods) }
+}
+
+/// Every line of a band, one entry a period.
+pub(super) fn lines(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    repetition: Repetition,
+) -> Result<Vec<Line>, IdentifyError> {
+    signals.check()?;
+    let count = count(signals.len(), repetition)?;
+    let bins = band::bins(band_hz, signals.rate_hz, repetition.period)?;
+    let input = spectra(&signals.input_a, repetition, count);
+    let output = spectra(&signals.output_m, repetition, count);
+    Ok(bins.map(|k| Line::of(k, &input, &output)).collect())
 }
 
 impl Periods {
@@ -120,10 +130,11 @@ fn drift(samples: &[f64], start: usize, period: usize) -> f64 {
 }
 
 /// One line of the spectrum over all periods.
-struct Line {
-    number: usize,
-    input: Vec<Complex<f64>>,
-    output: Vec<Complex<f64>>,
+pub(super) struct Line {
+    /// Turns in a period.
+    pub(super) number: usize,
+    pub(super) input: Vec<Complex<f64>>,
+    pub(super) output: Vec<Complex<f64>>,
 }
 
 impl Line {
@@ -152,18 +163,18 @@ impl Line {
     }
 }
 
-fn mean(values: &[Complex<f64>]) -> Complex<f64> {
+pub(super) fn mean(values: &[Complex<f64>]) -> Complex<f64> {
     values.iter().sum::<Complex<f64>>() / values.len() as f64
 }
 
 /// E|error of the mean|^2, by the scatter of the values.
-fn variance_of_mean(values: &[Complex<f64>]) -> f64 {
+pub(super) fn variance_of_mean(values: &[Complex<f64>]) -> f64 {
     let (count, mean) = (values.len() as f64, mean(values));
     values.iter().map(|x| (x - mean).norm_sqr()).sum::<f64>() / ((count - 1.0) * count)
 }
 
 /// The lines whose input is above its own noise, and not of another order than the largest.
-fn excited(lines: &[Line]) -> impl Iterator<Item = &Line> {
+pub(super) fn excited(lines: &[Line]) -> impl Iterator<Item = &Line> {
     let largest = lines.iter().map(|line| mean(&line.input).norm()).fold(0.0, f64::max);
     lines.iter().filter(move |line| {
         let amplitude = mean(&line.input).norm();
