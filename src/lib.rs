@@ -36,6 +36,7 @@
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | a grid of chirps, and what all verdicts together say of the stage | [`campaign`] |
 //! | how a frequency response is estimated | [`identify`] |
+//! | noise told from geometry, and modes over amplitude | [`identify::linearity`], `session/amplitudes.rs`, `cli/linearity.rs` |
 //! | a plant identified under control | [`identify::joint`], `session/closed_loop.rs` |
 //! | how modes are fitted, and their number found | [`fit`] |
 //! | whether there are CNMP zeros | [`verdict`] |

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::CliError;
+use super::linearity_output::LinearityMade;
 use super::loop_output::LoopMade;
 use super::modal_output::Shown;
 use crate::config::Config;
 use crate::identify::{Unit, csv};
 use crate::recording::Recording;
 use crate::run_report::{AnalysedRun, KINDS, page, pictures};
-use crate::session::{AnalysisError, analyse};
+use crate::session::{Analysis, AnalysisError, analyse};
 
 /// The files that were made and what the response shows; `null` where the run gave no response.
 #[derive(Clone, Debug, Serialize)]
@@ -24,7 +25,7 @@ pub(super) struct Made {
     /// All pictures by name; `null` where the data carry none.
     plots: BTreeMap<&'static str, Option<String>>,
     /// The page of the run.
-    report: Option<String>,
+    pub report: Option<String>,
     frequencies: usize,
     /// Median coherence over the band.
     coherence_median: Option<f64>,
@@ -39,6 +40,9 @@ pub(super) struct Made {
     /// The loop around the plant, where it was closed.
     #[serde(rename = "loop", skip_serializing_if = "Option::is_none")]
     closed: Option<LoopMade>,
+    /// Distortion and noise, where a multisine left lines out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linearity: Option<LinearityMade>,
 }
 
 /// Why nothing was made: a person wished so.
@@ -52,10 +56,14 @@ impl From<AnalysisError> for CliError {
 
 /// Analyses a recording; the files stand beside it under its name.
 pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliError> {
-    let analysis = analyse(recording, config)?;
+    make_of(&analyse(recording, config)?, recording, config)
+}
+
+/// The same of an analysis that was made.
+pub(super) fn make_of(analysis: &Analysis, recording: &Recording, config: &Config) -> Result<Made, CliError> {
     let csv_path = free(recording.path(), "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
-    let run = AnalysedRun { analysis: &analysis, config, recording };
+    let run = AnalysedRun { analysis, config, recording };
     let pictures = pictures(&run).map_err(|e| CliError::Failed(e.to_string()))?;
     let mut plots = no_plots();
     for picture in &pictures {
@@ -78,6 +86,7 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
         closed: analysis.closed.as_ref().map(|closed| LoopMade::of(closed, recording.path())).transpose()?,
+        linearity: analysis.linearity.as_ref().map(LinearityMade::of),
     })
 }
 
@@ -97,6 +106,7 @@ impl Made {
             delay_beyond_model_sigma_s: None,
             shown: Shown::nothing(why),
             closed: None,
+            linearity: None,
         }
     }
 
@@ -134,11 +144,12 @@ impl Made {
             _ => String::new(),
         };
         format!(
-            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{}{delay}{}  report     {report}\n{}",
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{}{delay}{}{}  report     {report}\n{}",
             frf_csv,
             self.frequencies,
             coherence,
             self.closed.as_ref().map_or(String::new(), LoopMade::text),
+            self.linearity.as_ref().map_or(String::new(), LinearityMade::line),
             self.plots_text(),
             self.shown.text()
         )

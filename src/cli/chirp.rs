@@ -24,28 +24,51 @@ pub(super) struct Args {
     /// What to excite with: chirp, multisine, stepped_sine or prbs
     #[arg(long, value_name = "KIND")]
     excitation: Option<String>,
+    #[command(flatten)]
+    band: BandOptions,
+    /// Length of the sweep in seconds
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    duration: Option<f64>,
+    /// How the frequency runs over time: linear or logarithmic
+    #[arg(long, value_name = "KIND")]
+    sweep: Option<String>,
+    /// Only say what the run would do: travel, current, heat, duration; nothing moves
+    #[arg(long)]
+    plan: bool,
+}
+
+/// Which frequencies, and with how much.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct BandOptions {
     /// First frequency in hertz
     #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     start: Option<f64>,
     /// Last frequency in hertz
     #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     stop: Option<f64>,
-    /// Length of the sweep in seconds
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    duration: Option<f64>,
     /// The same amplitude in amperes at all frequencies
     #[arg(long, value_name = "A", allow_hyphen_values = true)]
     amplitude: Option<f64>,
-    /// How the frequency runs over time: linear or logarithmic
-    #[arg(long, value_name = "KIND")]
-    sweep: Option<String>,
     /// Amplitude over frequency for the same displacement everywhere, by the model or by an FRF measured before; a stepped sine
     /// takes the model if neither this nor --amplitude is given
     #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
     shape: Option<String>,
-    /// Only say what the run would do: travel, current, heat, duration; nothing moves
-    #[arg(long)]
-    plan: bool,
+}
+
+impl BandOptions {
+    pub(super) fn sets(&self) -> Vec<String> {
+        let number = |(key, value): (&str, Option<f64>)| value.map(|v| format!("chirp.{key}={}", toml::Value::from(v)));
+        let point =
+            |a: f64| format!("chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]", toml::Value::from(a));
+        let binary = |a: f64| format!("prbs.amplitude_a={}", toml::Value::from(a));
+        let flat = self.amplitude.map(point).into_iter().chain(self.amplitude.map(binary));
+        [("start_hz", self.start), ("stop_hz", self.stop)].into_iter().filter_map(number).chain(flat).collect()
+    }
+
+    /// The settings with the amplitude shaped as asked for.
+    pub(super) fn shaped(&self, config: Config) -> Result<Config, CliError> {
+        shape(config, self.shape.as_deref(), self.amplitude.is_some())
+    }
 }
 
 impl Args {
@@ -53,21 +76,14 @@ impl Args {
         let text = |key: &str, value: &Option<String>| {
             value.as_ref().map(|value| format!("{key}={}", toml::Value::from(value.as_str())))
         };
-        let number =
-            |key: &str, value: Option<f64>| value.map(|value| format!("chirp.{key}={}", toml::Value::from(value)));
-        let point =
-            |a: f64| format!("chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]", toml::Value::from(a));
-        let binary = |a: f64| format!("prbs.amplitude_a={}", toml::Value::from(a));
-        let flat = self.amplitude.map(point).into_iter().chain(self.amplitude.map(binary));
         let words = text("chirp.sweep", &self.sweep).into_iter().chain(text("excitation.kind", &self.excitation));
-        let numbers = [("start_hz", self.start), ("stop_hz", self.stop), ("duration_s", self.duration)];
-        numbers.into_iter().filter_map(|(key, value)| number(key, value)).chain(flat).chain(words).collect()
+        let duration = self.duration.map(|s| format!("chirp.duration_s={}", toml::Value::from(s)));
+        self.band.sets().into_iter().chain(duration).chain(words).collect()
     }
 
     /// The settings, with the amplitude shaped as asked for.
     fn config(&self) -> Result<Config, CliError> {
-        let config = self.bench.load(Purpose::Chirp, &self.sets())?;
-        shape(config, self.shape.as_deref(), self.amplitude.is_some())
+        self.band.shaped(self.bench.load(Purpose::Chirp, &self.sets())?)
     }
 }
 

@@ -22,7 +22,7 @@ const NEAR: f64 = 1.1;
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Expected {
     pub travel_m: f64,
-    current_a: f64,
+    pub current_a: f64,
     rms_current_a: f64,
     thermal_current_a: f64,
     slew_a_per_s: f64,

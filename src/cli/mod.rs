@@ -15,6 +15,8 @@ mod doctor;
 mod figures;
 mod identify;
 mod identify_table;
+mod linearity;
+mod linearity_output;
 mod loop_output;
 mod margins;
 mod modal_output;
@@ -47,6 +49,8 @@ pub struct Cli {
 enum Command {
     /// Excite the stage, record, estimate its frequency response: recording, CSV and Bode plot
     Chirp(chirp::Args),
+    /// A multisine at several amplitudes: distortion told apart from noise, and whether modes shift with amplitude
+    Linearity(linearity::Args),
     /// Close the loop with a reference: recording, predicted and measured figures
     Control(control::Args),
     /// One chirp at each point of a grid of operating points and asymmetries: dots over the map, offset, recommendation
@@ -77,6 +81,7 @@ enum Command {
 pub fn run(cli: Cli) -> Result<Outcome, CliError> {
     match cli.command {
         Command::Chirp(args) => chirp::run(&args),
+        Command::Linearity(args) => linearity::run(&args),
         Command::Control(args) => control::run(&args),
         Command::Campaign(args) => campaign::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

@@ -26,8 +26,9 @@ pub(super) struct Shown {
     orders: Vec<OrderJson>,
 }
 
+/// A mode with its standard deviations.
 #[derive(Clone, Debug, Serialize)]
-struct ModeJson {
+pub(super) struct ModeJson {
     frequency_hz: f64,
     frequency_hz_sigma: f64,
     damping_ratio: f64,
@@ -139,7 +140,7 @@ impl Shown {
     }
 }
 
-fn mode(mode: &FittedMode) -> ModeJson {
+pub(super) fn mode(mode: &FittedMode) -> ModeJson {
     ModeJson {
         frequency_hz: mode.frequency_hz().value,
         frequency_hz_sigma: mode.frequency_hz().sigma,

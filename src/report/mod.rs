@@ -3,7 +3,7 @@
 //! ```text
 //! sheet -> chart (axes, marks, in values) -> clip -> panel -> canvas
 //! bode -> trace (checked, unwrapped by phase) -> panel (axis: scales and ticks, curve: thinned out) -> canvas (SVG)
-//! pole_zero (ellipse: intervals), stability, responses (Nyquist, coherence) -> sheet
+//! pole_zero (ellipse: intervals), stability, levels, responses (Nyquist, coherence) -> sheet
 //! page (HTML) <- pictures, tables, number (digits by the error)
 //! quadrants (actuator and probe in the plane of two shapes) -> canvas
 //! ```
@@ -20,6 +20,7 @@ mod curve;
 pub mod ellipse;
 mod error;
 mod header;
+mod levels;
 pub mod number;
 pub mod page;
 mod panel;
@@ -34,6 +35,7 @@ mod trace;
 pub use bode::{bode_svg, response_svg};
 pub use chart::{Chart, Mark, Pen, Scale, ScaleKind, Stroke, Symbol};
 pub use error::ReportError;
+pub use levels::{LevelLines, levels_svg};
 pub use pole_zero::{Place, PoleZeroMap, pole_zero_svg};
 pub use quadrants::{QuadrantPanel, quadrants_svg};
 pub use responses::{coherence_svg, nyquist_svg};

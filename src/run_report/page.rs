@@ -60,6 +60,7 @@ fn evidence(run: &AnalysedRun<'_>) -> Vec<(String, String)> {
     let by_phase = analysis
         .beyond
         .map(|delay| format!("{} ms", interval(milli * delay.seconds, milli * SIGMAS_95 * delay.sigma_s)));
+    let linearity = analysis.linearity.as_ref();
     let pairs = [
         ("Judged up to", Some(judged)),
         ("Power that the fit leaves", power),
@@ -67,6 +68,7 @@ fn evidence(run: &AnalysedRun<'_>) -> Vec<(String, String)> {
         ("Delay by the configuration", Some(format!("{:.4} ms", milli * analysis.delay_s))),
         ("Delay beyond it, by the fit", fitted),
         ("Delay beyond it, by the phases", by_phase),
+        ("Coherence", linearity.map(|linearity| linearity.whole.words())),
     ];
     pairs.into_iter().filter_map(|(name, text)| Some((name.to_string(), text?))).collect()
 }

@@ -5,15 +5,17 @@ use nalgebra::Complex;
 use super::AnalysedRun;
 use crate::fit::{ModalFit, Order, UncertainPole, View};
 use crate::identify::Unit;
+use crate::identify::linearity::Linearity;
 use crate::report::{
-    Curve, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg, nyquist_svg, pole_zero_svg,
-    response_svg, stability_svg,
+    Curve, LevelLines, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg, levels_svg,
+    nyquist_svg, pole_zero_svg, response_svg, stability_svg,
 };
 use crate::session::ClosedResponses;
 use crate::verdict::{self, UncertainZero};
 
-/// The names of all pictures, as files and in JSON; two need modes, the last two a closed loop.
-pub const KINDS: [&str; 7] = ["bode", "coherence", "nyquist", "pole_zero", "stability", "loop", "sensitivity"];
+/// The names of all pictures, as files and in JSON; two need modes, two a closed loop, the last a multisine with lines left out.
+pub const KINDS: [&str; 8] =
+    ["bode", "coherence", "nyquist", "pole_zero", "stability", "loop", "sensitivity", "linearity"];
 /// The part of a Nyquist plot around two close modes reaches so many of their distances to either side.
 const AROUND: f64 = 1.5;
 const HERTZ: f64 = 2.0 * std::f64::consts::PI;
@@ -45,6 +47,9 @@ pub fn pictures(run: &AnalysedRun<'_>) -> Result<Vec<Picture>, ReportError> {
     }
     if let Some(closed) = &run.analysis.closed {
         all.extend(around(run, closed)?);
+    }
+    if let Some(linearity) = &run.analysis.linearity {
+        all.push(levels(run, linearity)?);
     }
     Ok(all)
 }
@@ -126,6 +131,23 @@ fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2
             ],
         )?,
     ])
+}
+
+/// Output, noise and distortion, line by line.
+fn levels(run: &AnalysedRun<'_>, linearity: &Linearity) -> Result<Picture, ReportError> {
+    let harmonics = &linearity.harmonics;
+    let periods = harmonics.periods;
+    let lines = LevelLines { output: &harmonics.excited, odd: &harmonics.odd, even: &harmonics.even, periods };
+    Ok(Picture {
+        kind: "linearity",
+        heading: "Distortion and noise",
+        caption: format!(
+            "RMS of the displacement a line, of the mean of {periods} periods: at the lines that were excited, and at the odd and even \
+             ones that were left out, averaged over neighbours. Without distortion these lie on the noise of the mean. {}.",
+            linearity.whole.words()
+        ),
+        svg: levels_svg(&lines, &run.config.title, &run.subtitle())?,
+    })
 }
 
 /// Poles and zeros of the fit.

@@ -10,6 +10,7 @@ use crate::config::Config;
 use crate::excitation::{self, Excitation};
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::delay::{self, Delay};
+use crate::identify::linearity::Linearity;
 use crate::identify::{Block, BlockSettings, Frf, IdentifyError, Signals, blocks, response};
 use crate::plant::{self, Chain, Modal, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
@@ -75,6 +76,8 @@ pub struct Analysis {
     pub judged_up_to_rad_s: f64,
     /// The loop around the plant, of a recording under control.
     pub closed: Option<ClosedResponses>,
+    /// How linear the stage answered, of a multisine with lines left out.
+    pub linearity: Option<Linearity>,
 }
 
 /// Analyses a recording made with `config`: of an excitation, or of a closed loop whose reference was swept.
@@ -83,12 +86,12 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     let Ran { loop_signals, filled_ticks } = ran(recording, config.servo.rate_hz, closed)?;
     let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
     let band_hz = (start_hz.min(stop_hz), start_hz.max(stop_hz));
-    let seen = if closed {
-        closed_loop::seen(&loop_signals, band_hz, recording, config)?
+    let (seen, linearity) = if closed {
+        (closed_loop::seen(&loop_signals, band_hz, recording, config)?, None)
     } else {
         open_loop(loop_signals.signals, band_hz, config)?
     };
-    shown(seen, config, filled_ticks)
+    Ok(Analysis { linearity, ..shown(seen, config, filled_ticks)? })
 }
 
 /// A response in both its forms.
@@ -98,15 +101,19 @@ pub(super) struct Seen {
     pub(super) closed: Option<ClosedResponses>,
 }
 
-fn open_loop(signals: Signals, band_hz: (f64, f64), config: &Config) -> Result<Seen, AnalysisError> {
-    let (frf, blocks) = match taken(signals, &excitation::of(config).pattern(), band_hz)? {
-        Taken::Lines(frf, blocks) => (frf, blocks),
+fn open_loop(
+    signals: Signals,
+    band_hz: (f64, f64),
+    config: &Config,
+) -> Result<(Seen, Option<Linearity>), AnalysisError> {
+    let (frf, blocks, linearity) = match taken(signals, &excitation::of(config).pattern(), band_hz)? {
+        Taken::Lines(frf, blocks, linearity) => (frf, blocks, linearity),
         Taken::Record(signals) => {
             let frf = response(&signals, band_hz, &config.identify)?;
-            (frf, blocks(&signals, band_hz, &BlockSettings::from(&config.identify))?)
+            (frf, blocks(&signals, band_hz, &BlockSettings::from(&config.identify))?, None)
         }
     };
-    Ok(Seen { frf, blocks, closed: None })
+    Ok((Seen { frf, blocks, closed: None }, linearity))
 }
 
 /// What a response shows beside the model.
@@ -129,6 +136,7 @@ fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, Ana
         verdict,
         judged_up_to_rad_s: last_rad_s,
         closed,
+        linearity: None,
     })
 }
 

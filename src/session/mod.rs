@@ -8,6 +8,7 @@
 //! tokio never stands in the loop's way: it watches counters, signals and the recorder's health, and talks to the loop
 //! through the ring of orders alone.
 
+mod amplitudes;
 mod analysis;
 mod closed_loop;
 mod foreign;
@@ -21,6 +22,7 @@ mod run;
 mod stop;
 mod swept;
 
+pub use amplitudes::{ModeOverAmplitude, over_amplitude};
 pub use analysis::{Analysis, AnalysisError, analyse};
 pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};
 pub use foreign::{ForeignAnalysis, analyse_signals};

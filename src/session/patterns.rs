@@ -4,13 +4,15 @@
 //! |---|---|
 //! | from rest to rest, once | the whole record, as configured |
 //! | from rest to rest, repeated | the mean of the repetitions, tick by tick, as one record: the same signal with less noise |
-//! | periodic | each line from the periods after the settled ones, the noise from their scatter |
+//! | periodic | each line from the periods after the settled ones, the noise from their scatter, and, where lines were left out, odd distortion as a noise of its own |
 //! | one sine after the other | each sine from its blocks, likewise |
 //!
 //! The mean of repetitions loses nothing, as all have the same input; and unlike their scatter, which takes five of them to
 //! say anything, the noise of the mean is seen among its neighbouring bins from two on.
 
 use crate::excitation::{Pattern, Window};
+use crate::identify::harmonics::harmonics;
+use crate::identify::linearity::Linearity;
 use crate::identify::periodic::{self, Periods, Repetition};
 use crate::identify::{Block, Frf, IdentifyError, Signals};
 
@@ -21,8 +23,8 @@ const NEIGHBOURS: usize = 4;
 pub(super) enum Taken {
     /// A record from rest to rest.
     Record(Signals),
-    /// A response at single frequencies.
-    Lines(Frf, Vec<Block>),
+    /// A response at single frequencies; how linear it is, where lines between were left out.
+    Lines(Frf, Vec<Block>, Option<Linearity>),
 }
 
 /// Takes a run apart.
@@ -34,7 +36,9 @@ pub(super) fn taken(signals: Signals, pattern: &Pattern, band_hz: (f64, f64)) ->
             let whole = part(&signals, *start, (skip + periods) * period);
             let repetition = Repetition { period: *period, skip: *skip };
             let Periods { frf, blocks, .. } = periodic::estimate(&whole, band_hz, repetition)?;
-            Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks)))
+            let linearity = harmonics(&whole, band_hz, repetition)?.map(Linearity::of);
+            let blocks = linearity.as_ref().map_or_else(|| blocks.clone(), |l| l.with_odd_distortion(&blocks));
+            Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks), linearity))
         }
         Pattern::Stepped(windows) => stepped(&signals, windows, band_hz),
     }
@@ -90,7 +94,7 @@ fn stepped(signals: &Signals, windows: &[Window], (low_hz, high_hz): (f64, f64))
     if blocks.is_empty() {
         return Err(IdentifyError::NotExcited { low_hz, high_hz });
     }
-    Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks)))
+    Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks), None))
 }
 
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {

@@ -1,0 +1,229 @@
+//! `bench linearity`: the same multisine at several amplitudes.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::analysis_output::{Made, make_of};
+use super::chirp::{BandOptions, check};
+use super::chirp_plan::Expected;
+use super::modal_output::{ModeJson, mode};
+use super::options::{BenchOptions, print_json, print_text};
+use super::run_options::{RunOptions, RunReport, finish};
+use super::table::table;
+use super::{CliError, Outcome};
+use crate::config::{Config, Purpose};
+use crate::excitation;
+use crate::fit::{Estimate, FittedMode, SIGMAS_95};
+use crate::recording::Recording;
+use crate::report::number::interval;
+use crate::session::{ModeOverAmplitude, Plan, analyse, over_amplitude, unless_stopped};
+
+/// Odd lines, one in four left out.
+const LINES: [&str; 2] = ["excitation.kind=\"multisine\"", "multisine.lines=\"odd_random\""];
+/// Amplitudes at most.
+const MOST: usize = 10;
+
+/// Which bench, in which band, and with which amplitudes.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    bench: BenchOptions,
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    band: BandOptions,
+    /// Amplitudes as ratios of the planned one, one run each
+    #[arg(
+        long,
+        value_name = "RATIO,RATIO,...",
+        value_delimiter = ',',
+        default_value = "0.25,0.5,1",
+        allow_hyphen_values = true
+    )]
+    scales: Vec<f64>,
+}
+
+impl Args {
+    /// The ratios, rising.
+    fn scales(&self) -> Result<Vec<f64>, CliError> {
+        let mut scales = self.scales.clone();
+        scales.sort_by(f64::total_cmp);
+        let sound = scales.iter().all(|scale| scale.is_finite() && *scale > 0.0);
+        let different = scales.windows(2).all(|pair| pair[0] < pair[1]);
+        if sound && different && (2..=MOST).contains(&scales.len()) {
+            return Ok(scales);
+        }
+        Err(CliError::Usage(format!(
+            "--scales {:?}: two to {MOST} different ratios above 0 are needed, such as 0.5,1,2",
+            self.scales
+        )))
+    }
+
+    /// The settings of each run.
+    fn configs(&self) -> Result<Vec<(f64, Config)>, CliError> {
+        let sets: Vec<String> = LINES.map(String::from).into_iter().chain(self.band.sets()).collect();
+        let planned = self.band.shaped(self.bench.load(Purpose::Chirp, &sets)?)?;
+        let scaled = |scale: f64| {
+            let mut config = planned.clone();
+            config.chirp.amplitude.iter_mut().for_each(|point| point.current_a *= scale);
+            (scale, config)
+        };
+        Ok(self.scales()?.into_iter().map(scaled).collect())
+    }
+}
+
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report {
+    scales: Vec<f64>,
+    /// One an amplitude, as `bench chirp` tells it.
+    runs: Vec<RunMade>,
+    /// The modes of the smallest amplitude in all runs.
+    modes: Vec<ModeMade>,
+    /// Whether any figure of any mode differs from that at the smallest amplitude by more than its errors explain; null without modes.
+    shifted: Option<bool>,
+    why: String,
+}
+
+#[derive(Debug, Serialize)]
+struct RunMade {
+    scale: f64,
+    expected: Expected,
+    #[serde(flatten)]
+    run: RunReport,
+    #[serde(flatten)]
+    made: Made,
+}
+
+#[derive(Debug, Serialize)]
+struct ModeMade {
+    /// In the order of the runs; null where it is not seen.
+    by_run: Vec<Option<ModeJson>>,
+    frequency_shifts: bool,
+    damping_shifts: bool,
+    residue_shifts: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let configs = args.configs()?;
+    let expected = configs.iter().map(|(scale, config)| expected(*scale, config)).collect::<Result<Vec<_>, _>>()?;
+    let (mut runs, mut modes, mut outcome) = (Vec::new(), Vec::new(), Outcome::Done);
+    for ((scale, config), expected) in configs.iter().zip(expected) {
+        let (made, seen) = one(args, *scale, config, expected)?;
+        let ended = if made.made.is_stopped() { Outcome::Failed } else { made.run.exit() };
+        outcome = if outcome == Outcome::Done { ended } else { outcome };
+        runs.push(made);
+        modes.push(seen);
+        if ended == Outcome::Failed {
+            outcome = ended;
+            break;
+        }
+    }
+    let report = report(runs, &over_amplitude(&modes));
+    if args.bench.json {
+        print_json(&report)?;
+    } else {
+        print_text(&text(&report, &configs, &over_amplitude(&modes)))?;
+    }
+    Ok(outcome)
+}
+
+/// What a run would do; refused where it crosses an interlock.
+fn expected(scale: f64, config: &Config) -> Result<Expected, CliError> {
+    let refused =
+        |error: CliError| CliError::Usage(format!("at {scale} of the planned amplitude: {error}; nothing moved"));
+    Ok(Expected::of(&check(config).map_err(refused)?))
+}
+
+/// One amplitude: recorded, analysed, its report in its recording.
+fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<(RunMade, Vec<FittedMode>), CliError> {
+    let mut run = args.run.run(&Plan::chirp(config.clone()), "linearity")?;
+    let totals = run.totals()?;
+    let told = RunReport::new(&run, &totals);
+    let (made, modes) = match told.outcome {
+        "completed" => analysed(&run.path, config)?,
+        _ => (Made::nothing("the run did not come to its end"), Vec::new()),
+    };
+    let made = RunMade { scale, expected, run: told, made };
+    finish(run, &made)?;
+    Ok((made, modes))
+}
+
+/// The analysis, which a person may stop, and the modes.
+fn analysed(path: &Path, config: &Config) -> Result<(Made, Vec<FittedMode>), CliError> {
+    let (path, config) = (path.to_path_buf(), config.clone());
+    let work = move || -> Result<(Made, Vec<FittedMode>), CliError> {
+        let recording = Recording::open(&path)?;
+        let analysis = analyse(&recording, &config)?;
+        let modes = analysis.fit.as_ref().map_or(Vec::new(), |fit| fit.modes());
+        Ok((make_of(&analysis, &recording, &config)?, modes))
+    };
+    let made = unless_stopped(work).map_err(|error| CliError::Failed(error.to_string()))?;
+    made.unwrap_or_else(|| Ok((Made::stopped(), Vec::new())))
+}
+
+fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
+    let compared = modes.iter().any(|mode| mode.by_run.iter().flatten().count() > 1);
+    let shifted = compared.then(|| modes.iter().any(ModeOverAmplitude::shifts));
+    let why = match shifted {
+        None => "no mode is seen at two amplitudes: take more periods (multisine.periods) or larger amplitudes".into(),
+        Some(false) => "no mode shifts with amplitude beyond what its errors explain".into(),
+        Some(true) => format!("with amplitude shift beyond what their errors explain: {}", shifting(modes)),
+    };
+    let mode = |over: &ModeOverAmplitude| ModeMade {
+        by_run: over.by_run.iter().map(|seen| seen.as_ref().map(mode)).collect(),
+        frequency_shifts: over.frequency_shifts,
+        damping_shifts: over.damping_shifts,
+        residue_shifts: over.residue_shifts,
+    };
+    let scales = runs.iter().map(|run| run.scale).collect();
+    Report { scales, runs, modes: modes.iter().map(mode).collect(), shifted, why }
+}
+
+/// Which figures of which modes shift.
+fn shifting(modes: &[ModeOverAmplitude]) -> String {
+    let of = |mode: &ModeOverAmplitude| {
+        let figures =
+            [("frequency", mode.frequency_shifts), ("damping", mode.damping_shifts), ("residue", mode.residue_shifts)];
+        let names: Vec<&str> = figures.into_iter().filter(|(_, shifts)| *shifts).map(|(name, _)| name).collect();
+        let at = mode.by_run.iter().flatten().next()?.frequency_hz().value;
+        (!names.is_empty()).then(|| format!("{} of the mode at {at:.2} Hz", names.join(" and ")))
+    };
+    modes.iter().filter_map(of).collect::<Vec<_>>().join(", ")
+}
+
+fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude]) -> String {
+    let run = |(run, (_, config)): (&RunMade, &(f64, Config))| {
+        let linearity = run.made.linearity.as_ref().map_or_else(|| run.made.text(), |linearity| linearity.text());
+        let page = run.made.report.as_ref().map_or(String::new(), |path| format!("  report     {path}\n"));
+        format!(
+            "{} of the amplitude; expected travel {:.0} um, current {:.3} A\n{}{page}{linearity}\n",
+            run.scale,
+            run.expected.travel_m * 1e6,
+            run.expected.current_a,
+            run.run.text(config)
+        )
+    };
+    let words = configs.first().map_or(String::new(), |(_, config)| excitation::words(config));
+    let runs: String = report.runs.iter().zip(configs).map(run).collect();
+    format!("{words}\n\n{runs}{}\nmodes over amplitude (* shifts): {}\n", mode_table(&report.scales, modes), report.why)
+}
+
+/// A row a mode and amplitude; intervals hold the truth with 95 %.
+fn mode_table(scales: &[f64], modes: &[ModeOverAmplitude]) -> String {
+    let figure = |e: Estimate| interval(e.value, SIGMAS_95 * e.sigma);
+    let mark = |text: String, shifts: bool| if shifts { text + " *" } else { text };
+    let row = |over: &ModeOverAmplitude, (scale, seen): (&f64, &Option<FittedMode>)| match seen {
+        None => [scale.to_string(), "not seen".into(), String::new(), String::new()].to_vec(),
+        Some(mode) => vec![
+            scale.to_string(),
+            mark(figure(mode.frequency_hz()), over.frequency_shifts),
+            mark(figure(mode.damping_ratio), over.damping_shifts),
+            mark(figure(mode.residue_per_kg), over.residue_shifts),
+        ],
+    };
+    let rows: Vec<Vec<String>> =
+        modes.iter().flat_map(|over| scales.iter().zip(&over.by_run).map(move |seen| row(over, seen))).collect();
+    table(&["amplitude", "mode Hz", "damping", "residue 1/kg"], &rows)
+}
