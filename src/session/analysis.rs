@@ -107,7 +107,7 @@ fn open_loop(
     config: &Config,
 ) -> Result<(Seen, Option<Linearity>), AnalysisError> {
     let (frf, blocks, linearity) = match taken(signals, &excitation::of(config).pattern(), band_hz)? {
-        Taken::Lines(frf, blocks, linearity) => (frf, blocks, linearity),
+        Taken::Lines(frf, blocks, linearity) => (frf, blocks, linearity.map(|boxed| *boxed)),
         Taken::Record(signals) => {
             let frf = response(&signals, band_hz, &config.identify)?;
             (frf, blocks(&signals, band_hz, &BlockSettings::from(&config.identify))?, None)

@@ -24,7 +24,7 @@ pub(super) enum Taken {
     /// A record from rest to rest.
     Record(Signals),
     /// A response at single frequencies; how linear it is, where lines between were left out.
-    Lines(Frf, Vec<Block>, Option<Linearity>),
+    Lines(Frf, Vec<Block>, Option<Box<Linearity>>),
 }
 
 /// Takes a run apart.
@@ -36,7 +36,7 @@ pub(super) fn taken(signals: Signals, pattern: &Pattern, band_hz: (f64, f64)) ->
             let whole = part(&signals, *start, (skip + periods) * period);
             let repetition = Repetition { period: *period, skip: *skip };
             let Periods { frf, blocks, .. } = periodic::estimate(&whole, band_hz, repetition)?;
-            let linearity = harmonics(&whole, band_hz, repetition)?.map(Linearity::of);
+            let linearity = harmonics(&whole, band_hz, repetition)?.map(|lines| Box::new(Linearity::of(lines)));
             let blocks = linearity.as_ref().map_or_else(|| blocks.clone(), |l| l.with_odd_distortion(&blocks));
             Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks), linearity))
         }

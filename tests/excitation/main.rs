@@ -1,6 +1,7 @@
 //! Whatever excites the stage, it shows the same stage; and what a plan says, the run does.
 mod averages;
 mod identified;
+mod linearity;
 mod plans;
 #[path = "../thesis/program.rs"]
 mod program;
