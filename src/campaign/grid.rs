@@ -7,8 +7,8 @@ use crate::config::{Config, PlantSettings, Sr4dofSettings, recheck};
 
 /// Points, at most: each takes a chirp of minutes.
 const MOST: usize = 10_000;
-/// Masses are put on in such steps (section 5.1.2), in kilograms.
-const MASS_STEP_KG: f64 = 0.0005;
+/// Masses are put on in such steps (section 5.2.1), in kilograms.
+pub(super) const MASS_STEP_KG: f64 = 0.0005;
 /// Seeds that a configuration may have.
 const SEEDS: u64 = 1 << 63;
 

@@ -13,6 +13,7 @@
 
 mod answer;
 mod grid;
+mod load;
 mod offset;
 mod picture;
 mod recommend;
@@ -22,6 +23,7 @@ mod work;
 
 pub use answer::{Answer, AnswerError, Told};
 pub use grid::{Grid, Place};
+pub use load::Load;
 pub use offset::{Offset, Said, Step, contradicted, offset};
 pub use picture::{PictureError, picture};
 pub use recommend::{Recommendation, Tolerances, recommend};

@@ -93,7 +93,7 @@ pub fn load(source: &Source) -> Result<Config, ConfigError> {
 }
 
 /// Tables that recordings of earlier versions lack, which ran a chirp: they are those of the default profile.
-const LATER: [&str; 5] = ["excitation", "multisine", "stepped_sine", "prbs", "shape"];
+const LATER: [&str; 6] = ["excitation", "multisine", "stepped_sine", "prbs", "shape", "campaign"];
 
 /// The configuration that travels with a recording: whole, over nothing but the tables that are newer than it may be.
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {

@@ -12,6 +12,7 @@
 //! The types are the only description: the schema (`bench config schema`), the ranges that are enforced and the
 //! documentation of each key come from them; the values come from `bench-config/stage.toml`.
 
+mod campaign;
 mod check;
 mod devices;
 mod excitation;
@@ -24,6 +25,7 @@ pub mod quantity;
 mod relations;
 mod settings;
 
+pub use campaign::*;
 pub(crate) use check::nearest;
 pub use devices::*;
 pub use excitation::*;

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::campaign::CampaignSettings;
 use super::devices::{AmplifierDevice, ProbeDevice};
 use super::excitation::{ExcitationSettings, MultisineSettings, PrbsSettings, ShapeSettings, SteppedSineSettings};
 use super::plant::PlantSettings;
@@ -49,6 +50,8 @@ pub struct Config {
     pub calibrate: CalibrateSettings,
     /// The calibration that runs use.
     pub calibration: CalibrationSettings,
+    /// How a person loads the stage between the points of a campaign.
+    pub campaign: CampaignSettings,
 }
 
 /// The real-time loop.

@@ -42,6 +42,7 @@ pub use modal::{Modal, Mode, Sign};
 pub use port::Port;
 pub(crate) use quadratic::{Load, Quadratic, QuadraticState};
 pub use sampled::{Block, Motion, Sampled};
+pub use sr4dof::holding_force_n;
 pub use structure::Structure;
 
 use crate::config::PlantSettings;

@@ -48,7 +48,17 @@ pub(crate) fn stages(s: &Sr4dofSettings) -> [[[f64; 4]; 2]; 5] {
     ]
 }
 
-/// The same with C = 0, whatever the damping of the settings.
+/// The force in Y on the motion stage that holds the operating point: F = k Y1o, k of one parallelogram.
+///
+/// Of the statics with the constraints of Eq. (2-1), not linearised: the secondary stages rest where each of their
+/// parallelograms takes half, y2 = y3 = Y1o/2. There both shorten alike, c (y1 - y2)^2 = c y2^2, so that x4 = x5 = x1: no bearing
+/// in X is strained, the stage rests at **x1 = 0 whatever the load**, and V = 4 k (Y1o/2)^2/2 = k Y1o^2/2. The static compliance
+/// in X, 1/(k4 + k5), knows nothing of it either. So the probe does not see the load while the stage rests: modes u and v do.
+pub fn holding_force_n(s: &Sr4dofSettings) -> f64 {
+    Beam::from(s).parallelogram_n_per_m() * s.operating_point_m
+}
+
+/// [`structure`] with C = 0, whatever the damping of the settings.
 pub(crate) fn undamped(s: &Sr4dofSettings) -> Structure {
     let m3 = s.secondary_stage_mass_kg;
     let k = Beam::from(s).parallelogram_n_per_m();

@@ -5,3 +5,4 @@ mod program;
 
 mod answers;
 mod interrupted;
+mod loads;
