@@ -35,6 +35,7 @@
 //! | what the simulated stage does | [`sim`] |
 //! | the devices that act for a rehearsal, and their faults | [`acting`] |
 //! | a grid of chirps, and what all verdicts together say of the stage | [`campaign`] |
+//! | what a person puts on for a point, and how that is checked | `campaign/load.rs`, `campaign/check.rs`, asked for in `campaign/attended.rs` |
 //! | how a frequency response is estimated | [`identify`] |
 //! | noise told from geometry, and modes over amplitude | [`identify::linearity`], `session/amplitudes.rs`, `cli/linearity.rs` |
 //! | a plant identified under control | [`identify::joint`], `session/closed_loop.rs` |

@@ -80,7 +80,12 @@ impl Grid {
 
 /// The settings of the one model that has operating point and asymmetry.
 pub(super) fn settings(config: &Config) -> Result<&Sr4dofSettings, CampaignError> {
-    match &config.plant {
+    of_plant(&config.plant)
+}
+
+/// The same of a model by itself.
+pub(super) fn of_plant(plant: &PlantSettings) -> Result<&Sr4dofSettings, CampaignError> {
+    match plant {
         PlantSettings::Sr4dof(settings) => Ok(settings),
         other => Err(CampaignError::Grid(format!(
             "a campaign is over operating point and mass asymmetry, which the model `{}` does not have both; take one of \

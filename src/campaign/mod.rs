@@ -9,25 +9,38 @@
 //!                                                                       picture: dots over the map <-----+
 //! ```
 //!
+//! On devices a person stands between Store and Point: [`Load`] says what to put on, [`Attended`] asks for it and checks it
+//! (`check.rs`).
+//!
 //! Operating points are ratios Y1o/L, asymmetries m2/m3 - 1 as intended: what the stage has beside that is the offset.
 
 mod answer;
+mod attended;
+mod check;
 mod grid;
 mod load;
+mod measured;
 mod offset;
+mod order;
 mod picture;
 mod recommend;
 mod region;
+mod rest;
 mod store;
 mod work;
 
 pub use answer::{Answer, AnswerError, Told};
+pub use attended::{Attended, Person, Question, Reply, Stage};
+pub use check::{Finding, LengthCheck, ModeCheck, PutOn};
 pub use grid::{Grid, Place};
 pub use load::Load;
+pub use measured::measured;
 pub use offset::{Offset, Said, Step, contradicted, offset};
+pub use order::order;
 pub use picture::{PictureError, picture};
 pub use recommend::{Recommendation, Tolerances, recommend};
 pub use region::Region;
+pub use rest::Rest;
 pub use store::{Found, Point, Store};
 pub use work::work;
 
@@ -54,6 +67,14 @@ pub enum CampaignError {
         /// The file.
         path: String,
         /// What was found.
+        why: String,
+    },
+    /// A quiet run that says nothing.
+    #[error("{recording} does not tell where the stage rests: {why}; `bench doctor` looks at the probe")]
+    Rest {
+        /// The run.
+        recording: String,
+        /// What was missing.
         why: String,
     },
     /// A file that cannot be written or read.

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{CampaignError, Grid, Place};
+use super::{CampaignError, Grid, Place, PutOn};
 use crate::config::Config;
 use crate::kept::write_whole;
 use crate::study::differences;
@@ -38,6 +38,9 @@ pub struct Point {
     pub zeros_rad_s: Vec<[f64; 2]>,
     /// Equal for two runs whose loops saw and did the same, bit for bit.
     pub loop_digest: String,
+    /// What a person put on for it, and how that was checked; none on the simulated stage.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub put_on: Option<PutOn>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]

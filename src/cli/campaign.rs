@@ -1,23 +1,23 @@
-//! `bench campaign`: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2).
+//! `bench campaign`: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2). On devices a
+//! person puts on what each point needs.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use super::campaign_attended::OnDevices;
 use super::campaign_output::Report;
 use super::chirp::check;
 use super::options::{BenchOptions, print_json, print_text};
 use super::progress::Progress;
 use super::spaced::Spaced;
 use super::{CliError, Outcome};
-use crate::campaign::{Answer, Found, Grid, Place, Point, Store, Tolerances, picture, work};
+use crate::campaign::{Answer, Found, Grid, Place, Point, Store, Tolerances, measured, order, picture, work};
 use crate::config::{Config, Purpose, profiles};
 use crate::devices;
-use crate::fit::FittedMode;
 use crate::kept::write_whole;
-use crate::recording::Recording;
 use crate::rt::thread::Pace;
-use crate::session::{self, Analysis, AnalysisError, Plan, Run, analyse, stoppable};
-use crate::verdict::{Cnmp, Verdict};
+use crate::session::{self, Plan, Run, stoppable};
 
 /// Section 5.2.2 was identified at 1 kHz; the sweep has to stay below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
@@ -39,7 +39,7 @@ pub(super) struct Args {
     /// Run on the simulated stage, with the rates, delays and steps of the configured devices
     #[arg(long)]
     simulate: bool,
-    /// Keep the recording of each point as well, some 9 MB
+    /// Keep the recording of each chirp as well, some 9 MB
     #[arg(long)]
     keep_recordings: bool,
     /// How exactly an asymmetry can be put on, for the recommendation [default: half a step of 0.5 g]
@@ -64,7 +64,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         eprintln!("bench: {} of {} points are done already", done.len(), done.len() + missing.len());
     }
     let bench = Bench { config: &config, grid: &grid, keep: args.keep_recordings };
-    let worked = stoppable(|stop| fill(&bench, &store, &missing, &mut done, threads(args), stop));
+    let worked = stoppable(|stop| match attended(args, &config) {
+        true => {
+            let attended = OnDevices { bench: &bench, store: &store, out: &args.out, done: &mut done };
+            attended.go(&order(&grid, &missing), tolerances.operating_point, stop)
+        }
+        false => fill(&bench, &store, &missing, &mut done, threads(args), stop),
+    });
     worked.map_err(|error| CliError::Failed(error.to_string()))??;
     done.sort_by_key(|(place, _)| *place);
     let all = grid.places().count();
@@ -119,7 +125,7 @@ fn draw(args: &Args, config: &Config, answer: &Answer<'_>) -> Result<PathBuf, Cl
     Ok(path)
 }
 
-/// The configuration of the campaign: of the simulated stage, without what the grid varies.
+/// The configuration of the campaign, without what the grid varies.
 fn config(args: &Args) -> Result<Config, CliError> {
     let usage = |what: &str| Err(CliError::Usage(what.into()));
     if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
@@ -134,19 +140,24 @@ fn config(args: &Args) -> Result<Config, CliError> {
         bench.sets.splice(0..0, RATE.map(String::from));
     }
     let config = bench.load(Purpose::Chirp, &[])?;
-    if !args.simulate && !devices::is_simulated(&config) {
+    if attended(args, &config) && !std::io::stdin().is_terminal() {
         return usage(
-            "the configuration names devices: between the points of a campaign a person would have to set the operating point \
-             and put masses on, which this version does not ask for; add --simulate, or run `bench chirp --operating-point Y \
-             --asymmetry D` at each point",
+            "the configuration names devices: between the points of a campaign a person is asked for the weight and the masses \
+             to put on, and standard input is no terminal; start it in one, or add --simulate, or run `bench chirp \
+             --operating-point Y --asymmetry D` at each point",
         );
     }
-    if config.calibration.file.is_some() {
+    if !attended(args, &config) && config.calibration.file.is_some() {
         return usage(
             "`calibration.file` is set, but the simulated stage of a campaign needs no correction; leave it out",
         );
     }
     Ok(config)
+}
+
+/// Whether a person loads the stage.
+fn attended(args: &Args, config: &Config) -> bool {
+    !args.simulate && !devices::is_simulated(config)
 }
 
 fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, CliError> {
@@ -169,24 +180,36 @@ fn threads(args: &Args) -> usize {
     args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
 }
 
-/// The simulated stage at any point of a grid.
-struct Bench<'a> {
-    config: &'a Config,
-    grid: &'a Grid,
-    keep: bool,
+/// The stage at any point of a grid.
+pub(super) struct Bench<'a> {
+    pub config: &'a Config,
+    pub grid: &'a Grid,
+    pub keep: bool,
 }
 
 impl Bench<'_> {
-    /// A chirp at a point, checked, run and analysed as `bench chirp` does it; none where a person stopped the run.
+    /// A chirp on the simulated stage at a point.
     fn measure(&self, place: Place, folder: &Path) -> Result<Option<Point>, CliError> {
+        self.measure_by(place, folder, |plan| {
+            let rig = devices::simulate(&plan.config)?.rig;
+            let run = session::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {});
+            run.map_err(|error| CliError::Failed(error.to_string()))
+        })
+    }
+
+    /// A chirp at a point, checked, run and analysed as `bench chirp` does it; none where a person stopped the run.
+    pub fn measure_by(
+        &self,
+        place: Place,
+        folder: &Path,
+        run: impl FnOnce(&Plan) -> Result<Run, CliError>,
+    ) -> Result<Option<Point>, CliError> {
         let config = self.grid.config(self.config, place)?;
         check(&config)?;
         // What a process left there that was killed has no result.
         remove(folder)?;
         let plan = Plan::chirp(config);
-        let rig = devices::simulate(&plan.config)?.rig;
-        let run = session::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {});
-        let run = run.map_err(|error| CliError::Failed(error.to_string()))?;
+        let run = run(&plan)?;
         let point = if run.stopped { None } else { Some(point(run, &plan.config)?) };
         if point.is_none() || !self.keep {
             remove(folder)?;
@@ -196,40 +219,13 @@ impl Bench<'_> {
 }
 
 /// What a run says; the recording is closed with that in it.
-fn point(mut run: Run, config: &Config) -> Result<Point, CliError> {
-    let loop_digest = format!("{:016x}", run.totals()?.loop_digest);
-    let analysis = match run.ended.trip {
-        Some((trip, tick)) => Err(format!("the run tripped at tick {tick}: {trip}; {}", trip.remedy())),
-        None => match analyse(&Recording::open(&run.path)?, config) {
-            Err(AnalysisError::Recording(error)) => return Err(error.into()),
-            other => other.map_err(|error| error.to_string()),
-        },
-    };
-    let point = match analysis {
-        Ok(analysis) => said(&analysis, loop_digest),
-        Err(why) => {
-            let (modes_hz, signs, zeros_rad_s) = Default::default();
-            Point { cnmp: Cnmp::Undecided, why, modes_hz, signs, zeros_rad_s, loop_digest }
-        }
-    };
+pub(super) fn point(mut run: Run, config: &Config) -> Result<Point, CliError> {
+    let point = measured(&mut run, config)?;
     super::run_options::finish(run, &point)?;
     Ok(point)
 }
 
-fn said(analysis: &Analysis, loop_digest: String) -> Point {
-    let Verdict { cnmp, why, zeros, .. } = analysis.verdict.clone();
-    let modes = analysis.fit.as_ref().map(|fit| fit.modes()).unwrap_or_default();
-    Point {
-        cnmp,
-        why,
-        modes_hz: modes.iter().map(|mode| mode.frequency_hz().value).collect(),
-        signs: modes.iter().map(FittedMode::sign).collect(),
-        zeros_rad_s: zeros.iter().map(|zero| [zero.s.re, zero.s.im]).collect(),
-        loop_digest,
-    }
-}
-
-fn remove(folder: &Path) -> Result<(), CliError> {
+pub(super) fn remove(folder: &Path) -> Result<(), CliError> {
     match std::fs::remove_dir_all(folder) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
             Err(CliError::Failed(format!("cannot remove {}: {e}; remove it and start again", folder.display())))

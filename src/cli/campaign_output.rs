@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::table::table;
-use crate::campaign::{Answer, Offset, Recommendation, Told, Tolerances};
+use crate::campaign::{Answer, Offset, PutOn, Recommendation, Told, Tolerances};
 use crate::verdict::Cnmp;
 
 /// The JSON object of the command.
@@ -35,6 +35,9 @@ struct PointJson {
     signs: String,
     zeros_rad_s: Vec<[f64; 2]>,
     loop_digest: String,
+    /// What a person put on, and how that was checked; not on the simulated stage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    put_on: Option<PutOn>,
 }
 
 #[derive(Debug, Serialize)]
@@ -174,6 +177,7 @@ fn point(told: &Told<'_>) -> PointJson {
         signs: point.signs,
         zeros_rad_s: point.zeros_rad_s,
         loop_digest: point.loop_digest,
+        put_on: point.put_on,
     }
 }
 

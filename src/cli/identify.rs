@@ -45,6 +45,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         let what = "is the recording of static steps, which `bench calibrate` analyses";
         return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
     }
+    if plan.kind == Kind::Quiet {
+        let what = "is a quiet run of `bench campaign`, in which no current flowed: it says where the stage rests";
+        return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
+    }
     let report = Report {
         recording: args.recording.display().to_string(),
         ticks: recording.tick_count(),

@@ -3,6 +3,7 @@
 mod analysis_output;
 mod calibrate;
 mod campaign;
+mod campaign_attended;
 mod campaign_output;
 mod chirp;
 mod chirp_plan;
@@ -23,6 +24,7 @@ mod modal_output;
 mod model;
 mod options;
 mod outcome;
+mod person;
 mod progress;
 mod recover;
 mod replay;

@@ -103,7 +103,7 @@ impl CliError {
                 Outcome::Usage
             }
             CliError::Table(_) => Outcome::Failed,
-            CliError::Campaign(CampaignError::File { .. }) => Outcome::Failed,
+            CliError::Campaign(CampaignError::File { .. } | CampaignError::Rest { .. }) => Outcome::Failed,
             CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
             _ => Outcome::Usage,
         }

@@ -40,6 +40,11 @@ fn pace(text: &str) -> Result<Pace, String> {
 }
 
 impl RunOptions {
+    /// On the configured devices, at their pace.
+    pub fn on_devices(out: PathBuf) -> RunOptions {
+        RunOptions { pace: None, simulate: false, clear_fault: false, out }
+    }
+
     fn is_simulated(&self, config: &Config) -> bool {
         self.simulate || devices::is_simulated(config)
     }

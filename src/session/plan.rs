@@ -5,7 +5,7 @@ use super::swept;
 use crate::config::{Config, ConfigError, ReferenceSettings, whole};
 use crate::control::{Controller, ControllerError, ControllerText};
 use crate::excitation::{
-    self, Chirp, Excitation, ExcitationError, Extremes, ReferenceError, Staircase, reference, reference_text,
+    self, Chirp, Excitation, ExcitationError, Extremes, Quiet, ReferenceError, Staircase, reference, reference_text,
 };
 use crate::plant::PlantError;
 use crate::recording::Recording;
@@ -29,6 +29,8 @@ pub enum Kind {
     Control,
     /// Static steps.
     Calibrate,
+    /// No current: where the stage rests.
+    Quiet,
 }
 
 impl Kind {
@@ -38,6 +40,7 @@ impl Kind {
             Kind::Chirp => "chirp",
             Kind::Control => "control",
             Kind::Calibrate => "calibrate",
+            Kind::Quiet => "quiet",
         }
     }
 }
@@ -98,6 +101,11 @@ impl Plan {
         Plan::excitation(Kind::Calibrate, config)
     }
 
+    /// No current.
+    pub fn quiet(config: Config) -> Plan {
+        Plan::excitation(Kind::Quiet, config)
+    }
+
     fn excitation(kind: Kind, config: Config) -> Plan {
         Plan { kind, config, controller: None, calibration: None, devices: Vec::new(), foreseen: None, reference: None }
     }
@@ -122,6 +130,7 @@ impl Plan {
             Some("chirp") => Kind::Chirp,
             Some("control") => Kind::Control,
             Some("calibrate") => Kind::Calibrate,
+            Some("quiet") => Kind::Quiet,
             _ => return Err(PlanError::Missing("kind of run")),
         };
         let controller = text(CONTROLLER).map(|text| ControllerText { name: config.control.controller.clone(), text });
@@ -135,6 +144,7 @@ impl Plan {
         match self.kind {
             Kind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
             Kind::Calibrate => return Ok(Box::new(Excite(Staircase::new(&config.calibrate, period_s)))),
+            Kind::Quiet => return Ok(Box::new(Excite(Quiet::new(&config.campaign, period_s)))),
             Kind::Control => {}
         }
         let text = self.controller.as_ref().ok_or(PlanError::Missing("controller"))?;

@@ -113,7 +113,7 @@ fn what_is_no_campaign_is_refused_and_left_as_it_is() {
         assert_eq!(bench.read("c/campaign.json"), text);
     }
     for (arguments, words) in [
-        ("campaign --config lab", "add --simulate"),
+        ("campaign --config lab", "standard input is no terminal; start it in one, or add --simulate"),
         ("campaign --config xy", "which the model `xy` does not have both"),
         ("campaign --asymmetry 2%", "fix what a campaign varies"),
         ("campaign --operating-points 0%:200%:3", "beyond the length of the beams"),

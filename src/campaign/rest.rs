@@ -1,0 +1,58 @@
+//! Where the stage rests without current.
+
+use serde::{Deserialize, Serialize};
+
+use super::CampaignError;
+use crate::identify::Moments;
+use crate::recording::Recording;
+use crate::rt::record::flag;
+use bench_hal::Validity;
+
+/// Stretches whose means are compared.
+const STRETCHES: usize = 10;
+/// Readings that a stretch has at least.
+const LEAST: usize = 2;
+
+/// The mean of the probe over the active part of a quiet run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rest {
+    /// The mean in metres.
+    pub mean_m: f64,
+    /// Standard deviation of the mean, from the scatter of the means of ten stretches: it has drift and slow noise in it.
+    pub sigma_m: f64,
+    /// The recording.
+    pub recording: String,
+}
+
+impl Rest {
+    /// Of a recording. Refuses one with fewer than twenty valid readings.
+    pub fn of(recording: &Recording, name: &str) -> Result<Rest, CampaignError> {
+        let failed = |why: String| CampaignError::Rest { recording: name.to_string(), why };
+        let mut readings = Vec::new();
+        for record in recording.ticks().map_err(|e| failed(e.to_string()))? {
+            let record = record.map_err(|e| failed(e.to_string()))?;
+            if record.flags & flag::ACTIVE != 0 && record.validity == Validity::Valid {
+                readings.push(record.position_m);
+            }
+        }
+        if readings.len() < STRETCHES * LEAST {
+            return Err(failed(format!("{} valid readings, {} are needed", readings.len(), STRETCHES * LEAST)));
+        }
+        let (mean_m, scatter_m) = scatter(&readings);
+        Ok(Rest { mean_m, sigma_m: scatter_m / (STRETCHES as f64).sqrt(), recording: name.to_string() })
+    }
+}
+
+/// Mean of all, and standard deviation of the means of the stretches.
+fn scatter(readings: &[f64]) -> (f64, f64) {
+    let (mut all, mut means) = (Moments::default(), Moments::default());
+    for stretch in readings.chunks_exact(readings.len() / STRETCHES) {
+        let mut within = Moments::default();
+        stretch.iter().for_each(|x| within.push(*x));
+        means.push(within.mean);
+    }
+    readings.iter().for_each(|x| all.push(*x));
+    // Ten means or more have one.
+    (all.mean, means.sigma().unwrap_or(0.0))
+}

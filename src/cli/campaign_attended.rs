@@ -1,0 +1,66 @@
+//! `bench campaign` on devices: quiet runs and chirps on the stage that a person loads.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use super::CliError;
+use super::campaign::Bench;
+use super::person::AtTerminal;
+use super::run_options::{RunOptions, finish};
+use crate::campaign::{Attended, CampaignError, Place, Point, Rest, Stage, Store};
+use crate::recording::Recording;
+use crate::session::Plan;
+
+/// The configured devices, and the folder of the campaign.
+pub(super) struct OnDevices<'a> {
+    pub bench: &'a Bench<'a>,
+    pub store: &'a Store,
+    pub out: &'a Path,
+    pub done: &'a mut Vec<(Place, Point)>,
+}
+
+impl OnDevices<'_> {
+    /// Goes through `places` with the person at the terminal.
+    pub fn go(self, places: &[Place], tolerance: f64, stop: &AtomicBool) -> Result<(), CliError> {
+        let (config, grid) = (self.bench.config, self.bench.grid);
+        let length_m = config.plant.beam_length_m();
+        let person = AtTerminal::new(stop, length_m)?;
+        Attended { config, grid, tolerance, person, stage: self }.go(places)
+    }
+}
+
+impl Stage for OnDevices<'_> {
+    type Error = CliError;
+
+    /// Recorded in the folder `rest` of the campaign; a trip is an error: nothing can be measured on such a bench.
+    fn rest(&mut self) -> Result<Option<Rest>, CliError> {
+        let plan = Plan::quiet(self.bench.config.clone());
+        let run = RunOptions::on_devices(self.out.join("rest")).run(&plan, "rest")?;
+        if let Some((trip, tick)) = run.ended.trip {
+            let what = format!("the bench tripped at rest, at tick {tick}: {trip}; {}", trip.remedy());
+            return Err(CliError::Failed(what));
+        }
+        if run.stopped {
+            return Ok(None);
+        }
+        let path = run.path.clone();
+        // All ticks are in the file once it is closed.
+        finish(run, &serde_json::json!({ "outcome": "completed" }))?;
+        let name = path.display().to_string();
+        let opened = Recording::open(&path);
+        let rest = opened.map_err(|e| CampaignError::Rest { recording: name.clone(), why: e.to_string() })?;
+        Ok(Some(Rest::of(&rest, &name)?))
+    }
+
+    fn measure(&mut self, place: Place) -> Result<Option<Point>, CliError> {
+        let folder = self.store.recordings(place);
+        let options = RunOptions::on_devices(folder.clone());
+        self.bench.measure_by(place, &folder, |plan| options.run(plan, "chirp"))
+    }
+
+    fn keep(&mut self, place: Place, point: &Point) -> Result<(), CliError> {
+        self.store.add(place, point)?;
+        self.done.push((place, point.clone()));
+        Ok(())
+    }
+}

@@ -1,0 +1,124 @@
+//! The person at the terminal: questions go to standard error, answers come from standard input.
+
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
+use super::CliError;
+use crate::campaign::{Person, Question, Reply};
+use crate::config::quantity::{self, Quantity};
+
+/// Ctrl-C is looked for so often while an answer is waited for.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Asks at the terminal. An end of input, or `stop` being set, is the answer `stop`.
+pub(super) struct AtTerminal<'a> {
+    stop: &'a AtomicBool,
+    beam_length_m: Option<f64>,
+    lines: Receiver<String>,
+}
+
+impl<'a> AtTerminal<'a> {
+    pub fn new(stop: &'a AtomicBool, beam_length_m: Option<f64>) -> Result<AtTerminal<'a>, CliError> {
+        let (tell, lines) = sync_channel(1);
+        // Ends with the input, or with the process: a read cannot be broken off.
+        let read = move || std::io::stdin().lines().map_while(Result::ok).try_for_each(|line| tell.send(line));
+        let thread = std::thread::Builder::new().name("bench-answers".into());
+        let started = thread.spawn(move || drop(read()));
+        started.map_err(|e| CliError::Failed(format!("cannot wait for answers: {e}; start it again")))?;
+        Ok(AtTerminal { stop, beam_length_m, lines })
+    }
+
+    /// A line; none at the end of input, or where the person stops the command.
+    fn line(&self) -> Option<String> {
+        while !self.stop.load(Ordering::Relaxed) {
+            match self.lines.recv_timeout(LOOK) {
+                Ok(line) => return Some(line),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
+        }
+        None
+    }
+}
+
+impl Person for AtTerminal<'_> {
+    fn ask(&mut self, question: &Question) -> Reply {
+        // What was typed during a run answers nothing.
+        while self.lines.try_recv().is_ok() {}
+        self.tell(&question.text);
+        loop {
+            eprint!("  {}: ", choices(question));
+            // An answer can be given all the same.
+            let _ = std::io::stderr().flush();
+            let Some(line) = self.line() else { return Reply::Stop };
+            match reply(&line, question, self.beam_length_m) {
+                Ok(reply) => return reply,
+                Err(why) => eprintln!("  {why}"),
+            }
+        }
+    }
+
+    fn tell(&mut self, text: &str) {
+        eprintln!("bench: {text}");
+    }
+}
+
+fn choices(question: &Question) -> String {
+    let choices = [
+        (true, "Enter when it is done"),
+        (question.may_read, "with the displacement in Y if you can read it, as 3.80mm"),
+        (question.may_confirm, "`right` if it is right all the same"),
+        (question.may_skip, "`skip` to leave the point out"),
+        (true, "`stop`"),
+    ];
+    choices.into_iter().filter(|(offered, _)| *offered).map(|(_, words)| words).collect::<Vec<_>>().join(", ")
+}
+
+/// An answer; why it is none.
+fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<Reply, String> {
+    let line = line.trim();
+    match line {
+        "" => return Ok(Reply::Done(None)),
+        "stop" => return Ok(Reply::Stop),
+        "skip" if question.may_skip => return Ok(Reply::Skip),
+        "right" if question.may_confirm => return Ok(Reply::Right),
+        _ => {}
+    }
+    let read = quantity::parse(line).ok().filter(|_| question.may_read);
+    let length_m = match read {
+        Some(Quantity::Metres(metres)) => Some(metres),
+        Some(Quantity::Ratio(ratio)) => beam_length_m.map(|length_m| ratio * length_m),
+        _ => None,
+    };
+    let read_m = length_m.filter(|metres| metres.is_finite());
+    read_m.map(|m| Reply::Done(Some(m))).ok_or_else(|| format!("`{line}` is no answer here; {}", choices(question)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(all: bool) -> Question {
+        Question { text: String::new(), may_read: all, may_confirm: all, may_skip: all }
+    }
+
+    #[test]
+    fn an_answer_is_taken_where_it_is_offered_and_nothing_else_is() {
+        let open = |line| reply(line, &question(true), Some(0.05));
+        let done = |m| Ok(Reply::Done(Some(m)));
+        assert_eq!(
+            [open(""), open(" "), open("stop")],
+            [Ok(Reply::Done(None)), Ok(Reply::Done(None)), Ok(Reply::Stop)]
+        );
+        assert_eq!([open("skip"), open(" right ")], [Ok(Reply::Skip), Ok(Reply::Right)]);
+        assert_eq!([open("3.5mm"), open("-2mm"), open("8%")], [done(0.0035), done(-0.002), done(0.004)]);
+        for line in ["3.8", "yes", "nan", "infmm", "skip it"] {
+            assert!(open(line).unwrap_err().contains("is no answer here; Enter when it is done"), "{line}");
+        }
+        for line in ["skip", "right", "3.5mm"] {
+            assert!(reply(line, &question(false), Some(0.05)).is_err(), "{line} is not offered");
+        }
+    }
+}
