@@ -3,6 +3,11 @@
 #[path = "../thesis/program.rs"]
 mod program;
 
+#[path = "../common/faulty_rig.rs"]
+#[allow(dead_code, reason = "each test binary takes what it needs")]
+mod faulty_rig;
+
 mod answers;
+mod attended;
 mod interrupted;
 mod loads;
