@@ -89,7 +89,7 @@ struct Known {
 }
 
 impl<P: Person, S: Stage> Attended<'_, P, S> {
-    /// Goes through `places` in their order (see [`super::order`]). Ends early where the person stops it; what is kept stays.
+    /// Goes through `places` in their order (see [`super::order()`]). Ends early where the person stops it; what is kept stays.
     pub fn go(&mut self, places: &[Place]) -> Result<(), S::Error> {
         if places.is_empty() {
             return Ok(());
