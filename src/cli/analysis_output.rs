@@ -20,6 +20,8 @@ use crate::session::{Analysis, AnalysisError, analyse};
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Made {
     frf_csv: Option<String>,
+    /// The same with the delay, measured as below, taken out of the phases.
+    frf_without_delay_csv: Option<String>,
     /// The Bode plot.
     plot: Option<String>,
     /// All pictures by name; `null` where the data carry none.
@@ -63,6 +65,9 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
 pub(super) fn make_of(analysis: &Analysis, recording: &Recording, config: &Config) -> Result<Made, CliError> {
     let csv_path = free(recording.path(), "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
+    let plain_path = free(recording.path(), "frf_without_delay", "csv");
+    let plain = analysis.frf.earlier(analysis.measured_delay_s());
+    csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
     let run = AnalysedRun { analysis, config, recording };
     let pictures = pictures(&run).map_err(|e| CliError::Failed(e.to_string()))?;
     let mut plots = no_plots();
@@ -75,6 +80,7 @@ pub(super) fn make_of(analysis: &Analysis, recording: &Recording, config: &Confi
     write_new(&report_path, &page(&run, &pictures))?;
     Ok(Made {
         frf_csv: Some(csv_path.display().to_string()),
+        frf_without_delay_csv: Some(plain_path.display().to_string()),
         plot: plots.get("bode").cloned().flatten(),
         plots,
         report: Some(report_path.display().to_string()),
@@ -95,6 +101,7 @@ impl Made {
     pub fn nothing(why: &str) -> Made {
         Made {
             frf_csv: None,
+            frf_without_delay_csv: None,
             plot: None,
             plots: no_plots(),
             report: None,
@@ -144,11 +151,12 @@ impl Made {
             _ => String::new(),
         };
         format!(
-            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{}{delay}{}{}  report     {report}\n{}",
+            "  response   {} ({} frequencies, median coherence {:.4}{filled})\n{}{delay}  without    {}, the same with that delay taken out of its phases\n{}{}  report     {report}\n{}",
             frf_csv,
             self.frequencies,
             coherence,
             self.closed.as_ref().map_or(String::new(), LoopMade::text),
+            self.frf_without_delay_csv.as_deref().unwrap_or_default(),
             self.linearity.as_ref().map_or(String::new(), LinearityMade::line),
             self.plots_text(),
             self.shown.text()

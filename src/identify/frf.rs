@@ -69,6 +69,13 @@ impl Frf {
         sorted.get(sorted.len() / 2).copied()
     }
 
+    /// The response as it would be `delay_s` earlier: H exp(j w delay).
+    pub fn earlier(&self, delay_s: f64) -> Frf {
+        let turned = |(f, h): (&f64, &Complex<f64>)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s);
+        let response = self.frequency_hz.iter().zip(&self.response).map(turned).collect();
+        Frf { response, ..self.clone() }
+    }
+
     /// Phase in radians, in (-pi, pi].
     pub fn phase_rad(&self, index: usize) -> f64 {
         wrapped_phase_rad(self.response[index])

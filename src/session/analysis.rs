@@ -140,6 +140,13 @@ fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, Ana
     })
 }
 
+impl Analysis {
+    /// From a command to the position that its reading shows, in seconds: by the configuration, and what the phases show beyond.
+    pub fn measured_delay_s(&self) -> f64 {
+        self.delay_s + self.beyond.map_or(0.0, |beyond| beyond.seconds)
+    }
+}
+
 /// What the fit says of CNMP zeros up to `up_to_rad_s`, beside the modes that the model has there.
 pub(super) fn judge(
     fit: &Result<ModalFit, FitError>,

@@ -82,3 +82,16 @@ fn a_file_of_other_columns_or_with_a_broken_row_is_refused_with_its_line() {
         assert!(error.contains("line 3") && error.contains(row), "{error}");
     }
 }
+
+/// A quarter of a turn at the first frequency.
+#[test]
+fn a_delay_taken_out_turns_phases_and_nothing_else() {
+    let late = frf(&[(0.0, -2e-4), (1e-4, 0.0)]);
+    let delay_s = 0.25 / late.frequency_hz[0];
+    let earlier = late.earlier(delay_s);
+    assert!((earlier.response[0] - Complex::new(2e-4, 0.0)).norm() < 1e-18);
+    let turns = late.frequency_hz[1] * delay_s;
+    let expected = late.response[1] * Complex::from_polar(1.0, std::f64::consts::TAU * turns);
+    assert!((earlier.response[1] - expected).norm() < 1e-18);
+    assert_eq!((earlier.magnitude_sigma, earlier.coherence), (late.magnitude_sigma, late.coherence));
+}
