@@ -36,7 +36,7 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
         ("control --reference step --amplitude 10m", &["is 10", "-1 to 1"]),
         ("control --reference sine --frequency 2500", &["2500 Hz", "half the servo rate"]),
         ("control --reference ramp --speed -1e-4", &["speed_m_per_s` is -0.0001"]),
-        ("control --reference hold --amplitude 5um", &["--amplitude", "step, ramp or sine"]),
+        ("control --reference hold --amplitude 5um", &["--amplitude", "step, ramp, sine or chirp"]),
         ("control --reference step --frequency 5", &["--frequency", "sine"]),
         ("control --speed 1e-5", &["--speed", "ramp"]),
         ("control --reference nosuch.csv", &["nosuch.csv", "No such file"]),
