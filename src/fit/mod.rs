@@ -12,6 +12,7 @@
 //! something, the errors grow with it.
 
 mod merged;
+mod normal;
 mod refine;
 mod response;
 mod search;

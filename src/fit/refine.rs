@@ -5,11 +5,15 @@
 //! chi^2 = sum over blocks of 2 |H_b - H(f_b)|^2 / v_b                    v_b = E|error|^2
 //! ```
 //!
-//! by Levenberg and Marquardt's steps in ln w, ln zeta, r, R, tau. With v known, chi^2 has its mean at 2 N less the number of
-//! parameters, and the inverse of J^T W J is their covariance.
+//! by Levenberg and Marquardt's steps in ln w, ln zeta and tau, after each of which r and R, in which H is linear, are solved
+//! for (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; L. Kaufman, BIT 15 (1975) 49): of modes closer than their
+//! widths only certain sums are well known, and steps in all parameters at once crawl along that valley. The damping
+//! follows what a step gains over what it promised (H. B. Nielsen, IMM-REP-1999-05, Technical University of Denmark). With v
+//! known, chi^2 has its mean at 2 N less the number of parameters, and the inverse of J^T W J is their covariance.
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
+use super::normal::Normal;
 use super::view::{View, slopes};
 use crate::identify::Block;
 use crate::zeros::Term;
@@ -18,6 +22,12 @@ use crate::zeros::Term;
 const STEPS: usize = 60;
 /// A step that would lower chi^2 by less is none: a hundredth of what noise does to one parameter.
 const NOTHING: f64 = 0.01;
+/// The damping of the first step, in coordinates of a unit diagonal.
+const FIRST_DAMPING: f64 = 1e-3;
+/// And that of any, at least.
+const LEAST_DAMPING: f64 = 1e-9;
+/// The damping falls at most to so much of itself in a step.
+const LOWERED: f64 = 0.1;
 /// ln w and ln zeta change at most so much in a step.
 const LARGEST: [f64; 2] = [0.02, 0.7];
 /// Bounds of a damping ratio.
@@ -49,6 +59,13 @@ pub(crate) enum Entry {
     Delay,
 }
 
+impl Entry {
+    /// Whether the model is linear in it.
+    fn is_linear(self) -> bool {
+        matches!(self, Entry::Residue(_) | Entry::Remainder)
+    }
+}
+
 impl Parameters {
     /// What is free, in the order of a covariance.
     pub(crate) fn entries(&self) -> Vec<Entry> {
@@ -58,6 +75,14 @@ impl Parameters {
         };
         let modes = (0..self.modes.len()).flat_map(of);
         modes.chain([Entry::Remainder, Entry::Delay]).collect()
+    }
+
+    /// These with the residues and R of `linear`, in this order.
+    fn with_linear(&self, linear: &DVector<f64>) -> Parameters {
+        let mut next = self.clone();
+        next.modes.iter_mut().zip(linear.iter()).for_each(|(mode, r)| mode.residue_per_kg = *r);
+        next.remainder_m_per_n = linear[self.modes.len()];
+        next
     }
 
     /// These, moved by a step in the coordinates of the fit; none that leaves what is possible.
@@ -94,19 +119,51 @@ pub(super) struct Seen {
 
 impl Seen {
     pub(super) fn of(parameters: &Parameters, view: &View<'_>, blocks: &[Block]) -> Seen {
+        let mut seen = Seen::parts_of(parameters, view, blocks);
+        seen.look(parameters, blocks);
+        seen
+    }
+
+    /// The same with the residues and R with which chi^2 is least, if the blocks tell them apart.
+    fn settled(parameters: Parameters, view: &View<'_>, blocks: &[Block]) -> (Parameters, Seen) {
+        let mut seen = Seen::parts_of(&parameters, view, blocks);
+        let settled = match seen.linear(blocks) {
+            Some(linear) => parameters.with_linear(&linear),
+            None => parameters,
+        };
+        seen.look(&settled, blocks);
+        (settled, seen)
+    }
+
+    fn parts_of(parameters: &Parameters, view: &View<'_>, blocks: &[Block]) -> Seen {
         let nodes = view.nodes(parameters.delay_s, blocks);
         let part = |m: &Term| view.mode((m.omega_rad_s, m.damping_ratio), &nodes);
-        let parts: Vec<_> = parameters.modes.iter().map(part).collect();
-        let constant = view.constant(&nodes);
-        let left: Vec<_> = (0..blocks.len())
-            .map(|b| {
-                let modes: Complex<f64> =
-                    parameters.modes.iter().zip(&parts).map(|(mode, part)| part[b] * mode.residue_per_kg).sum();
-                blocks[b].response - modes - constant[b] * parameters.remainder_m_per_n
-            })
-            .collect();
-        let chi2 = left.iter().zip(blocks).map(|(e, block)| 2.0 * e.norm_sqr() / block.variance).sum();
-        Seen { parts, constant, left, chi2 }
+        let parts = parameters.modes.iter().map(part).collect();
+        Seen { parts, constant: view.constant(&nodes), left: Vec::new(), chi2: f64::NAN }
+    }
+
+    /// What these parts, of the sizes of `parameters`, leave.
+    fn look(&mut self, parameters: &Parameters, blocks: &[Block]) {
+        let left = |(b, block): (usize, &Block)| {
+            let modes: Complex<f64> =
+                parameters.modes.iter().zip(&self.parts).map(|(mode, part)| part[b] * mode.residue_per_kg).sum();
+            block.response - modes - self.constant[b] * parameters.remainder_m_per_n
+        };
+        self.left = blocks.iter().enumerate().map(left).collect();
+        self.chi2 = self.left.iter().zip(blocks).map(|(e, block)| 2.0 * e.norm_sqr() / block.variance).sum();
+    }
+
+    /// The residues and R with which chi^2 is least: by normal equations in a unit diagonal, as an error of theirs is seen in
+    /// the chi^2 of the step, which is then none.
+    fn linear(&self, blocks: &[Block]) -> Option<DVector<f64>> {
+        let mut normal = Normal::of_size(self.parts.len() + 1);
+        let mut row = Vec::with_capacity(self.parts.len() + 1);
+        for (b, block) in blocks.iter().enumerate() {
+            row.clear();
+            row.extend(self.parts.iter().chain([&self.constant]).map(|part| part[b]));
+            normal.add(&row, block.response, (2.0 / block.variance).sqrt());
+        }
+        normal.solve(|_| 0.0)
     }
 
     /// How block `b` of the model changes with each parameter, in the order of [`Parameters::entries`].
@@ -127,26 +184,14 @@ impl Seen {
     }
 
     /// J^T W J and J^T W e.
-    fn normal(&self, parameters: &Parameters, blocks: &[Block]) -> (DMatrix<f64>, DVector<f64>) {
-        let n = parameters.entries().len();
-        let (mut square, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        let (mut row, mut scaled) = (Vec::with_capacity(n), vec![[0.0; 2]; n]);
+    fn normal(&self, parameters: &Parameters, blocks: &[Block]) -> Normal {
+        let mut normal = Normal::of_size(parameters.entries().len());
+        let mut row = Vec::with_capacity(normal.right.len());
         for (b, block) in blocks.iter().enumerate() {
-            let weight = (2.0 / block.variance).sqrt();
             self.slopes(parameters, b, block, &mut row);
-            scaled.iter_mut().zip(&row).for_each(|(scaled, slope)| *scaled = [slope.re * weight, slope.im * weight]);
-            let left = self.left[b] * weight;
-            for (i, [re, im]) in scaled.iter().enumerate() {
-                right[i] += re * left.re + im * left.im;
-                // Columns lie together: the lower triangle, column by column.
-                let column = &mut square.column_mut(i);
-                for (j, [other_re, other_im]) in scaled.iter().enumerate().skip(i) {
-                    column[j] += re * other_re + im * other_im;
-                }
-            }
+            normal.add(&row, self.left[b], (2.0 / block.variance).sqrt());
         }
-        square.fill_upper_triangle_with_lower_triangle();
-        (square, right)
+        normal
     }
 }
 
@@ -158,57 +203,58 @@ pub(super) fn refine(start: Parameters, view: &View<'_>, blocks: &[Block], coars
         return (start, seen);
     }
     let entries = start.entries();
-    let (mut best, mut damping) = (start, 1e-3);
-    let mut seen = Seen::of(&best, view, blocks);
+    let (mut best, mut seen) = Seen::settled(start, view, blocks);
+    let mut damping = Damping::first();
     let mut normal = seen.normal(&best, blocks);
     for _ in 0..STEPS {
-        let Some(step) = step(&normal, damping) else { break };
-        let next = best.moved(&entries, &step);
-        let there = Seen::of(&next, view, blocks);
-        let gained = seen.chi2 - there.chi2;
+        let Some(step) = normal.solve(|i| if entries[i].is_linear() { 0.0 } else { damping.now }) else { break };
+        let (next, there) = Seen::settled(best.moved(&entries, &step), view, blocks);
+        let (gained, promised) = (seen.chi2 - there.chi2, normal.promised(&step));
         if gained.is_finite() && gained >= 0.0 {
-            let done = gained < NOTHING + coarse * there.chi2 && damping < 1.0;
-            (best, seen, damping) = (next, there, (damping * 0.1f64).max(1e-9));
+            let done = gained < NOTHING + coarse * there.chi2 && damping.now < 1.0;
+            (best, seen) = (next, there);
             if done {
                 break;
             }
+            damping.lower(gained / promised);
             normal = seen.normal(&best, blocks);
-        } else if damping > 1e8 || normal.1.dot(&step) < NOTHING {
+        } else if damping.now > 1e8 || promised < NOTHING {
             break;
         } else {
-            damping *= 10.0;
+            damping.raise();
         }
     }
     (best, seen)
 }
 
-/// (A + damping diag A)^-1 b, in coordinates of a unit diagonal; nothing if A is not what it should be.
-fn step((square, right): &(DMatrix<f64>, DVector<f64>), damping: f64) -> Option<DVector<f64>> {
-    let (scale, scaled) = scaled(square)?;
-    let mut ridge = scaled;
-    for i in 0..ridge.nrows() {
-        ridge[(i, i)] += damping;
-    }
-    let solved = Cholesky::<f64, Dyn>::new(ridge)?.solve(&right.component_mul(&scale));
-    Some(solved.component_mul(&scale))
+/// What keeps a step short, in coordinates of a unit diagonal.
+struct Damping {
+    now: f64,
+    raised_by: f64,
 }
 
-/// 1/sqrt of the diagonal, and the matrix with a diagonal of 1.
-fn scaled(square: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let diagonal = square.diagonal();
-    if !diagonal.iter().all(|d| d.is_finite() && *d > 0.0) {
-        return None;
+impl Damping {
+    fn first() -> Self {
+        Self { now: FIRST_DAMPING, raised_by: 2.0 }
     }
-    let scale = diagonal.map(|d| 1.0 / d.sqrt());
-    let scaled = DMatrix::from_fn(square.nrows(), square.ncols(), |i, j| square[(i, j)] * scale[i] * scale[j]);
-    Some((scale, scaled))
+
+    /// After a step that gained such a share of what it promised: the less, the more it promised too much.
+    fn lower(&mut self, share: f64) {
+        let factor = (1.0 - (2.0 * share - 1.0).powi(3)).clamp(LOWERED, 2.0);
+        *self = Self { now: (self.now * factor).max(LEAST_DAMPING), raised_by: 2.0 };
+    }
+
+    /// After a step that gained nothing: twice, then four times, then eight times as much.
+    fn raise(&mut self) {
+        *self = Self { now: self.now * self.raised_by, raised_by: 2.0 * self.raised_by };
+    }
 }
 
 /// The covariance of w (rad/s), zeta, r (1/kg) of each mode, R (m/N) and tau (s), in the order of [`Parameters::entries`];
 /// `None` where the data do not determine them.
 pub(super) fn covariance(parameters: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<DMatrix<f64>> {
     let entries = parameters.entries();
-    let (scale, unit) = scaled(&seen.normal(parameters, blocks).0)?;
+    let (scale, unit) = seen.normal(parameters, blocks).scaled()?;
     let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
     let natural = |i: usize| {
         scale[i]

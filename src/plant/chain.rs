@@ -88,8 +88,7 @@ impl Chain {
         let current = self.held.current_response(z);
         let of = |tap: &Tap| {
             let moved: Complex<f64> = (tap.rows.iter().zip(&self.held.blocks))
-                .map(|(c, block)| (c, self.held.state_response(block, z)))
-                .map(|(c, x)| x[0] * c[0] + x[1] * c[1])
+                .map(|(row, block)| Sampled::state_response(block, *row, z, current))
                 .sum();
             (moved + current * tap.current + tap.setpoint) * z.powi(-(tap.periods as i32))
         };

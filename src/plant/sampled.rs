@@ -62,21 +62,22 @@ impl Sampled {
         (z - self.lag).inv() * (1.0 - self.lag)
     }
 
-    /// The states [q, q'/w] of a block per ampere of set-point at the period's start, at z = exp(j w T).
-    pub fn state_response(&self, block: &Block, z: Complex<f64>) -> [Complex<f64>; 2] {
-        let current = self.current_response(z);
+    /// row . [q, q'/w] of a block per ampere of set-point at the period's start, at z = exp(j w T), where the current is what
+    /// [`Sampled::current_response`] says.
+    pub fn state_response(block: &Block, row: [f64; 2], z: Complex<f64>, current: Complex<f64>) -> Complex<f64> {
         let [[a11, a12], [a21, a22]] = block.a;
         let drive = |i: usize| current * block.current[i] + block.setpoint[i];
+        let (first, second) = (drive(0), drive(1));
         let determinant = (z - a11) * (z - a22) - a12 * a21;
-        let first = (z - a22) * drive(0) + drive(1) * a12;
-        let second = (z - a11) * drive(1) + drive(0) * a21;
-        [first / determinant, second / determinant]
+        let along = ((z - a22) * first + second * a12) * row[0] + ((z - a11) * second + first * a21) * row[1];
+        along / determinant
     }
 
     /// Response in metres per ampere from set-point to position at the period's start, at z = exp(j w T). Delays are
     /// those of [`super::Chain`].
     pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
-        self.blocks.iter().map(|block| self.state_response(block, z)[0] * block.output).sum()
+        let current = self.current_response(z);
+        self.blocks.iter().map(|block| Self::state_response(block, [block.output, 0.0], z, current)).sum()
     }
 
     /// Everything at rest.

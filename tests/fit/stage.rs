@@ -2,7 +2,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench::config::Config;
+use bench::config::{Config, Source, UnmodelledMode, load};
 use bench::fit::{Estimate, FittedMode};
 use bench::plant::{self, Modal};
 use bench::session::Analysis;
@@ -71,5 +71,32 @@ fn intervals_of_95_percent_hold_frequency_damping_and_residue_in_90_to_98_percen
         println!("{:.3} rad/s: {held:?} of 200", truth[0]);
         // 190 +- 3.1 of 200.
         assert!(held.iter().all(|held| (180..=196).contains(held)), "{truth:?}: {held:?} of 200");
+    }
+}
+
+/// The six unmodelled modes of the simulated stage are there as well, three of them within 0.8 % of 282 Hz, each 1 % wide:
+/// only certain sums of theirs are well known, and a search that crawls along such a valley ends beside it, with a mode more
+/// than there is.
+///
+/// 8 seeds of 27 figures: one is beyond 4.5 of its errors once in 700.
+#[test]
+fn modes_closer_than_their_widths_are_found_and_no_other() {
+    let at = |seed: u64| {
+        let sets = ["plant.operating_point_m=0.0038", "plant.mass_asymmetry=0.1", &format!("sim.seed={}", 40 + seed)];
+        load(&Source { sets: sets.map(String::from).to_vec(), ..Source::default() }).expect("the profile is valid")
+    };
+    let of = |m: &UnmodelledMode| [2.0 * std::f64::consts::PI * m.frequency_hz, m.damping_ratio, m.residue_per_kg];
+    let unmodelled = at(0).sim.unmodelled;
+    let mut truth: Vec<Truth> = as_seen(&model(&at(0))).into_iter().chain(unmodelled.iter().map(of)).collect();
+    truth.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    for analysis in both(8, |seed| analysed(&at(seed), &at(seed))) {
+        let modes = analysis.fit.expect("modes").modes();
+        assert_eq!(modes.len(), truth.len(), "{modes:?}");
+        for (mode, truth) in modes.iter().zip(&truth) {
+            let figures = [mode.omega_rad_s, mode.damping_ratio, mode.residue_per_kg];
+            let off = figures.iter().zip(truth).map(|(e, t)| ((e.value - t) / e.sigma).abs()).fold(0.0, f64::max);
+            println!("{:.3} Hz: {off:.2} sigma", mode.frequency_hz().value);
+            assert!(off < 4.5, "{mode:?} for {truth:?}");
+        }
     }
 }
