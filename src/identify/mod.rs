@@ -8,7 +8,7 @@
 //! - [`blocks()`]: the same record without smoothing, for a fit.
 //! - [`joint::estimate`]: plant, loop and sensitivities of a stage under control.
 //! - [`response`]: as the configuration chooses.
-//! - [`repeated::estimate`]: repetitions of one excitation, each at rest at its ends, averaged.
+//! - [`repeated::mean`]: repetitions of one excitation, each at rest at its ends, averaged.
 //! - [`periodic::estimate`]: periods of one excitation, averaged.
 //! - [`harmonics`], [`linearity`]: what stands between the lines of a multisine: distortion, odd and even, beside noise.
 //! - [`with_distortion`]: what is alike in every period and yet no response.

@@ -1,8 +1,8 @@
-//! The power of the noise over frequency: of what curves leave, or of how repetitions differ.
+//! The power of the noise over frequency, of what curves leave.
 
 use super::EstimatorSettings;
 use super::curve;
-use super::record::{Record, Scatter};
+use super::record::Record;
 
 /// What curves leave is averaged with weights so many times as wide as theirs.
 const NOISE_WIDTH: f64 = 2.0;
@@ -19,22 +19,17 @@ struct Rest {
 /// The noise along a band.
 pub(super) struct NoiseFloor {
     rests: Vec<Rest>,
-    /// Half-width of the mean over that of the response.
-    width: f64,
 }
 
 impl NoiseFloor {
     /// The noise of a record between two places, and somewhat beyond.
     pub(super) fn of(record: &Record, (low, high): (f64, f64), settings: &EstimatorSettings) -> Self {
-        match &record.scatter {
-            Some(scatter) => Self { rests: repeated(scatter), width: 1.0 },
-            None => Self { rests: left(record, (low, high), settings), width: NOISE_WIDTH },
-        }
+        Self { rests: left(record, (low, high), settings) }
     }
 
     /// E|N|^2 in a bin around a place, weighted towards it.
     pub(super) fn power(&self, place: f64, half_width: f64) -> f64 {
-        let reach = self.width * half_width;
+        let reach = NOISE_WIDTH * half_width;
         let low = self.rests.partition_point(|rest| rest.place <= place - reach);
         let near = self.rests[low..].iter().take_while(|rest| rest.place < place + reach);
         let (residual, freedom) = near.fold((0.0, 0.0), |(residual, freedom), rest| {
@@ -58,14 +53,4 @@ fn left(record: &Record, (low, high): (f64, f64), settings: &EstimatorSettings) 
         place += half_width;
     }
     rests
-}
-
-/// How repetitions differ, bin by bin.
-fn repeated(scatter: &Scatter) -> Vec<Rest> {
-    let rest = |(bin, power): (usize, &f64)| Rest {
-        place: bin as f64,
-        residual: power * scatter.freedom,
-        freedom: scatter.freedom,
-    };
-    scatter.power.iter().enumerate().skip(1).filter(|(_, power)| power.is_finite()).map(rest).collect()
 }

@@ -9,23 +9,12 @@ use super::spectrum::Spectra;
 /// Input below this part of its root mean square over all bins is rounding, not excitation.
 const DEAD_RATIO: f64 = 1e-9;
 
-/// The bins of a record, and how its repetitions differ, if there are any.
-#[derive(Clone)]
+/// The bins of a record.
 pub(super) struct Record {
     /// U; zero where the input is dead.
     input: Vec<Complex<f64>>,
     output: Vec<Complex<f64>>,
     pub(super) bin_hz: f64,
-    pub(super) scatter: Option<Scatter>,
-}
-
-/// What repetitions tell of the noise of their mean.
-#[derive(Clone)]
-pub(super) struct Scatter {
-    /// E|N|^2 in each bin.
-    pub(super) power: Vec<f64>,
-    /// Repetitions less one.
-    pub(super) freedom: f64,
 }
 
 impl Record {
@@ -38,27 +27,17 @@ impl Record {
         for u in input.iter_mut().filter(|u| u.norm_sqr() <= DEAD_RATIO * DEAD_RATIO * power) {
             *u = Complex::default();
         }
-        Self { input, output, bin_hz, scatter: None }
+        Self { input, output, bin_hz }
     }
 
     /// From output to input, where there is an input.
     pub(super) fn swapped(&self) -> Self {
         let alive = |(u, y): (&Complex<f64>, &Complex<f64>)| if u.norm_sqr() > 0.0 { *y } else { Complex::default() };
-        let mut swapped = Self {
+        Self {
             input: self.input.iter().zip(&self.output).map(alive).collect(),
             output: self.input.clone(),
-            ..self.clone()
-        };
-        if let Some(scatter) = &mut swapped.scatter {
-            // Noise E in Y = H U is -E/H in U = Y/H.
-            let over = |(u, y): (&Complex<f64>, &Complex<f64>)| u.norm_sqr() / y.norm_sqr();
-            scatter
-                .power
-                .iter_mut()
-                .zip(self.input.iter().zip(&self.output).map(over))
-                .for_each(|(p, over)| *p *= over);
+            bin_hz: self.bin_hz,
         }
-        swapped
     }
 
     /// |U|^2 of a bin.

@@ -6,15 +6,12 @@
 //! | from rest to rest, repeated | the mean of the repetitions, tick by tick, as one record: the same signal with less noise |
 //! | periodic | each line from the periods after the settled ones, the noise from their scatter, and, where lines were left out, odd distortion as a noise of its own |
 //! | one sine after the other | each sine from its blocks, likewise |
-//!
-//! The mean of repetitions loses nothing, as all have the same input; and unlike their scatter, which takes five of them to
-//! say anything, the noise of the mean is seen among its neighbouring bins from two on.
 
 use crate::excitation::{Pattern, Window};
 use crate::identify::harmonics::harmonics;
 use crate::identify::linearity::Linearity;
 use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::{Block, Frf, IdentifyError, Signals};
+use crate::identify::{Block, Frf, IdentifyError, Signals, repeated};
 
 /// Lines to either side over which the noise is averaged for a fit.
 const NEIGHBOURS: usize = 4;
@@ -31,7 +28,7 @@ pub(super) enum Taken {
 pub(super) fn taken(signals: Signals, pattern: &Pattern, band_hz: (f64, f64)) -> Result<Taken, IdentifyError> {
     match pattern {
         Pattern::Once => Ok(Taken::Record(signals)),
-        Pattern::Repeated { period, count } => Ok(Taken::Record(mean(&signals, *period, *count))),
+        Pattern::Repeated { period, count } => Ok(Taken::Record(repeated::mean(&signals, *period, *count))),
         Pattern::Periodic { start, period, skip, periods } => {
             let whole = part(&signals, *start, (skip + periods) * period);
             let repetition = Repetition { period: *period, skip: *skip };
@@ -57,16 +54,6 @@ fn with_noise_of_neighbours(blocks: &[Block]) -> Vec<Block> {
 /// The samples of a signal from `start` on, as far as there are.
 fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     let of = |samples: &[f64]| samples.iter().skip(start).take(length).copied().collect();
-    Signals { rate_hz: signals.rate_hz, input_a: of(&signals.input_a), output_m: of(&signals.output_m) }
-}
-
-/// The mean of the repetitions; a last one that was cut off does not count.
-fn mean(signals: &Signals, period: usize, count: usize) -> Signals {
-    let count = count.min(signals.len().checked_div(period).unwrap_or(0));
-    let of = |samples: &[f64]| -> Vec<f64> {
-        let at = |n: usize| (0..count).map(|r| samples[r * period + n]).sum::<f64>() / count as f64;
-        if count == 0 { samples.to_vec() } else { (0..period).map(at).collect() }
-    };
     Signals { rate_hz: signals.rate_hz, input_a: of(&signals.input_a), output_m: of(&signals.output_m) }
 }
 
@@ -111,20 +98,4 @@ fn append(frf: &mut Frf, other: Frf) {
     frf.magnitude_sigma.extend(other.magnitude_sigma);
     frf.phase_sigma_rad.extend(other.phase_sigma_rad);
     frf.resolution_hz.extend(other.resolution_hz);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_mean_is_over_whole_repetitions() {
-        let samples: Vec<f64> = (0..11).map(f64::from).collect();
-        let signals = Signals { rate_hz: 1.0, input_a: samples.clone(), output_m: samples };
-        // 0 to 3, 4 to 7; 8 to 10 is no whole one.
-        assert_eq!(mean(&signals, 4, 3).input_a, [2.0, 3.0, 4.0, 5.0]);
-        assert_eq!(mean(&signals, 4, 1).output_m, [0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(mean(&signals, 20, 1).len(), 11, "what is not whole is left as it is");
-        assert_eq!(mean(&signals, 0, 1).len(), 11);
-    }
 }
