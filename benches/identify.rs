@@ -5,7 +5,7 @@
 use bench::config::{Config, Source, load};
 use bench::excitation::{Chirp, Excitation};
 use bench::fit::{View, fit};
-use bench::identify::{BlockSettings, Estimator, EstimatorSettings, Signals, blocks, local, welch};
+use bench::identify::{Estimator, EstimatorSettings, Signals, blocks, local, welch};
 use bench::sim::SimulatedRig;
 use bench::verdict::{Case, Verdict, verdict};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
@@ -37,7 +37,7 @@ fn signals(config: &Config) -> Signals {
 }
 
 fn judged(signals: &Signals, config: &Config) -> Verdict {
-    let blocks = blocks(signals, BAND_HZ, &BlockSettings::default()).expect("excited");
+    let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
     let view = View::Bench(config);
     let fit = fit(&blocks, &view).expect("modes");
     verdict(&Case { fit: &fit, view: &view, blocks: &blocks, up_to_rad_s: 650.0, expected_modes: Some(3) })

@@ -1,20 +1,23 @@
 //! The record cut into blocks of neighbouring bins: what a parametric fit takes, where each datum must be independent of
 //! the next and no curve may be smoothed.
 //!
-//! In a block, `H = sum Y conj(U) / sum |U|^2` is the mean of H over its bins, weighted with |U|^2, whatever the shape of H,
-//! with the variance S / sum |U|^2, S being the power of the noise in a bin, by what rational curves leave around it: an average
-//! would take the top of a resonance for noise, and the fit would trust what lies beside it too much. A model is compared with it by its mean at
-//! f -+ spread, which has the block's first three moments: an error of the fourth order in width over width of a mode.
+//! In a block, `H = sum Y conj(R) / sum U conj(R)`, with U itself for the instrument R in open loop, is the mean of H over its
+//! bins, weighted with U conj(R), whatever the shape of H, with the variance `S sum |R|^2 / |sum U conj(R)|^2`, S being the
+//! power of the noise in a bin, by what rational curves leave around it: an average would take the top of a resonance for
+//! noise, and the fit would trust what lies beside it too much. A model is compared with it by its mean at f -+ spread, which
+//! has the block's first three moments: an error of the fourth order in width over width of a mode.
+
+use core::ops::RangeInclusive;
 
 use nalgebra::Complex;
 
-use super::error::check_setting;
+use super::local::Bins;
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
 use super::{EstimatorSettings, IdentifyError, Signals, band};
 
-/// A rational curve, whose residual is the noise, needs so many times the bins that an average would.
-const CURVE_WIDER: f64 = 4.0;
+/// Width of a block as a ratio of frequency.
+const WIDTH_RATIO: f64 = 0.0005;
 
 /// The mean response over a few neighbouring bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,83 +32,56 @@ pub struct Block {
     pub variance: f64,
 }
 
-/// How wide blocks are, and over how many bins their noise is averaged.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BlockSettings {
-    /// Half-width in bins, at least, of the average whose residual is the noise: 2 to 10000.
-    pub min_half_width_bins: f64,
-    /// Width of a block as a ratio of frequency, and half-width of that average, where it is more: 0 to 0.1.
-    pub resolution_ratio: f64,
-}
-
-impl Default for BlockSettings {
-    fn default() -> Self {
-        Self { min_half_width_bins: 4.0, resolution_ratio: 0.0005 }
-    }
-}
-
-impl BlockSettings {
-    pub(super) fn check(&self) -> Result<(), IdentifyError> {
-        check_setting("min_half_width_bins", self.min_half_width_bins, 2.0, 1e4)?;
-        check_setting("resolution_ratio", self.resolution_ratio, 0.0, 0.1)
-    }
-
-    /// The curves whose residual is the noise.
-    fn curves(&self) -> EstimatorSettings {
-        let default = EstimatorSettings::default();
-        EstimatorSettings { min_half_width_bins: CURVE_WIDER * self.min_half_width_bins, ..default }
-    }
-
-    /// The first bin after a block.
-    pub(super) fn next(&self, bin: usize) -> usize {
-        bin + (self.resolution_ratio * bin as f64).floor().max(1.0) as usize
-    }
-
-    /// Half-width of the neighbourhood of a bin, in bins.
-    pub(super) fn half_width(&self, bin: usize) -> usize {
-        self.min_half_width_bins.max(self.resolution_ratio * bin as f64).round() as usize
-    }
-}
-
-/// The blocks of a record that begins and ends at rest, each `settings.resolution_ratio` of its frequency wide and one bin
-/// at least; those without input or without any noise are left out. Frequencies rise.
+/// The blocks of a record that begins and ends at rest, each a twentieth of a percent of its frequency wide and one bin at least;
+/// those without input or without any noise are left out. Frequencies rise. Of the settings, the least half-width counts.
 ///
 /// # Errors
 /// Those of [`super::local::estimate`].
-pub fn blocks(signals: &Signals, band_hz: (f64, f64), settings: &BlockSettings) -> Result<Vec<Block>, IdentifyError> {
+pub fn blocks(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &EstimatorSettings,
+) -> Result<Vec<Block>, IdentifyError> {
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    let record = Record::new(signals);
-    let floor = NoiseFloor::of(&record, (*bins.start() as f64, *bins.end() as f64), &settings.curves());
-    let (mut blocks, mut low) = (Vec::new(), *bins.start());
-    while low <= *bins.end() {
-        let high = (settings.next(low) - 1).min(*bins.end());
-        blocks.extend(block(&record, low, high, &floor, settings));
-        low = high + 1;
-    }
-    if blocks.is_empty() {
-        Err(IdentifyError::NotExcited { low_hz: band_hz.0, high_hz: band_hz.1 })
-    } else {
-        Ok(blocks)
-    }
+    let blocks = cut(&Record::new(signals), &bins, settings);
+    let (low_hz, high_hz) = band_hz;
+    if blocks.is_empty() { Err(IdentifyError::NotExcited { low_hz, high_hz }) } else { Ok(blocks) }
 }
 
-fn block(record: &Record, low: usize, high: usize, floor: &NoiseFloor, settings: &BlockSettings) -> Option<Block> {
-    let middle = 0.5 * (low + high) as f64;
-    let noise = floor.power(middle, settings.curves().half_width(middle, record.bin_hz));
-    let power: Vec<f64> = (low..=high).map(|bin| record.input_power(bin)).collect();
-    let sum = |of: &dyn Fn(usize) -> f64| (0..power.len()).map(|j| power[j] * of(j)).sum::<f64>();
-    let uu = sum(&|_| 1.0);
-    let centre = sum(&|j| j as f64) / uu;
-    let spread = (sum(&|j| (j as f64 - centre) * (j as f64 - centre)) / uu).sqrt();
-    let response = (low..=high).map(|bin| record.cross(bin)).sum::<Complex<f64>>() / uu;
-    let variance = noise / uu;
+/// The blocks between two bins.
+pub(super) fn cut(of: &impl Bins, bins: &RangeInclusive<usize>, settings: &EstimatorSettings) -> Vec<Block> {
+    let noise = noise_of(settings);
+    let floor = NoiseFloor::of(of, (*bins.start() as f64, *bins.end() as f64), &noise);
+    let (mut blocks, mut low) = (Vec::new(), *bins.start());
+    while low <= *bins.end() {
+        let next = low + (WIDTH_RATIO * low as f64).floor().max(1.0) as usize;
+        let high = (next - 1).min(*bins.end());
+        let middle = 0.5 * (low + high) as f64;
+        blocks.extend(block(of, low, high, floor.power(middle, noise.half_width(middle, of.bin_hz()))));
+        low = next;
+    }
+    blocks
+}
+
+/// The curves whose residual is the noise.
+fn noise_of(settings: &EstimatorSettings) -> EstimatorSettings {
+    EstimatorSettings { min_half_width_bins: settings.min_half_width_bins, ..EstimatorSettings::default() }
+}
+
+fn block(of: &impl Bins, low: usize, high: usize, noise: f64) -> Option<Block> {
+    let sum = |term: &dyn Fn(usize) -> Complex<f64>| (low..=high).map(term).sum::<Complex<f64>>();
+    let (drive, weight) = (sum(&|k| of.drive(k)), |k: usize| of.drive(k).norm());
+    let all = (low..=high).map(weight).sum::<f64>();
+    let moment = |term: &dyn Fn(f64) -> f64| (low..=high).map(|k| weight(k) * term(k as f64)).sum::<f64>() / all;
+    let centre = low as f64 + moment(&|k| k - low as f64);
     let block = Block {
-        frequency_hz: (low as f64 + centre) * record.bin_hz,
-        spread_hz: spread * record.bin_hz,
-        response,
-        variance,
+        frequency_hz: centre * of.bin_hz(),
+        spread_hz: moment(&|k| (k - centre) * (k - centre)).sqrt() * of.bin_hz(),
+        response: sum(&|k| of.cross(k)) / drive,
+        variance: noise * (low..=high).map(|k| of.power(k)).sum::<f64>() / drive.norm_sqr(),
     };
-    (variance > 0.0 && variance.is_finite() && response.norm().is_finite()).then_some(block)
+    let sound = block.variance > 0.0 && block.variance.is_finite() && block.response.norm().is_finite();
+    (sound && centre.is_finite()).then_some(block)
 }

@@ -1,10 +1,7 @@
 //! What the configuration chooses.
 
-use super::{BlockSettings, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
+use super::{EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use crate::config::{IdentifySettings, LocalSettings};
-
-/// Noise between neighbouring bins is averaged over so much less where it weighs the blocks of a fit, which has no curves.
-const BLOCKS_NARROWER: f64 = 4.0;
 
 /// The frequency response as configured.
 ///
@@ -33,13 +30,11 @@ impl From<&LocalSettings> for EstimatorSettings {
     }
 }
 
-impl From<&IdentifySettings> for BlockSettings {
+/// Those of the local estimator, where another is configured its defaults: for what only it can do.
+impl From<&IdentifySettings> for EstimatorSettings {
     fn from(settings: &IdentifySettings) -> Self {
         match settings {
-            IdentifySettings::Local(local) => {
-                let min_half_width_bins = (local.min_half_width_bins as f64 / BLOCKS_NARROWER).max(2.0);
-                Self { min_half_width_bins, ..Self::default() }
-            }
+            IdentifySettings::Local(local) => Self::from(local),
             IdentifySettings::Welch { .. } => Self::default(),
         }
     }

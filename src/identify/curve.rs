@@ -59,18 +59,29 @@ pub(super) struct Fitted {
     pub(super) freedom: f64,
     /// Equivalent noise bandwidth, in bins, of the weights that make H out of the Y/U.
     pub(super) width: f64,
+    /// The share of the output's power that the curve explains.
+    pub(super) coherence: f64,
+    /// Whether there is input in the middle, or to both sides of it.
+    pub(super) enclosed: bool,
+}
+
+/// A curve, and how it came to be.
+pub(super) struct Drawn {
+    pub(super) fitted: Fitted,
+    /// Its last linear step; the residual is that of the curve.
+    pub(super) squares: Squares,
 }
 
 /// The curve through a window; none where the input is dead.
-pub(super) fn fit(window: &Window, settings: &EstimatorSettings) -> Option<Fitted> {
+pub(super) fn fit(window: &Window, settings: &EstimatorSettings) -> Option<Drawn> {
     let EstimatorSettings { curve, transient, .. } = *settings;
     let degree = window.degree(curve, transient);
     let polynomial = polynomial(window, degree, transient)?;
     if curve != Curve::Rational || degree < 2 {
         return Some(polynomial);
     }
-    let rational = rational(window, transient, |linear| explains(&polynomial, linear) > WORTH_A_LOOK);
-    Some(rational.filter(|rational| explains(&polynomial, rational) > CALLED_FOR).unwrap_or(polynomial))
+    let rational = rational(window, transient, |linear| explains(&polynomial.fitted, linear) > WORTH_A_LOOK);
+    Some(rational.filter(|found| explains(&polynomial.fitted, &found.fitted) > CALLED_FOR).unwrap_or(polynomial))
 }
 
 /// The power that a pole explains over that of the noise that is left: Fisher's F.
@@ -82,15 +93,15 @@ fn explains(polynomial: &Fitted, rational: &Fitted) -> f64 {
 
 impl Window {
     /// Whether there is input in the middle, or to both sides of it: beyond the outermost bin with input is no answer.
-    pub(super) fn encloses_input(&self) -> bool {
+    fn encloses_input(&self) -> bool {
         let alive = || self.x.iter().zip(&self.input).filter(|(_, u)| u.norm_sqr() > 0.0).map(|(x, _)| *x);
         alive().any(|x| x <= 0.0) && alive().any(|x| x >= 0.0)
     }
 
-    /// The share of the output's power that the curve explains; an output that is not there is not coherent with anything.
-    pub(super) fn coherence(&self, fitted: &Fitted) -> f64 {
+    /// The share of the output's power without this residual; an output that is not there is not coherent with anything.
+    pub(super) fn coherence(&self, residual: f64) -> f64 {
         let power: f64 = self.output.iter().zip(&self.root).map(|(y, root)| y.norm_sqr() * root * root).sum();
-        if power > 0.0 { 1.0 - fitted.residual / power } else { 0.0 }
+        if power > 0.0 { 1.0 - residual / power } else { 0.0 }
     }
 
     /// The degree that so few bins allow: twice as many as there are unknowns, and one.
@@ -124,26 +135,30 @@ impl Window {
     fn fitted(&self, squares: &Squares) -> Fitted {
         let weighted =
             |of: &dyn Fn(usize) -> f64| self.root.iter().enumerate().map(|(j, root)| root * root * of(j)).sum::<f64>();
+        let residual = squares.residual.iter().map(|e| e.norm_sqr()).sum();
         Fitted {
             response: squares.solution[0],
             gain: weighted(&|j| squares.first[j].norm_sqr()),
-            residual: squares.residual.iter().map(|e| e.norm_sqr()).sum(),
+            residual,
+            coherence: self.coherence(residual),
+            enclosed: self.encloses_input(),
             freedom: weighted(&|j| 1.0 - squares.leverage[j]),
             width: 1.0 / weighted(&|j| (squares.first[j] * self.input[j]).norm_sqr()),
         }
     }
 }
 
-fn polynomial(window: &Window, degree: usize, transient: bool) -> Option<Fitted> {
+fn polynomial(window: &Window, degree: usize, transient: bool) -> Option<Drawn> {
     let columns = match transient {
         false => window.powers(degree, |j| window.input[j]),
         true => window.numerators(degree, true, &vec![Complex::from(1.0); window.x.len()]),
     };
     let right = window.output.iter().zip(&window.root).map(|(y, root)| y * root).collect();
-    Some(window.fitted(&squares::solve(columns, right)?))
+    let squares = squares::solve(columns, right)?;
+    Some(Drawn { fitted: window.fitted(&squares), squares })
 }
 
-fn rational(window: &Window, transient: bool, worth_a_look: impl Fn(&Fitted) -> bool) -> Option<Fitted> {
+fn rational(window: &Window, transient: bool, worth_a_look: impl Fn(&Fitted) -> bool) -> Option<Drawn> {
     let mut a = Complex::default();
     let mut over = Vec::new();
     for fit in 0..REWEIGHTED {
@@ -167,7 +182,7 @@ fn reweighted(window: &Window, transient: bool, before: Complex<f64>) -> Option<
 }
 
 /// Steps of Gauss and Newton on the error of the output: d/da of B U/A is -x B U/A^2.
-fn refined(window: &Window, transient: bool, mut a: Complex<f64>, mut over: Vec<Complex<f64>>) -> Option<Fitted> {
+fn refined(window: &Window, transient: bool, mut a: Complex<f64>, mut over: Vec<Complex<f64>>) -> Option<Drawn> {
     for step in 0..STEPS {
         let below = below(window, a)?;
         let mut columns = window.numerators(2, transient, &below);
@@ -180,7 +195,8 @@ fn refined(window: &Window, transient: bool, mut a: Complex<f64>, mut over: Vec<
         a += change;
         if change.norm() < SMALL || step + 1 == STEPS {
             // What the linear model leaves is what is left, up to the square of a small step.
-            return Some(Fitted { response: over[0], ..window.fitted(&squares) });
+            let fitted = Fitted { response: over[0], ..window.fitted(&squares) };
+            return Some(Drawn { fitted, squares });
         }
     }
     None

@@ -31,11 +31,14 @@
 //! rad/s, is that of cos^2 with the half-width h = R/(2 pi) in hertz. A parabola or rational curve is of the same noise as a
 //! constant of 0.52 h.
 
+use nalgebra::Complex;
+
+use super::curve::Fitted;
 use super::error::check_setting;
 use super::estimator::{between, inverted};
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
-use super::{Curve, Estimator, Frf, FrfPoint, IdentifyError, ResolutionPoint, Signals, band, curve};
+use super::{Curve, Estimator, Frf, FrfPoint, IdentifyError, ResolutionPoint, Signals, band};
 
 /// How the default estimator trades resolution for noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,21 +105,42 @@ pub fn estimate(signals: &Signals, band_hz: (f64, f64), settings: &EstimatorSett
     of_record(&Record::new(signals), sampling, band_hz, settings)
 }
 
+/// What curves are drawn through, bin by bin: input U, output Y, and an instrument R, which knows nothing of the noise; in open
+/// loop that is U itself.
+pub(super) trait Bins {
+    /// Width of a bin in hertz.
+    fn bin_hz(&self) -> f64;
+    /// The highest bin below the Nyquist frequency.
+    fn last_bin(&self) -> usize;
+    /// The response in the middle of a neighbourhood, both in bins; none where the instrument is dead.
+    fn fit(&self, place: f64, half_width: f64, settings: &EstimatorSettings) -> Option<Fitted>;
+    /// U conj(R) of a bin.
+    fn drive(&self, bin: usize) -> Complex<f64>;
+    /// Y conj(R) of a bin.
+    fn cross(&self, bin: usize) -> Complex<f64>;
+    /// |R|^2 of a bin.
+    fn power(&self, bin: usize) -> f64;
+}
+
 /// The FRF of a record that was sampled at a rate, with so many samples.
-pub(super) fn of_record(
+fn of_record(
     record: &Record,
     (rate_hz, samples): (f64, usize),
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
 ) -> Result<Frf, IdentifyError> {
-    settings.check()?;
     let bins = band::bins(band_hz, rate_hz, samples)?;
-    let places = settings.places(&bins, band_hz, record.bin_hz);
+    let places = settings.places(&bins, band_hz, record.bin_hz());
+    let frf = collected(points(record, &places, settings));
+    if frf.is_empty() { Err(IdentifyError::NotExcited { low_hz: band_hz.0, high_hz: band_hz.1 }) } else { Ok(frf) }
+}
+
+pub(super) fn collected(points: Vec<Option<FrfPoint>>) -> Frf {
     let mut frf = Frf::default();
-    for point in points(record, &places, settings).into_iter().flatten() {
+    for point in points.into_iter().flatten() {
         frf.push(point);
     }
-    if frf.is_empty() { Err(IdentifyError::NotExcited { low_hz: band_hz.0, high_hz: band_hz.1 }) } else { Ok(frf) }
+    frf
 }
 
 /// The estimate at each place, as settings choose.
@@ -131,23 +155,22 @@ fn points(record: &Record, places: &[f64], settings: &EstimatorSettings) -> Vec<
 }
 
 /// From input to output, all noise on the output; nothing where the input is dead.
-fn forward(record: &Record, places: &[f64], settings: &EstimatorSettings) -> Vec<Option<FrfPoint>> {
+pub(super) fn forward(bins: &impl Bins, places: &[f64], settings: &EstimatorSettings) -> Vec<Option<FrfPoint>> {
     let (Some(low), Some(high)) = (places.first(), places.last()) else { return Vec::new() };
-    let floor = NoiseFloor::of(record, (*low, *high), settings);
-    places.iter().map(|place| point(record, *place, settings, &floor)).collect()
+    let floor = NoiseFloor::of(bins, (*low, *high), settings);
+    places.iter().map(|place| point(bins, *place, settings, &floor)).collect()
 }
 
-fn point(record: &Record, place: f64, settings: &EstimatorSettings, floor: &NoiseFloor) -> Option<FrfPoint> {
-    let half_width = settings.half_width(place, record.bin_hz);
-    let window = record.window(place, half_width);
-    let fitted = window.encloses_input().then(|| curve::fit(&window, settings))??;
-    let wider = curve::fit(&record.window(place, 2.0 * half_width), settings)?;
+fn point(bins: &impl Bins, place: f64, settings: &EstimatorSettings, floor: &NoiseFloor) -> Option<FrfPoint> {
+    let half_width = settings.half_width(place, bins.bin_hz());
+    let fitted = bins.fit(place, half_width, settings).filter(|fitted| fitted.enclosed)?;
+    let wider = bins.fit(place, 2.0 * half_width, settings)?;
     let bias = (wider.response - fitted.response) / if settings.curve == Curve::Constant { 3.0 } else { 15.0 };
     Some(FrfPoint {
-        frequency_hz: place * record.bin_hz,
+        frequency_hz: place * bins.bin_hz(),
         response: fitted.response,
-        coherence: window.coherence(&fitted),
+        coherence: fitted.coherence,
         variance: floor.power(place, half_width) * fitted.gain + bias.norm_sqr(),
-        resolution_hz: fitted.width * record.bin_hz,
+        resolution_hz: fitted.width * bins.bin_hz(),
     })
 }

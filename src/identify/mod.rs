@@ -50,7 +50,7 @@ pub mod table;
 pub mod welch;
 
 pub use crate::config::{Curve, Estimator, ResolutionPoint};
-pub use blocks::{Block, BlockSettings, blocks};
+pub use blocks::{Block, blocks};
 pub use configured::response;
 pub use distortion::with_distortion;
 pub use error::IdentifyError;

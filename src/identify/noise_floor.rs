@@ -1,8 +1,7 @@
 //! The power of the noise over frequency, of what curves leave.
 
 use super::EstimatorSettings;
-use super::curve;
-use super::record::Record;
+use super::local::Bins;
 
 /// What curves leave is averaged with weights so many times as wide as theirs.
 const NOISE_WIDTH: f64 = 2.0;
@@ -22,9 +21,9 @@ pub(super) struct NoiseFloor {
 }
 
 impl NoiseFloor {
-    /// The noise of a record between two places, and somewhat beyond.
-    pub(super) fn of(record: &Record, (low, high): (f64, f64), settings: &EstimatorSettings) -> Self {
-        Self { rests: left(record, (low, high), settings) }
+    /// The noise between two places, and somewhat beyond.
+    pub(super) fn of(bins: &impl Bins, (low, high): (f64, f64), settings: &EstimatorSettings) -> Self {
+        Self { rests: left(bins, (low, high), settings) }
     }
 
     /// E|N|^2 in a bin around a place, weighted towards it.
@@ -41,14 +40,14 @@ impl NoiseFloor {
 }
 
 /// What the curves of `settings` leave, half-width by half-width.
-fn left(record: &Record, (low, high): (f64, f64), settings: &EstimatorSettings) -> Vec<Rest> {
-    let reach = |place: f64| NOISE_WIDTH * settings.half_width(place, record.bin_hz);
+fn left(bins: &impl Bins, (low, high): (f64, f64), settings: &EstimatorSettings) -> Vec<Rest> {
+    let reach = |place: f64| NOISE_WIDTH * settings.half_width(place, bins.bin_hz());
     let mut place = (low - reach(low)).max(1.0);
-    let end = (high + reach(high)).min(record.last_bin() as f64);
+    let end = (high + reach(high)).min(bins.last_bin() as f64);
     let mut rests = Vec::new();
     while place <= end {
-        let half_width = settings.half_width(place, record.bin_hz);
-        let fitted = curve::fit(&record.window(place, half_width), settings);
+        let half_width = settings.half_width(place, bins.bin_hz());
+        let fitted = bins.fit(place, half_width, settings);
         rests.extend(fitted.map(|f| Rest { place, residual: f.residual, freedom: f.freedom }));
         place += half_width;
     }

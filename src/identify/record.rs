@@ -2,9 +2,10 @@
 
 use nalgebra::Complex;
 
-use super::Signals;
-use super::curve::Window;
+use super::curve::{self, Fitted, Window};
+use super::local::Bins;
 use super::spectrum::Spectra;
+use super::{EstimatorSettings, Signals};
 
 /// Input below this part of its root mean square over all bins is rounding, not excitation.
 const DEAD_RATIO: f64 = 1e-9;
@@ -14,7 +15,7 @@ pub(super) struct Record {
     /// U; zero where the input is dead.
     input: Vec<Complex<f64>>,
     output: Vec<Complex<f64>>,
-    pub(super) bin_hz: f64,
+    bin_hz: f64,
 }
 
 impl Record {
@@ -40,21 +41,6 @@ impl Record {
         }
     }
 
-    /// |U|^2 of a bin.
-    pub(super) fn input_power(&self, bin: usize) -> f64 {
-        self.input[bin].norm_sqr()
-    }
-
-    /// Y conj(U) of a bin.
-    pub(super) fn cross(&self, bin: usize) -> Complex<f64> {
-        self.output[bin] * self.input[bin].conj()
-    }
-
-    /// The highest bin below the Nyquist frequency.
-    pub(super) fn last_bin(&self) -> usize {
-        self.input.len() - 1
-    }
-
     /// The bins around a place; bin 0, which holds the probe's offset, is never among them.
     pub(super) fn window(&self, place: f64, half_width: f64) -> Window {
         let low = (place - half_width).floor().max(0.0) as usize + 1;
@@ -62,5 +48,31 @@ impl Record {
         let x: Vec<f64> = (low..=high).map(|k| (k as f64 - place) / half_width).collect();
         let root = x.iter().map(|x| libm::cos(core::f64::consts::FRAC_PI_2 * x)).collect();
         Window { x, root, input: self.input[low..=high].to_vec(), output: self.output[low..=high].to_vec() }
+    }
+}
+
+impl Bins for Record {
+    fn bin_hz(&self) -> f64 {
+        self.bin_hz
+    }
+
+    fn last_bin(&self) -> usize {
+        self.input.len() - 1
+    }
+
+    fn fit(&self, place: f64, half_width: f64, settings: &EstimatorSettings) -> Option<Fitted> {
+        Some(curve::fit(&self.window(place, half_width), settings)?.fitted)
+    }
+
+    fn drive(&self, bin: usize) -> Complex<f64> {
+        Complex::from(self.input[bin].norm_sqr())
+    }
+
+    fn cross(&self, bin: usize) -> Complex<f64> {
+        self.output[bin] * self.input[bin].conj()
+    }
+
+    fn power(&self, bin: usize) -> f64 {
+        self.input[bin].norm_sqr()
     }
 }

@@ -11,7 +11,7 @@ use crate::excitation::{self, Excitation};
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::delay::{self, Delay};
 use crate::identify::linearity::Linearity;
-use crate::identify::{Block, BlockSettings, Frf, IdentifyError, Signals, blocks, response};
+use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, blocks, response};
 use crate::plant::{self, Chain, Modal, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
@@ -110,7 +110,7 @@ fn open_loop(
         Taken::Lines(frf, blocks, linearity) => (frf, blocks, linearity.map(|boxed| *boxed)),
         Taken::Record(signals) => {
             let frf = response(&signals, band_hz, &config.identify)?;
-            (frf, blocks(&signals, band_hz, &BlockSettings::from(&config.identify))?, None)
+            (frf, blocks(&signals, band_hz, &EstimatorSettings::from(&config.identify))?, None)
         }
     };
     Ok((Seen { frf, blocks, closed: None }, linearity))

@@ -8,7 +8,7 @@ use crate::config::{Config, ReferenceSettings};
 use crate::control::{ClosedLoop, ControllerError, Margins};
 use crate::fit::Estimate;
 use crate::identify::joint::{self, Joint, LoopSignals};
-use crate::identify::{BlockSettings, Frf};
+use crate::identify::{EstimatorSettings, Frf};
 use crate::plant::{self, Modal};
 use crate::recording::Recording;
 
@@ -70,7 +70,7 @@ pub(super) fn seen(
 ) -> Result<Seen, AnalysisError> {
     swept(&config.control.reference)?;
     let Joint { plant, blocks, complementary, sensitivity, loop_gain } =
-        joint::estimate(signals, band_hz, &BlockSettings::from(&config.identify))?;
+        joint::estimate(signals, band_hz, &EstimatorSettings::from(&config.identify))?;
     let model = model(recording, config)?;
     let model_loop = loop_gain.frequency_hz.iter().map(|f| model.sampled_loop(TURN * f)).collect();
     let margins = margins(&loop_gain, &sensitivity);

@@ -7,7 +7,7 @@ use super::AnalysisError;
 use super::analysis::judge;
 use crate::fit::{self, FitError, ModalFit, View};
 use crate::identify::periodic::{self, Repetition};
-use crate::identify::{Block, BlockSettings, EstimatorSettings, Frf, Signals, blocks, local, with_distortion};
+use crate::identify::{Block, EstimatorSettings, Frf, Signals, blocks, local, with_distortion};
 use crate::verdict::{MISFIT, Verdict};
 
 /// Half of the frequencies must have at least this coherence.
@@ -64,7 +64,7 @@ fn response(
         return Ok((periods.frf, periods.blocks, Some(periods.count)));
     }
     let frf = local::estimate(signals, band_hz, &EstimatorSettings::default())?;
-    Ok((frf, blocks(signals, band_hz, &BlockSettings::default())?, None))
+    Ok((frf, blocks(signals, band_hz, &EstimatorSettings::default())?, None))
 }
 
 /// The modes that periods show. Where they leave more than the noise, distortion counts as well; without periods the noise is
