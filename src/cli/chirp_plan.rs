@@ -130,16 +130,11 @@ fn lower_to(config: &mut Config, travel_m: f64) -> Result<(), CliError> {
     Ok(())
 }
 
-fn band_hz(config: &Config) -> (f64, f64) {
-    let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
-    (start_hz.min(stop_hz), start_hz.max(stop_hz))
-}
-
 /// Frequency in hertz and |G| of the chain of the model over the band.
 fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
     let modal = Modal::of(&plant::build(&config.plant)?)?;
     let chain = Chain::of_mean_age(config, &modal.modes);
-    let (low_hz, high_hz) = band_hz(config);
+    let (low_hz, high_hz) = config.chirp.band_hz();
     let grid = (0..=GRID).map(|k| low_hz * libm::pow(high_hz / low_hz, k as f64 / GRID as f64));
     let modes = modal.modes.iter().map(|mode| mode.omega_rad_s / (2.0 * PI));
     let mut frequencies: Vec<f64> = grid.chain(modes.filter(|f| (low_hz..high_hz).contains(f))).collect();
@@ -152,7 +147,7 @@ fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
 fn by_file(config: &Config, path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
     let frf =
         csv::read(path).map_err(|e| CliError::Usage(format!("--shape {}: {e}; or give `model`", path.display())))?;
-    let (low_hz, high_hz) = band_hz(config);
+    let (low_hz, high_hz) = config.chirp.band_hz();
     let rows = frf.frequency_hz.iter().zip(&frf.response).map(|(f, h)| (*f, h.norm()));
     let inside: Vec<(f64, f64)> = rows.filter(|(f, _)| (low_hz..=high_hz).contains(f)).collect();
     match (inside.first(), inside.last()) {

@@ -49,18 +49,17 @@ fn period_s(config: &Config) -> f64 {
 
 fn multisine(config: &Config, settings: &MultisineSettings) -> Option<Finding> {
     let line_hz = 1.0 / settings.period_s;
-    let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
-    let width_hz = (stop_hz - start_hz).abs();
+    let (low_hz, high_hz) = config.chirp.band_hz();
     let what = format!(
-        "is {} s: lines are {line_hz} Hz apart, and the band from {start_hz} to {stop_hz} Hz holds too few; it needs ten of them",
+        "is {} s: lines are {line_hz} Hz apart, and the band from {low_hz} to {high_hz} Hz holds too few; it needs ten of them",
         settings.period_s
     );
-    (width_hz < 10.0 * line_hz).then(|| finding("multisine.period_s", what))
+    (high_hz - low_hz < 10.0 * line_hz).then(|| finding("multisine.period_s", what))
 }
 
 fn prbs(config: &Config, settings: &PrbsSettings) -> Option<Finding> {
     let limit_hz = config.servo.rate_hz / f64::from(settings.clock_divider) / 2.0;
-    let highest_hz = config.chirp.start_hz.max(config.chirp.stop_hz);
+    let (_, highest_hz) = config.chirp.band_hz();
     let what = format!(
         "is {}: the sequence excites up to {limit_hz} Hz, the band goes to {highest_hz} Hz; lower it, or chirp.stop_hz",
         settings.clock_divider

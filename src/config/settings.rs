@@ -309,6 +309,13 @@ pub struct ChirpSettings {
     pub amplitude: Vec<AmplitudePoint>,
 }
 
+impl ChirpSettings {
+    /// The band in hertz, lowest and highest frequency, whichever way the sweep runs.
+    pub fn band_hz(&self) -> (f64, f64) {
+        (self.start_hz.min(self.stop_hz), self.start_hz.max(self.stop_hz))
+    }
+}
+
 fn once() -> u32 {
     1
 }

@@ -21,9 +21,9 @@ const BETWEEN: usize = 32;
 /// The amplitudes in metres over the band of `chirp`, whose own are those of the command in amperes; the stage moves by
 /// `travel_m` at most.
 pub fn swept_reference(closed_loop: &ClosedLoop, chirp: &ChirpSettings, travel_m: f64) -> Vec<TravelPoint> {
-    let (start_hz, stop_hz) = (chirp.start_hz.min(chirp.stop_hz), chirp.start_hz.max(chirp.stop_hz));
+    let (low_hz, high_hz) = chirp.band_hz();
     let amplitude = Amplitude::new(&chirp.amplitude);
-    let at = |x: f64| start_hz * libm::pow(stop_hz / start_hz, x);
+    let at = |x: f64| low_hz * libm::pow(high_hz / low_hz, x);
     let step = 1.0 / (POINTS - 1) as f64;
     let near = |i: usize| {
         (0..=2 * BETWEEN).map(move |j| (i as f64 - 1.0 + j as f64 / BETWEEN as f64) * step).map(|x| x.clamp(0.0, 1.0))

@@ -124,9 +124,8 @@ fn current(config: &Config, extremes: &Extremes, setting: &'static str) -> Resul
 }
 
 fn span(config: &Config) -> Result<(), ExcitationError> {
-    let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
-    let (least_a, most_a) =
-        Amplitude::new(&config.chirp.amplitude).range_a(start_hz.min(stop_hz), start_hz.max(stop_hz));
+    let (low_hz, high_hz) = config.chirp.band_hz();
+    let (least_a, most_a) = Amplitude::new(&config.chirp.amplitude).range_a(low_hz, high_hz);
     let wide = config.excitation.kind == ExcitationKind::Multisine && most_a > LARGEST_SPAN * least_a;
     if wide { Err(ExcitationError::Span { least_a, most_a }) } else { Ok(()) }
 }

@@ -33,7 +33,7 @@ pub fn multisine(config: &Config) -> Periodic {
     let length = libm::round(settings.period_s * config.servo.rate_hz).max(8.0) as usize;
     let line_hz = config.servo.rate_hz / length as f64;
     let chirp = &config.chirp;
-    let (low_hz, high_hz) = (chirp.start_hz.min(chirp.stop_hz), chirp.start_hz.max(chirp.stop_hz));
+    let (low_hz, high_hz) = chirp.band_hz();
     let amplitude = Amplitude::new(&chirp.amplitude);
     let of = |k: usize| (k, amplitude.at(libm::log(k as f64 * line_hz)));
     let lines = lines(settings, within(low_hz, high_hz, line_hz, length));

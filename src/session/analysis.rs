@@ -84,8 +84,7 @@ pub struct Analysis {
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
     let closed = recording.metadata().get(KIND).is_some_and(|kind| kind == Kind::Control.name());
     let Ran { loop_signals, filled_ticks } = ran(recording, config.servo.rate_hz, closed)?;
-    let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
-    let band_hz = (start_hz.min(stop_hz), start_hz.max(stop_hz));
+    let band_hz = config.chirp.band_hz();
     let (seen, linearity) = if closed {
         (closed_loop::seen(&loop_signals, band_hz, recording, config)?, None)
     } else {
