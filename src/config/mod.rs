@@ -12,28 +12,44 @@
 //! The types are the only description: the schema (`bench config schema`), the ranges that are enforced and the
 //! documentation of each key come from them; the values come from `bench-config/stage.toml`.
 
+mod calibration;
 mod campaign;
 mod check;
+mod chirp;
+mod control;
 mod devices;
 mod excitation;
 mod excited;
+mod identify;
+mod interlock;
 mod load;
+mod motor_amplifier_probe;
 mod place;
 mod plant;
 pub mod profiles;
 pub mod quantity;
 mod relations;
+mod servo;
 mod settings;
+mod sim;
 
+pub use calibration::*;
 pub use campaign::*;
 pub(crate) use check::nearest;
+pub use chirp::*;
+pub use control::*;
 pub use devices::*;
 pub use excitation::*;
+pub use identify::*;
+pub use interlock::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
 pub(crate) use load::{recheck, text_of, text_of_file, typed};
+pub use motor_amplifier_probe::*;
 pub use plant::*;
 pub(crate) use relations::relations_of;
+pub use servo::*;
 pub use settings::*;
+pub use sim::*;
 
 /// The JSON schema of a configuration, made from the types.
 pub fn schema() -> serde_json::Value {

@@ -1,0 +1,30 @@
+//! The real-time loop.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The real-time loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoopSettings {
+    /// Servo rate in ticks per second.
+    #[schemars(range(min = 1.0, max = 100000.0))]
+    pub rate_hz: f64,
+    /// Whole periods between a measurement and the moment its command acts.
+    #[schemars(range(min = 0, max = 8))]
+    pub computing_delay_periods: u32,
+    /// SCHED_FIFO priority of the loop's thread in real time.
+    #[schemars(range(min = 1, max = 98))]
+    pub priority: i32,
+    /// Processor to bind the loop's thread to; left to the scheduler if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0, max = 1023))]
+    pub cpu: Option<usize>,
+}
+
+impl LoopSettings {
+    /// Length of a tick in seconds.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+}

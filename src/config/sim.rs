@@ -1,0 +1,81 @@
+//! The simulated rig beyond the plant's model.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How the simulated stage obeys its constraints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Geometry {
+    /// Linearised about the operating point, as the model is.
+    #[default]
+    Linear,
+    /// As they are, x_i - x_j = -0.6 (y_i - y_j)^2/L: the response depends on the amplitude. Plant `sr4dof` only.
+    Quadratic,
+}
+
+/// The simulated rig beyond the plant's model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimSettings {
+    /// The constraints of the simulated stage, linearised or not.
+    #[serde(default)]
+    pub geometry: Geometry,
+    /// What the simulated stage has of mass asymmetry m2/m3 - 1 beyond `plant.mass_asymmetry`, which nobody knows of: an
+    /// initial asymmetry by manufacture (section 5.2.2). Plant `sr4dof` only.
+    #[serde(default)]
+    #[schemars(range(min = -0.5, max = 0.5))]
+    pub asymmetry_offset: f64,
+    /// Seed of noise and disturbance.
+    #[schemars(range(min = 0, max = 9223372036854775807i64))]
+    pub seed: u64,
+    /// White noise of the probe, RMS a reading, in metres.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub probe_noise_rms_m: f64,
+    /// Quantisation of the probe in metres; 0 for none.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub probe_quantisation_m: f64,
+    /// Mechanical stop on either side, in metres.
+    #[schemars(range(min = 1e-9, max = 1.0))]
+    pub stop_m: f64,
+    /// Stiffness of the stop in newtons per metre.
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub stop_stiffness_n_per_m: f64,
+    /// Damping of the stop in newton-seconds per metre.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub stop_damping_n_s_per_m: f64,
+    /// Modes of the rig that the plant's model leaves out.
+    pub unmodelled: Vec<UnmodelledMode>,
+    /// Lines of the floor's acceleration in X.
+    pub floor: Vec<FloorLine>,
+}
+
+/// A mode of the rig that the plant's model leaves out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UnmodelledMode {
+    /// Natural frequency in hertz.
+    #[schemars(range(min = 0.01, max = 1e5))]
+    pub frequency_hz: f64,
+    /// Damping ratio.
+    #[schemars(range(min = 0.0, max = 0.99))]
+    pub damping_ratio: f64,
+    /// Residue from force to displacement in 1/kg, with its sign.
+    #[schemars(range(min = -1e6, max = 1e6))]
+    pub residue_per_kg: f64,
+}
+
+/// White noise through the band-pass 2 zeta w s/(s^2 + 2 zeta w s + w^2), scaled to an RMS acceleration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FloorLine {
+    /// Centre frequency in hertz.
+    #[schemars(range(min = 0.01, max = 1e5))]
+    pub frequency_hz: f64,
+    /// Damping ratio: the line's full width at half power is 2 zeta times its frequency.
+    #[schemars(range(min = 1e-4, max = 0.99))]
+    pub damping_ratio: f64,
+    /// RMS of the line in m/s^2.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub acceleration_rms_m_per_s2: f64,
+}
