@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::grid::{of_plant, settings};
 use super::{AnswerError, CampaignError, Load, Point, Rest};
 use crate::config::{Config, PlantSettings, Sr4dofSettings};
-use crate::plant::{self, Modal, Mode};
+use crate::plant::{self, Modal, Mode, Sign};
 
 /// Standard deviations beyond which a difference is no noise: once in two million.
 const SIGMAS: f64 = 5.0;
@@ -171,7 +171,7 @@ impl Expected {
 
     /// The sign of a clear residue that is the same on both sides of the load's asymmetry.
     fn sign(&self, k: usize) -> Option<char> {
-        let sign = |modes: &[Mode]| if modes[k].residue_per_kg() > 0.0 { '+' } else { '-' };
+        let sign = |modes: &[Mode]| Sign::of(modes[k].residue_per_kg()).symbol();
         let sure = self.beside.iter().all(|beside| sign(beside) == sign(&self.loaded));
         (sure && share(&self.loaded, k) > CLEAR).then(|| sign(&self.loaded))
     }

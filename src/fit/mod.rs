@@ -26,6 +26,7 @@ pub use search::Order;
 pub use view::View;
 
 use crate::identify::Block;
+use crate::plant::Sign;
 pub(crate) use refine::Entry;
 use refine::{Seen, covariance, refine};
 
@@ -102,7 +103,7 @@ impl FittedMode {
 
     /// The sign of its residue.
     pub fn sign(&self) -> char {
-        if self.residue_per_kg.value > 0.0 { '+' } else { '-' }
+        Sign::of(self.residue_per_kg.value).symbol()
     }
 
     /// Undamped natural frequency in hertz.

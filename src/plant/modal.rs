@@ -52,6 +52,11 @@ pub enum Sign {
 }
 
 impl Sign {
+    /// Of the residue of a mode that shows.
+    pub fn of(residue_per_kg: f64) -> Sign {
+        if residue_per_kg > 0.0 { Sign::Plus } else { Sign::Minus }
+    }
+
     /// `+`, `-` or `0`.
     pub fn symbol(self) -> char {
         match self {
@@ -117,13 +122,7 @@ impl Modal {
             // The peak of a double integrator has no end: it shows unless its residue is rounding.
             let free = mode.omega_rad_s == 0.0;
             let hidden = if free { self.is_rounding(residue) } else { peak <= VISIBLE_RATIO * self.others(index) };
-            if hidden {
-                Sign::None
-            } else if residue > 0.0 {
-                Sign::Plus
-            } else {
-                Sign::Minus
-            }
+            if hidden { Sign::None } else { Sign::of(residue) }
         };
         self.modes.iter().enumerate().map(sign).collect()
     }
