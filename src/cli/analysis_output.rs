@@ -11,10 +11,11 @@ use super::linearity_output::LinearityMade;
 use super::loop_output::LoopMade;
 use super::modal_output::Shown;
 use crate::config::Config;
+use crate::fit::{FittedMode, ModalFit};
 use crate::identify::{Unit, csv};
 use crate::recording::Recording;
 use crate::run_report::{AnalysedRun, KINDS, page, pictures};
-use crate::session::{Analysis, AnalysisError, analyse};
+use crate::session::{AnalysisError, analyse};
 
 /// The files that were made and what the response shows; `null` where the run gave no response.
 #[derive(Clone, Debug, Serialize)]
@@ -45,6 +46,9 @@ pub(super) struct Made {
     /// Distortion and noise, where a multisine left lines out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linearity: Option<LinearityMade>,
+    /// The modes as fitted, to be compared with those of other runs.
+    #[serde(skip)]
+    pub fitted: Vec<FittedMode>,
 }
 
 /// Why nothing was made: a person wished so.
@@ -58,11 +62,7 @@ impl From<AnalysisError> for CliError {
 
 /// Analyses a recording; the files stand beside it under its name.
 pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliError> {
-    make_of(&analyse(recording, config)?, recording, config)
-}
-
-/// The same of an analysis that was made.
-pub(super) fn make_of(analysis: &Analysis, recording: &Recording, config: &Config) -> Result<Made, CliError> {
+    let analysis = &analyse(recording, config)?;
     let csv_path = free(recording.path(), "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
     let plain_path = free(recording.path(), "frf_without_delay", "csv");
@@ -93,6 +93,7 @@ pub(super) fn make_of(analysis: &Analysis, recording: &Recording, config: &Confi
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
         closed: analysis.closed.as_ref().map(|closed| LoopMade::of(closed, recording.path())).transpose()?,
         linearity: analysis.linearity.as_ref().map(LinearityMade::of),
+        fitted: analysis.fit.as_ref().map_or(Vec::new(), ModalFit::modes),
     })
 }
 
@@ -114,6 +115,7 @@ impl Made {
             shown: Shown::nothing(why),
             closed: None,
             linearity: None,
+            fitted: Vec::new(),
         }
     }
 

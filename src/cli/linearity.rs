@@ -1,11 +1,9 @@
 //! `bench linearity`: the same multisine at several amplitudes.
 
-use std::path::Path;
-
 use serde::Serialize;
 
-use super::analysis_output::{Made, make_of};
-use super::chirp::{BandOptions, check};
+use super::analysis_output::Made;
+use super::chirp::{BandOptions, analysed, check};
 use super::chirp_plan::Expected;
 use super::modal_output::{ModeJson, mode};
 use super::options::{BenchOptions, print_json, print_text};
@@ -15,9 +13,8 @@ use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::excitation;
 use crate::fit::{Estimate, FittedMode, SIGMAS_95};
-use crate::recording::Recording;
 use crate::report::number::interval;
-use crate::session::{ModeOverAmplitude, Plan, analyse, over_amplitude, unless_stopped};
+use crate::session::{ModeOverAmplitude, Plan, over_amplitude};
 
 /// Odd lines, one in four left out.
 const LINES: [&str; 2] = ["excitation.kind=\"multisine\"", "multisine.lines=\"odd_random\""];
@@ -108,23 +105,24 @@ struct ModeMade {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let configs = args.configs()?;
     let expected = configs.iter().map(|(scale, config)| expected(*scale, config)).collect::<Result<Vec<_>, _>>()?;
-    let (mut runs, mut modes, mut outcome) = (Vec::new(), Vec::new(), Outcome::Done);
+    let (mut runs, mut outcome) = (Vec::new(), Outcome::Done);
     for ((scale, config), expected) in configs.iter().zip(expected) {
-        let (made, seen) = one(args, *scale, config, expected)?;
+        let made = one(args, *scale, config, expected)?;
         let ended = if made.made.is_stopped() { Outcome::Failed } else { made.run.exit() };
         outcome = if outcome == Outcome::Done { ended } else { outcome };
         runs.push(made);
-        modes.push(seen);
         if ended == Outcome::Failed {
             outcome = ended;
             break;
         }
     }
-    let report = report(runs, &over_amplitude(&modes));
+    let fitted: Vec<Vec<FittedMode>> = runs.iter().map(|run| run.made.fitted.clone()).collect();
+    let modes = over_amplitude(&fitted);
+    let report = report(runs, &modes);
     if args.bench.json {
         print_json(&report)?;
     } else {
-        print_text(&text(&report, &configs, &over_amplitude(&modes)))?;
+        print_text(&text(&report, &configs, &modes))?;
     }
     Ok(outcome)
 }
@@ -137,30 +135,17 @@ fn expected(scale: f64, config: &Config) -> Result<Expected, CliError> {
 }
 
 /// One amplitude: recorded, analysed, its report in its recording.
-fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<(RunMade, Vec<FittedMode>), CliError> {
+fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<RunMade, CliError> {
     let mut run = args.run.run(&Plan::chirp(config.clone()), "linearity")?;
     let totals = run.totals()?;
     let told = RunReport::new(&run, &totals);
-    let (made, modes) = match told.outcome {
+    let made = match told.outcome {
         "completed" => analysed(&run.path, config)?,
-        _ => (Made::nothing("the run did not come to its end"), Vec::new()),
+        _ => Made::nothing("the run did not come to its end"),
     };
     let made = RunMade { scale, expected, run: told, made };
     finish(run, &made)?;
-    Ok((made, modes))
-}
-
-/// The analysis, which a person may stop, and the modes.
-fn analysed(path: &Path, config: &Config) -> Result<(Made, Vec<FittedMode>), CliError> {
-    let (path, config) = (path.to_path_buf(), config.clone());
-    let work = move || -> Result<(Made, Vec<FittedMode>), CliError> {
-        let recording = Recording::open(&path)?;
-        let analysis = analyse(&recording, &config)?;
-        let modes = analysis.fit.as_ref().map_or(Vec::new(), |fit| fit.modes());
-        Ok((make_of(&analysis, &recording, &config)?, modes))
-    };
-    let made = unless_stopped(work).map_err(|error| CliError::Failed(error.to_string()))?;
-    made.unwrap_or_else(|| Ok((Made::stopped(), Vec::new())))
+    Ok(made)
 }
 
 fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
