@@ -6,5 +6,7 @@ mod plans;
 #[path = "../thesis/program.rs"]
 mod program;
 mod rig;
+#[path = "../common/simulated.rs"]
+mod simulated;
 #[path = "../thesis/truth.rs"]
 mod truth;

@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 
 use bench::config::{Config, Purpose, Source, load};
 use bench::recording::Recording;
-use bench::rt::thread::Pace;
-use bench::session::{self, Analysis, Plan, analyse};
-use bench::sim::SimulatedRig;
+use bench::session::{Analysis, Plan};
+
+use crate::simulated;
 
 /// 1 kHz, up to 400 Hz.
 const HERE: [&str; 2] = ["loop.rate_hz=1000", "chirp.stop_hz=400.0"];
@@ -42,19 +42,11 @@ pub fn of_kind((kind, sets): (&str, &[&str]), more: &[&str]) -> Config {
 }
 
 pub fn recorded(config: &Config, folder: &Path) -> PathBuf {
-    let plan = Plan::chirp(config.clone());
-    let rig = Box::new(SimulatedRig::new(config).expect("a rig"));
-    let run = session::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
-    assert!(run.ended.completed, "{:?}", run.ended);
-    let path = run.path.clone();
-    run.finish("{}").expect("a good disk");
-    path
+    simulated::recorded(&Plan::chirp(config.clone()), folder)
 }
 
 pub fn analysed(config: &Config) -> Analysis {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = recorded(config, folder.path());
-    analyse(&Recording::open(&path).expect("a recording"), config).expect("an analysis")
+    simulated::analysed(&Plan::chirp(config.clone()), config).expect("an analysis")
 }
 
 /// The largest displacement that the probe saw, in metres.

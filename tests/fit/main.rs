@@ -3,6 +3,8 @@ mod intervals;
 mod modes;
 mod response;
 mod rig;
+#[path = "../common/simulated.rs"]
+mod simulated;
 mod stage;
 mod synthetic;
 mod under_control;

@@ -7,7 +7,8 @@ use bench::session::{Analysis, Plan};
 use bench::sim;
 use bench::verdict::Cnmp;
 
-use crate::rig::{analysed, analysed_run};
+use crate::rig::analysed;
+use crate::simulated;
 
 /// The default stage at its 5 kHz.
 fn config(sets: &[&str]) -> Config {
@@ -18,7 +19,7 @@ fn config(sets: &[&str]) -> Config {
 fn swept(sets: &[&str]) -> Analysis {
     let config = config(&[&["control.reference={ kind = \"chirp\", travel_m = 20e-6 }"], sets].concat());
     let plan = Plan::control(config).expect("a plan");
-    analysed_run(&plan, &plan.config).expect("an analysis")
+    simulated::analysed(&plan, &plan.config).expect("an analysis")
 }
 
 /// The data carry a frequency whose sigma is below this part of the response: errors below 4 sigma are then below 1 %.
@@ -114,6 +115,6 @@ fn a_sweep_that_would_trip_an_interlock_is_refused_before_anything_moves() {
 #[test]
 fn a_loop_whose_reference_did_not_sweep_is_refused_with_the_remedy() {
     let plan = Plan::control(config(&["control.duration_s=1"])).expect("a plan");
-    let error = analysed_run(&plan, &plan.config).unwrap_err().to_string();
+    let error = simulated::analysed(&plan, &plan.config).unwrap_err().to_string();
     assert!(error.contains("step") && error.contains("--reference chirp"), "{error}");
 }

@@ -2,4 +2,6 @@
 mod aliases;
 mod margins;
 mod measured;
+#[path = "../common/simulated.rs"]
+mod simulated;
 mod wires;

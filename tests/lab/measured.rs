@@ -1,25 +1,18 @@
 //! A chirp over the simulated chain of the profile `lab`, against the closed form.
 use bench::config::Config;
 use bench::plant::Mode;
-use bench::recording::Recording;
-use bench::rt::thread::Pace;
-use bench::session::{self, Analysis, Plan, analyse};
-use bench::sim::{self, SimulatedRig};
+use bench::session::{Analysis, Plan};
+use bench::sim;
 use nalgebra::Complex;
 
 use crate::aliases::{lab, response};
+use crate::simulated;
 
 const QUIET: [&str; 4] =
     ["sim.floor=[]", "sim.probe_noise_rms_m=0", "sim.probe_quantisation_m=0", "chirp.duration_s=60"];
 
-fn measured(config: &Config) -> Analysis {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let plan = Plan::chirp(config.clone());
-    let rig = Box::new(SimulatedRig::new(config).expect("a rig"));
-    let run = session::run(&plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
-    let path = run.path.clone();
-    run.finish("{}").expect("a good disk");
-    analyse(&Recording::open(&path).expect("a recording"), config).expect("an analysis")
+fn measured(config: &Config, believed: &Config) -> Analysis {
+    simulated::analysed(&Plan::chirp(config.clone()), believed).expect("an analysis")
 }
 
 /// Ratios of measured to exact response, between two frequencies; around the zeros, where little answers, the error is
@@ -41,7 +34,7 @@ fn share_beyond(ratios: &[Complex<f64>], percent: f64, deg: f64) -> f64 {
 #[test]
 fn a_slow_probe_of_its_own_clock_blurs_nothing() {
     let config = lab(&QUIET);
-    let (analysis, modes) = (measured(&config), sim::modes(&config).expect("modes"));
+    let (analysis, modes) = (measured(&config, &config), sim::modes(&config).expect("modes"));
     let all = ratios(&analysis, &config, &modes, (0.5, 140.0));
     assert!(all.len() > 1000);
     // A step of the current is 2 mA of 0.1 to 1.5 A: half a percent of a bin's noise. Taken as of one age, the readings would
@@ -61,13 +54,7 @@ fn the_delay_that_the_phases_show_is_that_of_the_chain_wherever_it_sits() {
         let config = lab(&[&QUIET[..], &[set]].concat());
         let mut believed = lab(&QUIET);
         believed.amplifier.latency_s = 0.0004;
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let plan = Plan::chirp(config.clone());
-        let rig = Box::new(SimulatedRig::new(&config).expect("a rig"));
-        let run = session::run(&plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
-        let path = run.path.clone();
-        run.finish("{}").expect("a good disk");
-        let analysis = analyse(&Recording::open(&path).expect("a recording"), &believed).expect("an analysis");
+        let analysis = measured(&config, &believed);
         let beyond = analysis.beyond.expect("enough frequencies");
         // Modes that the model leaves out turn the phase by 0.1 degree at 100 Hz: 3 us.
         assert!((beyond.seconds - extra_s).abs() < 6e-6, "{set}: {beyond:?}");

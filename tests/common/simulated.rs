@@ -1,0 +1,24 @@
+//! Runs on the simulated stage, recorded and analysed as they are on the command line.
+use std::path::{Path, PathBuf};
+
+use bench::config::Config;
+use bench::recording::Recording;
+use bench::rt::thread::Pace;
+use bench::session::{self, Analysis, AnalysisError, Plan, analyse};
+use bench::sim::SimulatedRig;
+
+/// The recording of a run by `plan`.
+pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
+    let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
+    let run = session::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    assert!(run.ended.completed, "{:?}", run.ended);
+    let path = run.path.clone();
+    run.finish("{}").expect("a good disk");
+    path
+}
+
+/// The analysis of a run by `plan`, believing `believed`.
+pub fn analysed(plan: &Plan, believed: &Config) -> Result<Analysis, AnalysisError> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    analyse(&Recording::open(&recorded(plan, folder.path())).expect("a recording"), believed)
+}
