@@ -5,7 +5,8 @@
 //! ```
 //!
 //! A_u is the amplitude that the chirp has in open loop, so that motor and amplifier are driven as there; where the plant
-//! resonates, |C S| is small and the travel limits. Between two points the least around them counts.
+//! resonates, |C S| is small and the travel limits. Between two points the least around them counts. Where a slow loop hardly
+//! answers its reference, both would ask for metres of it: it stays below a largest amplitude of its own.
 
 use std::f64::consts::PI;
 
@@ -19,8 +20,13 @@ const POINTS: usize = 48;
 const BETWEEN: usize = 32;
 
 /// The amplitudes in metres over the band of `chirp`, whose own are those of the command in amperes; the stage moves by
-/// `travel_m` at most.
-pub fn swept_reference(closed_loop: &ClosedLoop, chirp: &ChirpSettings, travel_m: f64) -> Vec<TravelPoint> {
+/// `travel_m` at most, and no amplitude is above `most_m`.
+pub fn swept_reference(
+    closed_loop: &ClosedLoop,
+    chirp: &ChirpSettings,
+    travel_m: f64,
+    most_m: f64,
+) -> Vec<TravelPoint> {
     let (low_hz, high_hz) = chirp.band_hz();
     let amplitude = Amplitude::new(&chirp.amplitude);
     let at = |x: f64| low_hz * libm::pow(high_hz / low_hz, x);
@@ -28,8 +34,7 @@ pub fn swept_reference(closed_loop: &ClosedLoop, chirp: &ChirpSettings, travel_m
     let near = |i: usize| {
         (0..=2 * BETWEEN).map(move |j| (i as f64 - 1.0 + j as f64 / BETWEEN as f64) * step).map(|x| x.clamp(0.0, 1.0))
     };
-    let least =
-        |i: usize| near(i).map(|x| allowed(closed_loop, &amplitude, travel_m, at(x))).fold(f64::INFINITY, f64::min);
+    let least = |i: usize| near(i).map(|x| allowed(closed_loop, &amplitude, travel_m, at(x))).fold(most_m, f64::min);
     (0..POINTS).map(|i| TravelPoint { frequency_hz: at(i as f64 * step), amplitude_m: least(i) }).collect()
 }
 

@@ -1,7 +1,7 @@
 //! A swept reference before its run: its amplitudes, where it has none, and what it would do.
 
 use super::plan::PlanError;
-use crate::config::{Config, ReferenceSettings};
+use crate::config::{Config, ReferenceSettings, recheck};
 use crate::control::{ClosedLoop, ControllerText, swept_reference};
 use crate::excitation::{Chirp, Excitation, Extremes, reference, within};
 use crate::sim;
@@ -15,10 +15,12 @@ pub(super) fn planned(
     let ReferenceSettings::Chirp { amplitude, travel_m } = &config.control.reference else { return Ok((config, None)) };
     let closed_loop = ClosedLoop::new(&config, sim::modes(&config)?, controller.sections(config.servo.rate_hz)?);
     let amplitude = match amplitude.is_empty() {
-        true => swept_reference(&closed_loop, &config.chirp, *travel_m),
+        true => swept_reference(&closed_loop, &config.chirp, *travel_m, config.interlock.soft_limit_m),
         false => amplitude.clone(),
     };
     config.control.reference = ReferenceSettings::Chirp { amplitude, travel_m: *travel_m };
+    // What is not allowed now could not be read back from the recording.
+    recheck(&config)?;
     let extremes = foreseen(&config, &closed_loop)?;
     Ok((config, Some(extremes)))
 }
