@@ -64,7 +64,9 @@ impl Load {
 
     /// What to do where `before` is on the stage: a line each for the weight and both stages.
     pub fn orders(&self, before: &Load) -> [String; 3] {
-        let side = if self.hung_kg < 0.0 { "-Y" } else { "+Y" };
+        // With nothing to hang it is the side that the weight is taken off.
+        let down = self.hung_kg < 0.0 || self.hung_kg == 0.0 && before.hung_kg < 0.0;
+        let side = if down { "-Y" } else { "+Y" };
         let turned = self.hung_kg * before.hung_kg < 0.0;
         let hung_before_kg = if turned { 0.0 } else { before.hung_kg.abs() };
         let weight = order(&format!("weight in {side}"), self.hung_kg.abs(), hung_before_kg, 1.0, "kg");

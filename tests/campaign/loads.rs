@@ -100,4 +100,5 @@ fn a_person_is_told_how_much_in_all_and_what_changes() {
     let other = on(-0.5, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0));
     assert_eq!(other[0], "take the weight off the other side; weight in -Y: 0.500 kg in all (put on 0.500 kg)");
     assert_eq!(on(0.25, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0))[0], "weight in +Y: 0.250 kg in all (take off 0.750 kg)");
+    assert_eq!(on(0.0, 0.0, 0.0).orders(&on(-0.5, 0.0, 0.0))[0], "weight in -Y: nothing (take off 0.500 kg)");
 }
