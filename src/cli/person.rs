@@ -2,7 +2,7 @@
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::CliError;
@@ -21,9 +21,19 @@ pub(super) struct AtTerminal<'a> {
 
 impl<'a> AtTerminal<'a> {
     pub fn new(stop: &'a AtomicBool, beam_length_m: Option<f64>) -> Result<AtTerminal<'a>, CliError> {
-        let (tell, lines) = sync_channel(1);
+        AtTerminal::of(stop, beam_length_m, || std::io::stdin().lines().map_while(Result::ok))
+    }
+
+    /// Of these lines, which a thread of its own takes as they come, asked for or not: what waits to be taken could not be told
+    /// from an answer.
+    fn of<L: Iterator<Item = String>>(
+        stop: &'a AtomicBool,
+        beam_length_m: Option<f64>,
+        typed: impl FnOnce() -> L + Send + 'static,
+    ) -> Result<AtTerminal<'a>, CliError> {
+        let (tell, lines) = channel();
         // Ends with the input, or with the process: a read cannot be broken off.
-        let read = move || std::io::stdin().lines().map_while(Result::ok).try_for_each(|line| tell.send(line));
+        let read = move || typed().try_for_each(|line| tell.send(line));
         let thread = std::thread::Builder::new().name("bench-answers".into());
         let started = thread.spawn(move || drop(read()));
         started.map_err(|e| CliError::Failed(format!("cannot wait for answers: {e}; start it again")))?;
@@ -102,6 +112,24 @@ mod tests {
 
     fn question(all: bool) -> Question {
         Question { text: String::new(), may_read: all, may_confirm: all, may_skip: all }
+    }
+
+    #[test]
+    fn what_was_typed_during_a_run_answers_no_question_however_much_it_was() {
+        let (ended, all_read) = channel();
+        let (input, open) = channel::<()>();
+        let lines = (0..5).map(|_| String::new());
+        let end = std::iter::from_fn(move || {
+            let told = ended.send(());
+            // Until the input ends.
+            told.ok().and(open.recv().ok()).map(|()| String::new())
+        });
+        let stop = AtomicBool::new(false);
+        let mut person = AtTerminal::of(&stop, None, || lines.chain(end)).expect("a thread");
+        let patience = Duration::from_secs(60);
+        all_read.recv_timeout(patience).expect("each line is taken when it is typed");
+        drop(input);
+        assert_eq!(person.ask(&question(true)), Reply::Stop, "five times Enter, and then the end of the input");
     }
 
     #[test]
