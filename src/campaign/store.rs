@@ -47,6 +47,9 @@ pub struct Point {
 struct Header<'a> {
     format: &'static str,
     version: &'static str,
+    /// Whether devices measured it: of the same settings, the simulated stage says nothing of the real one.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    on_devices: bool,
     #[serde(flatten)]
     grid: &'a Grid,
     config: &'a Config,
@@ -84,14 +87,15 @@ pub struct Found {
 }
 
 impl Store {
-    /// Opens the folder of a campaign, or makes it. Refuses one of other settings, one that another process works on, and one
-    /// whose `campaign.json` is something else; leaves these as they are.
-    pub fn open(folder: &Path, grid: &Grid, config: &Config) -> Result<Found, CampaignError> {
+    /// Opens the folder of a campaign, or makes it. Refuses one of other settings, one that was simulated for one on devices
+    /// and the other way round, one that another process works on, and one whose `campaign.json` is something else; leaves these
+    /// as they are.
+    pub fn open(folder: &Path, grid: &Grid, config: &Config, on_devices: bool) -> Result<Found, CampaignError> {
         let points = folder.join("points");
         std::fs::create_dir_all(&points).map_err(|e| failed("make", &points, &e))?;
         let lock = File::open(folder).map_err(|e| failed("open", folder, &e))?;
         locked(lock.try_lock(), folder)?;
-        let header = json(&Header { format: FORMAT, version: env!("CARGO_PKG_VERSION"), grid, config })?;
+        let header = json(&Header { format: FORMAT, version: env!("CARGO_PKG_VERSION"), on_devices, grid, config })?;
         let path = folder.join("campaign.json");
         match std::fs::read_to_string(&path) {
             Ok(theirs) => same(&path, folder, &theirs, &header)?,

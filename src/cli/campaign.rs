@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
     let grid = Grid::new(args.operating_points.0.clone(), args.asymmetries.0.clone(), &config)?;
     let tolerances = tolerances(args, &grid, &config)?;
-    let Found { store, mut done, dropped } = Store::open(&args.out, &grid, &config)?;
+    let Found { store, mut done, dropped } = Store::open(&args.out, &grid, &config, attended(args, &config))?;
     dropped.iter().for_each(|why| eprintln!("bench: {why}; the point is measured again"));
     let missing: Vec<Place> = grid.places().filter(|place| done.iter().all(|(there, _)| there != place)).collect();
     if !done.is_empty() {

@@ -3,6 +3,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use bench::campaign::{Grid, Place, Point, Store};
+use bench::config::{Source, load};
+use bench::verdict::Cnmp;
 use serde_json::Value;
 
 use crate::program::Bench;
@@ -126,6 +129,31 @@ fn what_is_no_campaign_is_refused_and_left_as_it_is() {
         assert!(answer.code == 2 && answer.err.contains(words), "{arguments}: {answer:?}");
     }
     assert_eq!(bench.files(), ["c"]);
+}
+
+#[test]
+fn points_of_the_simulated_stage_do_not_count_for_the_real_one_of_the_same_settings() {
+    let config = load(&Source::default()).expect("the default profile");
+    let grid = Grid::new(vec![0.0, 0.08], vec![0.1], &config).expect("a grid");
+    let point = Point {
+        cnmp: Cnmp::Excluded,
+        why: String::new(),
+        modes_hz: vec![29.3],
+        signs: "+".into(),
+        zeros_rad_s: Vec::new(),
+        loop_digest: String::new(),
+        put_on: None,
+    };
+    for simulated_first in [true, false] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let open = |on_devices| Store::open(folder.path(), &grid, &config, on_devices);
+        let first = open(!simulated_first).expect("a new folder");
+        first.store.add(Place { row: 1, column: 0 }, &point).expect("a point");
+        drop(first);
+        let error = open(simulated_first).expect_err("the other stage").to_string();
+        assert!(error.contains("other settings") && error.contains("`on_devices` is "), "{error}");
+        assert_eq!(open(!simulated_first).expect("the same").done.len(), 1);
+    }
 }
 
 #[test]
