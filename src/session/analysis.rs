@@ -42,12 +42,12 @@ pub enum AnalysisError {
     NothingRan,
     /// Too many ticks are missing.
     #[error(
-        "{missing} of {ticks} ticks are missing, {allowed} may be filled in; repeat the run at a rate the machine keeps, or in real-time scheduling"
+        "{missing} ticks or more are missing beside the {ticks} that were recorded, {allowed} may be filled in; repeat the run at a rate the machine keeps, or in real-time scheduling"
     )]
     Gaps {
-        /// Missing ticks.
+        /// Missing ticks, up to where there were too many.
         missing: u64,
-        /// Ticks in all.
+        /// Recorded ones.
         ticks: u64,
         /// Ticks that may be missing.
         allowed: u64,

@@ -44,7 +44,12 @@ pub(super) struct Gathered {
 
 impl Gathered {
     pub(super) fn new(recording: &Recording, rate_hz: f64) -> Self {
-        let ticks = recording.tick_count();
+        let on_devices = recording.metadata().get("probe").is_some_and(|probe| probe != "simulated");
+        Gathered::of(recording.tick_count(), rate_hz, on_devices)
+    }
+
+    /// Of a recording of so many ticks.
+    fn of(ticks: u64, rate_hz: f64, on_devices: bool) -> Self {
         Gathered {
             input_a: Vec::new(),
             output_m: Vec::new(),
@@ -56,7 +61,7 @@ impl Gathered {
             before: None,
             first_s: 0.0,
             rate_hz,
-            on_devices: recording.metadata().get("probe").is_some_and(|probe| probe != "simulated"),
+            on_devices,
             filled: 0,
             allowed: (ticks as f64 * FILLED_RATIO) as u64,
             ticks,
@@ -94,11 +99,13 @@ impl Gathered {
         self.offset_range_s = (self.offset_range_s.0.min(offset_s), self.offset_range_s.1.max(offset_s));
     }
 
-    /// Fills the gap between two records, if it is a short one: the current held, the position on a straight line.
+    /// Fills the gap between two records, unless all gaps so far are too long: the current held, the position on a straight
+    /// line.
     fn fill(&mut self, before: &TickRecord, after: &TickRecord) -> Result<(), AnalysisError> {
-        let missing = after.tick.saturating_sub(before.tick + 1);
-        if missing > self.allowed {
-            return Err(AnalysisError::Gaps { missing, ticks: self.ticks, allowed: self.allowed });
+        let missing = after.tick.saturating_sub(before.tick).saturating_sub(1);
+        let all = self.filled.saturating_add(missing);
+        if all > self.allowed {
+            return Err(AnalysisError::Gaps { missing: all, ticks: self.ticks, allowed: self.allowed });
         }
         for step in 1..=missing {
             let share = step as f64 / (missing + 1) as f64;
@@ -148,4 +155,37 @@ fn currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
 
 fn seconds(ns: u64) -> f64 {
     ns as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The ticks from 0 to `count`, without those that are `lost`.
+    fn gathered(count: u64, lost: impl Fn(u64) -> bool) -> Result<Ran, AnalysisError> {
+        let kept: Vec<u64> = (0..count).filter(|tick| !lost(*tick)).collect();
+        let mut gathered = Gathered::of(kept.len() as u64, 1000.0, false);
+        for tick in kept {
+            let (ns, position_m) = (tick * 1_000_000, tick as f64 * 1e-9);
+            let times = TickRecord { scheduled_ns: ns, woke_ns: ns, done_ns: ns, ..TickRecord::default() };
+            gathered.push(&TickRecord { tick, position_m, command_a: 0.5, ..times })?;
+        }
+        gathered.finish()
+    }
+
+    #[test]
+    fn a_thousandth_of_all_ticks_is_filled_in_and_no_more_however_short_the_gaps() {
+        // Of 9990 that are there, 9 may be missing: one a thousand, the last at 8500, or a gap of nine.
+        let nine = gathered(10_000, |tick| tick % 1000 == 500 && tick < 9000).expect("nine are few");
+        assert_eq!(nine.filled_ticks, 9);
+        let Signals { input_a, output_m, .. } = nine.loop_signals.signals;
+        assert!(input_a.len() == 10_000 && input_a.iter().all(|u| *u == 0.5));
+        let straight = |(tick, y): (usize, &f64)| (y - tick as f64 * 1e-9).abs() < 1e-18;
+        assert!(output_m.iter().enumerate().all(straight), "on a straight line");
+        assert_eq!(gathered(10_000, |tick| (500..509).contains(&tick)).expect("nine").filled_ticks, 9);
+        for lost in [|tick: u64| tick % 1000 == 500, |tick: u64| (500..510).contains(&tick)] {
+            let Err(error) = gathered(10_000, lost) else { panic!("ten of 9990 are too many") };
+            assert!(matches!(error, AnalysisError::Gaps { missing: 10, allowed: 9, .. }), "{error}");
+        }
+    }
 }
