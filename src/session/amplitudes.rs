@@ -67,7 +67,8 @@ fn nearest(first: &[FittedMode], k: usize, modes: &[FittedMode]) -> Option<Fitte
     let apart = |mode: &FittedMode| (at(mode) - here).abs();
     let to_next = first.iter().map(apart).filter(|distance| *distance > 0.0).fold(f64::INFINITY, f64::min);
     let found = modes.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
-    (apart(found) < (0.5 * to_next).min(SAME * here)).then_some(*found)
+    // A free body is at 0 in each run.
+    (apart(found) <= (0.5 * to_next).min(SAME * here)).then_some(*found)
 }
 
 #[cfg(test)]
@@ -105,6 +106,8 @@ mod tests {
         let far = over_amplitude(&[vec![mode(510.0, 0.01)], vec![mode(540.0, 0.01)]]);
         assert!(far[0].by_run[1].is_none() && !far[0].shifts());
         assert!(over_amplitude(&[]).is_empty());
+        let free = over_amplitude(&[vec![mode(0.0, 0.0), mode(180.0, 0.01)], vec![mode(0.0, 0.0)]]);
+        assert!(free[0].by_run[1].is_some() && free[1].by_run[1].is_none(), "{free:?}");
     }
 
     #[test]
