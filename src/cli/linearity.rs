@@ -78,7 +78,8 @@ struct Report {
     runs: Vec<RunMade>,
     /// The modes of the smallest amplitude in all runs.
     modes: Vec<ModeMade>,
-    /// Whether any figure of any mode differs from that at the smallest amplitude by more than its errors explain; null without modes.
+    /// Whether any figure of any mode differs from that at the smallest amplitude by more than its errors explain; null without modes,
+    /// and where none does but a run did not come to its end.
     shifted: Option<bool>,
     why: String,
 }
@@ -91,6 +92,12 @@ struct RunMade {
     run: RunReport,
     #[serde(flatten)]
     made: Made,
+}
+
+impl RunMade {
+    fn ended(&self) -> Outcome {
+        if self.made.is_stopped() { Outcome::Failed } else { self.run.exit() }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -108,7 +115,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let (mut runs, mut outcome) = (Vec::new(), Outcome::Done);
     for ((scale, config), expected) in configs.iter().zip(expected) {
         let made = one(args, *scale, config, expected)?;
-        let ended = if made.made.is_stopped() { Outcome::Failed } else { made.run.exit() };
+        let ended = made.ended();
         outcome = if outcome == Outcome::Done { ended } else { outcome };
         runs.push(made);
         if ended == Outcome::Failed {
@@ -150,10 +157,17 @@ fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<R
 
 fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
     let compared = modes.iter().any(|mode| mode.by_run.iter().flatten().count() > 1);
-    let shifted = compared.then(|| modes.iter().any(ModeOverAmplitude::shifts));
+    let whole = runs.iter().all(|run| run.ended() != Outcome::Failed);
+    let shifts = modes.iter().any(ModeOverAmplitude::shifts);
+    let shifted = (shifts || whole && compared).then_some(shifts);
     let why = match shifted {
+        None if !whole => {
+            "not every amplitude was run and analysed to its end: whether modes shift is not known".into()
+        }
         None => "no mode is seen at two amplitudes: take more periods (multisine.periods) or larger amplitudes".into(),
-        Some(false) => "no mode shifts with amplitude beyond what its errors explain".into(),
+        Some(false) => {
+            format!("no mode shifts with amplitude beyond what its errors explain{}", unseen(modes))
+        }
         Some(true) => format!("with amplitude shift beyond what their errors explain: {}", shifting(modes)),
     };
     let mode = |over: &ModeOverAmplitude| ModeMade {
@@ -164,6 +178,15 @@ fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
     };
     let scales = runs.iter().map(|run| run.scale).collect();
     Report { scales, runs, modes: modes.iter().map(mode).collect(), shifted, why }
+}
+
+/// Of which modes nothing is said, as not all amplitudes show them: noise may hide one, or it may have moved beyond all that is
+/// taken for the same.
+fn unseen(modes: &[ModeOverAmplitude]) -> String {
+    let at = |mode: &ModeOverAmplitude| Some(mode.by_run.iter().flatten().next()?.frequency_hz().value);
+    let lost = modes.iter().filter(|mode| !mode.is_seen_throughout()).filter_map(at);
+    let lost: Vec<String> = lost.map(|hz| format!("{hz:.2} Hz")).collect();
+    if lost.is_empty() { String::new() } else { format!("; not seen at every amplitude: {}", lost.join(", ")) }
 }
 
 /// Which figures of which modes shift.
@@ -211,4 +234,25 @@ fn mode_table(scales: &[f64], modes: &[ModeOverAmplitude]) -> String {
     let rows: Vec<Vec<String>> =
         modes.iter().flat_map(|over| scales.iter().zip(&over.by_run).map(move |seen| row(over, seen))).collect();
     table(&["amplitude", "mode Hz", "damping", "residue 1/kg"], &rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mode_that_is_not_seen_at_every_amplitude_is_named() {
+        let known = |value: f64| Estimate { value, sigma: 1e-3 * value };
+        let mode = |hz: f64| FittedMode {
+            omega_rad_s: known(hz * std::f64::consts::TAU),
+            damping_ratio: known(0.01),
+            residue_per_kg: known(0.5),
+        };
+        let said = |runs: &[Vec<FittedMode>]| report(Vec::new(), &over_amplitude(runs)).why;
+        let both = vec![mode(29.0), mode(82.0)];
+        // 90 Hz is no 82 Hz: nothing shifts, but of that mode nothing is known.
+        let why = said(&[both.clone(), vec![mode(29.0), mode(90.0)]]);
+        assert!(why.starts_with("no mode shifts") && why.ends_with("; not seen at every amplitude: 82.00 Hz"), "{why}");
+        assert!(said(&[both.clone(), both]).ends_with("explain"));
+    }
 }

@@ -23,6 +23,11 @@ pub struct ModeOverAmplitude {
 }
 
 impl ModeOverAmplitude {
+    /// Whether all runs show it.
+    pub fn is_seen_throughout(&self) -> bool {
+        self.by_run.iter().all(Option::is_some)
+    }
+
     /// Whether anything of it shifts.
     pub fn shifts(&self) -> bool {
         self.frequency_shifts || self.damping_shifts || self.residue_shifts

@@ -149,6 +149,22 @@ fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift
 }
 
 #[test]
+fn a_run_that_trips_ends_the_rest_and_what_it_did_not_show_is_no_sign_of_a_linear_stage() {
+    let bench = Bench::new();
+    // Planned up to 40 um below the soft limit of 900 um; the noise reaches 200 um and more. At a tenth all stays within 300 um.
+    let trips =
+        "--shape model --set shape.travel_m=0.00086 --set sim.probe_noise_rms_m=4e-5 --scales 0.1,0.2,1,1.01 --json";
+    let answer = bench.run(&format!("linearity {HERE} {trips}"));
+    assert_eq!(answer.code, 1, "{}", answer.err);
+    let report = answer.json();
+    assert_eq!(report["scales"], serde_json::json!([0.1, 0.2, 1.0]), "nothing runs after a trip");
+    assert_eq!(report["runs"][2]["outcome"], "tripped", "{}", report["runs"][2]);
+    assert!(report["runs"][2]["frf_csv"].is_null() && report["runs"][1]["frf_csv"].is_string());
+    assert!(report["shifted"].is_null(), "{}", report["why"]);
+    assert!(report["why"].as_str().expect("words").contains("not every amplitude was run"), "{}", report["why"]);
+}
+
+#[test]
 fn amplitudes_that_would_cross_an_interlock_or_are_none_are_refused_and_nothing_moves() {
     for (options, words) in [
         ("--amplitude 0.5 --scales 0.5,1,4", ["at 4 of the planned amplitude", "soft limit is 900 um"].as_slice()),
