@@ -121,13 +121,14 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
         let config = self.grid.config(self.config, place)?;
         let load = Load::of(&config)?;
         let mut question = self.put_on(place, number, &load.orders(&known.on));
-        let mut failed: Option<Point> = None;
+        let (mut failed, mut read_m): (Option<Point>, Option<f64>) = (None, None);
         loop {
-            let (read_m, confirmed) = match (self.person.ask(&question), failed.take()) {
+            let confirmed;
+            (read_m, confirmed) = match (self.person.ask(&question), failed.take()) {
                 (Reply::Stop, _) => return Ok(Next::Stopped),
                 (Reply::Skip, _) => return Ok(Next::Skipped),
                 (Reply::Right, Some(point)) => return self.keep(place, confirmed_by_hand(point)),
-                (Reply::Right, None) => (None, question.may_confirm),
+                (Reply::Right, None) => (read_m, question.may_confirm),
                 (Reply::Done(read_m), _) => (read_m, false),
             };
             known.on = load;
@@ -141,7 +142,8 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
             let Some(mut point) = self.stage.measure(place)? else { return Ok(Next::Stopped) };
             put_on.modes = modes(&config, &load, &point)?;
             (question, point.put_on) = (again(&put_on), Some(put_on.clone()));
-            if put_on.finding() != Finding::Fails || confirmed {
+            // What was confirmed before the chirp says nothing of the modes.
+            if put_on.modes_find() != Finding::Fails {
                 return self.keep(place, point);
             }
             failed = Some(point);

@@ -191,7 +191,12 @@ impl PutOn {
     /// What all checks find: a failure is one of any, and one that holds is enough (each of them stands beside it).
     pub fn finding(&self) -> Finding {
         let lengths = [Some(&self.rest), self.read.as_ref()].into_iter().flatten().map(|check| check.finding);
-        together(lengths.chain(self.modes.iter().map(|mode| mode.finding)))
+        together(lengths.chain([self.modes_find()]))
+    }
+
+    /// What the modes find.
+    pub fn modes_find(&self) -> Finding {
+        together(self.modes.iter().map(|mode| mode.finding))
     }
 
     /// What failed, a sentence each.

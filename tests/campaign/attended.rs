@@ -235,6 +235,33 @@ fn what_a_person_says_is_right_is_kept_as_said_by_hand_with_what_failed() {
 }
 
 #[test]
+fn what_a_person_says_of_the_rest_confirms_no_modes_and_a_displacement_that_was_read_stays_as_read() {
+    let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
+    // Nothing is put on, but something touches the stage: `right` to that is no `right` to modes nobody has seen yet.
+    let touched: Does = Box::new(|really| really.askew_m = 20e-6);
+    let script = vec![
+        (nothing(), DONE),
+        (touched, DONE),
+        (nothing(), Reply::Right),
+        (puts(&config, &grid, 0, 0), DONE),
+        (nothing(), Reply::Right),
+    ];
+    let came = campaign(&config, &grid, &all(&grid), script);
+    assert_eq!((came.asked.len(), came.chirps, came.kept.len()), (5, 2, 1), "{:?}", came.asked.last());
+    assert!(!came.asked[2].text.contains("mode") && came.asked[3].text.contains("is not seen"), "{:?}", came.asked);
+    let put_on = came.put_on(0);
+    assert!(put_on.confirmed_by_hand && put_on.rest.finding == Finding::Fails, "{put_on:?}");
+    assert!(put_on.modes.iter().all(|mode| mode.finding != Finding::Fails), "{put_on:?}");
+
+    let read: (Does, Reply) = (puts(&config, &grid, 0, 0), Reply::Done(Some(3.6e-3)));
+    let came = campaign(&config, &grid, &all(&grid), vec![(nothing(), DONE), read, (nothing(), Reply::Right)]);
+    assert_eq!((came.asked.len(), came.chirps, came.kept.len()), (3, 1, 1), "{:?}", came.asked.last());
+    let put_on = came.put_on(0);
+    assert!(put_on.confirmed_by_hand && put_on.finding() == Finding::Fails, "{put_on:?}");
+    assert_eq!(put_on.read.as_ref().map(|read| (read.seen_m, read.finding)), Some((3.6e-3, Finding::Fails)));
+}
+
+#[test]
 fn a_cable_that_pulls_askew_is_told_before_the_chirp_and_so_is_a_displacement_read_wrong() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
     // 34 N askew by 0.02 rad are 9.5 um at 72 N/mm, and 2 um may drift.
