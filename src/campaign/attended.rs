@@ -136,12 +136,12 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
             let mut put_on = self.lengths(&config, load, rest, known, read_m)?;
             put_on.confirmed_by_hand = confirmed;
             if put_on.finding() == Finding::Fails && !confirmed {
-                question = again(&put_on);
+                question = again(&put_on, None);
                 continue;
             }
             let Some(mut point) = self.stage.measure(place)? else { return Ok(Next::Stopped) };
             put_on.modes = modes(&config, &load, &point)?;
-            (question, point.put_on) = (again(&put_on), Some(put_on.clone()));
+            (question, point.put_on) = (again(&put_on, Some(&point)), Some(put_on.clone()));
             // What was confirmed before the chirp says nothing of the modes.
             if put_on.modes_find() != Finding::Fails {
                 return self.keep(place, point);
@@ -193,12 +193,15 @@ fn confirmed_by_hand(mut point: Point) -> Point {
     point
 }
 
-/// What is wrong, and what can be done.
-fn again(put_on: &PutOn) -> Question {
+/// What is wrong, and what can be done. A chirp without modes, as of a run that tripped, says why before anything else.
+fn again(put_on: &PutOn, point: Option<&Point>) -> Question {
+    let silent = point.filter(|point| point.modes_hz.is_empty());
+    let silent = silent.map(|point| format!("the chirp shows no modes: {}", point.why));
+    let failures: Vec<String> = silent.into_iter().chain(put_on.failures()).collect();
     let text = format!(
         "this is not what was to be put on:\n  {}\nput it right; a model that is off everywhere is mended in [plant] and \
          campaign.frequency_tolerance_ratio",
-        put_on.failures().join("\n  ")
+        failures.join("\n  ")
     );
     Question { text, may_read: true, may_confirm: true, may_skip: true }
 }

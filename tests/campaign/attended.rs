@@ -11,6 +11,7 @@ use bench::recording::Recording;
 use bench::rt::thread::Pace;
 use bench::session::{Plan, run};
 use bench::sim::SimulatedRig;
+use bench_hal::Validity;
 
 use crate::faulty_rig::{Fault, FaultyRig};
 
@@ -36,6 +37,8 @@ fn config(more: &[&str]) -> Config {
 struct Really {
     on: Load,
     askew_m: f64,
+    /// The probe loses its target during a chirp.
+    blind: bool,
 }
 
 /// What a person of the script does before an answer.
@@ -87,11 +90,13 @@ struct Simulated<'a> {
 
 impl Simulated<'_> {
     /// The rig does what is on it; the plan knows only what it was asked to be.
-    fn rig(&self, config: &Config) -> Box<FaultyRig<SimulatedRig>> {
+    fn rig(&self, config: &Config, chirps: bool) -> Box<FaultyRig<SimulatedRig>> {
         let really = *self.really.borrow();
         let plant = really.on.carried(self.config).expect("a stage");
         let rig = SimulatedRig::new(&Config { plant, ..config.clone() }).expect("a rig");
-        Box::new(FaultyRig::new(rig, &[(0..u64::MAX, Fault::Offset(really.askew_m))]))
+        let blind = (really.blind && chirps).then_some((2000..u64::MAX, Fault::Says(Validity::OutOfRange)));
+        let askew = (0..u64::MAX, Fault::Offset(really.askew_m));
+        Box::new(FaultyRig::new(rig, &[askew].into_iter().chain(blind).collect::<Vec<_>>()))
     }
 }
 
@@ -100,7 +105,8 @@ impl Stage for Simulated<'_> {
 
     fn rest(&mut self) -> Result<Option<Rest>, Failed> {
         let plan = Plan::quiet(self.config.clone());
-        let run = run(&plan, self.rig(self.config), Pace::Virtual, self.folder.path(), &mut |_, _| {}).expect("a run");
+        let run =
+            run(&plan, self.rig(self.config, false), Pace::Virtual, self.folder.path(), &mut |_, _| {}).expect("a run");
         assert!(run.ended.trip.is_none());
         let path = run.path.clone();
         run.finish("{}").expect("a file");
@@ -110,7 +116,7 @@ impl Stage for Simulated<'_> {
     fn measure(&mut self, place: Place) -> Result<Option<Point>, Failed> {
         self.chirps += 1;
         let plan = Plan::chirp(self.grid.config(self.config, place)?);
-        let rig = self.rig(&plan.config);
+        let rig = self.rig(&plan.config, true);
         let mut run = run(&plan, rig, Pace::Virtual, self.folder.path(), &mut |_, _| {}).expect("a run");
         Ok(Some(measured(&mut run, &plan.config).expect("a recording")))
     }
@@ -259,6 +265,21 @@ fn what_a_person_says_of_the_rest_confirms_no_modes_and_a_displacement_that_was_
     let put_on = came.put_on(0);
     assert!(put_on.confirmed_by_hand && put_on.finding() == Finding::Fails, "{put_on:?}");
     assert_eq!(put_on.read.as_ref().map(|read| (read.seen_m, read.finding)), Some((3.6e-3, Finding::Fails)));
+}
+
+#[test]
+fn a_chirp_that_tripped_is_told_as_such_and_not_as_a_load_alone() {
+    let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
+    let load = puts(&config, &grid, 0, 0);
+    let blind: Does = Box::new(move |really| {
+        load(really);
+        really.blind = true;
+    });
+    let sees: Does = Box::new(|really| really.blind = false);
+    let came = campaign(&config, &grid, &all(&grid), vec![(nothing(), DONE), (blind, DONE), (sees, DONE)]);
+    assert_eq!((came.asked.len(), came.chirps, came.kept.len()), (3, 2, 1), "{:?}", came.asked.last());
+    assert!(came.asked[2].text.contains("tripped"), "{:?}", came.asked[2]);
+    assert!(came.put_on(0).finding() == Finding::Holds && !came.put_on(0).confirmed_by_hand);
 }
 
 #[test]
