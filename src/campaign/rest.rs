@@ -47,12 +47,32 @@ impl Rest {
 /// Mean of all, and standard deviation of the means of the stretches.
 fn scatter(readings: &[f64]) -> (f64, f64) {
     let (mut all, mut means) = (Moments::default(), Moments::default());
-    for stretch in readings.chunks_exact(readings.len() / STRETCHES) {
+    let begin = |k: usize| k * readings.len() / STRETCHES;
+    for k in 0..STRETCHES {
         let mut within = Moments::default();
-        stretch.iter().for_each(|x| within.push(*x));
+        readings[begin(k)..begin(k + 1)].iter().for_each(|x| within.push(*x));
         means.push(within.mean);
     }
     readings.iter().for_each(|x| all.push(*x));
-    // Ten means or more have one.
+    // Ten means have one.
     (all.mean, means.sigma().unwrap_or(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_stretches_make_the_scatter_however_many_readings_there_are() {
+        for count in [20, 29, 1000, 1009] {
+            // Stretch by stretch 1 and -1, each with all of its readings.
+            let stretch =
+                |k: usize| (0..STRETCHES).rfind(|i| i * count / STRETCHES <= k).expect("the first begins at 0");
+            let readings: Vec<f64> = (0..count).map(|k| if stretch(k) % 2 == 0 { 1.0 } else { -1.0 }).collect();
+            let (mean, scatter) = scatter(&readings);
+            // Ten means of size 1 about 0: sqrt(10/9). Five stretches of either sign differ by five readings at most.
+            assert!((scatter - (10.0_f64 / 9.0).sqrt()).abs() < 1e-12, "{count}: {scatter}");
+            assert!(mean.abs() <= 5.0 / count as f64, "{count}: {mean}");
+        }
+    }
 }
