@@ -3,17 +3,23 @@ use std::path::{Path, PathBuf};
 
 use bench::config::Config;
 use bench::recording::Recording;
-use bench::rt::thread::Pace;
+use bench::rt::thread::{Ended, Pace};
 use bench::session::{self, Analysis, AnalysisError, Plan, analyse};
 use bench::sim::SimulatedRig;
 
-/// The recording of a run by `plan`.
-pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
+/// The recording of a run by `plan`, and how the run ended.
+pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, Ended) {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run = session::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
-    assert!(run.ended.completed, "{:?}", run.ended);
-    let path = run.path.clone();
+    let ended = (run.path.clone(), run.ended.clone());
     run.finish("{}").expect("a good disk");
+    ended
+}
+
+/// The recording of a run by `plan` that comes to its end.
+pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
+    let (path, ended) = ended(plan, folder);
+    assert!(ended.completed, "{ended:?}");
     path
 }
 

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 use bench::config::{Config, ReferenceSettings, Source, load};
 use bench::plant::Chain;
 use bench::recording::Recording;
-use bench::session::{Analysis, Plan};
+use bench::rt::arming::State;
+use bench::session::{Analysis, AnalysisError, Plan, analyse};
 use bench::sim;
 use bench::verdict::Cnmp;
 
@@ -131,4 +132,23 @@ fn a_loop_whose_reference_did_not_sweep_is_refused_with_the_remedy() {
     let plan = Plan::control(config(&["control.duration_s=1"])).expect("a plan");
     let error = simulated::analysed(&plan, &plan.config).unwrap_err().to_string();
     assert!(error.contains("step") && error.contains("--reference chirp"), "{error}");
+}
+
+/// What was recorded before it closed is of no loop: neither command nor reference.
+#[test]
+fn a_loop_that_never_closed_shows_nothing() {
+    let swept = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
+    // A third of the soft limit: one reading in 370 lies beyond it, of 2500 before the loop closes.
+    let sets = [swept, "chirp.duration_s=10", "chirp.fade_in_s=1", "sim.probe_noise_rms_m=3e-4"];
+    let plan = Plan::control(config(&sets)).expect("a plan");
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, ended) = simulated::ended(&plan, folder.path());
+    let (_, tick) = ended.trip.expect("a trip");
+    assert!((tick as f64) < plan.config.control.settle_s * 5000.0, "{ended:?}");
+    let recording = Recording::open(&path).expect("a recording");
+    let running =
+        recording.ticks().expect("ticks").filter(|tick| tick.as_ref().expect("whole").state == State::Running);
+    assert!(running.count() > 10, "the program ran");
+    let answer = analyse(&recording, &plan.config);
+    assert!(matches!(answer, Err(AnalysisError::NothingRan)), "{:?}", answer.err());
 }
