@@ -254,7 +254,11 @@ fn what_a_person_says_of_the_rest_confirms_no_modes_and_a_displacement_that_was_
     ];
     let came = campaign(&config, &grid, &all(&grid), script);
     assert_eq!((came.asked.len(), came.chirps, came.kept.len()), (5, 2, 1), "{:?}", came.asked.last());
-    assert!(!came.asked[2].text.contains("mode") && came.asked[3].text.contains("is not seen"), "{:?}", came.asked);
+    assert!(
+        !came.asked[2].text.contains("the mode expected") && came.asked[3].text.contains("is not seen"),
+        "{:?}",
+        came.asked
+    );
     let put_on = came.put_on(0);
     assert!(put_on.confirmed_by_hand && put_on.rest.finding == Finding::Fails, "{put_on:?}");
     assert!(put_on.modes.iter().all(|mode| mode.finding != Finding::Fails), "{put_on:?}");
