@@ -2,13 +2,13 @@
 //! estimator, of the local one, and of all that `bench chirp` makes of them, modes and verdict included.
 //! `benches/welch_scipy.py` measures scipy's csd on as many samples beside the first.
 
+#[path = "../tests/common/unrecorded.rs"]
+mod unrecorded;
+
 use bench::config::{Config, Source, load};
-use bench::excitation::{Chirp, Excitation};
 use bench::fit::{View, fit};
 use bench::identify::{Estimator, EstimatorSettings, Signals, blocks, local, welch};
-use bench::sim::SimulatedRig;
 use bench::verdict::{Case, Verdict, verdict};
-use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// Samples of a segment.
@@ -22,20 +22,6 @@ fn config() -> Config {
     load(&Source { sets, ..Source::default() }).expect("the profile is valid")
 }
 
-/// The default chirp on the simulated stage.
-fn signals(config: &Config) -> Signals {
-    let chirp = Chirp::new(&config.chirp, config.servo.period_s());
-    let mut rig = SimulatedRig::new(config).expect("a rig");
-    rig.enable().expect("an amplifier");
-    let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
-    for number in 0..chirp.ticks() {
-        let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;
-        output_m.push(rig.latest(Tick { number, scheduled_ns }).position_m);
-        input_a.push(rig.command(chirp.current_a(number)).expect("enabled"));
-    }
-    Signals { rate_hz: config.servo.rate_hz, input_a, output_m }
-}
-
 fn judged(signals: &Signals, config: &Config) -> Verdict {
     let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
     let view = View::Bench(config);
@@ -46,7 +32,7 @@ fn judged(signals: &Signals, config: &Config) -> Verdict {
 
 fn identify(c: &mut Criterion) {
     let config = config();
-    let signals = signals(&config);
+    let signals = unrecorded::chirp(&config);
     let settings = EstimatorSettings { frequencies: Some(FREQUENCIES), ..EstimatorSettings::default() };
     let mut group = c.benchmark_group("identify");
     group.sample_size(10);

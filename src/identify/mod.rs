@@ -20,41 +20,34 @@
 //!
 //! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
 
-pub mod align;
 mod band;
-mod blocks;
+mod block;
 mod configured;
 pub mod csv;
-mod curve;
+mod curves;
 pub mod delay;
-mod distortion;
-pub mod edges;
 mod error;
 mod estimator;
 mod frf;
-pub mod harmonics;
-pub mod joint;
-mod kernel;
-pub mod linearity;
-pub mod local;
+mod lines;
 mod moments;
-mod noise_floor;
-pub mod periodic;
-mod record;
 pub mod repeated;
-mod resolution;
 mod signals;
 mod spectrum;
-mod squares;
 pub mod table;
+mod times;
 pub mod welch;
 
 pub use crate::config::{Curve, Estimator, ResolutionPoint};
-pub use blocks::{Block, blocks};
+pub use block::Block;
 pub use configured::response;
-pub use distortion::with_distortion;
+pub use curves::blocks::blocks;
+pub use curves::local::EstimatorSettings;
+pub use curves::{joint, local};
 pub use error::IdentifyError;
 pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
-pub use local::EstimatorSettings;
+pub use lines::distortion::with_distortion;
+pub use lines::{harmonics, linearity, periodic};
 pub use moments::Moments;
 pub use signals::Signals;
+pub use times::{align, edges};

@@ -11,4 +11,6 @@ mod repeated;
 mod seeds;
 mod sides;
 mod stage;
+#[path = "../common/unrecorded.rs"]
+mod unrecorded;
 mod welch;

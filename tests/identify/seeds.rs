@@ -5,12 +5,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bench::config::{Config, Source, load};
-use bench::excitation::{Chirp, Excitation};
-use bench::identify::{Frf, Signals, response};
-use bench::sim::SimulatedRig;
-use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+use bench::identify::{Frf, response};
 
 use crate::stage::SampledPlant;
+use crate::unrecorded;
 
 const BAND_HZ: (f64, f64) = (0.5, 450.0);
 /// Three of the stage's runs a second on a core: 200 are 30 to 60 seconds on two.
@@ -22,23 +20,9 @@ fn config(sets: &[&str]) -> Config {
     load(&Source { sets: sets.iter().map(|set| set.to_string()).collect(), ..Source::default() }).expect("valid")
 }
 
-/// The default chirp on the simulated stage of a configuration.
-fn run(config: &Config) -> Signals {
-    let chirp = Chirp::new(&config.chirp, config.servo.period_s());
-    let mut rig = SimulatedRig::new(config).expect("a rig");
-    rig.enable().expect("an amplifier");
-    let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
-    for number in 0..chirp.ticks() {
-        let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;
-        output_m.push(rig.latest(Tick { number, scheduled_ns }).position_m);
-        input_a.push(rig.command(chirp.current_a(number)).expect("enabled"));
-    }
-    Signals { rate_hz: config.servo.rate_hz, input_a, output_m }
-}
-
 fn estimated(sets: &[&str]) -> Frf {
     let config = config(sets);
-    response(&run(&config), BAND_HZ, &config.identify).expect("excited")
+    response(&unrecorded::chirp(&config), BAND_HZ, &config.identify).expect("excited")
 }
 
 /// What `of` makes of the seeds 1 to [`SEEDS`], in their order.

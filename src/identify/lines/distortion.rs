@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::Block;
+use crate::identify::Block;
 
 /// Lines to either side.
 const REACH: usize = 8;

@@ -16,8 +16,8 @@
 
 use nalgebra::Complex;
 
-use super::spectrum::RealFft;
-use super::{Block, Frf, FrfPoint, IdentifyError, Signals, band};
+use crate::identify::spectrum::RealFft;
+use crate::identify::{Block, Frf, FrfPoint, IdentifyError, Signals, band};
 
 /// Periods that are averaged at least: with fewer the scatter says too little of itself.
 const LEAST_PERIODS: usize = 4;

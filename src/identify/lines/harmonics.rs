@@ -28,7 +28,7 @@
 //! distortion; in the probability one line weighs no more than ln(level) does.
 
 use super::periodic::{Line, ROUNDING, Repetition, excited, lines, mean, variance_of_mean};
-use super::{IdentifyError, Signals};
+use crate::identify::{IdentifyError, Signals};
 
 /// A line is left out whose input is below this part of the largest: of an excited line of a hundredth, a linear plant then
 /// answers with a thousandth of its amplitude.
@@ -197,7 +197,7 @@ mod tests {
             .map(|n| lines.iter().map(|(k, phase)| (turn * (k * n % PERIOD) as f64 + phase).cos()).sum())
             .collect();
         let mut static_part: Vec<f64> = input.iter().map(|u| u + a * u * u + b * u * u * u).collect();
-        let fft = super::super::spectrum::RealFft::new(PERIOD);
+        let fft = crate::identify::spectrum::RealFft::new(PERIOD);
         let spectrum = fft.transform(&mut static_part);
         let output: Vec<f64> = (0..PERIOD)
             .map(|n| {

@@ -1,7 +1,6 @@
 //! The power of the noise over frequency, of what curves leave.
 
-use super::EstimatorSettings;
-use super::local::Bins;
+use super::local::{Bins, EstimatorSettings};
 
 /// What curves leave is averaged with weights so many times as wide as theirs.
 const NOISE_WIDTH: f64 = 2.0;

@@ -12,8 +12,8 @@
 //! alone keep even distortion out of the response; odd distortion stays in it. Pintelon, Schoukens, System Identification, 2nd ed.,
 //! section 4.3: distortion at the excited lines is taken to be that at the lines around.
 
-use super::Block;
 use super::harmonics::{Harmonics, Level, by_noise_alone};
+use crate::identify::Block;
 
 /// Distortion is found where noise alone gives as much with less than this probability.
 pub const FALSE_ALARM: f64 = 1e-3;

@@ -21,7 +21,7 @@
 use nalgebra::Complex;
 
 use super::squares::{self, Squares};
-use super::{Curve, EstimatorSettings};
+use crate::identify::{Curve, EstimatorSettings};
 
 /// Fits with the denominator of the one before.
 const REWEIGHTED: usize = 2;

@@ -4,8 +4,8 @@ use nalgebra::Complex;
 
 use super::curve::{self, Fitted, Window};
 use super::local::Bins;
-use super::spectrum::Spectra;
-use super::{EstimatorSettings, Signals};
+use crate::identify::spectrum::Spectra;
+use crate::identify::{EstimatorSettings, Signals};
 
 /// Input below this part of its root mean square over all bins is rounding, not excitation.
 const DEAD_RATIO: f64 = 1e-9;

@@ -34,11 +34,11 @@
 use nalgebra::Complex;
 
 use super::curve::Fitted;
-use super::error::check_setting;
-use super::estimator::{between, inverted};
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
-use super::{Curve, Estimator, Frf, FrfPoint, IdentifyError, ResolutionPoint, Signals, band};
+use crate::identify::error::check_setting;
+use crate::identify::estimator::{between, inverted};
+use crate::identify::{Curve, Estimator, Frf, FrfPoint, IdentifyError, ResolutionPoint, Signals, band};
 
 /// How the default estimator trades resolution for noise.
 #[derive(Clone, Debug, PartialEq)]

@@ -14,23 +14,10 @@ use nalgebra::Complex;
 use super::local::Bins;
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
-use super::{EstimatorSettings, IdentifyError, Signals, band};
+use crate::identify::{Block, EstimatorSettings, IdentifyError, Signals, band};
 
 /// Width of a block as a ratio of frequency.
 const WIDTH_RATIO: f64 = 0.0005;
-
-/// The mean response over a few neighbouring bins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
-    /// Its centre, weighted with the power of the input, in hertz.
-    pub frequency_hz: f64,
-    /// Standard deviation of its frequencies about the centre, weighted alike, in hertz.
-    pub spread_hz: f64,
-    /// Mean of H in metres per ampere.
-    pub response: Complex<f64>,
-    /// E|error|^2 in (m/A)^2.
-    pub variance: f64,
-}
 
 /// The blocks of a record that begins and ends at rest, each a twentieth of a percent of its frequency wide and one bin at least;
 /// those without input or without any noise are left out. Frequencies rise. Of the settings, the least half-width counts.

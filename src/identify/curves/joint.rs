@@ -27,11 +27,12 @@
 
 use nalgebra::Complex;
 
+use super::blocks;
 use super::curve::{self, Drawn, Fitted, Window};
 use super::local::{Bins, collected, forward};
 use super::record::Record;
-use super::spectrum::{RealFft, Spectra};
-use super::{Block, EstimatorSettings, Frf, IdentifyError, Signals, band, blocks};
+use crate::identify::spectrum::{RealFft, Spectra};
+use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, band};
 
 /// Reference, command and position of a loop that was closed: one sample a tick.
 #[derive(Clone, Debug, PartialEq)]

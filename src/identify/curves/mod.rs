@@ -1,0 +1,16 @@
+//! Smooth curves through neighbouring bins of the FFT of a whole record.
+//!
+//! ```text
+//! Record (bins of U, Y) --Window--> curve (least squares) --NoiseFloor--> local: the response with its errors
+//!                                                                    '--> blocks: the same without smoothing
+//! joint: the same of a stage under control, by ratios of two curves
+//! ```
+
+pub mod blocks;
+mod curve;
+pub mod joint;
+pub mod local;
+mod noise_floor;
+mod record;
+mod resolution;
+mod squares;
