@@ -42,7 +42,7 @@ pub use crate::config::{Curve, Estimator, ResolutionPoint};
 pub use block::Block;
 pub use configured::response;
 pub use curves::blocks::blocks;
-pub use curves::local::EstimatorSettings;
+pub use curves::settings::EstimatorSettings;
 pub use curves::{joint, local};
 pub use error::IdentifyError;
 pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};

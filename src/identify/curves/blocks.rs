@@ -11,7 +11,7 @@ use core::ops::RangeInclusive;
 
 use nalgebra::Complex;
 
-use super::local::Bins;
+use super::bins::Bins;
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
 use crate::identify::{Block, EstimatorSettings, IdentifyError, Signals, band};

@@ -27,9 +27,10 @@
 
 use nalgebra::Complex;
 
+use super::bins::Bins;
 use super::blocks;
 use super::curve::{self, Drawn, Fitted, Window};
-use super::local::{Bins, collected, forward};
+use super::local::{collected, forward};
 use super::record::Record;
 use crate::identify::spectrum::{RealFft, Spectra};
 use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, band};

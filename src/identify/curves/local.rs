@@ -31,63 +31,11 @@
 //! rad/s, is that of cos^2 with the half-width h = R/(2 pi) in hertz. A parabola or rational curve is of the same noise as a
 //! constant of 0.52 h.
 
-use nalgebra::Complex;
-
-use super::curve::Fitted;
+use super::bins::Bins;
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
-use crate::identify::error::check_setting;
 use crate::identify::estimator::{between, inverted};
-use crate::identify::{Curve, Estimator, Frf, FrfPoint, IdentifyError, ResolutionPoint, Signals, band};
-
-/// How the default estimator trades resolution for noise.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EstimatorSettings {
-    /// Half-width of the neighbourhood in bins, at least: 2 to 10000.
-    pub min_half_width_bins: f64,
-    /// Half-width of the neighbourhood as a ratio of frequency, where that is more: 0 to 0.1.
-    pub resolution_ratio: f64,
-    /// Half-widths over frequency in place of the ratio, if any: frequencies rise.
-    pub resolution: Vec<ResolutionPoint>,
-    /// So many frequencies, evenly on a logarithmic axis; else bins half of a half-width apart.
-    pub frequencies: Option<usize>,
-    /// The shape within a neighbourhood.
-    pub curve: Curve,
-    /// Which signal has noise.
-    pub estimator: Estimator,
-    /// Whether the record begins or ends in motion.
-    pub transient: bool,
-}
-
-impl Default for EstimatorSettings {
-    fn default() -> Self {
-        Self {
-            min_half_width_bins: 16.0,
-            resolution_ratio: 0.0025,
-            resolution: Vec::new(),
-            frequencies: None,
-            curve: Curve::default(),
-            estimator: Estimator::default(),
-            transient: false,
-        }
-    }
-}
-
-impl EstimatorSettings {
-    /// Whether the settings are within their bounds.
-    pub fn check(&self) -> Result<(), IdentifyError> {
-        check_setting("min_half_width_bins", self.min_half_width_bins, 2.0, 1e4)?;
-        check_setting("resolution_ratio", self.resolution_ratio, 0.0, 0.1)?;
-        check_setting("frequencies", self.frequencies.map_or(2.0, |count| count as f64), 2.0, 1e6)?;
-        let mut above_hz = f64::MIN_POSITIVE;
-        for point in &self.resolution {
-            check_setting("resolution.frequency_hz", point.frequency_hz, above_hz, 1e5)?;
-            check_setting("resolution.half_width_hz", point.half_width_hz, 1e-6, 1e4)?;
-            above_hz = point.frequency_hz.next_up();
-        }
-        Ok(())
-    }
-}
+use crate::identify::{Curve, Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, Signals, band};
 
 /// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` at which there was any input.
 ///
@@ -103,23 +51,6 @@ pub fn estimate(signals: &Signals, band_hz: (f64, f64), settings: &EstimatorSett
     // A band without bins is told before the transform is made.
     band::bins(band_hz, sampling.0, sampling.1)?;
     of_record(&Record::new(signals), sampling, band_hz, settings)
-}
-
-/// What curves are drawn through, bin by bin: input U, output Y, and an instrument R, which knows nothing of the noise; in open
-/// loop that is U itself.
-pub(super) trait Bins {
-    /// Width of a bin in hertz.
-    fn bin_hz(&self) -> f64;
-    /// The highest bin below the Nyquist frequency.
-    fn last_bin(&self) -> usize;
-    /// The response in the middle of a neighbourhood, both in bins; none where the instrument is dead.
-    fn fit(&self, place: f64, half_width: f64, settings: &EstimatorSettings) -> Option<Fitted>;
-    /// U conj(R) of a bin.
-    fn drive(&self, bin: usize) -> Complex<f64>;
-    /// Y conj(R) of a bin.
-    fn cross(&self, bin: usize) -> Complex<f64>;
-    /// |R|^2 of a bin.
-    fn power(&self, bin: usize) -> f64;
 }
 
 /// The FRF of a record that was sampled at a rate, with so many samples.

@@ -6,6 +6,7 @@
 //! joint: the same of a stage under control, by ratios of two curves
 //! ```
 
+mod bins;
 pub mod blocks;
 mod curve;
 pub mod joint;
@@ -13,4 +14,5 @@ pub mod local;
 mod noise_floor;
 mod record;
 mod resolution;
+pub mod settings;
 mod squares;

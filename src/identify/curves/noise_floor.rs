@@ -1,6 +1,7 @@
 //! The power of the noise over frequency, of what curves leave.
 
-use super::local::{Bins, EstimatorSettings};
+use super::bins::Bins;
+use super::settings::EstimatorSettings;
 
 /// What curves leave is averaged with weights so many times as wide as theirs.
 const NOISE_WIDTH: f64 = 2.0;

@@ -2,8 +2,8 @@
 
 use nalgebra::Complex;
 
+use super::bins::Bins;
 use super::curve::{self, Fitted, Window};
-use super::local::Bins;
 use crate::identify::spectrum::Spectra;
 use crate::identify::{EstimatorSettings, Signals};
 

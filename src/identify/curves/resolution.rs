@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-use super::local::EstimatorSettings;
+use super::settings::EstimatorSettings;
 
 /// Frequencies are so many to a half-width.
 const TO_A_HALF_WIDTH: f64 = 2.0;
