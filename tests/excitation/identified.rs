@@ -1,5 +1,6 @@
 //! Multisine, binary sequence and stepped sine each give the response of the rig and its modes.
 use bench::config::Config;
+use bench::fit::FittedMode;
 use bench::recording::Recording;
 use bench::session::{Analysis, replay};
 use bench::verdict::Cnmp;
@@ -68,11 +69,13 @@ fn modes_r_u_and_v_have_the_signs_of_the_model_and_the_zeros_are_never_excluded(
     for kind in KINDS {
         let analysis = analysed(&of_kind(kind, &[]));
         let modes = analysis.fit.as_ref().expect("modes").modes();
-        for (index, (truth_hz, sign)) in truth_hz.into_iter().zip([1.0, -1.0, 1.0]).enumerate() {
-            let hz = modes[index].omega_rad_s.value / (2.0 * std::f64::consts::PI);
-            assert!((hz / truth_hz - 1.0).abs() < 5e-4, "{}: {hz} for {truth_hz} Hz", kind.0);
-            assert!(modes[index].residue_per_kg.value * sign > 0.0, "{}: {:?}", kind.0, modes[index]);
-            assert!(modes[index].sign_error_probability() < 1e-6);
+        // The binary sequence shows the fourth of the model as well, at 22.869 Hz with 6e-6 of R's residue.
+        for (truth_hz, sign) in truth_hz.into_iter().zip([1.0, -1.0, 1.0]) {
+            let near = |mode: &&FittedMode| (mode.frequency_hz().value / truth_hz - 1.0).abs() < 5e-4;
+            let found: Vec<_> = modes.iter().filter(near).collect();
+            let [mode] = found[..] else { panic!("{}: {found:?} for {truth_hz} Hz of {modes:?}", kind.0) };
+            assert!(mode.residue_per_kg.value * sign > 0.0, "{}: {mode:?}", kind.0);
+            assert!(mode.sign_error_probability() < 1e-6);
         }
         // The current of a multisine is put where the response is small; that of the others may not do for a verdict.
         let (cnmp, why) = (analysis.verdict.cnmp, &analysis.verdict.why);
