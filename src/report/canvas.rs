@@ -7,6 +7,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::ReportError;
+use super::colours::PAPER;
 
 const UNITS: f64 = 10.0;
 /// plotters divides by this before it writes a font size.
@@ -25,7 +26,7 @@ pub(super) struct TextForm {
     pub upward: bool,
 }
 
-/// Draws a page of `size` pixels and gives it as SVG.
+/// Draws a page of `size` pixels, on white, and gives it as SVG.
 pub(super) fn page(
     size: (f64, f64),
     draw: impl FnOnce(&Canvas) -> Result<(), ReportError>,
@@ -34,6 +35,8 @@ pub(super) fn page(
     let mut svg = String::new();
     {
         let canvas = Canvas(SVGBackend::with_string(&mut svg, (width, height)).into_drawing_area());
+        // On a dark ground, as some viewers have, dark ink would not be seen.
+        canvas.0.fill(&PAPER).map_err(failed)?;
         draw(&canvas)?;
         canvas.0.present().map_err(failed)?;
     }

@@ -7,7 +7,7 @@ use super::axis::{Axis, Tick};
 use super::canvas::{self, Canvas, TextForm};
 use super::chart::{Chart, Mark, Pen, Scale, ScaleKind, Stroke, Symbol};
 use super::clip::Frame;
-use super::colours::{Colour, INK, PAPER};
+use super::colours::{Colour, INK};
 use super::curve;
 use super::header::{CHARACTER, Header, TEXT_SIZE, flow, wrapped};
 use super::panel::{Panel, Ticks};
@@ -61,7 +61,6 @@ pub fn sheet_svg(title: &str, subtitle: &str, rows: &[Row]) -> Result<String, Re
         top = bottom;
     }
     canvas::page((WIDTH, top), |canvas| {
-        canvas.area(&[(0.0, 0.0), (WIDTH, 0.0), (WIDTH, top), (0.0, top)], PAPER.into())?;
         header.draw(canvas, &[])?;
         placed.iter().try_for_each(|cell| cell.draw(canvas))
     })

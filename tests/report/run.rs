@@ -111,6 +111,20 @@ fn nothing_is_no_number_or_outside_of_its_picture() {
     }
 }
 
+#[test]
+fn every_picture_has_paper_below_its_ink_so_that_it_is_read_on_a_dark_ground_as_well() {
+    for (kind, picture) in run().pictures() {
+        let (width, height) = size(&picture);
+        let first = picture.lines().find(|line| !line.starts_with("<svg ")).expect("something drawn");
+        assert!(first.starts_with("<rect ") && first.contains("fill=\"#FFFFFF\""), "{kind}: {first}");
+        let number = |name| svg::attribute(first, name).and_then(|text| text.parse::<f64>().ok());
+        // In tenths of a pixel; the last may be missing.
+        for (name, whole) in [("x", 0.0), ("y", 0.0), ("width", width), ("height", height)] {
+            assert!(number(name).is_some_and(|is| (is - whole).abs() <= 1.0), "{kind}: {name} in {first}");
+        }
+    }
+}
+
 fn size(picture: &str) -> (f64, f64) {
     let view = picture.split("viewBox=\"0 0 ").nth(1).unwrap().split('"').next().unwrap();
     let (width, height) = view.split_once(' ').unwrap();

@@ -60,7 +60,8 @@ fn boxed(tag: &str, text: &str) -> Words {
     Words { text, left: x - before, right: x - before + width, top: y - above, bottom: y - above + size }
 }
 
-fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+/// The value of an attribute of a tag.
+pub fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     let from = tag.find(&format!(" {name}=\""))? + name.len() + 3;
     tag[from..].split('"').next()
 }
