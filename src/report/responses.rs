@@ -61,9 +61,13 @@ fn measured(chart: Chart, name: &str, frf: &Frf, (low, high): (f64, f64)) -> Cha
     let largest = shown.iter().map(|k| frf.response[*k].norm()).fold(0.0, f64::max);
     let mut chart = chart;
     let mut circle_name = "95 % circles";
+    let mut drawn: Vec<Complex<f64>> = Vec::new();
     for k in shown.iter().step_by(shown.len().div_ceil(CIRCLES).max(1)) {
         let radius = SIGMAS_95_PLANE * frf.magnitude_sigma[*k];
-        if radius > SEEN * largest && known(frf, *k) {
+        // Many upon each other would hide what lies below them.
+        let free = drawn.iter().all(|other| (frf.response[*k] - other).norm() >= radius);
+        if radius > SEEN * largest && known(frf, *k) && free {
+            drawn.push(frf.response[*k]);
             let outline = circle(point(&frf.response[*k]), MICRO * radius);
             chart = chart.mark(Mark::Area { name: circle_name.into(), colour: BLUE, strength: 0.13, outline });
             circle_name = "";

@@ -2,6 +2,7 @@
 
 mod bode;
 mod map;
+mod nyquist;
 mod phase;
 mod pictures;
 mod run;
