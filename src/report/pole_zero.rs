@@ -73,7 +73,7 @@ impl PoleZeroMap {
             self.poles.iter().chain(&self.zeros).chain(&self.others).filter(|place| !holds(frame, place)).count();
         let heading = match beyond {
             0 => "Upper half of the plane of s".into(),
-            n => format!("Upper half of the plane of s, but {n} beyond"),
+            n => format!("Upper half of the plane of s; {n} more beyond"),
         };
         self.marked(plane(&heading, frame), true, false)
     }

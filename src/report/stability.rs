@@ -65,12 +65,15 @@ fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Ch
         Scale::logarithmic("Frequency (Hz)").within(from_hz(orders, band_hz), band_hz.1),
         Scale::linear("Order (number of modes)").within(0.0, highest),
     );
-    let mut name = "mode of the fit";
+    let mut name = format!("the {} modes of the fit", fit_hz.len());
     for f in fit_hz {
         let pen = Pen::dashed(GREY).thin();
-        chart =
-            chart.mark(Mark::Line { name: name.into(), pen, points: vec![(*f, 0.0), (*f, highest)], directed: false });
-        name = "";
+        chart = chart.mark(Mark::Line {
+            name: std::mem::take(&mut name),
+            pen,
+            points: vec![(*f, 0.0), (*f, highest)],
+            directed: false,
+        });
     }
     let kinds = [
         (Stays::New, "new, or moved by more than 1 %", ORANGE, Symbol::Cross),
