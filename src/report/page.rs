@@ -17,7 +17,7 @@ figure svg{display:block;width:100%;height:auto;background:#fff;border-radius:4p
 figcaption,.quiet{color:var(--quiet);font-size:.95rem}
 table{border-collapse:collapse;width:100%;font-size:.92rem;margin:1rem 0}
 th,td{border-bottom:1px solid var(--line);padding:.3rem .6rem;text-align:left;vertical-align:top}
-td.n{font-variant-numeric:tabular-nums}
+td.n{font-variant-numeric:tabular-nums;white-space:nowrap}
 .differs{color:var(--bad);font-weight:600}
 pre{background:var(--code);padding:.6rem .8rem;overflow-x:auto;font-size:.85rem;white-space:pre-wrap;overflow-wrap:anywhere}
 ul.facts{padding-left:1.2rem;font-size:.95rem}

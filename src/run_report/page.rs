@@ -24,14 +24,15 @@ pub fn page(run: &AnalysedRun<'_>, pictures: &[Picture]) -> String {
         })
         .collect();
     let body = format!(
-        "<h1>{}</h1>\n<p class=\"quiet\">{}<br>Recording {}</p>\n{}{}{}{shown}{}",
+        "<h1>{}</h1>\n<p class=\"quiet\">{}<br>Recording {}</p>\n{}{}{}{}{shown}{}",
         escaped(title),
         escaped(&run.subtitle()),
         escaped(&name),
         verdict(run),
         modes(run),
         zeros(run),
-        margins(run) + &loop_facts(run) + &configuration(run),
+        margins(run),
+        loop_facts(run) + &configuration(run),
     );
     document(title, &body)
 }
@@ -77,7 +78,12 @@ fn modes(run: &AnalysedRun<'_>) -> String {
     let Ok(fit) = &run.analysis.fit else { return String::new() };
     let header = ["Frequency (Hz)", "Damping (%)", "Residue (1/kg)", "Sign", "Other sign"];
     let rows: String = fit.modes().iter().map(mode).collect();
-    section("Modes", "Intervals hold the truth with 95 %.", &header, &rows)
+    section(
+        "Modes",
+        "Intervals hold the truth with 95 %; beside the sign the probability that it is the other one.",
+        &header,
+        &rows,
+    )
 }
 
 fn mode(mode: &FittedMode) -> String {
