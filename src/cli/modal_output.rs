@@ -108,8 +108,11 @@ impl Shown {
         }
         let modes = ["mode Hz", "+-", "damping", "+-", "residue 1/kg", "+-", "sign"];
         let zeros = ["zero rad/s", "+- re", "kind", "right of the axis"];
-        let blank = if self.zeros.is_empty() { String::new() } else { table(&zeros, &self.zero_rows()) };
-        format!("\n{}\n{blank}\n{verdict}", table(&modes, &self.mode_rows()))
+        let zeros = match self.zeros.is_empty() {
+            true => "no zeros up to where a verdict is given\n".into(),
+            false => table(&zeros, &self.zero_rows()),
+        };
+        format!("\n{}\n{zeros}\n+- holds the truth with 95 %\n{verdict}", table(&modes, &self.mode_rows()))
     }
 
     fn mode_rows(&self) -> Vec<Vec<String>> {
