@@ -95,7 +95,7 @@ impl LinearityMade {
 
     /// The line of `bench chirp`.
     pub fn line(&self) -> String {
-        format!("  linearity  {}: {}\n", self.whole.cause, self.why)
+        format!("  linearity  {}\n", self.why)
     }
 
     /// Amplitudes by bands, for people.

@@ -129,7 +129,7 @@ impl Share {
 
     /// The same in words, with the remedy.
     pub fn words(&self) -> String {
-        let part = |ratio: f64| format!("{:.2e}", ratio);
+        let part = |ratio: f64| if ratio == 0.0 { "0".into() } else { format!("{ratio:.2e}") };
         let (noise, distortion) = (part(self.missing_by_noise), part(self.missing_by_distortion()));
         let kinds = self.kinds();
         match self.cause() {
