@@ -63,6 +63,11 @@ pub enum PlanError {
     /// A swept reference that the interlocks would trip.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
+    /// A swept reference for a loop that runs away by the model.
+    #[error(
+        "by the model this loop is unstable: a swept reference would run away until an interlock trips; `bench margins` shows the loop; choose a controller, an operating point or an asymmetry with which it is stable"
+    )]
+    Unstable,
     /// A recording without what a plan needs.
     #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
     Missing(&'static str),

@@ -21,7 +21,9 @@ pub(super) fn planned(
     config.control.reference = ReferenceSettings::Chirp { amplitude, travel_m: *travel_m };
     // What is not allowed now could not be read back from the recording.
     recheck(&config)?;
-    let extremes = foreseen(&config, &closed_loop)?;
+    // What a loop that runs away would do has no largest current to lower.
+    let unstable = |error| if closed_loop.margins(false).stable { error } else { PlanError::Unstable };
+    let extremes = foreseen(&config, &closed_loop).map_err(unstable)?;
     Ok((config, Some(extremes)))
 }
 
