@@ -7,9 +7,11 @@ use serde::Serialize;
 use super::analysis_output::{Made, make};
 use super::identify_table::{self, TableOptions};
 use super::options::{print_json, print_text};
+use super::run_options::TripJson;
 use super::{CliError, Outcome};
+use crate::config::Config;
 use crate::recording::Recording;
-use crate::session::{Kind, Plan};
+use crate::session::{Ending, Kind, Plan};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]
@@ -26,6 +28,9 @@ pub(super) struct Args {
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
 struct Report {
+    /// `completed`, `tripped`, `stopped`, or `cut_off` where the file ends before the run does.
+    outcome: &'static str,
+    trip: Option<TripJson>,
     recording: String,
     ticks: u64,
     overruns: u64,
@@ -49,7 +54,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         let what = "is a quiet run of `bench campaign`, in which no current flowed: it says where the stage rests";
         return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
     }
+    let ending = Ending::of(&recording);
     let report = Report {
+        outcome: ending.name(),
+        trip: match &ending {
+            Ending::Tripped(trip, tick) => Some(TripJson::of(trip, *tick)),
+            _ => None,
+        },
         recording: args.recording.display().to_string(),
         ticks: recording.tick_count(),
         overruns: recording.overruns(),
@@ -60,8 +71,27 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     if args.json {
         print_json(&report)?
     } else {
-        print_text(&report.made.text())?
+        print_text(&report.text(&plan.config))?
     }
-    let whole = report.overruns + report.lost_records == 0 && !report.truncated;
+    let whole = report.overruns + report.lost_records == 0 && !report.truncated && ending == Ending::Completed;
     Ok(if whole { Outcome::Done } else { Outcome::Impaired })
+}
+
+impl Report {
+    /// How the run ended, and what its recording shows.
+    fn text(&self, config: &Config) -> String {
+        let period_s = config.servo.period_s();
+        let cut = if self.truncated { ", the file ends early" } else { "" };
+        format!(
+            "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}{}\n{}",
+            self.outcome.replace('_', " "),
+            self.ticks,
+            self.ticks as f64 * period_s,
+            config.servo.rate_hz,
+            self.overruns,
+            self.lost_records,
+            self.trip.as_ref().map_or(String::new(), |trip| trip.text(period_s)),
+            self.made.text()
+        )
+    }
 }

@@ -50,6 +50,9 @@ pub(super) struct TableOptions {
 /// The JSON object of the command: that of a recording, and what only a CSV has.
 #[derive(Debug, Serialize)]
 struct Report {
+    /// Of how others' runs ended nothing is known: `null`, as is a trip.
+    outcome: Option<&'static str>,
+    trip: Option<&'static str>,
     recording: String,
     input: String,
     output: String,
@@ -158,6 +161,8 @@ fn report(
     let plot_path = free(beside, "bode", "svg");
     write_new(&plot_path, &plot(path, columns, analysis)?)?;
     Ok(Report {
+        outcome: None,
+        trip: None,
         recording: path.display().to_string(),
         input: columns.input.clone(),
         output: columns.output.clone(),

@@ -39,7 +39,8 @@ pub use outcome::{CliError, Outcome};
 /// A controller daemon for a precision-motion test bench.
 ///
 /// Without a configuration every command works on the simulated stage of the thesis. Exit codes: 0 done, 1 failed (a trip of
-/// the interlocks included), 2 wrong usage or configuration, 3 done, but with overruns or lost records.
+/// the interlocks included), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) of a run
+/// that did not come to its end.
 #[derive(Debug, Parser)]
 #[command(name = "bench", version, max_term_width = 110)]
 pub struct Cli {

@@ -166,21 +166,32 @@ impl From<&Quantiles> for QuantilesJson {
     }
 }
 
+impl TripJson {
+    pub(super) fn of(trip: &Trip, tick: u64) -> TripJson {
+        TripJson { reason: trip.reason(), tick, text: trip.to_string(), remedy: trip.remedy() }
+    }
+
+    /// Two lines for people.
+    pub(super) fn text(&self, period_s: f64) -> String {
+        format!(
+            "\n  TRIPPED at tick {} ({:.4} s): {}; zero current, amplifier disabled\n  remedy     {}",
+            self.tick,
+            self.tick as f64 * period_s,
+            self.text,
+            self.remedy
+        )
+    }
+}
+
 impl RunReport {
     pub fn new(run: &Run, totals: &Totals) -> Self {
-        let trip = |(trip, tick): (Trip, u64)| TripJson {
-            reason: trip.reason(),
-            tick,
-            text: trip.to_string(),
-            remedy: trip.remedy(),
-        };
         RunReport {
             outcome: match (run.ended.trip.is_some(), run.ended.completed) {
                 (true, _) => "tripped",
                 (false, true) => "completed",
                 (false, false) => "stopped",
             },
-            trip: run.ended.trip.map(trip),
+            trip: run.ended.trip.map(|(trip, tick)| TripJson::of(&trip, tick)),
             ticks: totals.ticks,
             overruns: totals.overruns,
             // A loss at the very end leaves no gap: the loop's own count tells.
@@ -210,13 +221,7 @@ impl RunReport {
     /// How the run went, for people.
     pub fn text(&self, config: &Config) -> String {
         let seconds = self.ticks as f64 * config.servo.period_s();
-        let trip = self.trip.as_ref().map_or(String::new(), |t| {
-            let at_s = t.tick as f64 * config.servo.period_s();
-            format!(
-                "\n  TRIPPED at tick {} ({at_s:.4} s): {}; zero current, amplifier disabled\n  remedy     {}",
-                t.tick, t.text, t.remedy
-            )
-        });
+        let trip = self.trip.as_ref().map_or(String::new(), |trip| trip.text(config.servo.period_s()));
         let refused: String = self.timing.refused.iter().map(|line| format!("\n  not granted: {line}")).collect();
         let t = &self.timing;
         let timing = match t.pace {

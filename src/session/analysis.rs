@@ -3,6 +3,7 @@
 use nalgebra::Complex;
 
 use super::closed_loop::{self, ClosedLoopError, ClosedResponses};
+use super::ending::Ending;
 use super::gathered::{Gathered, Ran};
 use super::patterns::{Taken, taken};
 use super::plan::{KIND, Kind};
@@ -80,7 +81,8 @@ pub struct Analysis {
     pub linearity: Option<Linearity>,
 }
 
-/// Analyses a recording made with `config`: of an excitation, or of a closed loop whose reference was swept.
+/// Analyses a recording made with `config`: of an excitation, or of a closed loop whose reference was swept. Of a run that did
+/// not come to its end the verdict's reasons say so.
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
     let closed = recording.metadata().get(KIND).is_some_and(|kind| kind == Kind::Control.name());
     let Ran { loop_signals, filled_ticks } = ran(recording, config.servo.rate_hz, closed)?;
@@ -90,7 +92,9 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     } else {
         open_loop(loop_signals.signals, band_hz, config)?
     };
-    Ok(Analysis { linearity, ..shown(seen, config, filled_ticks)? })
+    let shown = shown(seen, config, filled_ticks)?;
+    let verdict = shown.verdict.with(Ending::of(recording).caution());
+    Ok(Analysis { linearity, verdict, ..shown })
 }
 
 /// A response in both its forms.

@@ -11,6 +11,7 @@
 mod amplitudes;
 mod analysis;
 mod closed_loop;
+mod ending;
 mod foreign;
 mod gathered;
 mod measure;
@@ -25,6 +26,7 @@ mod swept;
 pub use amplitudes::{ModeOverAmplitude, over_amplitude};
 pub use analysis::{Analysis, AnalysisError, analyse};
 pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};
+pub use ending::Ending;
 pub use foreign::{ForeignAnalysis, analyse_signals};
 pub use measure::{Measured, measure};
 pub use plan::{Kind, Plan, PlanError};

@@ -78,6 +78,12 @@ impl Verdict {
     pub fn undecided(why: String) -> Verdict {
         Verdict { cnmp: Cnmp::Undecided, why, zeros: Vec::new(), phase: None }
     }
+
+    /// The same with something told beside its reasons.
+    pub fn with(self, caution: Option<String>) -> Verdict {
+        let why = std::iter::once(self.why).chain(caution).collect::<Vec<_>>().join("; ");
+        Verdict { why, ..self }
+    }
 }
 
 /// What the verdict is about.

@@ -10,3 +10,4 @@ mod rig;
 mod simulated;
 #[path = "../thesis/truth.rs"]
 mod truth;
+mod unfinished;
