@@ -60,23 +60,23 @@ impl From<AnalysisError> for CliError {
     }
 }
 
-/// Analyses a recording; the files stand beside it under its name.
-pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliError> {
+/// Analyses a recording; the files stand beside a path, that of the recording or another, under its name.
+pub(super) fn make(recording: &Recording, config: &Config, beside: &Path) -> Result<Made, CliError> {
     let analysis = &analyse(recording, config)?;
-    let csv_path = free(recording.path(), "frf", "csv");
+    let csv_path = free(beside, "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
-    let plain_path = free(recording.path(), "frf_without_delay", "csv");
+    let plain_path = free(beside, "frf_without_delay", "csv");
     let plain = analysis.frf.earlier(analysis.measured_delay_s());
     csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
     let run = AnalysedRun { analysis, config, recording };
     let pictures = pictures(&run).map_err(|e| CliError::Failed(e.to_string()))?;
     let mut plots = no_plots();
     for picture in &pictures {
-        let path = free(recording.path(), picture.kind, "svg");
+        let path = free(beside, picture.kind, "svg");
         write_new(&path, &picture.svg)?;
         plots.insert(picture.kind, Some(path.display().to_string()));
     }
-    let report_path = free(recording.path(), "report", "html");
+    let report_path = free(beside, "report", "html");
     write_new(&report_path, &page(&run, &pictures))?;
     Ok(Made {
         frf_csv: Some(csv_path.display().to_string()),
@@ -91,7 +91,7 @@ pub(super) fn make(recording: &Recording, config: &Config) -> Result<Made, CliEr
         delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
         delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
-        closed: analysis.closed.as_ref().map(|closed| LoopMade::of(closed, recording.path())).transpose()?,
+        closed: analysis.closed.as_ref().map(|closed| LoopMade::of(closed, beside)).transpose()?,
         linearity: analysis.linearity.as_ref().map(LinearityMade::of),
         fitted: analysis.fit.as_ref().map_or(Vec::new(), ModalFit::modes),
     })
@@ -169,6 +169,14 @@ impl Made {
 /// Every name, and no picture.
 fn no_plots() -> BTreeMap<&'static str, Option<String>> {
     KINDS.into_iter().map(|kind| (kind, None)).collect()
+}
+
+/// The path under which a file would stand in a folder, which is made if it is not there; without one its own.
+pub(super) fn in_folder(folder: Option<&Path>, path: &Path) -> Result<PathBuf, CliError> {
+    let Some(folder) = folder else { return Ok(path.to_owned()) };
+    let failed = |e| CliError::Failed(format!("cannot make the folder {}: {e}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    Ok(folder.join(path.file_name().unwrap_or_default()))
 }
 
 /// `NAME_what.ext` beside the recording, with -2, -3, ... where that is taken.

@@ -120,7 +120,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 /// The analysis, which a person may stop: the recording is whole all the same.
 pub(super) fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
     let (path, config) = (path.to_path_buf(), config.clone());
-    let made = unless_stopped(move || make(&Recording::open(&path)?, &config));
+    let made = unless_stopped(move || make(&Recording::open(&path)?, &config, &path));
     made.map_err(|error| CliError::Failed(error.to_string()))?.unwrap_or(Ok(Made::stopped()))
 }
 

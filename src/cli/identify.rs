@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::analysis_output::{Made, make};
+use super::analysis_output::{Made, in_folder, make};
 use super::identify_table::{self, TableOptions};
 use super::options::{print_json, print_text};
 use super::run_options::TripJson;
@@ -20,6 +20,9 @@ pub(super) struct Args {
     recording: PathBuf,
     #[command(flatten)]
     table: TableOptions,
+    /// Folder of the results; that of the recording or CSV without it
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// One JSON object on standard output, nothing else there
     #[arg(long)]
     json: bool,
@@ -42,7 +45,7 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     if args.table.is_meant(&args.recording) {
-        return identify_table::run(&args.recording, &args.table, args.json);
+        return identify_table::run(&args.recording, args.out.as_deref(), &args.table, args.json);
     }
     let recording = Recording::open(&args.recording)?;
     let plan = Plan::of(&recording)?;
@@ -66,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         overruns: recording.overruns(),
         lost_records: recording.lost_records(),
         truncated: recording.truncated(),
-        made: make(&recording, &plan.config)?,
+        made: make(&recording, &plan.config, &in_folder(args.out.as_deref(), &args.recording)?)?,
     };
     if args.json {
         print_json(&report)?

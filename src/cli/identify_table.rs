@@ -1,10 +1,10 @@
 //! `bench identify` on a CSV of other hands: any input, any output, no model beside them.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output::{free, write_new};
+use super::analysis_output::{free, in_folder, write_new};
 use super::modal_output::Shown;
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
@@ -42,9 +42,6 @@ pub(super) struct TableOptions {
     /// Frequencies to look at, in hertz: 11:250. Without it all up to half the rate
     #[arg(long, value_name = "LOW:HIGH", requires = "input", allow_hyphen_values = true)]
     band: Option<String>,
-    /// Folder of the results; the CSV's own without it
-    #[arg(long, value_name = "FOLDER", requires = "input")]
-    out: Option<PathBuf>,
 }
 
 /// The JSON object of the command: that of a recording, and what only a CSV has.
@@ -122,30 +119,19 @@ impl TableOptions {
 }
 
 /// Analyses a CSV; the files stand beside it, or in the folder asked for, under its name.
-pub(super) fn run(path: &Path, options: &TableOptions, json: bool) -> Result<Outcome, CliError> {
+pub(super) fn run(path: &Path, out: Option<&Path>, options: &TableOptions, json: bool) -> Result<Outcome, CliError> {
     let columns = options.columns(path)?;
     let signals = table::read(path, &columns)?;
     signals.check()?;
     let band_hz = options.band_hz(signals.rate_hz)?;
     let analysis = analyse_signals(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
-    let beside = match &options.out {
-        Some(folder) => in_folder(folder, path)?,
-        None => path.to_owned(),
-    };
-    let report = report(path, &columns, &signals, band_hz, &analysis, &beside)?;
+    let report = report(path, &columns, &signals, band_hz, &analysis, &in_folder(out, path)?)?;
     if json {
         print_json(&report)?
     } else {
         print_text(&report.text())?
     }
     Ok(Outcome::Done)
-}
-
-/// The path under which a file would stand in a folder, which is made if it is not there.
-fn in_folder(folder: &Path, path: &Path) -> Result<PathBuf, CliError> {
-    let failed = |e| CliError::Failed(format!("cannot make the folder {}: {e}", folder.display()));
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    Ok(folder.join(path.file_name().unwrap_or_default()))
 }
 
 fn report(

@@ -40,7 +40,8 @@ fn the_recording_of_a_whole_run_says_that_it_is_whole_and_a_cut_one_that_it_is_c
     let bench = Bench::new();
     let ran = bench.json("chirp --set loop.rate_hz=1000 --start 5 --stop 200 --duration 20 --operating-point 8%");
     let recording = text(&ran["recording"]);
-    let whole = bench.json(&format!("identify {recording}"));
+    let whole = bench.json(&format!("identify {recording} --out results/again"));
+    assert!(text(&whole["report"]).starts_with("results/again/") && bench.path(text(&whole["report"])).exists());
     assert_eq!((&whole["outcome"], &whole["trip"], &whole["why"]), (&ran["outcome"], &Value::Null, &ran["why"]));
     let bytes = std::fs::read(bench.path(recording)).expect("a recording");
     std::fs::write(bench.path("cut.mcap"), &bytes[..bytes.len() * 3 / 4]).expect("a disk");
