@@ -119,9 +119,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The analysis, which a person may stop: the recording is whole all the same.
 pub(super) fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
-    let (path, config) = (path.to_path_buf(), config.clone());
-    let made = unless_stopped(move || make(&Recording::open(&path)?, &config, &path));
-    made.map_err(|error| CliError::Failed(error.to_string()))?.unwrap_or(Ok(Made::stopped()))
+    let (of, config) = (path.to_path_buf(), config.clone());
+    let made = unless_stopped(move || make(&Recording::open(&of)?, &config, &of));
+    let made = made.map_err(|error| CliError::Failed(error.to_string()))?.unwrap_or(Ok(Made::stopped()));
+    let kept = |error| CliError::Failed(format!("{error}; the run itself is whole, in {}", path.display()));
+    made.map_err(kept)
 }
 
 /// Refuses an excitation that would trip an interlock, by the model of the whole rig; returns what to expect.

@@ -51,3 +51,15 @@ fn the_recording_of_a_whole_run_says_that_it_is_whole_and_a_cut_one_that_it_is_c
     assert_eq!((&cut["outcome"], &cut["truncated"]), (&"cut_off".into(), &true.into()));
     assert!(text(&cut["why"]).contains("cut off"), "{}", cut["why"]);
 }
+
+#[test]
+fn a_run_whose_recording_carries_no_response_says_where_that_recording_is() {
+    let bench = Bench::new();
+    // Steps of 0.1 mm: the probe sees nothing of a nanoampere.
+    let still = "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=1e-4 --set loop.rate_hz=1000 --stop 400";
+    let answer = bench.run(&format!("chirp --amplitude 1e-9 --duration 10 {still} --out kept"));
+    let mut files = std::fs::read_dir(bench.path("kept")).expect("a folder");
+    let name = files.next().expect("the recording").expect("a name").file_name().to_string_lossy().into_owned();
+    assert_eq!(answer.code, 1, "{}", answer.err);
+    assert!(answer.err.contains("did not see the stage") && answer.err.contains(&name), "{name}: {}", answer.err);
+}
