@@ -22,6 +22,7 @@ act well
 ./bench doctor --config real.toml --json >doctor.json 2>doctor.err
 echo $? >doctor.code
 run chirp chirp
+run swept control --reference chirp --duration 24 --amplitude 50um --set identify.curve=rational --set identify.resolution_ratio=0.0025 --set identify.min_half_width_bins=16
 run control control --duration 6 &
 first=$!
 sleep 3
