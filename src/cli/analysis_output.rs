@@ -14,7 +14,7 @@ use crate::config::Config;
 use crate::fit::{FittedMode, ModalFit};
 use crate::identify::{Unit, csv};
 use crate::recording::Recording;
-use crate::run_report::{AnalysedRun, KINDS, page, pictures};
+use crate::run_report::{Analysed, AnalysedRun, KINDS, page, pictures};
 use crate::session::{AnalysisError, analyse};
 
 /// The files that were made and what the response shows; `null` where the run gave no response.
@@ -26,7 +26,7 @@ pub(super) struct Made {
     /// The Bode plot.
     plot: Option<String>,
     /// All pictures by name; `null` where the data carry none.
-    plots: BTreeMap<&'static str, Option<String>>,
+    plots: Plots,
     /// The page of the run.
     pub report: Option<String>,
     frequencies: usize,
@@ -69,21 +69,13 @@ pub(super) fn make(recording: &Recording, config: &Config, beside: &Path) -> Res
     let plain = analysis.frf.earlier(analysis.measured_delay_s());
     csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
     let run = AnalysedRun { analysis, config, recording };
-    let pictures = pictures(&run).map_err(|e| CliError::Failed(e.to_string()))?;
-    let mut plots = no_plots();
-    for picture in &pictures {
-        let path = free(beside, picture.kind, "svg");
-        write_new(&path, &picture.svg)?;
-        plots.insert(picture.kind, Some(path.display().to_string()));
-    }
-    let report_path = free(beside, "report", "html");
-    write_new(&report_path, &page(&run, &pictures))?;
+    let Drawn { plots, report } = drawn(&run, beside)?;
     Ok(Made {
         frf_csv: Some(csv_path.display().to_string()),
         frf_without_delay_csv: Some(plain_path.display().to_string()),
         plot: plots.get("bode").cloned().flatten(),
         plots,
-        report: Some(report_path.display().to_string()),
+        report: Some(report),
         frequencies: analysis.frf.len(),
         coherence_median: analysis.frf.median_coherence(),
         filled_ticks: analysis.filled_ticks,
@@ -128,10 +120,6 @@ impl Made {
         self.shown.why() == STOPPED
     }
 
-    fn plots_text(&self) -> String {
-        self.plots.values().flatten().map(|path| format!("  plot       {path}\n")).collect()
-    }
-
     pub fn text(&self) -> String {
         let (Some(frf_csv), Some(report), Some(coherence)) = (&self.frf_csv, &self.report, self.coherence_median)
         else {
@@ -160,14 +148,42 @@ impl Made {
             self.closed.as_ref().map_or(String::new(), LoopMade::text),
             self.frf_without_delay_csv.as_deref().unwrap_or_default(),
             self.linearity.as_ref().map_or(String::new(), LinearityMade::line),
-            self.plots_text(),
+            plots_text(&self.plots),
             self.shown.text()
         )
     }
 }
 
+/// Pictures by name; `null` where the data carry none.
+pub(super) type Plots = BTreeMap<&'static str, Option<String>>;
+
+/// The pictures of a record and its page.
+pub(super) struct Drawn {
+    pub(super) plots: Plots,
+    pub(super) report: String,
+}
+
+/// Draws a record; the files stand beside a path under its name.
+pub(super) fn drawn(record: &dyn Analysed, beside: &Path) -> Result<Drawn, CliError> {
+    let pictures = pictures(record).map_err(|e| CliError::Failed(e.to_string()))?;
+    let mut plots = no_plots();
+    for picture in &pictures {
+        let path = free(beside, picture.kind, "svg");
+        write_new(&path, &picture.svg)?;
+        plots.insert(picture.kind, Some(path.display().to_string()));
+    }
+    let report = free(beside, "report", "html");
+    write_new(&report, &page(record, &pictures))?;
+    Ok(Drawn { plots, report: report.display().to_string() })
+}
+
+/// A line for each picture.
+pub(super) fn plots_text(plots: &Plots) -> String {
+    plots.values().flatten().map(|path| format!("  plot       {path}\n")).collect()
+}
+
 /// Every name, and no picture.
-fn no_plots() -> BTreeMap<&'static str, Option<String>> {
+fn no_plots() -> Plots {
     KINDS.into_iter().map(|kind| (kind, None)).collect()
 }
 

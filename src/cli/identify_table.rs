@@ -4,14 +4,14 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output::{free, in_folder, write_new};
+use super::analysis_output::{Drawn, Plots, drawn, free, in_folder, plots_text};
 use super::modal_output::Shown;
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
 use crate::identify::periodic::Repetition;
 use crate::identify::table::{self, Clock, Columns};
 use crate::identify::{Signals, Unit, csv};
-use crate::report::{Curve, Trace, response_svg};
+use crate::run_report::AnalysedTable;
 use crate::session::{ForeignAnalysis, analyse_signals};
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
@@ -62,7 +62,11 @@ struct Report {
     /// Periods that were averaged; `null` of a record that does not repeat.
     periods: Option<usize>,
     frf_csv: String,
-    plot: String,
+    /// The Bode plot.
+    plot: Option<String>,
+    plots: Plots,
+    /// The page of the record.
+    report: String,
     frequencies: usize,
     /// Median coherence over the band.
     coherence_median: Option<f64>,
@@ -144,8 +148,11 @@ fn report(
 ) -> Result<Report, CliError> {
     let csv_path = free(beside, "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
-    let plot_path = free(beside, "bode", "svg");
-    write_new(&plot_path, &plot(path, columns, analysis)?)?;
+    let Columns { input, output, .. } = columns;
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let (samples, rate_hz) = (signals.len(), signals.rate_hz);
+    let Drawn { plots, report } =
+        drawn(&AnalysedTable { analysis, file: &file, input, output, rate_hz, samples }, beside)?;
     Ok(Report {
         outcome: None,
         trip: None,
@@ -160,21 +167,13 @@ fn report(
         band_hz,
         periods: analysis.periods,
         frf_csv: csv_path.display().to_string(),
-        plot: plot_path.display().to_string(),
+        plot: plots.get("bode").cloned().flatten(),
+        plots,
+        report,
         frequencies: analysis.frf.len(),
         coherence_median: analysis.frf.median_coherence(),
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
     })
-}
-
-fn plot(path: &Path, columns: &Columns, analysis: &ForeignAnalysis) -> Result<String, CliError> {
-    let measured = Trace { name: "measured", curve: Curve::Measured(&analysis.frf) };
-    let curve = Curve::Model { frequency_hz: &analysis.frf.frequency_hz, response: &analysis.fitted };
-    let fitted = (!analysis.fitted.is_empty()).then_some(Trace { name: "fit", curve });
-    let traces: Vec<Trace> = [measured].into_iter().chain(fitted).collect();
-    let title = path.file_name().unwrap_or_default().to_string_lossy();
-    let subtitle = format!("{} to {}; units are those of the columns", columns.input, columns.output);
-    response_svg(Unit::Bare, &traces, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))
 }
 
 impl Report {
@@ -182,7 +181,7 @@ impl Report {
         let periods = self.periods.map_or(String::new(), |count| format!(", {count} periods averaged"));
         format!(
             "  record     {}: {} samples at {} Hz from `{}` to `{}`{periods}\n  response   {} ({} frequencies, median coherence \
-             {:.4})\n  plot       {}\n  residues   in `{}` per `{}` and s^2, where the table says 1/kg\n  misfit     {:.1} times the power \
+             {:.4})\n{}  report     {}\n  residues   in `{}` per `{}` and s^2, where the table says 1/kg\n  misfit     {:.1} times the power \
              of the noise\n{}",
             self.recording,
             self.ticks,
@@ -192,7 +191,8 @@ impl Report {
             self.frf_csv,
             self.frequencies,
             self.coherence_median.unwrap_or(0.0),
-            self.plot,
+            plots_text(&self.plots),
+            self.report,
             self.output,
             self.input,
             self.shown.chi2().unwrap_or(0.0),

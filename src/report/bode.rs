@@ -24,22 +24,14 @@ const MARGIN: f64 = 0.06;
 
 /// The Bode plot of some responses, as an SVG document.
 ///
-/// Magnitude in m/A on a logarithmic axis, phase in degrees, unwrapped from the lowest frequency on, where it is within
+/// Magnitude in `unit` on a logarithmic axis, phase in degrees, unwrapped from the lowest frequency on, where it is within
 /// +-180, and the coherence of measured traces, if there are any. Around measured curves lies their band of +-2 sigma;
 /// where that reaches zero magnitude the curve is drawn faint and has no say in the axes. Models are drawn on top,
 /// dashed where there is something measured below.
 ///
 /// # Errors
 /// When there is nothing to draw, or a trace is not sound: see [`ReportError`].
-pub fn bode_svg(traces: &[Trace], title: &str, subtitle: &str) -> Result<String, ReportError> {
-    response_svg(Unit::MetresPerAmpere, traces, title, subtitle)
-}
-
-/// The same of responses in another unit.
-///
-/// # Errors
-/// As [`bode_svg`].
-pub fn response_svg(unit: Unit, traces: &[Trace], title: &str, subtitle: &str) -> Result<String, ReportError> {
+pub fn bode_svg(unit: Unit, traces: &[Trace], title: &str, subtitle: &str) -> Result<String, ReportError> {
     let mut lines = trace::lines(traces)?;
     // Stable: measured traces first, so that models come to lie on top.
     lines.sort_by_key(|line| line.measured.is_none());

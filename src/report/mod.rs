@@ -32,7 +32,7 @@ mod sheet;
 mod stability;
 mod trace;
 
-pub use bode::{bode_svg, response_svg};
+pub use bode::bode_svg;
 pub use chart::{Chart, Mark, Pen, Scale, ScaleKind, Stroke, Symbol};
 pub use error::ReportError;
 pub use levels::{LevelLines, levels_svg};

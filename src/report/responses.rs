@@ -8,7 +8,7 @@ use super::ellipse::SIGMAS_95_PLANE;
 use super::sheet::{Row, sheet_svg};
 use super::trace::gap;
 use super::{Curve, ReportError, Trace};
-use crate::identify::Frf;
+use crate::identify::{Frf, Unit};
 
 /// Magnitudes below so many sigmas are left out of a Nyquist plot: their direction is not known.
 const KNOWN: f64 = 2.0;
@@ -19,12 +19,13 @@ const SEEN: f64 = 0.004;
 /// Metres to micrometres.
 const MICRO: f64 = 1e6;
 
-/// The Nyquist plot as an SVG document: the whole response in um/A, and beside it a part of the frequencies, with circles that
+/// The Nyquist plot as an SVG document: the whole response in um/A, or as it is in another unit, and beside it a part of the frequencies, with circles that
 /// hold the truth with 95 %.
 ///
 /// # Errors
 /// When there is nothing measured, or a trace is not sound: see [`ReportError`].
 pub fn nyquist_svg(
+    unit: Unit,
     traces: &[Trace],
     part_hz: Option<(f64, f64)>,
     title: &str,
@@ -32,30 +33,34 @@ pub fn nyquist_svg(
 ) -> Result<String, ReportError> {
     super::trace::lines(traces)?;
     let all = (0.0, f64::INFINITY);
-    let whole = nyquist("All frequencies", traces, all);
+    let whole = nyquist(unit, "All frequencies", traces, all);
     let heading = |(low, high): (f64, f64)| format!("{low:.1} to {high:.1} Hz");
-    let part = part_hz.map(|part| nyquist(&heading(part), traces, part));
+    let part = part_hz.map(|part| nyquist(unit, &heading(part), traces, part));
     sheet_svg(title, subtitle, &[Row::new(400.0, std::iter::once(whole).chain(part).collect())])
 }
 
-fn nyquist(heading: &str, traces: &[Trace], band_hz: (f64, f64)) -> Chart {
-    let scale = |part: &str| Scale::linear(&format!("{part} part of H (um/A)"));
+fn nyquist(unit: Unit, heading: &str, traces: &[Trace], band_hz: (f64, f64)) -> Chart {
+    let (name, factor) = match unit {
+        Unit::MetresPerAmpere => (" (um/A)", MICRO),
+        Unit::Bare => ("", 1.0),
+    };
+    let scale = |part: &str| Scale::linear(&format!("{part} part of H{name}"));
     let mut chart = Chart::new(heading, scale("Real"), scale("Imaginary")).equal();
     let mut pens = [Pen::dashed(VERMILION), Pen::dotted(INK)].into_iter().cycle();
     for trace in traces {
         chart = match trace.curve {
-            Curve::Measured(frf) => measured(chart, trace.name, frf, band_hz),
+            Curve::Measured(frf) => measured(chart, trace.name, frf, band_hz, factor),
             Curve::Model { frequency_hz, response } => {
                 let pen = pens.next().unwrap_or(Pen::dashed(VERMILION));
                 let within = frequency_hz.iter().zip(response).filter(|(f, _)| **f >= band_hz.0 && **f <= band_hz.1);
-                chart.line(trace.name, pen, within.map(|(_, h)| point(h)).collect())
+                chart.line(trace.name, pen, within.map(|(_, h)| point(&(h * factor))).collect())
             }
         };
     }
     chart.points("origin", INK, Symbol::Cross, vec![(0.0, 0.0)])
 }
 
-fn measured(chart: Chart, name: &str, frf: &Frf, (low, high): (f64, f64)) -> Chart {
+fn measured(chart: Chart, name: &str, frf: &Frf, (low, high): (f64, f64), factor: f64) -> Chart {
     let within = |k: &usize| frf.frequency_hz[*k] >= low && frf.frequency_hz[*k] <= high;
     let shown: Vec<usize> = (0..frf.len()).filter(within).collect();
     let largest = shown.iter().map(|k| frf.response[*k].norm()).fold(0.0, f64::max);
@@ -68,20 +73,20 @@ fn measured(chart: Chart, name: &str, frf: &Frf, (low, high): (f64, f64)) -> Cha
         let free = drawn.iter().all(|other| (frf.response[*k] - other).norm() >= radius);
         if radius > SEEN * largest && known(frf, *k) && free {
             drawn.push(frf.response[*k]);
-            let outline = circle(point(&frf.response[*k]), MICRO * radius);
+            let outline = circle(point(&(frf.response[*k] * factor)), factor * radius);
             chart = chart.mark(Mark::Area { name: circle_name.into(), colour: BLUE, strength: 0.13, outline });
             circle_name = "";
         }
     }
-    chart.line(name, Pen::solid(BLUE), line(frf, &shown))
+    chart.line(name, Pen::solid(BLUE), line(frf, &shown, factor))
 }
 
 /// The points with gaps where frequencies, or magnitudes that can be told from noise, are missing.
-fn line(frf: &Frf, shown: &[usize]) -> Vec<(f64, f64)> {
+fn line(frf: &Frf, shown: &[usize], factor: f64) -> Vec<(f64, f64)> {
     let nothing = (f64::NAN, f64::NAN);
     let of = |k: &usize| {
         let before = (*k > 0 && gap(frf, *k)).then_some(nothing);
-        before.into_iter().chain([if known(frf, *k) { point(&frf.response[*k]) } else { nothing }])
+        before.into_iter().chain([if known(frf, *k) { point(&(frf.response[*k] * factor)) } else { nothing }])
     };
     shown.iter().flat_map(of).collect()
 }
@@ -91,7 +96,7 @@ fn known(frf: &Frf, k: usize) -> bool {
 }
 
 fn point(h: &Complex<f64>) -> (f64, f64) {
-    (MICRO * h.re, MICRO * h.im)
+    (h.re, h.im)
 }
 
 fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
@@ -119,7 +124,7 @@ pub fn coherence_svg(frf: &Frf, title: &str, subtitle: &str) -> Result<String, R
         series(|c| c),
     );
     let rest =
-        Chart::new("What the current does not explain", frequency(), Scale::logarithmic("1 less coherence (ratio)"))
+        Chart::new("What the input does not explain", frequency(), Scale::logarithmic("1 less coherence (ratio)"))
             .line("", Pen { width: 1.2, ..Pen::solid(BLUE) }, series(|c| 1.0 - c));
     sheet_svg(title, subtitle, &[Row::new(250.0, vec![whole]), Row::new(250.0, vec![rest])])
 }

@@ -29,10 +29,10 @@ pub struct ForeignAnalysis {
     pub frf: Frf,
     /// The modes that it shows, or why none are told.
     pub fit: Result<ModalFit, FitError>,
-    /// The response of these modes at the same frequencies; empty without them.
-    pub fitted: Vec<Complex<f64>>,
     /// What that says of CNMP zeros.
     pub verdict: Verdict,
+    /// Modes and zeros up to here count for the verdict, in rad/s: the end of the band.
+    pub judged_up_to_rad_s: f64,
     /// Periods that were averaged, of a periodic record.
     pub periods: Option<usize>,
 }
@@ -46,12 +46,12 @@ pub fn analyse_signals(
 ) -> Result<ForeignAnalysis, AnalysisError> {
     let (frf, blocks, periods) = response(signals, band_hz, repetition)?;
     let fit = if repetition.is_some() { fit_of_periods(&blocks) } else { fit::fit(&blocks, &View::Bare) };
-    let fitted = fit.as_ref().map_or(Vec::new(), |fit| fit.response(&View::Bare, &frf.frequency_hz));
+    let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
     let verdict = match doubt(signals.rate_hz, &frf, &blocks, &fit) {
         Some(why) => Verdict::undecided(why),
-        None => judge(&fit, &blocks, &View::Bare, 2.0 * std::f64::consts::PI * band_hz.1, None)?,
+        None => judge(&fit, &blocks, &View::Bare, judged_up_to_rad_s, None)?,
     };
-    Ok(ForeignAnalysis { frf, fit, fitted, verdict, periods })
+    Ok(ForeignAnalysis { frf, fit, verdict, judged_up_to_rad_s, periods })
 }
 
 fn response(

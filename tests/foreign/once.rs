@@ -50,3 +50,38 @@ fn a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold() {
     }
     near("delay", number(&answer["fit_delay_s"]), 0.5 / RATE_HZ, 0.05 / RATE_HZ);
 }
+
+/// The stage of [`a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold`] by another excitation: an impulse, whose answer
+/// of each mode is a closed form.
+#[test]
+fn a_record_gets_the_pictures_and_the_page_that_a_run_gets() {
+    let struck = |n: usize| if n == 100 { RATE_HZ } else { 0.0 };
+    let input_a: Vec<f64> = (0..20_000).map(struck).collect();
+    let ring = |t: f64| -> f64 {
+        let one = |(hz, zeta, residue): (f64, f64, f64)| {
+            let w = std::f64::consts::TAU * hz;
+            residue / w * (-zeta * w * t).exp() * (w * t).sin()
+        };
+        if t > 0.0 { STAGE.map(one).iter().sum() } else { 0.0 }
+    };
+    let mut normal = crate::signals::normal(5);
+    let output_m = (0..20_000).map(|n| ring((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal()).collect();
+    let bench = Bench::new();
+    bench.write("data.csv", csv(&Signals { rate_hz: RATE_HZ, output_m, input_a }));
+    let answer =
+        bench.json("identify data.csv --input force_n --output position_m --time time_s --band 8:150 --out seen");
+    for kind in ["bode", "coherence", "nyquist", "pole_zero", "stability"] {
+        let picture = bench.read(answer["plots"][kind].as_str().expect(kind));
+        assert!(picture.starts_with("<svg") && !picture.contains("m/A"), "{kind}");
+    }
+    for kind in ["loop", "sensitivity", "linearity"] {
+        assert!(answer["plots"][kind].is_null(), "{kind}");
+    }
+    let page = bench.read(answer["report"].as_str().expect("a page"));
+    let verdict = answer["cnmp"].as_str().expect("a verdict");
+    let places = ["data.csv", "force_n to position_m", verdict, "position_m per force_n and s^2", "<svg", "20000"];
+    let found: Vec<_> = places.iter().map(|words| page.find(words)).collect();
+    assert!(found.iter().all(Option::is_some), "{found:?}");
+    assert!(page.find("Modes") < page.find("<svg"), "verdict and modes stand before the pictures");
+    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+}

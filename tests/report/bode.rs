@@ -1,4 +1,5 @@
 use bench::identify::Frf;
+use bench::identify::Unit;
 use bench::report::{Curve, ReportError, Trace, bode_svg};
 use nalgebra::Complex;
 use proptest::prelude::*;
@@ -76,7 +77,7 @@ fn a_peak_narrower_than_a_pixel_is_drawn_to_its_top() {
     // Neither the first nor the last of the 112 samples of its pixel column.
     response[50_050] = Complex::from(1e-3);
     let trace = [Trace { name: "peak", curve: Curve::Model { frequency_hz: &frequency_hz, response: &response } }];
-    let svg = bode_svg(&trace, "", "").unwrap();
+    let svg = bode_svg(Unit::MetresPerAmpere, &trace, "", "").unwrap();
     let curves = svg::points(&svg, "polyline", MODEL);
     // Legend, magnitude, phase. The axis is 1.12 decades high, the peak one decade of it.
     let ys = curves[1].iter().map(|point| point.1);
@@ -115,7 +116,8 @@ fn where_two_sigma_reach_zero_the_curve_is_faint_and_has_no_say_in_the_axis() {
         frf.response[k] = Complex::from(1e-9);
         frf.magnitude_sigma[k] = 1e-9;
     }
-    let svg = bode_svg(&[Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "").unwrap();
+    let svg =
+        bode_svg(Unit::MetresPerAmpere, &[Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "").unwrap();
     assert!(svg.contains(&format!("opacity=\"0.3\" stroke=\"{MEASURED}\"")));
     assert!(!texts(&svg).iter().any(|text| text.contains("10⁻⁹")), "{:?}", texts(&svg));
 }
@@ -169,9 +171,11 @@ fn a_model_over_a_measured_curve_is_dashed_so_that_both_are_seen_and_alone_it_is
     let response = vec![Complex::from(1.5e-4); frf.len()];
     let curve = Curve::Model { frequency_hz: &frf.frequency_hz, response: &response };
     let model = Trace { name: "model", curve };
-    let alone = bode_svg(std::slice::from_ref(&model), "", "").unwrap();
+    let alone = bode_svg(Unit::MetresPerAmpere, std::slice::from_ref(&model), "", "").unwrap();
     assert_eq!(svg::points(&alone, "polyline", MODEL).len(), 3);
-    let both = bode_svg(&[model, Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "").unwrap();
+    let both =
+        bode_svg(Unit::MetresPerAmpere, &[model, Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "")
+            .unwrap();
     // 890 pixels in each of two panels, 30 in the legend; a dash every 11 pixels: 81 + 81 + 3, and 6 of the 11 drawn.
     let dashes = svg::points(&both, "polyline", MODEL);
     assert_eq!(dashes.len(), 165);
@@ -185,7 +189,7 @@ fn models_alone_make_a_plot_without_coherence() {
     let (whole, alone) = (model(&stage, &frequency_hz), model(&first, &frequency_hz));
     let curve = |response| Curve::Model { frequency_hz: &frequency_hz, response };
     let traces = [Trace { name: "stage", curve: curve(&whole) }, Trace { name: "first mode", curve: curve(&alone) }];
-    let svg = bode_svg(&traces, "Model", "stage, 8 % of L").unwrap();
+    let svg = bode_svg(Unit::MetresPerAmpere, &traces, "Model", "stage, 8 % of L").unwrap();
     keep("bode-models.svg", &svg);
     assert_tidy(&svg);
     assert_shows(&svg, &["stage", "first mode", "1000"]);
@@ -198,7 +202,7 @@ fn a_narrow_band_has_labels_too() {
     let response = model(&SampledPlant::stage(), &frequency_hz);
     let trace =
         [Trace { name: "close modes", curve: Curve::Model { frequency_hz: &frequency_hz, response: &response } }];
-    let svg = bode_svg(&trace, "Close modes", "").unwrap();
+    let svg = bode_svg(Unit::MetresPerAmpere, &trace, "Close modes", "").unwrap();
     keep("bode-narrow.svg", &svg);
     assert_tidy(&svg);
     assert_shows(&svg, &["80", "82", "84", "86", "88", "90"]);
@@ -208,7 +212,7 @@ fn a_narrow_band_has_labels_too() {
 fn a_single_frequency_is_a_plot_as_well() {
     let trace =
         [Trace { name: "one", curve: Curve::Model { frequency_hz: &[29.3], response: &[Complex::from(1e-4)] } }];
-    assert_tidy(&bode_svg(&trace, "One", "").unwrap());
+    assert_tidy(&bode_svg(Unit::MetresPerAmpere, &trace, "One", "").unwrap());
 }
 
 #[test]
@@ -216,21 +220,21 @@ fn long_titles_and_many_names_are_wrapped_and_letters_that_mean_something_to_svg
     let frf = flat();
     let name = "a measured response with a <long> name & more";
     let traces: Vec<Trace> = (0..5).map(|_| Trace { name, curve: Curve::Measured(&frf) }).collect();
-    let svg = bode_svg(&traces, &"title ".repeat(40), &"x".repeat(500)).unwrap();
+    let svg = bode_svg(Unit::MetresPerAmpere, &traces, &"title ".repeat(40), &"x".repeat(500)).unwrap();
     keep("bode-long.svg", &svg);
     assert_tidy(&svg);
     assert!(svg.contains("&lt;long&gt; name &amp; more") && !svg.contains("<long>"));
 }
 
 fn draw(curve: Curve) -> ReportError {
-    bode_svg(&[Trace { name: "bad", curve }], "", "").unwrap_err()
+    bode_svg(Unit::MetresPerAmpere, &[Trace { name: "bad", curve }], "", "").unwrap_err()
 }
 
 #[test]
 fn what_cannot_be_drawn_is_refused_by_name() {
     let one = [Complex::from(1.0)];
     let two = [Complex::from(1.0), Complex::from(f64::NAN)];
-    assert_eq!(bode_svg(&[], "", "").unwrap_err(), ReportError::NoTrace);
+    assert_eq!(bode_svg(Unit::MetresPerAmpere, &[], "", "").unwrap_err(), ReportError::NoTrace);
     assert_eq!(draw(Curve::Measured(&Frf::default())), ReportError::Empty { name: "bad".into() });
     let error = draw(Curve::Model { frequency_hz: &[1.0, 2.0], response: &one });
     assert_eq!(error.to_string(), "the trace \"bad\" has 2 frequencies, but a column of 1 values");
@@ -267,7 +271,7 @@ proptest! {
         }
         let model = Curve::Model { frequency_hz: &frf.frequency_hz, response: &frf.response };
         let traces = [Trace { name: "any", curve: Curve::Measured(&frf) }, Trace { name: "model", curve: model }];
-        assert_tidy(&bode_svg(&traces, "Any", "any").unwrap());
+        assert_tidy(&bode_svg(Unit::MetresPerAmpere, &traces, "Any", "any").unwrap());
     }
 }
 

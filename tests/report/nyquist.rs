@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use bench::identify::Frf;
+use bench::identify::{Frf, Unit};
 use bench::report::{Curve, Trace, nyquist_svg};
 use nalgebra::Complex;
 
@@ -14,7 +14,7 @@ const BLUE: &str = "#0072B2";
 /// Circles of confidence of a measured response: a sample in the legend has four corners, they have more.
 fn circles(frf: &Frf) -> usize {
     let measured = [Trace { name: "measured", curve: Curve::Measured(frf) }];
-    let svg = nyquist_svg(&measured, None, "Nyquist", "").unwrap();
+    let svg = nyquist_svg(Unit::MetresPerAmpere, &measured, None, "Nyquist", "").unwrap();
     svg::points(&svg, "polygon", BLUE).iter().filter(|outline| outline.len() > 10).count()
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bench::identify::Unit;
 use bench::identify::{EstimatorSettings, Frf, Signals, local};
 use bench::report::{Curve, Trace, bode_svg};
 use nalgebra::Complex;
@@ -53,7 +54,7 @@ pub fn bode(name: &str, frf: &Frf, plant: Option<&SampledPlant>, subtitle: &str)
         let curve = Curve::Model { frequency_hz: &frf.frequency_hz, response };
         traces.push(Trace { name: "model: sampled plant with 1 kHz current loop and one tick of delay", curve });
     }
-    let svg = bode_svg(&traces, "FRF from current to displacement", subtitle).unwrap();
+    let svg = bode_svg(Unit::MetresPerAmpere, &traces, "FRF from current to displacement", subtitle).unwrap();
     keep(name, &svg);
     svg
 }
