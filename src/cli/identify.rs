@@ -60,10 +60,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let ending = Ending::of(&recording);
     let report = Report {
         outcome: ending.name(),
-        trip: match &ending {
-            Ending::Tripped(trip, tick) => Some(TripJson::of(trip, *tick)),
-            _ => None,
-        },
+        trip: TripJson::of(&ending),
         recording: args.recording.display().to_string(),
         ticks: recording.tick_count(),
         overruns: recording.overruns(),

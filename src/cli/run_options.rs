@@ -16,7 +16,7 @@ use crate::devices;
 use crate::recording::{Quantiles, Totals};
 use crate::rt::arming::Trip;
 use crate::rt::thread::Pace;
-use crate::session::{Plan, Run, SessionError};
+use crate::session::{Ending, Plan, Run, SessionError};
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]
@@ -167,8 +167,15 @@ impl From<&Quantiles> for QuantilesJson {
 }
 
 impl TripJson {
-    pub(super) fn of(trip: &Trip, tick: u64) -> TripJson {
-        TripJson { reason: trip.reason(), tick, text: trip.to_string(), remedy: trip.remedy() }
+    /// Of a run that tripped.
+    pub(super) fn of(ending: &Ending) -> Option<TripJson> {
+        let told = |(trip, tick): (Trip, u64)| TripJson {
+            reason: trip.reason(),
+            tick,
+            text: trip.to_string(),
+            remedy: trip.remedy(),
+        };
+        ending.trip().map(told)
     }
 
     /// Two lines for people.
@@ -185,13 +192,10 @@ impl TripJson {
 
 impl RunReport {
     pub fn new(run: &Run, totals: &Totals) -> Self {
+        let ending = Ending::from(&run.ended);
         RunReport {
-            outcome: match (run.ended.trip.is_some(), run.ended.completed) {
-                (true, _) => "tripped",
-                (false, true) => "completed",
-                (false, false) => "stopped",
-            },
-            trip: run.ended.trip.map(|(trip, tick)| TripJson::of(&trip, tick)),
+            outcome: ending.name(),
+            trip: TripJson::of(&ending),
             ticks: totals.ticks,
             overruns: totals.overruns,
             // A loss at the very end leaves no gap: the loop's own count tells.

@@ -1,10 +1,11 @@
-//! How the run of a recording came to its end, as the recording tells it.
+//! How a run came to its end, as its loop or its recording tells it.
 
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
 use crate::rt::record::EventKind;
+use crate::rt::thread::Ended;
 
-/// The end of a recorded run.
+/// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ending {
     /// It ran to its end.
@@ -17,6 +18,12 @@ pub enum Ending {
     CutOff,
 }
 
+impl From<&Ended> for Ending {
+    fn from(ended: &Ended) -> Ending {
+        Ending::by(ended.trip, ended.completed)
+    }
+}
+
 impl Ending {
     /// By the events of a recording. A trip counts though the program had come to its end; a file that is still being written
     /// has no end of its own, and is whole for all that if the program had come to its.
@@ -26,11 +33,25 @@ impl Ending {
             _ => None,
         });
         let completed = recording.events().iter().any(|event| event.kind == EventKind::Completed);
+        match Ending::by(trip, completed) {
+            Ending::Stopped if recording.truncated() => Ending::CutOff,
+            ending => ending,
+        }
+    }
+
+    fn by(trip: Option<(Trip, u64)>, completed: bool) -> Ending {
         match (trip, completed) {
             (Some((trip, tick)), _) => Ending::Tripped(trip, tick),
             (None, true) => Ending::Completed,
-            (None, false) if recording.truncated() => Ending::CutOff,
             (None, false) => Ending::Stopped,
+        }
+    }
+
+    /// The trip, if there was one, and its tick.
+    pub fn trip(&self) -> Option<(Trip, u64)> {
+        match self {
+            Ending::Tripped(trip, tick) => Some((*trip, *tick)),
+            _ => None,
         }
     }
 
