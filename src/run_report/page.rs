@@ -46,22 +46,16 @@ fn verdict(shown: &Shown<'_>, record: &dyn Analysed) -> String {
 
 /// The numbers that a verdict rests on.
 fn evidence(shown: &Shown<'_>) -> Vec<(String, String)> {
-    let milli = 1e3;
     let judged = format!("{:.1} Hz", shown.judged_up_to_rad_s / HERTZ);
     let power = shown.fit.map(|fit| format!("{:.3} times that of the noise", fit.chi2_per_freedom));
     let fall = shown.verdict.phase.map(|p| format!("{:.1} deg beyond what the magnitude asks for", -p.beyond_deg));
-    let fitted = shown.fit.map(|fit| {
-        let delay = fit.delay_s();
-        format!("{} ms", interval(milli * delay.value, milli * SIGMAS_95 * delay.sigma))
-    });
-    let delay = if shown.model.is_some() { "Delay beyond the configuration, by the fit" } else { "Delay by the fit" };
-    let pairs = [
-        ("Judged up to", Some(judged)),
-        ("Power that the fit leaves", power),
-        ("Fall of the phase", fall),
-        (delay, fitted),
-    ];
+    let pairs = [("Judged up to", Some(judged)), ("Power that the fit leaves", power), ("Fall of the phase", fall)];
     pairs.into_iter().filter_map(|(name, text)| Some((name.to_string(), text?))).collect()
+}
+
+/// A delay in milliseconds with its interval.
+pub(super) fn delay_ms(delay_s: Estimate) -> String {
+    format!("{} ms", interval(1e3 * delay_s.value, 1e3 * SIGMAS_95 * delay_s.sigma))
 }
 
 fn modes(shown: &Shown<'_>) -> String {

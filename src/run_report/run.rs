@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::page::section;
+use super::page::{delay_ms, section};
 use super::{Analysed, Picture, Shown};
 use crate::config::Config;
 use crate::excitation::{swept_words, words};
@@ -70,13 +70,13 @@ impl Analysed for AnalysedRun<'_> {
     }
 
     fn evidence(&self) -> Vec<(String, String)> {
-        let (analysis, milli) = (self.analysis, 1e3);
-        let by_phase = analysis
-            .beyond
-            .map(|delay| format!("{} ms", interval(milli * delay.seconds, milli * SIGMAS_95 * delay.sigma_s)));
+        let analysis = self.analysis;
+        let fitted = analysis.fit.as_ref().ok().map(|fit| delay_ms(fit.delay_s()));
+        let by_phase = analysis.beyond.map(|d| delay_ms(Estimate { value: d.seconds, sigma: d.sigma_s }));
         let linearity = analysis.linearity.as_ref();
         let pairs = [
-            ("Delay by the configuration", Some(format!("{:.4} ms", milli * analysis.delay_s))),
+            ("Delay by the configuration", Some(format!("{:.4} ms", 1e3 * analysis.delay_s))),
+            ("Delay beyond it, by the fit", fitted),
             ("Delay beyond it, by the phases", by_phase),
             ("Coherence", linearity.map(|linearity| linearity.whole.words())),
         ];

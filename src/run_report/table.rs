@@ -1,5 +1,6 @@
 //! A record of other hands: no model, and no loop of ours.
 
+use super::page::delay_ms;
 use super::{Analysed, Picture, Shown};
 use crate::fit::View;
 use crate::identify::Unit;
@@ -45,7 +46,8 @@ impl Analysed for AnalysedTable<'_> {
     }
 
     fn evidence(&self) -> Vec<(String, String)> {
-        Vec::new()
+        let fit = self.analysis.fit.as_ref().ok();
+        fit.map(|fit| ("Delay by the fit".into(), delay_ms(fit.delay_s()))).into_iter().collect()
     }
 
     fn more_pictures(&self) -> Result<Vec<Picture>, ReportError> {
