@@ -19,8 +19,8 @@ const SEEN: f64 = 0.004;
 /// Metres to micrometres.
 const MICRO: f64 = 1e6;
 
-/// The Nyquist plot as an SVG document: the whole response in um/A, or as it is in another unit, and beside it a part of the frequencies, with circles that
-/// hold the truth with 95 %.
+/// The Nyquist plot as an SVG document: the whole response in um/A, or as it is in another unit, and beside it a part of the
+/// frequencies, with circles that hold the truth with 95 %.
 ///
 /// # Errors
 /// When there is nothing measured, or a trace is not sound: see [`ReportError`].

@@ -133,10 +133,11 @@ impl Gathered {
 
     /// The positions at the mean age, where ages differ; else none.
     fn positions(&self) -> Vec<f64> {
-        let differ = (self.offset_range_s.1 - self.offset_range_s.0) * self.rate_hz > SAME;
+        if (self.offset_range_s.1 - self.offset_range_s.0) * self.rate_hz <= SAME {
+            return Vec::new();
+        }
         let start_s = self.first_s + self.offset_s.mean;
-        let count = if differ { self.output_m.len() } else { 0 };
-        self.readings.at_regular_times(start_s, 1.0 / self.rate_hz, count)
+        self.readings.at_regular_times(start_s, 1.0 / self.rate_hz, self.output_m.len())
     }
 }
 

@@ -59,7 +59,8 @@ pub struct Joint {
     pub loop_gain: Frf,
 }
 
-/// P, T, S and L at the frequencies of `band_hz` at which the reference moved.
+/// P, T, S and L at the frequencies of `band_hz` at which the reference moved. The reference has no noise: which signal has, of
+/// the settings, does not count.
 ///
 /// # Errors
 /// When the signals, the band or the settings allow no estimate: see [`IdentifyError`].
