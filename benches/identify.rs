@@ -18,22 +18,37 @@ const BAND_HZ: (f64, f64) = (0.1, 500.0);
 const FREQUENCIES: usize = 2000;
 
 fn config() -> Config {
-    let sets = ["plant.operating_point_m=0.0038", "plant.mass_asymmetry=0.1"].map(String::from).to_vec();
-    load(&Source { sets, ..Source::default() }).expect("the profile is valid")
+    let sets = ["plant.operating_point_m=0.0038", "plant.mass_asymmetry=0.1"]
+        .map(String::from)
+        .to_vec();
+    load(&Source {
+        sets,
+        ..Source::default()
+    })
+    .expect("the profile is valid")
 }
 
 fn judged(signals: &Signals, config: &Config) -> Verdict {
     let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
     let view = View::Bench(config);
     let fit = fit(&blocks, &view).expect("modes");
-    verdict(&Case { fit: &fit, view: &view, blocks: &blocks, up_to_rad_s: 650.0, expected_modes: Some(3) })
-        .expect("zeros")
+    verdict(&Case {
+        fit: &fit,
+        view: &view,
+        blocks: &blocks,
+        up_to_rad_s: 650.0,
+        expected_modes: Some(3),
+    })
+    .expect("zeros")
 }
 
 fn identify(c: &mut Criterion) {
     let config = config();
     let signals = unrecorded::chirp(&config);
-    let settings = EstimatorSettings { frequencies: Some(FREQUENCIES), ..EstimatorSettings::default() };
+    let settings = EstimatorSettings {
+        frequencies: Some(FREQUENCIES),
+        ..EstimatorSettings::default()
+    };
     let mut group = c.benchmark_group("identify");
     group.sample_size(10);
     group.bench_function("welch", |b| {
@@ -43,7 +58,12 @@ fn identify(c: &mut Criterion) {
         b.iter(|| local::estimate(&signals, BAND_HZ, &settings).expect("excited"))
     });
     group.bench_function("local, modes and verdict", |b| {
-        b.iter(|| (local::estimate(&signals, BAND_HZ, &settings).expect("excited"), judged(&signals, &config)))
+        b.iter(|| {
+            (
+                local::estimate(&signals, BAND_HZ, &settings).expect("excited"),
+                judged(&signals, &config),
+            )
+        })
     });
     group.finish();
 }

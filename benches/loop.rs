@@ -29,7 +29,9 @@ fn stage() -> Config {
 /// Reading and command past the interlocks, error through the fast controller.
 fn check_and_control(c: &mut Criterion) {
     let config = stage();
-    let sections = ControllerText::find("fast").and_then(|text| text.sections(5000.0)).expect("embedded");
+    let sections = ControllerText::find("fast")
+        .and_then(|text| text.sections(5000.0))
+        .expect("embedded");
     let mut controller = Controller::new(&sections, 2e-4);
     let mut interlocks = Interlocks::new(&config);
     let mut number = 0;
@@ -37,8 +39,16 @@ fn check_and_control(c: &mut Criterion) {
         b.iter(|| {
             number += 1;
             let position_m = if number % 2 == 0 { 30e-9 } else { -30e-9 };
-            let reading = Reading { position_m, sequence: number, age_ns: 0, validity: Validity::Valid };
-            let now = Tick { number, scheduled_ns: number * 200_000 };
+            let reading = Reading {
+                position_m,
+                sequence: number,
+                age_ns: 0,
+                validity: Validity::Valid,
+            };
+            let now = Tick {
+                number,
+                scheduled_ns: number * 200_000,
+            };
             let checked = interlocks.check_reading(black_box(&reading), now);
             let command_a = controller.update(-reading.position_m);
             let passed = interlocks.check_command(command_a);
@@ -54,10 +64,15 @@ const TICKS: u64 = 600_000;
 /// The whole loop as `bench chirp` and `bench control` run it: simulated rig, interlocks, program, ring, recorder.
 fn rig_and_record(c: &mut Criterion) {
     let mut group = c.benchmark_group("tick: rig + loop + record");
-    group.sample_size(10).measurement_time(Duration::from_secs(8));
+    group
+        .sample_size(10)
+        .measurement_time(Duration::from_secs(8));
     let mut config = stage();
     config.control.duration_s = TICKS as f64 / config.servo.rate_hz;
-    let plans = [("chirp", Plan::chirp(config.clone())), ("fast", Plan::control(config.clone()).expect("embedded"))];
+    let plans = [
+        ("chirp", Plan::chirp(config.clone())),
+        ("fast", Plan::control(config.clone()).expect("embedded")),
+    ];
     for (name, plan) in plans {
         group.bench_function(name, |b| {
             b.iter_custom(|ticks| {
@@ -72,13 +87,22 @@ fn rig_and_record(c: &mut Criterion) {
 /// Time and ticks of one run, the last record written.
 fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     let folder = tempfile::tempdir().expect("temporary folder");
-    let header = Header { period_ns: 200_000, ..Header::default() };
-    let recorder = Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
+    let header = Header {
+        period_ns: 200_000,
+        ..Header::default()
+    };
+    let recorder =
+        Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
     let (producer, consumer) = RingBuffer::new(1 << 16);
     let (mut orders, taken) = RingBuffer::new(4);
     let (spent, _kept) = RingBuffer::new(4);
     let progress = Arc::new(Progress::default());
-    let connections = Connections { orders: taken, spent, outlet: Outlet::new(producer), progress };
+    let connections = Connections {
+        orders: taken,
+        spent,
+        outlet: Outlet::new(producer),
+        progress,
+    };
     let rig = Box::new(SimulatedRig::new(config).expect("valid"));
     let servo = Servo::new(rig, Interlocks::new(config), connections);
     for order in [Order::Arm, Order::Start(plan.program().expect("valid"))] {
@@ -86,7 +110,13 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     }
     let recorder = recording::spawn(recorder, consumer).expect("a thread");
     let start = Instant::now();
-    let ended = run(servo, Virtual { period_s: config.servo.period_s() }, 0);
+    let ended = run(
+        servo,
+        Virtual {
+            period_s: config.servo.period_s(),
+        },
+        0,
+    );
     let mut recorder = recorder.join().expect("a whole recording");
     let ticks = recorder.complete().expect("a whole recording").ticks;
     assert!(ended.completed);
@@ -96,14 +126,18 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
 /// The command as a person types it.
 fn whole_command(c: &mut Criterion) {
     let mut group = c.benchmark_group("command");
-    group.sample_size(10).measurement_time(Duration::from_secs(20));
+    group
+        .sample_size(10)
+        .measurement_time(Duration::from_secs(20));
     group.bench_function("bench chirp", |b| {
         b.iter_custom(|times| {
             let folder = tempfile::tempdir().expect("temporary folder");
             let start = Instant::now();
             for _ in 0..times {
-                let done =
-                    Command::new(env!("CARGO_BIN_EXE_bench")).args(["chirp", "--json"]).current_dir(&folder).output();
+                let done = Command::new(env!("CARGO_BIN_EXE_bench"))
+                    .args(["chirp", "--json"])
+                    .current_dir(&folder)
+                    .output();
                 assert!(done.expect("runs").status.success());
             }
             start.elapsed()

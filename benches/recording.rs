@@ -24,9 +24,14 @@ fn tick(number: u64) -> TickRecord {
 }
 
 fn write(path: &Path, ticks: &[Published]) {
-    let header = Header { period_ns: 200_000, ..Header::default() };
+    let header = Header {
+        period_ns: 200_000,
+        ..Header::default()
+    };
     let mut recorder = Recorder::create(path, &header).expect("temporary file");
-    ticks.iter().for_each(|tick| recorder.record(tick).expect("room on the disk"));
+    ticks
+        .iter()
+        .for_each(|tick| recorder.record(tick).expect("room on the disk"));
     recorder.finish(&[]).expect("room on the disk");
 }
 
@@ -35,16 +40,27 @@ fn recording(c: &mut Criterion) {
     let path = folder.path().join("bench.mcap");
     let ticks: Vec<Published> = (0..TICKS).map(|n| Published::Tick(tick(n))).collect();
     let mut group = c.benchmark_group("recording of 600,000 ticks");
-    group.throughput(Throughput::Elements(TICKS)).sample_size(10).measurement_time(Duration::from_secs(8));
+    group
+        .throughput(Throughput::Elements(TICKS))
+        .sample_size(10)
+        .measurement_time(Duration::from_secs(8));
     group.bench_function("write", |b| {
         b.iter(|| {
             let _ = std::fs::remove_file(&path);
             write(&path, &ticks);
         });
     });
-    group.bench_function("open", |b| b.iter(|| Recording::open(&path).expect("whole").tick_count()));
+    group.bench_function("open", |b| {
+        b.iter(|| Recording::open(&path).expect("whole").tick_count())
+    });
     let opened = Recording::open(&path).expect("whole");
-    let sum = || opened.ticks().expect("whole").map(|t| t.expect("whole").position_m).sum::<f64>();
+    let sum = || {
+        opened
+            .ticks()
+            .expect("whole")
+            .map(|t| t.expect("whole").position_m)
+            .sum::<f64>()
+    };
     group.bench_function("read", |b| b.iter(sum));
     group.finish();
 }

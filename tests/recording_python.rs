@@ -15,7 +15,14 @@ const TICKS: u64 = 11_000;
 const CONFIG: &str = "profile = \"stage\"\n";
 
 fn tick(n: u64) -> TickRecord {
-    let special = [-0.0, 0.0, f64::from_bits(0x7ff8_0000_0000_beef), f64::NEG_INFINITY, 5e-324, 0.1 + 0.2];
+    let special = [
+        -0.0,
+        0.0,
+        f64::from_bits(0x7ff8_0000_0000_beef),
+        f64::NEG_INFINITY,
+        5e-324,
+        0.1 + 0.2,
+    ];
     let scheduled_ns = n * 200_000;
     TickRecord {
         tick: n,
@@ -28,8 +35,18 @@ fn tick(n: u64) -> TickRecord {
         command_a: f64::from_bits(0x3ff0_0000_0000_0000 + n),
         probe_sequence: u64::MAX - n,
         probe_age_ns: n % 7,
-        validity: [Validity::Valid, Validity::OutOfRange, Validity::Faulty, Validity::Missing][n as usize % 4],
-        state: [State::Running, State::Armed, State::Disarmed, State::Tripped][n as usize % 4],
+        validity: [
+            Validity::Valid,
+            Validity::OutOfRange,
+            Validity::Faulty,
+            Validity::Missing,
+        ][n as usize % 4],
+        state: [
+            State::Running,
+            State::Armed,
+            State::Disarmed,
+            State::Tripped,
+        ][n as usize % 4],
         flags: n as u32 % 32,
         missed_ticks: 0,
         actual_a: [None, Some(-0.0), Some(1e-3 * n as f64)][n as usize % 3],
@@ -72,27 +89,56 @@ fn record(path: &Path) {
     };
     let mut recorder = Recorder::create(path, &header).expect("a fresh file");
     for n in 0..TICKS {
-        recorder.record(&Published::Tick(tick(n))).expect("a good disk");
+        recorder
+            .record(&Published::Tick(tick(n)))
+            .expect("a good disk");
     }
-    let trip = Trip::Travel { position_m: -4.1e-3, limit_m: 4e-3 };
-    for kind in [EventKind::Trip(trip), EventKind::State { from: State::Running, to: State::Tripped }] {
-        recorder.record(&Published::Event(Event { tick: TICKS - 1, kind })).expect("a good disk");
+    let trip = Trip::Travel {
+        position_m: -4.1e-3,
+        limit_m: 4e-3,
+    };
+    for kind in [
+        EventKind::Trip(trip),
+        EventKind::State {
+            from: State::Running,
+            to: State::Tripped,
+        },
+    ] {
+        recorder
+            .record(&Published::Event(Event {
+                tick: TICKS - 1,
+                kind,
+            }))
+            .expect("a good disk");
     }
-    recorder.finish(&[("result.json", "application/json", b"{}")]).expect("a good disk");
+    recorder
+        .finish(&[("result.json", "application/json", b"{}")])
+        .expect("a good disk");
 }
 
 /// What Python prints, or why there is none.
 fn read_by_python(path: &Path) -> Result<Value, String> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
-    let probe = Command::new(&python).args(["-c", "import mcap, mcap_protobuf"]).output();
+    let probe = Command::new(&python)
+        .args(["-c", "import mcap, mcap_protobuf"])
+        .output();
     match probe {
         Err(e) => return Err(format!("{python}: {e}")),
         Ok(o) if !o.status.success() => return Err(String::from_utf8_lossy(&o.stderr).into_owned()),
         Ok(_) => {}
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/read_recording.py");
-    let output = Command::new(&python).arg(script).arg(path).arg("--values").output().expect("has just run");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(&python)
+        .arg(script)
+        .arg(path)
+        .arg("--values")
+        .output()
+        .expect("has just run");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     Ok(serde_json::from_slice(&output.stdout).expect("one JSON object"))
 }
 
@@ -104,29 +150,54 @@ fn python_reads_every_tick_with_every_bit_by_the_embedded_schema() {
     let read = match read_by_python(&path) {
         Ok(read) => read,
         Err(why) => {
-            assert!(std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"), "Python is required here: {why}");
-            return eprintln!("not tested: {why}\npip install mcap mcap-protobuf-support, or set BENCH_PYTHON");
+            assert!(
+                std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"),
+                "Python is required here: {why}"
+            );
+            return eprintln!(
+                "not tested: {why}\npip install mcap mcap-protobuf-support, or set BENCH_PYTHON"
+            );
         }
     };
-    assert_eq!((&read["ticks"], &read["first_tick"], &read["last_tick"]), (&json!(TICKS), &json!(0), &json!(10_999)));
-    assert_eq!((&read["gaps"], &read["times_differ"]), (&json!([]), &json!(0)));
+    assert_eq!(
+        (&read["ticks"], &read["first_tick"], &read["last_tick"]),
+        (&json!(TICKS), &json!(0), &json!(10_999))
+    );
+    assert_eq!(
+        (&read["gaps"], &read["times_differ"]),
+        (&json!([]), &json!(0))
+    );
     for n in 0..TICKS {
         assert_eq!(read["values"][n as usize], row(&tick(n)), "tick {n}");
     }
     assert_eq!(read["config_bytes"], json!(CONFIG.len()));
     assert_eq!(read["attachments"]["result.json"], json!(2));
-    assert_eq!(read["metadata"]["bench"], json!({"host": "bench-1", "period_ns": "200000"}));
+    assert_eq!(
+        read["metadata"]["bench"],
+        json!({"host": "bench-1", "period_ns": "200000"})
+    );
     events_and_summaries_are_there(&read);
 }
 
 fn events_and_summaries_are_there(read: &Value) {
     let trip = &read["events"][0];
-    assert_eq!((&trip["kind"], &trip["reason"], &trip["tick"]), (&json!("trip"), &json!("travel"), &json!(10_999)));
-    assert_eq!((&trip["value"], &trip["limit"]), (&json!(-4.1e-3), &json!(4e-3)));
+    assert_eq!(
+        (&trip["kind"], &trip["reason"], &trip["tick"]),
+        (&json!("trip"), &json!("travel"), &json!(10_999))
+    );
+    assert_eq!(
+        (&trip["value"], &trip["limit"]),
+        (&json!(-4.1e-3), &json!(4e-3))
+    );
     let state = &read["events"][1];
-    assert_eq!((&state["from"], &state["to"]), (&json!("running"), &json!("tripped")));
+    assert_eq!(
+        (&state["from"], &state["to"]),
+        (&json!("running"), &json!("tripped"))
+    );
     // 11,000 ticks at 5 kHz: two full seconds and 0.2 s; each woke 1000 ns late and computed 500 ns.
-    let ticks: Vec<_> = (0..3).map(|n| read["timings"][n]["ticks"].clone()).collect();
+    let ticks: Vec<_> = (0..3)
+        .map(|n| read["timings"][n]["ticks"].clone())
+        .collect();
     assert_eq!(ticks, [json!(5000), json!(5000), json!(1000)]);
     assert_eq!(read["timings"][1]["lateness_p99_ns"], json!(1000));
     assert_eq!(read["timings"][1]["compute_max_ns"], json!(500));

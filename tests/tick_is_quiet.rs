@@ -3,7 +3,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use bench::config::{AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Source, Sweep, TravelPoint, load};
+use bench::config::{
+    AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Source, Sweep, TravelPoint, load,
+};
 use bench::control::{Controller, ControllerText};
 use bench::excitation::{Chirp, Quiet as NoCurrent, of, reference};
 use bench::rt::clock::{Clock, Moment, Realtime, Virtual};
@@ -40,37 +42,81 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
     std::fs::write(&own, text).expect("a file");
     let references = [
         ReferenceSettings::Hold,
-        ReferenceSettings::Step { amplitude_m: 50e-6, at_s: 0.1 },
-        ReferenceSettings::Ramp { amplitude_m: 50e-6, speed_m_per_s: 1e-4, at_s: 0.1 },
-        ReferenceSettings::Sine { amplitude_m: 20e-6, frequency_hz: 3.0 },
+        ReferenceSettings::Step {
+            amplitude_m: 50e-6,
+            at_s: 0.1,
+        },
+        ReferenceSettings::Ramp {
+            amplitude_m: 50e-6,
+            speed_m_per_s: 1e-4,
+            at_s: 0.1,
+        },
+        ReferenceSettings::Sine {
+            amplitude_m: 20e-6,
+            frequency_hz: 3.0,
+        },
         ReferenceSettings::Chirp {
-            amplitude: vec![TravelPoint { frequency_hz: 1.0, amplitude_m: 1e-6 }],
+            amplitude: vec![TravelPoint {
+                frequency_hz: 1.0,
+                amplitude_m: 1e-6,
+            }],
             travel_m: 20e-6,
         },
-        ReferenceSettings::File { path: "points.csv".into() },
+        ReferenceSettings::File {
+            path: "points.csv".into(),
+        },
     ];
     let mut programs: Vec<(String, Box<dyn Program>)> = Vec::new();
     for name in ["fast", "slow", own.to_str().expect("text")] {
-        let sections = ControllerText::find(name).expect("found").sections(config.servo.rate_hz).expect("valid");
+        let sections = ControllerText::find(name)
+            .expect("found")
+            .sections(config.servo.rate_hz)
+            .expect("valid");
         for settings in &references {
             let points = "time_s,reference_m\n0.0,0.0\n0.2,1e-5\n0.4,2e-5\n";
-            let reference = reference(settings, &config.chirp, Some(points), period_s).expect("valid");
+            let reference =
+                reference(settings, &config.chirp, Some(points), period_s).expect("valid");
             let program = Control::new(Controller::new(&sections, period_s), reference, 500, 4500);
             programs.push((format!("{name}, {settings:?}"), Box::new(program)));
         }
     }
     for sweep in [Sweep::Linear, Sweep::Logarithmic] {
         let mut chirp = config.chirp.clone();
-        (chirp.sweep, chirp.duration_s, chirp.quiet_before_s, chirp.quiet_after_s) = (sweep, 0.8, 0.1, 0.1);
-        (chirp.fade_in_s, chirp.amplitude) = (0.2, vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.2 }]);
-        programs.push((format!("{sweep:?} chirp"), Box::new(Excite(Chirp::new(&chirp, period_s)))));
+        (
+            chirp.sweep,
+            chirp.duration_s,
+            chirp.quiet_before_s,
+            chirp.quiet_after_s,
+        ) = (sweep, 0.8, 0.1, 0.1);
+        (chirp.fade_in_s, chirp.amplitude) = (
+            0.2,
+            vec![AmplitudePoint {
+                frequency_hz: 1.0,
+                current_a: 0.2,
+            }],
+        );
+        programs.push((
+            format!("{sweep:?} chirp"),
+            Box::new(Excite(Chirp::new(&chirp, period_s))),
+        ));
     }
-    for kind in [ExcitationKind::Chirp, ExcitationKind::Multisine, ExcitationKind::SteppedSine, ExcitationKind::Prbs] {
-        programs.push((format!("{kind:?} by its settings"), Box::new(Excite(of(&short(config, kind))))));
+    for kind in [
+        ExcitationKind::Chirp,
+        ExcitationKind::Multisine,
+        ExcitationKind::SteppedSine,
+        ExcitationKind::Prbs,
+    ] {
+        programs.push((
+            format!("{kind:?} by its settings"),
+            Box::new(Excite(of(&short(config, kind)))),
+        ));
     }
     let mut campaign = config.campaign.clone();
     (campaign.settle_s, campaign.average_s) = (0.5, 0.5);
-    programs.push((NO_CURRENT.into(), Box::new(Excite(NoCurrent::new(&campaign, period_s)))));
+    programs.push((
+        NO_CURRENT.into(),
+        Box::new(Excite(NoCurrent::new(&campaign, period_s))),
+    ));
     programs
 }
 
@@ -79,12 +125,34 @@ fn short(config: &Config, kind: ExcitationKind) -> Config {
     let mut config = config.clone();
     config.excitation.kind = kind;
     let chirp = &mut config.chirp;
-    (chirp.start_hz, chirp.stop_hz, chirp.duration_s, chirp.repetitions) = (50.0, 150.0, 0.4, 2);
-    (chirp.quiet_before_s, chirp.quiet_after_s, chirp.fade_in_s, chirp.fade_out_s) = (0.02, 0.02, 0.05, 0.05);
-    chirp.amplitude = vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.2 }];
-    let (multisine, prbs, sines) = (&mut config.multisine, &mut config.prbs, &mut config.stepped_sine);
+    (
+        chirp.start_hz,
+        chirp.stop_hz,
+        chirp.duration_s,
+        chirp.repetitions,
+    ) = (50.0, 150.0, 0.4, 2);
+    (
+        chirp.quiet_before_s,
+        chirp.quiet_after_s,
+        chirp.fade_in_s,
+        chirp.fade_out_s,
+    ) = (0.02, 0.02, 0.05, 0.05);
+    chirp.amplitude = vec![AmplitudePoint {
+        frequency_hz: 1.0,
+        current_a: 0.2,
+    }];
+    let (multisine, prbs, sines) = (
+        &mut config.multisine,
+        &mut config.prbs,
+        &mut config.stepped_sine,
+    );
     (multisine.period_s, multisine.periods) = (0.1, 7);
-    (prbs.order, prbs.clock_divider, prbs.periods, prbs.settle_periods) = (8, 2, 7, 1);
+    (
+        prbs.order,
+        prbs.clock_divider,
+        prbs.periods,
+        prbs.settle_periods,
+    ) = (8, 2, 7, 1);
     (sines.count, sines.settle_s, sines.measure_s) = (3, 0.12, 0.12);
     config
 }
@@ -119,7 +187,9 @@ impl Quiet {
             orders,
             records,
             spent,
-            clock: Virtual { period_s: config.servo.period_s() },
+            clock: Virtual {
+                period_s: config.servo.period_s(),
+            },
             next: 0,
             trip: None,
             completed: false,
@@ -127,7 +197,11 @@ impl Quiet {
         }
     }
 
-    fn running(config: &Config, faults: &[(Range<u64>, Fault)], program: Box<dyn Program>) -> Quiet {
+    fn running(
+        config: &Config,
+        faults: &[(Range<u64>, Fault)],
+        program: Box<dyn Program>,
+    ) -> Quiet {
         let mut quiet = Quiet::new(config, faults);
         quiet.order(Order::Arm);
         quiet.order(Order::Start(program));
@@ -140,7 +214,9 @@ impl Quiet {
 
     /// What the loop does in a tick, and nothing else.
     fn bare_tick(&mut self, missed: u32) {
-        let moment = self.clock.wait(self.next + u64::from(missed), self.servo.outlet());
+        let moment = self
+            .clock
+            .wait(self.next + u64::from(missed), self.servo.outlet());
         self.servo.tick(&Moment { missed, ..moment }, &self.clock);
         self.next = moment.tick.number + 1;
     }
@@ -161,7 +237,11 @@ impl Quiet {
 
     /// Whether the program came to its end, and commanded what it is there for.
     fn has_done(&self, name: &str) -> bool {
-        let commanded = if name == NO_CURRENT { self.commands == 0 } else { self.commands > 3500 };
+        let commanded = if name == NO_CURRENT {
+            self.commands == 0
+        } else {
+            self.commands > 3500
+        };
         self.completed && commanded
     }
 
@@ -178,7 +258,11 @@ struct Says(f64);
 
 impl Program for Says {
     fn decide(&mut self, _tick: u64, _position_m: f64) -> Decision {
-        Decision { reference_m: 0.0, requested_a: self.0, active: true }
+        Decision {
+            reference_m: 0.0,
+            requested_a: self.0,
+            active: true,
+        }
     }
     fn ticks(&self) -> u64 {
         u64::MAX
@@ -191,7 +275,11 @@ fn no_program_allocates_from_its_first_tick_to_its_completion() {
     for (name, program) in programs(&config) {
         let mut quiet = Quiet::running(&config, &[], program);
         quiet.run(5100);
-        assert!(quiet.has_done(&name) && quiet.trip.is_none(), "{name}: {} commands", quiet.commands);
+        assert!(
+            quiet.has_done(&name) && quiet.trip.is_none(),
+            "{name}: {} commands",
+            quiet.commands
+        );
     }
 }
 
@@ -217,7 +305,10 @@ fn all_trips() -> Vec<(&'static str, Fault, f64)> {
 /// The stage would run away under a constant current: the motor's force is as good as none here.
 fn weak() -> Config {
     let mut config = stage();
-    let (peak_a, rated_a) = (config.motor.peak_current_a(), config.motor.continuous_current_a());
+    let (peak_a, rated_a) = (
+        config.motor.peak_current_a(),
+        config.motor.continuous_current_a(),
+    );
     config.motor.force_constant_n_per_a = 1e-3;
     (config.motor.peak_force_n, config.motor.continuous_force_n) = (peak_a * 1e-3, rated_a * 1e-3);
     config
@@ -229,7 +320,13 @@ fn no_trip_allocates_nor_what_comes_after_it() {
         let mut quiet = Quiet::running(&weak(), &[(0..10_000, fault)], Box::new(Says(current_a)));
         quiet.run(8000);
         assert_eq!(quiet.trip, Some(reason), "{fault:?}");
-        for order in [Order::Arm, Order::Start(Box::new(Says(0.01))), Order::Stop, Order::Clear, Order::Stop] {
+        for order in [
+            Order::Arm,
+            Order::Start(Box::new(Says(0.01))),
+            Order::Stop,
+            Order::Clear,
+            Order::Stop,
+        ] {
             quiet.order(order);
         }
         quiet.run(10);
@@ -247,12 +344,21 @@ fn no_order_allocates_whenever_it_comes_and_programs_are_freed_outside() {
     let config = weak();
     let mut quiet = Quiet::new(&config, &[]);
     for round in 0..20 {
-        for order in [Order::Start(Box::new(Says(0.01))), Order::Arm, Order::Arm, Order::Start(Box::new(Says(0.01)))] {
+        for order in [
+            Order::Start(Box::new(Says(0.01))),
+            Order::Arm,
+            Order::Arm,
+            Order::Start(Box::new(Says(0.01))),
+        ] {
             quiet.order(order);
             assert_no_alloc(|| quiet.bare_tick(0));
         }
         quiet.order(Order::Start(Box::new(Says(0.02))));
-        quiet.order(if round % 2 == 0 { Order::Stop } else { Order::Clear });
+        quiet.order(if round % 2 == 0 {
+            Order::Stop
+        } else {
+            Order::Clear
+        });
         quiet.order(Order::Stop);
         // Nobody collects the programs here: after four the ring is full, and they are kept rather than freed in the tick.
         for _ in 0..3 {
@@ -267,8 +373,15 @@ fn no_order_allocates_whenever_it_comes_and_programs_are_freed_outside() {
 fn a_full_ring_to_the_recorder_allocates_nothing_and_holds_nothing_up() {
     let mut quiet = Quiet::running(&weak(), &[], Box::new(Says(0.01)));
     for number in 0..5000u64 {
-        let tick = Tick { number, scheduled_ns: number * 200_000 };
-        let moment = Moment { tick, woke_ns: tick.scheduled_ns, missed: 0 };
+        let tick = Tick {
+            number,
+            scheduled_ns: number * 200_000,
+        };
+        let moment = Moment {
+            tick,
+            woke_ns: tick.scheduled_ns,
+            missed: 0,
+        };
         assert_no_alloc(|| quiet.servo.tick(&moment, &quiet.clock));
     }
     // 1024 slots: four events and 1020 records.
@@ -287,7 +400,11 @@ fn in_a_child(work: impl FnOnce()) -> Ended {
     // SAFETY: the child has this thread alone. What it does before `_exit` takes no lock that another thread may hold: the
     // loop is made before the fork, and the ticks are here to be shown to need none.
     let child = unsafe { libc::fork() };
-    assert!(child >= 0, "cannot fork: {}", std::io::Error::last_os_error());
+    assert!(
+        child >= 0,
+        "cannot fork: {}",
+        std::io::Error::last_os_error()
+    );
     if child == 0 {
         work();
         // SAFETY: ends the child at once, without running anything of the parent's.
@@ -320,11 +437,18 @@ fn allow_only(calls: &[libc::c_long]) {
         filter[next + 1] = line(RETURN, 0, 0, libc::SECCOMP_RET_ALLOW);
         next += 2;
     }
-    let program = libc::sock_fprog { len: filter.len() as u16, filter: filter.as_mut_ptr() };
+    let program = libc::sock_fprog {
+        len: filter.len() as u16,
+        filter: filter.as_mut_ptr(),
+    };
     // SAFETY: the kernel copies the program, which outlives the call; both calls concern this thread alone.
     let refused = unsafe {
         libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0
-            || libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const program) != 0
+            || libc::prctl(
+                libc::PR_SET_SECCOMP,
+                libc::SECCOMP_MODE_FILTER,
+                &raw const program,
+            ) != 0
     };
     if refused {
         // SAFETY: ends the child; 99 tells the parent that the kernel has no filters.
@@ -339,10 +463,21 @@ const TICKS: u64 = 20_000;
 fn chains() -> Vec<(&'static str, Config)> {
     let with = |config: Option<&str>, sets: &[&str]| {
         let sets = sets.iter().map(|set| set.to_string()).collect();
-        load(&Source { config: config.map(str::to_string), sets, ..Source::default() }).expect("the profile is valid")
+        load(&Source {
+            config: config.map(str::to_string),
+            sets,
+            ..Source::default()
+        })
+        .expect("the profile is valid")
     };
     vec![
-        ("lab", with(Some("lab"), &["amplifier.latency_s=0.0043", "probe.latency_s=0.0027"])),
+        (
+            "lab",
+            with(
+                Some("lab"),
+                &["amplifier.latency_s=0.0043", "probe.latency_s=0.0027"],
+            ),
+        ),
         ("quadratic", with(None, &["sim.geometry=\"quadratic\""])),
     ]
 }
@@ -350,10 +485,20 @@ fn chains() -> Vec<(&'static str, Config)> {
 #[test]
 fn whatever_the_chain_a_tick_allocates_nothing_and_makes_no_system_call() {
     for (name, config) in chains() {
-        let running = || Quiet::running(&config, &[(0..TICKS, Fault::MeasuresBeyond(0.0))], Box::new(Says(0.05)));
+        let running = || {
+            Quiet::running(
+                &config,
+                &[(0..TICKS, Fault::MeasuresBeyond(0.0))],
+                Box::new(Says(0.05)),
+            )
+        };
         let mut quiet = running();
         quiet.run(TICKS);
-        assert!(quiet.commands > TICKS - 10 && quiet.trip.is_none(), "{name}: {:?}", quiet.trip);
+        assert!(
+            quiet.commands > TICKS - 10 && quiet.trip.is_none(),
+            "{name}: {:?}",
+            quiet.trip
+        );
         let mut quiet = running();
         let ended = in_a_child(|| {
             allow_only(&[]);
@@ -362,7 +507,11 @@ fn whatever_the_chain_a_tick_allocates_nothing_and_makes_no_system_call() {
                 quiet.collect();
             }
         });
-        assert_eq!(ended, Ended::Exit(0), "{name}: a signal is a system call in a tick");
+        assert_eq!(
+            ended,
+            Ended::Exit(0),
+            "{name}: a signal is a system call in a tick"
+        );
     }
 }
 
@@ -380,7 +529,11 @@ fn twenty_thousand_ticks_make_no_system_call() {
             // SAFETY: as in the parent; 1 says that the program did not run.
             unsafe { libc::_exit(if quiet.has_done(&name) { 0 } else { 1 }) };
         });
-        assert_eq!(ended, Ended::Exit(0), "{name}: a signal is a system call in a tick");
+        assert_eq!(
+            ended,
+            Ended::Exit(0),
+            "{name}: a signal is a system call in a tick"
+        );
     }
 }
 
@@ -389,8 +542,12 @@ fn trips_orders_and_late_ticks_make_no_system_call() {
     for (reason, fault, current_a) in all_trips() {
         let config = weak();
         let mut quiet = Quiet::running(&config, &[(0..8000, fault)], Box::new(Says(current_a)));
-        let mut others =
-            [Some(Order::Clear), Some(Order::Arm), Some(Order::Start(Box::new(Says(0.01)))), Some(Order::Stop)];
+        let mut others = [
+            Some(Order::Clear),
+            Some(Order::Arm),
+            Some(Order::Start(Box::new(Says(0.01)))),
+            Some(Order::Stop),
+        ];
         let ended = in_a_child(|| {
             allow_only(&[]);
             for _ in 0..8000 {
@@ -420,7 +577,13 @@ fn in_real_time_the_clock_is_all_that_the_loop_asks_of_the_system() {
         allow_only(&[libc::SYS_clock_nanosleep, libc::SYS_clock_gettime]);
         for number in 0..50 {
             let moment = clock.wait(number, quiet.servo.outlet());
-            quiet.servo.tick(&Moment { missed: 0, ..moment }, &clock);
+            quiet.servo.tick(
+                &Moment {
+                    missed: 0,
+                    ..moment
+                },
+                &clock,
+            );
             quiet.collect();
         }
     });
@@ -455,6 +618,10 @@ fn a_system_call_or_an_allocation_in_a_tick_would_be_seen() {
     let allocates = in_a_child(|| {
         assert_no_alloc(|| std::hint::black_box(Box::new(1u8)));
     });
-    assert_eq!(allocates, Ended::Signal(libc::SIGABRT), "and a single byte from the heap is an abort");
+    assert_eq!(
+        allocates,
+        Ended::Signal(libc::SIGABRT),
+        "and a single byte from the heap is an abort"
+    );
     assert_eq!(in_a_child(|| ()), Ended::Exit(0));
 }

@@ -23,7 +23,10 @@ struct Quiet {
 
 impl Port for Quiet {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
-        Ok(Box::new(QuietEndpoint { inner: self.world.endpoint(ids)?, swallow: Arc::clone(&self.swallow) }))
+        Ok(Box::new(QuietEndpoint {
+            inner: self.world.endpoint(ids)?,
+            swallow: Arc::clone(&self.swallow),
+        }))
     }
 }
 
@@ -46,7 +49,11 @@ struct QuietEndpoint {
 
 impl CanBus for QuietEndpoint {
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        if self.swallow.load(Ordering::Acquire) { Ok(()) } else { self.inner.send(frame) }
+        if self.swallow.load(Ordering::Acquire) {
+            Ok(())
+        } else {
+            self.inner.send(frame)
+        }
     }
     fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
         self.inner.receive(timeout)
@@ -68,12 +75,21 @@ fn tick(drive: &mut CanopenDrive, swallow: &AtomicBool) {
 
 #[test]
 fn command_status_and_disable_allocate_nothing() {
-    for exchange in [Exchange::Asynchronous { status_hz: 500.0 }, Exchange::Synchronous { status_every: 1 }] {
+    for exchange in [
+        Exchange::Asynchronous { status_hz: 500.0 },
+        Exchange::Synchronous { status_every: 1 },
+    ] {
         let (world, swallow) = (World::default(), Arc::new(AtomicBool::new(false)));
         let device = Arc::new(Mutex::new(Device::new(DeviceSettings::default())));
         let _running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
-        let host = Quiet { world: world.clone(), swallow: Arc::clone(&swallow) };
-        let settings = DriveSettings { exchange, ..DriveSettings::default() };
+        let host = Quiet {
+            world: world.clone(),
+            swallow: Arc::clone(&swallow),
+        };
+        let settings = DriveSettings {
+            exchange,
+            ..DriveSettings::default()
+        };
         let mut drive = CanopenDrive::open(settings, Box::new(host)).unwrap();
         tick(&mut drive, &swallow); // off
         drive.enable().unwrap();

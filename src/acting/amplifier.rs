@@ -48,24 +48,41 @@ impl Tally {
 
     /// When the amplifier was enabled first, in seconds.
     pub fn enabled_s(&self) -> Option<f64> {
-        Some(self.enabled_ns.load(Relaxed)).filter(|ns| *ns > 0).map(seconds)
+        Some(self.enabled_ns.load(Relaxed))
+            .filter(|ns| *ns > 0)
+            .map(seconds)
     }
 }
 
 impl Amplifier {
     /// On the CAN interface of the configuration, with a clock that began at `start`.
-    pub fn open(config: &Config, stage: Stage, journal: Journal, start: Instant) -> Result<Amplifier, ActingError> {
+    pub fn open(
+        config: &Config,
+        stage: Stage,
+        journal: Journal,
+        start: Instant,
+    ) -> Result<Amplifier, ActingError> {
         let (interface, bit_rate, node) = match &config.amplifier.device {
-            AmplifierDevice::Simulated(_) => return Err(ActingError::Simulated { device: "amplifier" }),
+            AmplifierDevice::Simulated(_) => {
+                return Err(ActingError::Simulated {
+                    device: "amplifier",
+                });
+            }
             AmplifierDevice::Canopen(device) => (&device.interface, device.bit_rate, device.node),
             AmplifierDevice::Vesc(device) => (&device.interface, device.bit_rate, device.node),
         };
         let port = SocketPort::open(interface, bit_rate)?;
         // Another claim than that of the driver, which may run on this computer too.
         let claim = Claim::new(&format!("{interface}/device"), node);
-        let held = |held| ActingError::Held { interface: interface.clone(), held };
+        let held = |held| ActingError::Held {
+            interface: interface.clone(),
+            held,
+        };
         let host = Arc::new(Threads::since(port, start).prepared(below_the_loop(&config.servo)));
-        Ok(Amplifier { _claim: claim.map_err(held)?, ..Amplifier::start(config, host, stage, journal)? })
+        Ok(Amplifier {
+            _claim: claim.map_err(held)?,
+            ..Amplifier::start(config, host, stage, journal)?
+        })
     }
 
     /// On any bus.
@@ -79,9 +96,19 @@ impl Amplifier {
         let tally = Arc::<Tally>::default();
         let follow = follow(stage, journal, Arc::clone(&tally));
         let running = DeviceTask::start_followed(&*host, Arc::clone(&device), follow);
-        let running = running.map_err(|source| ActingError::Thread { device: "amplifier", source })?;
+        let running = running.map_err(|source| ActingError::Thread {
+            device: "amplifier",
+            source,
+        })?;
         let kind = config.amplifier.device.kind();
-        Ok(Amplifier { _running: running, device, host, tally, kind, _claim: Claim::none() })
+        Ok(Amplifier {
+            _running: running,
+            device,
+            host,
+            tally,
+            kind,
+            _claim: Claim::none(),
+        })
     }
 
     /// Whether the device can have this fault.
@@ -136,7 +163,9 @@ impl Amplifier {
 
 fn device(config: &Config) -> Result<Arc<Mutex<dyn ActingAmplifier>>, ActingError> {
     match &config.amplifier.device {
-        AmplifierDevice::Simulated(_) => Err(ActingError::Simulated { device: "amplifier" }),
+        AmplifierDevice::Simulated(_) => Err(ActingError::Simulated {
+            device: "amplifier",
+        }),
         AmplifierDevice::Canopen(device) => Ok(Arc::new(Mutex::new(Device::new(drive(device))))),
         AmplifierDevice::Vesc(device) => Ok(Arc::new(Mutex::new(VescDevice::new(device.node)))),
     }
@@ -201,8 +230,12 @@ fn follow(stage: Stage, journal: Journal, tally: Arc<Tally>) -> Follow {
 fn count(tally: &Tally, passed: Passed, device: &mut dyn ActingAmplifier) {
     tally.received.store(passed.received, Relaxed);
     tally.sent.store(passed.sent, Relaxed);
-    tally.largest_a.fetch_max(device.current_a().abs().to_bits(), Relaxed);
+    tally
+        .largest_a
+        .fetch_max(device.current_a().abs().to_bits(), Relaxed);
     if device.is_enabled() {
-        let _ = tally.enabled_ns.compare_exchange(0, passed.now_ns.max(1), Relaxed, Relaxed); // the first time counts
+        let _ = tally
+            .enabled_ns
+            .compare_exchange(0, passed.now_ns.max(1), Relaxed, Relaxed); // the first time counts
     }
 }

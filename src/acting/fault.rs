@@ -52,17 +52,53 @@ const KINDS: [(&str, &str, &str); 23] = [
     ("amplifier.none", "", "sound again"),
     ("amplifier.silence", "", "sends nothing, but hears"),
     ("amplifier.unplugged", "", "neither sends nor hears"),
-    ("amplifier.short-frames", "", "status frames of a wrong length"),
-    ("amplifier.senseless-status", "", "statuswords that no state has"),
-    ("amplifier.fault", "0x2310", "the power stage fails: emergency message, then the state Fault"),
-    ("amplifier.emergency", "0x4210", "an emergency message without a change of state"),
-    ("amplifier.target-ignored", "", "enabled, but the target is not followed (bit 12)"),
-    ("amplifier.set-points-ignored", "", "takes no set-points, but obeys NMT"),
-    ("amplifier.orders-ignored", "", "takes neither set-points nor NMT"),
-    ("amplifier.switches-off", "", "switches itself off without a fault"),
+    (
+        "amplifier.short-frames",
+        "",
+        "status frames of a wrong length",
+    ),
+    (
+        "amplifier.senseless-status",
+        "",
+        "statuswords that no state has",
+    ),
+    (
+        "amplifier.fault",
+        "0x2310",
+        "the power stage fails: emergency message, then the state Fault",
+    ),
+    (
+        "amplifier.emergency",
+        "0x4210",
+        "an emergency message without a change of state",
+    ),
+    (
+        "amplifier.target-ignored",
+        "",
+        "enabled, but the target is not followed (bit 12)",
+    ),
+    (
+        "amplifier.set-points-ignored",
+        "",
+        "takes no set-points, but obeys NMT",
+    ),
+    (
+        "amplifier.orders-ignored",
+        "",
+        "takes neither set-points nor NMT",
+    ),
+    (
+        "amplifier.switches-off",
+        "",
+        "switches itself off without a fault",
+    ),
     ("amplifier.late", "50ms", "sends everything so much later"),
     ("amplifier.reset", "", "restarts as after a loss of power"),
-    ("amplifier.bus-off", "", "the other end is told that it is in bus-off, nothing passes (virtual interfaces only)"),
+    (
+        "amplifier.bus-off",
+        "",
+        "the other end is told that it is in bus-off, nothing passes (virtual interfaces only)",
+    ),
     ("probe.none", "", "sound again"),
     ("probe.silence", "", "sends nothing"),
     ("probe.corrupt", "1", "one byte in so many is another byte"),
@@ -76,7 +112,11 @@ const KINDS: [(&str, &str, &str); 23] = [
 /// The list of all kinds, a line each.
 pub fn help() -> String {
     let line = |(word, value, what): &(&str, &str, &str)| {
-        let value = if value.is_empty() { String::new() } else { format!("[={value}]") };
+        let value = if value.is_empty() {
+            String::new()
+        } else {
+            format!("[={value}]")
+        };
         format!("  {:<30} {what}\n", format!("{word}{value}"))
     };
     KINDS.iter().map(line).collect()
@@ -85,7 +125,11 @@ pub fn help() -> String {
 /// The whole word of a fault whose device was left out, where only one of the devices `served` can have it.
 pub fn whole(word: &str, served: &[String]) -> String {
     let kind = word.split('=').next().unwrap_or(word);
-    let known = |device: &&String| KINDS.iter().any(|(whole, ..)| *whole == format!("{device}.{kind}"));
+    let known = |device: &&String| {
+        KINDS
+            .iter()
+            .any(|(whole, ..)| *whole == format!("{device}.{kind}"))
+    };
     match served.iter().filter(known).collect::<Vec<_>>()[..] {
         [device] if kind != "none" => format!("{device}.{word}"),
         _ => word.into(),
@@ -99,11 +143,20 @@ fn words() -> String {
 impl ActingFault {
     /// Reads the words of a fault: `KIND` or `KIND=VALUE`.
     pub fn parse(text: &str) -> Result<ActingFault, FaultError> {
-        let (word, said) = text.split_once('=').map_or((text, None), |(word, value)| (word, Some(value)));
+        let (word, said) = text
+            .split_once('=')
+            .map_or((text, None), |(word, value)| (word, Some(value)));
         let unknown = || FaultError::Unknown { word: word.into() };
-        let (_, usual, _) = KINDS.iter().find(|(kind, ..)| *kind == word).ok_or_else(unknown)?;
+        let (_, usual, _) = KINDS
+            .iter()
+            .find(|(kind, ..)| *kind == word)
+            .ok_or_else(unknown)?;
         let value = said.unwrap_or(usual);
-        let refused = |wants| FaultError::Value { word: word.into(), value: value.into(), wants };
+        let refused = |wants| FaultError::Value {
+            word: word.into(),
+            value: value.into(),
+            wants,
+        };
         if said.is_some() && usual.is_empty() {
             return Err(refused("left out: this fault has no value"));
         }
@@ -114,7 +167,9 @@ impl ActingFault {
         match word.split_once('.') {
             Some(("amplifier", "bus-off")) => Ok(ActingFault::Amplifier(AmplifierFault::BusOff)),
             Some(("amplifier", kind)) => of_amplifier(kind, value).map(amplifier).map_err(refused),
-            Some((_, kind)) => of_probe(kind, value).map(ActingFault::Probe).map_err(refused),
+            Some((_, kind)) => of_probe(kind, value)
+                .map(ActingFault::Probe)
+                .map_err(refused),
             None => Err(unknown()),
         }
     }
@@ -123,7 +178,9 @@ impl ActingFault {
     pub fn end(self) -> ActingFault {
         match self {
             ActingFault::None => ActingFault::None,
-            ActingFault::Amplifier(_) => ActingFault::Amplifier(AmplifierFault::Device(DeviceFault::None)),
+            ActingFault::Amplifier(_) => {
+                ActingFault::Amplifier(AmplifierFault::Device(DeviceFault::None))
+            }
             ActingFault::Probe(_) => ActingFault::Probe(Fault::None),
         }
     }
@@ -152,7 +209,9 @@ fn of_probe(kind: &str, value: &str) -> Result<Fault, &'static str> {
         "silence" => Fault::Silence,
         "corrupt" => {
             let every = value.parse().ok().filter(|every| *every > 0);
-            Fault::Corrupt { every: every.ok_or("a whole number of bytes, above zero")? }
+            Fault::Corrupt {
+                every: every.ok_or("a whole number of bytes, above zero")?,
+            }
         }
         "stuck" => Fault::Stuck,
         "jump" => {
@@ -160,7 +219,9 @@ fn of_probe(kind: &str, value: &str) -> Result<Fault, &'static str> {
             Fault::Jump { every: 2, by_m }
         }
         "out-of-range" => Fault::OutOfRange,
-        "late" => Fault::Late { by_ns: nanoseconds(value)? },
+        "late" => Fault::Late {
+            by_ns: nanoseconds(value)?,
+        },
         "reset" => Fault::Reset,
         _ => Fault::None,
     })
@@ -170,14 +231,21 @@ fn of_probe(kind: &str, value: &str) -> Result<Fault, &'static str> {
 fn code(text: &str) -> Result<u16, &'static str> {
     let hexadecimal = text.strip_prefix("0x").or(text.strip_prefix("0X"));
     let number = hexadecimal.map_or_else(|| text.parse(), |digits| u16::from_str_radix(digits, 16));
-    number.ok().filter(|code| *code > 0).ok_or("an emergency code from 0x0001 to 0xFFFF")
+    number
+        .ok()
+        .filter(|code| *code > 0)
+        .ok_or("an emergency code from 0x0001 to 0xFFFF")
 }
 
 /// A time like `50ms`, an hour at most.
 fn nanoseconds(text: &str) -> Result<u64, &'static str> {
     const WANTS: &str = "a time with its unit (50ms, 200us, 1s), an hour at most";
     let time = humantime::parse_duration(text).map_err(|_| WANTS)?;
-    if time.as_secs() <= 3600 { Ok(time.as_nanos() as u64) } else { Err(WANTS) }
+    if time.as_secs() <= 3600 {
+        Ok(time.as_nanos() as u64)
+    } else {
+        Err(WANTS)
+    }
 }
 
 #[cfg(test)]
@@ -186,7 +254,9 @@ mod tests {
 
     #[test]
     fn every_kind_is_another_fault_and_is_in_the_help() {
-        let faults: Vec<ActingFault> = KINDS.map(|(word, ..)| ActingFault::parse(word).expect(word)).to_vec();
+        let faults: Vec<ActingFault> = KINDS
+            .map(|(word, ..)| ActingFault::parse(word).expect(word))
+            .to_vec();
         for (index, fault) in faults.iter().enumerate() {
             assert!(!faults[..index].contains(fault), "{}", KINDS[index].0);
             assert!(help().contains(KINDS[index].0));
@@ -196,13 +266,25 @@ mod tests {
     #[test]
     fn values_are_read_in_the_units_that_a_person_writes() {
         let amplifier = |fault| Ok(ActingFault::Amplifier(AmplifierFault::Device(fault)));
-        assert_eq!(ActingFault::parse("amplifier.late=250ms"), amplifier(DeviceFault::Late(250)));
-        assert_eq!(ActingFault::parse("amplifier.fault=0x3220"), amplifier(DeviceFault::Drive(0x3220)));
+        assert_eq!(
+            ActingFault::parse("amplifier.late=250ms"),
+            amplifier(DeviceFault::Late(250))
+        );
+        assert_eq!(
+            ActingFault::parse("amplifier.fault=0x3220"),
+            amplifier(DeviceFault::Drive(0x3220))
+        );
         assert_eq!(
             ActingFault::parse("probe.jump=-1mm"),
-            Ok(ActingFault::Probe(Fault::Jump { every: 2, by_m: -1e-3 }))
+            Ok(ActingFault::Probe(Fault::Jump {
+                every: 2,
+                by_m: -1e-3
+            }))
         );
-        assert_eq!(ActingFault::parse("probe.corrupt=97"), Ok(ActingFault::Probe(Fault::Corrupt { every: 97 })));
+        assert_eq!(
+            ActingFault::parse("probe.corrupt=97"),
+            Ok(ActingFault::Probe(Fault::Corrupt { every: 97 }))
+        );
     }
 
     #[test]
@@ -225,8 +307,20 @@ mod tests {
     #[test]
     fn what_is_no_fault_is_refused_with_what_there_is() {
         let refusal = |text| ActingFault::parse(text).expect_err(text).to_string();
-        for text in ["", "silence", "amplifier", "amplifier.", "probe.nonsense", "probe.stuck.now", "nonsense=1"] {
-            assert!(refusal(text).contains("there are none, amplifier.none, amplifier.silence"), "{}", refusal(text));
+        for text in [
+            "",
+            "silence",
+            "amplifier",
+            "amplifier.",
+            "probe.nonsense",
+            "probe.stuck.now",
+            "nonsense=1",
+        ] {
+            assert!(
+                refusal(text).contains("there are none, amplifier.none, amplifier.silence"),
+                "{}",
+                refusal(text)
+            );
         }
         assert!(refusal("probe.stuck=1").contains("has no value"));
         assert!(refusal("amplifier.fault=0").contains("0x0001 to 0xFFFF"));

@@ -31,7 +31,15 @@ pub struct Entry {
 
 impl fmt::Display for Entry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Entry { time_s, device, what, text, current_a, position_m, .. } = self;
+        let Entry {
+            time_s,
+            device,
+            what,
+            text,
+            current_a,
+            position_m,
+            ..
+        } = self;
         write!(f, "{time_s:10.4} s  {device:<9}  {what:<11}  {text}")?;
         match self.since_s {
             Some(since_s) => write!(f, "  since {since_s:.4} s")?,
@@ -84,9 +92,12 @@ impl CurrentWatch {
             return (!std::mem::replace(&mut self.is_on, true)).then_some(Turned::On);
         }
         let since_ns = *self.zero_since_ns.get_or_insert(now_ns);
-        let is_over = self.is_on && (!is_enabled || now_ns.saturating_sub(since_ns) >= Self::OFF_NS);
+        let is_over =
+            self.is_on && (!is_enabled || now_ns.saturating_sub(since_ns) >= Self::OFF_NS);
         self.is_on &= !is_over;
-        is_over.then_some(Turned::Off { since_s: seconds(since_ns) })
+        is_over.then_some(Turned::Off {
+            since_s: seconds(since_ns),
+        })
     }
 }
 
@@ -97,15 +108,27 @@ mod tests {
     #[test]
     fn a_current_is_off_when_none_can_flow_or_when_it_has_been_zero_for_a_while() {
         let mut watch = CurrentWatch::default();
-        let mut see = |ms: u64, current_a, is_enabled| watch.see(ms * 1_000_000, current_a, is_enabled);
+        let mut see =
+            |ms: u64, current_a, is_enabled| watch.see(ms * 1_000_000, current_a, is_enabled);
         assert_eq!(see(0, 0.0, false), None, "off from the start is no news");
         assert_eq!(see(10, 0.5, true), Some(Turned::On));
         assert_eq!(see(11, 0.0, true), None, "a sweep passes through zero");
         assert_eq!(see(12, -0.5, true), None);
         assert_eq!([see(20, 0.0, true), see(269, 0.0, true)], [None; 2]);
-        assert_eq!(see(270, 0.0, true), Some(Turned::Off { since_s: seconds(20_000_000) }));
+        assert_eq!(
+            see(270, 0.0, true),
+            Some(Turned::Off {
+                since_s: seconds(20_000_000)
+            })
+        );
         assert_eq!(see(900, 0.0, true), None);
         assert_eq!(see(1000, 0.1, true), Some(Turned::On));
-        assert_eq!(see(1001, 0.0, false), Some(Turned::Off { since_s: seconds(1_001_000_000) }), "at once");
+        assert_eq!(
+            see(1001, 0.0, false),
+            Some(Turned::Off {
+                since_s: seconds(1_001_000_000)
+            }),
+            "at once"
+        );
     }
 }

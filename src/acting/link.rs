@@ -23,9 +23,15 @@ impl Link {
                 ErrorKind::AlreadyExists => "it exists".to_string(),
                 _ => error.to_string(),
             };
-            ActingError::Link { path: path.into(), why }
+            ActingError::Link {
+                path: path.into(),
+                why,
+            }
         })?;
-        Ok(Link { path: path.into(), target: target.into() })
+        Ok(Link {
+            path: path.into(),
+            target: target.into(),
+        })
     }
 
     /// The link's own name.
@@ -53,8 +59,13 @@ mod tests {
         std::os::unix::fs::symlink("/nowhere", &path).expect("a link");
         std::fs::write(&target, "").expect("a file");
         let link = Link::new(&path, &target).expect("a dead link is replaced");
-        let error = Link::new(&path, &target).expect_err("it is in use").to_string();
-        assert!(error.contains("it exists") && error.contains("--pty"), "{error}");
+        let error = Link::new(&path, &target)
+            .expect_err("it is in use")
+            .to_string();
+        assert!(
+            error.contains("it exists") && error.contains("--pty"),
+            "{error}"
+        );
         drop(link);
         assert!(!path.is_symlink() && target.exists());
     }

@@ -39,7 +39,9 @@ pub use stage::Stage;
 #[derive(Debug, thiserror::Error)]
 pub enum ActingError {
     /// The configuration names none.
-    #[error("{device}.device is `simulated`: there is nothing to act for; name real devices, as --config lab does")]
+    #[error(
+        "{device}.device is `simulated`: there is nothing to act for; name real devices, as --config lab does"
+    )]
     Simulated {
         /// `amplifier` or `probe`.
         device: &'static str,
@@ -91,7 +93,9 @@ pub enum ActingError {
         device: &'static str,
     },
     /// The system refused a thread.
-    #[error("cannot start the thread of the {device}: {source}; raise the limit of processes (ulimit -u)")]
+    #[error(
+        "cannot start the thread of the {device}: {source}; raise the limit of processes (ulimit -u)"
+    )]
     Thread {
         /// Which device.
         device: &'static str,

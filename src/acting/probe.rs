@@ -60,15 +60,34 @@ impl Probe {
             End::Terminal(Some(path)) => Some(Link::new(path, &place)?),
             _ => None,
         };
-        let task =
-            ProbeTask::start(line, Arc::clone(&acting), now_ns, measure(config, stage), below_the_loop(&config.servo));
-        let task = task.map_err(|source| ActingError::Thread { device: "probe", source })?;
-        Ok(Probe { task, device: acting, place, notes, rate_hz, kind: device.kind(), link })
+        let task = ProbeTask::start(
+            line,
+            Arc::clone(&acting),
+            now_ns,
+            measure(config, stage),
+            below_the_loop(&config.servo),
+        );
+        let task = task.map_err(|source| ActingError::Thread {
+            device: "probe",
+            source,
+        })?;
+        Ok(Probe {
+            task,
+            device: acting,
+            place,
+            notes,
+            rate_hz,
+            kind: device.kind(),
+            link,
+        })
     }
 
     /// Misbehaves from now on.
     pub fn ask(&self, fault: Fault) {
-        self.device.lock().unwrap_or_else(PoisonError::into_inner).ask_fault(fault);
+        self.device
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .ask_fault(fault);
     }
 
     /// The port, or the reader's end of the pseudo terminal.
@@ -115,20 +134,30 @@ pub fn measuring_rate_hz(config: &Config) -> f64 {
         ProbeDevice::Optoncdt(_) | ProbeDevice::Simulated(_) => false,
     };
     let answers_hz = config.probe.rate_hz.unwrap_or(STREAM_HZ);
-    if is_asked { MEASUREMENTS_PER_ANSWER * answers_hz } else { answers_hz }
+    if is_asked {
+        MEASUREMENTS_PER_ANSWER * answers_hz
+    } else {
+        answers_hz
+    }
 }
 
 fn line(settings: PortSettings, end: &End) -> Result<(Line, Vec<Note>), ActingError> {
     Ok(match end {
         End::Terminal(_) => (Line::terminal(settings)?, Vec::new()),
-        End::Port(path) => Line::port(PortSettings { path: path.clone(), ..settings })?,
+        End::Port(path) => Line::port(PortSettings {
+            path: path.clone(),
+            ..settings
+        })?,
     })
 }
 
 /// What the probe measures at a time, in its own metres: position = gain (reading) + offset, the other way round.
 fn measure(config: &Config, stage: Stage) -> impl FnMut(u64) -> f64 + Send + use<> {
     let MountingSettings { gain, offset_m } =
-        config.probe.device.mounting().unwrap_or(MountingSettings { gain: 1.0, offset_m: 0.0 });
+        config.probe.device.mounting().unwrap_or(MountingSettings {
+            gain: 1.0,
+            offset_m: 0.0,
+        });
     let mut sensor = Sensor::new(config);
     move |at_ns| (sensor.sense(stage.position_m(at_ns)) - offset_m) / gain
 }

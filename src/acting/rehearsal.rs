@@ -76,7 +76,16 @@ impl Rehearsal {
         let opened = || Amplifier::open(config, stage.clone(), journal.clone(), start);
         let amplifier = cast.amplifier.then(opened).transpose()?;
         let (faults, probe_was_lost) = (0, false);
-        let rehearsal = Rehearsal { amplifier, probe, stage, journal, entries, start, faults, probe_was_lost };
+        let rehearsal = Rehearsal {
+            amplifier,
+            probe,
+            stage,
+            journal,
+            entries,
+            start,
+            faults,
+            probe_was_lost,
+        };
         rehearsal.say_what_is_served(config);
         Ok(rehearsal)
     }
@@ -85,19 +94,32 @@ impl Rehearsal {
         if let Some(amplifier) = &self.amplifier {
             let place = match &config.amplifier.device {
                 AmplifierDevice::Simulated(_) => String::new(),
-                AmplifierDevice::Canopen(device) => format!("node {} on {}", device.node, device.interface),
-                AmplifierDevice::Vesc(device) => format!("node {} on {}", device.node, device.interface),
+                AmplifierDevice::Canopen(device) => {
+                    format!("node {} on {}", device.node, device.interface)
+                }
+                AmplifierDevice::Vesc(device) => {
+                    format!("node {} on {}", device.node, device.interface)
+                }
             };
-            self.write("amplifier", "serving", format!("{} {place}", amplifier.kind()));
+            self.write(
+                "amplifier",
+                "serving",
+                format!("{} {place}", amplifier.kind()),
+            );
         }
         if let Some(probe) = &self.probe {
             let (kind, place, rate_hz) = (probe.kind(), probe.place().display(), probe.rate_hz());
-            let link = probe.link().map_or(String::new(), |link| format!(" as {}", link.display()));
-            self.write("probe", "serving", format!("{kind} on {place}{link}, {rate_hz} measurements a second"));
-            probe
-                .notes()
-                .iter()
-                .for_each(|note| self.write("probe", "note", format!("{}; {}", note.what, note.remedy)));
+            let link = probe
+                .link()
+                .map_or(String::new(), |link| format!(" as {}", link.display()));
+            self.write(
+                "probe",
+                "serving",
+                format!("{kind} on {place}{link}, {rate_hz} measurements a second"),
+            );
+            probe.notes().iter().for_each(|note| {
+                self.write("probe", "note", format!("{}; {}", note.what, note.remedy))
+            });
         }
     }
 
@@ -108,17 +130,25 @@ impl Rehearsal {
 
     /// When the amplifier was enabled first, in seconds.
     pub fn enabled_s(&self) -> Option<f64> {
-        self.amplifier.as_ref().and_then(|amplifier| amplifier.tally().enabled_s())
+        self.amplifier
+            .as_ref()
+            .and_then(|amplifier| amplifier.tally().enabled_s())
     }
 
     /// Refuses what the devices served here cannot have.
     pub fn check(&self, word: &str, fault: ActingFault) -> Result<(), ActingError> {
-        let not_served = |device| ActingError::NotServed { word: word.into(), device };
+        let not_served = |device| ActingError::NotServed {
+            word: word.into(),
+            device,
+        };
         match (fault, &self.amplifier, &self.probe) {
             (ActingFault::Amplifier(_), None, _) => Err(not_served("amplifier")),
             (ActingFault::Probe(_), _, None) => Err(not_served("probe")),
             (ActingFault::Amplifier(fault), Some(amplifier), _) if !amplifier.knows(fault) => {
-                Err(ActingError::Fault { kind: amplifier.kind(), word: word.into() })
+                Err(ActingError::Fault {
+                    kind: amplifier.kind(),
+                    word: word.into(),
+                })
             }
             _ => Ok(()),
         }
@@ -128,15 +158,24 @@ impl Rehearsal {
     pub fn ask(&mut self, word: &str, fault: ActingFault) -> Result<(), ActingError> {
         self.check(word, fault)?;
         self.faults += u64::from(fault != fault.end());
-        let device = if matches!(fault, ActingFault::Probe(_)) { "probe" } else { "amplifier" };
+        let device = if matches!(fault, ActingFault::Probe(_)) {
+            "probe"
+        } else {
+            "amplifier"
+        };
         self.write(device, "fault", word.into());
         match (fault, &self.amplifier, &self.probe) {
             (ActingFault::Amplifier(fault), Some(amplifier), _) => amplifier.ask(fault)?,
             (ActingFault::Probe(fault), _, Some(probe)) => probe.ask(fault),
             (ActingFault::None, amplifier, probe) => {
-                let sound = super::AmplifierFault::Device(bench_hal::can::device::DeviceFault::None);
-                amplifier.iter().try_for_each(|amplifier| amplifier.ask(sound))?;
-                probe.iter().for_each(|probe| probe.ask(bench_hal::serial::device::Fault::None));
+                let sound =
+                    super::AmplifierFault::Device(bench_hal::can::device::DeviceFault::None);
+                amplifier
+                    .iter()
+                    .try_for_each(|amplifier| amplifier.ask(sound))?;
+                probe
+                    .iter()
+                    .for_each(|probe| probe.ask(bench_hal::serial::device::Fault::None));
             }
             _ => {}
         }
@@ -147,22 +186,41 @@ impl Rehearsal {
     pub fn news(&mut self) -> Vec<Entry> {
         let is_lost = self.probe.as_ref().is_some_and(Probe::is_lost);
         if is_lost && !std::mem::replace(&mut self.probe_was_lost, true) {
-            self.write("probe", "lost", "the serial port is gone; plug it in and start anew".into());
+            self.write(
+                "probe",
+                "lost",
+                "the serial port is gone; plug it in and start anew".into(),
+            );
         }
         self.entries.try_iter().collect()
     }
 
     fn write(&self, device: &'static str, what: &'static str, text: String) {
         let now_ns = self.start.elapsed().as_nanos() as u64;
-        let (current_a, enabled) = self.amplifier.as_ref().map_or((0.0, false), |a| (a.current_a(), a.is_enabled()));
+        let (current_a, enabled) = self
+            .amplifier
+            .as_ref()
+            .map_or((0.0, false), |a| (a.current_a(), a.is_enabled()));
         let position_m = self.stage.position_m(now_ns);
         let (time_s, since_s) = (seconds(now_ns), None);
-        self.journal.write(Entry { time_s, device, what, text, enabled, current_a, position_m, since_s });
+        self.journal.write(Entry {
+            time_s,
+            device,
+            what,
+            text,
+            enabled,
+            current_a,
+            position_m,
+            since_s,
+        });
     }
 
     /// What it came to so far.
     pub fn summary(&self) -> Summary {
-        let (amplifier, carried) = (self.amplifier.as_ref(), self.probe.as_ref().map(Probe::carried));
+        let (amplifier, carried) = (
+            self.amplifier.as_ref(),
+            self.probe.as_ref().map(Probe::carried),
+        );
         let tally = amplifier.map(Amplifier::tally);
         Summary {
             duration_s: self.time_s(),
@@ -175,7 +233,9 @@ impl Rehearsal {
             measurements: carried.map_or(0, |carried| carried.measurements.load(Relaxed)),
             bytes_received: carried.map_or(0, |carried| carried.received.load(Relaxed)),
             bytes_sent: carried.map_or(0, |carried| carried.sent.load(Relaxed)),
-            position_m: self.stage.position_m(self.start.elapsed().as_nanos() as u64),
+            position_m: self
+                .stage
+                .position_m(self.start.elapsed().as_nanos() as u64),
             faults: self.faults,
         }
     }

@@ -37,14 +37,26 @@ impl std::str::FromStr for Planned {
 
     fn from_str(text: &str) -> Result<Planned, PlannedError> {
         let refused = || PlannedError::Time { text: text.into() };
-        let seconds = |text: &str| text.parse().ok().filter(|s| (0.0..=LONGEST_S).contains(s)).ok_or_else(refused);
+        let seconds = |text: &str| {
+            text.parse()
+                .ok()
+                .filter(|s| (0.0..=LONGEST_S).contains(s))
+                .ok_or_else(refused)
+        };
         let (word, when) = text.split_once('@').ok_or_else(refused)?;
-        let (from, to) = when.split_once("..").map_or((when, None), |(from, to)| (from, Some(to)));
+        let (from, to) = when
+            .split_once("..")
+            .map_or((when, None), |(from, to)| (from, Some(to)));
         let (from_s, to_s): (f64, Option<f64>) = (seconds(from)?, to.map(seconds).transpose()?);
         if to_s.is_some_and(|to_s| to_s <= from_s) {
             return Err(refused());
         }
-        Ok(Planned { word: word.into(), fault: ActingFault::parse(word)?, from_s, to_s })
+        Ok(Planned {
+            word: word.into(),
+            fault: ActingFault::parse(word)?,
+            from_s,
+            to_s,
+        })
     }
 }
 
@@ -59,7 +71,13 @@ impl Schedule {
     /// All that is planned, in the order of time.
     pub fn new(planned: &[Planned]) -> Schedule {
         let mut steps: Vec<(f64, Step)> = Vec::new();
-        for Planned { word, fault, from_s, to_s } in planned {
+        for Planned {
+            word,
+            fault,
+            from_s,
+            to_s,
+        } in planned
+        {
             steps.push((*from_s, (word.clone(), *fault)));
             steps.extend(to_s.map(|to_s| (to_s, (format!("end of {word}"), fault.end()))));
         }
@@ -74,7 +92,9 @@ impl Schedule {
 
     /// What is due by `time_s`, once.
     pub fn due(&mut self, time_s: f64) -> Vec<Step> {
-        std::iter::from_fn(|| self.0.pop_front_if(|(at_s, _)| *at_s <= time_s)).map(|(_, step)| step).collect()
+        std::iter::from_fn(|| self.0.pop_front_if(|(at_s, _)| *at_s <= time_s))
+            .map(|(_, step)| step)
+            .collect()
     }
 }
 
@@ -88,8 +108,17 @@ mod tests {
 
     #[test]
     fn faults_begin_and_end_when_planned() {
-        let mut schedule = Schedule::new(&[planned("probe.stuck@2.5"), planned("amplifier.late=20ms@1..2")]);
-        let mut words = |time_s| schedule.due(time_s).into_iter().map(|(word, _)| word).collect::<Vec<_>>();
+        let mut schedule = Schedule::new(&[
+            planned("probe.stuck@2.5"),
+            planned("amplifier.late=20ms@1..2"),
+        ]);
+        let mut words = |time_s| {
+            schedule
+                .due(time_s)
+                .into_iter()
+                .map(|(word, _)| word)
+                .collect::<Vec<_>>()
+        };
         assert!(words(0.99).is_empty());
         assert_eq!(words(1.0), ["amplifier.late=20ms"]);
         assert_eq!(words(2.4), ["end of amplifier.late=20ms"]);
@@ -99,10 +128,23 @@ mod tests {
 
     #[test]
     fn what_is_no_plan_is_refused_with_the_form() {
-        for text in ["probe.stuck", "probe.stuck@", "probe.stuck@-1", "probe.stuck@2..1", "probe.stuck@NaN", "@1..x"] {
+        for text in [
+            "probe.stuck",
+            "probe.stuck@",
+            "probe.stuck@-1",
+            "probe.stuck@2..1",
+            "probe.stuck@NaN",
+            "@1..x",
+        ] {
             let error = text.parse::<Planned>().expect_err(text).to_string();
             assert!(error.contains("KIND@FROM..TO"), "{error}");
         }
-        assert!("probe.nonsense@1".parse::<Planned>().expect_err("no kind").to_string().contains("probe.stuck"));
+        assert!(
+            "probe.nonsense@1"
+                .parse::<Planned>()
+                .expect_err("no kind")
+                .to_string()
+                .contains("probe.stuck")
+        );
     }
 }

@@ -87,7 +87,9 @@ pub enum CalibrationError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// Its date is none.
-    #[error("calibration {file}: made = {made:?} is not a date; make it anew with `bench calibrate`")]
+    #[error(
+        "calibration {file}: made = {made:?} is not a date; make it anew with `bench calibrate`"
+    )]
     Date {
         /// The file.
         file: String,
@@ -98,7 +100,9 @@ pub enum CalibrationError {
     #[error("the calibration cannot be written as TOML: {0}")]
     Text(String),
     /// Too old, or of other devices.
-    #[error("calibration {file}: {why}; make it anew with `bench calibrate`, or {setting} = \"warn\"; nothing moved")]
+    #[error(
+        "calibration {file}: {why}; make it anew with `bench calibrate`, or {setting} = \"warn\"; nothing moved"
+    )]
     Unfit {
         /// The file.
         file: String,
@@ -116,12 +120,22 @@ pub fn use_of(
     probe: &str,
     now: SystemTime,
 ) -> Result<Option<(Calibration, Vec<String>)>, CalibrationError> {
-    let Some(file) = &settings.file else { return Ok(None) };
+    let Some(file) = &settings.file else {
+        return Ok(None);
+    };
     let text = config::text_of_file(file, "calibration")?;
     let calibration: Calibration = config::typed(file, &text)?;
     let complaints = [
-        (expired(file, &calibration, settings.valid_days, now)?, settings.when_expired, "calibration.when_expired"),
-        (foreign(&calibration, amplifier, probe), settings.when_foreign, "calibration.when_foreign"),
+        (
+            expired(file, &calibration, settings.valid_days, now)?,
+            settings.when_expired,
+            "calibration.when_expired",
+        ),
+        (
+            foreign(&calibration, amplifier, probe),
+            settings.when_foreign,
+            "calibration.when_foreign",
+        ),
     ];
     let mut warnings = Vec::new();
     for (complaint, then, setting) in complaints {
@@ -129,7 +143,11 @@ pub fn use_of(
             (None, _) => {}
             (Some(why), WhenUnfit::Warn) => warnings.push(format!("calibration {file}: {why}")),
             (Some(why), WhenUnfit::Refuse) => {
-                return Err(CalibrationError::Unfit { file: file.clone(), why, setting });
+                return Err(CalibrationError::Unfit {
+                    file: file.clone(),
+                    why,
+                    setting,
+                });
             }
         }
     }
@@ -142,17 +160,26 @@ fn expired(
     valid_days: f64,
     now: SystemTime,
 ) -> Result<Option<String>, CalibrationError> {
-    let wrong = || CalibrationError::Date { file: file.to_string(), made: calibration.made.clone() };
+    let wrong = || CalibrationError::Date {
+        file: file.to_string(),
+        made: calibration.made.clone(),
+    };
     let made = humantime::parse_rfc3339(&calibration.made).map_err(|_| wrong())?;
     let age = now.duration_since(made).unwrap_or(Duration::ZERO);
     let days = age.as_secs_f64() / 86_400.0;
-    Ok((days > valid_days).then(|| format!("it was made {days:.0} days ago, calibration.valid_days is {valid_days}")))
+    Ok((days > valid_days)
+        .then(|| format!("it was made {days:.0} days ago, calibration.valid_days is {valid_days}")))
 }
 
 fn foreign(calibration: &Calibration, amplifier: &str, probe: &str) -> Option<String> {
-    let pairs = [("amplifier", &calibration.amplifier.device, amplifier), ("probe", &calibration.probe.device, probe)];
+    let pairs = [
+        ("amplifier", &calibration.amplifier.device, amplifier),
+        ("probe", &calibration.probe.device, probe),
+    ];
     let other = pairs.into_iter().find(|(_, theirs, ours)| theirs != ours);
-    other.map(|(what, theirs, ours)| format!("it is of another {what}: {theirs:?}, this one is {ours:?}"))
+    other.map(|(what, theirs, ours)| {
+        format!("it is of another {what}: {theirs:?}, this one is {ours:?}")
+    })
 }
 
 impl Calibration {

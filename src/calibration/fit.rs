@@ -16,7 +16,9 @@ pub enum FitError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A level has no ticks.
-    #[error("level {0} of the staircase has no ticks in the recording: the run did not come to its end")]
+    #[error(
+        "level {0} of the staircase has no ticks in the recording: the run did not come to its end"
+    )]
     Short(usize),
     /// The stage did not move.
     #[error(
@@ -67,11 +69,20 @@ pub struct Fit {
 pub fn fit(recording: &Recording, config: &Config) -> Result<Fit, FitError> {
     let staircase = Staircase::new(&config.calibrate, config.servo.period_s());
     let levels = levels(recording, &staircase)?;
-    let (offset_m, slope, sigma) = line(levels.iter().map(|l| (l.command_a.mean, l.position_m.mean)));
-    let noise = levels.iter().filter_map(|l| l.position_m.sigma()).map(|s| s * s).sum::<f64>() / levels.len() as f64;
+    let (offset_m, slope, sigma) =
+        line(levels.iter().map(|l| (l.command_a.mean, l.position_m.mean)));
+    let noise = levels
+        .iter()
+        .filter_map(|l| l.position_m.sigma())
+        .map(|s| s * s)
+        .sum::<f64>()
+        / levels.len() as f64;
     let span_a = 2.0 * config.calibrate.amplitude_a;
     let travel_m = (slope * span_a).abs();
-    let ticks = levels.iter().map(|l| l.position_m.count).fold(f64::INFINITY, f64::min);
+    let ticks = levels
+        .iter()
+        .map(|l| l.position_m.count)
+        .fold(f64::INFINITY, f64::min);
     let noise_m = (noise / ticks).sqrt();
     if travel_m.partial_cmp(&(SEEN * noise_m)) != Some(std::cmp::Ordering::Greater) {
         return Err(FitError::Still { travel_m, noise_m });
@@ -117,7 +128,12 @@ fn straight(fit: &Fit, settings: &CalibrateSettings) -> Result<(), FitError> {
         ),
     ];
     match cases.into_iter().find(|(_, found, limit, _)| found > limit) {
-        Some((what, found, limit, setting)) => Err(FitError::Crooked { what, found, limit, setting }),
+        Some((what, found, limit, setting)) => Err(FitError::Crooked {
+            what,
+            found,
+            limit,
+            setting,
+        }),
         None => Ok(()),
     }
 }
@@ -138,11 +154,16 @@ fn levels(recording: &Recording, staircase: &Staircase) -> Result<Vec<Level>, Fi
             continue;
         }
         let first = *first.get_or_insert(record.tick);
-        let Some(level) = staircase.level(record.tick - first) else { continue };
+        let Some(level) = staircase.level(record.tick - first) else {
+            continue;
+        };
         let level = &mut levels[level];
         level.command_a.push(record.command_a);
         level.position_m.push(record.position_m);
-        record.actual_a.into_iter().for_each(|actual_a| level.actual_a.push(actual_a));
+        record
+            .actual_a
+            .into_iter()
+            .for_each(|actual_a| level.actual_a.push(actual_a));
     }
     match levels.iter().position(|level| level.position_m.count < 2.0) {
         Some(short) => Err(FitError::Short(short)),
@@ -155,7 +176,8 @@ fn hysteresis_m(levels: &[Level], wanted_a: &[f64], slope: f64) -> f64 {
     let rest_m = |l: &Level| l.position_m.mean - slope * l.command_a.mean;
     let pairs = (0..levels.len()).flat_map(|i| (i + 1..levels.len()).map(move |j| (i, j)));
     let same = pairs.filter(|&(i, j)| wanted_a[i] == wanted_a[j]);
-    same.map(|(i, j)| (rest_m(&levels[i]) - rest_m(&levels[j])).abs()).fold(0.0, f64::max)
+    same.map(|(i, j)| (rest_m(&levels[i]) - rest_m(&levels[j])).abs())
+        .fold(0.0, f64::max)
 }
 
 /// Gain and offset of the current that flows, where the amplifier measured it at every level.
@@ -170,11 +192,16 @@ fn current(levels: &[Level]) -> Option<(f64, f64)> {
 /// Offset, slope and the slope's standard deviation of the least-squares line y = offset + slope x.
 fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64, f64) {
     let n = points.clone().count() as f64;
-    let (x, y) = points.clone().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let (xx, xy) =
-        points.clone().fold((0.0, 0.0), |(xx, xy), p| (xx + (p.0 - x) * (p.0 - x), xy + (p.0 - x) * (p.1 - y)));
+    let (x, y) = points
+        .clone()
+        .fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let (xx, xy) = points.clone().fold((0.0, 0.0), |(xx, xy), p| {
+        (xx + (p.0 - x) * (p.0 - x), xy + (p.0 - x) * (p.1 - y))
+    });
     let slope = xy / xx;
     let offset = y - slope * x;
-    let square: f64 = points.map(|p| (p.1 - offset - slope * p.0) * (p.1 - offset - slope * p.0)).sum();
+    let square: f64 = points
+        .map(|p| (p.1 - offset - slope * p.0) * (p.1 - offset - slope * p.0))
+        .sum();
     (offset, slope, (square / (n - 2.0).max(1.0) / xx).sqrt())
 }

@@ -18,6 +18,8 @@ mod file;
 mod fit;
 mod rig;
 
-pub use file::{AmplifierCalibration, Calibration, CalibrationError, ChainCalibration, ProbeCalibration, use_of};
+pub use file::{
+    AmplifierCalibration, Calibration, CalibrationError, ChainCalibration, ProbeCalibration, use_of,
+};
 pub use fit::{Fit, FitError, fit};
 pub use rig::CalibratedRig;

@@ -1,6 +1,9 @@
 //! A rig whose amplifier and probe are corrected by a calibration.
 
-use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig, Tick};
+use bench_hal::{
+    AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
+    Tick,
+};
 
 use super::Calibration;
 
@@ -33,7 +36,9 @@ impl CurrentAmplifier for CalibratedRig {
 
     /// Commands what makes `current_a` flow, and says which current that will be.
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
-        let given_a = self.rig.command((current_a - self.current_offset_a) / self.current_gain)?;
+        let given_a = self
+            .rig
+            .command((current_a - self.current_offset_a) / self.current_gain)?;
         Ok(given_a * self.current_gain + self.current_offset_a)
     }
 
@@ -61,6 +66,9 @@ impl CurrentAmplifier for CalibratedRig {
 impl DisplacementProbe for CalibratedRig {
     fn latest(&mut self, now: Tick) -> Reading {
         let reading = self.rig.latest(now);
-        Reading { position_m: self.gain * reading.position_m + self.offset_m, ..reading }
+        Reading {
+            position_m: self.gain * reading.position_m + self.offset_m,
+            ..reading
+        }
     }
 }

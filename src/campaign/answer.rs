@@ -2,8 +2,8 @@
 
 use super::grid::settings;
 use super::{
-    CampaignError, Grid, Offset, Place, Point, Recommendation, Region, Said, Tolerances, contradicted, offset,
-    recommend,
+    CampaignError, Grid, Offset, Place, Point, Recommendation, Region, Said, Tolerances,
+    contradicted, offset, recommend,
 };
 use crate::config::{Config, Sr4dofSettings};
 use crate::plant::PlantError;
@@ -84,20 +84,46 @@ impl<'a> Answer<'a> {
         let measured = Region::of(settings, &grid.operating_points, searched)?;
         let (first, last) = ends(&grid.operating_points);
         let beyond = BEYOND * tolerances.operating_point;
-        let region = Region::of(settings, &even(first - beyond, last + beyond, ROWS), searched)?;
-        let said: Vec<Said> = done.iter().filter_map(|(place, point)| said(grid, *place, point)).collect();
+        let region = Region::of(
+            settings,
+            &even(first - beyond, last + beyond, ROWS),
+            searched,
+        )?;
+        let said: Vec<Said> = done
+            .iter()
+            .filter_map(|(place, point)| said(grid, *place, point))
+            .collect();
         let offset = offset(&measured, &said);
         let interval = offset.as_ref().map_or([0.0, 0.0], |offset| offset.interval);
         let candidates = steps(low, high, grid.mass_step(config));
-        let recommendation = recommend(&region, [first, last], &candidates, interval, tolerances, &said);
+        let recommendation = recommend(
+            &region,
+            [first, last],
+            &candidates,
+            interval,
+            tolerances,
+            &said,
+        );
         let points = told(config, settings, grid, done, &measured)?;
         let contradicted = contradicted(&measured, &said, 0.0);
-        Ok(Answer { settings, grid, points, region, contradicted, offset, tolerances, recommendation })
+        Ok(Answer {
+            settings,
+            grid,
+            points,
+            region,
+            contradicted,
+            offset,
+            tolerances,
+            recommendation,
+        })
     }
 
     /// How many points were judged so.
     pub fn count(&self, cnmp: Cnmp) -> usize {
-        self.points.iter().filter(|told| told.point.cnmp == cnmp).count()
+        self.points
+            .iter()
+            .filter(|told| told.point.cnmp == cnmp)
+            .count()
     }
 }
 
@@ -105,7 +131,11 @@ impl<'a> Answer<'a> {
 fn said(grid: &Grid, place: Place, point: &Point) -> Option<Said> {
     let decided = point.cnmp != Cnmp::Undecided;
     let asymmetry = grid.asymmetries[place.column];
-    decided.then_some(Said { row: place.row, asymmetry, detected: point.cnmp == Cnmp::Detected })
+    decided.then_some(Said {
+        row: place.row,
+        asymmetry,
+        detected: point.cnmp == Cnmp::Detected,
+    })
 }
 
 fn told<'a>(
@@ -124,7 +154,8 @@ fn told<'a>(
         point,
         model_pairs: pairs[place.row][place.column],
         model_pairs_damped: u8::from(measured.contains(place.row, grid.asymmetries[place.column])),
-        wrong: said(grid, *place, point).is_some_and(|one| contradicted(measured, &[one], made) > 0),
+        wrong: said(grid, *place, point)
+            .is_some_and(|one| contradicted(measured, &[one], made) > 0),
     };
     Ok(done.iter().map(one).collect())
 }
@@ -138,9 +169,15 @@ fn steps(low: f64, high: f64, step: f64) -> Vec<f64> {
 }
 
 fn even(low: f64, high: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|k| low + (high - low) * k as f64 / (count - 1) as f64).collect()
+    (0..count)
+        .map(|k| low + (high - low) * k as f64 / (count - 1) as f64)
+        .collect()
 }
 
 fn ends(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        })
 }

@@ -94,8 +94,13 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
         if places.is_empty() {
             return Ok(());
         }
-        let Some(unloaded) = self.unloaded()? else { return Ok(()) };
-        let mut known = Known { on: Load::default(), unloaded };
+        let Some(unloaded) = self.unloaded()? else {
+            return Ok(());
+        };
+        let mut known = Known {
+            on: Load::default(),
+            unloaded,
+        };
         for (index, place) in places.iter().enumerate() {
             let number = format!("point {} of {}", index + 1, places.len());
             match self.point(*place, &number, &mut known)? {
@@ -110,7 +115,12 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
     fn unloaded(&mut self) -> Result<Option<Rest>, S::Error> {
         let text = "first, with nothing on: take every weight off the cable and every added mass off stages 2 and 3"
             .to_string();
-        let question = Question { text, may_read: false, may_confirm: false, may_skip: false };
+        let question = Question {
+            text,
+            may_read: false,
+            may_confirm: false,
+            may_skip: false,
+        };
         match self.person.ask(&question) {
             Reply::Stop => Ok(None),
             _ => self.stage.rest(),
@@ -132,14 +142,18 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
                 (Reply::Done(read_m), _) => (read_m, false),
             };
             known.on = load;
-            let Some(rest) = self.stage.rest()? else { return Ok(Next::Stopped) };
+            let Some(rest) = self.stage.rest()? else {
+                return Ok(Next::Stopped);
+            };
             let mut put_on = self.lengths(&config, load, rest, known, read_m)?;
             put_on.confirmed_by_hand = confirmed;
             if put_on.finding() == Finding::Fails && !confirmed {
                 question = again(&put_on, None);
                 continue;
             }
-            let Some(mut point) = self.stage.measure(place)? else { return Ok(Next::Stopped) };
+            let Some(mut point) = self.stage.measure(place)? else {
+                return Ok(Next::Stopped);
+            };
             put_on.modes = modes(&config, &load, &point)?;
             (question, point.put_on) = (again(&put_on, Some(&point)), Some(put_on.clone()));
             // What was confirmed before the chirp says nothing of the modes.
@@ -151,10 +165,22 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
     }
 
     fn put_on(&self, place: Place, number: &str, orders: &[String]) -> Question {
-        let (y, d) = (self.grid.operating_points[place.row], self.grid.asymmetries[place.column]);
-        let head = format!("{number}: Y1o = {:.2} % of L, m2/m3 - 1 = {:+.2} %", 100.0 * y, 100.0 * d);
+        let (y, d) = (
+            self.grid.operating_points[place.row],
+            self.grid.asymmetries[place.column],
+        );
+        let head = format!(
+            "{number}: Y1o = {:.2} % of L, m2/m3 - 1 = {:+.2} %",
+            100.0 * y,
+            100.0 * d
+        );
         let text = format!("{head}\n  {}", orders.join("\n  "));
-        Question { text, may_read: true, may_confirm: false, may_skip: true }
+        Question {
+            text,
+            may_read: true,
+            may_confirm: false,
+            may_skip: true,
+        }
     }
 
     fn lengths(
@@ -165,7 +191,9 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
         known: &Known,
         read_m: Option<f64>,
     ) -> Result<PutOn, S::Error> {
-        let read = read_m.map(|read_m| LengthCheck::read(config, read_m, self.tolerance)).transpose()?;
+        let read = read_m
+            .map(|read_m| LengthCheck::read(config, read_m, self.tolerance))
+            .transpose()?;
         Ok(PutOn {
             load,
             rest: LengthCheck::rest(config, &load, &rest, &known.unloaded)?,
@@ -178,18 +206,26 @@ impl<P: Person, S: Stage> Attended<'_, P, S> {
 
     fn keep(&mut self, place: Place, point: Point) -> Result<Next, S::Error> {
         self.stage.keep(place, &point)?;
-        let said = match point.put_on.as_ref().map(|put_on| (put_on.finding(), put_on.confirmed_by_hand)) {
+        let said = match point
+            .put_on
+            .as_ref()
+            .map(|put_on| (put_on.finding(), put_on.confirmed_by_hand))
+        {
             Some((_, true)) => "confirmed by hand",
             Some((Finding::Holds, _)) => "what can be checked of the load holds",
             _ => "nothing speaks against the load, but no check could tell it from none",
         };
-        self.person.tell(&format!("kept: CNMP zeros {}; {said}", point.cnmp.name()));
+        self.person
+            .tell(&format!("kept: CNMP zeros {}; {said}", point.cnmp.name()));
         Ok(Next::Kept)
     }
 }
 
 fn confirmed_by_hand(mut point: Point) -> Point {
-    point.put_on.iter_mut().for_each(|put_on| put_on.confirmed_by_hand = true);
+    point
+        .put_on
+        .iter_mut()
+        .for_each(|put_on| put_on.confirmed_by_hand = true);
     point
 }
 
@@ -203,5 +239,10 @@ fn again(put_on: &PutOn, point: Option<&Point>) -> Question {
          campaign.frequency_tolerance_ratio",
         failures.join("\n  ")
     );
-    Question { text, may_read: true, may_confirm: true, may_skip: true }
+    Question {
+        text,
+        may_read: true,
+        may_confirm: true,
+        may_skip: true,
+    }
 }

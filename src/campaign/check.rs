@@ -88,28 +88,53 @@ pub struct PutOn {
 impl LengthCheck {
     fn of(seen_m: f64, expected_m: f64, tolerance_m: f64) -> LengthCheck {
         // A NaN is no pass.
-        let finding = match ((seen_m - expected_m).abs() <= tolerance_m, expected_m.abs() <= tolerance_m) {
+        let finding = match (
+            (seen_m - expected_m).abs() <= tolerance_m,
+            expected_m.abs() <= tolerance_m,
+        ) {
             (false, _) => Finding::Fails,
             (true, true) => Finding::CannotTell,
             (true, false) => Finding::Holds,
         };
-        LengthCheck { finding, seen_m, expected_m, tolerance_m }
+        LengthCheck {
+            finding,
+            seen_m,
+            expected_m,
+            tolerance_m,
+        }
     }
 
     /// The place of rest in X: expected is none, within 5 sigma of both means, the drift of the mounting, and what a cable
     /// askew by the angle allowed pulls, F sin(angle)/(k4 + k5).
-    pub fn rest(config: &Config, load: &Load, rest: &Rest, unloaded: &Rest) -> Result<LengthCheck, CampaignError> {
+    pub fn rest(
+        config: &Config,
+        load: &Load,
+        rest: &Rest,
+        unloaded: &Rest,
+    ) -> Result<LengthCheck, CampaignError> {
         let (with, stage) = (&config.campaign, settings(config)?);
         let askew_n = load.force_n(with).abs() * libm::sin(with.askew_rad);
         let askew_m = askew_n / (2.0 * stage.spring_stiffness_n_per_m);
         let noise_m = SIGMAS * libm::hypot(rest.sigma_m, unloaded.sigma_m);
-        Ok(LengthCheck::of(rest.mean_m - unloaded.mean_m, 0.0, with.rest_tolerance_m + noise_m + askew_m))
+        Ok(LengthCheck::of(
+            rest.mean_m - unloaded.mean_m,
+            0.0,
+            with.rest_tolerance_m + noise_m + askew_m,
+        ))
     }
 
     /// The displacement in Y as read, within `tolerance` (a ratio of the beam length).
-    pub fn read(config: &Config, read_m: f64, tolerance: f64) -> Result<LengthCheck, CampaignError> {
+    pub fn read(
+        config: &Config,
+        read_m: f64,
+        tolerance: f64,
+    ) -> Result<LengthCheck, CampaignError> {
         let stage = settings(config)?;
-        Ok(LengthCheck::of(read_m, stage.operating_point_m, tolerance * stage.beam_length_m))
+        Ok(LengthCheck::of(
+            read_m,
+            stage.operating_point_m,
+            tolerance * stage.beam_length_m,
+        ))
     }
 }
 
@@ -137,7 +162,10 @@ fn modal(plant: &PlantSettings) -> Result<Vec<Mode>, AnswerError> {
 
 fn more_asymmetric(plant: &PlantSettings, by: f64) -> Result<Sr4dofSettings, CampaignError> {
     let stage = of_plant(plant)?;
-    Ok(Sr4dofSettings { mass_asymmetry: stage.mass_asymmetry + by, ..stage.clone() })
+    Ok(Sr4dofSettings {
+        mass_asymmetry: stage.mass_asymmetry + by,
+        ..stage.clone()
+    })
 }
 
 /// The modes by the model, slowest first.
@@ -154,25 +182,39 @@ impl Expected {
         let (expected_hz, unloaded_hz) = (hz(&self.loaded[k]), hz(&self.unloaded[k]));
         let away = |hz: f64| (hz / expected_hz - 1.0).abs();
         let seen = point.modes_hz.iter().copied().zip(point.signs.chars());
-        let seen = seen.min_by(|a, b| away(a.0).total_cmp(&away(b.0))).filter(|seen| away(seen.0) < FAR);
+        let seen = seen
+            .min_by(|a, b| away(a.0).total_cmp(&away(b.0)))
+            .filter(|seen| away(seen.0) < FAR);
         let expected_sign = self.sign(k);
         let tells = share(&self.unloaded, k) < FAINT || away(unloaded_hz) > 2.0 * self.tolerance;
         let finding = match seen {
             None if share(&self.loaded, k) > CLEAR => Finding::Fails,
             None => Finding::CannotTell,
             Some((hz, _)) if away(hz) > self.tolerance => Finding::Fails,
-            Some((_, sign)) if expected_sign.is_some_and(|expected| expected != sign) => Finding::Fails,
+            Some((_, sign)) if expected_sign.is_some_and(|expected| expected != sign) => {
+                Finding::Fails
+            }
             Some(_) if tells => Finding::Holds,
             Some(_) => Finding::CannotTell,
         };
         let (seen_hz, seen_sign) = seen.unzip();
-        ModeCheck { expected_hz, unloaded_hz, seen_hz, expected_sign, seen_sign, finding }
+        ModeCheck {
+            expected_hz,
+            unloaded_hz,
+            seen_hz,
+            expected_sign,
+            seen_sign,
+            finding,
+        }
     }
 
     /// The sign of a clear residue that is the same on both sides of the load's asymmetry.
     fn sign(&self, k: usize) -> Option<char> {
         let sign = |modes: &[Mode]| Sign::of(modes[k].residue_per_kg()).symbol();
-        let sure = self.beside.iter().all(|beside| sign(beside) == sign(&self.loaded));
+        let sure = self
+            .beside
+            .iter()
+            .all(|beside| sign(beside) == sign(&self.loaded));
         (sure && share(&self.loaded, k) > CLEAR).then(|| sign(&self.loaded))
     }
 }
@@ -190,7 +232,10 @@ fn hz(mode: &Mode) -> f64 {
 impl PutOn {
     /// What all checks find: a failure is one of any, and one that holds is enough (each of them stands beside it).
     pub fn finding(&self) -> Finding {
-        let lengths = [Some(&self.rest), self.read.as_ref()].into_iter().flatten().map(|check| check.finding);
+        let lengths = [Some(&self.rest), self.read.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(|check| check.finding);
         together(lengths.chain([self.modes_find()]))
     }
 
@@ -202,30 +247,44 @@ impl PutOn {
     /// What failed, a sentence each.
     pub fn failures(&self) -> Vec<String> {
         let length = |what: &str, check: &LengthCheck, remedy: &str| {
-            let [seen, expected, tolerance] = [check.seen_m, check.expected_m, check.tolerance_m].map(|m| m * 1e6);
+            let [seen, expected, tolerance] =
+                [check.seen_m, check.expected_m, check.tolerance_m].map(|m| m * 1e6);
             let fails = check.finding == Finding::Fails;
-            fails.then(|| format!("{what} {seen:+.1} um, expected {expected:+.1} +- {tolerance:.1} um: {remedy}"))
+            fails.then(|| {
+                format!(
+                    "{what} {seen:+.1} um, expected {expected:+.1} +- {tolerance:.1} um: {remedy}"
+                )
+            })
         };
         let askew = "the cable pulls in X, or something touches the stage";
         let rest = length("without current the stage rests in X at", &self.rest, askew);
-        let read = self
-            .read
-            .as_ref()
-            .and_then(|read| length("the displacement in Y is", read, "look at the weight and the pulley"));
-        rest.into_iter().chain(read).chain(self.modes.iter().filter_map(ModeCheck::failure)).collect()
+        let read = self.read.as_ref().and_then(|read| {
+            length(
+                "the displacement in Y is",
+                read,
+                "look at the weight and the pulley",
+            )
+        });
+        rest.into_iter()
+            .chain(read)
+            .chain(self.modes.iter().filter_map(ModeCheck::failure))
+            .collect()
     }
 }
 
 impl ModeCheck {
     fn failure(&self) -> Option<String> {
         let (expected, bare) = (self.expected_hz, self.unloaded_hz);
-        let sign = |sign: Option<char>| sign.map_or(String::new(), |sign| format!(", residue {sign}"));
+        let sign =
+            |sign: Option<char>| sign.map_or(String::new(), |sign| format!(", residue {sign}"));
         let seen = match self.seen_hz {
             Some(hz) => format!("is at {hz:.2} Hz{}", sign(self.seen_sign)),
             None => "is not seen".to_string(),
         };
         let signed = sign(self.expected_sign);
-        let what = format!("the mode expected at {expected:.2} Hz{signed} ({bare:.2} Hz with nothing on) {seen}");
+        let what = format!(
+            "the mode expected at {expected:.2} Hz{signed} ({bare:.2} Hz with nothing on) {seen}"
+        );
         (self.finding == Finding::Fails).then_some(what)
     }
 }

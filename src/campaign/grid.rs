@@ -33,11 +33,20 @@ pub struct Place {
 impl Grid {
     /// A grid for the stage of a configuration: refuses a model without operating point and asymmetry, more than 10,000
     /// points, and values that the configuration does not allow.
-    pub fn new(operating_points: Vec<f64>, asymmetries: Vec<f64>, config: &Config) -> Result<Grid, CampaignError> {
-        let grid = Grid { operating_points, asymmetries };
+    pub fn new(
+        operating_points: Vec<f64>,
+        asymmetries: Vec<f64>,
+        config: &Config,
+    ) -> Result<Grid, CampaignError> {
+        let grid = Grid {
+            operating_points,
+            asymmetries,
+        };
         let count = grid.operating_points.len() * grid.asymmetries.len();
         if !(1..=MOST).contains(&count) {
-            return Err(CampaignError::Grid(format!("{count} points; a campaign has from 1 to {MOST}: take fewer")));
+            return Err(CampaignError::Grid(format!(
+                "{count} points; a campaign has from 1 to {MOST}: take fewer"
+            )));
         }
         settings(config)?;
         // Every range of a setting is an interval: what the values at the ends may be, those between may be.
@@ -53,13 +62,16 @@ impl Grid {
 
     /// The asymmetry that the smallest mass makes, a ratio of m3.
     pub fn mass_step(&self, config: &Config) -> f64 {
-        settings(config).map_or(MASS_STEP_KG, |settings| MASS_STEP_KG / settings.secondary_stage_mass_kg)
+        settings(config).map_or(MASS_STEP_KG, |settings| {
+            MASS_STEP_KG / settings.secondary_stage_mass_kg
+        })
     }
 
     /// All points, row by row.
     pub fn places(&self) -> impl Iterator<Item = Place> + '_ {
         let columns = self.asymmetries.len();
-        (0..self.operating_points.len()).flat_map(move |row| (0..columns).map(move |column| Place { row, column }))
+        (0..self.operating_points.len())
+            .flat_map(move |row| (0..columns).map(move |column| Place { row, column }))
     }
 
     /// The configuration of a point: that of the campaign there, with a seed of its own, which is the point's alone.
@@ -73,7 +85,9 @@ impl Grid {
         there.plant = PlantSettings::Sr4dof(settings);
         let index = place.row * self.asymmetries.len() + place.column;
         there.sim.seed = config.sim.seed.wrapping_add(index as u64) % SEEDS;
-        recheck(&there).map_err(|error| CampaignError::Grid(format!("the grid leaves what is allowed: {error}")))?;
+        recheck(&there).map_err(|error| {
+            CampaignError::Grid(format!("the grid leaves what is allowed: {error}"))
+        })?;
         Ok(there)
     }
 }

@@ -34,8 +34,10 @@ impl Load {
         let (stage, with) = (settings(config)?, &config.campaign);
         let (wanted, built) = (1.0 + stage.mass_asymmetry, 1.0 + with.built_asymmetry);
         let (m2, m3) = (wanted - built, built / wanted - 1.0);
-        let stepped =
-            |share: f64| MASS_STEP_KG * libm::round(share.max(0.0) * stage.secondary_stage_mass_kg / MASS_STEP_KG);
+        let stepped = |share: f64| {
+            MASS_STEP_KG
+                * libm::round(share.max(0.0) * stage.secondary_stage_mass_kg / MASS_STEP_KG)
+        };
         Ok(Load {
             hung_kg: holding_force_n(stage) / (GRAVITY_M_PER_S2 * with.pulley_ratio),
             on_m2_kg: stepped(m2),
@@ -52,8 +54,14 @@ impl Load {
     pub fn carried(&self, config: &Config) -> Result<PlantSettings, CampaignError> {
         let (stage, with) = (settings(config)?, &config.campaign);
         let built_kg = stage.secondary_stage_mass_kg;
-        let (m2_kg, m3_kg) = (built_kg * (1.0 + with.built_asymmetry) + self.on_m2_kg, built_kg + self.on_m3_kg);
-        let soft = Sr4dofSettings { operating_point_m: 1.0, ..stage.clone() };
+        let (m2_kg, m3_kg) = (
+            built_kg * (1.0 + with.built_asymmetry) + self.on_m2_kg,
+            built_kg + self.on_m3_kg,
+        );
+        let soft = Sr4dofSettings {
+            operating_point_m: 1.0,
+            ..stage.clone()
+        };
         Ok(PlantSettings::Sr4dof(Sr4dofSettings {
             secondary_stage_mass_kg: m3_kg,
             mass_asymmetry: m2_kg / m3_kg - 1.0,
@@ -69,8 +77,18 @@ impl Load {
         let side = if down { "-Y" } else { "+Y" };
         let turned = self.hung_kg * before.hung_kg < 0.0;
         let hung_before_kg = if turned { 0.0 } else { before.hung_kg.abs() };
-        let weight = order(&format!("weight in {side}"), self.hung_kg.abs(), hung_before_kg, 1.0, "kg");
-        let first = if turned { "take the weight off the other side; " } else { "" };
+        let weight = order(
+            &format!("weight in {side}"),
+            self.hung_kg.abs(),
+            hung_before_kg,
+            1.0,
+            "kg",
+        );
+        let first = if turned {
+            "take the weight off the other side; "
+        } else {
+            ""
+        };
         let gram = |name: &str, now_kg, before_kg| order(name, now_kg, before_kg, 1e3, "g");
         [
             format!("{first}{weight}"),
@@ -84,7 +102,11 @@ impl Load {
 fn order(name: &str, now_kg: f64, before_kg: f64, per_kg: f64, unit: &str) -> String {
     let decimals = if unit == "kg" { 3 } else { 1 };
     let amount = |kg: f64| format!("{:.decimals$} {unit}", kg * per_kg);
-    let all = if now_kg < NOTHING_KG / 2.0 { "nothing".to_string() } else { format!("{} in all", amount(now_kg)) };
+    let all = if now_kg < NOTHING_KG / 2.0 {
+        "nothing".to_string()
+    } else {
+        format!("{} in all", amount(now_kg))
+    };
     let change = match now_kg - before_kg {
         more if more > NOTHING_KG / 2.0 => format!("put on {}", amount(more)),
         less if less < -NOTHING_KG / 2.0 => format!("take off {}", amount(-less)),

@@ -12,7 +12,10 @@ use crate::verdict::{Cnmp, Verdict};
 pub fn measured(run: &mut Run, config: &Config) -> Result<Point, RecordingError> {
     let loop_digest = format!("{:016x}", run.totals()?.loop_digest);
     let analysis = match run.ended.trip {
-        Some((trip, tick)) => Err(format!("the run tripped at tick {tick}: {trip}; {}", trip.remedy())),
+        Some((trip, tick)) => Err(format!(
+            "the run tripped at tick {tick}: {trip}; {}",
+            trip.remedy()
+        )),
         None => match analyse(&Recording::open(&run.path)?, config) {
             Err(AnalysisError::Recording(error)) => return Err(error),
             other => other.map_err(|error| error.to_string()),
@@ -22,14 +25,28 @@ pub fn measured(run: &mut Run, config: &Config) -> Result<Point, RecordingError>
         Ok(analysis) => said(&analysis, loop_digest),
         Err(why) => {
             let (modes_hz, signs, zeros_rad_s) = Default::default();
-            Point { cnmp: Cnmp::Undecided, why, modes_hz, signs, zeros_rad_s, loop_digest, put_on: None }
+            Point {
+                cnmp: Cnmp::Undecided,
+                why,
+                modes_hz,
+                signs,
+                zeros_rad_s,
+                loop_digest,
+                put_on: None,
+            }
         }
     })
 }
 
 fn said(analysis: &Analysis, loop_digest: String) -> Point {
-    let Verdict { cnmp, why, zeros, .. } = analysis.verdict.clone();
-    let modes = analysis.fit.as_ref().map(|fit| fit.modes()).unwrap_or_default();
+    let Verdict {
+        cnmp, why, zeros, ..
+    } = analysis.verdict.clone();
+    let modes = analysis
+        .fit
+        .as_ref()
+        .map(|fit| fit.modes())
+        .unwrap_or_default();
     Point {
         cnmp,
         why,

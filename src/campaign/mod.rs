@@ -62,7 +62,9 @@ pub enum CampaignError {
         differences: Vec<String>,
     },
     /// Something else where the campaign's settings should be.
-    #[error("{path} is not of a campaign ({why}); it is left as it is: name another folder with --out")]
+    #[error(
+        "{path} is not of a campaign ({why}); it is left as it is: name another folder with --out"
+    )]
     NotACampaign {
         /// The file.
         path: String,
@@ -70,7 +72,9 @@ pub enum CampaignError {
         why: String,
     },
     /// A quiet run that says nothing.
-    #[error("{recording} does not tell where the stage rests: {why}; `bench doctor` looks at the probe")]
+    #[error(
+        "{recording} does not tell where the stage rests: {why}; `bench doctor` looks at the probe"
+    )]
     Rest {
         /// The run.
         recording: String,

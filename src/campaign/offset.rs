@@ -59,7 +59,9 @@ pub struct Offset {
 
 /// How many verdicts the model contradicts with an offset.
 pub fn contradicted(region: &Region, said: &[Said], offset: f64) -> usize {
-    said.iter().filter(|one| is_contradicted(region, one, offset)).count()
+    said.iter()
+        .filter(|one| is_contradicted(region, one, offset))
+        .count()
 }
 
 fn is_contradicted(region: &Region, one: &Said, offset: f64) -> bool {
@@ -75,11 +77,20 @@ pub fn offset(region: &Region, said: &[Said]) -> Option<Offset> {
         return None;
     }
     let steps = steps(region, said, [least, most]);
-    let highest = steps.iter().map(|step| step.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+    let highest = steps
+        .iter()
+        .map(|step| step.log_likelihood)
+        .fold(f64::NEG_INFINITY, f64::max);
     let width = |step: &Step| step.to - step.from;
-    let widest =
-        steps.iter().filter(|step| step.log_likelihood == highest).max_by(|a, b| width(a).total_cmp(&width(b)))?;
-    let likely = || steps.iter().filter(|step| 2.0 * (highest - step.log_likelihood) <= CHI2_95);
+    let widest = steps
+        .iter()
+        .filter(|step| step.log_likelihood == highest)
+        .max_by(|a, b| width(a).total_cmp(&width(b)))?;
+    let likely = || {
+        steps
+            .iter()
+            .filter(|step| 2.0 * (highest - step.log_likelihood) <= CHI2_95)
+    };
     Some(Offset {
         best: 0.5 * (widest.from + widest.to),
         interval: [likely().next()?.from, likely().next_back()?.to],
@@ -94,17 +105,32 @@ pub fn offset(region: &Region, said: &[Said]) -> Option<Offset> {
 fn steps(region: &Region, said: &[Said], [least, most]: [f64; 2]) -> Vec<Step> {
     let crossing = |(index, one): (usize, &Said)| {
         let at = one.asymmetry;
-        region.borders(one.row).map(move |border| (border - at, index)).collect::<Vec<_>>()
+        region
+            .borders(one.row)
+            .map(move |border| (border - at, index))
+            .collect::<Vec<_>>()
     };
     let mut crossings: Vec<(f64, usize)> = said.iter().enumerate().flat_map(crossing).collect();
     crossings.retain(|(at, _)| *at > least && *at < most);
     crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut wrong: Vec<bool> = said.iter().map(|one| is_contradicted(region, one, least)).collect();
+    let mut wrong: Vec<bool> = said
+        .iter()
+        .map(|one| is_contradicted(region, one, least))
+        .collect();
     let (mut from, mut steps) = (least, Vec::new());
-    for (to, index) in crossings.into_iter().map(|(at, index)| (at, Some(index))).chain([(most, None)]) {
+    for (to, index) in crossings
+        .into_iter()
+        .map(|(at, index)| (at, Some(index)))
+        .chain([(most, None)])
+    {
         if to > from {
             let contradicted = wrong.iter().filter(|wrong| **wrong).count();
-            steps.push(Step { from, to, contradicted, log_likelihood: log_likelihood(contradicted, said.len()) });
+            steps.push(Step {
+                from,
+                to,
+                contradicted,
+                log_likelihood: log_likelihood(contradicted, said.len()),
+            });
             from = to;
         }
         if let Some(index) = index {

@@ -9,8 +9,15 @@ pub fn order(grid: &Grid, missing: &[Place]) -> Vec<Place> {
     let point = |place: &Place| grid.operating_points[place.row];
     let asymmetry = |place: &Place| grid.asymmetries[place.column];
     places.sort_by(|a, b| {
-        point(a).total_cmp(&point(b)).then(a.row.cmp(&b.row)).then(asymmetry(a).total_cmp(&asymmetry(b)))
+        point(a)
+            .total_cmp(&point(b))
+            .then(a.row.cmp(&b.row))
+            .then(asymmetry(a).total_cmp(&asymmetry(b)))
     });
-    places.chunk_by_mut(|a, b| a.row == b.row).skip(1).step_by(2).for_each(<[Place]>::reverse);
+    places
+        .chunk_by_mut(|a, b| a.row == b.row)
+        .skip(1)
+        .step_by(2)
+        .for_each(<[Place]>::reverse);
     places
 }

@@ -31,7 +31,10 @@ pub fn picture(title: &str, answer: &Answer<'_>) -> Result<String, PictureError>
     let mut maps = vec![map(answer, "(a) The model as configured", 0.0)?];
     let mut rows = Vec::new();
     if let Some(offset) = &answer.offset {
-        let heading = format!("(b) The model with {:+.2} % of initial asymmetry", 100.0 * offset.best);
+        let heading = format!(
+            "(b) The model with {:+.2} % of initial asymmetry",
+            100.0 * offset.best
+        );
         maps.push(map(answer, &heading, offset.best)?);
         rows.push(Row::new(150.0, vec![likelihood(offset)]));
     }
@@ -55,7 +58,11 @@ fn map(answer: &Answer<'_>, heading: &str, offset: f64) -> Result<Chart, Picture
     if let Some(best) = &answer.recommendation {
         let (low, high) = ends(&answer.grid.operating_points);
         let at = 100.0 * best.asymmetry;
-        chart = chart.line("recommended", Pen::dashed(GREEN), vec![(at, 100.0 * low), (at, 100.0 * high)]);
+        chart = chart.line(
+            "recommended",
+            Pen::dashed(GREEN),
+            vec![(at, 100.0 * low), (at, 100.0 * high)],
+        );
     }
     Ok(chart)
 }
@@ -63,23 +70,38 @@ fn map(answer: &Answer<'_>, heading: &str, offset: f64) -> Result<Chart, Picture
 /// Where a verdict was given, in per cent.
 fn dots(answer: &Answer<'_>, cnmp: Cnmp) -> Vec<(f64, f64)> {
     let told = answer.points.iter().filter(|told| told.point.cnmp == cnmp);
-    told.map(|told| (100.0 * told.asymmetry, 100.0 * told.operating_point)).collect()
+    told.map(|told| (100.0 * told.asymmetry, 100.0 * told.operating_point))
+        .collect()
 }
 
 fn cells(answer: &Answer<'_>, offset: f64) -> Result<Mark, PictureError> {
     let [(low, high), _] = frame(answer);
     let width = high - low;
-    let asymmetries: Vec<f64> = (0..COLUMNS).map(|k| low + width * (k as f64 + 0.5) / COLUMNS as f64).collect();
-    let shifted: Vec<f64> = asymmetries.iter().map(|asymmetry| asymmetry + offset).collect();
-    let undamped = cnmp_map(answer.settings, &answer.region.operating_points, &shifted, 1)?;
+    let asymmetries: Vec<f64> = (0..COLUMNS)
+        .map(|k| low + width * (k as f64 + 0.5) / COLUMNS as f64)
+        .collect();
+    let shifted: Vec<f64> = asymmetries
+        .iter()
+        .map(|asymmetry| asymmetry + offset)
+        .collect();
+    let undamped = cnmp_map(
+        answer.settings,
+        &answer.region.operating_points,
+        &shifted,
+        1,
+    )?;
     let cell = |row: usize, column: usize| match answer.region.contains(row, shifted[column]) {
         true => 2,
         false => usize::from(undamped[row][column] > 0),
     };
     Ok(Mark::Cells {
-        x: (0..=COLUMNS).map(|k| 100.0 * (low + width * k as f64 / COLUMNS as f64)).collect(),
+        x: (0..=COLUMNS)
+            .map(|k| 100.0 * (low + width * k as f64 / COLUMNS as f64))
+            .collect(),
         y: edges(&answer.region.operating_points),
-        rows: (0..undamped.len()).map(|row| (0..COLUMNS).map(|column| cell(row, column)).collect()).collect(),
+        rows: (0..undamped.len())
+            .map(|row| (0..COLUMNS).map(|column| cell(row, column)).collect())
+            .collect(),
         colours: vec![
             (String::new(), PAPER),
             ("CNMP zeros without damping only".into(), UNDAMPED),
@@ -92,24 +114,44 @@ fn cells(answer: &Answer<'_>, offset: f64) -> Result<Mark, PictureError> {
 fn frame(answer: &Answer<'_>) -> [(f64, f64); 2] {
     let (low, high) = ends(&answer.grid.asymmetries);
     let margin = 0.05 * (high - low);
-    [(low - margin, high + margin), ends(&answer.region.operating_points)]
+    [
+        (low - margin, high + margin),
+        ends(&answer.region.operating_points),
+    ]
 }
 
 /// Edges of the cells around rising values, in per cent.
 fn edges(values: &[f64]) -> Vec<f64> {
     let (low, high) = ends(values);
     let half = 0.5 * (high - low) / (values.len().max(2) - 1) as f64;
-    values.iter().map(|value| 100.0 * (value - half)).chain([100.0 * (high + half)]).collect()
+    values
+        .iter()
+        .map(|value| 100.0 * (value - half))
+        .chain([100.0 * (high + half)])
+        .collect()
 }
 
 fn ends(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        })
 }
 
 fn likelihood(offset: &Offset) -> Chart {
-    let highest = offset.steps.iter().map(|step| step.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+    let highest = offset
+        .steps
+        .iter()
+        .map(|step| step.log_likelihood)
+        .fold(f64::NEG_INFINITY, f64::max);
     let level = |step: &super::Step| step.log_likelihood - highest;
-    let corners = |step: &super::Step| [(100.0 * step.from, level(step)), (100.0 * step.to, level(step))];
+    let corners = |step: &super::Step| {
+        [
+            (100.0 * step.from, level(step)),
+            (100.0 * step.to, level(step)),
+        ]
+    };
     let lowest = offset.steps.iter().map(level).fold(-3.0, f64::min);
     let limit = -0.5 * CHI2_95;
     let [low, high] = offset.interval.map(|end| 100.0 * end);
@@ -123,8 +165,21 @@ fn likelihood(offset: &Offset) -> Chart {
         name: "interval of 95 %".into(),
         colour: GREEN,
         strength: 0.25,
-        outline: vec![(low, 1.08 * lowest), (high, 1.08 * lowest), (high, 0.0), (low, 0.0)],
+        outline: vec![
+            (low, 1.08 * lowest),
+            (high, 1.08 * lowest),
+            (high, 0.0),
+            (low, 0.0),
+        ],
     })
-    .line("", Pen::dotted(INK).thin(), vec![(from, limit), (to, limit)])
-    .line("", Pen::solid(BLUE), offset.steps.iter().flat_map(corners).collect())
+    .line(
+        "",
+        Pen::dotted(INK).thin(),
+        vec![(from, limit), (to, limit)],
+    )
+    .line(
+        "",
+        Pen::solid(BLUE),
+        offset.steps.iter().flat_map(corners).collect(),
+    )
 }

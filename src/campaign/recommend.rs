@@ -50,21 +50,34 @@ pub fn recommend(
 ) -> Option<Recommendation> {
     let (first, last) = (candidates.first()?, candidates.last()?);
     let seen = |asymmetry: f64| {
-        said.iter().any(|one| one.detected && (one.asymmetry - asymmetry).abs() <= tolerances.asymmetry)
+        said.iter()
+            .any(|one| one.detected && (one.asymmetry - asymmetry).abs() <= tolerances.asymmetry)
     };
     let judged = |&asymmetry: &f64| {
-        let near = nearest(region, range, [asymmetry + offset[0], asymmetry + offset[1]], tolerances);
+        let near = nearest(
+            region,
+            range,
+            [asymmetry + offset[0], asymmetry + offset[1]],
+            tolerances,
+        );
         let free = near.is_none_or(|near| near.distance > 0.0) && !seen(asymmetry);
         free.then_some(Recommendation {
             asymmetry,
             distance_tolerances: near.map(|near| near.distance),
-            nearest: near.map(|near| [near.operating_point, near.asymmetry - (near.end - asymmetry)]),
+            nearest: near.map(|near| {
+                [
+                    near.operating_point,
+                    near.asymmetry - (near.end - asymmetry),
+                ]
+            }),
             at_the_end: asymmetry == *first || asymmetry == *last,
         })
     };
     let distance = |one: &Recommendation| one.distance_tolerances.unwrap_or(f64::INFINITY);
     let better = |a: &Recommendation, b: &Recommendation| {
-        distance(a).total_cmp(&distance(b)).then(b.asymmetry.abs().total_cmp(&a.asymmetry.abs()))
+        distance(a)
+            .total_cmp(&distance(b))
+            .then(b.asymmetry.abs().total_cmp(&a.asymmetry.abs()))
     };
     candidates.iter().filter_map(judged).max_by(better)
 }
@@ -79,13 +92,28 @@ struct Near {
     end: f64,
 }
 
-fn nearest(region: &Region, range: [f64; 2], stage: [f64; 2], tolerances: Tolerances) -> Option<Near> {
+fn nearest(
+    region: &Region,
+    range: [f64; 2],
+    stage: [f64; 2],
+    tolerances: Tolerances,
+) -> Option<Near> {
     let of_row = |(row, &operating_point): (usize, &f64)| {
-        let away = (range[0] - operating_point).max(operating_point - range[1]).max(0.0);
+        let away = (range[0] - operating_point)
+            .max(operating_point - range[1])
+            .max(0.0);
         region.bands[row].iter().map(move |band| {
             let (gap, asymmetry, end) = gap(stage, *band);
-            let distance = libm::hypot(gap / tolerances.asymmetry, away / tolerances.operating_point);
-            Near { distance, operating_point, asymmetry, end }
+            let distance = libm::hypot(
+                gap / tolerances.asymmetry,
+                away / tolerances.operating_point,
+            );
+            Near {
+                distance,
+                operating_point,
+                asymmetry,
+                end,
+            }
         })
     };
     let all = region.operating_points.iter().enumerate().flat_map(of_row);

@@ -23,34 +23,66 @@ pub struct Region {
 impl Region {
     /// By the zeros with damping of `settings` at these operating points (ratios Y1o/L), between two asymmetries. Fails where
     /// the model cannot be analysed.
-    pub fn of(settings: &Sr4dofSettings, operating_points: &[f64], searched: [f64; 2]) -> Result<Region, PlantError> {
+    pub fn of(
+        settings: &Sr4dofSettings,
+        operating_points: &[f64],
+        searched: [f64; 2],
+    ) -> Result<Region, PlantError> {
         let row = |&point: &f64| bands(searched, |asymmetry| has_pairs(settings, point, asymmetry));
         let bands = operating_points.iter().map(row).collect::<Result<_, _>>()?;
-        Ok(Region { operating_points: operating_points.into(), bands, searched })
+        Ok(Region {
+            operating_points: operating_points.into(),
+            bands,
+            searched,
+        })
     }
 
     /// Whether there are CNMP zeros at an operating point, by its index, and an asymmetry.
     pub fn contains(&self, row: usize, asymmetry: f64) -> bool {
-        self.bands[row].iter().any(|[from, to]| (*from..*to).contains(&asymmetry))
+        self.bands[row]
+            .iter()
+            .any(|[from, to]| (*from..*to).contains(&asymmetry))
     }
 
     /// The borders at an operating point, by its index: asymmetries.
     pub fn borders(&self, row: usize) -> impl Iterator<Item = f64> + '_ {
-        self.bands[row].iter().flatten().copied().filter(|border| !self.searched.contains(border))
+        self.bands[row]
+            .iter()
+            .flatten()
+            .copied()
+            .filter(|border| !self.searched.contains(border))
     }
 }
 
 /// Whether the zeros with damping of SR4DoF have a CNMP pair among them.
 fn has_pairs(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<bool, PlantError> {
     let operating_point_m = point * settings.beam_length_m;
-    let there = Sr4dofSettings { operating_point_m, mass_asymmetry: asymmetry, ..settings.clone() };
-    Ok(cnmp_pairs(&damped_zeros(&plant::build(&PlantSettings::Sr4dof(there))?)?) > 0)
+    let there = Sr4dofSettings {
+        operating_point_m,
+        mass_asymmetry: asymmetry,
+        ..settings.clone()
+    };
+    Ok(
+        cnmp_pairs(&damped_zeros(&plant::build(&PlantSettings::Sr4dof(
+            there,
+        ))?)?)
+            > 0,
+    )
 }
 
 /// The bands in which `has` holds: by steps, and halvings where it changes between two.
-fn bands([low, high]: [f64; 2], has: impl Fn(f64) -> Result<bool, PlantError>) -> Result<Vec<[f64; 2]>, PlantError> {
+fn bands(
+    [low, high]: [f64; 2],
+    has: impl Fn(f64) -> Result<bool, PlantError>,
+) -> Result<Vec<[f64; 2]>, PlantError> {
     let steps = libm::ceil((high - low) / STEP).max(1.0) as usize;
-    let at = |k: usize| if k == steps { high } else { low + (high - low) * k as f64 / steps as f64 };
+    let at = |k: usize| {
+        if k == steps {
+            high
+        } else {
+            low + (high - low) * k as f64 / steps as f64
+        }
+    };
     let (mut bands, mut inside) = (Vec::new(), has(low)?.then_some(low));
     for k in 1..=steps {
         let now = has(at(k))?;
@@ -75,7 +107,11 @@ fn halved(
 ) -> Result<f64, PlantError> {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if has(middle)? == after { high = middle } else { low = middle }
+        if has(middle)? == after {
+            high = middle
+        } else {
+            low = middle
+        }
     }
     Ok(0.5 * (low + high))
 }
@@ -86,7 +122,8 @@ mod tests {
 
     #[test]
     fn bands_are_found_wherever_they_begin_and_end() {
-        let within = |bands: [[f64; 2]; 2]| move |x: f64| Ok(bands.iter().any(|[a, b]| x >= *a && x < *b));
+        let within =
+            |bands: [[f64; 2]; 2]| move |x: f64| Ok(bands.iter().any(|[a, b]| x >= *a && x < *b));
         let near = |found: &[[f64; 2]], expected: &[[f64; 2]]| {
             assert_eq!(found.len(), expected.len(), "{found:?}");
             for (a, b) in found.iter().flatten().zip(expected.iter().flatten()) {
@@ -98,6 +135,9 @@ mod tests {
         let open = bands([-0.1, 0.1], within([[-1.0, -0.02], [0.05, 1.0]])).expect("bands");
         near(&open, &[[-0.1, -0.02], [0.05, 0.1]]);
         assert!(bands([-0.1, 0.1], |_| Ok(false)).expect("bands").is_empty());
-        near(&bands([-0.1, 0.1], |_| Ok(true)).expect("bands"), &[[-0.1, 0.1]]);
+        near(
+            &bands([-0.1, 0.1], |_| Ok(true)).expect("bands"),
+            &[[-0.1, 0.1]],
+        );
     }
 }

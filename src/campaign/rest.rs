@@ -28,7 +28,10 @@ pub struct Rest {
 impl Rest {
     /// Of a recording. Refuses one with fewer than twenty valid readings.
     pub fn of(recording: &Recording, name: &str) -> Result<Rest, CampaignError> {
-        let failed = |why: String| CampaignError::Rest { recording: name.to_string(), why };
+        let failed = |why: String| CampaignError::Rest {
+            recording: name.to_string(),
+            why,
+        };
         let mut readings = Vec::new();
         for record in recording.ticks().map_err(|e| failed(e.to_string()))? {
             let record = record.map_err(|e| failed(e.to_string()))?;
@@ -37,10 +40,18 @@ impl Rest {
             }
         }
         if readings.len() < STRETCHES * LEAST {
-            return Err(failed(format!("{} valid readings, {} are needed", readings.len(), STRETCHES * LEAST)));
+            return Err(failed(format!(
+                "{} valid readings, {} are needed",
+                readings.len(),
+                STRETCHES * LEAST
+            )));
         }
         let (mean_m, scatter_m) = scatter(&readings);
-        Ok(Rest { mean_m, sigma_m: scatter_m / (STRETCHES as f64).sqrt(), recording: name.to_string() })
+        Ok(Rest {
+            mean_m,
+            sigma_m: scatter_m / (STRETCHES as f64).sqrt(),
+            recording: name.to_string(),
+        })
     }
 }
 
@@ -50,7 +61,9 @@ fn scatter(readings: &[f64]) -> (f64, f64) {
     let begin = |k: usize| k * readings.len() / STRETCHES;
     for k in 0..STRETCHES {
         let mut within = Moments::default();
-        readings[begin(k)..begin(k + 1)].iter().for_each(|x| within.push(*x));
+        readings[begin(k)..begin(k + 1)]
+            .iter()
+            .for_each(|x| within.push(*x));
         means.push(within.mean);
     }
     readings.iter().for_each(|x| all.push(*x));
@@ -66,12 +79,20 @@ mod tests {
     fn ten_stretches_make_the_scatter_however_many_readings_there_are() {
         for count in [20, 29, 1000, 1009] {
             // Stretch by stretch 1 and -1, each with all of its readings.
-            let stretch =
-                |k: usize| (0..STRETCHES).rfind(|i| i * count / STRETCHES <= k).expect("the first begins at 0");
-            let readings: Vec<f64> = (0..count).map(|k| if stretch(k) % 2 == 0 { 1.0 } else { -1.0 }).collect();
+            let stretch = |k: usize| {
+                (0..STRETCHES)
+                    .rfind(|i| i * count / STRETCHES <= k)
+                    .expect("the first begins at 0")
+            };
+            let readings: Vec<f64> = (0..count)
+                .map(|k| if stretch(k) % 2 == 0 { 1.0 } else { -1.0 })
+                .collect();
             let (mean, scatter) = scatter(&readings);
             // Ten means of size 1 about 0: sqrt(10/9). Five stretches of either sign differ by five readings at most.
-            assert!((scatter - (10.0_f64 / 9.0).sqrt()).abs() < 1e-12, "{count}: {scatter}");
+            assert!(
+                (scatter - (10.0_f64 / 9.0).sqrt()).abs() < 1e-12,
+                "{count}: {scatter}"
+            );
             assert!(mean.abs() <= 5.0 / count as f64, "{count}: {mean}");
         }
     }

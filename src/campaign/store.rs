@@ -90,19 +90,34 @@ impl Store {
     /// Opens the folder of a campaign, or makes it. Refuses one of other settings, one that was simulated for one on devices
     /// and the other way round, one that another process works on, and one whose `campaign.json` is something else; leaves these
     /// as they are.
-    pub fn open(folder: &Path, grid: &Grid, config: &Config, on_devices: bool) -> Result<Found, CampaignError> {
+    pub fn open(
+        folder: &Path,
+        grid: &Grid,
+        config: &Config,
+        on_devices: bool,
+    ) -> Result<Found, CampaignError> {
         let points = folder.join("points");
         std::fs::create_dir_all(&points).map_err(|e| failed("make", &points, &e))?;
         let lock = File::open(folder).map_err(|e| failed("open", folder, &e))?;
         locked(lock.try_lock(), folder)?;
-        let header = json(&Header { format: FORMAT, version: env!("CARGO_PKG_VERSION"), on_devices, grid, config })?;
+        let header = json(&Header {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION"),
+            on_devices,
+            grid,
+            config,
+        })?;
         let path = folder.join("campaign.json");
         match std::fs::read_to_string(&path) {
             Ok(theirs) => same(&path, folder, &theirs, &header)?,
             Err(e) if e.kind() == ErrorKind::NotFound => write(&path, &header)?,
             Err(e) => return Err(failed("read", &path, &e)),
         }
-        let store = Store { folder: folder.into(), campaign: checksum(&header), _lock: lock };
+        let store = Store {
+            folder: folder.into(),
+            campaign: checksum(&header),
+            _lock: lock,
+        };
         let (mut done, mut dropped) = (Vec::new(), Vec::new());
         for place in grid.places() {
             match store.read(place) {
@@ -111,12 +126,20 @@ impl Store {
                 Err(why) => dropped.push(format!("{} {why}", store.path(place).display())),
             }
         }
-        Ok(Found { store, done, dropped })
+        Ok(Found {
+            store,
+            done,
+            dropped,
+        })
     }
 
     /// Writes the result of a point.
     pub fn add(&self, place: Place, point: &Point) -> Result<(), CampaignError> {
-        let record = Record { campaign: self.campaign.clone(), place, point: point.clone() };
+        let record = Record {
+            campaign: self.campaign.clone(),
+            place,
+            point: point.clone(),
+        };
         write(&self.path(place), &json(&record)?)
     }
 
@@ -135,7 +158,8 @@ impl Store {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             text => text.map_err(|e| format!("cannot be read ({e})"))?,
         };
-        let record: Record = serde_json::from_str(&text).map_err(|e| format!("is torn or damaged ({e})"))?;
+        let record: Record =
+            serde_json::from_str(&text).map_err(|e| format!("is torn or damaged ({e})"))?;
         match record.campaign == self.campaign && record.place == place {
             true => Ok(Some(record.point)),
             false => Err("is of another campaign or another point".into()),
@@ -153,8 +177,12 @@ fn write(path: &Path, text: &str) -> Result<(), CampaignError> {
 
 /// Refuses what is no campaign, or one of other settings.
 fn same(path: &Path, folder: &Path, theirs: &str, ours: &str) -> Result<(), CampaignError> {
-    let wrong = |why: String| CampaignError::NotACampaign { path: path.display().to_string(), why };
-    let found: Value = serde_json::from_str(theirs).map_err(|e| wrong(format!("it is not JSON: {e}")))?;
+    let wrong = |why: String| CampaignError::NotACampaign {
+        path: path.display().to_string(),
+        why,
+    };
+    let found: Value =
+        serde_json::from_str(theirs).map_err(|e| wrong(format!("it is not JSON: {e}")))?;
     match found.get("format").and_then(Value::as_str) {
         Some(FORMAT) => {}
         Some(other) => return Err(wrong(format!("its format is `{other}`, not `{FORMAT}`"))),
@@ -167,11 +195,20 @@ fn same(path: &Path, folder: &Path, theirs: &str, ours: &str) -> Result<(), Camp
         differences.push(format!("  and {more} more"));
     }
     let folder = folder.display().to_string();
-    if differences.is_empty() { Ok(()) } else { Err(CampaignError::Other { folder, differences }) }
+    if differences.is_empty() {
+        Ok(())
+    } else {
+        Err(CampaignError::Other {
+            folder,
+            differences,
+        })
+    }
 }
 
 fn json(value: &impl Serialize) -> Result<String, CampaignError> {
-    let wrong = |e: serde_json::Error| CampaignError::Grid(format!("the settings cannot be written as JSON: {e}"));
+    let wrong = |e: serde_json::Error| {
+        CampaignError::Grid(format!("the settings cannot be written as JSON: {e}"))
+    };
     Ok(serde_json::to_string_pretty(value).map_err(wrong)? + "\n")
 }
 
@@ -194,8 +231,15 @@ fn locked(locked: Result<(), TryLockError>, folder: &Path) -> Result<(), Campaig
 
 fn failed(what: &'static str, path: &Path, error: &std::io::Error) -> CampaignError {
     let remedy = match what {
-        "write" => "the points done so far are kept: make room and start it again with the same arguments",
+        "write" => {
+            "the points done so far are kept: make room and start it again with the same arguments"
+        }
         _ => "check that the folder can be read and written, or name another with --out",
     };
-    CampaignError::File { what, path: path.display().to_string(), why: error.to_string(), remedy }
+    CampaignError::File {
+        what,
+        path: path.display().to_string(),
+        why: error.to_string(),
+        remedy,
+    }
 }

@@ -17,7 +17,12 @@ pub fn work<E: Send>(
 ) -> Result<(), E> {
     let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
     let stopped = || stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed);
-    let following = || missing.get(next.fetch_add(1, Ordering::Relaxed)).copied().filter(|_| !stopped());
+    let following = || {
+        missing
+            .get(next.fetch_add(1, Ordering::Relaxed))
+            .copied()
+            .filter(|_| !stopped())
+    };
     std::thread::scope(|scope| {
         let threads = threads.clamp(1, missing.len().max(1));
         let (tell, told) = sync_channel(threads);
@@ -36,7 +41,8 @@ pub fn work<E: Send>(
         let mut result = Ok(());
         // Points that end after an error count all the same: they are measured.
         for measured in told {
-            let taken = measured.and_then(|point| point.map_or(Ok(()), |(place, point)| take(place, point)));
+            let taken = measured
+                .and_then(|point| point.map_or(Ok(()), |(place, point)| take(place, point)));
             failed.fetch_or(taken.is_err(), Ordering::Relaxed);
             result = result.and(taken);
         }

@@ -52,7 +52,8 @@ pub(super) struct Made {
 }
 
 /// Why nothing was made: a person wished so.
-const STOPPED: &str = "stopped before the analysis was done; the recording is whole: `bench identify` analyses it";
+const STOPPED: &str =
+    "stopped before the analysis was done; the recording is whole: `bench identify` analyses it";
 
 impl From<AnalysisError> for CliError {
     fn from(error: AnalysisError) -> Self {
@@ -61,14 +62,24 @@ impl From<AnalysisError> for CliError {
 }
 
 /// Analyses a recording; the files stand beside a path, that of the recording or another, under its name.
-pub(super) fn make(recording: &Recording, config: &Config, beside: &Path) -> Result<Made, CliError> {
+pub(super) fn make(
+    recording: &Recording,
+    config: &Config,
+    beside: &Path,
+) -> Result<Made, CliError> {
     let analysis = &analyse(recording, config)?;
     let csv_path = free(beside, "frf", "csv");
-    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
+    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere)
+        .map_err(|e| CliError::Failed(e.to_string()))?;
     let plain_path = free(beside, "frf_without_delay", "csv");
     let plain = analysis.frf.earlier(analysis.measured_delay_s());
-    csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
-    let run = AnalysedRun { analysis, config, recording };
+    csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere)
+        .map_err(|e| CliError::Failed(e.to_string()))?;
+    let run = AnalysedRun {
+        analysis,
+        config,
+        recording,
+    };
     let Drawn { plots, report } = drawn(&run, beside)?;
     Ok(Made {
         frf_csv: Some(csv_path.display().to_string()),
@@ -83,7 +94,11 @@ pub(super) fn make(recording: &Recording, config: &Config, beside: &Path) -> Res
         delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
         delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
         shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
-        closed: analysis.closed.as_ref().map(|closed| LoopMade::of(closed, beside)).transpose()?,
+        closed: analysis
+            .closed
+            .as_ref()
+            .map(|closed| LoopMade::of(closed, beside))
+            .transpose()?,
         linearity: analysis.linearity.as_ref().map(LinearityMade::of),
         fitted: analysis.fit.as_ref().map_or(Vec::new(), ModalFit::modes),
     })
@@ -121,7 +136,8 @@ impl Made {
     }
 
     pub fn text(&self) -> String {
-        let (Some(frf_csv), Some(report), Some(coherence)) = (&self.frf_csv, &self.report, self.coherence_median)
+        let (Some(frf_csv), Some(report), Some(coherence)) =
+            (&self.frf_csv, &self.report, self.coherence_median)
         else {
             return format!("  no frequency response: {}\n", self.shown.why());
         };
@@ -130,7 +146,11 @@ impl Made {
         } else {
             String::new()
         };
-        let delay = match (self.delay_s, self.delay_beyond_model_s, self.delay_beyond_model_sigma_s) {
+        let delay = match (
+            self.delay_s,
+            self.delay_beyond_model_s,
+            self.delay_beyond_model_sigma_s,
+        ) {
             (Some(delay_s), Some(beyond_s), Some(sigma_s)) => format!(
                 "  delay      {:.3} ms from command to reading: {:.3} ms by the configuration, {:+.4} +- {:.4} ms beyond by the phases\n",
                 (delay_s + beyond_s) * 1e3,
@@ -147,7 +167,9 @@ impl Made {
             coherence,
             self.closed.as_ref().map_or(String::new(), LoopMade::text),
             self.frf_without_delay_csv.as_deref().unwrap_or_default(),
-            self.linearity.as_ref().map_or(String::new(), LinearityMade::line),
+            self.linearity
+                .as_ref()
+                .map_or(String::new(), LinearityMade::line),
             plots_text(&self.plots),
             self.shown.text()
         )
@@ -174,12 +196,19 @@ pub(super) fn drawn(record: &dyn Analysed, beside: &Path) -> Result<Drawn, CliEr
     }
     let report = free(beside, "report", "html");
     write_new(&report, &page(record, &pictures))?;
-    Ok(Drawn { plots, report: report.display().to_string() })
+    Ok(Drawn {
+        plots,
+        report: report.display().to_string(),
+    })
 }
 
 /// A line for each picture.
 pub(super) fn plots_text(plots: &Plots) -> String {
-    plots.values().flatten().map(|path| format!("  plot       {path}\n")).collect()
+    plots
+        .values()
+        .flatten()
+        .map(|path| format!("  plot       {path}\n"))
+        .collect()
 }
 
 /// Every name, and no picture.
@@ -189,7 +218,9 @@ fn no_plots() -> Plots {
 
 /// The path under which a file would stand in a folder, which is made if it is not there; without one its own.
 pub(super) fn in_folder(folder: Option<&Path>, path: &Path) -> Result<PathBuf, CliError> {
-    let Some(folder) = folder else { return Ok(path.to_owned()) };
+    let Some(folder) = folder else {
+        return Ok(path.to_owned());
+    };
     let failed = |e| CliError::Failed(format!("cannot make the folder {}: {e}", folder.display()));
     std::fs::create_dir_all(folder).map_err(failed)?;
     Ok(folder.join(path.file_name().unwrap_or_default()))
@@ -198,14 +229,29 @@ pub(super) fn in_folder(folder: Option<&Path>, path: &Path) -> Result<PathBuf, C
 /// `NAME_what.ext` beside the recording, with -2, -3, ... where that is taken.
 pub(super) fn free(recording: &Path, what: &str, extension: &str) -> PathBuf {
     let stem = recording.file_stem().unwrap_or_default().to_string_lossy();
-    let numbered = |n: u32| if n == 1 { String::new() } else { format!("-{n}") };
-    let path = |n: u32| recording.with_file_name(format!("{stem}_{what}{}.{extension}", numbered(n)));
-    (1..).map(path).find(|path| !path.exists()).unwrap_or_else(|| path(1))
+    let numbered = |n: u32| {
+        if n == 1 {
+            String::new()
+        } else {
+            format!("-{n}")
+        }
+    };
+    let path =
+        |n: u32| recording.with_file_name(format!("{stem}_{what}{}.{extension}", numbered(n)));
+    (1..)
+        .map(path)
+        .find(|path| !path.exists())
+        .unwrap_or_else(|| path(1))
 }
 
 pub(super) fn write_new(path: &Path, text: &str) -> Result<(), CliError> {
     let failed = |e: std::io::Error| {
-        CliError::Failed(format!("cannot write {}: {e}; free some space or choose another folder", path.display()))
+        CliError::Failed(format!(
+            "cannot write {}: {e}; free some space or choose another folder",
+            path.display()
+        ))
     };
-    std::fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)
+    std::fs::File::create_new(path)
+        .and_then(|mut file| file.write_all(text.as_bytes()))
+        .map_err(failed)
 }

@@ -8,7 +8,9 @@ use serde::Serialize;
 use super::options::{BenchOptions, print_json, print_text};
 use super::run_options::{RunOptions, RunReport, finish};
 use super::{CliError, Outcome};
-use crate::calibration::{AmplifierCalibration, Calibration, ChainCalibration, Fit, ProbeCalibration, fit};
+use crate::calibration::{
+    AmplifierCalibration, Calibration, ChainCalibration, Fit, ProbeCalibration, fit,
+};
 use crate::config::{Config, ExcitationKind, Purpose};
 use crate::excitation::{self, Extremes, Staircase};
 use crate::plant::{self, Modal, PlantError, Sampled};
@@ -47,7 +49,9 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let amplitude = args.amplitude.map(|a| format!("calibrate.amplitude_a={}", toml::Value::from(a)));
+    let amplitude = args
+        .amplitude
+        .map(|a| format!("calibrate.amplitude_a={}", toml::Value::from(a)));
     let mut config = args.bench.load(Purpose::Chirp, amplitude.as_slice())?;
     config.calibration.file = None;
     shorten(&mut config);
@@ -59,7 +63,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     } else {
         print_text(&text(&report, &config))?
     }
-    Ok(if report.calibration.is_some() { report.run.exit() } else { Outcome::Failed })
+    Ok(if report.calibration.is_some() {
+        report.run.exit()
+    } else {
+        Outcome::Failed
+    })
 }
 
 /// The delay's chirp is that of `[chirp]`, faster, once, whatever else is used otherwise.
@@ -76,7 +84,12 @@ fn shorten(config: &mut Config) {
 fn check(config: &Config) -> Result<(), CliError> {
     compliance_m_per_a(config)?;
     let (period_s, force_constant) = (config.servo.period_s(), config.motor.force_constant_n_per_a);
-    let rig = Sampled::new(&sim::modes(config)?, config.amplifier.bandwidth_hz, force_constant, period_s);
+    let rig = Sampled::new(
+        &sim::modes(config)?,
+        config.amplifier.bandwidth_hz,
+        force_constant,
+        period_s,
+    );
     let extremes = Extremes::of(&Staircase::new(&config.calibrate, period_s), config, &rig);
     let refuse = |found: f64, limit: f64, unit: &str, what: &str| {
         (found > limit).then(|| {
@@ -85,11 +98,29 @@ fn check(config: &Config) -> Result<(), CliError> {
             ))
         })
     };
-    let limit_a = config.amplifier.current_limit_a.min(config.motor.peak_current_a());
+    let limit_a = config
+        .amplifier
+        .current_limit_a
+        .min(config.motor.peak_current_a());
     let cases = [
-        refuse(config.calibrate.amplitude_a, limit_a, "A", "the limit of amplifier and motor"),
-        refuse(extremes.travel_m, config.interlock.soft_limit_m, "m", "the soft limit"),
-        refuse(extremes.thermal_a, config.motor.continuous_current_a(), "A", "the continuous current"),
+        refuse(
+            config.calibrate.amplitude_a,
+            limit_a,
+            "A",
+            "the limit of amplifier and motor",
+        ),
+        refuse(
+            extremes.travel_m,
+            config.interlock.soft_limit_m,
+            "m",
+            "the soft limit",
+        ),
+        refuse(
+            extremes.thermal_a,
+            config.motor.continuous_current_a(),
+            "A",
+            "the continuous current",
+        ),
     ];
     match cases.into_iter().flatten().next() {
         Some(refused) => Err(refused),
@@ -114,17 +145,35 @@ fn steps(args: &Args, config: &Config) -> Result<Steps, CliError> {
         "completed" => fit(&recording, config).map_err(|error| error.to_string()),
         outcome => Err(format!("the run of the static steps {outcome}")),
     };
-    let devices = recording.metadata().iter().map(|(key, value)| (key.clone(), value.clone())).collect();
+    let devices = recording
+        .metadata()
+        .iter()
+        .map(|(key, value)| (key.clone(), value.clone()))
+        .collect();
     finish(run, &report)?;
-    Ok(Steps { run: report, devices, fit })
+    Ok(Steps {
+        run: report,
+        devices,
+        fit,
+    })
 }
 
 fn report(args: &Args, config: &Config, steps: Steps) -> Result<Report, CliError> {
-    let mut report =
-        Report { run: steps.run, delay_recording: None, calibration_file: None, calibration: None, why: None };
+    let mut report = Report {
+        run: steps.run,
+        delay_recording: None,
+        calibration_file: None,
+        calibration: None,
+        why: None,
+    };
     let fit = match steps.fit {
         Ok(fit) => fit,
-        Err(why) => return Ok(Report { why: Some(why), ..report }),
+        Err(why) => {
+            return Ok(Report {
+                why: Some(why),
+                ..report
+            });
+        }
     };
     let mut calibration = calibration(config, &fit, &steps.devices, &report.run.recording)?;
     if !args.no_delay {
@@ -133,7 +182,10 @@ fn report(args: &Args, config: &Config, steps: Steps) -> Result<Report, CliError
     let beside = Path::new(&report.run.recording).with_extension("calibration.toml");
     let path = args.write.clone().unwrap_or(beside);
     calibration.write_new(&path).map_err(|e| {
-        CliError::Failed(format!("cannot write {}: {e}; name another file with --write", path.display()))
+        CliError::Failed(format!(
+            "cannot write {}: {e}; name another file with --write",
+            path.display()
+        ))
     })?;
     report.calibration_file = Some(path.display().to_string());
     report.calibration = Some(calibration);
@@ -149,7 +201,12 @@ fn calibration(
     let model_m_per_a = compliance_m_per_a(config)?;
     let gain = fit.probe_gain(config.calibrate.scale_by, model_m_per_a);
     let (current_gain, current_offset_a) = fit.current.unwrap_or((1.0, 0.0));
-    let device = |key: &str| devices.iter().find(|(k, _)| k == key).map_or(String::new(), |(_, value)| value.clone());
+    let device = |key: &str| {
+        devices
+            .iter()
+            .find(|(k, _)| k == key)
+            .map_or(String::new(), |(_, value)| value.clone())
+    };
     Ok(Calibration {
         made: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         recording: recording.to_string(),
@@ -178,16 +235,25 @@ fn calibration(
 }
 
 /// A chirp with what is known by now in effect, the sign above all; returns its recording.
-fn measure_delay(args: &Args, config: &Config, calibration: &mut Calibration) -> Result<String, CliError> {
+fn measure_delay(
+    args: &Args,
+    config: &Config,
+    calibration: &mut Calibration,
+) -> Result<String, CliError> {
     let plan = Plan::chirp(config.clone());
-    let mut run = args.run.run_calibrated(&plan, "chirp for the delay", Some(calibration.clone()))?;
+    let mut run =
+        args.run
+            .run_calibrated(&plan, "chirp for the delay", Some(calibration.clone()))?;
     let totals = run.totals()?;
     let report = RunReport::new(&run, &totals);
     if report.outcome == "completed" {
         let (path, config) = (run.path.clone(), config.clone());
-        let analysed =
-            unless_stopped(move || -> Result<_, CliError> { Ok(analyse(&Recording::open(&path)?, &config)?) });
-        let analysed = analysed.map_err(|error| CliError::Failed(error.to_string()))?.transpose()?;
+        let analysed = unless_stopped(move || -> Result<_, CliError> {
+            Ok(analyse(&Recording::open(&path)?, &config)?)
+        });
+        let analysed = analysed
+            .map_err(|error| CliError::Failed(error.to_string()))?
+            .transpose()?;
         let delay = analysed.and_then(|analysis| Some((analysis.delay_s, analysis.beyond?)));
         calibration.chain.delay_s = delay.map(|(delay_s, beyond)| delay_s + beyond.seconds);
         calibration.chain.delay_sigma_s = delay.map(|(_, beyond)| beyond.sigma_s);
@@ -200,17 +266,24 @@ fn measure_delay(args: &Args, config: &Config, calibration: &mut Calibration) ->
 fn compliance_m_per_a(config: &Config) -> Result<f64, CliError> {
     let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
     if modes.iter().any(|mode| mode.omega_rad_s == 0.0) {
-        return Err(PlantError::FreeBody("a static compliance, which `bench calibrate` measures,").into());
+        return Err(
+            PlantError::FreeBody("a static compliance, which `bench calibrate` measures,").into(),
+        );
     }
-    let static_m_per_n: f64 =
-        modes.iter().map(|mode| mode.residue_per_kg() / (mode.omega_rad_s * mode.omega_rad_s)).sum();
+    let static_m_per_n: f64 = modes
+        .iter()
+        .map(|mode| mode.residue_per_kg() / (mode.omega_rad_s * mode.omega_rad_s))
+        .sum();
     Ok(static_m_per_n * config.motor.force_constant_n_per_a)
 }
 
 fn text(report: &Report, config: &Config) -> String {
     let run = report.run.text(config);
     let Some(c) = &report.calibration else {
-        return format!("{run}  no calibration: {}\n", report.why.as_deref().unwrap_or("the run gave none"));
+        return format!(
+            "{run}  no calibration: {}\n",
+            report.why.as_deref().unwrap_or("the run gave none")
+        );
     };
     let current = match c.amplifier.measures_current {
         true => format!(

@@ -12,7 +12,9 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::progress::Progress;
 use super::spaced::Spaced;
 use super::{CliError, Outcome};
-use crate::campaign::{Answer, Found, Grid, Place, Point, Store, Tolerances, measured, order, picture, work};
+use crate::campaign::{
+    Answer, Found, Grid, Place, Point, Store, Tolerances, measured, order, picture, work,
+};
 use crate::config::{Config, Purpose, profiles};
 use crate::devices;
 use crate::kept::write_whole;
@@ -28,10 +30,20 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     /// Operating points as ratios of the beam length
-    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "0%:8%:15", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "FROM:TO:COUNT",
+        default_value = "0%:8%:15",
+        allow_hyphen_values = true
+    )]
     operating_points: Spaced,
     /// Mass asymmetries m2/m3 - 1 that are put on
-    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "-10%:10%:10", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "FROM:TO:COUNT",
+        default_value = "-10%:10%:10",
+        allow_hyphen_values = true
+    )]
     asymmetries: Spaced,
     /// Folder of the campaign: what is done is kept there, and the same command goes on from it
     #[arg(long, value_name = "DIR", default_value = "campaign")]
@@ -55,18 +67,44 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
-    let grid = Grid::new(args.operating_points.0.clone(), args.asymmetries.0.clone(), &config)?;
+    let grid = Grid::new(
+        args.operating_points.0.clone(),
+        args.asymmetries.0.clone(),
+        &config,
+    )?;
     let tolerances = tolerances(args, &grid, &config)?;
-    let Found { store, mut done, dropped } = Store::open(&args.out, &grid, &config, attended(args, &config))?;
-    dropped.iter().for_each(|why| eprintln!("bench: {why}; the point is measured again"));
-    let missing: Vec<Place> = grid.places().filter(|place| done.iter().all(|(there, _)| there != place)).collect();
+    let Found {
+        store,
+        mut done,
+        dropped,
+    } = Store::open(&args.out, &grid, &config, attended(args, &config))?;
+    dropped
+        .iter()
+        .for_each(|why| eprintln!("bench: {why}; the point is measured again"));
+    let missing: Vec<Place> = grid
+        .places()
+        .filter(|place| done.iter().all(|(there, _)| there != place))
+        .collect();
     if !done.is_empty() {
-        eprintln!("bench: {} of {} points are done already", done.len(), done.len() + missing.len());
+        eprintln!(
+            "bench: {} of {} points are done already",
+            done.len(),
+            done.len() + missing.len()
+        );
     }
-    let bench = Bench { config: &config, grid: &grid, keep: args.keep_recordings };
+    let bench = Bench {
+        config: &config,
+        grid: &grid,
+        keep: args.keep_recordings,
+    };
     let worked = stoppable(|stop| match attended(args, &config) {
         true => {
-            let attended = OnDevices { bench: &bench, store: &store, out: &args.out, done: &mut done };
+            let attended = OnDevices {
+                bench: &bench,
+                store: &store,
+                out: &args.out,
+                done: &mut done,
+            };
             attended.go(&order(&grid, &missing), tolerances.operating_point, stop)
         }
         false => fill(&bench, &store, &missing, &mut done, threads(args), stop),
@@ -82,7 +120,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         return Ok(Outcome::Failed);
     }
     let answer = Answer::of(&config, &grid, &done, tolerances)?;
-    let report = Report::of(&answer, &draw(args, &config, &answer)?, args.bench.profile());
+    let report = Report::of(
+        &answer,
+        &draw(args, &config, &answer)?,
+        args.bench.profile(),
+    );
     if args.bench.json {
         print_json(&report)?
     } else {
@@ -118,7 +160,10 @@ fn fill(
 fn draw(args: &Args, config: &Config, answer: &Answer<'_>) -> Result<PathBuf, CliError> {
     let path = args.out.join("campaign.svg");
     let failed = |error: &dyn std::fmt::Display| {
-        CliError::Failed(format!("cannot draw {}: {error}; the points are kept", path.display()))
+        CliError::Failed(format!(
+            "cannot draw {}: {error}; the points are kept",
+            path.display()
+        ))
     };
     let svg = picture(&config.title, answer).map_err(|error| failed(&error))?;
     write_whole(&path, &svg).map_err(|error| failed(&error))?;
@@ -134,8 +179,14 @@ fn config(args: &Args) -> Result<Config, CliError> {
         );
     }
     let mut bench = args.bench.clone();
-    let named = bench.config.as_deref().is_some_and(|name| name != profiles::DEFAULT);
-    let rate = bench.sets.iter().any(|set| set.trim_start().starts_with("loop.rate_hz"));
+    let named = bench
+        .config
+        .as_deref()
+        .is_some_and(|name| name != profiles::DEFAULT);
+    let rate = bench
+        .sets
+        .iter()
+        .any(|set| set.trim_start().starts_with("loop.rate_hz"));
     if !named && !rate {
         bench.sets.splice(0..0, RATE.map(String::from));
     }
@@ -166,18 +217,24 @@ fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, C
         asymmetry: args.asymmetry_tolerance.unwrap_or_else(half_a_step),
         operating_point: args.operating_point_tolerance,
     };
-    for (what, value) in
-        [("--asymmetry-tolerance", tolerances.asymmetry), ("--operating-point-tolerance", tolerances.operating_point)]
-    {
+    for (what, value) in [
+        ("--asymmetry-tolerance", tolerances.asymmetry),
+        ("--operating-point-tolerance", tolerances.operating_point),
+    ] {
         if !(value > 0.0 && value < 1.0) {
-            return Err(CliError::Usage(format!("{what} is {value}; it is a ratio between 0 and 1, as in 0.004")));
+            return Err(CliError::Usage(format!(
+                "{what} is {value}; it is a ratio between 0 and 1, as in 0.004"
+            )));
         }
     }
     Ok(tolerances)
 }
 
 fn threads(args: &Args) -> usize {
-    args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+    args.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        usize::from,
+    )
 }
 
 /// The stage at any point of a grid.
@@ -210,7 +267,11 @@ impl Bench<'_> {
         remove(folder)?;
         let plan = Plan::chirp(config);
         let run = run(&plan)?;
-        let point = if run.stopped { None } else { Some(point(run, &plan.config)?) };
+        let point = if run.stopped {
+            None
+        } else {
+            Some(point(run, &plan.config)?)
+        };
         if point.is_none() || !self.keep {
             remove(folder)?;
         }
@@ -227,9 +288,10 @@ pub(super) fn point(mut run: Run, config: &Config) -> Result<Point, CliError> {
 
 pub(super) fn remove(folder: &Path) -> Result<(), CliError> {
     match std::fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-            Err(CliError::Failed(format!("cannot remove {}: {e}; remove it and start again", folder.display())))
-        }
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(CliError::Failed(format!(
+            "cannot remove {}: {e}; remove it and start again",
+            folder.display()
+        ))),
         _ => Ok(()),
     }
 }

@@ -25,7 +25,14 @@ impl OnDevices<'_> {
         let (config, grid) = (self.bench.config, self.bench.grid);
         let length_m = config.plant.beam_length_m();
         let person = AtTerminal::new(stop, length_m)?;
-        Attended { config, grid, tolerance, person, stage: self }.go(places)
+        Attended {
+            config,
+            grid,
+            tolerance,
+            person,
+            stage: self,
+        }
+        .go(places)
     }
 }
 
@@ -37,7 +44,10 @@ impl Stage for OnDevices<'_> {
         let plan = Plan::quiet(self.bench.config.clone());
         let run = RunOptions::on_devices(self.out.join("rest")).run(&plan, "rest")?;
         if let Some((trip, tick)) = run.ended.trip {
-            let what = format!("the bench tripped at rest, at tick {tick}: {trip}; {}", trip.remedy());
+            let what = format!(
+                "the bench tripped at rest, at tick {tick}: {trip}; {}",
+                trip.remedy()
+            );
             return Err(CliError::Failed(what));
         }
         if run.stopped {
@@ -48,14 +58,18 @@ impl Stage for OnDevices<'_> {
         finish(run, &serde_json::json!({ "outcome": "completed" }))?;
         let name = path.display().to_string();
         let opened = Recording::open(&path);
-        let rest = opened.map_err(|e| CampaignError::Rest { recording: name.clone(), why: e.to_string() })?;
+        let rest = opened.map_err(|e| CampaignError::Rest {
+            recording: name.clone(),
+            why: e.to_string(),
+        })?;
         Ok(Some(Rest::of(&rest, &name)?))
     }
 
     fn measure(&mut self, place: Place) -> Result<Option<Point>, CliError> {
         let folder = self.store.recordings(place);
         let options = RunOptions::on_devices(folder.clone());
-        self.bench.measure_by(place, &folder, |plan| options.run(plan, "chirp"))
+        self.bench
+            .measure_by(place, &folder, |plan| options.run(plan, "chirp"))
     }
 
     fn keep(&mut self, place: Place, point: &Point) -> Result<(), CliError> {

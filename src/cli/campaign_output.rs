@@ -74,7 +74,12 @@ impl Report {
             profile: profile.into(),
             plot: plot.display().to_string(),
             points: answer.points.iter().map(point).collect(),
-            totals: Totals { points: answer.points.len(), detected, excluded, undecided },
+            totals: Totals {
+                points: answer.points.len(),
+                detected,
+                excluded,
+                undecided,
+            },
             agreement: Agreement {
                 decided: detected + excluded,
                 contradicted_as_configured: answer.contradicted,
@@ -89,9 +94,21 @@ impl Report {
 
     /// For people.
     pub fn text(&self) -> String {
-        let header = ["Y1o/L %", "asymmetry %", "CNMP zeros", "by the model", "with damping", "signs"];
+        let header = [
+            "Y1o/L %",
+            "asymmetry %",
+            "CNMP zeros",
+            "by the model",
+            "with damping",
+            "signs",
+        ];
         let rows: Vec<Vec<String>> = self.points.iter().map(row).collect();
-        let Totals { points, detected, excluded, undecided } = self.totals;
+        let Totals {
+            points,
+            detected,
+            excluded,
+            undecided,
+        } = self.totals;
         format!(
             "{}: {points} points\n\n{}\n{}{detected} detected, {excluded} excluded, {undecided} undecided\n{}{}{}picture     {}\n",
             self.profile,
@@ -107,13 +124,25 @@ impl Report {
     fn undecided_text(&self) -> String {
         let line = |point: &PointJson| {
             let (at, asymmetry) = (100.0 * point.operating_point, 100.0 * point.mass_asymmetry);
-            format!("undecided at {at:.3} % of L, {asymmetry:+.3} %: {}\n", point.why)
+            format!(
+                "undecided at {at:.3} % of L, {asymmetry:+.3} %: {}\n",
+                point.why
+            )
         };
-        self.points.iter().filter(|point| point.cnmp == Cnmp::Undecided).map(line).collect()
+        self.points
+            .iter()
+            .filter(|point| point.cnmp == Cnmp::Undecided)
+            .map(line)
+            .collect()
     }
 
     fn agreement_text(&self) -> String {
-        let Agreement { decided, contradicted_as_configured, contradicted_as_simulated, .. } = self.agreement;
+        let Agreement {
+            decided,
+            contradicted_as_configured,
+            contradicted_as_simulated,
+            ..
+        } = self.agreement;
         format!(
             "model       contradicts {contradicted_as_configured} of {decided} verdicts as configured, \
              {contradicted_as_simulated} as simulated (zeros with damping)\n"
@@ -121,7 +150,13 @@ impl Report {
     }
 
     fn offset_text(&self) -> String {
-        let Some(OffsetJson { best, low, high, searched }) = self.offset else {
+        let Some(OffsetJson {
+            best,
+            low,
+            high,
+            searched,
+        }) = self.offset
+        else {
             return "offset      no verdict tells\n".into();
         };
         let contradicted = self.agreement.contradicted_with_offset.unwrap_or_default();
@@ -146,8 +181,13 @@ impl Report {
                 .into();
         };
         let asymmetry = format!("recommended asymmetry {:+.2} %", 100.0 * best.asymmetry);
-        let end = if best.at_the_end { "; it is at the end of the range, farther out may be better" } else { "" };
-        let (Some(distance), Some([point, border])) = (best.distance_tolerances, best.nearest) else {
+        let end = if best.at_the_end {
+            "; it is at the end of the range, farther out may be better"
+        } else {
+            ""
+        };
+        let (Some(distance), Some([point, border])) = (best.distance_tolerances, best.nearest)
+        else {
             return format!("{asymmetry}: no CNMP zeros in reach\n");
         };
         let tolerances = self.tolerances;
@@ -183,7 +223,12 @@ fn point(told: &Told<'_>) -> PointJson {
 
 fn offset(offset: &Offset) -> OffsetJson {
     let [low, high] = offset.interval;
-    OffsetJson { best: offset.best, low, high, searched: offset.searched }
+    OffsetJson {
+        best: offset.best,
+        low,
+        high,
+        searched: offset.searched,
+    }
 }
 
 fn row(point: &PointJson) -> Vec<String> {

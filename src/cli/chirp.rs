@@ -57,12 +57,26 @@ pub(super) struct BandOptions {
 
 impl BandOptions {
     pub(super) fn sets(&self) -> Vec<String> {
-        let number = |(key, value): (&str, Option<f64>)| value.map(|v| format!("chirp.{key}={}", toml::Value::from(v)));
-        let point =
-            |a: f64| format!("chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]", toml::Value::from(a));
+        let number = |(key, value): (&str, Option<f64>)| {
+            value.map(|v| format!("chirp.{key}={}", toml::Value::from(v)))
+        };
+        let point = |a: f64| {
+            format!(
+                "chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]",
+                toml::Value::from(a)
+            )
+        };
         let binary = |a: f64| format!("prbs.amplitude_a={}", toml::Value::from(a));
-        let flat = self.amplitude.map(point).into_iter().chain(self.amplitude.map(binary));
-        [("start_hz", self.start), ("stop_hz", self.stop)].into_iter().filter_map(number).chain(flat).collect()
+        let flat = self
+            .amplitude
+            .map(point)
+            .into_iter()
+            .chain(self.amplitude.map(binary));
+        [("start_hz", self.start), ("stop_hz", self.stop)]
+            .into_iter()
+            .filter_map(number)
+            .chain(flat)
+            .collect()
     }
 
     /// The settings with the amplitude shaped as asked for.
@@ -74,16 +88,28 @@ impl BandOptions {
 impl Args {
     fn sets(&self) -> Vec<String> {
         let text = |key: &str, value: &Option<String>| {
-            value.as_ref().map(|value| format!("{key}={}", toml::Value::from(value.as_str())))
+            value
+                .as_ref()
+                .map(|value| format!("{key}={}", toml::Value::from(value.as_str())))
         };
-        let words = text("chirp.sweep", &self.sweep).into_iter().chain(text("excitation.kind", &self.excitation));
-        let duration = self.duration.map(|s| format!("chirp.duration_s={}", toml::Value::from(s)));
-        self.band.sets().into_iter().chain(duration).chain(words).collect()
+        let words = text("chirp.sweep", &self.sweep)
+            .into_iter()
+            .chain(text("excitation.kind", &self.excitation));
+        let duration = self
+            .duration
+            .map(|s| format!("chirp.duration_s={}", toml::Value::from(s)));
+        self.band
+            .sets()
+            .into_iter()
+            .chain(duration)
+            .chain(words)
+            .collect()
     }
 
     /// The settings, with the amplitude shaped as asked for.
     fn config(&self) -> Result<Config, CliError> {
-        self.band.shaped(self.bench.load(Purpose::Chirp, &self.sets())?)
+        self.band
+            .shaped(self.bench.load(Purpose::Chirp, &self.sets())?)
     }
 }
 
@@ -112,29 +138,57 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         "completed" => analysed(&run.path, &config)?,
         _ => Made::nothing("the run did not come to its end"),
     };
-    let report = Report { run: report, expected_travel_m: expected.travel_m, expected, made };
+    let report = Report {
+        run: report,
+        expected_travel_m: expected.travel_m,
+        expected,
+        made,
+    };
     close(run, &report, args.bench.json, &text(&report, &config))?;
-    Ok(if report.made.is_stopped() { Outcome::Failed } else { report.run.exit() })
+    Ok(if report.made.is_stopped() {
+        Outcome::Failed
+    } else {
+        report.run.exit()
+    })
 }
 
 /// The analysis, which a person may stop: the recording is whole all the same.
 pub(super) fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
     let (of, config) = (path.to_path_buf(), config.clone());
     let made = unless_stopped(move || make(&Recording::open(&of)?, &config, &of));
-    let made = made.map_err(|error| CliError::Failed(error.to_string()))?.unwrap_or(Ok(Made::stopped()));
-    let kept = |error| CliError::Failed(format!("{error}; the run itself is whole, in {}", path.display()));
+    let made = made
+        .map_err(|error| CliError::Failed(error.to_string()))?
+        .unwrap_or(Ok(Made::stopped()));
+    let kept = |error| {
+        CliError::Failed(format!(
+            "{error}; the run itself is whole, in {}",
+            path.display()
+        ))
+    };
     made.map_err(kept)
 }
 
 /// Refuses an excitation that would trip an interlock, by the model of the whole rig; returns what to expect.
 pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
-    Ok(excitation::check(&excitation::of(config), config, &rig(config)?)?)
+    Ok(excitation::check(
+        &excitation::of(config),
+        config,
+        &rig(config)?,
+    )?)
 }
 
 /// The model of the whole rig.
 pub(super) fn rig(config: &Config) -> Result<Sampled, CliError> {
-    let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
-    Ok(Sampled::new(&sim::modes(config)?, bandwidth_hz, force_constant, config.servo.period_s()))
+    let (bandwidth_hz, force_constant) = (
+        config.amplifier.bandwidth_hz,
+        config.motor.force_constant_n_per_a,
+    );
+    Ok(Sampled::new(
+        &sim::modes(config)?,
+        bandwidth_hz,
+        force_constant,
+        config.servo.period_s(),
+    ))
 }
 
 fn text(report: &Report, config: &Config) -> String {

@@ -65,7 +65,10 @@ struct Limits {
 pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<Outcome, CliError> {
     let limits = Limits {
         travel_m: config.interlock.soft_limit_m,
-        current_a: config.amplifier.current_limit_a.min(config.motor.peak_current_a()),
+        current_a: config
+            .amplifier
+            .current_limit_a
+            .min(config.motor.peak_current_a()),
         thermal_current_a: config.motor.continuous_current_a(),
         slew_a_per_s: config.amplifier.slew_limit_a_per_s,
     };
@@ -73,7 +76,12 @@ pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<O
         ExcitationKind::Prbs => &[],
         _ => config.chirp.amplitude.as_slice(),
     };
-    let report = Report { excitation: words(config), expected, limits, amplitude };
+    let report = Report {
+        excitation: words(config),
+        expected,
+        limits,
+        amplitude,
+    };
     if json {
         print_json(&report)?;
     } else {
@@ -85,7 +93,12 @@ pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<O
 fn text(report: &Report<'_>) -> String {
     let (e, l) = (report.expected, &report.limits);
     let points: String = (report.amplitude.iter())
-        .map(|p| format!("  amplitude    {:10.4} Hz {:9.5} A\n", p.frequency_hz, p.current_a))
+        .map(|p| {
+            format!(
+                "  amplitude    {:10.4} Hz {:9.5} A\n",
+                p.frequency_hz, p.current_a
+            )
+        })
         .collect();
     format!(
         "{}; nothing moves\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n{points}",
@@ -105,17 +118,34 @@ fn text(report: &Report<'_>) -> String {
 
 /// The configuration with an amplitude over frequency that moves the stage alike everywhere, by `source`: `model`, or the
 /// CSV of an FRF. A stepped sine takes the model by itself, unless its amplitude is `given`.
-pub(super) fn shape(mut config: Config, source: Option<&str>, given: bool) -> Result<Config, CliError> {
+pub(super) fn shape(
+    mut config: Config,
+    source: Option<&str>,
+    given: bool,
+) -> Result<Config, CliError> {
     let kind = config.excitation.kind;
     let automatic = (kind == ExcitationKind::SteppedSine && !given).then_some("model");
-    let Some(source) = source.or(automatic) else { return Ok(config) };
+    let Some(source) = source.or(automatic) else {
+        return Ok(config);
+    };
     if kind == ExcitationKind::Prbs {
         let what = "--shape has no meaning for a binary sequence, which has one amplitude: set prbs.amplitude_a, or take another --excitation";
         return Err(CliError::Usage(what.into()));
     }
-    let response = if source == "model" { by_model(&config)? } else { by_file(&config, Path::new(source))? };
-    let travel_m = config.shape.travel_m.unwrap_or(config.interlock.soft_limit_m / 3.0);
-    let span = if kind == ExcitationKind::Multisine { LARGEST_SPAN } else { f64::INFINITY };
+    let response = if source == "model" {
+        by_model(&config)?
+    } else {
+        by_file(&config, Path::new(source))?
+    };
+    let travel_m = config
+        .shape
+        .travel_m
+        .unwrap_or(config.interlock.soft_limit_m / 3.0);
+    let span = if kind == ExcitationKind::Multisine {
+        LARGEST_SPAN
+    } else {
+        f64::INFINITY
+    };
     config.chirp.amplitude = shaped(&response, travel_m, Cap::of(&config), span);
     if kind == ExcitationKind::Multisine {
         lower_to(&mut config, travel_m)?;
@@ -126,7 +156,11 @@ pub(super) fn shape(mut config: Config, source: Option<&str>, given: bool) -> Re
 /// The lines of a multisine add up: all of them smaller, until the sum moves the stage no farther.
 fn lower_to(config: &mut Config, travel_m: f64) -> Result<(), CliError> {
     let share = (travel_m / Extremes::of(&of(config), config, &rig(config)?).travel_m).min(1.0);
-    config.chirp.amplitude.iter_mut().for_each(|point| point.current_a *= share);
+    config
+        .chirp
+        .amplitude
+        .iter_mut()
+        .for_each(|point| point.current_a *= share);
     Ok(())
 }
 
@@ -137,19 +171,31 @@ fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
     let (low_hz, high_hz) = config.chirp.band_hz();
     let grid = (0..=GRID).map(|k| low_hz * libm::pow(high_hz / low_hz, k as f64 / GRID as f64));
     let modes = modal.modes.iter().map(|mode| mode.omega_rad_s / (2.0 * PI));
-    let mut frequencies: Vec<f64> = grid.chain(modes.filter(|f| (low_hz..high_hz).contains(f))).collect();
+    let mut frequencies: Vec<f64> = grid
+        .chain(modes.filter(|f| (low_hz..high_hz).contains(f)))
+        .collect();
     frequencies.sort_by(f64::total_cmp);
     frequencies.dedup();
-    Ok(frequencies.into_iter().map(|f| (f, chain.response(2.0 * PI * f).norm())).collect())
+    Ok(frequencies
+        .into_iter()
+        .map(|f| (f, chain.response(2.0 * PI * f).norm()))
+        .collect())
 }
 
 /// The same of an FRF that was measured before.
 fn by_file(config: &Config, path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
-    let frf =
-        csv::read(path).map_err(|e| CliError::Usage(format!("--shape {}: {e}; or give `model`", path.display())))?;
+    let frf = csv::read(path).map_err(|e| {
+        CliError::Usage(format!("--shape {}: {e}; or give `model`", path.display()))
+    })?;
     let (low_hz, high_hz) = config.chirp.band_hz();
-    let rows = frf.frequency_hz.iter().zip(&frf.response).map(|(f, h)| (*f, h.norm()));
-    let inside: Vec<(f64, f64)> = rows.filter(|(f, _)| (low_hz..=high_hz).contains(f)).collect();
+    let rows = frf
+        .frequency_hz
+        .iter()
+        .zip(&frf.response)
+        .map(|(f, h)| (*f, h.norm()));
+    let inside: Vec<(f64, f64)> = rows
+        .filter(|(f, _)| (low_hz..=high_hz).contains(f))
+        .collect();
     match (inside.first(), inside.last()) {
         (Some((first, _)), Some((last, _)))
             if *first <= low_hz * NEAR && *last * NEAR >= high_hz && inside.len() > 1 =>

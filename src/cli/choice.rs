@@ -24,6 +24,8 @@ impl Choice {
             (_, _, Some(file)) => Some(file.as_str()),
             _ => None,
         };
-        name.map(|name| format!("control.controller={}", toml::Value::from(name))).into_iter().collect()
+        name.map(|name| format!("control.controller={}", toml::Value::from(name)))
+            .into_iter()
+            .collect()
     }
 }

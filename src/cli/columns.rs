@@ -50,9 +50,16 @@ impl TableOptions {
 
     /// A line that says where `what` is; nothing without a file.
     pub fn told(&self, what: &str) -> String {
-        let files: Vec<String> =
-            [&self.csv, &self.parquet].into_iter().flatten().map(|path| path.display().to_string()).collect();
-        if files.is_empty() { String::new() } else { format!("{what} in {}\n", files.join(" and ")) }
+        let files: Vec<String> = [&self.csv, &self.parquet]
+            .into_iter()
+            .flatten()
+            .map(|path| path.display().to_string())
+            .collect();
+        if files.is_empty() {
+            String::new()
+        } else {
+            format!("{what} in {}\n", files.join(" and "))
+        }
     }
 }
 
@@ -76,20 +83,39 @@ pub(super) enum Numbers {
 
 impl Column {
     pub fn real(name: impl Into<String>, numbers: Vec<f64>) -> Column {
-        Column { name: name.into(), numbers: Numbers::Real(numbers) }
+        Column {
+            name: name.into(),
+            numbers: Numbers::Real(numbers),
+        }
     }
 
-    pub fn count(name: impl Into<String>, numbers: impl IntoIterator<Item = Option<u64>>) -> Column {
-        Column { name: name.into(), numbers: Numbers::Count(numbers.into_iter().collect()) }
+    pub fn count(
+        name: impl Into<String>,
+        numbers: impl IntoIterator<Item = Option<u64>>,
+    ) -> Column {
+        Column {
+            name: name.into(),
+            numbers: Numbers::Count(numbers.into_iter().collect()),
+        }
     }
 
     /// Columns of quantities from rows of as many.
-    pub fn of_rows(names: impl IntoIterator<Item = String>, rows: impl Iterator<Item = Vec<f64>>) -> Vec<Column> {
-        let mut columns: Vec<(String, Vec<f64>)> = names.into_iter().map(|name| (name, Vec::new())).collect();
+    pub fn of_rows(
+        names: impl IntoIterator<Item = String>,
+        rows: impl Iterator<Item = Vec<f64>>,
+    ) -> Vec<Column> {
+        let mut columns: Vec<(String, Vec<f64>)> =
+            names.into_iter().map(|name| (name, Vec::new())).collect();
         for row in rows {
-            columns.iter_mut().zip(row).for_each(|((_, numbers), number)| numbers.push(number));
+            columns
+                .iter_mut()
+                .zip(row)
+                .for_each(|((_, numbers), number)| numbers.push(number));
         }
-        columns.into_iter().map(|(name, numbers)| Column::real(name, numbers)).collect()
+        columns
+            .into_iter()
+            .map(|(name, numbers)| Column::real(name, numbers))
+            .collect()
     }
 
     fn len(&self) -> usize {
@@ -103,7 +129,9 @@ impl Column {
     fn cell(&self, row: usize) -> String {
         match &self.numbers {
             Numbers::Real(numbers) => format!("{:e}", numbers[row]),
-            Numbers::Count(numbers) => numbers[row].map_or(String::new(), |number| number.to_string()),
+            Numbers::Count(numbers) => {
+                numbers[row].map_or(String::new(), |number| number.to_string())
+            }
         }
     }
 }
@@ -121,7 +149,10 @@ fn write_csv(path: &Path, columns: &[Column]) -> std::io::Result<()> {
 }
 
 fn failed(path: &Path, error: &impl std::fmt::Display) -> CliError {
-    CliError::Failed(format!("cannot write {}: {error}; free some space or choose another file", path.display()))
+    CliError::Failed(format!(
+        "cannot write {}: {error}; free some space or choose another file",
+        path.display()
+    ))
 }
 
 #[cfg(feature = "parquet")]
@@ -145,7 +176,11 @@ mod parquet {
 
     pub fn write(path: &Path, columns: &[Column]) -> Result<()> {
         let fields = columns.iter().map(field).collect::<Result<_>>()?;
-        let schema = Arc::new(Type::group_type_builder("table").with_fields(fields).build()?);
+        let schema = Arc::new(
+            Type::group_type_builder("table")
+                .with_fields(fields)
+                .build()?,
+        );
         let mut file = SerializedFileWriter::new(File::create(path)?, schema, Arc::default())?;
         let rows = columns.first().map_or(0, Column::len);
         for first in (0..rows).step_by(GROUP) {
@@ -165,18 +200,37 @@ mod parquet {
             Numbers::Real(_) => (PhysicalType::DOUBLE, Repetition::REQUIRED),
             Numbers::Count(_) => (PhysicalType::INT64, Repetition::OPTIONAL),
         };
-        Ok(Arc::new(Type::primitive_type_builder(&column.name, kind).with_repetition(repetition).build()?))
+        Ok(Arc::new(
+            Type::primitive_type_builder(&column.name, kind)
+                .with_repetition(repetition)
+                .build()?,
+        ))
     }
 
-    fn write_column(mut writer: SerializedColumnWriter, column: &Column, rows: std::ops::Range<usize>) -> Result<()> {
+    fn write_column(
+        mut writer: SerializedColumnWriter,
+        column: &Column,
+        rows: std::ops::Range<usize>,
+    ) -> Result<()> {
         match &column.numbers {
             Numbers::Real(numbers) => {
-                writer.typed::<DoubleType>().write_batch(&numbers[rows], None, None)?;
+                writer
+                    .typed::<DoubleType>()
+                    .write_batch(&numbers[rows], None, None)?;
             }
             Numbers::Count(numbers) => {
-                let there: Vec<i16> = numbers[rows.clone()].iter().map(|number| i16::from(number.is_some())).collect();
-                let numbers: Vec<i64> = numbers[rows].iter().flatten().map(|&number| number as i64).collect();
-                writer.typed::<Int64Type>().write_batch(&numbers, Some(&there), None)?;
+                let there: Vec<i16> = numbers[rows.clone()]
+                    .iter()
+                    .map(|number| i16::from(number.is_some()))
+                    .collect();
+                let numbers: Vec<i64> = numbers[rows]
+                    .iter()
+                    .flatten()
+                    .map(|&number| number as i64)
+                    .collect();
+                writer
+                    .typed::<Int64Type>()
+                    .write_batch(&numbers, Some(&there), None)?;
             }
         }
         writer.close()

@@ -27,7 +27,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
         What::Show(options) => {
             let config = options.load(Purpose::Model, &[])?;
-            if options.json { print_json(&config)? } else { print_text(&to_toml(&config)?)? }
+            if options.json {
+                print_json(&config)?
+            } else {
+                print_text(&to_toml(&config)?)?
+            }
         }
         What::Check(options) => {
             let config = options.load(Purpose::All, &[])?;
@@ -44,5 +48,6 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The whole effective configuration, as it travels with a recording.
 pub(super) fn to_toml(config: &crate::config::Config) -> Result<String, CliError> {
-    toml::to_string(config).map_err(|e| CliError::Failed(format!("cannot write the configuration as TOML: {e}")))
+    toml::to_string(config)
+        .map_err(|e| CliError::Failed(format!("cannot write the configuration as TOML: {e}")))
 }

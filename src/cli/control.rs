@@ -51,8 +51,12 @@ impl Args {
         self.refuse_idle()?;
         let number = |x: f64| toml::Value::from(x).to_string();
         let mut sets = self.choice.sets();
-        let amplitude =
-            self.amplitude.as_deref().map(quantity::metres).transpose().map_err(|e| CliError::Usage(e.to_string()))?;
+        let amplitude = self
+            .amplitude
+            .as_deref()
+            .map(quantity::metres)
+            .transpose()
+            .map_err(|e| CliError::Usage(e.to_string()))?;
         let mut set = |key: &str, value: String| sets.push(format!("control.{key}={value}"));
         let swept = self.reference.as_deref() == Some("chirp");
         if let Some(duration) = self.duration.filter(|_| !swept) {
@@ -63,39 +67,74 @@ impl Args {
             None if self.amplitude.is_some() => set("reference.amplitude_m", height),
             None => {}
             Some("hold") => set("reference", "{ kind = \"hold\" }".into()),
-            Some("step") => set("reference", format!("{{ kind = \"step\", amplitude_m = {height}, at_s = 0.2 }}")),
+            Some("step") => set(
+                "reference",
+                format!("{{ kind = \"step\", amplitude_m = {height}, at_s = 0.2 }}"),
+            ),
             Some("ramp") => {
                 let speed = number(self.speed.unwrap_or(1e-4));
                 set(
                     "reference",
-                    format!("{{ kind = \"ramp\", amplitude_m = {height}, speed_m_per_s = {speed}, at_s = 0.2 }}"),
+                    format!(
+                        "{{ kind = \"ramp\", amplitude_m = {height}, speed_m_per_s = {speed}, at_s = 0.2 }}"
+                    ),
                 );
             }
             Some("sine") => {
                 let frequency = number(self.frequency.unwrap_or(1.0));
-                set("reference", format!("{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency} }}"));
+                set(
+                    "reference",
+                    format!(
+                        "{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency} }}"
+                    ),
+                );
             }
             Some("chirp") => {
                 let travel = number(amplitude.unwrap_or(20e-6));
-                set("reference", format!("{{ kind = \"chirp\", travel_m = {travel} }}"));
+                set(
+                    "reference",
+                    format!("{{ kind = \"chirp\", travel_m = {travel} }}"),
+                );
             }
-            Some(path) => set("reference", format!("{{ kind = \"file\", path = {} }}", toml::Value::from(path))),
+            Some(path) => set(
+                "reference",
+                format!("{{ kind = \"file\", path = {} }}", toml::Value::from(path)),
+            ),
         }
-        sets.extend(self.duration.filter(|_| swept).map(|duration| format!("chirp.duration_s={}", number(duration))));
+        sets.extend(
+            self.duration
+                .filter(|_| swept)
+                .map(|duration| format!("chirp.duration_s={}", number(duration))),
+        );
         Ok(sets)
     }
 
     /// Refuses an option that the reference has no use for.
     fn refuse_idle(&self) -> Result<(), CliError> {
         let kind = self.reference.as_deref();
-        let high = !matches!(kind, Some(kind) if !["step", "ramp", "sine", "chirp"].contains(&kind));
+        let high =
+            !matches!(kind, Some(kind) if !["step", "ramp", "sine", "chirp"].contains(&kind));
         let idle = [
-            (self.amplitude.is_some() && !high, "--amplitude", "step, ramp, sine or chirp"),
-            (self.frequency.is_some() && kind != Some("sine"), "--frequency", "sine"),
-            (self.speed.is_some() && kind != Some("ramp"), "--speed", "ramp"),
+            (
+                self.amplitude.is_some() && !high,
+                "--amplitude",
+                "step, ramp, sine or chirp",
+            ),
+            (
+                self.frequency.is_some() && kind != Some("sine"),
+                "--frequency",
+                "sine",
+            ),
+            (
+                self.speed.is_some() && kind != Some("ramp"),
+                "--speed",
+                "ramp",
+            ),
         ];
         match idle.iter().find(|(idle, ..)| *idle) {
-            Some((_, option, kinds)) => Err(CliError::Usage(format!("{option} goes with --reference {kinds} only"))),
+            Some((_, option, kinds)) => Err(CliError::Usage(format!(
+                "{option} goes with --reference {kinds} only"
+            ))),
             None => Ok(()),
         }
     }
@@ -128,7 +167,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins(false);
     enough(&config, &margins)?;
-    let step = if margins.stable { predicted_step(&config, &closed_loop) } else { None };
+    let step = if margins.stable {
+        predicted_step(&config, &closed_loop)
+    } else {
+        None
+    };
     let predicted = Predicted { margins, step };
     let plan = Plan::control(config.clone())?;
     let mut run = args.run.run(&plan, "control")?;
@@ -146,19 +189,32 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         (false, _) => None,
     };
     let expected = plan.foreseen.as_ref().map(Expected::of);
-    let report = Report { run: report, predicted, measured, expected, made };
+    let report = Report {
+        run: report,
+        predicted,
+        measured,
+        expected,
+        made,
+    };
     close(run, &report, args.bench.json, &text(&report, &config))?;
     let stopped = report.made.as_ref().is_some_and(Made::is_stopped);
-    Ok(if stopped { Outcome::Failed } else { report.run.exit() })
+    Ok(if stopped {
+        Outcome::Failed
+    } else {
+        report.run.exit()
+    })
 }
 
 /// The step by the linear model, if the reference is one that happens.
 fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepFigures> {
-    let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else { return None };
+    let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else {
+        return None;
+    };
     let after_s = config.control.duration_s - at_s;
     let ticks = ((after_s * config.servo.rate_hz) as usize).min(PREDICTED_TICKS);
     let positions = closed_loop.simulate(ticks, |_| amplitude_m);
-    (amplitude_m != 0.0 && ticks > 0).then(|| step_figures(&positions, amplitude_m, config.servo.period_s()))
+    (amplitude_m != 0.0 && ticks > 0)
+        .then(|| step_figures(&positions, amplitude_m, config.servo.period_s()))
 }
 
 fn text(report: &Report, config: &Config) -> String {
@@ -172,15 +228,24 @@ fn text(report: &Report, config: &Config) -> String {
     });
     if let Some(made) = &report.made {
         let margins = margins_text(config, &report.predicted.margins);
-        let travel_um = report.expected.map_or(0.0, |expected| expected.travel_m * 1e6);
+        let travel_um = report
+            .expected
+            .map_or(0.0, |expected| expected.travel_m * 1e6);
         let run = report.run.text(config);
-        return format!("{margins}  expected   travel of {travel_um:.1} um by the model\n{run}{}", made.text());
+        return format!(
+            "{margins}  expected   travel of {travel_um:.1} um by the model\n{run}{}",
+            made.text()
+        );
     }
     let measured = report.measured.as_ref().map_or(
         "  measured   nothing: the run did not reach a steady state\n".to_string(),
         |m| {
             let step = m.step.map_or(String::new(), |step| {
-                format!("settling {}, overshoot {:.1} %; ", milliseconds(step.settling_time_s), step.overshoot_percent)
+                format!(
+                    "settling {}, overshoot {:.1} %; ",
+                    milliseconds(step.settling_time_s),
+                    step.overshoot_percent
+                )
             });
             format!(
                 "  measured   {step}steady state: mean error {:+.4} um, sigma {:.4} um\n",
@@ -189,5 +254,9 @@ fn text(report: &Report, config: &Config) -> String {
             )
         },
     );
-    format!("{}{predicted}{measured}{}", margins_text(config, &report.predicted.margins), report.run.text(config))
+    format!(
+        "{}{predicted}{measured}{}",
+        margins_text(config, &report.predicted.margins),
+        report.run.text(config)
+    )
 }

@@ -62,7 +62,10 @@ impl Args {
     }
 
     fn cast(&self) -> Cast {
-        let end = self.port.clone().map_or_else(|| End::Terminal(self.pty.clone()), End::Port);
+        let end = self
+            .port
+            .clone()
+            .map_or_else(|| End::Terminal(self.pty.clone()), End::Port);
         Cast {
             amplifier: self.serves("amplifier"),
             probe: self.serves("probe").then_some(end),
@@ -72,28 +75,48 @@ impl Args {
 
     /// The settings that the options stand for.
     fn sets(&self) -> Vec<String> {
-        let set = |name: &String| format!("amplifier.device.interface={}", toml::Value::from(name.as_str()));
+        let set = |name: &String| {
+            format!(
+                "amplifier.device.interface={}",
+                toml::Value::from(name.as_str())
+            )
+        };
         self.interface.iter().map(set).collect()
     }
 
     /// Options that the devices have no use for, and values that cannot be.
     fn check(&self) -> Result<(), CliError> {
         let of_probe = self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
-        let positive = |value: Option<f64>| value.is_none_or(|value| value.is_finite() && value > 0.0);
+        let positive =
+            |value: Option<f64>| value.is_none_or(|value| value.is_finite() && value > 0.0);
         let wrong = [
-            (of_probe && !self.serves("probe"), "--port, --pty and --measuring-rate go with the device `probe` only"),
+            (
+                of_probe && !self.serves("probe"),
+                "--port, --pty and --measuring-rate go with the device `probe` only",
+            ),
             (
                 self.interface.is_some() && !self.serves("amplifier"),
                 "--interface goes with the device `amplifier` only",
             ),
-            (!positive(self.measuring_rate), "--measuring-rate must be above zero, in hertz"),
-            (!positive(self.duration), "--duration must be above zero, in seconds"),
+            (
+                !positive(self.measuring_rate),
+                "--measuring-rate must be above zero, in hertz",
+            ),
+            (
+                !positive(self.duration),
+                "--duration must be above zero, in seconds",
+            ),
         ];
-        wrong.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, why)| Err(CliError::Usage((*why).into())))
+        wrong
+            .iter()
+            .find(|(wrong, _)| *wrong)
+            .map_or(Ok(()), |(_, why)| Err(CliError::Usage((*why).into())))
     }
 
     fn counts_from_start(&self) -> bool {
-        self.faults_from.as_ref().map_or(!self.serves("amplifier"), |from| from == "start")
+        self.faults_from
+            .as_ref()
+            .map_or(!self.serves("amplifier"), |from| from == "start")
     }
 }
 
@@ -101,11 +124,21 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     args.check()?;
     let config = args.bench.load(Purpose::Model, &args.sets())?;
     let log = args.log.as_ref().map(Log::create).transpose()?;
-    let (runtime, signals) = signals().map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
+    let (runtime, signals) =
+        signals().map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
     let rehearsal = Rehearsal::start(&config, &args.cast())?;
     let schedule = Schedule::new(&args.faults);
-    schedule.steps().try_for_each(|(word, fault)| rehearsal.check(word, *fault))?;
-    let mut session = Session { rehearsal, schedule, log, typed: listen(), args, is_over: false };
+    schedule
+        .steps()
+        .try_for_each(|(word, fault)| rehearsal.check(word, *fault))?;
+    let mut session = Session {
+        rehearsal,
+        schedule,
+        log,
+        typed: listen(),
+        args,
+        is_over: false,
+    };
     runtime.block_on(session.serve(signals))?;
     if args.bench.json {
         print_json(&session.rehearsal.summary())?;
@@ -138,14 +171,23 @@ impl Session<'_> {
 
     fn look(&mut self) -> Result<(), CliError> {
         let time_s = self.rehearsal.time_s();
-        let origin_s = if self.args.counts_from_start() { Some(0.0) } else { self.rehearsal.enabled_s() };
-        for (word, fault) in origin_s.map_or(Vec::new(), |origin_s| self.schedule.due(time_s - origin_s)) {
+        let origin_s = if self.args.counts_from_start() {
+            Some(0.0)
+        } else {
+            self.rehearsal.enabled_s()
+        };
+        for (word, fault) in
+            origin_s.map_or(Vec::new(), |origin_s| self.schedule.due(time_s - origin_s))
+        {
             self.rehearsal.ask(&word, fault)?;
         }
         while let Ok(line) = self.typed.try_recv() {
             self.obey(line.trim());
         }
-        self.is_over |= self.args.duration.is_some_and(|duration_s| time_s >= duration_s);
+        self.is_over |= self
+            .args
+            .duration
+            .is_some_and(|duration_s| time_s >= duration_s);
         self.tell()
     }
 
@@ -158,7 +200,8 @@ impl Session<'_> {
             ["fault", word] => {
                 let word = fault::whole(word, &self.args.devices);
                 let fault = ActingFault::parse(&word).map_err(|e| e.to_string());
-                let asked = fault.and_then(|fault| self.rehearsal.ask(&word, fault).map_err(|e| e.to_string()));
+                let asked = fault
+                    .and_then(|fault| self.rehearsal.ask(&word, fault).map_err(|e| e.to_string()));
                 asked.unwrap_or_else(|why| eprintln!("bench device: {why}"));
             }
             _ => eprintln!("bench device: `{line}` is no order; there are fault KIND, quit, help"),
@@ -177,10 +220,15 @@ impl Session<'_> {
 
 /// From here on Ctrl-C and SIGTERM end a rehearsal in order: before anything is served that must be taken away again.
 fn signals() -> std::io::Result<(Runtime, [Signal; 2])> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
     let watched = {
         let _inside = runtime.enter();
-        [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?]
+        [
+            signal(SignalKind::interrupt())?,
+            signal(SignalKind::terminate())?,
+        ]
     };
     Ok((runtime, watched))
 }
@@ -203,14 +251,27 @@ struct Log {
 
 impl Log {
     fn create(path: &PathBuf) -> Result<Log, CliError> {
-        let failed = |e| CliError::Usage(format!("cannot write {}: {e}; choose another --log", path.display()));
-        Ok(Log { file: File::create(path).map_err(failed)?, path: path.clone() })
+        let failed = |e| {
+            CliError::Usage(format!(
+                "cannot write {}: {e}; choose another --log",
+                path.display()
+            ))
+        };
+        Ok(Log {
+            file: File::create(path).map_err(failed)?,
+            path: path.clone(),
+        })
     }
 
     fn write(&mut self, entry: &Entry) -> Result<(), CliError> {
         let written = serde_json::to_string(entry).map_err(std::io::Error::other);
         let written = written.and_then(|line| self.file.write_all((line + "\n").as_bytes()));
-        written.map_err(|e| CliError::Failed(format!("cannot write {}: {e}; free some space", self.path.display())))
+        written.map_err(|e| {
+            CliError::Failed(format!(
+                "cannot write {}: {e}; free some space",
+                self.path.display()
+            ))
+        })
     }
 }
 

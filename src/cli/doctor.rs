@@ -31,7 +31,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     } else {
         print_text(&report.text(&again(args)))?
     }
-    Ok(if report.ready { Outcome::Done } else { Outcome::Failed })
+    Ok(if report.ready {
+        Outcome::Done
+    } else {
+        Outcome::Failed
+    })
 }
 
 /// The very checks that `bench chirp` and `bench control` make before they open a device.
@@ -39,7 +43,10 @@ fn runs(args: &Args) -> Runs {
     let chirp = || Ok(chirp::check(&args.bench.load(Purpose::Chirp, &[])?)?.travel_m);
     let control = || loop_margins(&args.bench.load(Purpose::Control, &[])?);
     let words = |error: CliError| error.to_string();
-    Runs { chirp: chirp().map_err(words), control: control().map_err(words) }
+    Runs {
+        chirp: chirp().map_err(words),
+        control: control().map_err(words),
+    }
 }
 
 fn loop_margins(config: &Config) -> Result<Margins, CliError> {
@@ -51,10 +58,24 @@ fn loop_margins(config: &Config) -> Result<Margins, CliError> {
 
 /// The same bench on a command line.
 fn again(args: &Args) -> String {
-    let BenchOptions { config, sets, operating_point, asymmetry, seed, json: _ } = &args.bench;
-    let one =
-        |flag: &str, value: &Option<String>| value.iter().map(|v| format!(" {flag} {}", quoted(v))).collect::<String>();
-    let sets: String = sets.iter().map(|set| format!(" --set {}", quoted(set))).collect();
+    let BenchOptions {
+        config,
+        sets,
+        operating_point,
+        asymmetry,
+        seed,
+        json: _,
+    } = &args.bench;
+    let one = |flag: &str, value: &Option<String>| {
+        value
+            .iter()
+            .map(|v| format!(" {flag} {}", quoted(v)))
+            .collect::<String>()
+    };
+    let sets: String = sets
+        .iter()
+        .map(|set| format!(" --set {}", quoted(set)))
+        .collect();
     let out = (args.out.as_path() != Path::new(OUT)).then(|| args.out.display().to_string());
     [
         one("--config", config),
@@ -89,11 +110,20 @@ mod tests {
             asymmetry: Some("-10%".into()),
             ..BenchOptions::default()
         };
-        let args = Args { bench, out: "monday".into() };
+        let args = Args {
+            bench,
+            out: "monday".into(),
+        };
         assert_eq!(
             again(&args),
             r" --config 'my bench.toml' --set loop.rate_hz=1000 --set 'title=it'\''s' --asymmetry -10% --out monday"
         );
-        assert_eq!(again(&Args { bench: BenchOptions::default(), out: OUT.into() }), "");
+        assert_eq!(
+            again(&Args {
+                bench: BenchOptions::default(),
+                out: OUT.into()
+            }),
+            ""
+        );
     }
 }

@@ -59,7 +59,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let (folder, recordings) = (args.output.clone(), runs.clone());
     let work = move || {
         let progress = Progress::new("figures");
-        let made = make_all(&entries, &folder, &Workshop::new(&recordings), &mut |done, all| progress.show(done, all));
+        let made = make_all(
+            &entries,
+            &folder,
+            &Workshop::new(&recordings),
+            &mut |done, all| progress.show(done, all),
+        );
         progress.close();
         made
     };
@@ -67,7 +72,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     // The recordings were only there to be measured; if some stay, they are hidden and named after the process.
     let _ = std::fs::remove_dir_all(&runs);
     let Some(made) = made.map_err(|error| CliError::Failed(error.to_string()))? else {
-        return Err(CliError::Failed(format!("stopped; the files in {} so far are whole", args.output.display())));
+        return Err(CliError::Failed(format!(
+            "stopped; the files in {} so far are whole",
+            args.output.display()
+        )));
     };
     let report = report(&args.output, made?);
     if args.json {
@@ -80,7 +88,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 fn report(folder: &Path, made: Vec<Made>) -> Report {
     let page = folder.join("index.html").display().to_string();
-    Report { page, figures: made.into_iter().map(|made| figure(folder, made)).collect() }
+    Report {
+        page,
+        figures: made.into_iter().map(|made| figure(folder, made)).collect(),
+    }
 }
 
 fn figure(folder: &Path, made: Made) -> FigureJson {
@@ -102,14 +113,37 @@ fn figure(folder: &Path, made: Made) -> FigureJson {
 }
 
 fn text(report: &Report) -> String {
-    let count = |figure: &FigureJson, verdict| figure.compared.iter().filter(|row| row.verdict == verdict).count();
+    let count = |figure: &FigureJson, verdict| {
+        figure
+            .compared
+            .iter()
+            .filter(|row| row.verdict == verdict)
+            .count()
+    };
     let line = |figure: &FigureJson| match figure.reason {
-        Some(reason) => format!("  {:<9}  {}: not computed: {reason}\n", figure.number, figure.title),
+        Some(reason) => format!(
+            "  {:<9}  {}: not computed: {reason}\n",
+            figure.number, figure.title
+        ),
         None => {
-            let (agree, differ) = (count(figure, Verdict::Agrees), count(figure, Verdict::Differs));
-            let differ = if differ > 0 { format!(", {differ} differ") } else { String::new() };
-            format!("  {:<9}  {}: {agree} printed figures agree{differ}\n", figure.number, figure.title)
+            let (agree, differ) = (
+                count(figure, Verdict::Agrees),
+                count(figure, Verdict::Differs),
+            );
+            let differ = if differ > 0 {
+                format!(", {differ} differ")
+            } else {
+                String::new()
+            };
+            format!(
+                "  {:<9}  {}: {agree} printed figures agree{differ}\n",
+                figure.number, figure.title
+            )
         }
     };
-    format!("{}{}\n", report.figures.iter().map(line).collect::<String>(), report.page)
+    format!(
+        "{}{}\n",
+        report.figures.iter().map(line).collect::<String>(),
+        report.page
+    )
 }

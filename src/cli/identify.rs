@@ -51,11 +51,17 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let plan = Plan::of(&recording)?;
     if plan.kind == Kind::Calibrate {
         let what = "is the recording of static steps, which `bench calibrate` analyses";
-        return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
+        return Err(CliError::Usage(format!(
+            "{} {what}",
+            args.recording.display()
+        )));
     }
     if plan.kind == Kind::Quiet {
         let what = "is a quiet run of `bench campaign`, in which no current flowed: it says where the stage rests";
-        return Err(CliError::Usage(format!("{} {what}", args.recording.display())));
+        return Err(CliError::Usage(format!(
+            "{} {what}",
+            args.recording.display()
+        )));
     }
     let ending = Ending::of(&recording);
     let report = Report {
@@ -66,22 +72,36 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         overruns: recording.overruns(),
         lost_records: recording.lost_records(),
         truncated: recording.truncated(),
-        made: make(&recording, &plan.config, &in_folder(args.out.as_deref(), &args.recording)?)?,
+        made: make(
+            &recording,
+            &plan.config,
+            &in_folder(args.out.as_deref(), &args.recording)?,
+        )?,
     };
     if args.json {
         print_json(&report)?
     } else {
         print_text(&report.text(&plan.config))?
     }
-    let whole = report.overruns + report.lost_records == 0 && !report.truncated && ending == Ending::Completed;
-    Ok(if whole { Outcome::Done } else { Outcome::Impaired })
+    let whole = report.overruns + report.lost_records == 0
+        && !report.truncated
+        && ending == Ending::Completed;
+    Ok(if whole {
+        Outcome::Done
+    } else {
+        Outcome::Impaired
+    })
 }
 
 impl Report {
     /// How the run ended, and what its recording shows.
     fn text(&self, config: &Config) -> String {
         let period_s = config.servo.period_s();
-        let cut = if self.truncated { ", the file ends early" } else { "" };
+        let cut = if self.truncated {
+            ", the file ends early"
+        } else {
+            ""
+        };
         format!(
             "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}{}\n{}",
             self.outcome.replace('_', " "),
@@ -90,7 +110,9 @@ impl Report {
             config.servo.rate_hz,
             self.overruns,
             self.lost_records,
-            self.trip.as_ref().map_or(String::new(), |trip| trip.text(period_s)),
+            self.trip
+                .as_ref()
+                .map_or(String::new(), |trip| trip.text(period_s)),
             self.made.text()
         )
     }

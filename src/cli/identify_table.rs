@@ -28,10 +28,20 @@ pub(super) struct TableOptions {
     #[arg(long, value_name = "COLUMN", requires = "input")]
     output: Option<String>,
     /// Column of the times in seconds, which must be regular
-    #[arg(long, value_name = "COLUMN", requires = "input", conflicts_with = "rate")]
+    #[arg(
+        long,
+        value_name = "COLUMN",
+        requires = "input",
+        conflicts_with = "rate"
+    )]
     time: Option<String>,
     /// Samples per second, for a CSV without times
-    #[arg(long, value_name = "HZ", requires = "input", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        requires = "input",
+        allow_hyphen_values = true
+    )]
     rate: Option<f64>,
     /// The record repeats: samples a period (2500) or seconds (1s). Without it the record begins and ends at rest
     #[arg(long, value_name = "SAMPLES|S", requires = "input")]
@@ -40,7 +50,12 @@ pub(super) struct TableOptions {
     #[arg(long, value_name = "N", requires = "period")]
     skip_periods: Option<usize>,
     /// Frequencies to look at, in hertz: 11:250. Without it all up to half the rate
-    #[arg(long, value_name = "LOW:HIGH", requires = "input", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "LOW:HIGH",
+        requires = "input",
+        allow_hyphen_values = true
+    )]
     band: Option<String>,
 }
 
@@ -77,35 +92,58 @@ struct Report {
 impl TableOptions {
     /// Whether a file is to be read as a CSV: by the options, or by its name.
     pub(super) fn is_meant(&self, path: &Path) -> bool {
-        self.input.is_some() || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+        self.input.is_some()
+            || path
+                .extension()
+                .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
     }
 
     fn columns(&self, path: &Path) -> Result<Columns, CliError> {
         let there = || Ok::<_, CliError>(table::names(path)?.join(", "));
         let (Some(input), Some(output)) = (self.input.clone(), self.output.clone()) else {
-            let text = format!("which columns of {}? --input COLUMN --output COLUMN of {}", path.display(), there()?);
+            let text = format!(
+                "which columns of {}? --input COLUMN --output COLUMN of {}",
+                path.display(),
+                there()?
+            );
             return Err(CliError::Usage(text));
         };
         let clock = match (&self.time, self.rate) {
             (Some(time), _) => Clock::Column(time.clone()),
             (None, Some(rate_hz)) => Clock::RateHz(rate_hz),
             (None, None) => {
-                let text = format!("when were the lines sampled? --time COLUMN (of {}) or --rate HZ", there()?);
+                let text = format!(
+                    "when were the lines sampled? --time COLUMN (of {}) or --rate HZ",
+                    there()?
+                );
                 return Err(CliError::Usage(text));
             }
         };
-        Ok(Columns { input, output, clock })
+        Ok(Columns {
+            input,
+            output,
+            clock,
+        })
     }
 
     fn band_hz(&self, rate_hz: f64) -> Result<(f64, f64), CliError> {
-        let Some(text) = &self.band else { return Ok((0.0, rate_hz / 2.0)) };
-        let limits = text.split_once(':').and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)));
-        limits
-            .ok_or_else(|| CliError::Usage(format!("--band {text}: it must be two frequencies in hertz, as in 11:250")))
+        let Some(text) = &self.band else {
+            return Ok((0.0, rate_hz / 2.0));
+        };
+        let limits = text
+            .split_once(':')
+            .and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)));
+        limits.ok_or_else(|| {
+            CliError::Usage(format!(
+                "--band {text}: it must be two frequencies in hertz, as in 11:250"
+            ))
+        })
     }
 
     fn repetition(&self, rate_hz: f64) -> Result<Option<Repetition>, CliError> {
-        let Some(text) = &self.period else { return Ok(None) };
+        let Some(text) = &self.period else {
+            return Ok(None);
+        };
         let wrong = || {
             CliError::Usage(format!(
                 "--period {text}: it must be a whole number of samples, or seconds that make one at {rate_hz} Hz, as in 2500 or 1s"
@@ -116,20 +154,40 @@ impl TableOptions {
             None => text.parse().map_err(|_| wrong())?,
         };
         // A NaN compares as false, and so fails.
-        let whole = (1.0..1e15).contains(&samples) && (samples - samples.round()).abs() <= WHOLE_SAMPLES;
+        let whole =
+            (1.0..1e15).contains(&samples) && (samples - samples.round()).abs() <= WHOLE_SAMPLES;
         let period = samples.round() as usize;
-        if whole { Ok(Some(Repetition { period, skip: self.skip_periods.unwrap_or(0) })) } else { Err(wrong()) }
+        if whole {
+            Ok(Some(Repetition {
+                period,
+                skip: self.skip_periods.unwrap_or(0),
+            }))
+        } else {
+            Err(wrong())
+        }
     }
 }
 
 /// Analyses a CSV; the files stand beside it, or in the folder asked for, under its name.
-pub(super) fn run(path: &Path, out: Option<&Path>, options: &TableOptions, json: bool) -> Result<Outcome, CliError> {
+pub(super) fn run(
+    path: &Path,
+    out: Option<&Path>,
+    options: &TableOptions,
+    json: bool,
+) -> Result<Outcome, CliError> {
     let columns = options.columns(path)?;
     let signals = table::read(path, &columns)?;
     signals.check()?;
     let band_hz = options.band_hz(signals.rate_hz)?;
     let analysis = analyse_signals(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
-    let report = report(path, &columns, &signals, band_hz, &analysis, &in_folder(out, path)?)?;
+    let report = report(
+        path,
+        &columns,
+        &signals,
+        band_hz,
+        &analysis,
+        &in_folder(out, path)?,
+    )?;
     if json {
         print_json(&report)?
     } else {
@@ -147,12 +205,22 @@ fn report(
     beside: &Path,
 ) -> Result<Report, CliError> {
     let csv_path = free(beside, "frf", "csv");
-    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere).map_err(|e| CliError::Failed(e.to_string()))?;
+    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere)
+        .map_err(|e| CliError::Failed(e.to_string()))?;
     let Columns { input, output, .. } = columns;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let (samples, rate_hz) = (signals.len(), signals.rate_hz);
-    let Drawn { plots, report } =
-        drawn(&AnalysedTable { analysis, file: &file, input, output, rate_hz, samples }, beside)?;
+    let Drawn { plots, report } = drawn(
+        &AnalysedTable {
+            analysis,
+            file: &file,
+            input,
+            output,
+            rate_hz,
+            samples,
+        },
+        beside,
+    )?;
     Ok(Report {
         outcome: None,
         trip: None,
@@ -178,7 +246,9 @@ fn report(
 
 impl Report {
     fn text(&self) -> String {
-        let periods = self.periods.map_or(String::new(), |count| format!(", {count} periods averaged"));
+        let periods = self
+            .periods
+            .map_or(String::new(), |count| format!(", {count} periods averaged"));
         format!(
             "  record     {}: {} samples at {} Hz from `{}` to `{}`{periods}\n  response   {} ({} frequencies, median coherence \
              {:.4})\n{}  report     {}\n  residues   in `{}` per `{}` and s^2, where the table says 1/kg\n  misfit     {:.1} times the power \

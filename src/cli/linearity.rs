@@ -17,7 +17,10 @@ use crate::report::number::interval;
 use crate::session::{ModeOverAmplitude, Plan, over_amplitude};
 
 /// Odd lines, one in four left out.
-const LINES: [&str; 2] = ["excitation.kind=\"multisine\"", "multisine.lines=\"odd_random\""];
+const LINES: [&str; 2] = [
+    "excitation.kind=\"multisine\"",
+    "multisine.lines=\"odd_random\"",
+];
 /// Amplitudes at most.
 const MOST: usize = 10;
 
@@ -59,11 +62,19 @@ impl Args {
 
     /// The settings of each run.
     fn configs(&self) -> Result<Vec<(f64, Config)>, CliError> {
-        let sets: Vec<String> = LINES.map(String::from).into_iter().chain(self.band.sets()).collect();
+        let sets: Vec<String> = LINES
+            .map(String::from)
+            .into_iter()
+            .chain(self.band.sets())
+            .collect();
         let planned = self.band.shaped(self.bench.load(Purpose::Chirp, &sets)?)?;
         let scaled = |scale: f64| {
             let mut config = planned.clone();
-            config.chirp.amplitude.iter_mut().for_each(|point| point.current_a *= scale);
+            config
+                .chirp
+                .amplitude
+                .iter_mut()
+                .for_each(|point| point.current_a *= scale);
             (scale, config)
         };
         Ok(self.scales()?.into_iter().map(scaled).collect())
@@ -96,7 +107,11 @@ struct RunMade {
 
 impl RunMade {
     fn ended(&self) -> Outcome {
-        if self.made.is_stopped() { Outcome::Failed } else { self.run.exit() }
+        if self.made.is_stopped() {
+            Outcome::Failed
+        } else {
+            self.run.exit()
+        }
     }
 }
 
@@ -111,12 +126,19 @@ struct ModeMade {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let configs = args.configs()?;
-    let expected = configs.iter().map(|(scale, config)| expected(*scale, config)).collect::<Result<Vec<_>, _>>()?;
+    let expected = configs
+        .iter()
+        .map(|(scale, config)| expected(*scale, config))
+        .collect::<Result<Vec<_>, _>>()?;
     let (mut runs, mut outcome) = (Vec::new(), Outcome::Done);
     for ((scale, config), expected) in configs.iter().zip(expected) {
         let made = one(args, *scale, config, expected)?;
         let ended = made.ended();
-        outcome = if outcome == Outcome::Done { ended } else { outcome };
+        outcome = if outcome == Outcome::Done {
+            ended
+        } else {
+            outcome
+        };
         runs.push(made);
         if ended == Outcome::Failed {
             outcome = ended;
@@ -136,8 +158,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// What a run would do; refused where it crosses an interlock.
 fn expected(scale: f64, config: &Config) -> Result<Expected, CliError> {
-    let refused =
-        |error: CliError| CliError::Usage(format!("at {scale} of the planned amplitude: {error}; nothing moved"));
+    let refused = |error: CliError| {
+        CliError::Usage(format!(
+            "at {scale} of the planned amplitude: {error}; nothing moved"
+        ))
+    };
     Ok(Expected::of(&check(config).map_err(refused)?))
 }
 
@@ -150,13 +175,20 @@ fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<R
         "completed" => analysed(&run.path, config)?,
         _ => Made::nothing("the run did not come to its end"),
     };
-    let made = RunMade { scale, expected, run: told, made };
+    let made = RunMade {
+        scale,
+        expected,
+        run: told,
+        made,
+    };
     finish(run, &made)?;
     Ok(made)
 }
 
 fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
-    let compared = modes.iter().any(|mode| mode.by_run.iter().flatten().count() > 1);
+    let compared = modes
+        .iter()
+        .any(|mode| mode.by_run.iter().flatten().count() > 1);
     let whole = runs.iter().all(|run| run.ended() != Outcome::Failed);
     let shifts = modes.iter().any(ModeOverAmplitude::shifts);
     let shifted = (shifts || whole && compared).then_some(shifts);
@@ -171,30 +203,55 @@ fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
         Some(true) => format!("with amplitude shift beyond what their errors explain: {}", shifting(modes)),
     };
     let mode = |over: &ModeOverAmplitude| ModeMade {
-        by_run: over.by_run.iter().map(|seen| seen.as_ref().map(mode)).collect(),
+        by_run: over
+            .by_run
+            .iter()
+            .map(|seen| seen.as_ref().map(mode))
+            .collect(),
         frequency_shifts: over.frequency_shifts,
         damping_shifts: over.damping_shifts,
         residue_shifts: over.residue_shifts,
     };
     let scales = runs.iter().map(|run| run.scale).collect();
-    Report { scales, runs, modes: modes.iter().map(mode).collect(), shifted, why }
+    Report {
+        scales,
+        runs,
+        modes: modes.iter().map(mode).collect(),
+        shifted,
+        why,
+    }
 }
 
 /// Of which modes nothing is said, as not all amplitudes show them: noise may hide one, or it may have moved beyond all that is
 /// taken for the same.
 fn unseen(modes: &[ModeOverAmplitude]) -> String {
-    let at = |mode: &ModeOverAmplitude| Some(mode.by_run.iter().flatten().next()?.frequency_hz().value);
-    let lost = modes.iter().filter(|mode| !mode.is_seen_throughout()).filter_map(at);
+    let at =
+        |mode: &ModeOverAmplitude| Some(mode.by_run.iter().flatten().next()?.frequency_hz().value);
+    let lost = modes
+        .iter()
+        .filter(|mode| !mode.is_seen_throughout())
+        .filter_map(at);
     let lost: Vec<String> = lost.map(|hz| format!("{hz:.2} Hz")).collect();
-    if lost.is_empty() { String::new() } else { format!("; not seen at every amplitude: {}", lost.join(", ")) }
+    if lost.is_empty() {
+        String::new()
+    } else {
+        format!("; not seen at every amplitude: {}", lost.join(", "))
+    }
 }
 
 /// Which figures of which modes shift.
 fn shifting(modes: &[ModeOverAmplitude]) -> String {
     let of = |mode: &ModeOverAmplitude| {
-        let figures =
-            [("frequency", mode.frequency_shifts), ("damping", mode.damping_shifts), ("residue", mode.residue_shifts)];
-        let names: Vec<&str> = figures.into_iter().filter(|(_, shifts)| *shifts).map(|(name, _)| name).collect();
+        let figures = [
+            ("frequency", mode.frequency_shifts),
+            ("damping", mode.damping_shifts),
+            ("residue", mode.residue_shifts),
+        ];
+        let names: Vec<&str> = figures
+            .into_iter()
+            .filter(|(_, shifts)| *shifts)
+            .map(|(name, _)| name)
+            .collect();
         let at = mode.by_run.iter().flatten().next()?.frequency_hz().value;
         (!names.is_empty()).then(|| format!("{} of the mode at {at:.2} Hz", names.join(" and ")))
     };
@@ -203,8 +260,16 @@ fn shifting(modes: &[ModeOverAmplitude]) -> String {
 
 fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude]) -> String {
     let run = |(run, (_, config)): (&RunMade, &(f64, Config))| {
-        let linearity = run.made.linearity.as_ref().map_or_else(|| run.made.text(), |linearity| linearity.text());
-        let page = run.made.report.as_ref().map_or(String::new(), |path| format!("  report     {path}\n"));
+        let linearity = run
+            .made
+            .linearity
+            .as_ref()
+            .map_or_else(|| run.made.text(), |linearity| linearity.text());
+        let page = run
+            .made
+            .report
+            .as_ref()
+            .map_or(String::new(), |path| format!("  report     {path}\n"));
         format!(
             "{} of the amplitude; expected travel {:.0} um, current {:.3} A\n{}{page}{linearity}\n",
             run.scale,
@@ -213,9 +278,15 @@ fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude])
             run.run.text(config)
         )
     };
-    let words = configs.first().map_or(String::new(), |(_, config)| excitation::words(config));
+    let words = configs
+        .first()
+        .map_or(String::new(), |(_, config)| excitation::words(config));
     let runs: String = report.runs.iter().zip(configs).map(run).collect();
-    format!("{words}\n\n{runs}{}\nmodes over amplitude (* shifts): {}\n", mode_table(&report.scales, modes), report.why)
+    format!(
+        "{words}\n\n{runs}{}\nmodes over amplitude (* shifts): {}\n",
+        mode_table(&report.scales, modes),
+        report.why
+    )
 }
 
 /// A row a mode and amplitude; intervals hold the truth with 95 %.
@@ -223,7 +294,13 @@ fn mode_table(scales: &[f64], modes: &[ModeOverAmplitude]) -> String {
     let figure = |e: Estimate| interval(e.value, SIGMAS_95 * e.sigma);
     let mark = |text: String, shifts: bool| if shifts { text + " *" } else { text };
     let row = |over: &ModeOverAmplitude, (scale, seen): (&f64, &Option<FittedMode>)| match seen {
-        None => [scale.to_string(), "not seen".into(), String::new(), String::new()].to_vec(),
+        None => [
+            scale.to_string(),
+            "not seen".into(),
+            String::new(),
+            String::new(),
+        ]
+        .to_vec(),
         Some(mode) => vec![
             scale.to_string(),
             mark(figure(mode.frequency_hz()), over.frequency_shifts),
@@ -231,8 +308,15 @@ fn mode_table(scales: &[f64], modes: &[ModeOverAmplitude]) -> String {
             mark(figure(mode.residue_per_kg), over.residue_shifts),
         ],
     };
-    let rows: Vec<Vec<String>> =
-        modes.iter().flat_map(|over| scales.iter().zip(&over.by_run).map(move |seen| row(over, seen))).collect();
+    let rows: Vec<Vec<String>> = modes
+        .iter()
+        .flat_map(|over| {
+            scales
+                .iter()
+                .zip(&over.by_run)
+                .map(move |seen| row(over, seen))
+        })
+        .collect();
     table(&["amplitude", "mode Hz", "damping", "residue 1/kg"], &rows)
 }
 
@@ -242,7 +326,10 @@ mod tests {
 
     #[test]
     fn a_mode_that_is_not_seen_at_every_amplitude_is_named() {
-        let known = |value: f64| Estimate { value, sigma: 1e-3 * value };
+        let known = |value: f64| Estimate {
+            value,
+            sigma: 1e-3 * value,
+        };
         let mode = |hz: f64| FittedMode {
             omega_rad_s: known(hz * std::f64::consts::TAU),
             damping_ratio: known(0.01),
@@ -252,7 +339,11 @@ mod tests {
         let both = vec![mode(29.0), mode(82.0)];
         // 90 Hz is no 82 Hz: nothing shifts, but of that mode nothing is known.
         let why = said(&[both.clone(), vec![mode(29.0), mode(90.0)]]);
-        assert!(why.starts_with("no mode shifts") && why.ends_with("; not seen at every amplitude: 82.00 Hz"), "{why}");
+        assert!(
+            why.starts_with("no mode shifts")
+                && why.ends_with("; not seen at every amplitude: 82.00 Hz"),
+            "{why}"
+        );
         assert!(said(&[both.clone(), both]).ends_with("explain"));
     }
 }

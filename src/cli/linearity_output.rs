@@ -100,8 +100,20 @@ impl LinearityMade {
 
     /// Amplitudes by bands, for people.
     pub fn text(&self) -> String {
-        let header = ["Hz", "noise/output", "odd/output", "even/output", "coherence", "lacks by"];
-        let rows: Vec<_> = self.bands.iter().chain([&self.whole]).map(ShareJson::row).collect();
+        let header = [
+            "Hz",
+            "noise/output",
+            "odd/output",
+            "even/output",
+            "coherence",
+            "lacks by",
+        ];
+        let rows: Vec<_> = self
+            .bands
+            .iter()
+            .chain([&self.whole])
+            .map(ShareJson::row)
+            .collect();
         self.line() + &table(&header, &rows)
     }
 }

@@ -50,7 +50,9 @@ impl LoopMade {
     }
 
     pub(super) fn text(&self) -> String {
-        let crossover = self.crossover_rad_s.map_or("none in the band".into(), |w| format!("{w:.2} rad/s"));
+        let crossover = self
+            .crossover_rad_s
+            .map_or("none in the band".into(), |w| format!("{w:.2} rad/s"));
         let margin = match (self.phase_margin_deg, self.phase_margin_sigma_deg) {
             (Some(deg), Some(sigma_deg)) => format!("{deg:.2} +- {:.2} deg", 2.0 * sigma_deg),
             _ => "none".into(),

@@ -35,8 +35,15 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins(args.continuous);
     if args.bench.json {
-        let delay_s = if args.continuous { 0.0 } else { closed_loop.chain().delay_s() };
-        print_json(&Report { margins: &margins, delay_s })?
+        let delay_s = if args.continuous {
+            0.0
+        } else {
+            closed_loop.chain().delay_s()
+        };
+        print_json(&Report {
+            margins: &margins,
+            delay_s,
+        })?
     } else {
         print_text(&text(&config, &margins))?
     }
@@ -45,7 +52,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The loop of a configuration around the model of its plant.
 pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
-    let sections = ControllerText::find(&config.control.controller)?.sections(config.servo.rate_hz)?;
+    let sections =
+        ControllerText::find(&config.control.controller)?.sections(config.servo.rate_hz)?;
     let modal = Modal::of(&plant::build(&config.plant)?)?;
     Ok(ClosedLoop::new(config, modal.modes, sections))
 }
@@ -80,7 +88,9 @@ fn chain_text(config: &Config) -> String {
     }
     let age_ms = probe.age_at_arrival_s() * 1e3;
     match probe.rate_hz {
-        Some(rate_hz) => text += &format!(", {rate_hz} readings a second, {age_ms:.2} ms old on arrival, held"),
+        Some(rate_hz) => {
+            text += &format!(", {rate_hz} readings a second, {age_ms:.2} ms old on arrival, held")
+        }
         None if age_ms > 0.0 => text += &format!(", readings {age_ms:.2} ms old"),
         None => {}
     }
@@ -89,7 +99,8 @@ fn chain_text(config: &Config) -> String {
 
 /// Margins in words.
 pub(super) fn text(config: &Config, margins: &Margins) -> String {
-    let or = |value: Option<f64>, unit: &str| value.map_or("none".into(), |v| format!("{v:.2} {unit}"));
+    let or =
+        |value: Option<f64>, unit: &str| value.map_or("none".into(), |v| format!("{v:.2} {unit}"));
     let time = match margins.continuous {
         true => "continuous time, without delay and amplifier".to_string(),
         false => chain_text(config),

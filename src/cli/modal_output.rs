@@ -106,13 +106,24 @@ impl Shown {
         if self.modes.is_empty() {
             return verdict;
         }
-        let modes = ["mode Hz", "+-", "damping", "+-", "residue 1/kg", "+-", "sign"];
+        let modes = [
+            "mode Hz",
+            "+-",
+            "damping",
+            "+-",
+            "residue 1/kg",
+            "+-",
+            "sign",
+        ];
         let zeros = ["zero rad/s", "+- re", "kind", "right of the axis"];
         let zeros = match self.zeros.is_empty() {
             true => "no zeros up to where a verdict is given\n".into(),
             false => table(&zeros, &self.zero_rows()),
         };
-        format!("\n{}\n{zeros}\n+- holds the truth with 95 %\n{verdict}", table(&modes, &self.mode_rows()))
+        format!(
+            "\n{}\n{zeros}\n+- holds the truth with 95 %\n{verdict}",
+            table(&modes, &self.mode_rows())
+        )
     }
 
     fn mode_rows(&self) -> Vec<Vec<String>> {

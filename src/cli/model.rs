@@ -78,7 +78,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 fn run_modes(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
     let modes = Modes::of(&config, options.profile())?;
-    if options.json { print_json(&modes) } else { print_text(&modes.text()) }
+    if options.json {
+        print_json(&modes)
+    } else {
+        print_text(&modes.text())
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -121,7 +125,10 @@ impl Modes {
     fn of(config: &Config, profile: &str) -> Result<Modes, CliError> {
         let structure = plant::build(&config.plant)?;
         let modal = Modal::of(&structure)?;
-        let (undamped, damped) = (zeros::undamped_zeros(&structure)?, zeros::damped_zeros(&structure)?);
+        let (undamped, damped) = (
+            zeros::undamped_zeros(&structure)?,
+            zeros::damped_zeros(&structure)?,
+        );
         let plant = &config.plant;
         Ok(Modes {
             profile: profile.into(),
@@ -142,10 +149,16 @@ impl Modes {
     }
 
     fn title(&self) -> String {
-        let point = self.operating_point_m.map(|m| format!("at Y1o = {:.4} mm", m * 1e3));
-        let asymmetry = self.mass_asymmetry.map(|ratio| format!("mass asymmetry {:+.2} %", ratio * 100.0));
+        let point = self
+            .operating_point_m
+            .map(|m| format!("at Y1o = {:.4} mm", m * 1e3));
+        let asymmetry = self
+            .mass_asymmetry
+            .map(|ratio| format!("mass asymmetry {:+.2} %", ratio * 100.0));
         let where_to: Vec<String> = point.into_iter().chain(asymmetry).collect();
-        format!("{} {}", self.profile, where_to.join(", ")).trim_end().to_string()
+        format!("{} {}", self.profile, where_to.join(", "))
+            .trim_end()
+            .to_string()
     }
 
     fn text(&self) -> String {
@@ -157,15 +170,40 @@ impl Modes {
                 format!("{:.5}", m.damping_ratio),
                 format!("{:+.6}", m.residue),
                 m.sign.to_string(),
-                m.shape.iter().map(|x| format!("{x:+.4}")).collect::<Vec<_>>().join(" "),
+                m.shape
+                    .iter()
+                    .map(|x| format!("{x:+.4}"))
+                    .collect::<Vec<_>>()
+                    .join(" "),
             ]
         };
-        let zero = |z: &ZeroJson| vec![format!("{:+.4}", z.re_rad_s), format!("{:+.4}", z.im_rad_s), z.kind.into()];
+        let zero = |z: &ZeroJson| {
+            vec![
+                format!("{:+.4}", z.re_rad_s),
+                format!("{:+.4}", z.im_rad_s),
+                z.kind.into(),
+            ]
+        };
         let shape = format!("shape [{}]", self.coordinates.join(" "));
-        let header = ["mode", "rad/s", "Hz", "damping", "residue 1/kg", "sign", &shape];
-        let modes = table(&header, &self.modes.iter().enumerate().map(mode).collect::<Vec<_>>());
-        let zero_table =
-            |zeros: &[ZeroJson]| table(&["re rad/s", "im rad/s", "kind"], &zeros.iter().map(zero).collect::<Vec<_>>());
+        let header = [
+            "mode",
+            "rad/s",
+            "Hz",
+            "damping",
+            "residue 1/kg",
+            "sign",
+            &shape,
+        ];
+        let modes = table(
+            &header,
+            &self.modes.iter().enumerate().map(mode).collect::<Vec<_>>(),
+        );
+        let zero_table = |zeros: &[ZeroJson]| {
+            table(
+                &["re rad/s", "im rad/s", "kind"],
+                &zeros.iter().map(zero).collect::<Vec<_>>(),
+            )
+        };
         format!(
             "{}\n\n{modes}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns {}   dominant modes {}   CNMP pairs {} ({} with damping)   phase drop {} deg\n{}",
             self.title(),
@@ -194,5 +232,12 @@ fn modes(modal: &Modal) -> Vec<ModeJson> {
 }
 
 fn zeros(zeros: &[Zero]) -> Vec<ZeroJson> {
-    zeros.iter().map(|zero| ZeroJson { re_rad_s: zero.s.re, im_rad_s: zero.s.im, kind: zero.kind.name() }).collect()
+    zeros
+        .iter()
+        .map(|zero| ZeroJson {
+            re_rad_s: zero.s.re,
+            im_rad_s: zero.s.im,
+            kind: zero.kind.name(),
+        })
+        .collect()
 }

@@ -34,30 +34,47 @@ pub(super) struct BenchOptions {
 impl BenchOptions {
     /// The profile's name, or the file.
     pub fn profile(&self) -> &str {
-        self.config.as_deref().unwrap_or(crate::config::profiles::DEFAULT)
+        self.config
+            .as_deref()
+            .unwrap_or(crate::config::profiles::DEFAULT)
     }
 
     /// The effective configuration; `more` are settings that the command's own options stand for.
     pub fn load(&self, purpose: Purpose, more: &[String]) -> Result<Config, CliError> {
-        let mut source = Source { config: self.config.clone(), sets: self.sets.clone(), purpose };
+        let mut source = Source {
+            config: self.config.clone(),
+            sets: self.sets.clone(),
+            purpose,
+        };
         let usage = |e: quantity::QuantityError| CliError::Usage(e.to_string());
         if let Some(seed) = self.seed {
             source.sets.push(format!("sim.seed={seed}"));
         }
         source.sets.extend_from_slice(more);
-        let model = (self.asymmetry.is_some() || self.operating_point.is_some()).then(|| load(&source)).transpose()?;
+        let model = (self.asymmetry.is_some() || self.operating_point.is_some())
+            .then(|| load(&source))
+            .transpose()?;
         let plant = model.map(|config| config.plant);
         if let (Some(text), Some(plant)) = (&self.asymmetry, &plant) {
             has(plant, plant.mass_asymmetry(), "--asymmetry")?;
-            source.sets.push(format!("plant.mass_asymmetry={:?}", quantity::ratio(text).map_err(usage)?));
+            source.sets.push(format!(
+                "plant.mass_asymmetry={:?}",
+                quantity::ratio(text).map_err(usage)?
+            ));
         }
         if let (Some(text), Some(plant)) = (&self.operating_point, &plant) {
-            let length_m = has(plant, plant.operating_point_m().and(plant.beam_length_m()), "--operating-point")?;
+            let length_m = has(
+                plant,
+                plant.operating_point_m().and(plant.beam_length_m()),
+                "--operating-point",
+            )?;
             let metres = match quantity::parse(text).map_err(usage)? {
                 Quantity::Bare(metres) | Quantity::Metres(metres) => metres,
                 Quantity::Ratio(ratio) => ratio * length_m,
             };
-            source.sets.push(format!("plant.operating_point_m={metres:?}"));
+            source
+                .sets
+                .push(format!("plant.operating_point_m={metres:?}"));
         }
         let config = load(&source)?;
         devices::check(&config)?;
@@ -69,12 +86,17 @@ impl BenchOptions {
 fn has(plant: &PlantSettings, value: Option<f64>, option: &str) -> Result<f64, CliError> {
     let model = plant.model();
     let settings = "`bench config show` lists its settings, --set KEY=VALUE changes one";
-    value.ok_or_else(|| CliError::Usage(format!("{option} has no meaning for the model `{model}`; {settings}")))
+    value.ok_or_else(|| {
+        CliError::Usage(format!(
+            "{option} has no meaning for the model `{model}`; {settings}"
+        ))
+    })
 }
 
 /// Prints the one JSON object of a command.
 pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
     print_text(&format!("{text}\n"))
 }
 
@@ -82,9 +104,9 @@ pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
 pub(super) fn print_text(text: &str) -> Result<(), CliError> {
     use std::io::Write;
     match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(CliError::Failed(format!("cannot write to standard output: {e}")))
-        }
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(CliError::Failed(format!(
+            "cannot write to standard output: {e}"
+        ))),
         _ => Ok(()),
     }
 }

@@ -99,11 +99,15 @@ impl CliError {
     pub fn outcome(&self) -> Outcome {
         match self {
             CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
-            CliError::Table(TableError::NoColumn { .. } | TableError::Ambiguous { .. } | TableError::Same { .. }) => {
-                Outcome::Usage
-            }
+            CliError::Table(
+                TableError::NoColumn { .. }
+                | TableError::Ambiguous { .. }
+                | TableError::Same { .. },
+            ) => Outcome::Usage,
             CliError::Table(_) => Outcome::Failed,
-            CliError::Campaign(CampaignError::File { .. } | CampaignError::Rest { .. }) => Outcome::Failed,
+            CliError::Campaign(CampaignError::File { .. } | CampaignError::Rest { .. }) => {
+                Outcome::Failed
+            }
             CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
             _ => Outcome::Usage,
         }

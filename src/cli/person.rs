@@ -20,8 +20,13 @@ pub(super) struct AtTerminal<'a> {
 }
 
 impl<'a> AtTerminal<'a> {
-    pub fn new(stop: &'a AtomicBool, beam_length_m: Option<f64>) -> Result<AtTerminal<'a>, CliError> {
-        AtTerminal::of(stop, beam_length_m, || std::io::stdin().lines().map_while(Result::ok))
+    pub fn new(
+        stop: &'a AtomicBool,
+        beam_length_m: Option<f64>,
+    ) -> Result<AtTerminal<'a>, CliError> {
+        AtTerminal::of(stop, beam_length_m, || {
+            std::io::stdin().lines().map_while(Result::ok)
+        })
     }
 
     /// Of these lines, which a thread of its own takes as they come, asked for or not: what waits to be taken could not be told
@@ -36,8 +41,14 @@ impl<'a> AtTerminal<'a> {
         let read = move || typed().try_for_each(|line| tell.send(line));
         let thread = std::thread::Builder::new().name("bench-answers".into());
         let started = thread.spawn(move || drop(read()));
-        started.map_err(|e| CliError::Failed(format!("cannot wait for answers: {e}; start it again")))?;
-        Ok(AtTerminal { stop, beam_length_m, lines })
+        started.map_err(|e| {
+            CliError::Failed(format!("cannot wait for answers: {e}; start it again"))
+        })?;
+        Ok(AtTerminal {
+            stop,
+            beam_length_m,
+            lines,
+        })
     }
 
     /// A line; none at the end of input, or where the person stops the command.
@@ -62,7 +73,9 @@ impl Person for AtTerminal<'_> {
             eprint!("  {}: ", choices(question));
             // An answer can be given all the same.
             let _ = std::io::stderr().flush();
-            let Some(line) = self.line() else { return Reply::Stop };
+            let Some(line) = self.line() else {
+                return Reply::Stop;
+            };
             match reply(&line, question, self.beam_length_m) {
                 Ok(reply) => return reply,
                 Err(why) => eprintln!("  {why}"),
@@ -78,12 +91,20 @@ impl Person for AtTerminal<'_> {
 fn choices(question: &Question) -> String {
     let choices = [
         (true, "Enter when it is done"),
-        (question.may_read, "with the displacement in Y if you can read it, as 3.80mm"),
+        (
+            question.may_read,
+            "with the displacement in Y if you can read it, as 3.80mm",
+        ),
         (question.may_confirm, "`right` if it is right all the same"),
         (question.may_skip, "`skip` to leave the point out"),
         (true, "`stop`"),
     ];
-    choices.into_iter().filter(|(offered, _)| *offered).map(|(_, words)| words).collect::<Vec<_>>().join(", ")
+    choices
+        .into_iter()
+        .filter(|(offered, _)| *offered)
+        .map(|(_, words)| words)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// An answer; why it is none.
@@ -103,7 +124,9 @@ fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<
         _ => None,
     };
     let read_m = length_m.filter(|metres| metres.is_finite());
-    read_m.map(|m| Reply::Done(Some(m))).ok_or_else(|| format!("`{line}` is no answer here; {}", choices(question)))
+    read_m
+        .map(|m| Reply::Done(Some(m)))
+        .ok_or_else(|| format!("`{line}` is no answer here; {}", choices(question)))
 }
 
 #[cfg(test)]
@@ -111,7 +134,12 @@ mod tests {
     use super::*;
 
     fn question(all: bool) -> Question {
-        Question { text: String::new(), may_read: all, may_confirm: all, may_skip: all }
+        Question {
+            text: String::new(),
+            may_read: all,
+            may_confirm: all,
+            may_skip: all,
+        }
     }
 
     #[test]
@@ -127,9 +155,15 @@ mod tests {
         let stop = AtomicBool::new(false);
         let mut person = AtTerminal::of(&stop, None, || lines.chain(end)).expect("a thread");
         let patience = Duration::from_secs(60);
-        all_read.recv_timeout(patience).expect("each line is taken when it is typed");
+        all_read
+            .recv_timeout(patience)
+            .expect("each line is taken when it is typed");
         drop(input);
-        assert_eq!(person.ask(&question(true)), Reply::Stop, "five times Enter, and then the end of the input");
+        assert_eq!(
+            person.ask(&question(true)),
+            Reply::Stop,
+            "five times Enter, and then the end of the input"
+        );
     }
 
     #[test]
@@ -138,15 +172,33 @@ mod tests {
         let done = |m| Ok(Reply::Done(Some(m)));
         assert_eq!(
             [open(""), open(" "), open("stop")],
-            [Ok(Reply::Done(None)), Ok(Reply::Done(None)), Ok(Reply::Stop)]
+            [
+                Ok(Reply::Done(None)),
+                Ok(Reply::Done(None)),
+                Ok(Reply::Stop)
+            ]
         );
-        assert_eq!([open("skip"), open(" right ")], [Ok(Reply::Skip), Ok(Reply::Right)]);
-        assert_eq!([open("3.5mm"), open("-2mm"), open("8%")], [done(0.0035), done(-0.002), done(0.004)]);
+        assert_eq!(
+            [open("skip"), open(" right ")],
+            [Ok(Reply::Skip), Ok(Reply::Right)]
+        );
+        assert_eq!(
+            [open("3.5mm"), open("-2mm"), open("8%")],
+            [done(0.0035), done(-0.002), done(0.004)]
+        );
         for line in ["3.8", "yes", "nan", "infmm", "skip it"] {
-            assert!(open(line).unwrap_err().contains("is no answer here; Enter when it is done"), "{line}");
+            assert!(
+                open(line)
+                    .unwrap_err()
+                    .contains("is no answer here; Enter when it is done"),
+                "{line}"
+            );
         }
         for line in ["skip", "right", "3.5mm"] {
-            assert!(reply(line, &question(false), Some(0.05)).is_err(), "{line} is not offered");
+            assert!(
+                reply(line, &question(false), Some(0.05)).is_err(),
+                "{line} is not offered"
+            );
         }
     }
 }

@@ -10,11 +10,18 @@ pub(super) struct Progress(ProgressBar);
 impl Progress {
     pub(super) fn new(what: &'static str) -> Self {
         let shown = std::io::stderr().is_terminal();
-        let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = if shown {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
         let template = "{msg} [{bar:40}] {percent:>3} %  {elapsed} gone, {eta} left";
-        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style =
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         Progress(
-            ProgressBar::with_draw_target(Some(1), target).with_style(style.progress_chars("=> ")).with_message(what),
+            ProgressBar::with_draw_target(Some(1), target)
+                .with_style(style.progress_chars("=> "))
+                .with_message(what),
         )
     }
 

@@ -20,8 +20,15 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let stem = args.recording.file_stem().unwrap_or_default().to_string_lossy();
-    let to = args.to.clone().unwrap_or_else(|| args.recording.with_file_name(format!("{stem}_recovered.mcap")));
+    let stem = args
+        .recording
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let to = args.to.clone().unwrap_or_else(|| {
+        args.recording
+            .with_file_name(format!("{stem}_recovered.mcap"))
+    });
     let recovered = recover(&args.recording, &to)?;
     let (totals, lost) = (&recovered.totals, recovered.cut.as_ref());
     if args.json {
@@ -35,9 +42,20 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         }))?;
     } else {
         let cut = lost.map_or("nothing is missing".into(), |cut| {
-            format!("bytes {} to {} could not be used: {}", cut.at_byte, cut.of_bytes, cut.why)
+            format!(
+                "bytes {} to {} could not be used: {}",
+                cut.at_byte, cut.of_bytes, cut.why
+            )
         });
-        print_text(&format!("{} ticks recovered into {}; {cut}\n", totals.ticks, to.display()))?;
+        print_text(&format!(
+            "{} ticks recovered into {}; {cut}\n",
+            totals.ticks,
+            to.display()
+        ))?;
     }
-    Ok(if totals.lost_records > 0 { Outcome::Impaired } else { Outcome::Done })
+    Ok(if totals.lost_records > 0 {
+        Outcome::Impaired
+    } else {
+        Outcome::Done
+    })
 }

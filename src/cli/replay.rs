@@ -19,7 +19,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let recording = Recording::open(&args.recording)?;
-    let replayed = replay(&recording).map_err(|e| CliError::Failed(format!("{}: {e}", args.recording.display())))?;
+    let replayed = replay(&recording)
+        .map_err(|e| CliError::Failed(format!("{}: {e}", args.recording.display())))?;
     let same = replayed.different == 0;
     if args.json {
         print_json(&serde_json::json!({
@@ -37,9 +38,14 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 fn text(recording: &Recording, replayed: &Replayed) -> String {
-    let cut = recording.cut().map_or(String::new(), |cut| format!("the recording is cut off: {}\n", cut.why));
+    let cut = recording.cut().map_or(String::new(), |cut| {
+        format!("the recording is cut off: {}\n", cut.why)
+    });
     match replayed.first {
-        None => format!("{cut}{} ticks replayed, every command the same bit for bit\n", replayed.ticks),
+        None => format!(
+            "{cut}{} ticks replayed, every command the same bit for bit\n",
+            replayed.ticks
+        ),
         Some(first) => format!(
             "{cut}{} of {} ticks DIFFER, the first at tick {}: recorded {:e} A, replayed {:e} A\n",
             replayed.different, replayed.ticks, first.tick, first.recorded_a, first.replayed_a

@@ -36,13 +36,21 @@ pub(super) struct RunOptions {
 }
 
 fn pace(text: &str) -> Result<Pace, String> {
-    [Pace::Virtual, Pace::Realtime].into_iter().find(|p| p.name() == text).ok_or("allowed is virtual, realtime".into())
+    [Pace::Virtual, Pace::Realtime]
+        .into_iter()
+        .find(|p| p.name() == text)
+        .ok_or("allowed is virtual, realtime".into())
 }
 
 impl RunOptions {
     /// On the configured devices, at their pace.
     pub fn on_devices(out: PathBuf) -> RunOptions {
-        RunOptions { pace: None, simulate: false, clear_fault: false, out }
+        RunOptions {
+            pace: None,
+            simulate: false,
+            clear_fault: false,
+            out,
+        }
     }
 
     fn is_simulated(&self, config: &Config) -> bool {
@@ -62,21 +70,44 @@ impl RunOptions {
     }
 
     /// The rig of a plan, corrected by `given` or by the configured calibration; and the plan with what is known of both.
-    fn open(&self, plan: &Plan, given: Option<Calibration>) -> Result<(Plan, Box<dyn Rig>), CliError> {
+    fn open(
+        &self,
+        plan: &Plan,
+        given: Option<Calibration>,
+    ) -> Result<(Plan, Box<dyn Rig>), CliError> {
         let config = &plan.config;
-        let mut opened = if self.is_simulated(config) { devices::simulate(config)? } else { devices::open(config)? };
-        opened.notes.iter().for_each(|note| tracing::warn!("{note}"));
+        let mut opened = if self.is_simulated(config) {
+            devices::simulate(config)?
+        } else {
+            devices::open(config)?
+        };
+        opened
+            .notes
+            .iter()
+            .for_each(|note| tracing::warn!("{note}"));
         if self.clear_fault {
-            opened.rig.reset_fault().map_err(|error| CliError::Failed(format!("amplifier: {error}; nothing moved")))?;
+            opened
+                .rig
+                .reset_fault()
+                .map_err(|error| CliError::Failed(format!("amplifier: {error}; nothing moved")))?;
         }
         let mut plan = plan.clone();
         let used = match given {
             Some(calibration) => Some((calibration, Vec::new())),
-            None => use_of(&config.calibration, &opened.amplifier, &opened.probe, SystemTime::now())?,
+            None => use_of(
+                &config.calibration,
+                &opened.amplifier,
+                &opened.probe,
+                SystemTime::now(),
+            )?,
         };
         plan.devices = vec![("amplifier", opened.amplifier), ("probe", opened.probe)];
-        let Some((calibration, warnings)) = used else { return Ok((plan, opened.rig)) };
-        warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+        let Some((calibration, warnings)) = used else {
+            return Ok((plan, opened.rig));
+        };
+        warnings
+            .iter()
+            .for_each(|warning| tracing::warn!("{warning}"));
         plan.calibration = Some(calibration.to_toml()?);
         Ok((plan, Box::new(CalibratedRig::new(opened.rig, &calibration))))
     }
@@ -96,7 +127,9 @@ impl RunOptions {
         let pace = self.pace(&plan.config)?;
         let (plan, rig) = self.open(plan, calibration)?;
         let progress = Progress::new(what);
-        let run = crate::session::run(&plan, rig, pace, &self.out, &mut |done, total| progress.show(done, total));
+        let run = crate::session::run(&plan, rig, pace, &self.out, &mut |done, total| {
+            progress.show(done, total)
+        });
         progress.close();
         run.map_err(|error| match error {
             SessionError::Plan(plan) => CliError::from(plan),
@@ -107,14 +140,19 @@ impl RunOptions {
 
 /// Adds the report of a run to its recording and closes the file; returns the report as JSON.
 pub(super) fn finish(run: Run, report: &impl Serialize) -> Result<String, CliError> {
-    let results =
-        serde_json::to_string_pretty(report).map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
+    let results = serde_json::to_string_pretty(report)
+        .map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
     run.finish(&results)?;
     Ok(results + "\n")
 }
 
 /// Adds the report of a run to its recording, closes the file, and prints the report as asked.
-pub(super) fn close(run: Run, report: &impl Serialize, json: bool, text: &str) -> Result<(), CliError> {
+pub(super) fn close(
+    run: Run,
+    report: &impl Serialize,
+    json: bool,
+    text: &str,
+) -> Result<(), CliError> {
     let results = finish(run, report)?;
     print_text(if json { &results } else { text })
 }
@@ -162,7 +200,12 @@ struct QuantilesJson {
 
 impl From<&Quantiles> for QuantilesJson {
     fn from(q: &Quantiles) -> Self {
-        QuantilesJson { p50: q.p50_ns, p99: q.p99_ns, p9999: q.p9999_ns, max: q.max_ns }
+        QuantilesJson {
+            p50: q.p50_ns,
+            p99: q.p99_ns,
+            p9999: q.p9999_ns,
+            max: q.max_ns,
+        }
     }
 }
 
@@ -225,15 +268,27 @@ impl RunReport {
     /// How the run went, for people.
     pub fn text(&self, config: &Config) -> String {
         let seconds = self.ticks as f64 * config.servo.period_s();
-        let trip = self.trip.as_ref().map_or(String::new(), |trip| trip.text(config.servo.period_s()));
-        let refused: String = self.timing.refused.iter().map(|line| format!("\n  not granted: {line}")).collect();
+        let trip = self
+            .trip
+            .as_ref()
+            .map_or(String::new(), |trip| trip.text(config.servo.period_s()));
+        let refused: String = self
+            .timing
+            .refused
+            .iter()
+            .map(|line| format!("\n  not granted: {line}"))
+            .collect();
         let t = &self.timing;
         let timing = match t.pace {
             "virtual" => "virtual pace (no timing to report)".to_string(),
             _ => format!(
                 "{}, memory {}; lateness p50 {:.1} us, p99 {:.1} us, max {:.1} us; compute p50 {:.1} us, max {:.1} us",
                 t.policy,
-                if t.memory_locked { "locked" } else { "not locked" },
+                if t.memory_locked {
+                    "locked"
+                } else {
+                    "not locked"
+                },
                 t.lateness_ns.p50 as f64 / 1e3,
                 t.lateness_ns.p99 as f64 / 1e3,
                 t.lateness_ns.max as f64 / 1e3,
@@ -243,7 +298,12 @@ impl RunReport {
         };
         format!(
             "{}: {} ticks ({seconds:.2} s at {} Hz), {} overruns, {} lost records\n  {timing}{refused}{trip}\n  recording  {}\n",
-            self.outcome, self.ticks, config.servo.rate_hz, self.overruns, self.lost_records, self.recording
+            self.outcome,
+            self.ticks,
+            config.servo.rate_hz,
+            self.overruns,
+            self.lost_records,
+            self.recording
         )
     }
 }

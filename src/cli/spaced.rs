@@ -20,13 +20,25 @@ impl FromStr for Spaced {
         };
         let ratio = |text: &str| quantity::ratio(text).map_err(|e| e.to_string());
         let (from, to) = (ratio(from)?, ratio(to)?);
-        let count = count.trim().parse().ok().filter(|count| (2..=MOST).contains(count));
+        let count = count
+            .trim()
+            .parse()
+            .ok()
+            .filter(|count| (2..=MOST).contains(count));
         let count: usize = count.ok_or(format!("COUNT is a whole number from 2 to {MOST}"))?;
         if from == to {
-            return Err(format!("an empty sweep: FROM and TO are both {from}; give two values"));
+            return Err(format!(
+                "an empty sweep: FROM and TO are both {from}; give two values"
+            ));
         }
         let last = (count - 1) as f64;
-        let value = |k: usize| if k + 1 == count { to } else { from + (to - from) * k as f64 / last };
+        let value = |k: usize| {
+            if k + 1 == count {
+                to
+            } else {
+                from + (to - from) * k as f64 / last
+            }
+        };
         Ok(Spaced((0..count).map(value).collect()))
     }
 }

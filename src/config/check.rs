@@ -38,11 +38,19 @@ struct Findings(Vec<Finding>);
 
 impl Findings {
     fn add(&mut self, path: &str, what: String) {
-        self.0.push(Finding { path: path.to_string(), what, missing: false });
+        self.0.push(Finding {
+            path: path.to_string(),
+            what,
+            missing: false,
+        });
     }
 
     fn lacks(&mut self, path: &str, what: String) {
-        self.0.push(Finding { path: path.to_string(), what, missing: true });
+        self.0.push(Finding {
+            path: path.to_string(),
+            what,
+            missing: true,
+        });
     }
 }
 
@@ -52,7 +60,9 @@ fn node(root: &Json, schema: &Json, value: &Value, path: &str, out: &mut Finding
         return variant(root, variants, value, path, out);
     }
     match value {
-        Value::Table(entries) if is(&keywords, "object") => table(root, &keywords, entries, path, out),
+        Value::Table(entries) if is(&keywords, "object") => {
+            table(root, &keywords, entries, path, out)
+        }
         Value::Array(items) if is(&keywords, "array") => array(root, &keywords, items, path, out),
         Value::Integer(n) if is(&keywords, "integer") || is(&keywords, "number") => {
             range(&keywords, *n as f64, path, out);
@@ -67,8 +77,14 @@ fn node(root: &Json, schema: &Json, value: &Value, path: &str, out: &mut Finding
 /// The keywords of a node together with those of what it refers to.
 fn flatten(root: &Json, schema: &Json) -> Map<String, Json> {
     let mut keywords = schema.as_object().cloned().unwrap_or_default();
-    let target = schema.get("$ref").and_then(Json::as_str).and_then(|r| root.pointer(r.strip_prefix('#')?));
-    for (key, value) in target.map(|target| flatten(root, target)).unwrap_or_default() {
+    let target = schema
+        .get("$ref")
+        .and_then(Json::as_str)
+        .and_then(|r| root.pointer(r.strip_prefix('#')?));
+    for (key, value) in target
+        .map(|target| flatten(root, target))
+        .unwrap_or_default()
+    {
         match (keywords.get_mut(&key), value) {
             (Some(Json::Object(mine)), Json::Object(theirs)) => mine.extend(theirs),
             (Some(Json::Array(mine)), Json::Array(theirs)) => mine.extend(theirs),
@@ -91,11 +107,16 @@ fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut 
         return;
     };
     let word = value.get(&tag).and_then(Value::as_str);
-    let chosen = variants.iter().find(|v| word.is_some() && constant(&v["properties"][&tag]) == word);
+    let chosen = variants
+        .iter()
+        .find(|v| word.is_some() && constant(&v["properties"][&tag]) == word);
     match chosen {
         Some(chosen) => node(root, chosen, value, path, out),
         None => {
-            let words: Vec<&str> = variants.iter().filter_map(|v| constant(&v["properties"][&tag])).collect();
+            let words: Vec<&str> = variants
+                .iter()
+                .filter_map(|v| constant(&v["properties"][&tag]))
+                .collect();
             match value.get(&tag) {
                 Some(given) => out.add(&join(path, &tag), not_one_of(&given.to_string(), &words)),
                 None => out.lacks(&join(path, &tag), not_one_of("missing", &words)),
@@ -104,28 +125,61 @@ fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut 
     }
 }
 
-fn table(root: &Json, keywords: &Map<String, Json>, entries: &Table, path: &str, out: &mut Findings) {
+fn table(
+    root: &Json,
+    keywords: &Map<String, Json>,
+    entries: &Table,
+    path: &str,
+    out: &mut Findings,
+) {
     let none = Map::new();
-    let properties = keywords.get("properties").and_then(Json::as_object).unwrap_or(&none);
+    let properties = keywords
+        .get("properties")
+        .and_then(Json::as_object)
+        .unwrap_or(&none);
     // A table of entries with names of the user's own has one schema for all of them.
-    let named = keywords.get("additionalProperties").filter(|schema| schema.is_object());
+    let named = keywords
+        .get("additionalProperties")
+        .filter(|schema| schema.is_object());
     for (key, value) in entries {
         match properties.get(key).or(named) {
             Some(schema) => node(root, schema, value, &join(path, key), out),
             None => out.add(&join(path, key), unknown_key(key, properties)),
         }
     }
-    let required = keywords.get("required").and_then(Json::as_array).into_iter().flatten();
-    for key in required.filter_map(Json::as_str).filter(|key| !entries.contains_key(*key)) {
-        out.lacks(&join(path, key), "is missing; this kind of table needs it".into());
+    let required = keywords
+        .get("required")
+        .and_then(Json::as_array)
+        .into_iter()
+        .flatten();
+    for key in required
+        .filter_map(Json::as_str)
+        .filter(|key| !entries.contains_key(*key))
+    {
+        out.lacks(
+            &join(path, key),
+            "is missing; this kind of table needs it".into(),
+        );
     }
 }
 
-fn array(root: &Json, keywords: &Map<String, Json>, items: &[Value], path: &str, out: &mut Findings) {
+fn array(
+    root: &Json,
+    keywords: &Map<String, Json>,
+    items: &[Value],
+    path: &str,
+    out: &mut Findings,
+) {
     let least = keywords.get("minItems").and_then(Json::as_u64).unwrap_or(0);
-    let most = keywords.get("maxItems").and_then(Json::as_u64).unwrap_or(u64::MAX);
+    let most = keywords
+        .get("maxItems")
+        .and_then(Json::as_u64)
+        .unwrap_or(u64::MAX);
     if !(least..=most).contains(&(items.len() as u64)) {
-        out.add(path, format!("has {} entries; {least} to {most} are allowed", items.len()));
+        out.add(
+            path,
+            format!("has {} entries; {least} to {most} are allowed", items.len()),
+        );
     }
     for (index, item) in items.iter().enumerate() {
         if let Some(schema) = keywords.get("items") {
@@ -139,20 +193,32 @@ fn range(keywords: &Map<String, Json>, x: f64, path: &str, out: &mut Findings) {
     let (low, high) = (limit("minimum"), limit("maximum"));
     if !x.is_finite() || low.is_some_and(|low| x < low) || high.is_some_and(|high| x > high) {
         let bound = |b: Option<f64>| b.map_or("any".to_string(), |b| format!("{b}"));
-        out.add(path, format!("is {x}; allowed is {} to {}", bound(low), bound(high)));
+        out.add(
+            path,
+            format!("is {x}; allowed is {} to {}", bound(low), bound(high)),
+        );
     }
 }
 
 fn text(keywords: &Map<String, Json>, word: &str, path: &str, out: &mut Findings) {
-    let words: Vec<&str> =
-        keywords.get("enum").and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str).collect();
+    let words: Vec<&str> = keywords
+        .get("enum")
+        .and_then(Json::as_array)
+        .into_iter()
+        .flatten()
+        .filter_map(Json::as_str)
+        .collect();
     if !words.is_empty() && !words.contains(&word) {
         out.add(path, not_one_of(&format!("{word:?}"), &words));
     }
 }
 
 fn join(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
+    if path.is_empty() {
+        key.to_string()
+    } else {
+        format!("{path}.{key}")
+    }
 }
 
 fn is(keywords: &Map<String, Json>, kind: &str) -> bool {
@@ -170,7 +236,10 @@ fn constant(schema: &Json) -> Option<&str> {
 /// The property that holds a constant in this variant.
 fn tag_of(variant: &Json) -> Option<String> {
     let properties = variant.get("properties")?.as_object()?;
-    properties.iter().find(|(_, schema)| constant(schema).is_some()).map(|(key, _)| key.clone())
+    properties
+        .iter()
+        .find(|(_, schema)| constant(schema).is_some())
+        .map(|(key, _)| key.clone())
 }
 
 fn unknown_key(key: &str, properties: &Map<String, Json>) -> String {
@@ -182,8 +251,12 @@ fn unknown_key(key: &str, properties: &Map<String, Json>) -> String {
 }
 
 /// The candidate most like `word`.
-pub(crate) fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    candidates.max_by(|a, b| strsim::jaro_winkler(word, a).total_cmp(&strsim::jaro_winkler(word, b)))
+pub(crate) fn nearest<'a>(
+    word: &str,
+    candidates: impl Iterator<Item = &'a str>,
+) -> Option<&'a str> {
+    candidates
+        .max_by(|a, b| strsim::jaro_winkler(word, a).total_cmp(&strsim::jaro_winkler(word, b)))
 }
 
 fn not_one_of(given: &str, words: &[&str]) -> String {
@@ -191,16 +264,31 @@ fn not_one_of(given: &str, words: &[&str]) -> String {
 }
 
 fn wrong_type(keywords: &Map<String, Json>, given: &Value) -> String {
-    let wanted = ["number", "integer", "string", "boolean", "array", "object"].into_iter().find(|t| is(keywords, t));
-    let wanted = wanted.map_or("something else", |t| if t == "object" { "table" } else { t });
-    let si = given.as_str().filter(|_| wanted == "number").and_then(|text| quantity::parse(text).ok());
+    let wanted = ["number", "integer", "string", "boolean", "array", "object"]
+        .into_iter()
+        .find(|t| is(keywords, t));
+    let wanted = wanted.map_or(
+        "something else",
+        |t| if t == "object" { "table" } else { t },
+    );
+    let si = given
+        .as_str()
+        .filter(|_| wanted == "number")
+        .and_then(|text| quantity::parse(text).ok());
     match si {
         Some(Quantity::Bare(x) | Quantity::Metres(x) | Quantity::Ratio(x)) => {
             format!("is the text {given}, not a number; settings are in SI units: write {x}")
         }
         None => {
-            let article = if wanted.starts_with(['a', 'i']) { "an" } else { "a" };
-            format!("is {given}, {} where {article} {wanted} belongs", given.type_str())
+            let article = if wanted.starts_with(['a', 'i']) {
+                "an"
+            } else {
+                "a"
+            };
+            format!(
+                "is {given}, {} where {article} {wanted} belongs",
+                given.type_str()
+            )
         }
     }
 }

@@ -52,7 +52,10 @@ pub struct ChirpSettings {
 impl ChirpSettings {
     /// The band in hertz, lowest and highest frequency, whichever way the sweep runs.
     pub fn band_hz(&self) -> (f64, f64) {
-        (self.start_hz.min(self.stop_hz), self.start_hz.max(self.stop_hz))
+        (
+            self.start_hz.min(self.stop_hz),
+            self.start_hz.max(self.stop_hz),
+        )
     }
 }
 

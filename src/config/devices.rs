@@ -335,7 +335,11 @@ pub struct PollingSettings {
 
 impl Default for PollingSettings {
     fn default() -> Self {
-        PollingSettings { interval_s: 0.0, timeout_s: 0.1, quiet_s: 0.02 }
+        PollingSettings {
+            interval_s: 0.0,
+            timeout_s: 0.1,
+            quiet_s: 0.02,
+        }
     }
 }
 

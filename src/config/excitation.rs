@@ -88,7 +88,9 @@ impl SteppedSineSettings {
             Spacing::Linear => start_hz + (stop_hz - start_hz) * share,
             Spacing::Logarithmic => start_hz * libm::pow(stop_hz / start_hz, share),
         };
-        (0..self.count.max(2)).map(|k| at(f64::from(k) / last)).collect()
+        (0..self.count.max(2))
+            .map(|k| at(f64::from(k) / last))
+            .collect()
     }
 }
 

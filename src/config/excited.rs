@@ -17,7 +17,8 @@ pub(super) fn ticks(config: &Config) -> (f64, &'static str, f64) {
     let (chirp, rate_hz) = (&config.chirp, config.servo.rate_hz);
     let quiet_s = chirp.quiet_before_s + chirp.quiet_after_s;
     let periodic = |period_s: f64, periods: u32, settle: u32| {
-        (quiet_s + period_s * f64::from(periods.saturating_add(settle)) + chirp.fade_out_s) * rate_hz
+        (quiet_s + period_s * f64::from(periods.saturating_add(settle)) + chirp.fade_out_s)
+            * rate_hz
     };
     match config.excitation.kind {
         ExcitationKind::Chirp => {
@@ -26,17 +27,33 @@ pub(super) fn ticks(config: &Config) -> (f64, &'static str, f64) {
         }
         ExcitationKind::Multisine => {
             let m = &config.multisine;
-            (periodic(m.period_s, m.periods, m.settle_periods), "multisine.period_s", m.period_s)
+            (
+                periodic(m.period_s, m.periods, m.settle_periods),
+                "multisine.period_s",
+                m.period_s,
+            )
         }
         ExcitationKind::Prbs => {
             let p = &config.prbs;
-            (periodic(period_s(config), p.periods, p.settle_periods), "prbs.order", f64::from(p.order))
+            (
+                periodic(period_s(config), p.periods, p.settle_periods),
+                "prbs.order",
+                f64::from(p.order),
+            )
         }
         ExcitationKind::SteppedSine => {
             let s = &config.stepped_sine;
             let one_s = |f: f64| s.settle_s + s.measure_s.max(BLOCKS_PER_SINE / f);
-            let sines_s: f64 = s.frequencies_hz(chirp.start_hz, chirp.stop_hz).into_iter().map(one_s).sum();
-            ((quiet_s + sines_s + s.settle_s) * rate_hz, "stepped_sine.count", f64::from(s.count))
+            let sines_s: f64 = s
+                .frequencies_hz(chirp.start_hz, chirp.stop_hz)
+                .into_iter()
+                .map(one_s)
+                .sum();
+            (
+                (quiet_s + sines_s + s.settle_s) * rate_hz,
+                "stepped_sine.count",
+                f64::from(s.count),
+            )
         }
     }
 }
@@ -68,5 +85,9 @@ fn prbs(config: &Config, settings: &PrbsSettings) -> Option<Finding> {
 }
 
 fn finding(path: &str, what: String) -> Finding {
-    Finding { path: path.into(), what, missing: false }
+    Finding {
+        path: path.into(),
+        what,
+        missing: false,
+    }
 }

@@ -93,7 +93,14 @@ pub fn load(source: &Source) -> Result<Config, ConfigError> {
 }
 
 /// Tables that recordings of earlier versions lack, which ran a chirp: they are those of the default profile.
-const LATER: [&str; 6] = ["excitation", "multisine", "stepped_sine", "prbs", "shape", "campaign"];
+const LATER: [&str; 6] = [
+    "excitation",
+    "multisine",
+    "stepped_sine",
+    "prbs",
+    "shape",
+    "campaign",
+];
 
 /// The configuration that travels with a recording: whole, over nothing but the tables that are newer than it may be.
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
@@ -114,7 +121,9 @@ fn checked(layers: &[Layer], purpose: Purpose) -> Result<Config, ConfigError> {
     }
     let findings = check::check(&schema(), &Value::Table(merged.clone()));
     refuse(layers, findings)?;
-    let config: Config = merged.try_into().map_err(|e: toml::de::Error| ConfigError::Refused(vec![e.to_string()]))?;
+    let config: Config = merged
+        .try_into()
+        .map_err(|e: toml::de::Error| ConfigError::Refused(vec![e.to_string()]))?;
     refuse(layers, cross_checks(&config, purpose))?;
     Ok(config)
 }
@@ -124,8 +133,15 @@ pub(crate) fn recheck(config: &Config) -> Result<(), ConfigError> {
     let value = Value::try_from(config).map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
     let mut findings = check::check(&schema(), &value);
     findings.extend(cross_checks(config, Purpose::Model));
-    let lines: Vec<String> = findings.iter().map(|f| format!("  `{}` {}", f.path, f.what)).collect();
-    if lines.is_empty() { Ok(()) } else { Err(ConfigError::Refused(lines)) }
+    let lines: Vec<String> = findings
+        .iter()
+        .map(|f| format!("  `{}` {}", f.path, f.what))
+        .collect();
+    if lines.is_empty() {
+        Ok(())
+    } else {
+        Err(ConfigError::Refused(lines))
+    }
 }
 
 fn refuse(layers: &[Layer], findings: Vec<Finding>) -> Result<(), ConfigError> {
@@ -133,7 +149,10 @@ fn refuse(layers: &[Layer], findings: Vec<Finding>) -> Result<(), ConfigError> {
         return Ok(());
     }
     Err(ConfigError::Refused(
-        findings.iter().map(|f| format!("  {}: `{}` {}", place(layers, f.at()), f.path, f.what)).collect(),
+        findings
+            .iter()
+            .map(|f| format!("  {}: `{}` {}", place(layers, f.at()), f.path, f.what))
+            .collect(),
     ))
 }
 
@@ -143,12 +162,20 @@ fn place(layers: &[Layer], path: &str) -> String {
     loop {
         for layer in layers.iter().rev() {
             if let Some(line) = line_of(&layer.text, path) {
-                return if layer.name == "--set" { layer.name.clone() } else { format!("{} line {line}", layer.name) };
+                return if layer.name == "--set" {
+                    layer.name.clone()
+                } else {
+                    format!("{} line {line}", layer.name)
+                };
             }
         }
         match path.rsplit_once('.') {
             Some((outer, _)) => path = outer,
-            None => return layers.last().map_or("the configuration".into(), |layer| layer.name.clone()),
+            None => {
+                return layers
+                    .last()
+                    .map_or("the configuration".into(), |layer| layer.name.clone());
+            }
         }
     }
 }
@@ -157,13 +184,21 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
     let embedded = |name: &str| profiles::find(profiles::PROFILES, name);
     let mut layers = Vec::new();
     if let Some(base) = embedded(profiles::DEFAULT) {
-        layers.push(parse(format!("profile {}", base.name), base.text.to_string())?);
+        layers.push(parse(
+            format!("profile {}", base.name),
+            base.text.to_string(),
+        )?);
     }
     match source.config.as_deref() {
         None | Some(profiles::DEFAULT) => {}
         Some(name) => match embedded(name) {
-            Some(profile) => layers.push(parse(format!("profile {name}"), profile.text.to_string())?),
-            None => layers.push(parse(name.to_string(), read(name, profiles::PROFILES, "profile")?)?),
+            Some(profile) => {
+                layers.push(parse(format!("profile {name}"), profile.text.to_string())?)
+            }
+            None => layers.push(parse(
+                name.to_string(),
+                read(name, profiles::PROFILES, "profile")?,
+            )?),
         },
     }
     if !source.sets.is_empty() {
@@ -175,13 +210,24 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
 fn read(name: &str, known: &[Embedded], what: &'static str) -> Result<String, ConfigError> {
     let path = Path::new(name);
     if !path.exists() {
-        return Err(ConfigError::NotFound { what, name: name.into(), known: profiles::names(known) });
+        return Err(ConfigError::NotFound {
+            what,
+            name: name.into(),
+            known: profiles::names(known),
+        });
     }
-    std::fs::read_to_string(path).map_err(|e| ConfigError::Unreadable { path: path.into(), why: e.to_string() })
+    std::fs::read_to_string(path).map_err(|e| ConfigError::Unreadable {
+        path: path.into(),
+        why: e.to_string(),
+    })
 }
 
 /// The text of an embedded file by its name, or of any file by its path.
-pub(crate) fn text_of(name: &str, known: &[Embedded], what: &'static str) -> Result<String, ConfigError> {
+pub(crate) fn text_of(
+    name: &str,
+    known: &[Embedded],
+    what: &'static str,
+) -> Result<String, ConfigError> {
     match profiles::find(known, name) {
         Some(embedded) => Ok(embedded.text.to_string()),
         None => read(name, known, what),
@@ -202,13 +248,19 @@ where
     let schema = schemars::schema_for!(T).to_value();
     let findings = check::check(&schema, &Value::Table(layer.table.clone()));
     refuse(std::slice::from_ref(&layer), findings)?;
-    layer.table.try_into().map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
+    layer
+        .table
+        .try_into()
+        .map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
 }
 
 fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
     match text.parse::<Table>() {
         Ok(table) => Ok(Layer { name, text, table }),
-        Err(e) => Err(ConfigError::Syntax { place: name, why: e.to_string() }),
+        Err(e) => Err(ConfigError::Syntax {
+            place: name,
+            why: e.to_string(),
+        }),
     }
 }
 
@@ -216,11 +268,18 @@ fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
 fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
     let mut table = Table::new();
     for set in sets {
-        let wrong = |why: &str| ConfigError::Syntax { place: format!("--set {set}"), why: why.into() };
-        let (key, text) =
-            set.split_once('=').ok_or_else(|| wrong("write KEY=VALUE, as in plant.mass_asymmetry=0.05"))?;
+        let wrong = |why: &str| ConfigError::Syntax {
+            place: format!("--set {set}"),
+            why: why.into(),
+        };
+        let (key, text) = set
+            .split_once('=')
+            .ok_or_else(|| wrong("write KEY=VALUE, as in plant.mass_asymmetry=0.05"))?;
         let (key, text) = (key.trim(), text.trim());
-        let parsed = format!("value = {text}").parse::<Table>().ok().and_then(|mut t| t.remove("value"));
+        let parsed = format!("value = {text}")
+            .parse::<Table>()
+            .ok()
+            .and_then(|mut t| t.remove("value"));
         let value = parsed.unwrap_or_else(|| Value::String(text.trim_matches('"').into()));
         let nested = key.rsplit('.').fold(value, |inner, part| {
             let mut outer = Table::new();
@@ -228,12 +287,18 @@ fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
             Value::Table(outer)
         });
         match nested {
-            Value::Table(layer) if !key.split('.').any(str::is_empty) => lay(&mut table, &layer, |_, _| true),
+            Value::Table(layer) if !key.split('.').any(str::is_empty) => {
+                lay(&mut table, &layer, |_, _| true)
+            }
             _ => return Err(wrong("the key has an empty part")),
         }
     }
     let text = toml::to_string(&table).unwrap_or_default();
-    Ok(Layer { name: "--set".into(), text, table })
+    Ok(Layer {
+        name: "--set".into(),
+        text,
+        table,
+    })
 }
 
 /// Lays `over` upon `base`: tables that `joins` accepts are merged key by key, all else takes the old value's place.
@@ -250,10 +315,12 @@ fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
 
 /// Tables of another `kind` or `model` have other keys: the new one replaces the old one.
 fn same_kind(old: &Table, new: &Table) -> bool {
-    ["kind", "model"].iter().all(|tag| match (old.get(*tag), new.get(*tag)) {
-        (Some(old), Some(new)) => old == new,
-        _ => true,
-    })
+    ["kind", "model"]
+        .iter()
+        .all(|tag| match (old.get(*tag), new.get(*tag)) {
+            (Some(old), Some(new)) => old == new,
+            _ => true,
+        })
 }
 
 /// What no single setting can say: relations between settings.
@@ -276,18 +343,32 @@ struct Relations(Vec<Finding>);
 impl Relations {
     fn must(&mut self, good: bool, path: &str, what: String) {
         if !good {
-            self.0.push(Finding { path: path.into(), what, missing: false });
+            self.0.push(Finding {
+                path: path.into(),
+                what,
+                missing: false,
+            });
         }
     }
 
     fn rig(&mut self, config: &Config) {
-        let (soft_m, stop_m, seen_m) = (config.interlock.soft_limit_m, config.sim.stop_m, config.probe.range_m / 2.0);
+        let (soft_m, stop_m, seen_m) = (
+            config.interlock.soft_limit_m,
+            config.sim.stop_m,
+            config.probe.range_m / 2.0,
+        );
         let path = "interlock.soft_limit_m";
-        self.must(soft_m < stop_m, path, format!("is {soft_m} m; it must lie inside the stop at {stop_m} m"));
+        self.must(
+            soft_m < stop_m,
+            path,
+            format!("is {soft_m} m; it must lie inside the stop at {stop_m} m"),
+        );
         self.must(
             soft_m <= seen_m,
             path,
-            format!("is {soft_m} m, beyond what the probe sees, {seen_m} m (half of probe.range_m)"),
+            format!(
+                "is {soft_m} m, beyond what the probe sees, {seen_m} m (half of probe.range_m)"
+            ),
         );
         let (continuous_n, peak_n) = (config.motor.continuous_force_n, config.motor.peak_force_n);
         let what = format!("is {continuous_n} N, above the peak force of {peak_n} N");
@@ -295,7 +376,8 @@ impl Relations {
         let (stale_s, period_s) = (config.interlock.probe_stale_s, config.servo.period_s());
         let what = format!("is {stale_s} s, shorter than a tick of {period_s} s");
         self.must(stale_s >= period_s, "interlock.probe_stale_s", what);
-        let oldest_s = config.probe.age_at_arrival_s() + config.probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
+        let oldest_s = config.probe.age_at_arrival_s()
+            + config.probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
         let what = format!(
             "is {stale_s} s, but a reading may be {oldest_s} s old before the next one (probe.latency_s, transport_s, rate_hz)"
         );
@@ -305,13 +387,17 @@ impl Relations {
     fn chirp(&mut self, config: &Config) {
         let (chirp, nyquist_hz) = (&config.chirp, config.servo.rate_hz / 2.0);
         let (start_hz, stop_hz) = (chirp.start_hz, chirp.stop_hz);
-        let what = format!("is {stop_hz} Hz, but the sweep starts at {start_hz} Hz; a sweep needs two frequencies");
+        let what = format!(
+            "is {stop_hz} Hz, but the sweep starts at {start_hz} Hz; a sweep needs two frequencies"
+        );
         self.must(start_hz != stop_hz, "chirp.stop_hz", what);
         for (path, hz) in [("chirp.start_hz", start_hz), ("chirp.stop_hz", stop_hz)] {
-            let what = format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
+            let what =
+                format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
             self.must(hz < nyquist_hz, path, what);
             let seen_hz = config.probe.rate_hz.unwrap_or(f64::INFINITY) / 2.0;
-            let what = format!("is {hz} Hz; the probe sees frequencies below half its rate, {seen_hz} Hz");
+            let what =
+                format!("is {hz} Hz; the probe sees frequencies below half its rate, {seen_hz} Hz");
             self.must(hz < seen_hz, path, what);
         }
         let (ticks, path, value) = excited::ticks(config);
@@ -322,27 +408,53 @@ impl Relations {
         self.must(ticks <= CHIRP_TICKS, path, what);
         self.0.extend(excited::excitation(config));
         let fades_s = chirp.fade_in_s + chirp.fade_out_s;
-        let what = format!("is {} s, shorter than both fades, {fades_s} s", chirp.duration_s);
+        let what = format!(
+            "is {} s, shorter than both fades, {fades_s} s",
+            chirp.duration_s
+        );
         self.must(fades_s <= chirp.duration_s, "chirp.duration_s", what);
-        let rising = chirp.amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
-        self.must(rising, "chirp.amplitude", "has frequencies that do not rise from point to point".into());
+        let rising = chirp
+            .amplitude
+            .windows(2)
+            .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        self.must(
+            rising,
+            "chirp.amplitude",
+            "has frequencies that do not rise from point to point".into(),
+        );
     }
 
     /// A swept reference.
     fn swept(&mut self, config: &Config, amplitude: &[TravelPoint], travel_m: f64) {
         let soft_m = config.interlock.soft_limit_m;
-        let largest_m = amplitude.iter().map(|point| point.amplitude_m).fold(travel_m, f64::max);
-        let what = format!("reaches {largest_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)");
+        let largest_m = amplitude
+            .iter()
+            .map(|point| point.amplitude_m)
+            .fold(travel_m, f64::max);
+        let what = format!(
+            "reaches {largest_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)"
+        );
         self.must(largest_m <= soft_m, "control.reference", what);
-        let rising = amplitude.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        let rising = amplitude
+            .windows(2)
+            .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
         let what = "has frequencies that do not rise from point to point";
         self.must(rising, "control.reference.amplitude", what.into());
     }
 
     fn identify(&mut self, config: &Config) {
-        let IdentifySettings::Local(local) = &config.identify else { return };
-        let rising = local.resolution.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
-        self.must(rising, "identify.resolution", "has frequencies that do not rise from point to point".into());
+        let IdentifySettings::Local(local) = &config.identify else {
+            return;
+        };
+        let rising = local
+            .resolution
+            .windows(2)
+            .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        self.must(
+            rising,
+            "identify.resolution",
+            "has frequencies that do not rise from point to point".into(),
+        );
     }
 
     fn control(&mut self, config: &Config) {
@@ -353,17 +465,28 @@ impl Relations {
             ReferenceSettings::Step { amplitude_m, .. }
             | ReferenceSettings::Ramp { amplitude_m, .. }
             | ReferenceSettings::Sine { amplitude_m, .. } => {
-                let what = format!("is {amplitude_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)");
+                let what = format!(
+                    "is {amplitude_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)"
+                );
                 self.must(amplitude_m.abs() <= soft_m, path, what);
             }
-            ReferenceSettings::Chirp { ref amplitude, travel_m } => {
+            ReferenceSettings::Chirp {
+                ref amplitude,
+                travel_m,
+            } => {
                 self.swept(config, amplitude, travel_m);
             }
             ReferenceSettings::Hold | ReferenceSettings::File { .. } => {}
         }
         if let ReferenceSettings::Sine { frequency_hz, .. } = config.control.reference {
-            let what = format!("is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
-            self.must(frequency_hz < nyquist_hz, "control.reference.frequency_hz", what);
+            let what = format!(
+                "is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz"
+            );
+            self.must(
+                frequency_hz < nyquist_hz,
+                "control.reference.frequency_hz",
+                what,
+            );
         }
     }
 }

@@ -9,11 +9,17 @@ pub(super) fn line_of(text: &str, path: &str) -> Option<usize> {
     let mut found = None;
     let mut parts = path.split('.').peekable();
     while let Some(part) = parts.next() {
-        let (key, value) = table.iter().find(|(key, _)| key.get_ref().as_ref() == part)?;
+        let (key, value) = table
+            .iter()
+            .find(|(key, _)| key.get_ref().as_ref() == part)?;
         found = Some(key.span().start);
         let mut value = value.get_ref();
         while let DeValue::Array(items) = value {
-            let Some(item) = parts.peek().and_then(|n| n.parse::<usize>().ok()).and_then(|n| items.get(n)) else {
+            let Some(item) = parts
+                .peek()
+                .and_then(|n| n.parse::<usize>().ok())
+                .and_then(|n| items.get(n))
+            else {
                 break;
             };
             parts.next();

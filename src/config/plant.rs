@@ -61,7 +61,9 @@ impl PlantSettings {
         match self {
             PlantSettings::Sr4dof(_) => vec!["x1", "y1", "y2", "y3"],
             PlantSettings::Xy(_) => {
-                vec!["x_ms", "y_ms", "y_sL", "y_sR", "x_sT", "x_sB", "x_gL", "x_gR", "y_gT", "y_gB"]
+                vec![
+                    "x_ms", "y_ms", "y_sL", "y_sR", "x_sT", "x_sB", "x_gL", "x_gR", "y_gT", "y_gB",
+                ]
             }
             PlantSettings::Lumped(plant) => plant.nodes.keys().map(String::as_str).collect(),
             PlantSettings::Modal(plant) => plant.modes.keys().map(String::as_str).collect(),

@@ -26,13 +26,26 @@ const LENGTHS: [(&str, f64); 4] = [("nm", 1e-9), ("um", 1e-6), ("mm", 1e-3), ("m
 /// Reads a number with `%`, `nm`, `um`, `mm`, `m` or nothing behind it.
 pub fn parse(text: &str) -> Result<Quantity, QuantityError> {
     let expected = "a number, a percentage (8%) or a length (3.8mm, 50um, 0.0038)";
-    let fail = || QuantityError { text: text.to_string(), expected };
-    let number = |digits: &str| digits.trim().parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(fail);
+    let fail = || QuantityError {
+        text: text.to_string(),
+        expected,
+    };
+    let number = |digits: &str| {
+        digits
+            .trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|n| n.is_finite())
+            .ok_or_else(fail)
+    };
     let text = text.trim();
     if let Some(digits) = text.strip_suffix('%') {
         return Ok(Quantity::Ratio(number(digits)? / 100.0));
     }
-    match LENGTHS.iter().find_map(|(unit, scale)| text.strip_suffix(unit).map(|digits| (digits, scale))) {
+    match LENGTHS
+        .iter()
+        .find_map(|(unit, scale)| text.strip_suffix(unit).map(|digits| (digits, scale)))
+    {
         Some((digits, scale)) => Ok(Quantity::Metres(number(digits)? * scale)),
         None => Ok(Quantity::Bare(number(text)?)),
     }
@@ -42,7 +55,10 @@ pub fn parse(text: &str) -> Result<Quantity, QuantityError> {
 pub fn ratio(text: &str) -> Result<f64, QuantityError> {
     match parse(text)? {
         Quantity::Bare(value) | Quantity::Ratio(value) => Ok(value),
-        Quantity::Metres(_) => Err(QuantityError { text: text.into(), expected: "a ratio (10% or 0.1)" }),
+        Quantity::Metres(_) => Err(QuantityError {
+            text: text.into(),
+            expected: "a ratio (10% or 0.1)",
+        }),
     }
 }
 
@@ -50,7 +66,10 @@ pub fn ratio(text: &str) -> Result<f64, QuantityError> {
 pub fn metres(text: &str) -> Result<f64, QuantityError> {
     match parse(text)? {
         Quantity::Bare(value) | Quantity::Metres(value) => Ok(value),
-        Quantity::Ratio(_) => Err(QuantityError { text: text.into(), expected: "a length (50um or 5e-5, in metres)" }),
+        Quantity::Ratio(_) => Err(QuantityError {
+            text: text.into(),
+            expected: "a length (50um or 5e-5, in metres)",
+        }),
     }
 }
 
@@ -80,7 +99,10 @@ mod tests {
     fn what_is_no_number_is_refused_with_the_text() {
         for text in ["", "mm", "8 apples", "NaN", "inf%", "1e999"] {
             let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(text.trim()) && error.contains("3.8mm"), "{error}");
+            assert!(
+                error.contains(text.trim()) && error.contains("3.8mm"),
+                "{error}"
+            );
         }
         assert!(ratio("3mm").is_err() && metres("3%").is_err());
     }

@@ -7,7 +7,9 @@ use super::calibration::{CalibrateSettings, CalibrationSettings};
 use super::campaign::CampaignSettings;
 use super::chirp::ChirpSettings;
 use super::control::ControlSettings;
-use super::excitation::{ExcitationSettings, MultisineSettings, PrbsSettings, ShapeSettings, SteppedSineSettings};
+use super::excitation::{
+    ExcitationSettings, MultisineSettings, PrbsSettings, ShapeSettings, SteppedSineSettings,
+};
 use super::identify::IdentifySettings;
 use super::interlock::InterlockSettings;
 use super::motor_amplifier_probe::{AmplifierSettings, MotorSettings, ProbeSettings};

@@ -20,7 +20,14 @@ impl Biquad {
     /// A section at rest from coefficients by rising power of z^-1, divided by the denominator's first.
     pub fn new(numerator: [f64; 3], denominator: [f64; 3]) -> Self {
         let b = numerator.map(|c| c / denominator[0]);
-        Biquad { b, a: [denominator[1] / denominator[0], denominator[2] / denominator[0]], state: [0.0; 2] }
+        Biquad {
+            b,
+            a: [
+                denominator[1] / denominator[0],
+                denominator[2] / denominator[0],
+            ],
+            state: [0.0; 2],
+        }
     }
 
     /// The output for the input `x` of this tick. *In the tick.*
@@ -47,7 +54,12 @@ impl Biquad {
     pub fn state_space(&self) -> (Matrix2<f64>, Vector2<f64>, RowVector2<f64>, f64) {
         let [a1, a2] = self.a;
         let [b0, b1, b2] = self.b;
-        (Matrix2::new(-a1, 1.0, -a2, 0.0), Vector2::new(b1 - a1 * b0, b2 - a2 * b0), RowVector2::new(1.0, 0.0), b0)
+        (
+            Matrix2::new(-a1, 1.0, -a2, 0.0),
+            Vector2::new(b1 - a1 * b0, b2 - a2 * b0),
+            RowVector2::new(1.0, 0.0),
+            b0,
+        )
     }
 }
 
@@ -60,24 +72,35 @@ mod tests {
     #[test]
     fn update_is_the_difference_equation_of_the_docstring() {
         let mut biquad = Biquad::new([0.4, -0.3, 0.2], [2.0, -2.4, 0.9]);
-        let input: Vec<f64> = (0..50).map(|k| f64::sin(k as f64) + 0.1 * k as f64).collect();
+        let input: Vec<f64> = (0..50)
+            .map(|k| f64::sin(k as f64) + 0.1 * k as f64)
+            .collect();
         let mut output: Vec<f64> = Vec::new();
         for (k, &x) in input.iter().enumerate() {
             let back = |list: &[f64], n: usize| if k >= n { list[k - n] } else { 0.0 };
-            let direct = 0.2 * x - 0.15 * back(&input, 1) + 0.1 * back(&input, 2) + 1.2 * back(&output, 1)
-                - 0.45 * back(&output, 2);
+            let direct =
+                0.2 * x - 0.15 * back(&input, 1) + 0.1 * back(&input, 2) + 1.2 * back(&output, 1)
+                    - 0.45 * back(&output, 2);
             output.push(direct);
-            assert!((biquad.update(x) - direct).abs() < 1e-13 * direct.abs().max(1.0), "sample {k}");
+            assert!(
+                (biquad.update(x) - direct).abs() < 1e-13 * direct.abs().max(1.0),
+                "sample {k}"
+            );
         }
     }
 
     #[test]
     fn the_response_is_the_transform_of_the_impulse_response() {
         let mut biquad = Biquad::new([0.4, -0.3, 0.2], [2.0, -2.4, 0.9]);
-        let response: Vec<f64> = (0..400).map(|k| biquad.update(if k == 0 { 1.0 } else { 0.0 })).collect();
+        let response: Vec<f64> = (0..400)
+            .map(|k| biquad.update(if k == 0 { 1.0 } else { 0.0 }))
+            .collect();
         for angle in POINTS {
             let z = Complex::new(f64::cos(angle), f64::sin(angle));
-            let sum: Complex<f64> = response.iter().rev().fold(Complex::new(0.0, 0.0), |sum, h| sum / z + h);
+            let sum: Complex<f64> = response
+                .iter()
+                .rev()
+                .fold(Complex::new(0.0, 0.0), |sum, h| sum / z + h);
             // The poles have magnitude sqrt(0.45): 400 samples leave nothing.
             assert!((sum - biquad.response(z)).norm() < 1e-12);
         }
@@ -89,8 +112,12 @@ mod tests {
         let (a, b, c, d) = biquad.state_space();
         for angle in POINTS {
             let z = Complex::new(f64::cos(angle), f64::sin(angle));
-            let resolvent = (Matrix2::identity() * z - a.map(|x| Complex::new(x, 0.0))).try_inverse().unwrap();
-            let direct = (c.map(|x| Complex::new(x, 0.0)) * resolvent * b.map(|x| Complex::new(x, 0.0)))[0] + d;
+            let resolvent = (Matrix2::identity() * z - a.map(|x| Complex::new(x, 0.0)))
+                .try_inverse()
+                .unwrap();
+            let direct =
+                (c.map(|x| Complex::new(x, 0.0)) * resolvent * b.map(|x| Complex::new(x, 0.0)))[0]
+                    + d;
             assert!((direct - biquad.response(z)).norm() < 1e-13);
         }
     }

@@ -48,7 +48,11 @@ impl ClosedLoop {
     /// L = P C in continuous time, without hold, delay and amplifier.
     pub fn continuous_loop(&self, omega_rad_s: f64) -> Complex<f64> {
         let s = Complex::new(0.0, omega_rad_s);
-        let plant: Complex<f64> = self.modes.iter().map(|mode| mode.resonance(s) * mode.residue_per_kg()).sum();
+        let plant: Complex<f64> = self
+            .modes
+            .iter()
+            .map(|mode| mode.resonance(s) * mode.residue_per_kg())
+            .sum();
         plant * self.force_constant_n_per_a * continuous_response(&self.sections, s)
     }
 
@@ -56,14 +60,31 @@ impl ClosedLoop {
     pub fn margins(&self, continuous: bool) -> Margins {
         let nyquist_rad_s = std::f64::consts::PI / self.chain.period_s();
         let slowest = self.modes.iter().find(|mode| mode.omega_rad_s > 0.0);
-        let low_rad_s = 1e-3 * slowest.map_or(1.0, |mode| mode.omega_rad_s).min(nyquist_rad_s);
+        let low_rad_s = 1e-3
+            * slowest
+                .map_or(1.0, |mode| mode.omega_rad_s)
+                .min(nyquist_rad_s);
         if continuous {
-            let highest = self.modes.last().map_or(1.0, |mode| mode.omega_rad_s).max(nyquist_rad_s);
+            let highest = self
+                .modes
+                .last()
+                .map_or(1.0, |mode| mode.omega_rad_s)
+                .max(nyquist_rad_s);
             let grid = grid(low_rad_s, 10.0 * highest, &self.features());
-            return margins(&|w| self.continuous_loop(w), &grid, self.continuous_stable(), true);
+            return margins(
+                &|w| self.continuous_loop(w),
+                &grid,
+                self.continuous_stable(),
+                true,
+            );
         }
         let grid = grid(low_rad_s, nyquist_rad_s * (1.0 - 1e-9), &self.features());
-        margins(&|w| self.sampled_loop(w), &grid, self.sampled_stable(), false)
+        margins(
+            &|w| self.sampled_loop(w),
+            &grid,
+            self.sampled_stable(),
+            false,
+        )
     }
 
     /// Frequencies in rad/s that follow every resonance of plant and controller.
@@ -74,11 +95,17 @@ impl ClosedLoop {
     /// Reading (in metres, relative to the start) at each tick after a reference of `reference_m(tick)`: the linear loop
     /// from rest, without noise, disturbance and limits.
     pub fn simulate(&self, ticks: usize, reference_m: impl Fn(usize) -> f64) -> Vec<f64> {
-        self.course(ticks, reference_m).map(|(_, position_m)| position_m).collect()
+        self.course(ticks, reference_m)
+            .map(|(_, position_m)| position_m)
+            .collect()
     }
 
     /// The same with the command in amperes of each tick before its reading.
-    pub fn course(&self, ticks: usize, reference_m: impl Fn(usize) -> f64) -> impl Iterator<Item = (f64, f64)> {
+    pub fn course(
+        &self,
+        ticks: usize,
+        reference_m: impl Fn(usize) -> f64,
+    ) -> impl Iterator<Item = (f64, f64)> {
         let mut controller = self.controller.clone();
         controller.reset();
         let mut state = self.chain.at_rest();
@@ -97,12 +124,22 @@ impl ClosedLoop {
 
     /// Where the loop's response turns quickly: the plant's modes and the controller's lightly damped pairs.
     fn features(&self) -> Vec<(f64, f64)> {
-        let modes = self.modes.iter().map(|mode| (mode.omega_rad_s, mode.damping_ratio)).filter(|(w, _)| *w > 0.0);
-        let pairs = self.sections.iter().flat_map(|section| [section.numerator, section.denominator]).filter_map(|c| {
-            let w = (c[0] / c[2]).sqrt();
-            (c[2] != 0.0 && w > 0.0).then(|| (w, (c[1] / (2.0 * c[2] * w)).abs()))
-        });
-        modes.chain(pairs.filter(|(w, zeta)| w.is_finite() && *zeta < 0.5)).collect()
+        let modes = self
+            .modes
+            .iter()
+            .map(|mode| (mode.omega_rad_s, mode.damping_ratio))
+            .filter(|(w, _)| *w > 0.0);
+        let pairs = self
+            .sections
+            .iter()
+            .flat_map(|section| [section.numerator, section.denominator])
+            .filter_map(|c| {
+                let w = (c[0] / c[2]).sqrt();
+                (c[2] != 0.0 && w > 0.0).then(|| (w, (c[1] / (2.0 * c[2] * w)).abs()))
+            });
+        modes
+            .chain(pairs.filter(|(w, zeta)| w.is_finite() && *zeta < 0.5))
+            .collect()
     }
 
     /// All poles of the sampled closed loop lie inside the unit circle.
@@ -111,19 +148,34 @@ impl ClosedLoop {
         let plant = Cascade::new(a, b, c, 0.0);
         let sections = self.controller.sections().iter().map(|section| {
             let (a, b, c, d) = section.state_space();
-            let matrix = |rows, columns, values: &[f64]| DMatrix::from_column_slice(rows, columns, values);
-            Cascade::new(matrix(2, 2, a.as_slice()), matrix(2, 1, b.as_slice()), matrix(1, 2, c.as_slice()), d)
+            let matrix =
+                |rows, columns, values: &[f64]| DMatrix::from_column_slice(rows, columns, values);
+            Cascade::new(
+                matrix(2, 2, a.as_slice()),
+                matrix(2, 1, b.as_slice()),
+                matrix(1, 2, c.as_slice()),
+                d,
+            )
         });
-        let open = sections.fold(Cascade::gain(1e6), |chain, section| chain.then(&section)).then(&plant);
-        open.closed_poles().is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+        let open = sections
+            .fold(Cascade::gain(1e6), |chain, section| chain.then(&section))
+            .then(&plant);
+        open.closed_poles()
+            .is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
     }
 
     /// All poles of the continuous closed loop lie left of the imaginary axis.
     fn continuous_stable(&self) -> bool {
-        let open =
-            self.sections.iter().fold(Cascade::gain(1e6), |chain, section| chain.then(&Cascade::of_section(section)));
+        let open = self
+            .sections
+            .iter()
+            .fold(Cascade::gain(1e6), |chain, section| {
+                chain.then(&Cascade::of_section(section))
+            });
         let plant = Cascade::of_modes(&self.modes, self.force_constant_n_per_a);
-        open.then(&plant).closed_poles().is_some_and(|poles| poles.iter().all(|pole| pole.re < 0.0))
+        open.then(&plant)
+            .closed_poles()
+            .is_some_and(|poles| poles.iter().all(|pole| pole.re < 0.0))
     }
 }
 
@@ -141,16 +193,28 @@ impl Cascade {
     }
 
     fn gain(d: f64) -> Self {
-        Cascade::new(DMatrix::zeros(0, 0), DMatrix::zeros(0, 1), DMatrix::zeros(1, 0), d)
+        Cascade::new(
+            DMatrix::zeros(0, 0),
+            DMatrix::zeros(0, 1),
+            DMatrix::zeros(1, 0),
+            d,
+        )
     }
 
     /// Controllable form in time scaled by the pole's own frequency, which keeps the entries of one size.
     fn of_section(section: &Section) -> Self {
         let order = section.poles().len();
         let lead = section.denominator[order];
-        let (n, m) = (section.numerator.map(|c| c / lead), section.denominator.map(|c| c / lead));
+        let (n, m) = (
+            section.numerator.map(|c| c / lead),
+            section.denominator.map(|c| c / lead),
+        );
         let d = n[order];
-        let w = if order == 2 && m[0] > 0.0 { m[0].sqrt() } else { 1.0 };
+        let w = if order == 2 && m[0] > 0.0 {
+            m[0].sqrt()
+        } else {
+            1.0
+        };
         match order {
             0 => Cascade::gain(d),
             1 => {
@@ -168,7 +232,11 @@ impl Cascade {
 
     fn of_modes(modes: &[Mode], force_constant_n_per_a: f64) -> Self {
         let n = 2 * modes.len();
-        let (mut a, mut b, mut c) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1), DMatrix::zeros(1, n));
+        let (mut a, mut b, mut c) = (
+            DMatrix::zeros(n, n),
+            DMatrix::zeros(n, 1),
+            DMatrix::zeros(1, n),
+        );
         for (index, mode) in modes.iter().enumerate() {
             let (first, w, scale) = (2 * index, mode.omega_rad_s, mode.rate_scale_rad_s());
             a[(first, first + 1)] = scale;
@@ -183,7 +251,11 @@ impl Cascade {
     /// This system, its output into `next`.
     fn then(&self, next: &Cascade) -> Cascade {
         let (n, m) = (self.a.nrows(), next.a.nrows());
-        let (mut a, mut b, mut c) = (DMatrix::zeros(n + m, n + m), DMatrix::zeros(n + m, 1), DMatrix::zeros(1, n + m));
+        let (mut a, mut b, mut c) = (
+            DMatrix::zeros(n + m, n + m),
+            DMatrix::zeros(n + m, 1),
+            DMatrix::zeros(1, n + m),
+        );
         a.view_mut((0, 0), (n, n)).copy_from(&self.a);
         a.view_mut((n, n), (m, m)).copy_from(&next.a);
         a.view_mut((n, 0), (m, n)).copy_from(&(&next.b * &self.c));

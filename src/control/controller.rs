@@ -16,12 +16,19 @@ pub struct Controller {
 impl Controller {
     /// Discretises continuous sections, one by one.
     pub fn new(sections: &[Section], period_s: f64) -> Controller {
-        Controller { sections: sections.iter().map(|section| section.tustin(period_s)).collect() }
+        Controller {
+            sections: sections
+                .iter()
+                .map(|section| section.tustin(period_s))
+                .collect(),
+        }
     }
 
     /// The command in amperes for the error r - y in metres. *In the tick.*
     pub fn update(&mut self, error_m: f64) -> f64 {
-        self.sections.iter_mut().fold(error_m * UM_PER_M, |x, section| section.update(x))
+        self.sections
+            .iter_mut()
+            .fold(error_m * UM_PER_M, |x, section| section.update(x))
     }
 
     /// Forgets the past: the first command after it is that of a controller at rest.
@@ -31,7 +38,11 @@ impl Controller {
 
     /// C(z) in amperes per metre.
     pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
-        self.sections.iter().map(|section| section.response(z)).product::<Complex<f64>>() * UM_PER_M
+        self.sections
+            .iter()
+            .map(|section| section.response(z))
+            .product::<Complex<f64>>()
+            * UM_PER_M
     }
 
     /// The sections, first to last.
@@ -42,5 +53,9 @@ impl Controller {
 
 /// C(s) in amperes per metre of continuous sections.
 pub fn continuous_response(sections: &[Section], s: Complex<f64>) -> Complex<f64> {
-    sections.iter().map(|section| section.response(s)).product::<Complex<f64>>() * UM_PER_M
+    sections
+        .iter()
+        .map(|section| section.response(s))
+        .product::<Complex<f64>>()
+        * UM_PER_M
 }

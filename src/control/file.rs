@@ -137,7 +137,10 @@ pub struct ControllerText {
 impl ControllerText {
     /// Finds `fast`, `slow` or a file.
     pub fn find(name: &str) -> Result<Self, ControllerError> {
-        Ok(ControllerText { name: name.into(), text: config::text_of(name, profiles::CONTROLLERS, "controller")? })
+        Ok(ControllerText {
+            name: name.into(),
+            text: config::text_of(name, profiles::CONTROLLERS, "controller")?,
+        })
     }
 
     /// The sections, checked for a servo rate.
@@ -148,9 +151,15 @@ impl ControllerText {
             let (name, number) = (self.name.clone(), index + 1);
             match section(settings).checked() {
                 Err(why) => Err(ControllerError::Section { name, number, why }),
-                Ok(Section { prewarp_rad_s: Some(prewarp_rad_s), .. }) if prewarp_rad_s >= limit_rad_s => {
-                    Err(ControllerError::Prewarp { name, number, prewarp_rad_s, limit_rad_s })
-                }
+                Ok(Section {
+                    prewarp_rad_s: Some(prewarp_rad_s),
+                    ..
+                }) if prewarp_rad_s >= limit_rad_s => Err(ControllerError::Prewarp {
+                    name,
+                    number,
+                    prewarp_rad_s,
+                    limit_rad_s,
+                }),
                 Ok(section) => Ok(section),
             }
         };
@@ -159,14 +168,28 @@ impl ControllerText {
 }
 
 fn section(settings: &SectionSettings) -> Section {
-    let plain = |numerator, denominator| Section { numerator, denominator, prewarp_rad_s: None };
+    let plain = |numerator, denominator| Section {
+        numerator,
+        denominator,
+        prewarp_rad_s: None,
+    };
     let pair = |w: f64, zeta: f64| [w * w, 2.0 * zeta * w, 1.0];
     match *settings {
-        SectionSettings::Gain { gain_a_per_um } => plain([gain_a_per_um, 0.0, 0.0], [1.0, 0.0, 0.0]),
-        SectionSettings::Integrator { gain_a_per_um } => plain([gain_a_per_um, 0.0, 0.0], [0.0, 1.0, 0.0]),
-        SectionSettings::ZeroPole { zero_rad_s, pole_rad_s } => plain([zero_rad_s, 1.0, 0.0], [pole_rad_s, 1.0, 0.0]),
+        SectionSettings::Gain { gain_a_per_um } => {
+            plain([gain_a_per_um, 0.0, 0.0], [1.0, 0.0, 0.0])
+        }
+        SectionSettings::Integrator { gain_a_per_um } => {
+            plain([gain_a_per_um, 0.0, 0.0], [0.0, 1.0, 0.0])
+        }
+        SectionSettings::ZeroPole {
+            zero_rad_s,
+            pole_rad_s,
+        } => plain([zero_rad_s, 1.0, 0.0], [pole_rad_s, 1.0, 0.0]),
         SectionSettings::Pole { pole_rad_s } => plain([1.0, 0.0, 0.0], [pole_rad_s, 1.0, 0.0]),
-        SectionSettings::PolePair { omega_rad_s: w, damping_ratio } => plain([w * w, 0.0, 0.0], pair(w, damping_ratio)),
+        SectionSettings::PolePair {
+            omega_rad_s: w,
+            damping_ratio,
+        } => plain([w * w, 0.0, 0.0], pair(w, damping_ratio)),
         SectionSettings::Biquad {
             zeros_rad_s,
             zeros_damping_ratio,
@@ -178,9 +201,15 @@ fn section(settings: &SectionSettings) -> Section {
             denominator: pair(poles_rad_s, poles_damping_ratio),
             prewarp_rad_s,
         },
-        SectionSettings::Coefficients { ref numerator, ref denominator, prewarp_rad_s } => {
-            Section { numerator: rising(numerator), denominator: rising(denominator), prewarp_rad_s }
-        }
+        SectionSettings::Coefficients {
+            ref numerator,
+            ref denominator,
+            prewarp_rad_s,
+        } => Section {
+            numerator: rising(numerator),
+            denominator: rising(denominator),
+            prewarp_rad_s,
+        },
     }
 }
 

@@ -54,15 +54,25 @@ pub(super) fn margins(
     let gains: Vec<f64> = values.iter().map(|l| l.norm().ln()).collect();
     let crossings: Vec<Crossing> = sign_changes(&gains)
         .map(|i| bisect(&gain, grid_rad_s[i], grid_rad_s[i + 1]))
-        .map(|rad_s| Crossing { rad_s, phase_margin_deg: phase_margin_deg(response(rad_s)) })
+        .map(|rad_s| Crossing {
+            rad_s,
+            phase_margin_deg: phase_margin_deg(response(rad_s)),
+        })
         .collect();
     let falling = sign_changes(&gains).position(|i| gains[i] > 0.0);
-    let smallest = crossings.iter().map(|c| c.phase_margin_deg).min_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let smallest = crossings
+        .iter()
+        .map(|c| c.phase_margin_deg)
+        .min_by(|a, b| a.abs().total_cmp(&b.abs()));
     let peak = sensitivity_peak(&sensitivity, grid_rad_s, &values);
     let rise = |w: f64| libm::log(sensitivity(w)) + 0.5 * std::f64::consts::LN_2;
-    let rises: Vec<f64> = values.iter().map(|l| -(l + 1.0).norm().ln() + 0.5 * std::f64::consts::LN_2).collect();
-    let bandwidth =
-        sign_changes(&rises).find(|&i| rises[i] < 0.0).map(|i| bisect(&rise, grid_rad_s[i], grid_rad_s[i + 1]));
+    let rises: Vec<f64> = values
+        .iter()
+        .map(|l| -(l + 1.0).norm().ln() + 0.5 * std::f64::consts::LN_2)
+        .collect();
+    let bandwidth = sign_changes(&rises)
+        .find(|&i| rises[i] < 0.0)
+        .map(|i| bisect(&rise, grid_rad_s[i], grid_rad_s[i + 1]));
     Margins {
         crossover_rad_s: falling.map(|i| crossings[i].rad_s),
         phase_margin_deg: smallest,
@@ -82,10 +92,13 @@ pub(crate) fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> 
     const PER_DECADE: f64 = 400.0;
     let decades = libm::log10(high_rad_s / low_rad_s);
     let count = libm::ceil(decades * PER_DECADE) as usize;
-    let mut grid: Vec<f64> =
-        (0..=count).map(|i| low_rad_s * libm::pow(10.0, decades * i as f64 / count as f64)).collect();
+    let mut grid: Vec<f64> = (0..=count)
+        .map(|i| low_rad_s * libm::pow(10.0, decades * i as f64 / count as f64))
+        .collect();
     for &(w, zeta) in features {
-        grid.extend((-240..=240).map(|i| w * (1.0 + zeta.max(1e-6) * libm::sinh(f64::from(i) / 40.0))));
+        grid.extend(
+            (-240..=240).map(|i| w * (1.0 + zeta.max(1e-6) * libm::sinh(f64::from(i) / 40.0))),
+        );
     }
     grid.retain(|w| (low_rad_s..=high_rad_s).contains(w));
     grid.sort_by(f64::total_cmp);
@@ -99,26 +112,47 @@ fn phase_margin_deg(l: Complex<f64>) -> f64 {
 }
 
 /// Smallest distance in decibels of |L| from 1 where L crosses the negative real axis.
-fn gain_margin_db(response: &dyn Fn(f64) -> Complex<f64>, grid: &[f64], values: &[Complex<f64>]) -> Option<f64> {
+fn gain_margin_db(
+    response: &dyn Fn(f64) -> Complex<f64>,
+    grid: &[f64],
+    values: &[Complex<f64>],
+) -> Option<f64> {
     let imaginary: Vec<f64> = values.iter().map(|l| l.im).collect();
     let negative = |i: &usize| values[*i].re < 0.0 || values[*i + 1].re < 0.0;
     let at = |i: usize| response(bisect(&|w| response(w).im, grid[i], grid[i + 1]));
-    let margins =
-        sign_changes(&imaginary).filter(negative).map(at).filter(|l| l.re < 0.0).map(|l| -20.0 * libm::log10(l.norm()));
+    let margins = sign_changes(&imaginary)
+        .filter(negative)
+        .map(at)
+        .filter(|l| l.re < 0.0)
+        .map(|l| -20.0 * libm::log10(l.norm()));
     margins.min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-fn sensitivity_peak(sensitivity: &dyn Fn(f64) -> f64, grid: &[f64], values: &[Complex<f64>]) -> f64 {
+fn sensitivity_peak(
+    sensitivity: &dyn Fn(f64) -> f64,
+    grid: &[f64],
+    values: &[Complex<f64>],
+) -> f64 {
     let on_grid: Vec<f64> = values.iter().map(|l| (l + 1.0).inv().norm()).collect();
     let highest = on_grid.iter().copied().fold(0.0, f64::max);
-    let near =
-        |i: &usize| on_grid[*i] > 0.9 * highest && on_grid[*i] >= on_grid[*i - 1] && on_grid[*i] >= on_grid[*i + 1];
+    let near = |i: &usize| {
+        on_grid[*i] > 0.9 * highest
+            && on_grid[*i] >= on_grid[*i - 1]
+            && on_grid[*i] >= on_grid[*i + 1]
+    };
     let last = on_grid.len().saturating_sub(1);
-    (1..last).filter(near).map(|i| maximum(sensitivity, grid[i - 1], grid[i + 1])).fold(highest, f64::max)
+    (1..last)
+        .filter(near)
+        .map(|i| maximum(sensitivity, grid[i - 1], grid[i + 1]))
+        .fold(highest, f64::max)
 }
 
 fn sign_changes(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
-    values.windows(2).enumerate().filter(|(_, pair)| (pair[0] > 0.0) != (pair[1] > 0.0)).map(|(i, _)| i)
+    values
+        .windows(2)
+        .enumerate()
+        .filter(|(_, pair)| (pair[0] > 0.0) != (pair[1] > 0.0))
+        .map(|(i, _)| i)
 }
 
 /// Where `f` changes its sign between `low` and `high`, to the last bits.
@@ -158,14 +192,17 @@ mod tests {
         // L = k exp(-j w d)/(j w): crossover k, phase margin 90 deg - k d, phase crossing at pi/(2 d), gain margin
         // pi/(2 k d).
         let (k, d): (f64, f64) = (100.0, 4e-3);
-        let l = move |w: f64| Complex::new((-w * d).cos(), (-w * d).sin()) * k / Complex::new(0.0, w);
+        let l =
+            move |w: f64| Complex::new((-w * d).cos(), (-w * d).sin()) * k / Complex::new(0.0, w);
         let found = margins(&l, &grid(0.1, 700.0, &[]), true, true);
         assert!((found.crossover_rad_s.unwrap() - k).abs() < 1e-9);
         assert!((found.phase_margin_deg.unwrap() - (90.0 - (k * d).to_degrees())).abs() < 1e-9);
         let gain_margin = 20.0 * (std::f64::consts::PI / (2.0 * k * d)).log10();
         assert!((found.gain_margin_db.unwrap() - gain_margin).abs() < 1e-9);
         // The peak of |S| against a brute force search in steps of 7 mrad/s.
-        let brute = (1..100_000).map(|i| (l(f64::from(i) * 7e-3) + 1.0).inv().norm()).fold(0.0, f64::max);
+        let brute = (1..100_000)
+            .map(|i| (l(f64::from(i) * 7e-3) + 1.0).inv().norm())
+            .fold(0.0, f64::max);
         assert!((found.modulus_margin * brute - 1.0).abs() < 1e-7);
     }
 
@@ -173,7 +210,9 @@ mod tests {
     fn a_lightly_damped_peak_between_grid_points_is_not_missed() {
         // A resonance of damping 1e-5 crosses |L| = 1 twice within 0.1 rad/s.
         let (w0, zeta) = (517.0, 1e-5);
-        let l = move |w: f64| Complex::new(0.01 * w0 * w0, 0.0) / Complex::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w);
+        let l = move |w: f64| {
+            Complex::new(0.01 * w0 * w0, 0.0) / Complex::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
+        };
         let found = margins(&l, &grid(1.0, 1e4, &[(w0, zeta)]), true, true);
         assert_eq!(found.crossings.len(), 2, "{:?}", found.crossings);
         // |L| = 1 at w^2 = w0^2 (1 +- 0.01) but for the damping.

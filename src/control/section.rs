@@ -19,7 +19,9 @@ pub struct Section {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SectionError {
     /// More zeros than poles: infinite gain at high frequency.
-    #[error("is improper: its numerator has order {numerator}, its denominator {denominator}; add a pole")]
+    #[error(
+        "is improper: its numerator has order {numerator}, its denominator {denominator}; add a pole"
+    )]
     Improper {
         /// Order of the numerator.
         numerator: usize,
@@ -50,18 +52,31 @@ impl Section {
 
     /// Refuses what is improper or unstable.
     pub fn checked(self) -> Result<Section, SectionError> {
-        let finite = self.numerator.iter().chain(&self.denominator).all(|c| c.is_finite());
+        let finite = self
+            .numerator
+            .iter()
+            .chain(&self.denominator)
+            .all(|c| c.is_finite());
         let (Some(denominator), true) = (order(&self.denominator), finite) else {
             return Err(SectionError::Degenerate);
         };
         let numerator = order(&self.numerator).unwrap_or(0);
         if numerator > denominator {
-            return Err(SectionError::Improper { numerator, denominator });
+            return Err(SectionError::Improper {
+                numerator,
+                denominator,
+            });
         }
         let poles = self.poles();
         let at_origin = poles.iter().filter(|pole| pole.norm() == 0.0).count();
-        match poles.iter().find(|pole| pole.re >= 0.0 && (pole.norm() > 0.0 || at_origin > 1)) {
-            Some(pole) => Err(SectionError::Unstable { re_rad_s: pole.re, im_rad_s: pole.im }),
+        match poles
+            .iter()
+            .find(|pole| pole.re >= 0.0 && (pole.norm() > 0.0 || at_origin > 1))
+        {
+            Some(pole) => Err(SectionError::Unstable {
+                re_rad_s: pole.re,
+                im_rad_s: pole.im,
+            }),
             None => Ok(self),
         }
     }
@@ -88,9 +103,14 @@ impl Section {
             [p[0] + p1 + p2, 2.0 * (p[0] - p2), p[0] - p1 + p2]
         };
         // Of lower order: without the common factors (z + 1), each of which would be a mode at half the sampling rate.
-        let order = order(&self.numerator).max(order(&self.denominator)).unwrap_or(0);
+        let order = order(&self.numerator)
+            .max(order(&self.denominator))
+            .unwrap_or(0);
         if order == 0 {
-            return Biquad::new([self.numerator[0], 0.0, 0.0], [self.denominator[0], 0.0, 0.0]);
+            return Biquad::new(
+                [self.numerator[0], 0.0, 0.0],
+                [self.denominator[0], 0.0, 0.0],
+            );
         }
         if order == 1 {
             let map = |p: &[f64; 3]| [p[0] + p[1] * c, p[0] - p[1] * c, 0.0];
@@ -112,7 +132,11 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [Complex<f64>; 2] {
         return [Complex::new(re, im), Complex::new(re, -im)];
     }
     let q = -0.5 * (b + discriminant.sqrt().copysign(b));
-    if q == 0.0 { [Complex::new(0.0, 0.0); 2] } else { [q / a, c / q].map(|root| Complex::new(root, 0.0)) }
+    if q == 0.0 {
+        [Complex::new(0.0, 0.0); 2]
+    } else {
+        [q / a, c / q].map(|root| Complex::new(root, 0.0))
+    }
 }
 
 #[cfg(test)]
@@ -120,7 +144,11 @@ mod tests {
     use super::*;
 
     fn section(numerator: [f64; 3], denominator: [f64; 3]) -> Section {
-        Section { numerator, denominator, prewarp_rad_s: None }
+        Section {
+            numerator,
+            denominator,
+            prewarp_rad_s: None,
+        }
     }
 
     #[test]
@@ -135,8 +163,12 @@ mod tests {
                     let angle: f64 = w * period_s;
                     let z = Complex::new(angle.cos(), angle.sin());
                     let warped = Complex::new(0.0, 2.0 / period_s * (angle / 2.0).tan());
-                    let (discrete, continuous) = (h.tustin(period_s).response(z), h.response(warped));
-                    assert!((discrete - continuous).norm() < 1e-9 * continuous.norm(), "{h:?} at {w}");
+                    let (discrete, continuous) =
+                        (h.tustin(period_s).response(z), h.response(warped));
+                    assert!(
+                        (discrete - continuous).norm() < 1e-9 * continuous.norm(),
+                        "{h:?} at {w}"
+                    );
                 }
             }
         }
@@ -149,11 +181,21 @@ mod tests {
         let pole = section([893.0, 0.0, 0.0], [893.0, 1.0, 0.0]);
         for (h, expected) in [(gain, 0.2), (pole, 1.0)] {
             let mut biquad = h.tustin(2e-4);
-            let response: Vec<f64> = (0..2000).map(|k| biquad.update(if k == 0 { 1.0 } else { 0.0 })).collect();
+            let response: Vec<f64> = (0..2000)
+                .map(|k| biquad.update(if k == 0 { 1.0 } else { 0.0 }))
+                .collect();
             // The pole's memory after 2000 ticks is exp(-893 * 0.4), 1e-155 of the first sample.
-            assert!((response.iter().sum::<f64>() - expected).abs() < 1e-12 && response[1999].abs() < 1e-100);
+            assert!(
+                (response.iter().sum::<f64>() - expected).abs() < 1e-12
+                    && response[1999].abs() < 1e-100
+            );
             let (a, ..) = biquad.state_space();
-            assert!(a.complex_eigenvalues().iter().all(|pole| pole.norm() < 0.99), "{h:?}");
+            assert!(
+                a.complex_eigenvalues()
+                    .iter()
+                    .all(|pole| pole.norm() < 0.99),
+                "{h:?}"
+            );
         }
     }
 
@@ -166,19 +208,46 @@ mod tests {
         let plain = (notch.tustin(period_s).response(z) - continuous).norm() / continuous.norm();
         notch.prewarp_rad_s = Some(w);
         let warped = (notch.tustin(period_s).response(z) - continuous).norm() / continuous.norm();
-        assert!(warped < 1e-10 && plain > 0.1, "prewarped {warped}, plain {plain}");
+        assert!(
+            warped < 1e-10 && plain > 0.1,
+            "prewarped {warped}, plain {plain}"
+        );
     }
 
     #[test]
     fn improper_and_unstable_sections_are_refused() {
-        assert!(matches!(section([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]).checked(), Err(SectionError::Improper { .. })));
-        assert!(matches!(section([1.0, 0.0, 0.0], [-5.0, 1.0, 0.0]).checked(), Err(SectionError::Unstable { .. })));
-        assert!(matches!(section([1.0, 0.0, 0.0], [25.0, -1.0, 1.0]).checked(), Err(SectionError::Unstable { .. })));
-        assert!(matches!(section([1.0, 0.0, 0.0], [25.0, 0.0, 1.0]).checked(), Err(SectionError::Unstable { .. })));
-        assert!(matches!(section([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]).checked(), Err(SectionError::Unstable { .. })));
-        assert!(matches!(section([1.0, 0.0, 0.0], [0.0; 3]).checked(), Err(SectionError::Degenerate)));
-        assert!(matches!(section([f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.0]).checked(), Err(SectionError::Degenerate)));
-        assert!(section([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).checked().is_ok(), "one integrator is allowed");
+        assert!(matches!(
+            section([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]).checked(),
+            Err(SectionError::Improper { .. })
+        ));
+        assert!(matches!(
+            section([1.0, 0.0, 0.0], [-5.0, 1.0, 0.0]).checked(),
+            Err(SectionError::Unstable { .. })
+        ));
+        assert!(matches!(
+            section([1.0, 0.0, 0.0], [25.0, -1.0, 1.0]).checked(),
+            Err(SectionError::Unstable { .. })
+        ));
+        assert!(matches!(
+            section([1.0, 0.0, 0.0], [25.0, 0.0, 1.0]).checked(),
+            Err(SectionError::Unstable { .. })
+        ));
+        assert!(matches!(
+            section([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]).checked(),
+            Err(SectionError::Unstable { .. })
+        ));
+        assert!(matches!(
+            section([1.0, 0.0, 0.0], [0.0; 3]).checked(),
+            Err(SectionError::Degenerate)
+        ));
+        assert!(matches!(
+            section([f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.0]).checked(),
+            Err(SectionError::Degenerate)
+        ));
+        assert!(
+            section([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).checked().is_ok(),
+            "one integrator is allowed"
+        );
         assert!(section([1.0, 2.0, 3.0], [25.0, 1.0, 1.0]).checked().is_ok());
     }
 }

@@ -25,7 +25,12 @@ pub struct StepMeter {
 impl StepMeter {
     /// Before the first position.
     pub fn new(height_m: f64) -> Self {
-        StepMeter { height_m, seen: 0, settled: 0, beyond_m: 0.0 }
+        StepMeter {
+            height_m,
+            seen: 0,
+            settled: 0,
+            beyond_m: 0.0,
+        }
     }
 
     /// The next position, relative to where the step started.
@@ -62,20 +67,38 @@ mod tests {
     fn a_second_order_step_has_the_figures_of_its_closed_form() {
         let (w, zeta, period_s) = (50.0, 0.5f64, 1e-4);
         let damped = w * (1.0 - zeta * zeta).sqrt();
-        let y = |t: f64| 1.0 - (-zeta * w * t).exp() * ((damped * t).cos() + zeta * w / damped * (damped * t).sin());
+        let y = |t: f64| {
+            1.0 - (-zeta * w * t).exp()
+                * ((damped * t).cos() + zeta * w / damped * (damped * t).sin())
+        };
         for height in [50e-6, -50e-6] {
-            let positions: Vec<f64> = (0..10_000).map(|k| height * y(f64::from(k) * period_s)).collect();
+            let positions: Vec<f64> = (0..10_000)
+                .map(|k| height * y(f64::from(k) * period_s))
+                .collect();
             let figures = step_figures(&positions, height, period_s);
-            let overshoot = 100.0 * (-std::f64::consts::PI * zeta / (1.0 - zeta * zeta).sqrt()).exp();
-            assert!((figures.overshoot_percent - overshoot).abs() < 0.01, "{figures:?}");
+            let overshoot =
+                100.0 * (-std::f64::consts::PI * zeta / (1.0 - zeta * zeta).sqrt()).exp();
+            assert!(
+                (figures.overshoot_percent - overshoot).abs() < 0.01,
+                "{figures:?}"
+            );
             // The last time |1 - y| passes 2 %, found on the closed form itself.
-            let settled = (0..1_000_000).map(|k| f64::from(k) * 1e-6).rfind(|t| (1.0 - y(*t)).abs() > 0.02).unwrap();
-            assert!((figures.settling_time_s.unwrap() - settled).abs() < 2.0 * period_s, "{figures:?} {settled}");
+            let settled = (0..1_000_000)
+                .map(|k| f64::from(k) * 1e-6)
+                .rfind(|t| (1.0 - y(*t)).abs() > 0.02)
+                .unwrap();
+            assert!(
+                (figures.settling_time_s.unwrap() - settled).abs() < 2.0 * period_s,
+                "{figures:?} {settled}"
+            );
         }
     }
 
     #[test]
     fn a_response_that_never_settles_has_no_settling_time() {
-        assert_eq!(step_figures(&[0.0, 1.0, 0.0], 1.0, 1.0).settling_time_s, None);
+        assert_eq!(
+            step_figures(&[0.0, 1.0, 0.0], 1.0, 1.0).settling_time_s,
+            None
+        );
     }
 }

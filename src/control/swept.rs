@@ -32,16 +32,30 @@ pub fn swept_reference(
     let at = |x: f64| low_hz * libm::pow(high_hz / low_hz, x);
     let step = 1.0 / (POINTS - 1) as f64;
     let near = |i: usize| {
-        (0..=2 * BETWEEN).map(move |j| (i as f64 - 1.0 + j as f64 / BETWEEN as f64) * step).map(|x| x.clamp(0.0, 1.0))
+        (0..=2 * BETWEEN)
+            .map(move |j| (i as f64 - 1.0 + j as f64 / BETWEEN as f64) * step)
+            .map(|x| x.clamp(0.0, 1.0))
     };
-    let least = |i: usize| near(i).map(|x| allowed(closed_loop, &amplitude, travel_m, at(x))).fold(most_m, f64::min);
-    (0..POINTS).map(|i| TravelPoint { frequency_hz: at(i as f64 * step), amplitude_m: least(i) }).collect()
+    let least = |i: usize| {
+        near(i)
+            .map(|x| allowed(closed_loop, &amplitude, travel_m, at(x)))
+            .fold(most_m, f64::min)
+    };
+    (0..POINTS)
+        .map(|i| TravelPoint {
+            frequency_hz: at(i as f64 * step),
+            amplitude_m: least(i),
+        })
+        .collect()
 }
 
 /// The reference's amplitude that moves command and position as far as they may, but never further than they.
 fn allowed(closed_loop: &ClosedLoop, command: &Amplitude, travel_m: f64, frequency_hz: f64) -> f64 {
     let omega_rad_s = 2.0 * PI * frequency_hz;
-    let (plant, loop_gain) = (closed_loop.sampled_plant(omega_rad_s), closed_loop.sampled_loop(omega_rad_s));
+    let (plant, loop_gain) = (
+        closed_loop.sampled_plant(omega_rad_s),
+        closed_loop.sampled_loop(omega_rad_s),
+    );
     let complementary = loop_gain / (loop_gain + 1.0);
     let by_command_m = command.at(libm::log(frequency_hz)) * (plant / complementary).norm();
     by_command_m.min(travel_m / complementary.norm())

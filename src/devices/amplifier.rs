@@ -4,13 +4,16 @@ use std::time::Duration;
 
 use bench_hal::can::budget::Exchange;
 use bench_hal::can::bus::{PortError, SocketPort, Threads};
-use bench_hal::can::drive::{CanopenDrive, DriveSettings, ExpectedIdentity, OpenError, TorqueMode as Mode};
+use bench_hal::can::drive::{
+    CanopenDrive, DriveSettings, ExpectedIdentity, OpenError, TorqueMode as Mode,
+};
 use bench_hal::can::scale::Reference;
 use bench_hal::can::vesc::{self, Vesc};
 
 use super::Amplifier;
 use crate::config::{
-    AmplifierDevice, CanopenSettings, Config, ExchangeSettings, TargetReference, TorqueMode, VescSettings, WhenUnheard,
+    AmplifierDevice, CanopenSettings, Config, ExchangeSettings, TargetReference, TorqueMode,
+    VescSettings, WhenUnheard,
 };
 use crate::rt::thread::below_the_loop;
 
@@ -54,7 +57,10 @@ pub fn open(config: &Config) -> Result<(Amplifier, String), AmplifierError> {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
             let host = Threads::new(port).prepared(below_the_loop(&config.servo));
             let opened = Vesc::open(vesc_settings(device, config), Box::new(host));
-            let vesc = opened.map_err(|why| AmplifierError::Vesc { node: device.node, why })?;
+            let vesc = opened.map_err(|why| AmplifierError::Vesc {
+                node: device.node,
+                why,
+            })?;
             Ok((Box::new(vesc), format!("vesc {}", device.node)))
         }
     }
@@ -62,7 +68,8 @@ pub fn open(config: &Config) -> Result<(Amplifier, String), AmplifierError> {
 
 /// `canopen 0x0000029C-0x00000402-0x00010001-0x000004D2`: vendor, product, revision and serial number.
 fn canopen_identity(identity: [Option<u32>; 4]) -> String {
-    let words = identity.map(|number| number.map_or("?".to_string(), |number| format!("0x{number:08X}")));
+    let words =
+        identity.map(|number| number.map_or("?".to_string(), |number| format!("0x{number:08X}")));
     format!("canopen {}", words.join("-"))
 }
 
@@ -111,7 +118,10 @@ pub fn drive_settings(device: &CanopenSettings, config: &Config) -> DriveSetting
         sdo_timeout: seconds(times.sdo_s),
         state_timeout: seconds(times.state_s),
     };
-    DriveSettings { exchange: exchange(device.exchange, &settings), ..settings }
+    DriveSettings {
+        exchange: exchange(device.exchange, &settings),
+        ..settings
+    }
 }
 
 /// By budget: with SYNC where the bus carries it, for the drive then takes each set-point at a known moment.
@@ -122,8 +132,17 @@ fn exchange(wanted: ExchangeSettings, settings: &DriveSettings) -> Exchange {
         ExchangeSettings::ByBudget { status_hz } => {
             let status_every = (settings.rate_hz / status_hz).ceil().clamp(1.0, 240.0) as u8;
             let synchronous = Exchange::Synchronous { status_every };
-            let fits = DriveSettings { exchange: synchronous, ..settings.clone() }.check().is_ok();
-            if fits { synchronous } else { Exchange::Asynchronous { status_hz } }
+            let fits = DriveSettings {
+                exchange: synchronous,
+                ..settings.clone()
+            }
+            .check()
+            .is_ok();
+            if fits {
+                synchronous
+            } else {
+                Exchange::Asynchronous { status_hz }
+            }
         }
     }
 }

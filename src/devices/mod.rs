@@ -105,18 +105,36 @@ pub fn open(config: &Config) -> Result<Opened, DevicesError> {
     }
     let mut probe = probe::open(config)?;
     let (amplifier, amplifier_identity) = amplifier::open(config)?;
-    let notes = probe.notes().iter().map(|note| format!("{}; {}", note.what, note.remedy)).collect();
+    let notes = probe
+        .notes()
+        .iter()
+        .map(|note| format!("{}; {}", note.what, note.remedy))
+        .collect();
     let watch = probe.watch();
     wait_for_reading(&mut probe, &watch)?;
     let rig = Box::new(Devices { amplifier, probe });
     let (amplifier, probe) = (amplifier_identity, probe::identity(config));
-    Ok(Opened { rig, amplifier, probe, notes, watch: Some(watch) })
+    Ok(Opened {
+        rig,
+        amplifier,
+        probe,
+        notes,
+        watch: Some(watch),
+    })
 }
 
 /// The simulated stage with the rates, delays and steps of whatever devices the configuration names.
 pub fn simulate(config: &Config) -> Result<Opened, DevicesError> {
-    let (rig, name) = (Box::new(SimulatedRig::new(config)?), || "simulated".to_string());
-    Ok(Opened { rig, amplifier: name(), probe: name(), notes: Vec::new(), watch: None })
+    let (rig, name) = (Box::new(SimulatedRig::new(config)?), || {
+        "simulated".to_string()
+    });
+    Ok(Opened {
+        rig,
+        amplifier: name(),
+        probe: name(),
+        notes: Vec::new(),
+        watch: None,
+    })
 }
 
 /// A run that began before the first reading would trip at once.
@@ -142,7 +160,13 @@ fn no_reading(validity: Validity, watch: &Watch) -> DevicesError {
         _ => "no reading came",
     };
     let (bytes, values, damaged, timeouts) = (s.bytes, s.values, s.damaged_bytes, s.timeouts);
-    DevicesError::NoReading { what, bytes, values, damaged, timeouts }
+    DevicesError::NoReading {
+        what,
+        bytes,
+        values,
+        damaged,
+        timeouts,
+    }
 }
 
 impl AmplifierDevice {

@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use bench_hal::serial::{
-    Mounting, Polling, PortSettings, ProbeSettings, Protocol, SerialError, SerialProbe, ascii, capancdt, optoncdt,
+    Mounting, Polling, PortSettings, ProbeSettings, Protocol, SerialError, SerialProbe, ascii,
+    capancdt, optoncdt,
 };
 
 use crate::config::{
-    AsciiSettings, CapancdtSettings, Config, CounterMeaning, LineSettings, MountingSettings, OptoncdtSettings, Parity,
-    PollingSettings, ProbeDevice,
+    AsciiSettings, CapancdtSettings, Config, CounterMeaning, LineSettings, MountingSettings,
+    OptoncdtSettings, Parity, PollingSettings, ProbeDevice,
 };
 use crate::rt::thread::below_the_loop;
 
@@ -39,13 +40,20 @@ pub enum ProbeError {
 
 /// Refuses settings that make no sense, and a line that cannot be as fast as `probe.transport_s` says.
 pub fn check(config: &Config) -> Result<(), ProbeError> {
-    let Some(settings) = settings(config) else { return Ok(()) };
+    let Some(settings) = settings(config) else {
+        return Ok(());
+    };
     settings.protocol.decoder()?;
     let characters = config.probe.device.characters_per_reading().unwrap_or(0);
     let least_s = settings.port.line_time_ns(characters) as f64 * 1e-9;
     let transport_s = config.probe.transport_s;
     if transport_s < least_s {
-        return Err(ProbeError::Transport { transport_s, least_s, characters, baud: settings.port.baud });
+        return Err(ProbeError::Transport {
+            transport_s,
+            least_s,
+            characters,
+            baud: settings.port.baud,
+        });
     }
     Ok(())
 }
@@ -53,13 +61,18 @@ pub fn check(config: &Config) -> Result<(), ProbeError> {
 /// Opens the probe that the configuration names; it reads from now on.
 pub fn open(config: &Config) -> Result<SerialProbe, ProbeError> {
     let settings = settings(config).ok_or(ProbeError::Simulated)?;
-    Ok(SerialProbe::open_with(settings, below_the_loop(&config.servo))?)
+    Ok(SerialProbe::open_with(
+        settings,
+        below_the_loop(&config.servo),
+    )?)
 }
 
 /// Kind and port: serial probes do not say who they are. A port below /dev/serial/by-id names the adapter at least.
 pub fn identity(config: &Config) -> String {
     let device = &config.probe.device;
-    device.line().map_or(device.kind().to_string(), |line| format!("{} {}", device.kind(), line.port))
+    device.line().map_or(device.kind().to_string(), |line| {
+        format!("{} {}", device.kind(), line.port)
+    })
 }
 
 /// The driver's settings; `None` for the simulated probe.
@@ -87,7 +100,10 @@ pub fn port(line: &LineSettings) -> PortSettings {
 }
 
 fn mounting(settings: MountingSettings) -> Mounting {
-    Mounting { gain: settings.gain, offset_m: settings.offset_m }
+    Mounting {
+        gain: settings.gain,
+        offset_m: settings.offset_m,
+    }
 }
 
 fn polling(settings: PollingSettings) -> Polling {
@@ -165,8 +181,14 @@ fn capancdt(device: &CapancdtSettings) -> capancdt::Settings {
 }
 
 fn optoncdt(device: &OptoncdtSettings) -> optoncdt::Settings {
-    let cycle = optoncdt::Cycle { values: device.values_per_cycle, displacement: device.displacement_value };
-    optoncdt::Settings { range_m: device.sensor_range_m, cycle }
+    let cycle = optoncdt::Cycle {
+        values: device.values_per_cycle,
+        displacement: device.displacement_value,
+    };
+    optoncdt::Settings {
+        range_m: device.sensor_range_m,
+        cycle,
+    }
 }
 
 fn ascii(device: &AsciiSettings) -> ascii::Settings {

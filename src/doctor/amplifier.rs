@@ -26,15 +26,24 @@ pub(super) fn examine(config: &Config, report: &mut Report) {
             let (load, finding) = bus_load::of_drive(&settings);
             report.figures.bus_load = Some(load);
             report.find([finding]);
-            let Some(host) = interface(&device.interface, device.bit_rate, report) else { return };
+            let Some(host) = interface(&device.interface, device.bit_rate, report) else {
+                return;
+            };
             on_bus(&host, &settings, device.maximum_current_ratio, report);
         }
         AmplifierDevice::Vesc(device) => {
             let (load, finding) = bus_load::of_vesc(config.servo.rate_hz, device.bit_rate);
             report.figures.bus_load = Some(load);
             report.find([finding]);
-            let Some(host) = interface(&device.interface, device.bit_rate, report) else { return };
-            watch(&host, &vesc_settings(device, config), device.bit_rate, report);
+            let Some(host) = interface(&device.interface, device.bit_rate, report) else {
+                return;
+            };
+            watch(
+                &host,
+                &vesc_settings(device, config),
+                device.bit_rate,
+                report,
+            );
         }
     }
 }
@@ -42,13 +51,18 @@ pub(super) fn examine(config: &Config, report: &mut Report) {
 /// The bus behind an interface, if it can be used as it is.
 fn interface(name: &str, bit_rate: u32, report: &mut Report) -> Option<Threads<SocketPort>> {
     let found = can_interface::findings(&can_interface::gather(name, bit_rate));
-    let is_usable = found.iter().all(|finding| finding.verdict < Verdict::Failure);
+    let is_usable = found
+        .iter()
+        .all(|finding| finding.verdict < Verdict::Failure);
     report.find(found);
     if !is_usable {
         return None;
     }
     let opened = SocketPort::open(name, bit_rate);
-    opened.map(Threads::new).map_err(|error| report.find([Finding::refused("CAN interface", &error)])).ok()
+    opened
+        .map(Threads::new)
+        .map_err(|error| report.find([Finding::refused("CAN interface", &error)]))
+        .ok()
 }
 
 /// A CANopen drive on a bus: who is there, and what the drive says of itself. Read only.
@@ -58,7 +72,9 @@ pub fn on_bus(host: &dyn Host, settings: &DriveSettings, maximum_ratio: f64, rep
         Ok(claim) => claim,
         Err(other) => return report.find([held("drive", other)]),
     };
-    let Some(heard) = listen(host, LISTEN, node, settings.bit_rate, report) else { return };
+    let Some(heard) = listen(host, LISTEN, node, settings.bit_rate, report) else {
+        return;
+    };
     match inspect(host, node, settings.sdo_timeout) {
         Ok(seen) => {
             report.find(drive::findings(&seen, settings, maximum_ratio));
@@ -75,11 +91,19 @@ pub fn watch(host: &dyn Host, settings: &VescSettings, bit_rate: u32, report: &m
         Err(other) => return report.find([held("VESC", other)]),
     };
     let time = LISTEN.max(3 * settings.status_timeout);
-    let Some(heard) = listen(host, time, settings.node, bit_rate, report) else { return };
+    let Some(heard) = listen(host, time, settings.node, bit_rate, report) else {
+        return;
+    };
     report.find(vesc::findings(&heard, settings));
 }
 
-fn listen(host: &dyn Host, time: Duration, node: u8, bit_rate: u32, report: &mut Report) -> Option<Heard> {
+fn listen(
+    host: &dyn Host,
+    time: Duration,
+    node: u8,
+    bit_rate: u32,
+    report: &mut Report,
+) -> Option<Heard> {
     match can_nodes::listen(host, time) {
         Ok(heard) => {
             report.find(can_nodes::findings(&heard, node, bit_rate));
@@ -101,7 +125,11 @@ fn held(subject: &'static str, Held { node, pid }: Held) -> Finding {
             format!("wait for its end, or end it: a run stops with zero current on `kill {pid}`"),
         ),
     };
-    Finding::failure(subject, format!("node {node} is held by {who}; it was not asked anything"), remedy)
+    Finding::failure(
+        subject,
+        format!("node {node} is held by {who}; it was not asked anything"),
+        remedy,
+    )
 }
 
 /// A node that is heard and does not answer may be stopped: then it serves no SDO.
@@ -109,7 +137,11 @@ fn silent(node: u8, heard: &Heard, error: &impl std::fmt::Display) -> Finding {
     let finding = Finding::refused("drive", error);
     match heard.nodes.get(&node) {
         Some(state) => {
-            let what = format!("{}; its heartbeat says {}", finding.what, can_nodes::words(*state));
+            let what = format!(
+                "{}; its heartbeat says {}",
+                finding.what,
+                can_nodes::words(*state)
+            );
             let remedy = "a stopped node answers nothing: switch its supply off and on, or let its NMT master start it";
             Finding::failure("drive", what, remedy)
         }

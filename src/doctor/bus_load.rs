@@ -24,24 +24,40 @@ pub struct BusLoad {
 /// Of a CANopen drive; a load above its limit was refused with the configuration.
 pub fn of_drive(settings: &DriveSettings) -> (BusLoad, Finding) {
     let traffic = settings.traffic();
-    let load =
-        BusLoad { load: traffic.load(), load_limit: settings.load_limit, highest_rate_hz: traffic.highest_rate_hz() };
+    let load = BusLoad {
+        load: traffic.load(),
+        load_limit: settings.load_limit,
+        highest_rate_hz: traffic.highest_rate_hz(),
+    };
     let exchange = match settings.exchange {
-        Exchange::Asynchronous { status_hz } => format!("asynchronous set-points, {status_hz} status frames a second"),
+        Exchange::Asynchronous { status_hz } => {
+            format!("asynchronous set-points, {status_hz} status frames a second")
+        }
         Exchange::Synchronous { status_every } => {
             format!("set-points with SYNC, a status frame after every {status_every} SYNCs")
         }
     };
-    let finding = judge(&load, &format!("{exchange}, {} Hz", settings.rate_hz), settings.bit_rate);
+    let finding = judge(
+        &load,
+        &format!("{exchange}, {} Hz", settings.rate_hz),
+        settings.bit_rate,
+    );
     (load, finding)
 }
 
 /// Of a VESC: a set-point of four bytes each tick, and its STATUS of eight.
 pub fn of_vesc(rate_hz: f64, bit_rate: u32) -> (BusLoad, Finding) {
-    let (set_point, status) = (f64::from(extended_frame_bits(4)), VESC_STATUS_HZ * f64::from(extended_frame_bits(8)));
+    let (set_point, status) = (
+        f64::from(extended_frame_bits(4)),
+        VESC_STATUS_HZ * f64::from(extended_frame_bits(8)),
+    );
     let (bits, load_limit) = (f64::from(bit_rate), 0.8);
     let load = (rate_hz * set_point + status) / bits;
-    let load = BusLoad { load, load_limit, highest_rate_hz: ((load_limit * bits - status) / set_point).max(0.0) };
+    let load = BusLoad {
+        load,
+        load_limit,
+        highest_rate_hz: ((load_limit * bits - status) / set_point).max(0.0),
+    };
     let finding = judge(&load, &format!("set-points at {rate_hz} Hz"), bit_rate);
     (load, finding)
 }
@@ -54,10 +70,16 @@ fn judge(load: &BusLoad, exchange: &str, bit_rate: u32) -> Finding {
         load.highest_rate_hz
     );
     match load.load {
-        load if load > 1.0 => Finding::failure(SUBJECT, what, "lower loop.rate_hz or raise the bit rate of the bus"),
-        l if l > load.load_limit => {
-            Finding::warning(SUBJECT, what, "lower loop.rate_hz or raise the bit rate of the bus")
-        }
+        load if load > 1.0 => Finding::failure(
+            SUBJECT,
+            what,
+            "lower loop.rate_hz or raise the bit rate of the bus",
+        ),
+        l if l > load.load_limit => Finding::warning(
+            SUBJECT,
+            what,
+            "lower loop.rate_hz or raise the bit rate of the bus",
+        ),
         _ => Finding::ok(SUBJECT, what),
     }
 }
@@ -71,10 +93,17 @@ mod tests {
     fn a_drive_at_1_khz_with_sync_and_100_heartbeats_a_second_loads_1_mbit_to_20_percent() {
         // SYNC 55, set-point 95, status 95/2 bits a tick; 2 * 50 heartbeats of 65 bits: 197500 + 6500 bits/s.
         let exchange = Exchange::Synchronous { status_every: 2 };
-        let (load, finding) = of_drive(&DriveSettings { exchange, ..DriveSettings::default() });
+        let (load, finding) = of_drive(&DriveSettings {
+            exchange,
+            ..DriveSettings::default()
+        });
         assert!((load.load - 0.204).abs() < 1e-9, "{load:?}");
         assert_eq!(finding.verdict, Verdict::Ok);
-        assert!(finding.what.contains("20.4 % of 1000000 bit/s"), "{}", finding.what);
+        assert!(
+            finding.what.contains("20.4 % of 1000000 bit/s"),
+            "{}",
+            finding.what
+        );
     }
 
     #[test]

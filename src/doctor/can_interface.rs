@@ -46,7 +46,13 @@ pub enum Link {
 /// Asks the kernel.
 pub fn gather(name: &str, bit_rate: u32) -> InterfaceFacts {
     let net = Path::new("/sys/class/net");
-    let property = |property: &str| if name.contains('/') { None } else { line(net.join(name).join(property)) };
+    let property = |property: &str| {
+        if name.contains('/') {
+            None
+        } else {
+            line(net.join(name).join(property))
+        }
+    };
     let link = match (Interface::read(name), property("type").as_deref()) {
         (_, Some(kind)) if kind != CAN => Link::NotCan,
         (Ok(interface), _) => Link::Known(interface),
@@ -65,8 +71,12 @@ pub fn gather(name: &str, bit_rate: u32) -> InterfaceFacts {
 
 fn can_interfaces(net: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(net).into_iter().flatten().flatten();
-    let is_can = |entry: &std::fs::DirEntry| line(entry.path().join("type")).as_deref() == Some(CAN);
-    let mut names: Vec<String> = entries.filter(is_can).map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    let is_can =
+        |entry: &std::fs::DirEntry| line(entry.path().join("type")).as_deref() == Some(CAN);
+    let mut names: Vec<String> = entries
+        .filter(is_can)
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
     names.sort();
     names
 }
@@ -84,26 +94,39 @@ pub fn findings(facts: &InterfaceFacts) -> Vec<Finding> {
 
 fn absent(facts: &InterfaceFacts) -> Finding {
     let name = &facts.name;
-    let there = if facts.others.is_empty() { "no CAN interface at all".into() } else { facts.others.join(", ") };
+    let there = if facts.others.is_empty() {
+        "no CAN interface at all".into()
+    } else {
+        facts.others.join(", ")
+    };
     let fitting = "plug the adapter in and load its driver (`dmesg` names it), or name one of these in amplifier.device.interface";
     match &facts.link {
-        Link::NotCan => Finding::failure(SUBJECT, format!("{name} is no CAN interface; there is {there}"), fitting),
+        Link::NotCan => Finding::failure(
+            SUBJECT,
+            format!("{name} is no CAN interface; there is {there}"),
+            fitting,
+        ),
         Link::Unasked(why) => Finding::failure(
             SUBJECT,
             format!("{name} cannot be asked: {why}"),
             format!("`ip -details link show {name}` may tell more"),
         ),
-        Link::Missing | Link::Known(_) => {
-            Finding::failure(SUBJECT, format!("there is no {name}; there is {there}"), fitting)
-        }
+        Link::Missing | Link::Known(_) => Finding::failure(
+            SUBJECT,
+            format!("there is no {name}; there is {there}"),
+            fitting,
+        ),
     }
 }
 
 fn known(facts: &InterfaceFacts, interface: &Interface) -> Vec<Finding> {
     let (name, want) = (&facts.name, facts.bit_rate);
-    let again = format!("`ip link set {name} down` and `ip link set {name} up type can bitrate {want}`");
+    let again =
+        format!("`ip link set {name} down` and `ip link set {name} up type can bitrate {want}`");
     if !interface.is_up {
-        let up = format!("`ip link set {name} up type can bitrate {want}` (a virtual one: `ip link set {name} up`)");
+        let up = format!(
+            "`ip link set {name} up type can bitrate {want}` (a virtual one: `ip link set {name} up`)"
+        );
         return vec![Finding::failure(SUBJECT, format!("{name} is down"), up)];
     }
     let findings = [
@@ -136,7 +159,8 @@ fn bit_rate(facts: &InterfaceFacts, interface: &Interface, again: &str) -> Findi
 fn state(name: &str, interface: &Interface, again: &str) -> Option<Finding> {
     let state = interface.state?;
     let what = format!("the controller of {name} is in state {state}");
-    let check = "check cable, termination (120 ohms at both ends), bit rate, and that the drive is powered";
+    let check =
+        "check cable, termination (120 ohms at both ends), bit rate, and that the drive is powered";
     Some(match (interface.is_healthy, state) {
         (false, _) => Finding::failure("CAN state", what, format!("{check}; then {again}")),
         (true, "error active") => Finding::ok("CAN state", what),
@@ -158,10 +182,15 @@ fn errors(name: &str, interface: &Interface) -> Option<Finding> {
 fn restart(interface: &Interface) -> Option<Finding> {
     interface.state?;
     Some(match interface.restart_ms {
-        None | Some(0) => Finding::ok("CAN restart", "after a bus-off the interface waits for a person"),
+        None | Some(0) => Finding::ok(
+            "CAN restart",
+            "after a bus-off the interface waits for a person",
+        ),
         Some(ms) => Finding::note(
             "CAN restart",
-            format!("after a bus-off the interface comes back by itself within {ms} ms; the run has tripped by then"),
+            format!(
+                "after a bus-off the interface comes back by itself within {ms} ms; the run has tripped by then"
+            ),
             "`ip link set IFACE type can restart-ms 0` leaves that to a person",
         ),
     })
@@ -169,12 +198,22 @@ fn restart(interface: &Interface) -> Option<Finding> {
 
 /// A short queue loses bursts, a long one keeps set-points that nobody wants any more.
 fn queue(name: &str, length: u32) -> Finding {
-    let (what, remedy) =
-        (format!("{length} frames may wait to be sent on {name}"), format!("`ip link set {name} txqueuelen 10`"));
+    let (what, remedy) = (
+        format!("{length} frames may wait to be sent on {name}"),
+        format!("`ip link set {name} txqueuelen 10`"),
+    );
     match length {
-        0..4 => Finding::warning("CAN queue", format!("{what}: too few for a tick and the heartbeat"), remedy),
+        0..4 => Finding::warning(
+            "CAN queue",
+            format!("{what}: too few for a tick and the heartbeat"),
+            remedy,
+        ),
         4..=100 => Finding::ok("CAN queue", what),
-        _ => Finding::note("CAN queue", format!("{what}: on a bus that stalls, old set-points would"), remedy),
+        _ => Finding::note(
+            "CAN queue",
+            format!("{what}: on a bus that stalls, old set-points would"),
+            remedy,
+        ),
     }
 }
 
@@ -212,7 +251,11 @@ mod tests {
 
     /// What is not ok.
     fn verdicts(found: &[Finding]) -> Vec<(&'static str, Verdict)> {
-        found.iter().map(|f| (f.subject, f.verdict)).filter(|(_, verdict)| *verdict != Ok).collect()
+        found
+            .iter()
+            .map(|f| (f.subject, f.verdict))
+            .filter(|(_, verdict)| *verdict != Ok)
+            .collect()
     }
 
     #[test]
@@ -223,33 +266,99 @@ mod tests {
 
     #[test]
     fn each_trouble_of_an_interface_has_its_verdict() {
-        let bus_off =
-            Interface { state: Some("bus off"), is_healthy: false, error_counters: Some((248, 0)), ..sound() };
+        let bus_off = Interface {
+            state: Some("bus off"),
+            is_healthy: false,
+            error_counters: Some((248, 0)),
+            ..sound()
+        };
         let cases = [
-            (Interface { is_up: false, ..sound() }, vec![(SUBJECT, Failure)]),
-            (Interface { bit_rate: Some(500_000), ..sound() }, vec![(SUBJECT, Failure)]),
-            (bus_off, vec![("CAN state", Failure), ("CAN errors", Warning)]),
-            (Interface { state: Some("error passive"), is_healthy: false, ..sound() }, vec![("CAN state", Failure)]),
-            (Interface { state: Some("error warning"), ..sound() }, vec![("CAN state", Warning)]),
-            (Interface { error_counters: Some((0, 3)), ..sound() }, vec![("CAN errors", Note)]),
-            (Interface { restart_ms: Some(100), ..sound() }, vec![("CAN restart", Note)]),
+            (
+                Interface {
+                    is_up: false,
+                    ..sound()
+                },
+                vec![(SUBJECT, Failure)],
+            ),
+            (
+                Interface {
+                    bit_rate: Some(500_000),
+                    ..sound()
+                },
+                vec![(SUBJECT, Failure)],
+            ),
+            (
+                bus_off,
+                vec![("CAN state", Failure), ("CAN errors", Warning)],
+            ),
+            (
+                Interface {
+                    state: Some("error passive"),
+                    is_healthy: false,
+                    ..sound()
+                },
+                vec![("CAN state", Failure)],
+            ),
+            (
+                Interface {
+                    state: Some("error warning"),
+                    ..sound()
+                },
+                vec![("CAN state", Warning)],
+            ),
+            (
+                Interface {
+                    error_counters: Some((0, 3)),
+                    ..sound()
+                },
+                vec![("CAN errors", Note)],
+            ),
+            (
+                Interface {
+                    restart_ms: Some(100),
+                    ..sound()
+                },
+                vec![("CAN restart", Note)],
+            ),
         ];
         for (interface, expected) in cases {
-            assert_eq!(verdicts(&found(interface.clone())), expected, "{interface:?}");
+            assert_eq!(
+                verdicts(&found(interface.clone())),
+                expected,
+                "{interface:?}"
+            );
         }
     }
 
     #[test]
     fn remedies_name_the_interface_and_the_bit_rate() {
-        let down = &found(Interface { is_up: false, ..sound() })[0];
-        assert!(down.remedy.as_deref().unwrap().starts_with("`ip link set can0 up type can bitrate 1000000`"));
-        let slow = &found(Interface { bit_rate: Some(500_000), ..sound() })[0];
-        assert_eq!(slow.what, "can0 runs at 500000 bit/s, the configuration says 1000000");
+        let down = &found(Interface {
+            is_up: false,
+            ..sound()
+        })[0];
+        assert!(
+            down.remedy
+                .as_deref()
+                .unwrap()
+                .starts_with("`ip link set can0 up type can bitrate 1000000`")
+        );
+        let slow = &found(Interface {
+            bit_rate: Some(500_000),
+            ..sound()
+        })[0];
+        assert_eq!(
+            slow.what,
+            "can0 runs at 500000 bit/s, the configuration says 1000000"
+        );
     }
 
     #[test]
     fn a_virtual_interface_is_a_note() {
-        let virtual_one = Interface { is_up: true, is_healthy: true, ..Interface::default() };
+        let virtual_one = Interface {
+            is_up: true,
+            is_healthy: true,
+            ..Interface::default()
+        };
         assert_eq!(verdicts(&found(virtual_one)), [(SUBJECT, Note)]);
     }
 
@@ -261,20 +370,38 @@ mod tests {
             (Link::Unasked("EPERM".into()), "can0 cannot be asked: EPERM"),
         ] {
             let found = findings(&facts(link));
-            assert_eq!((found.len(), found[0].verdict, found[0].what.as_str()), (1, Failure, words));
+            assert_eq!(
+                (found.len(), found[0].verdict, found[0].what.as_str()),
+                (1, Failure, words)
+            );
         }
     }
 
     #[test]
     fn a_kernel_without_can_is_the_only_finding() {
-        let found = findings(&InterfaceFacts { kernel: Err(KernelError::Missing), ..facts(Link::Missing) });
-        assert_eq!((found.len(), found[0].what.as_str()), (1, "this kernel has no CAN"));
-        assert!(found[0].remedy.as_deref().unwrap().contains("modprobe can_raw"));
+        let found = findings(&InterfaceFacts {
+            kernel: Err(KernelError::Missing),
+            ..facts(Link::Missing)
+        });
+        assert_eq!(
+            (found.len(), found[0].what.as_str()),
+            (1, "this kernel has no CAN")
+        );
+        assert!(
+            found[0]
+                .remedy
+                .as_deref()
+                .unwrap()
+                .contains("modprobe can_raw")
+        );
     }
 
     #[test]
     fn a_queue_is_neither_too_short_nor_too_long() {
         let verdict = |length| queue("can0", length).verdict;
-        assert_eq!([2, 4, 10, 100, 1000].map(verdict), [Warning, Ok, Ok, Ok, Note]);
+        assert_eq!(
+            [2, 4, 10, 100, 1000].map(verdict),
+            [Warning, Ok, Ok, Ok, Note]
+        );
     }
 }

@@ -53,9 +53,15 @@ pub struct BusFigures {
 /// Listens for `time`; sends nothing.
 pub fn listen(host: &dyn Host, time: Duration) -> Result<Heard, BusError> {
     let mut bus = host.endpoint(&[])?;
-    let mut heard = Heard { seconds: time.as_secs_f64(), ..Heard::default() };
+    let mut heard = Heard {
+        seconds: time.as_secs_f64(),
+        ..Heard::default()
+    };
     let end_ns = host.now_ns().saturating_add(time.as_nanos() as u64);
-    while let Some(left_ns) = end_ns.checked_sub(host.now_ns()).filter(|left_ns| *left_ns > 0) {
+    while let Some(left_ns) = end_ns
+        .checked_sub(host.now_ns())
+        .filter(|left_ns| *left_ns > 0)
+    {
         if let Some(event) = bus.receive(Duration::from_nanos(left_ns))? {
             heard.take(event);
         }
@@ -67,7 +73,9 @@ impl Heard {
     fn take(&mut self, event: BusEvent) {
         match event {
             BusEvent::Frame(frame) => self.frame(&frame),
-            BusEvent::Condition(condition) if !self.conditions.contains(&condition) => self.conditions.push(condition),
+            BusEvent::Condition(condition) if !self.conditions.contains(&condition) => {
+                self.conditions.push(condition)
+            }
             BusEvent::Condition(_) => {}
         }
     }
@@ -82,9 +90,13 @@ impl Heard {
         let node = (id.raw() & 0x7F) as u8;
         match id.raw() & 0x780 {
             0x000 | 0x080 if id == nmt::COB_ID || id == sync::FRAME.id() => self.master = true,
-            0x080 => self.emergencies.extend(Emergency::decode(data).map(|emergency| (node, emergency))),
+            0x080 => self
+                .emergencies
+                .extend(Emergency::decode(data).map(|emergency| (node, emergency))),
             0x200 => self.commanded.extend([node]),
-            0x700 => self.nodes.extend(heartbeat::decode(data).map(|state| (node, state))),
+            0x700 => self
+                .nodes
+                .extend(heartbeat::decode(data).map(|state| (node, state))),
             _ => {}
         }
     }
@@ -110,14 +122,28 @@ impl Heard {
 }
 
 fn bits(id: Id, bytes: u32) -> u32 {
-    if id.is_extended() { extended_frame_bits(bytes) } else { base_frame_bits(bytes) }
+    if id.is_extended() {
+        extended_frame_bits(bytes)
+    } else {
+        base_frame_bits(bytes)
+    }
 }
 
 /// What that means for a run with `node`, which nobody else of this program holds.
 pub fn findings(heard: &Heard, node: u8, bit_rate: u32) -> Vec<Finding> {
     let mut findings = vec![who(heard, bit_rate)];
-    findings.extend(heard.conditions.iter().filter_map(|condition| trouble(*condition)));
-    findings.extend(heard.emergencies.iter().map(|(from, emergency)| cry(*from, emergency)));
+    findings.extend(
+        heard
+            .conditions
+            .iter()
+            .filter_map(|condition| trouble(*condition)),
+    );
+    findings.extend(
+        heard
+            .emergencies
+            .iter()
+            .map(|(from, emergency)| cry(*from, emergency)),
+    );
     if heard.commanded.contains(&node) {
         let what = format!("somebody else sends set-points to node {node}");
         findings.push(Finding::warning(
@@ -126,20 +152,35 @@ pub fn findings(heard: &Heard, node: u8, bit_rate: u32) -> Vec<Finding> {
             "end the other program, or unplug the other controller: two masters fight",
         ));
     } else if heard.master {
-        let remedy = "end the other program, or unplug the other controller, unless it is meant to be there";
-        findings.push(Finding::warning(SUBJECT, "another master sends SYNC or NMT orders", remedy));
+        let remedy =
+            "end the other program, or unplug the other controller, unless it is meant to be there";
+        findings.push(Finding::warning(
+            SUBJECT,
+            "another master sends SYNC or NMT orders",
+            remedy,
+        ));
     }
     findings
 }
 
 fn who(heard: &Heard, bit_rate: u32) -> Finding {
-    let heartbeats = heard.nodes.iter().map(|(node, state)| format!("node {node} {}", words(*state)));
+    let heartbeats = heard
+        .nodes
+        .iter()
+        .map(|(node, state)| format!("node {node} {}", words(*state)));
     let vescs = heard.vescs.keys().map(|node| format!("VESC {node}"));
     let all: Vec<String> = heartbeats.chain(vescs).collect();
-    let names = if all.is_empty() { "nobody by heartbeat or STATUS".into() } else { all.join(", ") };
+    let names = if all.is_empty() {
+        "nobody by heartbeat or STATUS".into()
+    } else {
+        all.join(", ")
+    };
     let figures = heard.figures(bit_rate);
     let (seconds, frames, percent) = (heard.seconds, heard.frames, 100.0 * figures.load);
-    Finding::ok(SUBJECT, format!("heard within {seconds} s: {names}; {frames} frames, {percent:.1} % of the bus"))
+    Finding::ok(
+        SUBJECT,
+        format!("heard within {seconds} s: {names}; {frames} frames, {percent:.1} % of the bus"),
+    )
 }
 
 /// A state for people.
@@ -162,7 +203,8 @@ fn trouble(condition: Condition) -> Option<Finding> {
         Condition::Noise => "errors on the wire",
         Condition::Active => return None,
     };
-    let remedy = "check cable, termination (120 ohms at both ends), bit rate, and that the drive is powered";
+    let remedy =
+        "check cable, termination (120 ohms at both ends), bit rate, and that the drive is powered";
     Some(match condition {
         Condition::BusOff | Condition::Passive => Finding::failure("CAN state", what, remedy),
         _ => Finding::warning("CAN state", what, remedy),
@@ -174,7 +216,11 @@ fn cry(node: u8, emergency: &Emergency) -> Finding {
     let what = format!("node {node} sent emergency 0x{code:04X}: {text}");
     match code {
         0 => Finding::note(SUBJECT, what, "none: the error is over"),
-        _ => Finding::warning(SUBJECT, what, "remove the cause; the drive's manual has the vendor's bytes"),
+        _ => Finding::warning(
+            SUBJECT,
+            what,
+            "remove the cause; the drive's manual has the vendor's bytes",
+        ),
     }
 }
 
@@ -184,13 +230,22 @@ mod tests {
     use crate::doctor::Verdict;
 
     fn heard(frames: &[CanFrame]) -> Heard {
-        let mut heard = Heard { seconds: 0.3, ..Heard::default() };
-        frames.iter().for_each(|frame| heard.take(BusEvent::Frame(*frame)));
+        let mut heard = Heard {
+            seconds: 0.3,
+            ..Heard::default()
+        };
+        frames
+            .iter()
+            .for_each(|frame| heard.take(BusEvent::Frame(*frame)));
         heard
     }
 
     fn worst(heard: &Heard) -> Verdict {
-        findings(heard, 5, 1_000_000).iter().map(|finding| finding.verdict).max().unwrap()
+        findings(heard, 5, 1_000_000)
+            .iter()
+            .map(|finding| finding.verdict)
+            .max()
+            .unwrap()
     }
 
     #[test]
@@ -213,35 +268,65 @@ mod tests {
     #[test]
     fn another_master_is_a_warning() {
         assert_eq!(worst(&heard(&[sync::FRAME])), Verdict::Warning);
-        assert_eq!(worst(&heard(&[nmt::Command::Start.frame(9)])), Verdict::Warning);
+        assert_eq!(
+            worst(&heard(&[nmt::Command::Start.frame(9)])),
+            Verdict::Warning
+        );
         let commanded = heard(&[CanFrame::new(Id::standard(0x205), [0; 4])]);
-        assert!(findings(&commanded, 5, 1_000_000)[1].what.contains("set-points to node 5"));
-        assert_eq!(worst(&heard(&[CanFrame::new(Id::standard(0x206), [0; 4])])), Verdict::Ok, "another's drive");
+        assert!(
+            findings(&commanded, 5, 1_000_000)[1]
+                .what
+                .contains("set-points to node 5")
+        );
+        assert_eq!(
+            worst(&heard(&[CanFrame::new(Id::standard(0x206), [0; 4])])),
+            Verdict::Ok,
+            "another's drive"
+        );
     }
 
     #[test]
     fn emergencies_are_put_into_words() {
-        let frame = Emergency { code: 0x4210, register: 8, vendor: [0; 5] }.frame(5);
+        let frame = Emergency {
+            code: 0x4210,
+            register: 8,
+            vendor: [0; 5],
+        }
+        .frame(5);
         let found = findings(&heard(&[frame]), 5, 1_000_000);
         assert_eq!(found[1].what, "node 5 sent emergency 0x4210: drive too hot");
         assert_eq!(found[1].verdict, Verdict::Warning);
-        assert_eq!(worst(&heard(&[Emergency::default().frame(5)])), Verdict::Note);
+        assert_eq!(
+            worst(&heard(&[Emergency::default().frame(5)])),
+            Verdict::Note
+        );
     }
 
     #[test]
     fn what_the_controller_tells_is_told_once() {
         let mut heard = heard(&[]);
-        for condition in [Condition::BusOff, Condition::NoAcknowledge, Condition::BusOff, Condition::Active] {
+        for condition in [
+            Condition::BusOff,
+            Condition::NoAcknowledge,
+            Condition::BusOff,
+            Condition::Active,
+        ] {
             heard.take(BusEvent::Condition(condition));
         }
-        let verdicts: Vec<Verdict> = findings(&heard, 5, 1_000_000).iter().map(|f| f.verdict).collect();
+        let verdicts: Vec<Verdict> = findings(&heard, 5, 1_000_000)
+            .iter()
+            .map(|f| f.verdict)
+            .collect();
         assert_eq!(verdicts, [Verdict::Ok, Verdict::Failure, Verdict::Warning]);
     }
 
     #[test]
     fn a_vesc_is_known_by_its_status() {
         let status = CanFrame::new(vesc::status_id(23), [0, 0, 0, 0, 0xFF, 0xFB, 0, 0]);
-        assert_eq!(heard(&[status, status]).vescs, BTreeMap::from([(23, (2, -5))]));
+        assert_eq!(
+            heard(&[status, status]).vescs,
+            BTreeMap::from([(23, (2, -5))])
+        );
         assert!(heard(&[vesc::set_current(23, 1000)]).vescs.is_empty());
     }
 }

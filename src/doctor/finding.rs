@@ -44,8 +44,18 @@ pub struct Finding {
 }
 
 impl Finding {
-    fn new(subject: &'static str, verdict: Verdict, what: impl Into<String>, remedy: Option<String>) -> Finding {
-        Finding { subject, what: what.into(), verdict, remedy }
+    fn new(
+        subject: &'static str,
+        verdict: Verdict,
+        what: impl Into<String>,
+        remedy: Option<String>,
+    ) -> Finding {
+        Finding {
+            subject,
+            what: what.into(),
+            verdict,
+            remedy,
+        }
     }
 
     /// As it should be.
@@ -54,17 +64,29 @@ impl Finding {
     }
 
     /// Good to know.
-    pub fn note(subject: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Finding {
+    pub fn note(
+        subject: &'static str,
+        what: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Finding {
         Finding::new(subject, Verdict::Note, what, Some(remedy.into()))
     }
 
     /// The run starts nevertheless.
-    pub fn warning(subject: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Finding {
+    pub fn warning(
+        subject: &'static str,
+        what: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Finding {
         Finding::new(subject, Verdict::Warning, what, Some(remedy.into()))
     }
 
     /// The run does not start, or trips at once.
-    pub fn failure(subject: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Finding {
+    pub fn failure(
+        subject: &'static str,
+        what: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Finding {
         Finding::new(subject, Verdict::Failure, what, Some(remedy.into()))
     }
 
@@ -76,7 +98,10 @@ impl Finding {
 
     /// No graver than `worst`.
     pub fn at_most(self, worst: Verdict) -> Finding {
-        Finding { verdict: self.verdict.min(worst), ..self }
+        Finding {
+            verdict: self.verdict.min(worst),
+            ..self
+        }
     }
 }
 
@@ -96,14 +121,20 @@ mod tests {
     fn an_errors_text_is_parted_into_what_and_remedy() {
         let finding = Finding::refused("port", &"/dev/x: gone; plug it in; then start again");
         assert_eq!(finding.what, "/dev/x: gone");
-        assert_eq!(finding.remedy.as_deref(), Some("plug it in; then start again"));
+        assert_eq!(
+            finding.remedy.as_deref(),
+            Some("plug it in; then start again")
+        );
         assert_eq!(Finding::refused("port", &"no idea").remedy, None);
     }
 
     #[test]
     fn verdicts_are_softened_never_sharpened() {
         let warning = Finding::warning("x", "y", "z");
-        assert_eq!(warning.clone().at_most(Verdict::Note).verdict, Verdict::Note);
+        assert_eq!(
+            warning.clone().at_most(Verdict::Note).verdict,
+            Verdict::Note
+        );
         assert_eq!(warning.at_most(Verdict::Failure).verdict, Verdict::Warning);
     }
 }

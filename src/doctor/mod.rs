@@ -47,7 +47,11 @@ pub use trial::{Lateness, Trial, trial};
 /// Looks at everything that the runs of `config` need. `runs` is what their commands say of it; `out` is the folder for
 /// recordings.
 pub fn examine(config: &Config, runs: &Runs, out: &Path) -> Report {
-    let pace = if devices::is_simulated(config) { Pace::Virtual } else { Pace::Realtime };
+    let pace = if devices::is_simulated(config) {
+        Pace::Virtual
+    } else {
+        Pace::Realtime
+    };
     let mut report = Report::default();
     report.find(runs::kinds(config));
     report.find(runs::findings(runs, config.control.least_modulus_margin));
@@ -68,7 +72,11 @@ fn system_and_loop(config: &Config, pace: Pace, report: &mut Report) {
         Ok(trial) => {
             let facts = scheduler::gather(&config.servo, &trial);
             report.find(scheduler::findings(&facts, pace));
-            report.find([trial::finding(&trial.lateness, config.interlock.overruns_per_s, pace)]);
+            report.find([trial::finding(
+                &trial.lateness,
+                config.interlock.overruns_per_s,
+                pace,
+            )]);
             report.figures.lateness = Some(trial.lateness);
         }
         Err(error) => report.find([Finding::failure(
@@ -80,10 +88,14 @@ fn system_and_loop(config: &Config, pace: Pace, report: &mut Report) {
 }
 
 fn probe(config: &Config, report: &mut Report) {
-    let Some(line) = config.probe.device.line() else { return };
+    let Some(line) = config.probe.device.line() else {
+        return;
+    };
     let facts = serial_port::gather(line);
     let found = serial_port::findings(&facts);
-    let is_usable = found.iter().all(|finding| finding.verdict < Verdict::Failure);
+    let is_usable = found
+        .iter()
+        .all(|finding| finding.verdict < Verdict::Failure);
     report.find(found);
     if !is_usable {
         return;

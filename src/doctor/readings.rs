@@ -65,7 +65,15 @@ pub fn gather(probe: &mut SerialProbe, config: &Config) -> Readings {
         std::thread::sleep(look);
     }
     let watched_s = began.elapsed().as_secs_f64();
-    counted(Readings { came, watched_s, ..tally.figures() }, &before, &probe.statistics())
+    counted(
+        Readings {
+            came,
+            watched_s,
+            ..tally.figures()
+        },
+        &before,
+        &probe.statistics(),
+    )
 }
 
 fn wait_for_first(probe: &mut SerialProbe) -> bool {
@@ -127,7 +135,12 @@ impl Tally {
         // From the first on: where all are the same, nothing is left to be rounded.
         let first_m = self.positions_m.first().copied().unwrap_or_default();
         let mean_m = first_m + self.positions_m.iter().map(|x| x - first_m).sum::<f64>() / count;
-        let square_m2 = self.positions_m.iter().map(|x| (x - mean_m) * (x - mean_m)).sum::<f64>() / count;
+        let square_m2 = self
+            .positions_m
+            .iter()
+            .map(|x| (x - mean_m) * (x - mean_m))
+            .sum::<f64>()
+            / count;
         let farther = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
         Readings {
             looks: self.looks,
@@ -160,19 +173,33 @@ pub fn findings(seen: &Readings, config: &Config) -> Vec<Finding> {
 }
 
 fn none(seen: &Readings) -> Finding {
-    let Readings { bytes, damaged_bytes, timeouts, faults, .. } = seen;
-    let figures =
-        format!("{bytes} bytes, {damaged_bytes} of them damaged, {timeouts} missing answers, {faults} faults");
+    let Readings {
+        bytes,
+        damaged_bytes,
+        timeouts,
+        faults,
+        ..
+    } = seen;
+    let figures = format!(
+        "{bytes} bytes, {damaged_bytes} of them damaged, {timeouts} missing answers, {faults} faults"
+    );
     let (what, remedy) = match (bytes, seen.out_of_range_looks) {
         (_, 1..) => (
             "the target is outside the probe's range",
             "move probe or stage until the probe's own display shows a value",
         ),
-        (0, _) => ("the probe says nothing", "check its power and wiring (A and B swapped?), baud rate and address"),
-        _ if *faults > 0 => {
-            ("the probe says that it cannot measure", "its own display says why: target, cable, controller")
-        }
-        _ => ("bytes come, but no reading", "check baud rate, parity and protocol in probe.device"),
+        (0, _) => (
+            "the probe says nothing",
+            "check its power and wiring (A and B swapped?), baud rate and address",
+        ),
+        _ if *faults > 0 => (
+            "the probe says that it cannot measure",
+            "its own display says why: target, cable, controller",
+        ),
+        _ => (
+            "bytes come, but no reading",
+            "check baud rate, parity and protocol in probe.device",
+        ),
     };
     Finding::failure(SUBJECT, format!("{what}: {figures}"), remedy)
 }
@@ -195,7 +222,10 @@ fn validity(seen: &Readings) -> Option<Finding> {
 
 fn rate(seen: &Readings, probe: &ProbeSettings) -> Option<Finding> {
     let configured_hz = probe.rate_hz?;
-    let what = format!("{:.0} readings a second; probe.rate_hz is {configured_hz}", seen.rate_hz);
+    let what = format!(
+        "{:.0} readings a second; probe.rate_hz is {configured_hz}",
+        seen.rate_hz
+    );
     let remedy = "set probe.rate_hz to what comes: margins and simulation are computed with it";
     Some(match seen.rate_hz / configured_hz {
         ..0.9 => Finding::warning(SUBJECT, what, remedy),
@@ -218,9 +248,11 @@ fn age(seen: &Readings, probe: &ProbeSettings, interlock: &InterlockSettings) ->
     );
     let remedy = "correct probe.latency_s, transport_s and rate_hz; low latency of the adapter and a quiet machine make readings younger";
     match (seen.age_max_s > stale_s, seen.age_mean_s > 1.2 * expected_s) {
-        (true, _) => {
-            Finding::failure(SUBJECT, what, format!("{remedy}; or raise interlock.probe_stale_s if the loop bears it"))
-        }
+        (true, _) => Finding::failure(
+            SUBJECT,
+            what,
+            format!("{remedy}; or raise interlock.probe_stale_s if the loop bears it"),
+        ),
         (_, true) => Finding::warning(SUBJECT, what, remedy),
         _ => Finding::ok(SUBJECT, what),
     }
@@ -230,8 +262,10 @@ fn position(seen: &Readings, interlock: &InterlockSettings) -> Finding {
     let um = |m: f64| format!("{:+.1} um", m * 1e6);
     let limit_m = interlock.soft_limit_m;
     let (mean, farthest) = (um(seen.position_mean_m), um(seen.position_farthest_m));
-    let what =
-        format!("position {mean} in the mean, {farthest} at the farthest; the soft limit is {:.1} um", limit_m * 1e6);
+    let what = format!(
+        "position {mean} in the mean, {farthest} at the farthest; the soft limit is {:.1} um",
+        limit_m * 1e6
+    );
     match seen.position_farthest_m.abs() > limit_m {
         true => Finding::failure(
             SUBJECT,
@@ -246,9 +280,11 @@ fn noise(seen: &Readings) -> Finding {
     let what = format!("noise {} RMS, if the stage rests", length(seen.noise_rms_m));
     match seen.noise_rms_m > 0.0 {
         true => Finding::ok(SUBJECT, what),
-        false => {
-            Finding::note(SUBJECT, "every reading is the same", "push the stage gently: a probe that measures shows it")
-        }
+        false => Finding::note(
+            SUBJECT,
+            "every reading is the same",
+            "push the stage gently: a probe that measures shows it",
+        ),
     }
 }
 
@@ -262,7 +298,14 @@ fn length(m: f64) -> String {
 }
 
 fn damage(seen: &Readings) -> Finding {
-    let Readings { gaps, damaged_bytes, timeouts, faults, watched_s, .. } = seen;
+    let Readings {
+        gaps,
+        damaged_bytes,
+        timeouts,
+        faults,
+        watched_s,
+        ..
+    } = seen;
     let what = format!(
         "within {watched_s:.1} s: {gaps} readings missing, {damaged_bytes} damaged bytes, {timeouts} missing answers, {faults} faults"
     );
@@ -283,7 +326,11 @@ mod tests {
     use crate::doctor::Verdict::{self, Failure, Note, Warning};
 
     fn lab() -> Config {
-        load(&Source { config: Some("lab".into()), ..Source::default() }).unwrap()
+        load(&Source {
+            config: Some("lab".into()),
+            ..Source::default()
+        })
+        .unwrap()
     }
 
     fn sound() -> Readings {
@@ -305,57 +352,183 @@ mod tests {
 
     fn bad(seen: Readings) -> Vec<(Verdict, String)> {
         let found = findings(&seen, &lab()).into_iter();
-        found.filter(|finding| finding.verdict != Verdict::Ok).map(|finding| (finding.verdict, finding.what)).collect()
+        found
+            .filter(|finding| finding.verdict != Verdict::Ok)
+            .map(|finding| (finding.verdict, finding.what))
+            .collect()
     }
 
     #[test]
     fn sound_readings_are_ok_in_everything() {
         assert_eq!(bad(sound()), []);
-        assert!(findings(&sound(), &lab()).iter().any(|f| f.what == "noise 40.0 nm RMS, if the stage rests"));
+        assert!(
+            findings(&sound(), &lab())
+                .iter()
+                .any(|f| f.what == "noise 40.0 nm RMS, if the stage rests")
+        );
     }
 
     #[test]
     fn each_trouble_of_readings_has_its_verdict_and_words() {
         // lab: expected 0.3 + 1.4 + 0.77 = 2.47 ms in the mean, stale at 10 ms, soft limit 900 um, 650 Hz.
         let cases = [
-            (Readings { came: false, bytes: 0, timeouts: 20, ..sound() }, Failure, "says nothing: 0 bytes"),
-            (Readings { came: false, damaged_bytes: 10_000, ..sound() }, Failure, "bytes come, but no reading"),
-            (Readings { came: false, faults: 3, ..sound() }, Failure, "cannot measure"),
-            (Readings { came: false, out_of_range_looks: 9, ..sound() }, Failure, "outside the probe's range"),
-            (Readings { valid_looks: 990, out_of_range_looks: 10, ..sound() }, Failure, "10 of 1000 looks"),
-            (Readings { rate_hz: 500.0, ..sound() }, Warning, "500 readings a second; probe.rate_hz is 650"),
-            (Readings { rate_hz: 900.0, ..sound() }, Note, "900 readings a second"),
-            (Readings { age_mean_s: 0.0031, ..sound() }, Warning, "age 3.10 ms in the mean"),
-            (Readings { age_max_s: 0.0101, ..sound() }, Failure, "10.10 ms at most"),
-            (Readings { position_farthest_m: -950e-6, ..sound() }, Failure, "-950.0 um at the farthest"),
-            (Readings { noise_rms_m: 0.0, ..sound() }, Note, "every reading is the same"),
-            (Readings { gaps: 1, ..sound() }, Warning, "1 readings missing"),
-            (Readings { damaged_bytes: 7, ..sound() }, Warning, "7 damaged bytes"),
+            (
+                Readings {
+                    came: false,
+                    bytes: 0,
+                    timeouts: 20,
+                    ..sound()
+                },
+                Failure,
+                "says nothing: 0 bytes",
+            ),
+            (
+                Readings {
+                    came: false,
+                    damaged_bytes: 10_000,
+                    ..sound()
+                },
+                Failure,
+                "bytes come, but no reading",
+            ),
+            (
+                Readings {
+                    came: false,
+                    faults: 3,
+                    ..sound()
+                },
+                Failure,
+                "cannot measure",
+            ),
+            (
+                Readings {
+                    came: false,
+                    out_of_range_looks: 9,
+                    ..sound()
+                },
+                Failure,
+                "outside the probe's range",
+            ),
+            (
+                Readings {
+                    valid_looks: 990,
+                    out_of_range_looks: 10,
+                    ..sound()
+                },
+                Failure,
+                "10 of 1000 looks",
+            ),
+            (
+                Readings {
+                    rate_hz: 500.0,
+                    ..sound()
+                },
+                Warning,
+                "500 readings a second; probe.rate_hz is 650",
+            ),
+            (
+                Readings {
+                    rate_hz: 900.0,
+                    ..sound()
+                },
+                Note,
+                "900 readings a second",
+            ),
+            (
+                Readings {
+                    age_mean_s: 0.0031,
+                    ..sound()
+                },
+                Warning,
+                "age 3.10 ms in the mean",
+            ),
+            (
+                Readings {
+                    age_max_s: 0.0101,
+                    ..sound()
+                },
+                Failure,
+                "10.10 ms at most",
+            ),
+            (
+                Readings {
+                    position_farthest_m: -950e-6,
+                    ..sound()
+                },
+                Failure,
+                "-950.0 um at the farthest",
+            ),
+            (
+                Readings {
+                    noise_rms_m: 0.0,
+                    ..sound()
+                },
+                Note,
+                "every reading is the same",
+            ),
+            (
+                Readings { gaps: 1, ..sound() },
+                Warning,
+                "1 readings missing",
+            ),
+            (
+                Readings {
+                    damaged_bytes: 7,
+                    ..sound()
+                },
+                Warning,
+                "7 damaged bytes",
+            ),
         ];
         for (seen, verdict, words) in cases {
             let found = bad(seen.clone());
-            assert_eq!((found.len(), found[0].0), (1, verdict), "{seen:?}: {found:?}");
+            assert_eq!(
+                (found.len(), found[0].0),
+                (1, verdict),
+                "{seen:?}: {found:?}"
+            );
             assert!(found[0].1.contains(words), "{}: {words}", found[0].1);
         }
     }
 
     #[test]
     fn noise_is_the_deviation_of_readings_each_counted_once() {
-        let reading = |sequence, position_m, validity| Reading { sequence, position_m, validity, age_ns: 1_000_000 };
+        let reading = |sequence, position_m, validity| Reading {
+            sequence,
+            position_m,
+            validity,
+            age_ns: 1_000_000,
+        };
         let mut tally = Tally::default();
         for (sequence, position_m) in [(1, 1e-6), (1, 1e-6), (2, 3e-6), (2, 3e-6), (2, 3e-6)] {
             tally.take(&reading(sequence, position_m, Validity::Valid));
         }
         tally.take(&reading(3, 1.0, Validity::OutOfRange));
         let figures = tally.figures();
-        assert_eq!((figures.looks, figures.valid_looks, figures.out_of_range_looks), (6, 5, 1));
-        assert!((figures.position_mean_m - 2e-6).abs() < 1e-18 && (figures.noise_rms_m - 1e-6).abs() < 1e-18);
-        assert_eq!((figures.position_farthest_m, figures.age_max_s), (3e-6, 1e-3));
+        assert_eq!(
+            (
+                figures.looks,
+                figures.valid_looks,
+                figures.out_of_range_looks
+            ),
+            (6, 5, 1)
+        );
+        assert!(
+            (figures.position_mean_m - 2e-6).abs() < 1e-18
+                && (figures.noise_rms_m - 1e-6).abs() < 1e-18
+        );
+        assert_eq!(
+            (figures.position_farthest_m, figures.age_max_s),
+            (3e-6, 1e-3)
+        );
         assert_eq!(Tally::default().figures().noise_rms_m, 0.0);
     }
 
     #[test]
     fn lengths_are_in_the_unit_that_a_person_reads() {
-        assert_eq!([40e-9, 1.5e-6, 2e-3].map(length), ["40.0 nm", "1.50 um", "2.00 mm"]);
+        assert_eq!(
+            [40e-9, 1.5e-6, 2e-3].map(length),
+            ["40.0 nm", "1.50 um", "2.00 mm"]
+        );
     }
 }

@@ -45,12 +45,18 @@ pub struct Space {
 /// Looks at `folder`, for a run of so many ticks.
 pub fn gather(folder: &Path, ticks: u64) -> SpaceFacts {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
-    let existing = absolute.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/")).to_path_buf();
+    let existing = absolute
+        .ancestors()
+        .find(|path| path.exists())
+        .unwrap_or(Path::new("/"))
+        .to_path_buf();
     let free = statvfs(&existing).map(|fs| fs.blocks_available() * fs.fragment_size());
     SpaceFacts {
         folder: folder.to_path_buf(),
         is_folder: existing.is_dir(),
-        refused: eaccess(&existing, AccessFlags::W_OK | AccessFlags::X_OK).err().map(|error| error.to_string()),
+        refused: eaccess(&existing, AccessFlags::W_OK | AccessFlags::X_OK)
+            .err()
+            .map(|error| error.to_string()),
         existing,
         free_bytes: free.ok(),
         needed_bytes: ticks.saturating_mul(BYTES_PER_TICK),
@@ -61,7 +67,11 @@ impl SpaceFacts {
     /// The figures.
     pub fn figures(&self) -> Space {
         let (free_bytes, needed_bytes) = (self.free_bytes, self.needed_bytes);
-        Space { folder: self.folder.display().to_string(), free_bytes, needed_bytes }
+        Space {
+            folder: self.folder.display().to_string(),
+            free_bytes,
+            needed_bytes,
+        }
     }
 }
 
@@ -74,7 +84,11 @@ pub fn findings(facts: &SpaceFacts) -> Vec<Finding> {
     }
     if let Some(why) = &facts.refused {
         let what = format!("{existing} may not be written: {why}");
-        return vec![Finding::failure(SUBJECT, what, "choose another with --out, or take ownership of it")];
+        return vec![Finding::failure(
+            SUBJECT,
+            what,
+            "choose another with --out, or take ownership of it",
+        )];
     }
     vec![room(facts)]
 }
@@ -83,14 +97,22 @@ fn room(facts: &SpaceFacts) -> Finding {
     let megabytes = |bytes: u64| format!("{:.1} MB", bytes as f64 * 1e-6);
     let (folder, needed) = (facts.folder.display(), megabytes(facts.needed_bytes));
     let Some(free_bytes) = facts.free_bytes else {
-        return Finding::note(SUBJECT, format!("{folder} can be written; its free room is unknown"), "`df` may tell");
+        return Finding::note(
+            SUBJECT,
+            format!("{folder} can be written; its free room is unknown"),
+            "`df` may tell",
+        );
     };
     let what = format!(
         "{folder} can be written, {} free; the longest configured run takes {needed} at the most",
         megabytes(free_bytes)
     );
     match free_bytes {
-        ..LEAST_BYTES => Finding::failure(SUBJECT, what, "free some room, or choose another folder with --out"),
+        ..LEAST_BYTES => Finding::failure(
+            SUBJECT,
+            what,
+            "free some room, or choose another folder with --out",
+        ),
         _ if free_bytes < facts.needed_bytes => Finding::warning(
             SUBJECT,
             what,
@@ -120,11 +142,41 @@ mod tests {
     fn each_trouble_has_its_verdict() {
         let cases = [
             (sound(), Verdict::Ok),
-            (SpaceFacts { free_bytes: None, ..sound() }, Verdict::Note),
-            (SpaceFacts { free_bytes: Some(50_000_000), ..sound() }, Verdict::Warning),
-            (SpaceFacts { free_bytes: Some(4096), ..sound() }, Verdict::Failure),
-            (SpaceFacts { refused: Some("EROFS".into()), ..sound() }, Verdict::Failure),
-            (SpaceFacts { is_folder: false, ..sound() }, Verdict::Failure),
+            (
+                SpaceFacts {
+                    free_bytes: None,
+                    ..sound()
+                },
+                Verdict::Note,
+            ),
+            (
+                SpaceFacts {
+                    free_bytes: Some(50_000_000),
+                    ..sound()
+                },
+                Verdict::Warning,
+            ),
+            (
+                SpaceFacts {
+                    free_bytes: Some(4096),
+                    ..sound()
+                },
+                Verdict::Failure,
+            ),
+            (
+                SpaceFacts {
+                    refused: Some("EROFS".into()),
+                    ..sound()
+                },
+                Verdict::Failure,
+            ),
+            (
+                SpaceFacts {
+                    is_folder: false,
+                    ..sound()
+                },
+                Verdict::Failure,
+            ),
         ];
         for (facts, expected) in cases {
             let found = findings(&facts);
@@ -138,7 +190,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let facts = gather(&folder.path().join("a/b"), 1000);
         assert_eq!(facts.existing, folder.path());
-        assert_eq!((facts.is_folder, facts.refused.clone(), facts.needed_bytes), (true, None, 1000 * BYTES_PER_TICK));
+        assert_eq!(
+            (facts.is_folder, facts.refused.clone(), facts.needed_bytes),
+            (true, None, 1000 * BYTES_PER_TICK)
+        );
         assert!(facts.free_bytes.is_some() && !folder.path().join("a").exists());
     }
 
@@ -147,6 +202,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
-        assert_eq!(findings(&gather(&file.join("in"), 1))[0].what, format!("{} is not a folder", file.display()));
+        assert_eq!(
+            findings(&gather(&file.join("in"), 1))[0].what,
+            format!("{} is not a folder", file.display())
+        );
     }
 }

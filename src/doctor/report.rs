@@ -66,34 +66,64 @@ impl Report {
 
     /// An aligned list for people; `again` is what follows `bench chirp` or `bench control` on the command line.
     pub fn text(&self, again: &str) -> String {
-        let width = self.findings.iter().map(|finding| finding.subject.len()).max().unwrap_or(0);
+        let width = self
+            .findings
+            .iter()
+            .map(|finding| finding.subject.len())
+            .max()
+            .unwrap_or(0);
         let lines = self.findings.iter().map(|finding| {
             let remedy = finding.remedy.as_ref();
-            let remedy = remedy.map_or(String::new(), |remedy| format!("{:width$}           -> {remedy}\n", ""));
-            format!("{:width$}  {:7}  {}\n{remedy}", finding.subject, finding.verdict.word(), finding.what)
+            let remedy = remedy.map_or(String::new(), |remedy| {
+                format!("{:width$}           -> {remedy}\n", "")
+            });
+            format!(
+                "{:width$}  {:7}  {}\n{remedy}",
+                finding.subject,
+                finding.verdict.word(),
+                finding.what
+            )
         });
         lines.collect::<String>() + &self.conclusion(again)
     }
 
     fn conclusion(&self, again: &str) -> String {
-        let commands: Vec<String> = self.could_start.iter().map(|run| format!("`bench {run}{again}`")).collect();
+        let commands: Vec<String> = self
+            .could_start
+            .iter()
+            .map(|run| format!("`bench {run}{again}`"))
+            .collect();
         let counts = self.counts();
         match (self.ready, commands.is_empty()) {
-            (true, _) => format!("ready ({counts}): {} could start now\n", commands.join(" and ")),
-            (false, true) => format!("NOT READY ({counts}): no run could start; see each FAILURE for its remedy\n"),
-            (false, false) => format!("NOT READY ({counts}): only {} could start now\n", commands.join(" and ")),
+            (true, _) => format!(
+                "ready ({counts}): {} could start now\n",
+                commands.join(" and ")
+            ),
+            (false, true) => format!(
+                "NOT READY ({counts}): no run could start; see each FAILURE for its remedy\n"
+            ),
+            (false, false) => format!(
+                "NOT READY ({counts}): only {} could start now\n",
+                commands.join(" and ")
+            ),
         }
     }
 
     fn counts(&self) -> String {
         let mut counts: BTreeMap<Verdict, usize> = BTreeMap::new();
-        self.findings.iter().for_each(|finding| *counts.entry(finding.verdict).or_default() += 1);
+        self.findings
+            .iter()
+            .for_each(|finding| *counts.entry(finding.verdict).or_default() += 1);
         let word = |verdict: Verdict, count: usize| match (verdict, count) {
             (Verdict::Ok, _) => format!("{count} ok"),
             (_, 1) => format!("1 {}", verdict.word().to_lowercase()),
             _ => format!("{count} {}s", verdict.word().to_lowercase()),
         };
-        counts.into_iter().map(|(verdict, count)| word(verdict, count)).collect::<Vec<_>>().join(", ")
+        counts
+            .into_iter()
+            .map(|(verdict, count)| word(verdict, count))
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
@@ -113,25 +143,37 @@ mod tests {
         assert!(report([Finding::ok("a", "b"), Finding::warning("a", "b", "c")]).ready);
         let failed = report([Finding::failure("a", "b", "c")]);
         assert!(!failed.ready && failed.could_start.is_empty());
-        assert!(
-            failed.text("").ends_with("NOT READY (1 failure): no run could start; see each FAILURE for its remedy\n")
-        );
+        assert!(failed.text("").ends_with(
+            "NOT READY (1 failure): no run could start; see each FAILURE for its remedy\n"
+        ));
     }
 
     #[test]
     fn what_stops_one_run_alone_leaves_the_other() {
-        let report = report([Finding::failure(CONTROL, "no margin", "another controller"), Finding::ok("a", "b")]);
-        assert_eq!((report.ready, &report.could_start[..]), (false, &[CHIRP][..]));
+        let report = report([
+            Finding::failure(CONTROL, "no margin", "another controller"),
+            Finding::ok("a", "b"),
+        ]);
+        assert_eq!(
+            (report.ready, &report.could_start[..]),
+            (false, &[CHIRP][..])
+        );
         let text = report.text(" --config lab");
         assert!(
-            text.ends_with("NOT READY (1 ok, 1 failure): only `bench chirp --config lab` could start now\n"),
+            text.ends_with(
+                "NOT READY (1 ok, 1 failure): only `bench chirp --config lab` could start now\n"
+            ),
             "{text}"
         );
     }
 
     #[test]
     fn the_list_is_aligned_and_remedies_stand_below() {
-        let text = report([Finding::ok("clock", "fine"), Finding::note("recordings", "full", "empty it")]).text("");
+        let text = report([
+            Finding::ok("clock", "fine"),
+            Finding::note("recordings", "full", "empty it"),
+        ])
+        .text("");
         let expected = "clock       ok       fine\nrecordings  note     full\n                     -> empty it\n";
         assert!(text.starts_with(expected), "{text}");
         assert!(text.ends_with("`bench chirp` and `bench control` could start now\n"));

@@ -23,13 +23,18 @@ pub struct Runs {
 /// Ticks of the longer of both runs.
 pub fn longest_ticks(config: &Config) -> u64 {
     let control_s = config.control.settle_s + config.control.duration_s;
-    excitation::of(config).ticks().max((control_s * config.servo.rate_hz).ceil() as u64)
+    excitation::of(config)
+        .ticks()
+        .max((control_s * config.servo.rate_hz).ceil() as u64)
 }
 
 /// A loop has two devices or none.
 pub fn kinds(config: &Config) -> Vec<Finding> {
     let (amplifier, probe) = (config.amplifier.device.kind(), config.probe.device.kind());
-    let what = format!("amplifier {amplifier}, probe {probe}, {} Hz: {}", config.servo.rate_hz, config.title);
+    let what = format!(
+        "amplifier {amplifier}, probe {probe}, {} Hz: {}",
+        config.servo.rate_hz, config.title
+    );
     let is_mixed = ("simulated" == amplifier) != ("simulated" == probe);
     if is_mixed {
         let error = devices::DevicesError::Mixed { amplifier, probe };
@@ -45,21 +50,45 @@ pub fn findings(runs: &Runs, least: f64) -> Vec<Finding> {
 
 fn chirp(answer: &Result<f64, String>) -> Finding {
     match answer {
-        Ok(travel_m) => {
-            Finding::ok(CHIRP, format!("the excitation moves the stage by {:.0} um by the model", travel_m * 1e6))
-        }
-        Err(why) => refused(CHIRP, why, "correct the settings of [chirp], or give them to `bench chirp`"),
+        Ok(travel_m) => Finding::ok(
+            CHIRP,
+            format!(
+                "the excitation moves the stage by {:.0} um by the model",
+                travel_m * 1e6
+            ),
+        ),
+        Err(why) => refused(
+            CHIRP,
+            why,
+            "correct the settings of [chirp], or give them to `bench chirp`",
+        ),
     }
 }
 
 fn control(answer: &Result<Margins, String>, least: f64) -> Finding {
     let margins = match answer {
         Ok(margins) => margins,
-        Err(why) => return refused(CONTROL, why, "correct the settings of [control], or give them to `bench control`"),
+        Err(why) => {
+            return refused(
+                CONTROL,
+                why,
+                "correct the settings of [control], or give them to `bench control`",
+            );
+        }
     };
-    let asked = if least > 0.0 { format!("at least {least} is asked for") } else { "none is asked for".into() };
+    let asked = if least > 0.0 {
+        format!("at least {least} is asked for")
+    } else {
+        "none is asked for".into()
+    };
     if margins.stable {
-        return Finding::ok(CONTROL, format!("modulus margin {:.3} by the model; {asked}", margins.modulus_margin));
+        return Finding::ok(
+            CONTROL,
+            format!(
+                "modulus margin {:.3} by the model; {asked}",
+                margins.modulus_margin
+            ),
+        );
     }
     Finding::warning(
         CONTROL,
@@ -72,7 +101,10 @@ fn control(answer: &Result<Margins, String>, least: f64) -> Finding {
 fn refused(subject: &'static str, why: &str, otherwise: &str) -> Finding {
     let why = why.trim_end_matches("; nothing moved");
     let finding = Finding::refused(subject, &why);
-    Finding { remedy: finding.remedy.or_else(|| Some(otherwise.to_string())), ..finding }
+    Finding {
+        remedy: finding.remedy.or_else(|| Some(otherwise.to_string())),
+        ..finding
+    }
 }
 
 #[cfg(test)]
@@ -95,19 +127,40 @@ mod tests {
     }
 
     fn verdicts(runs: &Runs) -> Vec<Verdict> {
-        findings(runs, 0.4).iter().map(|finding| finding.verdict).collect()
+        findings(runs, 0.4)
+            .iter()
+            .map(|finding| finding.verdict)
+            .collect()
     }
 
     #[test]
     fn what_a_command_refuses_is_a_failure_with_its_remedy() {
-        let good = Runs { chirp: Ok(1e-4), control: Ok(margins(true)) };
+        let good = Runs {
+            chirp: Ok(1e-4),
+            control: Ok(margins(true)),
+        };
         assert_eq!(verdicts(&good), [Verdict::Ok, Verdict::Ok]);
         let why = "refused: margin 0.3; choose a controller; nothing moved".to_string();
-        let bad = Runs { control: Err(why), ..good.clone() };
+        let bad = Runs {
+            control: Err(why),
+            ..good.clone()
+        };
         assert_eq!(verdicts(&bad), [Verdict::Ok, Verdict::Failure]);
-        assert_eq!(findings(&bad, 0.4)[1].remedy.as_deref(), Some("choose a controller"));
-        let wild = Runs { chirp: Err("too far".into()), control: Ok(margins(false)) };
+        assert_eq!(
+            findings(&bad, 0.4)[1].remedy.as_deref(),
+            Some("choose a controller")
+        );
+        let wild = Runs {
+            chirp: Err("too far".into()),
+            control: Ok(margins(false)),
+        };
         assert_eq!(verdicts(&wild), [Verdict::Failure, Verdict::Warning]);
-        assert!(findings(&wild, 0.0)[0].remedy.as_deref().unwrap().contains("[chirp]"));
+        assert!(
+            findings(&wild, 0.0)[0]
+                .remedy
+                .as_deref()
+                .unwrap()
+                .contains("[chirp]")
+        );
     }
 }

@@ -49,23 +49,44 @@ pub fn gather(settings: &LoopSettings, trial: &Trial) -> SchedulerFacts {
 
 fn allowed() -> Vec<usize> {
     let set = sched_getaffinity(Pid::from_raw(0)).unwrap_or_else(|_| CpuSet::new());
-    (0..CpuSet::count()).filter(|&cpu| set.is_set(cpu).unwrap_or(false)).collect()
+    (0..CpuSet::count())
+        .filter(|&cpu| set.is_set(cpu).unwrap_or(false))
+        .collect()
 }
 
 /// What that means for a loop at this pace: a run starts without all of it, and says so.
 pub fn findings(facts: &SchedulerFacts, pace: Pace) -> Vec<Finding> {
-    let worst = if pace == Pace::Virtual { Verdict::Note } else { Verdict::Warning };
+    let worst = if pace == Pace::Virtual {
+        Verdict::Note
+    } else {
+        Verdict::Warning
+    };
     let findings = [Some(priority(facts)), Some(memory(facts)), processor(facts)];
-    findings.into_iter().flatten().map(|finding| finding.at_most(worst)).collect()
+    findings
+        .into_iter()
+        .flatten()
+        .map(|finding| finding.at_most(worst))
+        .collect()
 }
 
 fn priority(facts: &SchedulerFacts) -> Finding {
-    let right = format!("limit rtprio {}, CAP_SYS_NICE {}", facts.priority_limit, yes(facts.may_schedule));
+    let right = format!(
+        "limit rtprio {}, CAP_SYS_NICE {}",
+        facts.priority_limit,
+        yes(facts.may_schedule)
+    );
     if facts.scheduling.policy.starts_with("SCHED_FIFO") {
-        return Finding::ok("scheduler", format!("{} is granted ({right})", facts.scheduling.policy));
+        return Finding::ok(
+            "scheduler",
+            format!("{} is granted ({right})", facts.scheduling.policy),
+        );
     }
     let (what, remedy) = refusal(&facts.scheduling, "SCHED_FIFO");
-    Finding::warning("scheduler", format!("{what} for priority {} ({right})", facts.priority), remedy)
+    Finding::warning(
+        "scheduler",
+        format!("{what} for priority {} ({right})", facts.priority),
+        remedy,
+    )
 }
 
 fn memory(facts: &SchedulerFacts) -> Finding {
@@ -73,7 +94,10 @@ fn memory(facts: &SchedulerFacts) -> Finding {
         u64::MAX => "unlimited".to_string(),
         bytes => format!("{} MiB", bytes >> 20),
     };
-    let right = format!("limit memlock {limit}, CAP_IPC_LOCK {}", yes(facts.may_lock));
+    let right = format!(
+        "limit memlock {limit}, CAP_IPC_LOCK {}",
+        yes(facts.may_lock)
+    );
     if facts.scheduling.memory_locked {
         return Finding::ok("memory", format!("can be locked ({right})"));
     }
@@ -84,12 +108,18 @@ fn memory(facts: &SchedulerFacts) -> Finding {
 fn processor(facts: &SchedulerFacts) -> Option<Finding> {
     let cpu = facts.cpu?;
     if facts.scheduling.cpu == Some(cpu) {
-        return Some(Finding::ok("processor", format!("the loop can be bound to processor {cpu}")));
+        return Some(Finding::ok(
+            "processor",
+            format!("the loop can be bound to processor {cpu}"),
+        ));
     }
     let allowed: Vec<String> = facts.allowed.iter().map(usize::to_string).collect();
     Some(Finding::warning(
         "processor",
-        format!("loop.cpu is {cpu}, this process may use {}", allowed.join(", ")),
+        format!(
+            "loop.cpu is {cpu}, this process may use {}",
+            allowed.join(", ")
+        ),
         "choose one of these in loop.cpu, or widen the process's affinity (taskset, the service's CPUAffinity=)",
     ))
 }
@@ -100,9 +130,15 @@ fn yes(is: bool) -> &'static str {
 
 /// What the system refused, and the remedy.
 fn refusal(scheduling: &Scheduling, what: &str) -> (String, String) {
-    let line = scheduling.refused.iter().find(|line| line.starts_with(what));
+    let line = scheduling
+        .refused
+        .iter()
+        .find(|line| line.starts_with(what));
     let (what, remedy) = parted(line.map_or(what, String::as_str));
-    (what, remedy.unwrap_or_else(|| "see \"Two paces\" in the README".into()))
+    (
+        what,
+        remedy.unwrap_or_else(|| "see \"Two paces\" in the README".into()),
+    )
 }
 
 #[cfg(test)]
@@ -136,30 +172,64 @@ mod tests {
                 "SCHED_FIFO: EPERM: Operation not permitted; raise `rtprio`".into(),
             ],
         };
-        SchedulerFacts { scheduling, priority_limit: 0, memory_limit_bytes: 8 << 20, cpu: Some(7), ..granted() }
+        SchedulerFacts {
+            scheduling,
+            priority_limit: 0,
+            memory_limit_bytes: 8 << 20,
+            cpu: Some(7),
+            ..granted()
+        }
     }
 
     #[test]
     fn what_is_granted_is_ok() {
-        assert!(findings(&granted(), Pace::Realtime).iter().all(|f| f.verdict == Verdict::Ok));
-        assert_eq!(findings(&SchedulerFacts { cpu: None, ..granted() }, Pace::Realtime).len(), 2);
+        assert!(
+            findings(&granted(), Pace::Realtime)
+                .iter()
+                .all(|f| f.verdict == Verdict::Ok)
+        );
+        assert_eq!(
+            findings(
+                &SchedulerFacts {
+                    cpu: None,
+                    ..granted()
+                },
+                Pace::Realtime
+            )
+            .len(),
+            2
+        );
     }
 
     #[test]
     fn what_is_refused_is_a_warning_with_limit_and_remedy_and_no_failure() {
         let found = findings(&refused(), Pace::Realtime);
-        assert!(found.iter().all(|f| f.verdict == Verdict::Warning), "{found:?}");
         assert!(
-            found[0].what.contains("EPERM") && found[0].what.contains("priority 80 (limit rtprio 0, CAP_SYS_NICE no)")
+            found.iter().all(|f| f.verdict == Verdict::Warning),
+            "{found:?}"
+        );
+        assert!(
+            found[0].what.contains("EPERM")
+                && found[0]
+                    .what
+                    .contains("priority 80 (limit rtprio 0, CAP_SYS_NICE no)")
         );
         assert_eq!(found[0].remedy.as_deref(), Some("raise `rtprio`"));
-        assert!(found[1].what.contains("limit memlock 8 MiB"), "{}", found[1].what);
+        assert!(
+            found[1].what.contains("limit memlock 8 MiB"),
+            "{}",
+            found[1].what
+        );
         assert_eq!(found[2].what, "loop.cpu is 7, this process may use 0, 1");
     }
 
     #[test]
     fn at_virtual_pace_it_is_only_worth_a_note() {
-        assert!(findings(&refused(), Pace::Virtual).iter().all(|f| f.verdict == Verdict::Note));
+        assert!(
+            findings(&refused(), Pace::Virtual)
+                .iter()
+                .all(|f| f.verdict == Verdict::Note)
+        );
     }
 
     #[test]

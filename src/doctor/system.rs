@@ -32,23 +32,34 @@ pub fn gather() -> SystemFacts {
     let step = clock_getres(ClockId::CLOCK_MONOTONIC);
     SystemFacts {
         release: line("/proc/sys/kernel/osrelease").unwrap_or_else(|| "unknown".into()),
-        preemption: preemption(line("/sys/kernel/realtime").as_deref(), &line("/proc/version").unwrap_or_default()),
-        clock_step_ns: step.map_or(0, |step| step.tv_sec() as u64 * 1_000_000_000 + step.tv_nsec() as u64),
+        preemption: preemption(
+            line("/sys/kernel/realtime").as_deref(),
+            &line("/proc/version").unwrap_or_default(),
+        ),
+        clock_step_ns: step.map_or(0, |step| {
+            step.tv_sec() as u64 * 1_000_000_000 + step.tv_nsec() as u64
+        }),
         timer_slack_ns: nix::sys::prctl::get_timerslack().map_or(0, |slack| slack.max(0) as u64),
         governors: governors(Path::new("/sys/devices/system/cpu/cpufreq")),
-        rt_runtime_us: line("/proc/sys/kernel/sched_rt_runtime_us").and_then(|text| text.parse().ok()),
-        rt_period_us: line("/proc/sys/kernel/sched_rt_period_us").and_then(|text| text.parse().ok()),
+        rt_runtime_us: line("/proc/sys/kernel/sched_rt_runtime_us")
+            .and_then(|text| text.parse().ok()),
+        rt_period_us: line("/proc/sys/kernel/sched_rt_period_us")
+            .and_then(|text| text.parse().ok()),
     }
 }
 
 /// A file of one line; `None` if it is not there.
 pub(super) fn line(path: impl AsRef<Path>) -> Option<String> {
-    read_to_string(path).ok().map(|text| text.trim().to_string())
+    read_to_string(path)
+        .ok()
+        .map(|text| text.trim().to_string())
 }
 
 /// `/sys/kernel/realtime` is 1 on kernels with PREEMPT_RT; the version names the other kinds.
 fn preemption(realtime: Option<&str>, version: &str) -> String {
-    let named = version.split_whitespace().find(|word| word.starts_with("PREEMPT"));
+    let named = version
+        .split_whitespace()
+        .find(|word| word.starts_with("PREEMPT"));
     match (realtime, named) {
         (Some("1"), _) => "PREEMPT_RT".into(),
         (_, Some(named)) => named.into(),
@@ -59,8 +70,9 @@ fn preemption(realtime: Option<&str>, version: &str) -> String {
 /// One folder a policy, each with `scaling_governor`.
 fn governors(folder: &Path) -> Vec<String> {
     let policies = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut governors: Vec<String> =
-        policies.filter_map(|policy| line(policy.path().join("scaling_governor"))).collect();
+    let mut governors: Vec<String> = policies
+        .filter_map(|policy| line(policy.path().join("scaling_governor")))
+        .collect();
     governors.sort();
     governors.dedup();
     governors
@@ -68,9 +80,21 @@ fn governors(folder: &Path) -> Vec<String> {
 
 /// What that means for a loop at this pace.
 pub fn findings(facts: &SystemFacts, pace: Pace) -> Vec<Finding> {
-    let worst = if pace == Pace::Virtual { Verdict::Note } else { Verdict::Warning };
-    let findings = [kernel(facts), clock(facts), governor(facts), throttling(facts)];
-    findings.into_iter().map(|finding| finding.at_most(worst)).collect()
+    let worst = if pace == Pace::Virtual {
+        Verdict::Note
+    } else {
+        Verdict::Warning
+    };
+    let findings = [
+        kernel(facts),
+        clock(facts),
+        governor(facts),
+        throttling(facts),
+    ];
+    findings
+        .into_iter()
+        .map(|finding| finding.at_most(worst))
+        .collect()
 }
 
 fn kernel(facts: &SystemFacts) -> Finding {
@@ -87,22 +111,31 @@ fn kernel(facts: &SystemFacts) -> Finding {
 
 fn clock(facts: &SystemFacts) -> Finding {
     let (step_ns, slack_us) = (facts.clock_step_ns, facts.timer_slack_ns as f64 * 1e-3);
-    let what =
-        format!("monotonic clock in steps of {step_ns} ns; timer slack {slack_us} us where SCHED_FIFO is not granted");
+    let what = format!(
+        "monotonic clock in steps of {step_ns} ns; timer slack {slack_us} us where SCHED_FIFO is not granted"
+    );
     if step_ns <= 1000 {
         return Finding::ok("clock", what);
     }
-    Finding::warning("clock", what, "boot with high resolution timers (CONFIG_HIGH_RES_TIMERS, no `highres=off`)")
+    Finding::warning(
+        "clock",
+        what,
+        "boot with high resolution timers (CONFIG_HIGH_RES_TIMERS, no `highres=off`)",
+    )
 }
 
 fn governor(facts: &SystemFacts) -> Finding {
     let names = facts.governors.join(", ");
     match facts.governors.as_slice() {
         [] => Finding::ok("processors", "their frequency is not scaled by this system"),
-        [only] if only == "performance" => Finding::ok("processors", "frequency governor performance"),
+        [only] if only == "performance" => {
+            Finding::ok("processors", "frequency governor performance")
+        }
         _ => Finding::warning(
             "processors",
-            format!("frequency governor {names}: a processor that has slowed down wakes the loop late"),
+            format!(
+                "frequency governor {names}: a processor that has slowed down wakes the loop late"
+            ),
             "`cpupower frequency-set -g performance`",
         ),
     }
@@ -116,12 +149,15 @@ fn throttling(facts: &SystemFacts) -> Finding {
     let share = 100.0 * runtime_us as f64 / period_us.max(1) as f64;
     match runtime_us {
         ..0 => Finding::ok("throttling", "real-time threads may run without limit"),
-        _ if share >= 50.0 => {
-            Finding::ok("throttling", format!("real-time threads may use {share:.0} % of a processor"))
-        }
+        _ if share >= 50.0 => Finding::ok(
+            "throttling",
+            format!("real-time threads may use {share:.0} % of a processor"),
+        ),
         _ => Finding::warning(
             "throttling",
-            format!("real-time threads may use only {share:.0} % of a processor; then they stand still"),
+            format!(
+                "real-time threads may use only {share:.0} % of a processor; then they stand still"
+            ),
             "`sysctl kernel.sched_rt_runtime_us=950000`",
         ),
     }
@@ -144,33 +180,87 @@ mod tests {
     }
 
     fn verdicts(facts: &SystemFacts, pace: Pace) -> Vec<(&'static str, Verdict)> {
-        findings(facts, pace).into_iter().map(|f| (f.subject, f.verdict)).filter(|(_, v)| *v != Verdict::Ok).collect()
+        findings(facts, pace)
+            .into_iter()
+            .map(|f| (f.subject, f.verdict))
+            .filter(|(_, v)| *v != Verdict::Ok)
+            .collect()
     }
 
     #[test]
     fn a_sound_system_is_ok_in_everything() {
         assert_eq!(verdicts(&sound(), Pace::Realtime), []);
-        let unscaled = SystemFacts { governors: vec![], rt_runtime_us: Some(-1), ..sound() };
+        let unscaled = SystemFacts {
+            governors: vec![],
+            rt_runtime_us: Some(-1),
+            ..sound()
+        };
         assert_eq!(verdicts(&unscaled, Pace::Realtime), []);
-        assert_eq!(verdicts(&SystemFacts { rt_runtime_us: None, ..sound() }, Pace::Realtime), []);
+        assert_eq!(
+            verdicts(
+                &SystemFacts {
+                    rt_runtime_us: None,
+                    ..sound()
+                },
+                Pace::Realtime
+            ),
+            []
+        );
     }
 
     #[test]
     fn each_weakness_is_found_by_itself() {
         let cases = [
-            (SystemFacts { preemption: "PREEMPT_DYNAMIC".into(), ..sound() }, ("kernel", Verdict::Note)),
-            (SystemFacts { clock_step_ns: 4_000_000, ..sound() }, ("clock", Verdict::Warning)),
-            (SystemFacts { governors: vec!["powersave".into()], ..sound() }, ("processors", Verdict::Warning)),
             (
-                SystemFacts { governors: vec!["performance".into(), "schedutil".into()], ..sound() },
+                SystemFacts {
+                    preemption: "PREEMPT_DYNAMIC".into(),
+                    ..sound()
+                },
+                ("kernel", Verdict::Note),
+            ),
+            (
+                SystemFacts {
+                    clock_step_ns: 4_000_000,
+                    ..sound()
+                },
+                ("clock", Verdict::Warning),
+            ),
+            (
+                SystemFacts {
+                    governors: vec!["powersave".into()],
+                    ..sound()
+                },
                 ("processors", Verdict::Warning),
             ),
-            (SystemFacts { rt_runtime_us: Some(100_000), ..sound() }, ("throttling", Verdict::Warning)),
-            (SystemFacts { rt_runtime_us: Some(0), ..sound() }, ("throttling", Verdict::Warning)),
+            (
+                SystemFacts {
+                    governors: vec!["performance".into(), "schedutil".into()],
+                    ..sound()
+                },
+                ("processors", Verdict::Warning),
+            ),
+            (
+                SystemFacts {
+                    rt_runtime_us: Some(100_000),
+                    ..sound()
+                },
+                ("throttling", Verdict::Warning),
+            ),
+            (
+                SystemFacts {
+                    rt_runtime_us: Some(0),
+                    ..sound()
+                },
+                ("throttling", Verdict::Warning),
+            ),
         ];
         for (facts, expected) in cases {
             assert_eq!(verdicts(&facts, Pace::Realtime), [expected]);
-            assert_eq!(verdicts(&facts, Pace::Virtual), [(expected.0, Verdict::Note)], "nobody waits for a clock");
+            assert_eq!(
+                verdicts(&facts, Pace::Virtual),
+                [(expected.0, Verdict::Note)],
+                "nobody waits for a clock"
+            );
         }
     }
 
@@ -179,17 +269,30 @@ mod tests {
         let dynamic = "Linux version 6.18.44 (x@y) (gcc) #1 SMP PREEMPT_DYNAMIC @0";
         assert_eq!(preemption(None, dynamic), "PREEMPT_DYNAMIC");
         assert_eq!(preemption(Some("1"), dynamic), "PREEMPT_RT");
-        assert_eq!(preemption(None, "Linux version 6.1 #1 SMP PREEMPT_RT Debian"), "PREEMPT_RT");
-        assert_eq!(preemption(Some("0"), "Linux version 5.4 #1 SMP"), "no preemption");
+        assert_eq!(
+            preemption(None, "Linux version 6.1 #1 SMP PREEMPT_RT Debian"),
+            "PREEMPT_RT"
+        );
+        assert_eq!(
+            preemption(Some("0"), "Linux version 5.4 #1 SMP"),
+            "no preemption"
+        );
     }
 
     #[test]
     fn governors_are_named_once() {
         let folder = tempfile::tempdir().unwrap();
-        for (policy, governor) in [("policy0", "powersave\n"), ("policy1", "performance\n"), ("policy2", "powersave\n")]
-        {
+        for (policy, governor) in [
+            ("policy0", "powersave\n"),
+            ("policy1", "performance\n"),
+            ("policy2", "powersave\n"),
+        ] {
             std::fs::create_dir(folder.path().join(policy)).unwrap();
-            std::fs::write(folder.path().join(policy).join("scaling_governor"), governor).unwrap();
+            std::fs::write(
+                folder.path().join(policy).join("scaling_governor"),
+                governor,
+            )
+            .unwrap();
         }
         assert_eq!(governors(folder.path()), ["performance", "powersave"]);
         assert_eq!(governors(&folder.path().join("none")), [""; 0]);

@@ -53,21 +53,33 @@ pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
         let scheduling = become_realtime(&settings);
         let lateness = watch(&settings, &scheduling);
         let _ = nix::sys::mman::munlockall(); // what was not locked is no harm
-        Trial { scheduling, lateness }
+        Trial {
+            scheduling,
+            lateness,
+        }
     };
-    let thread = std::thread::Builder::new().name("bench-trial".into()).spawn(work)?;
-    thread.join().map_err(|_| std::io::Error::other("the trial's thread died"))
+    let thread = std::thread::Builder::new()
+        .name("bench-trial".into())
+        .spawn(work)?;
+    thread
+        .join()
+        .map_err(|_| std::io::Error::other("the trial's thread died"))
 }
 
 fn watch(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
     let ticks = (settings.rate_hz * WATCHED.as_secs_f64()).ceil() as u64;
     let mut late_ns: Vec<u64> = Vec::with_capacity(ticks as usize);
-    let (outlet, mut clock) = (Outlet::new(RingBuffer::new(1).0), Realtime::new(settings.period_s()));
+    let (outlet, mut clock) = (
+        Outlet::new(RingBuffer::new(1).0),
+        Realtime::new(settings.period_s()),
+    );
     let (mut number, mut missed) = (0, 0);
     while number < ticks {
         let moment = clock.wait(number, &outlet);
         let slept_through_ns = f64::from(moment.missed) * settings.period_s() * 1e9;
-        late_ns.push(moment.woke_ns.saturating_sub(moment.tick.scheduled_ns) + slept_through_ns as u64);
+        late_ns.push(
+            moment.woke_ns.saturating_sub(moment.tick.scheduled_ns) + slept_through_ns as u64,
+        );
         missed += u64::from(moment.missed);
         number = moment.tick.number + 1;
     }
@@ -80,7 +92,9 @@ impl Lateness {
     fn of(late_ns: &[u64], missed: u64, rate_hz: f64, scheduling: &Scheduling) -> Lateness {
         let quantile = |q: f64| {
             let rank = (q * late_ns.len() as f64).ceil() as usize;
-            late_ns.get(rank.saturating_sub(1)).map_or(0.0, |&ns| ns as f64 / 1e9)
+            late_ns
+                .get(rank.saturating_sub(1))
+                .map_or(0.0, |&ns| ns as f64 / 1e9)
         };
         Lateness {
             policy: scheduling.policy.clone(),
@@ -97,7 +111,11 @@ impl Lateness {
 
     fn words(&self) -> String {
         let us = |s: f64| format!("{:.1} us", s * 1e6);
-        let memory = if self.memory_locked { "locked" } else { "not locked" };
+        let memory = if self.memory_locked {
+            "locked"
+        } else {
+            "not locked"
+        };
         format!(
             "{}, memory {memory}: woken {} late (p50), {} (p99), {} (max) in {} ticks at {} Hz, {} missed",
             self.policy,
@@ -115,16 +133,20 @@ impl Lateness {
 pub fn finding(lateness: &Lateness, overruns_per_s: u32, pace: Pace) -> Finding {
     let remedy = "grant real-time scheduling, give the loop a processor of its own (loop.cpu, isolcpus=), \
                   stop what else runs here, or lower loop.rate_hz";
-    let (what, is_late) = (lateness.words(), lateness.missed > 0 || lateness.max_s > 1.0 / lateness.rate_hz);
+    let (what, is_late) = (
+        lateness.words(),
+        lateness.missed > 0 || lateness.max_s > 1.0 / lateness.rate_hz,
+    );
     match pace {
         Pace::Realtime if lateness.missed > u64::from(overruns_per_s) => {
-            let what = format!("{what}; the interlock trips on more than {overruns_per_s} a second");
+            let what =
+                format!("{what}; the interlock trips on more than {overruns_per_s} a second");
             Finding::failure("lateness", what, remedy)
         }
         Pace::Realtime if is_late => Finding::warning("lateness", what, remedy),
         Pace::Virtual if is_late => {
-            let remedy =
-                "none for virtual pace, which waits for no clock; before --pace realtime: ".to_string() + remedy;
+            let remedy = "none for virtual pace, which waits for no clock; before --pace realtime: "
+                .to_string() + remedy;
             Finding::note("lateness", what, remedy)
         }
         _ => Finding::ok("lateness", what),
@@ -137,7 +159,11 @@ mod tests {
     use crate::doctor::Verdict;
 
     fn lateness(late_ns: &[u64], missed: u64) -> Lateness {
-        let scheduling = Scheduling { policy: "SCHED_FIFO 80".into(), memory_locked: true, ..Scheduling::default() };
+        let scheduling = Scheduling {
+            policy: "SCHED_FIFO 80".into(),
+            memory_locked: true,
+            ..Scheduling::default()
+        };
         Lateness::of(late_ns, missed, 1000.0, &scheduling)
     }
 
@@ -145,31 +171,59 @@ mod tests {
     fn quantiles_are_ranks() {
         let late_ns: Vec<u64> = (1..=1000).collect();
         let lateness = lateness(&late_ns, 0);
-        assert_eq!((lateness.p50_s, lateness.p99_s, lateness.max_s), (500e-9, 990e-9, 1e-6));
-        assert_eq!(super::Lateness::of(&[], 0, 1.0, &Scheduling::default()).max_s, 0.0);
+        assert_eq!(
+            (lateness.p50_s, lateness.p99_s, lateness.max_s),
+            (500e-9, 990e-9, 1e-6)
+        );
+        assert_eq!(
+            super::Lateness::of(&[], 0, 1.0, &Scheduling::default()).max_s,
+            0.0
+        );
     }
 
     #[test]
     fn a_tick_late_is_a_warning_and_what_trips_the_interlock_a_failure() {
-        let verdict = |late_ns: &[u64], missed, pace| finding(&lateness(late_ns, missed), 50, pace).verdict;
+        let verdict =
+            |late_ns: &[u64], missed, pace| finding(&lateness(late_ns, missed), 50, pace).verdict;
         assert_eq!(verdict(&[5000, 900_000], 0, Pace::Realtime), Verdict::Ok);
-        assert_eq!(verdict(&[5000, 1_100_000], 1, Pace::Realtime), Verdict::Warning);
-        assert_eq!(verdict(&[5000, 51_500_000], 51, Pace::Realtime), Verdict::Failure);
-        assert_eq!(verdict(&[5000, 51_500_000], 51, Pace::Virtual), Verdict::Note);
+        assert_eq!(
+            verdict(&[5000, 1_100_000], 1, Pace::Realtime),
+            Verdict::Warning
+        );
+        assert_eq!(
+            verdict(&[5000, 51_500_000], 51, Pace::Realtime),
+            Verdict::Failure
+        );
+        assert_eq!(
+            verdict(&[5000, 51_500_000], 51, Pace::Virtual),
+            Verdict::Note
+        );
     }
 
     #[test]
     fn the_policy_stands_beside_the_figures() {
         let what = finding(&lateness(&[5000, 9000], 0), 50, Pace::Realtime).what;
-        assert!(what.starts_with("SCHED_FIFO 80, memory locked: woken 5.0 us late (p50)"), "{what}");
+        assert!(
+            what.starts_with("SCHED_FIFO 80, memory locked: woken 5.0 us late (p50)"),
+            "{what}"
+        );
     }
 
     #[test]
     fn the_trial_counts_every_tick_of_its_second_as_woken_or_missed() {
-        let settings = LoopSettings { rate_hz: 1000.0, computing_delay_periods: 0, priority: 80, cpu: None };
+        let settings = LoopSettings {
+            rate_hz: 1000.0,
+            computing_delay_periods: 0,
+            priority: 80,
+            cpu: None,
+        };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;
         assert!(all >= 1000, "{lateness:?}");
-        assert!(lateness.ticks > 0 && lateness.p50_s <= lateness.p99_s && lateness.p99_s <= lateness.max_s);
+        assert!(
+            lateness.ticks > 0
+                && lateness.p50_s <= lateness.p99_s
+                && lateness.p99_s <= lateness.max_s
+        );
     }
 }

@@ -21,7 +21,9 @@ impl Usb {
     /// The adapter of the terminal `name` (`ttyUSB0`); `None` if it is none. `class` is `/sys/class/tty`.
     pub fn of(class: &Path, name: &str) -> Option<Usb> {
         let device = class.join(name).join("device").canonicalize().ok()?;
-        let usb = device.ancestors().find(|folder| folder.join("idVendor").exists())?;
+        let usb = device
+            .ancestors()
+            .find(|folder| folder.join("idVendor").exists())?;
         Some(Usb {
             vendor: line(usb.join("idVendor"))?,
             product: line(usb.join("idProduct"))?,
@@ -32,8 +34,12 @@ impl Usb {
 
     /// A udev rule that gives this adapter to `group` and to who sits at the machine.
     pub fn rule(&self, group: &str) -> String {
-        let Usb { vendor, product, .. } = self;
-        let serial = self.serial.as_ref().map_or(String::new(), |serial| format!("ATTRS{{serial}}==\"{serial}\", "));
+        let Usb {
+            vendor, product, ..
+        } = self;
+        let serial = self.serial.as_ref().map_or(String::new(), |serial| {
+            format!("ATTRS{{serial}}==\"{serial}\", ")
+        });
         format!(
             "SUBSYSTEM==\"tty\", ATTRS{{idVendor}}==\"{vendor}\", ATTRS{{idProduct}}==\"{product}\", {serial}\
              GROUP=\"{group}\", MODE=\"0660\", TAG+=\"uaccess\""
@@ -51,7 +57,11 @@ mod tests {
         let usb = sys.path().join("devices/usb1/1-2");
         let port = usb.join("1-2:1.0/ttyUSB0");
         std::fs::create_dir_all(&port).unwrap();
-        for (file, text) in [("idVendor", "0403\n"), ("idProduct", "6001\n"), ("serial", "A6004xyz\n")] {
+        for (file, text) in [
+            ("idVendor", "0403\n"),
+            ("idProduct", "6001\n"),
+            ("serial", "A6004xyz\n"),
+        ] {
             std::fs::write(usb.join(file), text).unwrap();
         }
         std::fs::write(port.join("latency_timer"), "16\n").unwrap();
@@ -60,7 +70,10 @@ mod tests {
         std::fs::create_dir_all(class.join("ttyS0")).unwrap();
         std::os::unix::fs::symlink(&port, class.join("ttyUSB0/device")).unwrap();
         let found = Usb::of(&class, "ttyUSB0").unwrap();
-        assert_eq!((found.vendor.as_str(), found.latency_ms), ("0403", Some(16)));
+        assert_eq!(
+            (found.vendor.as_str(), found.latency_ms),
+            ("0403", Some(16))
+        );
         assert_eq!(
             found.rule("dialout"),
             "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"0403\", ATTRS{idProduct}==\"6001\", ATTRS{serial}==\"A6004xyz\", \

@@ -19,17 +19,30 @@ pub fn findings(heard: &Heard, settings: &VescSettings) -> Vec<Finding> {
             "check its power and cable, its number, and that CAN status 1 is on in VESC Tool",
         )];
     };
-    vec![rate(node, count, heard.seconds, settings.status_timeout.as_secs_f64()), current(node, tenths)]
+    vec![
+        rate(
+            node,
+            count,
+            heard.seconds,
+            settings.status_timeout.as_secs_f64(),
+        ),
+        current(node, tenths),
+    ]
 }
 
 fn rate(node: u8, count: u64, seconds: f64, lost_s: f64) -> Finding {
     let rate_hz = count as f64 / seconds;
-    let what =
-        format!("VESC {node} sends STATUS {rate_hz:.0} times a second; it counts as lost after {lost_s} s without");
+    let what = format!(
+        "VESC {node} sends STATUS {rate_hz:.0} times a second; it counts as lost after {lost_s} s without"
+    );
     if rate_hz * lost_s >= 2.0 {
         return Finding::ok(SUBJECT, what);
     }
-    Finding::warning(SUBJECT, what, "raise the rate of CAN status 1 in VESC Tool, or amplifier.device.status_lost_s")
+    Finding::warning(
+        SUBJECT,
+        what,
+        "raise the rate of CAN status 1 in VESC Tool, or amplifier.device.status_lost_s",
+    )
 }
 
 fn current(node: u8, tenths: i16) -> Finding {
@@ -51,16 +64,31 @@ mod tests {
     use std::time::Duration;
 
     fn verdicts(vesc: u8, count: u64, tenths: i16) -> Vec<Verdict> {
-        let settings = VescSettings { node: 23, current_limit_a: 1.0, status_timeout: Duration::from_millis(100) };
-        let heard = Heard { seconds: 0.5, vescs: [(vesc, (count, tenths))].into(), ..Heard::default() };
-        findings(&heard, &settings).iter().map(|finding| finding.verdict).collect()
+        let settings = VescSettings {
+            node: 23,
+            current_limit_a: 1.0,
+            status_timeout: Duration::from_millis(100),
+        };
+        let heard = Heard {
+            seconds: 0.5,
+            vescs: [(vesc, (count, tenths))].into(),
+            ..Heard::default()
+        };
+        findings(&heard, &settings)
+            .iter()
+            .map(|finding| finding.verdict)
+            .collect()
     }
 
     #[test]
     fn a_vesc_must_be_heard_often_enough_and_give_no_current() {
         assert_eq!(verdicts(23, 25, -2), [Ok, Ok]);
         assert_eq!(verdicts(24, 25, 0), [Failure], "another one");
-        assert_eq!(verdicts(23, 5, 0), [Warning, Ok], "10 a second, lost after one missing");
+        assert_eq!(
+            verdicts(23, 5, 0),
+            [Warning, Ok],
+            "10 a second, lost after one missing"
+        );
         assert_eq!(verdicts(23, 25, -30), [Ok, Warning]);
     }
 }

@@ -11,7 +11,9 @@ pub const LARGEST_SPAN: f64 = 50.0;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExcitationError {
     /// Beyond the motor or the amplifier.
-    #[error("the excitation's largest current of {current_a:.3} A is beyond {limit_a:.3} A, {what}; lower {setting}")]
+    #[error(
+        "the excitation's largest current of {current_a:.3} A is beyond {limit_a:.3} A, {what}; lower {setting}"
+    )]
     Current {
         /// The largest current.
         current_a: f64,
@@ -98,27 +100,49 @@ pub fn within(
     current(config, extremes, setting)?;
     let limit_a_per_s = config.amplifier.slew_limit_a_per_s;
     if extremes.slew_a_per_s > limit_a_per_s {
-        return Err(ExcitationError::Slew { slew_a_per_s: extremes.slew_a_per_s, limit_a_per_s, setting });
+        return Err(ExcitationError::Slew {
+            slew_a_per_s: extremes.slew_a_per_s,
+            limit_a_per_s,
+            setting,
+        });
     }
     let limit_a = config.motor.continuous_current_a();
     if extremes.thermal_a > limit_a {
-        return Err(ExcitationError::Heat { thermal_a: extremes.thermal_a, limit_a, setting });
+        return Err(ExcitationError::Heat {
+            thermal_a: extremes.thermal_a,
+            limit_a,
+            setting,
+        });
     }
     if extremes.travel_m > config.interlock.soft_limit_m {
         let (travel_um, limit_um) = (extremes.travel_m * 1e6, config.interlock.soft_limit_m * 1e6);
-        return Err(ExcitationError::Travel { travel_um, frequency_hz, limit_um, setting });
+        return Err(ExcitationError::Travel {
+            travel_um,
+            frequency_hz,
+            limit_um,
+            setting,
+        });
     }
     Ok(())
 }
 
-fn current(config: &Config, extremes: &Extremes, setting: &'static str) -> Result<(), ExcitationError> {
+fn current(
+    config: &Config,
+    extremes: &Extremes,
+    setting: &'static str,
+) -> Result<(), ExcitationError> {
     let limits = [
         (config.motor.peak_current_a(), "the motor's peak current"),
         (config.amplifier.current_limit_a, "the amplifier's limit"),
     ];
     let current_a = extremes.current_a;
     match limits.into_iter().find(|(limit_a, _)| current_a > *limit_a) {
-        Some((limit_a, what)) => Err(ExcitationError::Current { current_a, limit_a, what, setting }),
+        Some((limit_a, what)) => Err(ExcitationError::Current {
+            current_a,
+            limit_a,
+            what,
+            setting,
+        }),
         None => Ok(()),
     }
 }
@@ -126,8 +150,13 @@ fn current(config: &Config, extremes: &Extremes, setting: &'static str) -> Resul
 fn span(config: &Config) -> Result<(), ExcitationError> {
     let (low_hz, high_hz) = config.chirp.band_hz();
     let (least_a, most_a) = Amplitude::new(&config.chirp.amplitude).range_a(low_hz, high_hz);
-    let wide = config.excitation.kind == ExcitationKind::Multisine && most_a > LARGEST_SPAN * least_a;
-    if wide { Err(ExcitationError::Span { least_a, most_a }) } else { Ok(()) }
+    let wide =
+        config.excitation.kind == ExcitationKind::Multisine && most_a > LARGEST_SPAN * least_a;
+    if wide {
+        Err(ExcitationError::Span { least_a, most_a })
+    } else {
+        Ok(())
+    }
 }
 
 /// The setting of the current.
@@ -149,25 +178,58 @@ mod tests {
         change(&mut config);
         let structure = crate::plant::build(&config.plant).unwrap();
         let modes = crate::plant::Modal::of(&structure).unwrap().modes;
-        let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
-        let plant = Sampled::new(&modes, bandwidth_hz, force_constant, config.servo.period_s());
+        let (bandwidth_hz, force_constant) = (
+            config.amplifier.bandwidth_hz,
+            config.motor.force_constant_n_per_a,
+        );
+        let plant = Sampled::new(
+            &modes,
+            bandwidth_hz,
+            force_constant,
+            config.servo.period_s(),
+        );
         check(&of(&config), &config, &plant)
     }
 
     fn flat(config: &mut Config, current_a: f64) {
-        config.chirp.amplitude = vec![AmplitudePoint { frequency_hz: 1.0, current_a }];
+        config.chirp.amplitude = vec![AmplitudePoint {
+            frequency_hz: 1.0,
+            current_a,
+        }];
     }
 
     #[test]
     fn what_the_interlocks_would_trip_is_refused_with_the_figures() {
         let travel_m = checked(&|_| {}).unwrap().travel_m;
-        assert!((300e-6..900e-6).contains(&travel_m), "the default moves and stays inside: {travel_m}");
-        assert!(matches!(checked(&|c| flat(c, 9.99)), Err(ExcitationError::Current { .. })));
-        assert!(matches!(checked(&|c| flat(c, 8.0)), Err(ExcitationError::Slew { .. })));
-        assert!(matches!(checked(&|c| flat(c, 3.5)), Err(ExcitationError::Heat { .. })));
-        let Err(ExcitationError::Travel { travel_um, frequency_hz, .. }) = checked(&|c| flat(c, 0.3)) else { panic!() };
+        assert!(
+            (300e-6..900e-6).contains(&travel_m),
+            "the default moves and stays inside: {travel_m}"
+        );
+        assert!(matches!(
+            checked(&|c| flat(c, 9.99)),
+            Err(ExcitationError::Current { .. })
+        ));
+        assert!(matches!(
+            checked(&|c| flat(c, 8.0)),
+            Err(ExcitationError::Slew { .. })
+        ));
+        assert!(matches!(
+            checked(&|c| flat(c, 3.5)),
+            Err(ExcitationError::Heat { .. })
+        ));
+        let Err(ExcitationError::Travel {
+            travel_um,
+            frequency_hz,
+            ..
+        }) = checked(&|c| flat(c, 0.3))
+        else {
+            panic!()
+        };
         // Mode R at 183.9 rad/s = 29.3 Hz rings up as the sweep passes it.
-        assert!((27.0..33.0).contains(&frequency_hz.unwrap()) && travel_um > 900.0, "{travel_um} {frequency_hz:?}");
+        assert!(
+            (27.0..33.0).contains(&frequency_hz.unwrap()) && travel_um > 900.0,
+            "{travel_um} {frequency_hz:?}"
+        );
     }
 
     #[test]
@@ -176,7 +238,11 @@ mod tests {
             move |config: &mut Config| {
                 (config.excitation.kind, config.prbs.amplitude_a) = (kind, current_a);
                 (config.chirp.start_hz, config.chirp.quiet_after_s) = (20.0, 0.5);
-                (config.multisine.periods, config.prbs.periods, config.stepped_sine.count) = (5, 5, 30);
+                (
+                    config.multisine.periods,
+                    config.prbs.periods,
+                    config.stepped_sine.count,
+                ) = (5, 5, 30);
                 flat(config, current_a);
             }
         };
@@ -204,7 +270,10 @@ mod tests {
     fn a_multisine_whose_lines_differ_too_much_is_refused() {
         let steep = |config: &mut Config| {
             config.excitation.kind = ExcitationKind::Multisine;
-            let point = |frequency_hz, current_a| AmplitudePoint { frequency_hz, current_a };
+            let point = |frequency_hz, current_a| AmplitudePoint {
+                frequency_hz,
+                current_a,
+            };
             config.chirp.amplitude = vec![point(1.0, 0.001), point(100.0, 0.06)];
         };
         assert!(matches!(checked(&steep), Err(ExcitationError::Span { .. })));

@@ -32,7 +32,8 @@ impl Chirp {
     /// The chirp of the settings at a period of the loop.
     pub fn new(settings: &ChirpSettings, period_s: f64) -> Chirp {
         let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
-        let (start_tick, sweep_ticks) = (ticks(settings.quiet_before_s), ticks(settings.duration_s));
+        let (start_tick, sweep_ticks) =
+            (ticks(settings.quiet_before_s), ticks(settings.duration_s));
         let mut chirp = Chirp {
             amplitude: Amplitude::new(&settings.amplitude),
             period_s,
@@ -41,7 +42,9 @@ impl Chirp {
             ticks: start_tick + sweep_ticks + ticks(settings.quiet_after_s),
             rate: match settings.sweep {
                 Sweep::Linear => (settings.stop_hz - settings.start_hz) / settings.duration_s,
-                Sweep::Logarithmic => libm::log(settings.stop_hz / settings.start_hz) / settings.duration_s,
+                Sweep::Logarithmic => {
+                    libm::log(settings.stop_hz / settings.start_hz) / settings.duration_s
+                }
             },
             mean: 0.0,
             settings: settings.clone(),
@@ -66,16 +69,20 @@ impl Chirp {
     fn parts(&self, time_s: f64) -> (f64, f64) {
         let s = &self.settings;
         let (ln_frequency, phase) = match s.sweep {
-            Sweep::Linear => {
-                (libm::log(s.start_hz + self.rate * time_s), s.start_hz * time_s + 0.5 * self.rate * time_s * time_s)
-            }
+            Sweep::Linear => (
+                libm::log(s.start_hz + self.rate * time_s),
+                s.start_hz * time_s + 0.5 * self.rate * time_s * time_s,
+            ),
             Sweep::Logarithmic => {
                 let ln = libm::log(s.start_hz) + self.rate * time_s;
                 (ln, s.start_hz * libm::expm1(self.rate * time_s) / self.rate)
             }
         };
         let fade = fade(time_s, s.fade_in_s) * fade(s.duration_s - time_s, s.fade_out_s);
-        (fade * self.amplitude.at(ln_frequency), libm::sin(2.0 * PI * (phase - libm::floor(phase))))
+        (
+            fade * self.amplitude.at(ln_frequency),
+            libm::sin(2.0 * PI * (phase - libm::floor(phase))),
+        )
     }
 }
 
@@ -110,25 +117,42 @@ mod tests {
     const PERIOD_S: f64 = 2e-4;
 
     fn settings(sweep: Sweep, start_hz: f64, stop_hz: f64) -> ChirpSettings {
-        let flat = vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.5 }];
+        let flat = vec![AmplitudePoint {
+            frequency_hz: 1.0,
+            current_a: 0.5,
+        }];
         let quiet = 0.5;
         let (quiet_before_s, quiet_after_s) = (quiet, quiet);
         let mut settings = load(&Source::default()).unwrap().chirp;
-        (settings.sweep, settings.start_hz, settings.stop_hz, settings.amplitude) = (sweep, start_hz, stop_hz, flat);
-        (settings.quiet_before_s, settings.quiet_after_s, settings.duration_s) = (quiet_before_s, quiet_after_s, 10.0);
+        (
+            settings.sweep,
+            settings.start_hz,
+            settings.stop_hz,
+            settings.amplitude,
+        ) = (sweep, start_hz, stop_hz, flat);
+        (
+            settings.quiet_before_s,
+            settings.quiet_after_s,
+            settings.duration_s,
+        ) = (quiet_before_s, quiet_after_s, 10.0);
         (settings.fade_in_s, settings.fade_out_s) = (0.5, 0.5);
         settings
     }
 
     fn samples(chirp: &Chirp) -> Vec<f64> {
-        (0..chirp.ticks()).map(|tick| chirp.current_a(tick)).collect()
+        (0..chirp.ticks())
+            .map(|tick| chirp.current_a(tick))
+            .collect()
     }
 
     /// Zero crossings between two times, counted on the signal itself: two a period.
     fn crossings_per_second(chirp: &Chirp, from_s: f64, to_s: f64) -> f64 {
         let signal = samples(chirp);
         let part = &signal[(from_s / PERIOD_S) as usize..(to_s / PERIOD_S) as usize];
-        part.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0)).count() as f64 / (to_s - from_s)
+        part.windows(2)
+            .filter(|w| (w[0] > 0.0) != (w[1] > 0.0))
+            .count() as f64
+            / (to_s - from_s)
     }
 
     #[test]
@@ -137,11 +161,16 @@ mod tests {
             for (start_hz, stop_hz) in [(5.0, 400.0), (300.0, 20.0)] {
                 let chirp = Chirp::new(&settings(sweep, start_hz, stop_hz), PERIOD_S);
                 for time_s in [2.0, 5.0, 8.0] {
-                    let heard_hz = crossings_per_second(&chirp, 0.5 + time_s - 0.5, 0.5 + time_s + 0.5) / 2.0;
+                    let heard_hz =
+                        crossings_per_second(&chirp, 0.5 + time_s - 0.5, 0.5 + time_s + 0.5) / 2.0;
                     // Mean frequency over the second: from the phase's closed form; one crossing in the second may be missed.
                     let steps = 1000;
                     let mean_hz = (0..steps)
-                        .map(|i| chirp.frequency_hz(time_s - 0.5 + (f64::from(i) + 0.5) / f64::from(steps)))
+                        .map(|i| {
+                            chirp.frequency_hz(
+                                time_s - 0.5 + (f64::from(i) + 0.5) / f64::from(steps),
+                            )
+                        })
                         .sum::<f64>()
                         / f64::from(steps);
                     assert!(
@@ -160,11 +189,19 @@ mod tests {
             let chirp = Chirp::new(&settings(sweep, 1.0, 400.0), PERIOD_S);
             let signal = samples(&chirp);
             let quiet = (0.5 / PERIOD_S) as usize;
-            assert!(signal[..quiet].iter().chain(&signal[signal.len() - quiet..]).all(|u| *u == 0.0));
+            assert!(
+                signal[..quiet]
+                    .iter()
+                    .chain(&signal[signal.len() - quiet..])
+                    .all(|u| *u == 0.0)
+            );
             // 50,000 numbers below 0.5, each rounded at 1e-16.
             assert!(signal.iter().sum::<f64>().abs() < 1e-11);
             // At the ends the envelope is (pi n/(2 N))^2 of the amplitude n samples in, N = 2500 to a fade.
-            let (first, last) = (signal[quiet + 1].abs(), signal[signal.len() - quiet - 1].abs());
+            let (first, last) = (
+                signal[quiet + 1].abs(),
+                signal[signal.len() - quiet - 1].abs(),
+            );
             assert!(first < 1e-6 && last < 1e-6, "{first} {last}");
             assert!(signal.iter().all(|u| u.abs() <= 0.5 * 1.05));
         }
@@ -174,16 +211,30 @@ mod tests {
     fn the_amplitude_follows_its_points() {
         let mut s = settings(Sweep::Logarithmic, 1.0, 400.0);
         s.amplitude = vec![
-            AmplitudePoint { frequency_hz: 10.0, current_a: 1.0 },
-            AmplitudePoint { frequency_hz: 100.0, current_a: 0.01 },
+            AmplitudePoint {
+                frequency_hz: 10.0,
+                current_a: 1.0,
+            },
+            AmplitudePoint {
+                frequency_hz: 100.0,
+                current_a: 0.01,
+            },
         ];
         let chirp = Chirp::new(&s, PERIOD_S);
         // Two decades down over one decade up: A = (10 Hz/f)^2.
-        for (frequency_hz, amplitude_a) in
-            [(5.0, 1.0), (10.0, 1.0), (20.0, 0.25), (50.0, 0.04), (100.0, 0.01), (200.0, 0.01)]
-        {
+        for (frequency_hz, amplitude_a) in [
+            (5.0, 1.0),
+            (10.0, 1.0),
+            (20.0, 0.25),
+            (50.0, 0.04),
+            (100.0, 0.01),
+            (200.0, 0.01),
+        ] {
             let ours = chirp.amplitude.at(libm::log(frequency_hz));
-            assert!((ours / amplitude_a - 1.0).abs() < 1e-12, "{frequency_hz}: {ours}");
+            assert!(
+                (ours / amplitude_a - 1.0).abs() < 1e-12,
+                "{frequency_hz}: {ours}"
+            );
         }
     }
 }

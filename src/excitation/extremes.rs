@@ -25,7 +25,11 @@ pub struct Extremes {
 
 impl Extremes {
     /// Runs the whole excitation through the model of the plant.
-    pub fn of(excitation: &(impl Excitation + ?Sized), config: &Config, plant: &Sampled) -> Extremes {
+    pub fn of(
+        excitation: &(impl Excitation + ?Sized),
+        config: &Config,
+        plant: &Sampled,
+    ) -> Extremes {
         let mut motion = plant.at_rest();
         let course = (0..excitation.ticks()).map(|tick| {
             let command_a = excitation.current_a(tick);
@@ -43,7 +47,9 @@ impl Extremes {
         let mut extremes = Extremes::default();
         for (tick, (command_a, position_m)) in (0..).zip(course) {
             extremes.current_a = extremes.current_a.max(command_a.abs());
-            extremes.slew_a_per_s = extremes.slew_a_per_s.max((command_a - before_a).abs() / period_s);
+            extremes.slew_a_per_s = extremes
+                .slew_a_per_s
+                .max((command_a - before_a).abs() / period_s);
             before_a = command_a;
             square_a2 += command_a * command_a;
             heat_a2 += cooling * (command_a * command_a - heat_a2);
@@ -54,6 +60,10 @@ impl Extremes {
             ticks = tick + 1;
         }
         let rms_current_a = (square_a2 / ticks.max(1) as f64).sqrt();
-        Extremes { rms_current_a, duration_s: ticks as f64 * period_s, ..extremes }
+        Extremes {
+            rms_current_a,
+            duration_s: ticks as f64 * period_s,
+            ..extremes
+        }
     }
 }

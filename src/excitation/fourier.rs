@@ -18,7 +18,9 @@ pub(super) fn transform(x: &mut [Complex<f64>]) {
     if n < 2 || !n.is_power_of_two() {
         return;
     }
-    let turns: Vec<Complex<f64>> = (0..n / 2).map(|k| turn(2.0 * PI * k as f64 / n as f64)).collect();
+    let turns: Vec<Complex<f64>> = (0..n / 2)
+        .map(|k| turn(2.0 * PI * k as f64 / n as f64))
+        .collect();
     let shift = usize::BITS - n.trailing_zeros();
     for k in 0..n {
         let other = k.reverse_bits() >> shift;
@@ -64,7 +66,9 @@ pub(super) fn samples(lines: &[Complex<f64>], n: usize) -> Vec<f64> {
     // The inverse of a transform is its conjugate's conjugate over its length.
     let mut product: Vec<Complex<f64>> = a.iter().zip(&b).map(|(a, b)| (a * b).conj()).collect();
     transform(&mut product);
-    (0..n).map(|k| (product[k].conj() * chirp(k)).re / length as f64).collect()
+    (0..n)
+        .map(|k| (product[k].conj() * chirp(k)).re / length as f64)
+        .collect()
 }
 
 /// exp(i angle).
@@ -78,7 +82,9 @@ mod tests {
     use super::*;
 
     fn lines(count: usize) -> Vec<Complex<f64>> {
-        (0..count).map(|k| turn(k as f64 * k as f64) * (1.0 + k as f64 % 3.0)).collect()
+        (0..count)
+            .map(|k| turn(k as f64 * k as f64) * (1.0 + k as f64 % 3.0))
+            .collect()
     }
 
     #[test]
@@ -86,11 +92,15 @@ mod tests {
         for (count, n) in [(1, 1), (3, 7), (12, 25), (40, 100), (30, 64), (50, 127)] {
             let lines = lines(count);
             for (at, sample) in samples(&lines, n).into_iter().enumerate() {
-                let term =
-                    |(k, line): (usize, &Complex<f64>)| (line * turn(2.0 * PI * ((k * at) % n) as f64 / n as f64)).re;
+                let term = |(k, line): (usize, &Complex<f64>)| {
+                    (line * turn(2.0 * PI * ((k * at) % n) as f64 / n as f64)).re
+                };
                 let sum: f64 = lines.iter().enumerate().map(term).sum();
                 // Three transforms of up to 256 numbers: some 10 roundings of a sum of up to 150.
-                assert!((sample - sum).abs() < 150.0 * 1e-14, "{count} lines, sample {at} of {n}: {sample} for {sum}");
+                assert!(
+                    (sample - sum).abs() < 150.0 * 1e-14,
+                    "{count} lines, sample {at} of {n}: {sample} for {sum}"
+                );
             }
         }
     }

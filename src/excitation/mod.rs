@@ -128,7 +128,9 @@ impl<E: Excitation + ?Sized> Excitation for Box<E> {
 pub fn of(config: &Config) -> Box<dyn Excitation> {
     let chirp = || Chirp::new(&config.chirp, config.servo.period_s());
     match config.excitation.kind {
-        ExcitationKind::Chirp if config.chirp.repetitions > 1 => Box::new(Repeated::new(chirp(), &config.chirp)),
+        ExcitationKind::Chirp if config.chirp.repetitions > 1 => {
+            Box::new(Repeated::new(chirp(), &config.chirp))
+        }
         ExcitationKind::Chirp => Box::new(chirp()),
         ExcitationKind::Multisine => Box::new(multisine(config)),
         ExcitationKind::SteppedSine => Box::new(SteppedSine::new(config)),
@@ -156,7 +158,11 @@ pub fn words(config: &Config) -> String {
                 Sweep::Linear => "linear",
                 Sweep::Logarithmic => "logarithmic",
             };
-            let times = if chirp.repetitions > 1 { format!(", {} times", chirp.repetitions) } else { String::new() };
+            let times = if chirp.repetitions > 1 {
+                format!(", {} times", chirp.repetitions)
+            } else {
+                String::new()
+            };
             format!("{sweep} chirp, {band} in {} s{times}", chirp.duration_s)
         }
         ExcitationKind::Multisine => {
@@ -166,7 +172,10 @@ pub fn words(config: &Config) -> String {
                 Lines::Odd => "odd",
                 Lines::OddRandom => "three in four odd",
             };
-            format!("multisine, {band}, {lines} lines of 1/{} s, {} periods", m.period_s, m.periods)
+            format!(
+                "multisine, {band}, {lines} lines of 1/{} s, {} periods",
+                m.period_s, m.periods
+            )
         }
         ExcitationKind::SteppedSine => {
             let s = &config.stepped_sine;

@@ -40,13 +40,22 @@ pub fn multisine(config: &Config) -> Periodic {
     let weighted: Vec<(usize, f64)> = lines.into_iter().map(of).collect();
     let mut table = table(&weighted, settings.seed, length);
     let peak_a = table.iter().fold(0.0f64, |peak, u| peak.max(u.abs()));
-    let scale = if peak_a > 0.0 { amplitude.range_a(low_hz, high_hz).1 / peak_a } else { 0.0 };
+    let scale = if peak_a > 0.0 {
+        amplitude.range_a(low_hz, high_hz).1 / peak_a
+    } else {
+        0.0
+    };
     table.iter_mut().for_each(|u| *u *= scale);
     Periodic::new(config, table, settings.settle_periods, settings.periods)
 }
 
 /// The lines of the band below half the rate; one that is a limit up to rounding counts.
-fn within(low_hz: f64, high_hz: f64, line_hz: f64, length: usize) -> std::ops::RangeInclusive<usize> {
+fn within(
+    low_hz: f64,
+    high_hz: f64,
+    line_hz: f64,
+    length: usize,
+) -> std::ops::RangeInclusive<usize> {
     let low = libm::ceil(low_hz / line_hz - 1e-6).max(1.0) as usize;
     low..=(libm::floor(high_hz / line_hz + 1e-6) as usize).min((length - 1) / 2)
 }
@@ -60,7 +69,11 @@ fn lines(settings: &MultisineSettings, band: std::ops::RangeInclusive<usize>) ->
             let odd: Vec<usize> = band.filter(|k| k % 2 == 1).collect();
             let mut random = Pcg64::seed_from_u64(settings.seed);
             let kept = |group: &[usize]| {
-                let out = if group.len() == GROUP { (random.next_u64() >> 62) as usize } else { GROUP };
+                let out = if group.len() == GROUP {
+                    (random.next_u64() >> 62) as usize
+                } else {
+                    GROUP
+                };
                 let rest = group.iter().enumerate().filter(|(place, _)| *place != out);
                 rest.map(|(_, k)| *k).collect::<Vec<_>>()
             };
@@ -71,7 +84,9 @@ fn lines(settings: &MultisineSettings, band: std::ops::RangeInclusive<usize>) ->
 
 /// One period of the sum of lines (number, amplitude).
 fn table(lines: &[(usize, f64)], seed: u64, length: usize) -> Vec<f64> {
-    let Some(&(last, _)) = lines.last() else { return vec![0.0; length] };
+    let Some(&(last, _)) = lines.last() else {
+        return vec![0.0; length];
+    };
     let mut spectrum = vec![Complex::new(0.0, 0.0); last + 1];
     for (&(k, a), phase) in lines.iter().zip(phases(lines, seed)) {
         spectrum[k] = phase * a;
@@ -82,7 +97,8 @@ fn table(lines: &[(usize, f64)], seed: u64, length: usize) -> Vec<f64> {
 /// exp(i phi) of each line, by which the sum's peak is low.
 fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
     let mut random = Pcg64::new(u128::from(seed), 1);
-    let mut draw = || turn(2.0 * PI * (random.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64));
+    let mut draw =
+        || turn(2.0 * PI * (random.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64));
     let mut phases: Vec<Complex<f64>> = lines.iter().map(|_| draw()).collect();
     let last = lines.last().map_or(0, |(k, _)| *k);
     let mut signal = vec![Complex::new(0.0, 0.0); (OVERSAMPLING * last).next_power_of_two()];
@@ -93,7 +109,9 @@ fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
             (best, lowest) = (phases.clone(), peak);
         }
         let level = peak * (CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS));
-        signal.iter_mut().for_each(|u| *u = Complex::new(u.re.clamp(-level, level), 0.0));
+        signal
+            .iter_mut()
+            .for_each(|u| *u = Complex::new(u.re.clamp(-level, level), 0.0));
         transform(&mut signal);
         for ((k, _), phase) in lines.iter().zip(&mut phases) {
             // What turns by exp(+i) in the signal stands conjugate in its transform with exp(+i) again.
@@ -125,9 +143,16 @@ mod tests {
     fn config(lines: Lines, seed: u64, amplitude: &[(f64, f64)]) -> Config {
         let mut config = load(&Source::default()).unwrap();
         (config.chirp.start_hz, config.chirp.stop_hz) = (20.0, 219.0);
-        let point = |&(frequency_hz, current_a): &(f64, f64)| AmplitudePoint { frequency_hz, current_a };
+        let point = |&(frequency_hz, current_a): &(f64, f64)| AmplitudePoint {
+            frequency_hz,
+            current_a,
+        };
         config.chirp.amplitude = amplitude.iter().map(point).collect();
-        (config.multisine.period_s, config.multisine.lines, config.multisine.seed) = (1.0, lines, seed);
+        (
+            config.multisine.period_s,
+            config.multisine.lines,
+            config.multisine.seed,
+        ) = (1.0, lines, seed);
         config
     }
 
@@ -138,7 +163,10 @@ mod tests {
         let fft = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(table.len());
         let (mut input, mut output) = (table.to_vec(), fft.make_output_vec());
         fft.process(&mut input, &mut output).unwrap();
-        output.iter().map(|line| 2.0 * line.norm() / table.len() as f64).collect()
+        output
+            .iter()
+            .map(|line| 2.0 * line.norm() / table.len() as f64)
+            .collect()
     }
 
     fn crest_factor(table: &[f64]) -> f64 {
@@ -157,10 +185,16 @@ mod tests {
             for (k, amplitude) in amplitudes.iter().enumerate() {
                 let expected = if (20..=219).contains(&k) { a } else { 0.0 };
                 // Transforms of 16384 and 5000 numbers: some 14 roundings of the sum of 200 lines.
-                assert!((amplitude - expected).abs() < 1e-12 * a.max(0.1), "line {k}: {amplitude} for {expected}");
+                assert!(
+                    (amplitude - expected).abs() < 1e-12 * a.max(0.1),
+                    "line {k}: {amplitude} for {expected}"
+                );
             }
             let peak = table.iter().fold(0.0f64, |peak, u| peak.max(u.abs()));
-            assert!((peak / 0.7 - 1.0).abs() < 1e-12, "the largest current is the amplitude: {peak}");
+            assert!(
+                (peak / 0.7 - 1.0).abs() < 1e-12,
+                "the largest current is the amplitude: {peak}"
+            );
             // The peak of 200 random phases is near sqrt(2 ln 5000) = 4.1 sigma at most, and 3 at least; a sine has 1.41.
             let crest = crest_factor(table);
             assert!((1.41..1.8).contains(&crest), "seed {seed}: {crest}");
@@ -188,13 +222,21 @@ mod tests {
     fn lines_left_out_are_zero_even_ones_and_one_in_each_group_of_four_odd_ones() {
         for (lines, left) in [(Lines::Odd, 100), (Lines::OddRandom, 75)] {
             let amplitudes = amplitudes(multisine(&config(lines, 5, &FLAT)).table());
-            let excited: Vec<usize> = (0..amplitudes.len()).filter(|k| amplitudes[*k] > 1e-3).collect();
+            let excited: Vec<usize> = (0..amplitudes.len())
+                .filter(|k| amplitudes[*k] > 1e-3)
+                .collect();
             assert_eq!(excited.len(), left, "{lines:?}");
             assert!(excited.iter().all(|k| k % 2 == 1 && (20..=219).contains(k)));
-            assert!((0..amplitudes.len()).all(|k| excited.contains(&k) || amplitudes[k] < 1e-13), "{lines:?}");
+            assert!(
+                (0..amplitudes.len()).all(|k| excited.contains(&k) || amplitudes[k] < 1e-13),
+                "{lines:?}"
+            );
             for group in 0..25 {
                 let first = 21 + 8 * group;
-                let within = excited.iter().filter(|k| (first..first + 8).contains(*k)).count();
+                let within = excited
+                    .iter()
+                    .filter(|k| (first..first + 8).contains(*k))
+                    .count();
                 assert_eq!(within, left / 25, "{lines:?}, group {group}");
             }
         }
@@ -204,7 +246,11 @@ mod tests {
 
     #[test]
     fn the_same_seed_is_the_same_current_and_another_is_another() {
-        let at = |seed: u64, tick: u64| multisine(&config(Lines::Full, seed, &FLAT)).current_a(tick).to_bits();
+        let at = |seed: u64, tick: u64| {
+            multisine(&config(Lines::Full, seed, &FLAT))
+                .current_a(tick)
+                .to_bits()
+        };
         assert_eq!(at(1, 30_000), at(1, 30_000));
         assert_ne!(at(1, 30_000), at(2, 30_000));
     }

@@ -28,7 +28,12 @@ pub struct Periodic {
 
 impl Periodic {
     /// `table` over and over, with the quiet and the fades of `[chirp]`.
-    pub(super) fn new(config: &Config, table: Vec<f64>, settle_periods: u32, measured_periods: u32) -> Periodic {
+    pub(super) fn new(
+        config: &Config,
+        table: Vec<f64>,
+        settle_periods: u32,
+        measured_periods: u32,
+    ) -> Periodic {
         let ticks = |seconds: f64| libm::round(seconds * config.servo.rate_hz) as u64;
         let chirp = &config.chirp;
         let settle = table.len() as u64 * u64::from(settle_periods);
@@ -61,7 +66,8 @@ impl Excitation for Periodic {
         }
         let at = tick - self.start_tick;
         let (begun, left) = (at as f64, (self.whole() + self.fade_out_ticks - at) as f64);
-        let envelope = fade(begun, self.fade_in_ticks as f64) * fade(left, self.fade_out_ticks as f64);
+        let envelope =
+            fade(begun, self.fade_in_ticks as f64) * fade(left, self.fade_out_ticks as f64);
         self.table[(at % self.table.len() as u64) as usize] * envelope
     }
 
@@ -93,12 +99,25 @@ mod tests {
     fn it_fades_in_within_the_settling_and_out_after_the_last_period_and_repeats_between() {
         let mut config = load(&Source::default()).unwrap();
         let chirp = &mut config.chirp;
-        (chirp.quiet_before_s, chirp.quiet_after_s, chirp.fade_in_s, chirp.fade_out_s) = (0.02, 0.04, 5.0, 0.01);
+        (
+            chirp.quiet_before_s,
+            chirp.quiet_after_s,
+            chirp.fade_in_s,
+            chirp.fade_out_s,
+        ) = (0.02, 0.04, 5.0, 0.01);
         let table: Vec<f64> = (0..200).map(|n| libm::sin(f64::from(n))).collect();
         let periodic = Periodic::new(&config, table.clone(), 2, 5);
         // At 5 kHz: 100 ticks of quiet, 7 periods, 50 ticks of fade, 200 of quiet.
         assert_eq!(periodic.ticks(), 100 + 1400 + 50 + 200);
-        assert_eq!(periodic.pattern(), Pattern::Periodic { start: 100, period: 200, skip: 2, periods: 5 });
+        assert_eq!(
+            periodic.pattern(),
+            Pattern::Periodic {
+                start: 100,
+                period: 200,
+                skip: 2,
+                periods: 5
+            }
+        );
         for tick in 0..periodic.ticks() {
             let (current_a, active) = (periodic.current_a(tick), (100..1550).contains(&tick));
             assert_eq!(periodic.active(tick), active, "{tick}");

@@ -32,7 +32,11 @@ const TAPS: [&[u32]; 14] = [
 pub fn prbs(config: &Config) -> Periodic {
     let settings = &config.prbs;
     let held = |bit: bool| {
-        let current_a = if bit { settings.amplitude_a } else { -settings.amplitude_a };
+        let current_a = if bit {
+            settings.amplitude_a
+        } else {
+            -settings.amplitude_a
+        };
         std::iter::repeat_n(current_a, settings.clock_divider.max(1) as usize)
     };
     let table = sequence(settings).into_iter().flat_map(held).collect();
@@ -47,7 +51,9 @@ fn sequence(settings: &PrbsSettings) -> Vec<bool> {
     let mut register = length;
     let mut step = || {
         let output = register >> (order - 1) & 1 == 1;
-        let fed = taps.iter().fold(0, |sum, tap| sum ^ (register >> (tap - 1) & 1));
+        let fed = taps
+            .iter()
+            .fold(0, |sum, tap| sum ^ (register >> (tap - 1) & 1));
         register = (register << 1 | fed) & length;
         output
     };
@@ -61,7 +67,11 @@ mod tests {
 
     fn settings(order: u32, clock_divider: u32) -> Config {
         let mut config = load(&Source::default()).unwrap();
-        (config.prbs.order, config.prbs.clock_divider, config.prbs.amplitude_a) = (order, clock_divider, 0.5);
+        (
+            config.prbs.order,
+            config.prbs.clock_divider,
+            config.prbs.amplitude_a,
+        ) = (order, clock_divider, 0.5);
         config
     }
 
@@ -76,13 +86,22 @@ mod tests {
     #[test]
     fn its_autocorrelation_has_two_values() {
         for order in 7..=11 {
-            let bits: Vec<i64> =
-                prbs(&settings(order, 1)).table().iter().map(|u| if *u > 0.0 { 1 } else { -1 }).collect();
+            let bits: Vec<i64> = prbs(&settings(order, 1))
+                .table()
+                .iter()
+                .map(|u| if *u > 0.0 { 1 } else { -1 })
+                .collect();
             let length = (1usize << order) - 1;
             assert_eq!(bits.len(), length);
             for shift in 0..length {
-                let sum: i64 = (0..length).map(|k| bits[k] * bits[(k + shift) % length]).sum();
-                assert_eq!(sum, if shift == 0 { length as i64 } else { -1 }, "order {order}, shift {shift}");
+                let sum: i64 = (0..length)
+                    .map(|k| bits[k] * bits[(k + shift) % length])
+                    .sum();
+                assert_eq!(
+                    sum,
+                    if shift == 0 { length as i64 } else { -1 },
+                    "order {order}, shift {shift}"
+                );
             }
         }
     }
@@ -93,9 +112,16 @@ mod tests {
             let table = prbs(&settings(order, 1)).table().to_vec();
             // The transform of the autocorrelation: L + 1 at every line but 0, where the one step more of + leaves 1.
             let (length, powers) = (table.len() as f64, powers(&table));
-            assert!((powers[0] / 0.25 - 1.0).abs() < 1e-6, "order {order}: {}", powers[0]);
+            assert!(
+                (powers[0] / 0.25 - 1.0).abs() < 1e-6,
+                "order {order}: {}",
+                powers[0]
+            );
             for (k, power) in powers.iter().enumerate().skip(1) {
-                assert!((power / (0.25 * (length + 1.0)) - 1.0).abs() < 1e-9, "order {order}, line {k}: {power}");
+                assert!(
+                    (power / (0.25 * (length + 1.0)) - 1.0).abs() < 1e-9,
+                    "order {order}, line {k}: {power}"
+                );
             }
         }
     }
@@ -110,8 +136,16 @@ mod tests {
             // |sum of exp(-i w n) for n = 0, 1, 2| = sin(3 w/2)/sin(w/2).
             let half = std::f64::consts::PI * k as f64 / table.len() as f64;
             let hold = ((3.0 * half).sin() / half.sin()).powi(2);
-            let expected = 0.25 * if (k as f64) % length == 0.0 { 1.0 } else { length + 1.0 } * hold;
-            assert!((power - expected).abs() < 1e-9 * length, "line {k}: {power} for {expected}");
+            let expected =
+                0.25 * if (k as f64) % length == 0.0 {
+                    1.0
+                } else {
+                    length + 1.0
+                } * hold;
+            assert!(
+                (power - expected).abs() < 1e-9 * length,
+                "line {k}: {power} for {expected}"
+            );
         }
     }
 }

@@ -15,7 +15,10 @@ impl Quiet {
     pub fn new(settings: &CampaignSettings, period_s: f64) -> Quiet {
         let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
         let settle_ticks = ticks(settings.settle_s);
-        Quiet { settle_ticks, ticks: settle_ticks + ticks(settings.average_s).max(1) }
+        Quiet {
+            settle_ticks,
+            ticks: settle_ticks + ticks(settings.average_s).max(1),
+        }
     }
 }
 

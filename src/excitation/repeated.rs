@@ -13,7 +13,10 @@ pub struct Repeated {
 impl Repeated {
     /// As often as the settings say.
     pub fn new(chirp: Chirp, settings: &ChirpSettings) -> Repeated {
-        Repeated { chirp, count: u64::from(settings.repetitions) }
+        Repeated {
+            chirp,
+            count: u64::from(settings.repetitions),
+        }
     }
 
     /// The tick within its repetition.
@@ -24,11 +27,13 @@ impl Repeated {
 
 impl Excitation for Repeated {
     fn current_a(&self, tick: u64) -> f64 {
-        self.within(tick).map_or(0.0, |tick| self.chirp.current_a(tick))
+        self.within(tick)
+            .map_or(0.0, |tick| self.chirp.current_a(tick))
     }
 
     fn active(&self, tick: u64) -> bool {
-        self.within(tick).is_some_and(|tick| self.chirp.active(tick))
+        self.within(tick)
+            .is_some_and(|tick| self.chirp.active(tick))
     }
 
     fn ticks(&self) -> u64 {
@@ -40,7 +45,10 @@ impl Excitation for Repeated {
     }
 
     fn pattern(&self) -> Pattern {
-        Pattern::Repeated { period: self.chirp.ticks() as usize, count: self.count as usize }
+        Pattern::Repeated {
+            period: self.chirp.ticks() as usize,
+            count: self.count as usize,
+        }
     }
 }
 
@@ -52,16 +60,33 @@ mod tests {
     #[test]
     fn every_repetition_is_the_chirp_bit_for_bit_and_then_there_is_nothing() {
         let mut settings = load(&Source::default()).unwrap().chirp;
-        (settings.duration_s, settings.quiet_before_s, settings.quiet_after_s, settings.repetitions) =
-            (6.0, 0.1, 0.2, 3);
+        (
+            settings.duration_s,
+            settings.quiet_before_s,
+            settings.quiet_after_s,
+            settings.repetitions,
+        ) = (6.0, 0.1, 0.2, 3);
         let chirp = Chirp::new(&settings, 1e-3);
         let repeated = Repeated::new(chirp.clone(), &settings);
         assert_eq!(repeated.ticks(), 3 * 6300);
-        assert_eq!(repeated.pattern(), Pattern::Repeated { period: 6300, count: 3 });
+        assert_eq!(
+            repeated.pattern(),
+            Pattern::Repeated {
+                period: 6300,
+                count: 3
+            }
+        );
         for tick in 0..20_000 {
-            let once = if tick < 3 * 6300 { chirp.current_a(tick % 6300) } else { 0.0 };
+            let once = if tick < 3 * 6300 {
+                chirp.current_a(tick % 6300)
+            } else {
+                0.0
+            };
             assert_eq!(repeated.current_a(tick).to_bits(), once.to_bits(), "{tick}");
-            assert_eq!(repeated.active(tick), tick < 3 * 6300 && chirp.active(tick % 6300));
+            assert_eq!(
+                repeated.active(tick),
+                tick < 3 * 6300 && chirp.active(tick % 6300)
+            );
         }
     }
 }

@@ -26,14 +26,21 @@ pub struct Cap {
 impl Cap {
     /// A share of what motor and amplifier allow; a sine of the continuous current has sqrt 2 times its amplitude.
     pub fn of(config: &Config) -> Cap {
-        let (motor, amplifier, share) = (&config.motor, &config.amplifier, config.shape.current_ratio);
+        let (motor, amplifier, share) =
+            (&config.motor, &config.amplifier, config.shape.current_ratio);
         let continuous_a = std::f64::consts::SQRT_2 * motor.continuous_current_a();
-        let current_a = continuous_a.min(motor.peak_current_a()).min(amplifier.current_limit_a);
-        Cap { current_a: share * current_a, slew_a_per_s: share * amplifier.slew_limit_a_per_s }
+        let current_a = continuous_a
+            .min(motor.peak_current_a())
+            .min(amplifier.current_limit_a);
+        Cap {
+            current_a: share * current_a,
+            slew_a_per_s: share * amplifier.slew_limit_a_per_s,
+        }
     }
 
     fn at_a(&self, frequency_hz: f64) -> f64 {
-        self.current_a.min(self.slew_a_per_s / (2.0 * std::f64::consts::PI * frequency_hz))
+        self.current_a
+            .min(self.slew_a_per_s / (2.0 * std::f64::consts::PI * frequency_hz))
     }
 }
 
@@ -43,26 +50,41 @@ impl Cap {
 pub fn shaped(response: &[(f64, f64)], travel_m: f64, cap: Cap, span: f64) -> Vec<AmplitudePoint> {
     let wanted = |(frequency_hz, gain): &(f64, f64)| {
         let limit_a = cap.at_a(*frequency_hz);
-        let current_a = if *gain > 0.0 { limit_a.min(travel_m / gain) } else { limit_a };
+        let current_a = if *gain > 0.0 {
+            limit_a.min(travel_m / gain)
+        } else {
+            limit_a
+        };
         (libm::log(*frequency_hz), libm::log(current_a))
     };
     let mut curve: Vec<(f64, f64)> = response.iter().map(wanted).collect();
     let least = curve.iter().map(|(_, a)| *a).fold(f64::INFINITY, f64::min);
-    curve.iter_mut().for_each(|(_, a)| *a = a.min(least + libm::log(span)));
+    curve
+        .iter_mut()
+        .for_each(|(_, a)| *a = a.min(least + libm::log(span)));
     simplified(&curve)
         .into_iter()
-        .map(|(f, a)| AmplitudePoint { frequency_hz: libm::exp(f), current_a: libm::exp(a) })
+        .map(|(f, a)| AmplitudePoint {
+            frequency_hz: libm::exp(f),
+            current_a: libm::exp(a),
+        })
         .collect()
 }
 
 /// The curve by few of its points, lowered to where they lie nowhere above it.
 fn simplified(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let [first, .., last] = curve else { return curve.to_vec() };
+    let [first, .., last] = curve else {
+        return curve.to_vec();
+    };
     let mut kept = vec![*first, *last];
     while kept.len() < MOST_POINTS {
         let far = |(_, off): &(usize, f64)| off.abs();
-        let worst = off(curve, &kept).enumerate().max_by(|a, b| far(a).total_cmp(&far(b)));
-        let Some((index, _)) = worst.filter(|(_, off)| off.abs() > CLOSE) else { break };
+        let worst = off(curve, &kept)
+            .enumerate()
+            .max_by(|a, b| far(a).total_cmp(&far(b)));
+        let Some((index, _)) = worst.filter(|(_, off)| off.abs() > CLOSE) else {
+            break;
+        };
         let place = kept.partition_point(|(f, _)| *f < curve[index].0);
         kept.insert(place, curve[index]);
     }
@@ -73,7 +95,9 @@ fn simplified(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// By how much the lines through `kept` lie above each point of the curve.
 fn off(curve: &[(f64, f64)], kept: &[(f64, f64)]) -> impl Iterator<Item = f64> {
     curve.iter().map(|(f, a)| {
-        let after = kept.partition_point(|(at, _)| at <= f).clamp(1, kept.len() - 1);
+        let after = kept
+            .partition_point(|(at, _)| at <= f)
+            .clamp(1, kept.len() - 1);
         let ((f0, a0), (f1, a1)) = (kept[after - 1], kept[after]);
         a0 + (a1 - a0) * (f - f0) / (f1 - f0) - a
     })
@@ -84,7 +108,10 @@ mod tests {
     use super::*;
     use crate::excitation::Amplitude;
 
-    const CAP: Cap = Cap { current_a: 2.0, slew_a_per_s: 4000.0 };
+    const CAP: Cap = Cap {
+        current_a: 2.0,
+        slew_a_per_s: 4000.0,
+    };
 
     /// |1e-4 w0^2/(s^2 + 2 zeta w0 s + w0^2)| and |1 + s^2/wz^2| together: resonance at 30 Hz, zero at 80 Hz.
     fn gain(f: f64) -> f64 {
@@ -94,41 +121,77 @@ mod tests {
     }
 
     fn response() -> Vec<(f64, f64)> {
-        (0..=4000).map(|k| 0.1 * 5000f64.powf(f64::from(k) / 4000.0)).map(|f| (f, gain(f))).collect()
+        (0..=4000)
+            .map(|k| 0.1 * 5000f64.powf(f64::from(k) / 4000.0))
+            .map(|f| (f, gain(f)))
+            .collect()
     }
 
     #[test]
     fn the_displacement_is_alike_where_the_current_suffices_and_the_current_full_where_not() {
         let points = shaped(&response(), 100e-6, CAP, f64::INFINITY);
-        assert!((10..=MOST_POINTS).contains(&points.len()), "{}", points.len());
+        assert!(
+            (10..=MOST_POINTS).contains(&points.len()),
+            "{}",
+            points.len()
+        );
         let amplitude = Amplitude::new(&points);
         for (f, gain) in response() {
-            let (current_a, cap_a) = (amplitude.at(f.ln()), 2f64.min(4000.0 / (2.0 * std::f64::consts::PI * f)));
+            let (current_a, cap_a) = (
+                amplitude.at(f.ln()),
+                2f64.min(4000.0 / (2.0 * std::f64::consts::PI * f)),
+            );
             let wanted_a = cap_a.min(100e-6 / gain);
             // Never above, by rounding of a logarithm; below by twice what the simplification may miss.
             let ratio = current_a / wanted_a;
-            assert!((0.9..=1.0 + 1e-9).contains(&ratio), "{f} Hz: {current_a} of {wanted_a} A");
+            assert!(
+                (0.9..=1.0 + 1e-9).contains(&ratio),
+                "{f} Hz: {current_a} of {wanted_a} A"
+            );
         }
         let at = |f: f64| amplitude.at(f.ln());
         // At the resonance Q = 55.6, less by 1 - (30/80)^2: 4.77 mm/A and 21 mA; at the zero all that there is.
-        assert!((0.019..0.0212).contains(&at(30.0)) && at(80.0) > 1.8, "{} {}", at(30.0), at(80.0));
+        assert!(
+            (0.019..0.0212).contains(&at(30.0)) && at(80.0) > 1.8,
+            "{} {}",
+            at(30.0),
+            at(80.0)
+        );
     }
 
     #[test]
     fn the_largest_is_no_more_times_the_least_than_asked_for() {
         let points = shaped(&response(), 100e-6, CAP, 50.0);
-        let least = points.iter().map(|p| p.current_a).fold(f64::INFINITY, f64::min);
+        let least = points
+            .iter()
+            .map(|p| p.current_a)
+            .fold(f64::INFINITY, f64::min);
         let most = points.iter().map(|p| p.current_a).fold(0.0, f64::max);
-        assert!((45.0..=50.0 + 1e-6).contains(&(most / least)), "{}", most / least);
+        assert!(
+            (45.0..=50.0 + 1e-6).contains(&(most / least)),
+            "{}",
+            most / least
+        );
     }
 
     #[test]
     fn a_response_of_noise_or_of_zero_still_gives_few_sound_points() {
-        let noisy: Vec<(f64, f64)> = (1..3000).map(|k| (f64::from(k), 1e-6 * (1.0 + f64::from(k * k % 97)))).collect();
+        let noisy: Vec<(f64, f64)> = (1..3000)
+            .map(|k| (f64::from(k), 1e-6 * (1.0 + f64::from(k * k % 97))))
+            .collect();
         let points = shaped(&noisy, 1e-4, CAP, f64::INFINITY);
         assert_eq!(points.len(), MOST_POINTS);
-        assert!(points.windows(2).all(|pair| pair[0].frequency_hz < pair[1].frequency_hz));
+        assert!(
+            points
+                .windows(2)
+                .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz)
+        );
         let dead = shaped(&[(1.0, 0.0), (10.0, 0.0)], 1e-4, CAP, f64::INFINITY);
-        assert_eq!(dead.iter().map(|p| (p.current_a * 1e9).round() / 1e9).collect::<Vec<_>>(), [2.0, 2.0]);
+        assert_eq!(
+            dead.iter()
+                .map(|p| (p.current_a * 1e9).round() / 1e9)
+                .collect::<Vec<_>>(),
+            [2.0, 2.0]
+        );
     }
 }

@@ -27,7 +27,9 @@ impl Staircase {
         let n = i64::from(settings.levels);
         let steps = (0..=n).chain((-n..n).rev()).chain(-n + 1..=0);
         Staircase {
-            levels_a: steps.map(|step| settings.amplitude_a * step as f64 / n as f64).collect(),
+            levels_a: steps
+                .map(|step| settings.amplitude_a * step as f64 / n as f64)
+                .collect(),
             ramp_ticks: ticks(settings.ramp_s),
             settle_ticks: ticks(settings.settle_s),
             average_ticks: ticks(settings.average_s),
@@ -38,7 +40,8 @@ impl Staircase {
     pub fn level(&self, tick: u64) -> Option<usize> {
         let within = tick % self.level_ticks();
         let level = (tick / self.level_ticks()) as usize;
-        (within >= self.ramp_ticks + self.settle_ticks && level < self.levels_a.len()).then_some(level)
+        (within >= self.ramp_ticks + self.settle_ticks && level < self.levels_a.len())
+            .then_some(level)
     }
 
     /// Current of each level in amperes, in order.
@@ -53,9 +56,16 @@ impl Staircase {
 
 impl Excitation for Staircase {
     fn current_a(&self, tick: u64) -> f64 {
-        let (level, within) = ((tick / self.level_ticks()) as usize, tick % self.level_ticks());
-        let Some(&to_a) = self.levels_a.get(level) else { return 0.0 };
-        let from_a = level.checked_sub(1).map_or(0.0, |before| self.levels_a[before]);
+        let (level, within) = (
+            (tick / self.level_ticks()) as usize,
+            tick % self.level_ticks(),
+        );
+        let Some(&to_a) = self.levels_a.get(level) else {
+            return 0.0;
+        };
+        let from_a = level
+            .checked_sub(1)
+            .map_or(0.0, |before| self.levels_a[before]);
         let share = (within as f64 / self.ramp_ticks as f64).min(1.0);
         from_a + (to_a - from_a) * (0.5 - 0.5 * libm::cos(std::f64::consts::PI * share))
     }
@@ -96,14 +106,24 @@ mod tests {
         let staircase = staircase();
         assert_eq!(staircase.ticks(), 9 * 1700);
         assert_eq!(staircase.current_a(1700), 0.0);
-        assert!((staircase.current_a(1800) - 0.1).abs() < 1e-12, "half of the ramp, half of the way");
+        assert!(
+            (staircase.current_a(1800) - 0.1).abs() < 1e-12,
+            "half of the ramp, half of the way"
+        );
         for tick in 1900..3400 {
             assert_eq!(staircase.current_a(tick), 0.2);
             assert_eq!(staircase.level(tick), (tick >= 2900).then_some(1));
         }
-        let largest = (1..staircase.ticks()).map(|t| (staircase.current_a(t) - staircase.current_a(t - 1)).abs());
+        let largest = (1..staircase.ticks())
+            .map(|t| (staircase.current_a(t) - staircase.current_a(t - 1)).abs());
         // The slope of the ramp at its middle, pi/2 times the mean one.
         assert!(largest.fold(0.0, f64::max) < 0.2 / 200.0 * 1.6);
-        assert_eq!((staircase.current_a(staircase.ticks()), staircase.level(staircase.ticks())), (0.0, None));
+        assert_eq!(
+            (
+                staircase.current_a(staircase.ticks()),
+                staircase.level(staircase.ticks())
+            ),
+            (0.0, None)
+        );
     }
 }

@@ -46,7 +46,8 @@ impl Sine {
         // Turns since the measured blocks began, modulo one, exactly: (n q mod m)/m.
         let before = settle_ticks % self.block;
         let n = (tick - self.start) % self.block + self.block - before;
-        let share = (u128::from(n) * u128::from(self.turns) % u128::from(self.block)) as f64 / self.block as f64;
+        let share = (u128::from(n) * u128::from(self.turns) % u128::from(self.block)) as f64
+            / self.block as f64;
         self.amplitude_a * libm::sin(2.0 * PI * share)
     }
 
@@ -59,24 +60,42 @@ impl Sine {
 impl SteppedSine {
     /// The sines of a configuration.
     pub fn new(config: &Config) -> SteppedSine {
-        let (chirp, settings, rate_hz) = (&config.chirp, &config.stepped_sine, config.servo.rate_hz);
+        let (chirp, settings, rate_hz) =
+            (&config.chirp, &config.stepped_sine, config.servo.rate_hz);
         let ticks = |seconds: f64| libm::round(seconds * rate_hz) as u64;
-        let (start_tick, settle_ticks) = (ticks(chirp.quiet_before_s), ticks(settings.settle_s).max(2));
+        let (start_tick, settle_ticks) =
+            (ticks(chirp.quiet_before_s), ticks(settings.settle_s).max(2));
         let amplitude = Amplitude::new(&chirp.amplitude);
         let mut sines: Vec<Sine> = Vec::new();
         for frequency_hz in settings.frequencies_hz(chirp.start_hz, chirp.stop_hz) {
             let (turns, block) = block(frequency_hz, settings.measure_s / BLOCKS_PER_SINE, rate_hz);
             let amplitude_a = amplitude.at(libm::log(frequency_hz));
-            let start = sines.last().map_or(start_tick, |before| before.end(settle_ticks));
-            sines.push(Sine { amplitude_a, turns, block, start });
+            let start = sines
+                .last()
+                .map_or(start_tick, |before| before.end(settle_ticks));
+            sines.push(Sine {
+                amplitude_a,
+                turns,
+                block,
+                start,
+            });
         }
         let quiet_after_ticks = ticks(chirp.quiet_after_s);
-        SteppedSine { sines, rate_hz, fade_ticks: settle_ticks / 2, settle_ticks, start_tick, quiet_after_ticks }
+        SteppedSine {
+            sines,
+            rate_hz,
+            fade_ticks: settle_ticks / 2,
+            settle_ticks,
+            start_tick,
+            quiet_after_ticks,
+        }
     }
 
     /// Where the last sine is gone.
     fn end(&self) -> u64 {
-        self.sines.last().map_or(self.start_tick, |last| last.end(self.settle_ticks) + self.fade_ticks)
+        self.sines.last().map_or(self.start_tick, |last| {
+            last.end(self.settle_ticks) + self.fade_ticks
+        })
     }
 
     /// The sine that runs or comes at a tick, with the one before it.
@@ -101,10 +120,14 @@ fn block(frequency_hz: f64, least_s: f64, rate_hz: f64) -> (u64, u64) {
 impl Excitation for SteppedSine {
     fn current_a(&self, tick: u64) -> f64 {
         let (now, before) = self.at(tick);
-        let begun = now.map_or_else(|| before.map_or(0, |b| b.end(self.settle_ticks)), |sine| sine.start);
+        let begun = now.map_or_else(
+            || before.map_or(0, |b| b.end(self.settle_ticks)),
+            |sine| sine.start,
+        );
         let come = fade(tick.saturating_sub(begun) as f64, self.fade_ticks as f64);
         let of = |sine: Option<&Sine>, share: f64| {
-            sine.filter(|_| share > 0.0).map_or(0.0, |sine| share * sine.current_a(tick, self.settle_ticks))
+            sine.filter(|_| share > 0.0)
+                .map_or(0.0, |sine| share * sine.current_a(tick, self.settle_ticks))
         };
         of(now, come) + of(before, 1.0 - come)
     }
@@ -119,7 +142,9 @@ impl Excitation for SteppedSine {
 
     fn frequency_at_hz(&self, tick: u64) -> Option<f64> {
         let (now, before) = self.at(tick);
-        now.or(before).map(|sine| sine.turns as f64 / sine.block as f64).map(|turns| turns * self.rate_hz)
+        now.or(before)
+            .map(|sine| sine.turns as f64 / sine.block as f64)
+            .map(|turns| turns * self.rate_hz)
     }
 
     fn pattern(&self) -> Pattern {
@@ -140,12 +165,24 @@ mod tests {
 
     fn config(spacing: Spacing, start_hz: f64, stop_hz: f64) -> Config {
         let mut config = load(&Source::default()).unwrap();
-        (config.chirp.start_hz, config.chirp.stop_hz, config.chirp.quiet_before_s) = (start_hz, stop_hz, 0.1);
+        (
+            config.chirp.start_hz,
+            config.chirp.stop_hz,
+            config.chirp.quiet_before_s,
+        ) = (start_hz, stop_hz, 0.1);
         config.chirp.amplitude = [(10.0, 0.2), (100.0, 0.02)]
-            .map(|(frequency_hz, current_a)| AmplitudePoint { frequency_hz, current_a })
+            .map(|(frequency_hz, current_a)| AmplitudePoint {
+                frequency_hz,
+                current_a,
+            })
             .to_vec();
         let settings = &mut config.stepped_sine;
-        (settings.count, settings.spacing, settings.settle_s, settings.measure_s) = (9, spacing, 0.3, 0.2);
+        (
+            settings.count,
+            settings.spacing,
+            settings.settle_s,
+            settings.measure_s,
+        ) = (9, spacing, 0.3, 0.2);
         config
     }
 
@@ -158,10 +195,15 @@ mod tests {
 
     #[test]
     fn each_window_is_whole_periods_of_one_sine_of_its_amplitude() {
-        for (spacing, start_hz, stop_hz) in [(Spacing::Linear, 7.3, 431.0), (Spacing::Logarithmic, 431.0, 7.3)] {
+        for (spacing, start_hz, stop_hz) in [
+            (Spacing::Linear, 7.3, 431.0),
+            (Spacing::Logarithmic, 431.0, 7.3),
+        ] {
             let config = config(spacing, start_hz, stop_hz);
             let sines = SteppedSine::new(&config);
-            for (window, asked_hz) in windows(&sines).iter().zip(config.stepped_sine.frequencies_hz(start_hz, stop_hz))
+            for (window, asked_hz) in windows(&sines)
+                .iter()
+                .zip(config.stepped_sine.frequencies_hz(start_hz, stop_hz))
             {
                 let frequency_hz = window.turns as f64 * 5000.0 / window.period as f64;
                 // The nearest whole number of ticks is half a tick off at most.
@@ -169,14 +211,20 @@ mod tests {
                     (frequency_hz / asked_hz - 1.0).abs() <= 0.51 / window.period as f64,
                     "{frequency_hz} {asked_hz}"
                 );
-                assert!(window.periods == 6 && (window.period * window.periods) as f64 >= 0.2 * 5000.0 - 6.0);
+                assert!(
+                    window.periods == 6
+                        && (window.period * window.periods) as f64 >= 0.2 * 5000.0 - 6.0
+                );
                 // 0.2 A (10 Hz/f) between 10 and 100 Hz.
                 let amplitude_a = 0.2 * 10.0 / asked_hz.clamp(10.0, 100.0);
                 for n in 0..window.period * window.periods {
                     let turns = (n * window.turns % window.period) as f64 / window.period as f64;
                     let expected_a = amplitude_a * (2.0 * PI * turns).sin();
                     let current_a = sines.current_a((window.start + n) as u64);
-                    assert!((current_a - expected_a).abs() < 1e-12 * amplitude_a.max(0.1), "{asked_hz} Hz, tick {n}");
+                    assert!(
+                        (current_a - expected_a).abs() < 1e-12 * amplitude_a.max(0.1),
+                        "{asked_hz} Hz, tick {n}"
+                    );
                 }
             }
         }
@@ -185,14 +233,24 @@ mod tests {
     #[test]
     fn it_jumps_nowhere_and_rises_from_zero_and_falls_back_to_it() {
         let sines = SteppedSine::new(&config(Spacing::Logarithmic, 20.0, 200.0));
-        let signal: Vec<f64> = (0..sines.ticks()).map(|tick| sines.current_a(tick)).collect();
+        let signal: Vec<f64> = (0..sines.ticks())
+            .map(|tick| sines.current_a(tick))
+            .collect();
         // Both sines and both envelopes at their steepest: 2 (2 pi f A + pi A/(2 x 0.15 s))/rate, f A up to 2 + 2 Hz A.
-        let largest = signal.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        let largest = signal
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .fold(0.0, f64::max);
         assert!((0.001..0.012).contains(&largest), "{largest}");
-        let active: Vec<u64> = (0..sines.ticks()).filter(|tick| sines.active(*tick)).collect();
+        let active: Vec<u64> = (0..sines.ticks())
+            .filter(|tick| sines.active(*tick))
+            .collect();
         assert_eq!((active[0], signal[0], signal[500]), (500, 0.0, 0.0));
         let end = active.len() + 500;
-        assert!(signal[end..].iter().all(|u| *u == 0.0) && signal.len() - end == 40_000, "8 s of quiet");
+        assert!(
+            signal[end..].iter().all(|u| *u == 0.0) && signal.len() - end == 40_000,
+            "8 s of quiet"
+        );
         assert_eq!(active, (500..end as u64).collect::<Vec<_>>());
     }
 

@@ -20,66 +20,121 @@ pub(super) struct Curve {
 
 impl Curve {
     pub fn new(name: &str, pen: Pen, points: Vec<(f64, Complex<f64>)>) -> Curve {
-        Curve { name: name.into(), pen, points, first_deg: None }
+        Curve {
+            name: name.into(),
+            pen,
+            points,
+            first_deg: None,
+        }
     }
 
     /// Frequencies in hertz instead of rad/s.
     pub fn in_hertz(mut self) -> Curve {
-        self.points.iter_mut().for_each(|point| point.0 /= std::f64::consts::TAU);
+        self.points
+            .iter_mut()
+            .for_each(|point| point.0 /= std::f64::consts::TAU);
         self
     }
 
     /// A range of it, to its very ends; its phase goes on from below.
     pub fn part(&self, low: f64, high: f64) -> Curve {
         let inside = |w: f64| (low..=high).contains(&w);
-        let mut points: Vec<_> = self.points.iter().filter(|(w, _)| inside(*w)).copied().collect();
-        let first_deg = self.phase_deg().into_iter().find(|(w, _)| inside(*w)).map(|(_, phase)| phase);
-        if let Some(value) = self.between(low).filter(|_| points.first().is_some_and(|point| point.0 > low)) {
+        let mut points: Vec<_> = self
+            .points
+            .iter()
+            .filter(|(w, _)| inside(*w))
+            .copied()
+            .collect();
+        let first_deg = self
+            .phase_deg()
+            .into_iter()
+            .find(|(w, _)| inside(*w))
+            .map(|(_, phase)| phase);
+        if let Some(value) = self
+            .between(low)
+            .filter(|_| points.first().is_some_and(|point| point.0 > low))
+        {
             points.insert(0, (low, value));
         }
-        if let Some(value) = self.between(high).filter(|_| points.last().is_some_and(|point| point.0 < high)) {
+        if let Some(value) = self
+            .between(high)
+            .filter(|_| points.last().is_some_and(|point| point.0 < high))
+        {
             points.push((high, value));
         }
-        Curve { first_deg, ..Curve::new(&self.name, self.pen, points) }
+        Curve {
+            first_deg,
+            ..Curve::new(&self.name, self.pen, points)
+        }
     }
 
     /// On the straight line between the two points around a frequency.
     fn between(&self, w: f64) -> Option<Complex<f64>> {
         let after = self.points.partition_point(|point| point.0 <= w);
-        let (before, after) = (self.points.get(after.checked_sub(1)?)?, self.points.get(after)?);
+        let (before, after) = (
+            self.points.get(after.checked_sub(1)?)?,
+            self.points.get(after)?,
+        );
         Some(before.1 + (after.1 - before.1) * ((w - before.0) / (after.0 - before.0)))
     }
 
     pub fn magnitude(&self) -> Vec<(f64, f64)> {
-        self.points.iter().map(|(w, value)| (*w, value.norm())).collect()
+        self.points
+            .iter()
+            .map(|(w, value)| (*w, value.norm()))
+            .collect()
     }
 
     /// Unwrapped from the lowest frequency on, where it is in (-270, 90] degrees: a double integrator begins at -180.
     pub fn phase_deg(&self) -> Vec<(f64, f64)> {
-        let wrapped: Vec<f64> = self.points.iter().map(|(_, value)| value.arg().to_degrees()).collect();
+        let wrapped: Vec<f64> = self
+            .points
+            .iter()
+            .map(|(_, value)| value.arg().to_degrees())
+            .collect();
         let phases = unwrapped_deg(&wrapped, &vec![true; wrapped.len()]);
         let turn = match (phases.first(), self.first_deg) {
             (Some(first), Some(known)) => 360.0 * ((first - known) / 360.0).round(),
             (Some(first), None) if *first > 90.0 => 360.0,
             _ => 0.0,
         };
-        self.points.iter().zip(phases).map(|((w, _), phase)| (*w, phase - turn)).collect()
+        self.points
+            .iter()
+            .zip(phases)
+            .map(|((w, _), phase)| (*w, phase - turn))
+            .collect()
     }
 
     /// The curve in the complex plane.
     pub fn polar(&self) -> Vec<(f64, f64)> {
-        self.points.iter().map(|(_, value)| (value.re, value.im)).collect()
+        self.points
+            .iter()
+            .map(|(_, value)| (value.re, value.im))
+            .collect()
     }
 }
 
 /// Magnitude and phase, for two rows; the names stand in the legend of the first.
-pub(super) fn bode(heading: &str, frequency: &str, magnitude: &str, curves: &[Curve]) -> (Chart, Chart) {
+pub(super) fn bode(
+    heading: &str,
+    frequency: &str,
+    magnitude: &str,
+    curves: &[Curve],
+) -> (Chart, Chart) {
     let range = |scale: Scale| match ends(curves) {
         Some((low, high)) => scale.within(low, high),
         None => scale,
     };
-    let mut gains = Chart::new(heading, range(Scale::logarithmic(frequency)), Scale::logarithmic(magnitude));
-    let mut phases = Chart::new("", range(Scale::logarithmic(frequency)), Scale::degrees("Phase (deg)"));
+    let mut gains = Chart::new(
+        heading,
+        range(Scale::logarithmic(frequency)),
+        Scale::logarithmic(magnitude),
+    );
+    let mut phases = Chart::new(
+        "",
+        range(Scale::logarithmic(frequency)),
+        Scale::degrees("Phase (deg)"),
+    );
     for curve in curves {
         gains = gains.line(&curve.name, curve.pen, curve.magnitude());
         phases = phases.line("", curve.pen, curve.phase_deg());
@@ -88,9 +143,18 @@ pub(super) fn bode(heading: &str, frequency: &str, magnitude: &str, curves: &[Cu
 }
 
 fn ends(curves: &[Curve]) -> Option<(f64, f64)> {
-    let firsts = curves.iter().filter_map(|curve| curve.points.first()).map(|point| point.0);
-    let lasts = curves.iter().filter_map(|curve| curve.points.last()).map(|point| point.0);
-    let (low, high) = (firsts.fold(f64::INFINITY, f64::min), lasts.fold(f64::NEG_INFINITY, f64::max));
+    let firsts = curves
+        .iter()
+        .filter_map(|curve| curve.points.first())
+        .map(|point| point.0);
+    let lasts = curves
+        .iter()
+        .filter_map(|curve| curve.points.last())
+        .map(|point| point.0);
+    let (low, high) = (
+        firsts.fold(f64::INFINITY, f64::min),
+        lasts.fold(f64::NEG_INFINITY, f64::max),
+    );
     (low < high).then_some((low, high))
 }
 
@@ -109,12 +173,9 @@ pub(super) fn nyquist(heading: &str, re: (f64, f64), im: (f64, f64), what: &str)
 
 /// With the critical point and the unit circle.
 pub(super) fn critical(chart: Chart) -> Chart {
-    chart.line("|L| = 1", Pen::dotted(GREY), circle((0.0, 0.0), 1.0)).points(
-        "−1",
-        VERMILION,
-        Symbol::Cross,
-        vec![(-1.0, 0.0)],
-    )
+    chart
+        .line("|L| = 1", Pen::dotted(GREY), circle((0.0, 0.0), 1.0))
+        .points("−1", VERMILION, Symbol::Cross, vec![(-1.0, 0.0)])
 }
 
 /// The origin, where the corner between two resonance circles may lie on either side.

@@ -28,7 +28,9 @@ fn rays(chart: Chart, zero: Complex<f64>, omega_0: f64, pen: Pen) -> Chart {
 
 fn named(chart: Chart, name: &str, zero: Complex<f64>, aside: (f64, f64)) -> Chart {
     let at = (zero.re, zero.im);
-    chart.points("", VERMILION, Symbol::Ring, vec![at]).text(at, aside, name)
+    chart
+        .points("", VERMILION, Symbol::Ring, vec![at])
+        .text(at, aside, name)
 }
 
 fn degrees(angle: f64) -> String {
@@ -49,10 +51,24 @@ pub(super) fn fig_1_3(_: &Workshop) -> Result<Content, FigureError> {
         let (z, z2) = (on_circle(1.0, angle, z_deg), on_circle(1.0, angle, z2_deg));
         let chart = plane(heading, (-0.6, 2.4), (-1.5, 1.5)).equal();
         let chart = chart.line("same Θ", Pen::solid(BLUE), circle((centre, 0.0), radius));
-        let chart = rays(rays(chart, z, 1.0, Pen::solid(INK)), z2, 1.0, Pen::dashed(GREY));
+        let chart = rays(
+            rays(chart, z, 1.0, Pen::solid(INK)),
+            z2,
+            1.0,
+            Pen::dashed(GREY),
+        );
         let chart = named(named(chart, "z", z, (12.0, -8.0)), "z2", z2, (16.0, -6.0));
-        let chart = chart.points("", INK, Symbol::Dot, vec![(0.0, 1.0), (0.0, -1.0), (centre, 0.0)]);
-        charts.push(chart.text((0.0, 1.0), (-16.0, -10.0), "jω0").text((0.0, -1.0), (-20.0, 10.0), "−jω0"));
+        let chart = chart.points(
+            "",
+            INK,
+            Symbol::Dot,
+            vec![(0.0, 1.0), (0.0, -1.0), (centre, 0.0)],
+        );
+        charts.push(chart.text((0.0, 1.0), (-16.0, -10.0), "jω0").text(
+            (0.0, -1.0),
+            (-20.0, 10.0),
+            "−jω0",
+        ));
         let (ours, other) = (opening_angle(z, 1.0), opening_angle(z2, 1.0));
         content = content.compare(
             Comparison::within(
@@ -67,10 +83,17 @@ pub(super) fn fig_1_3(_: &Workshop) -> Result<Content, FigureError> {
         );
         content = content.compare(match angle_deg == 90.0 {
             true => Comparison::within("(a) Θ", 90.0, 0, ours.to_degrees(), "deg", 1e-9),
-            false => Comparison::holds("(b) Θ", "below 90 deg", ours.to_degrees() < 90.0, &degrees(ours)),
+            false => Comparison::holds(
+                "(b) Θ",
+                "below 90 deg",
+                ours.to_degrees() < 90.0,
+                &degrees(ours),
+            ),
         });
     }
-    Ok(content.row(380.0, charts).command("bench model bounds --bandwidth 100"))
+    Ok(content
+        .row(380.0, charts)
+        .command("bench model bounds --bandwidth 100"))
 }
 
 pub(super) fn fig_1_4(_: &Workshop) -> Result<Content, FigureError> {
@@ -84,23 +107,52 @@ pub(super) fn fig_1_4(_: &Workshop) -> Result<Content, FigureError> {
     let outside = vec![(-99.0, -99.0), (99.0, -99.0), (99.0, 99.0), (-99.0, 99.0)];
     let chart = plane("", (-3.0, 9.0), (-4.5, 4.5)).equal();
     let chart = chart
-        .mark(Mark::Area { name: "zeros here cost less".into(), colour: BLUE, strength: 0.12, outline: outside })
+        .mark(Mark::Area {
+            name: "zeros here cost less".into(),
+            colour: BLUE,
+            strength: 0.12,
+            outline: outside,
+        })
         .mark(Mark::Area {
             name: String::new(),
             colour: crate::report::colours::PAPER,
             strength: 1.0,
             outline: circle((centre, 0.0), radius),
         })
-        .line("Θ = 30 deg at ω0", Pen::solid(BLUE), circle((centre, 0.0), radius))
-        .line("Θ = 30 deg at the smaller ω0 of z2", Pen::dashed(GREEN), circle((centre_2, 0.0), radius_2));
-    let chart = rays(rays(chart, z, omega_0, Pen::solid(INK)), z2, smaller, Pen::dashed(GREY));
+        .line(
+            "Θ = 30 deg at ω0",
+            Pen::solid(BLUE),
+            circle((centre, 0.0), radius),
+        )
+        .line(
+            "Θ = 30 deg at the smaller ω0 of z2",
+            Pen::dashed(GREEN),
+            circle((centre_2, 0.0), radius_2),
+        );
+    let chart = rays(
+        rays(chart, z, omega_0, Pen::solid(INK)),
+        z2,
+        smaller,
+        Pen::dashed(GREY),
+    );
     let chart = named(named(chart, "z", z, (12.0, -8.0)), "z2", z2, (14.0, -8.0));
-    let chart = chart.text((0.0, omega_0), (-18.0, -6.0), "jω0").text((0.0, -omega_0), (-22.0, 8.0), "−jω0");
+    let chart = chart.text((0.0, omega_0), (-18.0, -6.0), "jω0").text(
+        (0.0, -omega_0),
+        (-22.0, 8.0),
+        "−jω0",
+    );
     let size = z.norm();
-    let bands = [Complex::new(size, 0.0), z, Complex::from_polar(size, 85f64.to_radians())]
-        .map(|zero| bandwidth_rad_s(zero, angle));
+    let bands = [
+        Complex::new(size, 0.0),
+        z,
+        Complex::from_polar(size, 85f64.to_radians()),
+    ]
+    .map(|zero| bandwidth_rad_s(zero, angle));
     let rising = bands[0] < bands[1] && bands[1] < bands[2];
-    let seen = (opening_angle(Complex::new(4.0, 4.0), omega_0), opening_angle(z2, omega_0));
+    let seen = (
+        opening_angle(Complex::new(4.0, 4.0), omega_0),
+        opening_angle(z2, omega_0),
+    );
     Ok(Content::new("The band ω0 that a zero z leaves if it may see it under 30 deg. A zero outside of the circle (shaded) leaves more, one inside (z2) less.")
         .setting("Eqs. (1-2), (1-3), α = 0.5, Θ = 30 deg")
         .assumed("z = 2 + 3j, z2 = 1.4 + 1.4j rad/s")

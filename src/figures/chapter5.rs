@@ -18,7 +18,10 @@ pub(super) fn fig_5_2(_: &Workshop) -> Result<Content, FigureError> {
         "no damping; 201 × 201 points; (a) profile chapter2, (b) profile stage, the one that was built and measured",
     )
     .assumed("ranges of both axes; the 3D view is Fig 2-5 (b)");
-    for (heading, name) in [("(a) Stage of Chapter 2", "chapter2"), ("(b) Stage of Chapter 5", "stage")] {
+    for (heading, name) in [
+        ("(a) Stage of Chapter 2", "chapter2"),
+        ("(b) Stage of Chapter 5", "stage"),
+    ] {
         let PlantSettings::Sr4dof(settings) = Model::profile(name).config()?.plant else {
             return Err(FigureError::Run(format!("profile {name} is another model")));
         };
@@ -32,12 +35,21 @@ pub(super) fn fig_5_2(_: &Workshop) -> Result<Content, FigureError> {
                 .collect::<Vec<f64>>()
         };
         let mirrored = map.iter().zip(map.iter().rev()).all(|(a, b)| a == b);
-        let below = map.iter().flat_map(|row| row.iter().zip(&asymmetries)).all(|(pairs, d)| *d > 0.0 || *pairs == 0);
+        let below = map
+            .iter()
+            .flat_map(|row| row.iter().zip(&asymmetries))
+            .all(|(pairs, d)| *d > 0.0 || *pairs == 0);
         let cells = Mark::Cells {
             x: edges(&asymmetries),
             y: edges(&points),
-            rows: map.iter().map(|row| row.iter().map(|pairs| usize::from(*pairs > 0)).collect()).collect(),
-            colours: vec![("no CNMP zeros".into(), Colour(222, 235, 247)), ("CNMP zeros".into(), Colour(0, 0, 0))],
+            rows: map
+                .iter()
+                .map(|row| row.iter().map(|pairs| usize::from(*pairs > 0)).collect())
+                .collect(),
+            colours: vec![
+                ("no CNMP zeros".into(), Colour(222, 235, 247)),
+                ("CNMP zeros".into(), Colour(0, 0, 0)),
+            ],
         };
         charts.push(
             Chart::new(

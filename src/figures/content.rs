@@ -26,7 +26,10 @@ pub struct Content {
 impl Content {
     /// A figure of which so much is known.
     pub fn new(drawn: &str) -> Content {
-        Content { drawn: drawn.into(), ..Content::default() }
+        Content {
+            drawn: drawn.into(),
+            ..Content::default()
+        }
     }
 
     /// With a setting.
@@ -99,23 +102,55 @@ pub struct Comparison {
 
 impl Comparison {
     /// A number printed with so many digits behind the point.
-    pub fn number(what: &str, printed: f64, digits: usize, computed: f64, unit: &str) -> Comparison {
-        Comparison::within(what, printed, digits, computed, unit, 0.5 * 10f64.powi(-(digits as i32)))
+    pub fn number(
+        what: &str,
+        printed: f64,
+        digits: usize,
+        computed: f64,
+        unit: &str,
+    ) -> Comparison {
+        Comparison::within(
+            what,
+            printed,
+            digits,
+            computed,
+            unit,
+            0.5 * 10f64.powi(-(digits as i32)),
+        )
     }
 
     /// The same with another tolerance, in the unit.
-    pub fn within(what: &str, printed: f64, digits: usize, computed: f64, unit: &str, tolerance: f64) -> Comparison {
+    pub fn within(
+        what: &str,
+        printed: f64,
+        digits: usize,
+        computed: f64,
+        unit: &str,
+        tolerance: f64,
+    ) -> Comparison {
         let more = digits + 2;
         let difference = computed - printed;
         // A printed digit is rounded either way; the sum of the two is exact to 1e-12 of it.
         let agrees = difference.abs() <= tolerance * (1.0 + 1e-12) + 1e-15 * printed.abs();
         Comparison {
             what: what.into(),
-            printed: format!("{} {unit}", signed(printed, digits)).trim_end().into(),
-            computed: format!("{} {unit}", signed(computed, more)).trim_end().into(),
-            difference: format!("{}{}", if difference >= 0.0 { "+" } else { "" }, signed(difference, more)),
+            printed: format!("{} {unit}", signed(printed, digits))
+                .trim_end()
+                .into(),
+            computed: format!("{} {unit}", signed(computed, more))
+                .trim_end()
+                .into(),
+            difference: format!(
+                "{}{}",
+                if difference >= 0.0 { "+" } else { "" },
+                signed(difference, more)
+            ),
             tolerance: Some(tolerance),
-            verdict: if agrees { Verdict::Agrees } else { Verdict::Differs },
+            verdict: if agrees {
+                Verdict::Agrees
+            } else {
+                Verdict::Differs
+            },
             remark: String::new(),
         }
     }
@@ -129,7 +164,11 @@ impl Comparison {
             computed: computed.into(),
             difference: if same { "none" } else { "differs" }.into(),
             tolerance: None,
-            verdict: if same { Verdict::Agrees } else { Verdict::Differs },
+            verdict: if same {
+                Verdict::Agrees
+            } else {
+                Verdict::Differs
+            },
             remark: String::new(),
         }
     }
@@ -141,7 +180,11 @@ impl Comparison {
             printed: printed.into(),
             computed: computed.into(),
             difference: if holds { "none" } else { "differs" }.into(),
-            verdict: if holds { Verdict::Agrees } else { Verdict::Differs },
+            verdict: if holds {
+                Verdict::Agrees
+            } else {
+                Verdict::Differs
+            },
             ..words
         }
     }
@@ -150,12 +193,21 @@ impl Comparison {
     pub fn unprinted(what: &str, computed: impl Into<String>) -> Comparison {
         let words = Comparison::words(what, "", "");
         let (printed, difference) = ("not printed".into(), String::new());
-        Comparison { printed, computed: computed.into(), difference, verdict: Verdict::NotPrinted, ..words }
+        Comparison {
+            printed,
+            computed: computed.into(),
+            difference,
+            verdict: Verdict::NotPrinted,
+            ..words
+        }
     }
 
     /// With a remark.
     pub fn remark(self, text: &str) -> Comparison {
-        Comparison { remark: text.into(), ..self }
+        Comparison {
+            remark: text.into(),
+            ..self
+        }
     }
 }
 
@@ -163,5 +215,9 @@ impl Comparison {
 pub(super) fn signed(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     let zero = text.chars().all(|c| !('1'..='9').contains(&c));
-    if zero { text.replace('-', "") } else { text.replace('-', "\u{2212}") }
+    if zero {
+        text.replace('-', "")
+    } else {
+        text.replace('-', "\u{2212}")
+    }
 }

@@ -52,7 +52,11 @@ pub(super) struct Closed {
 impl Workshop {
     /// Recordings of runs go into `folder`, which need not be there; whoever gives it removes it.
     pub fn new(folder: &Path) -> Workshop {
-        Workshop { folder: folder.into(), chirp: OnceCell::new(), steps: [OnceCell::new(), OnceCell::new()] }
+        Workshop {
+            folder: folder.into(),
+            chirp: OnceCell::new(),
+            steps: [OnceCell::new(), OnceCell::new()],
+        }
     }
 
     /// The frequency response of `bench chirp`.
@@ -72,7 +76,9 @@ impl Workshop {
         if let Some(known) = cell.get() {
             return Ok(known);
         }
-        let config = Model::stage().set(&format!("control.controller={}", which.name())).config()?;
+        let config = Model::stage()
+            .set(&format!("control.controller={}", which.name()))
+            .config()?;
         let closed = self.closed(config)?;
         Ok(cell.get_or_init(|| closed))
     }
@@ -82,7 +88,8 @@ impl Workshop {
         let plan = Plan::control(config.clone()).map_err(session::SessionError::Plan)?;
         let recording = self.run(&plan, "control")?;
         let measured = session::measure(&recording, &config)?;
-        let measured = measured.ok_or_else(|| FigureError::Run("the run ended before its steady state".into()))?;
+        let measured = measured
+            .ok_or_else(|| FigureError::Run("the run ended before its steady state".into()))?;
         let ticks: Vec<TickRecord> = recording.ticks()?.collect::<Result<_, _>>()?;
         Ok(closed(&ticks, config.servo.period_s(), measured))
     }
@@ -93,7 +100,9 @@ impl Workshop {
         run.totals()?;
         let path = run.path.clone();
         if let Some((trip, tick)) = run.ended.trip {
-            return Err(FigureError::Run(format!("`bench {what}` tripped at tick {tick}: {trip}")));
+            return Err(FigureError::Run(format!(
+                "`bench {what}` tripped at tick {tick}: {trip}"
+            )));
         }
         if !run.ended.completed {
             return Err(FigureError::Run(format!("`bench {what}` was stopped")));
@@ -105,11 +114,24 @@ impl Workshop {
 
 /// The ticks with the loop closed, relative to where the stage rested before.
 fn closed(ticks: &[TickRecord], period_s: f64, measured: Measured) -> Closed {
-    let active: Vec<&TickRecord> = ticks.iter().filter(|tick| tick.flags & flag::ACTIVE != 0).collect();
-    let origin_m = ticks.iter().rfind(|tick| active.first().is_some_and(|first| tick.tick < first.tick));
+    let active: Vec<&TickRecord> = ticks
+        .iter()
+        .filter(|tick| tick.flags & flag::ACTIVE != 0)
+        .collect();
+    let origin_m = ticks
+        .iter()
+        .rfind(|tick| active.first().is_some_and(|first| tick.tick < first.tick));
     let origin_m = origin_m.map_or(0.0, |tick| tick.reference_m);
     let course = |of: fn(&TickRecord) -> f64| {
-        active.iter().enumerate().map(|(k, tick)| (k as f64 * period_s, of(tick) - origin_m)).collect()
+        active
+            .iter()
+            .enumerate()
+            .map(|(k, tick)| (k as f64 * period_s, of(tick) - origin_m))
+            .collect()
     };
-    Closed { course: course(|tick| tick.position_m), reference: course(|tick| tick.reference_m), measured }
+    Closed {
+        course: course(|tick| tick.position_m),
+        reference: course(|tick| tick.reference_m),
+        measured,
+    }
 }

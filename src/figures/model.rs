@@ -22,7 +22,10 @@ pub(super) struct ModeOf(pub &'static str, pub f64, pub f64, pub f64);
 impl Model {
     /// A profile by its name.
     pub fn profile(name: &'static str) -> Model {
-        Model { profile: Some(name), sets: Vec::new() }
+        Model {
+            profile: Some(name),
+            sets: Vec::new(),
+        }
     }
 
     /// The default profile, the stage that was built.
@@ -36,7 +39,10 @@ impl Model {
             format!("{name}={{omega_rad_s={w:?},residue_per_kg={r:?},damping_ratio={zeta:?}}}")
         };
         let modes: Vec<String> = modes.iter().map(mode).collect();
-        Model::stage().set(&format!("plant={{model=\"modal\",modes={{{}}}}}", modes.join(",")))
+        Model::stage().set(&format!(
+            "plant={{model=\"modal\",modes={{{}}}}}",
+            modes.join(",")
+        ))
     }
 
     /// With one setting more, KEY=VALUE.
@@ -48,24 +54,36 @@ impl Model {
     /// At an operating point (ratio of the beam length of 47.5 mm) and a mass asymmetry (ratio).
     pub fn at(self, operating_point: f64, asymmetry: f64) -> Model {
         let point_m = operating_point * 0.0475;
-        self.set(&format!("plant.operating_point_m={point_m:?}")).set(&format!("plant.mass_asymmetry={asymmetry:?}"))
+        self.set(&format!("plant.operating_point_m={point_m:?}"))
+            .set(&format!("plant.mass_asymmetry={asymmetry:?}"))
     }
 
     /// `bench WHAT` on this plant, then `more`.
     pub fn command(&self, what: &str, more: &str) -> String {
         let profile = self.profile.map(|name| format!(" --config {name}"));
-        let quoted = |set: &String| match set.chars().any(|c| !(c.is_ascii_alphanumeric() || "._=+-".contains(c))) {
+        let quoted = |set: &String| match set
+            .chars()
+            .any(|c| !(c.is_ascii_alphanumeric() || "._=+-".contains(c)))
+        {
             true => format!(" --set '{set}'"),
             false => format!(" --set {set}"),
         };
         let sets: String = self.sets.iter().map(quoted).collect();
-        let more = if more.is_empty() { String::new() } else { format!(" {more}") };
+        let more = if more.is_empty() {
+            String::new()
+        } else {
+            format!(" {more}")
+        };
         format!("bench {what}{}{sets}{more}", profile.unwrap_or_default())
     }
 
     /// The effective configuration.
     pub fn config(&self) -> Result<Config, FigureError> {
-        let source = Source { config: self.profile.map(String::from), sets: self.sets.clone(), ..Source::default() };
+        let source = Source {
+            config: self.profile.map(String::from),
+            sets: self.sets.clone(),
+            ..Source::default()
+        };
         Ok(load(&source)?)
     }
 
@@ -107,8 +125,9 @@ impl Varied {
         if let Some(slot) = plant.pointer_mut(&self.pointer) {
             *slot = value.into();
         }
-        let settings: PlantSettings = serde_json::from_value(plant)
-            .map_err(|e| FigureError::Run(format!("the plant at {} = {value}: {e}", self.pointer)))?;
+        let settings: PlantSettings = serde_json::from_value(plant).map_err(|e| {
+            FigureError::Run(format!("the plant at {} = {value}: {e}", self.pointer))
+        })?;
         Ok(plant::build(&settings)?)
     }
 
@@ -121,25 +140,54 @@ impl Varied {
 /// Values at equal distances, both ends among them; `count` is two at least.
 pub(super) fn even(from: f64, to: f64, count: usize) -> Vec<f64> {
     let last = (count - 1) as f64;
-    (0..count).map(|k| if k + 1 == count { to } else { from + (to - from) * k as f64 / last }).collect()
+    (0..count)
+        .map(|k| {
+            if k + 1 == count {
+                to
+            } else {
+                from + (to - from) * k as f64 / last
+            }
+        })
+        .collect()
 }
 
 /// Values at equal ratios, both ends among them.
 pub(super) fn geometric(from: f64, to: f64, count: usize) -> Vec<f64> {
-    even(from.ln(), to.ln(), count).into_iter().map(f64::exp).collect()
+    even(from.ln(), to.ln(), count)
+        .into_iter()
+        .map(f64::exp)
+        .collect()
 }
 
 /// Frequencies in rad/s dense enough to show every resonance and antiresonance of a sum.
-pub(super) fn frequencies(sum: &ModalSum, low_rad_s: f64, high_rad_s: f64) -> Result<Vec<f64>, FigureError> {
-    let poles = sum.terms().iter().map(|term| (term.omega_rad_s, term.damping_ratio)).filter(|(w, _)| *w > 0.0);
+pub(super) fn frequencies(
+    sum: &ModalSum,
+    low_rad_s: f64,
+    high_rad_s: f64,
+) -> Result<Vec<f64>, FigureError> {
+    let poles = sum
+        .terms()
+        .iter()
+        .map(|term| (term.omega_rad_s, term.damping_ratio))
+        .filter(|(w, _)| *w > 0.0);
     let zeros = sum.damped_zeros()?;
-    let dips = zeros.iter().filter(|zero| zero.s.im > 0.0).map(|zero| (zero.s.norm(), zero.s.re.abs() / zero.s.norm()));
-    let features: Vec<(f64, f64)> = poles.chain(dips).map(|(w, zeta)| (w, zeta.max(1e-4))).collect();
+    let dips = zeros
+        .iter()
+        .filter(|zero| zero.s.im > 0.0)
+        .map(|zero| (zero.s.norm(), zero.s.re.abs() / zero.s.norm()));
+    let features: Vec<(f64, f64)> = poles
+        .chain(dips)
+        .map(|(w, zeta)| (w, zeta.max(1e-4)))
+        .collect();
     Ok(control::grid(low_rad_s, high_rad_s, &features))
 }
 
 /// G(jw) at such frequencies.
-pub(super) fn response(sum: &ModalSum, low: f64, high: f64) -> Result<Vec<(f64, Complex<f64>)>, FigureError> {
+pub(super) fn response(
+    sum: &ModalSum,
+    low: f64,
+    high: f64,
+) -> Result<Vec<(f64, Complex<f64>)>, FigureError> {
     let at = |w: f64| (w, sum.response(Complex::new(0.0, w)));
     Ok(frequencies(sum, low, high)?.into_iter().map(at).collect())
 }

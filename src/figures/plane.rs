@@ -25,12 +25,19 @@ pub(super) fn plane(heading: &str, re: (f64, f64), im: (f64, f64)) -> Chart {
 /// Poles of a sum in the upper half plane.
 pub(super) fn poles(sum: &ModalSum) -> Vec<(f64, f64)> {
     let pole = |w: f64, zeta: f64| (-zeta * w, w * (1.0 - zeta * zeta).max(0.0).sqrt());
-    sum.terms().iter().map(|term| pole(term.omega_rad_s, term.damping_ratio)).collect()
+    sum.terms()
+        .iter()
+        .map(|term| pole(term.omega_rad_s, term.damping_ratio))
+        .collect()
 }
 
 /// Zeros in the upper half plane, the real axis included.
 pub(super) fn places(zeros: &[Zero]) -> Vec<(f64, f64)> {
-    zeros.iter().filter(|zero| zero.s.im >= 0.0).map(|zero| (zero.s.re, zero.s.im)).collect()
+    zeros
+        .iter()
+        .filter(|zero| zero.s.im >= 0.0)
+        .map(|zero| (zero.s.re, zero.s.im))
+        .collect()
 }
 
 /// Which part of the plane is drawn.
@@ -48,7 +55,11 @@ pub(super) enum Part {
 pub(super) fn locus(varied: &Varied, plane: Plane, values: &[f64]) -> Result<Locus, FigureError> {
     follow(plane, values, |value| {
         let structure = varied.structure(value)?;
-        Ok(if plane == Plane::Undamped { undamped_zeros(&structure)? } else { damped_zeros(&structure)? })
+        Ok(if plane == Plane::Undamped {
+            undamped_zeros(&structure)?
+        } else {
+            damped_zeros(&structure)?
+        })
     })
 }
 
@@ -60,9 +71,18 @@ pub(super) fn follow(
     mut zeros: impl FnMut(f64) -> Result<Vec<Zero>, FigureError>,
 ) -> Result<Locus, FigureError> {
     let mut locus = Locus::follow(plane, values, &mut zeros)?;
-    let meetings: Vec<f64> = locus.changes.iter().flat_map(|change| beside(change.value, values)).collect();
+    let meetings: Vec<f64> = locus
+        .changes
+        .iter()
+        .flat_map(|change| beside(change.value, values))
+        .collect();
     for round in 0..REFINEMENTS {
-        let mut all: Vec<f64> = locus.values.iter().copied().chain(between(&locus)).collect();
+        let mut all: Vec<f64> = locus
+            .values
+            .iter()
+            .copied()
+            .chain(between(&locus))
+            .collect();
         if round == 0 {
             all.extend(&meetings);
         }
@@ -79,8 +99,14 @@ const STRIDE: f64 = 0.03;
 /// Values to both sides of a meeting, nearer and nearer.
 fn beside(value: f64, values: &[f64]) -> Vec<f64> {
     let range = (values[values.len() - 1] - values[0]).abs();
-    let size = if value == 0.0 { range } else { value.abs().min(range) };
-    (2..40).flat_map(|k| [value - size * 0.5f64.powi(k), value + size * 0.5f64.powi(k)]).collect()
+    let size = if value == 0.0 {
+        range
+    } else {
+        value.abs().min(range)
+    };
+    (2..40)
+        .flat_map(|k| [value - size * 0.5f64.powi(k), value + size * 0.5f64.powi(k)])
+        .collect()
 }
 
 /// Values between those where some zero moved too far.
@@ -94,9 +120,16 @@ fn between(locus: &Locus) -> Vec<f64> {
     };
     let middle = |k: usize| {
         let (a, b) = (locus.values[k], locus.values[k + 1]);
-        if a * b > 0.0 { (a * b).sqrt().copysign(a) } else { 0.5 * (a + b) }
+        if a * b > 0.0 {
+            (a * b).sqrt().copysign(a)
+        } else {
+            0.5 * (a + b)
+        }
     };
-    (0..locus.values.len() - 1).filter(far).map(middle).collect()
+    (0..locus.values.len() - 1)
+        .filter(far)
+        .map(middle)
+        .collect()
 }
 
 /// In the order of `values` and within their ends, each once.
@@ -116,7 +149,12 @@ pub(super) fn tracks(mut chart: Chart, name: &str, pen: Pen, locus: &Locus, part
     let mut name = name;
     for track in &locus.tracks {
         for points in views(track, part) {
-            chart = chart.mark(Mark::Line { name: name.into(), pen, points, directed: false });
+            chart = chart.mark(Mark::Line {
+                name: name.into(),
+                pen,
+                points,
+                directed: false,
+            });
             name = "";
         }
     }
@@ -126,7 +164,10 @@ pub(super) fn tracks(mut chart: Chart, name: &str, pen: Pen, locus: &Locus, part
 /// A track as it is seen: without damping one of a pair s, -s stands for both.
 fn views(track: &[Option<Complex<f64>>], part: Part) -> Vec<Vec<(f64, f64)>> {
     let seen = |of: fn(Complex<f64>) -> (f64, f64)| {
-        track.iter().map(|s| s.map_or((f64::NAN, f64::NAN), of)).collect::<Vec<_>>()
+        track
+            .iter()
+            .map(|s| s.map_or((f64::NAN, f64::NAN), of))
+            .collect::<Vec<_>>()
     };
     match part {
         Part::Quadrant => vec![seen(|s| (s.re.abs(), s.im.abs()))],
@@ -138,16 +179,33 @@ fn views(track: &[Option<Complex<f64>>], part: Part) -> Vec<Vec<(f64, f64)>> {
 /// Where zeros meet, on the axes.
 pub(super) fn changes(chart: Chart, locus: &Locus) -> Chart {
     let finite = |change: &&Change| change.s.re.is_finite() && change.s.norm() > 0.0;
-    let points: Vec<(f64, f64)> = locus.changes.iter().filter(finite).map(|c| (c.s.re, c.s.im)).collect();
-    if points.is_empty() { chart } else { chart.points("zeros meet", INK, Symbol::Dot, points) }
+    let points: Vec<(f64, f64)> = locus
+        .changes
+        .iter()
+        .filter(finite)
+        .map(|c| (c.s.re, c.s.im))
+        .collect();
+    if points.is_empty() {
+        chart
+    } else {
+        chart.points("zeros meet", INK, Symbol::Dot, points)
+    }
 }
 
 /// Poles and zeros of one plant.
-pub(super) fn pole_zero(chart: Chart, names: (&str, &str), colour: Colour, sum: &ModalSum, zeros: &[Zero]) -> Chart {
-    chart.points(names.0, INK, Symbol::Cross, poles(sum)).points(
-        names.1,
-        if colour == INK { BLUE } else { colour },
-        Symbol::Ring,
-        places(zeros),
-    )
+pub(super) fn pole_zero(
+    chart: Chart,
+    names: (&str, &str),
+    colour: Colour,
+    sum: &ModalSum,
+    zeros: &[Zero],
+) -> Chart {
+    chart
+        .points(names.0, INK, Symbol::Cross, poles(sum))
+        .points(
+            names.1,
+            if colour == INK { BLUE } else { colour },
+            Symbol::Ring,
+            places(zeros),
+        )
 }

@@ -9,7 +9,8 @@ use super::{Comparison, Content, FigureError, Workshop};
 use crate::config::{PlantSettings, XySettings};
 use crate::plant;
 use crate::zeros::{
-    Kinds, ModalSum, Place, Row, Sequence, TABLES, Table, Term, phase_drop_deg, table_of, undamped_zeros,
+    Kinds, ModalSum, Place, Row, Sequence, TABLES, Table, Term, phase_drop_deg, table_of,
+    undamped_zeros,
 };
 
 const TAU: f64 = std::f64::consts::TAU;
@@ -48,11 +49,32 @@ pub(super) fn table_2_2(_: &Workshop) -> Result<Content, FigureError> {
         content = content.command(model.command("model modes", ""));
         for (k, mode) in model.modal()?.modes.iter().enumerate() {
             let hertz = mode.omega_rad_s / TAU;
-            content = content.compare(Comparison::number(&format!("{at}, f{}", k + 1), frequencies[k], 1, hertz, "Hz"));
-            let side = mode.shape.iter().zip(shapes[k]).map(|(ours, theirs)| ours * theirs).sum::<f64>().signum();
-            for (name, (ours, printed)) in ["x1", "y1", "y2", "y3"].iter().zip(mode.shape.iter().zip(shapes[k])) {
-                let row =
-                    Comparison::within(&format!("{at}, mode {}, {name}", k + 1), printed, 4, side * ours, "", 5e-4);
+            content = content.compare(Comparison::number(
+                &format!("{at}, f{}", k + 1),
+                frequencies[k],
+                1,
+                hertz,
+                "Hz",
+            ));
+            let side = mode
+                .shape
+                .iter()
+                .zip(shapes[k])
+                .map(|(ours, theirs)| ours * theirs)
+                .sum::<f64>()
+                .signum();
+            for (name, (ours, printed)) in ["x1", "y1", "y2", "y3"]
+                .iter()
+                .zip(mode.shape.iter().zip(shapes[k]))
+            {
+                let row = Comparison::within(
+                    &format!("{at}, mode {}, {name}", k + 1),
+                    printed,
+                    4,
+                    side * ours,
+                    "",
+                    5e-4,
+                );
                 let flipped = asymmetry > 0.0 && k == 0 && name.starts_with('y') && *name != "y1";
                 content = content.compare(if flipped {
                     row.remark("the printed signs of y2 and y3 are flipped in this column: compare D = 0 %")
@@ -68,17 +90,31 @@ pub(super) fn table_2_2(_: &Workshop) -> Result<Content, FigureError> {
 /// Table 2-3: phase drop in degrees, operating point as a ratio of L, deviations of the masses a to h in per cent.
 const TABLE_2_3: [(f64, f64, [f64; 8]); 3] = [
     (0.0, 0.0, [0.0; 8]),
-    (360.0, 0.0488, [-8.16, 13.10, 8.57, -13.21, -13.24, 0.66, -4.80, -13.12]),
-    (720.0, 0.0954, [8.47, 12.08, -14.19, -12.78, 6.59, -2.42, 14.97, 5.14]),
+    (
+        360.0,
+        0.0488,
+        [-8.16, 13.10, 8.57, -13.21, -13.24, 0.66, -4.80, -13.12],
+    ),
+    (
+        720.0,
+        0.0954,
+        [8.47, 12.08, -14.19, -12.78, 6.59, -2.42, 14.97, 5.14],
+    ),
 ];
 const PLACES: [&str; 8] = ["sL", "sR", "sT", "sB", "gL", "gR", "gT", "gB"];
 
 /// The XY stage with the masses of a row at the places that a labelling gives them.
 fn labelled(base: &XySettings, row: usize, labels: &[usize; 8]) -> XySettings {
     let (_, point, deviations) = TABLE_2_3[row];
-    let mut settings = XySettings { operating_point_m: point * base.beam_length_m, ..base.clone() };
+    let mut settings = XySettings {
+        operating_point_m: point * base.beam_length_m,
+        ..base.clone()
+    };
     let at = &mut settings.secondary_mass_deviation;
-    let slots = [&mut at.sL, &mut at.sR, &mut at.sT, &mut at.sB, &mut at.gL, &mut at.gR, &mut at.gT, &mut at.gB];
+    let slots = [
+        &mut at.sL, &mut at.sR, &mut at.sT, &mut at.sB, &mut at.gL, &mut at.gR, &mut at.gT,
+        &mut at.gB,
+    ];
     for (slot, label) in slots.into_iter().zip(labels) {
         *slot = deviations[*label] / 100.0;
     }
@@ -86,13 +122,20 @@ fn labelled(base: &XySettings, row: usize, labels: &[usize; 8]) -> XySettings {
 }
 
 fn drop_deg(settings: XySettings) -> Result<f64, FigureError> {
-    Ok(phase_drop_deg(&undamped_zeros(&plant::build(&PlantSettings::Xy(settings))?)?))
+    Ok(phase_drop_deg(&undamped_zeros(&plant::build(
+        &PlantSettings::Xy(settings),
+    )?)?))
 }
 
 /// The next of all orders of eight things, in alphabetical order; `false` after the last.
 fn next_order(order: &mut [usize; 8]) -> bool {
-    let Some(from) = (0..7).rev().find(|&k| order[k] < order[k + 1]) else { return false };
-    let to = (from + 1..8).rev().find(|&k| order[k] > order[from]).unwrap_or(from + 1);
+    let Some(from) = (0..7).rev().find(|&k| order[k] < order[k + 1]) else {
+        return false;
+    };
+    let to = (from + 1..8)
+        .rev()
+        .find(|&k| order[k] > order[from])
+        .unwrap_or(from + 1);
     order.swap(from, to);
     order[from + 1..].reverse();
     true
@@ -102,7 +145,9 @@ fn next_order(order: &mut [usize; 8]) -> bool {
 fn labelling(base: &XySettings) -> Result<[usize; 8], FigureError> {
     let mut labels = [0, 1, 2, 3, 4, 5, 6, 7];
     loop {
-        let fits = |row: usize| Ok::<bool, FigureError>(drop_deg(labelled(base, row, &labels))? == TABLE_2_3[row].0);
+        let fits = |row: usize| {
+            Ok::<bool, FigureError>(drop_deg(labelled(base, row, &labels))? == TABLE_2_3[row].0)
+        };
         if fits(2)? && fits(1)? {
             return Ok(labels);
         }
@@ -117,18 +162,29 @@ pub(super) fn table_2_3(_: &Workshop) -> Result<Content, FigureError> {
         return Err(FigureError::Run("profile xy is another model".into()));
     };
     let labels = labelling(&base)?;
-    let words: Vec<String> =
-        PLACES.iter().zip(labels).map(|(place, k)| format!("{} at {place}", char::from(b'a' + k as u8))).collect();
+    let words: Vec<String> = PLACES
+        .iter()
+        .zip(labels)
+        .map(|(place, k)| format!("{} at {place}", char::from(b'a' + k as u8)))
+        .collect();
     let mut content = Content::new("Phase drop of the XY stage with the printed deviations of its eight secondary masses.")
         .setting("profile xy: pinwheel, no geometric stiffness, no damping")
         .assumed(format!("the places of the labels a to h, which only Fig 1-2a would tell: {}, the first in alphabetical order of the 145 out of 40320 labellings that give all three rows in the pinwheel", words.join(", ")));
     for (row, (printed, point, _)) in TABLE_2_3.iter().enumerate() {
         let settings = labelled(&base, row, &labels);
         let masses = serde_json::to_value(settings.secondary_mass_deviation).unwrap_or_default();
-        let mut model = Model::profile("xy").set(&format!("plant.operating_point_m={:?}", settings.operating_point_m));
+        let mut model = Model::profile("xy").set(&format!(
+            "plant.operating_point_m={:?}",
+            settings.operating_point_m
+        ));
         for place in PLACES {
-            let deviation = masses.get(place).and_then(serde_json::Value::as_f64).unwrap_or_default();
-            model = model.set(&format!("plant.secondary_mass_deviation.{place}={deviation:?}"));
+            let deviation = masses
+                .get(place)
+                .and_then(serde_json::Value::as_f64)
+                .unwrap_or_default();
+            model = model.set(&format!(
+                "plant.secondary_mass_deviation.{place}={deviation:?}"
+            ));
         }
         let computed = drop_deg(settings)?;
         content = content
@@ -199,7 +255,9 @@ fn mmp_places(sum: &ModalSum) -> Result<Vec<Place>, FigureError> {
         _ => Place::AboveV,
     };
     let zeros = sum.undamped_zeros()?;
-    let mmp = zeros.iter().filter(|zero| zero.kind == crate::zeros::ZeroKind::Mmp && zero.s.im > 0.0);
+    let mmp = zeros
+        .iter()
+        .filter(|zero| zero.kind == crate::zeros::ZeroKind::Mmp && zero.s.im > 0.0);
     Ok(mmp.map(|zero| place(zero.s.im)).collect())
 }
 
@@ -219,13 +277,18 @@ fn drawn(index: usize) -> Result<(Vec<Drawn>, usize), FigureError> {
         let slot = &mut rows[row.number - 1];
         slot.count += 1;
         slot.as_printed += usize::from(row.kinds.contains(&kinds) && mmp_places(&sum)? == row.mmp);
-        slot.example.get_or_insert((sum, sequence.to_string(), kinds));
+        slot.example
+            .get_or_insert((sum, sequence.to_string(), kinds));
     }
     Ok((rows, outside))
 }
 
 fn kinds_of(row: &Row) -> String {
-    row.kinds.iter().map(Kinds::to_string).collect::<Vec<_>>().join(" or ")
+    row.kinds
+        .iter()
+        .map(Kinds::to_string)
+        .collect::<Vec<_>>()
+        .join(" or ")
 }
 
 fn places_of(row: &Row) -> String {
@@ -236,11 +299,21 @@ fn places_of(row: &Row) -> String {
     };
     let mut words: Vec<&str> = row.mmp.iter().map(word).collect();
     words.dedup();
-    if words.is_empty() { String::new() } else { format!(", MMP in {}", words.join(" and ")) }
+    if words.is_empty() {
+        String::new()
+    } else {
+        format!(", MMP in {}", words.join(" and "))
+    }
 }
 
 fn example_words(sum: &ModalSum) -> String {
-    let term = |term: &Term| format!("{} at {} rad/s", signed(term.residue_per_kg, 4), signed(term.omega_rad_s, 4));
+    let term = |term: &Term| {
+        format!(
+            "{} at {} rad/s",
+            signed(term.residue_per_kg, 4),
+            signed(term.omega_rad_s, 4)
+        )
+    };
     let terms: Vec<String> = sum.terms().iter().map(term).collect();
     let constant = if sum.constant_m_per_n() == 0.0 {
         String::new()
@@ -259,12 +332,17 @@ fn table_of_chapter_3(index: usize, class: &str) -> Result<Content, FigureError>
         let what = format!("{} {}", row.signs, row.printed);
         let printed = format!("{}{}", kinds_of(row), places_of(row));
         let Some((sum, sequence, kinds)) = drawn.example else {
-            content = content.compare(Comparison::unprinted(&what, "no plant drawn").remark("rare: draw more"));
+            content = content
+                .compare(Comparison::unprinted(&what, "no plant drawn").remark("rare: draw more"));
             continue;
         };
-        let computed = format!("{} of {} plants; {sequence}: {kinds}", drawn.as_printed, drawn.count);
+        let computed = format!(
+            "{} of {} plants; {sequence}: {kinds}",
+            drawn.as_printed, drawn.count
+        );
         content = content.compare(
-            Comparison::holds(&what, &printed, drawn.as_printed == drawn.count, &computed).remark(&example_words(&sum)),
+            Comparison::holds(&what, &printed, drawn.as_printed == drawn.count, &computed)
+                .remark(&example_words(&sum)),
         );
         if sum.constant_m_per_n() == 0.0 {
             let names = ["a", "b", "c"];

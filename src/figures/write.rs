@@ -36,7 +36,12 @@ pub fn make_all(
 
 fn made(entry: &'static Entry, folder: &Path, workshop: &Workshop) -> Result<Made, FigureError> {
     let make = match entry.make {
-        Make::Not(reason) => return Ok(Made { entry, outcome: Err(reason) }),
+        Make::Not(reason) => {
+            return Ok(Made {
+                entry,
+                outcome: Err(reason),
+            });
+        }
         Make::Draw(make) => make,
     };
     let content = make(workshop)?;
@@ -50,7 +55,10 @@ fn made(entry: &'static Entry, folder: &Path, workshop: &Workshop) -> Result<Mad
     if let Some(svg) = &svg {
         write(&folder.join(entry.file()), svg)?;
     }
-    Ok(Made { entry, outcome: Ok((content, svg)) })
+    Ok(Made {
+        entry,
+        outcome: Ok((content, svg)),
+    })
 }
 
 fn write(path: &Path, text: &str) -> Result<(), FigureError> {
@@ -58,5 +66,8 @@ fn write(path: &Path, text: &str) -> Result<(), FigureError> {
 }
 
 fn failed(path: &Path, error: &std::io::Error) -> FigureError {
-    FigureError::Write { path: path.display().to_string(), why: error.to_string() }
+    FigureError::Write {
+        path: path.display().to_string(),
+        why: error.to_string(),
+    }
 }

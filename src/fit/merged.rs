@@ -17,7 +17,10 @@ pub(super) fn merged(blocks: &[Block], sum: &Parameters) -> Vec<Block> {
     let mut rest = blocks;
     while let Some(first) = rest.first() {
         let widest_hz = widest_hz(first.frequency_hz, sum);
-        let count = rest.iter().take_while(|b| b.frequency_hz - first.frequency_hz <= widest_hz).count();
+        let count = rest
+            .iter()
+            .take_while(|b| b.frequency_hz - first.frequency_hz <= widest_hz)
+            .count();
         merged.push(one(&rest[..count]));
         rest = &rest[count..];
     }
@@ -26,16 +29,23 @@ pub(super) fn merged(blocks: &[Block], sum: &Parameters) -> Vec<Block> {
 
 fn widest_hz(frequency_hz: f64, sum: &Parameters) -> f64 {
     let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * frequency_hz);
-    let distance = |w: f64, zeta: f64| (s - Complex::new(-zeta * w, w * (1.0 - zeta * zeta).max(0.0).sqrt())).norm();
-    let nearest =
-        sum.modes.iter().map(|mode| distance(mode.omega_rad_s, mode.damping_ratio)).fold(f64::INFINITY, f64::min);
+    let distance = |w: f64, zeta: f64| {
+        (s - Complex::new(-zeta * w, w * (1.0 - zeta * zeta).max(0.0).sqrt())).norm()
+    };
+    let nearest = sum
+        .modes
+        .iter()
+        .map(|mode| distance(mode.omega_rad_s, mode.damping_ratio))
+        .fold(f64::INFINITY, f64::min);
     (OF_DISTANCE * nearest / (2.0 * std::f64::consts::PI)).min(OF_FREQUENCY * frequency_hz)
 }
 
 /// The mean of some blocks, each with the weight that its error leaves it.
 fn one(blocks: &[Block]) -> Block {
     let weight: f64 = blocks.iter().map(|b| 1.0 / b.variance).sum();
-    let mean = |of: &dyn Fn(&Block) -> f64| blocks.iter().map(|b| of(b) / b.variance).sum::<f64>() / weight;
+    let mean = |of: &dyn Fn(&Block) -> f64| {
+        blocks.iter().map(|b| of(b) / b.variance).sum::<f64>() / weight
+    };
     let frequency_hz = mean(&|b| b.frequency_hz);
     let square = |b: &Block| (b.frequency_hz - frequency_hz).powi(2) + b.spread_hz * b.spread_hz;
     Block {

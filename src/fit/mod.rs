@@ -53,7 +53,9 @@ pub enum FitError {
         blocks: usize,
     },
     /// The parameters cannot be told apart.
-    #[error("the response does not tell the parameters of {modes} modes apart; record for longer or excite more")]
+    #[error(
+        "the response does not tell the parameters of {modes} modes apart; record for longer or excite more"
+    )]
     Undetermined {
         /// How many modes were found.
         modes: usize,
@@ -75,7 +77,10 @@ pub struct Estimate {
 impl Estimate {
     /// The same in another unit.
     pub fn scaled(self, factor: f64) -> Estimate {
-        Estimate { value: self.value * factor, sigma: self.sigma * factor.abs() }
+        Estimate {
+            value: self.value * factor,
+            sigma: self.sigma * factor.abs(),
+        }
     }
 
     /// Probability that a number of a normal distribution is below zero.
@@ -98,7 +103,11 @@ pub struct FittedMode {
 impl FittedMode {
     /// Probability that the residue has the other sign, for errors of a normal distribution.
     pub fn sign_error_probability(&self) -> f64 {
-        Estimate { value: self.residue_per_kg.value.abs(), ..self.residue_per_kg }.below_zero_probability()
+        Estimate {
+            value: self.residue_per_kg.value.abs(),
+            ..self.residue_per_kg
+        }
+        .below_zero_probability()
     }
 
     /// The sign of its residue.
@@ -129,15 +138,26 @@ pub struct ModalFit {
 
 /// Fits modes to the blocks of a record, as many as there is evidence for.
 pub fn fit(blocks: &[Block], view: &View<'_>) -> Result<ModalFit, FitError> {
-    let [first, .., last] = blocks else { return Err(FitError::TooFew { blocks: blocks.len() }) };
+    let [first, .., last] = blocks else {
+        return Err(FitError::TooFew {
+            blocks: blocks.len(),
+        });
+    };
     let band_hz = (first.frequency_hz, last.frequency_hz);
     let orders = search::orders(view, blocks);
-    let best = orders.last().ok_or(FitError::NoMode { low_hz: band_hz.0, high_hz: band_hz.1 })?;
+    let best = orders.last().ok_or(FitError::NoMode {
+        low_hz: band_hz.0,
+        high_hz: band_hz.1,
+    })?;
     let mut start = best.parameters.clone();
-    start.modes.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+    start
+        .modes
+        .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
     let blocks = &merged::merged(blocks, &start);
     if 2 * blocks.len() <= start.entries().len() {
-        return Err(FitError::TooFew { blocks: blocks.len() });
+        return Err(FitError::TooFew {
+            blocks: blocks.len(),
+        });
     }
     let start = search::without_the_needless(start, view, blocks);
     let seen = Seen::of(&start, view, blocks);
@@ -145,19 +165,38 @@ pub fn fit(blocks: &[Block], view: &View<'_>) -> Result<ModalFit, FitError> {
     let blocks = with_noise_of(&seen, blocks, start.entries().len());
     let (parameters, seen) = refine(start, view, &blocks, 0.0);
     let modes = parameters.modes.len();
-    let covariance = covariance(&parameters, &seen, &blocks).ok_or(FitError::Undetermined { modes })?;
-    Ok(ModalFit { covariance, chi2_per_freedom, orders, parameters, band_hz })
+    let covariance =
+        covariance(&parameters, &seen, &blocks).ok_or(FitError::Undetermined { modes })?;
+    Ok(ModalFit {
+        covariance,
+        chi2_per_freedom,
+        orders,
+        parameters,
+        band_hz,
+    })
 }
 
 /// The blocks with the noise that a fit of `parameters` leaves over: the mean of |e|^2/v around each.
 fn with_noise_of(seen: &Seen, blocks: &[Block], parameters: usize) -> Vec<Block> {
     let freedom = 1.0 - parameters as f64 / (2 * blocks.len()) as f64;
-    let ratio: Vec<f64> = seen.left.iter().zip(blocks).map(|(e, b)| e.norm_sqr() / b.variance / freedom).collect();
+    let ratio: Vec<f64> = seen
+        .left
+        .iter()
+        .zip(blocks)
+        .map(|(e, b)| e.norm_sqr() / b.variance / freedom)
+        .collect();
     let around = |b: usize| {
         let near = &ratio[b.saturating_sub(NOISE_BLOCKS)..(b + NOISE_BLOCKS + 1).min(ratio.len())];
         near.iter().sum::<f64>() / near.len() as f64
     };
-    blocks.iter().enumerate().map(|(b, block)| Block { variance: block.variance * around(b), ..*block }).collect()
+    blocks
+        .iter()
+        .enumerate()
+        .map(|(b, block)| Block {
+            variance: block.variance * around(b),
+            ..*block
+        })
+        .collect()
 }
 
 impl ModalFit {
@@ -165,12 +204,24 @@ impl ModalFit {
     pub fn modes(&self) -> Vec<FittedMode> {
         let entries = self.parameters.entries();
         let sigma = |wanted: Entry| {
-            entries.iter().position(|entry| *entry == wanted).map_or(0.0, |i| self.covariance[(i, i)].sqrt())
+            entries
+                .iter()
+                .position(|entry| *entry == wanted)
+                .map_or(0.0, |i| self.covariance[(i, i)].sqrt())
         };
         let of = |(k, term): (usize, &crate::zeros::Term)| FittedMode {
-            omega_rad_s: Estimate { value: term.omega_rad_s, sigma: sigma(Entry::Omega(k)) },
-            damping_ratio: Estimate { value: term.damping_ratio, sigma: sigma(Entry::Damping(k)) },
-            residue_per_kg: Estimate { value: term.residue_per_kg, sigma: sigma(Entry::Residue(k)) },
+            omega_rad_s: Estimate {
+                value: term.omega_rad_s,
+                sigma: sigma(Entry::Omega(k)),
+            },
+            damping_ratio: Estimate {
+                value: term.damping_ratio,
+                sigma: sigma(Entry::Damping(k)),
+            },
+            residue_per_kg: Estimate {
+                value: term.residue_per_kg,
+                sigma: sigma(Entry::Residue(k)),
+            },
         };
         self.parameters.modes.iter().enumerate().map(of).collect()
     }
@@ -178,6 +229,9 @@ impl ModalFit {
     /// How much later than its view the plant answers, in seconds.
     pub fn delay_s(&self) -> Estimate {
         let last = self.covariance.nrows() - 1;
-        Estimate { value: self.parameters.delay_s, sigma: self.covariance[(last, last)].sqrt() }
+        Estimate {
+            value: self.parameters.delay_s,
+            sigma: self.covariance[(last, last)].sqrt(),
+        }
     }
 }

@@ -80,7 +80,10 @@ impl Parameters {
     /// These with the residues and R of `linear`, in this order.
     fn with_linear(&self, linear: &DVector<f64>) -> Parameters {
         let mut next = self.clone();
-        next.modes.iter_mut().zip(linear.iter()).for_each(|(mode, r)| mode.residue_per_kg = *r);
+        next.modes
+            .iter_mut()
+            .zip(linear.iter())
+            .for_each(|(mode, r)| mode.residue_per_kg = *r);
         next.remainder_m_per_n = linear[self.modes.len()];
         next
     }
@@ -139,18 +142,32 @@ impl Seen {
         let nodes = view.nodes(parameters.delay_s, blocks);
         let part = |m: &Term| view.mode((m.omega_rad_s, m.damping_ratio), &nodes);
         let parts = parameters.modes.iter().map(part).collect();
-        Seen { parts, constant: view.constant(&nodes), left: Vec::new(), chi2: f64::NAN }
+        Seen {
+            parts,
+            constant: view.constant(&nodes),
+            left: Vec::new(),
+            chi2: f64::NAN,
+        }
     }
 
     /// What these parts, of the sizes of `parameters`, leave.
     fn look(&mut self, parameters: &Parameters, blocks: &[Block]) {
         let left = |(b, block): (usize, &Block)| {
-            let modes: Complex<f64> =
-                parameters.modes.iter().zip(&self.parts).map(|(mode, part)| part[b] * mode.residue_per_kg).sum();
+            let modes: Complex<f64> = parameters
+                .modes
+                .iter()
+                .zip(&self.parts)
+                .map(|(mode, part)| part[b] * mode.residue_per_kg)
+                .sum();
             block.response - modes - self.constant[b] * parameters.remainder_m_per_n
         };
         self.left = blocks.iter().enumerate().map(left).collect();
-        self.chi2 = self.left.iter().zip(blocks).map(|(e, block)| 2.0 * e.norm_sqr() / block.variance).sum();
+        self.chi2 = self
+            .left
+            .iter()
+            .zip(blocks)
+            .map(|(e, block)| 2.0 * e.norm_sqr() / block.variance)
+            .sum();
     }
 
     /// The residues and R with which chi^2 is least: by normal equations in a unit diagonal, as an error of theirs is seen in
@@ -160,14 +177,25 @@ impl Seen {
         let mut row = Vec::with_capacity(self.parts.len() + 1);
         for (b, block) in blocks.iter().enumerate() {
             row.clear();
-            row.extend(self.parts.iter().chain([&self.constant]).map(|part| part[b]));
+            row.extend(
+                self.parts
+                    .iter()
+                    .chain([&self.constant])
+                    .map(|part| part[b]),
+            );
             normal.add(&row, block.response, (2.0 / block.variance).sqrt());
         }
         normal.solve(|_| 0.0)
     }
 
     /// How block `b` of the model changes with each parameter, in the order of [`Parameters::entries`].
-    fn slopes(&self, parameters: &Parameters, b: usize, block: &Block, slopes_out: &mut Vec<Complex<f64>>) {
+    fn slopes(
+        &self,
+        parameters: &Parameters,
+        b: usize,
+        block: &Block,
+        slopes_out: &mut Vec<Complex<f64>>,
+    ) {
         let omega = 2.0 * std::f64::consts::PI * block.frequency_hz;
         slopes_out.clear();
         for (mode, part) in parameters.modes.iter().zip(&self.parts) {
@@ -197,7 +225,12 @@ impl Seen {
 
 /// Where the steps end, the last of which lowers chi^2 by less than `coarse` of it: the parameters, and what is left of the
 /// blocks there.
-pub(super) fn refine(start: Parameters, view: &View<'_>, blocks: &[Block], coarse: f64) -> (Parameters, Seen) {
+pub(super) fn refine(
+    start: Parameters,
+    view: &View<'_>,
+    blocks: &[Block],
+    coarse: f64,
+) -> (Parameters, Seen) {
     if start.modes.is_empty() {
         let seen = Seen::of(&start, view, blocks);
         return (start, seen);
@@ -207,7 +240,15 @@ pub(super) fn refine(start: Parameters, view: &View<'_>, blocks: &[Block], coars
     let mut damping = Damping::first();
     let mut normal = seen.normal(&best, blocks);
     for _ in 0..STEPS {
-        let Some(step) = normal.solve(|i| if entries[i].is_linear() { 0.0 } else { damping.now }) else { break };
+        let Some(step) = normal.solve(|i| {
+            if entries[i].is_linear() {
+                0.0
+            } else {
+                damping.now
+            }
+        }) else {
+            break;
+        };
         let (next, there) = Seen::settled(best.moved(&entries, &step), view, blocks);
         let (gained, promised) = (seen.chi2 - there.chi2, normal.promised(&step));
         if gained.is_finite() && gained >= 0.0 {
@@ -235,24 +276,37 @@ struct Damping {
 
 impl Damping {
     fn first() -> Self {
-        Self { now: FIRST_DAMPING, raised_by: 2.0 }
+        Self {
+            now: FIRST_DAMPING,
+            raised_by: 2.0,
+        }
     }
 
     /// After a step that gained such a share of what it promised: the less, the more it promised too much.
     fn lower(&mut self, share: f64) {
         let factor = (1.0 - (2.0 * share - 1.0).powi(3)).clamp(LOWERED, 2.0);
-        *self = Self { now: (self.now * factor).max(LEAST_DAMPING), raised_by: 2.0 };
+        *self = Self {
+            now: (self.now * factor).max(LEAST_DAMPING),
+            raised_by: 2.0,
+        };
     }
 
     /// After a step that gained nothing: twice, then four times, then eight times as much.
     fn raise(&mut self) {
-        *self = Self { now: self.now * self.raised_by, raised_by: 2.0 * self.raised_by };
+        *self = Self {
+            now: self.now * self.raised_by,
+            raised_by: 2.0 * self.raised_by,
+        };
     }
 }
 
 /// The covariance of w (rad/s), zeta, r (1/kg) of each mode, R (m/N) and tau (s), in the order of [`Parameters::entries`];
 /// `None` where the data do not determine them.
-pub(super) fn covariance(parameters: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<DMatrix<f64>> {
+pub(super) fn covariance(
+    parameters: &Parameters,
+    seen: &Seen,
+    blocks: &[Block],
+) -> Option<DMatrix<f64>> {
     let entries = parameters.entries();
     let (scale, unit) = seen.normal(parameters, blocks).scaled()?;
     let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
@@ -264,5 +318,7 @@ pub(super) fn covariance(parameters: &Parameters, seen: &Seen, blocks: &[Block])
                 _ => 1.0,
             }
     };
-    Some(DMatrix::from_fn(entries.len(), entries.len(), |i, j| inverse[(i, j)] * natural(i) * natural(j)))
+    Some(DMatrix::from_fn(entries.len(), entries.len(), |i, j| {
+        inverse[(i, j)] * natural(i) * natural(j)
+    }))
 }

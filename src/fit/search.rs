@@ -20,7 +20,11 @@ const WORST: usize = 6;
 /// Candidates that are fitted, the best first, before the search ends.
 const TRIALS: usize = 3;
 /// A body on no spring.
-const FREE: Term = Term { omega_rad_s: 0.0, damping_ratio: 0.0, residue_per_kg: 0.0 };
+const FREE: Term = Term {
+    omega_rad_s: 0.0,
+    damping_ratio: 0.0,
+    residue_per_kg: 0.0,
+};
 /// Delays that are tried with the first mode: so many a period of the highest frequency, over half a period of the mode.
 const DELAYS_A_PERIOD: f64 = 6.0;
 /// At most so many.
@@ -42,9 +46,21 @@ struct Look {
 
 /// From the first to the last.
 const LOOKS: [Look; 3] = [
-    Look { rough: 0.03, every: 4, coarse: 1e-2 },
-    Look { rough: 0.003, every: 1, coarse: 1e-3 },
-    Look { rough: 0.0, every: 1, coarse: 1e-7 },
+    Look {
+        rough: 0.03,
+        every: 4,
+        coarse: 1e-2,
+    },
+    Look {
+        rough: 0.003,
+        every: 1,
+        coarse: 1e-3,
+    },
+    Look {
+        rough: 0.0,
+        every: 1,
+        coarse: 1e-7,
+    },
 ];
 
 /// The sum of one order.
@@ -77,10 +93,19 @@ pub(super) fn orders(view: &View<'_>, blocks: &[Block]) -> Vec<Order> {
         let mut seen;
         (now, seen) = refine(now, view, &rough, look.coarse);
         while now.modes.len() < MOST {
-            let Some((next, there, evidence)) = one_more(&now, &seen, view, &rough, look.coarse) else { break };
-            let freedom = (2 * rough.len()).saturating_sub(next.entries().len()).max(1) as f64;
+            let Some((next, there, evidence)) = one_more(&now, &seen, view, &rough, look.coarse)
+            else {
+                break;
+            };
+            let freedom = (2 * rough.len())
+                .saturating_sub(next.entries().len())
+                .max(1) as f64;
             let chi2_per_freedom = there.chi2 / freedom;
-            orders.push(Order { parameters: next.clone(), chi2_per_freedom, evidence });
+            orders.push(Order {
+                parameters: next.clone(),
+                chi2_per_freedom,
+                evidence,
+            });
             (now, seen) = (next, there);
         }
     }
@@ -89,12 +114,18 @@ pub(super) fn orders(view: &View<'_>, blocks: &[Block]) -> Vec<Order> {
 
 /// The sum without the modes that it can do without: those below five of their errors, the least of them first, as long as
 /// the others take their place without a rise of chi^2 that says otherwise.
-pub(super) fn without_the_needless(sum: Parameters, view: &View<'_>, blocks: &[Block]) -> Parameters {
+pub(super) fn without_the_needless(
+    sum: Parameters,
+    view: &View<'_>,
+    blocks: &[Block],
+) -> Parameters {
     let needed = threshold(blocks.len());
     let (now, seen) = refine(sum, view, blocks, 0.0);
     let (mut now, mut seen) = with_one_below(now, seen, view, blocks);
     while now.modes.len() > 1 {
-        let Some(place) = weakest(&now, &seen, blocks) else { break };
+        let Some(place) = weakest(&now, &seen, blocks) else {
+            break;
+        };
         let mut fewer = now.clone();
         fewer.modes.remove(place);
         let (next, there) = refine(fewer, view, blocks, 0.0);
@@ -109,19 +140,39 @@ pub(super) fn without_the_needless(sum: Parameters, view: &View<'_>, blocks: &[B
 
 /// The sum with one mode in the place of all that lie below the blocks, if it does as well: friction takes a free body for
 /// several, none of which can be told from the others.
-fn with_one_below(sum: Parameters, seen: Seen, view: &View<'_>, blocks: &[Block]) -> (Parameters, Seen) {
+fn with_one_below(
+    sum: Parameters,
+    seen: Seen,
+    view: &View<'_>,
+    blocks: &[Block],
+) -> (Parameters, Seen) {
     let low_rad_s = 2.0 * std::f64::consts::PI * blocks[0].frequency_hz;
-    let (below, above): (Vec<Term>, Vec<Term>) = sum.modes.iter().partition(|mode| mode.omega_rad_s < low_rad_s);
+    let (below, above): (Vec<Term>, Vec<Term>) = sum
+        .modes
+        .iter()
+        .partition(|mode| mode.omega_rad_s < low_rad_s);
     if below.len() < 2 {
         return (sum, seen);
     }
     let residue_per_kg = below.iter().map(|mode| mode.residue_per_kg).sum();
-    let one = Term { omega_rad_s: BELOW.0 * low_rad_s, damping_ratio: BELOW.1, residue_per_kg };
-    let start = Parameters { modes: [one].into_iter().chain(above).collect(), ..sum.clone() };
+    let one = Term {
+        omega_rad_s: BELOW.0 * low_rad_s,
+        damping_ratio: BELOW.1,
+        residue_per_kg,
+    };
+    let start = Parameters {
+        modes: [one].into_iter().chain(above).collect(),
+        ..sum.clone()
+    };
     let (next, there) = refine(start, view, blocks, 0.0);
     let misfit = (seen.chi2 / (2 * blocks.len()) as f64).max(1.0);
-    let worse = (there.chi2 - seen.chi2) / ((below.len() - 1) as f64 * threshold(blocks.len()) * misfit);
-    if worse <= 1.0 { (next, there) } else { (sum, seen) }
+    let worse =
+        (there.chi2 - seen.chi2) / ((below.len() - 1) as f64 * threshold(blocks.len()) * misfit);
+    if worse <= 1.0 {
+        (next, there)
+    } else {
+        (sum, seen)
+    }
 }
 
 /// The mode whose residue is the smallest part of its error, if it is below five; where the modes cannot even be told
@@ -133,7 +184,9 @@ fn weakest(now: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<usize> {
     };
     let entries = now.entries();
     let in_errors = |k: &usize| {
-        let place = entries.iter().position(|entry| *entry == Entry::Residue(*k));
+        let place = entries
+            .iter()
+            .position(|entry| *entry == Entry::Residue(*k));
         place.map_or(f64::INFINITY, |i| size(k) / covariance[(i, i)].sqrt())
     };
     let weakest = (0..now.modes.len()).min_by(|a, b| in_errors(a).total_cmp(&in_errors(b)))?;
@@ -143,8 +196,15 @@ fn weakest(now: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<usize> {
 /// The blocks of a look: merged where what is known already leaves the response smooth, once modes are known.
 fn roughened(blocks: &[Block], look: &Look, known: &Parameters) -> Vec<Block> {
     let more = look.rough * look.rough;
-    let rough = |b: &Block| Block { variance: b.variance + more * b.response.norm_sqr(), ..*b };
-    let fewer = if known.modes.is_empty() { blocks.to_vec() } else { merged(blocks, known) };
+    let rough = |b: &Block| Block {
+        variance: b.variance + more * b.response.norm_sqr(),
+        ..*b
+    };
+    let fewer = if known.modes.is_empty() {
+        blocks.to_vec()
+    } else {
+        merged(blocks, known)
+    };
     fewer.iter().step_by(look.every).map(rough).collect()
 }
 
@@ -166,8 +226,9 @@ fn one_more(
         // All that follows stands on the first: the best of all, a free body among them.
         let all = candidates.into_iter().take(TRIALS).chain([FREE]);
         let starts = all.flat_map(|term| starts(term, seen, view, blocks));
-        let (next, there) =
-            starts.map(|start| refine(start, view, blocks, coarse)).min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?;
+        let (next, there) = starts
+            .map(|start| refine(start, view, blocks, coarse))
+            .min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?;
         let evidence = evidence(&there);
         return (evidence > 1.0).then_some((next, there, evidence));
     }
@@ -182,21 +243,42 @@ fn one_more(
 
 /// Where to begin with a first mode: at the delays with which it lowers chi^2 most, and the residue that does.
 fn starts(term: Term, seen: &Seen, view: &View<'_>, blocks: &[Block]) -> Vec<Parameters> {
-    let part = view.mode((term.omega_rad_s, term.damping_ratio), &view.nodes(0.0, blocks));
-    let step_s = blocks.last().map_or(0.0, |last| 1.0 / (DELAYS_A_PERIOD * last.frequency_hz));
-    let half_period_s =
-        std::f64::consts::PI / term.omega_rad_s.max(2.0 * std::f64::consts::PI * blocks[0].frequency_hz);
+    let part = view.mode(
+        (term.omega_rad_s, term.damping_ratio),
+        &view.nodes(0.0, blocks),
+    );
+    let step_s = blocks
+        .last()
+        .map_or(0.0, |last| 1.0 / (DELAYS_A_PERIOD * last.frequency_hz));
+    let half_period_s = std::f64::consts::PI
+        / term
+            .omega_rad_s
+            .max(2.0 * std::f64::consts::PI * blocks[0].frequency_hz);
     let reach = (half_period_s / step_s).min(MOST_DELAYS).ceil() as i32;
     let mut tried: Vec<(f64, Parameters)> = (-reach / 2..=reach)
         .map(|k| {
             let delay_s = f64::from(k) * step_s;
             let (gain, residue_per_kg) = projected(seen, blocks, &part, delay_s);
-            let modes = vec![Term { residue_per_kg, ..term }];
-            (gain, Parameters { modes, delay_s, ..Parameters::default() })
+            let modes = vec![Term {
+                residue_per_kg,
+                ..term
+            }];
+            (
+                gain,
+                Parameters {
+                    modes,
+                    delay_s,
+                    ..Parameters::default()
+                },
+            )
         })
         .collect();
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    tried.into_iter().take(TRIALS).map(|(_, start)| start).collect()
+    tried
+        .into_iter()
+        .take(TRIALS)
+        .map(|(_, start)| start)
+        .collect()
 }
 
 /// Modes that would lower chi^2, the best first, one for each place; a free body among them.
@@ -207,14 +289,27 @@ fn candidates(seen: &Seen, view: &View<'_>, blocks: &[Block], now: &Parameters) 
         let tried = DAMPINGS.map(|damping_ratio| {
             let part = view.mode((omega_rad_s, damping_ratio), &nodes);
             let (gain, residue_per_kg) = projected(seen, blocks, &part, 0.0);
-            (gain, Term { omega_rad_s, damping_ratio, residue_per_kg })
+            (
+                gain,
+                Term {
+                    omega_rad_s,
+                    damping_ratio,
+                    residue_per_kg,
+                },
+            )
         });
         found.extend(tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)));
     }
     if now.modes.iter().all(|mode| mode.omega_rad_s > 0.0) {
         let part = view.mode((0.0, 0.0), &nodes);
         let (gain, residue_per_kg) = projected(seen, blocks, &part, 0.0);
-        found.push((gain, Term { residue_per_kg, ..FREE }));
+        found.push((
+            gain,
+            Term {
+                residue_per_kg,
+                ..FREE
+            },
+        ));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().map(|(_, term)| term).collect()
@@ -228,8 +323,12 @@ fn worst(seen: &Seen, blocks: &[Block], first: bool) -> Vec<usize> {
         false => seen.left[*b].norm_sqr() / blocks[*b].variance,
     };
     let size = blocks.len().div_ceil(PLACES);
-    let parts = (0..blocks.len()).step_by(size).map(|low| low..(low + size).min(blocks.len()));
-    let mut places: Vec<usize> = parts.filter_map(|part| part.max_by(|a, b| excess(a).total_cmp(&excess(b)))).collect();
+    let parts = (0..blocks.len())
+        .step_by(size)
+        .map(|low| low..(low + size).min(blocks.len()));
+    let mut places: Vec<usize> = parts
+        .filter_map(|part| part.max_by(|a, b| excess(a).total_cmp(&excess(b))))
+        .collect();
     places.sort_by(|a, b| excess(b).total_cmp(&excess(a)));
     places.truncate(WORST);
     places
@@ -239,7 +338,11 @@ fn worst(seen: &Seen, blocks: &[Block], first: bool) -> Vec<usize> {
 fn projected(seen: &Seen, blocks: &[Block], part: &[Complex<f64>], delay_s: f64) -> (f64, f64) {
     let (mut along, mut square) = (0.0, 0.0);
     for ((part, left), block) in part.iter().zip(&seen.left).zip(blocks) {
-        let late = part * Complex::from_polar(1.0, -2.0 * std::f64::consts::PI * block.frequency_hz * delay_s);
+        let late = part
+            * Complex::from_polar(
+                1.0,
+                -2.0 * std::f64::consts::PI * block.frequency_hz * delay_s,
+            );
         along += 2.0 / block.variance * (late.conj() * left).re;
         square += 2.0 / block.variance * late.norm_sqr();
     }

@@ -56,19 +56,37 @@ impl View<'_> {
         let node = |hz: f64| {
             let omega_rad_s = 2.0 * std::f64::consts::PI * hz;
             let s = Complex::new(0.0, omega_rad_s);
-            Node { s, z: turn(omega_rad_s * period_s), late: turn(-omega_rad_s * delay_s) }
+            Node {
+                s,
+                z: turn(omega_rad_s * period_s),
+                late: turn(-omega_rad_s * delay_s),
+            }
         };
         let of = |block: &Block| match block.spread_hz {
             0.0 => (node(block.frequency_hz), None),
-            spread_hz => (node(block.frequency_hz - spread_hz), Some(node(block.frequency_hz + spread_hz))),
+            spread_hz => (
+                node(block.frequency_hz - spread_hz),
+                Some(node(block.frequency_hz + spread_hz)),
+            ),
         };
         Nodes(blocks.iter().map(of).collect())
     }
 
     /// The response of a mode of residue 1 over each block.
-    pub(super) fn mode(&self, (omega_rad_s, damping_ratio): (f64, f64), nodes: &Nodes) -> Vec<Complex<f64>> {
+    pub(super) fn mode(
+        &self,
+        (omega_rad_s, damping_ratio): (f64, f64),
+        nodes: &Nodes,
+    ) -> Vec<Complex<f64>> {
         let shape = DVector::zeros(0);
-        let mode = Mode { omega_rad_s, damping_ratio, shape, force_gain: 1.0, sensor_gain: 1.0, floor_gain: 0.0 };
+        let mode = Mode {
+            omega_rad_s,
+            damping_ratio,
+            shape,
+            force_gain: 1.0,
+            sensor_gain: 1.0,
+            floor_gain: 0.0,
+        };
         match self {
             View::Bench(config) => {
                 let chain = Chain::of_mean_age(config, &[mode]);
@@ -82,19 +100,33 @@ impl View<'_> {
     /// What sampling folds back stays.
     pub fn mechanics(&self, blocks: &[Block], delay_s: f64) -> Vec<Complex<f64>> {
         let constant = self.constant(&self.nodes(delay_s, blocks));
-        blocks.iter().zip(constant).map(|(block, constant)| block.response / constant).collect()
+        blocks
+            .iter()
+            .zip(constant)
+            .map(|(block, constant)| block.response / constant)
+            .collect()
     }
 
     /// The response of a constant compliance of 1 m/N over each block.
     pub(super) fn constant(&self, nodes: &Nodes) -> Vec<Complex<f64>> {
-        self.mode((FAR_RAD_S, 1.0), nodes).into_iter().map(|h| h * (FAR_RAD_S * FAR_RAD_S)).collect()
+        self.mode((FAR_RAD_S, 1.0), nodes)
+            .into_iter()
+            .map(|h| h * (FAR_RAD_S * FAR_RAD_S))
+            .collect()
     }
 }
 
 /// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, which sampling alters by what it folds
 /// back, a part in a thousand of a slope.
 pub(super) fn slopes(term: &Term, omega_rad_s: f64) -> [Complex<f64>; 2] {
-    let (s, w, zeta) = (Complex::new(0.0, omega_rad_s), term.omega_rad_s, term.damping_ratio);
+    let (s, w, zeta) = (
+        Complex::new(0.0, omega_rad_s),
+        term.omega_rad_s,
+        term.damping_ratio,
+    );
     let resonance = term.resonance(s);
-    [-resonance * (s * (2.0 * zeta) + 2.0 * w), -resonance * s * (2.0 * w)]
+    [
+        -resonance * (s * (2.0 * zeta) + 2.0 * w),
+        -resonance * s * (2.0 * w),
+    ]
 }

@@ -7,14 +7,28 @@ use super::IdentifyError;
 /// The bins k = 1 ..= (samples - 1)/2 of an FFT over `samples` whose frequency k rate/samples lies within the band,
 /// limits included. Bin 0 carries the offset of the probe, and the bin at the Nyquist frequency has no phase: both stay
 /// out.
-pub(super) fn bins(band_hz: (f64, f64), rate_hz: f64, samples: usize) -> Result<RangeInclusive<usize>, IdentifyError> {
+pub(super) fn bins(
+    band_hz: (f64, f64),
+    rate_hz: f64,
+    samples: usize,
+) -> Result<RangeInclusive<usize>, IdentifyError> {
     let (low_hz, high_hz) = band_hz;
     check(band_hz, rate_hz)?;
     let bin_hz = rate_hz / samples as f64;
     // A limit that is a bin up to rounding counts as that bin.
     let low = (low_hz / bin_hz - 1e-6).ceil().max(1.0) as usize;
-    let high = (high_hz / bin_hz + 1e-6).floor().min(last_bin(samples) as f64) as usize;
-    if low > high { Err(IdentifyError::BandEmpty { low_hz, high_hz, bin_hz }) } else { Ok(low..=high) }
+    let high = (high_hz / bin_hz + 1e-6)
+        .floor()
+        .min(last_bin(samples) as f64) as usize;
+    if low > high {
+        Err(IdentifyError::BandEmpty {
+            low_hz,
+            high_hz,
+            bin_hz,
+        })
+    } else {
+        Ok(low..=high)
+    }
 }
 
 /// The highest bin below the Nyquist frequency.
@@ -27,5 +41,9 @@ fn check((low_hz, high_hz): (f64, f64), rate_hz: f64) -> Result<(), IdentifyErro
     if !(low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite()) {
         return Err(IdentifyError::BandOrder { low_hz, high_hz });
     }
-    if high_hz > limit_hz { Err(IdentifyError::BandBeyondNyquist { high_hz, limit_hz }) } else { Ok(()) }
+    if high_hz > limit_hz {
+        Err(IdentifyError::BandBeyondNyquist { high_hz, limit_hz })
+    } else {
+        Ok(())
+    }
 }

@@ -7,12 +7,24 @@ use crate::config::{IdentifySettings, LocalSettings};
 ///
 /// # Errors
 /// Those of the estimator.
-pub fn response(signals: &Signals, band_hz: (f64, f64), settings: &IdentifySettings) -> Result<Frf, IdentifyError> {
+pub fn response(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &IdentifySettings,
+) -> Result<Frf, IdentifyError> {
     match settings {
-        IdentifySettings::Local(local) => local::estimate(signals, band_hz, &EstimatorSettings::from(local)),
-        IdentifySettings::Welch { segment_s, estimator } => {
-            welch::estimate(signals, band_hz, libm::round(segment_s * signals.rate_hz) as usize, *estimator)
+        IdentifySettings::Local(local) => {
+            local::estimate(signals, band_hz, &EstimatorSettings::from(local))
         }
+        IdentifySettings::Welch {
+            segment_s,
+            estimator,
+        } => welch::estimate(
+            signals,
+            band_hz,
+            libm::round(segment_s * signals.rate_hz) as usize,
+            *estimator,
+        ),
     }
 }
 

@@ -15,8 +15,7 @@ use thiserror::Error;
 use super::{Frf, Unit};
 
 /// Columns of the file, in this order.
-pub const HEADER: &str =
-    "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
+pub const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
 
 /// Columns of a ratio, as of a sensitivity: the same, but for the unit.
 pub const BARE_HEADER: &str =
@@ -48,7 +47,9 @@ pub enum CsvError {
         found: String,
     },
     /// A row that does not hold seven finite numbers with rising frequencies.
-    #[error("line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before")]
+    #[error(
+        "line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before"
+    )]
     Row {
         /// Number of the line, counted from 1.
         line: usize,
@@ -73,11 +74,14 @@ pub fn to_string(frf: &Frf, unit: Unit) -> String {
 fn row(text: &mut String, frf: &Frf, k: usize) {
     let frequency = frf.frequency_hz[k];
     let (magnitude, phase) = (frf.response[k].norm(), frf.phase_rad(k).to_degrees());
-    let (magnitude_sigma, phase_sigma) = (frf.magnitude_sigma[k], frf.phase_sigma_rad[k].to_degrees());
+    let (magnitude_sigma, phase_sigma) =
+        (frf.magnitude_sigma[k], frf.phase_sigma_rad[k].to_degrees());
     let (coherence, resolution) = (frf.coherence[k], frf.resolution_hz[k]);
     // Writing to a string cannot fail.
-    let _ =
-        writeln!(text, "{frequency},{magnitude:e},{phase},{coherence},{magnitude_sigma:e},{phase_sigma},{resolution}");
+    let _ = writeln!(
+        text,
+        "{frequency},{magnitude:e},{phase},{coherence},{magnitude_sigma:e},{phase_sigma},{resolution}"
+    );
 }
 
 /// Writes the FRF into a new file.
@@ -86,11 +90,22 @@ fn row(text: &mut String, frf: &Frf, k: usize) {
 /// When the file exists already, or cannot be written.
 pub fn write_new(path: &Path, frf: &Frf, unit: Unit) -> Result<(), CsvError> {
     let failed = |source: io::Error| match source.kind() {
-        io::ErrorKind::AlreadyExists => CsvError::Exists { path: path.to_owned() },
-        _ => CsvError::Io { path: path.to_owned(), source },
+        io::ErrorKind::AlreadyExists => CsvError::Exists {
+            path: path.to_owned(),
+        },
+        _ => CsvError::Io {
+            path: path.to_owned(),
+            source,
+        },
     };
-    let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
-    file.write_all(to_string(frf, unit).as_bytes()).and_then(|()| file.sync_all()).map_err(failed)
+    let mut file = OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(path)
+        .map_err(failed)?;
+    file.write_all(to_string(frf, unit).as_bytes())
+        .and_then(|()| file.sync_all())
+        .map_err(failed)
 }
 
 /// Reads an FRF from a file.
@@ -98,7 +113,10 @@ pub fn write_new(path: &Path, frf: &Frf, unit: Unit) -> Result<(), CsvError> {
 /// # Errors
 /// When the file cannot be read, or is not an FRF.
 pub fn read(path: &Path) -> Result<Frf, CsvError> {
-    let text = std::fs::read_to_string(path).map_err(|source| CsvError::Io { path: path.to_owned(), source })?;
+    let text = std::fs::read_to_string(path).map_err(|source| CsvError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
     from_str(&text)
 }
 
@@ -110,22 +128,45 @@ pub fn from_str(text: &str) -> Result<Frf, CsvError> {
     let mut lines = text.lines().enumerate();
     let found = lines.next().map_or("", |(_, line)| line.trim());
     if found != HEADER {
-        return Err(CsvError::Header { found: found.to_owned() });
+        return Err(CsvError::Header {
+            found: found.to_owned(),
+        });
     }
     let mut frf = Frf::default();
     for (index, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-        parsed(line, &mut frf).ok_or_else(|| CsvError::Row { line: index + 1, text: line.to_owned() })?;
+        parsed(line, &mut frf).ok_or_else(|| CsvError::Row {
+            line: index + 1,
+            text: line.to_owned(),
+        })?;
     }
     Ok(frf)
 }
 
 fn parsed(line: &str, frf: &mut Frf) -> Option<()> {
-    let numbers: Vec<f64> = line.split(',').map(|field| field.trim().parse().ok()).collect::<Option<_>>()?;
-    let [frequency, magnitude, phase_deg, coherence, magnitude_sigma, phase_sigma_deg, resolution]: [f64; COLUMNS] =
-        numbers.try_into().ok()?;
+    let numbers: Vec<f64> = line
+        .split(',')
+        .map(|field| field.trim().parse().ok())
+        .collect::<Option<_>>()?;
+    let [
+        frequency,
+        magnitude,
+        phase_deg,
+        coherence,
+        magnitude_sigma,
+        phase_sigma_deg,
+        resolution,
+    ]: [f64; COLUMNS] = numbers.try_into().ok()?;
     let rising = frf.frequency_hz.last().is_none_or(|last| frequency > *last);
     let response = Complex::from_polar(magnitude, phase_deg.to_radians());
-    let finite = [frequency, magnitude, phase_deg, coherence, magnitude_sigma, phase_sigma_deg, resolution];
+    let finite = [
+        frequency,
+        magnitude,
+        phase_deg,
+        coherence,
+        magnitude_sigma,
+        phase_sigma_deg,
+        resolution,
+    ];
     if !rising || finite.iter().any(|number| !number.is_finite()) {
         return None;
     }

@@ -40,10 +40,16 @@ pub fn beyond(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Option
         kept = near(&points, tau_s);
     }
     let (weight, square) = kept.iter().fold((0.0, 0.0), |(weight, square), p| {
-        (weight + p.weight * p.omega_rad_s * p.omega_rad_s, square + p.weight * p.off(tau_s) * p.off(tau_s))
+        (
+            weight + p.weight * p.omega_rad_s * p.omega_rad_s,
+            square + p.weight * p.off(tau_s) * p.off(tau_s),
+        )
     });
     let scatter = square / (kept.len().saturating_sub(1).max(1)) as f64;
-    (kept.len() >= FEWEST).then(|| Delay { seconds: tau_s, sigma_s: (scatter / weight).sqrt() })
+    (kept.len() >= FEWEST).then(|| Delay {
+        seconds: tau_s,
+        sigma_s: (scatter / weight).sqrt(),
+    })
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -66,10 +72,21 @@ fn points(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Vec<Point>
         let ratio = measured.response[index] / model;
         let sigma_rad = measured.phase_sigma_rad[index].max(BEST_PHASE_RAD);
         let omega_rad_s = 2.0 * std::f64::consts::PI * measured.frequency_hz[index];
-        let good = ratio.norm().is_normal() && sigma_rad < 0.5 && measured.frequency_hz[index] <= highest_hz;
-        good.then(|| Point { omega_rad_s, turn: ratio / ratio.norm(), weight: 1.0 / (sigma_rad * sigma_rad) })
+        let good = ratio.norm().is_normal()
+            && sigma_rad < 0.5
+            && measured.frequency_hz[index] <= highest_hz;
+        good.then(|| Point {
+            omega_rad_s,
+            turn: ratio / ratio.norm(),
+            weight: 1.0 / (sigma_rad * sigma_rad),
+        })
     };
-    model.iter().enumerate().take(measured.len()).filter_map(of).collect()
+    model
+        .iter()
+        .enumerate()
+        .take(measured.len())
+        .filter_map(of)
+        .collect()
 }
 
 /// The delay that leaves the phases most in line, on a grid of an eighth of the fastest turn.
@@ -77,7 +94,12 @@ fn coarse(points: &[Point]) -> Option<f64> {
     let fastest = points.iter().map(|p| p.omega_rad_s).fold(0.0, f64::max);
     let step_s = std::f64::consts::PI / (4.0 * fastest);
     let steps = (LARGEST_S / step_s).ceil() as i64;
-    let in_line = |tau_s: f64| points.iter().map(|p| p.weight * p.off(tau_s).cos()).sum::<f64>();
+    let in_line = |tau_s: f64| {
+        points
+            .iter()
+            .map(|p| p.weight * p.off(tau_s).cos())
+            .sum::<f64>()
+    };
     let candidates = (-steps..=steps).map(|step| step as f64 * step_s);
     candidates.max_by(|a, b| in_line(*a).total_cmp(&in_line(*b)))
 }
@@ -86,7 +108,10 @@ fn coarse(points: &[Point]) -> Option<f64> {
 fn fit(points: &[Point], tau_s: f64) -> Option<f64> {
     let (top, bottom) = points.iter().fold((0.0, 0.0), |(top, bottom), p| {
         let weighted = p.weight * p.omega_rad_s;
-        (top - weighted * p.off(tau_s), bottom + weighted * p.omega_rad_s)
+        (
+            top - weighted * p.off(tau_s),
+            bottom + weighted * p.omega_rad_s,
+        )
     });
     (bottom > 0.0).then(|| top / bottom)
 }
@@ -94,8 +119,17 @@ fn fit(points: &[Point], tau_s: f64) -> Option<f64> {
 fn near(points: &[Point], tau_s: f64) -> Vec<Point> {
     let mut sizes: Vec<f64> = points.iter().map(|p| p.off(tau_s).abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    let limit = FAR_OFF * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0).max(BEST_PHASE_RAD);
-    points.iter().copied().filter(|p| p.off(tau_s).abs() <= limit).collect()
+    let limit = FAR_OFF
+        * sizes
+            .get(sizes.len() / 2)
+            .copied()
+            .unwrap_or(0.0)
+            .max(BEST_PHASE_RAD);
+    points
+        .iter()
+        .copied()
+        .filter(|p| p.off(tau_s).abs() <= limit)
+        .collect()
 }
 
 #[cfg(test)]
@@ -112,7 +146,9 @@ mod tests {
     fn case(tau_s: f64, noise: f64) -> (Frf, Vec<Complex<f64>>) {
         let (mut frf, mut model, mut seed) = (Frf::default(), Vec::new(), 1u64);
         let mut random = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
         for k in 1..400 {
@@ -123,7 +159,13 @@ mod tests {
             model.push(m);
             let variance = (noise * f.norm()).powi(2) / 6.0;
             let frequency_hz = w / (2.0 * std::f64::consts::PI);
-            frf.push(FrfPoint { frequency_hz, response: f + error, coherence: 1.0, variance, resolution_hz: 0.1 });
+            frf.push(FrfPoint {
+                frequency_hz,
+                response: f + error,
+                coherence: 1.0,
+                variance,
+                resolution_hz: 0.1,
+            });
         }
         (frf, model)
     }
@@ -134,7 +176,11 @@ mod tests {
             let (frf, model) = case(tau_s, 0.02);
             let delay = beyond(&frf, &model, 200.0).unwrap();
             // 300 phases of 0.006 rad at 600 rad/s in the mean: 0.6 us; the mode that lies elsewhere pulls by a few more.
-            assert!((delay.seconds - tau_s).abs() < 1e-5, "{} for {tau_s}", delay.seconds);
+            assert!(
+                (delay.seconds - tau_s).abs() < 1e-5,
+                "{} for {tau_s}",
+                delay.seconds
+            );
             assert!((1e-7..1e-5).contains(&delay.sigma_s), "{}", delay.sigma_s);
         }
     }

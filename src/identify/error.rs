@@ -130,6 +130,20 @@ pub enum IdentifyError {
 }
 
 /// An error unless a setting lies within its bounds, limits included; a NaN does not.
-pub(super) fn check_setting(name: &'static str, value: f64, least: f64, most: f64) -> Result<(), IdentifyError> {
-    if value >= least && value <= most { Ok(()) } else { Err(IdentifyError::Setting { name, value, least, most }) }
+pub(super) fn check_setting(
+    name: &'static str,
+    value: f64,
+    least: f64,
+    most: f64,
+) -> Result<(), IdentifyError> {
+    if value >= least && value <= most {
+        Ok(())
+    } else {
+        Err(IdentifyError::Setting {
+            name,
+            value,
+            least,
+            most,
+        })
+    }
 }

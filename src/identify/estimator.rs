@@ -28,7 +28,11 @@ use super::FrfPoint;
 /// H2 from what was estimated from output to input: 1/G, whose relative error is that of G.
 pub(super) fn inverted(point: FrfPoint) -> FrfPoint {
     let response = point.response.inv();
-    FrfPoint { response, variance: point.variance * response.norm_sqr() * response.norm_sqr(), ..point }
+    FrfPoint {
+        response,
+        variance: point.variance * response.norm_sqr() * response.norm_sqr(),
+        ..point
+    }
 }
 
 /// Hv from H1 and H2 at the same frequency.
@@ -36,7 +40,11 @@ pub(super) fn between(h1: FrfPoint, h2: FrfPoint) -> FrfPoint {
     let response = h1.response * (h2.response.norm() / h1.response.norm()).sqrt();
     let relative = |point: &FrfPoint| point.variance / point.response.norm_sqr();
     let variance = 0.5 * (relative(&h1) + relative(&h2)) * response.norm_sqr();
-    FrfPoint { response, variance, ..h1 }
+    FrfPoint {
+        response,
+        variance,
+        ..h1
+    }
 }
 
 /// One of them by the spectra: H1 = S_yu/S_uu is given, of the same coherence.
@@ -47,5 +55,9 @@ pub(super) fn by_coherence(h1: FrfPoint, estimator: super::Estimator) -> FrfPoin
         super::Estimator::Hv => h1.coherence.sqrt(),
     };
     let response: Complex<f64> = h1.response / factor;
-    FrfPoint { response, variance: h1.variance / (factor * factor), ..h1 }
+    FrfPoint {
+        response,
+        variance: h1.variance / (factor * factor),
+        ..h1
+    }
 }

@@ -71,9 +71,18 @@ impl Frf {
 
     /// The response as it would be `delay_s` earlier: H exp(j w delay).
     pub fn earlier(&self, delay_s: f64) -> Frf {
-        let turned = |(f, h): (&f64, &Complex<f64>)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s);
-        let response = self.frequency_hz.iter().zip(&self.response).map(turned).collect();
-        Frf { response, ..self.clone() }
+        let turned =
+            |(f, h): (&f64, &Complex<f64>)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s);
+        let response = self
+            .frequency_hz
+            .iter()
+            .zip(&self.response)
+            .map(turned)
+            .collect();
+        Frf {
+            response,
+            ..self.clone()
+        }
     }
 
     /// Phase in radians, in (-pi, pi].
@@ -109,5 +118,9 @@ pub fn wrapped_phase_rad(response: Complex<f64>) -> f64 {
 
 /// sigma/|H|, up to what can be said of a phase at all (0/0, neither response nor noise, included).
 fn phase_sigma_rad(sigma: f64, magnitude: f64) -> f64 {
-    if sigma < PHASE_SIGMA_LIMIT_RAD * magnitude { sigma / magnitude } else { PHASE_SIGMA_LIMIT_RAD }
+    if sigma < PHASE_SIGMA_LIMIT_RAD * magnitude {
+        sigma / magnitude
+    } else {
+        PHASE_SIGMA_LIMIT_RAD
+    }
 }

@@ -31,13 +31,18 @@ mod tests {
 
     #[test]
     fn mean_and_sigma_in_one_pass_are_those_of_two_passes() {
-        let values: Vec<f64> = (0..10_000).map(|k| 5e-5 + 1e-8 * f64::sin(f64::from(k) * 1.7)).collect();
+        let values: Vec<f64> = (0..10_000)
+            .map(|k| 5e-5 + 1e-8 * f64::sin(f64::from(k) * 1.7))
+            .collect();
         let mut moments = Moments::default();
         values.iter().for_each(|x| moments.push(*x));
         let mean = values.iter().sum::<f64>() / 1e4;
         let sigma = (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / 9999.0).sqrt();
         // 10,000 roundings of 1e-20 in the mean of 5e-5.
-        assert!((moments.mean - mean).abs() < 1e-16 && (moments.sigma().unwrap() / sigma - 1.0).abs() < 1e-9);
+        assert!(
+            (moments.mean - mean).abs() < 1e-16
+                && (moments.sigma().unwrap() / sigma - 1.0).abs() < 1e-9
+        );
         assert_eq!(Moments::default().sigma(), None);
     }
 }

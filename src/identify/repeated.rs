@@ -13,7 +13,15 @@ pub fn mean(signals: &Signals, length: usize, count: usize) -> Signals {
     let count = count.min(signals.len().checked_div(length).unwrap_or(0));
     let of = |samples: &[f64]| -> Vec<f64> {
         let at = |n: usize| (0..count).map(|r| samples[r * length + n]).sum::<f64>() / count as f64;
-        if count == 0 { samples.to_vec() } else { (0..length).map(at).collect() }
+        if count == 0 {
+            samples.to_vec()
+        } else {
+            (0..length).map(at).collect()
+        }
     };
-    Signals { rate_hz: signals.rate_hz, input_a: of(&signals.input_a), output_m: of(&signals.output_m) }
+    Signals {
+        rate_hz: signals.rate_hz,
+        input_a: of(&signals.input_a),
+        output_m: of(&signals.output_m),
+    }
 }

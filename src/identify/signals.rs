@@ -42,10 +42,15 @@ impl Signals {
             return Err(IdentifyError::Lengths { input, output });
         }
         if input < LEAST_SAMPLES {
-            return Err(IdentifyError::TooShort { samples: input, least: LEAST_SAMPLES });
+            return Err(IdentifyError::TooShort {
+                samples: input,
+                least: LEAST_SAMPLES,
+            });
         }
         if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
-            return Err(IdentifyError::Rate { rate_hz: self.rate_hz });
+            return Err(IdentifyError::Rate {
+                rate_hz: self.rate_hz,
+            });
         }
         check_samples("input_a", &self.input_a)?;
         check_samples("output_m", &self.output_m)?;
@@ -74,16 +79,26 @@ impl Signals {
         let least = (LEAST_QUIET_S * self.rate_hz).max(8.0);
         let enough = before.len().min(after.len()) as f64 >= least;
         let (offset, slope) = if enough {
-            line(centre(&self.output_m, before), centre(&self.output_m, after))
+            line(
+                centre(&self.output_m, before),
+                centre(&self.output_m, after),
+            )
         } else {
             (mean(&self.output_m), 0.0)
         };
-        self.output_m.iter().enumerate().map(|(k, y)| y - offset - slope * k as f64).collect()
+        self.output_m
+            .iter()
+            .enumerate()
+            .map(|(k, y)| y - offset - slope * k as f64)
+            .collect()
     }
 
     /// The quiet stretch before the excitation and the last half of the one after it.
     fn quiet(&self) -> (Range<usize>, Range<usize>) {
-        let peak = self.input_a.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
+        let peak = self
+            .input_a
+            .iter()
+            .fold(0.0_f64, |peak, u| peak.max(u.abs()));
         let quiet = |u: &&f64| u.abs() <= QUIET_RATIO * peak;
         let before = self.input_a.iter().take_while(quiet).count();
         let after = self.input_a.iter().rev().take_while(quiet).count();
@@ -95,7 +110,12 @@ fn check_samples(column: &'static str, samples: &[f64]) -> Result<(), IdentifyEr
     // A NaN compares as false, and so fails.
     let fit = |sample: &f64| sample.abs() <= LARGEST_SAMPLE;
     match samples.iter().position(|sample| !fit(sample)) {
-        Some(index) => Err(IdentifyError::Sample { column, index, value: samples[index], limit: LARGEST_SAMPLE }),
+        Some(index) => Err(IdentifyError::Sample {
+            column,
+            index,
+            value: samples[index],
+            limit: LARGEST_SAMPLE,
+        }),
         None => Ok(()),
     }
 }
@@ -112,7 +132,10 @@ fn mean(samples: &[f64]) -> f64 {
 
 /// Middle index and mean of a stretch.
 fn centre(samples: &[f64], range: Range<usize>) -> (f64, f64) {
-    ((range.start + range.end - 1) as f64 / 2.0, mean(&samples[range]))
+    (
+        (range.start + range.end - 1) as f64 / 2.0,
+        mean(&samples[range]),
+    )
 }
 
 /// Offset at index 0 and slope per sample of the line through two points.

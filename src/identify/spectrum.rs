@@ -18,7 +18,9 @@ impl RealFft {
     pub(super) fn transform(&self, samples: &mut [f64]) -> Vec<Complex<f64>> {
         let mut spectrum = self.0.make_output_vec();
         // The only error is a buffer of the wrong length: one is made by the plan, the other promised by the caller.
-        self.0.process(samples, &mut spectrum).expect("as many samples as planned");
+        self.0
+            .process(samples, &mut spectrum)
+            .expect("as many samples as planned");
         spectrum
     }
 }

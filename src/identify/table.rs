@@ -90,7 +90,9 @@ pub enum TableError {
         text: String,
     },
     /// Too short to have a rate.
-    #[error("{path} has {samples} lines of samples; at least 2 have a rate, and an estimate takes 64")]
+    #[error(
+        "{path} has {samples} lines of samples; at least 2 have a rate, and an estimate takes 64"
+    )]
     TooShort {
         /// The file.
         path: PathBuf,
@@ -135,13 +137,23 @@ pub enum TableError {
 /// When the file is no table, lacks a column, holds something else than numbers, or its times are not regular: see
 /// [`TableError`]. Whether the signals are fit for an estimator is [`Signals::check`]'s to say.
 pub fn read(path: &Path, columns: &Columns) -> Result<Signals, TableError> {
-    let text = std::fs::read(path).map_err(|source| TableError::Io { path: path.to_owned(), source })?;
-    let table = Table { path, delimiter: delimiter(&text), text: &text };
+    let text = std::fs::read(path).map_err(|source| TableError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    let table = Table {
+        path,
+        delimiter: delimiter(&text),
+        text: &text,
+    };
     let time = match &columns.clock {
         Clock::Column(name) => Some(name.as_str()),
         Clock::RateHz(_) => None,
     };
-    let names: Vec<&str> = [columns.input.as_str(), columns.output.as_str()].into_iter().chain(time).collect();
+    let names: Vec<&str> = [columns.input.as_str(), columns.output.as_str()]
+        .into_iter()
+        .chain(time)
+        .collect();
     let Numbers { lines, mut numbers } = table.numbers(&names)?;
     let rate_hz = match (&columns.clock, numbers.get(2)) {
         (Clock::Column(name), Some(time_s)) => table.rate_hz(name, time_s, &lines)?,
@@ -150,7 +162,11 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Signals, TableError> {
         (Clock::Column(_), None) => f64::NAN,
     };
     let output_m = numbers.swap_remove(1);
-    Ok(Signals { rate_hz, input_a: numbers.swap_remove(0), output_m })
+    Ok(Signals {
+        rate_hz,
+        input_a: numbers.swap_remove(0),
+        output_m,
+    })
 }
 
 /// The names of the columns of a table.
@@ -158,9 +174,20 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Signals, TableError> {
 /// # Errors
 /// When the file cannot be read, or its first line holds no names.
 pub fn names(path: &Path) -> Result<Vec<String>, TableError> {
-    let text = std::fs::read(path).map_err(|source| TableError::Io { path: path.to_owned(), source })?;
-    let table = Table { path, delimiter: delimiter(&text), text: &text };
-    let header = table.reader().headers().cloned().map_err(|source| table.no_table(source))?;
+    let text = std::fs::read(path).map_err(|source| TableError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    let table = Table {
+        path,
+        delimiter: delimiter(&text),
+        text: &text,
+    };
+    let header = table
+        .reader()
+        .headers()
+        .cloned()
+        .map_err(|source| table.no_table(source))?;
     Ok(header.iter().map(String::from).collect())
 }
 
@@ -168,7 +195,10 @@ pub fn names(path: &Path) -> Result<Vec<String>, TableError> {
 fn delimiter(text: &[u8]) -> u8 {
     let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
     let count = |mark: &u8| first.iter().filter(|byte| *byte == mark).count();
-    [b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(count)
+        .unwrap_or(b',')
 }
 
 struct Table<'a> {
@@ -185,18 +215,30 @@ struct Numbers {
 
 impl Table<'_> {
     fn reader(&self) -> csv::Reader<&[u8]> {
-        csv::ReaderBuilder::new().delimiter(self.delimiter).trim(csv::Trim::All).from_reader(self.text)
+        csv::ReaderBuilder::new()
+            .delimiter(self.delimiter)
+            .trim(csv::Trim::All)
+            .from_reader(self.text)
     }
 
     fn no_table(&self, source: csv::Error) -> TableError {
-        TableError::NoTable { path: self.path.to_owned(), source }
+        TableError::NoTable {
+            path: self.path.to_owned(),
+            source,
+        }
     }
 
     fn numbers(&self, names: &[&str]) -> Result<Numbers, TableError> {
         let mut reader = self.reader();
-        let header = reader.headers().cloned().map_err(|source| self.no_table(source))?;
+        let header = reader
+            .headers()
+            .cloned()
+            .map_err(|source| self.no_table(source))?;
         let places = self.places(&header, names)?;
-        let mut found = Numbers { lines: Vec::new(), numbers: vec![Vec::new(); names.len()] };
+        let mut found = Numbers {
+            lines: Vec::new(),
+            numbers: vec![Vec::new(); names.len()],
+        };
         for record in reader.records() {
             let record = record.map_err(|source| self.no_table(source))?;
             let line = record.position().map_or(0, csv::Position::line);
@@ -211,43 +253,72 @@ impl Table<'_> {
     fn places(&self, header: &csv::StringRecord, names: &[&str]) -> Result<Vec<usize>, TableError> {
         let twice = |(k, name): &(usize, &&str)| names[..*k].contains(*name);
         if let Some((_, name)) = names.iter().enumerate().find(twice) {
-            return Err(TableError::Same { name: name.to_string() });
+            return Err(TableError::Same {
+                name: name.to_string(),
+            });
         }
         names.iter().map(|name| self.place(header, name)).collect()
     }
 
     fn place(&self, header: &csv::StringRecord, name: &str) -> Result<usize, TableError> {
         let (path, name) = (self.path.to_owned(), name.to_owned());
-        let mut places = header.iter().enumerate().filter(|(_, there)| *there == name).map(|(place, _)| place);
+        let mut places = header
+            .iter()
+            .enumerate()
+            .filter(|(_, there)| *there == name)
+            .map(|(place, _)| place);
         match (places.next(), places.next()) {
             (Some(place), None) => Ok(place),
             (Some(_), Some(_)) => Err(TableError::Ambiguous { path, name }),
-            (None, _) => Err(TableError::NoColumn { path, name, there: header.iter().collect::<Vec<_>>().join(", ") }),
+            (None, _) => Err(TableError::NoColumn {
+                path,
+                name,
+                there: header.iter().collect::<Vec<_>>().join(", "),
+            }),
         }
     }
 
     fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, TableError> {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         let (path, column, text) = (self.path.to_owned(), column.to_owned(), text.to_owned());
-        number.ok_or(TableError::Cell { path, line, column, text })
+        number.ok_or(TableError::Cell {
+            path,
+            line,
+            column,
+            text,
+        })
     }
 
     /// Samples per second, from the first to the last.
     fn rate_hz(&self, column: &str, time_s: &[f64], lines: &[u64]) -> Result<f64, TableError> {
         let [first_s, .., last_s] = time_s else {
-            return Err(TableError::TooShort { path: self.path.to_owned(), samples: time_s.len() });
+            return Err(TableError::TooShort {
+                path: self.path.to_owned(),
+                samples: time_s.len(),
+            });
         };
         let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         if let Some(k) = steps_s.iter().position(|step_s| *step_s <= 0.0) {
             let (path, column) = (self.path.to_owned(), column.to_owned());
             let (time_s, before_s) = (time_s[k + 1], time_s[k]);
-            return Err(TableError::Backwards { path, line: lines[k + 1], column, time_s, before_s });
+            return Err(TableError::Backwards {
+                path,
+                line: lines[k + 1],
+                column,
+                time_s,
+                before_s,
+            });
         }
         let median_s = median(&steps_s);
         let irregular = |step_s: &f64| (step_s - median_s).abs() > IRREGULAR * median_s;
         if let Some(k) = steps_s.iter().position(irregular) {
             let path = self.path.to_owned();
-            return Err(TableError::Irregular { path, line: lines[k + 1], step_s: steps_s[k], median_s });
+            return Err(TableError::Irregular {
+                path,
+                line: lines[k + 1],
+                step_s: steps_s[k],
+                median_s,
+            });
         }
         Ok(steps_s.len() as f64 / (last_s - first_s))
     }

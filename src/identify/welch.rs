@@ -55,10 +55,25 @@ pub fn estimate(
     let bins = band::bins(band_hz, signals.rate_hz, segment)?;
     let least = segment + segment.div_ceil(2);
     if spectra.segments < 2 {
-        return Err(IdentifyError::TooShort { samples: signals.len(), least });
+        return Err(IdentifyError::TooShort {
+            samples: signals.len(),
+            least,
+        });
     }
-    let frf = frf(&spectra, estimator, bins, HANN_BANDWIDTH_BINS * signals.rate_hz / segment as f64);
-    if frf.is_empty() { Err(IdentifyError::NotExcited { low_hz: band_hz.0, high_hz: band_hz.1 }) } else { Ok(frf) }
+    let frf = frf(
+        &spectra,
+        estimator,
+        bins,
+        HANN_BANDWIDTH_BINS * signals.rate_hz / segment as f64,
+    );
+    if frf.is_empty() {
+        Err(IdentifyError::NotExcited {
+            low_hz: band_hz.0,
+            high_hz: band_hz.1,
+        })
+    } else {
+        Ok(frf)
+    }
 }
 
 /// The spectra of both signals. Every segment loses its mean before it is windowed.
@@ -70,7 +85,12 @@ pub fn spectra(signals: &Signals, segment: usize) -> Result<Spectra, IdentifyErr
     let (least, most) = (LEAST_SEGMENT, signals.len());
     if segment < least || segment > most {
         let (value, least, most) = (segment as f64, least as f64, most as f64);
-        return Err(IdentifyError::Setting { name: "segment", value, least, most });
+        return Err(IdentifyError::Setting {
+            name: "segment",
+            value,
+            least,
+            most,
+        });
     }
     let mut sums = Sums::new(segment);
     let step = segment - segment / 2;
@@ -83,7 +103,9 @@ pub fn spectra(signals: &Signals, segment: usize) -> Result<Spectra, IdentifyErr
 
 /// sin^2(pi n / N): Hann's window, periodic.
 fn hann(samples: usize) -> Vec<f64> {
-    (0..samples).map(|n| libm::sin(PI * n as f64 / samples as f64).powi(2)).collect()
+    (0..samples)
+        .map(|n| libm::sin(PI * n as f64 / samples as f64).powi(2))
+        .collect()
 }
 
 /// Running sums over segments.
@@ -98,8 +120,17 @@ impl Sums {
         let bins = segment / 2 + 1;
         let zero = vec![0.0; bins];
         let cross = vec![Complex::default(); bins];
-        let spectra = Spectra { input: zero.clone(), output: zero, cross, ..Spectra::default() };
-        Self { fft: RealFft::new(segment), window: hann(segment), spectra }
+        let spectra = Spectra {
+            input: zero.clone(),
+            output: zero,
+            cross,
+            ..Spectra::default()
+        };
+        Self {
+            fft: RealFft::new(segment),
+            window: hann(segment),
+            spectra,
+        }
     }
 
     fn add(&mut self, input: &[f64], output: &[f64]) {
@@ -114,7 +145,11 @@ impl Sums {
 
     fn windowed(&self, samples: &[f64]) -> Vec<Complex<f64>> {
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-        let mut windowed: Vec<f64> = samples.iter().zip(&self.window).map(|(s, w)| (s - mean) * w).collect();
+        let mut windowed: Vec<f64> = samples
+            .iter()
+            .zip(&self.window)
+            .map(|(s, w)| (s - mean) * w)
+            .collect();
         self.fft.transform(&mut windowed)
     }
 
@@ -125,7 +160,9 @@ impl Sums {
         let density = 1.0 / (rate_hz * energy * self.spectra.segments as f64);
         for k in 0..=segment / 2 {
             let sides = if k == 0 || 2 * k == segment { 1.0 } else { 2.0 };
-            self.spectra.frequency_hz.push(k as f64 * rate_hz / segment as f64);
+            self.spectra
+                .frequency_hz
+                .push(k as f64 * rate_hz / segment as f64);
             self.spectra.input[k] *= sides * density;
             self.spectra.output[k] *= sides * density;
             self.spectra.cross[k] *= sides * density;
@@ -134,16 +171,31 @@ impl Sums {
     }
 }
 
-fn frf(spectra: &Spectra, estimator: Estimator, bins: RangeInclusive<usize>, resolution_hz: f64) -> Frf {
+fn frf(
+    spectra: &Spectra,
+    estimator: Estimator,
+    bins: RangeInclusive<usize>,
+    resolution_hz: f64,
+) -> Frf {
     let mut frf = Frf::default();
     for k in bins {
         let (input, output, cross) = (spectra.input[k], spectra.output[k], spectra.cross[k]);
         // A dead input makes 0/0 here, and push() leaves the frequency out.
         let response = cross / input;
-        let coherence = if output > 0.0 { response.norm() * (cross.norm() / output) } else { 0.0 };
+        let coherence = if output > 0.0 {
+            response.norm() * (cross.norm() / output)
+        } else {
+            0.0
+        };
         let unexplained = (output / input * (1.0 - coherence)).max(0.0);
         let variance = unexplained / (averages(spectra.segments) - 1.0);
-        let h1 = FrfPoint { frequency_hz: spectra.frequency_hz[k], response, coherence, variance, resolution_hz };
+        let h1 = FrfPoint {
+            frequency_hz: spectra.frequency_hz[k],
+            response,
+            coherence,
+            variance,
+            resolution_hz,
+        };
         frf.push(by_coherence(h1, estimator));
     }
     frf

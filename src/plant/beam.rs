@@ -22,7 +22,8 @@ impl Beam {
     pub fn parallelogram_n_per_m(&self) -> f64 {
         let cube = |x: f64| x * x * x;
         let second_moment_m4 = self.height_m * cube(self.thickness_m) / 12.0;
-        let plate_modulus_pa = self.youngs_modulus_pa / (1.0 - self.poisson_ratio * self.poisson_ratio);
+        let plate_modulus_pa =
+            self.youngs_modulus_pa / (1.0 - self.poisson_ratio * self.poisson_ratio);
         24.0 * plate_modulus_pa * second_moment_m4 / cube(self.length_m)
     }
 

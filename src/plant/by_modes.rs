@@ -10,7 +10,10 @@ use crate::config::{ModalSettings, ModeSettings};
 
 pub(super) fn structure(s: &ModalSettings) -> Structure {
     let rate = |mode: &ModeSettings| 2.0 * mode.damping_ratio * mode.omega_rad_s;
-    Structure { damping: DMatrix::from_diagonal(&vector(s, rate)), ..undamped(s) }
+    Structure {
+        damping: DMatrix::from_diagonal(&vector(s, rate)),
+        ..undamped(s)
+    }
 }
 
 fn vector(s: &ModalSettings, of: fn(&ModeSettings) -> f64) -> DVector<f64> {
@@ -27,6 +30,10 @@ pub(super) fn undamped(s: &ModalSettings) -> Structure {
         force: vector(s, |mode| mode.residue_per_kg),
         sensor: DVector::from_element(n, 1.0),
         floor: DVector::zeros(n),
-        free_bodies: s.modes.values().filter(|mode| mode.omega_rad_s == 0.0).count(),
+        free_bodies: s
+            .modes
+            .values()
+            .filter(|mode| mode.omega_rad_s == 0.0)
+            .count(),
     }
 }

@@ -58,13 +58,22 @@ impl Chain {
 
     /// The mean over `delays`.
     fn over(config: &Config, modes: &[Mode], delays: Vec<f64>) -> Chain {
-        let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
+        let (bandwidth_hz, force_constant) = (
+            config.amplifier.bandwidth_hz,
+            config.motor.force_constant_n_per_a,
+        );
         let period_s = config.servo.period_s();
         let over = |span_s: f64| Sampled::new(modes, bandwidth_hz, force_constant, span_s);
         let held = over(period_s);
         let share = 1.0 / delays.len() as f64;
-        let taps = delays.iter().fold(Vec::new(), |taps, d| add(taps, tap(&held, &over, *d), share));
-        Chain { held, taps, delay_s: delays.iter().sum::<f64>() * share }
+        let taps = delays.iter().fold(Vec::new(), |taps, d| {
+            add(taps, tap(&held, &over, *d), share)
+        });
+        Chain {
+            held,
+            taps,
+            delay_s: delays.iter().sum::<f64>() * share,
+        }
     }
 
     /// Length of a period in seconds.
@@ -100,7 +109,11 @@ impl Chain {
         let (moving, register) = (1 + 2 * self.held.blocks.len(), self.longest());
         let n = moving + register;
         let (a0, b0, _) = self.held.state_space();
-        let (mut a, mut b, mut c) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1), DMatrix::zeros(1, n));
+        let (mut a, mut b, mut c) = (
+            DMatrix::zeros(n, n),
+            DMatrix::zeros(n, 1),
+            DMatrix::zeros(1, n),
+        );
         a.view_mut((0, 0), (moving, moving)).copy_from(&a0);
         b.view_mut((0, 0), (moving, 1)).copy_from(&b0);
         for place in 1..register {
@@ -123,7 +136,10 @@ impl Chain {
 
     /// The chain at rest.
     pub fn at_rest(&self) -> ChainState {
-        ChainState { motion: self.held.at_rest(), coming_m: vec![0.0; self.longest() + 1] }
+        ChainState {
+            motion: self.held.at_rest(),
+            coming_m: vec![0.0; self.longest() + 1],
+        }
     }
 
     /// The reading of this tick in metres.
@@ -161,7 +177,9 @@ fn delays(config: &Config) -> Vec<f64> {
     let youngest_s = computing_s + config.amplifier.latency_s + config.probe.age_at_arrival_s();
     match config.probe.rate_hz.map(|rate_hz| 1.0 / rate_hz) {
         None => vec![youngest_s],
-        Some(period_s) => (0..NODES).map(|i| youngest_s + period_s * (i as f64 + 0.5) / NODES as f64).collect(),
+        Some(period_s) => (0..NODES)
+            .map(|i| youngest_s + period_s * (i as f64 + 0.5) / NODES as f64)
+            .collect(),
     }
 }
 
@@ -170,14 +188,33 @@ fn tap(held: &Sampled, over: &impl Fn(f64) -> Sampled, delay_s: f64) -> Tap {
     let whole = libm::floor(ratio + ROUNDING);
     let rest = ratio - whole;
     if rest <= ROUNDING {
-        let rows = held.blocks.iter().map(|block| [block.output, 0.0]).collect();
-        return Tap { periods: whole as usize, rows, current: 0.0, setpoint: 0.0 };
+        let rows = held
+            .blocks
+            .iter()
+            .map(|block| [block.output, 0.0])
+            .collect();
+        return Tap {
+            periods: whole as usize,
+            rows,
+            current: 0.0,
+            setpoint: 0.0,
+        };
     }
     let within = over(held.period_s * (1.0 - rest));
-    let sum = |of: fn(&super::Block) -> f64| within.blocks.iter().map(|block| block.output * of(block)).sum();
+    let sum = |of: fn(&super::Block) -> f64| {
+        within
+            .blocks
+            .iter()
+            .map(|block| block.output * of(block))
+            .sum()
+    };
     Tap {
         periods: whole as usize + 1,
-        rows: within.blocks.iter().map(|block| block.a[0].map(|a| block.output * a)).collect(),
+        rows: within
+            .blocks
+            .iter()
+            .map(|block| block.a[0].map(|a| block.output * a))
+            .collect(),
         current: sum(|block| block.current[0]),
         setpoint: sum(|block| block.setpoint[0]),
     }
@@ -186,7 +223,12 @@ fn tap(held: &Sampled, over: &impl Fn(f64) -> Sampled, delay_s: f64) -> Tap {
 /// `taps` with `share` of `tap`, which joins one that arrives at the same time.
 fn add(mut taps: Vec<Tap>, tap: Tap, share: f64) -> Vec<Tap> {
     let rows = tap.rows.iter().map(|row| row.map(|c| c * share)).collect();
-    let tap = Tap { rows, current: tap.current * share, setpoint: tap.setpoint * share, ..tap };
+    let tap = Tap {
+        rows,
+        current: tap.current * share,
+        setpoint: tap.setpoint * share,
+        ..tap
+    };
     match taps.iter_mut().find(|other| other.periods == tap.periods) {
         Some(other) => other.join(&tap),
         None => taps.push(tap),
@@ -196,7 +238,12 @@ fn add(mut taps: Vec<Tap>, tap: Tap, share: f64) -> Vec<Tap> {
 
 impl Tap {
     fn join(&mut self, other: &Tap) {
-        for (mine, theirs) in self.rows.iter_mut().flatten().zip(other.rows.iter().flatten()) {
+        for (mine, theirs) in self
+            .rows
+            .iter_mut()
+            .flatten()
+            .zip(other.rows.iter().flatten())
+        {
             *mine += theirs;
         }
         self.current += other.current;
@@ -204,7 +251,12 @@ impl Tap {
     }
 
     fn of(&self, motion: &Motion, setpoint_a: f64) -> f64 {
-        let moved: f64 = self.rows.iter().zip(&motion.states).map(|(c, x)| c[0] * x[0] + c[1] * x[1]).sum();
+        let moved: f64 = self
+            .rows
+            .iter()
+            .zip(&motion.states)
+            .map(|(c, x)| c[0] * x[0] + c[1] * x[1])
+            .sum();
         moved + self.current * motion.current_a + self.setpoint * setpoint_a
     }
 
@@ -224,12 +276,23 @@ mod tests {
 
     fn config(sets: &[&str]) -> Config {
         let sets = sets.iter().map(|set| set.to_string()).collect();
-        load(&Source { sets, ..Source::default() }).unwrap()
+        load(&Source {
+            sets,
+            ..Source::default()
+        })
+        .unwrap()
     }
 
     fn mode() -> Mode {
         let shape = nalgebra::DVector::zeros(1);
-        Mode { omega_rad_s: 950.0, damping_ratio: 0.02, shape, force_gain: 0.7, sensor_gain: 0.6, floor_gain: 1.0 }
+        Mode {
+            omega_rad_s: 950.0,
+            damping_ratio: 0.02,
+            shape,
+            force_gain: 0.7,
+            sensor_gain: 0.6,
+            floor_gain: 1.0,
+        }
     }
 
     /// The closed form by the aliases of sampling: G = sum over k of P(j w_k) H(j w_k) E(j w_k), w_k = w + k 2 pi/T, with the
@@ -240,13 +303,22 @@ mod tests {
         let delay_s = f64::from(config.servo.computing_delay_periods) * period_s
             + config.amplifier.latency_s
             + config.probe.age_at_arrival_s();
-        let hold = |s: Complex<f64>, span_s: f64| (Complex::new(1.0, 0.0) - (-s * span_s).exp()) / (s * span_s);
+        let hold = |s: Complex<f64>, span_s: f64| {
+            (Complex::new(1.0, 0.0) - (-s * span_s).exp()) / (s * span_s)
+        };
         let lag = 2.0 * std::f64::consts::PI * config.amplifier.bandwidth_hz;
         (-4000..=4000)
             .map(|k| {
-                let s = Complex::new(0.0, omega_rad_s + f64::from(k) * 2.0 * std::f64::consts::PI / period_s);
-                let plant = mode.resonance(s) * mode.residue_per_kg() * config.motor.force_constant_n_per_a;
-                let probe = config.probe.rate_hz.map_or(Complex::new(1.0, 0.0), |rate_hz| hold(s, 1.0 / rate_hz));
+                let s = Complex::new(
+                    0.0,
+                    omega_rad_s + f64::from(k) * 2.0 * std::f64::consts::PI / period_s,
+                );
+                let plant =
+                    mode.resonance(s) * mode.residue_per_kg() * config.motor.force_constant_n_per_a;
+                let probe = config
+                    .probe
+                    .rate_hz
+                    .map_or(Complex::new(1.0, 0.0), |rate_hz| hold(s, 1.0 / rate_hz));
                 plant * lag / (s + lag) * hold(s, period_s) * (-s * delay_s).exp() * probe
             })
             .sum()
@@ -254,10 +326,28 @@ mod tests {
 
     const CASES: [&[&str]; 5] = [
         &[],
-        &["loop.rate_hz=1000.0", "amplifier.latency_s=0.00037", "loop.computing_delay_periods=0"],
-        &["loop.rate_hz=1000.0", "probe.latency_s=0.0017", "interlock.probe_stale_s=0.01"],
-        &["loop.rate_hz=1000.0", "probe.rate_hz=430.0", "probe.transport_s=0.0012", "interlock.probe_stale_s=0.01"],
-        &["loop.rate_hz=5000.0", "probe.rate_hz=3900.0", "amplifier.latency_s=0.0001", "interlock.probe_stale_s=0.01"],
+        &[
+            "loop.rate_hz=1000.0",
+            "amplifier.latency_s=0.00037",
+            "loop.computing_delay_periods=0",
+        ],
+        &[
+            "loop.rate_hz=1000.0",
+            "probe.latency_s=0.0017",
+            "interlock.probe_stale_s=0.01",
+        ],
+        &[
+            "loop.rate_hz=1000.0",
+            "probe.rate_hz=430.0",
+            "probe.transport_s=0.0012",
+            "interlock.probe_stale_s=0.01",
+        ],
+        &[
+            "loop.rate_hz=5000.0",
+            "probe.rate_hz=3900.0",
+            "amplifier.latency_s=0.0001",
+            "interlock.probe_stale_s=0.01",
+        ],
     ];
 
     #[test]
@@ -266,10 +356,16 @@ mod tests {
             let config = config(sets);
             let chain = Chain::new(&config, &[mode()]);
             for omega_rad_s in [1.0, 150.0, 949.0, 1300.0, 2800.0] {
-                let (ours, exact) = (chain.response(omega_rad_s), by_aliases(&config, omega_rad_s));
+                let (ours, exact) = (
+                    chain.response(omega_rad_s),
+                    by_aliases(&config, omega_rad_s),
+                );
                 // The midpoint rule errs by (w Tp)^2/(24 64^2) = 4e-4 at 2800 rad/s and 2.3 ms; as much again of the aliases,
                 // which weigh more where the hold's own roll-off (w Tp near 2 pi) leaves little of the first harmonic.
-                assert!((ours / exact - 1.0).norm() < 8e-4, "{sets:?} at {omega_rad_s}: {ours} for {exact}");
+                assert!(
+                    (ours / exact - 1.0).norm() < 8e-4,
+                    "{sets:?} at {omega_rad_s}: {ours} for {exact}"
+                );
             }
         }
     }
@@ -284,7 +380,10 @@ mod tests {
                 let command_a = f64::from(tick % 7) - 2.5;
                 let (by_matrix, by_steps) = ((&c * &x)[(0, 0)], chain.reading_m(&state));
                 // Two hundred steps of numbers below 1e-3, rounded at 1e-16 each.
-                assert!((by_matrix - by_steps).abs() < 1e-16, "{sets:?} tick {tick}: {by_matrix} {by_steps}");
+                assert!(
+                    (by_matrix - by_steps).abs() < 1e-16,
+                    "{sets:?} tick {tick}: {by_matrix} {by_steps}"
+                );
                 x = &a * &x + &b * command_a;
                 chain.step(&mut state, command_a);
             }
@@ -292,7 +391,10 @@ mod tests {
             let complex = |m: &DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
             let inside = DMatrix::identity(a.nrows(), a.nrows()) * z - complex(&a);
             let direct = (complex(&c) * inside.lu().solve(&complex(&b)).unwrap())[(0, 0)];
-            assert!((chain.response(0.7 / chain.period_s()) / direct - 1.0).norm() < 1e-9, "{sets:?}");
+            assert!(
+                (chain.response(0.7 / chain.period_s()) / direct - 1.0).norm() < 1e-9,
+                "{sets:?}"
+            );
         }
     }
 

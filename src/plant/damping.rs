@@ -7,15 +7,26 @@ use super::{PlantError, Structure};
 use crate::config::{DampingPoint, DampingSettings};
 
 /// C of a structure: Rayleigh's mass_per_s M + stiffness_s K, or 2 zeta w in every mode.
-pub(super) fn matrix(structure: &Structure, settings: &DampingSettings) -> Result<DMatrix<f64>, PlantError> {
+pub(super) fn matrix(
+    structure: &Structure,
+    settings: &DampingSettings,
+) -> Result<DMatrix<f64>, PlantError> {
     match settings {
-        DampingSettings::Rayleigh { mass_per_s, stiffness_s } => rayleigh(structure, (*mass_per_s, *stiffness_s)),
-        DampingSettings::Measured { first, second } => rayleigh(structure, coefficients(first, second)),
+        DampingSettings::Rayleigh {
+            mass_per_s,
+            stiffness_s,
+        } => rayleigh(structure, (*mass_per_s, *stiffness_s)),
+        DampingSettings::Measured { first, second } => {
+            rayleigh(structure, coefficients(first, second))
+        }
         DampingSettings::Uniform { ratio } => uniform(structure, *ratio),
     }
 }
 
-fn rayleigh(structure: &Structure, (mass_per_s, stiffness_s): (f64, f64)) -> Result<DMatrix<f64>, PlantError> {
+fn rayleigh(
+    structure: &Structure,
+    (mass_per_s, stiffness_s): (f64, f64),
+) -> Result<DMatrix<f64>, PlantError> {
     if structure.free_bodies > 0 && mass_per_s != 0.0 {
         return Err(PlantError::DampedFreeBody { mass_per_s });
     }
@@ -43,11 +54,20 @@ mod tests {
 
     #[test]
     fn the_coefficients_give_back_the_measured_ratios() {
-        let points =
-            [DampingPoint { omega_rad_s: 179.0, ratio: 0.009 }, DampingPoint { omega_rad_s: 520.0, ratio: 0.004 }];
+        let points = [
+            DampingPoint {
+                omega_rad_s: 179.0,
+                ratio: 0.009,
+            },
+            DampingPoint {
+                omega_rad_s: 520.0,
+                ratio: 0.004,
+            },
+        ];
         let (mass_per_s, stiffness_s) = coefficients(&points[0], &points[1]);
         for point in points {
-            let ratio = mass_per_s / (2.0 * point.omega_rad_s) + stiffness_s * point.omega_rad_s / 2.0;
+            let ratio =
+                mass_per_s / (2.0 * point.omega_rad_s) + stiffness_s * point.omega_rad_s / 2.0;
             assert!((ratio - point.ratio).abs() < 1e-15, "{ratio}");
         }
         // Both terms are needed: with stiffness alone the upper ratio would be the larger.

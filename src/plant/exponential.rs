@@ -8,8 +8,15 @@ const TERMS: u32 = 13;
 /// exp(A) by scaling and squaring: the Taylor series of A/2^s, squared s times. (nalgebra has one with its `std` feature
 /// alone, whose products are rounded differently on different processors.)
 pub(crate) fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
-    let norm = matrix.column_iter().map(|column| column.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
-    let squarings = if norm > 0.0 { (libm::ceil(libm::log2(norm)) as i32 + 4).max(0) } else { 0 };
+    let norm = matrix
+        .column_iter()
+        .map(|column| column.iter().map(|x| x.abs()).sum::<f64>())
+        .fold(0.0, f64::max);
+    let squarings = if norm > 0.0 {
+        (libm::ceil(libm::log2(norm)) as i32 + 4).max(0)
+    } else {
+        0
+    };
     let scaled = matrix * libm::exp2(-f64::from(squarings));
     // Horner: I + A (I + A/2 (I + A/3 (...))).
     let mut sum = SMatrix::<f64, N, N>::identity();
@@ -30,11 +37,16 @@ mod tests {
             let rotation = exponential(&Matrix2::new(0.0, angle, -angle, 0.0));
             let exact = Matrix2::new(angle.cos(), angle.sin(), -angle.sin(), angle.cos());
             // Each of log2(16 angle) squarings doubles the rounding: 16 angle times 1e-16, times a few sums.
-            assert!((rotation - exact).amax() < 1e-15 * (10.0 + 50.0 * angle), "{angle}");
+            assert!(
+                (rotation - exact).amax() < 1e-15 * (10.0 + 50.0 * angle),
+                "{angle}"
+            );
         }
         let decay = exponential(&Matrix2::new(-3.0, 0.0, 0.0, -700.0));
         // Scaled for the 700 by 2^14: as many roundings of 1e-16 in the slow element.
-        assert!((decay[(0, 0)] / f64::exp(-3.0) - 1.0).abs() < 4e-12 && decay[(1, 1)].abs() < 1e-300);
+        assert!(
+            (decay[(0, 0)] / f64::exp(-3.0) - 1.0).abs() < 4e-12 && decay[(1, 1)].abs() < 1e-300
+        );
         let shear = exponential(&Matrix2::new(0.0, 5.0, 0.0, 0.0));
         assert!((shear - Matrix2::new(1.0, 5.0, 0.0, 1.0)).amax() < 1e-14);
     }

@@ -31,20 +31,35 @@ impl Coordinate {
     /// What does not move, at zero.
     pub fn ground(degrees_of_freedom: usize, curved: bool) -> Coordinate {
         let n = degrees_of_freedom;
-        Coordinate { at_m: 0.0, row: DVector::zeros(n), curve: curved.then(|| DMatrix::zeros(n, n)) }
+        Coordinate {
+            at_m: 0.0,
+            row: DVector::zeros(n),
+            curve: curved.then(|| DMatrix::zeros(n, n)),
+        }
     }
 
     /// A degree of freedom itself.
     pub fn free(degrees_of_freedom: usize, curved: bool, index: usize, at_m: f64) -> Coordinate {
-        let mut free = Coordinate { at_m, ..Coordinate::ground(degrees_of_freedom, curved) };
+        let mut free = Coordinate {
+            at_m,
+            ..Coordinate::ground(degrees_of_freedom, curved)
+        };
         free.row[index] = 1.0;
         free
     }
 
     /// How far this coordinate is beyond another.
     pub fn from(&self, other: &Coordinate) -> Coordinate {
-        let curve = self.curve.as_ref().zip(other.curve.as_ref()).map(|(mine, theirs)| mine - theirs);
-        Coordinate { at_m: self.at_m - other.at_m, row: &self.row - &other.row, curve }
+        let curve = self
+            .curve
+            .as_ref()
+            .zip(other.curve.as_ref())
+            .map(|(mine, theirs)| mine - theirs);
+        Coordinate {
+            at_m: self.at_m - other.at_m,
+            row: &self.row - &other.row,
+            curve,
+        }
     }
 
     /// Along a parallelogram's axis: a_S of this a_P, with `across` = t_S - t_P, S on `side` s, and c in 1/m.
@@ -58,7 +73,9 @@ impl Coordinate {
                 .curve
                 .as_ref()
                 .zip(across.curve.as_ref())
-                .map(|(mine, theirs)| mine - (2.0 * scale * &across.row * across.row.transpose() + slope * theirs)),
+                .map(|(mine, theirs)| {
+                    mine - (2.0 * scale * &across.row * across.row.transpose() + slope * theirs)
+                }),
         }
     }
 }

@@ -32,7 +32,8 @@ pub(super) fn undamped(s: &LumpedSettings) -> Structure {
         }
         parts.spring(spring.stiffness_n_per_m, &along);
     }
-    let weights = |of: fn(&crate::config::NodeSettings) -> f64| s.nodes.values().map(of).collect::<Vec<_>>();
+    let weights =
+        |of: fn(&crate::config::NodeSettings) -> f64| s.nodes.values().map(of).collect::<Vec<_>>();
     let mut structure = parts.finish(&weights(|node| node.actuator), &weights(|node| node.sensor));
     structure.free_bodies = s.free().len();
     structure
@@ -40,6 +41,14 @@ pub(super) fn undamped(s: &LumpedSettings) -> Structure {
 
 /// The displacement of each node.
 pub(super) fn ports(s: &LumpedSettings) -> Vec<Port> {
-    let row = |index: usize| (0..s.nodes.len()).map(|other| f64::from(u8::from(other == index))).collect::<Vec<_>>();
-    s.nodes.keys().enumerate().map(|(index, name)| Port::new(name, &row(index))).collect()
+    let row = |index: usize| {
+        (0..s.nodes.len())
+            .map(|other| f64::from(u8::from(other == index)))
+            .collect::<Vec<_>>()
+    };
+    s.nodes
+        .keys()
+        .enumerate()
+        .map(|(index, name)| Port::new(name, &row(index)))
+        .collect()
 }

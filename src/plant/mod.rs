@@ -56,7 +56,9 @@ pub enum PlantError {
     )]
     SingularMass,
     /// An eigenvalue iteration did not end.
-    #[error("the eigenvalues of {what} did not converge; scale the model's masses and stiffnesses to similar sizes")]
+    #[error(
+        "the eigenvalues of {what} did not converge; scale the model's masses and stiffnesses to similar sizes"
+    )]
     NoConvergence {
         /// Which matrix.
         what: &'static str,
@@ -85,7 +87,9 @@ pub enum PlantError {
         mass_per_s: f64,
     },
     /// A model that is only known linearised.
-    #[error("the model `{model}` has no geometry beyond the linear one; set sim.geometry = \"linear\"")]
+    #[error(
+        "the model `{model}` has no geometry beyond the linear one; set sim.geometry = \"linear\""
+    )]
     NotQuadratic {
         /// Which model.
         model: &'static str,

@@ -30,7 +30,11 @@ impl Mode {
 
     /// What the velocity is divided by to be of the displacement's size: w, or 1 rad/s of a free body.
     pub fn rate_scale_rad_s(&self) -> f64 {
-        if self.omega_rad_s > 0.0 { self.omega_rad_s } else { 1.0 }
+        if self.omega_rad_s > 0.0 {
+            self.omega_rad_s
+        } else {
+            1.0
+        }
     }
 
     /// 1/(s^2 + 2 zeta w s + w^2).
@@ -54,7 +58,11 @@ pub enum Sign {
 impl Sign {
     /// Of the residue of a mode that shows.
     pub fn of(residue_per_kg: f64) -> Sign {
-        if residue_per_kg > 0.0 { Sign::Plus } else { Sign::Minus }
+        if residue_per_kg > 0.0 {
+            Sign::Plus
+        } else {
+            Sign::Minus
+        }
     }
 
     /// `+`, `-` or `0`.
@@ -88,28 +96,53 @@ impl Modal {
     pub fn of(structure: &Structure) -> Result<Modal, PlantError> {
         let (values, shapes) = modes(&structure.mass, &structure.stiffness)?;
         let floor = HELD_RATIO * values.amax();
-        let modes = values.iter().zip(shapes.column_iter()).enumerate().map(|(index, (&w2, shape))| {
-            let shape: DVector<f64> = shape.into_owned();
-            match index < structure.free_bodies {
-                true => Ok(mode(structure, 0.0, shape)),
-                false if w2 <= floor => Err(PlantError::Free { number: index + 1, eigenvalue_rad2_s2: w2 }),
-                false => Ok(mode(structure, w2.sqrt(), shape)),
-            }
-        });
-        let modal = Modal { modes: modes.collect::<Result<_, _>>()? };
-        if modal.is_deaf() { Err(PlantError::NoResponse) } else { Ok(modal) }
+        let modes =
+            values
+                .iter()
+                .zip(shapes.column_iter())
+                .enumerate()
+                .map(|(index, (&w2, shape))| {
+                    let shape: DVector<f64> = shape.into_owned();
+                    match index < structure.free_bodies {
+                        true => Ok(mode(structure, 0.0, shape)),
+                        false if w2 <= floor => Err(PlantError::Free {
+                            number: index + 1,
+                            eigenvalue_rad2_s2: w2,
+                        }),
+                        false => Ok(mode(structure, w2.sqrt(), shape)),
+                    }
+                });
+        let modal = Modal {
+            modes: modes.collect::<Result<_, _>>()?,
+        };
+        if modal.is_deaf() {
+            Err(PlantError::NoResponse)
+        } else {
+            Ok(modal)
+        }
     }
 
     /// Whether no force reaches the probe: every residue is rounding beside its two parts.
     fn is_deaf(&self) -> bool {
-        let largest = |of: fn(&Mode) -> f64| self.modes.iter().map(|mode| of(mode).abs()).fold(0.0, f64::max);
-        let (force, sensor) = (largest(|mode| mode.force_gain), largest(|mode| mode.sensor_gain));
+        let largest = |of: fn(&Mode) -> f64| {
+            self.modes
+                .iter()
+                .map(|mode| of(mode).abs())
+                .fold(0.0, f64::max)
+        };
+        let (force, sensor) = (
+            largest(|mode| mode.force_gain),
+            largest(|mode| mode.sensor_gain),
+        );
         largest(Mode::residue_per_kg) <= SILENT_RATIO * force * sensor
     }
 
     /// G(s): displacement in metres per newton.
     pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
-        self.modes.iter().map(|mode| mode.resonance(s) * mode.residue_per_kg()).sum()
+        self.modes
+            .iter()
+            .map(|mode| mode.resonance(s) * mode.residue_per_kg())
+            .sum()
     }
 
     /// The sign of each residue; `None` where the mode's peak |r|/(2 zeta w^2) stays below 0.1 % of what all other modes
@@ -117,25 +150,48 @@ impl Modal {
     pub fn signs(&self) -> Vec<Sign> {
         let sign = |(index, mode): (usize, &Mode)| {
             let residue = mode.residue_per_kg();
-            let peak =
-                residue.abs() / (2.0 * mode.damping_ratio.max(VISIBLE_DAMPING) * mode.omega_rad_s * mode.omega_rad_s);
+            let peak = residue.abs()
+                / (2.0
+                    * mode.damping_ratio.max(VISIBLE_DAMPING)
+                    * mode.omega_rad_s
+                    * mode.omega_rad_s);
             // The peak of a double integrator has no end: it shows unless its residue is rounding.
             let free = mode.omega_rad_s == 0.0;
-            let hidden = if free { self.is_rounding(residue) } else { peak <= VISIBLE_RATIO * self.others(index) };
-            if hidden { Sign::None } else { Sign::of(residue) }
+            let hidden = if free {
+                self.is_rounding(residue)
+            } else {
+                peak <= VISIBLE_RATIO * self.others(index)
+            };
+            if hidden {
+                Sign::None
+            } else {
+                Sign::of(residue)
+            }
         };
         self.modes.iter().enumerate().map(sign).collect()
     }
 
     fn is_rounding(&self, residue: f64) -> bool {
-        residue.abs() <= SILENT_RATIO * self.modes.iter().map(|mode| mode.residue_per_kg().abs()).fold(0.0, f64::max)
+        residue.abs()
+            <= SILENT_RATIO
+                * self
+                    .modes
+                    .iter()
+                    .map(|mode| mode.residue_per_kg().abs())
+                    .fold(0.0, f64::max)
     }
 
     /// |G| of all modes but one, at that one's frequency.
     fn others(&self, index: usize) -> f64 {
         let s = Complex::new(0.0, self.modes[index].omega_rad_s);
-        let rest = self.modes.iter().enumerate().filter(|(other, _)| *other != index);
-        rest.map(|(_, mode)| mode.resonance(s) * mode.residue_per_kg()).sum::<Complex<f64>>().norm()
+        let rest = self
+            .modes
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != index);
+        rest.map(|(_, mode)| mode.resonance(s) * mode.residue_per_kg())
+            .sum::<Complex<f64>>()
+            .norm()
     }
 }
 
@@ -144,11 +200,19 @@ fn mode(structure: &Structure, omega_rad_s: f64, unit_mass_shape: DVector<f64>) 
     // The sign of a shape is free. Positive at the probe, or at its largest element where the probe sees nothing.
     let largest = unit_mass_shape[unit_mass_shape.iamax()];
     let seen = sensor_gain.abs() > 1e-6 * structure.sensor.norm() * largest.abs();
-    let flip = if (if seen { sensor_gain } else { largest }) < 0.0 { -1.0 } else { 1.0 };
+    let flip = if (if seen { sensor_gain } else { largest }) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
     let v = flip * unit_mass_shape;
     Mode {
         omega_rad_s,
-        damping_ratio: if omega_rad_s == 0.0 { 0.0 } else { v.dot(&(&structure.damping * &v)) / (2.0 * omega_rad_s) },
+        damping_ratio: if omega_rad_s == 0.0 {
+            0.0
+        } else {
+            v.dot(&(&structure.damping * &v)) / (2.0 * omega_rad_s)
+        },
         force_gain: structure.force.dot(&v),
         sensor_gain: structure.sensor.dot(&v),
         floor_gain: structure.floor.dot(&v),

@@ -68,13 +68,19 @@ impl Quadratic {
     pub fn of(settings: &PlantSettings) -> Result<Quadratic, PlantError> {
         match settings {
             PlantSettings::Sr4dof(s) => Ok(Quadratic::new(s, &sr4dof::structure(s)?)),
-            other => Err(PlantError::NotQuadratic { model: other.model() }),
+            other => Err(PlantError::NotQuadratic {
+                model: other.model(),
+            }),
         }
     }
 
     fn new(s: &Sr4dofSettings, linear: &Structure) -> Quadratic {
         let beam = Beam::from(s);
-        let (m1, m3, m4) = (s.motion_stage_mass_kg, s.secondary_stage_mass_kg, s.intermediate_stage_mass_kg);
+        let (m1, m3, m4) = (
+            s.motion_stage_mass_kg,
+            s.secondary_stage_mass_kg,
+            s.intermediate_stage_mass_kg,
+        );
         let m2 = m3 * (1.0 + s.mass_asymmetry);
         let k = beam.parallelogram_n_per_m();
         #[rustfmt::skip]
@@ -121,7 +127,8 @@ impl Quadratic {
     fn acceleration(&self, state: &QuadraticState, force_n: f64, load: Load) -> Vector4<f64> {
         let motions = self.motions(state);
         let mut mass = self.straight;
-        let mut force = motions[2].gradient * force_n - self.bending * state.place - self.damping * state.rate;
+        let mut force =
+            motions[2].gradient * force_n - self.bending * state.place - self.damping * state.rate;
         // Stage 1 moves along x1 itself.
         force[0] += load.probe_n - self.straight[(0, 0)] * load.floor_m_per_s2;
         for (motion, m) in motions.iter().zip(self.masses_kg) {
@@ -132,7 +139,10 @@ impl Quadratic {
             force -= motion.gradient * (self.spring_n_per_m * motion.along_m);
         }
         // Positive definite for any finite z, as `straight` is; a state beyond numbers stays so, and the probe says so.
-        mass.cholesky().map_or(Vector4::from_element(f64::NAN), |factor| factor.solve(&force))
+        mass.cholesky()
+            .map_or(Vector4::from_element(f64::NAN), |factor| {
+                factor.solve(&force)
+            })
     }
 
     /// Stages 2, 3, 4, 5.
@@ -146,12 +156,24 @@ impl Quadratic {
         let (s12, s2, s13, s3) = (slope(y1 - y2), slope(y2), slope(y1 - y3), slope(y3));
         let (x2, x3) = (x1 + shortened(y1 - y2), x1 - shortened(y1 - y3));
         let (b2, b3) = (bend(v1 - v2), -bend(v1 - v3));
-        let motion = |along_m, gradient, bend_m_per_s2| Motion { along_m, gradient, bend_m_per_s2 };
+        let motion = |along_m, gradient, bend_m_per_s2| Motion {
+            along_m,
+            gradient,
+            bend_m_per_s2,
+        };
         [
             motion(x2, Vector4::new(1.0, s12, -s12, 0.0), b2),
             motion(x3, Vector4::new(1.0, -s13, 0.0, s13), b3),
-            motion(x2 - shortened(y2), Vector4::new(1.0, s12, -s12 - s2, 0.0), b2 - bend(v2)),
-            motion(x3 + shortened(y3), Vector4::new(1.0, -s13, 0.0, s13 + s3), b3 + bend(v3)),
+            motion(
+                x2 - shortened(y2),
+                Vector4::new(1.0, s12, -s12 - s2, 0.0),
+                b2 - bend(v2),
+            ),
+            motion(
+                x3 + shortened(y3),
+                Vector4::new(1.0, -s13, 0.0, s13 + s3),
+                b3 + bend(v3),
+            ),
         ]
     }
 }
@@ -168,7 +190,13 @@ mod tests {
 
     fn settings(sets: &[&str]) -> Sr4dofSettings {
         let sets = sets.iter().map(|set| set.to_string()).collect();
-        match load(&Source { sets, ..Source::default() }).unwrap().plant {
+        match load(&Source {
+            sets,
+            ..Source::default()
+        })
+        .unwrap()
+        .plant
+        {
             PlantSettings::Sr4dof(s) => s,
             other => panic!("{other:?}"),
         }
@@ -183,12 +211,19 @@ mod tests {
     fn energy(s: &Sr4dofSettings, q: &Quadratic, state: &QuadraticState) -> f64 {
         let motions = q.motions(state);
         let x_speed = |motion: &Motion| motion.gradient.dot(&state.rate);
-        let moving: f64 = motions.iter().zip(q.masses_kg).map(|(motion, m)| m * x_speed(motion).powi(2)).sum();
+        let moving: f64 = motions
+            .iter()
+            .zip(q.masses_kg)
+            .map(|(motion, m)| m * x_speed(motion).powi(2))
+            .sum();
         let straight = state.rate.dot(&(q.straight * state.rate));
         let [y1, y2, y3] = [state.place[1], state.place[2], state.place[3]];
         let k = Beam::from(s).parallelogram_n_per_m();
         let bent = k * ((y1 - y2).powi(2) + y2 * y2 + (y1 - y3).powi(2) + y3 * y3);
-        let springs: f64 = motions[2..].iter().map(|motion| q.spring_n_per_m * motion.along_m.powi(2)).sum();
+        let springs: f64 = motions[2..]
+            .iter()
+            .map(|motion| q.spring_n_per_m * motion.along_m.powi(2))
+            .sum();
         0.5 * (moving + straight + bent + springs)
     }
 
@@ -201,15 +236,22 @@ mod tests {
             for (place, rate, force_n) in [(1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0), (0.0, 0.0, 1.0)] {
                 let mut state = QuadraticState::default();
                 (state.place[axis], state.rate[axis]) = (place, rate);
-                let load = Load { probe_n: 0.3 * force_n, floor_m_per_s2: 0.2 * force_n };
+                let load = Load {
+                    probe_n: 0.3 * force_n,
+                    floor_m_per_s2: 0.2 * force_n,
+                };
                 let ours = q.acceleration(&state, force_n, load);
                 let vector = |v: &Vector4<f64>| DVector::from_column_slice(v.as_slice());
                 let mut force = &linear.force * force_n - &linear.floor * load.floor_m_per_s2;
                 force[0] += load.probe_n;
-                force -= &linear.stiffness * vector(&state.place) + &linear.damping * vector(&state.rate);
+                force -= &linear.stiffness * vector(&state.place)
+                    + &linear.damping * vector(&state.rate);
                 let expected = &inverse * force;
                 // Beyond the linear part are squares of 1e-9 m, 1e-7 of it over the 4 mm of Y1o; 1e-5 leaves room for stiff axes.
-                assert!((vector(&ours) - &expected).amax() <= 1e-5 * expected.amax(), "{ours} {expected}");
+                assert!(
+                    (vector(&ours) - &expected).amax() <= 1e-5 * expected.amax(),
+                    "{ours} {expected}"
+                );
             }
         }
     }
@@ -218,7 +260,10 @@ mod tests {
     fn large_motions_without_damping_keep_their_energy() {
         let s = settings(&["plant.damping={kind=\"uniform\",ratio=0.0}"]);
         let (q, _) = mechanism(&s);
-        let mut state = QuadraticState { place: Vector4::new(5e-4, 2e-3, -1e-3, 3e-3), ..QuadraticState::default() };
+        let mut state = QuadraticState {
+            place: Vector4::new(5e-4, 2e-3, -1e-3, 3e-3),
+            ..QuadraticState::default()
+        };
         let before = energy(&s, &q, &state);
         let mut least = 1.0;
         for _ in 0..50_000 {
@@ -227,7 +272,10 @@ mod tests {
         }
         // One second: the fastest mode, 540 rad/s, loses 2 * 540 rad * (540 * 2e-5)^5/144 = 1.1e-9 of its energy.
         let left = energy(&s, &q, &state) / before;
-        assert!((left - 1.0).abs() < 5e-9 && least > 1.0 - 5e-9, "{left} {least}");
+        assert!(
+            (left - 1.0).abs() < 5e-9 && least > 1.0 - 5e-9,
+            "{left} {least}"
+        );
         // The motion is far from linear: x4 bends by c (3 mm)^2 = 0.11 mm beside its 0.5 mm.
         assert!(state.place.amax() > 1e-4);
     }
@@ -237,8 +285,10 @@ mod tests {
         let s = settings(&[]);
         let (q, _) = mechanism(&s);
         let after = |steps: usize| {
-            let mut state =
-                QuadraticState { place: Vector4::new(5e-4, 2e-3, -1e-3, 3e-3), ..QuadraticState::default() };
+            let mut state = QuadraticState {
+                place: Vector4::new(5e-4, 2e-3, -1e-3, 3e-3),
+                ..QuadraticState::default()
+            };
             let step_s = 0.02 / steps as f64;
             (0..steps).for_each(|_| q.step(&mut state, step_s, [0.1; 3], Load::default()));
             state.place

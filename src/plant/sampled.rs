@@ -51,10 +51,22 @@ pub struct Sampled {
 
 impl Sampled {
     /// Discretises `modes`, driven through an amplifier of `bandwidth_hz` and a motor of `force_constant_n_per_a`.
-    pub fn new(modes: &[Mode], bandwidth_hz: f64, force_constant_n_per_a: f64, period_s: f64) -> Sampled {
+    pub fn new(
+        modes: &[Mode],
+        bandwidth_hz: f64,
+        force_constant_n_per_a: f64,
+        period_s: f64,
+    ) -> Sampled {
         let lag_rad_s = 2.0 * std::f64::consts::PI * bandwidth_hz;
-        let blocks = modes.iter().map(|mode| block(mode, lag_rad_s, force_constant_n_per_a, period_s)).collect();
-        Sampled { period_s, lag: libm::exp(-lag_rad_s * period_s), blocks }
+        let blocks = modes
+            .iter()
+            .map(|mode| block(mode, lag_rad_s, force_constant_n_per_a, period_s))
+            .collect();
+        Sampled {
+            period_s,
+            lag: libm::exp(-lag_rad_s * period_s),
+            blocks,
+        }
     }
 
     /// Current per ampere of set-point at the period's start, at z = exp(j w T).
@@ -64,12 +76,18 @@ impl Sampled {
 
     /// row . [q, q'/w] of a block per ampere of set-point at the period's start, at z = exp(j w T), where the current is what
     /// [`Sampled::current_response`] says.
-    pub fn state_response(block: &Block, row: [f64; 2], z: Complex<f64>, current: Complex<f64>) -> Complex<f64> {
+    pub fn state_response(
+        block: &Block,
+        row: [f64; 2],
+        z: Complex<f64>,
+        current: Complex<f64>,
+    ) -> Complex<f64> {
         let [[a11, a12], [a21, a22]] = block.a;
         let drive = |i: usize| current * block.current[i] + block.setpoint[i];
         let (first, second) = (drive(0), drive(1));
         let determinant = (z - a11) * (z - a22) - a12 * a21;
-        let along = ((z - a22) * first + second * a12) * row[0] + ((z - a11) * second + first * a21) * row[1];
+        let along = ((z - a22) * first + second * a12) * row[0]
+            + ((z - a11) * second + first * a21) * row[1];
         along / determinant
     }
 
@@ -77,12 +95,18 @@ impl Sampled {
     /// those of [`super::Chain`].
     pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
         let current = self.current_response(z);
-        self.blocks.iter().map(|block| Self::state_response(block, [block.output, 0.0], z, current)).sum()
+        self.blocks
+            .iter()
+            .map(|block| Self::state_response(block, [block.output, 0.0], z, current))
+            .sum()
     }
 
     /// Everything at rest.
     pub fn at_rest(&self) -> Motion {
-        Motion { current_a: 0.0, states: vec![[0.0; 2]; self.blocks.len()] }
+        Motion {
+            current_a: 0.0,
+            states: vec![[0.0; 2]; self.blocks.len()],
+        }
     }
 
     /// One period on, with the set-point held; `force` is what else acts on a mode, held as well.
@@ -103,18 +127,30 @@ impl Sampled {
 
     /// Displacement at the probe in metres.
     pub fn position_m(&self, motion: &Motion) -> f64 {
-        self.blocks.iter().zip(&motion.states).map(|(block, x)| block.output * x[0]).sum()
+        self.blocks
+            .iter()
+            .zip(&motion.states)
+            .map(|(block, x)| block.output * x[0])
+            .sum()
     }
 
     /// Velocity at the probe in metres per second.
     pub fn velocity_m_per_s(&self, motion: &Motion) -> f64 {
-        self.blocks.iter().zip(&motion.states).map(|(block, x)| block.output_rate * x[1]).sum()
+        self.blocks
+            .iter()
+            .zip(&motion.states)
+            .map(|(block, x)| block.output_rate * x[1])
+            .sum()
     }
 
     /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ...].
     pub fn state_space(&self) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let n = 1 + 2 * self.blocks.len();
-        let (mut a, mut b, mut c) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1), DMatrix::zeros(1, n));
+        let (mut a, mut b, mut c) = (
+            DMatrix::zeros(n, n),
+            DMatrix::zeros(n, 1),
+            DMatrix::zeros(1, n),
+        );
         a[(0, 0)] = self.lag;
         b[(0, 0)] = 1.0 - self.lag;
         for (index, block) in self.blocks.iter().enumerate() {
@@ -163,7 +199,14 @@ mod tests {
 
     fn mode() -> Mode {
         let shape = DVector::zeros(1);
-        Mode { omega_rad_s: 184.0, damping_ratio: 0.009, shape, force_gain: 0.7, sensor_gain: 0.6, floor_gain: 1.0 }
+        Mode {
+            omega_rad_s: 184.0,
+            damping_ratio: 0.009,
+            shape,
+            force_gain: 0.7,
+            sensor_gain: 0.6,
+            floor_gain: 1.0,
+        }
     }
 
     const BANDWIDTH_HZ: f64 = 1000.0;
@@ -171,7 +214,8 @@ mod tests {
     #[test]
     fn a_mode_swings_freely_as_in_closed_form() {
         let (mode, period_s) = (mode(), 2e-4);
-        let block = Sampled::new(std::slice::from_ref(&mode), BANDWIDTH_HZ, 11.12, period_s).blocks[0];
+        let block =
+            Sampled::new(std::slice::from_ref(&mode), BANDWIDTH_HZ, 11.12, period_s).blocks[0];
         // Displaced and let go: q(t) = exp(-zeta w t) (cos wd t + zeta/sqrt(1 - zeta^2) sin wd t).
         let (mut x, zeta) = ([1.0, 0.0], mode.damping_ratio);
         let damped = (1.0 - zeta * zeta).sqrt();
@@ -181,7 +225,11 @@ mod tests {
             let exact = (-zeta * mode.omega_rad_s * period_s * f64::from(tick)).exp()
                 * (phase.cos() + zeta / damped * phase.sin());
             // Ten thousand steps, each rounded at 1e-16.
-            assert!((x[0] - exact).abs() < 1e-11, "tick {tick}: {} for {exact}", x[0]);
+            assert!(
+                (x[0] - exact).abs() < 1e-11,
+                "tick {tick}: {} for {exact}",
+                x[0]
+            );
         }
     }
 
@@ -202,9 +250,15 @@ mod tests {
         let complex = |m: DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
         for angle in [1e-4, 0.03, 0.5, 3.0] {
             let z = Complex::new(f64::cos(angle), f64::sin(angle));
-            let resolvent = (DMatrix::identity(3, 3) * z - complex(a.clone())).lu().solve(&complex(b.clone())).unwrap();
+            let resolvent = (DMatrix::identity(3, 3) * z - complex(a.clone()))
+                .lu()
+                .solve(&complex(b.clone()))
+                .unwrap();
             let direct = (complex(c.clone()) * resolvent)[(0, 0)];
-            assert!((sampled.response(z) - direct).norm() < 1e-9 * direct.norm(), "at {angle}");
+            assert!(
+                (sampled.response(z) - direct).norm() < 1e-9 * direct.norm(),
+                "at {angle}"
+            );
         }
     }
 

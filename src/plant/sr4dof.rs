@@ -32,8 +32,19 @@ pub(super) fn structure(s: &Sr4dofSettings) -> Result<Structure, PlantError> {
 /// The displacements of the five stages in X, and of those that move in Y.
 pub(super) fn ports(s: &Sr4dofSettings) -> Vec<Port> {
     let [[x1, _], [x2, _], [x3, _], [x4, _], [x5, _]] = stages(s);
-    let rows = [("x1", x1), ("x2", x2), ("x3", x3), ("x4", x4), ("x5", x5), ("y1", Y1), ("y2", Y2), ("y3", Y3)];
-    rows.into_iter().map(|(name, row)| Port::new(name, &row)).collect()
+    let rows = [
+        ("x1", x1),
+        ("x2", x2),
+        ("x3", x3),
+        ("x4", x4),
+        ("x5", x5),
+        ("y1", Y1),
+        ("y2", Y2),
+        ("y3", Y3),
+    ];
+    rows.into_iter()
+        .map(|(name, row)| Port::new(name, &row))
+        .collect()
 }
 
 /// Displacements x and y of the stages 1 to 5 (Fig 2-2), over the degrees of freedom [x1, y1, y2, y3].
@@ -64,7 +75,11 @@ pub(crate) fn undamped(s: &Sr4dofSettings) -> Structure {
     let k = Beam::from(s).parallelogram_n_per_m();
     let rows = stages(s);
     let (x4, x5) = (rows[3][0], rows[4][0]);
-    let (m1, m2, m4) = (s.motion_stage_mass_kg, m3 * (1.0 + s.mass_asymmetry), s.intermediate_stage_mass_kg);
+    let (m1, m2, m4) = (
+        s.motion_stage_mass_kg,
+        m3 * (1.0 + s.mass_asymmetry),
+        s.intermediate_stage_mass_kg,
+    );
     let mut parts = Assembly::new(4);
     for (kilograms, [x, y]) in [m1, m2, m3, m4, m4].into_iter().zip(&rows) {
         parts.mass(kilograms, x, y);
@@ -88,11 +103,20 @@ mod tests {
     /// Eq. (2-5) as printed, for m4 = m5, k4 = k5 and four equal parallelograms k.
     fn printed(s: &Sr4dofSettings) -> (Matrix4<f64>, Matrix4<f64>) {
         let a = 0.6 * s.operating_point_m / s.beam_length_m;
-        let (m1, m3, m4) = (s.motion_stage_mass_kg, s.secondary_stage_mass_kg, s.intermediate_stage_mass_kg);
-        let (m2, m5, k4, k5) =
-            (m3 * (1.0 + s.mass_asymmetry), m4, s.spring_stiffness_n_per_m, s.spring_stiffness_n_per_m);
+        let (m1, m3, m4) = (
+            s.motion_stage_mass_kg,
+            s.secondary_stage_mass_kg,
+            s.intermediate_stage_mass_kg,
+        );
+        let (m2, m5, k4, k5) = (
+            m3 * (1.0 + s.mass_asymmetry),
+            m4,
+            s.spring_stiffness_n_per_m,
+            s.spring_stiffness_n_per_m,
+        );
         let i = s.beam_height_m * s.beam_thickness_m.powi(3) / 12.0;
-        let k = 24.0 * s.youngs_modulus_pa * i / (s.beam_length_m.powi(3) * (1.0 - s.poisson_ratio.powi(2)));
+        let k = 24.0 * s.youngs_modulus_pa * i
+            / (s.beam_length_m.powi(3) * (1.0 - s.poisson_ratio.powi(2)));
         let a2 = a * a;
         #[rustfmt::skip]
         let mass = Matrix4::new(
@@ -121,9 +145,20 @@ mod tests {
             Coordinate::ground(4, true),
         );
         let free = |index, at_m| Coordinate::free(4, true, index, at_m);
-        let (x1, y1, y2, y3) = (free(0, 0.0), free(1, y0), free(2, y0 / 2.0), free(3, y0 / 2.0));
-        let (x2, x3) = (x1.joined(&y2.from(&y1), -1.0, c), x1.joined(&y3.from(&y1), 1.0, c));
-        let (x4, x5) = (x2.joined(&ground.from(&y2), 1.0, c), x3.joined(&ground.from(&y3), -1.0, c));
+        let (x1, y1, y2, y3) = (
+            free(0, 0.0),
+            free(1, y0),
+            free(2, y0 / 2.0),
+            free(3, y0 / 2.0),
+        );
+        let (x2, x3) = (
+            x1.joined(&y2.from(&y1), -1.0, c),
+            x1.joined(&y3.from(&y1), 1.0, c),
+        );
+        let (x4, x5) = (
+            x2.joined(&ground.from(&y2), 1.0, c),
+            x3.joined(&ground.from(&y3), -1.0, c),
+        );
         let m3 = s.secondary_stage_mass_kg;
         let (m2, m4) = (m3 * (1.0 + s.mass_asymmetry), s.intermediate_stage_mass_kg);
         let stages = [
@@ -137,7 +172,14 @@ mod tests {
         for (kilograms, x, y) in stages {
             parts.mass(kilograms, x.row.as_slice(), y.row.as_slice());
         }
-        let springs = [(k, y1.from(&y2)), (k, y2.clone()), (k, y1.from(&y3)), (k, y3.clone()), (k4, x4), (k4, x5)];
+        let springs = [
+            (k, y1.from(&y2)),
+            (k, y2.clone()),
+            (k, y1.from(&y3)),
+            (k, y3.clone()),
+            (k4, x4),
+            (k4, x5),
+        ];
         let mut geometric = DMatrix::zeros(4, 4);
         for (stiffness, spring) in &springs {
             parts.spring(*stiffness, spring.row.as_slice());

@@ -33,7 +33,11 @@ pub(super) struct Assembly {
 impl Assembly {
     pub(super) fn new(degrees_of_freedom: usize) -> Self {
         let square = DMatrix::zeros(degrees_of_freedom, degrees_of_freedom);
-        Assembly { mass: square.clone(), stiffness: square, floor: DVector::zeros(degrees_of_freedom) }
+        Assembly {
+            mass: square.clone(),
+            stiffness: square,
+            floor: DVector::zeros(degrees_of_freedom),
+        }
     }
 
     /// A mass that moves along `x` (in the direction of the floor's acceleration) and along `y` (across it).

@@ -85,7 +85,8 @@ pub(super) fn ports(s: &XySettings) -> Vec<Port> {
         .chain(named(["sL", "sR", "sT", "sB"], stages.inner))
         .chain(named(["gL", "gR", "gT", "gB"], stages.outer));
     let both = |(name, stage): (&str, Stage)| {
-        [("x", stage.x.row), ("y", stage.y.row)].map(|(axis, row)| Port::new(&format!("{axis}_{name}"), row.as_slice()))
+        [("x", stage.x.row), ("y", stage.y.row)]
+            .map(|(axis, row)| Port::new(&format!("{axis}_{name}"), row.as_slice()))
     };
     all.flat_map(both).collect()
 }
@@ -93,14 +94,18 @@ pub(super) fn ports(s: &XySettings) -> Vec<Port> {
 /// The sum of static forces times curves: k d curve of each parallelogram bent by d, less F curve of the holding force F,
 /// which follows from the equilibrium in y_ms.
 fn geometric_stiffness(springs: &[Coordinate], k: f64, held: &Coordinate) -> DMatrix<f64> {
-    let pull_n: f64 = springs.iter().map(|spring| k * spring.at_m * spring.row[Y_MS]).sum();
+    let pull_n: f64 = springs
+        .iter()
+        .map(|spring| k * spring.at_m * spring.row[Y_MS])
+        .sum();
     let holding_n = pull_n / held.row[Y_MS];
     let add = |sum: DMatrix<f64>, (force_n, along): (f64, &Coordinate)| match &along.curve {
         Some(curve) => sum + force_n * curve,
         None => sum,
     };
     let bent = springs.iter().map(|d| (k * d.at_m, d));
-    bent.chain([(-holding_n, held)]).fold(DMatrix::zeros(N, N), add)
+    bent.chain([(-holding_n, held)])
+        .fold(DMatrix::zeros(N, N), add)
 }
 
 impl Stages {
@@ -112,27 +117,56 @@ impl Stages {
             XyLayout::MirrorAway => (1.0, 1.0),
             XyLayout::MirrorToward => (-1.0, -1.0),
         };
-        let motion = Stage { x: free(0, 0.0), y: free(Y_MS, y0) };
-        let [(s_l, xl, g_l), (s_r, xr, g_r)] = [(2, 6, -1.0, 1.0), (3, 7, 1.0, -1.0)]
-            .map(|(inner, outer, at, side)| across_y(&motion, free(inner, half), free(outer, 0.0), at, side, c));
+        let motion = Stage {
+            x: free(0, 0.0),
+            y: free(Y_MS, y0),
+        };
+        let [(s_l, xl, g_l), (s_r, xr, g_r)] =
+            [(2, 6, -1.0, 1.0), (3, 7, 1.0, -1.0)].map(|(inner, outer, at, side)| {
+                across_y(&motion, free(inner, half), free(outer, 0.0), at, side, c)
+            });
         let [(s_t, yt, g_t), (s_b, yb, g_b)] = [(4, 8, 1.0, side_top), (5, 9, -1.0, side_bottom)]
-            .map(|(inner, outer, at, side)| across_x(&motion, free(inner, 0.0), free(outer, half), at, side, c));
-        Stages { motion, intermediate: [xl, xr, yt, yb], inner: [s_l, s_r, s_t, s_b], outer: [g_l, g_r, g_t, g_b] }
+            .map(|(inner, outer, at, side)| {
+                across_x(&motion, free(inner, 0.0), free(outer, half), at, side, c)
+            });
+        Stages {
+            motion,
+            intermediate: [xl, xr, yt, yb],
+            inner: [s_l, s_r, s_t, s_b],
+            outer: [g_l, g_r, g_t, g_b],
+        }
     }
 
     fn masses(&self, s: &XySettings) -> Vec<(f64, &Stage)> {
         let d = &s.secondary_mass_deviation;
         let secondary = |deviation: f64| s.secondary_stage_mass_kg * (1.0 + deviation);
-        let inner = [d.sL, d.sR, d.sT, d.sB].map(secondary).into_iter().zip(&self.inner);
-        let outer = [d.gL, d.gR, d.gT, d.gB].map(secondary).into_iter().zip(&self.outer);
-        let intermediate = self.intermediate.iter().map(|stage| (s.intermediate_stage_mass_kg, stage));
-        std::iter::once((s.motion_stage_mass_kg, &self.motion)).chain(intermediate).chain(inner).chain(outer).collect()
+        let inner = [d.sL, d.sR, d.sT, d.sB]
+            .map(secondary)
+            .into_iter()
+            .zip(&self.inner);
+        let outer = [d.gL, d.gR, d.gT, d.gB]
+            .map(secondary)
+            .into_iter()
+            .zip(&self.outer);
+        let intermediate = self
+            .intermediate
+            .iter()
+            .map(|stage| (s.intermediate_stage_mass_kg, stage));
+        std::iter::once((s.motion_stage_mass_kg, &self.motion))
+            .chain(intermediate)
+            .chain(inner)
+            .chain(outer)
+            .collect()
     }
 
     /// How far each of the sixteen parallelograms is bent.
     fn springs(&self) -> Vec<Coordinate> {
         let module = |place: usize| {
-            let (inner, outer, intermediate) = (&self.inner[place], &self.outer[place], &self.intermediate[place]);
+            let (inner, outer, intermediate) = (
+                &self.inner[place],
+                &self.outer[place],
+                &self.intermediate[place],
+            );
             let in_y = [
                 self.motion.y.from(&inner.y),
                 inner.y.from(&intermediate.y),
@@ -162,11 +196,17 @@ fn across_y(
     c: f64,
 ) -> (Stage, Stage, Stage) {
     let ground = Coordinate::ground(N, motion.x.curve.is_some());
-    let inner = Stage { x: motion.x.joined(&inner_y.from(&motion.y), at, c), y: inner_y };
+    let inner = Stage {
+        x: motion.x.joined(&inner_y.from(&motion.y), at, c),
+        y: inner_y,
+    };
     // In Y the intermediate stage is held: its row is zero, as the outer module is not bent at rest. Its curve, which the
     // line after the next finds, would change only the curve of its x, along which no static force acts.
     let x = inner.x.joined(&ground.from(&inner.y), -at, c);
-    let outer = Stage { y: ground.joined(&outer_x, side, c), x: outer_x };
+    let outer = Stage {
+        y: ground.joined(&outer_x, side, c),
+        x: outer_x,
+    };
     let y = outer.y.joined(&x.from(&outer.x), -side, c);
     (inner, Stage { x, y }, outer)
 }
@@ -181,8 +221,14 @@ fn across_x(
     c: f64,
 ) -> (Stage, Stage, Stage) {
     let ground = Coordinate::ground(N, motion.x.curve.is_some());
-    let inner = Stage { y: motion.y.joined(&inner_x.from(&motion.x), at, c), x: inner_x };
-    let outer = Stage { x: ground.joined(&outer_y, side, c), y: outer_y };
+    let inner = Stage {
+        y: motion.y.joined(&inner_x.from(&motion.x), at, c),
+        x: inner_x,
+    };
+    let outer = Stage {
+        x: ground.joined(&outer_y, side, c),
+        y: outer_y,
+    };
     // To first order the intermediate stage follows the inner one in Y, as the inner module is not bent at rest.
     let x = outer.x.joined(&inner.y.from(&outer.y), -side, c);
     let y = inner.y.joined(&x.from(&inner.x), -at, c);

@@ -37,7 +37,10 @@ impl Continuity {
             Some((_, last)) => gap(last, record),
             None => None,
         };
-        self.first_and_last = Some((self.first_and_last.map_or(record.tick, |(first, _)| first), record.tick));
+        self.first_and_last = Some((
+            self.first_and_last.map_or(record.tick, |(first, _)| first),
+            record.tick,
+        ));
         self.ticks += 1;
         self.overruns += u64::from(record.missed_ticks);
         self.lost_in_gaps += gap.map_or(0, |g| g.lost);
@@ -78,7 +81,12 @@ impl Continuity {
 fn gap(last: u64, record: &TickRecord) -> Option<Gap> {
     let absent = record.tick - last - 1;
     let missed = absent.min(u64::from(record.missed_ticks));
-    (absent > 0).then_some(Gap { after_tick: last, before_tick: record.tick, missed, lost: absent - missed })
+    (absent > 0).then_some(Gap {
+        after_tick: last,
+        before_tick: record.tick,
+        missed,
+        lost: absent - missed,
+    })
 }
 
 #[cfg(test)]
@@ -89,7 +97,11 @@ mod tests {
         let mut account = Continuity::default();
         let mut gaps = Vec::new();
         for &(tick, missed_ticks) in ticks {
-            let record = TickRecord { tick, missed_ticks, ..TickRecord::default() };
+            let record = TickRecord {
+                tick,
+                missed_ticks,
+                ..TickRecord::default()
+            };
             gaps.extend(account.tick(&record).expect("increasing"));
         }
         (account, gaps)
@@ -98,8 +110,14 @@ mod tests {
     #[test]
     fn consecutive_ticks_have_no_gap_wherever_they_begin() {
         let (account, gaps) = follow(&[(7, 0), (8, 0), (9, 0)]);
-        assert_eq!((account.ticks(), account.overruns(), account.lost_records()), (3, 0, 0));
-        assert_eq!((account.first_tick(), account.last_tick()), (Some(7), Some(9)));
+        assert_eq!(
+            (account.ticks(), account.overruns(), account.lost_records()),
+            (3, 0, 0)
+        );
+        assert_eq!(
+            (account.first_tick(), account.last_tick()),
+            (Some(7), Some(9))
+        );
         assert!(gaps.is_empty());
     }
 
@@ -107,31 +125,71 @@ mod tests {
     fn a_gap_the_loop_answers_for_is_an_overrun_and_not_a_loss() {
         let (account, gaps) = follow(&[(0, 0), (4, 3)]);
         assert_eq!((account.overruns(), account.lost_records()), (3, 0));
-        assert_eq!(gaps, [Gap { after_tick: 0, before_tick: 4, missed: 3, lost: 0 }]);
+        assert_eq!(
+            gaps,
+            [Gap {
+                after_tick: 0,
+                before_tick: 4,
+                missed: 3,
+                lost: 0
+            }]
+        );
     }
 
     #[test]
     fn what_the_loop_does_not_answer_for_is_lost() {
         let (account, gaps) = follow(&[(0, 0), (4, 1), (10, 0)]);
         assert_eq!((account.overruns(), account.lost_records()), (1, 2 + 5));
-        assert_eq!(gaps[0], Gap { after_tick: 0, before_tick: 4, missed: 1, lost: 2 });
-        assert_eq!(gaps[1], Gap { after_tick: 4, before_tick: 10, missed: 0, lost: 5 });
+        assert_eq!(
+            gaps[0],
+            Gap {
+                after_tick: 0,
+                before_tick: 4,
+                missed: 1,
+                lost: 2
+            }
+        );
+        assert_eq!(
+            gaps[1],
+            Gap {
+                after_tick: 4,
+                before_tick: 10,
+                missed: 0,
+                lost: 5
+            }
+        );
     }
 
     #[test]
     fn a_loss_that_is_announced_and_seen_counts_once() {
         let (mut account, _) = follow(&[(0, 0), (6, 0)]);
-        account.event(&Event { tick: 6, kind: EventKind::Lost { records: 5 } });
+        account.event(&Event {
+            tick: 6,
+            kind: EventKind::Lost { records: 5 },
+        });
         assert_eq!(account.lost_records(), 5);
-        account.event(&Event { tick: 6, kind: EventKind::Lost { records: 2 } });
-        assert_eq!(account.lost_records(), 7, "two events were lost besides five ticks");
+        account.event(&Event {
+            tick: 6,
+            kind: EventKind::Lost { records: 2 },
+        });
+        assert_eq!(
+            account.lost_records(),
+            7,
+            "two events were lost besides five ticks"
+        );
     }
 
     #[test]
     fn ticks_that_repeat_or_go_back_are_refused() {
         let (mut account, _) = follow(&[(3, 0)]);
         for tick in [3, 2, 0] {
-            assert_eq!(account.tick(&TickRecord { tick, ..TickRecord::default() }), Err(NotAbove(3)));
+            assert_eq!(
+                account.tick(&TickRecord {
+                    tick,
+                    ..TickRecord::default()
+                }),
+                Err(NotAbove(3))
+            );
         }
         assert_eq!(account.ticks(), 1);
     }

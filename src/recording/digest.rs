@@ -45,7 +45,11 @@ mod tests {
         for bit in 0..8 * message.len() {
             let mut altered = message.clone();
             altered[bit / 8] ^= 1 << (bit % 8);
-            assert_ne!(digest(&[&message, &[7]]), digest(&[&altered, &[7]]), "bit {bit}");
+            assert_ne!(
+                digest(&[&message, &[7]]),
+                digest(&[&altered, &[7]]),
+                "bit {bit}"
+            );
         }
     }
 

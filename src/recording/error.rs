@@ -43,7 +43,9 @@ pub enum RecordingError {
         after: u64,
     },
     /// The recorder's thread could not be started or died.
-    #[error("the recorder's thread {what}; the recording is cut off there: `bench recover` makes it whole")]
+    #[error(
+        "the recorder's thread {what}; the recording is cut off there: `bench recover` makes it whole"
+    )]
     Thread {
         /// What happened to it.
         what: String,
@@ -108,7 +110,12 @@ pub(super) fn why(error: &McapError) -> String {
 
 fn remedy_of_writing(error: &McapError) -> &'static str {
     match error {
-        McapError::Io(e) if matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
+        McapError::Io(e)
+            if matches!(
+                e.kind(),
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+            ) =>
+        {
             "free space or record to another disk; `bench recover` makes what was written whole"
         }
         _ => "check the disk; `bench recover` makes what was written whole",

@@ -163,7 +163,10 @@ pub struct Unknown {
 }
 
 pub(super) fn unknown(field: &'static str, found: impl ToString) -> Unknown {
-    Unknown { field, found: found.to_string() }
+    Unknown {
+        field,
+        found: found.to_string(),
+    }
 }
 
 impl From<&TickRecord> for Loop {
@@ -222,12 +225,14 @@ fn validity_code(validity: Validity) -> ValidityCode {
 }
 
 fn validity(number: i32) -> Result<Validity, Unknown> {
-    Ok(match ValidityCode::try_from(number).map_err(|_| unknown("validity", number))? {
-        ValidityCode::Missing => Validity::Missing,
-        ValidityCode::Valid => Validity::Valid,
-        ValidityCode::OutOfRange => Validity::OutOfRange,
-        ValidityCode::Faulty => Validity::Faulty,
-    })
+    Ok(
+        match ValidityCode::try_from(number).map_err(|_| unknown("validity", number))? {
+            ValidityCode::Missing => Validity::Missing,
+            ValidityCode::Valid => Validity::Valid,
+            ValidityCode::OutOfRange => Validity::OutOfRange,
+            ValidityCode::Faulty => Validity::Faulty,
+        },
+    )
 }
 
 fn state_code(state: State) -> StateCode {
@@ -240,12 +245,14 @@ fn state_code(state: State) -> StateCode {
 }
 
 fn state(number: i32) -> Result<State, Unknown> {
-    Ok(match StateCode::try_from(number).map_err(|_| unknown("state", number))? {
-        StateCode::Disarmed => State::Disarmed,
-        StateCode::Armed => State::Armed,
-        StateCode::Running => State::Running,
-        StateCode::Tripped => State::Tripped,
-    })
+    Ok(
+        match StateCode::try_from(number).map_err(|_| unknown("state", number))? {
+            StateCode::Disarmed => State::Disarmed,
+            StateCode::Armed => State::Armed,
+            StateCode::Running => State::Running,
+            StateCode::Tripped => State::Tripped,
+        },
+    )
 }
 
 #[cfg(test)]
@@ -254,18 +261,40 @@ mod tests {
 
     #[test]
     fn a_number_of_a_later_version_is_an_error_and_never_a_valid_measurement() {
-        let good = Loop::from(&TickRecord { validity: Validity::Valid, ..TickRecord::default() });
-        assert_eq!(TickRecord::try_from(&good).map(|t| t.validity), Ok(Validity::Valid));
+        let good = Loop::from(&TickRecord {
+            validity: Validity::Valid,
+            ..TickRecord::default()
+        });
+        assert_eq!(
+            TickRecord::try_from(&good).map(|t| t.validity),
+            Ok(Validity::Valid)
+        );
         for number in [4, -1, i32::MAX] {
-            let error = TickRecord::try_from(&Loop { validity: number, ..good }).expect_err("unknown");
-            assert!(error.to_string().contains("validity") && error.to_string().contains(&number.to_string()));
-            assert!(TickRecord::try_from(&Loop { state: number, ..good }).is_err());
+            let error = TickRecord::try_from(&Loop {
+                validity: number,
+                ..good
+            })
+            .expect_err("unknown");
+            assert!(
+                error.to_string().contains("validity")
+                    && error.to_string().contains(&number.to_string())
+            );
+            assert!(
+                TickRecord::try_from(&Loop {
+                    state: number,
+                    ..good
+                })
+                .is_err()
+            );
         }
     }
 
     #[test]
     fn an_empty_message_means_no_measurement_and_disarmed() {
         let tick = TickRecord::try_from(&Loop::default()).expect("all fields have a meaning");
-        assert_eq!((tick.validity, tick.state), (Validity::Missing, State::Disarmed));
+        assert_eq!(
+            (tick.validity, tick.state),
+            (Validity::Missing, State::Disarmed)
+        );
     }
 }

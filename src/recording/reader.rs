@@ -78,9 +78,15 @@ impl Recording {
                 Err(stop) => break Some(stop),
             }
         };
-        let cut = stop.map(|stop| judge(path, stop, walk.offset, &found, salvage)).transpose()?;
+        let cut = stop
+            .map(|stop| judge(path, stop, walk.offset, &found, salvage))
+            .transpose()?;
         refuse_without_ticks(path, &walk.contents, &found, cut.is_some())?;
-        Ok(Recording { path: path.into(), cut, found })
+        Ok(Recording {
+            path: path.into(),
+            cut,
+            found,
+        })
     }
 
     /// The file.
@@ -100,7 +106,8 @@ impl Recording {
 
     /// The effective configuration of the run, as it was attached at its start.
     pub fn config_toml(&self) -> Option<&str> {
-        self.attachment(CONFIG_ATTACHMENT).and_then(|a| std::str::from_utf8(&a.data).ok())
+        self.attachment(CONFIG_ATTACHMENT)
+            .and_then(|a| std::str::from_utf8(&a.data).ok())
     }
 
     /// Program version, host, scheduling, `period_ns` and what else the run said of itself.
@@ -183,13 +190,24 @@ impl Recording {
 impl Found {
     fn take(&mut self, part: Part<'_>) -> Result<(), String> {
         match part {
-            Part::Message { topic: Topic::Timing, data } => self.timings.push(decode(data)?),
+            Part::Message {
+                topic: Topic::Timing,
+                data,
+            } => self.timings.push(decode(data)?),
             Part::Message { topic, data } => {
                 self.published(published(topic, data)?)?;
                 self.digest.add(topic as u8, data);
             }
-            Part::Attachment { name, media_type, data } => {
-                self.attachments.push(StoredAttachment { name, media_type, data: data.into() });
+            Part::Attachment {
+                name,
+                media_type,
+                data,
+            } => {
+                self.attachments.push(StoredAttachment {
+                    name,
+                    media_type,
+                    data: data.into(),
+                });
             }
             Part::Metadata(m) if m.name == METADATA_RECORD => self.metadata.extend(m.metadata),
             Part::Metadata(_) => {}
@@ -205,7 +223,8 @@ impl Found {
             }
             Published::Tick(tick) => {
                 let refused = |last| format!("tick {} follows tick {last}", tick.tick);
-                self.gaps.extend(self.account.tick(&tick).map_err(|e| refused(e.0))?);
+                self.gaps
+                    .extend(self.account.tick(&tick).map_err(|e| refused(e.0))?);
             }
         }
         Ok(())
@@ -215,33 +234,72 @@ impl Found {
 fn open(path: &Path) -> Result<File, RecordingError> {
     File::open(path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => RecordingError::Missing { path: path.into() },
-        _ => RecordingError::Read { path: path.into(), source },
+        _ => RecordingError::Read {
+            path: path.into(),
+            source,
+        },
     })
 }
 
 /// Whether a walk that stopped early still leaves a recording to work with.
-fn judge(path: &Path, stop: Stop, at_byte: u64, found: &Found, salvage: bool) -> Result<Cut, RecordingError> {
+fn judge(
+    path: &Path,
+    stop: Stop,
+    at_byte: u64,
+    found: &Found,
+    salvage: bool,
+) -> Result<Cut, RecordingError> {
     let path = path.to_path_buf();
     let of_bytes = path.metadata().map_or(at_byte, |m| m.len());
     match stop {
-        Stop::Cut => Ok(Cut { at_byte, of_bytes, why: "the file ends there".into() }),
-        Stop::Damaged(why) if salvage => Ok(Cut { at_byte, of_bytes, why }),
-        Stop::Damaged(what) => Err(RecordingError::Damaged { path, at_byte, ticks: found.account.ticks(), what }),
+        Stop::Cut => Ok(Cut {
+            at_byte,
+            of_bytes,
+            why: "the file ends there".into(),
+        }),
+        Stop::Damaged(why) if salvage => Ok(Cut {
+            at_byte,
+            of_bytes,
+            why,
+        }),
+        Stop::Damaged(what) => Err(RecordingError::Damaged {
+            path,
+            at_byte,
+            ticks: found.account.ticks(),
+            what,
+        }),
         Stop::NotMcap => Err(RecordingError::NotMcap { path }),
         Stop::Read(source) => Err(RecordingError::Read { path, source }),
     }
 }
 
-fn refuse_without_ticks(path: &Path, contents: &Contents, found: &Found, cut: bool) -> Result<(), RecordingError> {
+fn refuse_without_ticks(
+    path: &Path,
+    contents: &Contents,
+    found: &Found,
+    cut: bool,
+) -> Result<(), RecordingError> {
     if found.account.ticks() > 0 {
         return Ok(());
     }
     let path = path.to_path_buf();
     if contents.has_loop() || (cut && contents.channels.is_empty()) {
-        let state = if cut { "it was cut off before its first half second was written" } else { "it is complete" };
+        let state = if cut {
+            "it was cut off before its first half second was written"
+        } else {
+            "it is complete"
+        };
         return Err(RecordingError::Empty { path, state });
     }
-    let names: Vec<_> = contents.channels.values().map(|(topic, schema)| format!("{topic} of {schema}")).collect();
-    let found = if names.is_empty() { "it has no channels".into() } else { format!("it has {}", names.join(", ")) };
+    let names: Vec<_> = contents
+        .channels
+        .values()
+        .map(|(topic, schema)| format!("{topic} of {schema}"))
+        .collect();
+    let found = if names.is_empty() {
+        "it has no channels".into()
+    } else {
+        format!("it has {}", names.join(", "))
+    };
     Err(RecordingError::Foreign { path, found })
 }

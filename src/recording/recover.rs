@@ -23,15 +23,31 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
     for published in old.published()? {
         new.record(&published?)?;
     }
-    let others = old.attachments().iter().filter(|a| a.name != CONFIG_ATTACHMENT);
-    let results: Vec<_> = others.map(|a| (a.name.as_str(), a.media_type.as_str(), a.data.as_slice())).collect();
-    Ok(Recovered { totals: new.finish(&results)?, cut: old.cut().cloned() })
+    let others = old
+        .attachments()
+        .iter()
+        .filter(|a| a.name != CONFIG_ATTACHMENT);
+    let results: Vec<_> = others
+        .map(|a| (a.name.as_str(), a.media_type.as_str(), a.data.as_slice()))
+        .collect();
+    Ok(Recovered {
+        totals: new.finish(&results)?,
+        cut: old.cut().cloned(),
+    })
 }
 
 fn header(old: &Recording) -> Header {
     let mut metadata = old.metadata().clone();
-    if let Some(Cut { at_byte, of_bytes, why }) = old.cut() {
-        metadata.insert("recovered".into(), format!("readable up to byte {at_byte} of {of_bytes}: {why}"));
+    if let Some(Cut {
+        at_byte,
+        of_bytes,
+        why,
+    }) = old.cut()
+    {
+        metadata.insert(
+            "recovered".into(),
+            format!("readable up to byte {at_byte} of {of_bytes}: {why}"),
+        );
     }
     Header {
         config_toml: old.config_toml().unwrap_or_default().into(),

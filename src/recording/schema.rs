@@ -4,8 +4,8 @@
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
-    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
-    FileDescriptorSet, OneofDescriptorProto,
+    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto,
+    FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
 };
 
 /// The bytes that go into each channel's schema record.
@@ -44,7 +44,10 @@ fn loop_message() -> DescriptorProto {
     // Absent where the amplifier does not say: a proto3 `optional`, which descriptors write as a oneof of one.
     let actual = &mut message.field[14];
     (actual.proto3_optional, actual.oneof_index) = (Some(true), Some(0));
-    message.oneof_decl = vec![OneofDescriptorProto { name: Some("_actual_a".into()), options: None }];
+    message.oneof_decl = vec![OneofDescriptorProto {
+        name: Some("_actual_a".into()),
+        options: None,
+    }];
     message.field[10].type_name = Some(".bench.Loop.Validity".into());
     message.field[11].type_name = Some(".bench.Loop.State".into());
     message.enum_type = vec![
@@ -137,7 +140,9 @@ mod tests {
             let key = prost::encoding::decode_varint(&mut bytes).expect("a key");
             fields.push(((key >> 3) as i32, (key & 7) as u8));
             let skip = match key & 7 {
-                0 => prost::encoding::decode_varint(&mut bytes).map(|_| 0).expect("a number"),
+                0 => prost::encoding::decode_varint(&mut bytes)
+                    .map(|_| 0)
+                    .expect("a number"),
                 1 => 8,
                 2 => prost::encoding::decode_varint(&mut bytes).expect("a length") as usize,
                 other => panic!("wire type {other}"),
@@ -154,7 +159,11 @@ mod tests {
             Type::Uint64 | Type::Uint32 | Type::Sint64 | Type::Enum => 0,
             other => panic!("{other:?} is not used"),
         };
-        message.field.iter().map(|f| (f.number(), wire_type(f.r#type()))).collect()
+        message
+            .field
+            .iter()
+            .map(|f| (f.number(), wire_type(f.r#type())))
+            .collect()
     }
 
     #[test]
@@ -213,15 +222,22 @@ mod tests {
 
     #[test]
     fn doubles_are_written_even_when_they_equal_zero() {
-        let zero = Loop::from(&TickRecord { reference_m: -0.0, ..TickRecord::default() });
-        let doubles: Vec<_> = wire(&zero.encode_to_vec()).into_iter().filter(|f| f.1 == 1).collect();
+        let zero = Loop::from(&TickRecord {
+            reference_m: -0.0,
+            ..TickRecord::default()
+        });
+        let doubles: Vec<_> = wire(&zero.encode_to_vec())
+            .into_iter()
+            .filter(|f| f.1 == 1)
+            .collect();
         assert_eq!(doubles, [(5, 1), (6, 1), (7, 1), (8, 1)]);
     }
 
     #[test]
     fn the_names_of_enumerations_stand_at_their_numbers() {
         let enums = loop_message().enum_type;
-        let name = |which: usize, number: i32| enums[which].value[number as usize].name().to_string();
+        let name =
+            |which: usize, number: i32| enums[which].value[number as usize].name().to_string();
         assert_eq!(name(0, ValidityCode::Valid as i32), "valid");
         assert_eq!(name(0, ValidityCode::OutOfRange as i32), "out_of_range");
         assert_eq!(name(0, ValidityCode::Faulty as i32), "faulty");

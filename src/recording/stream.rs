@@ -38,7 +38,13 @@ impl Iterator for Stream {
 impl Stream {
     /// A stream of the first `left` ticks and events of the file under `walk`.
     pub(super) fn new(path: &Path, walk: Walk, left: u64) -> Stream {
-        Stream { path: path.into(), walk, chunk: Vec::new(), next: 0, left }
+        Stream {
+            path: path.into(),
+            walk,
+            chunk: Vec::new(),
+            next: 0,
+            left,
+        }
     }
 
     /// Fills `chunk` anew. An error behind some good records is met again after them, if they are not the last wanted.
@@ -47,22 +53,31 @@ impl Stream {
         self.next = 0;
         let chunk = &mut self.chunk;
         let stepped = self.walk.step(&mut |part| match part {
-            Part::Message { topic: topic @ (Topic::Loop | Topic::Event), data } => {
-                published(topic, data).map(|p| chunk.push(p))
-            }
+            Part::Message {
+                topic: topic @ (Topic::Loop | Topic::Event),
+                data,
+            } => published(topic, data).map(|p| chunk.push(p)),
             _ => Ok(()),
         });
         match stepped {
             Ok(true) => Ok(()),
             _ if !self.chunk.is_empty() => Ok(()),
-            Err(Stop::Read(source)) => Err(RecordingError::Read { path: self.path.clone(), source }),
+            Err(Stop::Read(source)) => Err(RecordingError::Read {
+                path: self.path.clone(),
+                source,
+            }),
             _ => Err(self.changed()),
         }
     }
 
     fn changed(&self) -> RecordingError {
         let what = "the file was changed since it was opened".into();
-        RecordingError::Damaged { path: self.path.clone(), at_byte: self.walk.offset, ticks: 0, what }
+        RecordingError::Damaged {
+            path: self.path.clone(),
+            at_byte: self.walk.offset,
+            ticks: 0,
+            what,
+        }
     }
 }
 
@@ -93,10 +108,14 @@ impl Iterator for Ticks {
 pub(super) fn published(topic: Topic, data: &[u8]) -> Result<Published, String> {
     if topic == Topic::Loop {
         let message: messages::Loop = decode(data)?;
-        return TickRecord::try_from(&message).map(Published::Tick).map_err(|e| e.to_string());
+        return TickRecord::try_from(&message)
+            .map(Published::Tick)
+            .map_err(|e| e.to_string());
     }
     let message: messages::Event = decode(data)?;
-    Event::try_from(&message).map(Published::Event).map_err(|e| e.to_string())
+    Event::try_from(&message)
+        .map(Published::Event)
+        .map_err(|e| e.to_string())
 }
 
 /// A message of its bytes.

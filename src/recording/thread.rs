@@ -59,7 +59,11 @@ impl RecorderHandle {
     /// Waits until the loop has dropped its end of the ring and everything in it is written. The recorder is given back
     /// to be finished with the results; if writing failed, the error instead.
     pub fn join(self) -> Result<Recorder, RecordingError> {
-        self.thread.join().unwrap_or_else(|_| Err(RecordingError::Thread { what: "died of a panic".into() }))
+        self.thread.join().unwrap_or_else(|_| {
+            Err(RecordingError::Thread {
+                what: "died of a panic".into(),
+            })
+        })
     }
 }
 
@@ -68,17 +72,26 @@ impl RecorderHandle {
 ///
 /// If writing fails (a full disk), the thread keeps emptying the ring, so that the loop never notices, counts what it
 /// throws away and says so in [`Health`] at once.
-pub fn spawn(recorder: Recorder, ring: Consumer<Published>) -> Result<RecorderHandle, RecordingError> {
+pub fn spawn(
+    recorder: Recorder,
+    ring: Consumer<Published>,
+) -> Result<RecorderHandle, RecordingError> {
     let health = Arc::new(Health::default());
     let seen = Arc::clone(&health);
     let thread = std::thread::Builder::new()
         .name("bench-recorder".into())
         .spawn(move || run(recorder, ring, &seen))
-        .map_err(|e| RecordingError::Thread { what: format!("could not be started ({e})") })?;
+        .map_err(|e| RecordingError::Thread {
+            what: format!("could not be started ({e})"),
+        })?;
     Ok(RecorderHandle { thread, health })
 }
 
-fn run(mut recorder: Recorder, mut ring: Consumer<Published>, health: &Health) -> Result<Recorder, RecordingError> {
+fn run(
+    mut recorder: Recorder,
+    mut ring: Consumer<Published>,
+    health: &Health,
+) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
     yield_to_others();
     let mut outcome = Ok(());
@@ -113,11 +126,20 @@ impl Drop for Alarm<'_> {
     }
 }
 
-fn take(published: &Published, recorder: &mut Recorder, outcome: &mut Result<(), RecordingError>, health: &Health) {
+fn take(
+    published: &Published,
+    recorder: &mut Recorder,
+    outcome: &mut Result<(), RecordingError>,
+    health: &Health,
+) {
     if outcome.is_ok() {
         *outcome = recorder.record(published);
         health.failed.store(outcome.is_err(), Ordering::Release);
     }
-    let counter = if outcome.is_ok() { &health.written } else { &health.thrown_away };
+    let counter = if outcome.is_ok() {
+        &health.written
+    } else {
+        &health.thrown_away
+    };
     counter.fetch_add(1, Ordering::Relaxed);
 }

@@ -31,8 +31,12 @@ struct Spread {
 impl Spread {
     fn new() -> Spread {
         // Creation fails only for bounds out of order or more than five digits.
-        let histogram = Histogram::new_with_bounds(1, 10 * SECOND_NS, 3).expect("constant bounds are in order");
-        Spread { histogram, max_ns: 0 }
+        let histogram =
+            Histogram::new_with_bounds(1, 10 * SECOND_NS, 3).expect("constant bounds are in order");
+        Spread {
+            histogram,
+            max_ns: 0,
+        }
     }
 
     fn add(&mut self, duration_ns: u64) {
@@ -42,7 +46,12 @@ impl Spread {
 
     fn quantiles(&self) -> Quantiles {
         let at = |quantile| self.histogram.value_at_quantile(quantile).min(self.max_ns);
-        Quantiles { p50_ns: at(0.5), p99_ns: at(0.99), p9999_ns: at(0.9999), max_ns: self.max_ns }
+        Quantiles {
+            p50_ns: at(0.5),
+            p99_ns: at(0.99),
+            p9999_ns: at(0.9999),
+            max_ns: self.max_ns,
+        }
     }
 
     fn clear(&mut self) {
@@ -60,12 +69,19 @@ struct Pair {
 
 impl Pair {
     fn new() -> Pair {
-        Pair { lateness: Spread::new(), compute: Spread::new() }
+        Pair {
+            lateness: Spread::new(),
+            compute: Spread::new(),
+        }
     }
 
     fn add(&mut self, tick: &TickRecord, period_ns: u64) {
         let missed_ns = u64::from(tick.missed_ticks).saturating_mul(period_ns);
-        self.lateness.add(tick.woke_ns.saturating_add(missed_ns).saturating_sub(tick.scheduled_ns));
+        self.lateness.add(
+            tick.woke_ns
+                .saturating_add(missed_ns)
+                .saturating_sub(tick.scheduled_ns),
+        );
         self.compute.add(tick.done_ns.saturating_sub(tick.woke_ns));
     }
 }
@@ -90,12 +106,21 @@ pub(super) struct Tally {
 
 impl Tally {
     pub(super) fn new(period_ns: u64) -> Tally {
-        Tally { period_ns, second: None, within: Pair::new(), all: Pair::new(), reported_overruns: 0, reported_lost: 0 }
+        Tally {
+            period_ns,
+            second: None,
+            within: Pair::new(),
+            all: Pair::new(),
+            reported_overruns: 0,
+            reported_lost: 0,
+        }
     }
 
     /// Whether `tick` belongs to a later second than the one under way, which is then to be closed first.
     pub(super) fn is_over(&self, tick: &TickRecord) -> bool {
-        self.second.as_ref().is_some_and(|s| s.number != tick.scheduled_ns / SECOND_NS)
+        self.second
+            .as_ref()
+            .is_some_and(|s| s.number != tick.scheduled_ns / SECOND_NS)
     }
 
     /// Takes in a tick.
@@ -103,7 +128,12 @@ impl Tally {
         self.within.add(tick, self.period_ns);
         self.all.add(tick, self.period_ns);
         let number = tick.scheduled_ns / SECOND_NS;
-        let second = self.second.get_or_insert(Second { number, first_tick: tick.tick, last: *tick, ticks: 0 });
+        let second = self.second.get_or_insert(Second {
+            number,
+            first_tick: tick.tick,
+            last: *tick,
+            ticks: 0,
+        });
         second.last = *tick;
         second.ticks += 1;
     }
@@ -129,7 +159,10 @@ impl Tally {
     }
 
     fn summary(&self, second: &Second) -> Timing {
-        let (late, compute) = (self.within.lateness.quantiles(), self.within.compute.quantiles());
+        let (late, compute) = (
+            self.within.lateness.quantiles(),
+            self.within.compute.quantiles(),
+        );
         Timing {
             first_tick: second.first_tick,
             last_tick: second.last.tick,

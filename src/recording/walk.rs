@@ -25,8 +25,15 @@ const CHUNK_BYTES: usize = 64 << 20;
 
 /// Something in the file that can be trusted.
 pub(super) enum Part<'a> {
-    Message { topic: Topic, data: &'a [u8] },
-    Attachment { name: String, media_type: String, data: &'a [u8] },
+    Message {
+        topic: Topic,
+        data: &'a [u8],
+    },
+    Attachment {
+        name: String,
+        media_type: String,
+        data: &'a [u8],
+    },
     Metadata(Metadata),
 }
 
@@ -75,7 +82,13 @@ impl Walk {
             .with_validate_summary_section_crc(true)
             .with_record_length_limit(RECORD_BYTES);
         let reader = LinearReader::new_with_options(options);
-        Walk { file, reader, bytes_read: 0, offset: 0, contents: Contents::default() }
+        Walk {
+            file,
+            reader,
+            bytes_read: 0,
+            offset: 0,
+            contents: Contents::default(),
+        }
     }
 
     /// Goes one record on (a whole chunk at a time); `false` at the end of a complete file.
@@ -85,7 +98,9 @@ impl Walk {
                 Ok(LinearReadEvent::ReadRequest(need)) => self.fill(need)?,
                 Ok(LinearReadEvent::Record { opcode, data }) => {
                     let next = self.offset.max(mcap::MAGIC.len() as u64) + 9 + data.len() as u64;
-                    self.contents.record(opcode, data, take).map_err(Stop::Damaged)?;
+                    self.contents
+                        .record(opcode, data, take)
+                        .map_err(Stop::Damaged)?;
                     self.offset = next;
                     return Ok(true);
                 }
@@ -117,7 +132,9 @@ impl Walk {
             McapError::UnexpectedEof if self.bytes_read < mcap::MAGIC.len() as u64 => Stop::NotMcap,
             McapError::UnexpectedEof => Stop::Cut,
             McapError::BadMagic if self.offset == 0 => Stop::NotMcap,
-            McapError::BadMagic => Stop::Damaged("the file does not end as an MCAP file does".into()),
+            McapError::BadMagic => {
+                Stop::Damaged("the file does not end as an MCAP file does".into())
+            }
             other => Stop::Damaged(error::why(&other)),
         }
     }
@@ -131,7 +148,9 @@ impl Contents {
             op::CHUNK => self.chunk(data, take)?,
             op::ATTACHMENT => attachment(data, take)?,
             op::METADATA => metadata(data, take)?,
-            op::MESSAGE => return Err("a message outside of the chunks, where no CRC covers it".into()),
+            op::MESSAGE => {
+                return Err("a message outside of the chunks, where no CRC covers it".into());
+            }
             op::SCHEMA | op::CHANNEL => self.define(opcode, data)?,
             _ => {} // indexes, and what a later version of MCAP may add
         }
@@ -144,7 +163,10 @@ impl Contents {
         let mut reader = chunk_reader(chunk);
         while let Some(event) = reader.next_event() {
             match event.map_err(|e| error::why(&e))? {
-                LinearReadEvent::Record { opcode: op::MESSAGE, data } => self.message(data, take)?,
+                LinearReadEvent::Record {
+                    opcode: op::MESSAGE,
+                    data,
+                } => self.message(data, take)?,
                 LinearReadEvent::Record { opcode, data } => self.define(opcode, data)?,
                 LinearReadEvent::ReadRequest(_) => reader.notify_read(0), // all of it was given: this is its end
             }
@@ -159,9 +181,14 @@ impl Contents {
         match parse_record(opcode, data).map_err(|e| error::why(&e))? {
             Record::Schema { header, .. } => drop(self.schemas.insert(header.id, header.name)),
             Record::Channel(channel) => {
-                let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let schema = self
+                    .schemas
+                    .get(&channel.schema_id)
+                    .cloned()
+                    .unwrap_or_default();
                 let ours = |t: &Topic| t.name() == channel.topic && t.schema_name() == schema;
-                self.topics.extend(Topic::ALL.into_iter().find(ours).map(|t| (channel.id, t)));
+                self.topics
+                    .extend(Topic::ALL.into_iter().find(ours).map(|t| (channel.id, t)));
                 self.channels.insert(channel.id, (channel.topic, schema));
             }
             _ => {}
@@ -188,7 +215,10 @@ impl Contents {
         if number == expected {
             return Ok(());
         }
-        Err(format!("message {expected} of {} is missing, {number} follows", topic.name()))
+        Err(format!(
+            "message {expected} of {} is missing, {number} follows",
+            topic.name()
+        ))
     }
 
     /// Whether the channel with the ticks is there.
@@ -214,7 +244,9 @@ fn chunk_reader(chunk: &[u8]) -> LinearReader {
 
 /// Refuses what `mcap` would take unchecked (no CRC) or panic at (a length beyond the end of an uncompressed chunk).
 fn vet_chunk(chunk: &[u8]) -> Result<(), String> {
-    let Record::Chunk { header, data } = parse_record(op::CHUNK, chunk).map_err(|e| error::why(&e))? else {
+    let Record::Chunk { header, data } =
+        parse_record(op::CHUNK, chunk).map_err(|e| error::why(&e))?
+    else {
         return Err("a chunk that is none".into());
     };
     match header.compression.as_str() {
@@ -228,7 +260,10 @@ fn vet_chunk(chunk: &[u8]) -> Result<(), String> {
 fn is_framed(mut records: &[u8]) -> bool {
     while let Some((head, rest)) = records.split_first_chunk::<9>() {
         let [_, length @ ..] = *head;
-        match usize::try_from(u64::from_le_bytes(length)).ok().and_then(|n| rest.get(n..)) {
+        match usize::try_from(u64::from_le_bytes(length))
+            .ok()
+            .and_then(|n| rest.get(n..))
+        {
             Some(next) => records = next,
             None => return false,
         }
@@ -242,9 +277,11 @@ fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
     }
     match parse_record(op::ATTACHMENT, data).map_err(|e| error::why(&e))? {
         Record::Attachment { crc: 0, .. } => Err("an attachment without a CRC".into()),
-        Record::Attachment { header, data, .. } => {
-            take(Part::Attachment { name: header.name, media_type: header.media_type, data: &data })
-        }
+        Record::Attachment { header, data, .. } => take(Part::Attachment {
+            name: header.name,
+            media_type: header.media_type,
+            data: &data,
+        }),
         _ => Ok(()),
     }
 }
@@ -254,11 +291,14 @@ fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
 fn attachment_is_framed(record: &[u8]) -> bool {
     let after_string = |rest: &[u8]| {
         let (length, text) = rest.split_first_chunk::<4>()?;
-        text.get(u32::from_le_bytes(*length) as usize..).map(<[u8]>::len)
+        text.get(u32::from_le_bytes(*length) as usize..)
+            .map(<[u8]>::len)
     };
     let tail = |remaining: usize| &record[record.len() - remaining..];
     let after_name = record.get(16..).and_then(after_string);
-    after_name.and_then(|n| after_string(tail(n))).is_some_and(|n| n >= 8 + 4)
+    after_name
+        .and_then(|n| after_string(tail(n)))
+        .is_some_and(|n| n >= 8 + 4)
 }
 
 fn metadata(data: &[u8], take: &mut Take) -> Result<(), String> {

@@ -86,15 +86,28 @@ impl Recorder {
     pub fn create(path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
-            _ => RecordingError::Create { path: path.into(), source },
+            _ => RecordingError::Create {
+                path: path.into(),
+                source,
+            },
         })?;
         Recorder::over(Box::new(file), path, header)
     }
 
     /// Records to any place that takes bytes; `path` only names it in messages.
-    pub fn over(out: Box<dyn Write + Send>, path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
-        let failed = |source| RecordingError::Write { path: path.into(), ticks: 0, source };
-        let mut mcap = options().create(NoSeek::new(BufWriter::new(out))).map_err(failed)?;
+    pub fn over(
+        out: Box<dyn Write + Send>,
+        path: &Path,
+        header: &Header,
+    ) -> Result<Recorder, RecordingError> {
+        let failed = |source| RecordingError::Write {
+            path: path.into(),
+            ticks: 0,
+            source,
+        };
+        let mut mcap = options()
+            .create(NoSeek::new(BufWriter::new(out)))
+            .map_err(failed)?;
         let channels = write_head(&mut mcap, header).map_err(failed)?;
         Ok(Recorder {
             path: path.into(),
@@ -124,7 +137,12 @@ impl Recorder {
     }
 
     /// Adds a file to the recording.
-    pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), RecordingError> {
+    pub fn attach(
+        &mut self,
+        name: &str,
+        media_type: &str,
+        data: &[u8],
+    ) -> Result<(), RecordingError> {
         let written = attach(&mut self.mcap, name, media_type, data);
         written.map_err(|source| self.failed(source))
     }
@@ -155,7 +173,11 @@ impl Recorder {
             self.close_second()?;
         }
         self.close_chunk_if_due(tick.scheduled_ns)?;
-        let order = |after| RecordingError::Order { path: self.path.clone(), tick: tick.tick, after };
+        let order = |after| RecordingError::Order {
+            path: self.path.clone(),
+            tick: tick.tick,
+            after,
+        };
         self.account.tick(tick).map_err(|e| order(e.0))?;
         self.tally.add(tick);
         self.write(Topic::Loop, tick.scheduled_ns, &messages::Loop::from(tick))
@@ -182,12 +204,19 @@ impl Recorder {
         self.mcap.flush().map_err(|source| self.failed(source))
     }
 
-    fn write(&mut self, topic: Topic, log_time: u64, message: &impl Message) -> Result<(), RecordingError> {
+    fn write(
+        &mut self,
+        topic: Topic,
+        log_time: u64,
+        message: &impl Message,
+    ) -> Result<(), RecordingError> {
         self.encoded.clear();
         // A Vec takes any length: `encode_raw` is `encode` without asking for the length first.
         message.encode_raw(&mut self.encoded);
         let header = self.next_header(topic, log_time);
-        self.mcap.write_to_known_channel(&header, &self.encoded).map_err(|source| self.failed(source))?;
+        self.mcap
+            .write_to_known_channel(&header, &self.encoded)
+            .map_err(|source| self.failed(source))?;
         if topic != Topic::Timing {
             self.digest.add(topic as u8, &self.encoded);
         }
@@ -199,7 +228,12 @@ impl Recorder {
         let count = &mut self.written[topic as usize];
         let sequence = *count as u32;
         *count += 1;
-        MessageHeader { channel_id: self.channels[topic as usize], sequence, log_time, publish_time: log_time }
+        MessageHeader {
+            channel_id: self.channels[topic as usize],
+            sequence,
+            log_time,
+            publish_time: log_time,
+        }
     }
 
     fn write_end(&mut self, attachments: &[(&str, &str, &[u8])]) -> McapResult<()> {
@@ -226,7 +260,11 @@ impl Recorder {
     }
 
     fn failed(&self, source: McapError) -> RecordingError {
-        RecordingError::Write { path: self.path.clone(), ticks: self.account.ticks(), source }
+        RecordingError::Write {
+            path: self.path.clone(),
+            ticks: self.account.ticks(),
+            source,
+        }
     }
 }
 
@@ -240,16 +278,28 @@ fn options() -> WriteOptions {
         .library(concat!("bench ", env!("CARGO_PKG_VERSION")))
 }
 
-fn write_head<W: Write + io::Seek>(mcap: &mut mcap::Writer<W>, header: &Header) -> McapResult<[u16; 3]> {
+fn write_head<W: Write + io::Seek>(
+    mcap: &mut mcap::Writer<W>,
+    header: &Header,
+) -> McapResult<[u16; 3]> {
     let mut metadata = header.metadata.clone();
     metadata.insert("period_ns".into(), header.period_ns.to_string());
-    mcap.write_metadata(&Metadata { name: METADATA_RECORD.into(), metadata })?;
-    attach(mcap, CONFIG_ATTACHMENT, "application/toml", header.config_toml.as_bytes())?;
+    mcap.write_metadata(&Metadata {
+        name: METADATA_RECORD.into(),
+        metadata,
+    })?;
+    attach(
+        mcap,
+        CONFIG_ATTACHMENT,
+        "application/toml",
+        header.config_toml.as_bytes(),
+    )?;
     let schema = descriptor_set();
     let mut channels = [0; 3];
     for topic in Topic::ALL {
         let id = mcap.add_schema(topic.schema_name(), "protobuf", &schema)?;
-        channels[topic as usize] = mcap.add_channel(id, topic.name(), "protobuf", &BTreeMap::new())?;
+        channels[topic as usize] =
+            mcap.add_channel(id, topic.name(), "protobuf", &BTreeMap::new())?;
     }
     mcap.flush()?;
     Ok(channels)

@@ -19,11 +19,23 @@ pub(super) struct Axis {
 
 impl Axis {
     pub fn linear((low, high): (f64, f64), (start, end): (f64, f64)) -> Self {
-        Self { low, high, start, end, logarithmic: false }
+        Self {
+            low,
+            high,
+            start,
+            end,
+            logarithmic: false,
+        }
     }
 
     pub fn logarithmic((low, high): (f64, f64), (start, end): (f64, f64)) -> Self {
-        Self { low, high, start, end, logarithmic: true }
+        Self {
+            low,
+            high,
+            start,
+            end,
+            logarithmic: true,
+        }
     }
 
     /// The pixel of a value; values beyond an end of the axis are put there.
@@ -40,7 +52,11 @@ impl Axis {
     /// The pixel of a value, beyond the ends of the axis too; not a number for values that a logarithmic axis cannot show.
     pub fn place(&self, value: f64) -> f64 {
         let part = if self.logarithmic {
-            if value > 0.0 { libm::log(value / self.low) / libm::log(self.high / self.low) } else { f64::NAN }
+            if value > 0.0 {
+                libm::log(value / self.low) / libm::log(self.high / self.low)
+            } else {
+                f64::NAN
+            }
         } else {
             (value - self.low) / (self.high - self.low)
         };
@@ -71,7 +87,8 @@ impl Axis {
         // A label a decade is enough, unless there are so many that they would touch.
         let every = (decades / 8.0).ceil().max(1.0) as i32;
         let labelled = |digit, power: i32| {
-            (digit == 1 && power.rem_euclid(every) == 0) || (decades < 2.0 && (digit == 2 || digit == 5))
+            (digit == 1 && power.rem_euclid(every) == 0)
+                || (decades < 2.0 && (digit == 2 || digit == 5))
         };
         self.decade_ticks(labelled, |_, digit, power| power_of_ten(digit, power))
     }
@@ -87,13 +104,23 @@ impl Axis {
 
     /// The same, at whole multiples of 30 degrees where there is less than half a turn.
     pub fn degree_ticks(&self) -> Vec<Tick> {
-        if self.high - self.low < 185.0 { self.linear_ticks(30.0, plain) } else { self.phase_ticks() }
+        if self.high - self.low < 185.0 {
+            self.linear_ticks(30.0, plain)
+        } else {
+            self.phase_ticks()
+        }
     }
 
     /// Ticks at whole multiples of a step.
     pub fn linear_ticks(&self, step: f64, label: impl Fn(f64) -> String) -> Vec<Tick> {
-        let (first, last) = ((self.low / step - 1e-9).ceil() as i64, (self.high / step + 1e-9).floor() as i64);
-        let tick = |k: i64| Tick { value: k as f64 * step, label: Some(label(k as f64 * step)) };
+        let (first, last) = (
+            (self.low / step - 1e-9).ceil() as i64,
+            (self.high / step + 1e-9).floor() as i64,
+        );
+        let tick = |k: i64| Tick {
+            value: k as f64 * step,
+            label: Some(label(k as f64 * step)),
+        };
         (first..=last).map(tick).collect()
     }
 
@@ -101,13 +128,18 @@ impl Axis {
         libm::log10(self.high / self.low)
     }
 
-    fn decade_ticks(&self, labelled: impl Fn(i32, i32) -> bool, label: impl Fn(f64, i32, i32) -> String) -> Vec<Tick> {
+    fn decade_ticks(
+        &self,
+        labelled: impl Fn(i32, i32) -> bool,
+        label: impl Fn(f64, i32, i32) -> String,
+    ) -> Vec<Tick> {
         let powers = libm::log10(self.low).floor() as i32..=libm::log10(self.high).ceil() as i32;
         let all = powers.flat_map(|power| (1..=9).map(move |digit| (digit, power)));
         let tick = |(digit, power): (i32, i32)| {
             let value = f64::from(digit) * libm::pow(10.0, f64::from(power));
             let label = labelled(digit, power).then(|| label(value, digit, power));
-            (value >= self.low * (1.0 - 1e-9) && value <= self.high * (1.0 + 1e-9)).then_some(Tick { value, label })
+            (value >= self.low * (1.0 - 1e-9) && value <= self.high * (1.0 + 1e-9))
+                .then_some(Tick { value, label })
         };
         all.filter_map(tick).collect()
     }
@@ -127,14 +159,22 @@ fn nice_step(step: f64) -> f64 {
 fn plain(value: f64) -> String {
     let digits = (8 - libm::log10(value.abs().max(1e-9)).ceil() as i32).clamp(0, 15) as usize;
     let text = format!("{value:.digits$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
     text.replace('-', "\u{2212}")
 }
 
 /// 10 to a power, 2x10 to a power ..., with the power raised.
 fn power_of_ten(digit: i32, power: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let factor = if digit == 1 { String::new() } else { format!("{digit}\u{b7}") };
+    let factor = if digit == 1 {
+        String::new()
+    } else {
+        format!("{digit}\u{b7}")
+    };
     let raised = power
         .to_string()
         .chars()

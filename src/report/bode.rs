@@ -31,14 +31,25 @@ const MARGIN: f64 = 0.06;
 ///
 /// # Errors
 /// When there is nothing to draw, or a trace is not sound: see [`ReportError`].
-pub fn bode_svg(unit: Unit, traces: &[Trace], title: &str, subtitle: &str) -> Result<String, ReportError> {
+pub fn bode_svg(
+    unit: Unit,
+    traces: &[Trace],
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
     let mut lines = trace::lines(traces)?;
     // Stable: measured traces first, so that models come to lie on top.
     lines.sort_by_key(|line| line.measured.is_none());
     let header = Header::new(title, subtitle, &lines, (LEFT, RIGHT));
     let magnitudes = magnitude_range(&lines).ok_or(ReportError::NoMagnitude)?;
-    let plot =
-        Plot { frequencies: frequency_range(&lines), magnitudes, phases: phase_range(&lines), lines, header, unit };
+    let plot = Plot {
+        frequencies: frequency_range(&lines),
+        magnitudes,
+        phases: phase_range(&lines),
+        lines,
+        header,
+        unit,
+    };
     canvas::page(SIZE, |canvas| plot.draw(canvas))
 }
 
@@ -62,8 +73,18 @@ impl Plot<'_> {
             self.coherence(canvas, self.rows(2, panels))?;
         }
         let anchor = (HPos::Center, VPos::Bottom);
-        let form = TextForm { size: 13.0, colour: INK, bold: false, anchor, upward: false };
-        canvas.text("Frequency (Hz)", ((LEFT + RIGHT) / 2.0, SIZE.1 - 12.0), form)
+        let form = TextForm {
+            size: 13.0,
+            colour: INK,
+            bold: false,
+            anchor,
+            upward: false,
+        };
+        canvas.text(
+            "Frequency (Hz)",
+            ((LEFT + RIGHT) / 2.0, SIZE.1 - 12.0),
+            form,
+        )
     }
 
     /// Top and bottom of a panel.
@@ -77,34 +98,88 @@ impl Plot<'_> {
 
     fn panel(&self, (top, bottom): (f64, f64), y: Axis) -> (Panel, Vec<Tick>) {
         let x = Axis::logarithmic(self.frequencies, (LEFT, RIGHT));
-        (Panel { left: LEFT, right: RIGHT, top, bottom, x, y }, x.frequency_ticks())
+        (
+            Panel {
+                left: LEFT,
+                right: RIGHT,
+                top,
+                bottom,
+                x,
+                y,
+            },
+            x.frequency_ticks(),
+        )
     }
 
     fn magnitude(&self, canvas: &Canvas, (top, bottom): (f64, f64)) -> Result<(), ReportError> {
-        let (panel, x) = self.panel((top, bottom), Axis::logarithmic(self.magnitudes, (bottom, top)));
+        let (panel, x) = self.panel(
+            (top, bottom),
+            Axis::logarithmic(self.magnitudes, (bottom, top)),
+        );
         let label = match self.unit {
             Unit::MetresPerAmpere => "Magnitude (m/A)",
             Unit::Bare => "Magnitude",
         };
         let y = panel.y.magnitude_ticks();
-        panel.frame(canvas, &Ticks { x: &x, y: &y, label, frequencies: false })?;
-        self.lines.iter().try_for_each(|line| panel.curve(canvas, line, |k| line.magnitude(k)))
+        panel.frame(
+            canvas,
+            &Ticks {
+                x: &x,
+                y: &y,
+                label,
+                frequencies: false,
+            },
+        )?;
+        self.lines
+            .iter()
+            .try_for_each(|line| panel.curve(canvas, line, |k| line.magnitude(k)))
     }
 
-    fn phase(&self, canvas: &Canvas, (top, bottom): (f64, f64), frequencies: bool) -> Result<(), ReportError> {
+    fn phase(
+        &self,
+        canvas: &Canvas,
+        (top, bottom): (f64, f64),
+        frequencies: bool,
+    ) -> Result<(), ReportError> {
         let (panel, x) = self.panel((top, bottom), Axis::linear(self.phases, (bottom, top)));
         let y = panel.y.phase_ticks();
-        panel.frame(canvas, &Ticks { x: &x, y: &y, label: "Phase (deg)", frequencies })?;
-        self.lines.iter().try_for_each(|line| panel.curve(canvas, line, |k| line.phase(k)))
+        panel.frame(
+            canvas,
+            &Ticks {
+                x: &x,
+                y: &y,
+                label: "Phase (deg)",
+                frequencies,
+            },
+        )?;
+        self.lines
+            .iter()
+            .try_for_each(|line| panel.curve(canvas, line, |k| line.phase(k)))
     }
 
     fn coherence(&self, canvas: &Canvas, (top, bottom): (f64, f64)) -> Result<(), ReportError> {
         let (panel, x) = self.panel((top, bottom), Axis::linear((0.0, 1.05), (bottom, top)));
         let y = panel.y.linear_ticks(0.5, |value| value.to_string());
-        panel.frame(canvas, &Ticks { x: &x, y: &y, label: "Coherence", frequencies: true })?;
-        let measured = self.lines.iter().filter_map(|line| Some((line, line.measured?)));
+        panel.frame(
+            canvas,
+            &Ticks {
+                x: &x,
+                y: &y,
+                label: "Coherence",
+                frequencies: true,
+            },
+        )?;
+        let measured = self
+            .lines
+            .iter()
+            .filter_map(|line| Some((line, line.measured?)));
         for (line, frf) in measured {
-            let shown = |value| Shown { value, low: value, high: value, faint: false };
+            let shown = |value| Shown {
+                value,
+                low: value,
+                high: value,
+                faint: false,
+            };
             panel.curve(canvas, line, |k| shown(frf.coherence[k]))?;
         }
         Ok(())
@@ -113,17 +188,31 @@ impl Plot<'_> {
 
 /// Of all lines; a single frequency gets a third of an octave to either side.
 fn frequency_range(lines: &[Line]) -> (f64, f64) {
-    let frequencies = || lines.iter().flat_map(|line| line.frequency_hz.iter().copied());
+    let frequencies = || {
+        lines
+            .iter()
+            .flat_map(|line| line.frequency_hz.iter().copied())
+    };
     let (low, high) = range(frequencies()).unwrap_or((1.0, 1.0));
-    if low < high { (low, high) } else { (low / 1.26, high * 1.26) }
+    if low < high {
+        (low, high)
+    } else {
+        (low / 1.26, high * 1.26)
+    }
 }
 
 /// Of the magnitudes drawn in full, or of all where none is, with a margin, and a decade at least.
 fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
     let logs = |all: bool| {
-        let shown = move |line: &'_ Line, k: usize| (all || line.firm[k]) && line.magnitude[k] > 0.0;
-        let log = move |line: &Line, k: usize| shown(line, k).then(|| libm::log10(line.magnitude[k]));
-        range(lines.iter().flat_map(|line| (0..line.magnitude.len()).filter_map(move |k| log(line, k))))
+        let shown =
+            move |line: &'_ Line, k: usize| (all || line.firm[k]) && line.magnitude[k] > 0.0;
+        let log =
+            move |line: &Line, k: usize| shown(line, k).then(|| libm::log10(line.magnitude[k]));
+        range(
+            lines
+                .iter()
+                .flat_map(|line| (0..line.magnitude.len()).filter_map(move |k| log(line, k))),
+        )
     };
     let (low, high) = with_margin(logs(false).or_else(|| logs(true))?, 1.0);
     Some((libm::pow(10.0, low), libm::pow(10.0, high)))
@@ -133,9 +222,16 @@ fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
 fn phase_range(lines: &[Line]) -> (f64, f64) {
     let phases = |all: bool| {
         let shown = move |line: &Line, k: usize| (all || line.firm[k]).then_some(line.phase_deg[k]);
-        range(lines.iter().flat_map(|line| (0..line.phase_deg.len()).filter_map(move |k| shown(line, k))))
+        range(
+            lines
+                .iter()
+                .flat_map(|line| (0..line.phase_deg.len()).filter_map(move |k| shown(line, k))),
+        )
     };
-    with_margin(phases(false).or_else(|| phases(true)).unwrap_or((0.0, 0.0)), 180.0)
+    with_margin(
+        phases(false).or_else(|| phases(true)).unwrap_or((0.0, 0.0)),
+        180.0,
+    )
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

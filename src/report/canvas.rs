@@ -41,36 +41,84 @@ pub(super) fn page(
         canvas.0.present().map_err(failed)?;
     }
     let from = format!("<svg width=\"{width}\" height=\"{height}\"");
-    let to = format!("<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"", size.0, size.1);
+    let to = format!(
+        "<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"",
+        size.0, size.1
+    );
     Ok(svg.replacen(&from, &to, 1))
 }
 
 impl Canvas<'_> {
-    pub fn line(&self, points: &[(f64, f64)], colour: RGBAColor, width: f64) -> Result<(), ReportError> {
+    pub fn line(
+        &self,
+        points: &[(f64, f64)],
+        colour: RGBAColor,
+        width: f64,
+    ) -> Result<(), ReportError> {
         let points: Vec<_> = points.iter().map(|point| at(*point)).collect();
-        self.0.draw(&PathElement::new(points, colour.stroke_width(units(width) as u32))).map_err(failed)
+        self.0
+            .draw(&PathElement::new(
+                points,
+                colour.stroke_width(units(width) as u32),
+            ))
+            .map_err(failed)
     }
 
     pub fn area(&self, points: &[(f64, f64)], colour: RGBAColor) -> Result<(), ReportError> {
         let points: Vec<_> = points.iter().map(|point| at(*point)).collect();
-        self.0.draw(&Polygon::new(points, colour.filled())).map_err(failed)
+        self.0
+            .draw(&Polygon::new(points, colour.filled()))
+            .map_err(failed)
     }
 
-    pub fn dot(&self, centre: (f64, f64), radius: f64, colour: RGBAColor) -> Result<(), ReportError> {
-        self.0.draw(&Circle::new(at(centre), units(radius), colour.filled())).map_err(failed)
+    pub fn dot(
+        &self,
+        centre: (f64, f64),
+        radius: f64,
+        colour: RGBAColor,
+    ) -> Result<(), ReportError> {
+        self.0
+            .draw(&Circle::new(at(centre), units(radius), colour.filled()))
+            .map_err(failed)
     }
 
-    pub fn ring(&self, centre: (f64, f64), radius: f64, colour: RGBAColor, width: f64) -> Result<(), ReportError> {
+    pub fn ring(
+        &self,
+        centre: (f64, f64),
+        radius: f64,
+        colour: RGBAColor,
+        width: f64,
+    ) -> Result<(), ReportError> {
         let style = colour.stroke_width(units(width) as u32);
-        self.0.draw(&Circle::new(at(centre), units(radius), style)).map_err(failed)
+        self.0
+            .draw(&Circle::new(at(centre), units(radius), style))
+            .map_err(failed)
     }
 
-    pub fn text(&self, text: &str, position: (f64, f64), form: TextForm) -> Result<(), ReportError> {
-        let style = if form.bold { FontStyle::Bold } else { FontStyle::Normal };
-        let turn = if form.upward { FontTransform::Rotate270 } else { FontTransform::None };
-        let font = FontDesc::new(FontFamily::SansSerif, form.size * UNITS * FONT_SCALE, style).transform(turn);
-        let style = font.color(&form.colour).pos(Pos::new(form.anchor.0, form.anchor.1));
-        self.0.draw(&Text::new(text, at(position), style)).map_err(failed)
+    pub fn text(
+        &self,
+        text: &str,
+        position: (f64, f64),
+        form: TextForm,
+    ) -> Result<(), ReportError> {
+        let style = if form.bold {
+            FontStyle::Bold
+        } else {
+            FontStyle::Normal
+        };
+        let turn = if form.upward {
+            FontTransform::Rotate270
+        } else {
+            FontTransform::None
+        };
+        let font = FontDesc::new(FontFamily::SansSerif, form.size * UNITS * FONT_SCALE, style)
+            .transform(turn);
+        let style = font
+            .color(&form.colour)
+            .pos(Pos::new(form.anchor.0, form.anchor.1));
+        self.0
+            .draw(&Text::new(text, at(position), style))
+            .map_err(failed)
     }
 }
 

@@ -27,22 +27,35 @@ pub enum Stroke {
 impl Pen {
     /// A whole line.
     pub const fn solid(colour: Colour) -> Pen {
-        Pen { colour, stroke: Stroke::Solid, width: 1.6 }
+        Pen {
+            colour,
+            stroke: Stroke::Solid,
+            width: 1.6,
+        }
     }
 
     /// A line in dashes.
     pub const fn dashed(colour: Colour) -> Pen {
-        Pen { stroke: Stroke::Dashed, ..Pen::solid(colour) }
+        Pen {
+            stroke: Stroke::Dashed,
+            ..Pen::solid(colour)
+        }
     }
 
     /// A line in dots.
     pub const fn dotted(colour: Colour) -> Pen {
-        Pen { stroke: Stroke::Dotted, ..Pen::solid(colour) }
+        Pen {
+            stroke: Stroke::Dotted,
+            ..Pen::solid(colour)
+        }
     }
 
     /// The same, half as wide.
     pub const fn thin(self) -> Pen {
-        Pen { width: 0.5 * self.width, ..self }
+        Pen {
+            width: 0.5 * self.width,
+            ..self
+        }
     }
 }
 
@@ -84,27 +97,43 @@ pub enum ScaleKind {
 impl Scale {
     /// Even, with a quantity and its unit.
     pub fn linear(label: &str) -> Scale {
-        Scale { label: label.into(), kind: ScaleKind::Linear, range: None }
+        Scale {
+            label: label.into(),
+            kind: ScaleKind::Linear,
+            range: None,
+        }
     }
 
     /// By powers of ten.
     pub fn logarithmic(label: &str) -> Scale {
-        Scale { kind: ScaleKind::Logarithmic, ..Scale::linear(label) }
+        Scale {
+            kind: ScaleKind::Logarithmic,
+            ..Scale::linear(label)
+        }
     }
 
     /// Degrees.
     pub fn degrees(label: &str) -> Scale {
-        Scale { kind: ScaleKind::Degrees, ..Scale::linear(label) }
+        Scale {
+            kind: ScaleKind::Degrees,
+            ..Scale::linear(label)
+        }
     }
 
     /// Without numbers.
     pub fn blank(label: &str) -> Scale {
-        Scale { kind: ScaleKind::Blank, ..Scale::linear(label) }
+        Scale {
+            kind: ScaleKind::Blank,
+            ..Scale::linear(label)
+        }
     }
 
     /// With these ends.
     pub fn within(self, low: f64, high: f64) -> Scale {
-        Scale { range: Some((low, high)), ..self }
+        Scale {
+            range: Some((low, high)),
+            ..self
+        }
     }
 }
 
@@ -186,12 +215,21 @@ pub struct Chart {
 impl Chart {
     /// A chart without anything in it.
     pub fn new(heading: &str, x: Scale, y: Scale) -> Chart {
-        Chart { heading: heading.into(), x, y, marks: Vec::new(), equal: false }
+        Chart {
+            heading: heading.into(),
+            x,
+            y,
+            marks: Vec::new(),
+            equal: false,
+        }
     }
 
     /// With as many pixels a unit on both axes: a circle is round.
     pub fn equal(self) -> Chart {
-        Chart { equal: true, ..self }
+        Chart {
+            equal: true,
+            ..self
+        }
     }
 
     /// With one thing more.
@@ -202,21 +240,47 @@ impl Chart {
 
     /// With a line.
     pub fn line(self, name: &str, pen: Pen, points: Vec<(f64, f64)>) -> Chart {
-        self.mark(Mark::Line { name: name.into(), pen, points, directed: false })
+        self.mark(Mark::Line {
+            name: name.into(),
+            pen,
+            points,
+            directed: false,
+        })
     }
 
     /// With a line whose direction arrow heads show.
     pub fn directed(self, name: &str, pen: Pen, points: Vec<(f64, f64)>) -> Chart {
-        self.mark(Mark::Line { name: name.into(), pen, points, directed: true })
+        self.mark(Mark::Line {
+            name: name.into(),
+            pen,
+            points,
+            directed: true,
+        })
     }
 
     /// With points.
-    pub fn points(self, name: &str, colour: Colour, symbol: Symbol, points: Vec<(f64, f64)>) -> Chart {
-        self.mark(Mark::Points { name: name.into(), colour, symbol, points })
+    pub fn points(
+        self,
+        name: &str,
+        colour: Colour,
+        symbol: Symbol,
+        points: Vec<(f64, f64)>,
+    ) -> Chart {
+        self.mark(Mark::Points {
+            name: name.into(),
+            colour,
+            symbol,
+            points,
+        })
     }
 
     /// With words centred beside a point: so many pixels to the right and down.
     pub fn text(self, at: (f64, f64), offset: (f64, f64), text: &str) -> Chart {
-        self.mark(Mark::Text { at, offset, text: text.into(), colour: INK })
+        self.mark(Mark::Text {
+            at,
+            offset,
+            text: text.into(),
+            colour: INK,
+        })
     }
 }

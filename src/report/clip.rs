@@ -18,12 +18,18 @@ impl Frame {
     pub fn holds(&self, (x, y): (f64, f64)) -> bool {
         // Half a rounding of the page, so that a point on the frame is in it.
         let slack = 0.06;
-        x >= self.left - slack && x <= self.right + slack && y >= self.top - slack && y <= self.bottom + slack
+        x >= self.left - slack
+            && x <= self.right + slack
+            && y >= self.top - slack
+            && y <= self.bottom + slack
     }
 
     /// The nearest point of the frame.
     pub fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        (x.clamp(self.left, self.right), y.clamp(self.top, self.bottom))
+        (
+            x.clamp(self.left, self.right),
+            y.clamp(self.top, self.bottom),
+        )
     }
 
     /// The pieces of a line inside of the frame, thinned out.
@@ -81,9 +87,18 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let rising = points.windows(2).all(|pair| pair[1].0 >= pair[0].0);
     let width = points[points.len() - 1].0 - points[0].0;
     if rising && points.len() as f64 > 3.0 * width.max(1.0) {
-        let sample = |&(x, y): &(f64, f64)| Sample { x, y, band: (y, y), faint: false, begins: false };
+        let sample = |&(x, y): &(f64, f64)| Sample {
+            x,
+            y,
+            band: (y, y),
+            faint: false,
+            begins: false,
+        };
         let samples: Vec<Sample> = points.iter().map(sample).collect();
-        return curve::columns(&samples).into_iter().flat_map(|column| column.points).collect();
+        return curve::columns(&samples)
+            .into_iter()
+            .flat_map(|column| column.points)
+            .collect();
     }
     simplified(points)
 }
@@ -96,13 +111,20 @@ fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut open = vec![(0, last)];
     while let Some((from, to)) = open.pop() {
         let beside = |k: &usize| distance(points[*k], points[from], points[to]);
-        let Some(far) = (from + 1..to).max_by(|a, b| beside(a).total_cmp(&beside(b))) else { continue };
+        let Some(far) = (from + 1..to).max_by(|a, b| beside(a).total_cmp(&beside(b))) else {
+            continue;
+        };
         if beside(&far) > UNSEEN {
             kept[far] = true;
             open.extend([(from, far), (far, to)]);
         }
     }
-    points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
+    points
+        .iter()
+        .zip(kept)
+        .filter(|(_, kept)| *kept)
+        .map(|(point, _)| *point)
+        .collect()
 }
 
 /// Of a point from the segment between two others.
@@ -119,12 +141,23 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const FRAME: Frame = Frame { left: 0.0, right: 100.0, top: 0.0, bottom: 50.0 };
+    const FRAME: Frame = Frame {
+        left: 0.0,
+        right: 100.0,
+        top: 0.0,
+        bottom: 50.0,
+    };
 
     #[test]
     fn a_line_that_leaves_and_comes_back_is_two_pieces_that_end_on_the_frame() {
         let pieces = FRAME.pieces(&[(10.0, 25.0), (10.0, -25.0), (20.0, -25.0), (20.0, 25.0)]);
-        assert_eq!(pieces, [vec![(10.0, 25.0), (10.0, 0.0)], vec![(20.0, 0.0), (20.0, 25.0)]]);
+        assert_eq!(
+            pieces,
+            [
+                vec![(10.0, 25.0), (10.0, 0.0)],
+                vec![(20.0, 0.0), (20.0, 25.0)]
+            ]
+        );
         assert!(FRAME.pieces(&[(-5.0, 10.0), (-5.0, 20.0)]).is_empty());
         assert!(FRAME.pieces(&[(f64::NAN, 10.0), (5.0, 20.0)]).is_empty());
     }

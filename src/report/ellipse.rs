@@ -23,8 +23,10 @@ impl Ellipse {
         let (mean, half) = (0.5 * (a + d), 0.5 * (a - d));
         let radius = libm::hypot(half, b);
         let axis = |variance: f64| SIGMAS_95_PLANE * variance.max(0.0).sqrt();
-        let all =
-            Ellipse { half_axes: [axis(mean + radius), axis(mean - radius)], angle_rad: 0.5 * libm::atan2(b, half) };
+        let all = Ellipse {
+            half_axes: [axis(mean + radius), axis(mean - radius)],
+            angle_rad: 0.5 * libm::atan2(b, half),
+        };
         (all.half_axes[0].is_finite() && all.angle_rad.is_finite()).then_some(all)
     }
 
@@ -33,8 +35,14 @@ impl Ellipse {
         let (sin, cos) = (libm::sin(self.angle_rad), libm::cos(self.angle_rad));
         let at = |k: usize| {
             let turn = 2.0 * std::f64::consts::PI * (k % CORNERS) as f64 / CORNERS as f64;
-            let (along, across) = (self.half_axes[0] * libm::cos(turn), self.half_axes[1] * libm::sin(turn));
-            (x + along * cos - across * sin, y + along * sin + across * cos)
+            let (along, across) = (
+                self.half_axes[0] * libm::cos(turn),
+                self.half_axes[1] * libm::sin(turn),
+            );
+            (
+                x + along * cos - across * sin,
+                y + along * sin + across * cos,
+            )
         };
         (0..=CORNERS).map(at).collect()
     }
@@ -52,7 +60,10 @@ mod tests {
         // The chi-squared distribution of two degrees of freedom: P(x < k^2) = 1 - exp(-k^2/2).
         let k = (-2.0 * 0.05f64.ln()).sqrt();
         // Sums and roots of numbers below 10: a few roundings of 1e-15.
-        assert!((ellipse.half_axes[0] - 3.0 * k).abs() < 1e-13 && (ellipse.half_axes[1] - 2.0 * k).abs() < 1e-13);
+        assert!(
+            (ellipse.half_axes[0] - 3.0 * k).abs() < 1e-13
+                && (ellipse.half_axes[1] - 2.0 * k).abs() < 1e-13
+        );
         assert!((ellipse.angle_rad - std::f64::consts::PI / 6.0).abs() < 1e-14);
         for (x, y) in ellipse.outline((1.0, -2.0)) {
             let (u, v) = (x - 1.0, y + 2.0);
@@ -69,7 +80,10 @@ mod tests {
         let flat = Ellipse::of_95_percent([[4.0, 0.0], [0.0, 0.0]]).unwrap();
         assert_eq!((flat.angle_rad, flat.half_axes[1]), (0.0, 0.0));
         assert!(flat.outline((0.0, 3.0)).iter().all(|point| point.1 == 3.0));
-        assert_eq!(Ellipse::of_95_percent([[f64::INFINITY, 0.0], [0.0, 1.0]]), None);
+        assert_eq!(
+            Ellipse::of_95_percent([[f64::INFINITY, 0.0], [0.0, 1.0]]),
+            None
+        );
         assert_eq!(Ellipse::of_95_percent([[f64::NAN, 0.0], [0.0, 1.0]]), None);
     }
 }

@@ -37,7 +37,9 @@ pub enum ReportError {
         value: f64,
     },
     /// A value that is not a number.
-    #[error("the trace {name:?} has a value that is not finite at {frequency_hz} Hz: leave that frequency out")]
+    #[error(
+        "the trace {name:?} has a value that is not finite at {frequency_hz} Hz: leave that frequency out"
+    )]
     NotFinite {
         /// Name of the trace.
         name: String,

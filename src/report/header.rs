@@ -39,13 +39,28 @@ impl Header {
         }
         let entries = entries(lines, (left, right), y + 4.0);
         let bottom = entries.last().map_or(y, |entry| entry.1) + 26.0;
-        Self { texts, entries, left, bottom }
+        Self {
+            texts,
+            entries,
+            left,
+            bottom,
+        }
     }
 
     pub fn draw(&self, canvas: &Canvas, lines: &[Line]) -> Result<(), ReportError> {
         for (text, y, bold) in &self.texts {
-            let (size, colour) = if *bold { (TITLE_SIZE, INK) } else { (TEXT_SIZE, QUIET_INK) };
-            let form = TextForm { size, colour, bold: *bold, anchor: (HPos::Left, VPos::Top), upward: false };
+            let (size, colour) = if *bold {
+                (TITLE_SIZE, INK)
+            } else {
+                (TEXT_SIZE, QUIET_INK)
+            };
+            let form = TextForm {
+                size,
+                colour,
+                bold: *bold,
+                anchor: (HPos::Left, VPos::Top),
+                upward: false,
+            };
             canvas.text(text, (self.left, *y), form)?;
         }
         for (line, entry) in lines.iter().zip(&self.entries) {
@@ -56,7 +71,9 @@ impl Header {
 }
 
 fn entries(lines: &[Line], edges: (f64, f64), top: f64) -> Vec<(f64, f64)> {
-    let width = |line: &Line| SWATCH + 8.0 + CHARACTER * TEXT_SIZE * label(line).chars().count() as f64 + 24.0;
+    let width = |line: &Line| {
+        SWATCH + 8.0 + CHARACTER * TEXT_SIZE * label(line).chars().count() as f64 + 24.0
+    };
     flow(&lines.iter().map(width).collect::<Vec<_>>(), edges, top)
 }
 
@@ -78,18 +95,31 @@ fn draw_entry(canvas: &Canvas, line: &Line, (x, y): (f64, f64)) -> Result<(), Re
     let middle = y + 8.0;
     if line.measured.is_some() {
         let (top, bottom, end) = (middle - 6.0, middle + 6.0, x + SWATCH);
-        canvas.area(&[(x, top), (end, top), (end, bottom), (x, bottom)], line.colour.mix(BAND))?;
+        canvas.area(
+            &[(x, top), (end, top), (end, bottom), (x, bottom)],
+            line.colour.mix(BAND),
+        )?;
     }
     for dash in panel::dashes(line, &[(x, middle), (x + SWATCH, middle)]) {
         canvas.line(&dash, line.colour.to_rgba(), LINE_WIDTH)?;
     }
     let anchor = (HPos::Left, VPos::Center);
-    let form = TextForm { size: TEXT_SIZE, colour: INK, bold: false, anchor, upward: false };
+    let form = TextForm {
+        size: TEXT_SIZE,
+        colour: INK,
+        bold: false,
+        anchor,
+        upward: false,
+    };
     canvas.text(&label(line), (x + SWATCH + 8.0, middle), form)
 }
 
 fn label(line: &Line) -> String {
-    if line.measured.is_some() { format!("{} (band: ±2σ)", line.name) } else { line.name.to_owned() }
+    if line.measured.is_some() {
+        format!("{} (band: ±2σ)", line.name)
+    } else {
+        line.name.to_owned()
+    }
 }
 
 /// Rows of at most so many characters, broken between words, or within one that is longer than a row.
@@ -101,7 +131,11 @@ pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
             if !row.is_empty() && row.chars().count() + 1 + piece.chars().count() > most {
                 rows.push(core::mem::take(&mut row));
             }
-            row = if row.is_empty() { piece } else { format!("{row} {piece}") };
+            row = if row.is_empty() {
+                piece
+            } else {
+                format!("{row} {piece}")
+            };
         }
         rows.push(row);
     }
@@ -110,5 +144,8 @@ pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
 
 fn pieces(word: &str, most: usize) -> Vec<String> {
     let characters: Vec<char> = word.chars().collect();
-    characters.chunks(most.max(1)).map(|piece| piece.iter().collect()).collect()
+    characters
+        .chunks(most.max(1))
+        .map(|piece| piece.iter().collect())
+        .collect()
 }

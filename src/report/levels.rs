@@ -26,19 +26,55 @@ pub struct LevelLines<'a> {
 ///
 /// # Errors
 /// When there is nothing to draw.
-pub fn levels_svg(lines: &LevelLines<'_>, title: &str, subtitle: &str) -> Result<String, ReportError> {
-    let ends = lines.output.first().zip(lines.output.last()).ok_or(ReportError::NoTrace)?;
+pub fn levels_svg(
+    lines: &LevelLines<'_>,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    let ends = lines
+        .output
+        .first()
+        .zip(lines.output.last())
+        .ok_or(ReportError::NoTrace)?;
     let ends_hz = (ends.0.frequency_hz, ends.1.frequency_hz);
-    let frequency = Scale { range: (ends_hz.0 < ends_hz.1).then_some(ends_hz), ..Scale::logarithmic("Frequency (Hz)") };
+    let frequency = Scale {
+        range: (ends_hz.0 < ends_hz.1).then_some(ends_hz),
+        ..Scale::logarithmic("Frequency (Hz)")
+    };
     let mut all: Vec<Level> = [lines.output, lines.odd, lines.even].concat();
     all.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let periods = lines.periods.max(1) as f64;
     let power = |level: &Level| level.power_m2;
-    let chart = Chart::new("", frequency, Scale::logarithmic("Displacement a line, RMS (m)"))
-        .line("excited lines", Pen { width: 1.2, ..Pen::solid(BLUE) }, each(lines.output))
-        .line("noise of the mean", Pen::solid(GREY), averaged(&all, |level| level.noise_m2 / periods))
-        .points("odd lines left out", VERMILION, Symbol::Cross, averaged(lines.odd, power))
-        .points("even lines", GREEN, Symbol::Ring, averaged(lines.even, power));
+    let chart = Chart::new(
+        "",
+        frequency,
+        Scale::logarithmic("Displacement a line, RMS (m)"),
+    )
+    .line(
+        "excited lines",
+        Pen {
+            width: 1.2,
+            ..Pen::solid(BLUE)
+        },
+        each(lines.output),
+    )
+    .line(
+        "noise of the mean",
+        Pen::solid(GREY),
+        averaged(&all, |level| level.noise_m2 / periods),
+    )
+    .points(
+        "odd lines left out",
+        VERMILION,
+        Symbol::Cross,
+        averaged(lines.odd, power),
+    )
+    .points(
+        "even lines",
+        GREEN,
+        Symbol::Ring,
+        averaged(lines.even, power),
+    );
     sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart])])
 }
 
@@ -48,20 +84,30 @@ fn each(lines: &[Level]) -> Vec<(f64, f64)> {
 
 /// RMS over all lines within the same part of ln f.
 fn averaged(lines: &[Level], of: impl Fn(&Level) -> f64) -> Vec<(f64, f64)> {
-    let (Some(first), Some(last)) = (lines.first(), lines.last()) else { return Vec::new() };
+    let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
+        return Vec::new();
+    };
     let width = libm::log(last.frequency_hz / first.frequency_hz) / COLUMNS;
     let column = |line: &Level| {
-        if width > 0.0 { (libm::log(line.frequency_hz / first.frequency_hz) / width).floor() } else { 0.0 }
+        if width > 0.0 {
+            (libm::log(line.frequency_hz / first.frequency_hz) / width).floor()
+        } else {
+            0.0
+        }
     };
     shown(lines.chunk_by(|a, b| column(a) == column(b)).map(|near| {
-        let mean = |of: &dyn Fn(&Level) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
+        let mean =
+            |of: &dyn Fn(&Level) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
         (mean(&|line| line.frequency_hz), mean(&of))
     }))
 }
 
 /// Roots of the powers; a logarithmic axis has no 0.
 fn shown(powers: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    powers.filter(|(_, power)| *power > 0.0).map(|(f, power)| (f, power.sqrt())).collect()
+    powers
+        .filter(|(_, power)| *power > 0.0)
+        .map(|(f, power)| (f, power.sqrt()))
+        .collect()
 }
 
 #[cfg(test)]
@@ -79,7 +125,13 @@ mod tests {
         };
         let power = |level: &Level| level.power_m2;
         // 1 to 1000 Hz: a column is exp(ln(1000)/120) = 5.9 % wide; 1 Hz begins the first, 100 and 101 Hz share the 80th.
-        let lines = [level(1.0, 9.0), level(10.2, 0.0), level(101.0, 1.0), level(102.0, 7.0), level(1000.0, 25.0)];
+        let lines = [
+            level(1.0, 9.0),
+            level(10.2, 0.0),
+            level(101.0, 1.0),
+            level(102.0, 7.0),
+            level(1000.0, 25.0),
+        ];
         let points = averaged(&lines, power);
         assert_eq!(points, [(1.0, 3.0), (101.5, 2.0), (1000.0, 5.0)]);
         assert_eq!(averaged(&lines[..1], power), [(1.0, 3.0)]);
@@ -88,6 +140,18 @@ mod tests {
 
     #[test]
     fn nothing_excited_is_no_picture() {
-        assert!(levels_svg(&LevelLines { output: &[], odd: &[], even: &[], periods: 4 }, "", "").is_err());
+        assert!(
+            levels_svg(
+                &LevelLines {
+                    output: &[],
+                    odd: &[],
+                    even: &[],
+                    periods: 4
+                },
+                "",
+                ""
+            )
+            .is_err()
+        );
     }
 }

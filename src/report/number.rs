@@ -41,6 +41,9 @@ mod tests {
         assert_eq!(interval(-1234.5, 67.0), "\u{2212}1234 ± 67");
         assert_eq!(interval(-0.5, 0.0), "\u{2212}0.500000 ± 0.000000");
         assert_eq!(interval(0.5, f64::INFINITY), "0.500000 ± without bound");
-        assert_eq!([1e-9, 0.5, 0.99999].map(percent), ["below 0.01 %", "50.00 %", "above 99.99 %"]);
+        assert_eq!(
+            [1e-9, 0.5, 0.99999].map(percent),
+            ["below 0.01 %", "50.00 %", "above 99.99 %"]
+        );
     }
 }

@@ -44,30 +44,49 @@ pub fn document(title: &str, body: &str) -> String {
 pub fn picture(svg: &str, label: &str, caption: &str) -> String {
     let labelled = format!("<svg role=\"img\" aria-label=\"{}\" ", escaped(label));
     let svg = svg.replacen("<svg ", &labelled, 1);
-    format!("<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n", svg.trim_end(), escaped(caption))
+    format!(
+        "<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n",
+        svg.trim_end(),
+        escaped(caption)
+    )
 }
 
 /// A table of rows that are HTML already: see [`row`].
 pub fn table(header: &[&str], rows: &str) -> String {
-    let header: String = header.iter().map(|cell| format!("<th>{}</th>", escaped(cell))).collect();
+    let header: String = header
+        .iter()
+        .map(|cell| format!("<th>{}</th>", escaped(cell)))
+        .collect();
     format!("<table>\n<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n")
 }
 
 /// A row of a table.
 pub fn row(cells: &[String]) -> String {
-    let cells: String = cells.iter().map(|cell| format!("<td class=\"n\">{}</td>", escaped(cell))).collect();
+    let cells: String = cells
+        .iter()
+        .map(|cell| format!("<td class=\"n\">{}</td>", escaped(cell)))
+        .collect();
     format!("<tr>{cells}</tr>\n")
 }
 
 /// Names and what they stand for.
 pub fn facts(pairs: &[(String, String)]) -> String {
-    let pair = |(name, text): &(String, String)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(text));
-    format!("<dl>\n{}</dl>\n", pairs.iter().map(pair).collect::<String>())
+    let pair = |(name, text): &(String, String)| {
+        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(text))
+    };
+    format!(
+        "<dl>\n{}</dl>\n",
+        pairs.iter().map(pair).collect::<String>()
+    )
 }
 
 /// Text that means nothing to HTML.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
 }
 
 #[cfg(test)]
@@ -76,10 +95,15 @@ mod tests {
 
     #[test]
     fn what_means_something_to_html_is_escaped() {
-        assert_eq!(escaped("<a href=\"x\">'&'"), "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#39;");
+        assert_eq!(
+            escaped("<a href=\"x\">'&'"),
+            "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#39;"
+        );
         let all = document(
             "<t>",
-            &(row(&["<r>".into()]) + &picture("<svg x=\"1\"/>", "\"<l>", "<c>") + &table(&["<h>"], "")),
+            &(row(&["<r>".into()])
+                + &picture("<svg x=\"1\"/>", "\"<l>", "<c>")
+                + &table(&["<h>"], "")),
         );
         for raw in ["<t>", "<r>", "<l>", "<c>", "<h>", "\"\""] {
             assert!(!all.contains(raw), "{raw}: {all}");

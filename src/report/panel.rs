@@ -52,26 +52,57 @@ impl Panel {
             self.grid(canvas, ticks, labelled)?;
         }
         let (l, r, t, b) = (self.left, self.right, self.top, self.bottom);
-        canvas.line(&[(l, t), (r, t), (r, b), (l, b), (l, t), (r, t)], FRAME.to_rgba(), 0.8)?;
+        canvas.line(
+            &[(l, t), (r, t), (r, b), (l, b), (l, t), (r, t)],
+            FRAME.to_rgba(),
+            0.8,
+        )?;
         for tick in ticks.y {
             let position = (self.left - 6.0, self.y.pixel(tick.value));
             write(canvas, tick, position, (HPos::Right, VPos::Center))?;
         }
         for tick in ticks.x.iter().filter(|_| ticks.frequencies) {
-            write(canvas, tick, (self.x.pixel(tick.value), b + 6.0), (HPos::Center, VPos::Top))?;
+            write(
+                canvas,
+                tick,
+                (self.x.pixel(tick.value), b + 6.0),
+                (HPos::Center, VPos::Top),
+            )?;
         }
         let middle = (self.left - LABEL_LEFT, (t + b) / 2.0);
         let anchor = (HPos::Center, VPos::Center);
-        canvas.text(ticks.label, middle, TextForm { size: 13.0, colour: INK, bold: false, anchor, upward: true })
+        canvas.text(
+            ticks.label,
+            middle,
+            TextForm {
+                size: 13.0,
+                colour: INK,
+                bold: false,
+                anchor,
+                upward: true,
+            },
+        )
     }
 
     fn grid(&self, canvas: &Canvas, ticks: &Ticks, labelled: bool) -> Result<(), ReportError> {
-        let (colour, width) = if labelled { (GRID, 0.8) } else { (FINE_GRID, 0.6) };
-        for tick in ticks.x.iter().filter(|tick| tick.label.is_some() == labelled) {
+        let (colour, width) = if labelled {
+            (GRID, 0.8)
+        } else {
+            (FINE_GRID, 0.6)
+        };
+        for tick in ticks
+            .x
+            .iter()
+            .filter(|tick| tick.label.is_some() == labelled)
+        {
             let x = self.x.pixel(tick.value);
             canvas.line(&[(x, self.top), (x, self.bottom)], colour.to_rgba(), width)?;
         }
-        for tick in ticks.y.iter().filter(|tick| tick.label.is_some() == labelled) {
+        for tick in ticks
+            .y
+            .iter()
+            .filter(|tick| tick.label.is_some() == labelled)
+        {
             let y = self.y.pixel(tick.value);
             canvas.line(&[(self.left, y), (self.right, y)], colour.to_rgba(), width)?;
         }
@@ -79,7 +110,12 @@ impl Panel {
     }
 
     /// A line of a trace, of which `shown` gives the k-th value.
-    pub fn curve(&self, canvas: &Canvas, line: &Line, shown: impl Fn(usize) -> Shown) -> Result<(), ReportError> {
+    pub fn curve(
+        &self,
+        canvas: &Canvas,
+        line: &Line,
+        shown: impl Fn(usize) -> Shown,
+    ) -> Result<(), ReportError> {
         let samples = self.samples(line, shown);
         let columns = curve::columns(&samples);
         if samples.iter().any(|sample| sample.band.0 < sample.band.1) {
@@ -99,7 +135,8 @@ impl Panel {
     /// Dots where measured points are few, or stand alone between gaps.
     fn marks(&self, canvas: &Canvas, line: &Line, samples: &[Sample]) -> Result<(), ReportError> {
         let few = line.measured.is_some() && samples.len() < MARKED_POINTS;
-        let alone = |k: usize| samples[k].begins && samples.get(k + 1).is_none_or(|next| next.begins);
+        let alone =
+            |k: usize| samples[k].begins && samples.get(k + 1).is_none_or(|next| next.begins);
         for (k, sample) in samples.iter().enumerate().filter(|(k, _)| few || alone(*k)) {
             let strength = if samples[k].faint { FAINT } else { 1.0 };
             canvas.dot((sample.x, sample.y), DOT, line.colour.mix(strength))?;
@@ -111,8 +148,17 @@ impl Panel {
         let sample = |k: usize| {
             let shown = shown(k);
             let band = (self.y.pixel(shown.high), self.y.pixel(shown.low));
-            let (x, y) = (self.x.pixel(line.frequency_hz[k]), self.y.pixel(shown.value));
-            Sample { x, y, band, faint: shown.faint, begins: line.begins[k] }
+            let (x, y) = (
+                self.x.pixel(line.frequency_hz[k]),
+                self.y.pixel(shown.value),
+            );
+            Sample {
+                x,
+                y,
+                band,
+                faint: shown.faint,
+                begins: line.begins[k],
+            }
         };
         (0..line.frequency_hz.len()).map(sample).collect()
     }
@@ -120,10 +166,26 @@ impl Panel {
 
 /// A line as it is drawn for a trace: in one, or in dashes.
 pub(super) fn dashes(line: &Line, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
-    line.dashes.map_or_else(|| vec![points.to_vec()], |dashes| curve::dashed(points, dashes))
+    line.dashes.map_or_else(
+        || vec![points.to_vec()],
+        |dashes| curve::dashed(points, dashes),
+    )
 }
 
-fn write(canvas: &Canvas, tick: &Tick, position: (f64, f64), anchor: (HPos, VPos)) -> Result<(), ReportError> {
-    let form = TextForm { size: LABEL_SIZE, colour: INK, bold: false, anchor, upward: false };
-    tick.label.as_ref().map_or(Ok(()), |label| canvas.text(label, position, form))
+fn write(
+    canvas: &Canvas,
+    tick: &Tick,
+    position: (f64, f64),
+    anchor: (HPos, VPos),
+) -> Result<(), ReportError> {
+    let form = TextForm {
+        size: LABEL_SIZE,
+        colour: INK,
+        bold: false,
+        anchor,
+        upward: false,
+    };
+    tick.label
+        .as_ref()
+        .map_or(Ok(()), |label| canvas.text(label, position, form))
 }

@@ -32,15 +32,22 @@ pub fn closest(phase_deg: f64, to_deg: f64) -> f64 {
 pub fn offset_deg(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> f64 {
     let mut turns: Vec<f64> = curve
         .iter()
-        .filter_map(|(frequency, phase)| Some(((at(reference, *frequency)? - phase) / TURN).round()))
+        .filter_map(|(frequency, phase)| {
+            Some(((at(reference, *frequency)? - phase) / TURN).round())
+        })
         .collect();
     turns.sort_by(f64::total_cmp);
-    turns.get(turns.len() / 2).map_or(0.0, |median| median * TURN)
+    turns
+        .get(turns.len() / 2)
+        .map_or(0.0, |median| median * TURN)
 }
 
 /// A curve at a frequency: the last point that is not above it, if any is and it is not past the end.
 fn at(curve: &[(f64, f64)], frequency: f64) -> Option<f64> {
     let after = curve.partition_point(|point| point.0 <= frequency);
     let within = curve.last().is_some_and(|last| frequency <= last.0);
-    curve.get(after.checked_sub(1)?).filter(|_| within).map(|point| point.1)
+    curve
+        .get(after.checked_sub(1)?)
+        .filter(|_| within)
+        .map(|point| point.1)
 }

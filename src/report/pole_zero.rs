@@ -46,8 +46,14 @@ pub struct PoleZeroMap {
 ///
 /// # Errors
 /// When drawing fails.
-pub fn pole_zero_svg(map: &PoleZeroMap, title: &str, subtitle: &str) -> Result<String, ReportError> {
-    let first = std::iter::once(map.whole()).chain(map.close_modes()).collect();
+pub fn pole_zero_svg(
+    map: &PoleZeroMap,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    let first = std::iter::once(map.whole())
+        .chain(map.close_modes())
+        .collect();
     let rows = [Row::new(400.0, first), Row::new(250.0, map.enlarged())];
     sheet_svg(title, subtitle, &rows)
 }
@@ -57,7 +63,12 @@ impl PoleZeroMap {
     /// imaginary parts in rad/s.
     pub fn close_pair(&self) -> Option<(f64, f64)> {
         let counts = |place: &&Place| place.s.im > 0.0 && place.s.norm() <= self.up_to_rad_s;
-        let mut im: Vec<f64> = self.poles.iter().filter(counts).map(|pole| pole.s.im).collect();
+        let mut im: Vec<f64> = self
+            .poles
+            .iter()
+            .filter(counts)
+            .map(|pole| pole.s.im)
+            .collect();
         im.sort_by(f64::total_cmp);
         let pairs = im.windows(2).map(|pair| (pair[0], pair[1]));
         pairs.min_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)))
@@ -65,12 +76,22 @@ impl PoleZeroMap {
 
     fn whole(&self) -> Chart {
         let swings = |place: &&Place| -place.s.re <= OSCILLATES * place.s.norm();
-        let seen: Vec<&Place> = self.poles.iter().filter(swings).chain(&self.zeros).collect();
+        let seen: Vec<&Place> = self
+            .poles
+            .iter()
+            .filter(swings)
+            .chain(&self.zeros)
+            .collect();
         let re = span(seen.iter().map(|place| place.s.re), 0.15);
         let highest = seen.iter().map(|place| place.s.im).fold(0.0, f64::max);
         let frame = (re, (0.0, 1.08 * highest.max(1.0)));
-        let beyond =
-            self.poles.iter().chain(&self.zeros).chain(&self.others).filter(|place| !holds(frame, place)).count();
+        let beyond = self
+            .poles
+            .iter()
+            .chain(&self.zeros)
+            .chain(&self.others)
+            .filter(|place| !holds(frame, place))
+            .count();
         let heading = match beyond {
             0 => "Upper half of the plane of s".into(),
             n => format!("Upper half of the plane of s; {n} more beyond"),
@@ -84,10 +105,19 @@ impl PoleZeroMap {
         let room = 0.7 * (high - low).max(1e-3 * high);
         let im = (low - room, high + room);
         let within = |place: &&Place| place.s.im >= im.0 && place.s.im <= im.1;
-        let seen: Vec<&Place> = self.poles.iter().chain(&self.zeros).filter(within).collect();
+        let seen: Vec<&Place> = self
+            .poles
+            .iter()
+            .chain(&self.zeros)
+            .filter(within)
+            .collect();
         let re = span(seen.iter().map(|place| place.s.re), 0.3);
         let hertz = 2.0 * std::f64::consts::PI;
-        let heading = format!("The closest modes, {:.2} and {:.2} Hz, enlarged", low / hertz, high / hertz);
+        let heading = format!(
+            "The closest modes, {:.2} and {:.2} Hz, enlarged",
+            low / hertz,
+            high / hertz
+        );
         Some(self.marked(plane(&heading, (re, im)), false, true))
     }
 
@@ -99,14 +129,26 @@ impl PoleZeroMap {
         }
         chart = chart.points(name("pole"), INK, Symbol::Cross, points(&self.poles));
         if !self.others.is_empty() {
-            chart = chart.points(name("zero that is not judged"), GREY, Symbol::Ring, points(&self.others));
+            chart = chart.points(
+                name("zero that is not judged"),
+                GREY,
+                Symbol::Ring,
+                points(&self.others),
+            );
         }
         for (right, text) in [(false, "zero left"), (true, "zero right of the axis")] {
-            let side: Vec<Place> = self.zeros.iter().filter(|zero| (zero.s.re > 0.0) == right).copied().collect();
+            let side: Vec<Place> = self
+                .zeros
+                .iter()
+                .filter(|zero| (zero.s.re > 0.0) == right)
+                .copied()
+                .collect();
             if side.is_empty() {
                 continue;
             }
-            chart = side.iter().fold(chart, |chart, zero| ellipse(chart, "", zero, Complex::new(0.0, 0.0)));
+            chart = side.iter().fold(chart, |chart, zero| {
+                ellipse(chart, "", zero, Complex::new(0.0, 0.0))
+            });
             chart = chart.points(name(text), colour(&side[0]), Symbol::Ring, points(&side));
         }
         chart
@@ -114,9 +156,15 @@ impl PoleZeroMap {
 
     /// Zeros whose ellipses can be drawn, nearest to the axis first.
     fn enlarged(&self) -> Vec<Chart> {
-        let drawn = |zero: &&Place| sigma(zero, 0) > 0.0 && Ellipse::of_95_percent(zero.covariance).is_some();
+        let drawn = |zero: &&Place| {
+            sigma(zero, 0) > 0.0 && Ellipse::of_95_percent(zero.covariance).is_some()
+        };
         let mut zeros: Vec<&Place> = self.zeros.iter().filter(drawn).collect();
-        zeros.sort_by(|a, b| (a.s.re / sigma(a, 0)).abs().total_cmp(&(b.s.re / sigma(b, 0)).abs()));
+        zeros.sort_by(|a, b| {
+            (a.s.re / sigma(a, 0))
+                .abs()
+                .total_cmp(&(b.s.re / sigma(b, 0)).abs())
+        });
         zeros.into_iter().take(ENLARGED).map(zero_alone).collect()
     }
 }
@@ -125,7 +173,11 @@ impl PoleZeroMap {
 fn zero_alone(zero: &Place) -> Chart {
     let half = |part: usize| SIGMAS_95_PLANE * sigma(zero, part);
     let (re, im) = (half(0), if half(1) > 0.0 { half(1) } else { half(0) });
-    let axis = if zero.s.re.abs() <= AXIS_WITHIN * re { -zero.s.re } else { 0.0 };
+    let axis = if zero.s.re.abs() <= AXIS_WITHIN * re {
+        -zero.s.re
+    } else {
+        0.0
+    };
     let free = ROOM * re;
     let x = ((-re).min(axis) - free, re.max(axis) + free);
     let less = |value: f64, half: f64| number::plain(value, number::decimals(half));
@@ -135,13 +187,21 @@ fn zero_alone(zero: &Place) -> Chart {
         Scale::linear(&format!("Im. part less {} (rad/s)", less(zero.s.im, im)))
             .within(-(1.0 + ROOM) * im, (1.0 + ROOM) * im),
     );
-    let chart = if axis == 0.0 { chart } else { upright(chart, "imaginary axis", axis) };
+    let chart = if axis == 0.0 {
+        chart
+    } else {
+        upright(chart, "imaginary axis", axis)
+    };
     ellipse(chart, "95 %", zero, zero.s).points("", colour(zero), Symbol::Dot, vec![(0.0, 0.0)])
 }
 
 fn heading(zero: &Place) -> String {
     let sigmas = (zero.s.re / sigma(zero, 0)).abs();
-    let sigmas = if sigmas > 1000.0 { "over 1000".into() } else { format!("{sigmas:.1}") };
+    let sigmas = if sigmas > 1000.0 {
+        "over 1000".into()
+    } else {
+        format!("{sigmas:.1}")
+    };
     let side = if zero.s.re > 0.0 { "right" } else { "left" };
     let hz = zero.s.norm() / (2.0 * std::f64::consts::PI);
     format!("Zero at {hz:.2} Hz, {sigmas} σ {side} of the axis")
@@ -158,15 +218,32 @@ fn plane(heading: &str, (re, im): ((f64, f64), (f64, f64))) -> Chart {
 }
 
 fn upright(chart: Chart, name: &str, x: f64) -> Chart {
-    chart.line(name, Pen { width: 1.1, ..Pen::solid(INK) }, vec![(x, -FAR), (x, FAR)])
+    chart.line(
+        name,
+        Pen {
+            width: 1.1,
+            ..Pen::solid(INK)
+        },
+        vec![(x, -FAR), (x, FAR)],
+    )
 }
 
 /// The ellipse of a zero, less an origin.
 fn ellipse(chart: Chart, name: &str, zero: &Place, origin: Complex<f64>) -> Chart {
-    let Some(ellipse) = Ellipse::of_95_percent(zero.covariance) else { return chart };
+    let Some(ellipse) = Ellipse::of_95_percent(zero.covariance) else {
+        return chart;
+    };
     let outline = ellipse.outline((zero.s.re - origin.re, zero.s.im - origin.im));
-    let pen = Pen { width: 1.0, ..Pen::solid(colour(zero)) };
-    let area = super::Mark::Area { name: name.into(), colour: colour(zero), strength: 0.22, outline: outline.clone() };
+    let pen = Pen {
+        width: 1.0,
+        ..Pen::solid(colour(zero))
+    };
+    let area = super::Mark::Area {
+        name: name.into(),
+        colour: colour(zero),
+        strength: 0.22,
+        outline: outline.clone(),
+    };
     chart.mark(area).line("", pen, outline)
 }
 
@@ -174,12 +251,13 @@ fn ellipse(chart: Chart, name: &str, zero: &Place, origin: Complex<f64>) -> Char
 fn crossed(chart: Chart, pole: &Place) -> Chart {
     let Complex { re, im } = pole.s;
     let half = |part: usize| SIGMAS_95 * sigma(pole, part);
-    let pen = Pen { width: 0.9, ..Pen::solid(INK) };
-    chart.line("", pen, vec![(re - half(0), im), (re + half(0), im)]).line(
-        "",
-        pen,
-        vec![(re, im - half(1)), (re, im + half(1))],
-    )
+    let pen = Pen {
+        width: 0.9,
+        ..Pen::solid(INK)
+    };
+    chart
+        .line("", pen, vec![(re - half(0), im), (re + half(0), im)])
+        .line("", pen, vec![(re, im - half(1)), (re, im + half(1))])
 }
 
 fn colour(zero: &Place) -> Colour {
@@ -187,7 +265,10 @@ fn colour(zero: &Place) -> Colour {
 }
 
 fn points(places: &[Place]) -> Vec<(f64, f64)> {
-    places.iter().map(|place| (place.s.re, place.s.im)).collect()
+    places
+        .iter()
+        .map(|place| (place.s.re, place.s.im))
+        .collect()
 }
 
 fn sigma(place: &Place, part: usize) -> f64 {
@@ -201,7 +282,9 @@ fn holds((re, im): ((f64, f64), (f64, f64)), place: &Place) -> bool {
 
 /// From the least to the greatest, 0 among them, with a margin.
 fn span(values: impl Iterator<Item = f64>, margin: f64) -> (f64, f64) {
-    let (low, high) = values.fold((0.0, 0.0), |(low, high): (f64, f64), x| (low.min(x), high.max(x)));
+    let (low, high) = values.fold((0.0, 0.0), |(low, high): (f64, f64), x| {
+        (low.min(x), high.max(x))
+    });
     let room = margin * (high - low).max(1e-3);
     (low - room, high + room)
 }

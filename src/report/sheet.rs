@@ -77,17 +77,50 @@ struct Cell<'a> {
 /// The cells of a row, and where it ends.
 fn cells(row: &Row, top: f64) -> (Vec<Cell<'_>>, f64) {
     let width = WIDTH / row.charts.len() as f64;
-    let edges = |k: usize| (k as f64 * width + BESIDE.0, (k + 1) as f64 * width - BESIDE.1);
-    let heads: Vec<_> = row.charts.iter().enumerate().map(|(k, chart)| head(chart, edges(k), top)).collect();
+    let edges = |k: usize| {
+        (
+            k as f64 * width + BESIDE.0,
+            (k + 1) as f64 * width - BESIDE.1,
+        )
+    };
+    let heads: Vec<_> = row
+        .charts
+        .iter()
+        .enumerate()
+        .map(|(k, chart)| head(chart, edges(k), top))
+        .collect();
     let frame_top = heads.iter().map(|head| head.2).fold(top, f64::max);
     let bottom = frame_top + row.height;
     let cell = |(k, (headings, legend, _)): (usize, (Vec<_>, Vec<_>, f64))| {
         let chart = &row.charts[k];
         let (left, right) = edges(k);
-        let (x, y) = axes(chart, Frame { left, right, top: frame_top, bottom });
-        Cell { chart, headings, legend, panel: Panel { left, right, top: frame_top, bottom, x, y } }
+        let (x, y) = axes(
+            chart,
+            Frame {
+                left,
+                right,
+                top: frame_top,
+                bottom,
+            },
+        );
+        Cell {
+            chart,
+            headings,
+            legend,
+            panel: Panel {
+                left,
+                right,
+                top: frame_top,
+                bottom,
+                x,
+                y,
+            },
+        }
     };
-    (heads.into_iter().enumerate().map(cell).collect(), bottom + FOOT)
+    (
+        heads.into_iter().enumerate().map(cell).collect(),
+        bottom + FOOT,
+    )
 }
 
 /// A head's rows of words, its legend, and where it ends.
@@ -97,13 +130,21 @@ type Head = (Vec<(String, f64)>, Vec<(Key, (f64, f64))>, f64);
 fn head(chart: &Chart, (left, right): (f64, f64), top: f64) -> Head {
     let mut y = top + 4.0;
     let mut headings = Vec::new();
-    for row in wrapped(&chart.heading, ((right - left) / (0.62 * HEADING_SIZE)) as usize) {
+    for row in wrapped(
+        &chart.heading,
+        ((right - left) / (0.62 * HEADING_SIZE)) as usize,
+    ) {
         headings.push((row, y));
         y += 1.4 * HEADING_SIZE;
     }
     let keys: Vec<Key> = chart.marks.iter().flat_map(keys).collect();
-    let width = |key: &Key| SWATCH + 6.0 + CHARACTER * TEXT_SIZE * key.name.chars().count() as f64 + 18.0;
-    let places = flow(&keys.iter().map(width).collect::<Vec<_>>(), (left, right), y);
+    let width =
+        |key: &Key| SWATCH + 6.0 + CHARACTER * TEXT_SIZE * key.name.chars().count() as f64 + 18.0;
+    let places = flow(
+        &keys.iter().map(width).collect::<Vec<_>>(),
+        (left, right),
+        y,
+    );
     let bottom = places.last().map_or(y, |place| place.1 + 20.0) + 4.0;
     (headings, keys.into_iter().zip(places).collect(), bottom)
 }
@@ -123,15 +164,29 @@ enum Sample {
 fn keys(mark: &Mark) -> Vec<Key> {
     let named = |name: &String, sample: Sample| match name.is_empty() {
         true => Vec::new(),
-        false => vec![Key { name: name.clone(), sample }],
+        false => vec![Key {
+            name: name.clone(),
+            sample,
+        }],
     };
     match mark {
         Mark::Line { name, pen, .. } => named(name, Sample::Line(*pen)),
-        Mark::Points { name, colour, symbol, .. } => named(name, Sample::Point(*colour, *symbol)),
-        Mark::Area { name, colour, strength, .. } => named(name, Sample::Area(*colour, *strength)),
-        Mark::Cells { colours, .. } => {
-            colours.iter().flat_map(|(name, colour)| named(name, Sample::Area(*colour, 1.0))).collect()
-        }
+        Mark::Points {
+            name,
+            colour,
+            symbol,
+            ..
+        } => named(name, Sample::Point(*colour, *symbol)),
+        Mark::Area {
+            name,
+            colour,
+            strength,
+            ..
+        } => named(name, Sample::Area(*colour, *strength)),
+        Mark::Cells { colours, .. } => colours
+            .iter()
+            .flat_map(|(name, colour)| named(name, Sample::Area(*colour, 1.0)))
+            .collect(),
         Mark::Text { .. } => Vec::new(),
     }
 }
@@ -141,9 +196,11 @@ fn places(mark: &Mark) -> Vec<(f64, f64)> {
     match mark {
         Mark::Line { points, .. } | Mark::Points { points, .. } => points.clone(),
         Mark::Area { outline, .. } => outline.clone(),
-        Mark::Cells { x, y, .. } => {
-            [x.first().zip(y.first()), x.last().zip(y.last())].into_iter().flatten().map(|(x, y)| (*x, *y)).collect()
-        }
+        Mark::Cells { x, y, .. } => [x.first().zip(y.first()), x.last().zip(y.last())]
+            .into_iter()
+            .flatten()
+            .map(|(x, y)| (*x, *y))
+            .collect(),
         Mark::Text { at, .. } => vec![*at],
     }
 }
@@ -153,7 +210,12 @@ fn axes(chart: &Chart, frame: Frame) -> (Axis, Axis) {
     let all: Vec<(f64, f64)> = chart.marks.iter().flat_map(places).collect();
     let mut x = ends(&chart.x, all.iter().map(|point| point.0));
     // Of the points that the other axis shows.
-    let seen = |point: &&(f64, f64)| chart.x.range.is_none_or(|(low, high)| point.0 >= low && point.0 <= high);
+    let seen = |point: &&(f64, f64)| {
+        chart
+            .x
+            .range
+            .is_none_or(|(low, high)| point.0 >= low && point.0 <= high)
+    };
     let mut y = ends(&chart.y, all.iter().filter(seen).map(|point| point.1));
     let (width, height) = (frame.right - frame.left, frame.bottom - frame.top);
     if chart.equal {
@@ -164,7 +226,10 @@ fn axes(chart: &Chart, frame: Frame) -> (Axis, Axis) {
         ScaleKind::Logarithmic => Axis::logarithmic(range, pixels),
         _ => Axis::linear(range, pixels),
     };
-    (axis(&chart.x, x, (frame.left, frame.right)), axis(&chart.y, y, (frame.bottom, frame.top)))
+    (
+        axis(&chart.x, x, (frame.left, frame.right)),
+        axis(&chart.y, y, (frame.bottom, frame.top)),
+    )
 }
 
 fn about((low, high): (f64, f64), width: f64) -> (f64, f64) {
@@ -179,18 +244,45 @@ fn ends(scale: &Scale, values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
     let logarithmic = scale.kind == ScaleKind::Logarithmic;
     let shown = values.filter(|value| value.is_finite() && (!logarithmic || *value > 0.0));
-    let shown = shown.map(|value| if logarithmic { libm::log10(value) } else { value });
-    let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let shown = shown.map(|value| {
+        if logarithmic {
+            libm::log10(value)
+        } else {
+            value
+        }
+    });
+    let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+        (low.min(x), high.max(x))
+    });
     let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
-    let least = if logarithmic { 0.1 } else { 1e-9 * low.abs().max(high.abs()).max(1e-300) };
+    let least = if logarithmic {
+        0.1
+    } else {
+        1e-9 * low.abs().max(high.abs()).max(1e-300)
+    };
     let (low, high) = about((low, high), (high - low).max(least) * (1.0 + 2.0 * MARGIN));
-    if logarithmic { (libm::pow(10.0, low), libm::pow(10.0, high)) } else { (low, high) }
+    if logarithmic {
+        (libm::pow(10.0, low), libm::pow(10.0, high))
+    } else {
+        (low, high)
+    }
 }
 
 impl Cell<'_> {
     fn frame(&self) -> Frame {
-        let Panel { left, right, top, bottom, .. } = self.panel;
-        Frame { left, right, top, bottom }
+        let Panel {
+            left,
+            right,
+            top,
+            bottom,
+            ..
+        } = self.panel;
+        Frame {
+            left,
+            right,
+            top,
+            bottom,
+        }
     }
 
     fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
@@ -200,13 +292,24 @@ impl Cell<'_> {
     fn draw(&self, canvas: &Canvas) -> Result<(), ReportError> {
         for (text, y) in &self.headings {
             let anchor = (HPos::Left, VPos::Top);
-            let form = TextForm { size: HEADING_SIZE, colour: INK, bold: true, anchor, upward: false };
+            let form = TextForm {
+                size: HEADING_SIZE,
+                colour: INK,
+                bold: true,
+                anchor,
+                upward: false,
+            };
             canvas.text(text, (self.panel.left, *y), form)?;
         }
-        self.legend.iter().try_for_each(|(key, place)| draw_key(canvas, key, *place))?;
+        self.legend
+            .iter()
+            .try_for_each(|(key, place)| draw_key(canvas, key, *place))?;
         // A map covers the grid; everything else stands on it.
-        let (maps, others): (Vec<&Mark>, Vec<&Mark>) =
-            self.chart.marks.iter().partition(|mark| matches!(mark, Mark::Cells { .. } | Mark::Area { .. }));
+        let (maps, others): (Vec<&Mark>, Vec<&Mark>) = self
+            .chart
+            .marks
+            .iter()
+            .partition(|mark| matches!(mark, Mark::Cells { .. } | Mark::Area { .. }));
         let ticks = Ticks {
             x: &ticks(&self.chart.x, &self.panel.x, TICK.0),
             y: &ticks(&self.chart.y, &self.panel.y, TICK.1),
@@ -214,38 +317,97 @@ impl Cell<'_> {
             frequencies: true,
         };
         self.panel.frame(canvas, &ticks)?;
-        maps.into_iter().chain(others).try_for_each(|mark| self.mark(canvas, mark))?;
+        maps.into_iter()
+            .chain(others)
+            .try_for_each(|mark| self.mark(canvas, mark))?;
         let anchor = (HPos::Center, VPos::Bottom);
-        let form = TextForm { size: HEADING_SIZE, colour: INK, bold: false, anchor, upward: false };
+        let form = TextForm {
+            size: HEADING_SIZE,
+            colour: INK,
+            bold: false,
+            anchor,
+            upward: false,
+        };
         let middle = (self.panel.left + self.panel.right) / 2.0;
-        canvas.text(&self.chart.x.label, (middle, self.panel.bottom + FOOT - 8.0), form)
+        canvas.text(
+            &self.chart.x.label,
+            (middle, self.panel.bottom + FOOT - 8.0),
+            form,
+        )
     }
 
     fn mark(&self, canvas: &Canvas, mark: &Mark) -> Result<(), ReportError> {
         match mark {
-            Mark::Line { pen, points, directed, .. } => self.line(canvas, *pen, points, *directed),
-            Mark::Points { colour, symbol, points, .. } => {
-                let inside = points.iter().map(|point| self.at(*point)).filter(|at| self.frame().holds(*at));
-                inside.into_iter().try_for_each(|at| draw_symbol(canvas, *colour, *symbol, at))
+            Mark::Line {
+                pen,
+                points,
+                directed,
+                ..
+            } => self.line(canvas, *pen, points, *directed),
+            Mark::Points {
+                colour,
+                symbol,
+                points,
+                ..
+            } => {
+                let inside = points
+                    .iter()
+                    .map(|point| self.at(*point))
+                    .filter(|at| self.frame().holds(*at));
+                inside
+                    .into_iter()
+                    .try_for_each(|at| draw_symbol(canvas, *colour, *symbol, at))
             }
-            Mark::Area { colour, strength, outline, .. } => {
+            Mark::Area {
+                colour,
+                strength,
+                outline,
+                ..
+            } => {
                 // A logarithmic axis has no place for values of 0 and below.
-                let places = outline.iter().map(|point| self.at(*point)).filter(|(x, y)| !(x.is_nan() || y.is_nan()));
+                let places = outline
+                    .iter()
+                    .map(|point| self.at(*point))
+                    .filter(|(x, y)| !(x.is_nan() || y.is_nan()));
                 let corners: Vec<_> = places.map(|place| self.frame().nearest(place)).collect();
-                if corners.len() < 3 { Ok(()) } else { canvas.area(&corners, colour.mix_with(*strength)) }
+                if corners.len() < 3 {
+                    Ok(())
+                } else {
+                    canvas.area(&corners, colour.mix_with(*strength))
+                }
             }
-            Mark::Cells { x, y, rows, colours } => self.cells(canvas, (x, y), rows, colours),
-            Mark::Text { at, offset, text, colour } => self.text(canvas, self.at(*at), *offset, text, *colour),
+            Mark::Cells {
+                x,
+                y,
+                rows,
+                colours,
+            } => self.cells(canvas, (x, y), rows, colours),
+            Mark::Text {
+                at,
+                offset,
+                text,
+                colour,
+            } => self.text(canvas, self.at(*at), *offset, text, *colour),
         }
     }
 
-    fn line(&self, canvas: &Canvas, pen: Pen, points: &[(f64, f64)], directed: bool) -> Result<(), ReportError> {
+    fn line(
+        &self,
+        canvas: &Canvas,
+        pen: Pen,
+        points: &[(f64, f64)],
+        directed: bool,
+    ) -> Result<(), ReportError> {
         let points: Vec<(f64, f64)> = points.iter().map(|point| self.at(*point)).collect();
         for piece in self.frame().pieces(&points) {
             for dash in dashes(pen.stroke, &piece) {
                 canvas.line(&dash, pen.colour.into(), pen.width)?;
             }
-            for head in if directed { arrow_heads(&piece) } else { Vec::new() } {
+            for head in if directed {
+                arrow_heads(&piece)
+            } else {
+                Vec::new()
+            } {
                 if head.iter().all(|corner| self.frame().holds(*corner)) {
                     canvas.area(&head, pen.colour.into())?;
                 }
@@ -292,13 +454,37 @@ impl Cell<'_> {
         if at.0.is_nan() || at.1.is_nan() {
             return Ok(());
         }
-        let half = (0.5 * CHARACTER * TEXT_SIZE * text.chars().count() as f64 + 3.0, 0.6 * TEXT_SIZE + 2.0);
-        let Frame { left, right, top, bottom } = self.frame();
-        let within = |x: f64, low: f64, high: f64| if low < high { x.clamp(low, high) } else { 0.5 * (low + high) };
+        let half = (
+            0.5 * CHARACTER * TEXT_SIZE * text.chars().count() as f64 + 3.0,
+            0.6 * TEXT_SIZE + 2.0,
+        );
+        let Frame {
+            left,
+            right,
+            top,
+            bottom,
+        } = self.frame();
+        let within = |x: f64, low: f64, high: f64| {
+            if low < high {
+                x.clamp(low, high)
+            } else {
+                0.5 * (low + high)
+            }
+        };
         let x = within(at.0 + offset.0, left + half.0, right - half.0);
         let y = within(at.1 + offset.1, top + half.1, bottom - half.1);
         let anchor = (HPos::Center, VPos::Center);
-        canvas.text(text, (x, y), TextForm { size: TEXT_SIZE, colour, bold: false, anchor, upward: false })
+        canvas.text(
+            text,
+            (x, y),
+            TextForm {
+                size: TEXT_SIZE,
+                colour,
+                bold: false,
+                anchor,
+                upward: false,
+            },
+        )
     }
 }
 
@@ -329,7 +515,10 @@ fn arrow_heads(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
         since += length;
         if since > ARROWS.0 && length > 0.0 {
             let (ux, uy) = (dx / length * ARROWS.1, dy / length * ARROWS.1);
-            let tip = (pair[0].0 + 0.5 * dx + 0.5 * ux, pair[0].1 + 0.5 * dy + 0.5 * uy);
+            let tip = (
+                pair[0].0 + 0.5 * dx + 0.5 * ux,
+                pair[0].1 + 0.5 * dy + 0.5 * uy,
+            );
             let back = |side: f64| (tip.0 - ux - side * 0.5 * uy, tip.1 - uy + side * 0.5 * ux);
             heads.push(vec![tip, back(1.0), back(-1.0)]);
             since = 0.0;
@@ -338,7 +527,12 @@ fn arrow_heads(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     heads
 }
 
-fn draw_symbol(canvas: &Canvas, colour: Colour, symbol: Symbol, (x, y): (f64, f64)) -> Result<(), ReportError> {
+fn draw_symbol(
+    canvas: &Canvas,
+    colour: Colour,
+    symbol: Symbol,
+    (x, y): (f64, f64),
+) -> Result<(), ReportError> {
     let (ink, r) = (colour.into(), SYMBOL);
     match symbol {
         Symbol::Dot => canvas.dot((x, y), 3.2, ink),
@@ -358,16 +552,28 @@ fn draw_key(canvas: &Canvas, key: &Key, (x, y): (f64, f64)) -> Result<(), Report
                 canvas.line(&dash, pen.colour.into(), pen.width.max(1.2))?;
             }
         }
-        Sample::Point(colour, symbol) => draw_symbol(canvas, colour, symbol, (x + SWATCH - 8.0, middle))?,
+        Sample::Point(colour, symbol) => {
+            draw_symbol(canvas, colour, symbol, (x + SWATCH - 8.0, middle))?
+        }
         Sample::Area(colour, strength) => {
             let (top, bottom, left) = (middle - 6.0, middle + 6.0, x + 6.0);
             let corners = [(left, top), (end, top), (end, bottom), (left, bottom)];
             canvas.area(&corners, colour.mix_with(strength))?;
-            canvas.line(&[corners[0], corners[1], corners[2], corners[3], corners[0]], INK.into(), 0.5)?;
+            canvas.line(
+                &[corners[0], corners[1], corners[2], corners[3], corners[0]],
+                INK.into(),
+                0.5,
+            )?;
         }
     }
     let anchor = (HPos::Left, VPos::Center);
-    let form = TextForm { size: TEXT_SIZE, colour: INK, bold: false, anchor, upward: false };
+    let form = TextForm {
+        size: TEXT_SIZE,
+        colour: INK,
+        bold: false,
+        anchor,
+        upward: false,
+    };
     canvas.text(&key.name, (end + 6.0, middle), form)
 }
 

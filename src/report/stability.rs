@@ -55,7 +55,11 @@ pub fn stability_svg(
     if orders.is_empty() {
         return Err(ReportError::NoTrace);
     }
-    sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart(orders, fit_hz, band_hz)])])
+    sheet_svg(
+        title,
+        subtitle,
+        &[Row::new(420.0, vec![chart(orders, fit_hz, band_hz)])],
+    )
 }
 
 fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Chart {
@@ -76,18 +80,39 @@ fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Ch
         });
     }
     let kinds = [
-        (Stays::New, "new, or moved by more than 1 %", ORANGE, Symbol::Cross),
-        (Stays::Frequency, "frequency stays within 1 %", VERMILION, Symbol::Ring),
-        (Stays::Whole, "frequency and damping (5 %) stay", BLUE, Symbol::Dot),
+        (
+            Stays::New,
+            "new, or moved by more than 1 %",
+            ORANGE,
+            Symbol::Cross,
+        ),
+        (
+            Stays::Frequency,
+            "frequency stays within 1 %",
+            VERMILION,
+            Symbol::Ring,
+        ),
+        (
+            Stays::Whole,
+            "frequency and damping (5 %) stay",
+            BLUE,
+            Symbol::Dot,
+        ),
     ];
     kinds
         .into_iter()
-        .fold(chart, |chart, (kind, name, colour, symbol)| chart.points(name, colour, symbol, places(orders, kind)))
+        .fold(chart, |chart, (kind, name, colour, symbol)| {
+            chart.points(name, colour, symbol, places(orders, kind))
+        })
 }
 
 /// Half of the lowest mode that swings, or the band's lower end where that is higher: below is nothing to see.
 fn from_hz(orders: &[Vec<OrderedMode>], band_hz: (f64, f64)) -> f64 {
-    let swinging = orders.iter().flatten().map(|mode| mode.frequency_hz).filter(|f| *f > 0.0);
+    let swinging = orders
+        .iter()
+        .flatten()
+        .map(|mode| mode.frequency_hz)
+        .filter(|f| *f > 0.0);
     let lowest = swinging.fold(band_hz.1, f64::min);
     band_hz.0.max(0.5 * lowest)
 }
@@ -97,7 +122,8 @@ fn places(orders: &[Vec<OrderedMode>], kind: Stays) -> Vec<(f64, f64)> {
     let before = |k: usize| if k == 0 { &[][..] } else { &orders[k - 1][..] };
     let of = |(k, modes): (usize, &Vec<OrderedMode>)| {
         let kept = modes.iter().filter(|mode| stays(mode, before(k)) == kind);
-        kept.map(|mode| (mode.frequency_hz, (k + 1) as f64)).collect::<Vec<_>>()
+        kept.map(|mode| (mode.frequency_hz, (k + 1) as f64))
+            .collect::<Vec<_>>()
     };
     orders.iter().enumerate().flat_map(of).collect()
 }
@@ -108,7 +134,10 @@ mod tests {
 
     #[test]
     fn a_mode_stays_whole_by_frequency_alone_or_not_at_all() {
-        let mode = |frequency_hz, damping_ratio| OrderedMode { frequency_hz, damping_ratio };
+        let mode = |frequency_hz, damping_ratio| OrderedMode {
+            frequency_hz,
+            damping_ratio,
+        };
         let before = [mode(100.0, 0.01), mode(50.0, 0.02)];
         for (now, expected) in [
             (mode(100.9, 0.0104), Stays::Whole),

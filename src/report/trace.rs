@@ -82,9 +82,17 @@ pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportErr
     }
     align_phases(&mut lines);
     let any_measured = lines.iter().any(|line| line.measured.is_some());
-    let models = lines.iter_mut().filter(|line| any_measured && line.measured.is_none());
-    models.zip(DASHES.iter().cycle()).for_each(|(line, dashes)| line.dashes = Some(*dashes));
-    if lines.is_empty() { Err(ReportError::NoTrace) } else { Ok(lines) }
+    let models = lines
+        .iter_mut()
+        .filter(|line| any_measured && line.measured.is_none());
+    models
+        .zip(DASHES.iter().cycle())
+        .for_each(|(line, dashes)| line.dashes = Some(*dashes));
+    if lines.is_empty() {
+        Err(ReportError::NoTrace)
+    } else {
+        Ok(lines)
+    }
 }
 
 impl<'a> Line<'a> {
@@ -92,31 +100,70 @@ impl<'a> Line<'a> {
         check(trace)?;
         let (frequency_hz, response, measured) = match trace.curve {
             Curve::Measured(frf) => (&frf.frequency_hz[..], &frf.response[..], Some(frf)),
-            Curve::Model { frequency_hz, response } => (frequency_hz, response, None),
+            Curve::Model {
+                frequency_hz,
+                response,
+            } => (frequency_hz, response, None),
         };
         let magnitude: Vec<f64> = response.iter().map(|h| h.norm()).collect();
         let sigma = |k: usize| measured.map_or(0.0, |frf| frf.magnitude_sigma[k]);
-        let beyond = |sigmas: f64| magnitude.iter().enumerate().map(|(k, h)| *h > sigmas * sigma(k)).collect();
+        let beyond = |sigmas: f64| {
+            magnitude
+                .iter()
+                .enumerate()
+                .map(|(k, h)| *h > sigmas * sigma(k))
+                .collect()
+        };
         let (firm, leading): (Vec<bool>, Vec<bool>) = (beyond(BAND_SIGMAS), beyond(LEADING_SIGMAS));
-        let wrapped: Vec<f64> = response.iter().map(|h| wrapped_phase_rad(*h).to_degrees()).collect();
+        let wrapped: Vec<f64> = response
+            .iter()
+            .map(|h| wrapped_phase_rad(*h).to_degrees())
+            .collect();
         let phase_deg = phase::unwrapped_deg(&wrapped, &leading);
-        let begins = (0..response.len()).map(|k| k == 0 || measured.is_some_and(|frf| gap(frf, k))).collect();
+        let begins = (0..response.len())
+            .map(|k| k == 0 || measured.is_some_and(|frf| gap(frf, k)))
+            .collect();
         let name = trace.name;
-        Ok(Self { name, colour, dashes: None, frequency_hz, magnitude, phase_deg, firm, leading, begins, measured })
+        Ok(Self {
+            name,
+            colour,
+            dashes: None,
+            frequency_hz,
+            magnitude,
+            phase_deg,
+            firm,
+            leading,
+            begins,
+            measured,
+        })
     }
 
     /// Magnitude with its band.
     pub fn magnitude(&self, k: usize) -> Shown {
-        self.shown(k, self.magnitude[k], self.measured.map_or(0.0, |frf| frf.magnitude_sigma[k]))
+        self.shown(
+            k,
+            self.magnitude[k],
+            self.measured.map_or(0.0, |frf| frf.magnitude_sigma[k]),
+        )
     }
 
     /// Phase in degrees with its band.
     pub fn phase(&self, k: usize) -> Shown {
-        self.shown(k, self.phase_deg[k], self.measured.map_or(0.0, |frf| frf.phase_sigma_rad[k].to_degrees()))
+        self.shown(
+            k,
+            self.phase_deg[k],
+            self.measured
+                .map_or(0.0, |frf| frf.phase_sigma_rad[k].to_degrees()),
+        )
     }
 
     fn shown(&self, k: usize, value: f64, sigma: f64) -> Shown {
-        Shown { value, low: value - BAND_SIGMAS * sigma, high: value + BAND_SIGMAS * sigma, faint: !self.firm[k] }
+        Shown {
+            value,
+            low: value - BAND_SIGMAS * sigma,
+            high: value + BAND_SIGMAS * sigma,
+            faint: !self.firm[k],
+        }
     }
 
     /// The points (frequency, phase) that are known well.
@@ -130,13 +177,16 @@ impl<'a> Line<'a> {
 
 /// Whether a gap lies between a measured frequency and the one before it.
 pub(super) fn gap(frf: &Frf, k: usize) -> bool {
-    frf.frequency_hz[k] - frf.frequency_hz[k - 1] > GAP_RESOLUTIONS * frf.resolution_hz[k].max(frf.resolution_hz[k - 1])
+    frf.frequency_hz[k] - frf.frequency_hz[k - 1]
+        > GAP_RESOLUTIONS * frf.resolution_hz[k].max(frf.resolution_hz[k - 1])
 }
 
 /// Puts every line on the turn of the one that begins at the lowest frequency, which knows best where the phase starts.
 fn align_phases(lines: &mut [Line]) {
     let first = |a: &&Line, b: &&Line| a.frequency_hz[0].total_cmp(&b.frequency_hz[0]);
-    let Some(reference) = lines.iter().min_by(first).map(Line::leading_phases) else { return };
+    let Some(reference) = lines.iter().min_by(first).map(Line::leading_phases) else {
+        return;
+    };
     for line in lines {
         let offset = phase::offset_deg(&line.leading_phases(), &reference);
         line.phase_deg.iter_mut().for_each(|phase| *phase += offset);
@@ -146,20 +196,46 @@ fn align_phases(lines: &mut [Line]) {
 fn check(trace: &Trace) -> Result<(), ReportError> {
     let name = || trace.name.to_owned();
     match trace.curve {
-        Curve::Model { frequency_hz, response } => {
+        Curve::Model {
+            frequency_hz,
+            response,
+        } => {
             check_lengths(trace.name, frequency_hz.len(), &[response.len()])?;
             check_frequencies(trace.name, frequency_hz)?;
-            let bad = response.iter().position(|h| !(h.re.is_finite() && h.im.is_finite()));
-            bad.map_or(Ok(()), |k| Err(ReportError::NotFinite { name: name(), frequency_hz: frequency_hz[k] }))
+            let bad = response
+                .iter()
+                .position(|h| !(h.re.is_finite() && h.im.is_finite()));
+            bad.map_or(Ok(()), |k| {
+                Err(ReportError::NotFinite {
+                    name: name(),
+                    frequency_hz: frequency_hz[k],
+                })
+            })
         }
         Curve::Measured(frf) => {
-            let columns = [&frf.coherence, &frf.magnitude_sigma, &frf.phase_sigma_rad, &frf.resolution_hz];
+            let columns = [
+                &frf.coherence,
+                &frf.magnitude_sigma,
+                &frf.phase_sigma_rad,
+                &frf.resolution_hz,
+            ];
             let lengths = columns.map(Vec::len);
-            check_lengths(trace.name, frf.len(), &[&lengths[..], &[frf.response.len()]].concat())?;
+            check_lengths(
+                trace.name,
+                frf.len(),
+                &[&lengths[..], &[frf.response.len()]].concat(),
+            )?;
             check_frequencies(trace.name, &frf.frequency_hz)?;
-            let finite = |k: &usize| frf.response[*k].norm().is_finite() && columns.iter().all(|c| c[*k].is_finite());
+            let finite = |k: &usize| {
+                frf.response[*k].norm().is_finite() && columns.iter().all(|c| c[*k].is_finite())
+            };
             let bad = (0..frf.len()).find(|k| !finite(k));
-            bad.map_or(Ok(()), |k| Err(ReportError::NotFinite { name: name(), frequency_hz: frf.frequency_hz[k] }))
+            bad.map_or(Ok(()), |k| {
+                Err(ReportError::NotFinite {
+                    name: name(),
+                    frequency_hz: frf.frequency_hz[k],
+                })
+            })
         }
     }
 }
@@ -167,7 +243,11 @@ fn check(trace: &Trace) -> Result<(), ReportError> {
 fn check_lengths(name: &str, frequencies: usize, columns: &[usize]) -> Result<(), ReportError> {
     let name = name.to_owned();
     match columns.iter().find(|values| **values != frequencies) {
-        Some(values) => Err(ReportError::Lengths { name, frequencies, values: *values }),
+        Some(values) => Err(ReportError::Lengths {
+            name,
+            frequencies,
+            values: *values,
+        }),
         None if frequencies == 0 => Err(ReportError::Empty { name }),
         None => Ok(()),
     }
@@ -177,7 +257,11 @@ fn check_frequencies(name: &str, frequency_hz: &[f64]) -> Result<(), ReportError
     let mut last = 0.0;
     for (index, value) in frequency_hz.iter().copied().enumerate() {
         if !(value.is_finite() && value > last) {
-            return Err(ReportError::Frequency { name: name.to_owned(), index, value });
+            return Err(ReportError::Frequency {
+                name: name.to_owned(),
+                index,
+                value,
+            });
         }
         last = value;
     }

@@ -139,7 +139,10 @@ pub enum Trip {
 impl From<DeviceError> for Trip {
     fn from(error: DeviceError) -> Trip {
         let DeviceError { what, remedy, code } = error;
-        Trip::Amplifier { code, words: Some(FaultText { what, remedy }) }
+        Trip::Amplifier {
+            code,
+            words: Some(FaultText { what, remedy }),
+        }
     }
 }
 
@@ -163,14 +166,18 @@ impl Trip {
     /// What a person can do about it.
     pub fn remedy(&self) -> &'static str {
         match self {
-            Trip::Travel { .. } => "check the loop's margins and the amplitude; the limit is interlock.soft_limit_m",
+            Trip::Travel { .. } => {
+                "check the loop's margins and the amplitude; the limit is interlock.soft_limit_m"
+            }
             Trip::PeakCurrent { .. } => {
                 "check the loop's margins; the limit is motor.peak_force_n over the force constant"
             }
             Trip::ContinuousCurrent { .. } => "let the motor cool, lower amplitude or duration",
             Trip::CommandNotFinite => "check the controller and its reference",
             Trip::ProbeInvalid => "check the probe's cable, target and range",
-            Trip::ProbeStale { .. } => "check the probe's rate and connection; the limit is interlock.probe_stale_s",
+            Trip::ProbeStale { .. } => {
+                "check the probe's rate and connection; the limit is interlock.probe_stale_s"
+            }
             Trip::ProbeStuck { .. } => {
                 "check the probe and the motor's connection; the limit is interlock.probe_stuck_s"
             }
@@ -180,20 +187,33 @@ impl Trip {
             Trip::Overruns { .. } => {
                 "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s"
             }
-            Trip::Amplifier { words: Some(words), .. } => words.remedy,
-            Trip::Amplifier { .. } => "look up the code in the amplifier's manual, clear its fault, start again",
+            Trip::Amplifier {
+                words: Some(words), ..
+            } => words.remedy,
+            Trip::Amplifier { .. } => {
+                "look up the code in the amplifier's manual, clear its fault, start again"
+            }
         }
     }
 
     /// The value that crossed the limit, and the limit, where there are such.
     pub fn value_and_limit(&self) -> Option<(f64, f64)> {
         match *self {
-            Trip::Travel { position_m, limit_m } => Some((position_m, limit_m)),
+            Trip::Travel {
+                position_m,
+                limit_m,
+            } => Some((position_m, limit_m)),
             Trip::PeakCurrent { command_a, limit_a } => Some((command_a, limit_a)),
             Trip::ContinuousCurrent { thermal_a, limit_a } => Some((thermal_a, limit_a)),
             Trip::ProbeStale { age_s, limit_s } => Some((age_s, limit_s)),
-            Trip::ProbeStuck { unchanged_s, limit_s } => Some((unchanged_s, limit_s)),
-            Trip::CurrentNotFollowed { actual_a, command_a } => Some((actual_a, command_a)),
+            Trip::ProbeStuck {
+                unchanged_s,
+                limit_s,
+            } => Some((unchanged_s, limit_s)),
+            Trip::CurrentNotFollowed {
+                actual_a,
+                command_a,
+            } => Some((actual_a, command_a)),
             Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
             Trip::CommandNotFinite | Trip::ProbeInvalid | Trip::Amplifier { .. } => None,
         }
@@ -203,35 +223,72 @@ impl Trip {
 impl fmt::Display for Trip {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Trip::Travel { position_m, limit_m } => {
-                write!(f, "travel: {:.1} um is beyond the soft limit of {:.1} um", position_m * 1e6, limit_m * 1e6)
+            Trip::Travel {
+                position_m,
+                limit_m,
+            } => {
+                write!(
+                    f,
+                    "travel: {:.1} um is beyond the soft limit of {:.1} um",
+                    position_m * 1e6,
+                    limit_m * 1e6
+                )
             }
             Trip::PeakCurrent { command_a, limit_a } => {
-                write!(f, "peak current: a command of {command_a:.3} A is beyond {limit_a:.3} A")
+                write!(
+                    f,
+                    "peak current: a command of {command_a:.3} A is beyond {limit_a:.3} A"
+                )
             }
             Trip::ContinuousCurrent { thermal_a, limit_a } => {
-                write!(f, "continuous current: the motor's thermal current {thermal_a:.3} A is beyond {limit_a:.3} A")
+                write!(
+                    f,
+                    "continuous current: the motor's thermal current {thermal_a:.3} A is beyond {limit_a:.3} A"
+                )
             }
             Trip::CommandNotFinite => write!(f, "the command was not a finite number"),
             Trip::ProbeInvalid => write!(f, "the probe's reading was not valid"),
             Trip::ProbeStale { age_s, limit_s } => {
-                write!(f, "the probe's reading is {:.3} ms old, {:.3} ms are allowed", age_s * 1e3, limit_s * 1e3)
+                write!(
+                    f,
+                    "the probe's reading is {:.3} ms old, {:.3} ms are allowed",
+                    age_s * 1e3,
+                    limit_s * 1e3
+                )
             }
-            Trip::ProbeStuck { unchanged_s, limit_s } => write!(
+            Trip::ProbeStuck {
+                unchanged_s,
+                limit_s,
+            } => write!(
                 f,
                 "the probe's reading did not move for {:.1} ms ({:.1} ms are allowed) while the current did",
                 unchanged_s * 1e3,
                 limit_s * 1e3
             ),
-            Trip::CurrentNotFollowed { actual_a, command_a } => {
-                write!(f, "the amplifier measures {actual_a:.3} A, {command_a:.3} A is the nearest that was commanded")
+            Trip::CurrentNotFollowed {
+                actual_a,
+                command_a,
+            } => {
+                write!(
+                    f,
+                    "the amplifier measures {actual_a:.3} A, {command_a:.3} A is the nearest that was commanded"
+                )
             }
             Trip::Overruns { count, limit } => {
-                write!(f, "{count} ticks missed within a second, {limit} are allowed")
+                write!(
+                    f,
+                    "{count} ticks missed within a second, {limit} are allowed"
+                )
             }
-            Trip::Amplifier { code, words: Some(words) } => write!(f, "amplifier: {} (code {code})", words.what),
+            Trip::Amplifier {
+                code,
+                words: Some(words),
+            } => write!(f, "amplifier: {} (code {code})", words.what),
             Trip::Amplifier { code, words: None } => {
-                write!(f, "the amplifier reported a fault or refused a command (code {code})")
+                write!(
+                    f,
+                    "the amplifier reported a fault or refused a command (code {code})"
+                )
             }
         }
     }

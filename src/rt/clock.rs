@@ -32,7 +32,10 @@ pub trait Clock {
 
 /// Scheduled time of a tick.
 fn tick(number: u64, period_s: f64) -> Tick {
-    Tick { number, scheduled_ns: (number as f64 * period_s * 1e9).round() as u64 }
+    Tick {
+        number,
+        scheduled_ns: (number as f64 * period_s * 1e9).round() as u64,
+    }
 }
 
 /// Back to back, as fast as the machine goes; every tick begins and ends when it is due. Waits for room in the ring, so
@@ -49,7 +52,11 @@ impl Clock for Virtual {
             std::thread::yield_now();
         }
         let tick = tick(number, self.period_s);
-        Moment { tick, woke_ns: tick.scheduled_ns, missed: 0 }
+        Moment {
+            tick,
+            woke_ns: tick.scheduled_ns,
+            missed: 0,
+        }
     }
 
     fn now_ns(&self, tick: Tick) -> u64 {
@@ -70,7 +77,10 @@ pub struct Realtime {
 impl Realtime {
     /// A clock whose tick 0 is due one period from now.
     pub fn new(period_s: f64) -> Self {
-        let mut clock = Realtime { period_s, origin_ns: 0 };
+        let mut clock = Realtime {
+            period_s,
+            origin_ns: 0,
+        };
         clock.restart(0);
         clock
     }
@@ -82,8 +92,9 @@ impl Realtime {
 
 /// The monotonic clock; it cannot fail on Linux, where it always exists.
 fn monotonic_ns() -> i128 {
-    clock_gettime(ClockId::CLOCK_MONOTONIC)
-        .map_or(0, |t| i128::from(t.tv_sec()) * 1_000_000_000 + i128::from(t.tv_nsec()))
+    clock_gettime(ClockId::CLOCK_MONOTONIC).map_or(0, |t| {
+        i128::from(t.tv_sec()) * 1_000_000_000 + i128::from(t.tv_nsec())
+    })
 }
 
 impl Clock for Realtime {
@@ -92,12 +103,20 @@ impl Clock for Realtime {
         let until = TimeSpec::new((due / 1_000_000_000) as i64, (due % 1_000_000_000) as i64);
         // A signal may end the sleep early: sleep on until the time has come.
         while monotonic_ns() < due {
-            let _ = clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &until);
+            let _ = clock_nanosleep(
+                ClockId::CLOCK_MONOTONIC,
+                ClockNanosleepFlags::TIMER_ABSTIME,
+                &until,
+            );
         }
         let woke_ns = self.elapsed_ns().max(0) as u64;
         let late_ns = woke_ns.saturating_sub(tick(number, self.period_s).scheduled_ns);
         let missed = (late_ns as f64 * 1e-9 / self.period_s) as u32;
-        Moment { tick: tick(number + u64::from(missed), self.period_s), woke_ns, missed }
+        Moment {
+            tick: tick(number + u64::from(missed), self.period_s),
+            woke_ns,
+            missed,
+        }
     }
 
     fn now_ns(&self, _tick: Tick) -> u64 {

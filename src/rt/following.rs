@@ -42,7 +42,14 @@ impl Following {
     /// Currents may differ by `error_a` over a window.
     pub(super) fn new(error_a: f64, window_ns: u64) -> Self {
         let (before, commanded, measured) = (Band(0.0, 0.0), Band::NONE, Band::NONE);
-        Following { error_a, window_ns, began_ns: None, before, commanded, measured }
+        Following {
+            error_a,
+            window_ns,
+            began_ns: None,
+            before,
+            commanded,
+            measured,
+        }
     }
 
     /// Forgets what was: the amplifier is off.
@@ -60,17 +67,28 @@ impl Following {
         }
         let verdict = self.judge();
         self.before = self.commanded;
-        (self.commanded, self.measured, self.began_ns) = (Band::NONE, Band::NONE, Some(now.scheduled_ns));
+        (self.commanded, self.measured, self.began_ns) =
+            (Band::NONE, Band::NONE, Some(now.scheduled_ns));
         verdict
     }
 
     fn judge(&self) -> Result<(), Trip> {
         let asked = self.before.with(self.commanded.0).with(self.commanded.1);
-        let not_followed = |actual_a, command_a| Err(Trip::CurrentNotFollowed { actual_a, command_a });
-        let stands_still = self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a;
+        let not_followed = |actual_a, command_a| {
+            Err(Trip::CurrentNotFollowed {
+                actual_a,
+                command_a,
+            })
+        };
+        let stands_still =
+            self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a;
         match self.measured {
-            Band(lowest_a, _) if lowest_a < asked.0 - self.error_a => not_followed(lowest_a, asked.0),
-            Band(_, highest_a) if highest_a > asked.1 + self.error_a => not_followed(highest_a, asked.1),
+            Band(lowest_a, _) if lowest_a < asked.0 - self.error_a => {
+                not_followed(lowest_a, asked.0)
+            }
+            Band(_, highest_a) if highest_a > asked.1 + self.error_a => {
+                not_followed(highest_a, asked.1)
+            }
             Band(_, highest_a) if stands_still => not_followed(highest_a, self.commanded.1),
             _ => Ok(()),
         }
@@ -82,11 +100,20 @@ mod tests {
     use super::*;
 
     /// Ticks of 1 ms through a window of 50 ms with a tolerance of 0.1 A: the first tick that trips.
-    fn first_trip(ticks: u64, command_a: impl Fn(u64) -> f64, actual_a: impl Fn(u64) -> f64) -> Option<u64> {
+    fn first_trip(
+        ticks: u64,
+        command_a: impl Fn(u64) -> f64,
+        actual_a: impl Fn(u64) -> f64,
+    ) -> Option<u64> {
         let mut following = Following::new(0.1, 50_000_000);
         (0..ticks).find(|&number| {
-            let tick = Tick { number, scheduled_ns: number * 1_000_000 };
-            following.check(command_a(number), actual_a(number), tick).is_err()
+            let tick = Tick {
+                number,
+                scheduled_ns: number * 1_000_000,
+            };
+            following
+                .check(command_a(number), actual_a(number), tick)
+                .is_err()
         })
     }
 
@@ -98,28 +125,42 @@ mod tests {
     fn a_current_that_lags_and_is_quantised_follows() {
         for hz in [0.3, 3.0, 30.0, 150.0] {
             let late = |tick: u64| (500.0 * sine(hz, tick as f64 - 3.3)).round() / 500.0;
-            assert_eq!(first_trip(20_000, |tick| sine(hz, tick as f64), late), None, "{hz} Hz");
+            assert_eq!(
+                first_trip(20_000, |tick| sine(hz, tick as f64), late),
+                None,
+                "{hz} Hz"
+            );
         }
         let step = |tick: u64| if tick < 777 { 0.0 } else { 2.0 };
-        assert_eq!(first_trip(5_000, step, |tick| step(tick.saturating_sub(4))), None);
+        assert_eq!(
+            first_trip(5_000, step, |tick| step(tick.saturating_sub(4))),
+            None
+        );
     }
 
     #[test]
     fn a_drive_that_keeps_its_last_current_is_found_within_two_windows() {
         let stuck = |hz: f64| move |tick: u64| sine(hz, tick.min(1000) as f64);
         for hz in [3.0, 30.0, 150.0] {
-            let found = first_trip(5_000, |tick| sine(hz, tick as f64), stuck(hz)).expect("it stands still");
+            let found = first_trip(5_000, |tick| sine(hz, tick as f64), stuck(hz))
+                .expect("it stands still");
             assert!((1000..=1150).contains(&found), "{hz} Hz: {found}");
         }
         // The commands go to zero and stay there: outside of what was asked for in the last two windows.
         let found = first_trip(5_000, |tick| if tick < 1000 { 0.5 } else { 0.0 }, |_| 0.5);
-        assert!(found.is_some_and(|tick| (1000..=1151).contains(&tick)), "{found:?}");
+        assert!(
+            found.is_some_and(|tick| (1000..=1151).contains(&tick)),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn after_a_reset_nothing_old_counts() {
         let mut following = Following::new(0.1, 50_000_000);
-        let tick = |number: u64| Tick { number, scheduled_ns: number * 1_000_000 };
+        let tick = |number: u64| Tick {
+            number,
+            scheduled_ns: number * 1_000_000,
+        };
         (0..49).for_each(|n| assert!(following.check(0.0, 3.0, tick(n)).is_ok()));
         following.reset();
         (100..300).for_each(|n| assert!(following.check(0.2, 0.2, tick(n)).is_ok()));

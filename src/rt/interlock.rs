@@ -65,7 +65,10 @@ impl Interlocks {
             thermal_a2: 0.0,
             last_command_a: 0.0,
             fresh: Freshness::default(),
-            following: Following::new(config.interlock.current_error_a, ns(config.interlock.current_error_s)),
+            following: Following::new(
+                config.interlock.current_error_a,
+                ns(config.interlock.current_error_s),
+            ),
             overruns: Overruns::new(config.interlock.overruns_per_s, config.servo.rate_hz),
         }
     }
@@ -76,12 +79,20 @@ impl Interlocks {
         if reading.validity != Validity::Valid || !reading.position_m.is_finite() {
             return Err(Trip::ProbeInvalid);
         }
-        let age_ns = reading.age_ns.max(now.scheduled_ns.saturating_sub(self.fresh.sequence_ns));
+        let age_ns = reading
+            .age_ns
+            .max(now.scheduled_ns.saturating_sub(self.fresh.sequence_ns));
         if age_ns > self.stale_ns {
-            return Err(Trip::ProbeStale { age_s: seconds(age_ns), limit_s: seconds(self.stale_ns) });
+            return Err(Trip::ProbeStale {
+                age_s: seconds(age_ns),
+                limit_s: seconds(self.stale_ns),
+            });
         }
         if reading.position_m.abs() > self.soft_limit_m {
-            return Err(Trip::Travel { position_m: reading.position_m, limit_m: self.soft_limit_m });
+            return Err(Trip::Travel {
+                position_m: reading.position_m,
+                limit_m: self.soft_limit_m,
+            });
         }
         stuck
     }
@@ -97,11 +108,16 @@ impl Interlocks {
             (fresh.position_m, fresh.position_ns) = (reading.position_m, now.scheduled_ns);
             (fresh.lowest_a, fresh.highest_a) = (self.last_command_a, self.last_command_a);
         }
-        (fresh.lowest_a, fresh.highest_a) =
-            (fresh.lowest_a.min(self.last_command_a), fresh.highest_a.max(self.last_command_a));
+        (fresh.lowest_a, fresh.highest_a) = (
+            fresh.lowest_a.min(self.last_command_a),
+            fresh.highest_a.max(self.last_command_a),
+        );
         let unchanged_ns = now.scheduled_ns.saturating_sub(fresh.position_ns);
         if unchanged_ns > self.stuck_ns && fresh.highest_a - fresh.lowest_a > self.stuck_current_a {
-            return Err(Trip::ProbeStuck { unchanged_s: seconds(unchanged_ns), limit_s: seconds(self.stuck_ns) });
+            return Err(Trip::ProbeStuck {
+                unchanged_s: seconds(unchanged_ns),
+                limit_s: seconds(self.stuck_ns),
+            });
         }
         Ok(())
     }
@@ -114,14 +130,22 @@ impl Interlocks {
         self.heat(self.last_command_a, f64::from(missed));
         let count = self.overruns.add(missed, now.scheduled_ns);
         if count > self.overruns_per_s {
-            return Err(Trip::Overruns { count, limit: self.overruns_per_s });
+            return Err(Trip::Overruns {
+                count,
+                limit: self.overruns_per_s,
+            });
         }
         Ok(())
     }
 
     /// Does the current that the amplifier measures follow the commands? Where it measures none, nothing is said; where it is
     /// off, everything is forgotten. *In the tick.*
-    pub fn check_current(&mut self, is_on: bool, actual_a: Option<f64>, now: Tick) -> Result<(), Trip> {
+    pub fn check_current(
+        &mut self,
+        is_on: bool,
+        actual_a: Option<f64>,
+        now: Tick,
+    ) -> Result<(), Trip> {
         match actual_a {
             Some(actual_a) if is_on => self.following.check(self.last_command_a, actual_a, now),
             _ => {
@@ -137,11 +161,17 @@ impl Interlocks {
             return Err(Trip::CommandNotFinite);
         }
         if command_a.abs() > self.peak_current_a {
-            return Err(Trip::PeakCurrent { command_a, limit_a: self.peak_current_a });
+            return Err(Trip::PeakCurrent {
+                command_a,
+                limit_a: self.peak_current_a,
+            });
         }
         let thermal_a2 = self.thermal_a2 + self.cooling * (command_a * command_a - self.thermal_a2);
         if thermal_a2 > self.continuous_current_a * self.continuous_current_a {
-            return Err(Trip::ContinuousCurrent { thermal_a: thermal_a2.sqrt(), limit_a: self.continuous_current_a });
+            return Err(Trip::ContinuousCurrent {
+                thermal_a: thermal_a2.sqrt(),
+                limit_a: self.continuous_current_a,
+            });
         }
         Ok(())
     }
@@ -153,19 +183,29 @@ impl Interlocks {
     }
 
     fn heat(&mut self, current_a: f64, periods: f64) {
-        self.thermal_a2 += (self.cooling * periods).min(1.0) * (current_a * current_a - self.thermal_a2);
+        self.thermal_a2 +=
+            (self.cooling * periods).min(1.0) * (current_a * current_a - self.thermal_a2);
     }
 }
 
 impl Overruns {
     fn new(limit: u32, rate_hz: f64) -> Self {
         let room = (f64::from(limit).min(rate_hz) as usize).saturating_add(2);
-        Overruns { when: VecDeque::with_capacity(room), room, count: 0 }
+        Overruns {
+            when: VecDeque::with_capacity(room),
+            room,
+            count: 0,
+        }
     }
 
     /// How many were missed within the second before `now_ns`, with those that were missed right now.
     fn add(&mut self, missed: u32, now_ns: u64) -> u32 {
-        while self.when.len() == self.room || self.when.front().is_some_and(|(ns, _)| is_past(*ns, now_ns)) {
+        while self.when.len() == self.room
+            || self
+                .when
+                .front()
+                .is_some_and(|(ns, _)| is_past(*ns, now_ns))
+        {
             let (_, gone) = self.when.pop_front().unwrap_or_default();
             self.count -= u64::from(gone);
         }

@@ -21,7 +21,11 @@ pub const SLOTS_PER_TICK: usize = 3 * ORDERS_PER_TICK + 6;
 impl Outlet {
     /// An outlet into `ring`.
     pub fn new(ring: Producer<Published>) -> Self {
-        Outlet { ring, lost: 0, unreported: 0 }
+        Outlet {
+            ring,
+            lost: 0,
+            unreported: 0,
+        }
     }
 
     /// Whether all that a tick may publish fits.
@@ -42,7 +46,12 @@ impl Outlet {
     /// The signals of a tick. *In the tick.*
     pub fn record(&mut self, record: TickRecord) {
         if self.unreported > 0 && self.ring.slots() >= 2 {
-            let lost = Event { tick: record.tick, kind: EventKind::Lost { records: self.unreported } };
+            let lost = Event {
+                tick: record.tick,
+                kind: EventKind::Lost {
+                    records: self.unreported,
+                },
+            };
             self.unreported = 0;
             self.push(Published::Event(lost));
         }
@@ -71,7 +80,10 @@ mod tests {
     fn what_does_not_fit_is_counted_and_told_when_there_is_room_again() {
         let (producer, mut consumer) = RingBuffer::new(4);
         let mut outlet = Outlet::new(producer);
-        let record = |tick| TickRecord { tick, ..TickRecord::default() };
+        let record = |tick| TickRecord {
+            tick,
+            ..TickRecord::default()
+        };
         (0..7).for_each(|tick| outlet.record(record(tick)));
         assert_eq!(outlet.lost(), 3, "ticks 4, 5 and 6 found no room");
         for expected in 0..4 {
@@ -80,7 +92,13 @@ mod tests {
         outlet.record(record(7));
         let lost = consumer.pop();
         assert!(
-            matches!(lost, Ok(Published::Event(Event { tick: 7, kind: EventKind::Lost { records: 3 } }))),
+            matches!(
+                lost,
+                Ok(Published::Event(Event {
+                    tick: 7,
+                    kind: EventKind::Lost { records: 3 }
+                }))
+            ),
             "{lost:?}"
         );
         assert!(matches!(consumer.pop(), Ok(Published::Tick(t)) if t.tick == 7));

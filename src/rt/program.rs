@@ -34,7 +34,11 @@ pub struct Excite<E>(
 
 impl<E: Excitation> Program for Excite<E> {
     fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
-        Decision { reference_m: 0.0, requested_a: self.0.current_a(tick), active: self.0.active(tick) }
+        Decision {
+            reference_m: 0.0,
+            requested_a: self.0.current_a(tick),
+            active: self.0.active(tick),
+        }
     }
 
     fn ticks(&self) -> u64 {
@@ -63,7 +67,13 @@ impl Control {
         closed_ticks: u64,
     ) -> Self {
         controller.reset();
-        Control { controller, reference, settle_ticks: settle_ticks.max(1), closed_ticks, origin_m: 0.0 }
+        Control {
+            controller,
+            reference,
+            settle_ticks: settle_ticks.max(1),
+            closed_ticks,
+            origin_m: 0.0,
+        }
     }
 }
 
@@ -71,10 +81,18 @@ impl Program for Control {
     fn decide(&mut self, tick: u64, position_m: f64) -> Decision {
         if tick < self.settle_ticks {
             self.origin_m += (position_m - self.origin_m) / (tick + 1) as f64;
-            return Decision { reference_m: self.origin_m, requested_a: 0.0, active: false };
+            return Decision {
+                reference_m: self.origin_m,
+                requested_a: 0.0,
+                active: false,
+            };
         }
         let reference_m = self.origin_m + self.reference.at_m(tick - self.settle_ticks);
-        Decision { reference_m, requested_a: self.controller.update(reference_m - position_m), active: true }
+        Decision {
+            reference_m,
+            requested_a: self.controller.update(reference_m - position_m),
+            active: true,
+        }
     }
 
     fn ticks(&self) -> u64 {

@@ -84,7 +84,12 @@ pub struct Connections {
 impl Servo {
     /// A disarmed loop around a rig.
     pub fn new(rig: Box<dyn Rig>, interlocks: Interlocks, connections: Connections) -> Self {
-        let Connections { orders, spent, outlet, progress } = connections;
+        let Connections {
+            orders,
+            spent,
+            outlet,
+            progress,
+        } = connections;
         Servo {
             rig,
             interlocks,
@@ -118,11 +123,14 @@ impl Servo {
         let timing = self.interlocks.check_timing(moment.missed, moment.tick);
         let reading = self.interlocks.check_reading(reading, moment.tick);
         let is_on = matches!(self.state, State::Armed | State::Running);
-        let current = self.interlocks.check_current(is_on, self.rig.actual_current_a(), moment.tick);
+        let current =
+            self.interlocks
+                .check_current(is_on, self.rig.actual_current_a(), moment.tick);
         match self.rig.status() {
-            AmplifierStatus::Fault(code) => {
-                Err(Trip::Amplifier { code: i64::from(code), words: self.rig.explain(code) })
-            }
+            AmplifierStatus::Fault(code) => Err(Trip::Amplifier {
+                code: i64::from(code),
+                words: self.rig.explain(code),
+            }),
             _ => timing.and(reading).and(current),
         }
     }
@@ -153,9 +161,18 @@ impl Servo {
         command_a
     }
 
-    fn publish(&mut self, moment: &Moment, done_ns: u64, reading: &Reading, decision: &Decision, command_a: f64) {
+    fn publish(
+        &mut self,
+        moment: &Moment,
+        done_ns: u64,
+        reading: &Reading,
+        decision: &Decision,
+        command_a: f64,
+    ) {
         let bit = |set: bool, bit: u32| if set { bit } else { 0 };
-        let tripped_now = self.trip.is_some_and(|(_, tick)| tick == moment.tick.number);
+        let tripped_now = self
+            .trip
+            .is_some_and(|(_, tick)| tick == moment.tick.number);
         self.outlet.record(TickRecord {
             tick: moment.tick.number,
             scheduled_ns: moment.tick.scheduled_ns,
@@ -171,7 +188,10 @@ impl Servo {
             validity: reading.validity,
             state: self.state,
             flags: bit(decision.active, flag::ACTIVE)
-                | bit(command_a.to_bits() != decision.requested_a.to_bits(), flag::LIMITED)
+                | bit(
+                    command_a.to_bits() != decision.requested_a.to_bits(),
+                    flag::LIMITED,
+                )
                 | bit(moment.missed > 0, flag::OVERRUN)
                 | bit(reading.validity != Validity::Valid, flag::INVALID)
                 | bit(tripped_now, flag::TRIPPED),
@@ -184,8 +204,14 @@ impl Servo {
             return;
         }
         self.run_tick += 1;
-        self.progress.run_ticks.store(self.run_tick, Ordering::Relaxed);
-        if self.program.as_ref().is_some_and(|program| self.run_tick >= program.ticks()) {
+        self.progress
+            .run_ticks
+            .store(self.run_tick, Ordering::Relaxed);
+        if self
+            .program
+            .as_ref()
+            .is_some_and(|program| self.run_tick >= program.ticks())
+        {
             self.completed = true;
             self.outlet.event(tick, EventKind::Completed);
             self.switch_off(Change::Stop, tick);
@@ -259,14 +285,22 @@ impl Servo {
 
     fn change(&mut self, change: Change, tick: u64) {
         if let Some(to) = self.state.after(change) {
-            self.outlet.event(tick, EventKind::State { from: self.state, to });
+            self.outlet.event(
+                tick,
+                EventKind::State {
+                    from: self.state,
+                    to,
+                },
+            );
             self.state = to;
         }
     }
 
     /// Memory is freed outside the loop; if nobody collects it, it is kept rather than freed here.
     fn hand_back(&mut self, program: Option<Box<dyn Program>>) {
-        if let Some(rtrb::PushError::Full(program)) = program.and_then(|program| self.spent.push(program).err()) {
+        if let Some(rtrb::PushError::Full(program)) =
+            program.and_then(|program| self.spent.push(program).err())
+        {
             std::mem::forget(program);
         }
     }

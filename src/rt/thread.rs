@@ -77,26 +77,48 @@ impl Prepared {
 }
 
 /// Makes a thread for the loop. Once begun it runs until the loop has been off for `tail_ticks`.
-pub fn prepare(servo: Servo, settings: &LoopSettings, pace: Pace, tail_ticks: u64) -> std::io::Result<Prepared> {
+pub fn prepare(
+    servo: Servo,
+    settings: &LoopSettings,
+    pace: Pace,
+    tail_ticks: u64,
+) -> std::io::Result<Prepared> {
     let settings = settings.clone();
     let (leave, permitted) = channel();
     let (tell, told) = channel();
-    let thread = std::thread::Builder::new().name("bench-loop".into()).spawn(move || {
-        let scheduling = match pace {
-            Pace::Virtual => Scheduling { policy: "SCHED_OTHER".into(), ..Scheduling::default() },
-            Pace::Realtime => become_realtime(&settings),
-        };
-        let _ = tell.send(scheduling);
-        if permitted.recv().is_err() {
-            return Ended::default();
-        }
-        match pace {
-            Pace::Virtual => run(servo, Virtual { period_s: settings.period_s() }, tail_ticks),
-            Pace::Realtime => run(servo, Realtime::new(settings.period_s()), tail_ticks),
-        }
-    })?;
-    let scheduling = told.recv().map_err(|_| std::io::Error::other("the loop's thread ended before it began"))?;
-    Ok(Prepared { thread, leave, scheduling })
+    let thread = std::thread::Builder::new()
+        .name("bench-loop".into())
+        .spawn(move || {
+            let scheduling = match pace {
+                Pace::Virtual => Scheduling {
+                    policy: "SCHED_OTHER".into(),
+                    ..Scheduling::default()
+                },
+                Pace::Realtime => become_realtime(&settings),
+            };
+            let _ = tell.send(scheduling);
+            if permitted.recv().is_err() {
+                return Ended::default();
+            }
+            match pace {
+                Pace::Virtual => run(
+                    servo,
+                    Virtual {
+                        period_s: settings.period_s(),
+                    },
+                    tail_ticks,
+                ),
+                Pace::Realtime => run(servo, Realtime::new(settings.period_s()), tail_ticks),
+            }
+        })?;
+    let scheduling = told
+        .recv()
+        .map_err(|_| std::io::Error::other("the loop's thread ended before it began"))?;
+    Ok(Prepared {
+        thread,
+        leave,
+        scheduling,
+    })
 }
 
 /// Ticks until the loop has been off for `tail_ticks`.
@@ -111,7 +133,11 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> Ended {
         }
         off_ticks = if servo.is_off() { off_ticks + 1 } else { 0 };
     }
-    Ended { trip: servo.last_trip(), completed: servo.completed(), lost_records: servo.outlet().lost() }
+    Ended {
+        trip: servo.last_trip(),
+        completed: servo.completed(),
+        lost_records: servo.outlet().lost(),
+    }
 }
 
 /// Asks for everything that keeps the system from interrupting the calling thread, which is the loop's.
@@ -124,7 +150,8 @@ pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
             false
         }
     };
-    let all = nix::sys::mman::MlockAllFlags::MCL_CURRENT | nix::sys::mman::MlockAllFlags::MCL_FUTURE;
+    let all =
+        nix::sys::mman::MlockAllFlags::MCL_CURRENT | nix::sys::mman::MlockAllFlags::MCL_FUTURE;
     let memory_locked = ask(
         "locking memory",
         nix::sys::mman::mlockall(all),
@@ -135,11 +162,24 @@ pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
         set_fifo(settings.priority),
         "raise `rtprio` in /etc/security/limits.conf or give the program CAP_SYS_NICE",
     );
-    let bound = settings
-        .cpu
-        .filter(|&cpu| ask("binding to a processor", bind(cpu), "choose a processor this process may use in loop.cpu"));
-    let policy = if fifo { format!("SCHED_FIFO {}", settings.priority) } else { "SCHED_OTHER".into() };
-    Scheduling { policy, memory_locked, cpu: bound, refused }
+    let bound = settings.cpu.filter(|&cpu| {
+        ask(
+            "binding to a processor",
+            bind(cpu),
+            "choose a processor this process may use in loop.cpu",
+        )
+    });
+    let policy = if fifo {
+        format!("SCHED_FIFO {}", settings.priority)
+    } else {
+        "SCHED_OTHER".into()
+    };
+    Scheduling {
+        policy,
+        memory_locked,
+        cpu: bound,
+        refused,
+    }
 }
 
 /// For the threads that serve the loop's devices: right below it, where that is permitted. Where it is not, the loop's own
@@ -152,7 +192,9 @@ pub fn below_the_loop(settings: &LoopSettings) -> impl Fn() + Send + Sync + Clon
 }
 
 fn set_fifo(priority: i32) -> nix::Result<()> {
-    let parameters = libc::sched_param { sched_priority: priority };
+    let parameters = libc::sched_param {
+        sched_priority: priority,
+    };
     // SAFETY: 0 is the calling thread, `parameters` outlives the call, and the kernel only reads it.
     let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
     nix::errno::Errno::result(result).map(drop)

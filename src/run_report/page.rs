@@ -36,7 +36,10 @@ pub fn page(record: &dyn Analysed, pictures: &[Picture]) -> String {
 
 fn verdict(shown: &Shown<'_>, record: &dyn Analysed) -> String {
     let name = shown.verdict.cnmp.name();
-    let all: Vec<_> = evidence(shown).into_iter().chain(record.evidence()).collect();
+    let all: Vec<_> = evidence(shown)
+        .into_iter()
+        .chain(record.evidence())
+        .collect();
     format!(
         "<section>\n<h2>Complex non-minimum phase zeros</h2>\n<p class=\"verdict {name}\"><strong>{name}</strong><br>{}</p>\n{}</section>\n",
         escaped(&shown.verdict.why),
@@ -47,21 +50,46 @@ fn verdict(shown: &Shown<'_>, record: &dyn Analysed) -> String {
 /// The numbers that a verdict rests on.
 fn evidence(shown: &Shown<'_>) -> Vec<(String, String)> {
     let judged = format!("{:.1} Hz", shown.judged_up_to_rad_s / HERTZ);
-    let power = shown.fit.map(|fit| format!("{:.3} times that of the noise", fit.chi2_per_freedom));
-    let fall = shown.verdict.phase.map(|p| format!("{:.1} deg beyond what the magnitude asks for", -p.beyond_deg));
-    let pairs = [("Judged up to", Some(judged)), ("Power that the fit leaves", power), ("Fall of the phase", fall)];
-    pairs.into_iter().filter_map(|(name, text)| Some((name.to_string(), text?))).collect()
+    let power = shown
+        .fit
+        .map(|fit| format!("{:.3} times that of the noise", fit.chi2_per_freedom));
+    let fall = shown.verdict.phase.map(|p| {
+        format!(
+            "{:.1} deg beyond what the magnitude asks for",
+            -p.beyond_deg
+        )
+    });
+    let pairs = [
+        ("Judged up to", Some(judged)),
+        ("Power that the fit leaves", power),
+        ("Fall of the phase", fall),
+    ];
+    pairs
+        .into_iter()
+        .filter_map(|(name, text)| Some((name.to_string(), text?)))
+        .collect()
 }
 
 /// A delay in milliseconds with its interval.
 pub(super) fn delay_ms(delay_s: Estimate) -> String {
-    format!("{} ms", interval(1e3 * delay_s.value, 1e3 * SIGMAS_95 * delay_s.sigma))
+    format!(
+        "{} ms",
+        interval(1e3 * delay_s.value, 1e3 * SIGMAS_95 * delay_s.sigma)
+    )
 }
 
 fn modes(shown: &Shown<'_>) -> String {
-    let Some(fit) = shown.fit else { return String::new() };
+    let Some(fit) = shown.fit else {
+        return String::new();
+    };
     let residue = escaped(&format!("Residue ({})", shown.residue_unit));
-    let header = ["Frequency (Hz)", "Damping (%)", &residue, "Sign", "Other sign"];
+    let header = [
+        "Frequency (Hz)",
+        "Damping (%)",
+        &residue,
+        "Sign",
+        "Other sign",
+    ];
     let rows: String = fit.modes().iter().map(mode).collect();
     section(
         "Modes",
@@ -72,12 +100,17 @@ fn modes(shown: &Shown<'_>) -> String {
 }
 
 fn mode(mode: &FittedMode) -> String {
-    let scaled = |e: Estimate, factor: f64| interval(e.value * factor, SIGMAS_95 * e.sigma * factor);
+    let scaled =
+        |e: Estimate, factor: f64| interval(e.value * factor, SIGMAS_95 * e.sigma * factor);
     row(&[
         scaled(mode.omega_rad_s, 1.0 / HERTZ),
         scaled(mode.damping_ratio, 100.0),
         scaled(mode.residue_per_kg, 1.0),
-        if mode.sign() == '+' { "+".into() } else { "\u{2212}".into() },
+        if mode.sign() == '+' {
+            "+".into()
+        } else {
+            "\u{2212}".into()
+        },
         percent(mode.sign_error_probability()),
     ])
 }
@@ -87,9 +120,20 @@ fn zeros(shown: &Shown<'_>) -> String {
     if zeros.is_empty() {
         return String::new();
     }
-    let header = ["|s| (Hz)", "Real part (rad/s)", "Imaginary part (rad/s)", "Kind", "Right of the axis"];
+    let header = [
+        "|s| (Hz)",
+        "Real part (rad/s)",
+        "Imaginary part (rad/s)",
+        "Kind",
+        "Right of the axis",
+    ];
     let words = "Of the fit, up to where it is judged; of a conjugate pair the one above the real axis. Intervals hold each part with 95 %.";
-    section("Zeros", words, &header, &zeros.iter().map(zero).collect::<String>())
+    section(
+        "Zeros",
+        words,
+        &header,
+        &zeros.iter().map(zero).collect::<String>(),
+    )
 }
 
 fn zero(zero: &UncertainZero) -> String {
@@ -97,7 +141,11 @@ fn zero(zero: &UncertainZero) -> String {
     row(&[
         format!("{:.3}", zero.s.norm() / HERTZ),
         part(zero.s.re, 0),
-        if zero.s.im == 0.0 { "0".into() } else { part(zero.s.im, 1) },
+        if zero.s.im == 0.0 {
+            "0".into()
+        } else {
+            part(zero.s.im, 1)
+        },
         zero.kind.name().into(),
         percent(zero.rhp_probability),
     ])

@@ -3,14 +3,22 @@
 use super::{Analysed, Shown};
 use crate::fit::{ModalFit, Order, UncertainPole};
 use crate::report::{
-    Curve, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg, nyquist_svg, pole_zero_svg,
-    stability_svg,
+    Curve, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg,
+    nyquist_svg, pole_zero_svg, stability_svg,
 };
 use crate::verdict::{self, UncertainZero};
 
 /// The names of all pictures, as files and in JSON; two need modes, two a closed loop, the last a multisine with lines left out.
-pub const KINDS: [&str; 8] =
-    ["bode", "coherence", "nyquist", "pole_zero", "stability", "loop", "sensitivity", "linearity"];
+pub const KINDS: [&str; 8] = [
+    "bode",
+    "coherence",
+    "nyquist",
+    "pole_zero",
+    "stability",
+    "loop",
+    "sensitivity",
+    "linearity",
+];
 /// The part of a Nyquist plot around two close modes reaches so many of their distances to either side.
 const AROUND: f64 = 1.5;
 const HERTZ: f64 = 2.0 * std::f64::consts::PI;
@@ -45,20 +53,48 @@ pub fn pictures(record: &dyn Analysed) -> Result<Vec<Picture>, ReportError> {
 }
 
 fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Picture>, ReportError> {
-    let Shown { title, subtitle, unit, frf, fit, .. } = shown;
+    let Shown {
+        title,
+        subtitle,
+        unit,
+        frf,
+        fit,
+        ..
+    } = shown;
     let frequency_hz = &frf.frequency_hz;
     let fitted = fit.map(|fit| fit.response(&shown.view, frequency_hz));
-    let name = fit.map_or(String::new(), |fit| format!("fit of {} modes", fit.parameters.modes.len()));
-    let mut traces = vec![Trace { name: "measured", curve: Curve::Measured(frf) }];
-    traces.extend(shown.model.map(|response| Trace { name: "model", curve: Curve::Model { frequency_hz, response } }));
-    traces
-        .extend(fitted.as_ref().map(|response| Trace { name: &name, curve: Curve::Model { frequency_hz, response } }));
+    let name = fit.map_or(String::new(), |fit| {
+        format!("fit of {} modes", fit.parameters.modes.len())
+    });
+    let mut traces = vec![Trace {
+        name: "measured",
+        curve: Curve::Measured(frf),
+    }];
+    traces.extend(shown.model.map(|response| Trace {
+        name: "model",
+        curve: Curve::Model {
+            frequency_hz,
+            response,
+        },
+    }));
+    traces.extend(fitted.as_ref().map(|response| Trace {
+        name: &name,
+        curve: Curve::Model {
+            frequency_hz,
+            response,
+        },
+    }));
     let around = |(low, high): (f64, f64)| {
         let room = AROUND * (high - low);
         ((low - room).max(0.0) / HERTZ, (high + room) / HERTZ)
     };
     let part_hz = map.and_then(PoleZeroMap::close_pair).map(around);
-    let picture = |kind, heading, caption: &str, svg| Picture { kind, heading, caption: caption.into(), svg };
+    let picture = |kind, heading, caption: &str, svg| Picture {
+        kind,
+        heading,
+        caption: caption.into(),
+        svg,
+    };
     Ok(vec![
         picture(
             "bode",
@@ -87,14 +123,24 @@ fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Picture
 /// Poles and zeros of the fit.
 fn map(shown: &Shown<'_>, fit: &ModalFit) -> PoleZeroMap {
     let judged = &shown.verdict.zeros;
-    let pole = |pole: UncertainPole| Place { s: pole.s, covariance: pole.covariance };
-    let zero = |zero: &UncertainZero| Place { s: zero.s, covariance: zero.covariance };
+    let pole = |pole: UncertainPole| Place {
+        s: pole.s,
+        covariance: pole.covariance,
+    };
+    let zero = |zero: &UncertainZero| Place {
+        s: zero.s,
+        covariance: zero.covariance,
+    };
     // A sum whose zeros cannot be found has no verdict either.
     let all = verdict::zeros(fit).unwrap_or_default();
     PoleZeroMap {
         poles: fit.poles().into_iter().map(pole).collect(),
         zeros: judged.iter().map(zero).collect(),
-        others: all.iter().filter(|other| !judged.contains(other)).map(zero).collect(),
+        others: all
+            .iter()
+            .filter(|other| !judged.contains(other))
+            .map(zero)
+            .collect(),
         up_to_rad_s: shown.judged_up_to_rad_s,
     }
 }
@@ -121,7 +167,12 @@ fn stability(shown: &Shown<'_>, fit: &ModalFit) -> Result<Picture, ReportError> 
     };
     let modes = |order: &Order| order.parameters.modes.iter().map(mode).collect();
     let orders: Vec<Vec<OrderedMode>> = fit.orders.iter().map(modes).collect();
-    let fit_hz: Vec<f64> = fit.parameters.modes.iter().map(|term| term.omega_rad_s / HERTZ).collect();
+    let fit_hz: Vec<f64> = fit
+        .parameters
+        .modes
+        .iter()
+        .map(|term| term.omega_rad_s / HERTZ)
+        .collect();
     Ok(Picture {
         kind: "stability",
         heading: "Stability chart",

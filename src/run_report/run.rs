@@ -31,7 +31,10 @@ pub struct AnalysedRun<'a> {
 impl AnalysedRun<'_> {
     /// What was excited, and when, in two lines.
     fn subtitle(&self) -> String {
-        format!("current set-point to displacement, with hold, amplifier and delay;\n{}", self.occasion())
+        format!(
+            "current set-point to displacement, with hold, amplifier and delay;\n{}",
+            self.occasion()
+        )
     }
 
     /// How the stage was excited, and when.
@@ -40,12 +43,19 @@ impl AnalysedRun<'_> {
             Some(_) => swept_words(self.config),
             None => words(self.config),
         };
-        format!("{how} at {} Hz; {}", self.config.servo.rate_hz, self.said("started"))
+        format!(
+            "{how} at {} Hz; {}",
+            self.config.servo.rate_hz,
+            self.said("started")
+        )
     }
 
     /// What the recording says of itself under a name.
     fn said(&self, name: &str) -> &str {
-        self.recording.metadata().get(name).map_or("", String::as_str)
+        self.recording
+            .metadata()
+            .get(name)
+            .map_or("", String::as_str)
     }
 }
 
@@ -66,21 +76,46 @@ impl Analysed for AnalysedRun<'_> {
     }
 
     fn record(&self) -> String {
-        format!("Recording {}", self.recording.path().file_name().unwrap_or_default().to_string_lossy())
+        format!(
+            "Recording {}",
+            self.recording
+                .path()
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+        )
     }
 
     fn evidence(&self) -> Vec<(String, String)> {
         let analysis = self.analysis;
-        let fitted = analysis.fit.as_ref().ok().map(|fit| delay_ms(fit.delay_s()));
-        let by_phase = analysis.beyond.map(|d| delay_ms(Estimate { value: d.seconds, sigma: d.sigma_s }));
+        let fitted = analysis
+            .fit
+            .as_ref()
+            .ok()
+            .map(|fit| delay_ms(fit.delay_s()));
+        let by_phase = analysis.beyond.map(|d| {
+            delay_ms(Estimate {
+                value: d.seconds,
+                sigma: d.sigma_s,
+            })
+        });
         let linearity = analysis.linearity.as_ref();
         let pairs = [
-            ("Delay by the configuration", Some(format!("{:.4} ms", 1e3 * analysis.delay_s))),
+            (
+                "Delay by the configuration",
+                Some(format!("{:.4} ms", 1e3 * analysis.delay_s)),
+            ),
             ("Delay beyond it, by the fit", fitted),
             ("Delay beyond it, by the phases", by_phase),
-            ("Coherence", linearity.map(|linearity| linearity.whole.words())),
+            (
+                "Coherence",
+                linearity.map(|linearity| linearity.whole.words()),
+            ),
         ];
-        pairs.into_iter().filter_map(|(name, text)| Some((name.to_string(), text?))).collect()
+        pairs
+            .into_iter()
+            .filter_map(|(name, text)| Some((name.to_string(), text?)))
+            .collect()
     }
 
     fn more_pictures(&self) -> Result<Vec<Picture>, ReportError> {
@@ -102,21 +137,43 @@ impl Analysed for AnalysedRun<'_> {
 /// The loop and its sensitivities, measured over model.
 fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2], ReportError> {
     let frequency_hz = &closed.loop_gain.frequency_hz;
-    let by_model = |of: fn(Complex<f64>) -> Complex<f64>| closed.model_loop.iter().map(|l| of(*l)).collect::<Vec<_>>();
+    let by_model = |of: fn(Complex<f64>) -> Complex<f64>| {
+        closed.model_loop.iter().map(|l| of(*l)).collect::<Vec<_>>()
+    };
     let (sensitivity, complementary) = (by_model(|l| (l + 1.0).inv()), by_model(|l| l / (l + 1.0)));
-    let measured = |name, frf| Trace { name, curve: Curve::Measured(frf) };
-    let model = |name, response| Trace { name, curve: Curve::Model { frequency_hz, response } };
+    let measured = |name, frf| Trace {
+        name,
+        curve: Curve::Measured(frf),
+    };
+    let model = |name, response| Trace {
+        name,
+        curve: Curve::Model {
+            frequency_hz,
+            response,
+        },
+    };
     let picture = |kind, heading, caption: &str, traces: &[Trace]| {
-        let subtitle = format!("the loop as sampled, with hold, amplifier and delay;\n{}", run.occasion());
+        let subtitle = format!(
+            "the loop as sampled, with hold, amplifier and delay;\n{}",
+            run.occasion()
+        );
         let svg = bode_svg(Unit::Bare, traces, &run.config.title, &subtitle)?;
-        Ok(Picture { kind, heading, caption: caption.into(), svg })
+        Ok(Picture {
+            kind,
+            heading,
+            caption: caption.into(),
+            svg,
+        })
     };
     Ok([
         picture(
             "loop",
             "Loop",
             "L = P C from error to displacement, measured with its band of two sigma, and by the model.",
-            &[measured("L measured", &closed.loop_gain), model("L by the model", &closed.model_loop)],
+            &[
+                measured("L measured", &closed.loop_gain),
+                model("L by the model", &closed.model_loop),
+            ],
         )?,
         picture(
             "sensitivity",
@@ -136,7 +193,12 @@ fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2
 fn levels(run: &AnalysedRun<'_>, linearity: &Linearity) -> Result<Picture, ReportError> {
     let harmonics = &linearity.harmonics;
     let periods = harmonics.periods;
-    let lines = LevelLines { output: &harmonics.excited, odd: &harmonics.odd, even: &harmonics.even, periods };
+    let lines = LevelLines {
+        output: &harmonics.excited,
+        odd: &harmonics.odd,
+        even: &harmonics.even,
+        periods,
+    };
     Ok(Picture {
         kind: "linearity",
         heading: "Distortion and noise",
@@ -151,20 +213,37 @@ fn levels(run: &AnalysedRun<'_>, linearity: &Linearity) -> Result<Picture, Repor
 
 /// What the measured loop dares, beside the model.
 fn margins(run: &AnalysedRun<'_>) -> String {
-    let Some(closed) = &run.analysis.closed else { return String::new() };
+    let Some(closed) = &run.analysis.closed else {
+        return String::new();
+    };
     let (measured, predicted) = (&closed.margins, &closed.predicted);
-    let hz = |w: Option<f64>| w.map_or("none in the band".into(), |w| format!("{:.2} Hz", w / HERTZ));
-    let deg = |text: Option<String>| text.map_or("none in the band".into(), |text| format!("{text} deg"));
+    let hz = |w: Option<f64>| {
+        w.map_or("none in the band".into(), |w| {
+            format!("{:.2} Hz", w / HERTZ)
+        })
+    };
+    let deg =
+        |text: Option<String>| text.map_or("none in the band".into(), |text| format!("{text} deg"));
     let known = |e: Estimate| interval(e.value, SIGMAS_95 * e.sigma);
     let header = ["", "Measured", "By the model"];
     let rows = [
-        row(&["Crossover".into(), hz(measured.crossover_rad_s), hz(predicted.crossover_rad_s)]),
+        row(&[
+            "Crossover".into(),
+            hz(measured.crossover_rad_s),
+            hz(predicted.crossover_rad_s),
+        ]),
         row(&[
             "Phase margin".into(),
             deg(measured.phase_margin_deg.map(known)),
-            deg(predicted.phase_margin_deg.map(|margin| format!("{margin:.2}"))),
+            deg(predicted
+                .phase_margin_deg
+                .map(|margin| format!("{margin:.2}"))),
         ]),
-        row(&["Modulus margin".into(), known(measured.modulus_margin), format!("{:.4}", predicted.modulus_margin)]),
+        row(&[
+            "Modulus margin".into(),
+            known(measured.modulus_margin),
+            format!("{:.4}", predicted.modulus_margin),
+        ]),
     ];
     let words = "The phase margin measured is that at the crossover, the one by the model the smallest of all. Intervals hold the truth \
                  with 95 %.";
@@ -175,7 +254,18 @@ fn margins(run: &AnalysedRun<'_>) -> String {
 fn loop_facts(run: &AnalysedRun<'_>) -> String {
     let recording = run.recording;
     let counted = |count: u64| count.to_string();
-    let told = ["program", "host", "kernel", "pace", "policy", "memory_locked", "cpu", "refused", "amplifier", "probe"];
+    let told = [
+        "program",
+        "host",
+        "kernel",
+        "pace",
+        "policy",
+        "memory_locked",
+        "cpu",
+        "refused",
+        "amplifier",
+        "probe",
+    ];
     let told = told.map(|name| (capital(name), run.said(name).to_string()));
     let kept = [
         ("Ticks".into(), counted(recording.tick_count())),
@@ -183,9 +273,16 @@ fn loop_facts(run: &AnalysedRun<'_>) -> String {
         ("Lost records".into(), counted(recording.lost_records())),
         ("Ticks filled in".into(), counted(run.analysis.filled_ticks)),
     ];
-    let pairs: Vec<_> =
-        told.into_iter().filter(|(_, text)| !text.is_empty()).chain(kept).chain(lateness(run)).collect();
-    format!("<section>\n<h2>The loop</h2>\n{}</section>\n", facts(&pairs))
+    let pairs: Vec<_> = told
+        .into_iter()
+        .filter(|(_, text)| !text.is_empty())
+        .chain(kept)
+        .chain(lateness(run))
+        .collect();
+    format!(
+        "<section>\n<h2>The loop</h2>\n{}</section>\n",
+        facts(&pairs)
+    )
 }
 
 /// The worst over the run, where there was a clock.
@@ -194,24 +291,35 @@ fn lateness(run: &AnalysedRun<'_>) -> Vec<(String, String)> {
         return Vec::new();
     }
     let timings = run.recording.timings();
-    let worst = |of: fn(&crate::recording::messages::Timing) -> u64| timings.iter().map(of).max().unwrap_or(0);
+    let worst = |of: fn(&crate::recording::messages::Timing) -> u64| {
+        timings.iter().map(of).max().unwrap_or(0)
+    };
     let us = |ns: u64| format!("{:.1} us", ns as f64 / 1e3);
     vec![
         ("Latest wake".into(), us(worst(|t| t.lateness_max_ns))),
-        ("Longest computation".into(), us(worst(|t| t.compute_max_ns))),
+        (
+            "Longest computation".into(),
+            us(worst(|t| t.compute_max_ns)),
+        ),
     ]
 }
 
 /// `memory_locked` as `Memory locked`.
 fn capital(name: &str) -> String {
     let mut letters = name.chars();
-    letters
-        .next()
-        .map_or(String::new(), |first| first.to_uppercase().chain(letters).collect::<String>().replace('_', " "))
+    letters.next().map_or(String::new(), |first| {
+        first
+            .to_uppercase()
+            .chain(letters)
+            .collect::<String>()
+            .replace('_', " ")
+    })
 }
 
 fn configuration(run: &AnalysedRun<'_>) -> String {
-    let Some(toml) = run.recording.config_toml() else { return String::new() };
+    let Some(toml) = run.recording.config_toml() else {
+        return String::new();
+    };
     format!(
         "<section>\n<h2>Configuration</h2>\n<details><summary>{}</summary>\n<pre><code>{}</code></pre>\n</details>\n</section>\n",
         escaped(&run.config.title),

@@ -29,7 +29,10 @@ impl Analysed for AnalysedTable<'_> {
     fn shown(&self) -> Shown<'_> {
         Shown {
             title: self.file.to_string(),
-            subtitle: format!("{} to {}; units are those of the columns", self.input, self.output),
+            subtitle: format!(
+                "{} to {}; units are those of the columns",
+                self.input, self.output
+            ),
             unit: Unit::Bare,
             residue_unit: format!("{} per {} and s^2", self.output, self.input),
             frf: &self.analysis.frf,
@@ -47,7 +50,9 @@ impl Analysed for AnalysedTable<'_> {
 
     fn evidence(&self) -> Vec<(String, String)> {
         let fit = self.analysis.fit.as_ref().ok();
-        fit.map(|fit| ("Delay by the fit".into(), delay_ms(fit.delay_s()))).into_iter().collect()
+        fit.map(|fit| ("Delay by the fit".into(), delay_ms(fit.delay_s())))
+            .into_iter()
+            .collect()
     }
 
     fn more_pictures(&self) -> Result<Vec<Picture>, ReportError> {
@@ -55,7 +60,10 @@ impl Analysed for AnalysedTable<'_> {
     }
 
     fn sections(&self) -> (String, String) {
-        let periods = self.analysis.periods.map(|count| ("Periods averaged".to_string(), count.to_string()));
+        let periods = self
+            .analysis
+            .periods
+            .map(|count| ("Periods averaged".to_string(), count.to_string()));
         let pairs = [
             ("Input".to_string(), self.input.to_string()),
             ("Output".to_string(), self.output.to_string()),
@@ -63,6 +71,12 @@ impl Analysed for AnalysedTable<'_> {
             ("Rate".to_string(), format!("{} Hz", self.rate_hz)),
         ];
         let pairs: Vec<_> = pairs.into_iter().chain(periods).collect();
-        (String::new(), format!("<section>\n<h2>The record</h2>\n{}</section>\n", facts(&pairs)))
+        (
+            String::new(),
+            format!(
+                "<section>\n<h2>The record</h2>\n{}</section>\n",
+                facts(&pairs)
+            ),
+        )
     }
 }

@@ -84,17 +84,30 @@ pub struct Analysis {
 /// Analyses a recording made with `config`: of an excitation, or of a closed loop whose reference was swept. Of a run that did
 /// not come to its end the verdict's reasons say so.
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
-    let closed = recording.metadata().get(KIND).is_some_and(|kind| kind == Kind::Control.name());
-    let Ran { loop_signals, filled_ticks } = ran(recording, config.servo.rate_hz, closed)?;
+    let closed = recording
+        .metadata()
+        .get(KIND)
+        .is_some_and(|kind| kind == Kind::Control.name());
+    let Ran {
+        loop_signals,
+        filled_ticks,
+    } = ran(recording, config.servo.rate_hz, closed)?;
     let band_hz = config.chirp.band_hz();
     let (seen, linearity) = if closed {
-        (closed_loop::seen(&loop_signals, band_hz, recording, config)?, None)
+        (
+            closed_loop::seen(&loop_signals, band_hz, recording, config)?,
+            None,
+        )
     } else {
         open_loop(loop_signals.signals, band_hz, config)?
     };
     let shown = shown(seen, config, filled_ticks)?;
     let verdict = shown.verdict.with(Ending::of(recording).caution());
-    Ok(Analysis { linearity, verdict, ..shown })
+    Ok(Analysis {
+        linearity,
+        verdict,
+        ..shown
+    })
 }
 
 /// A response in both its forms.
@@ -109,26 +122,61 @@ fn open_loop(
     band_hz: (f64, f64),
     config: &Config,
 ) -> Result<(Seen, Option<Linearity>), AnalysisError> {
-    let (frf, blocks, linearity) = match taken(signals, &excitation::of(config).pattern(), band_hz)? {
+    let (frf, blocks, linearity) = match taken(signals, &excitation::of(config).pattern(), band_hz)?
+    {
         Taken::Lines(frf, blocks, linearity) => (frf, blocks, linearity.map(|boxed| *boxed)),
         Taken::Record(signals) => {
             let frf = response(&signals, band_hz, &config.identify)?;
-            (frf, blocks(&signals, band_hz, &EstimatorSettings::from(&config.identify))?, None)
+            (
+                frf,
+                blocks(
+                    &signals,
+                    band_hz,
+                    &EstimatorSettings::from(&config.identify),
+                )?,
+                None,
+            )
         }
     };
-    Ok((Seen { frf, blocks, closed: None }, linearity))
+    Ok((
+        Seen {
+            frf,
+            blocks,
+            closed: None,
+        },
+        linearity,
+    ))
 }
 
 /// What a response shows beside the model.
 fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, AnalysisError> {
-    let Seen { frf, blocks, closed } = seen;
+    let Seen {
+        frf,
+        blocks,
+        closed,
+    } = seen;
     let modal = Modal::of(&plant::build(&config.plant)?)?;
-    let last_rad_s = LAST_MODE * modal.modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max);
+    let last_rad_s = LAST_MODE
+        * modal
+            .modes
+            .iter()
+            .map(|mode| mode.omega_rad_s)
+            .fold(0.0, f64::max);
     let chain = Chain::of_mean_age(config, &modal.modes);
-    let model: Vec<_> = frf.frequency_hz.iter().map(|f| chain.response(2.0 * std::f64::consts::PI * f)).collect();
+    let model: Vec<_> = frf
+        .frequency_hz
+        .iter()
+        .map(|f| chain.response(2.0 * std::f64::consts::PI * f))
+        .collect();
     let beyond = delay::beyond(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
     let fit = fit::fit(&blocks, &View::Bench(config));
-    let verdict = judge(&fit, &blocks, &View::Bench(config), last_rad_s, Some(&modal))?;
+    let verdict = judge(
+        &fit,
+        &blocks,
+        &View::Bench(config),
+        last_rad_s,
+        Some(&modal),
+    )?;
     Ok(Analysis {
         frf,
         model,
@@ -162,9 +210,17 @@ pub(super) fn judge(
         Ok(fit) => fit,
         Err(error) => return Ok(Verdict::undecided(error.to_string())),
     };
-    let shows = |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
-    let expected_modes = model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
-    Ok(verdict(&Case { fit, view, blocks, up_to_rad_s, expected_modes })?)
+    let shows =
+        |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
+    let expected_modes =
+        model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
+    Ok(verdict(&Case {
+        fit,
+        view,
+        blocks,
+        up_to_rad_s,
+        expected_modes,
+    })?)
 }
 
 /// Every tick of the run, or those with the loop closed.

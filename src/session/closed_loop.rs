@@ -69,14 +69,34 @@ pub(super) fn seen(
     config: &Config,
 ) -> Result<Seen, AnalysisError> {
     swept(&config.control.reference)?;
-    let Joint { plant, blocks, complementary, sensitivity, loop_gain } =
-        joint::estimate(signals, band_hz, &EstimatorSettings::from(&config.identify))?;
+    let Joint {
+        plant,
+        blocks,
+        complementary,
+        sensitivity,
+        loop_gain,
+    } = joint::estimate(signals, band_hz, &EstimatorSettings::from(&config.identify))?;
     let model = model(recording, config)?;
-    let model_loop = loop_gain.frequency_hz.iter().map(|f| model.sampled_loop(TURN * f)).collect();
+    let model_loop = loop_gain
+        .frequency_hz
+        .iter()
+        .map(|f| model.sampled_loop(TURN * f))
+        .collect();
     let margins = margins(&loop_gain, &sensitivity);
     let predicted = model.margins(false);
-    let closed = ClosedResponses { complementary, sensitivity, loop_gain, model_loop, predicted, margins };
-    Ok(Seen { frf: plant, blocks, closed: Some(closed) })
+    let closed = ClosedResponses {
+        complementary,
+        sensitivity,
+        loop_gain,
+        model_loop,
+        predicted,
+        margins,
+    };
+    Ok(Seen {
+        frf: plant,
+        blocks,
+        closed: Some(closed),
+    })
 }
 
 const TURN: f64 = 2.0 * std::f64::consts::PI;
@@ -97,19 +117,38 @@ fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
 fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, AnalysisError> {
     let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
     let plan = Plan::of(recording).map_err(ClosedLoopError::Plan)?;
-    let text = plan.controller.ok_or(ClosedLoopError::Plan(PlanError::Missing("controller")))?;
-    let sections = text.sections(config.servo.rate_hz).map_err(ClosedLoopError::Controller)?;
+    let text = plan
+        .controller
+        .ok_or(ClosedLoopError::Plan(PlanError::Missing("controller")))?;
+    let sections = text
+        .sections(config.servo.rate_hz)
+        .map_err(ClosedLoopError::Controller)?;
     Ok(ClosedLoop::new(config, modes, sections))
 }
 
 fn margins(loop_gain: &Frf, sensitivity: &Frf) -> MeasuredMargins {
-    let crossing = loop_gain.response.windows(2).position(|pair| pair[0].norm() > 1.0 && pair[1].norm() <= 1.0);
-    let peak = (0..sensitivity.len())
-        .max_by(|a, b| sensitivity.response[*a].norm_sqr().total_cmp(&sensitivity.response[*b].norm_sqr()));
-    let modulus_margin = peak.map_or(Estimate { value: f64::NAN, sigma: f64::NAN }, |k| {
-        let size = sensitivity.response[k].norm();
-        Estimate { value: 1.0 / size, sigma: sensitivity.magnitude_sigma[k] / (size * size) }
+    let crossing = loop_gain
+        .response
+        .windows(2)
+        .position(|pair| pair[0].norm() > 1.0 && pair[1].norm() <= 1.0);
+    let peak = (0..sensitivity.len()).max_by(|a, b| {
+        sensitivity.response[*a]
+            .norm_sqr()
+            .total_cmp(&sensitivity.response[*b].norm_sqr())
     });
+    let modulus_margin = peak.map_or(
+        Estimate {
+            value: f64::NAN,
+            sigma: f64::NAN,
+        },
+        |k| {
+            let size = sensitivity.response[k].norm();
+            Estimate {
+                value: 1.0 / size,
+                sigma: sensitivity.magnitude_sigma[k] / (size * size),
+            }
+        },
+    );
     MeasuredMargins {
         crossover_rad_s: crossing.map(|k| TURN * crossed(loop_gain, k)),
         phase_margin_deg: crossing.map(|k| phase_margin_deg(loop_gain, k)),
@@ -121,7 +160,8 @@ fn margins(loop_gain: &Frf, sensitivity: &Frf) -> MeasuredMargins {
 /// Where |L| is 1 between two frequencies: ln |L| over ln f is a straight line.
 fn crossed(loop_gain: &Frf, k: usize) -> f64 {
     let share = share(loop_gain, k);
-    loop_gain.frequency_hz[k] * (loop_gain.frequency_hz[k + 1] / loop_gain.frequency_hz[k]).powf(share)
+    loop_gain.frequency_hz[k]
+        * (loop_gain.frequency_hz[k + 1] / loop_gain.frequency_hz[k]).powf(share)
 }
 
 fn share(loop_gain: &Frf, k: usize) -> f64 {
@@ -132,6 +172,11 @@ fn share(loop_gain: &Frf, k: usize) -> f64 {
 fn phase_margin_deg(loop_gain: &Frf, k: usize) -> Estimate {
     let (from, to) = (loop_gain.response[k], loop_gain.response[k + 1]);
     let turned = (to / from).arg() * share(loop_gain, k);
-    let value = (-from * Complex::from_polar(1.0, turned)).arg().to_degrees();
-    Estimate { value, sigma: loop_gain.phase_sigma_rad[k].to_degrees() }
+    let value = (-from * Complex::from_polar(1.0, turned))
+        .arg()
+        .to_degrees();
+    Estimate {
+        value,
+        sigma: loop_gain.phase_sigma_rad[k].to_degrees(),
+    }
 }

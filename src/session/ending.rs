@@ -28,11 +28,17 @@ impl Ending {
     /// By the events of a recording. A trip counts though the program had come to its end; a file that is still being written
     /// has no end of its own, and is whole for all that if the program had come to its.
     pub fn of(recording: &Recording) -> Ending {
-        let trip = recording.events().iter().find_map(|event| match event.kind {
-            EventKind::Trip(trip) => Some((trip, event.tick)),
-            _ => None,
-        });
-        let completed = recording.events().iter().any(|event| event.kind == EventKind::Completed);
+        let trip = recording
+            .events()
+            .iter()
+            .find_map(|event| match event.kind {
+                EventKind::Trip(trip) => Some((trip, event.tick)),
+                _ => None,
+            });
+        let completed = recording
+            .events()
+            .iter()
+            .any(|event| event.kind == EventKind::Completed);
         match Ending::by(trip, completed) {
             Ending::Stopped if recording.truncated() => Ending::CutOff,
             ending => ending,

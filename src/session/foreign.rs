@@ -45,13 +45,23 @@ pub fn analyse_signals(
     repetition: Option<Repetition>,
 ) -> Result<ForeignAnalysis, AnalysisError> {
     let (frf, blocks, periods) = response(signals, band_hz, repetition)?;
-    let fit = if repetition.is_some() { fit_of_periods(&blocks) } else { fit::fit(&blocks, &View::Bare) };
+    let fit = if repetition.is_some() {
+        fit_of_periods(&blocks)
+    } else {
+        fit::fit(&blocks, &View::Bare)
+    };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
     let verdict = match doubt(signals.rate_hz, &frf, &blocks, &fit) {
         Some(why) => Verdict::undecided(why),
         None => judge(&fit, &blocks, &View::Bare, judged_up_to_rad_s, None)?,
     };
-    Ok(ForeignAnalysis { frf, fit, verdict, judged_up_to_rad_s, periods })
+    Ok(ForeignAnalysis {
+        frf,
+        fit,
+        verdict,
+        judged_up_to_rad_s,
+        periods,
+    })
 }
 
 fn response(
@@ -64,7 +74,11 @@ fn response(
         return Ok((periods.frf, periods.blocks, Some(periods.count)));
     }
     let frf = local::estimate(signals, band_hz, &EstimatorSettings::default())?;
-    Ok((frf, blocks(signals, band_hz, &EstimatorSettings::default())?, None))
+    Ok((
+        frf,
+        blocks(signals, band_hz, &EstimatorSettings::default())?,
+        None,
+    ))
 }
 
 /// The modes that periods show. Where they leave more than the noise, distortion counts as well; without periods the noise is
@@ -83,15 +97,26 @@ fn fit_of_periods(blocks: &[Block]) -> Result<ModalFit, FitError> {
 fn chi2_per_freedom(fit: &ModalFit, blocks: &[Block]) -> f64 {
     let frequency_hz: Vec<f64> = blocks.iter().map(|block| block.frequency_hz).collect();
     let fitted = fit.response(&View::Bare, &frequency_hz);
-    let left = |(block, h): (&Block, &Complex<f64>)| 2.0 * (block.response - h).norm_sqr() / block.variance;
-    let freedom = (2 * blocks.len()).saturating_sub(fit.covariance.nrows()).max(1);
+    let left = |(block, h): (&Block, &Complex<f64>)| {
+        2.0 * (block.response - h).norm_sqr() / block.variance
+    };
+    let freedom = (2 * blocks.len())
+        .saturating_sub(fit.covariance.nrows())
+        .max(1);
     blocks.iter().zip(&fitted).map(left).sum::<f64>() / freedom as f64
 }
 
 /// Why the data carry no verdict, whatever the fit says of them.
-fn doubt(rate_hz: f64, frf: &Frf, blocks: &[Block], fit: &Result<ModalFit, FitError>) -> Option<String> {
+fn doubt(
+    rate_hz: f64,
+    frf: &Frf,
+    blocks: &[Block],
+    fit: &Result<ModalFit, FitError>,
+) -> Option<String> {
     let swapped = || grows(frf).or_else(|| explained_the_other_way(blocks, fit));
-    incoherent(frf).or_else(swapped).or_else(|| early(rate_hz, fit.as_ref().ok()?))
+    incoherent(frf)
+        .or_else(swapped)
+        .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
 
 /// Modes that do not explain the response, but do explain its inverse.
@@ -105,7 +130,11 @@ fn explained_the_other_way(blocks: &[Block], fit: &Result<ModalFit, FitError>) -
         variance: block.variance / block.response.norm_sqr().powi(2),
         ..*block
     };
-    let inverse: Vec<Block> = blocks.iter().map(inverse).filter(|b| b.variance.is_normal()).collect();
+    let inverse: Vec<Block> = blocks
+        .iter()
+        .map(inverse)
+        .filter(|b| b.variance.is_normal())
+        .collect();
     let other = fit::fit(&inverse, &View::Bare).ok()?;
     explained(&other).then(|| {
         "modes explain how the input answers the output, and not how the output answers the input: they are swapped (--input, \
@@ -130,8 +159,15 @@ fn incoherent(frf: &Frf) -> Option<String> {
 fn grows(frf: &Frf) -> Option<String> {
     let (first_hz, last_hz) = (frf.frequency_hz.first()?, frf.frequency_hz.last()?);
     let from_hz = last_hz * (first_hz / last_hz).powf(END);
-    let end = frf.frequency_hz.iter().zip(&frf.response).filter(|(f, _)| **f >= from_hz);
-    let slope = slope(end.map(|(f, h)| (f.ln(), h.norm().ln())).filter(|(_, y)| y.is_finite()))?;
+    let end = frf
+        .frequency_hz
+        .iter()
+        .zip(&frf.response)
+        .filter(|(f, _)| **f >= from_hz);
+    let slope = slope(
+        end.map(|(f, h)| (f.ln(), h.norm().ln()))
+            .filter(|(_, y)| y.is_finite()),
+    )?;
     (slope > STEEPEST).then(|| {
         format!(
             "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}: input and output \

@@ -26,18 +26,25 @@ pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured
     let tick = |seconds: f64| (seconds * config.servo.rate_hz).round() as u64;
     let (change, height_m) = match config.control.reference {
         ReferenceSettings::Step { amplitude_m, at_s } => (tick(at_s), amplitude_m),
-        ReferenceSettings::Ramp { amplitude_m, speed_m_per_s, at_s } => {
-            (tick(at_s + amplitude_m.abs() / speed_m_per_s), 0.0)
-        }
+        ReferenceSettings::Ramp {
+            amplitude_m,
+            speed_m_per_s,
+            at_s,
+        } => (tick(at_s + amplitude_m.abs() / speed_m_per_s), 0.0),
         _ => (0, 0.0),
     };
     let steady = change.saturating_add(tick(config.control.steady_after_s));
-    let (mut step, mut error, mut origin_m, mut active) = (StepMeter::new(height_m), Moments::default(), 0.0, 0);
+    let (mut step, mut error, mut origin_m, mut active) =
+        (StepMeter::new(height_m), Moments::default(), 0.0, 0);
     for record in recording.ticks()? {
         let record = record?;
         if record.flags & flag::ACTIVE == 0 {
             // Where the stage rests is known best in the last tick before the loop closes; a step may come with the first.
-            origin_m = if active == 0 { record.reference_m } else { origin_m };
+            origin_m = if active == 0 {
+                record.reference_m
+            } else {
+                origin_m
+            };
             continue;
         }
         if active >= change {
@@ -48,11 +55,20 @@ pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured
         }
         active += 1;
     }
-    let Some(sigma) = error.sigma() else { return Ok(None) };
+    let Some(sigma) = error.sigma() else {
+        return Ok(None);
+    };
     let step = (height_m != 0.0).then(|| {
         let figures = step.figures(config.servo.period_s());
         let seen = 0.02 * height_m.abs() > 3.0 * sigma;
-        StepFigures { settling_time_s: figures.settling_time_s.filter(|_| seen), ..figures }
+        StepFigures {
+            settling_time_s: figures.settling_time_s.filter(|_| seen),
+            ..figures
+        }
     });
-    Ok(Some(Measured { step, steady_state_mean_error_m: error.mean, steady_state_sigma_m: sigma }))
+    Ok(Some(Measured {
+        step,
+        steady_state_mean_error_m: error.mean,
+        steady_state_sigma_m: sigma,
+    }))
 }

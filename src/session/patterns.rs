@@ -25,17 +25,38 @@ pub(super) enum Taken {
 }
 
 /// Takes a run apart.
-pub(super) fn taken(signals: Signals, pattern: &Pattern, band_hz: (f64, f64)) -> Result<Taken, IdentifyError> {
+pub(super) fn taken(
+    signals: Signals,
+    pattern: &Pattern,
+    band_hz: (f64, f64),
+) -> Result<Taken, IdentifyError> {
     match pattern {
         Pattern::Once => Ok(Taken::Record(signals)),
-        Pattern::Repeated { period, count } => Ok(Taken::Record(repeated::mean(&signals, *period, *count))),
-        Pattern::Periodic { start, period, skip, periods } => {
+        Pattern::Repeated { period, count } => {
+            Ok(Taken::Record(repeated::mean(&signals, *period, *count)))
+        }
+        Pattern::Periodic {
+            start,
+            period,
+            skip,
+            periods,
+        } => {
             let whole = part(&signals, *start, (skip + periods) * period);
-            let repetition = Repetition { period: *period, skip: *skip };
+            let repetition = Repetition {
+                period: *period,
+                skip: *skip,
+            };
             let Periods { frf, blocks, .. } = periodic::estimate(&whole, band_hz, repetition)?;
-            let linearity = harmonics(&whole, band_hz, repetition)?.map(|lines| Box::new(Linearity::of(lines)));
-            let blocks = linearity.as_ref().map_or_else(|| blocks.clone(), |l| l.with_odd_distortion(&blocks));
-            Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks), linearity))
+            let linearity =
+                harmonics(&whole, band_hz, repetition)?.map(|lines| Box::new(Linearity::of(lines)));
+            let blocks = linearity
+                .as_ref()
+                .map_or_else(|| blocks.clone(), |l| l.with_odd_distortion(&blocks));
+            Ok(Taken::Lines(
+                frf,
+                with_noise_of_neighbours(&blocks),
+                linearity,
+            ))
         }
         Pattern::Stepped(windows) => stepped(&signals, windows, band_hz),
     }
@@ -48,17 +69,32 @@ fn with_noise_of_neighbours(blocks: &[Block]) -> Vec<Block> {
         let near = &blocks[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(blocks.len())];
         near.iter().map(|block| block.variance).sum::<f64>() / near.len() as f64
     };
-    blocks.iter().enumerate().map(|(k, block)| Block { variance: around(k), ..*block }).collect()
+    blocks
+        .iter()
+        .enumerate()
+        .map(|(k, block)| Block {
+            variance: around(k),
+            ..*block
+        })
+        .collect()
 }
 
 /// The samples of a signal from `start` on, as far as there are.
 fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     let of = |samples: &[f64]| samples.iter().skip(start).take(length).copied().collect();
-    Signals { rate_hz: signals.rate_hz, input_a: of(&signals.input_a), output_m: of(&signals.output_m) }
+    Signals {
+        rate_hz: signals.rate_hz,
+        input_a: of(&signals.input_a),
+        output_m: of(&signals.output_m),
+    }
 }
 
 /// Each sine by its blocks; the frequencies rise, whichever way the sines went.
-fn stepped(signals: &Signals, windows: &[Window], (low_hz, high_hz): (f64, f64)) -> Result<Taken, IdentifyError> {
+fn stepped(
+    signals: &Signals,
+    windows: &[Window],
+    (low_hz, high_hz): (f64, f64),
+) -> Result<Taken, IdentifyError> {
     let (mut frf, mut blocks) = (Frf::default(), Vec::new());
     let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
     // A run that was stopped has those that it came to.
@@ -69,7 +105,11 @@ fn stepped(signals: &Signals, windows: &[Window], (low_hz, high_hz): (f64, f64))
     rising.dedup_by(|a, b| hz(a) <= hz(b));
     for window in rising {
         match sine(signals, window, hz(window)) {
-            Ok(Periods { frf: one, blocks: of_one, .. }) => {
+            Ok(Periods {
+                frf: one,
+                blocks: of_one,
+                ..
+            }) => {
                 append(&mut frf, one);
                 blocks.extend(of_one);
             }
@@ -87,8 +127,15 @@ fn stepped(signals: &Signals, windows: &[Window], (low_hz, high_hz): (f64, f64))
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {
     let line_hz = signals.rate_hz / window.period as f64;
     let band_hz = (frequency_hz - 0.25 * line_hz, frequency_hz + 0.25 * line_hz);
-    let repetition = Repetition { period: window.period, skip: 0 };
-    periodic::estimate(&part(signals, window.start, window.period * window.periods), band_hz, repetition)
+    let repetition = Repetition {
+        period: window.period,
+        skip: 0,
+    };
+    periodic::estimate(
+        &part(signals, window.start, window.period * window.periods),
+        band_hz,
+        repetition,
+    )
 }
 
 fn append(frf: &mut Frf, other: Frf) {

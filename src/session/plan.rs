@@ -5,7 +5,8 @@ use super::swept;
 use crate::config::{Config, ConfigError, ReferenceSettings, whole};
 use crate::control::{Controller, ControllerError, ControllerText};
 use crate::excitation::{
-    self, Chirp, Excitation, ExcitationError, Extremes, Quiet, ReferenceError, Staircase, reference, reference_text,
+    self, Chirp, Excitation, ExcitationError, Extremes, Quiet, ReferenceError, Staircase,
+    reference, reference_text,
 };
 use crate::plant::PlantError;
 use crate::recording::Recording;
@@ -112,7 +113,15 @@ impl Plan {
     }
 
     fn excitation(kind: Kind, config: Config) -> Plan {
-        Plan { kind, config, controller: None, calibration: None, devices: Vec::new(), foreseen: None, reference: None }
+        Plan {
+            kind,
+            config,
+            controller: None,
+            calibration: None,
+            devices: Vec::new(),
+            foreseen: None,
+            reference: None,
+        }
     }
 
     /// A closed loop. A swept reference without amplitudes gets them here, from the model, so that they travel with the
@@ -121,16 +130,27 @@ impl Plan {
         let controller = ControllerText::find(&config.control.controller)?;
         let (config, foreseen) = swept::planned(config, &controller)?;
         let reference = reference_text(&config.control.reference)?;
-        Ok(Plan { controller: Some(controller), reference, foreseen, ..Plan::excitation(Kind::Control, config) })
+        Ok(Plan {
+            controller: Some(controller),
+            reference,
+            foreseen,
+            ..Plan::excitation(Kind::Control, config)
+        })
     }
 
     /// The plan of a recorded run.
     pub fn of(recording: &Recording) -> Result<Plan, PlanError> {
         let config = whole(
             "the recording's configuration",
-            recording.config_toml().ok_or(PlanError::Missing("configuration"))?,
+            recording
+                .config_toml()
+                .ok_or(PlanError::Missing("configuration"))?,
         )?;
-        let text = |name| recording.attachment(name).map(|a| String::from_utf8_lossy(&a.data).into_owned());
+        let text = |name| {
+            recording
+                .attachment(name)
+                .map(|a| String::from_utf8_lossy(&a.data).into_owned())
+        };
         let kind = match recording.metadata().get(KIND).map(String::as_str) {
             Some("chirp") => Kind::Chirp,
             Some("control") => Kind::Control,
@@ -138,9 +158,17 @@ impl Plan {
             Some("quiet") => Kind::Quiet,
             _ => return Err(PlanError::Missing("kind of run")),
         };
-        let controller = text(CONTROLLER).map(|text| ControllerText { name: config.control.controller.clone(), text });
+        let controller = text(CONTROLLER).map(|text| ControllerText {
+            name: config.control.controller.clone(),
+            text,
+        });
         let calibration = text(CALIBRATION);
-        Ok(Plan { controller, calibration, reference: text(REFERENCE), ..Plan::excitation(kind, config) })
+        Ok(Plan {
+            controller,
+            calibration,
+            reference: text(REFERENCE),
+            ..Plan::excitation(kind, config)
+        })
     }
 
     /// The program of the loop.
@@ -148,20 +176,35 @@ impl Plan {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
         match self.kind {
             Kind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
-            Kind::Calibrate => return Ok(Box::new(Excite(Staircase::new(&config.calibrate, period_s)))),
+            Kind::Calibrate => {
+                return Ok(Box::new(Excite(Staircase::new(
+                    &config.calibrate,
+                    period_s,
+                ))));
+            }
             Kind::Quiet => return Ok(Box::new(Excite(Quiet::new(&config.campaign, period_s)))),
             Kind::Control => {}
         }
-        let text = self.controller.as_ref().ok_or(PlanError::Missing("controller"))?;
+        let text = self
+            .controller
+            .as_ref()
+            .ok_or(PlanError::Missing("controller"))?;
         let controller = Controller::new(&text.sections(config.servo.rate_hz)?, period_s);
-        let reference = reference(&config.control.reference, &config.chirp, self.reference.as_deref(), period_s)?;
+        let reference = reference(
+            &config.control.reference,
+            &config.chirp,
+            self.reference.as_deref(),
+            period_s,
+        )?;
         let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
         let closed = match config.control.reference {
             ReferenceSettings::Chirp { .. } => Chirp::new(&config.chirp, period_s).ticks(),
             _ => ticks(config.control.duration_s),
         };
         let settle = ticks(config.control.settle_s);
-        Ok(Box::new(Control::new(controller, reference, settle, closed)))
+        Ok(Box::new(Control::new(
+            controller, reference, settle, closed,
+        )))
     }
 
     /// The effective configuration as TOML.
@@ -171,9 +214,22 @@ impl Plan {
 
     /// Texts that the configuration names, for the recording.
     pub fn attachments(&self) -> Vec<(&'static str, &'static str, &str)> {
-        let controller = self.controller.as_ref().map(|c| (CONTROLLER, "application/toml", c.text.as_str()));
-        let reference = self.reference.as_ref().map(|text| (REFERENCE, "text/csv", text.as_str()));
-        let calibration = self.calibration.as_ref().map(|text| (CALIBRATION, "application/toml", text.as_str()));
-        controller.into_iter().chain(reference).chain(calibration).collect()
+        let controller = self
+            .controller
+            .as_ref()
+            .map(|c| (CONTROLLER, "application/toml", c.text.as_str()));
+        let reference = self
+            .reference
+            .as_ref()
+            .map(|text| (REFERENCE, "text/csv", text.as_str()));
+        let calibration = self
+            .calibration
+            .as_ref()
+            .map(|text| (CALIBRATION, "application/toml", text.as_str()));
+        controller
+            .into_iter()
+            .chain(reference)
+            .chain(calibration)
+            .collect()
     }
 }

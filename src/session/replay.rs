@@ -65,18 +65,31 @@ pub struct Replayed {
 /// Replays a recording.
 pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     if let Some(gap) = recording.gaps().iter().find(|gap| gap.lost > 0) {
-        return Err(ReplayError::Gap { lost: recording.lost_records(), after: gap.after_tick });
+        return Err(ReplayError::Gap {
+            lost: recording.lost_records(),
+            after: gap.after_tick,
+        });
     }
     let plan = Plan::of(recording)?;
     let (published, records) = RingBuffer::new(64);
     let (orders, taken) = RingBuffer::new(64);
     let (spent, collected) = RingBuffer::new(64);
-    let connections =
-        Connections { orders: taken, spent, outlet: Outlet::new(published), progress: Arc::new(Progress::default()) };
+    let connections = Connections {
+        orders: taken,
+        spent,
+        outlet: Outlet::new(published),
+        progress: Arc::new(Progress::default()),
+    };
     let (to_rig, seen) = RingBuffer::new(4);
     let (enabled, enables) = RingBuffer::new(64);
     let (cleared, clears) = RingBuffer::new(64);
-    let rig = Box::new(RecordedRig { now: Seen::default(), seen, enables, clears, status: AmplifierStatus::Disabled });
+    let rig = Box::new(RecordedRig {
+        now: Seen::default(),
+        seen,
+        enables,
+        clears,
+        status: AmplifierStatus::Disabled,
+    });
     let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
     let program = plan.program()?;
     let mut comparison = Comparison {
@@ -88,13 +101,20 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
         records,
         collected,
         program: Some(program),
-        replayed: Replayed { ticks: 0, different: 0, first: None },
+        replayed: Replayed {
+            ticks: 0,
+            different: 0,
+            first: None,
+        },
     };
     let mut events = recording.events().iter().peekable();
     for record in recording.ticks()? {
         let record = record?;
         let amplifier_tripped = comparison.take(&mut events, record.tick);
-        comparison.tick(&Seen { record, amplifier_tripped });
+        comparison.tick(&Seen {
+            record,
+            amplifier_tripped,
+        });
     }
     Ok(comparison.replayed)
 }
@@ -121,18 +141,31 @@ struct Seen {
 
 impl Comparison {
     /// The events up to a tick: orders for the loop, and what the amplifier did; whether it made the loop trip.
-    fn take<'a>(&mut self, events: &mut Peekable<impl Iterator<Item = &'a Event>>, tick: u64) -> bool {
-        let of_amplifier = |event: &Event| matches!(event.kind, EventKind::Trip(Trip::Amplifier { .. }));
+    fn take<'a>(
+        &mut self,
+        events: &mut Peekable<impl Iterator<Item = &'a Event>>,
+        tick: u64,
+    ) -> bool {
+        let of_amplifier =
+            |event: &Event| matches!(event.kind, EventKind::Trip(Trip::Amplifier { .. }));
         let mut tripped = false;
         while let Some(event) = events.next_if(|event| event.tick <= tick) {
             match event.kind {
                 EventKind::Order(kind) => self.order(kind),
-                EventKind::State { from: State::Disarmed, to: State::Armed } => {
-                    let refused = events.next_if(|next| next.tick == event.tick && of_amplifier(next)).is_some();
+                EventKind::State {
+                    from: State::Disarmed,
+                    to: State::Armed,
+                } => {
+                    let refused = events
+                        .next_if(|next| next.tick == event.tick && of_amplifier(next))
+                        .is_some();
                     // The rig takes it within this very tick.
                     let _ = self.enabled.push(!refused);
                 }
-                EventKind::State { from: State::Tripped, to: State::Disarmed } => {
+                EventKind::State {
+                    from: State::Tripped,
+                    to: State::Disarmed,
+                } => {
                     // As above.
                     let _ = self.cleared.push(());
                 }
@@ -155,8 +188,15 @@ impl Comparison {
 
     fn tick(&mut self, seen: &Seen) {
         let recorded = &seen.record;
-        let tick = Tick { number: recorded.tick, scheduled_ns: recorded.scheduled_ns };
-        let moment = Moment { tick, woke_ns: recorded.woke_ns, missed: recorded.missed_ticks };
+        let tick = Tick {
+            number: recorded.tick,
+            scheduled_ns: recorded.scheduled_ns,
+        };
+        let moment = Moment {
+            tick,
+            woke_ns: recorded.woke_ns,
+            missed: recorded.missed_ticks,
+        };
         // The rig takes its record within this very tick.
         let _ = self.to_rig.push(*seen);
         self.servo.tick(&moment, &RecordedClock(recorded.done_ns));
@@ -171,9 +211,14 @@ impl Comparison {
     fn compare(&mut self, recorded: &TickRecord, now: &TickRecord) {
         let bits = |r: &TickRecord| [r.command_a, r.requested_a, r.reference_m].map(f64::to_bits);
         self.replayed.ticks += 1;
-        if bits(recorded) != bits(now) || (recorded.state, recorded.flags) != (now.state, now.flags) {
+        if bits(recorded) != bits(now) || (recorded.state, recorded.flags) != (now.state, now.flags)
+        {
             self.replayed.different += 1;
-            let difference = Difference { tick: now.tick, recorded_a: recorded.command_a, replayed_a: now.command_a };
+            let difference = Difference {
+                tick: now.tick,
+                recorded_a: recorded.command_a,
+                replayed_a: now.command_a,
+            };
             self.replayed.first.get_or_insert(difference);
         }
     }
@@ -190,8 +235,11 @@ struct RecordedRig {
     status: AmplifierStatus,
 }
 
-const REFUSED: DeviceError =
-    DeviceError { what: "the amplifier refused, as recorded", remedy: "see the recording's events", code: 0 };
+const REFUSED: DeviceError = DeviceError {
+    what: "the amplifier refused, as recorded",
+    remedy: "see the recording's events",
+    code: 0,
+};
 
 impl CurrentAmplifier for RecordedRig {
     fn enable(&mut self) -> Result<(), DeviceError> {
@@ -227,9 +275,13 @@ impl CurrentAmplifier for RecordedRig {
     /// A fault keeps the program from deciding anything; where something was decided, it was the command that failed.
     fn status(&self) -> AmplifierStatus {
         let record = &self.now.record;
-        let decided =
-            record.requested_a.to_bits() | record.reference_m.to_bits() != 0 || record.flags & flag::ACTIVE != 0;
-        if self.now.amplifier_tripped && !decided { AmplifierStatus::Fault(0) } else { self.status }
+        let decided = record.requested_a.to_bits() | record.reference_m.to_bits() != 0
+            || record.flags & flag::ACTIVE != 0;
+        if self.now.amplifier_tripped && !decided {
+            AmplifierStatus::Fault(0)
+        } else {
+            self.status
+        }
     }
 }
 
@@ -239,7 +291,12 @@ impl DisplacementProbe for RecordedRig {
             self.now = seen;
         }
         let r = &self.now.record;
-        Reading { position_m: r.position_m, sequence: r.probe_sequence, age_ns: r.probe_age_ns, validity: r.validity }
+        Reading {
+            position_m: r.position_m,
+            sequence: r.probe_sequence,
+            age_ns: r.probe_age_ns,
+            validity: r.validity,
+        }
     }
 }
 
@@ -247,7 +304,14 @@ struct RecordedClock(u64);
 
 impl Clock for RecordedClock {
     fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
-        Moment { tick: Tick { number, scheduled_ns: 0 }, woke_ns: 0, missed: 0 }
+        Moment {
+            tick: Tick {
+                number,
+                scheduled_ns: 0,
+            },
+            woke_ns: 0,
+            missed: 0,
+        }
     }
 
     fn now_ns(&self, _tick: Tick) -> u64 {
@@ -257,4 +321,7 @@ impl Clock for RecordedClock {
     fn restart(&mut self, _number: u64) {}
 }
 
-const _: () = assert!(SLOTS_PER_TICK <= 64, "the ring of a replay holds what a tick publishes");
+const _: () = assert!(
+    SLOTS_PER_TICK <= 64,
+    "the ring of a replay holds what a tick publishes"
+);

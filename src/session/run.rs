@@ -38,7 +38,9 @@ pub enum SessionError {
     #[error("{0}; nothing moved")]
     Create(RecordingError),
     /// The folder could not be made; nothing moved.
-    #[error("cannot make the folder {folder} for recordings: {why}; choose another with --out; nothing moved")]
+    #[error(
+        "cannot make the folder {folder} for recordings: {why}; choose another with --out; nothing moved"
+    )]
     Folder {
         /// The folder.
         folder: PathBuf,
@@ -84,7 +86,8 @@ impl Run {
 
     /// Adds the results and closes the file.
     pub fn finish(self, results_json: &str) -> Result<Totals, RecordingError> {
-        self.recorder.finish(&[("results.json", "application/json", results_json.as_bytes())])
+        self.recorder
+            .finish(&[("results.json", "application/json", results_json.as_bytes())])
     }
 }
 
@@ -102,23 +105,41 @@ pub fn run(
     let (mut orders, taken) = RingBuffer::new(ORDERS_PER_TICK);
     let (spent, _kept_until_the_end) = RingBuffer::new(16);
     let progress = Arc::new(Progress::default());
-    let connections =
-        Connections { orders: taken, spent, outlet: Outlet::new(outlet), progress: Arc::clone(&progress) };
+    let connections = Connections {
+        orders: taken,
+        spent,
+        outlet: Outlet::new(outlet),
+        progress: Arc::clone(&progress),
+    };
     let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
     queue(&mut orders, program);
     let tail_ticks = (TAIL_S * plan.config.servo.rate_hz) as u64;
-    let prepared = prepare(servo, &plan.config.servo, pace, tail_ticks)
-        .map_err(|e| SessionError::System { what: "start the loop's thread", why: e.to_string() })?;
+    let prepared =
+        prepare(servo, &plan.config.servo, pace, tail_ticks).map_err(|e| SessionError::System {
+            what: "start the loop's thread",
+            why: e.to_string(),
+        })?;
     let recorder = create(plan, pace, &prepared, folder)?;
     let path = recorder.path().to_path_buf();
     let recorder = recording::spawn(recorder, records).map_err(SessionError::Create)?;
     let scheduling = prepared.scheduling().clone();
-    let mut supervisor = Supervisor { orders, health: recorder.health(), stopped: false };
+    let mut supervisor = Supervisor {
+        orders,
+        health: recorder.health(),
+        stopped: false,
+    };
     let watching = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
     let ended = supervisor.watch_over(prepared, watching)?;
     let recorder = recorder.join()?;
     let ended = ended.map_err(|_| SessionError::LoopDied(path.clone()))?;
-    Ok(Run { path, ended, pace, scheduling, stopped: supervisor.stopped, recorder })
+    Ok(Run {
+        path,
+        ended,
+        pace,
+        scheduling,
+        stopped: supervisor.stopped,
+        recorder,
+    })
 }
 
 /// Arm and start: in the ring before the loop begins, so that they take effect at tick 0.
@@ -130,28 +151,43 @@ fn queue(orders: &mut Producer<Order>, program: Box<dyn Program>) {
 }
 
 /// The file, with everything that is known before the first tick.
-fn create(plan: &Plan, pace: Pace, prepared: &Prepared, folder: &Path) -> Result<Recorder, SessionError> {
+fn create(
+    plan: &Plan,
+    pace: Pace,
+    prepared: &Prepared,
+    folder: &Path,
+) -> Result<Recorder, SessionError> {
     let header = Header {
         config_toml: plan.config_toml()?,
         period_ns: libm::round(plan.config.servo.period_s() * 1e9) as u64,
         metadata: metadata(plan, pace, prepared.scheduling()),
     };
-    std::fs::create_dir_all(folder).map_err(|e| SessionError::Folder { folder: folder.into(), why: e.to_string() })?;
+    std::fs::create_dir_all(folder).map_err(|e| SessionError::Folder {
+        folder: folder.into(),
+        why: e.to_string(),
+    })?;
     let path = name::recording(folder, plan.kind.name(), SystemTime::now());
     let mut recorder = Recorder::create(&path, &header).map_err(SessionError::Create)?;
     for (name, media_type, text) in plan.attachments() {
-        recorder.attach(name, media_type, text.as_bytes()).map_err(SessionError::Create)?;
+        recorder
+            .attach(name, media_type, text.as_bytes())
+            .map_err(SessionError::Create)?;
     }
     Ok(recorder)
 }
 
 fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String, String> {
-    let file = |path: &str| std::fs::read_to_string(path).map_or("unknown".into(), |text| text.trim().to_string());
+    let file = |path: &str| {
+        std::fs::read_to_string(path).map_or("unknown".into(), |text| text.trim().to_string())
+    };
     let cpu = scheduling.cpu.map_or("any".into(), |cpu| cpu.to_string());
     let pairs = [
         (KIND, plan.kind.name().to_string()),
         ("program", format!("bench {}", env!("CARGO_PKG_VERSION"))),
-        ("started", humantime::format_rfc3339_millis(SystemTime::now()).to_string()),
+        (
+            "started",
+            humantime::format_rfc3339_millis(SystemTime::now()).to_string(),
+        ),
         ("host", file("/proc/sys/kernel/hostname")),
         ("kernel", file("/proc/sys/kernel/osrelease")),
         ("pace", pace.name().into()),
@@ -160,7 +196,11 @@ fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String
         ("cpu", cpu),
         ("refused", scheduling.refused.join("\n")),
     ];
-    pairs.into_iter().chain(plan.devices.iter().cloned()).map(|(key, value)| (key.to_string(), value)).collect()
+    pairs
+        .into_iter()
+        .chain(plan.devices.iter().cloned())
+        .map(|(key, value)| (key.to_string(), value))
+        .collect()
 }
 
 /// Watches from outside: signals, progress, the recorder's health.
@@ -176,8 +216,14 @@ impl Supervisor {
         prepared: Prepared,
         watch: impl FnMut(),
     ) -> Result<std::thread::Result<Ended>, SessionError> {
-        let system = |e: std::io::Error| SessionError::System { what: "start the supervisor", why: e.to_string() };
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
+        let system = |e: std::io::Error| SessionError::System {
+            what: "start the supervisor",
+            why: e.to_string(),
+        };
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(system)?;
         runtime.block_on(async {
             let signals = signals().map_err(system)?;
             let thread = prepared.begin();
@@ -186,7 +232,12 @@ impl Supervisor {
         })
     }
 
-    async fn until_finished(&mut self, thread: &JoinHandle<Ended>, signals: (Signal, Signal), mut watch: impl FnMut()) {
+    async fn until_finished(
+        &mut self,
+        thread: &JoinHandle<Ended>,
+        signals: (Signal, Signal),
+        mut watch: impl FnMut(),
+    ) {
         let (mut interrupt, mut terminate) = signals;
         let mut beat = tokio::time::interval(BEAT);
         while !thread.is_finished() {

@@ -9,17 +9,24 @@ use super::SessionError;
 
 /// Interrupt (Ctrl-C) and terminate, from now on for the whole process.
 pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
-    Ok((signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?))
+    Ok((
+        signal(SignalKind::interrupt())?,
+        signal(SignalKind::terminate())?,
+    ))
 }
 
 /// Does `work` in a thread of its own and returns what it made; `None` if a person stops it before it is done. The thread
 /// is then left behind, and ends with the process: `work` must not hold what has to be closed in order.
-pub fn unless_stopped<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<Option<T>, SessionError> {
+pub fn unless_stopped<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<Option<T>, SessionError> {
     runtime()?.block_on(async {
         let (mut interrupt, mut terminate) = signals().map_err(system)?;
         let (tell, told) = tokio::sync::oneshot::channel();
         let thread = std::thread::Builder::new().name("bench-analysis".into());
-        thread.spawn(move || drop(tell.send(work()))).map_err(system)?;
+        thread
+            .spawn(move || drop(tell.send(work())))
+            .map_err(system)?;
         tokio::select! {
             result = told => result.map(Some).map_err(died),
             _ = interrupt.recv() => Ok(None),
@@ -37,7 +44,9 @@ pub fn stoppable<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<
             let (mut interrupt, mut terminate) = signals().map_err(system)?;
             let (tell, mut told) = tokio::sync::oneshot::channel();
             let thread = std::thread::Builder::new().name("bench-analysis".into());
-            thread.spawn_scoped(scope, || drop(tell.send(work(&stop)))).map_err(system)?;
+            thread
+                .spawn_scoped(scope, || drop(tell.send(work(&stop))))
+                .map_err(system)?;
             loop {
                 tokio::select! {
                     result = &mut told => return result.map_err(died),
@@ -50,15 +59,24 @@ pub fn stoppable<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<
 }
 
 fn runtime() -> Result<Runtime, SessionError> {
-    tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(system)
 }
 
 fn system(e: std::io::Error) -> SessionError {
-    SessionError::System { what: "start the analysis", why: e.to_string() }
+    SessionError::System {
+        what: "start the analysis",
+        why: e.to_string(),
+    }
 }
 
 fn died(_: tokio::sync::oneshot::error::RecvError) -> SessionError {
-    SessionError::System { what: "finish the analysis", why: "its thread died of a panic".into() }
+    SessionError::System {
+        what: "finish the analysis",
+        why: "its thread died of a panic".into(),
+    }
 }
 
 #[cfg(test)]

@@ -25,7 +25,11 @@ impl Body {
         Ok(Body {
             mechanism: Quadratic::of(&made)?,
             state: QuadraticState::default(),
-            fastest_rad_s: linear.modes.iter().map(|mode| mode.omega_rad_s).fold(0.0, f64::max),
+            fastest_rad_s: linear
+                .modes
+                .iter()
+                .map(|mode| mode.omega_rad_s)
+                .fold(0.0, f64::max),
             lag_rad_s: 2.0 * std::f64::consts::PI * config.amplifier.bandwidth_hz,
             force_constant_n_per_a: config.motor.force_constant_n_per_a,
         })
@@ -48,8 +52,11 @@ impl Body {
 
     /// One step: the current goes from `current_a` towards the set-point as the amplifier has it.
     pub(super) fn step(&mut self, step_s: f64, current_a: f64, setpoint_a: f64, load: Load) {
-        let after = |span_s: f64| setpoint_a + (current_a - setpoint_a) * libm::exp(-self.lag_rad_s * span_s);
-        let force_n = [current_a, after(0.5 * step_s), after(step_s)].map(|a| a * self.force_constant_n_per_a);
+        let after = |span_s: f64| {
+            setpoint_a + (current_a - setpoint_a) * libm::exp(-self.lag_rad_s * span_s)
+        };
+        let force_n = [current_a, after(0.5 * step_s), after(step_s)]
+            .map(|a| a * self.force_constant_n_per_a);
         self.mechanism.step(&mut self.state, step_s, force_n, load);
     }
 }

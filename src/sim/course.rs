@@ -27,7 +27,11 @@ pub(super) struct Passed {
 impl Passed {
     /// Where the stage was at a time of the step, in metres.
     pub(super) fn position_m(&self, time: f64) -> f64 {
-        self.before.towards(&self.after, self.length_s, (time - self.from) / (self.to - self.from))
+        self.before.towards(
+            &self.after,
+            self.length_s,
+            (time - self.from) / (self.to - self.from),
+        )
     }
 }
 
@@ -35,7 +39,10 @@ impl Course {
     /// At rest, to be carried by periods of `period_s`; room for the set-points that `delay` periods hold back.
     pub(super) fn new(config: &Config, period_s: f64, delay: f64) -> Result<Self, PlantError> {
         let stage = super::stage(config, period_s)?;
-        Ok(Course { stage, setpoints: Setpoints::new(delay) })
+        Ok(Course {
+            stage,
+            setpoints: Setpoints::new(delay),
+        })
     }
 
     /// Takes a set-point that acts from `due`.
@@ -82,6 +89,13 @@ impl Course {
     fn step(&mut self, from: f64, to: f64, length_s: f64, advance: fn(&mut Stage, f64)) -> Passed {
         let before = self.stage.place();
         advance(&mut self.stage, self.setpoints.mean(from, to));
-        Passed { from, to, current_a: self.stage.current_a(), before, after: self.stage.place(), length_s }
+        Passed {
+            from,
+            to,
+            current_a: self.stage.current_a(),
+            before,
+            after: self.stage.place(),
+            length_s,
+        }
     }
 }

@@ -22,15 +22,25 @@ pub(super) struct Line {
 impl Line {
     pub(super) fn new(line: &FloorLine, period_s: f64, mut noise: Gaussian) -> Self {
         let w = 2.0 * std::f64::consts::PI * line.frequency_hz;
-        let over_period = exponential(&(Matrix2::new(0.0, w, -w, -2.0 * line.damping_ratio * w) * period_s));
+        let over_period =
+            exponential(&(Matrix2::new(0.0, w, -w, -2.0 * line.damping_ratio * w) * period_s));
         let rms = line.acceleration_rms_m_per_s2;
         let missing = Matrix2::identity() - over_period * over_period.transpose();
         // Cholesky of a 2 x 2 matrix that is positive but for rounding.
         let l11 = missing[(0, 0)].max(0.0).sqrt();
-        let l21 = if l11 > 0.0 { missing[(1, 0)] / l11 } else { 0.0 };
+        let l21 = if l11 > 0.0 {
+            missing[(1, 0)] / l11
+        } else {
+            0.0
+        };
         let l22 = (missing[(1, 1)] - l21 * l21).max(0.0).sqrt();
         let state = Vector2::new(noise.next(), noise.next()) * rms;
-        Line { over_period, noise_gain: Matrix2::new(l11, 0.0, l21, l22) * rms, state, noise }
+        Line {
+            over_period,
+            noise_gain: Matrix2::new(l11, 0.0, l21, l22) * rms,
+            state,
+            noise,
+        }
     }
 
     /// The acceleration in m/s^2, held over the next period.
@@ -46,7 +56,11 @@ impl Line {
 mod tests {
     use super::*;
 
-    const LINE: FloorLine = FloorLine { frequency_hz: 70.0, damping_ratio: 0.1, acceleration_rms_m_per_s2: 2e-3 };
+    const LINE: FloorLine = FloorLine {
+        frequency_hz: 70.0,
+        damping_ratio: 0.1,
+        acceleration_rms_m_per_s2: 2e-3,
+    };
 
     #[test]
     fn the_rms_is_as_stated_at_any_tick() {
@@ -69,8 +83,14 @@ mod tests {
         let damped = w * (1.0 - zeta * zeta).sqrt();
         for lag in [10usize, 25, 36, 71, 143] {
             let tau = lag as f64 / rate_hz;
-            let exact = (-zeta * w * tau).exp() * ((damped * tau).cos() - zeta * w / damped * (damped * tau).sin());
-            let ours = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
+            let exact = (-zeta * w * tau).exp()
+                * ((damped * tau).cos() - zeta * w / damped * (damped * tau).sin());
+            let ours = values
+                .iter()
+                .zip(&values[lag..])
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / power;
             // 400 s again: 0.7 % standard deviation in a correlation; four allowed.
             assert!((ours - exact).abs() < 0.03, "lag {lag}: {ours} for {exact}");
         }

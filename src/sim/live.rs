@@ -25,7 +25,11 @@ pub struct LiveStage {
 impl LiveStage {
     /// The stage of a configuration, at rest, with its floor and its stop.
     pub fn new(config: &Config) -> Result<Self, PlantError> {
-        Ok(LiveStage { course: Course::new(config, STEP_S, 0.0)?, done: 0, past: VecDeque::with_capacity(KEPT + 1) })
+        Ok(LiveStage {
+            course: Course::new(config, STEP_S, 0.0)?,
+            done: 0,
+            past: VecDeque::with_capacity(KEPT + 1),
+        })
     }
 
     /// Takes a set-point that acts from `time_s` on; in what has passed already nothing changes.
@@ -36,7 +40,8 @@ impl LiveStage {
     /// Where the stage is at `time_s`, in metres. What is older than is kept is where it was when the record begins.
     pub fn position_m(&mut self, time_s: f64) -> f64 {
         let time = self.advance(time_s);
-        self.step_at(time).map_or(0.0, |step| step.position_m(time.max(step.from)))
+        self.step_at(time)
+            .map_or(0.0, |step| step.position_m(time.max(step.from)))
     }
 
     /// The current at the end of the step in which `time_s` lies, in amperes.
@@ -81,10 +86,15 @@ mod tests {
         let mut stage = quiet();
         stage.command(0.0, 0.1);
         // Slowest mode: damping 0.009 at 184 rad/s, 20 s are 33 time constants.
-        let ends_m: Vec<f64> = (1..=1000).map(|k| stage.position_m(20.0 + 1e-3 * f64::from(k))).collect();
+        let ends_m: Vec<f64> = (1..=1000)
+            .map(|k| stage.position_m(20.0 + 1e-3 * f64::from(k)))
+            .collect();
         let mean_m = ends_m.iter().sum::<f64>() / ends_m.len() as f64;
         assert!(ends_m.iter().all(|x| (x - mean_m).abs() < 1e-9), "at rest");
-        assert!((mean_m - 15e-6).abs() < 2e-6, "0.1 A, 1.1 N, 74 kN/m: {mean_m}");
+        assert!(
+            (mean_m - 15e-6).abs() < 2e-6,
+            "0.1 A, 1.1 N, 74 kN/m: {mean_m}"
+        );
         assert!((stage.current_a(21.0) - 0.1).abs() < 1e-9);
     }
 
@@ -97,7 +107,10 @@ mod tests {
         let moments = [0.0101, 0.01234, 0.0219, 0.05];
         let straight = moments.map(|time_s| in_order.position_m(time_s));
         out_of_order.position_m(0.06);
-        assert_eq!(straight, moments.map(|time_s| out_of_order.position_m(time_s)));
+        assert_eq!(
+            straight,
+            moments.map(|time_s| out_of_order.position_m(time_s))
+        );
         assert!(straight[3].abs() > 1e-6, "it moves");
     }
 
@@ -105,7 +118,9 @@ mod tests {
     fn between_two_steps_the_position_has_no_jump() {
         let mut stage = quiet();
         stage.command(0.0, 1.0);
-        let x: Vec<f64> = (0..10_000).map(|k| stage.position_m(1e-6 * f64::from(k))).collect();
+        let x: Vec<f64> = (0..10_000)
+            .map(|k| stage.position_m(1e-6 * f64::from(k)))
+            .collect();
         let speed = |i: usize| x[i + 1] - x[i];
         // At most 11 N on 0.4 kg: 28 m/s^2, 28e-12 m a us^2; the cubics stay within a few of it.
         assert!((1..9_998).all(|i| (speed(i + 1) - speed(i)).abs() < 2e-10));

@@ -82,9 +82,17 @@ impl SimulatedRig {
     fn accept(&self, current_a: f64) -> f64 {
         let change_a = current_a - self.accepted_a;
         let within = change_a.abs() <= self.largest_change_a;
-        let reached_a = if within { current_a } else { self.accepted_a + self.largest_change_a.copysign(change_a) };
+        let reached_a = if within {
+            current_a
+        } else {
+            self.accepted_a + self.largest_change_a.copysign(change_a)
+        };
         let step_a = self.current_step_a;
-        let stepped_a = if step_a > 0.0 { libm::round(reached_a / step_a) * step_a } else { reached_a };
+        let stepped_a = if step_a > 0.0 {
+            libm::round(reached_a / step_a) * step_a
+        } else {
+            reached_a
+        };
         stepped_a.clamp(-self.current_limit_a, self.current_limit_a)
     }
 }
@@ -93,7 +101,12 @@ impl SimulatedRig {
 fn stage(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
     match config.sim.geometry {
         Geometry::Linear => Ok(Stage::new(config, &modes(config)?, None, period_s)),
-        Geometry::Quadratic => Ok(Stage::new(config, &unmodelled_modes(config), Some(Body::new(config)?), period_s)),
+        Geometry::Quadratic => Ok(Stage::new(
+            config,
+            &unmodelled_modes(config),
+            Some(Body::new(config)?),
+            period_s,
+        )),
     }
 }
 
@@ -139,10 +152,17 @@ impl CurrentAmplifier for SimulatedRig {
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         if self.status != AmplifierStatus::Enabled {
             let remedy = "arm the loop first";
-            return Err(DeviceError { what: "the simulated amplifier is disabled", remedy, code: 0 });
+            return Err(DeviceError {
+                what: "the simulated amplifier is disabled",
+                remedy,
+                code: 0,
+            });
         }
         self.accepted_a = self.accept(current_a);
-        self.course.push(self.tick.unwrap_or_default() as f64 + self.delay, self.accepted_a);
+        self.course.push(
+            self.tick.unwrap_or_default() as f64 + self.delay,
+            self.accepted_a,
+        );
         Ok(self.accepted_a)
     }
 
@@ -163,6 +183,10 @@ impl DisplacementProbe for SimulatedRig {
             self.advance(tick);
         }
         self.tick = Some(now.number);
-        if self.in_step { self.probe.measure(self.course.position_m()) } else { self.probe.latest(now.number as f64) }
+        if self.in_step {
+            self.probe.measure(self.course.position_m())
+        } else {
+            self.probe.latest(now.number as f64)
+        }
     }
 }

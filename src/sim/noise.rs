@@ -52,9 +52,15 @@ mod tests {
         let numbers: Vec<f64> = (0..N).map(|_| stream.next()).collect();
         let moment = |p: i32| numbers.iter().map(|x| x.powi(p)).sum::<f64>() / N as f64;
         // Moments 0, 1, 0, 3; their standard deviations over N numbers are sqrt((1, 2, 15, 96)/N); five of them allowed.
-        for (p, expected, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
+        for (p, expected, variance) in
+            [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)]
+        {
             let bound = 5.0 * f64::sqrt(variance / N as f64);
-            assert!((moment(p) - expected).abs() < bound, "moment {p}: {}", moment(p));
+            assert!(
+                (moment(p) - expected).abs() < bound,
+                "moment {p}: {}",
+                moment(p)
+            );
         }
         // Beyond two sigma lie 4.550 %; binomial sigma 0.021 %.
         let tail = numbers.iter().filter(|x| x.abs() > 2.0).count() as f64 / N as f64;
@@ -71,7 +77,10 @@ mod tests {
         let base = of(1, 0);
         for other in [of(2, 0), of(1, 1), of(0, 0)] {
             let correlation = base.iter().zip(&other).map(|(a, b)| a * b).sum::<f64>() / N as f64;
-            assert!(correlation.abs() < 5.0 / f64::sqrt(N as f64), "{correlation}");
+            assert!(
+                correlation.abs() < 5.0 / f64::sqrt(N as f64),
+                "{correlation}"
+            );
         }
         assert_eq!(base, of(1, 0));
     }

@@ -32,7 +32,11 @@ impl Sensor {
     /// What is measured at `position_m`, in metres.
     pub fn sense(&mut self, position_m: f64) -> f64 {
         let noisy_m = position_m + self.noise_rms_m * self.noise.next();
-        if self.quantum_m > 0.0 { libm::round(noisy_m / self.quantum_m) * self.quantum_m } else { noisy_m }
+        if self.quantum_m > 0.0 {
+            libm::round(noisy_m / self.quantum_m) * self.quantum_m
+        } else {
+            noisy_m
+        }
     }
 }
 
@@ -58,7 +62,10 @@ impl Probe {
     /// The probe of a configuration, which has already seen the stage at rest once.
     pub(super) fn new(config: &Config) -> Self {
         let rate_hz = config.servo.rate_hz;
-        let period = config.probe.rate_hz.map_or(1.0, |probe_hz| rate_hz / probe_hz * (1.0 + CLOCK_ERROR));
+        let period = config
+            .probe
+            .rate_hz
+            .map_or(1.0, |probe_hz| rate_hz / probe_hz * (1.0 + CLOCK_ERROR));
         let age = config.probe.age_at_arrival_s() * rate_hz;
         let mut probe = Probe {
             sensor: Sensor::new(config),
@@ -81,10 +88,19 @@ impl Probe {
     /// A measurement of `position_m`, of no age.
     pub(super) fn measure(&mut self, position_m: f64) -> Reading {
         let sensed_m = self.sensor.sense(position_m);
-        let validity = if sensed_m.abs() <= self.half_range_m { Validity::Valid } else { Validity::OutOfRange };
+        let validity = if sensed_m.abs() <= self.half_range_m {
+            Validity::Valid
+        } else {
+            Validity::OutOfRange
+        };
         self.sequence += 1;
         let position_m = sensed_m.clamp(-self.half_range_m, self.half_range_m);
-        Reading { position_m, sequence: self.sequence, age_ns: 0, validity }
+        Reading {
+            position_m,
+            sequence: self.sequence,
+            age_ns: 0,
+            validity,
+        }
     }
 
     /// Measures what falls due up to `to`; `position_m` tells where the stage is at a time.
@@ -100,7 +116,10 @@ impl Probe {
     /// Takes what has arrived by `now`.
     fn receive(&mut self, now: f64) {
         let age = self.age;
-        while let Some(arrived) = self.coming.pop_front_if(|(taken, _)| *taken + age <= now + 1e-9) {
+        while let Some(arrived) = self
+            .coming
+            .pop_front_if(|(taken, _)| *taken + age <= now + 1e-9)
+        {
             self.newest = arrived;
         }
     }
@@ -109,7 +128,10 @@ impl Probe {
     pub(super) fn latest(&mut self, now: f64) -> Reading {
         self.receive(now);
         let (taken, reading) = self.newest;
-        Reading { age_ns: ((now - taken).max(0.0) * self.tick_s * 1e9) as u64, ..reading }
+        Reading {
+            age_ns: ((now - taken).max(0.0) * self.tick_s * 1e9) as u64,
+            ..reading
+        }
     }
 }
 

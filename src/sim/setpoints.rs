@@ -12,7 +12,10 @@ pub(super) struct Setpoints {
 impl Setpoints {
     /// Room for what `delay_ticks` hold back.
     pub(super) fn new(delay_ticks: f64) -> Self {
-        Setpoints { coming_a: VecDeque::with_capacity(delay_ticks as usize + 3), acting_a: 0.0 }
+        Setpoints {
+            coming_a: VecDeque::with_capacity(delay_ticks as usize + 3),
+            acting_a: 0.0,
+        }
     }
 
     /// Takes a set-point that acts from `due`; the last word for a moment counts.
@@ -57,7 +60,10 @@ mod tests {
         setpoints.push(1.0, 5.0);
         setpoints.push(1.0, 2.0);
         setpoints.push(2.0, 3.0);
-        assert_eq!([0.0, 1.0, 1.5, 2.0].map(|time| setpoints.at(time)), [0.0, 2.0, 2.0, 3.0]);
+        assert_eq!(
+            [0.0, 1.0, 1.5, 2.0].map(|time| setpoints.at(time)),
+            [0.0, 2.0, 2.0, 3.0]
+        );
     }
 
     #[test]

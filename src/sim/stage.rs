@@ -24,8 +24,12 @@ impl Place {
     /// The position at a share of the way to `after`, `length_s` later: the cubic through both places (Hermite).
     pub(super) fn towards(&self, after: &Place, length_s: f64, share: f64) -> f64 {
         let rise_m = after.position_m - self.position_m;
-        let (start_m, end_m) = (self.velocity_m_per_s * length_s, after.velocity_m_per_s * length_s);
-        let bend_m = 3.0 * rise_m - 2.0 * start_m - end_m + share * (start_m + end_m - 2.0 * rise_m);
+        let (start_m, end_m) = (
+            self.velocity_m_per_s * length_s,
+            after.velocity_m_per_s * length_s,
+        );
+        let bend_m =
+            3.0 * rise_m - 2.0 * start_m - end_m + share * (start_m + end_m - 2.0 * rise_m);
         self.position_m + share * (start_m + share * bend_m)
     }
 }
@@ -49,10 +53,22 @@ impl Stage {
     /// A stage at rest, to be carried by periods of `period_s`: `modes`, and a body where the plant is not among them.
     pub(super) fn new(config: &Config, modes: &[Mode], body: Option<Body>, period_s: f64) -> Self {
         let contact_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
-        let fine_steps = body.as_ref().map_or(0, |body| body.steps(period_s)).max(contact_steps);
-        let (bandwidth_hz, force_constant) = (config.amplifier.bandwidth_hz, config.motor.force_constant_n_per_a);
+        let fine_steps = body
+            .as_ref()
+            .map_or(0, |body| body.steps(period_s))
+            .max(contact_steps);
+        let (bandwidth_hz, force_constant) = (
+            config.amplifier.bandwidth_hz,
+            config.motor.force_constant_n_per_a,
+        );
         let sampled = |period_s| Sampled::new(modes, bandwidth_hz, force_constant, period_s);
-        let line = |(index, line)| Line::new(line, period_s, Gaussian::new(config.sim.seed, 1 + index as u64));
+        let line = |(index, line)| {
+            Line::new(
+                line,
+                period_s,
+                Gaussian::new(config.sim.seed, 1 + index as u64),
+            )
+        };
         let whole = sampled(period_s);
         Stage {
             motion: whole.at_rest(),
@@ -76,18 +92,25 @@ impl Stage {
     /// Displacement at the probe in metres.
     pub(super) fn position_m(&self) -> f64 {
         let modes_m = self.whole.position_m(&self.motion);
-        self.body.as_ref().map_or(modes_m, |body| body.position_m() + modes_m)
+        self.body
+            .as_ref()
+            .map_or(modes_m, |body| body.position_m() + modes_m)
     }
 
     /// Where it is and where it goes.
     pub(super) fn place(&self) -> Place {
-        Place { position_m: self.position_m(), velocity_m_per_s: self.velocity_m_per_s() }
+        Place {
+            position_m: self.position_m(),
+            velocity_m_per_s: self.velocity_m_per_s(),
+        }
     }
 
     /// Velocity at the probe in metres per second.
     fn velocity_m_per_s(&self) -> f64 {
         let modes_m_per_s = self.whole.velocity_m_per_s(&self.motion);
-        self.body.as_ref().map_or(modes_m_per_s, |body| body.velocity_m_per_s() + modes_m_per_s)
+        self.body.as_ref().map_or(modes_m_per_s, |body| {
+            body.velocity_m_per_s() + modes_m_per_s
+        })
     }
 
     /// Length of a period in seconds.
@@ -111,7 +134,9 @@ impl Stage {
         let reach_m = self.position_m().abs() + self.velocity_m_per_s().abs() * self.whole.period_s;
         if self.body.is_none() && reach_m < self.stop_m {
             let floor_m_per_s2 = self.floor_m_per_s2;
-            return self.whole.step(&mut self.motion, setpoint_a, |block| -floor_m_per_s2 * block.floor);
+            return self.whole.step(&mut self.motion, setpoint_a, |block| {
+                -floor_m_per_s2 * block.floor
+            });
         }
         for _ in 0..self.fine_steps {
             self.advance_finely(setpoint_a);
@@ -127,10 +152,15 @@ impl Stage {
     pub(super) fn advance_finely(&mut self, setpoint_a: f64) {
         let (contact_n, floor_m_per_s2) = (self.contact_n(), self.floor_m_per_s2);
         if let Some(body) = &mut self.body {
-            let load = Load { probe_n: contact_n, floor_m_per_s2 };
+            let load = Load {
+                probe_n: contact_n,
+                floor_m_per_s2,
+            };
             body.step(self.fine.period_s, self.motion.current_a, setpoint_a, load);
         }
-        self.fine.step(&mut self.motion, setpoint_a, |block| contact_n * block.output - floor_m_per_s2 * block.floor);
+        self.fine.step(&mut self.motion, setpoint_a, |block| {
+            contact_n * block.output - floor_m_per_s2 * block.floor
+        });
     }
 
     /// Force of the stop on the stage: a spring and a damper that push and never pull.
@@ -141,8 +171,8 @@ impl Stage {
             return 0.0;
         }
         let side = position_m.signum();
-        let inward =
-            self.stop_stiffness_n_per_m * depth_m + self.stop_damping_n_s_per_m * side * self.velocity_m_per_s();
+        let inward = self.stop_stiffness_n_per_m * depth_m
+            + self.stop_damping_n_s_per_m * side * self.velocity_m_per_s();
         -side * inward.max(0.0)
     }
 }

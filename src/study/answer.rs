@@ -126,7 +126,9 @@ impl Answer {
                 examples: failures.into_iter().take(EXAMPLES).cloned().collect(),
             },
             cnmp_pairs: counted(results, |block| &block.cnmp_pairs),
-            damped_cnmp_pairs: plan.damped.then(|| counted(results, |block| &block.damped_cnmp_pairs)),
+            damped_cnmp_pairs: plan
+                .damped
+                .then(|| counted(results, |block| &block.damped_cnmp_pairs)),
         }
     }
 }
@@ -145,9 +147,14 @@ fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
     }
     let all: u64 = counts.iter().sum();
     Counted {
-        probabilities: (0..).zip(&counts).map(|(pairs, &yes)| probability(Some(pairs), yes, all)).collect(),
+        probabilities: (0..)
+            .zip(&counts)
+            .map(|(pairs, &yes)| probability(Some(pairs), yes, all))
+            .collect(),
         any: probability(None, all - counts[0], all),
-        share_alone: (0..results.plan.varied.len()).map(|index| Some(effects.single(index)?.value)).sum(),
+        share_alone: (0..results.plan.varied.len())
+            .map(|index| Some(effects.single(index)?.value))
+            .sum(),
         share_of_couples: effects.couples().map(|(_, share)| Some(share?.value)).sum(),
         settings: singles(&results.plan.varied, &effects),
         couples: couples(&results.plan.varied, &effects),
@@ -156,7 +163,17 @@ fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
 
 fn probability(pairs: Option<u32>, yes: u64, all: u64) -> Probability {
     let [low, high] = wilson(yes, all);
-    Probability { pairs, draws: yes, probability: if all == 0 { 0.0 } else { yes as f64 / all as f64 }, low, high }
+    Probability {
+        pairs,
+        draws: yes,
+        probability: if all == 0 {
+            0.0
+        } else {
+            yes as f64 / all as f64
+        },
+        low,
+        high,
+    }
 }
 
 fn singles(varied: &[Varied], effects: &Effects) -> Vec<Effect> {
@@ -176,7 +193,10 @@ fn singles(varied: &[Varied], effects: &Effects) -> Vec<Effect> {
 }
 
 fn direction([low, _, high]: &[Cell; 3]) -> char {
-    let (difference, sigma) = (high.probability() - low.probability(), high.sigma().hypot(low.sigma()));
+    let (difference, sigma) = (
+        high.probability() - low.probability(),
+        high.sigma().hypot(low.sigma()),
+    );
     match difference.abs() > SIGNIFICANT * sigma {
         true if difference > 0.0 => '+',
         true => '-',
@@ -186,7 +206,9 @@ fn direction([low, _, high]: &[Cell; 3]) -> char {
 
 fn couples(varied: &[Varied], effects: &Effects) -> Vec<Couple> {
     let strong = |(couple, share): ([usize; 2], Option<Share>)| {
-        share.filter(|share| share.value > SIGNIFICANT * share.noise).map(|share| (couple, share))
+        share
+            .filter(|share| share.value > SIGNIFICANT * share.noise)
+            .map(|share| (couple, share))
     };
     let mut strongest: Vec<([usize; 2], Share)> = effects.couples().filter_map(strong).collect();
     strongest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));

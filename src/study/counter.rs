@@ -4,7 +4,9 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Count, Plan};
-use crate::config::{LumpedSettings, ModalSettings, PlantSettings, Sr4dofSettings, XySettings, relations_of};
+use crate::config::{
+    LumpedSettings, ModalSettings, PlantSettings, Sr4dofSettings, XySettings, relations_of,
+};
 use crate::plant::{self, Modal, PlantError, Structure};
 use crate::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
 
@@ -23,7 +25,11 @@ impl<'a> Counter<'a> {
             table.shift_remove("model");
         }
         let pointer = |key: &str| key.strip_prefix("plant").unwrap_or(key).replace('.', "/");
-        Counter { plan, settings, pointers: plan.varied.iter().map(|one| pointer(&one.key)).collect() }
+        Counter {
+            plan,
+            settings,
+            pointers: plan.varied.iter().map(|one| pointer(&one.key)).collect(),
+        }
     }
 
     /// The count of a draw; or why its plant cannot be analysed.
@@ -37,7 +43,10 @@ impl<'a> Counter<'a> {
         if self.plan.damped {
             let structure = plant::build(plant)?;
             let damped_pairs = Some(cnmp_pairs(&damped_zeros(&structure)?) as u32);
-            return Ok(Count { damped_pairs, ..undamped(&structure)? });
+            return Ok(Count {
+                damped_pairs,
+                ..undamped(&structure)?
+            });
         }
         undamped(&plant::undamped(plant))
     }
@@ -45,17 +54,25 @@ impl<'a> Counter<'a> {
     /// The plant with these values.
     pub fn plant(&mut self, values: &[f64]) -> Result<PlantSettings, String> {
         for (pointer, value) in self.pointers.iter().zip(values) {
-            let place =
-                self.settings.pointer_mut(pointer).ok_or_else(|| format!("there is no setting at {pointer}"))?;
+            let place = self
+                .settings
+                .pointer_mut(pointer)
+                .ok_or_else(|| format!("there is no setting at {pointer}"))?;
             *place = Value::from(*value);
         }
         let settings = &self.settings;
         // The table of the model itself: one of several would be read by way of a copy, six times slower.
         let plant = match self.plan.plant {
-            PlantSettings::Sr4dof(_) => Sr4dofSettings::deserialize(settings).map(PlantSettings::Sr4dof),
+            PlantSettings::Sr4dof(_) => {
+                Sr4dofSettings::deserialize(settings).map(PlantSettings::Sr4dof)
+            }
             PlantSettings::Xy(_) => XySettings::deserialize(settings).map(PlantSettings::Xy),
-            PlantSettings::Lumped(_) => LumpedSettings::deserialize(settings).map(PlantSettings::Lumped),
-            PlantSettings::Modal(_) => ModalSettings::deserialize(settings).map(PlantSettings::Modal),
+            PlantSettings::Lumped(_) => {
+                LumpedSettings::deserialize(settings).map(PlantSettings::Lumped)
+            }
+            PlantSettings::Modal(_) => {
+                ModalSettings::deserialize(settings).map(PlantSettings::Modal)
+            }
         };
         plant.map_err(|error| error.to_string())
     }
@@ -64,5 +81,8 @@ impl<'a> Counter<'a> {
 /// The modes are asked first: what cannot move, is not held or does not respond has no zeros to count.
 fn undamped(structure: &Structure) -> Result<Count, PlantError> {
     Modal::of(structure)?;
-    Ok(Count { pairs: cnmp_pairs(&undamped_zeros(structure)?) as u32, damped_pairs: None })
+    Ok(Count {
+        pairs: cnmp_pairs(&undamped_zeros(structure)?) as u32,
+        damped_pairs: None,
+    })
 }

@@ -43,11 +43,18 @@ impl Cell {
     }
 
     pub fn sum<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Cell {
-        cells.into_iter().fold(Cell::default(), |sum, cell| Cell { all: sum.all + cell.all, yes: sum.yes + cell.yes })
+        cells.into_iter().fold(Cell::default(), |sum, cell| Cell {
+            all: sum.all + cell.all,
+            yes: sum.yes + cell.yes,
+        })
     }
 
     pub fn probability(&self) -> f64 {
-        if self.all == 0 { f64::NAN } else { self.yes as f64 / self.all as f64 }
+        if self.all == 0 {
+            f64::NAN
+        } else {
+            self.yes as f64 / self.all as f64
+        }
     }
 
     /// Of a probability in this class.
@@ -82,7 +89,9 @@ impl Effects {
             settings,
             single: vec![[Cell::default(); CLASSES]; settings],
             couple_classes,
-            couples: couples(settings).map(|_| vec![Cell::default(); couple_classes * couple_classes]).collect(),
+            couples: couples(settings)
+                .map(|_| vec![Cell::default(); couple_classes * couple_classes])
+                .collect(),
         }
     }
 
@@ -91,7 +100,10 @@ impl Effects {
         for (cells, &rank) in self.single.iter_mut().zip(ranks) {
             cells[class(rank, CLASSES)].add(yes);
         }
-        let classes: Vec<usize> = ranks.iter().map(|&rank| class(rank, self.couple_classes)).collect();
+        let classes: Vec<usize> = ranks
+            .iter()
+            .map(|&rank| class(rank, self.couple_classes))
+            .collect();
         for (cells, (i, j)) in self.couples.iter_mut().zip(couples(self.settings)) {
             cells[classes[i] * self.couple_classes + classes[j]].add(yes);
         }
@@ -113,7 +125,9 @@ impl Effects {
 
     /// What each couple explains beyond its two settings alone.
     pub fn couples(&self) -> impl Iterator<Item = ([usize; 2], Option<Share>)> + '_ {
-        couples(self.settings).zip(&self.couples).map(|((i, j), cells)| ([i, j], couple(cells, self.couple_classes)))
+        couples(self.settings)
+            .zip(&self.couples)
+            .map(|((i, j), cells)| ([i, j], couple(cells, self.couple_classes)))
     }
 
     /// The draws in which both settings of a couple lie in the same half, and in which they lie in different ones.
@@ -123,7 +137,13 @@ impl Effects {
         let (classes, half) = (self.couple_classes, self.couple_classes / 2);
         let same = |place: usize| (place / classes < half) == (place % classes < half);
         [true, false].map(|wanted| {
-            Cell::sum(cells.iter().enumerate().filter(|(place, _)| same(*place) == wanted).map(|(_, cell)| cell))
+            Cell::sum(
+                cells
+                    .iter()
+                    .enumerate()
+                    .filter(|(place, _)| same(*place) == wanted)
+                    .map(|(_, cell)| cell),
+            )
         })
     }
 }
@@ -139,8 +159,12 @@ fn couples(settings: usize) -> impl Iterator<Item = (usize, usize)> {
 fn couple(cells: &[Cell], n: usize) -> Option<Share> {
     let spread = Spread::of(cells)?;
     let line = |cells: Vec<&Cell>| Cell::sum(cells);
-    let rows: Vec<Cell> = (0..n).map(|i| line(cells[i * n..(i + 1) * n].iter().collect())).collect();
-    let columns: Vec<Cell> = (0..n).map(|j| line(cells.iter().skip(j).step_by(n).collect())).collect();
+    let rows: Vec<Cell> = (0..n)
+        .map(|i| line(cells[i * n..(i + 1) * n].iter().collect()))
+        .collect();
+    let columns: Vec<Cell> = (0..n)
+        .map(|j| line(cells.iter().skip(j).step_by(n).collect()))
+        .collect();
     let beyond = spread.between - Spread::of(&rows)?.between - Spread::of(&columns)?.between;
     Some(spread.share(beyond, ((n - 1) * (n - 1)) as f64))
 }
@@ -161,13 +185,24 @@ impl Spread {
         }
         let (draws, yes) = (sum.all as f64, sum.yes as f64);
         let occupied = cells.iter().filter(|cell| cell.all > 0);
-        let squares: f64 = occupied.clone().map(|cell| cell.yes as f64 * cell.probability()).sum();
+        let squares: f64 = occupied
+            .clone()
+            .map(|cell| cell.yes as f64 * cell.probability())
+            .sum();
         let (total, between) = (yes * (draws - yes) / draws, squares - yes * yes / draws);
-        Some(Spread { draws, total, between, noise: (total - between) / (draws - occupied.count() as f64) })
+        Some(Spread {
+            draws,
+            total,
+            between,
+            noise: (total - between) / (draws - occupied.count() as f64),
+        })
     }
 
     fn share(&self, squares: f64, freedom: f64) -> Share {
-        Share { value: (squares - freedom * self.noise) / self.total, noise: (2.0 * freedom).sqrt() / self.draws }
+        Share {
+            value: (squares - freedom * self.noise) / self.total,
+            noise: (2.0 * freedom).sqrt() / self.draws,
+        }
     }
 }
 
@@ -183,7 +218,9 @@ mod tests {
         let mut bits = Pcg64::seed_from_u64(seed);
         let mut effects = Effects::new(settings, N as u64);
         for _ in 0..N {
-            let ranks: Vec<f64> = (0..settings).map(|_| (bits.next_u64() >> 11) as f64 / (1u64 << 53) as f64).collect();
+            let ranks: Vec<f64> = (0..settings)
+                .map(|_| (bits.next_u64() >> 11) as f64 / (1u64 << 53) as f64)
+                .collect();
             effects.add(&ranks, yes(&ranks));
         }
         effects
@@ -193,11 +230,16 @@ mod tests {
     fn are(yes: impl Fn(&[f64]) -> bool, singles: [f64; 3], beyond: [f64; 3], tolerance: f64) {
         for seed in 1..=5 {
             let effects = effects(seed, 3, &yes);
-            let found = (0..3).map(|i| effects.single(i)).chain(effects.couples().map(|(_, share)| share));
+            let found = (0..3)
+                .map(|i| effects.single(i))
+                .chain(effects.couples().map(|(_, share)| share));
             for (share, expected) in found.zip(singles.into_iter().chain(beyond)) {
                 let share = share.unwrap();
                 let allowed = tolerance + 5.0 * share.noise;
-                assert!((share.value - expected).abs() < allowed, "{share:?} for {expected}, seed {seed}");
+                assert!(
+                    (share.value - expected).abs() < allowed,
+                    "{share:?} for {expected}, seed {seed}"
+                );
             }
         }
     }
@@ -210,19 +252,38 @@ mod tests {
         // x > 1/2 decides alone.
         are(|x| x[0] > 0.5, [1.0, 0.0, 0.0], [0.0; 3], 0.005);
         // Two signs alike: neither of the two alone, both together all.
-        are(|x| (x[0] > 0.5) == (x[1] > 0.5), [0.0; 3], [1.0, 0.0, 0.0], 0.005);
+        are(
+            |x| (x[0] > 0.5) == (x[1] > 0.5),
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            0.005,
+        );
         // x + y > 1: E[Y|x] = x, of variance 1/12, of 1/4; the couple takes the rest.
-        are(|x| x[0] + x[1] > 1.0, [1.0 / 3.0, 1.0 / 3.0, 0.0], [1.0 / 3.0, 0.0, 0.0], 0.04);
+        are(
+            |x| x[0] + x[1] > 1.0,
+            [1.0 / 3.0, 1.0 / 3.0, 0.0],
+            [1.0 / 3.0, 0.0, 0.0],
+            0.04,
+        );
         // x > 5/6 and y > 1/2: the edge of a class of 18, but of none of 28.
         let (a, b) = (1.0 / 6.0, 0.5);
         let singles = share_of_and(a, b);
-        are(|x| x[0] > 1.0 - a && x[1] > b, singles, [1.0 - singles[0] - singles[1], 0.0, 0.0], 0.04);
+        are(
+            |x| x[0] > 1.0 - a && x[1] > b,
+            singles,
+            [1.0 - singles[0] - singles[1], 0.0, 0.0],
+            0.04,
+        );
     }
 
     /// Shares of x > 1 - a and y > 1 - b where both are needed: p = a b.
     fn share_of_and(a: f64, b: f64) -> [f64; 3] {
         let p = a * b;
-        [(a * b * b - p * p) / (p - p * p), (b * a * a - p * p) / (p - p * p), 0.0]
+        [
+            (a * b * b - p * p) / (p - p * p),
+            (b * a * a - p * p) / (p - p * p),
+            0.0,
+        ]
     }
 
     #[test]
@@ -231,8 +292,9 @@ mod tests {
         for seed in 1..=20 {
             // The last number decides, and is not among the ones looked at.
             let effects = effects(seed, 5, |x| x[4] > 0.7);
-            let found =
-                (0..4).map(|i| effects.single(i)).chain(effects.couples().filter(|(c, _)| c[1] < 4).map(|(_, s)| s));
+            let found = (0..4)
+                .map(|i| effects.single(i))
+                .chain(effects.couples().filter(|(c, _)| c[1] < 4).map(|(_, s)| s));
             for share in found.map(Option::unwrap) {
                 let unit = share.value / share.noise;
                 (sum, squares, count) = (sum + unit, squares + unit * unit, count + 1.0);
@@ -250,7 +312,10 @@ mod tests {
         assert!((low - 0.5).abs() < 0.03 && middle == 0.0 && high == 0.0);
         let [same, opposite] = effects.halves([0, 1]).map(|cell| cell.probability());
         // A third of all x with half of all y are all in the lower halves: 1/6 of all, 1/3 of the half of all there.
-        assert!((same - 1.0 / 3.0).abs() < 0.03 && opposite == 0.0, "{same} {opposite}");
+        assert!(
+            (same - 1.0 / 3.0).abs() < 0.03 && opposite == 0.0,
+            "{same} {opposite}"
+        );
     }
 
     #[test]

@@ -29,7 +29,12 @@ struct Header {
 impl Header {
     fn json(plan: &Plan, shard: Shard) -> String {
         let (format, version) = (FORMAT.into(), env!("CARGO_PKG_VERSION").into());
-        json(&Header { format, version, shard, plan: plan.clone() })
+        json(&Header {
+            format,
+            version,
+            shard,
+            plan: plan.clone(),
+        })
     }
 }
 
@@ -57,25 +62,48 @@ impl StudyFile {
     /// it as it is.
     pub fn open(path: &Path, plan: &Plan, shard: Shard) -> Result<Opened, StudyError> {
         let name = path.display().to_string();
-        let options = File::options().read(true).write(true).create(true).truncate(false).open(path);
+        let options = File::options()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path);
         let file = options.map_err(|e| failed("open", &name, &e))?;
         lock(file.try_lock(), &name)?;
-        let mut file = StudyFile { file, path: name, header: Header::json(plan, shard) };
+        let mut file = StudyFile {
+            file,
+            path: name,
+            header: Header::json(plan, shard),
+        };
         let found = file.read()?;
         let first = record("", &file.header);
         if first.as_bytes().starts_with(&found) {
             // New; or its process died while it wrote the first line.
             file.cut(0)?;
             file.write(&first)?;
-            return Ok(Opened { file, results: Results::none(plan.clone(), shard), dropped: 0 });
+            return Ok(Opened {
+                file,
+                results: Results::none(plan.clone(), shard),
+                dropped: 0,
+            });
         }
-        let content = Content::of(&found).map_err(|why| StudyError::NotAStudy { path: file.path.clone(), why })?;
+        let content = Content::of(&found).map_err(|why| StudyError::NotAStudy {
+            path: file.path.clone(),
+            why,
+        })?;
         let differences = differences(&content.header, &file.header);
         if !differences.is_empty() {
-            return Err(StudyError::Other { path: file.path, differences });
+            return Err(StudyError::Other {
+                path: file.path,
+                differences,
+            });
         }
         file.cut(content.whole)?;
-        Ok(Opened { file, results: content.results, dropped: content.dropped })
+        Ok(Opened {
+            file,
+            results: content.results,
+            dropped: content.dropped,
+        })
     }
 
     /// Appends a block.
@@ -85,23 +113,32 @@ impl StudyFile {
 
     /// Waits until all of it is on the disk.
     pub fn sync(&self) -> Result<(), StudyError> {
-        self.file.sync_all().map_err(|e| failed("write", &self.path, &e))
+        self.file
+            .sync_all()
+            .map_err(|e| failed("write", &self.path, &e))
     }
 
     fn read(&mut self) -> Result<Vec<u8>, StudyError> {
         let mut found = Vec::new();
-        self.file.read_to_end(&mut found).map_err(|e| failed("read", &self.path, &e))?;
+        self.file
+            .read_to_end(&mut found)
+            .map_err(|e| failed("read", &self.path, &e))?;
         Ok(found)
     }
 
     /// Leaves so many bytes, and goes on behind them.
     fn cut(&mut self, bytes: u64) -> Result<(), StudyError> {
-        let cut = self.file.set_len(bytes).and_then(|()| self.file.seek(SeekFrom::Start(bytes)));
+        let cut = self
+            .file
+            .set_len(bytes)
+            .and_then(|()| self.file.seek(SeekFrom::Start(bytes)));
         cut.map(drop).map_err(|e| failed("write", &self.path, &e))
     }
 
     fn write(&mut self, line: &str) -> Result<(), StudyError> {
-        self.file.write_all(line.as_bytes()).map_err(|e| failed("write", &self.path, &e))
+        self.file
+            .write_all(line.as_bytes())
+            .map_err(|e| failed("write", &self.path, &e))
     }
 }
 
@@ -118,34 +155,56 @@ struct Content {
 impl Content {
     /// Or why it is no study.
     fn of(bytes: &[u8]) -> Result<Content, String> {
-        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let whole = bytes
+            .iter()
+            .rposition(|byte| *byte == b'\n')
+            .map_or(0, |end| end + 1);
         let text = String::from_utf8_lossy(&bytes[..whole]);
         let mut lines = text.lines();
-        let first = lines.next().and_then(|line| checked("", line)).ok_or("its first line is not a study's")?;
-        let header: Header =
-            serde_json::from_str(first).map_err(|e| format!("its first line is another version's: {e}"))?;
+        let first = lines
+            .next()
+            .and_then(|line| checked("", line))
+            .ok_or("its first line is not a study's")?;
+        let header: Header = serde_json::from_str(first)
+            .map_err(|e| format!("its first line is another version's: {e}"))?;
         if header.format != FORMAT || !header.shard.is_one() {
             return Err(format!("its format is `{}`, not `{FORMAT}`", header.format));
         }
         let mut results = Results::none(header.plan, header.shard);
-        let block = |line| checked(first, line).and_then(|json| serde_json::from_str::<Block>(json).ok());
-        let damaged = lines.filter(|line| !block(line).is_some_and(|block| results.add(block))).count();
+        let block =
+            |line| checked(first, line).and_then(|json| serde_json::from_str::<Block>(json).ok());
+        let damaged = lines
+            .filter(|line| !block(line).is_some_and(|block| results.add(block)))
+            .count();
         let torn = usize::from(whole < bytes.len());
-        Ok(Content { header: first.to_string(), results, whole: whole as u64, dropped: damaged + torn })
+        Ok(Content {
+            header: first.to_string(),
+            results,
+            whole: whole as u64,
+            dropped: damaged + torn,
+        })
     }
 }
 
 /// The study that files of shards make up together. Refuses those of other settings, and says which shards are missing, are
 /// there twice, or are not done.
 pub fn joined(paths: &[PathBuf]) -> Result<Results, StudyError> {
-    let parts = paths.iter().map(|path| part(path)).collect::<Result<Vec<_>, _>>()?;
+    let parts = paths
+        .iter()
+        .map(|path| part(path))
+        .collect::<Result<Vec<_>, _>>()?;
     let Some((first, _)) = parts.first() else {
-        return Err(StudyError::Plan("no file to join; give --join FILE...".into()));
+        return Err(StudyError::Plan(
+            "no file to join; give --join FILE...".into(),
+        ));
     };
     for (content, path) in &parts {
         let differences = differences(&shardless(&content.header), &shardless(&first.header));
         if !differences.is_empty() {
-            return Err(StudyError::Other { path: path.clone(), differences });
+            return Err(StudyError::Other {
+                path: path.clone(),
+                differences,
+            });
         }
     }
     let findings = findings(&parts);
@@ -153,7 +212,9 @@ pub fn joined(paths: &[PathBuf]) -> Result<Results, StudyError> {
         return Err(StudyError::Shards(findings));
     }
     let mut whole = Results::none(first.results.plan.clone(), Shard::WHOLE);
-    parts.into_iter().for_each(|(content, _)| whole.absorb(content.results));
+    parts
+        .into_iter()
+        .for_each(|(content, _)| whole.absorb(content.results));
     Ok(whole)
 }
 
@@ -162,7 +223,8 @@ fn part(path: &Path) -> Result<(Content, String), StudyError> {
     let mut file = File::open(path).map_err(|e| failed("open", &name, &e))?;
     lock(file.try_lock_shared(), &name)?;
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(|e| failed("read", &name, &e))?;
+    file.read_to_end(&mut bytes)
+        .map_err(|e| failed("read", &name, &e))?;
     match Content::of(&bytes) {
         Ok(content) => Ok((content, name)),
         Err(why) => Err(StudyError::NotAStudy { path: name, why }),
@@ -177,13 +239,32 @@ fn shardless(header: &str) -> String {
 }
 
 fn findings(parts: &[(Content, String)]) -> Vec<String> {
-    let count = parts.first().map_or(0, |(content, _)| content.results.shard.count);
-    let of = |index: u64| parts.iter().filter(move |(content, _)| content.results.shard.index == index);
-    let absent: Vec<String> = (1..=count).filter(|&index| of(index).next().is_none()).map(|i| i.to_string()).collect();
-    let absent = (!absent.is_empty()).then(|| format!("  of {count} shards there is no file of {}", absent.join(", ")));
+    let count = parts
+        .first()
+        .map_or(0, |(content, _)| content.results.shard.count);
+    let of = |index: u64| {
+        parts
+            .iter()
+            .filter(move |(content, _)| content.results.shard.index == index)
+    };
+    let absent: Vec<String> = (1..=count)
+        .filter(|&index| of(index).next().is_none())
+        .map(|i| i.to_string())
+        .collect();
+    let absent = (!absent.is_empty()).then(|| {
+        format!(
+            "  of {count} shards there is no file of {}",
+            absent.join(", ")
+        )
+    });
     let twice = |index: u64| {
         let names: Vec<&str> = of(index).map(|(_, name)| name.as_str()).collect();
-        (names.len() > 1).then(|| format!("  shard {index}/{count} is there more than once: {}", names.join(", ")))
+        (names.len() > 1).then(|| {
+            format!(
+                "  shard {index}/{count} is there more than once: {}",
+                names.join(", ")
+            )
+        })
     };
     let twice = parts
         .iter()
@@ -191,7 +272,11 @@ fn findings(parts: &[(Content, String)]) -> Vec<String> {
         .collect::<std::collections::BTreeSet<_>>()
         .into_iter()
         .filter_map(twice);
-    absent.into_iter().chain(twice).chain(parts.iter().filter_map(not_done)).collect()
+    absent
+        .into_iter()
+        .chain(twice)
+        .chain(parts.iter().filter_map(not_done))
+        .collect()
 }
 
 fn not_done((content, name): &(Content, String)) -> Option<String> {
@@ -228,14 +313,21 @@ fn checked<'a>(header: &str, line: &'a str) -> Option<&'a str> {
 
 /// A line for each setting in which two headers differ, both JSON.
 pub(crate) fn differences(theirs: &str, ours: &str) -> Vec<String> {
-    let [theirs, ours] = [theirs, ours].map(|text| serde_json::from_str::<Value>(text).unwrap_or_default());
+    let [theirs, ours] =
+        [theirs, ours].map(|text| serde_json::from_str::<Value>(text).unwrap_or_default());
     let mut found = Vec::new();
     differ("", &theirs, &ours, &mut found);
     found
 }
 
 fn differ(path: &str, theirs: &Value, ours: &Value, found: &mut Vec<String>) {
-    let below = |key: &str| if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
+    let below = |key: &str| {
+        if path.is_empty() {
+            key.to_string()
+        } else {
+            format!("{path}.{key}")
+        }
+    };
     match (theirs, ours) {
         (a, b) if a == b => {}
         (Value::Object(a), Value::Object(b)) => {
@@ -269,8 +361,15 @@ fn lock(locked: Result<(), TryLockError>, path: &str) -> Result<(), StudyError> 
 
 fn failed(what: &'static str, path: &str, error: &std::io::Error) -> StudyError {
     let remedy = match what {
-        "write" => "what is done so far is kept: make room and start it again with the same arguments",
+        "write" => {
+            "what is done so far is kept: make room and start it again with the same arguments"
+        }
         _ => "check that the file can be read and written",
     };
-    StudyError::File { what, path: path.into(), why: error.to_string(), remedy }
+    StudyError::File {
+        what,
+        path: path.into(),
+        why: error.to_string(),
+        remedy,
+    }
 }

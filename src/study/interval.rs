@@ -18,8 +18,16 @@ pub(super) fn wilson(yes: u64, all: u64) -> [f64; 2] {
     let (centre, scale) = (p + Z * Z / (2.0 * n), 1.0 + Z * Z / n);
     let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
     // At its ends the interval is exactly 0 or 1, which rounding would miss.
-    let low = if yes == 0 { 0.0 } else { (centre - half) / scale };
-    let high = if yes == all { 1.0 } else { (centre + half) / scale };
+    let low = if yes == 0 {
+        0.0
+    } else {
+        (centre - half) / scale
+    };
+    let high = if yes == all {
+        1.0
+    } else {
+        (centre + half) / scale
+    };
     [low, high]
 }
 
@@ -30,7 +38,14 @@ mod tests {
     #[test]
     fn the_ends_solve_the_score_equation() {
         // Both ends w satisfy (p - w)^2 = z^2 w (1 - w)/n.
-        for (yes, all) in [(1, 10), (5, 10), (9, 10), (388, 1000), (12_040, 20_000), (1, 1_000_000)] {
+        for (yes, all) in [
+            (1, 10),
+            (5, 10),
+            (9, 10),
+            (388, 1000),
+            (12_040, 20_000),
+            (1, 1_000_000),
+        ] {
             let p = yes as f64 / all as f64;
             let [low, high] = wilson(yes, all);
             assert!(low < p && p < high);

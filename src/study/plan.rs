@@ -60,7 +60,8 @@ impl Shard {
     /// Its draws: the I-th of N equal parts, to one draw.
     pub fn draws(&self, plan: &Plan) -> Range<u64> {
         // 128 bits hold the product of any two counts of 64.
-        let limit = |part: u64| (u128::from(plan.draws) * u128::from(part) / u128::from(self.count)) as u64;
+        let limit =
+            |part: u64| (u128::from(plan.draws) * u128::from(part) / u128::from(self.count)) as u64;
         limit(self.index - 1)..limit(self.index)
     }
 }
@@ -69,9 +70,13 @@ impl FromStr for Shard {
     type Err = StudyError;
 
     fn from_str(text: &str) -> Result<Shard, StudyError> {
-        let parts = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+        let parts = text
+            .split_once('/')
+            .and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
         let shard = parts.map(|(index, count)| Shard { index, count });
-        shard.filter(Shard::is_one).ok_or_else(|| StudyError::Shard(text.into()))
+        shard
+            .filter(Shard::is_one)
+            .ok_or_else(|| StudyError::Shard(text.into()))
     }
 }
 
@@ -99,12 +104,25 @@ pub struct Drawn {
 impl Plan {
     /// A plan over a configuration. Refuses a nominal plant that cannot be analysed, and a tolerance one end of which leaves
     /// what is allowed: a draw left out for that would bend the probabilities.
-    pub fn new(config: &Config, tolerances: &[Tolerance], draws: u64, damped: bool) -> Result<Plan, StudyError> {
+    pub fn new(
+        config: &Config,
+        tolerances: &[Tolerance],
+        draws: u64,
+        damped: bool,
+    ) -> Result<Plan, StudyError> {
         if !(1..=MOST_DRAWS).contains(&draws) {
-            return Err(StudyError::Plan(format!("{draws} draws; give --draws from 1 to {MOST_DRAWS}")));
+            return Err(StudyError::Plan(format!(
+                "{draws} draws; give --draws from 1 to {MOST_DRAWS}"
+            )));
         }
         let varied = varied(&config.plant, tolerances)?;
-        let plan = Plan { plant: config.plant.clone(), varied, seed: config.sim.seed, draws, damped };
+        let plan = Plan {
+            plant: config.plant.clone(),
+            varied,
+            seed: config.sim.seed,
+            draws,
+            damped,
+        };
         plan.check(config)?;
         Ok(plan)
     }
@@ -112,7 +130,8 @@ impl Plan {
     fn check(&self, config: &Config) -> Result<(), StudyError> {
         let mut counter = Counter::new(self);
         let nominal: Vec<f64> = self.varied.iter().map(|one| one.nominal).collect();
-        let wrong = |why: String| StudyError::Plan(format!("the nominal plant cannot be analysed: {why}"));
+        let wrong =
+            |why: String| StudyError::Plan(format!("the nominal plant cannot be analysed: {why}"));
         counter.count(&nominal).map_err(wrong)?;
         for (index, one) in self.varied.iter().enumerate() {
             for end in one.deviation.ends() {
@@ -125,7 +144,11 @@ impl Plan {
                     ))
                 };
                 let plant = counter.plant(&values).map_err(reaches)?;
-                recheck(&Config { plant, ..config.clone() }).map_err(|error| reaches(error.to_string()))?;
+                recheck(&Config {
+                    plant,
+                    ..config.clone()
+                })
+                .map_err(|error| reaches(error.to_string()))?;
             }
         }
         Ok(())
@@ -140,7 +163,9 @@ impl Plan {
         bits.advance(2 * self.varied.len() as u128 * u128::from(first));
         std::iter::repeat_with(move || {
             let drawn = self.varied.iter().map(|one| {
-                let (deviation, rank) = one.deviation.drawn([uniform(&mut bits), uniform(&mut bits)]);
+                let (deviation, rank) = one
+                    .deviation
+                    .drawn([uniform(&mut bits), uniform(&mut bits)]);
                 (one.nominal + deviation, rank)
             });
             let (values, ranks) = drawn.unzip();
@@ -158,39 +183,62 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
     let settings = settings(plant);
     let mut varied: Vec<Varied> = Vec::new();
     for tolerance in tolerances {
-        let matched: Vec<&(String, Value)> = settings.iter().filter(|(key, _)| tolerance.matches(key)).collect();
-        let numbers: Vec<(&String, f64)> =
-            matched.iter().filter(|(_, value)| value.is_f64()).filter_map(|(k, v)| Some((k, v.as_f64()?))).collect();
+        let matched: Vec<&(String, Value)> = settings
+            .iter()
+            .filter(|(key, _)| tolerance.matches(key))
+            .collect();
+        let numbers: Vec<(&String, f64)> = matched
+            .iter()
+            .filter(|(_, value)| value.is_f64())
+            .filter_map(|(k, v)| Some((k, v.as_f64()?)))
+            .collect();
         if numbers.is_empty() {
-            return Err(nothing(tolerance, &settings, matched.first().map(|(key, _)| key.as_str())));
+            return Err(nothing(
+                tolerance,
+                &settings,
+                matched.first().map(|(key, _)| key.as_str()),
+            ));
         }
         for (key, nominal) in numbers {
             if varied.iter().any(|one| one.key == *key) {
-                return Err(tolerance.wrong(format!("`{key}` varies already; name each setting once")));
+                return Err(
+                    tolerance.wrong(format!("`{key}` varies already; name each setting once"))
+                );
             }
-            varied.push(Varied { key: key.clone(), nominal, deviation: tolerance.deviation(key, nominal)? });
+            varied.push(Varied {
+                key: key.clone(),
+                nominal,
+                deviation: tolerance.deviation(key, nominal)?,
+            });
         }
     }
     match varied.len() {
-        0 => {
-            Err(StudyError::Plan("nothing varies; give --vary KEY=TOLERANCE, as in plant.mass_asymmetry=+-0.02".into()))
-        }
-        count if count > MOST_VARIED => {
-            Err(StudyError::Plan(format!("{count} settings would vary; {MOST_VARIED} may: name fewer")))
-        }
+        0 => Err(StudyError::Plan(
+            "nothing varies; give --vary KEY=TOLERANCE, as in plant.mass_asymmetry=+-0.02".into(),
+        )),
+        count if count > MOST_VARIED => Err(StudyError::Plan(format!(
+            "{count} settings would vary; {MOST_VARIED} may: name fewer"
+        ))),
         _ => Ok(varied),
     }
 }
 
-fn nothing(tolerance: &Tolerance, settings: &[(String, Value)], no_number: Option<&str>) -> StudyError {
+fn nothing(
+    tolerance: &Tolerance,
+    settings: &[(String, Value)],
+    no_number: Option<&str>,
+) -> StudyError {
     let pattern = tolerance.pattern();
     tolerance.wrong(match no_number {
         Some(key) => format!("`{key}` is no quantity: only those can deviate"),
         None if !pattern.starts_with("plant.") => {
-            format!("`{pattern}` is not of the plant; a study varies settings that begin with `plant.`")
+            format!(
+                "`{pattern}` is not of the plant; a study varies settings that begin with `plant.`"
+            )
         }
         None => {
-            let hint = nearest(pattern, settings.iter().map(|(key, _)| key.as_str())).unwrap_or("plant");
+            let hint =
+                nearest(pattern, settings.iter().map(|(key, _)| key.as_str())).unwrap_or("plant");
             format!("`{pattern}` is not a setting of this plant; the nearest is `{hint}`")
         }
     })
@@ -199,15 +247,19 @@ fn nothing(tolerance: &Tolerance, settings: &[(String, Value)], no_number: Optio
 /// All settings of a plant, with their dotted paths.
 fn settings(plant: &PlantSettings) -> Vec<(String, Value)> {
     let mut found = Vec::new();
-    leaves("plant", &serde_json::to_value(plant).unwrap_or_default(), &mut found);
+    leaves(
+        "plant",
+        &serde_json::to_value(plant).unwrap_or_default(),
+        &mut found,
+    );
     found
 }
 
 fn leaves(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
     match value {
-        Value::Object(entries) => {
-            entries.iter().for_each(|(key, value)| leaves(&format!("{path}.{key}"), value, found))
-        }
+        Value::Object(entries) => entries
+            .iter()
+            .for_each(|(key, value)| leaves(&format!("{path}.{key}"), value, found)),
         leaf => found.push((path.into(), leaf.clone())),
     }
 }
@@ -218,9 +270,19 @@ mod tests {
     use crate::config::{Source, load};
 
     fn plan(draws: u64, seed: u64) -> Plan {
-        let source = Source { config: Some("xy".into()), sets: vec![format!("sim.seed={seed}")], ..Source::default() };
-        let tolerances = ["plant.secondary_mass_deviation.*=+-0.15", "plant.*_stage_mass_kg=normal:1%"];
-        let tolerances: Vec<Tolerance> = tolerances.iter().map(|text| text.parse().unwrap()).collect();
+        let source = Source {
+            config: Some("xy".into()),
+            sets: vec![format!("sim.seed={seed}")],
+            ..Source::default()
+        };
+        let tolerances = [
+            "plant.secondary_mass_deviation.*=+-0.15",
+            "plant.*_stage_mass_kg=normal:1%",
+        ];
+        let tolerances: Vec<Tolerance> = tolerances
+            .iter()
+            .map(|text| text.parse().unwrap())
+            .collect();
         Plan::new(&load(&source).unwrap(), &tolerances, draws, false).unwrap()
     }
 
@@ -241,29 +303,49 @@ mod tests {
         let (plan, other) = (plan(N as u64, 1), plan(N as u64, 2));
         let columns = |plan: &Plan| {
             let drawn: Vec<Drawn> = plan.from_draw(0).take(N).collect();
-            (0..11).map(|j| drawn.iter().map(|d| d.ranks[j] - 0.5).collect::<Vec<f64>>()).collect::<Vec<_>>()
+            (0..11)
+                .map(|j| drawn.iter().map(|d| d.ranks[j] - 0.5).collect::<Vec<f64>>())
+                .collect::<Vec<_>>()
         };
         let (here, there) = (columns(&plan), columns(&other));
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / N as f64;
+        let product =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / N as f64;
         for (i, a) in here.iter().enumerate() {
             // Of a uniform rank: mean 0, variance 1/12; of N of them the mean has a sigma of sqrt(1/12/N), a product of two
             // 1/12/sqrt(N), the variance sqrt(1/80 - 1/144)/sqrt(N). Five of them.
             let (root, ones) = ((N as f64).sqrt(), vec![1.0; N]);
             assert!(product(a, &ones).abs() < 5.0 * (1.0 / 12.0f64).sqrt() / root);
-            assert!((product(a, a) - 1.0 / 12.0).abs() < 5.0 * (1.0 / 80.0 - 1.0 / 144.0f64).sqrt() / root);
+            assert!(
+                (product(a, a) - 1.0 / 12.0).abs()
+                    < 5.0 * (1.0 / 80.0 - 1.0 / 144.0f64).sqrt() / root
+            );
             for b in here[..i].iter().chain(&there) {
                 assert!(product(a, b).abs() < 5.0 / 12.0 / root);
             }
         }
-        let masses: Vec<f64> = plan.from_draw(0).take(N).map(|d| d.values[8] / plan.varied[8].nominal - 1.0).collect();
+        let masses: Vec<f64> = plan
+            .from_draw(0)
+            .take(N)
+            .map(|d| d.values[8] / plan.varied[8].nominal - 1.0)
+            .collect();
         let sigma = (masses.iter().map(|x| x * x).sum::<f64>() / N as f64).sqrt();
         // The sigma of a sigma is sigma/sqrt(2 N).
-        assert!((sigma - 0.01).abs() < 5.0 * 0.01 / (2.0 * N as f64).sqrt(), "{sigma}");
+        assert!(
+            (sigma - 0.01).abs() < 5.0 * 0.01 / (2.0 * N as f64).sqrt(),
+            "{sigma}"
+        );
     }
 
     #[test]
     fn shards_cover_every_draw_once() {
-        for (draws, count) in [(1, 1), (10, 3), (7, 7), (3, 5), (20_000, 8), (100_000_000, 999_983)] {
+        for (draws, count) in [
+            (1, 1),
+            (10, 3),
+            (7, 7),
+            (3, 5),
+            (20_000, 8),
+            (100_000_000, 999_983),
+        ] {
             let plan = plan(draws, 1);
             let mut next = 0;
             for index in 1..=count {

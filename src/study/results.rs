@@ -43,17 +43,25 @@ pub struct Block {
 
 impl Block {
     pub(super) fn new(first: u64) -> Block {
-        Block { first, cnmp_pairs: Vec::new(), damped_cnmp_pairs: Vec::new(), failures: Vec::new() }
+        Block {
+            first,
+            cnmp_pairs: Vec::new(),
+            damped_cnmp_pairs: Vec::new(),
+            failures: Vec::new(),
+        }
     }
 
     /// Adds what the next draw gave.
     pub(super) fn push(&mut self, counted: Result<Count, String>, damped: bool) {
         if damped {
-            self.damped_cnmp_pairs.push(counted.as_ref().ok().and_then(|count| count.damped_pairs));
+            self.damped_cnmp_pairs
+                .push(counted.as_ref().ok().and_then(|count| count.damped_pairs));
         }
         let draw = self.first + self.cnmp_pairs.len() as u64;
-        self.cnmp_pairs.push(counted.as_ref().ok().map(|count| count.pairs));
-        self.failures.extend(counted.err().map(|why| Failure { draw, why }));
+        self.cnmp_pairs
+            .push(counted.as_ref().ok().map(|count| count.pairs));
+        self.failures
+            .extend(counted.err().map(|why| Failure { draw, why }));
     }
 
     /// Whether it is one of a shard's blocks, and whole.
@@ -77,25 +85,33 @@ pub struct Results {
 impl Results {
     /// Nothing yet.
     pub fn none(plan: Plan, shard: Shard) -> Results {
-        Results { plan, shard, blocks: BTreeMap::new() }
+        Results {
+            plan,
+            shard,
+            blocks: BTreeMap::new(),
+        }
     }
 
     /// The ranges of draws that are the shard's blocks.
     fn ranges(&self) -> impl Iterator<Item = Range<u64>> + use<> {
         let all = self.shard.draws(&self.plan);
         let end = all.end;
-        all.step_by(BLOCK as usize).map(move |first| first..end.min(first + BLOCK))
+        all.step_by(BLOCK as usize)
+            .map(move |first| first..end.min(first + BLOCK))
     }
 
     /// The ranges of draws that are still to do, block by block; of a shard that is not joined from others.
     pub fn missing(&self) -> Vec<Range<u64>> {
-        self.ranges().filter(|range| !self.blocks.contains_key(&range.start)).collect()
+        self.ranges()
+            .filter(|range| !self.blocks.contains_key(&range.start))
+            .collect()
     }
 
     /// Adds a block; says whether it is one.
     pub fn add(&mut self, block: Block) -> bool {
         let draws = self.shard.draws(&self.plan);
-        let aligned = draws.contains(&block.first) && (block.first - draws.start).is_multiple_of(BLOCK);
+        let aligned =
+            draws.contains(&block.first) && (block.first - draws.start).is_multiple_of(BLOCK);
         let range = block.first..draws.end.min(block.first.saturating_add(BLOCK));
         let good = aligned && block.fits(&self.plan, &range);
         if good {
@@ -117,7 +133,9 @@ impl Results {
 
     /// How many draws are done.
     pub fn done(&self) -> u64 {
-        self.blocks().map(|block| block.cnmp_pairs.len() as u64).sum()
+        self.blocks()
+            .map(|block| block.cnmp_pairs.len() as u64)
+            .sum()
     }
 
     /// What is done, in the order of the draws.

@@ -44,9 +44,13 @@ impl Deviation {
         match *self {
             Deviation::Uniform { low, high } => (low + (high - low) * a, a),
             Deviation::Normal { sigma } => {
-                let unit = libm::sqrt(-2.0 * libm::log(1.0 - a)) * libm::cos(2.0 * std::f64::consts::PI * b);
+                let unit = libm::sqrt(-2.0 * libm::log(1.0 - a))
+                    * libm::cos(2.0 * std::f64::consts::PI * b);
                 let unit = unit.clamp(-NORMAL_END, NORMAL_END);
-                (sigma * unit, 0.5 * libm::erfc(-unit * std::f64::consts::FRAC_1_SQRT_2))
+                (
+                    sigma * unit,
+                    0.5 * libm::erfc(-unit * std::f64::consts::FRAC_1_SQRT_2),
+                )
             }
         }
     }
@@ -73,12 +77,16 @@ impl FromStr for Tolerance {
     type Err = StudyError;
 
     fn from_str(text: &str) -> Result<Tolerance, StudyError> {
-        let wrong = |why: String| StudyError::Tolerance { text: text.into(), why };
-        let usage =
-            "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
+        let wrong = |why: String| StudyError::Tolerance {
+            text: text.into(),
+            why,
+        };
+        let usage = "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
         let (pattern, amounts) = text.split_once('=').ok_or_else(|| wrong(usage.into()))?;
         let number = |text: &str| quantity::parse(text).map_err(|e| wrong(e.to_string()));
-        let limit = ["+-", "±"].iter().find_map(|sign| amounts.trim().strip_prefix(sign));
+        let limit = ["+-", "±"]
+            .iter()
+            .find_map(|sign| amounts.trim().strip_prefix(sign));
         let parts: Vec<&str> = amounts.split(':').map(str::trim).collect();
         let amounts = match (limit, parts.as_slice()) {
             (Some(limit), _) => {
@@ -89,7 +97,11 @@ impl FromStr for Tolerance {
             (None, ["normal", sigma]) => Amounts::Normal(number(sigma)?),
             _ => return Err(wrong(usage.into())),
         };
-        Ok(Tolerance { text: text.into(), pattern: pattern.trim().into(), amounts })
+        Ok(Tolerance {
+            text: text.into(),
+            pattern: pattern.trim().into(),
+            amounts,
+        })
     }
 }
 
@@ -110,7 +122,8 @@ impl Tolerance {
     /// Whether it is about this key.
     pub fn matches(&self, key: &str) -> bool {
         let (patterns, parts) = (self.pattern.split('.'), key.split('.'));
-        patterns.clone().count() == parts.clone().count() && patterns.zip(parts).all(|(p, part)| glob(p, part))
+        patterns.clone().count() == parts.clone().count()
+            && patterns.zip(parts).all(|(p, part)| glob(p, part))
     }
 
     /// The deviation of one of its settings from a nominal value. Refuses one that is empty, that is a length where there is
@@ -120,14 +133,24 @@ impl Tolerance {
         match self.amounts {
             Amounts::Uniform(low, high) => {
                 let (low, high) = (amount(low)?, amount(high)?);
-                let why =
-                    format!("an empty tolerance of `{key}`: from {low} to {high}; give a lower and a higher limit");
-                if low < high { Ok(Deviation::Uniform { low, high }) } else { Err(self.wrong(why)) }
+                let why = format!(
+                    "an empty tolerance of `{key}`: from {low} to {high}; give a lower and a higher limit"
+                );
+                if low < high {
+                    Ok(Deviation::Uniform { low, high })
+                } else {
+                    Err(self.wrong(why))
+                }
             }
             Amounts::Normal(sigma) => {
                 let sigma = amount(sigma)?;
-                let why = format!("the standard deviation of `{key}` is {sigma}; give one above zero");
-                if sigma > 0.0 { Ok(Deviation::Normal { sigma }) } else { Err(self.wrong(why)) }
+                let why =
+                    format!("the standard deviation of `{key}` is {sigma}; give one above zero");
+                if sigma > 0.0 {
+                    Ok(Deviation::Normal { sigma })
+                } else {
+                    Err(self.wrong(why))
+                }
             }
         }
     }
@@ -146,7 +169,10 @@ impl Tolerance {
 
     /// A refusal of this tolerance.
     pub fn wrong(&self, why: String) -> StudyError {
-        StudyError::Tolerance { text: self.text.clone(), why }
+        StudyError::Tolerance {
+            text: self.text.clone(),
+            why,
+        }
     }
 }
 
@@ -175,21 +201,41 @@ mod tests {
         assert_eq!(deviation("k=uniform:-0.5:2", "k", 7.0), uniform(-0.5, 2.0));
         assert_eq!(deviation("k=+-50%", "k", -3.0), uniform(-1.5, 1.5));
         assert_eq!(deviation("k = ±2", "k", 0.0), uniform(-2.0, 2.0));
-        assert_eq!(deviation("y_m=uniform:-1mm:0.5", "y_m", 0.0), uniform(-1e-3, 0.5));
-        assert_eq!(deviation("k=normal:25%", "k", 4.0), Ok(Deviation::Normal { sigma: 1.0 }));
+        assert_eq!(
+            deviation("y_m=uniform:-1mm:0.5", "y_m", 0.0),
+            uniform(-1e-3, 0.5)
+        );
+        assert_eq!(
+            deviation("k=normal:25%", "k", 4.0),
+            Ok(Deviation::Normal { sigma: 1.0 })
+        );
     }
 
     #[test]
     fn a_star_stands_for_part_of_one_name() {
         let tolerance: Tolerance = "plant.*.s*=+-1".parse().unwrap();
-        for (key, good) in [("plant.a.s", true), ("plant.a.sL", true), ("plant.a.gL", false), ("plant.a.b.sL", false)] {
+        for (key, good) in [
+            ("plant.a.s", true),
+            ("plant.a.sL", true),
+            ("plant.a.gL", false),
+            ("plant.a.b.sL", false),
+        ] {
             assert_eq!(tolerance.matches(key), good, "{key}");
         }
     }
 
     #[test]
     fn what_is_no_tolerance_is_refused_with_the_text() {
-        for text in ["k", "k=", "k=uniform:1", "k=uniform:1:x", "k=normal:", "k=gauss:1", "k=+-", "k=uniform:1:2:3"] {
+        for text in [
+            "k",
+            "k=",
+            "k=uniform:1",
+            "k=uniform:1:x",
+            "k=normal:",
+            "k=gauss:1",
+            "k=+-",
+            "k=uniform:1:2:3",
+        ] {
             let error = text.parse::<Tolerance>().unwrap_err().to_string();
             assert!(error.contains(text), "{error}");
         }
@@ -213,16 +259,24 @@ mod tests {
 
     #[test]
     fn ranks_are_those_of_the_distributions() {
-        let uniform = Deviation::Uniform { low: -1.0, high: 3.0 };
+        let uniform = Deviation::Uniform {
+            low: -1.0,
+            high: 3.0,
+        };
         assert_eq!(uniform.drawn([0.25, 0.9]), (0.0, 0.25));
         let normal = Deviation::Normal { sigma: 2.0 };
         // sqrt(-2 ln(1 - a)) = 1 at a = 1 - exp(-1/2); the normal distribution function at 1 is 0.8413447460685429.
         let one = 1.0 - (-0.5f64).exp();
-        for (b, value, rank) in
-            [(0.0, 2.0, 0.841_344_746_068_542_9), (0.5, -2.0, 0.158_655_253_931_457_05), (0.25, 0.0, 0.5)]
-        {
+        for (b, value, rank) in [
+            (0.0, 2.0, 0.841_344_746_068_542_9),
+            (0.5, -2.0, 0.158_655_253_931_457_05),
+            (0.25, 0.0, 0.5),
+        ] {
             let drawn = normal.drawn([one, b]);
-            assert!((drawn.0 - value).abs() < 1e-14 && (drawn.1 - rank).abs() < 1e-14, "{drawn:?}");
+            assert!(
+                (drawn.0 - value).abs() < 1e-14 && (drawn.1 - rank).abs() < 1e-14,
+                "{drawn:?}"
+            );
         }
         // Ten roundings of 1e-16 beside the largest number there is below 1.
         assert_eq!(normal.drawn([1.0 - f64::EPSILON / 2.0, 0.0]).0, 12.0);

@@ -34,10 +34,18 @@ pub fn count<E>(
     })
 }
 
-fn work(plan: &Plan, ranges: &[Range<u64>], next: &AtomicUsize, stopped: &impl Fn() -> bool, done: &SyncSender<Block>) {
+fn work(
+    plan: &Plan,
+    ranges: &[Range<u64>],
+    next: &AtomicUsize,
+    stopped: &impl Fn() -> bool,
+    done: &SyncSender<Block>,
+) {
     let mut counter = Counter::new(plan);
     while let Some(range) = ranges.get(next.fetch_add(1, Ordering::Relaxed)) {
-        let Some(block) = block(plan, &mut counter, range, stopped) else { return };
+        let Some(block) = block(plan, &mut counter, range, stopped) else {
+            return;
+        };
         if done.send(block).is_err() {
             return;
         }
@@ -45,7 +53,12 @@ fn work(plan: &Plan, ranges: &[Range<u64>], next: &AtomicUsize, stopped: &impl F
 }
 
 /// The block of a range; none when stopped on the way.
-fn block(plan: &Plan, counter: &mut Counter, range: &Range<u64>, stopped: &impl Fn() -> bool) -> Option<Block> {
+fn block(
+    plan: &Plan,
+    counter: &mut Counter,
+    range: &Range<u64>,
+    stopped: &impl Fn() -> bool,
+) -> Option<Block> {
     let mut block = Block::new(range.start);
     for (_, drawn) in range.clone().zip(plan.from_draw(range.start)) {
         if stopped() {

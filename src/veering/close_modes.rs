@@ -48,14 +48,26 @@ impl CloseModes {
     /// Of all modes the two of `pair`, in either order; `None` where their frequencies are the same or one is 0.
     pub fn of(terms: &[Term], pair: [usize; 2]) -> Option<CloseModes> {
         let [i, j] = pair.map(|mode| terms[mode]);
-        let (u, v) = if i.omega_rad_s < j.omega_rad_s { (i, j) } else { (j, i) };
+        let (u, v) = if i.omega_rad_s < j.omega_rad_s {
+            (i, j)
+        } else {
+            (j, i)
+        };
         let apart = 0.0 < u.omega_rad_s && u.omega_rad_s < v.omega_rad_s;
-        apart.then(|| CloseModes { u, v, remainder: Remainder::of(terms, pair, [u.omega_rad_s, v.omega_rad_s]) })
+        apart.then(|| CloseModes {
+            u,
+            v,
+            remainder: Remainder::of(terms, pair, [u.omega_rad_s, v.omega_rad_s]),
+        })
     }
 
     /// The residues aR, au, av in 1/kg.
     pub fn residues_per_kg(&self) -> [f64; 3] {
-        [self.remainder.residue_per_kg, self.u.residue_per_kg, self.v.residue_per_kg]
+        [
+            self.remainder.residue_per_kg,
+            self.u.residue_per_kg,
+            self.v.residue_per_kg,
+        ]
     }
 
     /// wv^2 - wu^2 over wu^2.
@@ -71,7 +83,9 @@ impl CloseModes {
 
     /// |b21-hat| and |b22-hat| of Eq. (4-10) in 1/kg, the smaller first. They are critical only where au av < 0.
     pub fn critical_b2_per_kg(&self) -> [f64; 2] {
-        let root = |term: &Term| term.residue_per_kg.abs().sqrt() * (term.omega_rad_s / self.u.omega_rad_s);
+        let root = |term: &Term| {
+            term.residue_per_kg.abs().sqrt() * (term.omega_rad_s / self.u.omega_rad_s)
+        };
         let (ru, rv) = (root(&self.u), root(&self.v));
         [(rv - ru) * (rv - ru), (rv + ru) * (rv + ru)]
     }
@@ -95,21 +109,32 @@ impl CloseModes {
 
 impl Remainder {
     fn of(terms: &[Term], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
-        let others = || terms.iter().enumerate().filter(|(mode, _)| !pair.contains(mode));
+        let others = || {
+            terms
+                .iter()
+                .enumerate()
+                .filter(|(mode, _)| !pair.contains(mode))
+        };
         let all = |w: f64| others().map(|(_, term)| term.part(w)).sum::<f64>();
         let middle = (wu * wv).sqrt();
         let residue_per_kg = -middle * middle * all(middle);
-        let largest = others().max_by(|a, b| a.1.part(middle).abs().total_cmp(&b.1.part(middle).abs()));
+        let largest =
+            others().max_by(|a, b| a.1.part(middle).abs().total_cmp(&b.1.part(middle).abs()));
         let largest = largest.filter(|(_, term)| term.part(middle) != 0.0);
         let departure = |w: f64| (-w * w * all(w) / residue_per_kg - 1.0).abs();
         let near = |w: f64| if w < wu { w / wu } else { wv / w };
         Remainder {
             residue_per_kg,
             mode: largest.map(|(mode, _)| mode),
-            others_ratio: largest
-                .map_or(0.0, |(_, term)| ((all(middle) - term.part(middle)) / term.part(middle)).abs()),
+            others_ratio: largest.map_or(0.0, |(_, term)| {
+                ((all(middle) - term.part(middle)) / term.part(middle)).abs()
+            }),
             nearness_ratio: largest.map_or(0.0, |(_, term)| near(term.omega_rad_s)),
-            integrator_ratio: if residue_per_kg == 0.0 { 0.0 } else { departure(wu).max(departure(wv)) },
+            integrator_ratio: if residue_per_kg == 0.0 {
+                0.0
+            } else {
+                departure(wu).max(departure(wv))
+            },
         }
     }
 }

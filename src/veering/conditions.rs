@@ -40,13 +40,23 @@ pub struct Condition {
 
 impl Condition {
     fn by_margin(name: &'static str, figure: f64, limits: [f64; 2], margin: f64) -> Condition {
-        Condition { name, holds: margin > 0.0, figure, limits, margin }
+        Condition {
+            name,
+            holds: margin > 0.0,
+            figure,
+            limits,
+            margin,
+        }
     }
 }
 
 /// Signs + - + or - + -, the better of the two for the residues aR, au, av: the sign of aR and av in it.
 pub fn pattern(residues_per_kg: [f64; 3]) -> f64 {
-    let worst = |sign: f64| fit(residues_per_kg, sign).into_iter().fold(f64::INFINITY, f64::min);
+    let worst = |sign: f64| {
+        fit(residues_per_kg, sign)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    };
     if worst(1.0) >= worst(-1.0) { 1.0 } else { -1.0 }
 }
 
@@ -59,7 +69,13 @@ fn fit([r, u, v]: [f64; 3], sign: f64) -> [f64; 3] {
 /// Which of R, u, v (0 to 2) decides on Condition C4-1: the one that would have to turn, or that turns first.
 pub fn deciding_residue(residues_per_kg: [f64; 3]) -> usize {
     let fit = fit(residues_per_kg, pattern(residues_per_kg));
-    (1..3).fold(0, |least, which| if fit[which] < fit[least] { which } else { least })
+    (1..3).fold(0, |least, which| {
+        if fit[which] < fit[least] {
+            which
+        } else {
+            least
+        }
+    })
 }
 
 /// C4-1: aR, au, av form a sequence of alternating signs.
@@ -72,14 +88,22 @@ pub fn c4_1(modes: &CloseModes) -> Condition {
 /// C4-2: b2-hat between b21-hat and b22-hat. Figure and limits in 1/kg.
 pub fn c4_2(modes: &CloseModes) -> Condition {
     let (figure, [low, high]) = (modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
-    let margin = if modes.are_opposed() { (figure - low).min(high - figure) / high } else { to_oppose(modes) };
+    let margin = if modes.are_opposed() {
+        (figure - low).min(high - figure) / high
+    } else {
+        to_oppose(modes)
+    };
     Condition::by_margin("C4-2", figure, [low, high], margin)
 }
 
 /// C4-4 at one value: b2-hat beyond b21-hat. Figure and limit in 1/kg.
 pub fn c4_4(modes: &CloseModes) -> Condition {
     let (figure, [low, high]) = (modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
-    let margin = if modes.are_opposed() { (figure - low) / high } else { to_oppose(modes) };
+    let margin = if modes.are_opposed() {
+        (figure - low) / high
+    } else {
+        to_oppose(modes)
+    };
     Condition::by_margin("C4-4", figure, [low, f64::INFINITY], margin)
 }
 
@@ -91,10 +115,18 @@ fn to_oppose(modes: &CloseModes) -> f64 {
 
 /// C4-3, of the two modes where they are closest (`None` at a crossing, where the gap is 0) and what their loci do there.
 pub fn c4_3(meeting: Meeting, closest: Option<&CloseModes>) -> Condition {
-    let ratio = |modes: &CloseModes| modes.b2_per_kg().abs() / modes.critical_b2_per_kg()[1].max(f64::MIN_POSITIVE);
+    let ratio = |modes: &CloseModes| {
+        modes.b2_per_kg().abs() / modes.critical_b2_per_kg()[1].max(f64::MIN_POSITIVE)
+    };
     let figure = closest.map_or(0.0, ratio);
     let holds = figure < 1.0 && meeting != Meeting::AtTheEnd;
-    Condition { name: "C4-3", holds, figure, limits: [0.0, 1.0], margin: 1.0 - figure }
+    Condition {
+        name: "C4-3",
+        holds,
+        figure,
+        limits: [0.0, 1.0],
+        margin: 1.0 - figure,
+    }
 }
 
 /// C4-4y at one value: two pairs of MMP zeros of the plant between the two modes. Its margin is -1 or more; without two
@@ -107,9 +139,17 @@ pub fn c4_4y(modes: &CloseModes, zeros: &[Zero]) -> Condition {
     places.sort_by(|a, b| depth(*b).total_cmp(&depth(*a)));
     let inside = places.iter().filter(|w| depth(**w) > 0.0).count();
     let margin = match places.as_slice() {
-        [first, second, ..] if inside >= 2 => depth(*second).min((first - second).abs() / (wv - wu)),
+        [first, second, ..] if inside >= 2 => {
+            depth(*second).min((first - second).abs() / (wv - wu))
+        }
         [_, second, ..] => depth(*second).max(-1.0),
         _ => -1.0,
     };
-    Condition { name: "C4-4y", holds: inside == 2, figure: inside as f64, limits: [2.0, 2.0], margin }
+    Condition {
+        name: "C4-4y",
+        holds: inside == 2,
+        figure: inside as f64,
+        limits: [2.0, 2.0],
+        margin,
+    }
 }

@@ -69,52 +69,100 @@ impl Course {
     {
         let (meeting, at) = loci.meeting(pair)?;
         let closest_value = at.value;
-        let mut stations = loci.path().iter().map(|at| station(at, pair, ports(at))).collect::<Result<Vec<_>, _>>()?;
+        let mut stations = loci
+            .path()
+            .iter()
+            .map(|at| station(at, pair, ports(at)))
+            .collect::<Result<Vec<_>, _>>()?;
         let rising = stations[0].value < stations[stations.len() - 1].value;
         let lies: [Lies; 2] = [|station| station.equation, |station| Some(station.plant)];
         for lie in lies {
-            let steps: Vec<[Station; 2]> = stations.windows(2).map(|step| [step[0].clone(), step[1].clone()]).collect();
+            let steps: Vec<[Station; 2]> = stations
+                .windows(2)
+                .map(|step| [step[0].clone(), step[1].clone()])
+                .collect();
             for step in steps.iter().filter(|step| hides(step, lie)) {
                 fill(step, lie, BISECTIONS, &mut stations, &mut |value| {
                     let at = loci.at(value)?;
                     station(at, pair, ports(at)).map_err(E::from)
                 })?;
             }
-            stations.sort_by(|a, b| if rising { a.value.total_cmp(&b.value) } else { b.value.total_cmp(&a.value) });
+            stations.sort_by(|a, b| {
+                if rising {
+                    a.value.total_cmp(&b.value)
+                } else {
+                    b.value.total_cmp(&a.value)
+                }
+            });
         }
-        let closest = stations.iter().position(|station| station.value == closest_value).unwrap_or(0);
-        Ok(Course { meeting, stations, closest })
+        let closest = stations
+            .iter()
+            .position(|station| station.value == closest_value)
+            .unwrap_or(0);
+        Ok(Course {
+            meeting,
+            stations,
+            closest,
+        })
     }
 
     /// The bands of values with a quartet of the plant that belongs to the two modes: from the first to the last station of
     /// each.
     pub fn bands(&self) -> Vec<[f64; 2]> {
         let quartet = |station: &Station| station.plant == Lie::Quartet;
-        let runs = self.stations.chunk_by(|a, b| quartet(a) == quartet(b)).filter(|run| quartet(&run[0]));
-        runs.map(|run| [run[0].value, run[run.len() - 1].value]).collect()
+        let runs = self
+            .stations
+            .chunk_by(|a, b| quartet(a) == quartet(b))
+            .filter(|run| quartet(&run[0]));
+        runs.map(|run| [run[0].value, run[run.len() - 1].value])
+            .collect()
     }
 }
 
 /// The station of two modes at one value, between a force and a probe.
-pub fn station(at: &ModesAt, pair: [usize; 2], [force, sensor]: [DVector<f64>; 2]) -> Result<Station, PlantError> {
+pub fn station(
+    at: &ModesAt,
+    pair: [usize; 2],
+    [force, sensor]: [DVector<f64>; 2],
+) -> Result<Station, PlantError> {
     let terms = at.terms(&force, &sensor);
-    let zeros = undamped_zeros(&Structure { force, sensor, ..at.structure().clone() })?;
-    let modes = if at.are_equal(pair) { None } else { CloseModes::of(&terms, pair) };
-    let equation = modes.map(|modes| Ok::<_, PlantError>(lie(&modes, modes.zeros()?.iter()))).transpose()?;
+    let zeros = undamped_zeros(&Structure {
+        force,
+        sensor,
+        ..at.structure().clone()
+    })?;
+    let modes = if at.are_equal(pair) {
+        None
+    } else {
+        CloseModes::of(&terms, pair)
+    };
+    let equation = modes
+        .map(|modes| Ok::<_, PlantError>(lie(&modes, modes.zeros()?.iter())))
+        .transpose()?;
     let belonging = belonging(&terms, pair, &zeros);
     let plant = match &modes {
         Some(modes) => lie(modes, belonging.into_iter()),
         None if belonging.iter().any(|zero| zero.kind == ZeroKind::Cnmp) => Lie::Quartet,
         None => Lie::Elsewhere,
     };
-    Ok(Station { value: at.value, modes, zeros, equation, plant })
+    Ok(Station {
+        value: at.value,
+        modes,
+        zeros,
+        equation,
+        plant,
+    })
 }
 
 fn lie<'a>(modes: &CloseModes, zeros: impl Iterator<Item = &'a Zero> + Clone) -> Lie {
     let between = |w: f64| modes.u.omega_rad_s < w && w < modes.v.omega_rad_s;
     if zeros.clone().any(|zero| zero.kind == ZeroKind::Cnmp) {
         Lie::Quartet
-    } else if zeros.filter(|zero| zero.kind == ZeroKind::Mmp && between(zero.s.im)).count() == 2 {
+    } else if zeros
+        .filter(|zero| zero.kind == ZeroKind::Mmp && between(zero.s.im))
+        .count()
+        == 2
+    {
         Lie::Between
     } else {
         Lie::Elsewhere
@@ -123,14 +171,29 @@ fn lie<'a>(modes: &CloseModes, zeros: impl Iterator<Item = &'a Zero> + Clone) ->
 
 /// The zeros whose magnitude is between the modes next to the two.
 fn belonging<'a>(terms: &[Term], pair: [usize; 2], zeros: &'a [Zero]) -> Vec<&'a Zero> {
-    let largest = terms.iter().map(|term| term.residue_per_kg.abs()).fold(0.0, f64::max);
-    let shows =
-        |(mode, term): &(usize, &Term)| !pair.contains(mode) && term.residue_per_kg.abs() > SILENT_RATIO * largest;
+    let largest = terms
+        .iter()
+        .map(|term| term.residue_per_kg.abs())
+        .fold(0.0, f64::max);
+    let shows = |(mode, term): &(usize, &Term)| {
+        !pair.contains(mode) && term.residue_per_kg.abs() > SILENT_RATIO * largest
+    };
     let [i, j] = pair.map(|mode| terms[mode].omega_rad_s);
-    let others = || terms.iter().enumerate().filter(shows).map(|(_, term)| term.omega_rad_s);
+    let others = || {
+        terms
+            .iter()
+            .enumerate()
+            .filter(shows)
+            .map(|(_, term)| term.omega_rad_s)
+    };
     let slower = others().filter(|w| *w < i.min(j)).fold(0.0, f64::max);
-    let faster = others().filter(|w| *w > i.max(j)).fold(f64::INFINITY, f64::min);
-    zeros.iter().filter(|zero| slower < zero.s.norm() && zero.s.norm() < faster).collect()
+    let faster = others()
+        .filter(|w| *w > i.max(j))
+        .fold(f64::INFINITY, f64::min);
+    zeros
+        .iter()
+        .filter(|zero| slower < zero.s.norm() && zero.s.norm() < faster)
+        .collect()
 }
 
 /// Which zeros are looked at.
@@ -141,7 +204,11 @@ type Lies = fn(&Station) -> Option<Lie>;
 fn hides(step: &[Station; 2], lie: Lies) -> bool {
     let lies = [lie(&step[0]), lie(&step[1])];
     let opposed = |station: &Station| station.modes.is_some_and(|modes| modes.are_opposed());
-    match lies.iter().filter(|lie| **lie == Some(Lie::Quartet)).count() {
+    match lies
+        .iter()
+        .filter(|lie| **lie == Some(Lie::Quartet))
+        .count()
+    {
         0 => lies[0] != lies[1] && lies.contains(&Some(Lie::Between)) && step.iter().all(opposed),
         count => count == 1,
     }

@@ -46,10 +46,16 @@ pub struct ModesAt {
 impl ModesAt {
     fn of(structure: Structure, value: f64) -> Result<ModesAt, PlantError> {
         let modal = Modal::of(&structure)?;
-        let unit = |mode: &Mode| &mode.shape / mode.shape.dot(&(&structure.mass * &mode.shape)).sqrt();
+        let unit =
+            |mode: &Mode| &mode.shape / mode.shape.dot(&(&structure.mass * &mode.shape)).sqrt();
         let columns: Vec<_> = modal.modes.iter().map(unit).collect();
         let omega_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s).collect();
-        Ok(ModesAt { value, omega_rad_s, shapes: DMatrix::from_columns(&columns), structure })
+        Ok(ModesAt {
+            value,
+            omega_rad_s,
+            shapes: DMatrix::from_columns(&columns),
+            structure,
+        })
     }
 
     /// The plant at this value.
@@ -66,13 +72,19 @@ impl ModesAt {
     /// v^T M w of a mode here with a mode there, both of unit modal mass: the cosine between them, with its sign.
     pub fn cosine(&self, mode: usize, there: &ModesAt, other: usize) -> f64 {
         let mass = 0.5 * (&self.structure.mass + &there.structure.mass);
-        self.shapes.column(mode).dot(&(mass * there.shapes.column(other)))
+        self.shapes
+            .column(mode)
+            .dot(&(mass * there.shapes.column(other)))
     }
 
     /// Damping ratio v^T C v/(2 w) of a mode; 0 of a free body.
     pub fn damping_ratio(&self, mode: usize) -> f64 {
         let (w, shape) = (self.omega_rad_s[mode], self.shapes.column(mode));
-        if w == 0.0 { 0.0 } else { shape.dot(&(&self.structure.damping * shape)) / (2.0 * w) }
+        if w == 0.0 {
+            0.0
+        } else {
+            shape.dot(&(&self.structure.damping * shape)) / (2.0 * w)
+        }
     }
 
     /// The undamped modes as seen between a force along `force` and a displacement along `sensor` (Eq. 4-15), each in its
@@ -86,19 +98,47 @@ impl ModesAt {
     /// Gains of all modes. A shape has of each other one some 1e-15 of the largest eigenvalue over the distance between the
     /// two: what is not more than ten times that is 0.
     pub(super) fn gains(&self, row: &DVector<f64>) -> Vec<f64> {
-        let gains: Vec<f64> = (0..self.omega_rad_s.len()).map(|mode| self.gain(mode, row)).collect();
-        let largest = self.omega_rad_s.iter().fold(0.0, |largest: f64, w| largest.max(w * w));
+        let gains: Vec<f64> = (0..self.omega_rad_s.len())
+            .map(|mode| self.gain(mode, row))
+            .collect();
+        let largest = self
+            .omega_rad_s
+            .iter()
+            .fold(0.0, |largest: f64, w| largest.max(w * w));
         let leak = |i: usize, j: usize| {
-            let distance = (self.omega_rad_s[i] - self.omega_rad_s[j]) * (self.omega_rad_s[i] + self.omega_rad_s[j]);
-            if i == j { 1.0 } else { largest / distance.abs() }
+            let distance = (self.omega_rad_s[i] - self.omega_rad_s[j])
+                * (self.omega_rad_s[i] + self.omega_rad_s[j]);
+            if i == j {
+                1.0
+            } else {
+                largest / distance.abs()
+            }
         };
-        let rounding = |i: usize| ROUNDED_GAIN * (0..gains.len()).map(|j| gains[j].abs() * leak(i, j)).sum::<f64>();
-        (0..gains.len()).map(|i| if gains[i].abs() <= rounding(i) { 0.0 } else { gains[i] }).collect()
+        let rounding = |i: usize| {
+            ROUNDED_GAIN
+                * (0..gains.len())
+                    .map(|j| gains[j].abs() * leak(i, j))
+                    .sum::<f64>()
+        };
+        (0..gains.len())
+            .map(|i| {
+                if gains[i].abs() <= rounding(i) {
+                    0.0
+                } else {
+                    gains[i]
+                }
+            })
+            .collect()
     }
 
     /// The shape of a mode over the degrees of freedom, of unit length.
     pub fn shape(&self, mode: usize) -> Vec<f64> {
-        self.shapes.column(mode).normalize().iter().copied().collect()
+        self.shapes
+            .column(mode)
+            .normalize()
+            .iter()
+            .copied()
+            .collect()
     }
 
     /// The share of each degree of freedom in a shape: the squares of its elements at unit length. They sum to 1; a share
@@ -140,8 +180,15 @@ impl ModesAt {
             let flip = before.shapes.column(index).dot(&(&mass * &shape)) < 0.0;
             shape *= if flip { -1.0 } else { 1.0 };
         }
-        let omega_rad_s = places.iter().map(|&place| self.omega_rad_s[place]).collect();
-        ModesAt { omega_rad_s, shapes, ..self }
+        let omega_rad_s = places
+            .iter()
+            .map(|&place| self.omega_rad_s[place])
+            .collect();
+        ModesAt {
+            omega_rad_s,
+            shapes,
+            ..self
+        }
     }
 
     /// Turns the basis of each group of equal modes (slowest first, as computed) to the nearest modes before: with
@@ -150,7 +197,10 @@ impl ModesAt {
         let n = self.omega_rad_s.len();
         let mut first = 0;
         while first < n {
-            let count = 1 + (first + 1..n).take_while(|&next| self.are_equal([next - 1, next])).count();
+            let count = 1
+                + (first + 1..n)
+                    .take_while(|&next| self.are_equal([next - 1, next]))
+                    .count();
             if count > 1 {
                 self.turn(before, first, count);
             }
@@ -162,13 +212,20 @@ impl ModesAt {
         let group = self.shapes.columns(first, count).into_owned();
         let reach = before.shapes.transpose() * &self.structure.mass * &group;
         let mut order: Vec<usize> = (0..reach.nrows()).collect();
-        order.sort_by(|&i, &j| reach.row(j).norm_squared().total_cmp(&reach.row(i).norm_squared()));
+        order.sort_by(|&i, &j| {
+            reach
+                .row(j)
+                .norm_squared()
+                .total_cmp(&reach.row(i).norm_squared())
+        });
         order.truncate(count);
         if let (Some(u), Some(w_t)) = {
             let svd = reach.select_rows(&order).svd(true, true);
             (svd.u, svd.v_t)
         } {
-            self.shapes.columns_mut(first, count).copy_from(&(group * (u * w_t).transpose()));
+            self.shapes
+                .columns_mut(first, count)
+                .copy_from(&(group * (u * w_t).transpose()));
         }
     }
 
@@ -188,7 +245,9 @@ impl ModesAt {
 fn partners(before: &ModesAt, after: &ModesAt) -> Vec<usize> {
     let n = before.omega_rad_s.len();
     let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    let mut pairs: Vec<(f64, usize, usize)> = pairs.map(|(i, j)| (before.mac(i, after, j), i, j)).collect();
+    let mut pairs: Vec<(f64, usize, usize)> = pairs
+        .map(|(i, j)| (before.mac(i, after, j), i, j))
+        .collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (mut place, mut taken) = (vec![None; n], vec![false; n]);
     for (_, i, j) in pairs {
@@ -197,7 +256,11 @@ fn partners(before: &ModesAt, after: &ModesAt) -> Vec<usize> {
             taken[j] = true;
         }
     }
-    place.into_iter().enumerate().map(|(i, place)| place.unwrap_or(i)).collect()
+    place
+        .into_iter()
+        .enumerate()
+        .map(|(i, place)| place.unwrap_or(i))
+        .collect()
 }
 
 /// What two loci do where they are closest.
@@ -239,7 +302,11 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
             let inside = from + FIRST_LOOK * (to - from);
             first = first.following(&ModesAt::of(at(inside)?, inside)?);
         }
-        let mut loci = Loci { at, smallest_step: SMALLEST_STEP * (to - from).abs(), path: vec![first] };
+        let mut loci = Loci {
+            at,
+            smallest_step: SMALLEST_STEP * (to - from).abs(),
+            path: vec![first],
+        };
         for &value in &values[1..] {
             loci.extend(loci.path.len(), value)?;
         }
@@ -254,8 +321,13 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
     /// The modes at one value of the grid; the nearest on the path for any other.
     pub fn near(&self, value: f64) -> &ModesAt {
         let distance = |at: &ModesAt| (at.value - value).abs();
-        let nearest = (1..self.path.len())
-            .fold(0, |best, index| if distance(&self.path[index]) < distance(&self.path[best]) { index } else { best });
+        let nearest = (1..self.path.len()).fold(0, |best, index| {
+            if distance(&self.path[index]) < distance(&self.path[best]) {
+                index
+            } else {
+                best
+            }
+        });
         &self.path[nearest]
     }
 
@@ -282,10 +354,13 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         let n = self.path[0].omega_rad_s.len();
         let held = |i: usize| self.path.iter().all(|at| at.omega_rad_s[i] > 0.0);
         let relative = |[i, j]: [usize; 2]| {
-            let ratio = |at: &ModesAt| at.gap_rad_s([i, j]) / (at.omega_rad_s[i] + at.omega_rad_s[j]);
+            let ratio =
+                |at: &ModesAt| at.gap_rad_s([i, j]) / (at.omega_rad_s[i] + at.omega_rad_s[j]);
             self.path.iter().map(ratio).fold(f64::INFINITY, f64::min)
         };
-        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| [i, j])).filter(|pair| pair.iter().all(|&i| held(i)));
+        let pairs = (0..n)
+            .flat_map(|j| (0..j).map(move |i| [i, j]))
+            .filter(|pair| pair.iter().all(|&i| held(i)));
         pairs.min_by(|a, b| relative(*a).total_cmp(&relative(*b)))
     }
 
@@ -300,13 +375,20 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         };
         let pairs = (0..n).flat_map(|j| (0..j).map(move |i| [i, j]));
         let held = |mode: &usize| self.path.iter().all(|at| at.omega_rad_s[*mode] > 0.0);
-        let mut pairs: Vec<[usize; 2]> = pairs.filter(|pair| pair.iter().all(held)).filter(inside).collect();
+        let mut pairs: Vec<[usize; 2]> = pairs
+            .filter(|pair| pair.iter().all(held))
+            .filter(inside)
+            .collect();
         let distance = |pair: &[usize; 2]| {
             let at = &self.path[self.closest(*pair)];
             at.gap_rad_s(*pair) / (at.omega_rad_s[pair[0]] + at.omega_rad_s[pair[1]])
         };
         let hidden = |pair: &[usize; 2]| pair.iter().any(|mode| !shown[*mode]);
-        pairs.sort_by(|a, b| hidden(a).cmp(&hidden(b)).then(distance(a).total_cmp(&distance(b))));
+        pairs.sort_by(|a, b| {
+            hidden(a)
+                .cmp(&hidden(b))
+                .then(distance(a).total_cmp(&distance(b)))
+        });
         pairs
     }
 
@@ -322,7 +404,10 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
                 .for_each(|(largest, term)| *largest = largest.max(term.residue_per_kg.abs()));
         }
         let most = largest.iter().copied().fold(0.0, f64::max);
-        largest.iter().map(|largest| *largest > SHOWN_RATIO * most).collect()
+        largest
+            .iter()
+            .map(|largest| *largest > SHOWN_RATIO * most)
+            .collect()
     }
 
     /// Where two modes have the closest frequencies (the veering point), by golden section around the closest values of
@@ -336,14 +421,27 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         if at.are_equal(pair) {
             return Ok((Meeting::Crossing, at));
         }
-        self.golden(pair, self.path[closest - 1].value, self.path[closest + 1].value)?;
+        self.golden(
+            pair,
+            self.path[closest - 1].value,
+            self.path[closest + 1].value,
+        )?;
         let at = self.path[self.closest(pair)].clone();
-        Ok((if at.are_equal(pair) { Meeting::Crossing } else { Meeting::Veering }, at))
+        Ok((
+            if at.are_equal(pair) {
+                Meeting::Crossing
+            } else {
+                Meeting::Veering
+            },
+            at,
+        ))
     }
 
     fn closest(&self, pair: [usize; 2]) -> usize {
         let gap = |index: &usize| self.path[*index].gap_rad_s(pair);
-        (0..self.path.len()).min_by(|a, b| gap(a).total_cmp(&gap(b))).unwrap_or(0)
+        (0..self.path.len())
+            .min_by(|a, b| gap(a).total_cmp(&gap(b)))
+            .unwrap_or(0)
     }
 
     fn golden(&mut self, pair: [usize; 2], mut low: f64, mut high: f64) -> Result<(), E> {
@@ -370,10 +468,20 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
     /// The modes at any value of the range, followed from those before it.
     pub fn at(&mut self, value: f64) -> Result<&ModesAt, E> {
         let rising = self.path[0].value < self.path[self.path.len() - 1].value;
-        let index = self.path.partition_point(|at| if rising { at.value <= value } else { at.value >= value });
+        let index = self.path.partition_point(|at| {
+            if rising {
+                at.value <= value
+            } else {
+                at.value >= value
+            }
+        });
         // The range is that of the path, so that some value comes before.
         let known = self.path[index.max(1) - 1].value == value;
-        let index = if known { index.max(1) - 1 } else { self.extend(index.max(1), value)? };
+        let index = if known {
+            index.max(1) - 1
+        } else {
+            self.extend(index.max(1), value)?
+        };
         Ok(&self.path[index])
     }
 }
@@ -387,19 +495,32 @@ mod tests {
         let n = mass.nrows();
         let ones = DVector::from_fn(n, |i, _| 1.0 + 0.3 * i as f64);
         let (force, sensor, floor) = (ones.clone(), ones.clone(), ones);
-        Ok(Structure { damping: DMatrix::zeros(n, n), mass, stiffness, force, sensor, floor, free_bodies: 0 })
+        Ok(Structure {
+            damping: DMatrix::zeros(n, n),
+            mass,
+            stiffness,
+            force,
+            sensor,
+            floor,
+            free_bodies: 0,
+        })
     }
 
     /// Two unit masses on springs k + d and k - d, joined by c: w^2 = k + c -+ sqrt(d^2 + c^2).
     fn oscillators(coupling: f64) -> impl Fn(f64) -> Result<Structure, PlantError> {
         move |d| {
             let (k, c) = (100.0, coupling);
-            structure(DMatrix::identity(2, 2), DMatrix::from_row_slice(2, 2, &[k + d + c, -c, -c, k - d + c]))
+            structure(
+                DMatrix::identity(2, 2),
+                DMatrix::from_row_slice(2, 2, &[k + d + c, -c, -c, k - d + c]),
+            )
         }
     }
 
     fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {
-        (0..count).map(|k| from + (to - from) * k as f64 / (count - 1) as f64).collect()
+        (0..count)
+            .map(|k| from + (to - from) * k as f64 / (count - 1) as f64)
+            .collect()
     }
 
     #[test]
@@ -412,19 +533,35 @@ mod tests {
                 let gap = (100.0 + 2.0 * coupling).sqrt() - 10.0;
                 assert_eq!(meeting, Meeting::Veering, "{coupling}");
                 // w^2 near 100 is rounded at some 1e-14 in each of a few operations: 1e-14 of w and more of its difference.
-                assert!((at.gap_rad_s([0, 1]) - gap).abs() < 1e-13, "{coupling}: {} for {gap}", at.gap_rad_s([0, 1]));
+                assert!(
+                    (at.gap_rad_s([0, 1]) - gap).abs() < 1e-13,
+                    "{coupling}: {} for {gap}",
+                    at.gap_rad_s([0, 1])
+                );
                 // The gap is flat to its rounding where d^2/(2 c) < 2e-12.
-                assert!(at.value.abs() < 1e-13 + (4e-12 * coupling).sqrt(), "{coupling}: at {}", at.value);
+                assert!(
+                    at.value.abs() < 1e-13 + (4e-12 * coupling).sqrt(),
+                    "{coupling}: at {}",
+                    at.value
+                );
                 let (first, last) = (&loci.path()[0], &loci.path()[loci.path().len() - 1]);
                 // tan(2 angle) = c/d: each shape leaves the axis by c/(2 d) on either side.
                 let swapped = (coupling / 7.0f64).atan() / 2.0 + (coupling / 9.0f64).atan() / 2.0;
                 let bound = swapped.sin().powi(2) * 1.1 + 1e-12;
                 for (i, j) in [(0, 1), (1, 0)] {
-                    assert!(first.mac(i, last, j) > 1.0 - bound, "{coupling}: {}", first.mac(i, last, j));
+                    assert!(
+                        first.mac(i, last, j) > 1.0 - bound,
+                        "{coupling}: {}",
+                        first.mac(i, last, j)
+                    );
                     assert!(first.mac(i, last, i) < bound);
                     // Half each at the veering point; d = 1e-3 c there turns the shapes by 5e-4.
                     let tolerance = 0.5 * at.value.abs() / coupling + 1e-6;
-                    assert!(at.shares(i).iter().all(|share| (share - 0.5).abs() < tolerance));
+                    assert!(
+                        at.shares(i)
+                            .iter()
+                            .all(|share| (share - 0.5).abs() < tolerance)
+                    );
                 }
             }
         }
@@ -441,8 +578,16 @@ mod tests {
             assert!(at.value.abs() <= 1e-10, "{}", at.value);
             let (first, last) = (&loci.path()[0], &loci.path()[loci.path().len() - 1]);
             assert!(first.mac(0, last, 0) > 1.0 - 1e-12 && first.mac(0, last, 1) < 1e-12);
-            assert!(at.shares(0).iter().chain(&at.shares(1)).all(|share| share.min(1.0 - share) < 1e-12));
-            assert!((first.omega_rad_s[0] < first.omega_rad_s[1]) && (last.omega_rad_s[0] > last.omega_rad_s[1]));
+            assert!(
+                at.shares(0)
+                    .iter()
+                    .chain(&at.shares(1))
+                    .all(|share| share.min(1.0 - share) < 1e-12)
+            );
+            assert!(
+                (first.omega_rad_s[0] < first.omega_rad_s[1])
+                    && (last.omega_rad_s[0] > last.omega_rad_s[1])
+            );
         }
     }
 
@@ -454,7 +599,10 @@ mod tests {
         // Equal at the first value: of all bases there, the shapes that the modes have beside it.
         let mut loci = Loci::follow(&grid(0.0, 9.0, 9), oscillators(0.0)).unwrap();
         let (meeting, at) = loci.meeting([0, 1]).unwrap();
-        assert_eq!((meeting, at.value, loci.path().len()), (Meeting::AtTheEnd, 0.0, 9));
+        assert_eq!(
+            (meeting, at.value, loci.path().len()),
+            (Meeting::AtTheEnd, 0.0, 9)
+        );
         assert!(at.shares(0)[1] > 1.0 - 1e-12 && at.shares(1)[0] > 1.0 - 1e-12);
     }
 

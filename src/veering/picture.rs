@@ -51,18 +51,39 @@ pub struct Picture {
 
 impl Picture {
     /// At `at`, in the frame of the pair's shapes at `frame`.
-    pub fn of(at: &ModesAt, frame: &ModesAt, pair: [usize; 2], [force, sensor]: &[DVector<f64>; 2]) -> Picture {
+    pub fn of(
+        at: &ModesAt,
+        frame: &ModesAt,
+        pair: [usize; 2],
+        [force, sensor]: &[DVector<f64>; 2],
+    ) -> Picture {
         let [i, j] = pair;
-        let ordered = if at.omega_rad_s[i] <= at.omega_rad_s[j] { [i, j] } else { [j, i] };
+        let ordered = if at.omega_rad_s[i] <= at.omega_rad_s[j] {
+            [i, j]
+        } else {
+            [j, i]
+        };
         let direction = |mode| unit(pair.map(|other| at.cosine(mode, frame, other)));
         let crossing = at.are_equal(pair);
         let components = |row: &DVector<f64>| {
-            let raw: Vec<f64> = (0..at.omega_rad_s.len()).map(|mode| at.gain(mode, row)).collect();
+            let raw: Vec<f64> = (0..at.omega_rad_s.len())
+                .map(|mode| at.gain(mode, row))
+                .collect();
             let length = raw.iter().map(|gain| gain * gain).sum::<f64>().sqrt();
             let gains = if crossing { raw } else { at.gains(row) };
-            ordered.map(|mode| if length > 0.0 { gains[mode] / length } else { 0.0 })
+            ordered.map(|mode| {
+                if length > 0.0 {
+                    gains[mode] / length
+                } else {
+                    0.0
+                }
+            })
         };
-        let modes = if crossing { None } else { CloseModes::of(&at.terms(force, sensor), pair) };
+        let modes = if crossing {
+            None
+        } else {
+            CloseModes::of(&at.terms(force, sensor), pair)
+        };
         Picture {
             value: at.value,
             shapes: ordered.map(direction),
@@ -90,7 +111,8 @@ impl Picture {
     /// The octant of the probe beside the actuator's: whether it is on the other side of the planes of R, u, v. C4-1 holds for
     /// `[false, true, false]` and `[true, false, true]`. `None` where the modes cross.
     pub fn across(&self) -> Option<[bool; 3]> {
-        self.residues_per_kg.map(|residues| residues.map(|residue| residue < 0.0))
+        self.residues_per_kg
+            .map(|residues| residues.map(|residue| residue < 0.0))
     }
 
     /// The quadrant in which a probe, with its aR as it is, would make the signs alternate.
@@ -113,13 +135,19 @@ impl Picture {
 
     /// Whether, with actuator, probe and aR as here, the signs alternate anywhere while phi_u turns from one angle to another.
     pub fn alternates_over(&self, from_rad: f64, to_rad: f64) -> bool {
-        let Some([remainder, ..]) = self.residues_per_kg else { return false };
+        let Some([remainder, ..]) = self.residues_per_kg else {
+            return false;
+        };
         let (b, c) = (self.in_frame(self.actuator), self.in_frame(self.sensor));
         let least = ROUNDING * dot(b, b).sqrt() * dot(c, c).sqrt();
-        let side = (self.shapes[0][0] * self.shapes[1][1] - self.shapes[0][1] * self.shapes[1][0]).signum();
+        let side = (self.shapes[0][0] * self.shapes[1][1] - self.shapes[0][1] * self.shapes[1][0])
+            .signum();
         let at = |step: usize| from_rad + (to_rad - from_rad) * step as f64 / STEPS as f64;
         (0..=STEPS).map(at).any(|turn| {
-            let (u, v) = ([turn.cos(), turn.sin()], [-side * turn.sin(), side * turn.cos()]);
+            let (u, v) = (
+                [turn.cos(), turn.sin()],
+                [-side * turn.sin(), side * turn.cos()],
+            );
             let residue = |shape| dot(b, shape) * dot(c, shape) * remainder.signum();
             remainder != 0.0 && residue(u) < -least && residue(v) > least
         })
@@ -142,7 +170,11 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 
 fn unit([x, y]: [f64; 2]) -> [f64; 2] {
     let length = x.hypot(y);
-    if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] }
+    if length > 0.0 {
+        [x / length, y / length]
+    } else {
+        [1.0, 0.0]
+    }
 }
 
 #[cfg(test)]
@@ -155,7 +187,13 @@ mod tests {
         let (actuator, sensor) = ([b.cos(), b.sin()], [c.cos(), c.sin()]);
         let residues = [remainder, actuator[0] * sensor[0], actuator[1] * sensor[1]];
         let shapes = [[1.0, 0.0], [0.0, 1.0]];
-        Picture { value: 0.0, shapes, actuator, sensor, residues_per_kg: Some(residues) }
+        Picture {
+            value: 0.0,
+            shapes,
+            actuator,
+            sensor,
+            residues_per_kg: Some(residues),
+        }
     }
 
     proptest! {

@@ -34,7 +34,12 @@ impl Trial {
 
     /// What to prefer: no CNMP zeros, then none of the close modes, then signs that are far from alternating.
     pub fn rank(&self) -> (usize, usize, bool, f64) {
-        (self.with_any_cnmp, self.with_cnmp, self.picture, self.margin)
+        (
+            self.with_any_cnmp,
+            self.with_cnmp,
+            self.picture,
+            self.margin,
+        )
     }
 }
 
@@ -47,34 +52,58 @@ pub fn trial(
     pair: [usize; 2],
 ) -> Result<Option<Trial>, PlantError> {
     let silent = |(at, [force, sensor]): (&&ModesAt, &[DVector<f64>; 2])| {
-        at.terms(force, sensor).iter().all(|term| term.residue_per_kg == 0.0)
+        at.terms(force, sensor)
+            .iter()
+            .all(|term| term.residue_per_kg == 0.0)
     };
     if path.iter().zip(ports).any(silent) {
         return Ok(None);
     }
-    let stations = path.iter().zip(ports).map(|(at, ports)| station(at, pair, ports.clone()));
+    let stations = path
+        .iter()
+        .zip(ports)
+        .map(|(at, ports)| station(at, pair, ports.clone()));
     let stations = stations.collect::<Result<Vec<_>, _>>()?;
-    let signs = || stations.iter().filter_map(|station| station.modes).map(|modes| c4_1(&modes));
-    let count = |of: &dyn Fn(&super::Station) -> bool| stations.iter().filter(|station| of(station)).count();
-    let middle = stations[stations.len() / 2].modes.map_or(0.0, |modes| modes.remainder.residue_per_kg.abs());
+    let signs = || {
+        stations
+            .iter()
+            .filter_map(|station| station.modes)
+            .map(|modes| c4_1(&modes))
+    };
+    let count = |of: &dyn Fn(&super::Station) -> bool| {
+        stations.iter().filter(|station| of(station)).count()
+    };
+    let middle = stations[stations.len() / 2]
+        .modes
+        .map_or(0.0, |modes| modes.remainder.residue_per_kg.abs());
     Ok(Some(Trial {
         remainder_per_kg: middle,
         values: stations.len(),
         with_cnmp: count(&|station| station.plant == Lie::Quartet),
         with_any_cnmp: count(&|station| cnmp_pairs(&station.zeros) > 0),
         alternating: signs().filter(|condition| condition.holds).count(),
-        margin: signs().map(|condition| condition.margin).fold(f64::NEG_INFINITY, f64::max),
+        margin: signs()
+            .map(|condition| condition.margin)
+            .fold(f64::NEG_INFINITY, f64::max),
         picture: foretold(path, ports, closest, pair),
     }))
 }
 
 /// Whether the picture at the veering point alternates while the shapes turn as they do on either side. Where the modes cross
 /// they do not turn but change places: the pictures of the values beside it are taken.
-fn foretold(path: &[&ModesAt], ports: &[[DVector<f64>; 2]], closest: usize, pair: [usize; 2]) -> bool {
+fn foretold(
+    path: &[&ModesAt],
+    ports: &[[DVector<f64>; 2]],
+    closest: usize,
+    pair: [usize; 2],
+) -> bool {
     let picture = |index: usize| Picture::of(path[index], path[closest], pair, &ports[index]);
     let (first, last) = (picture(0), picture(path.len() - 1));
     let sides = if path[closest].are_equal(pair) {
-        [(closest.saturating_sub(1), &first), ((closest + 1).min(path.len() - 1), &last)]
+        [
+            (closest.saturating_sub(1), &first),
+            ((closest + 1).min(path.len() - 1), &last),
+        ]
     } else {
         [(closest, &first), (closest, &last)]
     };

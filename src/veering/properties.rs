@@ -25,7 +25,11 @@ impl Dice {
     /// Of either sign, sizes even in their logarithm.
     fn spread(&mut self, low: f64, high: f64) -> f64 {
         let size = self.uniform(low.ln(), high.ln()).exp();
-        if self.uniform(-1.0, 1.0) < 0.0 { -size } else { size }
+        if self.uniform(-1.0, 1.0) < 0.0 {
+            -size
+        } else {
+            size
+        }
     }
 }
 
@@ -44,13 +48,24 @@ impl System {
         let residue = dice.spread(0.05, 300.0);
         let mut pair = || dice.uniform(-1.0, 1.0);
         let (force, sensor) = (vec![pair(), pair(), 1.0], vec![pair(), pair(), residue]);
-        System { coupling: dice.spread(1e-3, 2.0), force, sensor, others: vec![0.0] }
+        System {
+            coupling: dice.spread(1e-3, 2.0),
+            force,
+            sensor,
+            others: vec![0.0],
+        }
     }
 
     fn at(&self, d: f64) -> Result<Structure, PlantError> {
         let (k, c, n) = (100.0, self.coupling, 2 + self.others.len());
         let mut stiffness = DMatrix::zeros(n, n);
-        stiffness.view_mut((0, 0), (2, 2)).copy_from(&DMatrix::from_row_slice(2, 2, &[k + d + c, -c, -c, k - d + c]));
+        stiffness
+            .view_mut((0, 0), (2, 2))
+            .copy_from(&DMatrix::from_row_slice(
+                2,
+                2,
+                &[k + d + c, -c, -c, k - d + c],
+            ));
         for (index, other) in self.others.iter().enumerate() {
             stiffness[(2 + index, 2 + index)] = *other;
         }
@@ -67,7 +82,11 @@ impl System {
 
     fn course(&self) -> Course {
         let mut loci = Loci::follow(&grid(), |d| self.at(d)).unwrap();
-        let pair = loci.path()[0].omega_rad_s.iter().enumerate().filter(|(_, w)| (90.0..112.0).contains(&(*w * *w)));
+        let pair = loci.path()[0]
+            .omega_rad_s
+            .iter()
+            .enumerate()
+            .filter(|(_, w)| (90.0..112.0).contains(&(*w * *w)));
         let pair: Vec<usize> = pair.map(|(mode, _)| mode).collect();
         Course::along(&mut loci, [pair[0], pair[1]], as_configured).unwrap()
     }
@@ -93,8 +112,13 @@ impl Tally {
         self.asked += 1;
         self.appear += usize::from(proposition.foretold == Foretold::Appear);
         self.absent += usize::from(proposition.foretold == Foretold::Absent);
-        self.wrong_by_equation += usize::from(proposition.foretold.is_contradicted_by(proposition.equation));
-        self.wrong_by_plant += usize::from(proposition.foretold.is_contradicted_by(proposition.plant));
+        self.wrong_by_equation += usize::from(
+            proposition
+                .foretold
+                .is_contradicted_by(proposition.equation),
+        );
+        self.wrong_by_plant +=
+            usize::from(proposition.foretold.is_contradicted_by(proposition.plant));
     }
 }
 
@@ -105,22 +129,42 @@ fn p4_1_is_right_in_every_random_sum_of_eq_4_1_and_c4_2_implies_c4_1() {
         let wu = dice.uniform(0.5, 2.0);
         let wv = wu * (1.0 + dice.uniform(1e-3, 0.5));
         let mut mode = |omega_rad_s, low, high| Term::undamped(omega_rad_s, dice.spread(low, high));
-        let terms = [mode(0.0, 0.01, 100.0), mode(wu, 0.1, 10.0), mode(wv, 0.1, 10.0)];
+        let terms = [
+            mode(0.0, 0.01, 100.0),
+            mode(wu, 0.1, 10.0),
+            mode(wv, 0.1, 10.0),
+        ];
         let modes = CloseModes::of(&terms, [1, 2]).unwrap();
         assert!((modes.remainder.residue_per_kg / terms[0].residue_per_kg - 1.0).abs() < 1e-14);
         let quartet = Kinds::of(&modes.zeros().unwrap()).quartets == 1;
-        let lie = if quartet { Lie::Quartet } else { Lie::Elsewhere };
-        let station = Station { value: 0.0, modes: Some(modes), zeros: Vec::new(), equation: Some(lie), plant: lie };
+        let lie = if quartet {
+            Lie::Quartet
+        } else {
+            Lie::Elsewhere
+        };
+        let station = Station {
+            value: 0.0,
+            modes: Some(modes),
+            zeros: Vec::new(),
+            equation: Some(lie),
+            plant: lie,
+        };
         let proposition = p4_1(&station).unwrap();
         let [alternating, between] = [proposition.premises[0], proposition.premises[1]];
-        assert!(alternating.holds || !between.holds, "C4-2 without C4-1: {modes:?}");
+        assert!(
+            alternating.holds || !between.holds,
+            "C4-2 without C4-1: {modes:?}"
+        );
         // Nearer to a critical value two zeros are one to the root of the rounding.
         if between.margin.abs() > 1e-9 {
             tally.add(&proposition);
         }
     }
     assert_eq!(tally.wrong_by_equation, 0, "{tally:?}");
-    assert!(tally.appear > 500 && tally.absent > 10_000 && tally.asked > 19_990, "{tally:?}");
+    assert!(
+        tally.appear > 500 && tally.absent > 10_000 && tally.asked > 19_990,
+        "{tally:?}"
+    );
 }
 
 #[test]
@@ -133,9 +177,17 @@ fn p4_2_p4_2x_and_p4_2y_are_right_on_the_stretch_in_every_random_system_of_eq_4_
         let course = system.course();
         assert_eq!(course.meeting == Meeting::Crossing, system.coupling == 0.0);
         for side in [Side::Before, Side::After] {
-            for (tally, proposition) in tallies.iter_mut().zip(&Stretch::of(&course, side).propositions()) {
+            for (tally, proposition) in tallies
+                .iter_mut()
+                .zip(&Stretch::of(&course, side).propositions())
+            {
                 tally.add(proposition);
-                assert!(!proposition.foretold.is_contradicted_by(proposition.equation), "{system:?} {proposition:#?}");
+                assert!(
+                    !proposition
+                        .foretold
+                        .is_contradicted_by(proposition.equation),
+                    "{system:?} {proposition:#?}"
+                );
                 // The plant is Eq. (4-1) here.
                 assert_eq!(proposition.equation, proposition.plant, "{system:?}");
             }
@@ -143,22 +195,47 @@ fn p4_2_p4_2x_and_p4_2y_are_right_on_the_stretch_in_every_random_system_of_eq_4_
     }
     // Of 4000 sides the premises hold on 7 %, 7 % and 4 %: a third less would be beyond ten sigma.
     let [p4_2, p4_2x, p4_2y] = tallies;
-    assert!(p4_2.appear > 180 && p4_2x.appear > 180 && p4_2y.appear > 90, "{p4_2:?} {p4_2x:?} {p4_2y:?}");
+    assert!(
+        p4_2.appear > 180 && p4_2x.appear > 180 && p4_2y.appear > 90,
+        "{p4_2:?} {p4_2x:?} {p4_2y:?}"
+    );
     assert!(p4_2x.absent > 3000, "{p4_2x:?}");
 }
 
 /// P4-2 and P4-2y with C4-1 at psi_0 alone, and P4-2x over the whole range: how often each is wrong.
 fn as_printed(course: &Course) -> [Foretold; 3] {
-    let close = c4_3(course.meeting, course.stations[course.closest].modes.as_ref()).holds;
-    let away = course.stations.iter().enumerate().filter(|(index, _)| *index != course.closest);
+    let close = c4_3(
+        course.meeting,
+        course.stations[course.closest].modes.as_ref(),
+    )
+    .holds;
+    let away = course
+        .stations
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| *index != course.closest);
     let mut holds = [false; 2];
     for (modes, station) in away.filter_map(|(_, station)| Some((station.modes?, station))) {
         holds[0] |= c4_1(&modes).holds && c4_4(&modes).holds;
         holds[1] |= c4_4y(&modes, &station.zeros).holds;
     }
-    let foretold = |premise: bool, otherwise| if close && premise { Foretold::Appear } else { otherwise };
-    let necessary = if close { Foretold::Absent } else { Foretold::Nothing };
-    [foretold(holds[0], Foretold::Nothing), foretold(holds[0], necessary), foretold(holds[1], Foretold::Nothing)]
+    let foretold = |premise: bool, otherwise| {
+        if close && premise {
+            Foretold::Appear
+        } else {
+            otherwise
+        }
+    };
+    let necessary = if close {
+        Foretold::Absent
+    } else {
+        Foretold::Nothing
+    };
+    [
+        foretold(holds[0], Foretold::Nothing),
+        foretold(holds[0], necessary),
+        foretold(holds[1], Foretold::Nothing),
+    ]
 }
 
 #[test]
@@ -166,7 +243,10 @@ fn as_printed_with_signs_at_one_value_only_they_are_wrong_for_some_systems() {
     let (mut dice, mut asked, mut wrong) = (Dice::new(3), [0; 3], [0; 3]);
     for _ in 0..2000 {
         let course = System::with_double_integrator(&mut dice).course();
-        let quartet = course.stations.iter().any(|station| station.equation == Some(Lie::Quartet));
+        let quartet = course
+            .stations
+            .iter()
+            .any(|station| station.equation == Some(Lie::Quartet));
         for (which, foretold) in as_printed(&course).into_iter().enumerate() {
             asked[which] += usize::from(foretold == Foretold::Appear);
             wrong[which] += usize::from(foretold.is_contradicted_by(quartet));
@@ -175,22 +255,45 @@ fn as_printed_with_signs_at_one_value_only_they_are_wrong_for_some_systems() {
         }
     }
     // Of some 700 systems that P4-2 is sure of, and 400 of P4-2y, 40: their residues turn on the way.
-    assert!(asked[0] > 500 && asked[1] == asked[0] && asked[2] > 250, "{asked:?}");
-    assert!(wrong.iter().all(|wrong| (20..80).contains(wrong)), "{wrong:?}");
+    assert!(
+        asked[0] > 500 && asked[1] == asked[0] && asked[2] > 250,
+        "{asked:?}"
+    );
+    assert!(
+        wrong.iter().all(|wrong| (20..80).contains(wrong)),
+        "{wrong:?}"
+    );
 }
 
 #[test]
 fn zeros_may_appear_without_veering() {
     // Not necessary: two modes of fixed frequencies, the residue of mode R from 0.01 to 100. Fig 4-3 is such a system.
     let modes = |r: f64| {
-        CloseModes::of(&[Term::undamped(0.0, r), Term::undamped(1.0, -1.0), Term::undamped(2.0f64.sqrt(), 1.0)], [1, 2])
-            .unwrap()
+        CloseModes::of(
+            &[
+                Term::undamped(0.0, r),
+                Term::undamped(1.0, -1.0),
+                Term::undamped(2.0f64.sqrt(), 1.0),
+            ],
+            [1, 2],
+        )
+        .unwrap()
     };
     // aR1,R2 = (1 + 2 -+ 2 sqrt(2))/1 by Eq. (4-5).
     let (low, high) = (3.0 - 8.0f64.sqrt(), 3.0 + 8.0f64.sqrt());
-    for (r, quartet) in [(0.9 * low, false), (1.1 * low, true), (1.0, true), (0.9 * high, true), (1.1 * high, false)] {
+    for (r, quartet) in [
+        (0.9 * low, false),
+        (1.1 * low, true),
+        (1.0, true),
+        (0.9 * high, true),
+        (1.1 * high, false),
+    ] {
         let modes = modes(r);
-        assert_eq!(Kinds::of(&modes.zeros().unwrap()).quartets == 1, quartet, "{r}");
+        assert_eq!(
+            Kinds::of(&modes.zeros().unwrap()).quartets == 1,
+            quartet,
+            "{r}"
+        );
         assert_eq!(c4_2(&modes).holds, quartet, "{r}");
         assert!(!c4_3(Meeting::AtTheEnd, Some(&modes)).holds);
     }
@@ -201,24 +304,40 @@ fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
     let mut system = System::with_double_integrator(dice);
     system.others = vec![below * below, above * above];
     system.force.push(1.0);
-    system.sensor.push(dice.spread(0.05, 300.0) * above * above / 1e4);
+    system
+        .sensor
+        .push(dice.spread(0.05, 300.0) * above * above / 1e4);
     system
 }
 
 /// What P4-1 says of a plant, at the values of the grid where b2-hat is nearer to b22-hat than to b21-hat: how many are
 /// asked, how many wrong, and for the wrong ones the largest margin over A4-5's ratio.
 fn near_the_upper_limit(course: &Course) -> (usize, usize, f64) {
-    let on_grid = course.stations.iter().filter(|station| grid().contains(&station.value));
+    let on_grid = course
+        .stations
+        .iter()
+        .filter(|station| grid().contains(&station.value));
     let apart = on_grid.filter_map(|station| Some((station.modes?, p4_1(station)?)));
-    apart.fold((0, 0, 0.0), |(asked, wrong, furthest): (usize, usize, f64), (modes, p)| {
-        let c = c4_2(&modes);
-        if !c4_1(&modes).holds || 2.0 * c.figure < c.limits[0] + c.limits[1] {
-            return (asked, wrong, furthest);
-        }
-        let over = c.margin.abs() / modes.remainder.integrator_ratio;
-        let is_wrong = p.foretold.is_contradicted_by(p.plant);
-        (asked + 1, wrong + usize::from(is_wrong), if is_wrong { furthest.max(over) } else { furthest })
-    })
+    apart.fold(
+        (0, 0, 0.0),
+        |(asked, wrong, furthest): (usize, usize, f64), (modes, p)| {
+            let c = c4_2(&modes);
+            if !c4_1(&modes).holds || 2.0 * c.figure < c.limits[0] + c.limits[1] {
+                return (asked, wrong, furthest);
+            }
+            let over = c.margin.abs() / modes.remainder.integrator_ratio;
+            let is_wrong = p.foretold.is_contradicted_by(p.plant);
+            (
+                asked + 1,
+                wrong + usize::from(is_wrong),
+                if is_wrong {
+                    furthest.max(over)
+                } else {
+                    furthest
+                },
+            )
+        },
+    )
 }
 
 #[test]
@@ -226,21 +345,37 @@ fn beside_held_modes_p4_1_errs_by_less_than_the_remainder_departs_from_a_double_
     // Dual MMP zeros and their meeting lie between the modes, where the remainder is known to that ratio, and b22-hat is
     // where they meet. Of b21-hat this says nothing: zeros meet there outside, where the remainder may be anything.
     for (below, above) in [(0.5, 300.0), (2.0, 50.0), (4.0, 25.0), (6.0, 16.0)] {
-        let (mut dice, mut sum, mut tallies) = (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
+        let (mut dice, mut sum, mut tallies) =
+            (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
         for _ in 0..300 {
             let course = with_held_modes(&mut dice, below, above).course();
             let (asked, wrong, furthest) = near_the_upper_limit(&course);
             sum = (sum.0 + asked, sum.1 + wrong, sum.2.max(furthest));
             for side in [Side::Before, Side::After] {
                 let all = Stretch::of(&course, side).propositions();
-                tallies.iter_mut().zip(&all).for_each(|(tally, proposition)| tally.add(proposition));
+                tallies
+                    .iter_mut()
+                    .zip(&all)
+                    .for_each(|(tally, proposition)| tally.add(proposition));
             }
         }
-        assert!(sum.0 > 500 && sum.1 < sum.0 / 50 && sum.2 < 1.0, "{below} {above}: {sum:?}");
+        assert!(
+            sum.0 > 500 && sum.1 < sum.0 / 50 && sum.2 < 1.0,
+            "{below} {above}: {sum:?}"
+        );
         let [p4_2, p4_2x, p4_2y] = tallies;
-        assert!(p4_2.wrong_by_plant == 0 && p4_2.appear > 20, "{below} {above}: {p4_2:?}");
-        assert!(p4_2y.wrong_by_plant == 0 && p4_2y.appear > 8, "{below} {above}: {p4_2y:?}");
+        assert!(
+            p4_2.wrong_by_plant == 0 && p4_2.appear > 20,
+            "{below} {above}: {p4_2:?}"
+        );
+        assert!(
+            p4_2y.wrong_by_plant == 0 && p4_2y.appear > 8,
+            "{below} {above}: {p4_2y:?}"
+        );
         // P4-2x errs where the others have a quartet of their own with the two: beyond b21-hat.
-        assert!(p4_2x.wrong_by_plant < p4_2x.absent / 30 && p4_2x.absent > 400, "{below} {above}: {p4_2x:?}");
+        assert!(
+            p4_2x.wrong_by_plant < p4_2x.absent / 30 && p4_2x.absent > 400,
+            "{below} {above}: {p4_2x:?}"
+        );
     }
 }

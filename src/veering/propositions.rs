@@ -75,9 +75,19 @@ pub struct Proposition {
 pub fn p4_1(station: &Station) -> Option<Proposition> {
     let modes = station.modes?;
     let premises = vec![c4_1(&modes), c4_2(&modes)];
-    let foretold = if premises.iter().all(|premise| premise.holds) { Foretold::Appear } else { Foretold::Absent };
+    let foretold = if premises.iter().all(|premise| premise.holds) {
+        Foretold::Appear
+    } else {
+        Foretold::Absent
+    };
     let equation = station.equation == Some(Lie::Quartet);
-    Some(Proposition { name: "P4-1", premises, foretold, equation, plant: station.plant == Lie::Quartet })
+    Some(Proposition {
+        name: "P4-1",
+        premises,
+        foretold,
+        equation,
+        plant: station.plant == Lie::Quartet,
+    })
 }
 
 /// On which side of the veering point.
@@ -119,26 +129,45 @@ impl<'a> Stretch<'a> {
             Side::Before => course.stations[..=course.closest].iter().rev().collect(),
             Side::After => course.stations[course.closest..].iter().collect(),
         };
-        let apart: Vec<&Station> = outwards.into_iter().filter(|station| station.modes.is_some()).collect();
-        let alternates = |station: &&&Station| station.modes.is_some_and(|modes| c4_1(&modes).holds);
+        let apart: Vec<&Station> = outwards
+            .into_iter()
+            .filter(|station| station.modes.is_some())
+            .collect();
+        let alternates =
+            |station: &&&Station| station.modes.is_some_and(|modes| c4_1(&modes).holds);
         let stations = apart.iter().take_while(alternates).copied().collect();
         let closest = &course.stations[course.closest];
-        Stretch { side, meeting: course.meeting, closest, stations, next: apart.first().copied() }
+        Stretch {
+            side,
+            meeting: course.meeting,
+            closest,
+            stations,
+            next: apart.first().copied(),
+        }
     }
 
     /// The values from the veering point to the far end; `None` where C4-1 fails at the veering point.
     pub fn range(&self) -> Option<[f64; 2]> {
-        self.stations.last().map(|far| [self.closest.value, far.value])
+        self.stations
+            .last()
+            .map(|far| [self.closest.value, far.value])
     }
 
     /// P4-2, P4-2x and P4-2y on this side.
     pub fn propositions(&self) -> [Proposition; 3] {
         let (alternating, close) = (self.alternating(), self.close());
         let beyond = self.best(|station| station.modes.map(|modes| c4_4(&modes)), "C4-4");
-        let dual = self.best(|station| station.modes.map(|modes| c4_4y(&modes, &station.zeros)), "C4-4y");
+        let dual = self.best(
+            |station| station.modes.map(|modes| c4_4y(&modes, &station.zeros)),
+            "C4-4y",
+        );
         let holds = |premises: &[Condition]| premises.iter().all(|premise| premise.holds);
         let sufficient = |name, premises: Vec<Condition>| {
-            let foretold = if holds(&premises) { Foretold::Appear } else { Foretold::Nothing };
+            let foretold = if holds(&premises) {
+                Foretold::Appear
+            } else {
+                Foretold::Nothing
+            };
             self.proposition(name, premises, foretold)
         };
         let necessary = match (close.holds, holds(&[alternating, beyond])) {
@@ -153,16 +182,41 @@ impl<'a> Stretch<'a> {
         ]
     }
 
-    fn proposition(&self, name: &'static str, premises: Vec<Condition>, foretold: Foretold) -> Proposition {
-        let equation = self.stations.iter().any(|station| station.equation == Some(Lie::Quartet));
-        let plant = self.stations.iter().any(|station| station.plant == Lie::Quartet);
-        Proposition { name, premises, foretold, equation, plant }
+    fn proposition(
+        &self,
+        name: &'static str,
+        premises: Vec<Condition>,
+        foretold: Foretold,
+    ) -> Proposition {
+        let equation = self
+            .stations
+            .iter()
+            .any(|station| station.equation == Some(Lie::Quartet));
+        let plant = self
+            .stations
+            .iter()
+            .any(|station| station.plant == Lie::Quartet);
+        Proposition {
+            name,
+            premises,
+            foretold,
+            equation,
+            plant,
+        }
     }
 
     /// C4-1 next to the veering point, from where the stretch goes on as long as it holds.
     fn alternating(&self) -> Condition {
-        let nowhere = Condition { name: "C4-1", holds: false, figure: 0.0, limits: [0.0, f64::INFINITY], margin: 0.0 };
-        self.next.and_then(|station| station.modes).map_or(nowhere, |modes| c4_1(&modes))
+        let nowhere = Condition {
+            name: "C4-1",
+            holds: false,
+            figure: 0.0,
+            limits: [0.0, f64::INFINITY],
+            margin: 0.0,
+        };
+        self.next
+            .and_then(|station| station.modes)
+            .map_or(nowhere, |modes| c4_1(&modes))
     }
 
     /// C4-3, of the station next to the veering point where that is a crossing.
@@ -171,10 +225,29 @@ impl<'a> Stretch<'a> {
     }
 
     /// A condition where its margin on the stretch is largest, other than at the veering point itself.
-    fn best(&self, condition: impl Fn(&Station) -> Option<Condition>, name: &'static str) -> Condition {
-        let nowhere = Condition { name, holds: false, figure: 0.0, limits: [0.0, f64::INFINITY], margin: -1.0 };
-        let away = self.stations.iter().filter(|station| station.value != self.closest.value);
+    fn best(
+        &self,
+        condition: impl Fn(&Station) -> Option<Condition>,
+        name: &'static str,
+    ) -> Condition {
+        let nowhere = Condition {
+            name,
+            holds: false,
+            figure: 0.0,
+            limits: [0.0, f64::INFINITY],
+            margin: -1.0,
+        };
+        let away = self
+            .stations
+            .iter()
+            .filter(|station| station.value != self.closest.value);
         away.filter_map(|station| condition(station))
-            .fold(nowhere, |best, next| if (next.holds, next.margin) > (best.holds, best.margin) { next } else { best })
+            .fold(nowhere, |best, next| {
+                if (next.holds, next.margin) > (best.holds, best.margin) {
+                    next
+                } else {
+                    best
+                }
+            })
     }
 }

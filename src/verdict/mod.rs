@@ -76,12 +76,20 @@ pub struct Verdict {
 impl Verdict {
     /// Nothing can be said, and why.
     pub fn undecided(why: String) -> Verdict {
-        Verdict { cnmp: Cnmp::Undecided, why, zeros: Vec::new(), phase: None }
+        Verdict {
+            cnmp: Cnmp::Undecided,
+            why,
+            zeros: Vec::new(),
+            phase: None,
+        }
     }
 
     /// The same with something told beside its reasons.
     pub fn with(self, caution: Option<String>) -> Verdict {
-        let why = std::iter::once(self.why).chain(caution).collect::<Vec<_>>().join("; ");
+        let why = std::iter::once(self.why)
+            .chain(caution)
+            .collect::<Vec<_>>()
+            .join("; ");
         Verdict { why, ..self }
     }
 }
@@ -104,14 +112,27 @@ pub struct Case<'a> {
 /// Weighs the witnesses. Fails where the zeros of the fit cannot be computed.
 pub fn verdict(case: &Case<'_>) -> Result<Verdict, PlantError> {
     let within = |w: f64| w <= case.up_to_rad_s && w >= case.blocks.first().map_or(0.0, omega);
-    let zeros: Vec<UncertainZero> = zeros(case.fit)?.into_iter().filter(|zero| within(zero.s.norm())).collect();
-    let modes: Vec<FittedMode> = case.fit.modes().into_iter().filter(|mode| within(mode.omega_rad_s.value)).collect();
+    let zeros: Vec<UncertainZero> = zeros(case.fit)?
+        .into_iter()
+        .filter(|zero| within(zero.s.norm()))
+        .collect();
+    let modes: Vec<FittedMode> = case
+        .fit
+        .modes()
+        .into_iter()
+        .filter(|mode| within(mode.omega_rad_s.value))
+        .collect();
     let phase = fall(case, &modes);
     let (cnmp, why) = match doubt(case, &modes).or_else(|| unclear(&zeros)) {
         Some(doubt) => (Cnmp::Undecided, doubt),
         None => weigh(&zeros, &modes, phase),
     };
-    Ok(Verdict { cnmp, why, zeros, phase })
+    Ok(Verdict {
+        cnmp,
+        why,
+        zeros,
+        phase,
+    })
 }
 
 /// Why the data carry no verdict.
@@ -143,7 +164,8 @@ fn doubt(case: &Case<'_>, modes: &[FittedMode]) -> Option<String> {
 /// A zero of which nobody can say on which side of the imaginary axis it is.
 fn unclear(zeros: &[UncertainZero]) -> Option<String> {
     let near = |zero: &&UncertainZero| zero.s.re.abs() < TRUEST * zero.s.norm();
-    let sure = |zero: &&UncertainZero| zero.rhp_probability <= SURE || zero.rhp_probability >= 1.0 - SURE;
+    let sure =
+        |zero: &&UncertainZero| zero.rhp_probability <= SURE || zero.rhp_probability >= 1.0 - SURE;
     let zero = zeros.iter().find(|zero| near(zero) || !sure(zero))?;
     Some(format!(
         "the zero {:.3} +- {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, \
@@ -156,12 +178,23 @@ fn unclear(zeros: &[UncertainZero]) -> Option<String> {
 }
 
 /// The verdict of zeros that are all on a known side: the other two witnesses must agree.
-fn weigh(zeros: &[UncertainZero], modes: &[FittedMode], phase: Option<PhaseFall>) -> (Cnmp, String) {
+fn weigh(
+    zeros: &[UncertainZero],
+    modes: &[FittedMode],
+    phase: Option<PhaseFall>,
+) -> (Cnmp, String) {
     let right = |zero: &&UncertainZero| zero.s.re > 0.0;
-    let pairs = zeros.iter().filter(right).filter(|zero| zero.kind == ZeroKind::Cnmp).count();
+    let pairs = zeros
+        .iter()
+        .filter(right)
+        .filter(|zero| zero.kind == ZeroKind::Cnmp)
+        .count();
     let real = zeros.iter().filter(right).count() - pairs;
     let Some(phase) = phase else {
-        return (Cnmp::Undecided, "fewer than two modes are seen: there is no valley to look at".into());
+        return (
+            Cnmp::Undecided,
+            "fewer than two modes are seen: there is no valley to look at".into(),
+        );
     };
     let turns = (2 * pairs + real) as i32;
     let agree = phase.off_deg <= CLEAR_DEG && phase.half_turns == turns;
@@ -199,7 +232,9 @@ fn contradiction(turns: i32, phase: PhaseFall) -> String {
 }
 
 fn alternate(modes: &[FittedMode]) -> bool {
-    modes.windows(2).any(|pair| pair[0].residue_per_kg.value * pair[1].residue_per_kg.value < 0.0)
+    modes
+        .windows(2)
+        .any(|pair| pair[0].residue_per_kg.value * pair[1].residue_per_kg.value < 0.0)
 }
 
 /// Signs of the residues, slowest mode first.
@@ -214,11 +249,16 @@ fn fall(case: &Case<'_>, modes: &[FittedMode]) -> Option<PhaseFall> {
     let [first, .., _] = modes else { return None };
     let low = 0.5 * first.omega_rad_s.value;
     let from = case.blocks.iter().position(|block| omega(block) >= low)?;
-    let to = case.blocks.iter().rposition(|block| omega(block) <= case.up_to_rad_s)?;
+    let to = case
+        .blocks
+        .iter()
+        .rposition(|block| omega(block) <= case.up_to_rad_s)?;
     let clear = |block: &&Block| block.response.norm_sqr() > CLEAR_POWER * block.variance;
     let reach = to + 1 + case.blocks[to + 1..].iter().take_while(clear).count();
     let omega_rad_s: Vec<f64> = case.blocks[..reach].iter().map(omega).collect();
-    let mechanics = case.view.mechanics(&case.blocks[..reach], case.fit.parameters.delay_s);
+    let mechanics = case
+        .view
+        .mechanics(&case.blocks[..reach], case.fit.parameters.delay_s);
     (from < to).then(|| phase_fall(&omega_rad_s, &mechanics, from, to))
 }
 

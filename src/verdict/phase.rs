@@ -31,23 +31,44 @@ const LAG: f64 = 0.15;
 
 /// The fall of the phase of `response` beyond that of its magnitude between two of its frequencies, by index. Frequencies
 /// rise, responses are not zero.
-pub fn phase_fall(omega_rad_s: &[f64], response: &[Complex<f64>], from: usize, to: usize) -> PhaseFall {
-    let turned: f64 = response[from..=to].windows(2).map(|pair| (pair[1] / pair[0]).arg()).sum::<f64>();
-    let asked = minimum_phase(omega_rad_s, response, to) - minimum_phase(omega_rad_s, response, from);
+pub fn phase_fall(
+    omega_rad_s: &[f64],
+    response: &[Complex<f64>],
+    from: usize,
+    to: usize,
+) -> PhaseFall {
+    let turned: f64 = response[from..=to]
+        .windows(2)
+        .map(|pair| (pair[1] / pair[0]).arg())
+        .sum::<f64>();
+    let asked =
+        minimum_phase(omega_rad_s, response, to) - minimum_phase(omega_rad_s, response, from);
     let beyond_deg = (turned - asked).to_degrees();
     let half_turns = -(beyond_deg / 180.0).round();
-    PhaseFall { beyond_deg, half_turns: half_turns as i32, off_deg: (beyond_deg + 180.0 * half_turns).abs() }
+    PhaseFall {
+        beyond_deg,
+        half_turns: half_turns as i32,
+        off_deg: (beyond_deg + 180.0 * half_turns).abs(),
+    }
 }
 
 /// The phase in radians at one frequency that the magnitude asks for.
 fn minimum_phase(omega_rad_s: &[f64], response: &[Complex<f64>], at: usize) -> f64 {
-    let x: Vec<f64> = omega_rad_s.iter().map(|w| (w / omega_rad_s[at]).ln()).collect();
+    let x: Vec<f64> = omega_rad_s
+        .iter()
+        .map(|w| (w / omega_rad_s[at]).ln())
+        .collect();
     let height: Vec<f64> = response.iter().map(|h| h.norm().ln()).collect();
-    let within: f64 =
-        (1..x.len()).map(|i| (height[i] - height[i - 1]) / (x[i] - x[i - 1]) * (weight(x[i]) - weight(x[i - 1]))).sum();
+    let within: f64 = (1..x.len())
+        .map(|i| {
+            (height[i] - height[i - 1]) / (x[i] - x[i - 1]) * (weight(x[i]) - weight(x[i - 1]))
+        })
+        .sum();
     let last = x.len() - 1;
-    let below = end_slope(&x, &height, x[0], x[0] + END) * (weight(x[0]) - weight(f64::NEG_INFINITY));
-    let above = end_slope(&x, &height, x[last] - END, x[last]) * (weight(f64::INFINITY) - weight(x[last]));
+    let below =
+        end_slope(&x, &height, x[0], x[0] + END) * (weight(x[0]) - weight(f64::NEG_INFINITY));
+    let above =
+        end_slope(&x, &height, x[last] - END, x[last]) * (weight(f64::INFINITY) - weight(x[last]));
     (within + below + above) / std::f64::consts::PI
 }
 
@@ -72,7 +93,11 @@ fn weight(x: f64) -> f64 {
     // Near 0 the series is slow; there ln coth(t/2) = ln(2/t) + t^2/12 - ...
     let size = if x.abs() < 0.1 {
         let t = x.abs();
-        if t == 0.0 { 0.0 } else { t * ((2.0 / t).ln() + 1.0) + t.powi(3) / 36.0 }
+        if t == 0.0 {
+            0.0
+        } else {
+            t * ((2.0 / t).ln() + 1.0) + t.powi(3) / 36.0
+        }
     } else {
         let term = |k: i32| e.powi(2 * k + 1) / f64::from((2 * k + 1) * (2 * k + 1));
         quarter - 2.0 * (0..120).map(term).sum::<f64>()
@@ -85,12 +110,17 @@ mod tests {
     use super::*;
 
     fn of(zeros: &[Complex<f64>], delay_s: f64) -> (Vec<f64>, Vec<Complex<f64>>) {
-        let omega: Vec<f64> = (0..12_000).map(|k| 1.0 * (0.0007 * f64::from(k)).exp()).collect();
+        let omega: Vec<f64> = (0..12_000)
+            .map(|k| 1.0 * (0.0007 * f64::from(k)).exp())
+            .collect();
         let response = omega.iter().map(|w| {
             let s = Complex::new(0.0, *w);
             let mode = |w: f64, z: f64| (s * s / (w * w) + s * (2.0 * z / w) + 1.0).inv();
             let poles = mode(180.0, 0.009) * mode(516.0, 0.004) * mode(540.0, 0.004);
-            let zeros: Complex<f64> = zeros.iter().map(|z| (s - z) * (s - z.conj()) / z.norm_sqr()).product();
+            let zeros: Complex<f64> = zeros
+                .iter()
+                .map(|z| (s - z) * (s - z.conj()) / z.norm_sqr())
+                .product();
             poles * zeros * Complex::from_polar(1.0, -w * delay_s)
         });
         let response = response.collect();
@@ -115,7 +145,10 @@ mod tests {
         ] {
             let fall = fall(&zeros);
             // The slopes at the ends of the band stand for the rest of it: some degrees.
-            assert!(fall.half_turns == half_turns && fall.off_deg < 20.0, "{zeros:?}: {fall:?}");
+            assert!(
+                fall.half_turns == half_turns && fall.off_deg < 20.0,
+                "{zeros:?}: {fall:?}"
+            );
         }
     }
 
@@ -126,7 +159,9 @@ mod tests {
             // The midpoint rule; at 0 the logarithm costs it some half a step times ln 2.
             let step = 1e-5;
             let midpoint = |k: usize| (k as f64 + 0.5) * step;
-            let sum: f64 = (0..(x / step) as usize).map(|k| -(midpoint(k) / 2.0).tanh().ln() * step).sum();
+            let sum: f64 = (0..(x / step) as usize)
+                .map(|k| -(midpoint(k) / 2.0).tanh().ln() * step)
+                .sum();
             assert!((weight(x) - sum).abs() < 1e-4, "{x}: {} {sum}", weight(x));
             assert_eq!(weight(-x), -weight(x));
         }

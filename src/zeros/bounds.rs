@@ -33,7 +33,11 @@ pub fn bandwidth_rad_s(zero_rad_s: Complex<f64>, opening_angle_rad: f64) -> f64 
     let square = zero_rad_s.norm_sqr();
     let root = (along * along + square * sine * sine).sqrt();
     // Of the two forms of the positive root the one that adds.
-    if along >= 0.0 { square * sine / (along + root) } else { (root - along) / sine }
+    if along >= 0.0 {
+        square * sine / (along + root)
+    } else {
+        (root - along) / sine
+    }
 }
 
 /// The bound of one zero.
@@ -50,8 +54,12 @@ impl Bound {
     /// above 1.
     pub fn of(zeros: &[Zero], alpha: f64, peak: f64) -> Vec<Bound> {
         let angle = opening_angle_allowed(alpha, peak);
-        let right = |zero: &&Zero| matches!(zero.kind, ZeroKind::Rnmp | ZeroKind::Cnmp) && zero.s.im >= 0.0;
-        let bound = |zero: &Zero| Bound { zero: *zero, bandwidth_rad_s: bandwidth_rad_s(zero.s, angle) };
+        let right =
+            |zero: &&Zero| matches!(zero.kind, ZeroKind::Rnmp | ZeroKind::Cnmp) && zero.s.im >= 0.0;
+        let bound = |zero: &Zero| Bound {
+            zero: *zero,
+            bandwidth_rad_s: bandwidth_rad_s(zero.s, angle),
+        };
         let mut bounds: Vec<Bound> = zeros.iter().filter(right).map(bound).collect();
         bounds.sort_by(|a, b| a.bandwidth_rad_s.total_cmp(&b.bandwidth_rad_s));
         bounds
@@ -81,7 +89,10 @@ mod tests {
         // Section 1.2, last remark on Fig 1-4.
         let at = |angle: f64| bandwidth_rad_s(Complex::from_polar(1.0, angle), PI / 6.0);
         let falling: Vec<f64> = [0.0, 0.4, 0.8, 1.2, 1.5].into_iter().map(at).collect();
-        assert!(falling.windows(2).all(|pair| pair[0] < pair[1]), "{falling:?}");
+        assert!(
+            falling.windows(2).all(|pair| pair[0] < pair[1]),
+            "{falling:?}"
+        );
         // On the real axis the half angle is seen by w0/x.
         assert!((falling[0] - (PI / 12.0).tan()).abs() < 1e-15);
     }

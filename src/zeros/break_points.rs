@@ -11,8 +11,15 @@ use super::Term;
 /// In rad/s, the smaller magnitude first; the second is infinite where zu wu = zv wv. `None` where they are complex
 /// (large and very different damping) or the frequencies are equal.
 pub fn two_mode_break_points(u: &Term, v: &Term) -> Option<[f64; 2]> {
-    let ((wu, zu), (wv, zv)) = ((u.omega_rad_s, u.damping_ratio), (v.omega_rad_s, v.damping_ratio));
-    let (a, b, c) = (zu * wu - zv * wv, (wu - wv) * (wu + wv), wu * wv * (zv * wu - zu * wv));
+    let ((wu, zu), (wv, zv)) = (
+        (u.omega_rad_s, u.damping_ratio),
+        (v.omega_rad_s, v.damping_ratio),
+    );
+    let (a, b, c) = (
+        zu * wu - zv * wv,
+        (wu - wv) * (wu + wv),
+        wu * wv * (zv * wu - zu * wv),
+    );
     let discriminant = b * b - 4.0 * a * c;
     if b == 0.0 || discriminant < 0.0 {
         return None;
@@ -42,7 +49,10 @@ pub fn critical_residues(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<[f64;
 /// [`critical_residues`].
 pub fn critical_sums(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<[f64; 2]> {
     let (xu, xv) = shifted(omega_r_rad_s, u, v)?;
-    let (ru, rv) = ((xu * u.residue_per_kg.abs()).sqrt(), (xv * v.residue_per_kg.abs()).sqrt());
+    let (ru, rv) = (
+        (xu * u.residue_per_kg.abs()).sqrt(),
+        (xv * v.residue_per_kg.abs()).sqrt(),
+    );
     let sum = |root: f64| (root * root / (xv - xu)).copysign(v.residue_per_kg);
     Some([sum(rv - ru), sum(rv + ru)])
 }
@@ -95,17 +105,33 @@ mod tests {
     fn furthest_right(zeta: f64, eta: f64, kappa: f64) -> f64 {
         let right = |log: f64| {
             let av = log.exp();
-            let mode = |omega_rad_s, residue_per_kg| Term { omega_rad_s, damping_ratio: zeta, residue_per_kg };
-            let terms = vec![Term::undamped(0.0, 1.0), mode(eta, -kappa * av), mode(1.0, av)];
+            let mode = |omega_rad_s, residue_per_kg| Term {
+                omega_rad_s,
+                damping_ratio: zeta,
+                residue_per_kg,
+            };
+            let terms = vec![
+                Term::undamped(0.0, 1.0),
+                mode(eta, -kappa * av),
+                mode(1.0, av),
+            ];
             let zeros = ModalSum::new(terms, 0.0).unwrap().damped_zeros().unwrap();
-            zeros.iter().filter(|z| z.s.im > 1e-3).map(|z| z.s.re).fold(f64::NEG_INFINITY, f64::max)
+            zeros
+                .iter()
+                .filter(|z| z.s.im > 1e-3)
+                .map(|z| z.s.re)
+                .fold(f64::NEG_INFINITY, f64::max)
         };
         let grid = (0..=2000).map(|i| -8.0 + 16.0 * f64::from(i) / 2000.0);
         let best = grid.max_by(|a, b| right(*a).total_cmp(&right(*b))).unwrap();
         let (mut low, mut high) = (best - 0.01, best + 0.01);
         for _ in 0..60 {
             let (a, b) = (high - 0.618 * (high - low), low + 0.618 * (high - low));
-            if right(a) > right(b) { high = b } else { low = a }
+            if right(a) > right(b) {
+                high = b
+            } else {
+                low = a
+            }
         }
         right(0.5 * (low + high))
     }
@@ -125,7 +151,10 @@ mod tests {
         for (eta, kappa) in [(0.9 / 1.1, 2.0), (0.9 / 1.1, 5.0), (0.5, 6.0), (0.95, 1.2)] {
             let zeta = touching_damping(eta, kappa).unwrap();
             // Rounding of a pencil whose zero sits at 1: some 1e-15; a thousandth of damping more or less decides.
-            assert!(furthest_right(zeta, eta, kappa).abs() < 1e-10, "{eta} {kappa}: {zeta}");
+            assert!(
+                furthest_right(zeta, eta, kappa).abs() < 1e-10,
+                "{eta} {kappa}: {zeta}"
+            );
             assert!(furthest_right(zeta * 1.001, eta, kappa) < -1e-6);
             assert!(furthest_right(zeta * 0.999, eta, kappa) > 1e-6);
             assert!(critical_damping(eta, kappa).unwrap() <= zeta);
@@ -134,8 +163,17 @@ mod tests {
 
     #[test]
     fn without_their_condition_the_dampings_do_not_exist() {
-        for (eta, kappa) in [(1.0, 2.0), (0.5, 3.9), (1.2, 2.0), (0.0, 2.0), (0.9, f64::NAN)] {
-            assert_eq!((critical_damping(eta, kappa), touching_damping(eta, kappa)), (None, None));
+        for (eta, kappa) in [
+            (1.0, 2.0),
+            (0.5, 3.9),
+            (1.2, 2.0),
+            (0.0, 2.0),
+            (0.9, f64::NAN),
+        ] {
+            assert_eq!(
+                (critical_damping(eta, kappa), touching_damping(eta, kappa)),
+                (None, None)
+            );
         }
     }
 

@@ -67,7 +67,11 @@ impl Kinds {
     /// The kinds of the zeros of a plant without damping.
     pub fn of(zeros: &[Zero]) -> Kinds {
         let count = |kind| zeros.iter().filter(|zero| zero.kind == kind).count();
-        Kinds { mmp: count(ZeroKind::Mmp) / 2, real: count(ZeroKind::Rnmp), quartets: count(ZeroKind::Cnmp) / 2 }
+        Kinds {
+            mmp: count(ZeroKind::Mmp) / 2,
+            real: count(ZeroKind::Rnmp),
+            quartets: count(ZeroKind::Cnmp) / 2,
+        }
     }
 
     /// Zeros in the right half plane.
@@ -85,8 +89,16 @@ impl std::fmt::Display for Kinds {
             2 => Some(format!("dual {name}")),
             _ => Some(format!("{count} x {name}")),
         };
-        let parts = [(self.mmp, "MMP"), (self.real, "RMP-RNMP"), (self.quartets, "CMP-CNMP")];
-        let text = parts.into_iter().filter_map(named).collect::<Vec<_>>().join(" + ");
+        let parts = [
+            (self.mmp, "MMP"),
+            (self.real, "RMP-RNMP"),
+            (self.quartets, "CMP-CNMP"),
+        ];
+        let text = parts
+            .into_iter()
+            .filter_map(named)
+            .collect::<Vec<_>>()
+            .join(" + ");
         f.write_str(if text.is_empty() { "none" } else { &text })
     }
 }
@@ -118,8 +130,22 @@ pub(super) struct System<'a> {
 
 impl<'a> From<&'a Structure> for System<'a> {
     fn from(structure: &'a Structure) -> Self {
-        let Structure { mass, damping, stiffness, force, sensor, .. } = structure;
-        System { mass, damping, stiffness, force, sensor, constant_m_per_n: 0.0 }
+        let Structure {
+            mass,
+            damping,
+            stiffness,
+            force,
+            sensor,
+            ..
+        } = structure;
+        System {
+            mass,
+            damping,
+            stiffness,
+            force,
+            sensor,
+            constant_m_per_n: 0.0,
+        }
     }
 }
 
@@ -128,7 +154,10 @@ pub(super) fn undamped(system: &System) -> Result<Vec<Zero>, PlantError> {
     let scale = time_scale(system);
     let [mass, _, stiffness] = reduced(system, scale);
     let squares = pencil(&stiffness, &mass)?;
-    let zeros = squares.iter().flat_map(|u| of_square(u * (scale * scale))).collect();
+    let zeros = squares
+        .iter()
+        .flat_map(|u| of_square(u * (scale * scale)))
+        .collect();
     Ok(sorted(zeros))
 }
 
@@ -144,19 +173,30 @@ pub(super) fn damped(system: &System) -> Result<Vec<Zero>, PlantError> {
     linear.view_mut((n, 0), (n, n)).copy_from(&mass);
     linear.view_mut((n, n), (n, n)).copy_from(&damping);
     let undamped = undamped(system)?;
-    let zeros = pencil(&constant, &linear)?.iter().map(|s| kind_of_damped(s * scale, &undamped)).collect();
+    let zeros = pencil(&constant, &linear)?
+        .iter()
+        .map(|s| kind_of_damped(s * scale, &undamped))
+        .collect();
     Ok(sorted(zeros))
 }
 
 /// Number of CNMP pairs among zeros.
 pub fn cnmp_pairs(zeros: &[Zero]) -> usize {
-    zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp).count() / 2
+    zeros
+        .iter()
+        .filter(|zero| zero.kind == ZeroKind::Cnmp)
+        .count()
+        / 2
 }
 
 /// Phase in degrees by which the plant falls below the minimum-phase plant of the same magnitude: 180 a zero in the right
 /// half plane.
 pub fn phase_drop_deg(zeros: &[Zero]) -> f64 {
-    180.0 * zeros.iter().filter(|zero| matches!(zero.kind, ZeroKind::Cnmp | ZeroKind::Rnmp)).count() as f64
+    180.0
+        * zeros
+            .iter()
+            .filter(|zero| matches!(zero.kind, ZeroKind::Cnmp | ZeroKind::Rnmp))
+            .count() as f64
 }
 
 /// Mass, damping and stiffness of the pencil, with time in units of 1/`scale`: projected, by motions alone or, where there
@@ -180,13 +220,18 @@ fn with_constant(system: &System, scale: f64) -> [DMatrix<f64>; 3] {
     let basis = complement(&seen.push(through));
     let (motions, forces) = (basis.rows(0, n), basis.row(n));
     let stiffness = system.stiffness * motions / (scale * scale) - force * system.force * forces;
-    [system.mass * motions, system.damping * motions / scale, stiffness]
+    [
+        system.mass * motions,
+        system.damping * motions / scale,
+        stiffness,
+    ]
 }
 
 /// N_q^T (.) N_c of mass, damping and stiffness.
 fn projected(system: &System) -> [DMatrix<f64>; 3] {
     let (output, input) = (complement(system.sensor), complement(system.force));
-    [system.mass, system.damping, system.stiffness].map(|matrix| input.transpose() * matrix * &output)
+    [system.mass, system.damping, system.stiffness]
+        .map(|matrix| input.transpose() * matrix * &output)
 }
 
 /// A frequency in the middle of the structure's own, so that scaled masses and stiffnesses are of one size.
@@ -196,11 +241,17 @@ fn time_scale(system: &System) -> f64 {
 }
 
 fn of_square(u: Complex<f64>) -> Vec<Zero> {
-    let at = |re: f64, im: f64, kind| Zero { s: Complex::new(re, im), kind };
+    let at = |re: f64, im: f64, kind| Zero {
+        s: Complex::new(re, im),
+        kind,
+    };
     if u.im.abs() > COMPLEX_RATIO * u.norm() {
         // Both u and its conjugate come by here: each gives a right half plane zero and its mirror image.
         let s = u.sqrt();
-        return vec![at(s.re, s.im, ZeroKind::Cnmp), at(-s.re, -s.im, ZeroKind::Cmp)];
+        return vec![
+            at(s.re, s.im, ZeroKind::Cnmp),
+            at(-s.re, -s.im, ZeroKind::Cmp),
+        ];
     }
     let size = u.re.abs().sqrt();
     if u.re < 0.0 {
@@ -212,7 +263,9 @@ fn of_square(u: Complex<f64>) -> Vec<Zero> {
 
 fn kind_of_damped(s: Complex<f64>, undamped: &[Zero]) -> Zero {
     let real = s.im.abs() <= COMPLEX_RATIO * s.norm();
-    let nearest = undamped.iter().min_by(|a, b| (a.s - s).norm().total_cmp(&(b.s - s).norm()));
+    let nearest = undamped
+        .iter()
+        .min_by(|a, b| (a.s - s).norm().total_cmp(&(b.s - s).norm()));
     let kind = match (real, s.re > 0.0) {
         (true, true) => ZeroKind::Rnmp,
         (true, false) => ZeroKind::Rmp,
@@ -225,6 +278,10 @@ fn kind_of_damped(s: Complex<f64>, undamped: &[Zero]) -> Zero {
 
 fn sorted(mut zeros: Vec<Zero>) -> Vec<Zero> {
     let key = |zero: &Zero| (zero.s.im.abs(), zero.s.re, zero.s.im);
-    zeros.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+    zeros.sort_by(|a, b| {
+        key(a)
+            .partial_cmp(&key(b))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
     zeros
 }

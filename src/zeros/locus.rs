@@ -75,9 +75,20 @@ pub struct Locus {
 
 impl Locus {
     /// Follows the zeros that `zeros` gives at a value. `values` are two at least, in one order.
-    pub fn follow<E>(plane: Plane, values: &[f64], zeros: impl FnMut(f64) -> Result<Vec<Zero>, E>) -> Result<Locus, E> {
-        let mut follower = Follower { plane, zeros, left: 40 * values.len() + 2000 };
-        let samples = values.iter().map(|value| follower.sample(*value)).collect::<Result<Vec<_>, E>>()?;
+    pub fn follow<E>(
+        plane: Plane,
+        values: &[f64],
+        zeros: impl FnMut(f64) -> Result<Vec<Zero>, E>,
+    ) -> Result<Locus, E> {
+        let mut follower = Follower {
+            plane,
+            zeros,
+            left: 40 * values.len() + 2000,
+        };
+        let samples = values
+            .iter()
+            .map(|value| follower.sample(*value))
+            .collect::<Result<Vec<_>, E>>()?;
         let tracks = follower.tracks(&samples)?;
         let mut changes = Vec::new();
         for pair in samples.windows(2) {
@@ -87,9 +98,19 @@ impl Locus {
             follower.hidden(triple, &tracks, index, &mut changes)?;
         }
         let rising = values.first() <= values.last();
-        changes.sort_by(|a, b| if rising { a.value.total_cmp(&b.value) } else { b.value.total_cmp(&a.value) });
+        changes.sort_by(|a, b| {
+            if rising {
+                a.value.total_cmp(&b.value)
+            } else {
+                b.value.total_cmp(&a.value)
+            }
+        });
         let tracks = tracks.iter().map(|track| plane.places(track)).collect();
-        Ok(Locus { values: values.to_vec(), tracks, changes })
+        Ok(Locus {
+            values: values.to_vec(),
+            tracks,
+            changes,
+        })
     }
 }
 
@@ -114,7 +135,8 @@ impl Plane {
         let mut last: Option<Complex<f64>> = None;
         let nearer = |point: &Point| {
             let root = self.root((*point)?);
-            let turn = self == Plane::Undamped && last.is_some_and(|last| (last + root).norm() < (last - root).norm());
+            let turn = self == Plane::Undamped
+                && last.is_some_and(|last| (last + root).norm() < (last - root).norm());
             last = Some(if turn { -root } else { root });
             last
         };
@@ -124,7 +146,9 @@ impl Plane {
     fn root(self, point: Complex<f64>) -> Complex<f64> {
         match self {
             Plane::Damped => point,
-            Plane::Undamped if point.im == 0.0 && point.re < 0.0 => Complex::new(0.0, (-point.re).sqrt()),
+            Plane::Undamped if point.im == 0.0 && point.re < 0.0 => {
+                Complex::new(0.0, (-point.re).sqrt())
+            }
             Plane::Undamped => point.sqrt(),
         }
     }
@@ -134,7 +158,10 @@ impl Plane {
             Plane::Undamped => Census::Undamped(Kinds::of(zeros)),
             Plane::Damped => {
                 let count = |real: bool, right: bool| {
-                    zeros.iter().filter(|z| is_real(z.s) == real && (z.s.re > 0.0) == right).count()
+                    zeros
+                        .iter()
+                        .filter(|z| is_real(z.s) == real && (z.s.re > 0.0) == right)
+                        .count()
                 };
                 Census::Damped {
                     complex_left: count(false, false) / 2,
@@ -164,18 +191,37 @@ fn is_real(s: Complex<f64>) -> bool {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Census {
     Undamped(Kinds),
-    Damped { complex_left: usize, complex_right: usize, real_left: usize, real_right: usize },
+    Damped {
+        complex_left: usize,
+        complex_right: usize,
+        real_left: usize,
+        real_right: usize,
+    },
 }
 
 impl std::fmt::Display for Census {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Census::Undamped(kinds) => kinds.fmt(f),
-            Census::Damped { complex_left, complex_right, real_left, real_right } => {
-                let parts =
-                    [(complex_left, "MMP or CMP"), (complex_right, "CNMP"), (real_left, "RMP"), (real_right, "RNMP")];
+            Census::Damped {
+                complex_left,
+                complex_right,
+                real_left,
+                real_right,
+            } => {
+                let parts = [
+                    (complex_left, "MMP or CMP"),
+                    (complex_right, "CNMP"),
+                    (real_left, "RMP"),
+                    (real_right, "RNMP"),
+                ];
                 let parts = parts.iter().filter(|(count, _)| **count > 0);
-                f.write_str(&parts.map(|(count, name)| format!("{count} x {name}")).collect::<Vec<_>>().join(" + "))
+                f.write_str(
+                    &parts
+                        .map(|(count, name)| format!("{count} x {name}"))
+                        .collect::<Vec<_>>()
+                        .join(" + "),
+                )
             }
         }
     }
@@ -202,25 +248,45 @@ struct Follower<F> {
 impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
     fn sample(&mut self, value: f64) -> Result<Sample, E> {
         let zeros = (self.zeros)(value)?;
-        Ok(Sample { value, points: self.plane.points(&zeros), census: self.plane.census(&zeros) })
+        Ok(Sample {
+            value,
+            points: self.plane.points(&zeros),
+            census: self.plane.census(&zeros),
+        })
     }
 
     /// One list of places a zero.
     fn tracks(&mut self, samples: &[Sample]) -> Result<Vec<Vec<Point>>, E> {
-        let count = samples.iter().map(|sample| sample.points.len()).max().unwrap_or(0);
-        let Some(first) = samples.first() else { return Ok(Vec::new()) };
+        let count = samples
+            .iter()
+            .map(|sample| sample.points.len())
+            .max()
+            .unwrap_or(0);
+        let Some(first) = samples.first() else {
+            return Ok(Vec::new());
+        };
         let mut now = padded(&first.points, count);
         let mut tracks: Vec<Vec<Point>> = now.iter().map(|point| vec![*point]).collect();
         let scale = typical(samples);
         for pair in samples.windows(2) {
             now = self.moved(&now, pair[0].value, &pair[1], scale, DEPTH)?;
-            tracks.iter_mut().zip(&now).for_each(|(track, point)| track.push(*point));
+            tracks
+                .iter_mut()
+                .zip(&now)
+                .for_each(|(track, point)| track.push(*point));
         }
         Ok(tracks)
     }
 
     /// Where each of the points `from`, at the value `at`, is in the sample `to`.
-    fn moved(&mut self, from: &[Point], at: f64, to: &Sample, scale: f64, depth: u32) -> Result<Vec<Point>, E> {
+    fn moved(
+        &mut self,
+        from: &[Point],
+        at: f64,
+        to: &Sample,
+        scale: f64,
+        depth: u32,
+    ) -> Result<Vec<Point>, E> {
         let there = padded(&to.points, from.len());
         let moved = assigned(from, &there, scale);
         if depth == 0 || self.left == 0 || is_clear(from, &moved, scale) {
@@ -252,11 +318,17 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         loop {
             let middle = 0.5 * (low.value + high.value);
             let width = (high.value - low.value).abs();
-            if width <= 4.0 * f64::EPSILON * low.value.abs().max(high.value.abs()) || middle == low.value {
+            if width <= 4.0 * f64::EPSILON * low.value.abs().max(high.value.abs())
+                || middle == low.value
+            {
                 return Ok((low, high));
             }
             let sample = self.sample(middle)?;
-            if sample.census == low.census { low = sample } else { high = sample }
+            if sample.census == low.census {
+                low = sample
+            } else {
+                high = sample
+            }
         }
     }
 
@@ -275,11 +347,15 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         for (i, first) in tracks.iter().enumerate() {
             for second in &tracks[i + 1..] {
                 let gap = |k: usize| signed_gap(first[index + k], second[index + k]);
-                let (Some(ga), Some(gb), Some(gc)) = (gap(0), gap(1), gap(2)) else { continue };
+                let (Some(ga), Some(gb), Some(gc)) = (gap(0), gap(1), gap(2)) else {
+                    continue;
+                };
                 if !may_vanish(ga, gb, gc) {
                     continue;
                 }
-                if let Some(other) = self.nearest_approach(a, b, c, (first[index + 1], second[index + 1]))? {
+                if let Some(other) =
+                    self.nearest_approach(a, b, c, (first[index + 1], second[index + 1]))?
+                {
                     self.changes(a, &other, found)?;
                     self.changes(&other, c, found)?;
                 }
@@ -299,16 +375,27 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         let golden = 0.5 * (5f64.sqrt() - 1.0);
         let (mut low, mut high) = (a.value, c.value);
         let gap = |sample: &Sample| {
-            let places = assigned(&[pair.0, pair.1], &padded(&sample.points, sample.points.len()), 1.0);
+            let places = assigned(
+                &[pair.0, pair.1],
+                &padded(&sample.points, sample.points.len()),
+                1.0,
+            );
             signed_gap(places[0], places[1]).map_or(f64::INFINITY, f64::abs)
         };
         for _ in 0..48 {
             let probes = [high - golden * (high - low), low + golden * (high - low)];
             let [left, right] = [self.sample(probes[0])?, self.sample(probes[1])?];
-            if let Some(other) = [&left, &right].into_iter().find(|sample| sample.census != b.census) {
+            if let Some(other) = [&left, &right]
+                .into_iter()
+                .find(|sample| sample.census != b.census)
+            {
                 return Ok(Some(other.clone()));
             }
-            if gap(&left) < gap(&right) { high = probes[1] } else { low = probes[0] }
+            if gap(&left) < gap(&right) {
+                high = probes[1]
+            } else {
+                low = probes[0]
+            }
         }
         Ok(None)
     }
@@ -316,10 +403,16 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
 
 /// The median magnitude.
 fn typical(samples: &[Sample]) -> f64 {
-    let mut sizes: Vec<f64> =
-        samples.iter().flat_map(|sample| sample.points.iter().map(|point| point.norm())).collect();
+    let mut sizes: Vec<f64> = samples
+        .iter()
+        .flat_map(|sample| sample.points.iter().map(|point| point.norm()))
+        .collect();
     sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).copied().filter(|size| *size > 0.0).unwrap_or(1.0)
+    sizes
+        .get(sizes.len() / 2)
+        .copied()
+        .filter(|size| *size > 0.0)
+        .unwrap_or(1.0)
 }
 
 /// (a - b)^2 in units of the mean square: above 0 for two on the real axis, below for a conjugate pair; `None` for others.
@@ -335,7 +428,11 @@ fn signed_gap(a: Point, b: Point) -> Option<f64> {
 fn may_vanish(a: f64, b: f64, c: f64) -> bool {
     let towards = b.abs() <= a.abs() && b.abs() <= c.abs() && a * b > 0.0 && b * c > 0.0;
     let (slope, bend) = (0.5 * (c - a), 0.5 * (a + c) - b);
-    let extremum = if bend == 0.0 { b } else { b - 0.25 * slope * slope / bend };
+    let extremum = if bend == 0.0 {
+        b
+    } else {
+        b - 0.25 * slope * slope / bend
+    };
     towards && extremum / b < 0.67
 }
 
@@ -344,16 +441,36 @@ fn change(plane: Plane, low: &Sample, high: &Sample) -> Change {
     let (crossing, point) = match (low.census, high.census) {
         (Census::Undamped(a), Census::Undamped(b)) if a.quartets != b.quartets => {
             let at = meeting(if a.quartets > b.quartets { low } else { high });
-            (if at.re > 0.0 { Crossing::RealAxis } else { Crossing::ImaginaryAxis }, at)
+            (
+                if at.re > 0.0 {
+                    Crossing::RealAxis
+                } else {
+                    Crossing::ImaginaryAxis
+                },
+                at,
+            )
         }
         (
-            Census::Damped { real_left: al, real_right: ar, complex_right: a, .. },
-            Census::Damped { real_left: bl, real_right: br, complex_right: b, .. },
+            Census::Damped {
+                real_left: al,
+                real_right: ar,
+                complex_right: a,
+                ..
+            },
+            Census::Damped {
+                real_left: bl,
+                real_right: br,
+                complex_right: b,
+                ..
+            },
         ) => match (al + ar).cmp(&(bl + br)) {
             std::cmp::Ordering::Equal if a != b => (Crossing::ImaginaryAxis, on_axis(low)),
             std::cmp::Ordering::Equal => through(low),
             // The complex pair is on the side with fewer real zeros. (Through infinity one real zero comes or goes.)
-            less => (Crossing::RealAxis, meeting(if less.is_lt() { low } else { high })),
+            less => (
+                Crossing::RealAxis,
+                meeting(if less.is_lt() { low } else { high }),
+            ),
         },
         _ => through(low),
     };
@@ -388,7 +505,10 @@ fn through(sample: &Sample) -> (Crossing, Complex<f64>) {
     let mut sizes: Vec<f64> = sample.points.iter().map(|z| z.norm()).collect();
     sizes.sort_by(f64::total_cmp);
     let middle = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
-    let (least, most) = (sizes.first().copied().unwrap_or(0.0), sizes.last().copied().unwrap_or(f64::INFINITY));
+    let (least, most) = (
+        sizes.first().copied().unwrap_or(0.0),
+        sizes.last().copied().unwrap_or(f64::INFINITY),
+    );
     if least * most < middle * middle && least < middle {
         (Crossing::Origin, Complex::new(0.0, 0.0))
     } else {
@@ -403,22 +523,37 @@ mod tests {
     use crate::zeros::{ModalSum, Term};
 
     fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {
-        (0..count).map(|i| from + (to - from) * i as f64 / (count - 1) as f64).collect()
+        (0..count)
+            .map(|i| from + (to - from) * i as f64 / (count - 1) as f64)
+            .collect()
     }
 
     fn section_3_2_4(a0: f64) -> Result<Vec<Zero>, PlantError> {
-        let terms = vec![Term::undamped(0.0, 1.0), Term::undamped(10.0, -a0), Term::undamped(11.0, a0)];
+        let terms = vec![
+            Term::undamped(0.0, 1.0),
+            Term::undamped(10.0, -a0),
+            Term::undamped(11.0, a0),
+        ];
         ModalSum::new(terms, 0.0)?.undamped_zeros()
     }
 
     #[test]
     fn the_zeros_of_section_3_2_4_meet_at_1_21_and_21() {
         for count in [4, 50, 1001] {
-            let locus = Locus::follow(Plane::Undamped, &grid(1e-3, 30.0, count), section_3_2_4).unwrap();
-            let [first, second] = locus.changes.as_slice() else { panic!("{:?}", locus.changes) };
-            assert_eq!((first.crossing, second.crossing), (Crossing::ImaginaryAxis, Crossing::RealAxis));
+            let locus =
+                Locus::follow(Plane::Undamped, &grid(1e-3, 30.0, count), section_3_2_4).unwrap();
+            let [first, second] = locus.changes.as_slice() else {
+                panic!("{:?}", locus.changes)
+            };
+            assert_eq!(
+                (first.crossing, second.crossing),
+                (Crossing::ImaginaryAxis, Crossing::RealAxis)
+            );
             // Two zeros count as one below 1e-7 of their size: 1e-14 in the value, and rounding.
-            assert!((first.value * 21.0 - 1.0).abs() < 1e-11 && (second.value / 21.0 - 1.0).abs() < 1e-11);
+            assert!(
+                (first.value * 21.0 - 1.0).abs() < 1e-11
+                    && (second.value / 21.0 - 1.0).abs() < 1e-11
+            );
             assert_eq!(
                 [&first.before, &first.after, &second.before, &second.after],
                 ["dual MMP", "CMP-CNMP", "CMP-CNMP", "dual RMP-RNMP"]
@@ -438,7 +573,10 @@ mod tests {
         let half_width = (1e-6f64 / 0.05).sqrt();
         let values: Vec<f64> = locus.changes.iter().map(|change| change.value).collect();
         assert_eq!(values.len(), 2, "{:?}", locus.changes);
-        for (value, expected) in values.iter().zip([0.5137 - half_width, 0.5137 + half_width]) {
+        for (value, expected) in values
+            .iter()
+            .zip([0.5137 - half_width, 0.5137 + half_width])
+        {
             assert!((value - expected).abs() < 1e-9, "{value} for {expected}");
         }
     }
@@ -447,32 +585,61 @@ mod tests {
     fn a_pair_goes_through_infinity_and_is_followed_there() {
         // Fig 3-2: aR = 1, av from 0 to -3; the pair on the imaginary axis goes to infinity at av = -1 and comes back on the
         // real one. x = -wv^2/(1 + av).
-        let zeros =
-            |av: f64| ModalSum::new(vec![Term::undamped(0.0, 1.0), Term::undamped(3.0, av)], 0.0)?.undamped_zeros();
-        let locus = Locus::follow::<PlantError>(Plane::Undamped, &grid(-0.01, -3.0, 60), zeros).unwrap();
-        let [change] = locus.changes.as_slice() else { panic!("{:?}", locus.changes) };
+        let zeros = |av: f64| {
+            ModalSum::new(vec![Term::undamped(0.0, 1.0), Term::undamped(3.0, av)], 0.0)?
+                .undamped_zeros()
+        };
+        let locus =
+            Locus::follow::<PlantError>(Plane::Undamped, &grid(-0.01, -3.0, 60), zeros).unwrap();
+        let [change] = locus.changes.as_slice() else {
+            panic!("{:?}", locus.changes)
+        };
         assert_eq!(change.crossing, Crossing::Infinity);
         assert!((change.value + 1.0).abs() < 1e-11, "{change:?}");
         assert_eq!(locus.tracks.len(), 1);
         for (value, s) in locus.values.iter().zip(&locus.tracks[0]) {
             let square = s.unwrap() * s.unwrap();
-            assert!((square * (1.0 + value) + 9.0).norm() < 1e-9, "{square} at {value}");
+            assert!(
+                (square * (1.0 + value) + 9.0).norm() < 1e-9,
+                "{square} at {value}"
+            );
         }
     }
 
     #[test]
     fn damped_zeros_cross_the_imaginary_axis_one_by_one() {
         // Eq. (3-15) below the touching damping of wu = 0.9, wv = 1.1, ratio 2.
-        let mode = |omega_rad_s, residue_per_kg| Term { omega_rad_s, damping_ratio: 0.2, residue_per_kg };
-        let zeros = |av: f64| {
-            ModalSum::new(vec![Term::undamped(0.0, 1.0), mode(0.9, -2.0 * av), mode(1.1, av)], 0.0)?.damped_zeros()
+        let mode = |omega_rad_s, residue_per_kg| Term {
+            omega_rad_s,
+            damping_ratio: 0.2,
+            residue_per_kg,
         };
-        let locus = Locus::follow::<PlantError>(Plane::Damped, &grid(0.01, 0.9, 90), zeros).unwrap();
+        let zeros = |av: f64| {
+            ModalSum::new(
+                vec![
+                    Term::undamped(0.0, 1.0),
+                    mode(0.9, -2.0 * av),
+                    mode(1.1, av),
+                ],
+                0.0,
+            )?
+            .damped_zeros()
+        };
+        let locus =
+            Locus::follow::<PlantError>(Plane::Damped, &grid(0.01, 0.9, 90), zeros).unwrap();
         let crossings: Vec<Crossing> = locus.changes.iter().map(|change| change.crossing).collect();
-        assert_eq!(crossings, [Crossing::ImaginaryAxis, Crossing::ImaginaryAxis], "{:?}", locus.changes);
+        assert_eq!(
+            crossings,
+            [Crossing::ImaginaryAxis, Crossing::ImaginaryAxis],
+            "{:?}",
+            locus.changes
+        );
         for change in &locus.changes {
             let on_axis = zeros(change.value).unwrap();
-            assert!(on_axis.iter().any(|z| (z.s - change.s).norm() < 1e-9), "{change:?}: {on_axis:?}");
+            assert!(
+                on_axis.iter().any(|z| (z.s - change.s).norm() < 1e-9),
+                "{change:?}: {on_axis:?}"
+            );
         }
     }
 }

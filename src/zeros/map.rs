@@ -38,18 +38,31 @@ pub fn cnmp_map(
     threads: usize,
 ) -> Result<Vec<Vec<u8>>, PlantError> {
     let rows = operating_points.len().div_ceil(threads.max(1)).max(1);
-    let row = |&point: &f64| asymmetries.iter().map(|&d| count(settings, point, d)).collect::<Result<Vec<u8>, _>>();
+    let row = |&point: &f64| {
+        asymmetries
+            .iter()
+            .map(|&d| count(settings, point, d))
+            .collect::<Result<Vec<u8>, _>>()
+    };
     let part = |points: &[f64]| points.iter().map(row).collect::<Result<Vec<_>, _>>();
     let parts = std::thread::scope(|scope| {
-        let running: Vec<_> = operating_points.chunks(rows).map(|points| scope.spawn(move || part(points))).collect();
-        running.into_iter().map(joined).collect::<Result<Vec<_>, _>>()
+        let running: Vec<_> = operating_points
+            .chunks(rows)
+            .map(|points| scope.spawn(move || part(points)))
+            .collect();
+        running
+            .into_iter()
+            .map(joined)
+            .collect::<Result<Vec<_>, _>>()
     })?;
     Ok(parts.into_iter().flatten().collect())
 }
 
 /// What a thread returned; its panic goes on in this one.
 fn joined<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
-    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    thread
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn count(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, PlantError> {
@@ -61,9 +74,15 @@ fn count(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, Pl
 
 fn by_pencil(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, PlantError> {
     let operating_point_m = point * settings.beam_length_m;
-    let there = Sr4dofSettings { operating_point_m, mass_asymmetry: asymmetry, ..settings.clone() };
+    let there = Sr4dofSettings {
+        operating_point_m,
+        mass_asymmetry: asymmetry,
+        ..settings.clone()
+    };
     // Three values of u hold one complex pair at most.
-    Ok(u8::from(cnmp_pairs(&undamped_zeros(&sr4dof::undamped(&there))?) > 0))
+    Ok(u8::from(
+        cnmp_pairs(&undamped_zeros(&sr4dof::undamped(&there))?) > 0,
+    ))
 }
 
 /// Whether two of the three u are complex; none where that cannot be told.
@@ -82,28 +101,40 @@ struct Sized {
 
 impl Sized {
     fn of(value: f64) -> Sized {
-        Sized { value, size: value.abs() }
+        Sized {
+            value,
+            size: value.abs(),
+        }
     }
 }
 
 impl std::ops::Add for Sized {
     type Output = Sized;
     fn add(self, other: Sized) -> Sized {
-        Sized { value: self.value + other.value, size: self.size + other.size }
+        Sized {
+            value: self.value + other.value,
+            size: self.size + other.size,
+        }
     }
 }
 
 impl std::ops::Sub for Sized {
     type Output = Sized;
     fn sub(self, other: Sized) -> Sized {
-        Sized { value: self.value - other.value, size: self.size + other.size }
+        Sized {
+            value: self.value - other.value,
+            size: self.size + other.size,
+        }
     }
 }
 
 impl std::ops::Mul for Sized {
     type Output = Sized;
     fn mul(self, other: Sized) -> Sized {
-        Sized { value: self.value * other.value, size: self.size * other.size }
+        Sized {
+            value: self.value * other.value,
+            size: self.size * other.size,
+        }
     }
 }
 
@@ -120,7 +151,11 @@ fn minor([p, q]: [Linear; 2], [r, s]: [Linear; 2]) -> [Sized; 3] {
 fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Sized; 4] {
     let b = (0.6 * point) * (0.6 * point);
     let m3 = settings.secondary_stage_mass_kg;
-    let (m1, m2, m4) = (settings.motion_stage_mass_kg / m3, 1.0 + asymmetry, settings.intermediate_stage_mass_kg / m3);
+    let (m1, m2, m4) = (
+        settings.motion_stage_mass_kg / m3,
+        1.0 + asymmetry,
+        settings.intermediate_stage_mass_kg / m3,
+    );
     let bk = b * settings.spring_stiffness_n_per_m / Beam::from(settings).parallelogram_n_per_m();
     let entry = |constant: f64, linear: Sized| [Sized::of(constant), linear];
     let (near, far) = (Sized::of(b * (1.0 + m4)), Sized::of(b * (2.0 + 4.0 * m4)));
@@ -146,7 +181,10 @@ fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Sized; 4] {
 fn discriminant([d, c, b, a]: [Sized; 4]) -> Sized {
     let times = |factor: f64, x: Sized| Sized::of(factor) * x;
     let (bb, cc, ad) = (b * b, c * c, a * d);
-    times(18.0, ad * b * c) + bb * cc - times(4.0, bb * b * d) - times(4.0, a * cc * c) - times(27.0, ad * ad)
+    times(18.0, ad * b * c) + bb * cc
+        - times(4.0, bb * b * d)
+        - times(4.0, a * cc * c)
+        - times(27.0, ad * ad)
 }
 
 #[cfg(test)]
@@ -157,13 +195,21 @@ mod tests {
 
     fn chapter2(sets: &[&str]) -> Sr4dofSettings {
         let sets = sets.iter().map(|set| set.to_string()).collect();
-        let source = Source { config: Some("chapter2".into()), sets, ..Source::default() };
-        let PlantSettings::Sr4dof(settings) = load(&source).unwrap().plant else { panic!("not SR4DoF") };
+        let source = Source {
+            config: Some("chapter2".into()),
+            sets,
+            ..Source::default()
+        };
+        let PlantSettings::Sr4dof(settings) = load(&source).unwrap().plant else {
+            panic!("not SR4DoF")
+        };
         settings
     }
 
     fn grid(from: f64, to: f64, count: u32) -> Vec<f64> {
-        (0..count).map(|k| from + (to - from) * f64::from(k) / f64::from(count - 1)).collect()
+        (0..count)
+            .map(|k| from + (to - from) * f64::from(k) / f64::from(count - 1))
+            .collect()
     }
 
     /// Uniform in [0, 1), by the generator that the simulation takes.
@@ -185,12 +231,22 @@ mod tests {
             settings.spring_stiffness_n_per_m = between(10.0, 1e5);
             let (point, asymmetry) = (0.3 * draw() - 0.15, draw() - 0.5);
             let pencil = by_pencil(&settings, point, asymmetry).unwrap();
-            assert_eq!(count(&settings, point, asymmetry).unwrap(), pencil, "{settings:?} {point} {asymmetry}");
+            assert_eq!(
+                count(&settings, point, asymmetry).unwrap(),
+                pencil,
+                "{settings:?} {point} {asymmetry}"
+            );
             complex += u32::from(pencil);
             undecided += u32::from(by_discriminant(&settings, point, asymmetry).is_none());
         }
-        assert!((200..=19_800).contains(&complex), "both counts must be among the draws: {complex} of 20,000");
-        assert!(undecided <= 2_000, "the pencil is the exception: {undecided} of 20,000");
+        assert!(
+            (200..=19_800).contains(&complex),
+            "both counts must be among the draws: {complex} of 20,000"
+        );
+        assert!(
+            undecided <= 2_000,
+            "the pencil is the exception: {undecided} of 20,000"
+        );
     }
 
     #[test]
@@ -200,10 +256,18 @@ mod tests {
         let map = cnmp_map(&settings, &points, &asymmetries, 2).unwrap();
         for (row, &point) in map.iter().zip(&points) {
             for (&cell, &asymmetry) in row.iter().zip(&asymmetries) {
-                assert_eq!(cell, by_pencil(&settings, point, asymmetry).unwrap(), "at {point}, {asymmetry}");
+                assert_eq!(
+                    cell,
+                    by_pencil(&settings, point, asymmetry).unwrap(),
+                    "at {point}, {asymmetry}"
+                );
             }
         }
-        assert_eq!(map, cnmp_map(&settings, &points, &asymmetries, 1).unwrap(), "whatever the number of threads");
+        assert_eq!(
+            map,
+            cnmp_map(&settings, &points, &asymmetries, 1).unwrap(),
+            "whatever the number of threads"
+        );
     }
 
     #[test]
@@ -211,7 +275,11 @@ mod tests {
         // At D = 1 %, m3 = 18 g they leave the imaginary axis at 3.399 % of L: there no count may hang on the last bit.
         let settings = chapter2(&["plant.secondary_stage_mass_kg=0.018"]);
         for point in grid(0.03398, 0.03400, 201) {
-            assert_eq!(count(&settings, point, 0.01), by_pencil(&settings, point, 0.01), "at {point}");
+            assert_eq!(
+                count(&settings, point, 0.01),
+                by_pencil(&settings, point, 0.01),
+                "at {point}"
+            );
         }
     }
 

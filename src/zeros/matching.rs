@@ -45,8 +45,12 @@ pub(super) fn is_clear(from: &[Point], moved: &[Point], scale: f64) -> bool {
     let together = 1e-6;
     let step = |i: usize| distance(from[i], moved[i], scale);
     let neighbour = |i: usize| {
-        let others = (0..from.len()).filter(|j| *j != i).map(|j| distance(from[i], from[j], scale));
-        others.filter(|d| *d > together).fold(f64::INFINITY, f64::min)
+        let others = (0..from.len())
+            .filter(|j| *j != i)
+            .map(|j| distance(from[i], from[j], scale));
+        others
+            .filter(|d| *d > together)
+            .fold(f64::INFINITY, f64::min)
     };
     (0..from.len()).all(|i| step(i) <= 0.4 * neighbour(i))
 }

@@ -22,7 +22,9 @@ mod sum;
 mod tables;
 
 pub use bounds::{Bound, bandwidth_rad_s, guaranteed_peak, opening_angle, opening_angle_allowed};
-pub use break_points::{critical_damping, critical_residues, critical_sums, touching_damping, two_mode_break_points};
+pub use break_points::{
+    critical_damping, critical_residues, critical_sums, touching_damping, two_mode_break_points,
+};
 pub use kinds::{Kinds, Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 pub use locus::{Change, Crossing, Locus, Plane};
 pub use map::cnmp_map;

@@ -15,7 +15,12 @@ use crate::plant::{Modal, PlantError, Sign};
 
 /// The signs of the modes that show, slowest first: `+-+`.
 pub fn sign_sequence(modal: &Modal) -> String {
-    modal.signs().iter().filter(|sign| **sign != Sign::None).map(|sign| sign.symbol()).collect()
+    modal
+        .signs()
+        .iter()
+        .filter(|sign| **sign != Sign::None)
+        .map(|sign| sign.symbol())
+        .collect()
 }
 
 /// The sequence of dominant modes of the undamped plant in words, `[R]-[u]-[v]`; `[]` where no mode shows.
@@ -68,7 +73,10 @@ impl Sequence {
         for (index, event) in events.iter().enumerate() {
             let dominant = match *event {
                 Event::Resonance { mode, .. } => Dominant::Mode(mode),
-                Event::Crossing { omega_rad_s, positive_after } => {
+                Event::Crossing {
+                    omega_rad_s,
+                    positive_after,
+                } => {
                     let place = Place::of(sum, omega_rad_s);
                     let takers = takers(sum, &place, omega_rad_s, positive_after)?;
                     match takers.only() {
@@ -87,18 +95,28 @@ impl Sequence {
         }
         dominants.dedup();
         let slowest_is_r = sum.constant_m_per_n() == 0.0 && sum.terms().len() != 2;
-        Ok(Sequence { dominants, names: Names { slowest_is_r } })
+        Ok(Sequence {
+            dominants,
+            names: Names { slowest_is_r },
+        })
     }
 
     /// The names of the parts, without brackets.
     pub fn names(&self) -> Vec<String> {
-        self.dominants.iter().map(|dominant| self.names.of(*dominant)).collect()
+        self.dominants
+            .iter()
+            .map(|dominant| self.names.of(*dominant))
+            .collect()
     }
 }
 
 impl std::fmt::Display for Sequence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let bracketed: Vec<String> = self.names().iter().map(|name| format!("[{name}]")).collect();
+        let bracketed: Vec<String> = self
+            .names()
+            .iter()
+            .map(|name| format!("[{name}]"))
+            .collect();
         f.write_str(&bracketed.join("-"))
     }
 }
@@ -127,7 +145,10 @@ enum Event {
     /// A mode resonates.
     Resonance { omega_rad_s: f64, mode: usize },
     /// G passes through zero.
-    Crossing { omega_rad_s: f64, positive_after: bool },
+    Crossing {
+        omega_rad_s: f64,
+        positive_after: bool,
+    },
 }
 
 impl Event {
@@ -138,11 +159,21 @@ impl Event {
 }
 
 fn events(sum: &ModalSum) -> Result<Vec<Event>, PlantError> {
-    let modes =
-        sum.terms().iter().enumerate().map(|(mode, term)| Event::Resonance { omega_rad_s: term.omega_rad_s, mode });
+    let modes = sum
+        .terms()
+        .iter()
+        .enumerate()
+        .map(|(mode, term)| Event::Resonance {
+            omega_rad_s: term.omega_rad_s,
+            mode,
+        });
     let crossings = crossings(sum)?;
-    let zeros =
-        crossings.into_iter().map(|(omega_rad_s, positive_after)| Event::Crossing { omega_rad_s, positive_after });
+    let zeros = crossings
+        .into_iter()
+        .map(|(omega_rad_s, positive_after)| Event::Crossing {
+            omega_rad_s,
+            positive_after,
+        });
     let mut events: Vec<Event> = modes.chain(zeros).collect();
     events.sort_by(|a, b| a.omega_rad_s().total_cmp(&b.omega_rad_s()));
     Ok(events)
@@ -151,10 +182,19 @@ fn events(sum: &ModalSum) -> Result<Vec<Event>, PlantError> {
 /// The zeros of G on the imaginary axis in rad/s, and whether G is positive above each: the sign of its slope
 /// dG/d(w^2) = sum of r/(w_i^2 - w^2)^2.
 fn crossings(sum: &ModalSum) -> Result<Vec<(f64, bool)>, PlantError> {
-    let slope = |omega: f64| sum.terms().iter().map(|t| t.part(omega).powi(2) / t.residue_per_kg).sum::<f64>();
+    let slope = |omega: f64| {
+        sum.terms()
+            .iter()
+            .map(|t| t.part(omega).powi(2) / t.residue_per_kg)
+            .sum::<f64>()
+    };
     let zeros = sum.undamped_zeros()?;
-    let on_axis = zeros.iter().filter(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0);
-    Ok(on_axis.map(|zero| (zero.s.im, slope(zero.s.im) > 0.0)).collect())
+    let on_axis = zeros
+        .iter()
+        .filter(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0);
+    Ok(on_axis
+        .map(|zero| (zero.s.im, slope(zero.s.im) > 0.0))
+        .collect())
 }
 
 /// A mode or the constant.
@@ -190,8 +230,12 @@ impl Place {
     fn of(sum: &ModalSum, omega_rad_s: f64) -> Place {
         let resonances = || sum.terms().iter().map(|term| term.omega_rad_s);
         Place {
-            below: resonances().filter(|w| *w < omega_rad_s).fold(0.0, f64::max),
-            above: resonances().filter(|w| *w > omega_rad_s).fold(f64::INFINITY, f64::min),
+            below: resonances()
+                .filter(|w| *w < omega_rad_s)
+                .fold(0.0, f64::max),
+            above: resonances()
+                .filter(|w| *w > omega_rad_s)
+                .fold(f64::INFINITY, f64::min),
         }
     }
 
@@ -215,10 +259,17 @@ impl Takers {
     }
 
     fn largest(&self, sum: &ModalSum, omega_rad_s: f64) -> Dominant {
-        let among = if self.able.is_empty() { &self.candidates } else { &self.able };
+        let among = if self.able.is_empty() {
+            &self.candidates
+        } else {
+            &self.able
+        };
         let size = |part: &&Part| part.at(sum, omega_rad_s).abs();
         // G is zero and moves: it has parts of either sign. Without any, the constant would be all there is.
-        among.iter().max_by(|a, b| size(a).total_cmp(&size(b))).map_or(Dominant::Constant, |part| part.dominant())
+        among
+            .iter()
+            .max_by(|a, b| size(a).total_cmp(&size(b)))
+            .map_or(Dominant::Constant, |part| part.dominant())
     }
 }
 
@@ -230,7 +281,12 @@ fn holders(sum: &ModalSum, omega_rad_s: f64, positive: bool) -> (Vec<Part>, Vec<
 }
 
 /// Definitions (1) and (2a) for the crossing at `omega_rad_s`: who takes over.
-fn takers(sum: &ModalSum, place: &Place, omega_rad_s: f64, positive_after: bool) -> Result<Takers, PlantError> {
+fn takers(
+    sum: &ModalSum,
+    place: &Place,
+    omega_rad_s: f64,
+    positive_after: bool,
+) -> Result<Takers, PlantError> {
     let (candidates, rest) = holders(sum, omega_rad_s, positive_after);
     let able = able(sum, &candidates, &rest, place, positive_after)?;
     Ok(Takers { candidates, able })
@@ -248,9 +304,16 @@ fn able(
     for candidate in candidates {
         let parts = || rest.iter().chain([candidate]);
         let terms: Vec<Term> = parts().filter_map(|part| term(sum, *part)).collect();
-        let constant = if parts().any(|part| *part == Part::Constant) { sum.constant_m_per_n() } else { 0.0 };
+        let constant = if parts().any(|part| *part == Part::Constant) {
+            sum.constant_m_per_n()
+        } else {
+            0.0
+        };
         let crossings = crossings(&ModalSum::new(terms, constant)?)?;
-        if crossings.iter().any(|(omega, after)| place.holds(*omega) && *after == positive_after) {
+        if crossings
+            .iter()
+            .any(|(omega, after)| place.holds(*omega) && *after == positive_after)
+        {
             able.push(*candidate);
         }
     }
@@ -266,12 +329,23 @@ fn term(sum: &ModalSum, part: Part) -> Option<Term> {
 
 /// Who dominates below the first event; nobody is named where a double integrator does, its resonance at 0 is the first event.
 fn start(sum: &ModalSum, events: &[Event]) -> Result<Option<Dominant>, PlantError> {
-    let Some(Event::Crossing { omega_rad_s, positive_after }) = events.first().copied() else { return Ok(None) };
+    let Some(Event::Crossing {
+        omega_rad_s,
+        positive_after,
+    }) = events.first().copied()
+    else {
+        return Ok(None);
+    };
     let place = Place::of(sum, omega_rad_s);
     let (candidates, rest) = holders(sum, omega_rad_s, !positive_after);
     let able = able(sum, &candidates, &rest, &place, positive_after)?;
     let only = Takers { candidates, able }.only();
-    Ok(Some(only.map_or(Dominant::Dc { positive: !positive_after }, Part::dominant)))
+    Ok(Some(only.map_or(
+        Dominant::Dc {
+            positive: !positive_after,
+        },
+        Part::dominant,
+    )))
 }
 
 /// Who dominates beyond the last crossing, where several could.
@@ -279,7 +353,9 @@ fn top(takers: &Takers, positive_after: bool) -> Dominant {
     if takers.candidates.contains(&Part::Constant) {
         Dominant::Constant
     } else {
-        Dominant::Di { positive: !positive_after }
+        Dominant::Di {
+            positive: !positive_after,
+        }
     }
 }
 
@@ -289,7 +365,9 @@ mod tests {
 
     fn sequence(parts: &[(f64, f64)], constant: f64) -> String {
         let terms = parts.iter().map(|(w, r)| Term::undamped(*w, *r)).collect();
-        Sequence::of(&ModalSum::new(terms, constant).unwrap()).unwrap().to_string()
+        Sequence::of(&ModalSum::new(terms, constant).unwrap())
+            .unwrap()
+            .to_string()
     }
 
     #[test]
@@ -298,8 +376,16 @@ mod tests {
         assert_eq!(sequence(&[(1.0, 1.0), (10.0, -0.5)], 0.0), "[u]-[v]-[u]");
         assert_eq!(sequence(&[(1.0, 1.0), (10.0, -5.0)], 0.0), "[u]-[v]");
         // Eq. (3-9) with a_u = -a0: dual MMP zeros, CMP-CNMP zeros, two pairs of RMP-RNMP zeros.
-        for (a0, expected) in [(0.01, "[R]-[u]-[R]-[v]"), (5.0, "[R]-[u]-[v]"), (22.0, "[R]-[u]-[v]")] {
-            assert_eq!(sequence(&[(1.0, 1.0), (10.0, -a0), (11.0, a0)], 0.0), expected, "a0 = {a0}");
+        for (a0, expected) in [
+            (0.01, "[R]-[u]-[R]-[v]"),
+            (5.0, "[R]-[u]-[v]"),
+            (22.0, "[R]-[u]-[v]"),
+        ] {
+            assert_eq!(
+                sequence(&[(1.0, 1.0), (10.0, -a0), (11.0, a0)], 0.0),
+                expected,
+                "a0 = {a0}"
+            );
         }
     }
 
@@ -307,11 +393,20 @@ mod tests {
     fn several_modes_together_are_an_abstract_one() {
         // Above both resonances neither R nor u alone turns v's sign: u + v and R + v are positive at infinity, all three
         // are not. -2.5 + 2 > ... the sums of residues decide: R + v = -0.5, u + v = -0.5, R + u + v = 1.5.
-        assert_eq!(sequence(&[(0.0, 2.0), (1.0, 2.0), (2.0, -2.5)], 0.0), "[R]-[u]-[v]-[DI]");
+        assert_eq!(
+            sequence(&[(0.0, 2.0), (1.0, 2.0), (2.0, -2.5)], 0.0),
+            "[R]-[u]-[v]-[DI]"
+        );
         // With more of R it does so alone.
-        assert_eq!(sequence(&[(0.0, 4.0), (1.0, 2.0), (2.0, -2.5)], 0.0), "[R]-[u]-[v]-[R]");
+        assert_eq!(
+            sequence(&[(0.0, 4.0), (1.0, 2.0), (2.0, -2.5)], 0.0),
+            "[R]-[u]-[v]-[R]"
+        );
         // Table 3-4: at low frequency v and R are each too small to hold the sign against u.
-        assert_eq!(sequence(&[(1.0, 1.0), (2.0, -2.8)], -0.8), "[-DC]-[u]-[v]-[R]");
+        assert_eq!(
+            sequence(&[(1.0, 1.0), (2.0, -2.8)], -0.8),
+            "[-DC]-[u]-[v]-[R]"
+        );
     }
 
     #[test]

@@ -51,41 +51,72 @@ impl<'a> StepResponse<'a> {
 
     /// y in m/N, `time_s` after the step.
     pub fn position_m(&self, time_s: f64) -> f64 {
-        self.sum.constant_m_per_n() + self.sum.terms().iter().map(|term| position(term, time_s)).sum::<f64>()
+        self.sum.constant_m_per_n()
+            + self
+                .sum
+                .terms()
+                .iter()
+                .map(|term| position(term, time_s))
+                .sum::<f64>()
     }
 
     /// What each mode adds to it, in m/N.
     pub fn parts_m(&self, time_s: f64) -> Vec<f64> {
-        self.sum.terms().iter().map(|term| position(term, time_s)).collect()
+        self.sum
+            .terms()
+            .iter()
+            .map(|term| position(term, time_s))
+            .collect()
     }
 
     /// dy/dt in m/s per newton.
     pub fn velocity_m_per_s(&self, time_s: f64) -> f64 {
-        self.sum.terms().iter().map(|term| velocity(term, time_s)).sum()
+        self.sum
+            .terms()
+            .iter()
+            .map(|term| velocity(term, time_s))
+            .sum()
     }
 
     /// y at the end in m/N: G(0); infinite with a double integrator.
     pub fn end_m(&self) -> f64 {
-        self.sum.constant_m_per_n() + self.sum.terms().iter().map(|term| term.part(0.0)).sum::<f64>()
+        self.sum.constant_m_per_n()
+            + self
+                .sum
+                .terms()
+                .iter()
+                .map(|term| term.part(0.0))
+                .sum::<f64>()
     }
 
     /// Directions, zero crossings and reversals.
     pub fn initial(&self) -> InitialStep {
         let window_s = self.window_s();
         let period = |term: &Term| 2.0 * std::f64::consts::PI / term.omega_rad_s;
-        let initial_s = self.sum.terms().get(1).map_or(window_s, |second| period(second).min(window_s));
+        let initial_s = self
+            .sum
+            .terms()
+            .get(1)
+            .map_or(window_s, |second| period(second).min(window_s));
         let extrema_s = self.extrema_s(window_s);
         let zero_crossings_s = self.zero_crossings_s(&extrema_s, window_s);
         let ends_positive = self.ends_positive();
         let last_s = zero_crossings_s.last().copied().unwrap_or(0.0);
         let against = |y: f64| if ends_positive { -y } else { y };
-        let before = extrema_s.iter().filter(|t| **t < last_s).map(|t| against(self.position_m(*t)));
+        let before = extrema_s
+            .iter()
+            .filter(|t| **t < last_s)
+            .map(|t| against(self.position_m(*t)));
         InitialStep {
             starts_positive: self.starts_positive(window_s),
             ends_positive,
             undershoot_m: before.fold(against(self.sum.constant_m_per_n()).max(0.0), f64::max),
             zero_crossings_s,
-            reversals_s: extrema_s.iter().copied().filter(|t| *t <= initial_s).collect(),
+            reversals_s: extrema_s
+                .iter()
+                .copied()
+                .filter(|t| *t <= initial_s)
+                .collect(),
             window_s,
             initial_s,
         }
@@ -95,7 +126,10 @@ impl<'a> StepResponse<'a> {
     /// nothing, that of y early on.
     fn starts_positive(&self, window_s: f64) -> bool {
         let residues = || self.sum.terms().iter().map(|term| term.residue_per_kg);
-        let (total, size) = (residues().sum::<f64>(), residues().map(f64::abs).sum::<f64>());
+        let (total, size) = (
+            residues().sum::<f64>(),
+            residues().map(f64::abs).sum::<f64>(),
+        );
         match self.sum.constant_m_per_n() {
             constant if constant != 0.0 => constant > 0.0,
             _ if total.abs() > 1e-12 * size => total > 0.0,
@@ -112,18 +146,25 @@ impl<'a> StepResponse<'a> {
 
     /// Period of the fastest mode.
     fn shortest_s(&self) -> f64 {
-        self.sum.terms().last().map_or(1.0, |term| 2.0 * std::f64::consts::PI / term.omega_rad_s)
+        self.sum
+            .terms()
+            .last()
+            .map_or(1.0, |term| 2.0 * std::f64::consts::PI / term.omega_rad_s)
     }
 
     fn window_s(&self) -> f64 {
         match self.sum.terms().split_first() {
             None => 1.0,
-            Some((slowest, _)) if slowest.omega_rad_s > 0.0 => std::f64::consts::PI / slowest.omega_rad_s,
+            Some((slowest, _)) if slowest.omega_rad_s > 0.0 => {
+                std::f64::consts::PI / slowest.omega_rad_s
+            }
             Some((free, others)) => {
                 // The part of a mode is never beyond 2 |r|/w^2.
-                let most =
-                    others.iter().map(|t| 2.0 * t.part(0.0).abs()).sum::<f64>() + self.sum.constant_m_per_n().abs();
-                let longest = others.first().map_or(1.0, |t| 2.0 * std::f64::consts::PI / t.omega_rad_s);
+                let most = others.iter().map(|t| 2.0 * t.part(0.0).abs()).sum::<f64>()
+                    + self.sum.constant_m_per_n().abs();
+                let longest = others
+                    .first()
+                    .map_or(1.0, |t| 2.0 * std::f64::consts::PI / t.omega_rad_s);
                 (2.0 * most / free.residue_per_kg.abs()).sqrt().max(longest)
             }
         }
@@ -132,10 +173,14 @@ impl<'a> StepResponse<'a> {
     /// Instants to look at: fractions of the shortest period, and below the first of them smaller ones, for what lasts
     /// shortly only.
     fn instants_s(&self, window_s: f64) -> Vec<f64> {
-        let step_s = (self.shortest_s() / 64.0).min(window_s / 64.0).max(window_s / 1e6);
+        let step_s = (self.shortest_s() / 64.0)
+            .min(window_s / 64.0)
+            .max(window_s / 1e6);
         let early = (0..24).rev().map(|k| step_s * 0.5f64.powi(k + 1));
         let count = (window_s / step_s).ceil() as usize;
-        early.chain((1..=count).map(|k| (k as f64 * step_s).min(window_s))).collect()
+        early
+            .chain((1..=count).map(|k| (k as f64 * step_s).min(window_s)))
+            .collect()
     }
 
     /// Where dy/dt changes its sign.
@@ -143,15 +188,25 @@ impl<'a> StepResponse<'a> {
         let instants = self.instants_s(window_s);
         let velocities: Vec<f64> = instants.iter().map(|t| self.velocity_m_per_s(*t)).collect();
         let changes = (1..instants.len()).filter(|k| velocities[k - 1] * velocities[*k] < 0.0);
-        changes.map(|k| bisected(|t| self.velocity_m_per_s(t), instants[k - 1], instants[k])).collect()
+        changes
+            .map(|k| bisected(|t| self.velocity_m_per_s(t), instants[k - 1], instants[k]))
+            .collect()
     }
 
     /// Where y changes its sign: between two extrema at most once.
     fn zero_crossings_s(&self, extrema_s: &[f64], window_s: f64) -> Vec<f64> {
         let first = self.instants_s(window_s)[0];
-        let knots: Vec<f64> = [first].into_iter().chain(extrema_s.iter().copied()).chain([window_s]).collect();
-        let pairs = knots.windows(2).filter(|pair| self.position_m(pair[0]) * self.position_m(pair[1]) < 0.0);
-        pairs.map(|pair| bisected(|t| self.position_m(t), pair[0], pair[1])).collect()
+        let knots: Vec<f64> = [first]
+            .into_iter()
+            .chain(extrema_s.iter().copied())
+            .chain([window_s])
+            .collect();
+        let pairs = knots
+            .windows(2)
+            .filter(|pair| self.position_m(pair[0]) * self.position_m(pair[1]) < 0.0);
+        pairs
+            .map(|pair| bisected(|t| self.position_m(t), pair[0], pair[1]))
+            .collect()
     }
 }
 
@@ -160,7 +215,11 @@ fn bisected(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let negative = of(low) < 0.0;
     for _ in 0..64 {
         let middle = 0.5 * (low + high);
-        if (of(middle) < 0.0) == negative { low = middle } else { high = middle }
+        if (of(middle) < 0.0) == negative {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -179,7 +238,10 @@ fn swing(term: &Term, time_s: f64) -> (f64, f64) {
         (envelope * angle.cosh(), envelope * angle.sinh() / rate)
     } else {
         // Apart, as one of the two exponentials alone may be beyond all numbers.
-        let (slow, fast) = (((rate - decay) * time_s).exp(), (-(rate + decay) * time_s).exp());
+        let (slow, fast) = (
+            ((rate - decay) * time_s).exp(),
+            (-(rate + decay) * time_s).exp(),
+        );
         (0.5 * (slow + fast), 0.5 * (slow - fast) / rate)
     }
 }
@@ -214,8 +276,11 @@ mod tests {
     use crate::zeros::Kinds;
 
     fn sum(parts: &[(f64, f64, f64)]) -> ModalSum {
-        let term =
-            |&(omega_rad_s, damping_ratio, residue_per_kg): &_| Term { omega_rad_s, damping_ratio, residue_per_kg };
+        let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &_| Term {
+            omega_rad_s,
+            damping_ratio,
+            residue_per_kg,
+        };
         ModalSum::new(parts.iter().map(term).collect(), 0.0).unwrap()
     }
 
@@ -241,22 +306,38 @@ mod tests {
     fn eq_3_9_crosses_zero_as_often_as_it_has_real_zeros_and_its_complex_ones_are_a_transition() {
         // Section 3.2.4: none for dual MMP, two for dual RMP-RNMP, from none to two on the way (Fig 3-12d).
         let (mut with, mut without, mut reversing_only) = (0, 0, 0);
-        for a0 in [0.01, 0.04, 0.06, 0.5, 2.0, 5.0, 8.0, 10.0, 12.0, 15.0, 18.0, 20.9, 21.1, 25.0, 40.0] {
+        for a0 in [
+            0.01, 0.04, 0.06, 0.5, 2.0, 5.0, 8.0, 10.0, 12.0, 15.0, 18.0, 20.9, 21.1, 25.0, 40.0,
+        ] {
             let plant = eq_3_9(a0);
             let kinds = Kinds::of(
-                &ModalSum::new(plant.terms().iter().map(|t| Term { damping_ratio: 0.0, ..*t }).collect(), 0.0)
-                    .unwrap()
-                    .undamped_zeros()
-                    .unwrap(),
+                &ModalSum::new(
+                    plant
+                        .terms()
+                        .iter()
+                        .map(|t| Term {
+                            damping_ratio: 0.0,
+                            ..*t
+                        })
+                        .collect(),
+                    0.0,
+                )
+                .unwrap()
+                .undamped_zeros()
+                .unwrap(),
             );
             let initial = StepResponse::new(&plant).initial();
-            let (crossings, reversals) = (initial.zero_crossings_s.len(), initial.reversals_s.len());
+            let (crossings, reversals) =
+                (initial.zero_crossings_s.len(), initial.reversals_s.len());
             assert!(!initial.has_undershoot(), "a0 = {a0}");
             match (kinds.mmp, kinds.real, kinds.quartets) {
                 (2, 0, 0) => assert_eq!((crossings, reversals), (0, 0), "a0 = {a0}"),
                 (0, 2, 0) => assert_eq!((crossings, reversals), (2, 2), "a0 = {a0}"),
                 (0, 0, 1) => {
-                    assert!([0, 2].contains(&crossings) && [0, 2].contains(&reversals), "a0 = {a0}: {initial:?}");
+                    assert!(
+                        [0, 2].contains(&crossings) && [0, 2].contains(&reversals),
+                        "a0 = {a0}: {initial:?}"
+                    );
                     with += usize::from(crossings == 2);
                     reversing_only += usize::from(crossings == 0 && reversals == 2);
                     without += usize::from(reversals == 0);
@@ -264,7 +345,10 @@ mod tests {
                 _ => panic!("a0 = {a0}: {kinds}"),
             }
         }
-        assert!(with > 0 && without > 0 && reversing_only > 0, "{with} {without} {reversing_only}");
+        assert!(
+            with > 0 && without > 0 && reversing_only > 0,
+            "{with} {without} {reversing_only}"
+        );
     }
 
     #[test]
@@ -275,11 +359,17 @@ mod tests {
             // y'' + 2 zeta w y' + w^2 y = r, by central differences of the closed form: h^2 of the fourth derivative, 1e-7.
             for t in [0.1, 1.0, 2.5] {
                 let h = 1e-4;
-                let (low, here, high) =
-                    (response.position_m(t - h), response.position_m(t), response.position_m(t + h));
+                let (low, here, high) = (
+                    response.position_m(t - h),
+                    response.position_m(t),
+                    response.position_m(t + h),
+                );
                 let slope = (high - low) / (2.0 * h);
                 let bend = (high - 2.0 * here + low) / (h * h);
-                assert!((bend + 4.0 * zeta * slope + 4.0 * here - 4.0).abs() < 1e-5, "zeta = {zeta} at {t}");
+                assert!(
+                    (bend + 4.0 * zeta * slope + 4.0 * here - 4.0).abs() < 1e-5,
+                    "zeta = {zeta} at {t}"
+                );
                 assert!((response.velocity_m_per_s(t) - slope).abs() < 1e-6);
             }
         }

@@ -23,7 +23,11 @@ pub struct Term {
 impl Term {
     /// A mode without damping.
     pub fn undamped(omega_rad_s: f64, residue_per_kg: f64) -> Term {
-        Term { omega_rad_s, damping_ratio: 0.0, residue_per_kg }
+        Term {
+            omega_rad_s,
+            damping_ratio: 0.0,
+            residue_per_kg,
+        }
     }
 
     /// 1/(s^2 + 2 zeta w s + w^2) in s^2.
@@ -53,12 +57,19 @@ impl ModalSum {
         if terms.is_empty() && constant_m_per_n == 0.0 {
             return Err(PlantError::NoResponse);
         }
-        Ok(ModalSum { terms, constant_m_per_n })
+        Ok(ModalSum {
+            terms,
+            constant_m_per_n,
+        })
     }
 
     /// The modes of a structure that show between its actuator and its probe ([`Modal::signs`]).
     pub fn visible(modal: &Modal) -> Result<ModalSum, PlantError> {
-        let shown = modal.modes.iter().zip(modal.signs()).filter(|(_, sign)| *sign != Sign::None);
+        let shown = modal
+            .modes
+            .iter()
+            .zip(modal.signs())
+            .filter(|(_, sign)| *sign != Sign::None);
         let term = |(mode, _): (&Mode, Sign)| Term {
             omega_rad_s: mode.omega_rad_s,
             damping_ratio: mode.damping_ratio,
@@ -79,7 +90,9 @@ impl ModalSum {
 
     /// Whether the slowest mode is a double integrator.
     pub fn is_free(&self) -> bool {
-        self.terms.first().is_some_and(|term| term.omega_rad_s == 0.0)
+        self.terms
+            .first()
+            .is_some_and(|term| term.omega_rad_s == 0.0)
     }
 
     /// G(s) in m/N.
@@ -99,11 +112,16 @@ impl ModalSum {
     }
 
     /// Unit masses on springs, one a mode, each pushed and seen by the root of its residue, and the constant beside them.
-    fn by(&self, zeros: fn(&System) -> Result<Vec<Zero>, PlantError>) -> Result<Vec<Zero>, PlantError> {
+    fn by(
+        &self,
+        zeros: fn(&System) -> Result<Vec<Zero>, PlantError>,
+    ) -> Result<Vec<Zero>, PlantError> {
         if self.terms.is_empty() {
             return Ok(Vec::new());
         }
-        let vector = |of: fn(&Term) -> f64| DVector::from_iterator(self.terms.len(), self.terms.iter().map(of));
+        let vector = |of: fn(&Term) -> f64| {
+            DVector::from_iterator(self.terms.len(), self.terms.iter().map(of))
+        };
         zeros(&System {
             mass: &DMatrix::identity(self.terms.len(), self.terms.len()),
             damping: &DMatrix::from_diagonal(&vector(|t| 2.0 * t.damping_ratio * t.omega_rad_s)),
@@ -137,6 +155,9 @@ mod tests {
 
     #[test]
     fn a_sum_of_nothing_is_refused() {
-        assert_eq!(ModalSum::new(vec![Term::undamped(1.0, 0.0)], 0.0), Err(PlantError::NoResponse));
+        assert_eq!(
+            ModalSum::new(vec![Term::undamped(1.0, 0.0)], 0.0),
+            Err(PlantError::NoResponse)
+        );
     }
 }

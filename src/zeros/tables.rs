@@ -64,7 +64,9 @@ impl Row {
 fn fits(pattern: &[Piece], names: &[&str]) -> bool {
     match (pattern.split_first(), names.split_first()) {
         (None, None) => true,
-        (Some((Piece::One(of), rest)), Some((name, names))) => of.contains(name) && fits(rest, names),
+        (Some((Piece::One(of), rest)), Some((name, names))) => {
+            of.contains(name) && fits(rest, names)
+        }
         (Some((Piece::Some(of), rest)), Some((name, names))) => {
             of.contains(name) && (fits(rest, names) || fits(pattern, names))
         }
@@ -92,7 +94,11 @@ impl Table {
 /// The table for a plant's class: a double integrator and a mode, two modes, a slow mode (or double integrator) and two
 /// modes, two modes and a constant. `None` for any other.
 pub fn table_of(sum: &ModalSum) -> Option<&'static Table> {
-    let index = match (sum.terms().len(), sum.constant_m_per_n() != 0.0, sum.is_free()) {
+    let index = match (
+        sum.terms().len(),
+        sum.constant_m_per_n() != 0.0,
+        sum.is_free(),
+    ) {
         (2, false, true) => 0,
         (2, false, false) => 1,
         (3, false, _) => 2,
@@ -103,15 +109,23 @@ pub fn table_of(sum: &ModalSum) -> Option<&'static Table> {
 }
 
 fn slowest_is_negative(sum: &ModalSum) -> bool {
-    sum.terms().first().is_some_and(|term| term.residue_per_kg < 0.0)
+    sum.terms()
+        .first()
+        .is_some_and(|term| term.residue_per_kg < 0.0)
 }
 
 /// The signs along frequency, turned so that the first is positive.
 fn signs(sum: &ModalSum) -> String {
     let turn = if slowest_is_negative(sum) { -1.0 } else { 1.0 };
     let constant = Some(sum.constant_m_per_n()).filter(|constant| *constant != 0.0);
-    let parts = sum.terms().iter().map(|term| term.residue_per_kg).chain(constant);
-    parts.map(|part| if part * turn > 0.0 { '+' } else { '-' }).collect()
+    let parts = sum
+        .terms()
+        .iter()
+        .map(|term| term.residue_per_kg)
+        .chain(constant);
+    parts
+        .map(|part| if part * turn > 0.0 { '+' } else { '-' })
+        .collect()
 }
 
 /// The names of a sequence, turned with the signs.
@@ -122,11 +136,19 @@ fn turned(sum: &ModalSum, sequence: &Sequence) -> Vec<String> {
         _ => name,
     };
     let names = sequence.names().into_iter();
-    if slowest_is_negative(sum) { names.map(turn).collect() } else { names.collect() }
+    if slowest_is_negative(sum) {
+        names.map(turn).collect()
+    } else {
+        names.collect()
+    }
 }
 
 const fn kinds(mmp: usize, real: usize, quartets: usize) -> Kinds {
-    Kinds { mmp, real, quartets }
+    Kinds {
+        mmp,
+        real,
+        quartets,
+    }
 }
 
 const MMP: &[Kinds] = &[kinds(1, 0, 0)];
@@ -150,7 +172,15 @@ const fn row(
     kinds: &'static [Kinds],
     mmp: &'static [Place],
 ) -> Row {
-    Row { table, number, signs, printed, kinds, mmp, pattern }
+    Row {
+        table,
+        number,
+        signs,
+        printed,
+        kinds,
+        mmp,
+        pattern,
+    }
 }
 
 use Place::{AboveV, BelowU, Between};
@@ -180,10 +210,38 @@ pub const TABLES: &[Table] = &[
     Table {
         name: "3-3",
         rows: &[
-            row(("3-3", 1), "+-+", "[R]-[u]-[v]", &[R, U, V], QUARTET_OR_DUAL_REAL, &[]),
-            row(("3-3", 2), "+-+", "[R]-[u]-[R]-[v]", &[R, U, R, V], DUAL_MMP, &[Between, Between]),
-            row(("3-3", 3), "+-+", "[R]-[u]-[v]-[u]", &[R, U, V, U], MMP_AND_REAL, &[AboveV]),
-            row(("3-3", 4), "+-+", "[R]-[v]-[u]-[v]", &[R, V, U, V], DUAL_MMP, &[BelowU, BelowU]),
+            row(
+                ("3-3", 1),
+                "+-+",
+                "[R]-[u]-[v]",
+                &[R, U, V],
+                QUARTET_OR_DUAL_REAL,
+                &[],
+            ),
+            row(
+                ("3-3", 2),
+                "+-+",
+                "[R]-[u]-[R]-[v]",
+                &[R, U, R, V],
+                DUAL_MMP,
+                &[Between, Between],
+            ),
+            row(
+                ("3-3", 3),
+                "+-+",
+                "[R]-[u]-[v]-[u]",
+                &[R, U, V, U],
+                MMP_AND_REAL,
+                &[AboveV],
+            ),
+            row(
+                ("3-3", 4),
+                "+-+",
+                "[R]-[v]-[u]-[v]",
+                &[R, V, U, V],
+                DUAL_MMP,
+                &[BelowU, BelowU],
+            ),
             row(
                 ("3-3", 5),
                 "+-+",
@@ -192,7 +250,14 @@ pub const TABLES: &[Table] = &[
                 DUAL_MMP,
                 &[AboveV, AboveV],
             ),
-            row(("3-3", 6), "++-", "[Ru]-[v]", &[RU, V], MMP_AND_REAL, &[BelowU]),
+            row(
+                ("3-3", 6),
+                "++-",
+                "[Ru]-[v]",
+                &[RU, V],
+                MMP_AND_REAL,
+                &[BelowU],
+            ),
             row(
                 ("3-3", 7),
                 "++-",
@@ -201,18 +266,60 @@ pub const TABLES: &[Table] = &[
                 DUAL_MMP,
                 &[BelowU, AboveV],
             ),
-            row(("3-3", 8), "+--", "[R]-[uv]-[R]", &[R, RUV, R], DUAL_MMP, &[Between, AboveV]),
-            row(("3-3", 9), "+--", "[R]-[uv]", &[R, RU, V], MMP_AND_REAL, &[Between]),
-            row(("3-3", 10), "+++", "[Ruv]", &[RUV], DUAL_MMP, &[BelowU, Between]),
+            row(
+                ("3-3", 8),
+                "+--",
+                "[R]-[uv]-[R]",
+                &[R, RUV, R],
+                DUAL_MMP,
+                &[Between, AboveV],
+            ),
+            row(
+                ("3-3", 9),
+                "+--",
+                "[R]-[uv]",
+                &[R, RU, V],
+                MMP_AND_REAL,
+                &[Between],
+            ),
+            row(
+                ("3-3", 10),
+                "+++",
+                "[Ruv]",
+                &[RUV],
+                DUAL_MMP,
+                &[BelowU, Between],
+            ),
         ],
     },
     // Two modes and a constant R, Eq. (3-10).
     Table {
         name: "3-4",
         rows: &[
-            row(("3-4", 1), "+-+", "[u]-[v]-[R]", &[U, V, R], QUARTET_OR_DUAL_REAL, &[]),
-            row(("3-4", 2), "+-+", "[u]-[R]-[v]-[R]", &[U, R, V, R], DUAL_MMP, &[Between, Between]),
-            row(("3-4", 3), "+-+", "[v]-[u]-[v]-[R]", &[V, U, V, R], MMP_AND_REAL, &[BelowU]),
+            row(
+                ("3-4", 1),
+                "+-+",
+                "[u]-[v]-[R]",
+                &[U, V, R],
+                QUARTET_OR_DUAL_REAL,
+                &[],
+            ),
+            row(
+                ("3-4", 2),
+                "+-+",
+                "[u]-[R]-[v]-[R]",
+                &[U, R, V, R],
+                DUAL_MMP,
+                &[Between, Between],
+            ),
+            row(
+                ("3-4", 3),
+                "+-+",
+                "[v]-[u]-[v]-[R]",
+                &[V, U, V, R],
+                MMP_AND_REAL,
+                &[BelowU],
+            ),
             row(
                 ("3-4", 4),
                 "+-+",
@@ -221,8 +328,22 @@ pub const TABLES: &[Table] = &[
                 DUAL_MMP,
                 &[BelowU, BelowU],
             ),
-            row(("3-4", 5), "+-+", "[u]-[v]-[u]-[R]", &[U, V, U, R], DUAL_MMP, &[AboveV, AboveV]),
-            row(("3-4", 6), "+--", "[u]-[v]-[R]", &[U, V, R], MMP_AND_REAL, &[AboveV]),
+            row(
+                ("3-4", 5),
+                "+-+",
+                "[u]-[v]-[u]-[R]",
+                &[U, V, U, R],
+                DUAL_MMP,
+                &[AboveV, AboveV],
+            ),
+            row(
+                ("3-4", 6),
+                "+--",
+                "[u]-[v]-[R]",
+                &[U, V, R],
+                MMP_AND_REAL,
+                &[AboveV],
+            ),
             row(
                 ("3-4", 7),
                 "+--",
@@ -231,9 +352,30 @@ pub const TABLES: &[Table] = &[
                 DUAL_MMP,
                 &[BelowU, AboveV],
             ),
-            row(("3-4", 8), "++-", "[R]-[uv]-[R]", &[R, UV, R], DUAL_MMP, &[BelowU, Between]),
-            row(("3-4", 9), "++-", "[uv]-[R]", &[UV, R], MMP_AND_REAL, &[Between]),
-            row(("3-4", 10), "+++", "[uvR]", &[RUV], DUAL_MMP, &[Between, AboveV]),
+            row(
+                ("3-4", 8),
+                "++-",
+                "[R]-[uv]-[R]",
+                &[R, UV, R],
+                DUAL_MMP,
+                &[BelowU, Between],
+            ),
+            row(
+                ("3-4", 9),
+                "++-",
+                "[uv]-[R]",
+                &[UV, R],
+                MMP_AND_REAL,
+                &[Between],
+            ),
+            row(
+                ("3-4", 10),
+                "+++",
+                "[uvR]",
+                &[RUV],
+                DUAL_MMP,
+                &[Between, AboveV],
+            ),
         ],
     },
 ];

@@ -7,16 +7,28 @@ use serde_json::Value;
 
 fn bench(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     let mut command = Command::cargo_bin("bench").expect("built");
-    let output = command.current_dir(folder).args(arguments).arg("--json").output().expect("it runs");
+    let output = command
+        .current_dir(folder)
+        .args(arguments)
+        .arg("--json")
+        .output()
+        .expect("it runs");
     let json = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-    (output.status.code().unwrap_or(-1), json, String::from_utf8_lossy(&output.stderr).into_owned())
+    (
+        output.status.code().unwrap_or(-1),
+        json,
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    )
 }
 
 /// Makes a calibration in `folder` and returns its text.
 fn calibrate(folder: &Path) -> (Value, String) {
     let (code, report, errors) = bench(folder, &["calibrate", "--write", "mine.toml"]);
     assert_eq!(code, 0, "{errors}");
-    (report, std::fs::read_to_string(folder.join("mine.toml")).expect("the file"))
+    (
+        report,
+        std::fs::read_to_string(folder.join("mine.toml")).expect("the file"),
+    )
 }
 
 #[test]
@@ -25,31 +37,55 @@ fn a_calibration_names_its_date_its_devices_and_its_delay_and_is_never_overwritt
     let (report, text) = calibrate(folder.path());
     let calibration = &report["calibration"];
     assert_eq!(calibration["amplifier"]["device"], "simulated");
-    assert!(calibration["made"].as_str().is_some_and(|made| made.starts_with("20") && made.ends_with('Z')));
+    assert!(
+        calibration["made"]
+            .as_str()
+            .is_some_and(|made| made.starts_with("20") && made.ends_with('Z'))
+    );
     // 0.2 ms of computing delay; the fit of the phases knows it within a microsecond.
     let delay_s = calibration["chain"]["delay_s"].as_f64().expect("measured");
     assert!((delay_s - 2e-4).abs() < 2e-6, "{delay_s}");
     assert!(
         text.contains("compliance_m_per_a")
-            && Path::new(report["recording"].as_str().expect("a path")).extension().is_some()
+            && Path::new(report["recording"].as_str().expect("a path"))
+                .extension()
+                .is_some()
     );
-    let (code, _, errors) = bench(folder.path(), &["calibrate", "--no-delay", "--write", "mine.toml"]);
-    assert!(code == 1 && errors.contains("mine.toml") && errors.contains("--write"), "{errors}");
-    assert_eq!(std::fs::read_to_string(folder.path().join("mine.toml")).expect("the file"), text);
+    let (code, _, errors) = bench(
+        folder.path(),
+        &["calibrate", "--no-delay", "--write", "mine.toml"],
+    );
+    assert!(
+        code == 1 && errors.contains("mine.toml") && errors.contains("--write"),
+        "{errors}"
+    );
+    assert_eq!(
+        std::fs::read_to_string(folder.path().join("mine.toml")).expect("the file"),
+        text
+    );
 }
 
 #[test]
 fn a_run_carries_the_calibration_it_used_and_replays() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     calibrate(folder.path());
-    let run = ["control", "--duration", "1", "--set", "calibration.file=mine.toml"];
+    let run = [
+        "control",
+        "--duration",
+        "1",
+        "--set",
+        "calibration.file=mine.toml",
+    ];
     let (code, report, errors) = bench(folder.path(), &run);
     assert_eq!(code, 0, "{errors}");
     let path = report["recording"].as_str().expect("a path");
     let recording = Recording::open(&folder.path().join(path)).expect("a recording");
     let carried = recording.attachment("calibration.toml").expect("carried");
     assert!(String::from_utf8_lossy(&carried.data).contains("compliance_m_per_a"));
-    assert_eq!(recording.metadata().get("amplifier").map(String::as_str), Some("simulated"));
+    assert_eq!(
+        recording.metadata().get("amplifier").map(String::as_str),
+        Some("simulated")
+    );
     assert_eq!(bench(folder.path(), &["replay", path]).0, 0);
 }
 
@@ -57,21 +93,42 @@ fn a_run_carries_the_calibration_it_used_and_replays() {
 fn an_expired_or_foreign_calibration_is_a_warning_or_a_refusal_as_set() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (_, text) = calibrate(folder.path());
-    let old = text.lines().map(|l| if l.starts_with("made") { "made = \"2020-01-01T00:00:00Z\"" } else { l });
-    std::fs::write(folder.path().join("old.toml"), old.collect::<Vec<_>>().join("\n")).expect("a good disk");
+    let old = text.lines().map(|l| {
+        if l.starts_with("made") {
+            "made = \"2020-01-01T00:00:00Z\""
+        } else {
+            l
+        }
+    });
+    std::fs::write(
+        folder.path().join("old.toml"),
+        old.collect::<Vec<_>>().join("\n"),
+    )
+    .expect("a good disk");
     let foreign = text.replacen("device = \"simulated\"", "device = \"canopen 0x1-0x2\"", 1);
     std::fs::write(folder.path().join("foreign.toml"), foreign).expect("a good disk");
     let cases = [
         ("old.toml", "when_expired", "180", "days ago"),
-        ("foreign.toml", "when_foreign", "another amplifier", "canopen 0x1-0x2"),
+        (
+            "foreign.toml",
+            "when_foreign",
+            "another amplifier",
+            "canopen 0x1-0x2",
+        ),
     ];
     for (file, setting, first, second) in cases {
         for (then, wanted) in [("warn", 0), ("refuse", 2)] {
-            let (file, then) = (format!("calibration.file={file}"), format!("calibration.{setting}={then}"));
+            let (file, then) = (
+                format!("calibration.file={file}"),
+                format!("calibration.{setting}={then}"),
+            );
             let run = ["control", "--duration", "1", "--set", &file, "--set", &then];
             let (code, _, errors) = bench(folder.path(), &run);
             assert_eq!(code, wanted, "{file} {then}: {errors}");
-            assert!(errors.contains(first) && errors.contains(second), "{errors}");
+            assert!(
+                errors.contains(first) && errors.contains(second),
+                "{errors}"
+            );
             assert_eq!(errors.contains("nothing moved"), wanted == 2, "{errors}");
         }
     }
@@ -82,19 +139,37 @@ fn a_file_that_is_no_calibration_is_refused_with_its_place() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (_, text) = calibrate(folder.path());
     let cases = [
-        (text.replace("current_gain = 1.0", "current_gain = 0.0"), "current_gain"),
+        (
+            text.replace("current_gain = 1.0", "current_gain = 0.0"),
+            "current_gain",
+        ),
         (text.replace("[chain]", "[chains]"), "chain"),
-        (text.replace("made = \"2", "made = \"yesterday 2"), "not a date"),
+        (
+            text.replace("made = \"2", "made = \"yesterday 2"),
+            "not a date",
+        ),
         ("not toml [".into(), "TOML"),
     ];
     for (text, word) in cases {
         std::fs::write(folder.path().join("wrong.toml"), text).expect("a good disk");
-        let run = ["control", "--duration", "1", "--set", "calibration.file=wrong.toml"];
+        let run = [
+            "control",
+            "--duration",
+            "1",
+            "--set",
+            "calibration.file=wrong.toml",
+        ];
         let (code, _, errors) = bench(folder.path(), &run);
         assert!(code == 2 && errors.contains(word), "{word}: {errors}");
     }
-    let (code, _, errors) = bench(folder.path(), &["control", "--set", "calibration.file=none.toml"]);
+    let (code, _, errors) = bench(
+        folder.path(),
+        &["control", "--set", "calibration.file=none.toml"],
+    );
     assert!(code == 2 && errors.contains("none.toml"), "{errors}");
     let (code, _, errors) = bench(folder.path(), &["calibrate", "--amplitude", "6"]);
-    assert!(code == 2 && errors.contains("soft limit") && errors.contains("calibrate.amplitude_a"), "{errors}");
+    assert!(
+        code == 2 && errors.contains("soft limit") && errors.contains("calibrate.amplitude_a"),
+        "{errors}"
+    );
 }

@@ -39,12 +39,20 @@ pub struct SkewedRig {
 
 impl SkewedRig {
     pub fn new(inner: SimulatedRig, skew: Skew) -> Self {
-        SkewedRig { inner, skew, actual_a: 0.0, held_m: 0.0 }
+        SkewedRig {
+            inner,
+            skew,
+            actual_a: 0.0,
+            held_m: 0.0,
+        }
     }
 
     /// What a hand that drags something behind it reads (play of twice the backlash).
     fn dragged_m(&mut self, position_m: f64) -> f64 {
-        self.held_m = self.held_m.clamp(position_m - self.skew.backlash_m, position_m + self.skew.backlash_m);
+        self.held_m = self.held_m.clamp(
+            position_m - self.skew.backlash_m,
+            position_m + self.skew.backlash_m,
+        );
         self.held_m
     }
 }
@@ -73,6 +81,9 @@ impl DisplacementProbe for SkewedRig {
         let reading = self.inner.latest(now);
         let dragged_m = self.dragged_m(reading.position_m);
         let bent_m = dragged_m + self.skew.bend_per_m * dragged_m * dragged_m;
-        Reading { position_m: self.skew.probe_gain * bent_m + self.skew.probe_offset_m, ..reading }
+        Reading {
+            position_m: self.skew.probe_gain * bent_m + self.skew.probe_offset_m,
+            ..reading
+        }
     }
 }

@@ -2,7 +2,8 @@
 use std::path::Path;
 
 use bench::calibration::{
-    AmplifierCalibration, CalibratedRig, Calibration, ChainCalibration, Fit, FitError, ProbeCalibration, fit,
+    AmplifierCalibration, CalibratedRig, Calibration, ChainCalibration, Fit, FitError,
+    ProbeCalibration, fit,
 };
 use bench::config::{Config, ScaleBy, Source, load};
 use bench::recording::Recording;
@@ -39,13 +40,26 @@ fn fitted(skew: Skew, config: &Config) -> Result<Fit, FitError> {
 #[test]
 fn the_compliance_of_the_stage_comes_out_with_its_sign_and_an_honest_sigma() {
     for probe_gain in [1.0, -1.0] {
-        let fit = fitted(Skew { probe_gain, ..Skew::default() }, &config()).expect("a fit");
+        let fit = fitted(
+            Skew {
+                probe_gain,
+                ..Skew::default()
+            },
+            &config(),
+        )
+        .expect("a fit");
         let wanted = probe_gain * COMPLIANCE_M_PER_A;
         // The modes that the model leaves out add 0.04 % to the static compliance.
-        assert!((fit.compliance_m_per_a / wanted - 1.0).abs() < 1e-3, "{fit:?}");
+        assert!(
+            (fit.compliance_m_per_a / wanted - 1.0).abs() < 1e-3,
+            "{fit:?}"
+        );
         let ratio = fit.compliance_sigma_m_per_a / COMPLIANCE_M_PER_A;
         assert!((1e-6..2e-4).contains(&ratio), "{fit:?}");
-        assert!(fit.nonlinearity_ratio < 2e-4 && fit.hysteresis_ratio < 2e-4, "{fit:?}");
+        assert!(
+            fit.nonlinearity_ratio < 2e-4 && fit.hysteresis_ratio < 2e-4,
+            "{fit:?}"
+        );
         // 40 nm of the probe, its quantisation, and the floor.
         assert!((40e-9..100e-9).contains(&fit.noise_rms_m), "{fit:?}");
         assert_eq!(fit.current, None);
@@ -64,11 +78,21 @@ fn scale_and_offset_of_amplifier_and_probe_come_out() {
     };
     let fit = fitted(skew, &config()).expect("a fit");
     let (gain, offset_a) = fit.current.expect("the amplifier measures");
-    assert!((gain - 1.04).abs() < 1e-9 && (offset_a - 0.006).abs() < 1e-9, "{gain} {offset_a}");
-    assert!((fit.compliance_m_per_a / (-0.97 * 1.04 * COMPLIANCE_M_PER_A) - 1.0).abs() < 1e-3, "{fit:?}");
+    assert!(
+        (gain - 1.04).abs() < 1e-9 && (offset_a - 0.006).abs() < 1e-9,
+        "{gain} {offset_a}"
+    );
+    assert!(
+        (fit.compliance_m_per_a / (-0.97 * 1.04 * COMPLIANCE_M_PER_A) - 1.0).abs() < 1e-3,
+        "{fit:?}"
+    );
     // At the command zero 6 mA flow: the stage rests 0.93 um off, and the probe adds its 12 um.
     let rest_m = 12e-6 - 0.97 * 0.006 * COMPLIANCE_M_PER_A;
-    assert!((fit.rest_m - rest_m).abs() < 2e-8, "{} for {rest_m}", fit.rest_m);
+    assert!(
+        (fit.rest_m - rest_m).abs() < 2e-8,
+        "{} for {rest_m}",
+        fit.rest_m
+    );
     assert_eq!(fit.probe_gain(ScaleBy::Nothing, COMPLIANCE_M_PER_A), -1.0);
     assert!((fit.probe_gain(ScaleBy::Model, COMPLIANCE_M_PER_A) + 1.0 / 0.97).abs() < 1e-3);
 }
@@ -77,26 +101,69 @@ fn scale_and_offset_of_amplifier_and_probe_come_out() {
 fn backlash_and_a_bent_probe_are_refused_with_their_figures() {
     let config = config();
     // The travel is 2 x 0.4 A x 154 um/A = 124 um; a play of 2 x 2 um is 3 % of it, a bend of 1 % of 62 um shows as one.
-    let back = fitted(Skew { backlash_m: 2e-6, ..Skew::default() }, &config).expect_err("hysteresis").to_string();
-    assert!(back.contains("up and down") && back.contains("0.01 is allowed"), "{back}");
+    let back = fitted(
+        Skew {
+            backlash_m: 2e-6,
+            ..Skew::default()
+        },
+        &config,
+    )
+    .expect_err("hysteresis")
+    .to_string();
+    assert!(
+        back.contains("up and down") && back.contains("0.01 is allowed"),
+        "{back}"
+    );
     let mut generous = config.clone();
     generous.calibrate.largest_hysteresis_ratio = 0.05;
     generous.calibrate.largest_nonlinearity_ratio = 0.05;
-    let fit = fitted(Skew { backlash_m: 2e-6, ..Skew::default() }, &generous).expect("allowed");
+    let fit = fitted(
+        Skew {
+            backlash_m: 2e-6,
+            ..Skew::default()
+        },
+        &generous,
+    )
+    .expect("allowed");
     // 4 um less what the floor shakes out of the play, of 123.6 um.
     assert!((0.025..0.0325).contains(&fit.hysteresis_ratio), "{fit:?}");
-    let bent = fitted(Skew { bend_per_m: 1000.0, ..Skew::default() }, &config).expect_err("bent").to_string();
-    assert!(bent.contains("straight line") && bent.contains("largest_nonlinearity_ratio"), "{bent}");
+    let bent = fitted(
+        Skew {
+            bend_per_m: 1000.0,
+            ..Skew::default()
+        },
+        &config,
+    )
+    .expect_err("bent")
+    .to_string();
+    assert!(
+        bent.contains("straight line") && bent.contains("largest_nonlinearity_ratio"),
+        "{bent}"
+    );
 }
 
 #[test]
 fn a_stage_that_does_not_move_gives_no_calibration() {
     let mut config = config();
     // Noise alone: the interlock against a stuck probe sees it move.
-    let still = fitted(Skew { current_gain: 0.0, ..Skew::default() }, &config).expect_err("nothing moves").to_string();
+    let still = fitted(
+        Skew {
+            current_gain: 0.0,
+            ..Skew::default()
+        },
+        &config,
+    )
+    .expect_err("nothing moves")
+    .to_string();
     assert!(still.contains("does not follow the current"), "{still}");
     config.calibrate.amplitude_a = 3e-5; // 9 nm of travel, a mean of 5000 readings of 70 nm knows 1 nm
-    assert!(matches!(fitted(Skew::default(), &config), Err(FitError::Still { .. })), "lost in the noise");
+    assert!(
+        matches!(
+            fitted(Skew::default(), &config),
+            Err(FitError::Still { .. })
+        ),
+        "lost in the noise"
+    );
 }
 
 #[test]
@@ -117,8 +184,18 @@ fn through_its_calibration_a_skewed_rig_is_the_stage_again() {
     let calibration = Calibration {
         made: "2026-01-01T00:00:00Z".into(),
         recording: String::new(),
-        amplifier: AmplifierCalibration { device: device(), current_gain, current_offset_a, measures_current: true },
-        probe: ProbeCalibration { device: device(), gain, offset_m: -gain * first.rest_m, noise_rms_m: 0.0 },
+        amplifier: AmplifierCalibration {
+            device: device(),
+            current_gain,
+            current_offset_a,
+            measures_current: true,
+        },
+        probe: ProbeCalibration {
+            device: device(),
+            gain,
+            offset_m: -gain * first.rest_m,
+            noise_rms_m: 0.0,
+        },
         chain: ChainCalibration {
             compliance_m_per_a: first.compliance_m_per_a,
             compliance_sigma_m_per_a: 0.0,
@@ -132,10 +209,19 @@ fn through_its_calibration_a_skewed_rig_is_the_stage_again() {
     let rig = SkewedRig::new(SimulatedRig::new(&config).expect("a rig"), skew);
     let rig = CalibratedRig::new(Box::new(rig), &calibration);
     let second = fit(&recorded(Box::new(rig), &config, folder.path()), &config).expect("a fit");
-    assert!((second.compliance_m_per_a / COMPLIANCE_M_PER_A - 1.0).abs() < 2e-4, "{second:?}");
+    assert!(
+        (second.compliance_m_per_a / COMPLIANCE_M_PER_A - 1.0).abs() < 2e-4,
+        "{second:?}"
+    );
     let (gain, offset_a) = second.current.expect("the amplifier measures");
     // What the loop is told to flow is what flows.
-    assert!((gain - 1.0).abs() < 1e-9 && offset_a.abs() < 1e-9, "{gain} {offset_a}");
+    assert!(
+        (gain - 1.0).abs() < 1e-9 && offset_a.abs() < 1e-9,
+        "{gain} {offset_a}"
+    );
     // The zero is where the stage rested at the command zero, that is at -4 mA.
-    assert!((second.rest_m - 0.004 * COMPLIANCE_M_PER_A).abs() < 3e-8, "{second:?}");
+    assert!(
+        (second.rest_m - 0.004 * COMPLIANCE_M_PER_A).abs() < 3e-8,
+        "{second:?}"
+    );
 }

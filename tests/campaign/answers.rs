@@ -2,16 +2,28 @@
 use bench::campaign::{Region, Said, Tolerances, contradicted, offset, recommend};
 
 /// How exactly both are set.
-const TOLERANCES: Tolerances = Tolerances { asymmetry: 0.004, operating_point: 0.002 };
+const TOLERANCES: Tolerances = Tolerances {
+    asymmetry: 0.004,
+    operating_point: 0.002,
+};
 
 fn even(low: f64, high: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|k| low + (high - low) * k as f64 / (count - 1) as f64).collect()
+    (0..count)
+        .map(|k| low + (high - low) * k as f64 / (count - 1) as f64)
+        .collect()
 }
 
 /// CNMP zeros from the asymmetry `border(Y)` on.
 fn beyond(operating_points: &[f64], border: impl Fn(f64) -> f64) -> Region {
-    let bands = operating_points.iter().map(|&y| vec![[border(y), 0.3]]).collect();
-    Region { operating_points: operating_points.into(), bands, searched: [-0.3, 0.3] }
+    let bands = operating_points
+        .iter()
+        .map(|&y| vec![[border(y), 0.3]])
+        .collect();
+    Region {
+        operating_points: operating_points.into(),
+        bands,
+        searched: [-0.3, 0.3],
+    }
 }
 
 fn curved(y: f64) -> f64 {
@@ -21,8 +33,15 @@ fn curved(y: f64) -> f64 {
 /// What is said on the grid of section 5.2.2 of a stage with an offset, without error.
 fn table(made: f64) -> (Region, Vec<Said>) {
     let (points, asymmetries) = (even(0.0, 0.08, 15), even(-0.1, 0.1, 10));
-    let said = |row: usize, asymmetry: f64| Said { row, asymmetry, detected: asymmetry + made >= curved(points[row]) };
-    let all = (0..15).flat_map(|row| asymmetries.iter().map(move |d| (row, *d))).map(|(row, d)| said(row, d)).collect();
+    let said = |row: usize, asymmetry: f64| Said {
+        row,
+        asymmetry,
+        detected: asymmetry + made >= curved(points[row]),
+    };
+    let all = (0..15)
+        .flat_map(|row| asymmetries.iter().map(move |d| (row, *d)))
+        .map(|(row, d)| said(row, d))
+        .collect();
     (beyond(&points, curved), all)
 }
 
@@ -33,15 +52,29 @@ fn the_interval_of_the_offset_is_what_the_verdicts_allow() {
         let found = offset(&region, &said).expect("verdicts");
         // D + d >= border where detected, below it where excluded.
         let bound = |one: &Said| curved(region.operating_points[one.row]) - one.asymmetry;
-        let low = said.iter().filter(|one| one.detected).map(bound).fold(f64::MIN, f64::max);
-        let high = said.iter().filter(|one| !one.detected).map(bound).fold(f64::MAX, f64::min);
+        let low = said
+            .iter()
+            .filter(|one| one.detected)
+            .map(bound)
+            .fold(f64::MIN, f64::max);
+        let high = said
+            .iter()
+            .filter(|one| !one.detected)
+            .map(bound)
+            .fold(f64::MAX, f64::min);
         assert!(
             (found.interval[0] - low).abs() < 1e-12 && (found.interval[1] - high).abs() < 1e-12,
             "{made}: {found:?}"
         );
         assert!((found.best - 0.5 * (low + high)).abs() < 1e-12);
-        assert!(low <= made && made <= high && high - low < 0.01, "{made}: {low} to {high}");
-        assert_eq!((found.contradicted, contradicted(&region, &said, made)), (0, 0));
+        assert!(
+            low <= made && made <= high && high - low < 0.01,
+            "{made}: {low} to {high}"
+        );
+        assert_eq!(
+            (found.contradicted, contradicted(&region, &said, made)),
+            (0, 0)
+        );
         assert_eq!(found.decided, 150);
     }
 }
@@ -52,20 +85,31 @@ fn wrong_verdicts_widen_the_interval_and_do_not_move_it_away() {
     let (region, mut said) = table(made);
     let narrow = offset(&region, &said).expect("verdicts").interval;
     // Every sixth, 25 of 150, on both sides of the border.
-    said.iter_mut().step_by(6).for_each(|one| one.detected = !one.detected);
+    said.iter_mut()
+        .step_by(6)
+        .for_each(|one| one.detected = !one.detected);
     let found = offset(&region, &said).expect("verdicts");
     let [low, high] = found.interval;
     assert!(low <= made && made <= high, "{found:?}");
-    assert!(high - low >= narrow[1] - narrow[0] && high - low < 0.03, "{low} to {high}");
+    assert!(
+        high - low >= narrow[1] - narrow[0] && high - low < 0.03,
+        "{low} to {high}"
+    );
     // As good as the truth, or better.
-    assert!(found.contradicted <= contradicted(&region, &said, made) && found.contradicted >= 20, "{found:?}");
+    assert!(
+        found.contradicted <= contradicted(&region, &said, made) && found.contradicted >= 20,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn without_a_verdict_or_without_a_border_no_offset_is_told() {
     let (region, said) = table(0.0);
     assert_eq!(offset(&region, &[]), None);
-    let nowhere = Region { bands: vec![Vec::new(); 15], ..region };
+    let nowhere = Region {
+        bands: vec![Vec::new(); 15],
+        ..region
+    };
     let found = offset(&nowhere, &said).expect("verdicts");
     // Open at both ends: all offsets are as good.
     assert_eq!(found.interval, found.searched);
@@ -75,18 +119,32 @@ fn without_a_verdict_or_without_a_border_no_offset_is_told() {
 fn between_two_bands_the_middle_is_recommended() {
     let points = even(0.0, 0.08, 41);
     let bands = vec![vec![[-0.3, -0.06], [0.1, 0.3]]; 41];
-    let region = Region { operating_points: points, bands, searched: [-0.3, 0.3] };
+    let region = Region {
+        operating_points: points,
+        bands,
+        searched: [-0.3, 0.3],
+    };
     let candidates = even(-0.1, 0.1, 201);
     // The middle, less what the stage may have beside; half of the room, less half of the interval.
-    for (offset, middle, room) in [([0.0, 0.0], 0.02, 0.08), ([-0.02, -0.02], 0.04, 0.08), ([-0.03, -0.01], 0.04, 0.07)]
-    {
-        let best = recommend(&region, [0.0, 0.08], &candidates, offset, TOLERANCES, &[]).expect("there is room");
+    for (offset, middle, room) in [
+        ([0.0, 0.0], 0.02, 0.08),
+        ([-0.02, -0.02], 0.04, 0.08),
+        ([-0.03, -0.01], 0.04, 0.07),
+    ] {
+        let best = recommend(&region, [0.0, 0.08], &candidates, offset, TOLERANCES, &[])
+            .expect("there is room");
         assert!((best.asymmetry - middle).abs() < 1e-9, "{best:?}");
         let distance = best.distance_tolerances.expect("a border");
-        assert!((distance - room / TOLERANCES.asymmetry).abs() < 1e-6, "{best:?}");
+        assert!(
+            (distance - room / TOLERANCES.asymmetry).abs() < 1e-6,
+            "{best:?}"
+        );
         // The border as a person sees it: where the intended asymmetry reaches it.
         let border = best.nearest.expect("a border")[1];
-        assert!(((border - best.asymmetry).abs() - room).abs() < 1e-9 && !best.at_the_end, "{best:?}");
+        assert!(
+            ((border - best.asymmetry).abs() - room).abs() < 1e-9 && !best.at_the_end,
+            "{best:?}"
+        );
     }
 }
 
@@ -96,21 +154,60 @@ fn the_distance_to_a_straight_border_is_that_to_a_line() {
     // (0.1 - 0.12 - D)/sqrt(t^2 + (1.5 q)^2) away. Rows 0.05 % apart miss its foot by a quarter of a tolerance at most:
     // sqrt(d^2 + 0.125^2) - d < 1e-3 for d > 8.
     let region = beyond(&even(0.0, 0.2, 401), |y| 0.1 - 1.5 * y);
-    let best = recommend(&region, [0.0, 0.08], &even(-0.1, 0.1, 41), [0.0, 0.0], TOLERANCES, &[]).expect("room");
+    let best = recommend(
+        &region,
+        [0.0, 0.08],
+        &even(-0.1, 0.1, 41),
+        [0.0, 0.0],
+        TOLERANCES,
+        &[],
+    )
+    .expect("room");
     assert_eq!((best.asymmetry, best.at_the_end), (-0.1, true));
     let expected = 0.08 / f64::hypot(TOLERANCES.asymmetry, 1.5 * TOLERANCES.operating_point);
     let distance = best.distance_tolerances.expect("a border");
-    assert!(distance >= expected - 1e-9 && distance < expected + 1e-3, "{distance} {expected}");
+    assert!(
+        distance >= expected - 1e-9 && distance < expected + 1e-3,
+        "{distance} {expected}"
+    );
 }
 
 #[test]
 fn nothing_with_cnmp_zeros_is_recommended() {
     let everywhere = beyond(&even(0.0, 0.08, 9), |_| -0.3);
     let candidates = even(-0.1, 0.1, 21);
-    assert_eq!(recommend(&everywhere, [0.0, 0.08], &candidates, [0.0, 0.0], TOLERANCES, &[]), None);
+    assert_eq!(
+        recommend(
+            &everywhere,
+            [0.0, 0.08],
+            &candidates,
+            [0.0, 0.0],
+            TOLERANCES,
+            &[]
+        ),
+        None
+    );
     // Nor anything beside a point where they were measured, whatever the model says.
-    let nowhere = Region { bands: vec![Vec::new(); 9], ..everywhere };
-    let seen = [Said { row: 3, asymmetry: 0.001, detected: true }];
-    let best = recommend(&nowhere, [0.0, 0.08], &candidates, [0.0, 0.0], TOLERANCES, &seen).expect("room");
-    assert!((best.asymmetry.abs() - 0.01).abs() < 1e-12 && best.distance_tolerances.is_none(), "{best:?}");
+    let nowhere = Region {
+        bands: vec![Vec::new(); 9],
+        ..everywhere
+    };
+    let seen = [Said {
+        row: 3,
+        asymmetry: 0.001,
+        detected: true,
+    }];
+    let best = recommend(
+        &nowhere,
+        [0.0, 0.08],
+        &candidates,
+        [0.0, 0.0],
+        TOLERANCES,
+        &seen,
+    )
+    .expect("room");
+    assert!(
+        (best.asymmetry.abs() - 0.01).abs() < 1e-12 && best.distance_tolerances.is_none(),
+        "{best:?}"
+    );
 }

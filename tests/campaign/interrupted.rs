@@ -18,15 +18,26 @@ const PATIENCE: Duration = Duration::from_secs(240);
 
 fn start(bench: &Bench) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
-    command.current_dir(bench.path("")).args(GRID.split_whitespace()).stdin(Stdio::null());
-    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
+    command
+        .current_dir(bench.path(""))
+        .args(GRID.split_whitespace())
+        .stdin(Stdio::null());
+    command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts")
 }
 
 /// Files of points that are there.
 fn points(bench: &Bench) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(bench.path("c/points")) else { return Vec::new() };
+    let Ok(entries) = std::fs::read_dir(bench.path("c/points")) else {
+        return Vec::new();
+    };
     let paths = entries.map(|entry| entry.expect("an entry").path());
-    let mut whole: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
+    let mut whole: Vec<PathBuf> = paths
+        .filter(|path| path.extension().is_some_and(|e| e == "json"))
+        .collect();
     whole.sort();
     whole
 }
@@ -36,14 +47,20 @@ fn broken_off(bench: &Bench, number: i32) -> (Option<i32>, String) {
     let mut child = start(bench);
     let patience = Instant::now() + PATIENCE;
     while points(bench).len() < 3 {
-        assert!(child.try_wait().expect("a child of ours").is_none(), "it ended early");
+        assert!(
+            child.try_wait().expect("a child of ours").is_none(),
+            "it ended early"
+        );
         assert!(Instant::now() < patience, "nothing is written");
         std::thread::sleep(Duration::from_millis(10));
     }
     // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
     assert_eq!(unsafe { libc::kill(child.id() as libc::pid_t, number) }, 0);
     let output = child.wait_with_output().expect("a child of ours");
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    )
 }
 
 fn json(path: &Path) -> Value {
@@ -52,7 +69,9 @@ fn json(path: &Path) -> Value {
 
 /// Circles of a colour in a picture, as dots (filled) or rings.
 fn circles(svg: &str, attribute: &str) -> usize {
-    svg.lines().filter(|line| line.starts_with("<circle") && line.contains(attribute)).count()
+    svg.lines()
+        .filter(|line| line.starts_with("<circle") && line.contains(attribute))
+        .count()
 }
 
 #[test]
@@ -62,12 +81,30 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
     assert_eq!(answer.code, 0, "{}", answer.err);
     let report = answer.json();
     let count = |what: &str| report["totals"][what].as_u64().expect("a count") as usize;
-    assert_eq!((count("points"), count("detected") + count("excluded") + count("undecided")), (12, 12));
-    assert_eq!(report["agreement"]["contradicted_as_simulated"], 0, "never a wrong verdict: {report}");
+    assert_eq!(
+        (
+            count("points"),
+            count("detected") + count("excluded") + count("undecided")
+        ),
+        (12, 12)
+    );
+    assert_eq!(
+        report["agreement"]["contradicted_as_simulated"], 0,
+        "never a wrong verdict: {report}"
+    );
     // One dot a verdict on each of the maps, of which there are two where an offset is told, and one in the legend.
-    let (svg, maps) = (whole.read("c/campaign.svg"), if report["offset"].is_null() { 1 } else { 2 });
-    assert_eq!(circles(&svg, "fill=\"#D55E00\""), maps * (count("detected") + 1));
-    assert_eq!(circles(&svg, "stroke=\"#0072B2\""), maps * (count("excluded") + 1));
+    let (svg, maps) = (
+        whole.read("c/campaign.svg"),
+        if report["offset"].is_null() { 1 } else { 2 },
+    );
+    assert_eq!(
+        circles(&svg, "fill=\"#D55E00\""),
+        maps * (count("detected") + 1)
+    );
+    assert_eq!(
+        circles(&svg, "stroke=\"#0072B2\""),
+        maps * (count("excluded") + 1)
+    );
 
     for (number, expected) in [(libc::SIGKILL, None), (libc::SIGINT, Some(1))] {
         let broken = Bench::new();
@@ -75,10 +112,20 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
         assert_eq!(code, expected, "{said}");
         let kept = points(&broken);
         assert!((3..12).contains(&kept.len()), "{kept:?}");
-        kept.iter()
-            .for_each(|path| assert_eq!(json(path), json(&whole.path("c/points").join(path.file_name().unwrap()))));
+        kept.iter().for_each(|path| {
+            assert_eq!(
+                json(path),
+                json(&whole.path("c/points").join(path.file_name().unwrap()))
+            )
+        });
         let going_on = broken.run(&format!("{GRID} --json"));
-        assert!(going_on.err.contains(&format!("{} of 12 points are done already", kept.len())), "{}", going_on.err);
+        assert!(
+            going_on
+                .err
+                .contains(&format!("{} of 12 points are done already", kept.len())),
+            "{}",
+            going_on.err
+        );
         assert_eq!((going_on.code, &going_on.out), (0, &answer.out));
     }
 
@@ -88,18 +135,31 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
     std::fs::write(&files[0], &text[..text.len() / 2]).expect("a writable folder");
     std::fs::copy(&files[1], &files[2]).expect("a writable folder");
     let again = whole.run(&format!("{GRID} --json"));
-    for words in ["is torn or damaged", "is of another campaign or another point", "10 of 12 points are done already"] {
+    for words in [
+        "is torn or damaged",
+        "is of another campaign or another point",
+        "10 of 12 points are done already",
+    ] {
         assert!(again.err.contains(words), "{}", again.err);
     }
     assert_eq!((again.code, &again.out), (0, &answer.out));
 
     // Other settings are refused, and named.
     for (arguments, named) in [
-        (format!("{GRID} --seed 7"), "`config.sim.seed` is 1 there, 7 here"),
-        (GRID.replace("10%:3", "10%:2"), "`asymmetries.2` is 0.1 there, null here"),
+        (
+            format!("{GRID} --seed 7"),
+            "`config.sim.seed` is 1 there, 7 here",
+        ),
+        (
+            GRID.replace("10%:3", "10%:2"),
+            "`asymmetries.2` is 0.1 there, null here",
+        ),
     ] {
         let other = whole.run(&arguments);
-        assert!(other.code == 2 && other.err.contains("holds a campaign of other settings"), "{other:?}");
+        assert!(
+            other.code == 2 && other.err.contains("holds a campaign of other settings"),
+            "{other:?}"
+        );
         assert!(other.err.contains(named), "{other:?}");
     }
     assert_eq!(points(&whole), files);
@@ -112,21 +172,48 @@ fn what_is_no_campaign_is_refused_and_left_as_it_is() {
     for text in ["", "not JSON", "{\"format\": \"bench study 1\"}", "[1, 2]"] {
         bench.write("c/campaign.json", text);
         let answer = bench.run(GRID);
-        assert!(answer.code == 2 && answer.err.contains("is not of a campaign"), "{answer:?}");
+        assert!(
+            answer.code == 2 && answer.err.contains("is not of a campaign"),
+            "{answer:?}"
+        );
         assert_eq!(bench.read("c/campaign.json"), text);
     }
     for (arguments, words) in [
-        ("campaign --config lab", "standard input is no terminal; start it in one, or add --simulate"),
-        ("campaign --config xy", "which the model `xy` does not have both"),
+        (
+            "campaign --config lab",
+            "standard input is no terminal; start it in one, or add --simulate",
+        ),
+        (
+            "campaign --config xy",
+            "which the model `xy` does not have both",
+        ),
         ("campaign --asymmetry 2%", "fix what a campaign varies"),
-        ("campaign --operating-points 0%:200%:3", "beyond the length of the beams"),
-        ("campaign --operating-points 0%:8%:2000 --asymmetries -10%:10%:10", "20000 points"),
-        ("campaign --asymmetry-tolerance 0", "--asymmetry-tolerance is 0"),
-        ("chirp --config xy --set sim.asymmetry_offset=0.01", "`xy` has no mass asymmetry"),
-        ("chirp --asymmetry -0.8 --set sim.asymmetry_offset=-0.2", "too little is left of m2"),
+        (
+            "campaign --operating-points 0%:200%:3",
+            "beyond the length of the beams",
+        ),
+        (
+            "campaign --operating-points 0%:8%:2000 --asymmetries -10%:10%:10",
+            "20000 points",
+        ),
+        (
+            "campaign --asymmetry-tolerance 0",
+            "--asymmetry-tolerance is 0",
+        ),
+        (
+            "chirp --config xy --set sim.asymmetry_offset=0.01",
+            "`xy` has no mass asymmetry",
+        ),
+        (
+            "chirp --asymmetry -0.8 --set sim.asymmetry_offset=-0.2",
+            "too little is left of m2",
+        ),
     ] {
         let answer = bench.run(arguments);
-        assert!(answer.code == 2 && answer.err.contains(words), "{arguments}: {answer:?}");
+        assert!(
+            answer.code == 2 && answer.err.contains(words),
+            "{arguments}: {answer:?}"
+        );
     }
     assert_eq!(bench.files(), ["c"]);
 }
@@ -148,10 +235,18 @@ fn points_of_the_simulated_stage_do_not_count_for_the_real_one_of_the_same_setti
         let folder = tempfile::tempdir().expect("a temporary folder");
         let open = |on_devices| Store::open(folder.path(), &grid, &config, on_devices);
         let first = open(!simulated_first).expect("a new folder");
-        first.store.add(Place { row: 1, column: 0 }, &point).expect("a point");
+        first
+            .store
+            .add(Place { row: 1, column: 0 }, &point)
+            .expect("a point");
         drop(first);
-        let error = open(simulated_first).expect_err("the other stage").to_string();
-        assert!(error.contains("other settings") && error.contains("`on_devices` is "), "{error}");
+        let error = open(simulated_first)
+            .expect_err("the other stage")
+            .to_string();
+        assert!(
+            error.contains("other settings") && error.contains("`on_devices` is "),
+            "{error}"
+        );
         assert_eq!(open(!simulated_first).expect("the same").done.len(), 1);
     }
 }

@@ -4,11 +4,18 @@ use bench::config::{Config, PlantSettings, Purpose, Source, Sr4dofSettings, load
 
 fn config(sets: &[&str]) -> Config {
     let sets = sets.iter().map(|set| set.to_string()).collect();
-    load(&Source { sets, purpose: Purpose::Chirp, ..Source::default() }).expect("a configuration")
+    load(&Source {
+        sets,
+        purpose: Purpose::Chirp,
+        ..Source::default()
+    })
+    .expect("a configuration")
 }
 
 fn stage(config: &Config) -> &Sr4dofSettings {
-    let PlantSettings::Sr4dof(stage) = &config.plant else { panic!("the default plant") };
+    let PlantSettings::Sr4dof(stage) = &config.plant else {
+        panic!("the default plant")
+    };
     stage
 }
 
@@ -17,11 +24,16 @@ fn stage(config: &Config) -> &Sr4dofSettings {
 fn held(s: &Sr4dofSettings, y1: f64) -> (f64, f64) {
     let c = 0.6 / s.beam_length_m;
     let inertia = s.beam_height_m * s.beam_thickness_m.powi(3) / 12.0;
-    let k = 24.0 * s.youngs_modulus_pa * inertia / (s.beam_length_m.powi(3) * (1.0 - s.poisson_ratio.powi(2)));
+    let k = 24.0 * s.youngs_modulus_pa * inertia
+        / (s.beam_length_m.powi(3) * (1.0 - s.poisson_ratio.powi(2)));
     let k4 = s.spring_stiffness_n_per_m;
     let (mut x1, mut y2, mut y3) = (1e-4, 0.7 * y1, 0.2 * y1);
-    let bearings =
-        |x1: f64, y2: f64, y3: f64| (x1 + c * ((y1 - y2).powi(2) - y2 * y2), x1 - c * ((y1 - y3).powi(2) - y3 * y3));
+    let bearings = |x1: f64, y2: f64, y3: f64| {
+        (
+            x1 + c * ((y1 - y2).powi(2) - y2 * y2),
+            x1 - c * ((y1 - y3).powi(2) - y3 * y3),
+        )
+    };
     for _ in 0..2000 {
         let (x4, x5) = bearings(x1, y2, y3);
         // Both slopes of a bearing are 2 c y1: (y1 - y2) + y2.
@@ -39,15 +51,26 @@ fn held(s: &Sr4dofSettings, y1: f64) -> (f64, f64) {
 fn the_weight_holds_the_operating_point_and_the_stage_rests_where_it_was_in_x() {
     for point_m in [-0.0038, 0.0005, 0.0019, 0.0038] {
         for pulley in [1.0, 0.8] {
-            let set = [format!("plant.operating_point_m={point_m}"), format!("campaign.pulley_ratio={pulley:?}")];
+            let set = [
+                format!("plant.operating_point_m={point_m}"),
+                format!("campaign.pulley_ratio={pulley:?}"),
+            ];
             let config = config(&[&set[0], &set[1]]);
             let (force_n, x1_m) = held(stage(&config), point_m);
             // The descent ends at rounding: 1e-16 of lengths of 4 mm, and of forces of 34 N.
             assert!(x1_m.abs() < 1e-15, "{x1_m}");
             let load = Load::of(&config).expect("a load");
             let expected_kg = force_n / 9.80665 / pulley;
-            assert!((load.hung_kg / expected_kg - 1.0).abs() < 1e-9, "{} {expected_kg}", load.hung_kg);
-            let carried = load.carried(&config).expect("a stage").operating_point_m().expect("it has one");
+            assert!(
+                (load.hung_kg / expected_kg - 1.0).abs() < 1e-9,
+                "{} {expected_kg}",
+                load.hung_kg
+            );
+            let carried = load
+                .carried(&config)
+                .expect("a stage")
+                .operating_point_m()
+                .expect("it has one");
             assert!((carried / point_m - 1.0).abs() < 1e-12, "{carried}");
         }
     }
@@ -60,16 +83,30 @@ fn the_weight_holds_the_operating_point_and_the_stage_rests_where_it_was_in_x() 
 fn masses_go_where_they_make_the_asymmetry_of_the_stage_as_it_was_built() {
     for built in [-0.02, 0.0, 0.013] {
         for wanted in [-0.1, -0.05, -0.02, 0.0, 0.04, 0.1] {
-            let set = [format!("plant.mass_asymmetry={wanted:?}"), format!("campaign.built_asymmetry={built:?}")];
+            let set = [
+                format!("plant.mass_asymmetry={wanted:?}"),
+                format!("campaign.built_asymmetry={built:?}"),
+            ];
             let config = config(&[&set[0], &set[1]]);
             let load = Load::of(&config).expect("a load");
             let [m2, m3] = [0.06 * (1.0 + built) + load.on_m2_kg, 0.06 + load.on_m3_kg];
             // Half a step of 0.5 g, over m3 or, beyond it, a little less.
-            assert!((m2 / m3 - 1.0 - wanted).abs() <= 0.00025 / 0.06 * 1.02, "{built} {wanted} {load:?}");
-            assert!(load.on_m2_kg * load.on_m3_kg == 0.0, "only ever on one of them: {load:?}");
+            assert!(
+                (m2 / m3 - 1.0 - wanted).abs() <= 0.00025 / 0.06 * 1.02,
+                "{built} {wanted} {load:?}"
+            );
+            assert!(
+                load.on_m2_kg * load.on_m3_kg == 0.0,
+                "only ever on one of them: {load:?}"
+            );
             let steps = (load.on_m2_kg + load.on_m3_kg) / 0.0005;
-            assert!((steps - steps.round()).abs() < 1e-9, "whole steps: {load:?}");
-            let PlantSettings::Sr4dof(carried) = load.carried(&config).expect("a stage") else { panic!("a stage") };
+            assert!(
+                (steps - steps.round()).abs() < 1e-9,
+                "whole steps: {load:?}"
+            );
+            let PlantSettings::Sr4dof(carried) = load.carried(&config).expect("a stage") else {
+                panic!("a stage")
+            };
             assert!((carried.secondary_stage_mass_kg - m3).abs() < 1e-15);
             assert!((carried.mass_asymmetry - (m2 / m3 - 1.0)).abs() < 1e-12);
         }
@@ -78,7 +115,11 @@ fn masses_go_where_they_make_the_asymmetry_of_the_stage_as_it_was_built() {
 
 #[test]
 fn a_person_is_told_how_much_in_all_and_what_changes() {
-    let on = |hung_kg, on_m2_kg, on_m3_kg| Load { hung_kg, on_m2_kg, on_m3_kg };
+    let on = |hung_kg, on_m2_kg, on_m3_kg| Load {
+        hung_kg,
+        on_m2_kg,
+        on_m3_kg,
+    };
     let first = on(1.736, 0.006, 0.0).orders(&Load::default());
     assert_eq!(
         first,
@@ -98,7 +139,16 @@ fn a_person_is_told_how_much_in_all_and_what_changes() {
         ]
     );
     let other = on(-0.5, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0));
-    assert_eq!(other[0], "take the weight off the other side; weight in -Y: 0.500 kg in all (put on 0.500 kg)");
-    assert_eq!(on(0.25, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0))[0], "weight in +Y: 0.250 kg in all (take off 0.750 kg)");
-    assert_eq!(on(0.0, 0.0, 0.0).orders(&on(-0.5, 0.0, 0.0))[0], "weight in -Y: nothing (take off 0.500 kg)");
+    assert_eq!(
+        other[0],
+        "take the weight off the other side; weight in -Y: 0.500 kg in all (put on 0.500 kg)"
+    );
+    assert_eq!(
+        on(0.25, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0))[0],
+        "weight in +Y: 0.250 kg in all (take off 0.750 kg)"
+    );
+    assert_eq!(
+        on(0.0, 0.0, 0.0).orders(&on(-0.5, 0.0, 0.0))[0],
+        "weight in -Y: nothing (take off 0.500 kg)"
+    );
 }

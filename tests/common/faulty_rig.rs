@@ -1,7 +1,9 @@
 //! A rig that fails when told to.
 use std::ops::Range;
 
-use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity};
+use bench_hal::{
+    AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
+};
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,12 +47,21 @@ pub struct FaultyRig<R> {
 
 impl<R: Rig> FaultyRig<R> {
     pub fn new(inner: R, faults: &[(Range<u64>, Fault)]) -> Self {
-        FaultyRig { inner, faults: faults.to_vec(), now: None, last: Reading::default(), asked_a: 0.0 }
+        FaultyRig {
+            inner,
+            faults: faults.to_vec(),
+            now: None,
+            last: Reading::default(),
+            asked_a: 0.0,
+        }
     }
 
     /// The faults of the tick under way.
     fn find<T>(&self, tick: u64, wanted: impl Fn(&Fault) -> Option<T>) -> Option<T> {
-        self.faults.iter().filter(|(when, _)| when.contains(&tick)).find_map(|(_, fault)| wanted(fault))
+        self.faults
+            .iter()
+            .filter(|(when, _)| when.contains(&tick))
+            .find_map(|(_, fault)| wanted(fault))
     }
 
     fn now(&self) -> u64 {
@@ -59,14 +70,24 @@ impl<R: Rig> FaultyRig<R> {
 }
 
 fn refusal(code: i64) -> DeviceError {
-    DeviceError { what: "the amplifier refuses", remedy: "it was told to", code }
+    DeviceError {
+        what: "the amplifier refuses",
+        remedy: "it was told to",
+        code,
+    }
 }
 
 impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     /// Orders are taken before the probe is read: the tick is the one after the last reading.
     fn enable(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
-        match self.find(tick, |fault| if let Fault::DoesNotEnable(code) = fault { Some(*code) } else { None }) {
+        match self.find(tick, |fault| {
+            if let Fault::DoesNotEnable(code) = fault {
+                Some(*code)
+            } else {
+                None
+            }
+        }) {
             Some(code) => Err(refusal(code)),
             None => self.inner.enable(),
         }
@@ -74,13 +95,23 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         self.asked_a = current_a;
-        if let Some(code) =
-            self.find(self.now(), |fault| if let Fault::Refuses(code) = fault { Some(*code) } else { None })
-        {
+        if let Some(code) = self.find(self.now(), |fault| {
+            if let Fault::Refuses(code) = fault {
+                Some(*code)
+            } else {
+                None
+            }
+        }) {
             return Err(refusal(code));
         }
         let given_a = self.inner.command(current_a)?;
-        let claimed = self.find(self.now(), |fault| if let Fault::Gives(a) = fault { Some(*a) } else { None });
+        let claimed = self.find(self.now(), |fault| {
+            if let Fault::Gives(a) = fault {
+                Some(*a)
+            } else {
+                None
+            }
+        });
         Ok(claimed.unwrap_or(given_a))
     }
 
@@ -89,18 +120,33 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     }
 
     fn actual_current_a(&self) -> Option<f64> {
-        let beyond_a = |fault: &Fault| if let Fault::MeasuresBeyond(a) = fault { Some(*a) } else { None };
-        self.find(self.now(), beyond_a).map(|beyond_a| self.asked_a + beyond_a)
+        let beyond_a = |fault: &Fault| {
+            if let Fault::MeasuresBeyond(a) = fault {
+                Some(*a)
+            } else {
+                None
+            }
+        };
+        self.find(self.now(), beyond_a)
+            .map(|beyond_a| self.asked_a + beyond_a)
     }
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
-        let kept = self.find(tick, |fault| (*fault == Fault::Unclearable).then_some(refusal(5)));
+        let kept = self.find(tick, |fault| {
+            (*fault == Fault::Unclearable).then_some(refusal(5))
+        });
         kept.map_or(Ok(()), Err)
     }
 
     fn status(&self) -> AmplifierStatus {
-        let code = self.find(self.now(), |fault| if let Fault::Faulted(code) = fault { Some(*code) } else { None });
+        let code = self.find(self.now(), |fault| {
+            if let Fault::Faulted(code) = fault {
+                Some(*code)
+            } else {
+                None
+            }
+        });
         code.map_or(self.inner.status(), AmplifierStatus::Fault)
     }
 }
@@ -108,7 +154,11 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
 impl<R: Rig> DisplacementProbe for FaultyRig<R> {
     fn latest(&mut self, now: Tick) -> Reading {
         let mut reading = self.inner.latest(now);
-        for (_, fault) in self.faults.iter().filter(|(when, _)| when.contains(&now.number)) {
+        for (_, fault) in self
+            .faults
+            .iter()
+            .filter(|(when, _)| when.contains(&now.number))
+        {
             match *fault {
                 Fault::Says(validity) => reading.validity = validity,
                 Fault::At(position_m) => reading.position_m = position_m,

@@ -26,5 +26,8 @@ pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
 /// The analysis of a run by `plan`, believing `believed`.
 pub fn analysed(plan: &Plan, believed: &Config) -> Result<Analysis, AnalysisError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    analyse(&Recording::open(&recorded(plan, folder.path())).expect("a recording"), believed)
+    analyse(
+        &Recording::open(&recorded(plan, folder.path())).expect("a recording"),
+        believed,
+    )
 }

@@ -13,8 +13,18 @@ pub fn chirp(config: &Config) -> Signals {
     let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
     for number in 0..chirp.ticks() {
         let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;
-        output_m.push(rig.latest(Tick { number, scheduled_ns }).position_m);
+        output_m.push(
+            rig.latest(Tick {
+                number,
+                scheduled_ns,
+            })
+            .position_m,
+        );
         input_a.push(rig.command(chirp.current_a(number)).expect("enabled"));
     }
-    Signals { rate_hz: config.servo.rate_hz, input_a, output_m }
+    Signals {
+        rate_hz: config.servo.rate_hz,
+        input_a,
+        output_m,
+    }
 }

@@ -39,7 +39,12 @@ struct Case {
 }
 
 const fn case(word: &'static str, found: (u64, u32), zero: u64, armed_into: Option<u32>) -> Case {
-    Case { word, found, zero, armed_into }
+    Case {
+        word,
+        found,
+        zero,
+        armed_into,
+    }
 }
 
 /// A status frame comes every 2 ms, and up to a tick passes until the loop looks.
@@ -51,17 +56,62 @@ const SILENCE: u64 = 22;
 
 /// The table of `hal/README.md` in ticks of a millisecond.
 const CASES: [Case; 12] = [
-    case("amplifier.silence", (SILENCE, STATUS_LOST), SILENCE + SWITCH_OFF, Some(HEARTBEAT_LOST)),
-    case("amplifier.late=200ms", (SILENCE, STATUS_LOST), SILENCE + SWITCH_OFF, Some(HEARTBEAT_LOST)),
-    case("amplifier.unplugged", (SILENCE, STATUS_LOST), UNHEARD, Some(HEARTBEAT_LOST)),
-    case("amplifier.short-frames", (STATUS, MALFORMED), STATUS + SWITCH_OFF, Some(MALFORMED)),
-    case("amplifier.senseless-status", (STATUS, MALFORMED), STATUS + SWITCH_OFF, Some(NOT_REMOTE)),
-    case("amplifier.target-ignored", (STATUS, TARGET_IGNORED), 0, Some(TARGET_IGNORED)),
+    case(
+        "amplifier.silence",
+        (SILENCE, STATUS_LOST),
+        SILENCE + SWITCH_OFF,
+        Some(HEARTBEAT_LOST),
+    ),
+    case(
+        "amplifier.late=200ms",
+        (SILENCE, STATUS_LOST),
+        SILENCE + SWITCH_OFF,
+        Some(HEARTBEAT_LOST),
+    ),
+    case(
+        "amplifier.unplugged",
+        (SILENCE, STATUS_LOST),
+        UNHEARD,
+        Some(HEARTBEAT_LOST),
+    ),
+    case(
+        "amplifier.short-frames",
+        (STATUS, MALFORMED),
+        STATUS + SWITCH_OFF,
+        Some(MALFORMED),
+    ),
+    case(
+        "amplifier.senseless-status",
+        (STATUS, MALFORMED),
+        STATUS + SWITCH_OFF,
+        Some(NOT_REMOTE),
+    ),
+    case(
+        "amplifier.target-ignored",
+        (STATUS, TARGET_IGNORED),
+        0,
+        Some(TARGET_IGNORED),
+    ),
     case("amplifier.switches-off", (STATUS, SWITCHED_OFF), 0, None),
-    case("amplifier.fault=0x2310", (FRAME, EMERGENCY + 0x2310), 0, Some(EMERGENCY + 0x2310)),
-    case("amplifier.emergency=0x4210", (FRAME, EMERGENCY + 0x4210), FRAME + SWITCH_OFF, None),
+    case(
+        "amplifier.fault=0x2310",
+        (FRAME, EMERGENCY + 0x2310),
+        0,
+        Some(EMERGENCY + 0x2310),
+    ),
+    case(
+        "amplifier.emergency=0x4210",
+        (FRAME, EMERGENCY + 0x4210),
+        FRAME + SWITCH_OFF,
+        None,
+    ),
     case("amplifier.reset", (FRAME, RESTARTED), 0, Some(RESTARTED)),
-    case("amplifier.bus-off", (FRAME, BUS_OFF), UNHEARD, Some(BUS_OFF)),
+    case(
+        "amplifier.bus-off",
+        (FRAME, BUS_OFF),
+        UNHEARD,
+        Some(BUS_OFF),
+    ),
     case(INTERFACE_DOWN, (FRAME, BUS_DOWN), UNHEARD, Some(BUS_DOWN)),
 ];
 
@@ -114,10 +164,16 @@ impl DisplacementProbe for Look {
     fn latest(&mut self, _now: Tick) -> Reading {
         // An order that took its time begins the schedule anew.
         self.due_ns = (self.due_ns + PERIOD.as_nanos() as u64).max(self.world.now_ns());
-        self.world.sleep(Duration::from_nanos(self.due_ns - self.world.now_ns()));
+        self.world
+            .sleep(Duration::from_nanos(self.due_ns - self.world.now_ns()));
         self.sequence += 1;
         let position_m = self.stage.position_m(self.world.now_ns());
-        Reading { position_m, sequence: self.sequence, age_ns: 0, validity: Validity::Valid }
+        Reading {
+            position_m,
+            sequence: self.sequence,
+            age_ns: 0,
+            validity: Validity::Valid,
+        }
     }
 }
 
@@ -137,7 +193,9 @@ fn driver(config: &Config, world: &World) -> bench::devices::Amplifier {
         AmplifierDevice::Canopen(device) => {
             Box::new(CanopenDrive::open(drive_settings(device, config), host).expect("it opens"))
         }
-        AmplifierDevice::Vesc(device) => Box::new(Vesc::open(vesc_settings(device, config), host).expect("it opens")),
+        AmplifierDevice::Vesc(device) => {
+            Box::new(Vesc::open(vesc_settings(device, config), host).expect("it opens"))
+        }
         AmplifierDevice::Simulated(_) => unreachable!("the settings name a device"),
     }
 }
@@ -145,7 +203,12 @@ fn driver(config: &Config, world: &World) -> bench::devices::Amplifier {
 /// The driver in a loop that is disarmed.
 fn open(config: &Config, world: &World, stage: &Stage) -> Bench {
     let amplifier = driver(config, world);
-    let probe = Look { world: world.clone(), stage: stage.clone(), due_ns: world.now_ns(), sequence: 0 };
+    let probe = Look {
+        world: world.clone(),
+        stage: stage.clone(),
+        due_ns: world.now_ns(),
+        sequence: 0,
+    };
     Bench::around(config, Devices { amplifier, probe })
 }
 
@@ -158,16 +221,28 @@ impl Lab {
         let world = World::default();
         let stage = Stage::new(&config).expect("a stage");
         let (journal, _) = Journal::new();
-        let drive = Amplifier::start(&config, Arc::new(world.clone()), stage.clone(), journal).expect("a drive");
+        let drive = Amplifier::start(&config, Arc::new(world.clone()), stage.clone(), journal)
+            .expect("a drive");
         let bench = open(&config, &world, &stage);
-        Lab { bench, drive, stage, world, config }
+        Lab {
+            bench,
+            drive,
+            stage,
+            world,
+            config,
+        }
     }
 
     /// Armed, nothing running.
     fn arm(&mut self) {
         self.bench.order(Order::Arm);
         self.bench.run(50);
-        assert_eq!(self.bench.state(), State::Armed, "{:x?}", self.bench.trips());
+        assert_eq!(
+            self.bench.state(),
+            State::Armed,
+            "{:x?}",
+            self.bench.trips()
+        );
         assert!(self.drive.is_enabled());
     }
 
@@ -203,13 +278,17 @@ impl Lab {
     }
 
     fn ask(&self, word: &str) {
-        let Ok(ActingFault::Amplifier(fault)) = ActingFault::parse(word) else { panic!("{word} is a fault") };
+        let Ok(ActingFault::Amplifier(fault)) = ActingFault::parse(word) else {
+            panic!("{word} is a fault")
+        };
         self.drive.ask(fault).expect("a bus in memory takes it");
     }
 
     fn trip(&self) -> Option<(Trip, u64)> {
         self.bench.trips().last().map(|event| {
-            let EventKind::Trip(trip) = event.kind else { unreachable!() };
+            let EventKind::Trip(trip) = event.kind else {
+                unreachable!()
+            };
             (trip, event.tick)
         })
     }
@@ -246,20 +325,31 @@ impl Lab {
         let names = |trip: &Trip| matches!(*trip, Trip::Amplifier { code: found, .. } if found == i64::from(code));
         assert!(names(&trip), "0x{code:x}: {trip:?}");
         assert!(at.contains(&tick), "tick {tick}, {at:?} was promised");
-        self.bench.prove_that_the_recording_is_complete(tick, "amplifier");
+        self.bench
+            .prove_that_the_recording_is_complete(tick, "amplifier");
         let (_folder, recording) = self.bench.recorded();
         assert!(
-            recording.events().iter().any(|event| matches!(&event.kind, EventKind::Trip(trip) if names(trip))),
+            recording
+                .events()
+                .iter()
+                .any(|event| matches!(&event.kind, EventKind::Trip(trip) if names(trip))),
             "with its code"
         );
-        let mut ticks = recording.ticks().expect("readable").map(|record| record.expect("readable"));
+        let mut ticks = recording
+            .ticks()
+            .expect("readable")
+            .map(|record| record.expect("readable"));
         assert!(ticks.all(|record| record.tick < tick || record.command_a.to_bits() == 0));
     }
 
     /// A person removes the cause and clears the trip, and runs again.
     fn next_run_completes(&mut self) {
         self.end();
-        let clearing = if self.bench.state() == State::Tripped { Order::Clear } else { Order::Stop };
+        let clearing = if self.bench.state() == State::Tripped {
+            Order::Clear
+        } else {
+            Order::Stop
+        };
         self.bench.order(clearing);
         self.bench.run(100);
         self.run_completes();
@@ -268,10 +358,22 @@ impl Lab {
     /// The program ends, and the next one opens the drive anew.
     fn next_program_completes(mut self) {
         self.end();
-        let Lab { bench, drive, stage, world, config } = self;
+        let Lab {
+            bench,
+            drive,
+            stage,
+            world,
+            config,
+        } = self;
         drop(bench);
         let bench = open(&config, &world, &stage);
-        let mut next = Lab { bench, drive, stage, world, config };
+        let mut next = Lab {
+            bench,
+            drive,
+            stage,
+            world,
+            config,
+        };
         if next.drive.state() == "fault" {
             next.a_fault_of_the_drive_outlives_the_program();
         }
@@ -294,7 +396,8 @@ impl Lab {
         let mut config = self.config.clone();
         config.control.duration_s = 0.3;
         self.arm();
-        self.bench.order(Order::Start(program(&config, Run::Control)));
+        self.bench
+            .order(Order::Start(program(&config, Run::Control)));
         self.bench.run(450);
         assert_eq!(self.bench.trips().len(), trips, "{:x?}", self.trip());
         assert!(self.bench.servo().completed() && self.is_off());
@@ -314,7 +417,8 @@ fn with_sound_devices_nothing_trips_and_runs_complete() {
 }
 
 #[test]
-fn in_the_middle_of_a_run_every_fault_ends_the_current_in_time_and_is_recorded_and_the_next_run_is_clean() {
+fn in_the_middle_of_a_run_every_fault_ends_the_current_in_time_and_is_recorded_and_the_next_run_is_clean()
+ {
     for run in [Run::Chirp, Run::Control] {
         for case in &CASES {
             let mut lab = Lab::new();
@@ -322,8 +426,18 @@ fn in_the_middle_of_a_run_every_fault_ends_the_current_in_time_and_is_recorded_a
             let begin = lab.last_tick();
             lab.begin(case.word);
             let zero = lab.ticks_with_current(AFTER);
-            assert!(zero <= case.zero, "{}: current for {zero} ticks, {} are allowed", case.word, case.zero);
-            assert!(!lab.drive.is_enabled(), "{}: {}", case.word, lab.drive.state());
+            assert!(
+                zero <= case.zero,
+                "{}: current for {zero} ticks, {} are allowed",
+                case.word,
+                case.zero
+            );
+            assert!(
+                !lab.drive.is_enabled(),
+                "{}: {}",
+                case.word,
+                lab.drive.state()
+            );
             lab.trips_naming(case.found.1, begin..=begin + case.found.0);
             match run {
                 Run::Chirp => lab.next_run_completes(),
@@ -342,7 +456,11 @@ fn armed_every_fault_switches_the_amplifier_off_in_time() {
         lab.begin(case.word);
         let off = lab.ticks_enabled(AFTER);
         let allowed = case.zero.max(case.found.0 + SWITCH_OFF);
-        assert!(off <= allowed, "{}: enabled for {off} ticks, {allowed} are allowed", case.word);
+        assert!(
+            off <= allowed,
+            "{}: enabled for {off} ticks, {allowed} are allowed",
+            case.word
+        );
         lab.trips_naming(case.found.1, begin..=begin + case.found.0);
         lab.next_run_completes();
     }
@@ -358,13 +476,20 @@ fn disarmed_a_fault_gives_no_current_and_keeps_the_bench_from_starting_into_it()
         assert_eq!(lab.bench.state(), State::Disarmed);
         let begin = lab.last_tick();
         lab.bench.order(Order::Arm);
-        lab.bench.order(Order::Start(program(&lab.config, Run::Chirp)));
+        lab.bench
+            .order(Order::Start(program(&lab.config, Run::Chirp)));
         // 50 ms of quiet come first: what is there is found before a current flows.
         assert_eq!(lab.ticks_with_current(50), 0, "{}", case.word);
         match case.armed_into {
             Some(code) => {
                 lab.trips_naming(code, begin..=begin + 40);
-                assert_eq!(lab.ticks_enabled(AFTER), 0, "{}: {}", case.word, lab.drive.state());
+                assert_eq!(
+                    lab.ticks_enabled(AFTER),
+                    0,
+                    "{}: {}",
+                    case.word,
+                    lab.drive.state()
+                );
             }
             None => assert_eq!(lab.bench.trips(), [], "{}", case.word),
         }
@@ -379,21 +504,32 @@ fn the_same_fault_is_the_same_run_bit_for_bit() {
         lab.run_until_current_flows(Run::Control);
         lab.begin("amplifier.silence");
         lab.bench.run(AFTER);
-        lab.bench.all.iter().map(|published| format!("{published:?}")).collect::<Vec<_>>()
+        lab.bench
+            .all
+            .iter()
+            .map(|published| format!("{published:?}"))
+            .collect::<Vec<_>>()
     };
     assert_eq!(run(), run());
 }
 
 #[test]
-fn a_drive_that_ignores_its_switching_off_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
+fn a_drive_that_ignores_its_switching_off_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence()
+ {
     // 70 ms without confirmation and a repeat of 10 ms: NMT stop; 70 ms later the drive misses our heartbeat.
-    for (word, off) in [("amplifier.set-points-ignored", 85), ("amplifier.orders-ignored", 175)] {
+    for (word, off) in [
+        ("amplifier.set-points-ignored", 85),
+        ("amplifier.orders-ignored", 175),
+    ] {
         let mut lab = Lab::new();
         lab.run_until_current_flows(Run::Chirp);
         lab.begin(word);
         lab.bench.order(Order::Stop);
         let zero = lab.ticks_with_current(AFTER);
-        assert!((60..=off).contains(&zero), "{word}: current for {zero} ticks");
+        assert!(
+            (60..=off).contains(&zero),
+            "{word}: current for {zero} ticks"
+        );
         assert!(!lab.drive.is_enabled());
         lab.bench.order(Order::Arm);
         lab.bench.run(1);
@@ -413,8 +549,15 @@ fn a_drive_that_keeps_its_last_current_in_the_middle_of_a_run_is_found_by_what_i
         // Two windows of 50 ms at 1 kHz, the status's 2 ms, and the time until commands differ by 0.1 A; then off by NMT.
         let flowed = lab.ticks_with_current(1500);
         let (trip, tick) = lab.trip().expect("it trips");
-        assert!(matches!(trip, Trip::CurrentNotFollowed { .. }), "{run:?}: {trip:?}");
-        assert!(tick - asked <= 1000 && flowed <= tick - asked + 85, "{run:?}: {} ticks, {flowed}", tick - asked);
+        assert!(
+            matches!(trip, Trip::CurrentNotFollowed { .. }),
+            "{run:?}: {trip:?}"
+        );
+        assert!(
+            tick - asked <= 1000 && flowed <= tick - asked + 85,
+            "{run:?}: {} ticks, {flowed}",
+            tick - asked
+        );
     }
 }
 
@@ -422,16 +565,26 @@ fn a_drive_that_keeps_its_last_current_in_the_middle_of_a_run_is_found_by_what_i
 fn a_loop_that_dies_leaves_no_current() {
     let mut lab = Lab::new();
     lab.run_until_current_flows(Run::Control);
-    let Lab { bench, drive, world, .. } = lab;
+    let Lab {
+        bench,
+        drive,
+        world,
+        ..
+    } = lab;
     assert!(matches!(bench.all.last(), Some(Published::Tick(_))));
     drop(bench);
     world.sleep(Duration::from_millis(2));
-    assert!(drive.current_a() == 0.0 && !drive.is_enabled(), "{}", drive.state());
+    assert!(
+        drive.current_a() == 0.0 && !drive.is_enabled(),
+        "{}",
+        drive.state()
+    );
 }
 
 /// A VESC, whose codes are 1: silent, 2: bus-off, 3: interface down. STATUS is missed after 100 ms, and comes every 20 ms;
 /// commands are missed by the VESC itself after 500 ms.
-const VESC: &str = "amplifier.device={ kind = \"vesc\", interface = \"can0\", bit_rate = 500000, node = 23 }";
+const VESC: &str =
+    "amplifier.device={ kind = \"vesc\", interface = \"can0\", bit_rate = 500000, node = 23 }";
 
 #[test]
 fn a_vesc_loses_its_current_in_time_with_every_fault_in_every_state_and_runs_again() {
@@ -453,7 +606,10 @@ fn a_vesc_loses_its_current_in_time_with_every_fault_in_every_state_and_runs_aga
             let begin = lab.last_tick();
             lab.begin(word);
             let ticks = lab.ticks_with_current(600);
-            assert!(ticks <= zero, "{word}: current for {ticks} ticks, {zero} are allowed");
+            assert!(
+                ticks <= zero,
+                "{word}: current for {ticks} ticks, {zero} are allowed"
+            );
             lab.trips_naming(code, begin..=begin + found);
             lab.end();
             lab.bench.run(200); // what was held back comes late

@@ -14,14 +14,25 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 fn bench(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
-    command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     command
 }
 
 fn refusal(arguments: &[&str]) -> String {
-    let Output { status, stdout, stderr } = bench(arguments).output().expect("it runs");
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = bench(arguments).output().expect("it runs");
     let said = String::from_utf8_lossy(&stderr).into_owned();
-    assert!(status.code() == Some(2) && stdout.is_empty(), "{arguments:?}: {status:?} {said}");
+    assert!(
+        status.code() == Some(2) && stdout.is_empty(),
+        "{arguments:?}: {status:?} {said}"
+    );
     said
 }
 
@@ -36,7 +47,11 @@ impl Device {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut command = bench(&["device", "probe", "--config", "lab", "--json"]);
         command.args(more).stdin(Stdio::piped());
-        command.arg("--pty").arg(folder.path().join("probe")).arg("--log").arg(folder.path().join("log"));
+        command
+            .arg("--pty")
+            .arg(folder.path().join("probe"))
+            .arg("--log")
+            .arg(folder.path().join("log"));
         let child = Some(command.spawn().expect("it starts"));
         let device = Device { child, folder };
         device.until("serving", || device.link().exists());
@@ -61,7 +76,9 @@ impl Device {
 
     fn log(&self) -> Vec<serde_json::Value> {
         let text = std::fs::read_to_string(self.folder.path().join("log")).unwrap_or_default();
-        text.lines().map(|line| serde_json::from_str(line).expect("a JSON object a line")).collect()
+        text.lines()
+            .map(|line| serde_json::from_str(line).expect("a JSON object a line"))
+            .collect()
     }
 
     fn order(&mut self, line: &str) {
@@ -71,19 +88,33 @@ impl Device {
 
     fn signal(&mut self, signal: i32) {
         // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
-        assert_eq!(unsafe { libc::kill(self.child().id() as libc::pid_t, signal) }, 0);
+        assert_eq!(
+            unsafe { libc::kill(self.child().id() as libc::pid_t, signal) },
+            0
+        );
     }
 
     /// Waits for its end; its one JSON object.
     fn end(&mut self) -> serde_json::Value {
-        let output = self.child.take().expect("running").wait_with_output().expect("a child of ours");
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = self
+            .child
+            .take()
+            .expect("running")
+            .wait_with_output()
+            .expect("a child of ours");
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         serde_json::from_slice(&output.stdout).expect("one JSON object")
     }
 
     /// A reader of the served probe, as `bench control` would open it.
     fn reader(&self) -> SerialProbe {
-        bench::devices::probe::open(&config(&self.link(), self.folder.path())).expect("the probe is served")
+        bench::devices::probe::open(&config(&self.link(), self.folder.path()))
+            .expect("the probe is served")
     }
 }
 
@@ -97,8 +128,16 @@ impl Drop for Device {
 }
 
 fn config(port: &Path, locks: &Path) -> Config {
-    let sets = vec![format!("probe.device.line.port={port:?}"), format!("probe.device.line.lock_folder={locks:?}")];
-    load(&Source { config: Some("lab".into()), sets, ..Source::default() }).expect("the settings are valid")
+    let sets = vec![
+        format!("probe.device.line.port={port:?}"),
+        format!("probe.device.line.lock_folder={locks:?}"),
+    ];
+    load(&Source {
+        config: Some("lab".into()),
+        sets,
+        ..Source::default()
+    })
+    .expect("the settings are valid")
 }
 
 fn until(probe: &mut SerialProbe, what: &str, pleases: impl Fn(&Reading) -> bool) -> Reading {
@@ -108,7 +147,11 @@ fn until(probe: &mut SerialProbe, what: &str, pleases: impl Fn(&Reading) -> bool
         if pleases(&reading) {
             return reading;
         }
-        assert!(begun.elapsed() < PATIENCE, "never {what}: {reading:?} {:?}", probe.statistics());
+        assert!(
+            begun.elapsed() < PATIENCE,
+            "never {what}: {reading:?} {:?}",
+            probe.statistics()
+        );
         std::thread::sleep(Duration::from_millis(1));
     }
 }
@@ -134,10 +177,18 @@ fn every_protocol_is_served_and_read_in_the_stages_metres() {
         let set = format!("probe.device={probe}");
         let device = Device::start(&["--set", &set]);
         let (port, locks) = (device.link(), device.folder.path());
-        let sets =
-            [set, format!("probe.device.line.port={port:?}"), format!("probe.device.line.lock_folder={locks:?}")];
-        let config = load(&Source { config: Some("lab".into()), sets: sets.to_vec(), ..Source::default() });
-        let mut reader = bench::devices::probe::open(&config.expect("valid")).expect("the probe is served");
+        let sets = [
+            set,
+            format!("probe.device.line.port={port:?}"),
+            format!("probe.device.line.lock_folder={locks:?}"),
+        ];
+        let config = load(&Source {
+            config: Some("lab".into()),
+            sets: sets.to_vec(),
+            ..Source::default()
+        });
+        let mut reader =
+            bench::devices::probe::open(&config.expect("valid")).expect("the probe is served");
         until(&mut reader, "at rest", is_at_rest);
     }
 }
@@ -148,14 +199,19 @@ fn faults_come_by_the_plan_and_by_hand_and_every_one_is_in_the_log() {
     let mut reader = device.reader();
     until(&mut reader, "at rest", is_at_rest);
     device.order("fault out-of-range");
-    until(&mut reader, "out of range", |reading| reading.validity == Validity::OutOfRange);
+    until(&mut reader, "out of range", |reading| {
+        reading.validity == Validity::OutOfRange
+    });
     device.order("fault nonsense");
     device.order("fault none");
     until(&mut reader, "at rest", is_at_rest);
     device.order("quit");
     let summary = device.end();
     assert_eq!(summary["faults"], 2);
-    assert!(summary["measurements"].as_u64() > Some(0) && summary["bytes_sent"].as_u64() > Some(0), "{summary}");
+    assert!(
+        summary["measurements"].as_u64() > Some(0) && summary["bytes_sent"].as_u64() > Some(0),
+        "{summary}"
+    );
     let told: Vec<(String, String)> = device
         .log()
         .iter()
@@ -164,16 +220,40 @@ fn faults_come_by_the_plan_and_by_hand_and_every_one_is_in_the_log() {
             (text("what"), text("text"))
         })
         .collect();
-    let faults: Vec<&str> = told.iter().filter(|(what, _)| what == "fault").map(|(_, text)| text.as_str()).collect();
-    assert_eq!(faults, ["probe.out-of-range", "end of probe.out-of-range", "probe.out-of-range", "none"]);
-    assert!(told[0].0 == "serving" && told[0].1.contains("capancdt on /dev/pts/"), "{told:?}");
-    assert!(device.log().windows(2).all(|pair| pair[0]["time_s"].as_f64() <= pair[1]["time_s"].as_f64()));
+    let faults: Vec<&str> = told
+        .iter()
+        .filter(|(what, _)| what == "fault")
+        .map(|(_, text)| text.as_str())
+        .collect();
+    assert_eq!(
+        faults,
+        [
+            "probe.out-of-range",
+            "end of probe.out-of-range",
+            "probe.out-of-range",
+            "none"
+        ]
+    );
+    assert!(
+        told[0].0 == "serving" && told[0].1.contains("capancdt on /dev/pts/"),
+        "{told:?}"
+    );
+    assert!(
+        device
+            .log()
+            .windows(2)
+            .all(|pair| pair[0]["time_s"].as_f64() <= pair[1]["time_s"].as_f64())
+    );
 }
 
 #[test]
 fn it_ends_in_order_by_signal_and_by_time_and_takes_its_link_away() {
     for signal in [Some(libc::SIGTERM), Some(libc::SIGINT), None] {
-        let mut device = Device::start(if signal.is_some() { &[] } else { &["--duration", "0.2"] });
+        let mut device = Device::start(if signal.is_some() {
+            &[]
+        } else {
+            &["--duration", "0.2"]
+        });
         let link = device.link();
         signal.into_iter().for_each(|signal| device.signal(signal));
         device.end();
@@ -183,8 +263,14 @@ fn it_ends_in_order_by_signal_and_by_time_and_takes_its_link_away() {
 
 #[test]
 fn its_path_is_printed_where_no_link_is_wanted() {
-    let mut child = bench(&["device", "probe", "--config", "lab", "--duration", "60"]).spawn().expect("it starts");
-    let line = BufReader::new(child.stderr.take().expect("piped")).lines().next().expect("a line").expect("text");
+    let mut child = bench(&["device", "probe", "--config", "lab", "--duration", "60"])
+        .spawn()
+        .expect("it starts");
+    let line = BufReader::new(child.stderr.take().expect("piped"))
+        .lines()
+        .next()
+        .expect("a line")
+        .expect("text");
     child.kill().expect("running");
     child.wait().expect("a child of ours");
     assert!(line.contains("capancdt on /dev/pts/"), "{line}");
@@ -192,21 +278,87 @@ fn its_path_is_printed_where_no_link_is_wanted() {
 
 #[test]
 fn what_cannot_be_is_refused_before_anything_is_served() {
-    let missing = refusal(&["device", "amplifier", "--config", "lab", "--interface", "no-such-can"]);
-    assert!(missing.contains("no-such-can") && missing.contains("vcan0"), "{missing}");
+    let missing = refusal(&[
+        "device",
+        "amplifier",
+        "--config",
+        "lab",
+        "--interface",
+        "no-such-can",
+    ]);
+    assert!(
+        missing.contains("no-such-can") && missing.contains("vcan0"),
+        "{missing}"
+    );
     assert!(refusal(&["device", "probe"]).contains("--config lab"));
     assert!(refusal(&["device"]).contains("amplifier|probe"));
     assert!(refusal(&["device", "stage", "--config", "lab"]).contains("amplifier"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--port", "/dev/ttyNONE9"]).contains("no such port"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--interface", "vcan0"]).contains("amplifier"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--measuring-rate", "0"]).contains("above zero"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--fault", "probe.stuck"]).contains("KIND@FROM..TO"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--fault", "probe.x@1"]).contains("there is no fault"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--fault", "amplifier.reset@1"]).contains("no amplifier"));
+    assert!(
+        refusal(&[
+            "device",
+            "probe",
+            "--config",
+            "lab",
+            "--port",
+            "/dev/ttyNONE9"
+        ])
+        .contains("no such port")
+    );
+    assert!(
+        refusal(&["device", "probe", "--config", "lab", "--interface", "vcan0"])
+            .contains("amplifier")
+    );
+    assert!(
+        refusal(&[
+            "device",
+            "probe",
+            "--config",
+            "lab",
+            "--measuring-rate",
+            "0"
+        ])
+        .contains("above zero")
+    );
+    assert!(
+        refusal(&[
+            "device",
+            "probe",
+            "--config",
+            "lab",
+            "--fault",
+            "probe.stuck"
+        ])
+        .contains("KIND@FROM..TO")
+    );
+    assert!(
+        refusal(&["device", "probe", "--config", "lab", "--fault", "probe.x@1"])
+            .contains("there is no fault")
+    );
+    assert!(
+        refusal(&[
+            "device",
+            "probe",
+            "--config",
+            "lab",
+            "--fault",
+            "amplifier.reset@1"
+        ])
+        .contains("no amplifier")
+    );
     let folder = tempfile::tempdir().expect("a temporary folder");
     let taken = folder.path().join("taken");
     std::fs::write(&taken, "").expect("a file");
     let taken = taken.to_str().expect("text");
     assert!(refusal(&["device", "probe", "--config", "lab", "--pty", taken]).contains("it exists"));
-    assert!(refusal(&["device", "probe", "--config", "lab", "--log", "/nonexistent/log"]).contains("/nonexistent/log"));
+    assert!(
+        refusal(&[
+            "device",
+            "probe",
+            "--config",
+            "lab",
+            "--log",
+            "/nonexistent/log"
+        ])
+        .contains("/nonexistent/log")
+    );
 }

@@ -4,7 +4,10 @@
 mod amplifier;
 mod command;
 #[path = "../common/faulty_rig.rs"]
-#[allow(dead_code, reason = "the rig below knows it; here the devices themselves fail")]
+#[allow(
+    dead_code,
+    reason = "the rig below knows it; here the devices themselves fail"
+)]
 mod faulty_rig;
 mod probe;
 #[path = "../safety/rig.rs"]

@@ -27,7 +27,10 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Lines of text, two millimetres to either side: a damaged byte spoils the line, and a jump of a millimetre is in range.
 fn ascii(folder: &std::path::Path) -> String {
-    let line = format!("{{ port = {:?}, baud = 115200, lock_folder = {folder:?} }}", folder.join("probe"));
+    let line = format!(
+        "{{ port = {:?}, baud = 115200, lock_folder = {folder:?} }}",
+        folder.join("probe")
+    );
     format!(
         "{{ kind = \"ascii\", line = {line}, mounting = {{ gain = 1.0, offset_m = 0.0 }}, pattern = \"{{value:9.5}}\", \
          unit_m = 1e-3, lower_m = -2e-3, upper_m = 2e-3 }}"
@@ -62,7 +65,11 @@ fn config(folder: &std::path::Path) -> Config {
         "control.duration_s=30.0".into(),
         "control.reference={ kind = \"sine\", amplitude_m = 300e-6, frequency_hz = 0.5 }".into(),
     ];
-    let source = Source { config: Some("lab".into()), sets: sets.to_vec(), ..Source::default() };
+    let source = Source {
+        config: Some("lab".into()),
+        sets: sets.to_vec(),
+        ..Source::default()
+    };
     load(&source).expect("the settings are valid")
 }
 
@@ -76,7 +83,8 @@ struct Straight {
 
 impl Straight {
     fn give(&mut self, current_a: f64) {
-        self.stage.command(self.start.elapsed().as_nanos() as u64, current_a);
+        self.stage
+            .command(self.start.elapsed().as_nanos() as u64, current_a);
         self.given_a.store(current_a.to_bits(), Ordering::Relaxed);
     }
 }
@@ -87,7 +95,10 @@ impl CurrentAmplifier for Straight {
         Ok(())
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
-        assert!(self.is_on, "the loop commands an amplifier that it has switched off");
+        assert!(
+            self.is_on,
+            "the loop commands an amplifier that it has switched off"
+        );
         self.give(current_a);
         Ok(current_a)
     }
@@ -96,7 +107,11 @@ impl CurrentAmplifier for Straight {
         self.give(0.0);
     }
     fn status(&self) -> AmplifierStatus {
-        if self.is_on { AmplifierStatus::Enabled } else { AmplifierStatus::Disabled }
+        if self.is_on {
+            AmplifierStatus::Enabled
+        } else {
+            AmplifierStatus::Disabled
+        }
     }
 }
 
@@ -131,17 +146,39 @@ impl Table {
         Table::around(config, stage, start, folder)
     }
 
-    fn around(config: Config, stage: Stage, start: Instant, folder: Arc<tempfile::TempDir>) -> Table {
+    fn around(
+        config: Config,
+        stage: Stage,
+        start: Instant,
+        folder: Arc<tempfile::TempDir>,
+    ) -> Table {
         let end = End::Terminal(Some(folder.path().join("probe")));
         let now_ns = move || start.elapsed().as_nanos() as u64;
-        let acting = Probe::start(&config, &end, None, stage.clone(), now_ns).expect("a pseudo terminal");
+        let acting =
+            Probe::start(&config, &end, None, stage.clone(), now_ns).expect("a pseudo terminal");
         let given_a = Arc::<AtomicU64>::default();
-        let amplifier = Straight { stage: stage.clone(), start, given_a: Arc::clone(&given_a), is_on: false };
+        let amplifier = Straight {
+            stage: stage.clone(),
+            start,
+            given_a: Arc::clone(&given_a),
+            is_on: false,
+        };
         let probe = devices::probe::open(&config).expect("the acting probe is there");
         let watch = probe.watch();
         let bench = Bench::around(&config, Devices { amplifier, probe });
         let (probe, pace, published, _folder) = (Some(acting), Pace::Readings, 0, folder);
-        let mut table = Table { bench, watch, probe, stage, start, pace, published, given_a, config, _folder };
+        let mut table = Table {
+            bench,
+            watch,
+            probe,
+            stage,
+            start,
+            pace,
+            published,
+            given_a,
+            config,
+            _folder,
+        };
         table.run(10);
         table
     }
@@ -158,7 +195,11 @@ impl Table {
     fn wait_for_a_reading(&mut self) {
         let begun = Instant::now();
         while self.watch.statistics().published == self.published {
-            assert!(begun.elapsed() < PATIENCE, "no readings: {:?}", self.watch.statistics());
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "no readings: {:?}",
+                self.watch.statistics()
+            );
             std::thread::sleep(Duration::from_millis(1));
         }
         self.published = self.watch.statistics().published;
@@ -169,14 +210,20 @@ impl Table {
     }
 
     fn ask(&self, word: &str) {
-        let Ok(ActingFault::Probe(fault)) = ActingFault::parse(word) else { panic!("{word} is a fault") };
+        let Ok(ActingFault::Probe(fault)) = ActingFault::parse(word) else {
+            panic!("{word} is a fault")
+        };
         self.probe.as_ref().expect("the probe is there").ask(fault);
     }
 
     /// The fault begins; whether readings go on coming decides who sets the pace.
     fn begin(&mut self, word: &str) {
         let silent = ["probe.silence", "probe.corrupt", LATE, HANG_UP];
-        self.pace = if silent.contains(&word) { Pace::Time } else { Pace::Readings };
+        self.pace = if silent.contains(&word) {
+            Pace::Time
+        } else {
+            Pace::Readings
+        };
         if word == HANG_UP {
             self.probe = None;
         } else {
@@ -216,7 +263,9 @@ impl Table {
         if state == StateOf::Disarmed {
             self.bench.order(Order::Arm);
         }
-        if matches!(state, StateOf::Disarmed | StateOf::Armed) && self.bench.state() != State::Tripped {
+        if matches!(state, StateOf::Disarmed | StateOf::Armed)
+            && self.bench.state() != State::Tripped
+        {
             self.bench.order(Order::Start(self.program(StateOf::Chirp)));
         }
     }
@@ -235,12 +284,26 @@ impl Table {
         }
         self.run(20);
         let trips = self.bench.trips();
-        let [trip] = trips[..] else { panic!("one trip: {trips:?} {:?}", self.watch.statistics()) };
-        let EventKind::Trip(why) = trip.kind else { unreachable!() };
+        let [trip] = trips[..] else {
+            panic!("one trip: {trips:?} {:?}", self.watch.statistics())
+        };
+        let EventKind::Trip(why) = trip.kind else {
+            unreachable!()
+        };
         assert_eq!(why.reason(), reason, "{why}: {:?}", self.watch.statistics());
-        assert!(self.bench.ticks().iter().all(|record| record.tick < trip.tick || record.command_a.to_bits() == 0));
-        assert!(self.given_a() == 0.0 && !self.bench.is_on(), "{} A", self.given_a());
-        self.bench.prove_that_the_recording_is_complete(trip.tick, reason);
+        assert!(
+            self.bench
+                .ticks()
+                .iter()
+                .all(|record| record.tick < trip.tick || record.command_a.to_bits() == 0)
+        );
+        assert!(
+            self.given_a() == 0.0 && !self.bench.is_on(),
+            "{} A",
+            self.given_a()
+        );
+        self.bench
+            .prove_that_the_recording_is_complete(trip.tick, reason);
     }
 
     /// The cause is removed, a person clears the trip, and a run of the loop goes on without another.
@@ -260,7 +323,12 @@ impl Table {
         assert!(!self.bench.is_on(), "cleared is not armed");
         self.enter(StateOf::Control);
         self.run(50);
-        assert_eq!((self.bench.state(), self.bench.trips().len()), (State::Running, trips), "{:?}", self.bench.trips());
+        assert_eq!(
+            (self.bench.state(), self.bench.trips().len()),
+            (State::Running, trips),
+            "{:?}",
+            self.bench.trips()
+        );
     }
 }
 
@@ -273,7 +341,12 @@ enum StateOf {
     Control,
 }
 
-const STATES: [StateOf; 4] = [StateOf::Disarmed, StateOf::Armed, StateOf::Chirp, StateOf::Control];
+const STATES: [StateOf; 4] = [
+    StateOf::Disarmed,
+    StateOf::Armed,
+    StateOf::Chirp,
+    StateOf::Control,
+];
 
 /// Later than any reading may be.
 const LATE: &str = "probe.late=9s";
@@ -347,7 +420,10 @@ fn a_probe_that_restarts_is_read_on_without_a_trip() {
         assert!(damaged > 0, "the line that it was in is cut off");
         table.go_on(state);
         table.run(50);
-        assert_eq!((table.bench.trips(), table.bench.state()), (vec![], State::Running));
+        assert_eq!(
+            (table.bench.trips(), table.bench.state()),
+            (vec![], State::Running)
+        );
     });
 }
 
@@ -357,9 +433,21 @@ fn a_closed_terminal_trips_and_is_said_and_the_probe_is_opened_anew() {
         table.begin(HANG_UP);
         table.go_on(state);
         table.trips("probe_invalid");
-        let said = table.watch.statistics().last_error.expect("an error").to_string();
-        assert!(said.contains("the serial port is gone") && said.contains("open the probe again"), "{said}");
-        let (config, stage, folder) = (table.config.clone(), table.stage.clone(), Arc::clone(&table._folder));
+        let said = table
+            .watch
+            .statistics()
+            .last_error
+            .expect("an error")
+            .to_string();
+        assert!(
+            said.contains("the serial port is gone") && said.contains("open the probe again"),
+            "{said}"
+        );
+        let (config, stage, folder) = (
+            table.config.clone(),
+            table.stage.clone(),
+            Arc::clone(&table._folder),
+        );
         Table::around(config, stage, table.start, folder).runs_cleanly();
     });
 }

@@ -6,7 +6,9 @@ use std::time::Duration;
 use bench::doctor::{Finding, Report, Verdict, on_bus, watch};
 use std::num::NonZeroU32;
 
-use bench_hal::can::bus::{BusError, BusEvent, CanBus, Claim, Held, Host, Port, Running, Task, World};
+use bench_hal::can::bus::{
+    BusError, BusEvent, CanBus, Claim, Held, Host, Port, Running, Task, World,
+};
 use bench_hal::can::cia402::State;
 use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
@@ -30,7 +32,11 @@ fn examine(host: &dyn Host) -> Report {
 }
 
 fn bad(report: &Report) -> Vec<&Finding> {
-    report.findings.iter().filter(|finding| finding.verdict > Verdict::Note).collect()
+    report
+        .findings
+        .iter()
+        .filter(|finding| finding.verdict > Verdict::Note)
+        .collect()
 }
 
 /// All frames that were sent on the bus of a world, with an ear that was there before.
@@ -50,13 +56,24 @@ fn a_sound_drive_is_ok_and_asked_by_uploads_alone() {
     let objects = format!("{:?}", device.lock().unwrap().objects());
     let report = examine(&world);
     assert!(bad(&report).is_empty(), "{:?}", report.findings);
-    assert_eq!(report.figures.drive.as_ref().unwrap().rated_current_a, Some(4.0));
+    assert_eq!(
+        report.figures.drive.as_ref().unwrap().rated_current_a,
+        Some(4.0)
+    );
     let device = device.lock().unwrap();
-    assert_eq!(format!("{:?}", device.objects()), objects, "no object was written");
-    assert_eq!((device.power_state(), device.nmt_state()), (State::SwitchOnDisabled, nmt::State::PreOperational));
+    assert_eq!(
+        format!("{:?}", device.objects()),
+        objects,
+        "no object was written"
+    );
+    assert_eq!(
+        (device.power_state(), device.nmt_state()),
+        (State::SwitchOnDisabled, nmt::State::PreOperational)
+    );
     for frame in heard(&mut ear) {
         // CiA 301: 2 initiates an upload, 3 asks for its next segment.
-        let is_upload = frame.id() == sdo::request_id(5) && [2, 3].contains(&(frame.data()[0] >> 5));
+        let is_upload =
+            frame.id() == sdo::request_id(5) && [2, 3].contains(&(frame.data()[0] >> 5));
         assert!(is_upload || frame.id() == sdo::answer_id(5), "{frame:?}");
     }
 }
@@ -70,7 +87,14 @@ fn a_drive_that_runs_stays_as_it_is() {
     let mut report = Report::default();
     // A bus in memory knows no claims: this is how a drive of another program looks.
     on_bus(&world, &DriveSettings::default(), 1.5, &mut report);
-    assert!(report.findings.iter().all(|finding| finding.verdict < Verdict::Failure), "{:?}", report.findings);
+    assert!(
+        report
+            .findings
+            .iter()
+            .all(|finding| finding.verdict < Verdict::Failure),
+        "{:?}",
+        report.findings
+    );
     assert_eq!(device.lock().unwrap().nmt_state(), nmt::State::Operational);
 }
 
@@ -79,29 +103,61 @@ fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
     let (world, device, _running) = rig(DeviceSettings::default());
     device.lock().unwrap().inject(DeviceFault::Drive(0x4210));
     let report = examine(&world);
-    let words: Vec<&str> = bad(&report).iter().map(|finding| finding.what.as_str()).collect();
+    let words: Vec<&str> = bad(&report)
+        .iter()
+        .map(|finding| finding.what.as_str())
+        .collect();
     assert_eq!(words.len(), 2, "{words:?}");
     assert_eq!(words[0], "node 5 sent emergency 0x4210: drive too hot");
-    assert!(words[1].starts_with("state FAULT (statusword 0x"), "{words:?}");
+    assert!(
+        words[1].starts_with("state FAULT (statusword 0x"),
+        "{words:?}"
+    );
     assert_eq!(bad(&report)[1].verdict, Verdict::Failure);
-    assert_eq!(device.lock().unwrap().power_state(), State::Fault, "nobody acknowledged it");
+    assert_eq!(
+        device.lock().unwrap().power_state(),
+        State::Fault,
+        "nobody acknowledged it"
+    );
 }
 
 #[test]
 fn a_drive_of_another_rating_is_refused_before_every_ampere_is_wrong() {
-    let (world, _device, _running) = rig(DeviceSettings { rated_current_ma: 2000, ..DeviceSettings::default() });
+    let (world, _device, _running) = rig(DeviceSettings {
+        rated_current_ma: 2000,
+        ..DeviceSettings::default()
+    });
     let report = examine(&world);
     assert_eq!(bad(&report).len(), 1);
-    assert!(bad(&report)[0].what.contains("is 2 A, the configuration says 4 A"), "{report:?}");
+    assert!(
+        bad(&report)[0]
+            .what
+            .contains("is 2 A, the configuration says 4 A"),
+        "{report:?}"
+    );
 }
 
 #[test]
 fn silence_is_a_failure_that_says_what_to_check() {
     let report = examine(&World::default());
-    let [finding] = bad(&report)[..] else { panic!("{report:?}") };
+    let [finding] = bad(&report)[..] else {
+        panic!("{report:?}")
+    };
     assert_eq!(finding.verdict, Verdict::Failure);
-    assert!(finding.what.starts_with("node 5 did not answer to 0x1000:00 within 500 ms"), "{}", finding.what);
-    assert!(finding.remedy.as_deref().unwrap().contains("power, node number, bit rate and the bus termination"));
+    assert!(
+        finding
+            .what
+            .starts_with("node 5 did not answer to 0x1000:00 within 500 ms"),
+        "{}",
+        finding.what
+    );
+    assert!(
+        finding
+            .remedy
+            .as_deref()
+            .unwrap()
+            .contains("power, node number, bit rate and the bus termination")
+    );
 }
 
 #[test]
@@ -109,14 +165,24 @@ fn a_stopped_node_is_told_from_an_absent_one_by_its_heartbeat() {
     let (world, device, _running) = rig(DeviceSettings::default());
     let mut master = world.bus().connect(&[]);
     let write = [0x2B, 0x17, 0x10, 0, 50, 0, 0, 0]; // 0x1017 = 50 ms
-    master.send(&CanFrame::new(sdo::request_id(5), write)).unwrap();
+    master
+        .send(&CanFrame::new(sdo::request_id(5), write))
+        .unwrap();
     master.send(&nmt::Command::Stop.frame(5)).unwrap();
     world.sleep(Duration::from_millis(10));
     let report = examine(&world);
     let finding = bad(&report)[0];
-    assert!(finding.what.ends_with("its heartbeat says stopped"), "{}", finding.what);
+    assert!(
+        finding.what.ends_with("its heartbeat says stopped"),
+        "{}",
+        finding.what
+    );
     assert_eq!(report.figures.bus.as_ref().unwrap().nodes, [5]);
-    assert_eq!(device.lock().unwrap().nmt_state(), nmt::State::Stopped, "it was left as it was");
+    assert_eq!(
+        device.lock().unwrap().nmt_state(),
+        nmt::State::Stopped,
+        "it was left as it was"
+    );
 }
 
 /// A world in which another process has every node.
@@ -128,7 +194,10 @@ impl Port for Taken {
     }
 
     fn claim(&self, node: u8) -> Result<Claim, Held> {
-        Err(Held { node, pid: NonZeroU32::new(4711) })
+        Err(Held {
+            node,
+            pid: NonZeroU32::new(4711),
+        })
     }
 }
 
@@ -151,9 +220,14 @@ fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
     let (world, _device, _running) = rig(DeviceSettings::default());
     let mut ear = world.bus().connect(&[]);
     let report = examine(&Taken(world));
-    let [finding] = &report.findings[..] else { panic!("{report:?}") };
+    let [finding] = &report.findings[..] else {
+        panic!("{report:?}")
+    };
     assert_eq!(finding.verdict, Verdict::Failure);
-    assert_eq!(finding.what, "node 5 is held by process 4711; it was not asked anything");
+    assert_eq!(
+        finding.what,
+        "node 5 is held by process 4711; it was not asked anything"
+    );
     assert_eq!(heard(&mut ear), []);
 }
 
@@ -180,16 +254,29 @@ impl Task for Vesc {
 #[test]
 fn a_vesc_is_listened_to_and_sent_nothing() {
     let world = World::default();
-    let _running = world.start("vesc", Box::new(Vesc(world.endpoint(&[]).unwrap(), 0))).unwrap();
+    let _running = world
+        .start("vesc", Box::new(Vesc(world.endpoint(&[]).unwrap(), 0)))
+        .unwrap();
     let mut ear = world.bus().connect(&[]);
     let find = |node| {
-        let settings = VescSettings { node, current_limit_a: 1.0, status_timeout: Duration::from_millis(100) };
+        let settings = VescSettings {
+            node,
+            current_limit_a: 1.0,
+            status_timeout: Duration::from_millis(100),
+        };
         let mut report = Report::default();
         watch(&world, &settings, 500_000, &mut report);
         report.findings.iter().map(|finding| finding.verdict).max()
     };
-    assert_eq!((find(23), find(24)), (Some(Verdict::Ok), Some(Verdict::Failure)));
-    assert!(heard(&mut ear).iter().all(|frame| frame.id() == status_id(23)));
+    assert_eq!(
+        (find(23), find(24)),
+        (Some(Verdict::Ok), Some(Verdict::Failure))
+    );
+    assert!(
+        heard(&mut ear)
+            .iter()
+            .all(|frame| frame.id() == status_id(23))
+    );
 }
 
 #[test]

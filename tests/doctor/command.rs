@@ -14,33 +14,82 @@ pub fn sound(answer: &Answer) -> Value {
     assert!(!findings.is_empty());
     for finding in findings {
         let verdict = finding["verdict"].as_str().expect("a verdict");
-        assert!(["ok", "note", "warning", "failure"].contains(&verdict), "{finding}");
-        assert!(finding["subject"].is_string() && finding["what"].as_str().is_some_and(|what| !what.is_empty()));
-        assert!(finding["remedy"].is_null() || finding["remedy"].is_string(), "{finding}");
-        assert!(verdict == "ok" || finding["remedy"].is_string(), "without a remedy: {finding}");
+        assert!(
+            ["ok", "note", "warning", "failure"].contains(&verdict),
+            "{finding}"
+        );
+        assert!(
+            finding["subject"].is_string()
+                && finding["what"]
+                    .as_str()
+                    .is_some_and(|what| !what.is_empty())
+        );
+        assert!(
+            finding["remedy"].is_null() || finding["remedy"].is_string(),
+            "{finding}"
+        );
+        assert!(
+            verdict == "ok" || finding["remedy"].is_string(),
+            "without a remedy: {finding}"
+        );
     }
-    let failed = findings.iter().any(|finding| finding["verdict"] == "failure");
-    assert_eq!((report["ready"].as_bool(), answer.code), (Some(!failed), i32::from(failed)), "{report}");
-    for figures in ["lateness", "bus_load", "bus", "drive", "probe", "recordings", "control"] {
-        assert!(report[figures].is_null() || report[figures].is_object(), "{figures}: {report}");
+    let failed = findings
+        .iter()
+        .any(|finding| finding["verdict"] == "failure");
+    assert_eq!(
+        (report["ready"].as_bool(), answer.code),
+        (Some(!failed), i32::from(failed)),
+        "{report}"
+    );
+    for figures in [
+        "lateness",
+        "bus_load",
+        "bus",
+        "drive",
+        "probe",
+        "recordings",
+        "control",
+    ] {
+        assert!(
+            report[figures].is_null() || report[figures].is_object(),
+            "{figures}: {report}"
+        );
     }
     report
 }
 
 /// `verdict: what` of the findings on a subject.
 pub fn on(report: &Value, subject: &str) -> Vec<String> {
-    let findings = report["findings"].as_array().expect("findings").iter().filter(|f| f["subject"] == subject);
-    findings.map(|f| format!("{}: {}", f["verdict"].as_str().unwrap(), f["what"].as_str().unwrap())).collect()
+    let findings = report["findings"]
+        .as_array()
+        .expect("findings")
+        .iter()
+        .filter(|f| f["subject"] == subject);
+    findings
+        .map(|f| {
+            format!(
+                "{}: {}",
+                f["verdict"].as_str().unwrap(),
+                f["what"].as_str().unwrap()
+            )
+        })
+        .collect()
 }
 
 #[test]
 fn the_default_profile_is_ready_and_nothing_is_left_behind() {
     let bench = Bench::new();
     let answer = bench.run("doctor");
-    assert_eq!((answer.code, answer.err.as_str()), (0, ""), "{}", answer.out);
+    assert_eq!(
+        (answer.code, answer.err.as_str()),
+        (0, ""),
+        "{}",
+        answer.out
+    );
     let last = answer.out.lines().last().unwrap();
     assert!(
-        last.starts_with("ready (") && last.ends_with("`bench chirp` and `bench control` could start now"),
+        last.starts_with("ready (")
+            && last.ends_with("`bench chirp` and `bench control` could start now"),
         "{last}"
     );
     assert_eq!(bench.files(), [""; 0]);
@@ -49,8 +98,13 @@ fn the_default_profile_is_ready_and_nothing_is_left_behind() {
 #[test]
 fn the_command_that_is_offered_is_the_one_that_was_asked_about() {
     let answer = Bench::new().run("doctor --asymmetry -2% --set loop.rate_hz=4000 --out monday");
-    let offered = "`bench control --set loop.rate_hz=4000 --asymmetry -2% --out monday` could start now\n";
-    assert!(answer.code == 0 && answer.out.ends_with(offered), "{}", answer.out);
+    let offered =
+        "`bench control --set loop.rate_hz=4000 --asymmetry -2% --out monday` could start now\n";
+    assert!(
+        answer.code == 0 && answer.out.ends_with(offered),
+        "{}",
+        answer.out
+    );
 }
 
 #[test]
@@ -58,29 +112,62 @@ fn json_has_the_findings_and_the_figures_in_si_units_under_their_names() {
     let report = sound(&Bench::new().run("doctor --json"));
     let lateness = &report["lateness"];
     assert_eq!(lateness["rate_hz"], 5000.0);
-    assert!(lateness["policy"].as_str().is_some_and(|policy| policy.starts_with("SCHED_")), "{lateness}");
-    assert!(["p50_s", "p99_s", "max_s"].iter().all(|key| lateness[key].is_f64()), "{lateness}");
+    assert!(
+        lateness["policy"]
+            .as_str()
+            .is_some_and(|policy| policy.starts_with("SCHED_")),
+        "{lateness}"
+    );
+    assert!(
+        ["p50_s", "p99_s", "max_s"]
+            .iter()
+            .all(|key| lateness[key].is_f64()),
+        "{lateness}"
+    );
     // The chirp: 2 + 110 + 8 s at 5 kHz.
-    assert_eq!(report["recordings"]["needed_bytes"], 600_000 * bench::doctor::recordings::BYTES_PER_TICK);
-    assert!(report["control"]["modulus_margin"].is_f64() && report["drive"].is_null() && report["probe"].is_null());
-    assert_eq!(report["could_start"], serde_json::json!(["chirp", "control"]));
+    assert_eq!(
+        report["recordings"]["needed_bytes"],
+        600_000 * bench::doctor::recordings::BYTES_PER_TICK
+    );
+    assert!(
+        report["control"]["modulus_margin"].is_f64()
+            && report["drive"].is_null()
+            && report["probe"].is_null()
+    );
+    assert_eq!(
+        report["could_start"],
+        serde_json::json!(["chirp", "control"])
+    );
 }
 
 #[test]
 fn a_configuration_that_cannot_be_is_refused_like_by_every_command() {
-    Bench::new().run("doctor --set loop.rate=1").is_refused(&["loop.rate", "rate_hz"]);
-    Bench::new().run("doctor --frobnicate").is_refused(&["--frobnicate"]);
-    let overload = "doctor --config lab --set loop.rate_hz=5000 --set amplifier.device.bit_rate=125000";
-    Bench::new().run(overload).is_refused(&["125000 bit/s", "80 % is the limit"]);
+    Bench::new()
+        .run("doctor --set loop.rate=1")
+        .is_refused(&["loop.rate", "rate_hz"]);
+    Bench::new()
+        .run("doctor --frobnicate")
+        .is_refused(&["--frobnicate"]);
+    let overload =
+        "doctor --config lab --set loop.rate_hz=5000 --set amplifier.device.bit_rate=125000";
+    Bench::new()
+        .run(overload)
+        .is_refused(&["125000 bit/s", "80 % is the limit"]);
 }
 
 #[test]
 fn a_loop_with_too_little_margin_stops_control_and_leaves_the_chirp() {
     let answer = Bench::new().run("doctor --set control.least_modulus_margin=0.9 --json");
     let report = sound(&answer);
-    assert_eq!((answer.code, &report["could_start"]), (1, &serde_json::json!(["chirp"])));
+    assert_eq!(
+        (answer.code, &report["could_start"]),
+        (1, &serde_json::json!(["chirp"]))
+    );
     let found = on(&report, "control");
-    assert!(found[0].starts_with("failure: refused:") && found[0].contains("at least 0.9"), "{found:?}");
+    assert!(
+        found[0].starts_with("failure: refused:") && found[0].contains("at least 0.9"),
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -88,7 +175,10 @@ fn a_chirp_that_would_trip_stops_the_chirp_and_leaves_control() {
     let flat = "chirp.amplitude=[{ frequency_hz = 1.0, current_a = 0.3 }]";
     let answer = Bench::new().run_with(["doctor", "--json", "--set", flat]);
     let report = sound(&answer);
-    assert_eq!((answer.code, &report["could_start"]), (1, &serde_json::json!(["control"])));
+    assert_eq!(
+        (answer.code, &report["could_start"]),
+        (1, &serde_json::json!(["control"]))
+    );
     assert!(on(&report, "chirp")[0].contains("travel"), "{report}");
 }
 
@@ -98,8 +188,18 @@ fn a_folder_that_cannot_be_written_is_a_failure() {
     bench.write("file", "");
     let report = sound(&bench.run("doctor --json --out file/in"));
     let found = on(&report, "recordings");
-    assert!(found[0].starts_with("failure: ") && found[0].ends_with("file is not a folder"), "{found:?}");
-    assert_eq!(on(&sound(&bench.run("doctor --json --out /proc/recordings")), "recordings").len(), 1);
+    assert!(
+        found[0].starts_with("failure: ") && found[0].ends_with("file is not a folder"),
+        "{found:?}"
+    );
+    assert_eq!(
+        on(
+            &sound(&bench.run("doctor --json --out /proc/recordings")),
+            "recordings"
+        )
+        .len(),
+        1
+    );
 }
 
 #[test]
@@ -107,18 +207,38 @@ fn one_real_device_and_one_simulated_make_no_loop() {
     let answer = Bench::new()
         .run("doctor --json --set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}");
     let found = on(&sound(&answer), "configuration");
-    assert!(answer.code == 1 && found[0].contains("amplifier.device is vesc, probe.device is simulated"), "{found:?}");
+    assert!(
+        answer.code == 1
+            && found[0].contains("amplifier.device is vesc, probe.device is simulated"),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn an_interface_that_is_not_there_is_a_failure_with_its_remedy() {
-    for device in ["", "--set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}"] {
+    for device in [
+        "",
+        "--set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}",
+    ] {
         let set = "--set amplifier.device.interface=no-such-can";
-        let report = sound(&Bench::new().run(&format!("doctor --config lab --json {PATIENT} {set} {device}")));
+        let report = sound(&Bench::new().run(&format!(
+            "doctor --config lab --json {PATIENT} {set} {device}"
+        )));
         let found = [on(&report, "CAN kernel"), on(&report, "CAN interface")].concat();
-        let known = ["failure: this kernel has no CAN", "failure: there is no no-such-can"];
-        assert!(found.len() == 1 && known.iter().any(|known| found[0].starts_with(known)), "{found:?}");
-        assert!(report["bus_load"]["load"].as_f64().is_some_and(|load| load > 0.0 && load < 0.8), "{report}");
+        let known = [
+            "failure: this kernel has no CAN",
+            "failure: there is no no-such-can",
+        ];
+        assert!(
+            found.len() == 1 && known.iter().any(|known| found[0].starts_with(known)),
+            "{found:?}"
+        );
+        assert!(
+            report["bus_load"]["load"]
+                .as_f64()
+                .is_some_and(|load| load > 0.0 && load < 0.8),
+            "{report}"
+        );
         assert_eq!(report["could_start"], serde_json::json!([]));
     }
 }
@@ -127,19 +247,35 @@ fn an_interface_that_is_not_there_is_a_failure_with_its_remedy() {
 fn a_processor_that_is_not_there_is_no_failure_for_a_run_starts_without() {
     let report = sound(&Bench::new().run("doctor --json --set loop.cpu=1023"));
     let found = on(&report, "processor");
-    assert!(found[0].starts_with("note: loop.cpu is 1023, this process may use"), "{found:?}");
-    let lab = sound(&Bench::new().run(&format!("doctor --config lab --json {PATIENT} --set loop.cpu=1023")));
-    assert!(on(&lab, "processor")[0].starts_with("warning: loop.cpu is 1023"), "{lab}");
+    assert!(
+        found[0].starts_with("note: loop.cpu is 1023, this process may use"),
+        "{found:?}"
+    );
+    let lab = sound(&Bench::new().run(&format!(
+        "doctor --config lab --json {PATIENT} --set loop.cpu=1023"
+    )));
+    assert!(
+        on(&lab, "processor")[0].starts_with("warning: loop.cpu is 1023"),
+        "{lab}"
+    );
 }
 
 #[test]
 fn a_tick_takes_no_more_room_in_a_recording_than_is_reckoned_with() {
     let bench = Bench::new();
-    for command in ["control --fast --duration 4 --json --out a", "chirp --duration 10 --json --out b"] {
+    for command in [
+        "control --fast --duration 4 --json --out a",
+        "chirp --duration 10 --json --out b",
+    ] {
         let answer = bench.run(command);
         let run = answer.json();
-        let bytes = std::fs::metadata(bench.path(run["recording"].as_str().unwrap())).unwrap().len();
+        let bytes = std::fs::metadata(bench.path(run["recording"].as_str().unwrap()))
+            .unwrap()
+            .len();
         let per_tick = bytes / run["ticks"].as_u64().unwrap();
-        assert!((40..=bench::doctor::recordings::BYTES_PER_TICK).contains(&per_tick), "{command}: {per_tick} bytes");
+        assert!(
+            (40..=bench::doctor::recordings::BYTES_PER_TICK).contains(&per_tick),
+            "{command}: {per_tick} bytes"
+        );
     }
 }

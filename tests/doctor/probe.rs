@@ -12,17 +12,32 @@ use crate::program::{Bench, number};
 use crate::rehearsal::Rehearsal;
 
 /// The lab's capaNCDT, with limits that a busy machine does not meet: what is tested is not its timing.
-const PATIENT: [&str; 3] =
-    ["interlock.overruns_per_s=1000000", "interlock.probe_stale_s=10", "amplifier.device.interface=no-such-can"];
+const PATIENT: [&str; 3] = [
+    "interlock.overruns_per_s=1000000",
+    "interlock.probe_stale_s=10",
+    "amplifier.device.interface=no-such-can",
+];
 
 fn sets(rehearsal: &Rehearsal) -> Vec<String> {
     let port = format!("probe.device.line.port={}", rehearsal.path.display());
-    let locks = format!("probe.device.line.lock_folder={}", rehearsal.locks.path().display());
-    PATIENT.map(String::from).into_iter().chain([port, locks]).collect()
+    let locks = format!(
+        "probe.device.line.lock_folder={}",
+        rehearsal.locks.path().display()
+    );
+    PATIENT
+        .map(String::from)
+        .into_iter()
+        .chain([port, locks])
+        .collect()
 }
 
 fn config(sets: Vec<String>) -> Config {
-    load(&Source { config: Some("lab".into()), sets, ..Source::default() }).unwrap()
+    load(&Source {
+        config: Some("lab".into()),
+        sets,
+        ..Source::default()
+    })
+    .unwrap()
 }
 
 fn protocol() -> Protocol {
@@ -36,7 +51,13 @@ fn rehearsal() -> Rehearsal {
 
 fn doctor(sets: &[String]) -> Value {
     let sets = sets.iter().flat_map(|set| ["--set", set]);
-    sound(&Bench::new().run_with(["doctor", "--config", "lab", "--json"].into_iter().chain(sets)))
+    sound(
+        &Bench::new().run_with(
+            ["doctor", "--config", "lab", "--json"]
+                .into_iter()
+                .chain(sets),
+        ),
+    )
 }
 
 #[test]
@@ -44,14 +65,29 @@ fn readings_are_watched_and_judged_and_the_port_is_free_afterwards() {
     let rehearsal = rehearsal();
     let report = doctor(&sets(&rehearsal));
     let port = on(&report, "serial port");
-    assert!(port[0].starts_with("ok: ") && port[0].ends_with("may open it"), "{port:?}");
+    assert!(
+        port[0].starts_with("ok: ") && port[0].ends_with("may open it"),
+        "{port:?}"
+    );
     assert_eq!(port[1], "ok: opened at 230400 baud with even parity");
-    assert!(port[2].starts_with("note: ") && port[2].contains("a pseudo terminal has no parity"), "{port:?}");
+    assert!(
+        port[2].starts_with("note: ") && port[2].contains("a pseudo terminal has no parity"),
+        "{port:?}"
+    );
     let seen = &report["probe"];
-    assert!(seen["came"] == true && number(&seen["rate_hz"]) > 0.0 && number(&seen["age_mean_s"]) > 0.0, "{seen}");
+    assert!(
+        seen["came"] == true && number(&seen["rate_hz"]) > 0.0 && number(&seen["age_mean_s"]) > 0.0,
+        "{seen}"
+    );
     // One count of 0xFFFFFF is 0.12 nm.
-    assert!((number(&seen["position_mean_m"]) - 10e-6).abs() < 1e-9, "{seen}");
-    assert!(on(&report, "readings").contains(&"note: every reading is the same".to_string()), "{report}");
+    assert!(
+        (number(&seen["position_mean_m"]) - 10e-6).abs() < 1e-9,
+        "{seen}"
+    );
+    assert!(
+        on(&report, "readings").contains(&"note: every reading is the same".to_string()),
+        "{report}"
+    );
     let probe = SerialProbe::open(settings(&config(sets(&rehearsal))).unwrap());
     assert!(probe.is_ok(), "{:?}", probe.err());
 }
@@ -61,17 +97,31 @@ fn a_port_that_another_process_holds_is_told_with_its_number_and_name() {
     let rehearsal = rehearsal();
     let _holder = SerialProbe::open(settings(&config(sets(&rehearsal))).unwrap()).unwrap();
     let found = on(&doctor(&sets(&rehearsal)), "serial port");
-    let held = format!("{} is held by process {} (", rehearsal.path.display(), std::process::id());
-    assert!(found.len() == 2 && found[1].starts_with(&format!("failure: {held}")), "{found:?}");
+    let held = format!(
+        "{} is held by process {} (",
+        rehearsal.path.display(),
+        std::process::id()
+    );
+    assert!(
+        found.len() == 2 && found[1].starts_with(&format!("failure: {held}")),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn who_holds_a_terminal_without_our_lock_is_found_by_its_open_files() {
     let rehearsal = rehearsal();
-    let terminal = std::fs::File::options().read(true).write(true).open(&rehearsal.path).unwrap();
+    let terminal = std::fs::File::options()
+        .read(true)
+        .write(true)
+        .open(&rehearsal.path)
+        .unwrap();
     let _theirs = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
     let found = on(&doctor(&sets(&rehearsal)), "serial port");
-    assert!(found[1].contains(&format!("is held by process {} (", std::process::id())), "{found:?}");
+    assert!(
+        found[1].contains(&format!("is held by process {} (", std::process::id())),
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -79,7 +129,10 @@ fn a_silent_probe_is_a_failure_that_says_what_to_check() {
     let rehearsal = rehearsal();
     rehearsal.ask_fault(Fault::Silence);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
-    assert!(found.len() == 1 && found[0].starts_with("failure: the probe says nothing: 0 bytes"), "{found:?}");
+    assert!(
+        found.len() == 1 && found[0].starts_with("failure: the probe says nothing: 0 bytes"),
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -87,7 +140,11 @@ fn a_target_out_of_range_is_a_failure() {
     let rehearsal = rehearsal();
     rehearsal.ask_fault(Fault::OutOfRange);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
-    assert!(found.len() == 1 && found[0].starts_with("failure: the target is outside the probe's range"), "{found:?}");
+    assert!(
+        found.len() == 1
+            && found[0].starts_with("failure: the target is outside the probe's range"),
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -96,7 +153,12 @@ fn a_damaged_line_is_a_warning_with_the_count() {
     rehearsal.ask_fault(Fault::Corrupt { every: 500 });
     let report = doctor(&sets(&rehearsal));
     let found = on(&report, "readings");
-    assert!(found.iter().any(|f| f.starts_with("warning: within") && f.contains("damaged bytes")), "{found:?}");
+    assert!(
+        found
+            .iter()
+            .any(|f| f.starts_with("warning: within") && f.contains("damaged bytes")),
+        "{found:?}"
+    );
     assert!(number(&report["probe"]["damaged_bytes"]) > 0.0, "{report}");
 }
 
@@ -104,18 +166,36 @@ fn a_damaged_line_is_a_warning_with_the_count() {
 fn a_stage_beyond_the_soft_limit_would_trip_at_once() {
     let rehearsal = Rehearsal::new(&protocol(), 650.0, |_| 1.95e-3);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
-    let tripping = found.iter().find(|f| f.starts_with("failure: ")).expect("a failure");
-    assert!(tripping.contains("+950.0 um at the farthest; the soft limit is 900.0 um"), "{tripping}");
+    let tripping = found
+        .iter()
+        .find(|f| f.starts_with("failure: "))
+        .expect("a failure");
+    assert!(
+        tripping.contains("+950.0 um at the farthest; the soft limit is 900.0 um"),
+        "{tripping}"
+    );
 }
 
 #[test]
 fn a_missing_port_and_one_that_is_no_terminal_are_told_apart() {
     let with = |port: &str| {
         let port = format!("probe.device.line.port={port}");
-        on(&doctor(&[PATIENT.map(String::from).to_vec(), vec![port]].concat()), "serial port")
+        on(
+            &doctor(&[PATIENT.map(String::from).to_vec(), vec![port]].concat()),
+            "serial port",
+        )
     };
-    assert_eq!(with("/dev/ttyNONE9"), ["failure: there is no /dev/ttyNONE9"]);
-    assert_eq!(with("/etc/hostname"), ["failure: /etc/hostname is no terminal"]);
+    assert_eq!(
+        with("/dev/ttyNONE9"),
+        ["failure: there is no /dev/ttyNONE9"]
+    );
+    assert_eq!(
+        with("/etc/hostname"),
+        ["failure: /etc/hostname is no terminal"]
+    );
     let null = with("/dev/null");
-    assert!(null[1].starts_with("failure: /dev/null: cannot be opened as a serial port"), "{null:?}");
+    assert!(
+        null[1].starts_with("failure: /dev/null: cannot be opened as a serial port"),
+        "{null:?}"
+    );
 }

@@ -21,22 +21,37 @@ const SHAPED: &str = "chirp.amplitude=[{ frequency_hz = 10.0, current_a = 0.6 },
 const OPERATING: &str = "plant.operating_point_m=0.0038";
 
 fn shown(more: &[&str]) -> Analysis {
-    analysed(&of_kind(("multisine", &LEFT_OUT), &[&[SHAPED, OPERATING], more].concat()))
+    analysed(&of_kind(
+        ("multisine", &LEFT_OUT),
+        &[&[SHAPED, OPERATING], more].concat(),
+    ))
 }
 
 #[test]
 fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_nothing() {
-    for (seed, noise, cause) in [("1", "40e-9", Cause::None), ("2", "40e-9", Cause::None), ("3", "5e-6", Cause::Noise)]
-    {
-        let (seed, noise) = (format!("sim.seed={seed}"), format!("sim.probe_noise_rms_m={noise}"));
-        let linearity = shown(&[&seed, &noise]).linearity.expect("lines were left out");
+    for (seed, noise, cause) in [
+        ("1", "40e-9", Cause::None),
+        ("2", "40e-9", Cause::None),
+        ("3", "5e-6", Cause::Noise),
+    ] {
+        let (seed, noise) = (
+            format!("sim.seed={seed}"),
+            format!("sim.probe_noise_rms_m={noise}"),
+        );
+        let linearity = shown(&[&seed, &noise])
+            .linearity
+            .expect("lines were left out");
         let whole = &linearity.whole;
         assert_eq!(whole.cause(), cause, "{}", whole.words());
         for kind in [whole.odd, whole.even].map(|kind| kind.expect("looked for")) {
             assert!(!kind.is_found() && kind.missing == 0.0, "{seed}: {kind:?}");
             // The scatter of an estimate of 0 is the noise of the mean of 8 periods over the root of the lines. Those that hold most of
             // the noise, at the floor's 8 Hz and at mode R, are ten and more: a third, and three of these.
-            assert!(kind.ratio.abs() < whole.noise_ratio / 8.0, "{seed}: {kind:?} {}", whole.noise_ratio);
+            assert!(
+                kind.ratio.abs() < whole.noise_ratio / 8.0,
+                "{seed}: {kind:?} {}",
+                whole.noise_ratio
+            );
         }
     }
 }
@@ -45,13 +60,29 @@ fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_not
 fn constraints_as_they_are_make_even_and_odd_distortion_which_is_put_down_to_geometry() {
     let analysis = shown(&["sim.geometry=quadratic"]);
     let linearity = analysis.linearity.as_ref().expect("lines were left out");
-    let (odd, even) = (linearity.whole.odd.expect("looked for"), linearity.whole.even.expect("looked for"));
+    let (odd, even) = (
+        linearity.whole.odd.expect("looked for"),
+        linearity.whole.even.expect("looked for"),
+    );
     assert!(even.is_found() && odd.is_found(), "{even:?} {odd:?}");
     // x_i - x_j has a term in the square of y_i - y_j: even first, at most of the lines.
-    assert!(even.missing > odd.missing && odd.missing > 0.0, "{even:?} {odd:?}");
-    assert_eq!(linearity.whole.cause(), Cause::Geometry, "{}", linearity.whole.words());
+    assert!(
+        even.missing > odd.missing && odd.missing > 0.0,
+        "{even:?} {odd:?}"
+    );
+    assert_eq!(
+        linearity.whole.cause(),
+        Cause::Geometry,
+        "{}",
+        linearity.whole.words()
+    );
     // It stays inside of the stops, which are at 1 mm: geometry is all there is.
-    assert!(linearity.bands.iter().any(|band| band.cause() == Cause::Geometry && band.band_hz.0 > 20.0));
+    assert!(
+        linearity
+            .bands
+            .iter()
+            .any(|band| band.cause() == Cause::Geometry && band.band_hz.0 > 20.0)
+    );
 }
 
 #[test]
@@ -70,18 +101,35 @@ fn odd_distortion_is_an_error_of_the_fit_and_makes_no_modes_whose_sign_is_known(
             );
         }
         let below = modes.iter().filter(|mode| hz(mode) < 120.0);
-        let others: Vec<_> = below.filter(|mode| !model_hz.iter().any(|model_hz| is(hz(mode), *model_hz))).collect();
+        let others: Vec<_> = below
+            .filter(|mode| !model_hz.iter().any(|model_hz| is(hz(mode), *model_hz)))
+            .collect();
         // Where chance leaves a neighbourhood of four lines less distortion than there is, one may come up; it weighs a hundredth of v at most.
         assert!(others.len() <= 1, "{geometry}: {others:?}");
-        assert!(others.iter().all(|mode| mode.residue_per_kg.value.abs() < 2e-4), "{geometry}: {others:?}");
+        assert!(
+            others
+                .iter()
+                .all(|mode| mode.residue_per_kg.value.abs() < 2e-4),
+            "{geometry}: {others:?}"
+        );
     }
 }
 
 #[test]
 fn a_multisine_of_all_lines_and_a_chirp_say_nothing_of_it() {
     assert!(shown(&["multisine.lines=full"]).linearity.is_none());
-    assert!(shown(&["excitation.kind=chirp", "chirp.duration_s=20.0", "chirp.fade_in_s=1.0"]).linearity.is_none());
-    let odd = shown(&["multisine.lines=odd"]).linearity.expect("even lines were left out");
+    assert!(
+        shown(&[
+            "excitation.kind=chirp",
+            "chirp.duration_s=20.0",
+            "chirp.fade_in_s=1.0"
+        ])
+        .linearity
+        .is_none()
+    );
+    let odd = shown(&["multisine.lines=odd"])
+        .linearity
+        .expect("even lines were left out");
     assert!(odd.whole.odd.is_none() && odd.whole.even.is_some());
 }
 
@@ -102,13 +150,30 @@ fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
     assert!(modes.len() >= 3, "{modes:?}");
     for run in 0..3 {
         let made = &answer["runs"][run];
-        assert_ne!(made["linearity"]["cause"], "geometry", "{}", made["linearity"]);
-        assert!(number(&made["linearity"]["even_by_noise_alone"]) > 1e-3, "{}", made["linearity"]);
-        assert_eq!(made["linearity"]["bands"].as_array().expect("bands").len(), 6, "octaves from 5.125 Hz on");
-        for file in
-            ["recording", "report", "frf_csv"].map(|file| &made[file]).into_iter().chain([&made["plots"]["linearity"]])
+        assert_ne!(
+            made["linearity"]["cause"], "geometry",
+            "{}",
+            made["linearity"]
+        );
+        assert!(
+            number(&made["linearity"]["even_by_noise_alone"]) > 1e-3,
+            "{}",
+            made["linearity"]
+        );
+        assert_eq!(
+            made["linearity"]["bands"].as_array().expect("bands").len(),
+            6,
+            "octaves from 5.125 Hz on"
+        );
+        for file in ["recording", "report", "frf_csv"]
+            .map(|file| &made[file])
+            .into_iter()
+            .chain([&made["plots"]["linearity"]])
         {
-            assert!(bench.path(file.as_str().expect("a path")).exists(), "{file}");
+            assert!(
+                bench.path(file.as_str().expect("a path")).exists(),
+                "{file}"
+            );
         }
         let travel = |run: usize| number(&answer["runs"][run]["expected"]["travel_m"]);
         assert!((travel(run) / travel(0) / [1.0, 2.0, 4.0][run] - 1.0).abs() < 1e-9);
@@ -132,19 +197,37 @@ fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift
     // that is found with more than 1000 lines, some percent each; higher even orders add at the largest.
     for run in [1, 2] {
         let growth = even(run) / even(run - 1);
-        assert!((3.2..5.0).contains(&growth), "{growth}: {} {} {}", even(0), even(1), even(2));
+        assert!(
+            (3.2..5.0).contains(&growth),
+            "{growth}: {} {} {}",
+            even(0),
+            even(1),
+            even(2)
+        );
     }
-    assert_eq!(answer["runs"][2]["linearity"]["cause"], "geometry", "{}", answer["runs"][2]["linearity"]["why"]);
+    assert_eq!(
+        answer["runs"][2]["linearity"]["cause"], "geometry",
+        "{}",
+        answer["runs"][2]["linearity"]["why"]
+    );
     // A frequency shifts with the square of the amplitude, as the third order product at its own frequency does: by 4 times from the
     // second to the third of what it did, less where it began, so (4 - 1)/(1 - 1/4) = 4; errors of some 15 %.
     assert_eq!(answer["shifted"], true);
     let shifting = |mode: &&Value| mode["frequency_shifts"] == true;
-    let modes: Vec<&Value> = answer["modes"].as_array().expect("modes").iter().filter(shifting).collect();
+    let modes: Vec<&Value> = answer["modes"]
+        .as_array()
+        .expect("modes")
+        .iter()
+        .filter(shifting)
+        .collect();
     assert_eq!(modes.len(), 2, "u and v: {modes:?}");
     for mode in modes {
         let hz = |run: usize| number(&mode["by_run"][run]["frequency_hz"]);
         let growth = (hz(2) - hz(1)) / (hz(1) - hz(0));
-        assert!((81.0..87.0).contains(&hz(0)) && (3.0..5.5).contains(&growth), "{growth}: {mode}");
+        assert!(
+            (81.0..87.0).contains(&hz(0)) && (3.0..5.5).contains(&growth),
+            "{growth}: {mode}"
+        );
     }
 }
 
@@ -158,18 +241,43 @@ fn a_run_that_trips_ends_the_rest_and_what_it_did_not_show_is_no_sign_of_a_linea
     let answer = bench.run(&format!("linearity {HERE} {trips}"));
     assert_eq!(answer.code, 1, "{}", answer.err);
     let report = answer.json();
-    assert_eq!(report["scales"], serde_json::json!([0.1, 0.2, 1.0]), "nothing runs after a trip");
-    assert_eq!(report["runs"][2]["outcome"], "tripped", "{}", report["runs"][2]);
+    assert_eq!(
+        report["scales"],
+        serde_json::json!([0.1, 0.2, 1.0]),
+        "nothing runs after a trip"
+    );
+    assert_eq!(
+        report["runs"][2]["outcome"], "tripped",
+        "{}",
+        report["runs"][2]
+    );
     assert!(report["runs"][2]["frf_csv"].is_null() && report["runs"][1]["frf_csv"].is_string());
     assert!(report["shifted"].is_null(), "{}", report["why"]);
-    assert!(report["why"].as_str().expect("words").contains("not every amplitude was run"), "{}", report["why"]);
+    assert!(
+        report["why"]
+            .as_str()
+            .expect("words")
+            .contains("not every amplitude was run"),
+        "{}",
+        report["why"]
+    );
 }
 
 #[test]
 fn amplitudes_that_would_cross_an_interlock_or_are_none_are_refused_and_nothing_moves() {
     for (options, words) in [
-        ("--amplitude 0.5 --scales 0.5,1,4", ["at 4 of the planned amplitude", "soft limit is 900 um"].as_slice()),
-        ("--amplitude 12 --scales 1,2", &["at 1 of the planned amplitude", "peak current", "nothing moved"]),
+        (
+            "--amplitude 0.5 --scales 0.5,1,4",
+            ["at 4 of the planned amplitude", "soft limit is 900 um"].as_slice(),
+        ),
+        (
+            "--amplitude 12 --scales 1,2",
+            &[
+                "at 1 of the planned amplitude",
+                "peak current",
+                "nothing moved",
+            ],
+        ),
         ("--scales 1", &["--scales", "two to 10 different"]),
         ("--scales 1,1", &["--scales", "0.5,1,2"]),
         ("--scales 0,1", &["--scales", "above 0"]),
@@ -178,7 +286,9 @@ fn amplitudes_that_would_cross_an_interlock_or_are_none_are_refused_and_nothing_
         ("--scales one", &["--scales", "invalid float"]),
     ] {
         let bench = Bench::new();
-        bench.run(&format!("linearity {HERE} {options} --json")).is_refused(words);
+        bench
+            .run(&format!("linearity {HERE} {options} --json"))
+            .is_refused(words);
         assert_eq!(bench.files(), [""; 0], "{options}");
     }
 }

@@ -32,10 +32,17 @@ fn travel_current_and_duration_are_what_the_run_then_shows() {
         assert_eq!(run["expected_travel_m"], expected["travel_m"]);
         // Floor and noise add 0.3 um at their largest; the quadrature of samples is the rig's own.
         let travel_m = number(&expected["travel_m"]);
-        assert!((travelled_m - travel_m).abs() < 0.02 * travel_m + 0.5e-6, "{options}: {travelled_m} for {travel_m}");
+        assert!(
+            (travelled_m - travel_m).abs() < 0.02 * travel_m + 0.5e-6,
+            "{options}: {travelled_m} for {travel_m}"
+        );
         // Ticks of the program, and those of the motor going off.
         let ticks = number(&expected["duration_s"]) * 1000.0;
-        assert!((number(&run["ticks"]) - ticks - 100.0).abs() < 1.5, "{options}: {} for {ticks}", run["ticks"]);
+        assert!(
+            (number(&run["ticks"]) - ticks - 100.0).abs() < 1.5,
+            "{options}: {} for {ticks}",
+            run["ticks"]
+        );
         for (figure, limit) in [
             ("travel_m", "travel_m"),
             ("current_a", "current_a"),
@@ -43,7 +50,10 @@ fn travel_current_and_duration_are_what_the_run_then_shows() {
             ("slew_a_per_s", "slew_a_per_s"),
         ] {
             let (figure, limit) = (number(&expected[figure]), number(&plan["limits"][limit]));
-            assert!(0.0 < figure && figure <= limit, "{options}: {figure} of {limit}");
+            assert!(
+                0.0 < figure && figure <= limit,
+                "{options}: {figure} of {limit}"
+            );
         }
         assert!(number(&expected["rms_current_a"]) < number(&expected["current_a"]));
     }
@@ -52,9 +62,9 @@ fn travel_current_and_duration_are_what_the_run_then_shows() {
 #[test]
 fn a_shaped_stepped_sine_moves_the_stage_by_what_is_asked_for_wherever_the_current_suffices() {
     // By itself, without --shape; 100 um where G is 154 um/A and more: below mode R.
-    let options =
-        "--excitation stepped_sine --start 2 --set stepped_sine.count=12 --set shape.travel_m=100e-6 --stop 29";
-    let (plan, _, travelled_m) = planned_and_run(&format!("{options} --set stepped_sine.settle_s=8.0"));
+    let options = "--excitation stepped_sine --start 2 --set stepped_sine.count=12 --set shape.travel_m=100e-6 --stop 29";
+    let (plan, _, travelled_m) =
+        planned_and_run(&format!("{options} --set stepped_sine.settle_s=8.0"));
     // The curve of points lies up to some per cent below the wanted one; one sine comes as the other goes.
     assert!((85e-6..112e-6).contains(&travelled_m), "{travelled_m}");
     let points = plan["amplitude"].as_array().expect("points");
@@ -66,37 +76,89 @@ fn an_frf_measured_before_shapes_as_the_model_does() {
     let bench = Bench::new();
     let measured = bench.json(&format!("chirp {HERE} --start 1 --duration 60"));
     let frf = measured["frf_csv"].as_str().expect("a path");
-    let of = |source: &str| bench.json(&format!("chirp {HERE} --start 1 --duration 60 --shape {source} --plan"));
+    let of = |source: &str| {
+        bench.json(&format!(
+            "chirp {HERE} --start 1 --duration 60 --shape {source} --plan"
+        ))
+    };
     let (by_model, by_frf) = (of("model"), of(frf));
     let travel = |plan: &Value| number(&plan["expected"]["travel_m"]);
-    assert!((0.9..1.1).contains(&(travel(&by_frf) / travel(&by_model))), "{} {}", travel(&by_frf), travel(&by_model));
+    assert!(
+        (0.9..1.1).contains(&(travel(&by_frf) / travel(&by_model))),
+        "{} {}",
+        travel(&by_frf),
+        travel(&by_model)
+    );
     let least = |plan: &Value| {
         let points = plan["amplitude"].as_array().expect("points");
-        points.iter().map(|p| number(&p["current_a"])).fold(f64::INFINITY, f64::min)
+        points
+            .iter()
+            .map(|p| number(&p["current_a"]))
+            .fold(f64::INFINITY, f64::min)
     };
     // The peak of mode R, of 0.5 Hz, is smeared a little by the estimate.
-    assert!((0.8..1.25).contains(&(least(&by_frf) / least(&by_model))), "{} {}", least(&by_frf), least(&by_model));
+    assert!(
+        (0.8..1.25).contains(&(least(&by_frf) / least(&by_model))),
+        "{} {}",
+        least(&by_frf),
+        least(&by_model)
+    );
 }
 
 #[test]
 fn what_would_cross_an_interlock_is_refused_with_figure_limit_and_remedy_and_nothing_runs() {
     for (options, words) in [
-        ("--amplitude 0.5", ["um at 30", "900 um", "--shape model"].as_slice()),
-        ("--excitation multisine --amplitude 12", &["12.000 A", "9.982 A", "lower chirp.amplitude"]),
-        ("--excitation multisine --amplitude 8 --set motor.continuous_force_n=10", &["thermal current", "0.899 A"]),
-        ("--excitation prbs --amplitude 2 --set prbs.clock_divider=1", &["soft limit is 900 um", "prbs.amplitude_a"]),
-        ("--excitation stepped_sine --amplitude 1 --set stepped_sine.count=40", &["Hz", "the soft limit is 900 um"]),
-        ("--excitation multisine --set multisine.period_s=0.02 --start 100 --stop 150", &["multisine.period_s", "ten"]),
-        ("--excitation prbs --set prbs.clock_divider=2", &["prbs.clock_divider", "250 Hz", "400 Hz"]),
-        ("--excitation prbs --set prbs.clock_divider=1 --shape model", &["--shape", "prbs.amplitude_a"]),
-        ("--excitation noise", &["excitation.kind", "multisine", "stepped_sine", "prbs"]),
+        (
+            "--amplitude 0.5",
+            ["um at 30", "900 um", "--shape model"].as_slice(),
+        ),
+        (
+            "--excitation multisine --amplitude 12",
+            &["12.000 A", "9.982 A", "lower chirp.amplitude"],
+        ),
+        (
+            "--excitation multisine --amplitude 8 --set motor.continuous_force_n=10",
+            &["thermal current", "0.899 A"],
+        ),
+        (
+            "--excitation prbs --amplitude 2 --set prbs.clock_divider=1",
+            &["soft limit is 900 um", "prbs.amplitude_a"],
+        ),
+        (
+            "--excitation stepped_sine --amplitude 1 --set stepped_sine.count=40",
+            &["Hz", "the soft limit is 900 um"],
+        ),
+        (
+            "--excitation multisine --set multisine.period_s=0.02 --start 100 --stop 150",
+            &["multisine.period_s", "ten"],
+        ),
+        (
+            "--excitation prbs --set prbs.clock_divider=2",
+            &["prbs.clock_divider", "250 Hz", "400 Hz"],
+        ),
+        (
+            "--excitation prbs --set prbs.clock_divider=1 --shape model",
+            &["--shape", "prbs.amplitude_a"],
+        ),
+        (
+            "--excitation noise",
+            &["excitation.kind", "multisine", "stepped_sine", "prbs"],
+        ),
         ("--shape missing.csv", &["missing.csv", "model"]),
-        ("--set chirp.repetitions=200000", &["chirp.repetitions", "10000"]),
-        ("--set chirp.repetitions=9999", &["chirp.duration_s", "ticks"]),
+        (
+            "--set chirp.repetitions=200000",
+            &["chirp.repetitions", "10000"],
+        ),
+        (
+            "--set chirp.repetitions=9999",
+            &["chirp.duration_s", "ticks"],
+        ),
     ] {
         for plan in ["", "--plan"] {
             let bench = Bench::new();
-            bench.run(&format!("chirp {HERE} {options} {plan} --json")).is_refused(words);
+            bench
+                .run(&format!("chirp {HERE} {options} {plan} --json"))
+                .is_refused(words);
             assert_eq!(bench.files(), [""; 0], "{options}");
         }
     }
@@ -109,7 +171,10 @@ fn a_recording_of_before_there_were_kinds_is_a_chirp() {
     for table in ["excitation", "multisine", "stepped_sine", "prbs", "shape"] {
         assert!(old.remove(table).is_some(), "{table}");
     }
-    old["chirp"].as_table_mut().expect("a table").remove("repetitions");
+    old["chirp"]
+        .as_table_mut()
+        .expect("a table")
+        .remove("repetitions");
     let text = toml::to_string(&old).expect("TOML");
     assert_eq!(bench::config::whole("an old recording", &text), Ok(config));
 }

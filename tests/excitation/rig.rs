@@ -10,12 +10,24 @@ use crate::simulated;
 /// 1 kHz, up to 400 Hz.
 const HERE: [&str; 2] = ["loop.rate_hz=1000", "chirp.stop_hz=400.0"];
 /// Nothing but the plant.
-pub const SILENT: [&str; 3] = ["sim.probe_noise_rms_m=0", "sim.probe_quantisation_m=0", "sim.floor=[]"];
+pub const SILENT: [&str; 3] = [
+    "sim.probe_noise_rms_m=0",
+    "sim.probe_quantisation_m=0",
+    "sim.floor=[]",
+];
 
 /// Each kind with settings that show the modes of the stage: lines no farther apart than a mode is wide.
 pub const KINDS: [(&str, &[&str]); 3] = [
     ("multisine", &["multisine.periods=8"]),
-    ("prbs", &["prbs.order=14", "prbs.clock_divider=1", "prbs.periods=8", "prbs.amplitude_a=0.5"]),
+    (
+        "prbs",
+        &[
+            "prbs.order=14",
+            "prbs.clock_divider=1",
+            "prbs.periods=8",
+            "prbs.amplitude_a=0.5",
+        ],
+    ),
     (
         "stepped_sine",
         &[
@@ -32,7 +44,12 @@ pub const KINDS: [(&str, &[&str]); 3] = [
 
 pub fn config(sets: &[&str]) -> Config {
     let sets = HERE.iter().chain(sets).map(|set| set.to_string()).collect();
-    load(&Source { sets, purpose: Purpose::Chirp, ..Source::default() }).expect("valid settings")
+    load(&Source {
+        sets,
+        purpose: Purpose::Chirp,
+        ..Source::default()
+    })
+    .expect("valid settings")
 }
 
 /// A configuration of a kind with `more`.
@@ -52,5 +69,9 @@ pub fn analysed(config: &Config) -> Analysis {
 /// The largest displacement that the probe saw, in metres.
 pub fn travel_m(path: &Path) -> f64 {
     let recording = Recording::open(path).expect("a recording");
-    recording.ticks().expect("ticks").map(|record| record.expect("whole").position_m.abs()).fold(0.0, f64::max)
+    recording
+        .ticks()
+        .expect("ticks")
+        .map(|record| record.expect("whole").position_m.abs())
+        .fold(0.0, f64::max)
 }

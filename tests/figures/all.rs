@@ -17,20 +17,32 @@ pub fn all() -> &'static [Made] {
     ALL.get_or_init(|| {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let entries = selected(&[]).expect("all");
-        make_all(&entries, &folder(), &Workshop::new(runs.path()), &mut |_, _| {}).expect("all can be made")
+        make_all(
+            &entries,
+            &folder(),
+            &Workshop::new(runs.path()),
+            &mut |_, _| {},
+        )
+        .expect("all can be made")
     })
 }
 
 /// What one figure shows.
 pub fn content(number: &str) -> &'static Content {
-    let made = all().iter().find(|made| made.entry.number == number).expect("in the registry");
+    let made = all()
+        .iter()
+        .find(|made| made.entry.number == number)
+        .expect("in the registry");
     &made.outcome.as_ref().expect("is computed").0
 }
 
 /// A chart of a figure by the beginning of its heading.
 pub fn chart(number: &str, heading: &str) -> &'static Chart {
     let charts = content(number).rows.iter().flat_map(|row| &row.charts);
-    charts.into_iter().find(|chart| chart.heading.starts_with(heading)).expect("a chart of that heading")
+    charts
+        .into_iter()
+        .find(|chart| chart.heading.starts_with(heading))
+        .expect("a chart of that heading")
 }
 
 /// The lines of a chart that carry a curve: not those that only mark the axes.
@@ -47,5 +59,7 @@ fn curve(mark: &Mark) -> Option<(&str, &[(f64, f64)])> {
 
 /// Points of a curve, evenly picked.
 pub fn picked(points: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
-    (0..count).map(|k| points[(k * (points.len() - 1)) / (count - 1)]).collect()
+    (0..count)
+        .map(|k| points[(k * (points.len() - 1)) / (count - 1)])
+        .collect()
 }

@@ -16,10 +16,15 @@ fn asked() -> Vec<String> {
         Some((from, to)) => {
             let split = |text: &str| {
                 let (chapter, number) = text.split_once('-').expect("a number");
-                (chapter.to_string(), number.parse::<u32>().expect("a number"))
+                (
+                    chapter.to_string(),
+                    number.parse::<u32>().expect("a number"),
+                )
             };
             let ((chapter, from), (_, to)) = (split(from), split(to));
-            (from..=to).map(|number| format!("{chapter}-{number}")).collect()
+            (from..=to)
+                .map(|number| format!("{chapter}-{number}"))
+                .collect()
         }
     };
     ASKED.split_whitespace().flat_map(range).collect()
@@ -29,9 +34,14 @@ fn asked() -> Vec<String> {
 fn every_figure_and_table_asked_for_is_computed() {
     assert_eq!(asked().len(), 47);
     for number in asked() {
-        let entry =
-            FIGURES.iter().find(|entry| entry.number == number).unwrap_or_else(|| panic!("{number} is missing"));
-        assert!(matches!(entry.make, Make::Draw(_)), "{number} is not computed");
+        let entry = FIGURES
+            .iter()
+            .find(|entry| entry.number == number)
+            .unwrap_or_else(|| panic!("{number} is missing"));
+        assert!(
+            matches!(entry.make, Make::Draw(_)),
+            "{number} is not computed"
+        );
     }
 }
 
@@ -42,12 +52,19 @@ fn every_number_of_the_thesis_is_listed_once_and_those_not_computed_say_why() {
     // The last number of each chapter's figures, by the captions.
     for (chapter, last) in [(1, 5), (2, 6), (3, 16), (4, 10), (5, 11), (6, 13)] {
         for number in 1..=last {
-            assert!(numbers.contains(&format!("{chapter}-{number}").as_str()), "Fig {chapter}-{number}");
+            assert!(
+                numbers.contains(&format!("{chapter}-{number}").as_str()),
+                "Fig {chapter}-{number}"
+            );
         }
     }
     for entry in FIGURES {
         if let Make::Not(reason) = entry.make {
-            assert!(reason.split_whitespace().count() >= 2, "{}: {reason}", entry.number);
+            assert!(
+                reason.split_whitespace().count() >= 2,
+                "{}: {reason}",
+                entry.number
+            );
         }
     }
 }
@@ -55,11 +72,19 @@ fn every_number_of_the_thesis_is_listed_once_and_those_not_computed_say_why() {
 #[test]
 fn every_computed_figure_says_what_is_drawn_with_which_settings_and_by_which_command() {
     for made in all() {
-        let Ok((content, svg)) = &made.outcome else { continue };
+        let Ok((content, svg)) = &made.outcome else {
+            continue;
+        };
         let number = made.entry.number;
-        assert!(content.drawn.ends_with('.') && content.drawn.len() > 40, "{number}");
+        assert!(
+            content.drawn.ends_with('.') && content.drawn.len() > 40,
+            "{number}"
+        );
         assert!(!content.settings.is_empty(), "{number} has no settings");
-        assert!(!content.commands.is_empty() || number == "table-3-4", "{number} has no command");
+        assert!(
+            !content.commands.is_empty() || number == "table-3-4",
+            "{number} has no command"
+        );
         assert!(!content.compared.is_empty(), "{number} compares nothing");
         assert_eq!(svg.is_some(), !number.starts_with("table-"), "{number}");
     }
@@ -68,8 +93,14 @@ fn every_computed_figure_says_what_is_drawn_with_which_settings_and_by_which_com
 #[test]
 fn a_difference_beyond_its_tolerance_is_explained() {
     for made in all() {
-        let Ok((content, _)) = &made.outcome else { continue };
-        for row in content.compared.iter().filter(|row| row.verdict == Verdict::Differs) {
+        let Ok((content, _)) = &made.outcome else {
+            continue;
+        };
+        for row in content
+            .compared
+            .iter()
+            .filter(|row| row.verdict == Verdict::Differs)
+        {
             assert!(
                 !row.remark.is_empty(),
                 "{}: {} is {}, printed {}",
@@ -109,8 +140,13 @@ const DIFFER: &[(&str, &str)] = &[
 fn all_printed_figures_agree_but_those_that_are_known_not_to() {
     let mut found = BTreeSet::new();
     for made in all() {
-        let Ok((content, _)) = &made.outcome else { continue };
-        let differs = content.compared.iter().filter(|row| row.verdict == Verdict::Differs);
+        let Ok((content, _)) = &made.outcome else {
+            continue;
+        };
+        let differs = content
+            .compared
+            .iter()
+            .filter(|row| row.verdict == Verdict::Differs);
         found.extend(differs.map(|row| (made.entry.number, row.what.as_str())));
     }
     assert_eq!(found, DIFFER.iter().copied().collect());
@@ -119,9 +155,13 @@ fn all_printed_figures_agree_but_those_that_are_known_not_to() {
 #[test]
 fn tolerances_are_half_of_the_last_printed_digit_or_have_a_reason() {
     for made in all() {
-        let Ok((content, _)) = &made.outcome else { continue };
+        let Ok((content, _)) = &made.outcome else {
+            continue;
+        };
         for row in &content.compared {
-            let Some(tolerance) = row.tolerance else { continue };
+            let Some(tolerance) = row.tolerance else {
+                continue;
+            };
             let number = row.printed.split(' ').next().expect("a number");
             let digits = number.split('.').nth(1).map_or(0, str::len);
             let half = 0.5 * 10f64.powi(-(digits as i32));
@@ -129,26 +169,48 @@ fn tolerances_are_half_of_the_last_printed_digit_or_have_a_reason() {
             let known = made.entry.number == "table-2-2";
             let wide = tolerance > half * (1.0 + 1e-9);
             let said = !row.remark.is_empty() || row.what.contains("printed:");
-            assert!(!wide || said || known, "{}: {} within {tolerance}", made.entry.number, row.what);
+            assert!(
+                !wide || said || known,
+                "{}: {} within {tolerance}",
+                made.entry.number,
+                row.what
+            );
         }
     }
 }
 
 #[test]
 fn the_tables_of_chapter_3_hold_in_every_row() {
-    for (number, rows) in [("table-3-1", 3), ("table-3-2", 4), ("table-3-3", 10), ("table-3-4", 10)] {
+    for (number, rows) in [
+        ("table-3-1", 3),
+        ("table-3-2", 4),
+        ("table-3-3", 10),
+        ("table-3-4", 10),
+    ] {
         let compared = &content(number).compared;
         // One line says how many plants are in no row.
         assert_eq!(compared.len(), rows + 1, "{number}");
-        assert!(compared.iter().all(|row| row.verdict == Verdict::Agrees), "{number}: {compared:?}");
+        assert!(
+            compared.iter().all(|row| row.verdict == Verdict::Agrees),
+            "{number}: {compared:?}"
+        );
     }
 }
 
 #[test]
 fn an_unknown_number_is_refused_with_the_list() {
-    let error = selected(&["2-5".into(), "7-1".into()]).expect_err("no such figure").to_string();
-    assert!(error.contains("`7-1`") && error.contains("6-12, 6-13") && error.contains("table-2-2"), "{error}");
-    let two: Vec<&str> = selected(&["6-12".into(), "2-5".into()]).expect("both").iter().map(|e| e.number).collect();
+    let error = selected(&["2-5".into(), "7-1".into()])
+        .expect_err("no such figure")
+        .to_string();
+    assert!(
+        error.contains("`7-1`") && error.contains("6-12, 6-13") && error.contains("table-2-2"),
+        "{error}"
+    );
+    let two: Vec<&str> = selected(&["6-12".into(), "2-5".into()])
+        .expect("both")
+        .iter()
+        .map(|e| e.number)
+        .collect();
     assert_eq!(two, ["2-5", "6-12"]);
 }
 
@@ -156,8 +218,14 @@ fn an_unknown_number_is_refused_with_the_list() {
 fn files_are_whole_and_nothing_else_is_left() {
     all();
     for entry in std::fs::read_dir(folder()).expect("the folder") {
-        let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
-        let known = [".svg", ".html", ".toml", ".mcap"].iter().any(|end| name.ends_with(end));
+        let name = entry
+            .expect("an entry")
+            .file_name()
+            .to_string_lossy()
+            .into_owned();
+        let known = [".svg", ".html", ".toml", ".mcap"]
+            .iter()
+            .any(|end| name.ends_with(end));
         assert!(known && !name.contains("partial"), "{name}");
     }
 }

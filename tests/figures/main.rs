@@ -7,10 +7,16 @@ mod content;
 mod pictures;
 #[path = "../thesis/program.rs"]
 mod program;
-#[allow(dead_code, reason = "made for the tests of report, which use all of it")]
+#[allow(
+    dead_code,
+    reason = "made for the tests of report, which use all of it"
+)]
 #[path = "../report/svg.rs"]
 mod svg;
-#[allow(dead_code, reason = "made for the tests of the thesis, which use all of it")]
+#[allow(
+    dead_code,
+    reason = "made for the tests of the thesis, which use all of it"
+)]
 #[path = "../thesis/truth.rs"]
 mod truth;
 mod values;

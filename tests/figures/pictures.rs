@@ -20,40 +20,67 @@ fn frames(picture: &str) -> Vec<[f64; 4]> {
             ys.fold(f64::MIN, f64::max),
         ]
     };
-    svg::points(picture, "polyline", "#5A5A5A").iter().filter(|points| points.len() == 6).map(frame).collect()
+    svg::points(picture, "polyline", "#5A5A5A")
+        .iter()
+        .filter(|points| points.len() == 6)
+        .map(frame)
+        .collect()
 }
 
 fn page_size(picture: &str) -> (f64, f64) {
-    let view = picture.split("viewBox=\"0 0 ").nth(1).and_then(|rest| rest.split('"').next()).expect("a view box");
+    let view = picture
+        .split("viewBox=\"0 0 ")
+        .nth(1)
+        .and_then(|rest| rest.split('"').next())
+        .expect("a view box");
     let (width, height) = view.split_once(' ').expect("two numbers");
-    (width.parse().expect("a number"), height.parse().expect("a number"))
+    (
+        width.parse().expect("a number"),
+        height.parse().expect("a number"),
+    )
 }
 
 /// No coordinate is no number, all that is drawn is on the page, curves and areas are inside of a frame, and no text is cut
 /// off.
 fn assert_tidy(what: &str, picture: &str) {
-    assert!(!picture.contains("NaN") && !picture.contains("inf"), "{what}");
+    assert!(
+        !picture.contains("NaN") && !picture.contains("inf"),
+        "{what}"
+    );
     let (width, height) = page_size(picture);
     for words in svg::words(picture) {
-        let inside =
-            words.left >= -1.0 && words.right <= width + 1.0 && words.top >= -1.0 && words.bottom <= height + 1.0;
-        assert!(inside, "{what}: {words:?} leaves the page of {width} x {height}");
+        let inside = words.left >= -1.0
+            && words.right <= width + 1.0
+            && words.top >= -1.0
+            && words.bottom <= height + 1.0;
+        assert!(
+            inside,
+            "{what}: {words:?} leaves the page of {width} x {height}"
+        );
     }
     let frames = frames(picture);
     assert!(!frames.is_empty(), "{what} has no frame");
     for kind in ["polyline", "polygon"] {
         for points in svg::points(picture, kind, "") {
             assert!(
-                points.iter().all(|(x, y)| (0.0..=width).contains(x) && (0.0..=height).contains(y)),
+                points
+                    .iter()
+                    .all(|(x, y)| (0.0..=width).contains(x) && (0.0..=height).contains(y)),
                 "{what}: {points:?}"
             );
             // What has many points is a curve: no key, no tick.
             let within = |frame: &[f64; 4]| {
                 points.iter().all(|(x, y)| {
-                    *x >= frame[0] - 1.0 && *x <= frame[1] + 1.0 && *y >= frame[2] - 1.0 && *y <= frame[3] + 1.0
+                    *x >= frame[0] - 1.0
+                        && *x <= frame[1] + 1.0
+                        && *y >= frame[2] - 1.0
+                        && *y <= frame[3] + 1.0
                 })
             };
-            assert!(points.len() < 8 || frames.iter().any(within), "{what}: a curve leaves its frame");
+            assert!(
+                points.len() < 8 || frames.iter().any(within),
+                "{what}: a curve leaves its frame"
+            );
         }
     }
 }
@@ -69,17 +96,38 @@ fn every_picture_is_tidy() {
 
 #[test]
 fn every_axis_says_what_it_shows_in_which_unit() {
-    let bare = ["|L|", "|T|", "|S|", "N(x)", "Real part of L", "Imaginary part of L", "X", "Y"];
+    let bare = [
+        "|L|",
+        "|T|",
+        "|S|",
+        "N(x)",
+        "Real part of L",
+        "Imaginary part of L",
+        "X",
+        "Y",
+    ];
     for made in all() {
-        let Ok((content, _)) = &made.outcome else { continue };
+        let Ok((content, _)) = &made.outcome else {
+            continue;
+        };
         for chart in content.rows.iter().flat_map(|row| &row.charts) {
             for scale in [&chart.x, &chart.y] {
                 let unit = scale.label.contains('(') && scale.label.ends_with(')');
                 let of_g = scale.label.contains("part of G")
                     && (chart.heading.contains("m/N") || made.entry.number.starts_with("6-"));
-                let plain = bare.contains(&scale.label.as_str()) || of_g || scale.label.starts_with('Δ');
-                assert!(unit || plain, "{}: `{}` has no unit", made.entry.number, scale.label);
-                assert!(scale.kind != ScaleKind::Blank || scale.label.len() == 1, "{}", made.entry.number);
+                let plain =
+                    bare.contains(&scale.label.as_str()) || of_g || scale.label.starts_with('Δ');
+                assert!(
+                    unit || plain,
+                    "{}: `{}` has no unit",
+                    made.entry.number,
+                    scale.label
+                );
+                assert!(
+                    scale.kind != ScaleKind::Blank || scale.label.len() == 1,
+                    "{}",
+                    made.entry.number
+                );
             }
         }
     }
@@ -88,14 +136,23 @@ fn every_axis_says_what_it_shows_in_which_unit() {
 #[test]
 fn words_of_a_picture_do_not_run_into_each_other_outside_of_frames() {
     for made in all() {
-        let Ok((_, Some(picture))) = &made.outcome else { continue };
+        let Ok((_, Some(picture))) = &made.outcome else {
+            continue;
+        };
         let frames = frames(picture);
         let inside = |w: &svg::Words| {
-            frames.iter().any(|f| w.left >= f[0] && w.right <= f[1] && w.top >= f[2] && w.bottom <= f[3])
+            frames
+                .iter()
+                .any(|f| w.left >= f[0] && w.right <= f[1] && w.top >= f[2] && w.bottom <= f[3])
         };
-        let words: Vec<svg::Words> = svg::words(picture).into_iter().filter(|w| !inside(w)).collect();
+        let words: Vec<svg::Words> = svg::words(picture)
+            .into_iter()
+            .filter(|w| !inside(w))
+            .collect();
         for (k, a) in words.iter().enumerate() {
-            let overlap = |b: &svg::Words| a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+            let overlap = |b: &svg::Words| {
+                a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom
+            };
             if let Some(b) = words[k + 1..].iter().find(|b| overlap(b)) {
                 panic!("{}: {a:?} runs into {b:?}", made.entry.number);
             }
@@ -111,13 +168,19 @@ fn pictures_and_page_are_well_formed_by_other_programs() {
         .map(|made| folder().join(made.entry.file()).display().to_string())
         .collect();
     files.push(folder().join("index.html").display().to_string());
-    let Some(answers) = truth::ask_of("pages.py", &files.iter().map(|file| json!(file)).collect::<Vec<_>>()) else {
+    let Some(answers) = truth::ask_of(
+        "pages.py",
+        &files.iter().map(|file| json!(file)).collect::<Vec<_>>(),
+    ) else {
         return;
     };
     for (file, answer) in files.iter().zip(answers) {
         assert_eq!(answer["errors"], json!([]), "{file}");
         // Curves, texts, frames; of the page: an anchor for each entry.
-        assert!(answer["elements"].as_u64().is_some_and(|count| count > 20), "{file}: {answer}");
+        assert!(
+            answer["elements"].as_u64().is_some_and(|count| count > 20),
+            "{file}: {answer}"
+        );
     }
 }
 
@@ -128,7 +191,11 @@ fn the_page_needs_nothing_from_elsewhere_and_has_every_entry() {
         assert!(!html.contains(load), "{load}");
     }
     for (at, _) in html.match_indices("http") {
-        assert!(html[at..].starts_with("http://www.w3.org/2000/svg"), "{}", &html[at..at + 60]);
+        assert!(
+            html[at..].starts_with("http://www.w3.org/2000/svg"),
+            "{}",
+            &html[at..at + 60]
+        );
     }
     for made in all() {
         let id = made.entry.id();
@@ -136,14 +203,25 @@ fn the_page_needs_nothing_from_elsewhere_and_has_every_entry() {
         assert_eq!(html.matches(&format!("href=\"#{id}\"")).count(), 1, "{id}");
     }
     assert!(html.contains("prefers-color-scheme:dark") && html.contains("Not computed: "));
-    assert_eq!(std::fs::read_to_string(folder().join("index.html")).expect("the page"), html);
+    assert_eq!(
+        std::fs::read_to_string(folder().join("index.html")).expect("the page"),
+        html
+    );
 }
 
 #[test]
 fn text_that_means_something_to_svg_is_escaped_in_a_sheet() {
-    let chart = Chart::new("<b> & \"c\"", Scale::linear("a < b (1)"), Scale::linear("y (1)"))
-        .line("<i>", Pen::solid(colours::BLUE), vec![(0.0, 0.0), (1.0, 1.0)])
-        .text((0.5, 0.5), (0.0, 0.0), "1 < 2");
+    let chart = Chart::new(
+        "<b> & \"c\"",
+        Scale::linear("a < b (1)"),
+        Scale::linear("y (1)"),
+    )
+    .line(
+        "<i>",
+        Pen::solid(colours::BLUE),
+        vec![(0.0, 0.0), (1.0, 1.0)],
+    )
+    .text((0.5, 0.5), (0.0, 0.0), "1 < 2");
     let picture = sheet_svg("T & <t>", "", &[Row::new(200.0, vec![chart])]).expect("a picture");
     assert!(!picture.contains("<b>") && !picture.contains("<i>") && !picture.contains("<t>"));
     assert!(picture.contains("1 &lt; 2") && picture.contains("T &amp; &lt;t&gt;"));
@@ -151,7 +229,10 @@ fn text_that_means_something_to_svg_is_escaped_in_a_sheet() {
 
 #[test]
 fn a_sheet_without_charts_is_refused() {
-    assert!(sheet_svg("", "", &[]).is_err() && sheet_svg("", "", &[Row::new(100.0, Vec::new())]).is_err());
+    assert!(
+        sheet_svg("", "", &[]).is_err()
+            && sheet_svg("", "", &[Row::new(100.0, Vec::new())]).is_err()
+    );
 }
 
 proptest! {

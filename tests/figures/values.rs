@@ -9,28 +9,47 @@ use crate::truth;
 
 /// Pairs of numbers of an answer.
 fn pairs(answer: &Value) -> Vec<(f64, f64)> {
-    answer.as_array().expect("a list").iter().map(|pair| (number(&pair[0]), number(&pair[1]))).collect()
+    answer
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|pair| (number(&pair[0]), number(&pair[1])))
+        .collect()
 }
 
 /// The curve of this name, or the only one.
 fn curve(number: &str, heading: &str, name: &str) -> &'static [(f64, f64)] {
     let curves = curves(chart(number, heading));
-    curves.into_iter().find(|(known, _)| *known == name).expect("a curve of that name").1
+    curves
+        .into_iter()
+        .find(|(known, _)| *known == name)
+        .expect("a curve of that name")
+        .1
 }
 
 #[test]
 fn the_open_loops_of_figs_6_8_and_6_10_are_those_of_python() {
     let bench = Bench::new();
     for (figure, controller) in [("6-8", "slow"), ("6-10", "fast")] {
-        let config = bench.json(&format!("config show --set control.controller={controller}"));
+        let config = bench.json(&format!(
+            "config show --set control.controller={controller}"
+        ));
         let points = picked(curve(figure, "(a)", ""), 40);
         let omega: Vec<f64> = points.iter().map(|point| point.0).collect();
-        let question = json!({"what": "points", "of": "loop", "config": config, "omega_rad_s": omega});
-        let Some(answers) = truth::ask(&[question]) else { return };
+        let question =
+            json!({"what": "points", "of": "loop", "config": config, "omega_rad_s": omega});
+        let Some(answers) = truth::ask(&[question]) else {
+            return;
+        };
         for (point, truth) in points.iter().zip(pairs(&answers[0])) {
             let size = truth.0.hypot(truth.1);
             // At a resonance of damping 0.004 a relative rounding of the frequency is 250 times as large in |L|.
-            near(&format!("|L| of Fig {figure} at {} rad/s", point.0), point.1, size, 1e-9 * size);
+            near(
+                &format!("|L| of Fig {figure} at {} rad/s", point.0),
+                point.1,
+                size,
+                1e-9 * size,
+            );
         }
     }
 }
@@ -40,16 +59,28 @@ fn the_transfer_functions_of_fig_2_4_are_those_of_eq_2_5() {
     let bench = Bench::new();
     for (heading, asymmetry) in [("Asymmetry 0", 0.0), ("Asymmetry 5", 0.05)] {
         for (name, point) in [("2.5 % of L", 2.5), ("5 % of L", 5.0)] {
-            let config = bench
-                .json(&format!("config show --config chapter2 --operating-point {point}% --asymmetry {asymmetry}"));
+            let config = bench.json(&format!(
+                "config show --config chapter2 --operating-point {point}% --asymmetry {asymmetry}"
+            ));
             let points = picked(curve("2-4", heading, name), 30);
-            let omega: Vec<f64> = points.iter().map(|point| point.0 * std::f64::consts::TAU).collect();
-            let question = json!({"what": "points", "of": "plant", "config": config, "omega_rad_s": omega});
-            let Some(answers) = truth::ask(&[question]) else { return };
+            let omega: Vec<f64> = points
+                .iter()
+                .map(|point| point.0 * std::f64::consts::TAU)
+                .collect();
+            let question =
+                json!({"what": "points", "of": "plant", "config": config, "omega_rad_s": omega});
+            let Some(answers) = truth::ask(&[question]) else {
+                return;
+            };
             for (point, truth) in points.iter().zip(pairs(&answers[0])) {
                 let size = truth.0.hypot(truth.1);
                 // Modes that do not show are left out: below a thousandth of all others at their own resonance.
-                near(&format!("|G| at {} Hz", point.0), point.1, size, 2e-3 * size);
+                near(
+                    &format!("|G| at {} Hz", point.0),
+                    point.1,
+                    size,
+                    2e-3 * size,
+                );
             }
         }
     }
@@ -58,7 +89,13 @@ fn the_transfer_functions_of_fig_2_4_are_those_of_eq_2_5() {
 #[test]
 fn the_step_responses_of_figs_3_5_and_3_12_are_those_of_python() {
     let u_v = |r: f64| json!([[1.0, 0.001, 1.0], [10.0, 0.001, r]]);
-    let r_u_v = |size: f64| json!([[1.0, 0.0005, 1.0], [10.0, 0.001, -size], [11.0, 0.001, size]]);
+    let r_u_v = |size: f64| {
+        json!([
+            [1.0, 0.0005, 1.0],
+            [10.0, 0.001, -size],
+            [11.0, 0.001, size]
+        ])
+    };
     let cases = [
         ("3-5", "(c) Step", "", u_v(-0.5)),
         ("3-5", "(d) Step", "", u_v(-5.0)),
@@ -68,9 +105,18 @@ fn the_step_responses_of_figs_3_5_and_3_12_are_those_of_python() {
     for (figure, heading, name, terms) in cases {
         let points = picked(curve(figure, heading, name), 60);
         let times: Vec<f64> = points.iter().map(|point| point.0).collect();
-        let Some(answers) = truth::ask(&[json!({"what": "course", "terms": terms, "time_s": times})]) else { return };
+        let Some(answers) =
+            truth::ask(&[json!({"what": "course", "terms": terms, "time_s": times})])
+        else {
+            return;
+        };
         for (point, truth) in points.iter().zip(answers[0].as_array().expect("a list")) {
-            near(&format!("Fig {figure} {name} at {} s", point.0), point.1, number(truth), 1e-9);
+            near(
+                &format!("Fig {figure} {name} at {} s", point.0),
+                point.1,
+                number(truth),
+                1e-9,
+            );
         }
     }
 }
@@ -84,12 +130,22 @@ fn the_zeros_marked_in_fig_3_12_are_those_of_60_digits() {
             panic!("no ring {size}")
         };
         let terms = json!([[0.0, 0.0, 1.0], [10.0, 0.0, -size], [11.0, 0.0, size]]);
-        let Some(answers) = truth::ask(&[json!({"what": "modal", "terms": terms, "constant": 0.0})]) else { return };
+        let Some(answers) =
+            truth::ask(&[json!({"what": "modal", "terms": terms, "constant": 0.0})])
+        else {
+            return;
+        };
         let truth = pairs(&answers[0]["zeros"]);
         for (re, im) in points {
-            let distance = truth.iter().map(|zero| (zero.0 - re).hypot(zero.1 - im)).fold(f64::MAX, f64::min);
+            let distance = truth
+                .iter()
+                .map(|zero| (zero.0 - re).hypot(zero.1 - im))
+                .fold(f64::MAX, f64::min);
             // At 21 two zeros meet: they come apart by the root of the rounding.
-            assert!(distance < 1e-6 * re.hypot(*im), "{re} {im:+}j of α0 = {size} is {distance} off");
+            assert!(
+                distance < 1e-6 * re.hypot(*im),
+                "{re} {im:+}j of α0 = {size} is {distance} off"
+            );
         }
     }
 }
@@ -97,10 +153,24 @@ fn the_zeros_marked_in_fig_3_12_are_those_of_60_digits() {
 #[test]
 fn cells_of_the_maps_of_figs_2_5_and_5_2_are_black_where_python_has_a_cnmp_pair() {
     let bench = Bench::new();
-    for (figure, heading, profile) in [("2-5", "(a)", "chapter2"), ("5-2", "(a)", "chapter2"), ("5-2", "(b)", "stage")]
-    {
-        let cells = chart(figure, heading).marks.iter().find(|mark| matches!(mark, Mark::Cells { .. }));
-        let Some(Mark::Cells { x, y, rows, colours }) = cells else { panic!("no map") };
+    for (figure, heading, profile) in [
+        ("2-5", "(a)", "chapter2"),
+        ("5-2", "(a)", "chapter2"),
+        ("5-2", "(b)", "stage"),
+    ] {
+        let cells = chart(figure, heading)
+            .marks
+            .iter()
+            .find(|mark| matches!(mark, Mark::Cells { .. }));
+        let Some(Mark::Cells {
+            x,
+            y,
+            rows,
+            colours,
+        }) = cells
+        else {
+            panic!("no map")
+        };
         let black = colours.len() - 1;
         let mut questions = Vec::new();
         let mut expected = Vec::new();
@@ -113,13 +183,22 @@ fn cells_of_the_maps_of_figs_2_5_and_5_2_are_black_where_python_has_a_cnmp_pair(
             questions.push(json!({"what": "model", "config": config}));
             expected.push((asymmetry, point, usize::from(rows[j][i] == black)));
         }
-        let Some(answers) = truth::ask(&questions) else { return };
+        let Some(answers) = truth::ask(&questions) else {
+            return;
+        };
         let mut with = 0;
         for ((asymmetry, point, ours), truth) in expected.into_iter().zip(answers) {
-            assert_eq!(json!(ours), truth["cnmp_pairs"], "Fig {figure} at asymmetry {asymmetry}, {point} of L");
+            assert_eq!(
+                json!(ours),
+                truth["cnmp_pairs"],
+                "Fig {figure} at asymmetry {asymmetry}, {point} of L"
+            );
             with += ours;
         }
-        assert!((1..24).contains(&with), "both must be among the cells: {with} of 24");
+        assert!(
+            (1..24).contains(&with),
+            "both must be among the cells: {with} of 24"
+        );
     }
 }
 
@@ -138,17 +217,31 @@ fn every_point_of_the_circles_of_fig_1_3_sees_the_band_under_one_angle() {
 
 #[test]
 fn the_parabolas_of_fig_4_2_are_those_of_eq_4_3_and_touch_the_line_where_zeros_meet() {
-    for (name, residue) in [("αR = −1.0", -1.0), ("αR = 0.1", 0.1), ("αR = 2.0", 2.0), ("αR = 10.0", 10.0)] {
+    for (name, residue) in [
+        ("αR = −1.0", -1.0),
+        ("αR = 0.1", 0.1),
+        ("αR = 2.0", 2.0),
+        ("αR = 10.0", 10.0),
+    ] {
         for (x, y) in picked(curve("4-2", "(a)", name), 40) {
             // b2 x^2 + b1 x + b0 with au = -1, av = 1, wu^2 = 1, wv^2 = 2.
             let expected = residue * x * x + (3.0 * residue - 2.0 + 1.0) * x + 2.0 * residue;
             near("N(x)", y, expected, 1e-12 * (1.0 + expected.abs()));
         }
     }
-    for (_, points) in curves(chart("4-2", "(b)")).into_iter().filter(|(name, _)| name.starts_with("αR")) {
-        let least = points.iter().map(|point| point.1.abs()).fold(f64::MAX, f64::min);
+    for (_, points) in curves(chart("4-2", "(b)"))
+        .into_iter()
+        .filter(|(name, _)| name.starts_with("αR"))
+    {
+        let least = points
+            .iter()
+            .map(|point| point.1.abs())
+            .fold(f64::MAX, f64::min);
         // A grid of 0.02 stands 0.01 beside the point of contact at most, where N is up to 5.83 times its square.
-        assert!(points.iter().all(|point| point.1 > -1e-9) && least < 4e-3, "{least}");
+        assert!(
+            points.iter().all(|point| point.1 > -1e-9) && least < 4e-3,
+            "{least}"
+        );
     }
 }
 
@@ -156,11 +249,28 @@ fn the_parabolas_of_fig_4_2_are_those_of_eq_4_3_and_touch_the_line_where_zeros_m
 fn the_loci_of_fig_2_6_cross_where_python_says() {
     let bench = Bench::new();
     let config = bench.json("config show --config chapter2 --asymmetry 0");
-    let Some(answers) = truth::ask(&[json!({"what": "crossing", "config": config})]) else { return };
-    let lines: Vec<&[(f64, f64)]> = curves(chart("2-6", "(a)")).into_iter().map(|(_, points)| points).collect();
+    let Some(answers) = truth::ask(&[json!({"what": "crossing", "config": config})]) else {
+        return;
+    };
+    let lines: Vec<&[(f64, f64)]> = curves(chart("2-6", "(a)"))
+        .into_iter()
+        .map(|(_, points)| points)
+        .collect();
     // The first two are modes 3 and 4 at asymmetry 0; they are closest at the crossing.
     let gap = |k: &usize| (lines[0][*k].1 - lines[1][*k].1).abs();
-    let closest = (0..lines[0].len()).min_by(|a, b| gap(a).total_cmp(&gap(b))).expect("points");
-    near("the crossing in % of L", lines[0][closest].0, 100.0 * number(&answers[0]["operating_point"]), 0.1);
-    near("its frequency in Hz", lines[0][closest].1, number(&answers[0]["frequency_hz"]), 0.2);
+    let closest = (0..lines[0].len())
+        .min_by(|a, b| gap(a).total_cmp(&gap(b)))
+        .expect("points");
+    near(
+        "the crossing in % of L",
+        lines[0][closest].0,
+        100.0 * number(&answers[0]["operating_point"]),
+        0.1,
+    );
+    near(
+        "its frequency in Hz",
+        lines[0][closest].1,
+        number(&answers[0]["frequency_hz"]),
+        0.2,
+    );
 }

@@ -11,20 +11,38 @@ const QUIET_M_PER_N: f64 = 1e-9;
 #[test]
 fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
     for (ratio, opposite) in [(1.043, -1.0), (1.02, -1.0), (1.02, 1.0), (1.01, -1.0)] {
-        let (low, high) = (term(82.0, 0.004, -0.03), term(82.0 * ratio, 0.004, -0.02 * opposite));
+        let (low, high) = (
+            term(82.0, 0.004, -0.03),
+            term(82.0 * ratio, 0.004, -0.02 * opposite),
+        );
         let truth = [term(29.0, 0.009, 0.47), low, high];
         let fit = fit(&blocks(&truth, 0.0, QUIET_M_PER_N, 3), &View::Bare).unwrap();
         let modes = fit.modes();
         assert_eq!(modes.len(), 3, "{ratio}: {modes:?}");
         for (mode, truth) in modes.iter().zip(truth) {
-            let off = |estimate: bench::fit::Estimate, truth: f64| (estimate.value - truth).abs() / estimate.sigma;
+            let off = |estimate: bench::fit::Estimate, truth: f64| {
+                (estimate.value - truth).abs() / estimate.sigma
+            };
             // Nine numbers of a normal distribution: beyond 5 sigma once in 200,000.
-            assert!(off(mode.omega_rad_s, truth.omega_rad_s) < 5.0, "{ratio}: {mode:?}");
-            assert!(off(mode.damping_ratio, truth.damping_ratio) < 5.0, "{ratio}: {mode:?}");
-            assert!(off(mode.residue_per_kg, truth.residue_per_kg) < 5.0, "{ratio}: {mode:?}");
+            assert!(
+                off(mode.omega_rad_s, truth.omega_rad_s) < 5.0,
+                "{ratio}: {mode:?}"
+            );
+            assert!(
+                off(mode.damping_ratio, truth.damping_ratio) < 5.0,
+                "{ratio}: {mode:?}"
+            );
+            assert!(
+                off(mode.residue_per_kg, truth.residue_per_kg) < 5.0,
+                "{ratio}: {mode:?}"
+            );
             assert!(mode.sign_error_probability() < 1e-6);
         }
-        assert!((0.9..1.1).contains(&fit.chi2_per_freedom), "{}", fit.chi2_per_freedom);
+        assert!(
+            (0.9..1.1).contains(&fit.chi2_per_freedom),
+            "{}",
+            fit.chi2_per_freedom
+        );
     }
 }
 
@@ -33,7 +51,10 @@ fn a_delay_of_many_milliseconds_is_told_apart_from_the_modes() {
     for delay_s in [0.0, 1e-4, 1.7e-3, 6e-3, -2e-3] {
         let fit = fit(&blocks(&stage(), delay_s, QUIET_M_PER_N, 5), &View::Bare).unwrap();
         let delay = fit.delay_s();
-        assert!((delay.value - delay_s).abs() < 5.0 * delay.sigma, "{delay_s}: {delay:?}");
+        assert!(
+            (delay.value - delay_s).abs() < 5.0 * delay.sigma,
+            "{delay_s}: {delay:?}"
+        );
         assert!(delay.sigma < 1e-5, "{delay:?}");
         assert_eq!(fit.modes().len(), 3, "{delay_s}: {:?}", fit.modes());
     }
@@ -44,7 +65,9 @@ fn a_mode_below_the_noise_is_not_claimed() {
     // At its peak the second mode answers 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, a twentieth of the noise of a block.
     let truth = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 1e-7)];
     for seed in 0..20 {
-        let modes = fit(&blocks(&truth, 0.0, QUIET_M_PER_N, seed), &View::Bare).unwrap().modes();
+        let modes = fit(&blocks(&truth, 0.0, QUIET_M_PER_N, seed), &View::Bare)
+            .unwrap()
+            .modes();
         assert_eq!(modes.len(), 1, "{seed}: {modes:?}");
     }
 }
@@ -57,16 +80,36 @@ fn a_free_body_with_a_flexible_mode_is_one_double_integrator_and_one_mode() {
     assert_eq!(modes.len(), 2, "{modes:?}");
     assert_eq!(modes[0].omega_rad_s.value, 0.0);
     for (mode, truth) in modes.iter().zip(truth) {
-        assert!((mode.residue_per_kg.value - truth.residue_per_kg).abs() < 5.0 * mode.residue_per_kg.sigma, "{mode:?}");
+        assert!(
+            (mode.residue_per_kg.value - truth.residue_per_kg).abs()
+                < 5.0 * mode.residue_per_kg.sigma,
+            "{mode:?}"
+        );
     }
 }
 
 #[test]
 fn noise_alone_and_too_few_frequencies_are_refused() {
     let noise: Vec<Block> = blocks(&[], 0.0, 1e-6, 4);
-    assert!(matches!(fit(&noise, &View::Bare), Err(FitError::NoMode { .. })), "{:?}", fit(&noise, &View::Bare));
-    assert!(matches!(fit(&noise[..1], &View::Bare), Err(FitError::TooFew { blocks: 1 })));
-    assert!(matches!(fit(&[], &View::Bare), Err(FitError::TooFew { blocks: 0 })));
-    let dead: Vec<Block> = noise.iter().map(|b| Block { response: Complex::new(0.0, 0.0), ..*b }).collect();
+    assert!(
+        matches!(fit(&noise, &View::Bare), Err(FitError::NoMode { .. })),
+        "{:?}",
+        fit(&noise, &View::Bare)
+    );
+    assert!(matches!(
+        fit(&noise[..1], &View::Bare),
+        Err(FitError::TooFew { blocks: 1 })
+    ));
+    assert!(matches!(
+        fit(&[], &View::Bare),
+        Err(FitError::TooFew { blocks: 0 })
+    ));
+    let dead: Vec<Block> = noise
+        .iter()
+        .map(|b| Block {
+            response: Complex::new(0.0, 0.0),
+            ..*b
+        })
+        .collect();
     assert!(fit(&dead, &View::Bare).is_err());
 }

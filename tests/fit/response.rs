@@ -8,24 +8,47 @@ const DELAY_S: f64 = 3e-4;
 const REMAINDER_M_PER_N: f64 = 2e-6;
 
 fn fit(modes: Vec<Term>, covariance: DMatrix<f64>) -> ModalFit {
-    let parameters = Parameters { modes, remainder_m_per_n: REMAINDER_M_PER_N, delay_s: DELAY_S };
-    ModalFit { parameters, covariance, orders: Vec::new(), chi2_per_freedom: 1.0, band_hz: (1.0, 500.0) }
+    let parameters = Parameters {
+        modes,
+        remainder_m_per_n: REMAINDER_M_PER_N,
+        delay_s: DELAY_S,
+    };
+    ModalFit {
+        parameters,
+        covariance,
+        orders: Vec::new(),
+        chi2_per_freedom: 1.0,
+        band_hz: (1.0, 500.0),
+    }
 }
 
 fn term(omega_rad_s: f64, damping_ratio: f64, residue_per_kg: f64) -> Term {
-    Term { omega_rad_s, damping_ratio, residue_per_kg }
+    Term {
+        omega_rad_s,
+        damping_ratio,
+        residue_per_kg,
+    }
 }
 
 #[test]
 fn the_response_is_the_sum_of_modes_and_remainder_late() {
-    let modes = vec![term(184.0, 0.009, 0.47), term(516.0, 0.004, -0.03), term(0.0, 0.0, 0.01)];
+    let modes = vec![
+        term(184.0, 0.009, 0.47),
+        term(516.0, 0.004, -0.03),
+        term(0.0, 0.0, 0.01),
+    ];
     let frequency_hz = [1.0, 29.3, 82.0, 84.4, 300.0];
     let response = fit(modes.clone(), DMatrix::zeros(9, 9)).response(&View::Bare, &frequency_hz);
     for (f, h) in frequency_hz.iter().zip(response) {
         let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * f);
-        let of = |t: &Term| (s * s + s * (2.0 * t.damping_ratio * t.omega_rad_s) + t.omega_rad_s.powi(2)).inv();
-        let sum: Complex<f64> =
-            modes.iter().map(|t| of(t) * t.residue_per_kg).sum::<Complex<f64>>() + REMAINDER_M_PER_N;
+        let of = |t: &Term| {
+            (s * s + s * (2.0 * t.damping_ratio * t.omega_rad_s) + t.omega_rad_s.powi(2)).inv()
+        };
+        let sum: Complex<f64> = modes
+            .iter()
+            .map(|t| of(t) * t.residue_per_kg)
+            .sum::<Complex<f64>>()
+            + REMAINDER_M_PER_N;
         let truth = sum * (-s * DELAY_S).exp();
         // The remainder stands for modes far above, at 1e6 rad/s: 2 s / 1e6 of it, of 2e-6 m/N.
         assert!(
@@ -40,12 +63,20 @@ fn a_pole_and_its_covariance_are_those_of_frequency_and_damping() {
     let mut covariance = DMatrix::zeros(5, 5);
     (covariance[(0, 0)], covariance[(1, 1)]) = (4e-4, 9e-10);
     let fit = fit(vec![term(500.0, 0.6, 1.0)], covariance);
-    let [pole] = fit.poles()[..] else { panic!("one pole above the real axis") };
+    let [pole] = fit.poles()[..] else {
+        panic!("one pole above the real axis")
+    };
     // s = w (-0.6 + 0.8 j); by w (-0.6, 0.8), by zeta (-500, -500 0.6/0.8).
     assert!((pole.s - Complex::new(-300.0, 400.0)).norm() < 1e-12);
     let expected = [
-        [0.36 * 4e-4 + 250_000.0 * 9e-10, -0.48 * 4e-4 + 187_500.0 * 9e-10],
-        [-0.48 * 4e-4 + 187_500.0 * 9e-10, 0.64 * 4e-4 + 140_625.0 * 9e-10],
+        [
+            0.36 * 4e-4 + 250_000.0 * 9e-10,
+            -0.48 * 4e-4 + 187_500.0 * 9e-10,
+        ],
+        [
+            -0.48 * 4e-4 + 187_500.0 * 9e-10,
+            0.64 * 4e-4 + 140_625.0 * 9e-10,
+        ],
     ];
     for (row, truth) in pole.covariance.iter().zip(expected) {
         for (value, truth) in row.iter().zip(truth) {
@@ -57,7 +88,10 @@ fn a_pole_and_its_covariance_are_those_of_frequency_and_damping() {
 
 #[test]
 fn beyond_critical_damping_a_mode_has_two_real_poles_and_a_free_body_one_at_zero() {
-    let fit = fit(vec![term(0.0, 0.0, 1.0), term(100.0, 1.25, 1.0)], DMatrix::identity(6, 6));
+    let fit = fit(
+        vec![term(0.0, 0.0, 1.0), term(100.0, 1.25, 1.0)],
+        DMatrix::identity(6, 6),
+    );
     // -w (zeta -+ sqrt(zeta^2 - 1)) with the root 0.75.
     let poles: Vec<Complex<f64>> = fit.poles().iter().map(|pole| pole.s).collect();
     assert_eq!(poles, [0.0, -50.0, -200.0].map(|re| Complex::new(re, 0.0)));

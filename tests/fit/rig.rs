@@ -8,8 +8,14 @@ use crate::simulated;
 
 /// The default stage, identified at 1 kHz as in section 5.2.2.
 pub fn config(sets: &[String]) -> Config {
-    let sets = std::iter::once("loop.rate_hz=1000".to_string()).chain(sets.iter().cloned()).collect();
-    load(&Source { sets, ..Source::default() }).expect("the profile is valid")
+    let sets = std::iter::once("loop.rate_hz=1000".to_string())
+        .chain(sets.iter().cloned())
+        .collect();
+    load(&Source {
+        sets,
+        ..Source::default()
+    })
+    .expect("the profile is valid")
 }
 
 /// The analysis of a run with `config`, believing `believed`.

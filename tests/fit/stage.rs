@@ -15,13 +15,21 @@ pub type Truth = [f64; 3];
 /// The modes of the model, slowest first.
 pub fn model(config: &Config) -> Vec<Truth> {
     let modal = Modal::of(&plant::build(&config.plant).expect("a model")).expect("modes");
-    modal.modes.iter().map(|m| [m.omega_rad_s, m.damping_ratio, m.residue_per_kg()]).collect()
+    modal
+        .modes
+        .iter()
+        .map(|m| [m.omega_rad_s, m.damping_ratio, m.residue_per_kg()])
+        .collect()
 }
 
 /// The fitted mode that stands for one of the model, within half a percent of its frequency.
 pub fn stands_for(modes: &[FittedMode], omega_rad_s: f64) -> Option<FittedMode> {
     let off = |mode: &&FittedMode| (mode.omega_rad_s.value / omega_rad_s - 1.0).abs();
-    modes.iter().min_by(|a, b| off(a).total_cmp(&off(b))).filter(|mode| off(mode) < 5e-3).copied()
+    modes
+        .iter()
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .filter(|mode| off(mode) < 5e-3)
+        .copied()
 }
 
 /// On both cores.
@@ -47,10 +55,20 @@ fn both(count: u64, of: impl Fn(u64) -> Analysis + Sync) -> Vec<Analysis> {
 /// The fourth mode of the model, at 22.9 Hz, has 6e-6 of R's residue: nobody can see it, and R's takes over its static
 /// compliance, r_R + r_4 (w_R/w_4)^2, two of its own sigma.
 fn as_seen(modes: &[Truth]) -> Vec<Truth> {
-    let (shown, unseen): (Vec<Truth>, Vec<Truth>) = modes.iter().partition(|[_, _, residue]| residue.abs() > 1e-3);
-    let taken_over = |w: f64| unseen.iter().map(|[w4, _, r4]| r4 * (w / w4).powi(2)).sum::<f64>();
+    let (shown, unseen): (Vec<Truth>, Vec<Truth>) = modes
+        .iter()
+        .partition(|[_, _, residue]| residue.abs() > 1e-3);
+    let taken_over = |w: f64| {
+        unseen
+            .iter()
+            .map(|[w4, _, r4]| r4 * (w / w4).powi(2))
+            .sum::<f64>()
+    };
     let first = shown[0][0];
-    shown.into_iter().map(|[w, zeta, r]| [w, zeta, if w == first { r + taken_over(w) } else { r }]).collect()
+    shown
+        .into_iter()
+        .map(|[w, zeta, r]| [w, zeta, if w == first { r + taken_over(w) } else { r }])
+        .collect()
 }
 
 #[test]
@@ -65,12 +83,21 @@ fn intervals_of_95_percent_hold_frequency_damping_and_residue_in_90_to_98_percen
             let modes = analysis.fit.as_ref().expect("modes").modes();
             let mode = stands_for(&modes, truth[0]).expect("seen");
             let figures = [mode.omega_rad_s, mode.damping_ratio, mode.residue_per_kg];
-            let within = |(e, t): (Estimate, f64)| usize::from((e.value - t).abs() < 1.96 * e.sigma);
-            figures.into_iter().zip(truth).map(within).zip(&mut held).for_each(|(within, held)| *held += within);
+            let within =
+                |(e, t): (Estimate, f64)| usize::from((e.value - t).abs() < 1.96 * e.sigma);
+            figures
+                .into_iter()
+                .zip(truth)
+                .map(within)
+                .zip(&mut held)
+                .for_each(|(within, held)| *held += within);
         }
         println!("{:.3} rad/s: {held:?} of 200", truth[0]);
         // 190 +- 3.1 of 200.
-        assert!(held.iter().all(|held| (180..=196).contains(held)), "{truth:?}: {held:?} of 200");
+        assert!(
+            held.iter().all(|held| (180..=196).contains(held)),
+            "{truth:?}: {held:?} of 200"
+        );
     }
 }
 
@@ -82,19 +109,40 @@ fn intervals_of_95_percent_hold_frequency_damping_and_residue_in_90_to_98_percen
 #[test]
 fn modes_closer_than_their_widths_are_found_and_no_other() {
     let at = |seed: u64| {
-        let sets = ["plant.operating_point_m=0.0038", "plant.mass_asymmetry=0.1", &format!("sim.seed={}", 40 + seed)];
-        load(&Source { sets: sets.map(String::from).to_vec(), ..Source::default() }).expect("the profile is valid")
+        let sets = [
+            "plant.operating_point_m=0.0038",
+            "plant.mass_asymmetry=0.1",
+            &format!("sim.seed={}", 40 + seed),
+        ];
+        load(&Source {
+            sets: sets.map(String::from).to_vec(),
+            ..Source::default()
+        })
+        .expect("the profile is valid")
     };
-    let of = |m: &UnmodelledMode| [2.0 * std::f64::consts::PI * m.frequency_hz, m.damping_ratio, m.residue_per_kg];
+    let of = |m: &UnmodelledMode| {
+        [
+            2.0 * std::f64::consts::PI * m.frequency_hz,
+            m.damping_ratio,
+            m.residue_per_kg,
+        ]
+    };
     let unmodelled = at(0).sim.unmodelled;
-    let mut truth: Vec<Truth> = as_seen(&model(&at(0))).into_iter().chain(unmodelled.iter().map(of)).collect();
+    let mut truth: Vec<Truth> = as_seen(&model(&at(0)))
+        .into_iter()
+        .chain(unmodelled.iter().map(of))
+        .collect();
     truth.sort_by(|a, b| a[0].total_cmp(&b[0]));
     for analysis in both(8, |seed| analysed(&at(seed), &at(seed))) {
         let modes = analysis.fit.expect("modes").modes();
         assert_eq!(modes.len(), truth.len(), "{modes:?}");
         for (mode, truth) in modes.iter().zip(&truth) {
             let figures = [mode.omega_rad_s, mode.damping_ratio, mode.residue_per_kg];
-            let off = figures.iter().zip(truth).map(|(e, t)| ((e.value - t) / e.sigma).abs()).fold(0.0, f64::max);
+            let off = figures
+                .iter()
+                .zip(truth)
+                .map(|(e, t)| ((e.value - t) / e.sigma).abs())
+                .fold(0.0, f64::max);
             println!("{:.3} Hz: {off:.2} sigma", mode.frequency_hz().value);
             assert!(off < 4.5, "{mode:?} for {truth:?}");
         }

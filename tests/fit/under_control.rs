@@ -15,11 +15,21 @@ use crate::simulated;
 /// The default stage at its 5 kHz.
 fn config(sets: &[&str]) -> Config {
     let sets = sets.iter().map(|set| set.to_string()).collect();
-    load(&Source { sets, ..Source::default() }).expect("the profile is valid")
+    load(&Source {
+        sets,
+        ..Source::default()
+    })
+    .expect("the profile is valid")
 }
 
 fn swept(sets: &[&str]) -> Analysis {
-    let config = config(&[&["control.reference={ kind = \"chirp\", travel_m = 20e-6 }"], sets].concat());
+    let config = config(
+        &[
+            &["control.reference={ kind = \"chirp\", travel_m = 20e-6 }"],
+            sets,
+        ]
+        .concat(),
+    );
     let plan = Plan::control(config).expect("a plan");
     simulated::analysed(&plan, &plan.config).expect("an analysis")
 }
@@ -33,10 +43,19 @@ fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_wi
     let open = analysed(&plain, &plain).frf;
     let rig = Chain::of_mean_age(&plain, &sim::modes(&plain).expect("modes"));
     let mut carried = 0;
-    for (k, f) in closed.frf.frequency_hz.iter().enumerate().filter(|(_, f)| (0.5..450.0).contains(*f)) {
+    for (k, f) in closed
+        .frf
+        .frequency_hz
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| (0.5..450.0).contains(*f))
+    {
         let response = closed.frf.response[k];
         // The records differ by half a second, and so do their bins: the nearest one, with the rig's own ratio between.
-        let near = open.frequency_hz.partition_point(|other| other < f).min(open.len() - 1);
+        let near = open
+            .frequency_hz
+            .partition_point(|other| other < f)
+            .min(open.len() - 1);
         let moved = rig.response(TAU * f) / rig.response(TAU * open.frequency_hz[near]);
         let sure = closed.frf.magnitude_sigma[k] < CARRIED * response.norm()
             && open.magnitude_sigma[near] < CARRIED * open.response[near].norm();
@@ -44,11 +63,21 @@ fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_wi
             continue;
         }
         carried += 1;
-        assert!((response / rig.response(TAU * f) - 1.0).norm() < 0.01, "{f} Hz beside the rig: {response}");
+        assert!(
+            (response / rig.response(TAU * f) - 1.0).norm() < 0.01,
+            "{f} Hz beside the rig: {response}"
+        );
         // Two errors, each below 4 sigma of CARRIED.
-        assert!((response / (open.response[near] * moved) - 1.0).norm() < 0.014, "{f} Hz beside the open loop");
+        assert!(
+            (response / (open.response[near] * moved) - 1.0).norm() < 0.014,
+            "{f} Hz beside the open loop"
+        );
     }
-    assert!(carried as f64 > 0.7 * closed.frf.len() as f64, "{carried} of {}", closed.frf.len());
+    assert!(
+        carried as f64 > 0.7 * closed.frf.len() as f64,
+        "{carried} of {}",
+        closed.frf.len()
+    );
 }
 
 #[test]
@@ -56,19 +85,41 @@ fn its_modes_zeros_and_margins_are_told_as_well() {
     let closed = swept(&[]);
     let modes = closed.fit.as_ref().expect("modes").modes();
     // The model of the thesis at 8 % and +10 %: tests/identify/stage.rs has them from masses and beams.
-    for (mode, (omega_rad_s, residue_per_kg)) in
-        modes.iter().zip([(183.936_395, 0.471_522_5), (516.656_503, -0.031_943_85), (538.998_918, 0.020_850_64)])
-    {
-        assert!((mode.omega_rad_s.value / omega_rad_s - 1.0).abs() < 5e-4, "{mode:?}");
-        assert!((mode.residue_per_kg.value / residue_per_kg - 1.0).abs() < 0.03, "{mode:?}");
+    for (mode, (omega_rad_s, residue_per_kg)) in modes.iter().zip([
+        (183.936_395, 0.471_522_5),
+        (516.656_503, -0.031_943_85),
+        (538.998_918, 0.020_850_64),
+    ]) {
+        assert!(
+            (mode.omega_rad_s.value / omega_rad_s - 1.0).abs() < 5e-4,
+            "{mode:?}"
+        );
+        assert!(
+            (mode.residue_per_kg.value / residue_per_kg - 1.0).abs() < 0.03,
+            "{mode:?}"
+        );
     }
-    assert_eq!(closed.verdict.cnmp, Cnmp::Detected, "{}", closed.verdict.why);
+    assert_eq!(
+        closed.verdict.cnmp,
+        Cnmp::Detected,
+        "{}",
+        closed.verdict.why
+    );
     let around = closed.closed.expect("a loop");
-    let (measured, predicted) = (around.margins.modulus_margin, around.predicted.modulus_margin);
+    let (measured, predicted) = (
+        around.margins.modulus_margin,
+        around.predicted.modulus_margin,
+    );
     // 0.42 +- 0.0007; the unmodelled modes, of which the prediction knows nothing, take a thousandth of it.
-    assert!(measured.sigma < 0.005 && (measured.value - predicted).abs() < 4.0 * measured.sigma + 2e-3, "{measured:?}");
+    assert!(
+        measured.sigma < 0.005 && (measured.value - predicted).abs() < 4.0 * measured.sigma + 2e-3,
+        "{measured:?}"
+    );
     let crossover = around.margins.crossover_rad_s.expect("a crossover");
-    assert!((crossover / around.predicted.crossover_rad_s.expect("one") - 1.0).abs() < 2e-3, "{crossover}");
+    assert!(
+        (crossover / around.predicted.crossover_rad_s.expect("one") - 1.0).abs() < 2e-3,
+        "{crossover}"
+    );
 }
 
 /// By the plan from the model the stage moves no further than asked for (and by what the floor does), and the command no more
@@ -77,12 +128,19 @@ fn its_modes_zeros_and_margins_are_told_as_well() {
 fn a_planned_sweep_keeps_travel_and_current() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 10e-6 }";
     let plan = Plan::control(config(&[set, "chirp.duration_s=40"])).expect("a plan");
-    let ReferenceSettings::Chirp { amplitude, .. } = &plan.config.control.reference else { panic!() };
+    let ReferenceSettings::Chirp { amplitude, .. } = &plan.config.control.reference else {
+        panic!()
+    };
     assert!(amplitude.len() > 10 && amplitude.iter().all(|point| point.amplitude_m > 0.0));
     let folder = tempfile::tempdir().expect("a folder");
-    let recording = Recording::open(&simulated::recorded(&plan, folder.path())).expect("a recording");
+    let recording =
+        Recording::open(&simulated::recorded(&plan, folder.path())).expect("a recording");
     let (mut travel_m, mut current_a) = (0.0_f64, 0.0_f64);
-    for record in recording.ticks().expect("ticks").map(|record| record.expect("a tick")) {
+    for record in recording
+        .ticks()
+        .expect("ticks")
+        .map(|record| record.expect("a tick"))
+    {
         travel_m = travel_m.max(record.position_m.abs());
         current_a = current_a.max(record.command_a.abs());
     }
@@ -91,47 +149,87 @@ fn a_planned_sweep_keeps_travel_and_current() {
     assert!((5e-6..11.5e-6).contains(&travel_m), "{travel_m}");
     assert!((0.5..3.3).contains(&current_a), "{current_a}");
     let foreseen = plan.foreseen.expect("a course");
-    assert!((foreseen.travel_m - travel_m).abs() < 0.5e-6 && (foreseen.current_a / current_a - 1.0).abs() < 0.02);
-    assert_eq!(bench::session::replay(&recording).expect("a replay").different, 0);
+    assert!(
+        (foreseen.travel_m - travel_m).abs() < 0.5e-6
+            && (foreseen.current_a / current_a - 1.0).abs() < 0.02
+    );
+    assert_eq!(
+        bench::session::replay(&recording)
+            .expect("a replay")
+            .different,
+        0
+    );
 }
 
 /// The slow controller answers next to nothing of a reference at 450 Hz: to use up the chirp's current there it would take 60 m.
 #[test]
 fn a_planned_sweep_is_read_back_from_its_recording_whatever_the_controller() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
-    let sets = [set, "control.controller=slow", "chirp.duration_s=10", "chirp.fade_in_s=1"];
+    let sets = [
+        set,
+        "control.controller=slow",
+        "chirp.duration_s=10",
+        "chirp.fade_in_s=1",
+    ];
     let plan = Plan::control(config(&sets)).expect("a plan");
-    let ReferenceSettings::Chirp { amplitude, .. } = &plan.config.control.reference else { panic!() };
+    let ReferenceSettings::Chirp { amplitude, .. } = &plan.config.control.reference else {
+        panic!()
+    };
     // No reference that a person gives may reach beyond the soft limit of 0.9 mm; where the loop follows it is the travel.
-    let largest_m = amplitude.iter().map(|point| point.amplitude_m).fold(0.0, f64::max);
+    let largest_m = amplitude
+        .iter()
+        .map(|point| point.amplitude_m)
+        .fold(0.0, f64::max);
     assert!((0.89e-3..=0.9e-3).contains(&largest_m), "{largest_m}");
-    assert!((19e-6..21e-6).contains(&amplitude[0].amplitude_m), "{amplitude:?}");
+    assert!(
+        (19e-6..21e-6).contains(&amplitude[0].amplitude_m),
+        "{amplitude:?}"
+    );
     let folder = tempfile::tempdir().expect("a folder");
-    let recording = Recording::open(&simulated::recorded(&plan, folder.path())).expect("a recording");
-    assert_eq!(Plan::of(&recording).expect("the same plan").config, plan.config);
+    let recording =
+        Recording::open(&simulated::recorded(&plan, folder.path())).expect("a recording");
+    assert_eq!(
+        Plan::of(&recording).expect("the same plan").config,
+        plan.config
+    );
 }
 
 #[test]
 fn a_sweep_that_would_trip_an_interlock_is_refused_before_anything_moves() {
-    let point = |set: &str| format!("control.reference={{ kind = \"chirp\", travel_m = 1e-6, amplitude = [{set}] }}");
+    let point = |set: &str| {
+        format!("control.reference={{ kind = \"chirp\", travel_m = 1e-6, amplitude = [{set}] }}")
+    };
     for (amplitude, limit) in [
-        ("{ frequency_hz = 1.0, amplitude_m = 800e-6 }", "the motor's peak current"),
+        (
+            "{ frequency_hz = 1.0, amplitude_m = 800e-6 }",
+            "the motor's peak current",
+        ),
         // 600 um ask for 4 A at standstill, the motor stands 2.3.
         (
             "{ frequency_hz = 30.0, amplitude_m = 600e-6 }, { frequency_hz = 60.0, amplitude_m = 1e-6 }",
             "thermal current",
         ),
     ] {
-        let error = Plan::control(config(&[&point(amplitude)])).unwrap_err().to_string();
-        assert!(error.contains(limit) && error.contains("control.reference"), "{error}");
+        let error = Plan::control(config(&[&point(amplitude)]))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains(limit) && error.contains("control.reference"),
+            "{error}"
+        );
     }
 }
 
 #[test]
 fn a_loop_whose_reference_did_not_sweep_is_refused_with_the_remedy() {
     let plan = Plan::control(config(&["control.duration_s=1"])).expect("a plan");
-    let error = simulated::analysed(&plan, &plan.config).unwrap_err().to_string();
-    assert!(error.contains("step") && error.contains("--reference chirp"), "{error}");
+    let error = simulated::analysed(&plan, &plan.config)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("step") && error.contains("--reference chirp"),
+        "{error}"
+    );
 }
 
 /// What was recorded before it closed is of no loop: neither command nor reference.
@@ -139,16 +237,30 @@ fn a_loop_whose_reference_did_not_sweep_is_refused_with_the_remedy() {
 fn a_loop_that_never_closed_shows_nothing() {
     let swept = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
     // A third of the soft limit: one reading in 370 lies beyond it, of 2500 before the loop closes.
-    let sets = [swept, "chirp.duration_s=10", "chirp.fade_in_s=1", "sim.probe_noise_rms_m=3e-4"];
+    let sets = [
+        swept,
+        "chirp.duration_s=10",
+        "chirp.fade_in_s=1",
+        "sim.probe_noise_rms_m=3e-4",
+    ];
     let plan = Plan::control(config(&sets)).expect("a plan");
     let folder = tempfile::tempdir().expect("a folder");
     let (path, ended) = simulated::ended(&plan, folder.path());
     let (_, tick) = ended.trip.expect("a trip");
-    assert!((tick as f64) < plan.config.control.settle_s * 5000.0, "{ended:?}");
+    assert!(
+        (tick as f64) < plan.config.control.settle_s * 5000.0,
+        "{ended:?}"
+    );
     let recording = Recording::open(&path).expect("a recording");
-    let running =
-        recording.ticks().expect("ticks").filter(|tick| tick.as_ref().expect("whole").state == State::Running);
+    let running = recording
+        .ticks()
+        .expect("ticks")
+        .filter(|tick| tick.as_ref().expect("whole").state == State::Running);
     assert!(running.count() > 10, "the program ran");
     let answer = analyse(&recording, &plan.config);
-    assert!(matches!(answer, Err(AnalysisError::NothingRan)), "{:?}", answer.err());
+    assert!(
+        matches!(answer, Err(AnalysisError::NothingRan)),
+        "{:?}",
+        answer.err()
+    );
 }

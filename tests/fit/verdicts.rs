@@ -14,11 +14,20 @@ use crate::synthetic::{blocks, normal, stage, term};
 /// Points of the plane of section 5.2.2, operating point from 0 to 8 % of L and asymmetry from -10 to +10 %, by seed.
 fn points(count: usize, seed: u64) -> Vec<Vec<String>> {
     let mut normal = normal(seed);
-    let mut uniform = move || (normal() / 12.0 + 0.5).clamp(0.0, 1.0).mul_add(997.0, 0.31).fract();
+    let mut uniform = move || {
+        (normal() / 12.0 + 0.5)
+            .clamp(0.0, 1.0)
+            .mul_add(997.0, 0.31)
+            .fract()
+    };
     let set = |name: &str, value: f64| format!("{name}={value}");
     let point = |k| {
         let (y, d) = (uniform() * 0.08 * 0.0475, uniform() * 0.2 - 0.1);
-        vec![set("plant.operating_point_m", y), set("plant.mass_asymmetry", d), set("sim.seed", f64::from(k))]
+        vec![
+            set("plant.operating_point_m", y),
+            set("plant.mass_asymmetry", d),
+            set("sim.seed", f64::from(k)),
+        ]
     };
     (0..count as u32).map(point).collect()
 }
@@ -39,7 +48,10 @@ fn tally(count: usize, seed: u64, more: &[&str]) -> [usize; 3] {
             Cnmp::Excluded => 1,
             Cnmp::Undecided => 2,
         };
-        assert!(index == 2 || (index == 0) == (pairs > 0), "{sets:?}: {pairs} pairs, {said:?}");
+        assert!(
+            index == 2 || (index == 0) == (pairs > 0),
+            "{sets:?}: {pairs} pairs, {said:?}"
+        );
         tally[index] += 1;
     }
     tally
@@ -49,11 +61,18 @@ fn tally(count: usize, seed: u64, more: &[&str]) -> [usize; 3] {
 /// residue with its sign; of one that is not, the verdict says so.
 fn modes_are_true(config: &Config, analysis: &Analysis) {
     let modes = analysis.fit.as_ref().expect("modes").modes();
-    let sigma = modes.iter().map(|mode| mode.residue_per_kg.sigma).fold(0.0, f64::max);
+    let sigma = modes
+        .iter()
+        .map(|mode| mode.residue_per_kg.sigma)
+        .fold(0.0, f64::max);
     for [omega, damping, residue] in model(config) {
         let Some(mode) = stands_for(&modes, omega) else {
             let told = analysis.verdict.why.contains("are seen") || residue.abs() < 5.0 * sigma;
-            assert!(told, "{omega} rad/s, {residue} 1/kg: {:?}", analysis.verdict.why);
+            assert!(
+                told,
+                "{omega} rad/s, {residue} 1/kg: {:?}",
+                analysis.verdict.why
+            );
             continue;
         };
         if residue.abs() < 5.0 * mode.residue_per_kg.sigma {
@@ -62,9 +81,16 @@ fn modes_are_true(config: &Config, analysis: &Analysis) {
         let off = |e: Estimate, truth: f64| (e.value / truth - 1.0).abs();
         assert!(off(mode.omega_rad_s, omega) < 5e-4, "{omega}: {mode:?}");
         // Of a mode that just shows, the figures are as good as they say.
-        assert!(off(mode.damping_ratio, damping) < 0.05_f64.max(4.0 * mode.damping_ratio.sigma / damping), "{mode:?}");
+        assert!(
+            off(mode.damping_ratio, damping)
+                < 0.05_f64.max(4.0 * mode.damping_ratio.sigma / damping),
+            "{mode:?}"
+        );
         let known = 4.0 * mode.residue_per_kg.sigma / residue.abs();
-        assert!(off(mode.residue_per_kg, residue) < 0.03_f64.max(known), "{residue}: {mode:?}");
+        assert!(
+            off(mode.residue_per_kg, residue) < 0.03_f64.max(known),
+            "{residue}: {mode:?}"
+        );
         assert_eq!(mode.sign() == '+', residue > 0.0);
     }
 }
@@ -72,13 +98,20 @@ fn modes_are_true(config: &Config, analysis: &Analysis) {
 #[test]
 fn with_the_default_chirp_none_is_wrong_and_few_are_undecided() {
     let [detected, excluded, undecided] = tally(24, 1, &[]);
-    assert!(detected >= 3 && excluded >= 8 && undecided <= 6, "{detected} {excluded} {undecided}");
+    assert!(
+        detected >= 3 && excluded >= 8 && undecided <= 6,
+        "{detected} {excluded} {undecided}"
+    );
 }
 
 #[test]
 fn with_half_the_current_a_tenth_of_the_time_or_a_micrometre_of_noise_none_is_wrong() {
     let half = "chirp.amplitude=[{frequency_hz=0.1,current_a=0.2},{frequency_hz=8.0,current_a=0.2},{frequency_hz=20.0,current_a=0.05},{frequency_hz=45.0,current_a=0.05},{frequency_hz=70.0,current_a=0.5}]";
-    for more in [&[half][..], &["chirp.duration_s=11", "chirp.fade_in_s=0.5"], &["sim.probe_noise_rms_m=1e-6"]] {
+    for more in [
+        &[half][..],
+        &["chirp.duration_s=11", "chirp.fade_in_s=0.5"],
+        &["sim.probe_noise_rms_m=1e-6"],
+    ] {
         let [detected, excluded, _] = tally(8, 2, more);
         // A verdict that is never given is never wrong: half of the points at least are decided.
         assert!(detected + excluded >= 4, "{more:?}: {detected} {excluded}");
@@ -88,28 +121,51 @@ fn with_half_the_current_a_tenth_of_the_time_or_a_micrometre_of_noise_none_is_wr
 #[test]
 fn a_chain_that_answers_later_than_believed_is_never_taken_for_cnmp_zeros() {
     for extra_s in [2e-4, 1e-3, 4e-3] {
-        let sets = ["plant.operating_point_m=0.0032", "plant.mass_asymmetry=-0.05", "interlock.probe_stale_s=0.02"];
+        let sets = [
+            "plant.operating_point_m=0.0032",
+            "plant.mass_asymmetry=-0.05",
+            "interlock.probe_stale_s=0.02",
+        ];
         let sets = sets.map(String::from).to_vec();
         let believed = config(&sets);
         let mut real = believed.clone();
         real.probe.latency_s += extra_s;
         assert_eq!(truth(&real), 0);
         let analysis = analysed(&real, &believed);
-        assert_ne!(analysis.verdict.cnmp, Cnmp::Detected, "{:?}", analysis.verdict);
+        assert_ne!(
+            analysis.verdict.cnmp,
+            Cnmp::Detected,
+            "{:?}",
+            analysis.verdict
+        );
         let delay = analysis.fit.expect("modes").delay_s();
         // The delay put in, but for what a chain of 1 kHz folds back, which a delay turns the other way.
-        assert!((delay.value - extra_s).abs() < 1e-6 + 0.02 * extra_s, "{extra_s}: {delay:?}");
+        assert!(
+            (delay.value - extra_s).abs() < 1e-6 + 0.02 * extra_s,
+            "{extra_s}: {delay:?}"
+        );
     }
 }
 
 fn judged(modes: &[bench::zeros::Term], sigma_m_per_n: f64, expected: usize) -> Verdict {
     let blocks = blocks(modes, 0.0, sigma_m_per_n, 12);
-    judged_by(&fit(&blocks, &View::Bare).expect("modes"), &blocks, expected)
+    judged_by(
+        &fit(&blocks, &View::Bare).expect("modes"),
+        &blocks,
+        expected,
+    )
 }
 
 fn judged_by(fit: &ModalFit, blocks: &[Block], expected: usize) -> Verdict {
     let up_to_rad_s = std::f64::consts::TAU * 110.0;
-    verdict(&Case { fit, view: &View::Bare, blocks, up_to_rad_s, expected_modes: Some(expected) }).expect("zeros")
+    verdict(&Case {
+        fit,
+        view: &View::Bare,
+        blocks,
+        up_to_rad_s,
+        expected_modes: Some(expected),
+    })
+    .expect("zeros")
 }
 
 #[test]
@@ -126,7 +182,10 @@ fn what_is_not_a_number_is_never_sure() {
     }
     // A response of nothing has no phase, and no logarithm of its magnitude.
     let mut dead = blocks.clone();
-    let valley = dead.iter().position(|block| block.frequency_hz > 84.0).expect("in the band");
+    let valley = dead
+        .iter()
+        .position(|block| block.frequency_hz > 84.0)
+        .expect("in the band");
     dead[valley].response = Complex::new(0.0, 0.0);
     assert_eq!(judged_by(&good, &dead, 3).cnmp, Cnmp::Undecided);
     // The same of a stage without CNMP zeros, which half a turn of nothing must not exclude.
@@ -142,31 +201,54 @@ fn what_is_not_a_number_is_never_sure() {
 fn the_words_of_an_undecided_verdict_name_what_is_missing() {
     assert_eq!(judged(&stage(), 1e-9, 3).cnmp, Cnmp::Detected);
     let unseen = judged(&stage(), 1e-9, 4);
-    assert!(unseen.cnmp == Cnmp::Undecided && unseen.why.contains("3 of the 4 modes"), "{}", unseen.why);
+    assert!(
+        unseen.cnmp == Cnmp::Undecided && unseen.why.contains("3 of the 4 modes"),
+        "{}",
+        unseen.why
+    );
     let alone = judged(&[term(29.0, 0.009, 0.47)], 1e-9, 1);
-    assert!(alone.cnmp == Cnmp::Undecided && alone.why.contains("fewer than two modes"), "{}", alone.why);
+    assert!(
+        alone.cnmp == Cnmp::Undecided && alone.why.contains("fewer than two modes"),
+        "{}",
+        alone.why
+    );
 }
 
 #[test]
 fn where_the_zeros_touch_the_axis_nothing_is_said() {
     // The asymmetry of the default stage at 8 % of L for which a damped zero is on the axis lies between 0 and 2 %.
     let structure = |d: f64| {
-        let sets = ["plant.operating_point_m=0.0038".to_string(), format!("plant.mass_asymmetry={d:.17}")];
+        let sets = [
+            "plant.operating_point_m=0.0038".to_string(),
+            format!("plant.mass_asymmetry={d:.17}"),
+        ];
         plant::build(&config(&sets).plant).expect("a model")
     };
-    let pairs = |d: f64| bench::zeros::cnmp_pairs(&bench::zeros::damped_zeros(&structure(d)).expect("zeros"));
+    let pairs = |d: f64| {
+        bench::zeros::cnmp_pairs(&bench::zeros::damped_zeros(&structure(d)).expect("zeros"))
+    };
     let (mut low, mut high) = (-0.02, 0.02);
     assert!(pairs(low) == 0 && pairs(high) == 1);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if pairs(middle) == 0 { low = middle } else { high = middle }
+        if pairs(middle) == 0 {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     let modal = Modal::of(&structure(low)).expect("modes");
     let terms: Vec<_> = modal
         .modes
         .iter()
         .filter(|mode| mode.residue_per_kg().abs() > 1e-4)
-        .map(|mode| term(mode.omega_rad_s / std::f64::consts::TAU, mode.damping_ratio, mode.residue_per_kg()))
+        .map(|mode| {
+            term(
+                mode.omega_rad_s / std::f64::consts::TAU,
+                mode.damping_ratio,
+                mode.residue_per_kg(),
+            )
+        })
         .collect();
     assert_eq!(terms.len(), 3);
     let said = judged(&terms, 1e-9, 3);

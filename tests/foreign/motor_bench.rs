@@ -13,7 +13,10 @@ fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("BENCH_SHARED_DATA").map_or(beside, PathBuf::from);
     let path = folder.join("motor-bench-multisine.csv");
     if !path.is_file() {
-        eprintln!("not tested: {} is missing; BENCH_SHARED_DATA names the folder that has it", path.display());
+        eprintln!(
+            "not tested: {} is missing; BENCH_SHARED_DATA names the folder that has it",
+            path.display()
+        );
         return None;
     }
     Some(path)
@@ -30,15 +33,28 @@ fn side(path: &Path, output: &str) -> Side {
     let bench = Bench::new();
     let path = path.display();
     let columns = format!("--input current_a --output {output} --time time_s");
-    let answer =
-        bench.json(&format!("identify {path} {columns} --period 2500 --skip-periods 2 --band 11:250 --out results"));
+    let answer = bench.json(&format!(
+        "identify {path} {columns} --period 2500 --skip-periods 2 --band 11:250 --out results"
+    ));
     let residue = |mode: &Value| number(&mode["residue"]).abs();
     let all = answer["modes"].as_array().expect("modes");
     let largest = all.iter().map(residue).fold(0.0, f64::max);
-    let modes = all.iter().filter(|mode| residue(mode) > 0.2 * largest).cloned().collect();
+    let modes = all
+        .iter()
+        .filter(|mode| residue(mode) > 0.2 * largest)
+        .cloned()
+        .collect();
     let text = bench.read(answer["frf_csv"].as_str().expect("a path"));
-    let row = |line: &str| line.split(',').map(|cell| cell.parse().expect("a number")).collect();
-    Side { modes, frf: text.lines().skip(1).map(row).collect(), answer }
+    let row = |line: &str| {
+        line.split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect()
+    };
+    Side {
+        modes,
+        frf: text.lines().skip(1).map(row).collect(),
+        answer,
+    }
 }
 
 impl Side {
@@ -49,8 +65,13 @@ impl Side {
 
     /// Where between two frequencies |H| is least, or with -1 greatest.
     fn least(&self, from_hz: f64, to_hz: f64, sign: f64) -> f64 {
-        let within = self.frf.iter().filter(|row| (from_hz..=to_hz).contains(&row[0]));
-        within.min_by(|a, b| (sign * a[1]).total_cmp(&(sign * b[1]))).expect("lines")[0]
+        let within = self
+            .frf
+            .iter()
+            .filter(|row| (from_hz..=to_hz).contains(&row[0]));
+        within
+            .min_by(|a, b| (sign * a[1]).total_cmp(&(sign * b[1])))
+            .expect("lines")[0]
     }
 }
 
@@ -58,51 +79,109 @@ impl Side {
 fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
     assert_eq!(side.modes.len(), 2, "{}", side.answer["modes"]);
     let (rigid, flexible) = (&side.modes[0], &side.modes[1]);
-    assert!(number(&rigid["frequency_hz"]) < 6.0, "a body on no spring, but for its friction: {rigid}");
-    assert_eq!((rigid["sign"].as_str(), flexible["sign"].as_str()), (Some("+"), Some(sign)));
+    assert!(
+        number(&rigid["frequency_hz"]) < 6.0,
+        "a body on no spring, but for its friction: {rigid}"
+    );
+    assert_eq!(
+        (rigid["sign"].as_str(), flexible["sign"].as_str()),
+        (Some("+"), Some(sign))
+    );
     for mode in &side.modes {
         assert!(number(&mode["sign_error_probability"]) < 1e-6, "{mode}");
     }
     let text = path.display().to_string();
-    let Some(theirs) = python::numbers("motor_bench.py", &[&text, output], "") else { return };
+    let Some(theirs) = python::numbers("motor_bench.py", &[&text, output], "") else {
+        return;
+    };
     // Friction and play, which no sum of modes has, lead both programs astray as their weights have it; both count what is left as
     // noise. Of eight differences one is beyond 3 of their sigma once in fifty.
-    let ours = [(rigid, "residue"), (flexible, "frequency_hz"), (flexible, "damping_ratio"), (flexible, "residue")];
+    let ours = [
+        (rigid, "residue"),
+        (flexible, "frequency_hz"),
+        (flexible, "damping_ratio"),
+        (flexible, "residue"),
+    ];
     for ((mode, name), row) in ours.into_iter().zip(&theirs) {
         let (value, sigma) = (number(&mode[name]), number(&mode[&format!("{name}_sigma")]));
         let wide = 3.0 * sigma.hypot(row[1]);
-        eprintln!("{output} {name}: {value} +- {:.2e}, by scipy {} +- {:.2e}", 2.0 * sigma, row[0], 2.0 * row[1]);
-        assert!((value - row[0]).abs() < wide, "{output} {name}: {value} +- {sigma}, by scipy {row:?}");
-        assert!(sigma > 0.0 && sigma < 0.2 * value.abs(), "{output} {name}: {value} +- {sigma}");
+        eprintln!(
+            "{output} {name}: {value} +- {:.2e}, by scipy {} +- {:.2e}",
+            2.0 * sigma,
+            row[0],
+            2.0 * row[1]
+        );
+        assert!(
+            (value - row[0]).abs() < wide,
+            "{output} {name}: {value} +- {sigma}, by scipy {row:?}"
+        );
+        assert!(
+            sigma > 0.0 && sigma < 0.2 * value.abs(),
+            "{output} {name}: {value} +- {sigma}"
+        );
     }
 }
 
 #[test]
 fn the_residues_agree_at_the_motor_and_differ_at_the_load() {
     let Some(path) = data() else { return };
-    let (motor, load) = (side(&path, "motor_angle_rad"), side(&path, "load_angle_rad"));
+    let (motor, load) = (
+        side(&path, "motor_angle_rad"),
+        side(&path, "load_angle_rad"),
+    );
     // From the periodic average of others in the data's README, in three digits.
-    for (side, hz, expected) in
-        [(&motor, 40.0, 1.03e-3), (&load, 40.0, 2.25e-3), (&motor, 100.0, 8.83e-4), (&load, 100.0, 3.62e-4)]
-    {
-        assert!((side.magnitude(hz) / expected - 1.0).abs() < 0.006, "{hz} Hz: {}", side.magnitude(hz));
+    for (side, hz, expected) in [
+        (&motor, 40.0, 1.03e-3),
+        (&load, 40.0, 2.25e-3),
+        (&motor, 100.0, 8.83e-4),
+        (&load, 100.0, 3.62e-4),
+    ] {
+        assert!(
+            (side.magnitude(hz) / expected - 1.0).abs() < 0.006,
+            "{hz} Hz: {}",
+            side.magnitude(hz)
+        );
     }
-    assert!((51.0..=55.0).contains(&motor.least(40.0, 65.0, 1.0)), "antiresonance at the motor");
+    assert!(
+        (51.0..=55.0).contains(&motor.least(40.0, 65.0, 1.0)),
+        "antiresonance at the motor"
+    );
     let valley = |side: &Side| -> Vec<f64> {
         let zeros = side.answer["zeros"].as_array().expect("zeros");
-        let hz = |zero: &Value| number(&zero["re_rad_s"]).hypot(number(&zero["im_rad_s"])) / std::f64::consts::TAU;
-        zeros.iter().map(hz).filter(|hz| (20.0..120.0).contains(hz)).collect()
+        let hz = |zero: &Value| {
+            number(&zero["re_rad_s"]).hypot(number(&zero["im_rad_s"])) / std::f64::consts::TAU
+        };
+        zeros
+            .iter()
+            .map(hz)
+            .filter(|hz| (20.0..120.0).contains(hz))
+            .collect()
     };
-    assert!(matches!(valley(&motor)[..], [hz] if (52.0..55.0).contains(&hz)), "{:?}", valley(&motor));
-    assert_eq!(valley(&load), [0.0; 0], "between modes of opposite residues there is no zero");
+    assert!(
+        matches!(valley(&motor)[..], [hz] if (52.0..55.0).contains(&hz)),
+        "{:?}",
+        valley(&motor)
+    );
+    assert_eq!(
+        valley(&load),
+        [0.0; 0],
+        "between modes of opposite residues there is no zero"
+    );
     for side in [&motor, &load] {
-        assert!((75.0..=77.0).contains(&side.least(60.0, 90.0, -1.0)), "resonance");
+        assert!(
+            (75.0..=77.0).contains(&side.least(60.0, 90.0, -1.0)),
+            "resonance"
+        );
         assert_eq!(side.answer["periods"], 17);
         assert_eq!(side.answer["frequencies"], 240);
         // Friction and play are hundreds of times above the noise of 17 periods: it is told, and no verdict given.
         assert!(number(&side.answer["fit_chi2_per_freedom"]) > 10.0);
         assert_eq!(side.answer["cnmp"], "undecided");
-        assert!(side.answer["why"].as_str().is_some_and(|why| why.contains("times the power of the noise")));
+        assert!(
+            side.answer["why"]
+                .as_str()
+                .is_some_and(|why| why.contains("times the power of the noise"))
+        );
     }
     compare(&path, "motor_angle_rad", &motor, "+");
     compare(&path, "load_angle_rad", &load, "-");

@@ -16,7 +16,10 @@ fn step(state: (f64, f64), (hz, zeta, residue): (f64, f64, f64), force: f64) -> 
         let b = slope(plus(s, a, h / 2.0));
         let c = slope(plus(s, b, h / 2.0));
         let d = slope(plus(s, c, h));
-        (s.0 + h / 6.0 * (a.0 + 2.0 * (b.0 + c.0) + d.0), s.1 + h / 6.0 * (a.1 + 2.0 * (b.1 + c.1) + d.1))
+        (
+            s.0 + h / 6.0 * (a.0 + 2.0 * (b.0 + c.0) + d.0),
+            s.1 + h / 6.0 * (a.1 + 2.0 * (b.1 + c.1) + d.1),
+        )
     })
 }
 
@@ -32,14 +35,22 @@ fn a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold() {
     let mut normal = crate::signals::normal(5);
     let output_m = input_a.iter().map(|force| {
         let position: f64 = states.iter().map(|(x, _)| x).sum();
-        states.iter_mut().zip(STAGE).for_each(|(state, mode)| *state = step(*state, mode, *force));
+        states
+            .iter_mut()
+            .zip(STAGE)
+            .for_each(|(state, mode)| *state = step(*state, mode, *force));
         // Below 1e-7 the bend of sin(x)/x over the band stands out of the noise, and is fitted with a mode of its own.
         position + 3e-7 * normal()
     });
-    let signals = Signals { rate_hz: RATE_HZ, output_m: output_m.collect(), input_a };
+    let signals = Signals {
+        rate_hz: RATE_HZ,
+        output_m: output_m.collect(),
+        input_a,
+    };
     let bench = Bench::new();
     bench.write("data.csv", csv(&signals));
-    let answer = bench.json("identify data.csv --input force_n --output position_m --time time_s --band 8:150");
+    let answer = bench
+        .json("identify data.csv --input force_n --output position_m --time time_s --band 8:150");
     let modes = answer["modes"].as_array().expect("modes");
     assert_eq!(modes.len(), 2, "{answer}");
     for (mode, (hz, zeta, residue)) in modes.iter().zip(STAGE) {
@@ -48,7 +59,12 @@ fn a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold() {
         near("damping", number(&mode["damping_ratio"]), zeta, 0.03 * zeta);
         near("residue", number(&mode["residue"]), residue, 0.03 * residue);
     }
-    near("delay", number(&answer["fit_delay_s"]), 0.5 / RATE_HZ, 0.05 / RATE_HZ);
+    near(
+        "delay",
+        number(&answer["fit_delay_s"]),
+        0.5 / RATE_HZ,
+        0.05 / RATE_HZ,
+    );
 }
 
 /// The stage of [`a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold`] by another excitation: an impulse, whose answer
@@ -62,26 +78,55 @@ fn a_record_gets_the_pictures_and_the_page_that_a_run_gets() {
             let w = std::f64::consts::TAU * hz;
             residue / w * (-zeta * w * t).exp() * (w * t).sin()
         };
-        if t > 0.0 { STAGE.map(one).iter().sum() } else { 0.0 }
+        if t > 0.0 {
+            STAGE.map(one).iter().sum()
+        } else {
+            0.0
+        }
     };
     let mut normal = crate::signals::normal(5);
-    let output_m = (0..20_000).map(|n| ring((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal()).collect();
+    let output_m = (0..20_000)
+        .map(|n| ring((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal())
+        .collect();
     let bench = Bench::new();
-    bench.write("data.csv", csv(&Signals { rate_hz: RATE_HZ, output_m, input_a }));
+    bench.write(
+        "data.csv",
+        csv(&Signals {
+            rate_hz: RATE_HZ,
+            output_m,
+            input_a,
+        }),
+    );
     let answer =
         bench.json("identify data.csv --input force_n --output position_m --time time_s --band 8:150 --out seen");
     for kind in ["bode", "coherence", "nyquist", "pole_zero", "stability"] {
         let picture = bench.read(answer["plots"][kind].as_str().expect(kind));
-        assert!(picture.starts_with("<svg") && !picture.contains("m/A"), "{kind}");
+        assert!(
+            picture.starts_with("<svg") && !picture.contains("m/A"),
+            "{kind}"
+        );
     }
     for kind in ["loop", "sensitivity", "linearity"] {
         assert!(answer["plots"][kind].is_null(), "{kind}");
     }
     let page = bench.read(answer["report"].as_str().expect("a page"));
     let verdict = answer["cnmp"].as_str().expect("a verdict");
-    let words = ["force_n to position_m", verdict, "<h2>Modes", "position_m per force_n and s^2", "<svg", "20000"];
-    let places: Vec<usize> = words.iter().map(|words| page.find(words).unwrap_or_else(|| panic!("{words}"))).collect();
-    assert!(places.is_sorted(), "the verdict first, the pictures after the modes: {places:?}");
+    let words = [
+        "force_n to position_m",
+        verdict,
+        "<h2>Modes",
+        "position_m per force_n and s^2",
+        "<svg",
+        "20000",
+    ];
+    let places: Vec<usize> = words
+        .iter()
+        .map(|words| page.find(words).unwrap_or_else(|| panic!("{words}")))
+        .collect();
+    assert!(
+        places.is_sorted(),
+        "the verdict first, the pictures after the modes: {places:?}"
+    );
     let elsewhere = page.matches("://").count() - page.matches("http://www.w3.org").count();
     assert_eq!(elsewhere, 0, "nothing from elsewhere");
 }

@@ -8,7 +8,10 @@ use crate::signals::{PERIOD, multisine, response};
 const BAND_HZ: (f64, f64) = (5.0, 200.0);
 
 fn whole(skip: usize) -> Repetition {
-    Repetition { period: PERIOD, skip }
+    Repetition {
+        period: PERIOD,
+        skip,
+    }
 }
 
 fn lines(step: usize) -> Vec<usize> {
@@ -18,13 +21,19 @@ fn lines(step: usize) -> Vec<usize> {
 #[test]
 fn the_response_is_exact_in_spite_of_drift_and_of_a_first_period_that_settles() {
     let mut signals = multisine(&lines(1), 8, 3e-3, 0.0, 1);
-    signals.output_m[..PERIOD].iter_mut().enumerate().for_each(|(n, y)| *y += 1e-2 * (-(n as f64) / 30.0).exp());
+    signals.output_m[..PERIOD]
+        .iter_mut()
+        .enumerate()
+        .for_each(|(n, y)| *y += 1e-2 * (-(n as f64) / 30.0).exp());
     let periods = estimate(&signals, BAND_HZ, whole(1)).unwrap();
     assert_eq!((periods.count, periods.frf.len()), (6, 196));
     for (f, h) in periods.frf.frequency_hz.iter().zip(&periods.frf.response) {
         let exact = response(*f);
         // 1000 roundings of samples of 0.02, in a line of 1e-6 times 500: 1e-15 x 0.02 x sqrt(1000)/5e-4.
-        assert!((h - exact).norm() < 1e-10 + 1e-9 * exact.norm(), "{f} Hz: {h} is not {exact}");
+        assert!(
+            (h - exact).norm() < 1e-10 + 1e-9 * exact.norm(),
+            "{f} Hz: {h} is not {exact}"
+        );
     }
 }
 
@@ -40,7 +49,12 @@ fn only_excited_lines_are_told() {
 fn the_errors_are_as_large_as_they_say() {
     let (mut ratio, mut count) = (0.0, 0.0);
     for seed in 0..20 {
-        let periods = estimate(&multisine(&lines(1), 12, 0.0, 1e-6, seed), BAND_HZ, whole(1)).unwrap();
+        let periods = estimate(
+            &multisine(&lines(1), 12, 0.0, 1e-6, seed),
+            BAND_HZ,
+            whole(1),
+        )
+        .unwrap();
         for block in &periods.blocks {
             ratio += (block.response - response(block.frequency_hz)).norm_sqr() / block.variance;
             count += 1.0;
@@ -55,29 +69,59 @@ fn the_errors_are_as_large_as_they_say() {
 #[test]
 fn response_and_variance_are_those_of_numpy() {
     let signals = multisine(&lines(3), 7, 1e-3, 1e-6, 3);
-    let rows: String = signals.input_a.iter().zip(&signals.output_m).map(|(u, y)| format!("{u:e} {y:e}\n")).collect();
-    let arguments = [PERIOD.to_string(), "2".into(), "5".into(), "200".into(), "3".into()];
+    let rows: String = signals
+        .input_a
+        .iter()
+        .zip(&signals.output_m)
+        .map(|(u, y)| format!("{u:e} {y:e}\n"))
+        .collect();
+    let arguments = [
+        PERIOD.to_string(),
+        "2".into(),
+        "5".into(),
+        "200".into(),
+        "3".into(),
+    ];
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let Some(theirs) = python::numbers("periodic.py", &arguments, &rows) else { return };
+    let Some(theirs) = python::numbers("periodic.py", &arguments, &rows) else {
+        return;
+    };
     let ours = estimate(&signals, BAND_HZ, whole(2)).unwrap().blocks;
     assert_eq!(theirs.len(), ours.len());
     for (row, block) in theirs.iter().zip(&ours) {
-        let off = (block.response.re - row[1]).hypot(block.response.im - row[2]) / row[1].hypot(row[2]);
+        let off =
+            (block.response.re - row[1]).hypot(block.response.im - row[2]) / row[1].hypot(row[2]);
         // FFTs of other hands differ by roundings of the largest line, 1e3 times the smallest.
-        assert!(block.frequency_hz == row[0] && off < 1e-9, "{row:?}: {block:?}");
-        assert!((block.variance / row[3] - 1.0).abs() < 1e-6, "{row:?}: {block:?}");
+        assert!(
+            block.frequency_hz == row[0] && off < 1e-9,
+            "{row:?}: {block:?}"
+        );
+        assert!(
+            (block.variance / row[3] - 1.0).abs() < 1e-6,
+            "{row:?}: {block:?}"
+        );
     }
 }
 
 #[test]
 fn periods_that_are_none_are_refused() {
     let signals = multisine(&lines(1), 8, 0.0, 1e-7, 4);
-    let refused = |period, skip| estimate(&signals, BAND_HZ, Repetition { period, skip }).unwrap_err();
+    let refused =
+        |period, skip| estimate(&signals, BAND_HZ, Repetition { period, skip }).unwrap_err();
     for (period, skip) in [(0, 0), (1, 0), (7, 0), (8001, 0), (usize::MAX, 0)] {
-        assert!(matches!(refused(period, skip), IdentifyError::Setting { name: "period", .. }), "{period}");
+        assert!(
+            matches!(
+                refused(period, skip),
+                IdentifyError::Setting { name: "period", .. }
+            ),
+            "{period}"
+        );
     }
     for (period, skip) in [(PERIOD, 4), (PERIOD, usize::MAX), (2000, 0), (8000, 0)] {
-        assert!(matches!(refused(period, skip), IdentifyError::Periods { .. }), "{period} {skip}");
+        assert!(
+            matches!(refused(period, skip), IdentifyError::Periods { .. }),
+            "{period} {skip}"
+        );
     }
     // A band between lines that the period has.
     assert!(estimate(&signals, (5.2, 5.8), whole(0)).is_err());

@@ -11,7 +11,11 @@ fn asked(text: impl AsRef<[u8]>, more: &str) -> Answer {
     let bench = Bench::new();
     bench.write("data.csv", text);
     let answer = bench.run(&format!("{ASKED} {more}"));
-    assert!(answer.code == 0 || bench.files() == ["data.csv"], "{:?}", bench.files());
+    assert!(
+        answer.code == 0 || bench.files() == ["data.csv"],
+        "{:?}",
+        bench.files()
+    );
     answer
 }
 
@@ -21,29 +25,54 @@ fn good() -> String {
 
 /// The good file with one of its lines changed.
 fn with_line(number: usize, change: impl Fn(&str) -> String) -> String {
-    let line = |(k, line): (usize, &str)| if k + 1 == number { change(line) } else { format!("{line}\n") };
+    let line = |(k, line): (usize, &str)| {
+        if k + 1 == number {
+            change(line)
+        } else {
+            format!("{line}\n")
+        }
+    };
     good().lines().enumerate().map(line).collect()
 }
 
 #[test]
 fn options_that_do_not_go_with_the_file_are_refused() {
     for (more, words) in [
-        ("", &["--time COLUMN", "time_s, force_n, position_m", "--rate"][..]),
-        ("--time t", &["no column `t`", "time_s, force_n, position_m"]),
+        (
+            "",
+            &["--time COLUMN", "time_s, force_n, position_m", "--rate"][..],
+        ),
+        (
+            "--time t",
+            &["no column `t`", "time_s, force_n, position_m"],
+        ),
         ("--time force_n", &["`force_n` is asked for twice"]),
         ("--time time_s --rate 1000", &["--rate"]),
         ("--rate 1000 --skip-periods 1", &["--period"]),
-        ("--rate 1000 --period 2.5", &["--period 2.5", "whole number"]),
-        ("--rate 1000 --period inf", &["--period inf", "whole number"]),
-        ("--rate 1000 --period 0.99995s", &["--period 0.99995s", "1000 Hz"]),
+        (
+            "--rate 1000 --period 2.5",
+            &["--period 2.5", "whole number"],
+        ),
+        (
+            "--rate 1000 --period inf",
+            &["--period inf", "whole number"],
+        ),
+        (
+            "--rate 1000 --period 0.99995s",
+            &["--period 0.99995s", "1000 Hz"],
+        ),
         ("--rate 1000 --band 5-200", &["--band 5-200", "11:250"]),
     ] {
         asked(good(), more).is_refused(words);
     }
     let bench = Bench::new();
     bench.write("data.csv", good());
-    bench.run("identify data.csv").is_refused(&["which columns", "time_s, force_n, position_m"]);
-    bench.run("identify data.csv --input force_n").is_refused(&["--output"]);
+    bench
+        .run("identify data.csv")
+        .is_refused(&["which columns", "time_s, force_n, position_m"]);
+    bench
+        .run("identify data.csv --input force_n")
+        .is_refused(&["--output"]);
 }
 
 #[test]
@@ -66,27 +95,61 @@ fn data_that_are_no_record_fail_with_their_place() {
             with_line(17, |_| "0.015,banana,1\n".into()),
             &["line 17", "\"banana\"", "`force_n`", "not a finite number"][..],
         ),
-        (with_line(18, |_| "0.016,1,\n".into()), &["line 18", "\"\"", "`position_m`"]),
-        (with_line(19, |_| "0.017,nan,1\n".into()), &["line 19", "\"nan\""]),
-        (with_line(20, |_| "0.018,1\n".into()), &["line: 20", "2 fields"]),
-        (gap, &["line 40", "0.002000000 s after", "median step", "--rate"]),
-        (with_line(50, |line| format!("{line}\n{line}\n")), &["line 51", "not after", "sort the lines"]),
-        (with_line(60, |_| "-1,1,1\n".into()), &["line 60", "-1 s", "not after"]),
+        (
+            with_line(18, |_| "0.016,1,\n".into()),
+            &["line 18", "\"\"", "`position_m`"],
+        ),
+        (
+            with_line(19, |_| "0.017,nan,1\n".into()),
+            &["line 19", "\"nan\""],
+        ),
+        (
+            with_line(20, |_| "0.018,1\n".into()),
+            &["line: 20", "2 fields"],
+        ),
+        (
+            gap,
+            &["line 40", "0.002000000 s after", "median step", "--rate"],
+        ),
+        (
+            with_line(50, |line| format!("{line}\n{line}\n")),
+            &["line 51", "not after", "sort the lines"],
+        ),
+        (
+            with_line(60, |_| "-1,1,1\n".into()),
+            &["line 60", "-1 s", "not after"],
+        ),
         (lines[..2].join("\n"), &["1 lines of samples"]),
         (lines[..1].join("\n"), &["0 lines of samples"]),
-        (lines[..20].join("\n"), &["19 samples are too few", "at least 64"]),
+        (
+            lines[..20].join("\n"),
+            &["19 samples are too few", "at least 64"],
+        ),
         (still("1", "n"), &["input is 1", "nothing was excited"]),
         (still("n", "1"), &["output is 1", "did not see"]),
     ] {
         let answer = asked(text, "--time time_s");
         assert_eq!(answer.code, 1, "{answer:?}");
-        words.iter().for_each(|word| assert!(answer.err.contains(word), "`{word}` is not in {}", answer.err));
+        words.iter().for_each(|word| {
+            assert!(
+                answer.err.contains(word),
+                "`{word}` is not in {}",
+                answer.err
+            )
+        });
     }
-    for bytes in
-        [&b""[..], b"\xff\xfe\x00\x01", b"\n\n\n", b"force_n,position_m,time_s\n\xff,1,2\n", b"force_n,force_n\n1,2\n"]
-    {
+    for bytes in [
+        &b""[..],
+        b"\xff\xfe\x00\x01",
+        b"\n\n\n",
+        b"force_n,position_m,time_s\n\xff,1,2\n",
+        b"force_n,force_n\n1,2\n",
+    ] {
         let answer = asked(bytes, "--time time_s");
-        assert!([1, 2].contains(&answer.code) && answer.err.contains("data.csv"), "{answer:?}");
+        assert!(
+            [1, 2].contains(&answer.code) && answer.err.contains("data.csv"),
+            "{answer:?}"
+        );
     }
 }
 
@@ -95,9 +158,15 @@ fn other_marks_between_columns_and_a_rate_instead_of_times_do_as_well() {
     for mark in [";", "\t"] {
         let bench = Bench::new();
         bench.write("data.csv", good().replace(',', mark));
-        let answer = bench.json(&format!("{ASKED} --rate 1000 --period 1s --band 5:200 --out results"));
+        let answer = bench.json(&format!(
+            "{ASKED} --rate 1000 --period 1s --band 5:200 --out results"
+        ));
         assert_eq!(answer["periods"], 6);
-        assert_eq!(answer["modes"].as_array().map(Vec::len), Some(2), "{answer}");
+        assert_eq!(
+            answer["modes"].as_array().map(Vec::len),
+            Some(2),
+            "{answer}"
+        );
         assert_eq!(answer["cnmp"], "excluded", "{answer}");
         assert_eq!(bench.files(), ["data.csv", "results"]);
     }
@@ -110,17 +179,31 @@ fn swapped_channels_are_undecided_and_told() {
     let swapped = "identify data.csv --input position_m --output force_n --time time_s --period 1000 --band 5:200";
     let answer = bench.json(swapped);
     assert_eq!(answer["cnmp"], "undecided", "{answer}");
-    assert!(answer["why"].as_str().is_some_and(|why| why.contains("swapped")), "{answer}");
+    assert!(
+        answer["why"]
+            .as_str()
+            .is_some_and(|why| why.contains("swapped")),
+        "{answer}"
+    );
 }
 
 #[test]
 fn an_output_that_has_nothing_to_do_with_the_input_is_undecided_and_told() {
     let mut normal = normal(9);
     let noise = |normal: &mut dyn FnMut() -> f64| (0..8000).map(|_| normal()).collect();
-    let signals = Signals { rate_hz: 1000.0, input_a: noise(&mut normal), output_m: noise(&mut normal) };
+    let signals = Signals {
+        rate_hz: 1000.0,
+        input_a: noise(&mut normal),
+        output_m: noise(&mut normal),
+    };
     let bench = Bench::new();
     bench.write("data.csv", csv(&signals));
     let answer = bench.json(&format!("{ASKED} --time time_s --band 5:200"));
     assert_eq!(answer["cnmp"], "undecided", "{answer}");
-    assert!(answer["why"].as_str().is_some_and(|why| why.contains("explains")), "{answer}");
+    assert!(
+        answer["why"]
+            .as_str()
+            .is_some_and(|why| why.contains("explains")),
+        "{answer}"
+    );
 }

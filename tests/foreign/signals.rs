@@ -14,7 +14,9 @@ pub const STAGE: [(f64, f64, f64); 2] = [(40.0, 0.02, 1.0), (90.0, 0.02, 0.6)];
 pub fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1;
     let mut uniform = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
@@ -22,7 +24,9 @@ pub fn normal(seed: u64) -> impl FnMut() -> f64 {
 
 pub fn response(hz: f64) -> Complex<f64> {
     let s = Complex::new(0.0, TAU * hz);
-    let part = |(f, zeta, r): (f64, f64, f64)| (s * s + s * (2.0 * zeta * TAU * f) + (TAU * f).powi(2)).inv() * r;
+    let part = |(f, zeta, r): (f64, f64, f64)| {
+        (s * s + s * (2.0 * zeta * TAU * f) + (TAU * f).powi(2)).inv() * r
+    };
     STAGE.into_iter().map(part).sum()
 }
 
@@ -31,27 +35,49 @@ pub fn response(hz: f64) -> Complex<f64> {
 pub fn multisine(lines: &[usize], periods: usize, drift: f64, sigma: f64, seed: u64) -> Signals {
     let mut normal = normal(seed);
     let tone = |j: usize, f: usize| {
-        Complex::from_polar(1.0, -std::f64::consts::PI * (j * j) as f64 / lines.len() as f64 + 0.3 * f as f64)
+        Complex::from_polar(
+            1.0,
+            -std::f64::consts::PI * (j * j) as f64 / lines.len() as f64 + 0.3 * f as f64,
+        )
     };
     let one = |of: &dyn Fn(usize) -> Complex<f64>| -> Vec<f64> {
         let at = |n: usize| {
-            let turn = |f: usize| Complex::from_polar(1.0, TAU * ((n * f) % PERIOD) as f64 / PERIOD as f64);
-            lines.iter().enumerate().map(|(j, f)| (of(*f) * tone(j, *f) * turn(*f)).re).sum()
+            let turn = |f: usize| {
+                Complex::from_polar(1.0, TAU * ((n * f) % PERIOD) as f64 / PERIOD as f64)
+            };
+            lines
+                .iter()
+                .enumerate()
+                .map(|(j, f)| (of(*f) * tone(j, *f) * turn(*f)).re)
+                .sum()
         };
         (0..PERIOD).map(at).collect()
     };
-    let (input, output) = (one(&|_| Complex::new(1.0, 0.0)), one(&|f| response(f as f64)));
+    let (input, output) = (
+        one(&|_| Complex::new(1.0, 0.0)),
+        one(&|f| response(f as f64)),
+    );
     let samples = 0..periods * PERIOD;
     Signals {
         rate_hz: PERIOD as f64,
         input_a: samples.clone().map(|n| input[n % PERIOD]).collect(),
-        output_m: samples.map(|n| output[n % PERIOD] + drift * n as f64 / PERIOD as f64 + sigma * normal()).collect(),
+        output_m: samples
+            .map(|n| output[n % PERIOD] + drift * n as f64 / PERIOD as f64 + sigma * normal())
+            .collect(),
     }
 }
 
 /// The signals as a table `time_s,force_n,position_m`.
 pub fn csv(signals: &Signals) -> String {
-    let row = |(n, (u, y)): (usize, (&f64, &f64))| format!("{},{u:e},{y:e}\n", n as f64 / signals.rate_hz);
-    let rows: String = signals.input_a.iter().zip(&signals.output_m).enumerate().map(row).collect();
+    let row = |(n, (u, y)): (usize, (&f64, &f64))| {
+        format!("{},{u:e},{y:e}\n", n as f64 / signals.rate_hz)
+    };
+    let rows: String = signals
+        .input_a
+        .iter()
+        .zip(&signals.output_m)
+        .enumerate()
+        .map(row)
+        .collect();
     format!("time_s,force_n,position_m\n{rows}")
 }

@@ -22,36 +22,58 @@ fn assert_close(frf: &Frf, plant: &SampledPlant) {
     for (f, h) in frf.frequency_hz.iter().zip(&frf.response) {
         let ratio = h / plant.response(*f);
         let (magnitude, phase_deg) = ((ratio.norm() - 1.0).abs(), ratio.arg().to_degrees().abs());
-        assert!(magnitude < 0.001, "magnitude off by {} % at {f} Hz", 100.0 * magnitude);
-        assert!(phase_deg < 0.06, "phase off by {phase_deg} degrees at {f} Hz");
+        assert!(
+            magnitude < 0.001,
+            "magnitude off by {} % at {f} Hz",
+            100.0 * magnitude
+        );
+        assert!(
+            phase_deg < 0.06,
+            "phase off by {phase_deg} degrees at {f} Hz"
+        );
     }
 }
 
 #[test]
-fn without_noise_the_estimate_is_the_sampled_plant_within_a_tenth_of_a_percent_and_0_06_degrees_resonances_included() {
+fn without_noise_the_estimate_is_the_sampled_plant_within_a_tenth_of_a_percent_and_0_06_degrees_resonances_included()
+ {
     let signals = stage::clean_run();
     let start = std::time::Instant::now();
     let frf = estimate(&signals);
-    println!("{} frequencies from {} samples in {:?}", frf.len(), signals.len(), start.elapsed());
+    println!(
+        "{} frequencies from {} samples in {:?}",
+        frf.len(),
+        signals.len(),
+        start.elapsed()
+    );
     assert_close(&frf, &SampledPlant::stage());
 }
 
 #[test]
 fn what_a_parabola_takes_off_a_peak_is_within_two_sigma_even_without_noise() {
-    let settings = EstimatorSettings { curve: Curve::Polynomial, ..EstimatorSettings::default() };
+    let settings = EstimatorSettings {
+        curve: Curve::Polynomial,
+        ..EstimatorSettings::default()
+    };
     let frf = local::estimate(&stage::clean_run(), BAND_HZ, &settings).unwrap();
     let plant = SampledPlant::stage();
     for peak_hz in [29.27, 82.23, 85.78] {
         let k = frf.frequency_hz.partition_point(|f| *f < peak_hz);
         let off = (frf.response[k].norm() - plant.response(frf.frequency_hz[k]).norm()).abs();
         let sigma = frf.magnitude_sigma[k];
-        assert!(off <= 2.0 * sigma && sigma <= 2.0 * off, "{peak_hz} Hz: off by {off}, sigma {sigma}");
+        assert!(
+            off <= 2.0 * sigma && sigma <= 2.0 * off,
+            "{peak_hz} Hz: off by {off}, sigma {sigma}"
+        );
     }
 }
 
 #[test]
 fn frequencies_rise_through_the_band_in_steps_no_wider_than_the_resolution() {
-    let settings = EstimatorSettings { curve: Curve::Polynomial, ..EstimatorSettings::default() };
+    let settings = EstimatorSettings {
+        curve: Curve::Polynomial,
+        ..EstimatorSettings::default()
+    };
     let frf = local::estimate(&stage::clean_run(), BAND_HZ, &settings).unwrap();
     let last = frf.len() - 1;
     let bin_hz = 1.0 / 120.0;
@@ -67,8 +89,12 @@ fn frequencies_rise_through_the_band_in_steps_no_wider_than_the_resolution() {
 }
 
 #[test]
-fn an_offset_of_a_millimetre_and_a_drift_of_five_micrometres_leave_the_estimate_within_its_bounds() {
-    assert_close(&estimate(&with_drift(stage::clean_run())), &SampledPlant::stage());
+fn an_offset_of_a_millimetre_and_a_drift_of_five_micrometres_leave_the_estimate_within_its_bounds()
+{
+    assert_close(
+        &estimate(&with_drift(stage::clean_run())),
+        &SampledPlant::stage(),
+    );
 }
 
 /// Left in, the drift makes 5/(2 pi f) um s, 0.8 um s at 1 Hz, against 0.006 um s of probe noise: sigma a hundred times
@@ -79,7 +105,10 @@ fn an_offset_of_a_millimetre_and_a_drift_of_five_micrometres_leave_sigma_as_it_i
     let (still, drifting) = (estimate(&still), estimate(&with_drift(still.clone())));
     for (k, f) in still.frequency_hz.iter().enumerate() {
         let ratio = drifting.magnitude_sigma[k] / still.magnitude_sigma[k];
-        assert!((0.9..1.1).contains(&ratio), "{ratio} times as large at {f} Hz");
+        assert!(
+            (0.9..1.1).contains(&ratio),
+            "{ratio} times as large at {f} Hz"
+        );
     }
 }
 
@@ -101,12 +130,19 @@ fn an_offset_of_the_probe_moves_no_estimate_down_to_the_first_bin() {
     let input_a: Vec<f64> = chirp.iter().enumerate().map(|(k, u)| u + push(k)).collect();
     let plant = SampledPlant::stage();
     let output_m = plant.simulate(&input_a).iter().map(|y| y + 1e-3).collect();
-    let signals = Signals { rate_hz: stage::RATE_HZ, input_a, output_m };
+    let signals = Signals {
+        rate_hz: stage::RATE_HZ,
+        input_a,
+        output_m,
+    };
     let frf = local::estimate(&signals, (0.0, 10.0), &EstimatorSettings::default()).unwrap();
     assert!((frf.frequency_hz[0] - 1.0 / 20.2).abs() < 1e-12);
     for (f, h) in frf.frequency_hz.iter().zip(&frf.response) {
         // Curvature over 16 bins of 0.05 Hz is (0.8/29)^2, and a parabola has it.
-        assert!((h / plant.response(*f) - 1.0).norm() < 0.01, "{h} at {f} Hz");
+        assert!(
+            (h / plant.response(*f) - 1.0).norm() < 0.01,
+            "{h} at {f} Hz"
+        );
     }
 }
 
@@ -120,8 +156,14 @@ fn a_record_of_any_length_will_do() {
         output_m: signals.output_m[from..from + samples].to_vec(),
     };
     assert_close(&estimate(&cut(1, 599_999)), &SampledPlant::stage());
-    let short = Signals { input_a: stage::chirp_of(15.0, 1.0, 4.0), ..signals.clone() };
-    let mut short = Signals { output_m: SampledPlant::stage().simulate(&short.input_a), ..short };
+    let short = Signals {
+        input_a: stage::chirp_of(15.0, 1.0, 4.0),
+        ..signals.clone()
+    };
+    let mut short = Signals {
+        output_m: SampledPlant::stage().simulate(&short.input_a),
+        ..short
+    };
     short.input_a.truncate(99_991);
     short.output_m.truncate(99_991);
     let frf = estimate(&short);

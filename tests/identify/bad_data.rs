@@ -5,14 +5,22 @@ use proptest::prelude::*;
 fn good() -> Signals {
     let input_a: Vec<f64> = (0..200).map(|k| f64::from(k * k % 17) - 8.0).collect();
     let output_m = input_a.iter().map(|u| 1e-4 * u).collect();
-    Signals { rate_hz: 1000.0, input_a, output_m }
+    Signals {
+        rate_hz: 1000.0,
+        input_a,
+        output_m,
+    }
 }
 
 fn refusal(signals: &Signals, band_hz: (f64, f64)) -> IdentifyError {
     let local = local::estimate(signals, band_hz, &EstimatorSettings::default()).unwrap_err();
     let welch = welch::estimate(signals, band_hz, 16, Estimator::H1).unwrap_err();
     // Both say the same, but for the distance of their bins.
-    assert_eq!(std::mem::discriminant(&local), std::mem::discriminant(&welch), "{local} / {welch}");
+    assert_eq!(
+        std::mem::discriminant(&local),
+        std::mem::discriminant(&welch),
+        "{local} / {welch}"
+    );
     local
 }
 
@@ -31,40 +39,78 @@ fn the_signals_that_these_tests_spoil_are_good_before() {
 
 #[test]
 fn an_output_that_never_moves_is_refused() {
-    let signals = Signals { output_m: vec![1.25e-3; 200], ..good() };
-    assert_says(&refusal(&signals, (10.0, 400.0)), &["output is 0.00125 m", "200 samples", "check its range"]);
+    let signals = Signals {
+        output_m: vec![1.25e-3; 200],
+        ..good()
+    };
+    assert_says(
+        &refusal(&signals, (10.0, 400.0)),
+        &["output is 0.00125 m", "200 samples", "check its range"],
+    );
 }
 
 #[test]
 fn an_input_that_never_moves_is_refused() {
-    let signals = Signals { input_a: vec![0.0; 200], ..good() };
-    assert_says(&refusal(&signals, (10.0, 400.0)), &["input is 0 A", "200 samples", "amplifier was enabled"]);
+    let signals = Signals {
+        input_a: vec![0.0; 200],
+        ..good()
+    };
+    assert_says(
+        &refusal(&signals, (10.0, 400.0)),
+        &["input is 0 A", "200 samples", "amplifier was enabled"],
+    );
 }
 
 #[test]
 fn a_single_sample_is_refused() {
-    let signals = Signals { input_a: vec![1.0], output_m: vec![1e-4], ..good() };
-    assert_says(&refusal(&signals, (10.0, 400.0)), &["1 samples", "at least 64", "longer"]);
+    let signals = Signals {
+        input_a: vec![1.0],
+        output_m: vec![1e-4],
+        ..good()
+    };
+    assert_says(
+        &refusal(&signals, (10.0, 400.0)),
+        &["1 samples", "at least 64", "longer"],
+    );
 }
 
 #[test]
 fn columns_of_different_lengths_are_refused() {
-    let signals = Signals { output_m: vec![0.0; 199], ..good() };
-    assert_says(&refusal(&signals, (10.0, 400.0)), &["200 samples of the input", "199 of the output"]);
+    let signals = Signals {
+        output_m: vec![0.0; 199],
+        ..good()
+    };
+    assert_says(
+        &refusal(&signals, (10.0, 400.0)),
+        &["200 samples of the input", "199 of the output"],
+    );
 }
 
 #[test]
 fn a_sample_that_is_not_a_number_is_refused_with_its_column_and_index() {
     let mut signals = good();
     signals.output_m[37] = f64::NAN;
-    assert_says(&refusal(&signals, (10.0, 400.0)), &["output_m is NaN at sample 37", "finite"]);
+    assert_says(
+        &refusal(&signals, (10.0, 400.0)),
+        &["output_m is NaN at sample 37", "finite"],
+    );
     signals.input_a[5] = f64::INFINITY;
-    assert_says(&refusal(&signals, (10.0, 400.0)), &["input_a is inf at sample 5", "finite"]);
+    assert_says(
+        &refusal(&signals, (10.0, 400.0)),
+        &["input_a is inf at sample 5", "finite"],
+    );
 }
 
 #[test]
 fn a_band_beyond_the_nyquist_frequency_is_refused_with_the_limit() {
-    assert_says(&refusal(&good(), (10.0, 501.0)), &["501 Hz", "Nyquist frequency of 500 Hz", "lower its upper limit"]);
+    assert_says(
+        &refusal(&good(), (10.0, 501.0)),
+        &[
+            "501 Hz",
+            "Nyquist frequency of 500 Hz",
+            "lower its upper limit",
+        ],
+    );
 }
 
 #[test]
@@ -75,8 +121,14 @@ fn a_band_up_to_the_nyquist_frequency_itself_is_taken() {
 
 #[test]
 fn a_band_that_is_upside_down_or_no_number_is_refused() {
-    for band_hz in [(400.0, 10.0), (10.0, 10.0), (-1.0, 10.0), (f64::NAN, 10.0), (10.0, f64::NAN), (1.0, f64::INFINITY)]
-    {
+    for band_hz in [
+        (400.0, 10.0),
+        (10.0, 10.0),
+        (-1.0, 10.0),
+        (f64::NAN, 10.0),
+        (10.0, f64::NAN),
+        (1.0, f64::INFINITY),
+    ] {
         assert_says(&refusal(&good(), band_hz), &["0 <= lower < upper"]);
     }
 }
@@ -84,7 +136,10 @@ fn a_band_that_is_upside_down_or_no_number_is_refused() {
 #[test]
 fn a_band_between_two_bins_is_refused_with_their_distance() {
     let error = local::estimate(&good(), (11.0, 14.0), &EstimatorSettings::default()).unwrap_err();
-    assert_says(&error, &["between 11 and 14 Hz", "5 Hz apart", "longer record"]);
+    assert_says(
+        &error,
+        &["between 11 and 14 Hz", "5 Hz apart", "longer record"],
+    );
     let error = welch::estimate(&good(), (70.0, 100.0), 16, Estimator::H1).unwrap_err();
     assert_says(&error, &["between 70 and 100 Hz", "62.5 Hz apart"]);
 }
@@ -92,20 +147,35 @@ fn a_band_between_two_bins_is_refused_with_their_distance() {
 #[test]
 fn a_rate_that_is_none_is_refused() {
     for rate_hz in [0.0, -5000.0, f64::NAN, f64::INFINITY] {
-        assert_says(&refusal(&Signals { rate_hz, ..good() }, (10.0, 400.0)), &["sampling rate", "greater than 0"]);
+        assert_says(
+            &refusal(&Signals { rate_hz, ..good() }, (10.0, 400.0)),
+            &["sampling rate", "greater than 0"],
+        );
     }
 }
 
 #[test]
 fn settings_out_of_bounds_are_refused_with_name_value_and_bounds() {
-    let wide = EstimatorSettings { resolution_ratio: 0.2, ..EstimatorSettings::default() };
-    assert_says(&local::estimate(&good(), (10.0, 400.0), &wide).unwrap_err(), &["resolution_ratio is 0.2", "0 to 0.1"]);
-    let one = EstimatorSettings { min_half_width_bins: 1.0, ..EstimatorSettings::default() };
+    let wide = EstimatorSettings {
+        resolution_ratio: 0.2,
+        ..EstimatorSettings::default()
+    };
+    assert_says(
+        &local::estimate(&good(), (10.0, 400.0), &wide).unwrap_err(),
+        &["resolution_ratio is 0.2", "0 to 0.1"],
+    );
+    let one = EstimatorSettings {
+        min_half_width_bins: 1.0,
+        ..EstimatorSettings::default()
+    };
     assert_says(
         &local::estimate(&good(), (10.0, 400.0), &one).unwrap_err(),
         &["min_half_width_bins is 1", "2 to 10000"],
     );
-    assert_says(&welch::estimate(&good(), (10.0, 400.0), 7, Estimator::H1).unwrap_err(), &["segment is 7", "8 to 200"]);
+    assert_says(
+        &welch::estimate(&good(), (10.0, 400.0), 7, Estimator::H1).unwrap_err(),
+        &["segment is 7", "8 to 200"],
+    );
     assert_says(
         &welch::estimate(&good(), (10.0, 400.0), 201, Estimator::H1).unwrap_err(),
         &["segment is 201", "8 to 200"],
@@ -138,10 +208,28 @@ fn limit() -> impl Strategy<Value = f64> {
 
 fn assert_sound(frf: &Frf, band_hz: (f64, f64)) {
     assert!(!frf.is_empty());
-    let columns = [&frf.frequency_hz, &frf.coherence, &frf.magnitude_sigma, &frf.phase_sigma_rad, &frf.resolution_hz];
-    assert!(columns.iter().all(|column| column.len() == frf.response.len()));
-    assert!(columns.iter().all(|column| column.iter().all(|number| number.is_finite() && *number >= 0.0)));
-    assert!(frf.response.iter().all(|h| h.re.is_finite() && h.im.is_finite()));
+    let columns = [
+        &frf.frequency_hz,
+        &frf.coherence,
+        &frf.magnitude_sigma,
+        &frf.phase_sigma_rad,
+        &frf.resolution_hz,
+    ];
+    assert!(
+        columns
+            .iter()
+            .all(|column| column.len() == frf.response.len())
+    );
+    assert!(columns.iter().all(|column| {
+        column
+            .iter()
+            .all(|number| number.is_finite() && *number >= 0.0)
+    }));
+    assert!(
+        frf.response
+            .iter()
+            .all(|h| h.re.is_finite() && h.im.is_finite())
+    );
     assert!(frf.coherence.iter().all(|coherence| *coherence <= 1.0));
     assert!(frf.frequency_hz.windows(2).all(|pair| pair[0] < pair[1]));
     let (low, high) = (frf.frequency_hz[0], frf.frequency_hz[frf.len() - 1]);

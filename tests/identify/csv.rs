@@ -27,16 +27,29 @@ fn the_file_has_the_header_of_the_contract_and_one_row_a_frequency() {
         "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz"
     );
     // sigma(|H|) = sqrt(2e-14 / 2) = 1e-7, over |H| = 2e-4: 0.0005 rad.
-    let row: Vec<f64> = lines[1].split(',').map(|field| field.parse().unwrap()).collect();
+    let row: Vec<f64> = lines[1]
+        .split(',')
+        .map(|field| field.parse().unwrap())
+        .collect();
     assert_eq!(row[..4], [1.0 / 3.0, 2e-4, -90.0, 0.75]);
-    assert!((row[4] / 1e-7 - 1.0).abs() < 1e-12 && (row[5] / 0.0005_f64.to_degrees() - 1.0).abs() < 1e-12);
+    assert!(
+        (row[4] / 1e-7 - 1.0).abs() < 1e-12
+            && (row[5] / 0.0005_f64.to_degrees() - 1.0).abs() < 1e-12
+    );
     assert_eq!((row[6], lines.len()), (0.1, 3));
 }
 
 #[test]
 fn phases_are_wrapped_to_180_degrees_of_which_only_the_positive_one_is_written() {
-    let text = csv::to_string(&frf(&[(-1e-4, -0.0), (-1e-4, 0.0), (-1e-4, -1e-9), (1e-4, 0.0)]), Unit::MetresPerAmpere);
-    let phases: Vec<f64> = text.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse().unwrap()).collect();
+    let text = csv::to_string(
+        &frf(&[(-1e-4, -0.0), (-1e-4, 0.0), (-1e-4, -1e-9), (1e-4, 0.0)]),
+        Unit::MetresPerAmpere,
+    );
+    let phases: Vec<f64> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(2).unwrap().parse().unwrap())
+        .collect();
     assert_eq!((phases[0], phases[1], phases[3]), (180.0, 180.0, 0.0));
     assert!((-180.0..-179.9).contains(&phases[2]));
 }
@@ -50,7 +63,12 @@ fn a_measured_response_comes_back_from_its_file_as_it_was() {
     csv::write_new(&path, &frf, Unit::MetresPerAmpere).unwrap();
     let back = csv::read(&path).unwrap();
     let exact = |frf: &Frf| {
-        (frf.frequency_hz.clone(), frf.coherence.clone(), frf.magnitude_sigma.clone(), frf.resolution_hz.clone())
+        (
+            frf.frequency_hz.clone(),
+            frf.coherence.clone(),
+            frf.magnitude_sigma.clone(),
+            frf.resolution_hz.clone(),
+        )
     };
     assert_eq!(exact(&back), exact(&frf));
     for k in 0..frf.len() {
@@ -68,15 +86,29 @@ fn a_file_that_exists_is_never_overwritten() {
     let before = std::fs::read(&path).unwrap();
     let error = csv::write_new(&path, &frf(&[(2e-4, 0.0)]), Unit::MetresPerAmpere).unwrap_err();
     assert!(matches!(error, CsvError::Exists { .. }));
-    assert!(error.to_string().contains("frf.csv exists already and is not overwritten"), "{error}");
+    assert!(
+        error
+            .to_string()
+            .contains("frf.csv exists already and is not overwritten"),
+        "{error}"
+    );
     assert_eq!(std::fs::read(&path).unwrap(), before);
 }
 
 #[test]
 fn a_file_of_other_columns_or_with_a_broken_row_is_refused_with_its_line() {
     let error = csv::from_str("frequency_hz,magnitude\n1,2\n").unwrap_err();
-    assert!(error.to_string().contains("frequency_hz,magnitude_m_per_a"), "{error}");
-    for row in ["1,2,3", "1,NaN,3,4,5,6,7", "0.1,2,3,4,5,6,7", "1,2,3,4,5,6,seven", "1,2,3,4,5,6,7,8"] {
+    assert!(
+        error.to_string().contains("frequency_hz,magnitude_m_per_a"),
+        "{error}"
+    );
+    for row in [
+        "1,2,3",
+        "1,NaN,3,4,5,6,7",
+        "0.1,2,3,4,5,6,7",
+        "1,2,3,4,5,6,seven",
+        "1,2,3,4,5,6,7,8",
+    ] {
         let text = format!("{}\n0.5,1e-4,0,1,0,0,0.1\n{row}\n", csv::HEADER);
         let error = csv::from_str(&text).unwrap_err().to_string();
         assert!(error.contains("line 3") && error.contains(row), "{error}");
@@ -93,5 +125,8 @@ fn a_delay_taken_out_turns_phases_and_nothing_else() {
     let turns = late.frequency_hz[1] * delay_s;
     let expected = late.response[1] * Complex::from_polar(1.0, std::f64::consts::TAU * turns);
     assert!((earlier.response[1] - expected).norm() < 1e-18);
-    assert_eq!((earlier.magnitude_sigma, earlier.coherence), (late.magnitude_sigma, late.coherence));
+    assert_eq!(
+        (earlier.magnitude_sigma, earlier.coherence),
+        (late.magnitude_sigma, late.coherence)
+    );
 }

@@ -8,32 +8,51 @@ use crate::stage::{self, Dice, RATE_HZ, SampledPlant};
 const PEAKS_HZ: [f64; 3] = [29.27, 82.23, 85.78];
 
 fn settings(curve: Curve) -> EstimatorSettings {
-    EstimatorSettings { curve, ..EstimatorSettings::default() }
+    EstimatorSettings {
+        curve,
+        ..EstimatorSettings::default()
+    }
 }
 
 /// A chirp of ten seconds on the stage: bins of 1/20 Hz, of which mode R is ten wide at half its power.
 fn ten_seconds() -> Signals {
     let input_a = stage::chirp_of(10.0, 1.0, 9.0);
     let output_m = SampledPlant::stage().simulate(&input_a);
-    Signals { rate_hz: RATE_HZ, input_a, output_m }
+    Signals {
+        rate_hz: RATE_HZ,
+        input_a,
+        output_m,
+    }
 }
 
 /// The greatest relative error within a half-power width of the peaks.
 fn off_at_peaks(frf: &Frf) -> f64 {
     let plant = SampledPlant::stage();
     let near = |f: &f64| PEAKS_HZ.iter().any(|peak| (f / peak - 1.0).abs() < 0.008);
-    let at_peaks = frf.frequency_hz.iter().zip(&frf.response).filter(|(f, _)| near(f));
-    at_peaks.map(|(f, h)| (h / plant.response(*f) - 1.0).norm()).fold(0.0, f64::max)
+    let at_peaks = frf
+        .frequency_hz
+        .iter()
+        .zip(&frf.response)
+        .filter(|(f, _)| near(f));
+    at_peaks
+        .map(|(f, h)| (h / plant.response(*f) - 1.0).norm())
+        .fold(0.0, f64::max)
 }
 
 /// The neighbourhood reaches 0.8 Hz to either side, zeta f0 is 0.26 Hz: a constant is a mean over the whole peak.
 #[test]
 fn of_ten_seconds_a_pole_in_the_curve_tells_the_peaks_to_half_a_percent_and_nothing_else_does() {
-    let off = |curve| off_at_peaks(&local::estimate(&ten_seconds(), (10.0, 120.0), &settings(curve)).unwrap());
-    let [constant, polynomial, rational] = [Curve::Constant, Curve::Polynomial, Curve::Rational].map(off);
+    let off = |curve| {
+        off_at_peaks(&local::estimate(&ten_seconds(), (10.0, 120.0), &settings(curve)).unwrap())
+    };
+    let [constant, polynomial, rational] =
+        [Curve::Constant, Curve::Polynomial, Curve::Rational].map(off);
     println!("constant {constant:.4}, polynomial {polynomial:.4}, rational {rational:.6}");
     assert!(rational < 0.005, "{rational}");
-    assert!(polynomial > 0.1 && constant > polynomial, "{polynomial} {constant}");
+    assert!(
+        polynomial > 0.1 && constant > polynomial,
+        "{polynomial} {constant}"
+    );
 }
 
 #[test]
@@ -41,17 +60,27 @@ fn of_ten_seconds_with_the_noise_of_the_stage_the_peaks_are_within_two_sigma_nin
     let (clean, plant) = (ten_seconds(), SampledPlant::stage());
     let (mut held, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
     for seed in 1..=40 {
-        let frf = local::estimate(&stage::with_noise(&clean, seed), (10.0, 120.0), &settings(Curve::Rational)).unwrap();
+        let frf = local::estimate(
+            &stage::with_noise(&clean, seed),
+            (10.0, 120.0),
+            &settings(Curve::Rational),
+        )
+        .unwrap();
         for (k, f) in frf.frequency_hz.iter().enumerate() {
             if PEAKS_HZ.iter().any(|peak| (f / peak - 1.0).abs() < 0.008) {
                 let truth = plant.response(*f).norm();
-                held += f64::from((frf.response[k].norm() - truth).abs() <= 2.0 * frf.magnitude_sigma[k]);
+                held += f64::from(
+                    (frf.response[k].norm() - truth).abs() <= 2.0 * frf.magnitude_sigma[k],
+                );
                 count += 1.0;
                 worst = worst.max((frf.response[k].norm() / truth - 1.0).abs());
             }
         }
     }
-    println!("within two sigma {:.4} of {count}, off by up to {worst:.4}", held / count);
+    println!(
+        "within two sigma {:.4} of {count}, off by up to {worst:.4}",
+        held / count
+    );
     assert!((0.90..0.995).contains(&(held / count)), "{}", held / count);
     assert!(worst < 0.02, "{worst}");
 }
@@ -61,36 +90,66 @@ fn of_ten_seconds_with_the_noise_of_the_stage_the_peaks_are_within_two_sigma_nin
 fn where_no_mode_stands_the_rational_curve_is_the_parabola() {
     let mut dice = Dice::new(8);
     let input_a: Vec<f64> = (0..20_000).map(|_| dice.normal()).collect();
-    let output_m = input_a.iter().map(|u| 1e-4 * (u + 0.3 * dice.normal())).collect();
-    let signals = Signals { rate_hz: 1000.0, input_a, output_m };
+    let output_m = input_a
+        .iter()
+        .map(|u| 1e-4 * (u + 0.3 * dice.normal()))
+        .collect();
+    let signals = Signals {
+        rate_hz: 1000.0,
+        input_a,
+        output_m,
+    };
     let [parabola, rational] = [Curve::Polynomial, Curve::Rational]
         .map(|curve| local::estimate(&signals, (10.0, 490.0), &settings(curve)).unwrap());
-    let same = parabola.response.iter().zip(&rational.response).filter(|(a, b)| a == b).count() as f64;
+    let same = parabola
+        .response
+        .iter()
+        .zip(&rational.response)
+        .filter(|(a, b)| a == b)
+        .count() as f64;
     let share = same / parabola.len() as f64;
     assert!(share > 0.985 && share <= 1.0, "{share}");
 }
 
 #[test]
-fn a_logarithmic_grid_has_so_many_frequencies_at_one_ratio_from_the_first_to_the_last_of_the_band() {
-    let settings = EstimatorSettings { frequencies: Some(2000), ..EstimatorSettings::default() };
+fn a_logarithmic_grid_has_so_many_frequencies_at_one_ratio_from_the_first_to_the_last_of_the_band()
+{
+    let settings = EstimatorSettings {
+        frequencies: Some(2000),
+        ..EstimatorSettings::default()
+    };
     let frf = local::estimate(&stage::clean_run(), (0.5, 450.0), &settings).unwrap();
     assert_eq!(frf.len(), 2000);
     let ratio = 900_f64.powf(1.0 / 1999.0);
     for (k, f) in frf.frequency_hz.iter().enumerate() {
-        assert!((f / (0.5 * ratio.powi(k as i32)) - 1.0).abs() < 1e-9, "{f} Hz is number {k}");
+        assert!(
+            (f / (0.5 * ratio.powi(k as i32)) - 1.0).abs() < 1e-9,
+            "{f} Hz is number {k}"
+        );
     }
     // Between bins as on them.
     let plant = SampledPlant::stage();
-    let off = frf.frequency_hz.iter().zip(&frf.response).map(|(f, h)| (h / plant.response(*f) - 1.0).norm());
+    let off = frf
+        .frequency_hz
+        .iter()
+        .zip(&frf.response)
+        .map(|(f, h)| (h / plant.response(*f) - 1.0).norm());
     assert!(off.fold(0.0, f64::max) < 0.001);
 }
 
 /// 4/3 of a half-width is the noise bandwidth of cos^2; the chirp's ripple makes 5 %.
 #[test]
 fn half_widths_are_those_of_the_list_on_straight_lines_between_its_points() {
-    let point = |frequency_hz, half_width_hz| ResolutionPoint { frequency_hz, half_width_hz };
+    let point = |frequency_hz, half_width_hz| ResolutionPoint {
+        frequency_hz,
+        half_width_hz,
+    };
     let resolution = vec![point(2.0, 0.5), point(50.0, 0.5), point(200.0, 8.0)];
-    let settings = EstimatorSettings { resolution, frequencies: Some(50), ..settings(Curve::Constant) };
+    let settings = EstimatorSettings {
+        resolution,
+        frequencies: Some(50),
+        ..settings(Curve::Constant)
+    };
     let frf = local::estimate(&stage::clean_run(), (1.5, 400.0), &settings).unwrap();
     for (f, width) in frf.frequency_hz.iter().zip(&frf.resolution_hz) {
         let half_width_hz = match f {
@@ -99,16 +158,28 @@ fn half_widths_are_those_of_the_list_on_straight_lines_between_its_points() {
             f if *f < 200.0 => 0.5 * (f / 50.0).powi(2),
             _ => 8.0,
         };
-        assert!((width / (4.0 / 3.0 * half_width_hz) - 1.0).abs() < 0.05, "{width} at {f} Hz");
+        assert!(
+            (width / (4.0 / 3.0 * half_width_hz) - 1.0).abs() < 0.05,
+            "{width} at {f} Hz"
+        );
     }
 }
 
 #[test]
 fn a_list_of_half_widths_whose_frequencies_do_not_rise_is_refused() {
-    let point = ResolutionPoint { frequency_hz: 10.0, half_width_hz: 0.5 };
-    let settings = EstimatorSettings { resolution: vec![point, point], ..EstimatorSettings::default() };
+    let point = ResolutionPoint {
+        frequency_hz: 10.0,
+        half_width_hz: 0.5,
+    };
+    let settings = EstimatorSettings {
+        resolution: vec![point, point],
+        ..EstimatorSettings::default()
+    };
     let error = local::estimate(&stage::clean_run(), (1.0, 400.0), &settings).unwrap_err();
-    assert!(error.to_string().contains("resolution.frequency_hz is 10"), "{error}");
+    assert!(
+        error.to_string().contains("resolution.frequency_hz is 10"),
+        "{error}"
+    );
 }
 
 /// Twenty seconds out of the middle of sixty of white noise: what rings on from before, and beyond the end, leaks all along the
@@ -120,12 +191,22 @@ fn of_a_record_in_motion_at_both_ends_the_transient_is_told_from_the_response() 
     let plant = SampledPlant::stage();
     let output_m = plant.simulate(&input_a);
     let middle = 100_000..200_000;
-    let cut =
-        Signals { rate_hz: RATE_HZ, input_a: input_a[middle.clone()].to_vec(), output_m: output_m[middle].to_vec() };
+    let cut = Signals {
+        rate_hz: RATE_HZ,
+        input_a: input_a[middle.clone()].to_vec(),
+        output_m: output_m[middle].to_vec(),
+    };
     let off = |transient| {
-        let settings = EstimatorSettings { transient, ..EstimatorSettings::default() };
+        let settings = EstimatorSettings {
+            transient,
+            ..EstimatorSettings::default()
+        };
         let frf = local::estimate(&cut, (10.0, 70.0), &settings).unwrap();
-        let off = frf.frequency_hz.iter().zip(&frf.response).map(|(f, h)| (h / plant.response(*f) - 1.0).norm());
+        let off = frf
+            .frequency_hz
+            .iter()
+            .zip(&frf.response)
+            .map(|(f, h)| (h / plant.response(*f) - 1.0).norm());
         let mut off: Vec<f64> = off.collect();
         off.sort_by(f64::total_cmp);
         off[off.len() / 2]

@@ -51,7 +51,14 @@ fn run(noise: f64, seed: u64) -> LoopSignals {
         input_a.push(u);
         output_m.push(seen);
     }
-    LoopSignals { signals: Signals { rate_hz: RATE_HZ, input_a, output_m }, reference_m }
+    LoopSignals {
+        signals: Signals {
+            rate_hz: RATE_HZ,
+            input_a,
+            output_m,
+        },
+        reference_m,
+    }
 }
 
 fn swept(t: f64) -> f64 {
@@ -61,7 +68,13 @@ fn swept(t: f64) -> f64 {
         return 0.0;
     }
     let growth = (to_hz / from_hz).ln() / length_s;
-    let fade = |x: f64| if x < 1.0 { 0.5 - 0.5 * (std::f64::consts::PI * x).cos() } else { 1.0 };
+    let fade = |x: f64| {
+        if x < 1.0 {
+            0.5 - 0.5 * (std::f64::consts::PI * x).cos()
+        } else {
+            1.0
+        }
+    };
     let phase = std::f64::consts::TAU * from_hz / growth * (growth * time).exp_m1();
     fade(time / 0.5) * fade((length_s - time) / 0.2) * phase.sin()
 }
@@ -74,7 +87,9 @@ fn without_noise_plant_loop_and_sensitivities_are_those_of_the_loop() {
         ("P", &joint.plant, &plant as &dyn Fn(f64) -> Complex<f64>),
         ("L", &joint.loop_gain, &loop_gain),
         ("S", &joint.sensitivity, &|f| one / (one + loop_gain(f))),
-        ("T", &joint.complementary, &|f| loop_gain(f) / (one + loop_gain(f))),
+        ("T", &joint.complementary, &|f| {
+            loop_gain(f) / (one + loop_gain(f))
+        }),
     ] {
         assert!(frf.len() > 1000, "{name}");
         for (k, f) in frf.frequency_hz.iter().enumerate() {
@@ -96,8 +111,12 @@ fn noise_that_the_controller_answers_does_not_bias_the_plant() {
     for seed in 0..seeds {
         let signals = run(0.6, seed);
         let joint = estimate(&signals, BAND_HZ, &EstimatorSettings::default()).unwrap();
-        let direct = local::estimate(&signals.signals, BAND_HZ, &EstimatorSettings::default()).unwrap();
-        let at = joint.plant.frequency_hz.partition_point(|f| *f < frequency_hz);
+        let direct =
+            local::estimate(&signals.signals, BAND_HZ, &EstimatorSettings::default()).unwrap();
+        let at = joint
+            .plant
+            .frequency_hz
+            .partition_point(|f| *f < frequency_hz);
         let ratio = joint.plant.response[at] / plant(joint.plant.frequency_hz[at]);
         joint_mean += ratio / seeds as f64;
         squares += (ratio - 1.0).norm_sqr() / seeds as f64;
@@ -105,8 +124,14 @@ fn noise_that_the_controller_answers_does_not_bias_the_plant() {
     }
     // The mean of 60 scatters by the root of the squares' mean over 60: three times that.
     let room = 3.0 * (squares / seeds as f64).sqrt();
-    assert!((joint_mean - 1.0).norm() < room && room < 0.15, "{joint_mean} within {room}");
-    assert!((direct_mean - 1.0).norm() > 2.0 * room, "the case shows nothing: {direct_mean}");
+    assert!(
+        (joint_mean - 1.0).norm() < room && room < 0.15,
+        "{joint_mean} within {room}"
+    );
+    assert!(
+        (direct_mean - 1.0).norm() > 2.0 * room,
+        "the case shows nothing: {direct_mean}"
+    );
 }
 
 #[test]
@@ -115,7 +140,10 @@ fn bands_of_95_percent_hold_the_truth_in_93_to_97_percent() {
     for seed in 100..300 {
         let joint = estimate(&run(1e-3, seed), BAND_HZ, &EstimatorSettings::default()).unwrap();
         let frf = &joint.plant;
-        for k in (0..frf.len()).step_by(7).filter(|k| (frf.frequency_hz[*k] / POLE.0 - 1.0).abs() > 0.1) {
+        for k in (0..frf.len())
+            .step_by(7)
+            .filter(|k| (frf.frequency_hz[*k] / POLE.0 - 1.0).abs() > 0.1)
+        {
             let off = (frf.response[k].norm() - plant(frf.frequency_hz[k]).norm()).abs();
             inside += usize::from(off < 1.96 * frf.magnitude_sigma[k]);
             all += 1;
@@ -130,7 +158,10 @@ fn a_reference_that_never_moves_is_refused() {
     let mut signals = run(1e-3, 3);
     signals.reference_m.fill(0.0);
     let error = estimate(&signals, BAND_HZ, &EstimatorSettings::default()).unwrap_err();
-    assert!(error.to_string().contains("no energy between 2 and 300 Hz"), "{error}");
+    assert!(
+        error.to_string().contains("no energy between 2 and 300 Hz"),
+        "{error}"
+    );
     signals.reference_m.pop();
     assert!(estimate(&signals, BAND_HZ, &EstimatorSettings::default()).is_err());
 }

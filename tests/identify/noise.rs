@@ -25,20 +25,40 @@ fn share(errors: &[(f64, f64, f64)], of: impl Fn(&(f64, f64, f64)) -> f64) -> f6
 /// the 8700 frequencies are independent: a standard deviation of 0.5 %. 90 % is promised, and no more than 99.9 %.
 fn assert_honest(errors: &[(f64, f64, f64)], what: &str) {
     let (magnitude, phase) = (share(errors, |e| e.1), share(errors, |e| e.2));
-    println!("{what}: {} frequencies, within 2 sigma: magnitude {magnitude:.4}, phase {phase:.4}", errors.len());
-    assert!((0.90..=0.999).contains(&magnitude), "{what}: magnitude within 2 sigma at {magnitude} of the frequencies");
-    assert!((0.90..=0.999).contains(&phase), "{what}: phase within 2 sigma at {phase} of the frequencies");
+    println!(
+        "{what}: {} frequencies, within 2 sigma: magnitude {magnitude:.4}, phase {phase:.4}",
+        errors.len()
+    );
+    assert!(
+        (0.90..=0.999).contains(&magnitude),
+        "{what}: magnitude within 2 sigma at {magnitude} of the frequencies"
+    );
+    assert!(
+        (0.90..=0.999).contains(&phase),
+        "{what}: phase within 2 sigma at {phase} of the frequencies"
+    );
 }
 
 #[test]
 fn with_the_noise_of_the_stage_nine_errors_in_ten_are_within_two_sigma_for_every_seed() {
     let (clean, plant) = (stage::clean_run(), SampledPlant::stage());
     for seed in 1..=5 {
-        let errors = errors(&estimate(&stage::with_noise(&clean, seed), (0.5, 450.0)), &plant);
+        let errors = errors(
+            &estimate(&stage::with_noise(&clean, seed), (0.5, 450.0)),
+            &plant,
+        );
         assert_honest(&errors, &format!("seed {seed}"));
         // Sigma is neither timid nor bold: the root mean square of error/sigma is 1, within 10 %.
-        let square = errors.iter().map(|e| (e.1 * e.1 + e.2 * e.2) / 2.0).sum::<f64>() / errors.len() as f64;
-        assert!((0.9..1.1).contains(&square.sqrt()), "seed {seed}: error/sigma is {} RMS", square.sqrt());
+        let square = errors
+            .iter()
+            .map(|e| (e.1 * e.1 + e.2 * e.2) / 2.0)
+            .sum::<f64>()
+            / errors.len() as f64;
+        assert!(
+            (0.9..1.1).contains(&square.sqrt()),
+            "seed {seed}: error/sigma is {} RMS",
+            square.sqrt()
+        );
     }
 }
 
@@ -48,7 +68,10 @@ fn with_the_noise_of_the_stage_nine_errors_in_ten_are_within_two_sigma_around_ev
     let (clean, plant) = (stage::clean_run(), SampledPlant::stage());
     let mut near = Vec::new();
     for seed in 1..=5 {
-        near.extend(errors(&estimate(&stage::with_noise(&clean, seed), (0.5, 450.0)), &plant));
+        near.extend(errors(
+            &estimate(&stage::with_noise(&clean, seed), (0.5, 450.0)),
+            &plant,
+        ));
     }
     near.retain(|(f, _, _)| {
         let close = |(omega, _, damping): &(f64, f64, f64)| {
@@ -66,19 +89,37 @@ fn sigma_is_below_one_percent_from_1_to_200_hz_and_is_not_zero() {
     for (k, f) in frf.frequency_hz.iter().enumerate() {
         let relative = frf.magnitude_sigma[k] / frf.response[k].norm();
         // The least is that of 1 Hz: 50 nm of noise against 0.4 A of chirp, over 11 bins.
-        assert!((5e-6..0.01).contains(&relative), "{} % at {f} Hz", 100.0 * relative);
+        assert!(
+            (5e-6..0.01).contains(&relative),
+            "{} % at {f} Hz",
+            100.0 * relative
+        );
     }
 }
 
 /// A chirp of two seconds and 1.2 mA, 185 nm of motion, in 50 nm of noise: the errors of so many runs of 8.5 seconds.
 fn short_runs(seeds: u64, min_half_width_bins: f64) -> Vec<(f64, f64, f64)> {
     let plant = SampledPlant::stage();
-    let input_a: Vec<f64> = stage::chirp_of(2.0, 0.5, 6.0).iter().map(|u| 0.003 * u).collect();
+    let input_a: Vec<f64> = stage::chirp_of(2.0, 0.5, 6.0)
+        .iter()
+        .map(|u| 0.003 * u)
+        .collect();
     let output_m = plant.simulate(&input_a);
-    let clean = Signals { rate_hz: RATE_HZ, input_a, output_m };
-    let settings = EstimatorSettings { min_half_width_bins, ..EstimatorSettings::default() };
-    let run =
-        |seed| errors(&local::estimate(&stage::with_noise(&clean, seed), (2.0, 25.0), &settings).unwrap(), &plant);
+    let clean = Signals {
+        rate_hz: RATE_HZ,
+        input_a,
+        output_m,
+    };
+    let settings = EstimatorSettings {
+        min_half_width_bins,
+        ..EstimatorSettings::default()
+    };
+    let run = |seed| {
+        errors(
+            &local::estimate(&stage::with_noise(&clean, seed), (2.0, 25.0), &settings).unwrap(),
+            &plant,
+        )
+    };
     (1..=seeds).flat_map(run).collect()
 }
 
@@ -94,8 +135,14 @@ fn where_the_floor_peaks_in_a_short_record_eight_errors_in_ten_are_within_two_si
     let mut peak = short_runs(100, 8.0);
     peak.retain(|(f, _, _)| (4.5..5.5).contains(f));
     let (magnitude, phase) = (share(&peak, |e| e.1), share(&peak, |e| e.2));
-    println!("at the floor's peak: {} frequencies, magnitude {magnitude:.4}, phase {phase:.4}", peak.len());
-    assert!((0.80..0.96).contains(&magnitude) && (0.80..0.96).contains(&phase), "magnitude {magnitude}, phase {phase}");
+    println!(
+        "at the floor's peak: {} frequencies, magnitude {magnitude:.4}, phase {phase:.4}",
+        peak.len()
+    );
+    assert!(
+        (0.80..0.96).contains(&magnitude) && (0.80..0.96).contains(&phase),
+        "magnitude {magnitude}, phase {phase}"
+    );
 }
 
 #[test]
@@ -103,15 +150,34 @@ fn an_output_of_nothing_but_noise_is_called_so() {
     let input_a = stage::chirp_of(20.0, 1.0, 2.0);
     let mut dice = Dice::new(9);
     let output_m = input_a.iter().map(|_| 1e-6 * dice.normal()).collect();
-    let frf = estimate(&Signals { rate_hz: RATE_HZ, input_a, output_m }, (1.0, 400.0));
+    let frf = estimate(
+        &Signals {
+            rate_hz: RATE_HZ,
+            input_a,
+            output_m,
+        },
+        (1.0, 400.0),
+    );
     let count = frf.len() as f64;
-    let beyond = (0..frf.len()).filter(|k| frf.response[*k].norm() > 4.0 * frf.magnitude_sigma[*k]).count() as f64;
+    let beyond = (0..frf.len())
+        .filter(|k| frf.response[*k].norm() > 4.0 * frf.magnitude_sigma[*k])
+        .count() as f64;
     // |H| is Rayleigh's then: beyond 4 sigma once in exp(8) = 3000, and somewhat more with sigma itself known to 15 %.
-    assert!(beyond / count < 0.01, "{beyond} of {count} seem to be a response");
+    assert!(
+        beyond / count < 0.01,
+        "{beyond} of {count} seem to be a response"
+    );
     // The share of the output that any fit of 16/3 bins explains by chance: 3/16, and less with more bins.
     let coherence = frf.coherence.iter().sum::<f64>() / count;
-    assert!((0.05..0.2).contains(&coherence), "mean coherence {coherence}");
-    assert!(frf.phase_sigma_rad.iter().all(|sigma| (0.1..=PHASE_SIGMA_LIMIT_RAD).contains(sigma)));
+    assert!(
+        (0.05..0.2).contains(&coherence),
+        "mean coherence {coherence}"
+    );
+    assert!(
+        frf.phase_sigma_rad
+            .iter()
+            .all(|sigma| (0.1..=PHASE_SIGMA_LIMIT_RAD).contains(sigma))
+    );
 }
 
 /// Whole cycles only, of 20 to 40 Hz, in one second: the bins outside are exactly dead.
@@ -119,25 +185,51 @@ fn band_of_cosines() -> Signals {
     let mut dice = Dice::new(4);
     let cosines = |k: usize| {
         let turns = |bin: usize| (bin * k % 5000) as f64 / RATE_HZ;
-        (20..=40).map(|bin| 0.1 * (std::f64::consts::TAU * turns(bin) + (bin * bin) as f64).cos()).sum::<f64>()
+        (20..=40)
+            .map(|bin| 0.1 * (std::f64::consts::TAU * turns(bin) + (bin * bin) as f64).cos())
+            .sum::<f64>()
     };
     let input_a: Vec<f64> = (0..5000).map(cosines).collect();
-    let output_m = input_a.iter().map(|u| 1.5e-4 * u + 40e-9 * dice.normal()).collect();
-    Signals { rate_hz: RATE_HZ, input_a, output_m }
+    let output_m = input_a
+        .iter()
+        .map(|u| 1.5e-4 * u + 40e-9 * dice.normal())
+        .collect();
+    Signals {
+        rate_hz: RATE_HZ,
+        input_a,
+        output_m,
+    }
 }
 
 #[test]
 fn where_the_input_is_dead_no_number_is_made_up() {
     let frf = estimate(&band_of_cosines(), (1.0, 2000.0));
-    assert_eq!((frf.frequency_hz[0], frf.frequency_hz[frf.len() - 1]), (20.0, 40.0));
+    assert_eq!(
+        (frf.frequency_hz[0], frf.frequency_hz[frf.len() - 1]),
+        (20.0, 40.0)
+    );
     for (k, h) in frf.response.iter().enumerate() {
         let off = (h.norm() - 1.5e-4).abs();
-        assert!(off < 5.0 * frf.magnitude_sigma[k] && frf.magnitude_sigma[k] < 1e-6, "{} Hz: {h}", frf.frequency_hz[k]);
+        assert!(
+            off < 5.0 * frf.magnitude_sigma[k] && frf.magnitude_sigma[k] < 1e-6,
+            "{} Hz: {h}",
+            frf.frequency_hz[k]
+        );
     }
 }
 
 #[test]
 fn a_band_in_which_the_input_is_dead_is_an_error_that_names_it() {
-    let error = local::estimate(&band_of_cosines(), (100.0, 200.0), &EstimatorSettings::default()).unwrap_err();
-    assert!(error.to_string().contains("no energy between 100 and 200 Hz"), "{error}");
+    let error = local::estimate(
+        &band_of_cosines(),
+        (100.0, 200.0),
+        &EstimatorSettings::default(),
+    )
+    .unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("no energy between 100 and 200 Hz"),
+        "{error}"
+    );
 }

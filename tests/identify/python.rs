@@ -17,19 +17,45 @@ pub fn numbers(script: &str, arguments: &[&str], input: &str) -> Option<Vec<Vec<
         println!("not compared: {why}; install scipy or name another interpreter in BENCH_PYTHON");
         return None;
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/python")
+        .join(script);
     let mut command = Command::new(&python);
-    command.arg(path).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).env("PYTHONDONTWRITEBYTECODE", "1");
+    command
+        .arg(path)
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .env("PYTHONDONTWRITEBYTECODE", "1");
     let mut child = command.spawn().unwrap();
-    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(input.as_bytes())
+        .unwrap();
     let output = child.wait_with_output().unwrap();
-    assert!(output.status.success(), "{script} failed: {}", output.status);
+    assert!(
+        output.status.success(),
+        "{script} failed: {}",
+        output.status
+    );
     let text = String::from_utf8(output.stdout).unwrap();
-    Some(text.lines().map(|line| line.split_whitespace().map(|word| word.parse().unwrap()).collect()).collect())
+    Some(
+        text.lines()
+            .map(|line| {
+                line.split_whitespace()
+                    .map(|word| word.parse().unwrap())
+                    .collect()
+            })
+            .collect(),
+    )
 }
 
 fn scipy(python: &str) -> Result<(), String> {
-    let output = Command::new(python).args(["-c", "import scipy.signal, scipy.linalg"]).output();
+    let output = Command::new(python)
+        .args(["-c", "import scipy.signal, scipy.linalg"])
+        .output();
     match output {
         Ok(output) if output.status.success() => Ok(()),
         Ok(_) => Err(format!("{python} has no scipy")),

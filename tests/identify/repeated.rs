@@ -11,7 +11,11 @@ const REPETITIONS: usize = 5;
 fn once() -> Signals {
     let input_a = stage::chirp_of(4.0, 0.5, 5.5);
     let output_m = SampledPlant::stage().simulate(&input_a);
-    Signals { rate_hz: RATE_HZ, input_a, output_m }
+    Signals {
+        rate_hz: RATE_HZ,
+        input_a,
+        output_m,
+    }
 }
 
 /// The same over and over, with white noise on either side.
@@ -19,9 +23,20 @@ fn repetitions(seed: u64, noise_a: f64, noise_m: f64) -> Signals {
     let (once, mut dice) = (once(), Dice::new(seed));
     let mut noisy = |samples: &[f64], noise: f64| -> Vec<f64> {
         let all = std::iter::repeat_n(samples, REPETITIONS).flatten();
-        all.map(|x| x + if noise > 0.0 { noise * dice.normal() } else { 0.0 }).collect()
+        all.map(|x| {
+            x + if noise > 0.0 {
+                noise * dice.normal()
+            } else {
+                0.0
+            }
+        })
+        .collect()
     };
-    Signals { rate_hz: RATE_HZ, input_a: noisy(&once.input_a, noise_a), output_m: noisy(&once.output_m, noise_m) }
+    Signals {
+        rate_hz: RATE_HZ,
+        input_a: noisy(&once.input_a, noise_a),
+        output_m: noisy(&once.output_m, noise_m),
+    }
 }
 
 fn estimate(signals: &Signals) -> Frf {
@@ -37,8 +52,11 @@ fn held(seeds: u64, noise_a: f64, noise_m: f64) -> [f64; 2] {
         let frf = estimate(&repetitions(seed, noise_a, noise_m));
         for (k, f) in frf.frequency_hz.iter().enumerate() {
             let truth = plant.response(*f);
-            held[0] += f64::from((frf.response[k].norm() - truth.norm()).abs() <= 1.96 * frf.magnitude_sigma[k]);
-            held[1] += f64::from((frf.response[k] / truth).arg().abs() <= 1.96 * frf.phase_sigma_rad[k]);
+            held[0] += f64::from(
+                (frf.response[k].norm() - truth.norm()).abs() <= 1.96 * frf.magnitude_sigma[k],
+            );
+            held[1] +=
+                f64::from((frf.response[k] / truth).arg().abs() <= 1.96 * frf.phase_sigma_rad[k]);
             count += 1.0;
         }
     }
@@ -50,7 +68,10 @@ fn held(seeds: u64, noise_a: f64, noise_m: f64) -> [f64; 2] {
 fn bands_of_95_percent_of_the_mean_of_repetitions_hold_the_truth_as_often() {
     let held = held(40, 0.0, 1e-6);
     println!("{held:?}");
-    assert!(held.iter().all(|share| (0.93..0.97).contains(share)), "{held:?}");
+    assert!(
+        held.iter().all(|share| (0.93..0.97).contains(share)),
+        "{held:?}"
+    );
 }
 
 #[test]
@@ -58,7 +79,10 @@ fn noise_on_the_measured_input_is_in_the_bands_as_well() {
     // Its own power is a ten thousandth of the chirp's: no bias to speak of.
     let held = held(40, 2e-3, 1e-9);
     println!("{held:?}");
-    assert!(held.iter().all(|share| (0.92..0.975).contains(share)), "{held:?}");
+    assert!(
+        held.iter().all(|share| (0.92..0.975).contains(share)),
+        "{held:?}"
+    );
 }
 
 /// One over the square root of five is 0.447; sigma of one record is known to a tenth, its mean over the band far better.
@@ -74,8 +98,12 @@ fn the_mean_of_five_has_the_sigma_of_one_over_the_square_root_of_five() {
     let one = local::estimate(&first, BAND_HZ, &EstimatorSettings::default()).unwrap();
     let mean = estimate(&all);
     assert_eq!(mean.frequency_hz, one.frequency_hz);
-    let mut ratios: Vec<f64> =
-        mean.magnitude_sigma.iter().zip(&one.magnitude_sigma).map(|(mean, one)| mean / one).collect();
+    let mut ratios: Vec<f64> = mean
+        .magnitude_sigma
+        .iter()
+        .zip(&one.magnitude_sigma)
+        .map(|(mean, one)| mean / one)
+        .collect();
     ratios.sort_by(f64::total_cmp);
     let median = ratios[ratios.len() / 2];
     assert!((0.40..0.49).contains(&median), "{median}");
@@ -93,10 +121,21 @@ fn what_is_left_after_the_last_whole_repetition_is_left_out() {
 #[test]
 fn the_mean_is_over_whole_repetitions() {
     let samples: Vec<f64> = (0..11).map(f64::from).collect();
-    let signals = Signals { rate_hz: 1.0, input_a: samples.clone(), output_m: samples };
+    let signals = Signals {
+        rate_hz: 1.0,
+        input_a: samples.clone(),
+        output_m: samples,
+    };
     // 0 to 3, 4 to 7; 8 to 10 is no whole one.
     assert_eq!(repeated::mean(&signals, 4, 3).input_a, [2.0, 3.0, 4.0, 5.0]);
-    assert_eq!(repeated::mean(&signals, 4, 1).output_m, [0.0, 1.0, 2.0, 3.0]);
-    assert_eq!(repeated::mean(&signals, 20, 1).len(), 11, "what is not whole is left as it is");
+    assert_eq!(
+        repeated::mean(&signals, 4, 1).output_m,
+        [0.0, 1.0, 2.0, 3.0]
+    );
+    assert_eq!(
+        repeated::mean(&signals, 20, 1).len(),
+        11,
+        "what is not whole is left as it is"
+    );
     assert_eq!(repeated::mean(&signals, 0, 1).len(), 11);
 }

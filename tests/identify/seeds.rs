@@ -17,7 +17,11 @@ const SEEDS_OF_BIAS: usize = 50;
 const WORKERS: usize = 2;
 
 fn config(sets: &[&str]) -> Config {
-    load(&Source { sets: sets.iter().map(|set| set.to_string()).collect(), ..Source::default() }).expect("valid")
+    load(&Source {
+        sets: sets.iter().map(|set| set.to_string()).collect(),
+        ..Source::default()
+    })
+    .expect("valid")
 }
 
 fn estimated(sets: &[&str]) -> Frf {
@@ -29,7 +33,9 @@ fn estimated(sets: &[&str]) -> Frf {
 fn over_seeds<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let (next, all) = (AtomicU64::new(1), Mutex::new(Vec::new()));
     let work = || {
-        while let Some(seed) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|seed| *seed <= SEEDS) {
+        while let Some(seed) =
+            Some(next.fetch_add(1, Ordering::Relaxed)).filter(|seed| *seed <= SEEDS)
+        {
             let one = of(seed);
             all.lock().unwrap().push((seed, one));
         }
@@ -52,9 +58,15 @@ fn errors(frf: &Frf, plant: &SampledPlant) -> Vec<Error> {
     let error = |(k, f): (usize, &f64)| {
         let truth = plant.response(*f);
         let off = frf.response[k] / truth;
-        let in_sigmas =
-            [(frf.response[k].norm() - truth.norm()) / frf.magnitude_sigma[k], off.arg() / frf.phase_sigma_rad[k]];
-        Error { magnitude: off.norm() - 1.0, phase_deg: off.arg().to_degrees(), in_sigmas }
+        let in_sigmas = [
+            (frf.response[k].norm() - truth.norm()) / frf.magnitude_sigma[k],
+            off.arg() / frf.phase_sigma_rad[k],
+        ];
+        Error {
+            magnitude: off.norm() - 1.0,
+            phase_deg: off.arg().to_degrees(),
+            in_sigmas,
+        }
     };
     frf.frequency_hz.iter().enumerate().map(error).collect()
 }
@@ -63,10 +75,17 @@ fn errors(frf: &Frf, plant: &SampledPlant) -> Vec<Error> {
 fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let count = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / count;
-    (mean, (values.map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0) / count).sqrt())
+    (
+        mean,
+        (values.map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0) / count).sqrt(),
+    )
 }
 
-const QUIET: [&str; 3] = ["sim.probe_noise_rms_m=0.0", "sim.probe_quantisation_m=0.0", "sim.floor=[]"];
+const QUIET: [&str; 3] = [
+    "sim.probe_noise_rms_m=0.0",
+    "sim.probe_quantisation_m=0.0",
+    "sim.floor=[]",
+];
 
 #[test]
 fn without_noise_the_default_estimate_is_within_0_2_percent_and_0_1_degrees_of_the_stage() {
@@ -74,13 +93,25 @@ fn without_noise_the_default_estimate_is_within_0_2_percent_and_0_1_degrees_of_t
     let errors = errors(&frf, &SampledPlant::stage());
     let worst = |of: fn(&Error) -> f64| errors.iter().map(of).map(f64::abs).fold(0.0, f64::max);
     let (magnitude, phase_deg) = (worst(|e| e.magnitude), worst(|e| e.phase_deg));
-    println!("{} frequencies, off by up to {:.4} % and {phase_deg:.4} degrees", frf.len(), 100.0 * magnitude);
-    assert!(magnitude < 0.002 && phase_deg < 0.1, "{magnitude} {phase_deg}");
-    assert!((frf.frequency_hz[0] - 0.5).abs() < 1e-9 && frf.frequency_hz[frf.len() - 1] > 449.0 && frf.len() > 2000);
+    println!(
+        "{} frequencies, off by up to {:.4} % and {phase_deg:.4} degrees",
+        frf.len(),
+        100.0 * magnitude
+    );
+    assert!(
+        magnitude < 0.002 && phase_deg < 0.1,
+        "{magnitude} {phase_deg}"
+    );
+    assert!(
+        (frf.frequency_hz[0] - 0.5).abs() < 1e-9
+            && frf.frequency_hz[frf.len() - 1] > 449.0
+            && frf.len() > 2000
+    );
 }
 
 #[test]
-fn over_seeds_the_bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_bands_hold_the_truth_as_often() {
+fn over_seeds_the_bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_bands_hold_the_truth_as_often()
+ {
     let plant = SampledPlant::stage();
     let frequency_hz = estimated(&[]).frequency_hz;
     let all = over_seeds(|seed| errors(&estimated(&[&format!("sim.seed={seed}")]), &plant));
@@ -97,8 +128,15 @@ fn assert_unbiased(frequency_hz: &[f64], all: &[Vec<Error>]) {
     for (k, f) in frequency_hz.iter().enumerate() {
         let (magnitude, magnitude_sigma) = mean(all.iter().map(|errors| errors[k].magnitude));
         let (phase_deg, phase_sigma_deg) = mean(all.iter().map(|errors| errors[k].phase_deg));
-        assert!(magnitude.abs() < 0.002 + 4.0 * magnitude_sigma, "{} % at {f} Hz", 100.0 * magnitude);
-        assert!(phase_deg.abs() < 0.1 + 4.0 * phase_sigma_deg, "{phase_deg} degrees at {f} Hz");
+        assert!(
+            magnitude.abs() < 0.002 + 4.0 * magnitude_sigma,
+            "{} % at {f} Hz",
+            100.0 * magnitude
+        );
+        assert!(
+            phase_deg.abs() < 0.1 + 4.0 * phase_sigma_deg,
+            "{phase_deg} degrees at {f} Hz"
+        );
         within += usize::from(magnitude.abs() < 0.002 && phase_deg.abs() < 0.1);
         worst = (worst.0.max(magnitude.abs()), worst.1.max(phase_deg.abs()));
     }
@@ -114,8 +152,9 @@ fn assert_unbiased(frequency_hz: &[f64], all: &[Vec<Error>]) {
 }
 
 /// Ranges of frequency: between the modes, and around each of R, u, v and the unmodelled ones.
-const RANGES_HZ: [f64; 16] =
-    [0.5, 2.0, 5.0, 8.0, 12.0, 28.5, 30.0, 65.0, 75.0, 81.0, 87.0, 200.0, 233.0, 270.0, 286.0, 450.1];
+const RANGES_HZ: [f64; 16] = [
+    0.5, 2.0, 5.0, 8.0, 12.0, 28.5, 30.0, 65.0, 75.0, 81.0, 87.0, 200.0, 233.0, 270.0, 286.0, 450.1,
+];
 
 /// The share is of bins and seeds. A range of n independent bins and 200 seeds has a standard deviation of
 /// sqrt(0.95 0.05/(200 n)): 0.6 % of the five or so around a mode.
@@ -123,14 +162,24 @@ fn assert_covered(frequency_hz: &[f64], all: &[Vec<Error>]) {
     let share = |low_hz: f64, high_hz: f64, of: usize| {
         let inside = |k: &usize| (low_hz..high_hz).contains(&frequency_hz[*k]);
         let bins: Vec<usize> = (0..frequency_hz.len()).filter(inside).collect();
-        let held = all.iter().flat_map(|errors| bins.iter().map(|k| errors[*k].in_sigmas[of]));
+        let held = all
+            .iter()
+            .flat_map(|errors| bins.iter().map(|k| errors[*k].in_sigmas[of]));
         held.filter(|error| error.abs() <= 1.96).count() as f64 / (bins.len() * all.len()) as f64
     };
     let ranges = RANGES_HZ.windows(2).map(|range| (range[0], range[1]));
     for (low_hz, high_hz) in ranges.chain([(0.5, 450.1)]) {
         let (magnitude, phase) = (share(low_hz, high_hz, 0), share(low_hz, high_hz, 1));
-        println!("{low_hz} to {high_hz} Hz: 95 % bands hold magnitude {magnitude:.4}, phase {phase:.4}");
-        assert!((0.93..0.97).contains(&magnitude), "{low_hz} to {high_hz} Hz: {magnitude}");
-        assert!((0.93..0.97).contains(&phase), "{low_hz} to {high_hz} Hz: {phase}");
+        println!(
+            "{low_hz} to {high_hz} Hz: 95 % bands hold magnitude {magnitude:.4}, phase {phase:.4}"
+        );
+        assert!(
+            (0.93..0.97).contains(&magnitude),
+            "{low_hz} to {high_hz} Hz: {magnitude}"
+        );
+        assert!(
+            (0.93..0.97).contains(&phase),
+            "{low_hz} to {high_hz} Hz: {phase}"
+        );
     }
 }

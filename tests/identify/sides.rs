@@ -1,6 +1,8 @@
 //! H1, H2 and Hv: noise on the output, on the input, on both.
 
-use bench::identify::{Curve, Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
+use bench::identify::{
+    Curve, Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch,
+};
 use nalgebra::Complex;
 
 use crate::stage::Dice;
@@ -19,14 +21,26 @@ fn signals(seed: u64, on_input: f64, on_output: f64) -> Signals {
     let mut dice = Dice::new(seed);
     let truth: Vec<f64> = (0..10_000).map(|_| dice.normal()).collect();
     let mut noisy = |gain: f64, noise: f64| -> Vec<f64> {
-        truth.iter().map(|u| gain * (u + noise.sqrt() * dice.normal())).collect()
+        truth
+            .iter()
+            .map(|u| gain * (u + noise.sqrt() * dice.normal()))
+            .collect()
     };
-    Signals { rate_hz: 1000.0, input_a: noisy(1.0, on_input), output_m: noisy(GAIN, on_output) }
+    Signals {
+        rate_hz: 1000.0,
+        input_a: noisy(1.0, on_input),
+        output_m: noisy(GAIN, on_output),
+    }
 }
 
 fn by_curves(curve: Curve) -> impl Fn(&Signals, Estimator) -> Result<Frf, IdentifyError> {
     move |signals, estimator| {
-        let settings = EstimatorSettings { curve, estimator, resolution_ratio: 0.0, ..EstimatorSettings::default() };
+        let settings = EstimatorSettings {
+            curve,
+            estimator,
+            resolution_ratio: 0.0,
+            ..EstimatorSettings::default()
+        };
         local::estimate(signals, BAND_HZ, &settings)
     }
 }
@@ -45,7 +59,12 @@ fn every_way() -> [(&'static str, Box<Estimate>); 4] {
 }
 
 /// Mean of H over the gain, and the shares of magnitudes and phases within 1.96 of their sigmas, over frequencies and seeds.
-fn over_seeds(estimate: &Estimate, estimator: Estimator, on_input: f64, on_output: f64) -> (Complex<f64>, [f64; 2]) {
+fn over_seeds(
+    estimate: &Estimate,
+    estimator: Estimator,
+    on_input: f64,
+    on_output: f64,
+) -> (Complex<f64>, [f64; 2]) {
     let (mut sum, mut held, mut count) = (Complex::from(0.0), [0.0; 2], 0.0);
     for seed in 1..=SEEDS {
         let frf = estimate(&signals(seed, on_input, on_output), estimator).unwrap();
@@ -74,7 +93,10 @@ fn the_bias_is_that_of_the_closed_form_on_whichever_side_the_noise_is() {
                 let (mean, _) = over_seeds(&*estimate, estimator, on_input, on_output);
                 let expected = bias(estimator, on_input, on_output);
                 println!("{name} {estimator:?} {on_input} {on_output}: {mean:.4} {expected:.4}");
-                assert!((mean - expected).norm() < 0.004, "{name} {estimator:?}: {mean} is not {expected}");
+                assert!(
+                    (mean - expected).norm() < 0.004,
+                    "{name} {estimator:?}: {mean} is not {expected}"
+                );
             }
         }
     }
@@ -85,12 +107,17 @@ fn the_bias_is_that_of_the_closed_form_on_whichever_side_the_noise_is() {
 #[test]
 fn bands_of_95_percent_hold_the_truth_as_often_for_each_estimator_where_it_is_unbiased() {
     for (name, estimate) in every_way() {
-        for (estimator, on_input, on_output) in
-            [(Estimator::H1, 0.0, NOISE), (Estimator::H2, NOISE, 0.0), (Estimator::Hv, NOISE, NOISE)]
-        {
+        for (estimator, on_input, on_output) in [
+            (Estimator::H1, 0.0, NOISE),
+            (Estimator::H2, NOISE, 0.0),
+            (Estimator::Hv, NOISE, NOISE),
+        ] {
             let (_, held) = over_seeds(&*estimate, estimator, on_input, on_output);
             println!("{name} {estimator:?}: {held:?}");
-            assert!(held.iter().all(|share| (0.93..0.975).contains(share)), "{name} {estimator:?}: {held:?}");
+            assert!(
+                held.iter().all(|share| (0.93..0.975).contains(share)),
+                "{name} {estimator:?}: {held:?}"
+            );
         }
     }
 }
@@ -98,17 +125,38 @@ fn bands_of_95_percent_hold_the_truth_as_often_for_each_estimator_where_it_is_un
 /// H1/H2 is the coherence; rounding is of sums of hundreds of terms.
 #[test]
 fn the_magnitudes_rise_from_h1_through_hv_to_h2_by_the_coherence() {
-    for (name, estimate) in [("constant", every_way()), ("welch", every_way())]
-        .map(|(name, ways)| (name, ways.into_iter().find(|(other, _)| *other == name).unwrap().1))
+    for (name, estimate) in
+        [("constant", every_way()), ("welch", every_way())].map(|(name, ways)| {
+            (
+                name,
+                ways.into_iter()
+                    .find(|(other, _)| *other == name)
+                    .unwrap()
+                    .1,
+            )
+        })
     {
         let signals = signals(3, NOISE, NOISE);
         let [h1, h2, hv] = ALL.map(|estimator| estimate(&signals, estimator).unwrap());
         for k in 0..h1.len() {
             let [low, high, middle] = [&h1, &h2, &hv].map(|frf| frf.response[k].norm());
-            assert!(low < middle && middle < high, "{name}: {low} {middle} {high}");
-            assert!((low / high / h1.coherence[k] - 1.0).abs() < 1e-9, "{name}: {}", low / high);
-            assert!((middle * middle / (low * high) - 1.0).abs() < 1e-9, "{name}");
-            assert!((hv.response[k] / h1.response[k]).arg().abs() < 1e-9, "{name}");
+            assert!(
+                low < middle && middle < high,
+                "{name}: {low} {middle} {high}"
+            );
+            assert!(
+                (low / high / h1.coherence[k] - 1.0).abs() < 1e-9,
+                "{name}: {}",
+                low / high
+            );
+            assert!(
+                (middle * middle / (low * high) - 1.0).abs() < 1e-9,
+                "{name}"
+            );
+            assert!(
+                (hv.response[k] / h1.response[k]).arg().abs() < 1e-9,
+                "{name}"
+            );
         }
     }
 }
@@ -119,7 +167,11 @@ fn without_noise_all_are_the_same() {
     for (name, estimate) in every_way() {
         for estimator in ALL {
             let frf = estimate(&signals(4, 0.0, 0.0), estimator).unwrap();
-            let off = frf.response.iter().map(|h| (h / GAIN - 1.0).norm()).fold(0.0, f64::max);
+            let off = frf
+                .response
+                .iter()
+                .map(|h| (h / GAIN - 1.0).norm())
+                .fold(0.0, f64::max);
             assert!(off < 1e-10, "{name} {estimator:?}: {off}");
         }
     }

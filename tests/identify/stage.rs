@@ -17,10 +17,26 @@ const AMPLIFIER_RAD_S: f64 = 2.0 * PI * 1000.0;
 /// omega in rad/s, residue in 1/kg, damping ratio, as `tests/python/stage.py` computes them from masses and beams. The
 /// last six are the unmodelled modes of the built stage, with residues that make them visible.
 pub const MODES: [(f64, f64, f64); 10] = [
-    (143.689_269_182_618_15, -2.903_524_423_034_201_5e-6, 0.011_055_663_158_347_56),
-    (183.936_395_146_788_84, 4.715_225_052_258_582e-1, 0.008_777_627_626_056_26),
-    (516.656_502_781_449_1, -3.194_385_121_407_502_4e-2, 0.004_012_685_609_485_7),
-    (538.998_917_721_225_9, 2.085_064_331_994_430_2e-2, 0.003_932_453_521_067_82),
+    (
+        143.689_269_182_618_15,
+        -2.903_524_423_034_201_5e-6,
+        0.011_055_663_158_347_56,
+    ),
+    (
+        183.936_395_146_788_84,
+        4.715_225_052_258_582e-1,
+        0.008_777_627_626_056_26,
+    ),
+    (
+        516.656_502_781_449_1,
+        -3.194_385_121_407_502_4e-2,
+        0.004_012_685_609_485_7,
+    ),
+    (
+        538.998_917_721_225_9,
+        2.085_064_331_994_430_2e-2,
+        0.003_932_453_521_067_82,
+    ),
     (1_477.176_865_717_920_7, 0.018, 0.005),
     (1_494.141_466_047_305_6, -0.025, 0.005),
     (1_714.052_951_798_591_3, 0.041, 0.005),
@@ -44,10 +60,15 @@ impl SampledPlant {
     }
 
     pub fn new(modes: &[(f64, f64, f64)]) -> Self {
-        let mut terms = vec![Self::term(Complex::from(-AMPLIFIER_RAD_S), Self::amplifier_residue(modes))];
+        let mut terms = vec![Self::term(
+            Complex::from(-AMPLIFIER_RAD_S),
+            Self::amplifier_residue(modes),
+        )];
         for &(omega, residue, damping) in modes {
             let pole = Complex::new(-damping * omega, omega * (1.0 - damping * damping).sqrt());
-            let c = FORCE_CONSTANT * AMPLIFIER_RAD_S * residue / (pole + AMPLIFIER_RAD_S) / (pole - pole.conj());
+            let c = FORCE_CONSTANT * AMPLIFIER_RAD_S * residue
+                / (pole + AMPLIFIER_RAD_S)
+                / (pole - pole.conj());
             terms.extend([Self::term(pole, c), Self::term(pole.conj(), c.conj())]);
         }
         Self { terms }
@@ -69,7 +90,11 @@ impl SampledPlant {
     /// The analytic response in m/A at a frequency.
     pub fn response(&self, frequency_hz: f64) -> Complex<f64> {
         let z = Complex::from_polar(1.0, 2.0 * PI * frequency_hz / RATE_HZ);
-        self.terms.iter().map(|(step, gain)| gain / (z - step)).sum::<Complex<f64>>() / z
+        self.terms
+            .iter()
+            .map(|(step, gain)| gain / (z - step))
+            .sum::<Complex<f64>>()
+            / z
     }
 
     /// The output in metres, tick by tick, from rest.
@@ -96,8 +121,15 @@ pub fn chirp() -> Vec<f64> {
 
 /// The same within other times.
 pub fn chirp_of(duration_s: f64, before_s: f64, after_s: f64) -> Vec<f64> {
-    const AMPLITUDES: [(f64, f64); 7] =
-        [(0.1, 0.4), (8.0, 0.4), (20.0, 0.1), (45.0, 0.1), (70.0, 1.0), (150.0, 3.0), (500.0, 3.0)];
+    const AMPLITUDES: [(f64, f64); 7] = [
+        (0.1, 0.4),
+        (8.0, 0.4),
+        (20.0, 0.1),
+        (45.0, 0.1),
+        (70.0, 1.0),
+        (150.0, 3.0),
+        (500.0, 3.0),
+    ];
     let (from_hz, to_hz) = (0.1, 500.0);
     let growth = f64::ln(to_hz / from_hz) / duration_s;
     let ticks = ((duration_s + before_s + after_s) * RATE_HZ).round() as usize;
@@ -108,18 +140,27 @@ pub fn chirp_of(duration_s: f64, before_s: f64, after_s: f64) -> Vec<f64> {
         }
         let frequency_hz = from_hz * (growth * t).exp();
         let phase = 2.0 * PI * from_hz / growth * (growth * t).exp_m1();
-        let fade = faded(t / 5.0_f64.min(duration_s / 10.0)) * faded((duration_s - t) / 1.0_f64.min(duration_s / 10.0));
+        let fade = faded(t / 5.0_f64.min(duration_s / 10.0))
+            * faded((duration_s - t) / 1.0_f64.min(duration_s / 10.0));
         interpolated(&AMPLITUDES, frequency_hz) * fade * phase.sin()
     };
     (0..ticks).map(sample).collect()
 }
 
 fn faded(x: f64) -> f64 {
-    if x < 1.0 { 0.5 - 0.5 * (PI * x).cos() } else { 1.0 }
+    if x < 1.0 {
+        0.5 - 0.5 * (PI * x).cos()
+    } else {
+        1.0
+    }
 }
 
 fn interpolated(points: &[(f64, f64)], x: f64) -> f64 {
-    let after = points.iter().position(|p| p.0 >= x).unwrap_or(points.len() - 1).max(1);
+    let after = points
+        .iter()
+        .position(|p| p.0 >= x)
+        .unwrap_or(points.len() - 1)
+        .max(1);
     let ((x0, y0), (x1, y1)) = (points[after - 1], points[after]);
     y0 * (y1 / y0).powf((x / x0).ln() / (x1 / x0).ln())
 }
@@ -128,7 +169,11 @@ fn interpolated(points: &[(f64, f64)], x: f64) -> f64 {
 pub fn clean_run() -> Signals {
     let input_a = chirp();
     let output_m = SampledPlant::stage().simulate(&input_a);
-    Signals { rate_hz: RATE_HZ, input_a, output_m }
+    Signals {
+        rate_hz: RATE_HZ,
+        input_a,
+        output_m,
+    }
 }
 
 /// The noise of the built stage: a probe of 40 nm RMS, read in steps of 30 nm, on a floor that shakes it by 20 nm RMS
@@ -138,9 +183,14 @@ pub fn with_noise(signals: &Signals, seed: u64) -> Signals {
     let slow = floor(&mut dice, signals.len(), 5.0, 0.1, 20e-9);
     let fast = floor(&mut dice, signals.len(), 70.0, 0.02, 15e-9);
     let step = 30e-9;
-    let noisy = |(k, y): (usize, &f64)| ((y + slow[k] + fast[k] + 40e-9 * dice.normal()) / step).round() * step;
+    let noisy = |(k, y): (usize, &f64)| {
+        ((y + slow[k] + fast[k] + 40e-9 * dice.normal()) / step).round() * step
+    };
     let output_m = signals.output_m.iter().enumerate().map(noisy).collect();
-    Signals { output_m, ..signals.clone() }
+    Signals {
+        output_m,
+        ..signals.clone()
+    }
 }
 
 /// Narrowband noise: a resonance in white noise, in its stationary state from the start.

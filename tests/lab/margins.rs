@@ -9,13 +9,26 @@ use crate::aliases::{lab, modes, response};
 
 fn bench(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     let mut command = Command::cargo_bin("bench").expect("built");
-    let output = command.current_dir(folder).args(arguments).arg("--json").output().expect("it runs");
+    let output = command
+        .current_dir(folder)
+        .args(arguments)
+        .arg("--json")
+        .output()
+        .expect("it runs");
     let json = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-    (output.status.code().unwrap_or(-1), json, String::from_utf8_lossy(&output.stderr).into_owned())
+    (
+        output.status.code().unwrap_or(-1),
+        json,
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    )
 }
 
 fn margins(arguments: &[&str]) -> Value {
-    bench(Path::new("."), &[&["margins", "--config", "lab"], arguments].concat()).1
+    bench(
+        Path::new("."),
+        &[&["margins", "--config", "lab"], arguments].concat(),
+    )
+    .1
 }
 
 /// The slow controller, Eq. (6-6), discretised by Tustin's rule as each section is, in amperes per metre.
@@ -31,14 +44,25 @@ fn the_margins_of_the_slow_controller_are_those_of_the_closed_form() {
     let (config, ours) = (lab(&[]), margins(&["--slow"]));
     let (modes, period_s) = (modes(&config), config.servo.period_s());
     let open = |w: f64| response(&config, &modes, w, false) * slow(w, period_s);
-    let closest = (1..30_000).map(|k| (open(f64::from(k) * 0.1) + 1.0).norm()).fold(f64::INFINITY, f64::min);
+    let closest = (1..30_000)
+        .map(|k| (open(f64::from(k) * 0.1) + 1.0).norm())
+        .fold(f64::INFINITY, f64::min);
     let modulus_margin = ours["modulus_margin"].as_f64().expect("a number");
     // A grid of 0.1 rad/s against mode R of 184 x 0.009 = 1.7 rad/s half-width: (0.05/1.7)^2/2 of a dip at worst.
-    assert!((modulus_margin / closest - 1.0).abs() < 2e-3, "{modulus_margin} for {closest}");
+    assert!(
+        (modulus_margin / closest - 1.0).abs() < 2e-3,
+        "{modulus_margin} for {closest}"
+    );
     let crossover_rad_s = ours["crossover_rad_s"].as_f64().expect("a number");
-    assert!((open(crossover_rad_s).norm() - 1.0).abs() < 1e-3, "{crossover_rad_s}");
+    assert!(
+        (open(crossover_rad_s).norm() - 1.0).abs() < 1e-3,
+        "{crossover_rad_s}"
+    );
     let phase_deg = ours["phase_margin_deg"].as_f64().expect("a number");
-    assert!((open(crossover_rad_s).arg().to_degrees() + 180.0 - phase_deg).abs() < 0.05, "{phase_deg}");
+    assert!(
+        (open(crossover_rad_s).arg().to_degrees() + 180.0 - phase_deg).abs() < 0.05,
+        "{phase_deg}"
+    );
 }
 
 #[test]
@@ -46,42 +70,83 @@ fn each_part_of_the_delay_costs_phase_and_the_sum_is_stated() {
     let phase = |sets: &[&str]| {
         let ours = margins(&[&["--slow"], sets].concat());
         let number = |key: &str| ours[key].as_f64().expect("a number");
-        (number("phase_margin_deg"), number("crossover_rad_s"), number("delay_s"))
+        (
+            number("phase_margin_deg"),
+            number("crossover_rad_s"),
+            number("delay_s"),
+        )
     };
     let (base_deg, crossover_rad_s, delay_s) = phase(&[]);
-    assert!((delay_s - (0.0004 + 0.0003 + 0.0014 + 0.5 / 650.0)).abs() < 1e-12, "{delay_s}");
-    for set in ["amplifier.latency_s=0.0024", "probe.latency_s=0.0023", "probe.transport_s=0.0034"] {
+    assert!(
+        (delay_s - (0.0004 + 0.0003 + 0.0014 + 0.5 / 650.0)).abs() < 1e-12,
+        "{delay_s}"
+    );
+    for set in [
+        "amplifier.latency_s=0.0024",
+        "probe.latency_s=0.0023",
+        "probe.transport_s=0.0034",
+    ] {
         let (deg, _, later_s) = phase(&["--set", set]);
         assert!((later_s - delay_s - 0.002).abs() < 1e-12, "{set}");
         // 2 ms at the crossover, which moves by less than a percent.
         let cost_deg = (crossover_rad_s * 0.002).to_degrees();
-        assert!((base_deg - deg - cost_deg).abs() < 0.02 * cost_deg + 0.02, "{set}: {deg} from {base_deg}");
+        assert!(
+            (base_deg - deg - cost_deg).abs() < 0.02 * cost_deg + 0.02,
+            "{set}: {deg} from {base_deg}"
+        );
     }
     // Half the probe's rate: half a period, 0.77 ms, more.
     let (deg, _, _) = phase(&["--set", "probe.rate_hz=325"]);
-    assert!((base_deg - deg - (crossover_rad_s * 0.5 / 650.0).to_degrees()).abs() < 0.05, "{deg} from {base_deg}");
+    assert!(
+        (base_deg - deg - (crossover_rad_s * 0.5 / 650.0).to_degrees()).abs() < 0.05,
+        "{deg} from {base_deg}"
+    );
 }
 
 #[test]
-fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_for_this_rate_runs() {
+fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_for_this_rate_runs()
+{
     let folder = tempfile::tempdir().expect("a temporary folder");
     let control = |arguments: &[&str]| {
-        let common = ["control", "--config", "lab", "--simulate", "--duration", "2"];
+        let common = [
+            "control",
+            "--config",
+            "lab",
+            "--simulate",
+            "--duration",
+            "2",
+        ];
         bench(folder.path(), &[&common[..], arguments].concat())
     };
     let (code, _, errors) = control(&["--fast"]);
     assert_eq!(code, 2, "{errors}");
-    for word in ["modulus margin", "control.least_modulus_margin", "0.4", "--controller", "nothing moved"] {
+    for word in [
+        "modulus margin",
+        "control.least_modulus_margin",
+        "0.4",
+        "--controller",
+        "nothing moved",
+    ] {
         assert!(errors.contains(word), "{word}: {errors}");
     }
-    assert!(!folder.path().join("recordings").exists(), "nothing was begun");
+    assert!(
+        !folder.path().join("recordings").exists(),
+        "nothing was begun"
+    );
     for chosen in [&["--slow"][..], &[]] {
         let (code, report, errors) = control(chosen);
-        assert_eq!((code, report["outcome"].as_str()), (0, Some("completed")), "{errors}");
+        assert_eq!(
+            (code, report["outcome"].as_str()),
+            (0, Some("completed")),
+            "{errors}"
+        );
     }
     // The threshold is a setting: the slow controller has 0.69.
     let (code, _, errors) = control(&["--slow", "--set", "control.least_modulus_margin=0.75"]);
-    assert!(code == 2 && errors.contains("0.69") && errors.contains("0.75"), "{errors}");
+    assert!(
+        code == 2 && errors.contains("0.69") && errors.contains("0.75"),
+        "{errors}"
+    );
     // Who knows better is let through, and the interlocks stand below.
     let (code, report, _) = control(&["--fast", "--set", "control.least_modulus_margin=0"]);
     assert_eq!((code, report["outcome"].as_str()), (1, Some("tripped")));
@@ -91,29 +156,66 @@ fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_
 fn what_bus_and_line_cannot_carry_is_refused_with_the_figures() {
     let refused = |sets: &[&str], words: &[&str]| {
         let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-        let (code, _, errors) = bench(Path::new("."), &[&["margins", "--config", "lab"], &sets[..]].concat());
+        let (code, _, errors) = bench(
+            Path::new("."),
+            &[&["margins", "--config", "lab"], &sets[..]].concat(),
+        );
         assert_eq!(code, 2, "{errors}");
-        words.iter().for_each(|word| assert!(errors.contains(word), "{word}: {errors}"));
+        words
+            .iter()
+            .for_each(|word| assert!(errors.contains(word), "{word}: {errors}"));
     };
     let synchronous = "amplifier.device.exchange={ kind = \"synchronous\", status_every = 1 }";
-    refused(&["loop.rate_hz=5000", synchronous], &["245 us of the 200 us", "123.2 %", "80 %", "3239 Hz"]);
-    refused(&["loop.rate_hz=20000"], &["asynchronous set-point", "loads the bus", "allows"]);
+    refused(
+        &["loop.rate_hz=5000", synchronous],
+        &["245 us of the 200 us", "123.2 %", "80 %", "3239 Hz"],
+    );
+    refused(
+        &["loop.rate_hz=20000"],
+        &["asynchronous set-point", "loads the bus", "allows"],
+    );
     // 6 + 17 characters of 11 bits at 230,400 baud take 1.098 ms.
-    refused(&["probe.transport_s=0.001"], &["0.001 s", "23 characters", "0.001098"]);
+    refused(
+        &["probe.transport_s=0.001"],
+        &["0.001 s", "23 characters", "0.001098"],
+    );
     refused(&["interlock.probe_stale_s=0.003"], &["0.003", "rate_hz"]);
-    refused(&["amplifier.device.node=127"], &["own_node", "not that of the drive"]);
-    let (code, _, errors) = bench(Path::new("."), &["chirp", "--config", "lab", "--simulate", "--stop", "400"]);
-    assert!(code == 2 && errors.contains("half its rate, 325 Hz"), "{errors}");
+    refused(
+        &["amplifier.device.node=127"],
+        &["own_node", "not that of the drive"],
+    );
+    let (code, _, errors) = bench(
+        Path::new("."),
+        &["chirp", "--config", "lab", "--simulate", "--stop", "400"],
+    );
+    assert!(
+        code == 2 && errors.contains("half its rate, 325 Hz"),
+        "{errors}"
+    );
 }
 
 #[test]
 fn devices_keep_their_own_pace_and_one_device_alone_makes_no_loop() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let (code, _, errors) = bench(folder.path(), &["chirp", "--config", "lab", "--pace", "virtual"]);
+    let (code, _, errors) = bench(
+        folder.path(),
+        &["chirp", "--config", "lab", "--pace", "virtual"],
+    );
     assert!(code == 2 && errors.contains("--simulate"), "{errors}");
-    let (code, _, errors) =
-        bench(folder.path(), &["chirp", "--config", "lab", "--set", "amplifier.device.kind=simulated"]);
-    assert!(code == 2 && errors.contains("capancdt") && errors.contains("both"), "{errors}");
+    let (code, _, errors) = bench(
+        folder.path(),
+        &[
+            "chirp",
+            "--config",
+            "lab",
+            "--set",
+            "amplifier.device.kind=simulated",
+        ],
+    );
+    assert!(
+        code == 2 && errors.contains("capancdt") && errors.contains("both"),
+        "{errors}"
+    );
     // This machine has no can0, or no such port: nothing moves, and the word says which.
     let (code, _, errors) = bench(folder.path(), &["control", "--config", "lab", "--slow"]);
     assert!(code == 2 && errors.contains("nothing moved"), "{errors}");

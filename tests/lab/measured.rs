@@ -8,8 +8,12 @@ use nalgebra::Complex;
 use crate::aliases::{lab, response};
 use crate::simulated;
 
-const QUIET: [&str; 4] =
-    ["sim.floor=[]", "sim.probe_noise_rms_m=0", "sim.probe_quantisation_m=0", "chirp.duration_s=60"];
+const QUIET: [&str; 4] = [
+    "sim.floor=[]",
+    "sim.probe_noise_rms_m=0",
+    "sim.probe_quantisation_m=0",
+    "chirp.duration_s=60",
+];
 
 fn measured(config: &Config, believed: &Config) -> Analysis {
     simulated::analysed(&Plan::chirp(config.clone()), believed).expect("an analysis")
@@ -17,31 +21,51 @@ fn measured(config: &Config, believed: &Config) -> Analysis {
 
 /// Ratios of measured to exact response, between two frequencies; around the zeros, where little answers, the error is
 /// taken against the static compliance instead.
-fn ratios(analysis: &Analysis, config: &Config, modes: &[Mode], band_hz: (f64, f64)) -> Vec<Complex<f64>> {
+fn ratios(
+    analysis: &Analysis,
+    config: &Config,
+    modes: &[Mode],
+    band_hz: (f64, f64),
+) -> Vec<Complex<f64>> {
     let at = |(f, h): (&f64, &Complex<f64>)| {
         let exact = response(config, modes, std::f64::consts::TAU * f, true);
         h / exact
     };
     let all = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response);
-    all.filter(|(f, _)| (band_hz.0..band_hz.1).contains(*f)).map(at).collect()
+    all.filter(|(f, _)| (band_hz.0..band_hz.1).contains(*f))
+        .map(at)
+        .collect()
 }
 
 fn share_beyond(ratios: &[Complex<f64>], percent: f64, deg: f64) -> f64 {
-    let off = |r: &&Complex<f64>| (r.norm() - 1.0).abs() > percent / 100.0 || r.arg().to_degrees().abs() > deg;
+    let off = |r: &&Complex<f64>| {
+        (r.norm() - 1.0).abs() > percent / 100.0 || r.arg().to_degrees().abs() > deg
+    };
     ratios.iter().filter(off).count() as f64 / ratios.len() as f64
 }
 
 #[test]
 fn a_slow_probe_of_its_own_clock_blurs_nothing() {
     let config = lab(&QUIET);
-    let (analysis, modes) = (measured(&config, &config), sim::modes(&config).expect("modes"));
+    let (analysis, modes) = (
+        measured(&config, &config),
+        sim::modes(&config).expect("modes"),
+    );
     let all = ratios(&analysis, &config, &modes, (0.5, 140.0));
     assert!(all.len() > 1000);
     // A step of the current is 2 mA of 0.1 to 1.5 A: half a percent of a bin's noise. Taken as of one age, the readings would
     // be off by a third.
-    assert!(share_beyond(&all, 1.0, 1.0) < 0.01, "{}", share_beyond(&all, 1.0, 1.0));
+    assert!(
+        share_beyond(&all, 1.0, 1.0) < 0.01,
+        "{}",
+        share_beyond(&all, 1.0, 1.0)
+    );
     let low = ratios(&analysis, &config, &modes, (0.5, 25.0));
-    assert!(share_beyond(&low, 0.2, 0.2) < 0.01, "{}", share_beyond(&low, 0.2, 0.2));
+    assert!(
+        share_beyond(&low, 0.2, 0.2) < 0.01,
+        "{}",
+        share_beyond(&low, 0.2, 0.2)
+    );
 }
 
 #[test]

@@ -20,7 +20,9 @@ const WOKE_S: f64 = 10e-6;
 /// Numbers from 0 to 1, the same ones each time.
 fn random(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (seed >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -40,13 +42,26 @@ struct Wires {
 /// The run of a chirp over `wires`, recorded as the loop would; and the mean age of its readings in seconds.
 fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
     let mut stage = LiveStage::new(config).expect("a stage");
-    let (chirp, period_s) = (Chirp::new(&config.chirp, config.servo.period_s()), config.servo.period_s());
-    let metadata: BTreeMap<String, String> =
-        [("run", "chirp"), ("probe", "another")].map(|(k, v)| (k.to_string(), v.to_string())).into();
-    let config_toml = Plan::chirp(config.clone()).config_toml().expect("a configuration");
+    let (chirp, period_s) = (
+        Chirp::new(&config.chirp, config.servo.period_s()),
+        config.servo.period_s(),
+    );
+    let metadata: BTreeMap<String, String> = [("run", "chirp"), ("probe", "another")]
+        .map(|(k, v)| (k.to_string(), v.to_string()))
+        .into();
+    let config_toml = Plan::chirp(config.clone())
+        .config_toml()
+        .expect("a configuration");
     let path = folder.join("wires.mcap");
-    let mut recorder =
-        Recorder::create(&path, &Header { config_toml, metadata, ..Header::default() }).expect("a new file");
+    let mut recorder = Recorder::create(
+        &path,
+        &Header {
+            config_toml,
+            metadata,
+            ..Header::default()
+        },
+    )
+    .expect("a new file");
     let (mut random, mut ages_s) = (random(5), 0.0);
     // The stage's clock begins a second before the loop's.
     let begin_s = 1.0;
@@ -67,7 +82,12 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
             tick,
             scheduled_ns: ns(scheduled_s),
             woke_ns: ns(woke_s),
-            done_ns: ns(scheduled_s + if tick == 0 { wires.enabling_s.max(late_s) } else { late_s }),
+            done_ns: ns(scheduled_s
+                + if tick == 0 {
+                    wires.enabling_s.max(late_s)
+                } else {
+                    late_s
+                }),
             position_m,
             requested_a: command_a,
             command_a,
@@ -78,10 +98,15 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
             flags: if chirp.active(tick) { flag::ACTIVE } else { 0 },
             ..TickRecord::default()
         };
-        recorder.record(&Published::Tick(record)).expect("a good disk");
+        recorder
+            .record(&Published::Tick(record))
+            .expect("a good disk");
     }
     recorder.finish(&[]).expect("a good disk");
-    (Recording::open(&path).expect("a recording"), ages_s / chirp.ticks() as f64)
+    (
+        Recording::open(&path).expect("a recording"),
+        ages_s / chirp.ticks() as f64,
+    )
 }
 
 /// Largest distances in percent and degrees from the closed form of the chain with the mean delays, 0.5 to 120 Hz, and the
@@ -93,21 +118,37 @@ fn off(config: &Config, wires: &Wires) -> (f64, f64, f64) {
     let mut mean = config.clone();
     mean.amplifier.latency_s = wires.command_s.0 + 0.5 * wires.command_s.1;
     // Readings are taken when the tick is served.
-    (mean.probe.rate_hz, mean.probe.latency_s, mean.probe.transport_s) = (None, age_s - WOKE_S, 0.0);
+    (
+        mean.probe.rate_hz,
+        mean.probe.latency_s,
+        mean.probe.transport_s,
+    ) = (None, age_s - WOKE_S, 0.0);
     let modes: Vec<Mode> = sim::modes(config).expect("modes");
     let points = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response);
     // Around a resonance the estimator's own resolution counts, whatever the wires do.
     let narrow = [(27.0, 32.0), (80.0, 88.0)];
-    let inside = |f: f64| (0.5..120.0).contains(&f) && !narrow.iter().any(|(low, high)| (*low..*high).contains(&f));
+    let inside = |f: f64| {
+        (0.5..120.0).contains(&f) && !narrow.iter().any(|(low, high)| (*low..*high).contains(&f))
+    };
     let ratios: Vec<_> = points
         .filter(|(f, _)| inside(**f))
         .map(|(f, h)| h / response(&mean, &modes, std::f64::consts::TAU * f, true))
         .collect();
-    let (percent, degrees): (Vec<f64>, Vec<f64>) =
-        ratios.iter().map(|r| (100.0 * (r.norm() - 1.0).abs(), r.arg().to_degrees().abs())).unzip();
+    let (percent, degrees): (Vec<f64>, Vec<f64>) = ratios
+        .iter()
+        .map(|r| (100.0 * (r.norm() - 1.0).abs(), r.arg().to_degrees().abs()))
+        .unzip();
     let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
-    let beyond = percent.iter().zip(&degrees).filter(|(p, d)| **p > 1.0 || **d > 1.0).count();
-    (largest(&percent), largest(&degrees), beyond as f64 / ratios.len() as f64)
+    let beyond = percent
+        .iter()
+        .zip(&degrees)
+        .filter(|(p, d)| **p > 1.0 || **d > 1.0)
+        .count();
+    (
+        largest(&percent),
+        largest(&degrees),
+        beyond as f64 / ratios.len() as f64,
+    )
 }
 
 fn quiet(more: &[&str]) -> Config {
@@ -135,7 +176,12 @@ fn must_be_within(wires: &Wires, bound: &Bound) {
     );
 }
 
-const STEADY: Wires = Wires { command_s: (4e-5, 0.0), probe_s: (1e-3, 3e-4), arrival_s: (3e-4, 0.0), enabling_s: 0.0 };
+const STEADY: Wires = Wires {
+    command_s: (4e-5, 0.0),
+    probe_s: (1e-3, 3e-4),
+    arrival_s: (3e-4, 0.0),
+    enabling_s: 0.0,
+};
 
 // The estimator by itself: a chirp of 24 s resolves the slopes of the resonances to 0.2 %.
 const BY_ITSELF: Bound = Bound(0.3, 0.05, 0.0);
@@ -147,13 +193,26 @@ fn readings_of_one_age_are_those_of_the_closed_form() {
 
 #[test]
 fn a_first_tick_of_three_periods_in_which_the_drive_is_enabled_changes_nothing() {
-    must_be_within(&Wires { enabling_s: 6e-3, ..STEADY }, &BY_ITSELF);
+    must_be_within(
+        &Wires {
+            enabling_s: 6e-3,
+            ..STEADY
+        },
+        &BY_ITSELF,
+    );
 }
 
 #[test]
 fn readings_that_arrive_just_before_or_after_the_tick_change_nothing() {
     // Now and then the reading of a millisecond earlier is the newest: 36 degrees at 100 Hz.
-    must_be_within(&Wires { probe_s: (1e-3, 1.1e-4), arrival_s: (2e-4, 1e-4), ..STEADY }, &BY_ITSELF);
+    must_be_within(
+        &Wires {
+            probe_s: (1e-3, 1.1e-4),
+            arrival_s: (2e-4, 1e-4),
+            ..STEADY
+        },
+        &BY_ITSELF,
+    );
 }
 
 // What is held at 500 Hz has an image of 100 Hz at 400 Hz, a quarter as high, of which the stage shows a sixteenth: 1.6 %
@@ -163,20 +222,34 @@ fn readings_that_arrive_just_before_or_after_the_tick_change_nothing() {
 #[test]
 fn commands_that_go_out_at_any_time_within_a_fifth_of_a_period_are_undone() {
     // Taken at the ticks they would be off by 40 % and 25 degrees.
-    must_be_within(&Wires { command_s: (4e-5, 4e-4), ..STEADY }, &Bound(1.4, 0.9, 0.01));
+    must_be_within(
+        &Wires {
+            command_s: (4e-5, 4e-4),
+            ..STEADY
+        },
+        &Bound(1.4, 0.9, 0.01),
+    );
 }
 
 #[test]
 fn a_fast_probe_of_its_own_clock_is_undone() {
-    let probe =
-        Wires { command_s: (4e-5, 2e-5), probe_s: (0.25e-3 * 0.999_37, 0.0), arrival_s: (2e-4, 1e-4), ..STEADY };
+    let probe = Wires {
+        command_s: (4e-5, 2e-5),
+        probe_s: (0.25e-3 * 0.999_37, 0.0),
+        arrival_s: (2e-4, 1e-4),
+        ..STEADY
+    };
     must_be_within(&probe, &Bound(1.2, 0.5, 0.01));
 }
 
 #[test]
 fn a_slow_probe_of_its_own_clock_is_undone() {
     // Ages of 1.3 to 2.9 ms: taken as of one age, 29 degrees at 100 Hz.
-    let probe =
-        Wires { command_s: (4e-5, 2e-5), probe_s: (1.54e-3 * 0.999_37, 0.0), arrival_s: (1.3e-3, 1e-4), ..STEADY };
+    let probe = Wires {
+        command_s: (4e-5, 2e-5),
+        probe_s: (1.54e-3 * 0.999_37, 0.0),
+        arrival_s: (1.3e-3, 1e-4),
+        ..STEADY
+    };
     must_be_within(&probe, &Bound(1.6, 1.6, 0.06));
 }

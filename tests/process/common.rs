@@ -12,7 +12,14 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// As many late ticks as this machine may have under load: what is tested here is not its timing.
 pub const PATIENT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
 /// The chirp's last frequency must lie below half the rate in any configuration.
-pub const AT_1_KHZ: [&str; 6] = ["--set", "loop.rate_hz=1000", "--set", "chirp.stop_hz=200", "--pace", "realtime"];
+pub const AT_1_KHZ: [&str; 6] = [
+    "--set",
+    "loop.rate_hz=1000",
+    "--set",
+    "chirp.stop_hz=200",
+    "--pace",
+    "realtime",
+];
 pub const RATE_HZ: u64 = 1000;
 
 pub fn bench(arguments: &[&str]) -> Command {
@@ -24,8 +31,25 @@ pub fn bench(arguments: &[&str]) -> Command {
 /// A minute of closed loop with the slow controller, or of chirp: longer than any test lets it run.
 pub fn minute(what: &str) -> Vec<&str> {
     let own: &[&str] = match what {
-        "control" => &["control", "--slow", "--duration", "60", "--reference", "sine", "--amplitude", "20um"],
-        _ => &["chirp", "--duration", "60", "--amplitude", "0.1", "--set", "chirp.quiet_before_s=0.1"],
+        "control" => &[
+            "control",
+            "--slow",
+            "--duration",
+            "60",
+            "--reference",
+            "sine",
+            "--amplitude",
+            "20um",
+        ],
+        _ => &[
+            "chirp",
+            "--duration",
+            "60",
+            "--amplitude",
+            "0.1",
+            "--set",
+            "chirp.quiet_before_s=0.1",
+        ],
     };
     [own, &["--json"], &AT_1_KHZ, &PATIENT].concat()
 }
@@ -36,7 +60,13 @@ pub struct Running(Option<Child>);
 impl Running {
     pub fn start(arguments: &[&str], out: &Path) -> Running {
         let mut command = bench(arguments);
-        Running::of(command.arg("--out").arg(out).stdout(Stdio::piped()).stderr(Stdio::piped()))
+        Running::of(
+            command
+                .arg("--out")
+                .arg(out)
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped()),
+        )
     }
 
     pub fn of(command: &mut Command) -> Running {
@@ -55,13 +85,16 @@ impl Running {
 
     /// Sleeps of the loop's thread: one a tick at the most, so no more than the ticks begun (and a few before the first).
     fn sleeps(&self) -> u64 {
-        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.pid())).expect("a running process");
+        let tasks =
+            std::fs::read_dir(format!("/proc/{}/task", self.pid())).expect("a running process");
         for task in tasks {
             let Ok(task) = task else { continue };
             let named = |name: &str| std::fs::read_to_string(task.path().join(name)).ok();
             if named("comm").is_some_and(|comm| comm.trim() == "bench-loop") {
                 let status = named("status").unwrap_or_default();
-                let line = status.lines().find_map(|line| line.strip_prefix("voluntary_ctxt_switches:"));
+                let line = status
+                    .lines()
+                    .find_map(|line| line.strip_prefix("voluntary_ctxt_switches:"));
                 return line.and_then(|n| n.trim().parse().ok()).unwrap_or(0);
             }
         }
@@ -71,7 +104,14 @@ impl Running {
     /// Waits until it ends of its own.
     pub fn until_ended(&mut self) {
         let patience = Instant::now() + PATIENCE;
-        while self.0.as_mut().expect("running").try_wait().expect("a child of ours").is_none() {
+        while self
+            .0
+            .as_mut()
+            .expect("running")
+            .try_wait()
+            .expect("a child of ours")
+            .is_none()
+        {
             assert!(Instant::now() < patience, "it goes on and on");
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -85,17 +125,29 @@ impl Running {
             if sleeps >= times {
                 return sleeps;
             }
-            let ended = self.0.as_mut().expect("running").try_wait().expect("a child of ours");
+            let ended = self
+                .0
+                .as_mut()
+                .expect("running")
+                .try_wait()
+                .expect("a child of ours");
             if ended.is_some() {
                 panic!("it ended early: {:?}", self.end());
             }
-            assert!(Instant::now() < patience, "the loop does not run: {sleeps} sleeps");
+            assert!(
+                Instant::now() < patience,
+                "the loop does not run: {sleeps} sleeps"
+            );
             std::thread::sleep(Duration::from_millis(20));
         }
     }
 
     pub fn end(&mut self) -> Output {
-        self.0.take().expect("running").wait_with_output().expect("a child of ours")
+        self.0
+            .take()
+            .expect("running")
+            .wait_with_output()
+            .expect("a child of ours")
     }
 }
 
@@ -114,12 +166,19 @@ pub fn stderr(output: &Output) -> String {
 
 /// The one recording in a folder.
 pub fn recording_in(folder: &Path) -> PathBuf {
-    let files = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
-    let mut found: Vec<PathBuf> = files.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    let files = std::fs::read_dir(folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").path());
+    let mut found: Vec<PathBuf> = files
+        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
+        .collect();
     assert_eq!(found.len(), 1, "{found:?}");
     found.remove(0)
 }
 
 pub fn ticks(recording: &Recording) -> Vec<TickRecord> {
-    recording.ticks().and_then(Iterator::collect).expect("readable")
+    recording
+        .ticks()
+        .and_then(Iterator::collect)
+        .expect("readable")
 }

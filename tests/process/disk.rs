@@ -11,12 +11,18 @@ use crate::common::{AT_1_KHZ, PATIENT, Running, bench, recording_in, stderr};
 fn little_room(blocks: u32, arguments: &[&str], out: &Path) -> Command {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
     let mut command = Command::new("sh");
-    command.args(["-c", &script, env!("CARGO_BIN_EXE_bench")]).args(arguments).arg("--out").arg(out);
+    command
+        .args(["-c", &script, env!("CARGO_BIN_EXE_bench")])
+        .args(arguments)
+        .arg("--out")
+        .arg(out);
     command
 }
 
 fn with_little_room(blocks: u32, arguments: &[&str], out: &Path) -> Output {
-    little_room(blocks, arguments, out).output().expect("a shell")
+    little_room(blocks, arguments, out)
+        .output()
+        .expect("a shell")
 }
 
 #[test]
@@ -34,16 +40,29 @@ fn a_disk_that_fills_up_stops_the_run_says_so_and_keeps_what_was_written() {
             "what and where: {said}"
         );
         assert!(said.contains("bench recover"), "the remedy: {said}");
-        assert!(said.contains("the run was stopped with zero current"), "{said}");
+        assert!(
+            said.contains("the run was stopped with zero current"),
+            "{said}"
+        );
         assert!(!said.contains("panicked"), "{said}");
 
         let recover = bench(&["recover"]).arg(&path).output().expect("it runs");
         assert_eq!(recover.status.code(), Some(0), "{}", stderr(&recover));
         let stem = path.file_stem().expect("a name").to_str().expect("text");
-        let saved = Recording::open(&path.with_file_name(format!("{stem}_recovered.mcap"))).expect("whole");
+        let saved =
+            Recording::open(&path.with_file_name(format!("{stem}_recovered.mcap"))).expect("whole");
         // 1 MiB at 30 to 100 bytes a tick, less a chunk of 2500.
-        assert!((5_000..80_000).contains(&saved.tick_count()), "{}", saved.tick_count());
-        assert!(saved.ticks().expect("readable").any(|r| r.is_ok_and(|r| r.flags & flag::ACTIVE != 0)));
+        assert!(
+            (5_000..80_000).contains(&saved.tick_count()),
+            "{}",
+            saved.tick_count()
+        );
+        assert!(
+            saved
+                .ticks()
+                .expect("readable")
+                .any(|r| r.is_ok_and(|r| r.flags & flag::ACTIVE != 0))
+        );
     }
 }
 
@@ -51,14 +70,22 @@ fn a_disk_that_fills_up_stops_the_run_says_so_and_keeps_what_was_written() {
 fn a_run_in_real_time_is_stopped_when_the_disk_fills_up() {
     // An hour; 64 blocks are full within seconds. Were the run not stopped, it would not end while this test has patience.
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let arguments = [&["control", "--slow", "--duration", "3600"][..], &AT_1_KHZ, &PATIENT].concat();
+    let arguments = [
+        &["control", "--slow", "--duration", "3600"][..],
+        &AT_1_KHZ,
+        &PATIENT,
+    ]
+    .concat();
     let mut command = little_room(64, &arguments, folder.path());
     let mut running = Running::of(command.stdout(Stdio::piped()).stderr(Stdio::piped()));
     running.until_ended();
     let output = running.end();
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("File too large") && said.contains("the run was stopped with zero current"), "{said}");
+    assert!(
+        said.contains("File too large") && said.contains("the run was stopped with zero current"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -67,7 +94,10 @@ fn a_disk_that_is_full_from_the_start_moves_nothing() {
     let output = with_little_room(0, &["chirp"], folder.path());
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("File too large") && said.contains("nothing moved"), "{said}");
+    assert!(
+        said.contains("File too large") && said.contains("nothing moved"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -76,15 +106,36 @@ fn a_folder_that_cannot_be_written_to_is_told_before_anything_moves() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a_file");
     std::fs::write(&file, "in the way").expect("a file");
-    for out in [Path::new("/proc"), Path::new("/proc/recordings"), &file, &file.join("below")] {
+    for out in [
+        Path::new("/proc"),
+        Path::new("/proc/recordings"),
+        &file,
+        &file.join("below"),
+    ] {
         for command in ["chirp", "control"] {
-            let output = bench(&[command]).arg("--out").arg(out).output().expect("it runs");
+            let output = bench(&[command])
+                .arg("--out")
+                .arg(out)
+                .output()
+                .expect("it runs");
             let said = stderr(&output);
             assert_eq!(output.status.code(), Some(1), "{said}");
-            assert!(said.contains(out.to_str().expect("text")) && said.contains("nothing moved"), "{said}");
-            assert!(said.contains("--out") || said.contains("check that"), "the remedy: {said}");
-            assert!(output.stdout.is_empty() && !said.contains("panicked"), "{said}");
+            assert!(
+                said.contains(out.to_str().expect("text")) && said.contains("nothing moved"),
+                "{said}"
+            );
+            assert!(
+                said.contains("--out") || said.contains("check that"),
+                "the remedy: {said}"
+            );
+            assert!(
+                output.stdout.is_empty() && !said.contains("panicked"),
+                "{said}"
+            );
         }
     }
-    assert_eq!(std::fs::read_to_string(&file).expect("still there"), "in the way");
+    assert_eq!(
+        std::fs::read_to_string(&file).expect("still there"),
+        "in the way"
+    );
 }

@@ -14,23 +14,52 @@ fn of_a_killed_run_all_but_the_last_second_is_recovered() {
 
         let path = recording_in(folder.path());
         let before = std::fs::read(&path).expect("a file");
-        let output = bench(&["recover", "--json"]).arg(&path).output().expect("it runs");
-        let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        let output = bench(&["recover", "--json"])
+            .arg(&path)
+            .output()
+            .expect("it runs");
+        let said: serde_json::Value =
+            serde_json::from_slice(&output.stdout).expect("one JSON object");
         // 0, or 3 if the machine was too slow to hand all records over.
         let lost = said["lost_records"].as_u64().expect("a count");
-        assert_eq!(output.status.code(), Some(if lost == 0 { 0 } else { 3 }), "{}", stderr(&output));
-        assert!(said["cut"].is_object(), "it says where the file ends: {said}");
-        assert_eq!(std::fs::read(&path).expect("still there"), before, "the original is not touched");
+        assert_eq!(
+            output.status.code(),
+            Some(if lost == 0 { 0 } else { 3 }),
+            "{}",
+            stderr(&output)
+        );
+        assert!(
+            said["cut"].is_object(),
+            "it says where the file ends: {said}"
+        );
+        assert_eq!(
+            std::fs::read(&path).expect("still there"),
+            before,
+            "the original is not touched"
+        );
 
-        let recovered = Recording::open(said["recording"].as_str().expect("a path").as_ref()).expect("whole again");
+        let recovered = Recording::open(said["recording"].as_str().expect("a path").as_ref())
+            .expect("whole again");
         assert!(!recovered.truncated());
         assert_eq!(said["ticks"].as_u64(), Some(recovered.tick_count()));
         // At the kill the loop had slept so often, once for each tick at the most: at least as many ticks had begun (some
         // ten sleeps are of its start). Half a second is on its way to a chunk, half a second is in the open chunk.
         let begun = sleeps - 10;
-        assert!(recovered.last_tick() + RATE_HZ >= begun, "{} of {begun} ticks", recovered.last_tick());
-        assert_eq!(recovered.tick_count() + recovered.overruns() + recovered.lost_records(), recovered.last_tick() + 1);
+        assert!(
+            recovered.last_tick() + RATE_HZ >= begun,
+            "{} of {begun} ticks",
+            recovered.last_tick()
+        );
+        assert_eq!(
+            recovered.tick_count() + recovered.overruns() + recovered.lost_records(),
+            recovered.last_tick() + 1
+        );
         let replay = bench(&["replay"]).arg(&path).output().expect("it runs");
-        assert_eq!(replay.status.code(), Some(0), "what is left replays: {}", stderr(&replay));
+        assert_eq!(
+            replay.status.code(),
+            Some(0),
+            "what is left replays: {}",
+            stderr(&replay)
+        );
     }
 }

@@ -9,7 +9,10 @@ use bench::rt::record::{Published, TickRecord};
 use crate::common::{AT_1_KHZ, PATIENT, Running, bench, recording_in, stderr};
 
 fn replay(path: &Path) -> Output {
-    bench(&["replay", "--json"]).arg(path).output().expect("it runs")
+    bench(&["replay", "--json"])
+        .arg(path)
+        .output()
+        .expect("it runs")
 }
 
 fn json(output: &Output) -> serde_json::Value {
@@ -19,7 +22,12 @@ fn json(output: &Output) -> serde_json::Value {
 #[test]
 fn a_run_in_real_time_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let arguments = [&["control", "--slow", "--duration", "2", "--json"][..], &AT_1_KHZ, &PATIENT].concat();
+    let arguments = [
+        &["control", "--slow", "--duration", "2", "--json"][..],
+        &AT_1_KHZ,
+        &PATIENT,
+    ]
+    .concat();
     let mut running = Running::start(&arguments, folder.path());
     running.until_slept(800);
     // Held up for 50 ms and more: some fifty ticks at 1 kHz pass unserved.
@@ -28,16 +36,27 @@ fn a_run_in_real_time_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     running.signal(libc::SIGCONT);
     let output = running.end();
     let said = json(&output);
-    assert_eq!((output.status.code(), said["outcome"].as_str()), (Some(3), Some("completed")), "{said}");
+    assert_eq!(
+        (output.status.code(), said["outcome"].as_str()),
+        (Some(3), Some("completed")),
+        "{said}"
+    );
     let path = recording_in(folder.path());
     let recording = Recording::open(&path).expect("a recording");
     assert!(recording.overruns() >= 45, "{}", recording.overruns());
     assert_eq!(said["overruns"].as_u64(), Some(recording.overruns()));
-    assert_eq!(recording.tick_count() + recording.overruns(), recording.last_tick() + 1);
+    assert_eq!(
+        recording.tick_count() + recording.overruns(),
+        recording.last_tick() + 1
+    );
 
     let output = replay(&path);
     let said = json(&output);
-    assert_eq!((output.status.code(), said["identical"].as_bool()), (Some(0), Some(true)), "{said}");
+    assert_eq!(
+        (output.status.code(), said["identical"].as_bool()),
+        (Some(0), Some(true)),
+        "{said}"
+    );
     assert_eq!(said["ticks"].as_u64(), Some(recording.tick_count()));
 }
 
@@ -45,7 +64,12 @@ fn a_run_in_real_time_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
 fn more_missed_ticks_than_allowed_trip_and_exit_with_1() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let limit = ["--set", "interlock.overruns_per_s=100"];
-    let arguments = [&["control", "--slow", "--duration", "60", "--json"][..], &AT_1_KHZ, &limit].concat();
+    let arguments = [
+        &["control", "--slow", "--duration", "60", "--json"][..],
+        &AT_1_KHZ,
+        &limit,
+    ]
+    .concat();
     let mut running = Running::start(&arguments, folder.path());
     running.until_slept(800);
     running.signal(libc::SIGSTOP);
@@ -53,12 +77,20 @@ fn more_missed_ticks_than_allowed_trip_and_exit_with_1() {
     running.signal(libc::SIGCONT);
     let output = running.end();
     let said = json(&output);
-    assert_eq!((output.status.code(), said["outcome"].as_str()), (Some(1), Some("tripped")), "{said}");
+    assert_eq!(
+        (output.status.code(), said["outcome"].as_str()),
+        (Some(1), Some("tripped")),
+        "{said}"
+    );
     assert_eq!(said["trip"]["reason"].as_str(), Some("overruns"), "{said}");
     let path = recording_in(folder.path());
     let recording = Recording::open(&path).expect("a recording");
     let at = said["trip"]["tick"].as_u64().expect("a tick");
-    let after = recording.ticks().expect("readable").map(|r| r.expect("readable")).filter(|r| r.tick >= at);
+    let after = recording
+        .ticks()
+        .expect("readable")
+        .map(|r| r.expect("readable"))
+        .filter(|r| r.tick >= at);
     assert!(after.into_iter().all(|r| r.command_a.to_bits() == 0));
     assert_eq!(replay(&path).status.code(), Some(0));
 }
@@ -66,8 +98,10 @@ fn more_missed_ticks_than_allowed_trip_and_exit_with_1() {
 #[test]
 fn an_altered_recording_exits_with_1_and_names_the_tick() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let output =
-        bench(&["control", "--fast", "--duration", "1", "--out"]).arg(folder.path()).output().expect("it runs");
+    let output = bench(&["control", "--fast", "--duration", "1", "--out"])
+        .arg(folder.path())
+        .output()
+        .expect("it runs");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let path = recording_in(folder.path());
     assert_eq!(replay(&path).status.code(), Some(0));
@@ -81,7 +115,8 @@ fn an_altered_recording_exits_with_1_and_names_the_tick() {
     };
     let mut new = Recorder::create(&altered, &header).expect("a new file");
     for attachment in old.attachments().iter().filter(|a| a.name != "config.toml") {
-        new.attach(&attachment.name, &attachment.media_type, &attachment.data).expect("a good disk");
+        new.attach(&attachment.name, &attachment.media_type, &attachment.data)
+            .expect("a good disk");
     }
     let mut events = old.events().iter().peekable();
     for record in old.ticks().expect("readable") {
@@ -98,22 +133,34 @@ fn an_altered_recording_exits_with_1_and_names_the_tick() {
     new.finish(&[]).expect("a good disk");
     let output = replay(&altered);
     let said = json(&output);
-    assert_eq!((output.status.code(), said["identical"].as_bool()), (Some(1), Some(false)), "{said}");
+    assert_eq!(
+        (output.status.code(), said["identical"].as_bool()),
+        (Some(1), Some(false)),
+        "{said}"
+    );
     assert_eq!(said["first"]["tick"].as_u64(), Some(6000), "{said}");
     let output = bench(&["replay"]).arg(&altered).output().expect("it runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.code() == Some(1) && text.contains("DIFFER") && text.contains("tick 6000"), "{text}");
+    assert!(
+        output.status.code() == Some(1) && text.contains("DIFFER") && text.contains("tick 6000"),
+        "{text}"
+    );
 }
 
 #[test]
 fn files_that_are_no_recordings_are_refused_with_a_reason_and_without_a_panic() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let output =
-        bench(&["control", "--slow", "--duration", "1", "--out"]).arg(folder.path()).output().expect("it runs");
+    let output = bench(&["control", "--slow", "--duration", "1", "--out"])
+        .arg(folder.path())
+        .output()
+        .expect("it runs");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let whole = std::fs::read(recording_in(folder.path())).expect("a file");
     let foreign = folder.path().join("foreign.mcap");
-    mcap::Writer::new(std::fs::File::create(&foreign).expect("a file")).expect("room").finish().expect("room");
+    mcap::Writer::new(std::fs::File::create(&foreign).expect("a file"))
+        .expect("room")
+        .finish()
+        .expect("room");
     let foreign = std::fs::read(foreign).expect("a file");
 
     let mut altered = whole.clone();
@@ -137,17 +184,31 @@ fn files_that_are_no_recordings_are_refused_with_a_reason_and_without_a_panic() 
             let output = bench(&[command]).arg(&path).output().expect("it runs");
             let said = stderr(&output);
             assert_eq!(output.status.code(), Some(1), "{command} {name}: {said}");
-            assert!(said.contains(name) && said.contains(expected), "{command} {name}: {said}");
-            assert!(!said.contains("panicked") && output.stdout.is_empty(), "{command} {name}: {said}");
+            assert!(
+                said.contains(name) && said.contains(expected),
+                "{command} {name}: {said}"
+            );
+            assert!(
+                !said.contains("panicked") && output.stdout.is_empty(),
+                "{command} {name}: {said}"
+            );
         }
     }
     let output = replay(&folder.path().join("absent"));
-    assert!(output.status.code() == Some(1) && stderr(&output).contains("no such file"), "{}", stderr(&output));
+    assert!(
+        output.status.code() == Some(1) && stderr(&output).contains("no such file"),
+        "{}",
+        stderr(&output)
+    );
 
     // Cut off in the middle: what is there replays, and the program says that it is cut.
     let cut = folder.path().join("cut.mcap");
     std::fs::write(&cut, &whole[..whole.len() * 2 / 3]).expect("a file");
     let output = replay(&cut);
     let said = json(&output);
-    assert_eq!((output.status.code(), said["truncated"].as_bool()), (Some(0), Some(true)), "{said}");
+    assert_eq!(
+        (output.status.code(), said["truncated"].as_bool()),
+        (Some(0), Some(true)),
+        "{said}"
+    );
 }

@@ -15,29 +15,64 @@ fn stopped_by(signal: i32, what: &str) {
     let output = running.end();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
-    assert_eq!((said["outcome"].as_str(), said["trip"].is_null()), (Some("stopped"), true));
+    assert_eq!(
+        (said["outcome"].as_str(), said["trip"].is_null()),
+        (Some("stopped"), true)
+    );
 
     let path = recording_in(folder.path());
     let recording = Recording::open(&path).expect("a recording");
     assert!(!recording.truncated() && recording.lost_records() == 0);
-    let results = recording.attachment("results.json").expect("the results are in the recording");
+    let results = recording
+        .attachment("results.json")
+        .expect("the results are in the recording");
     let results: serde_json::Value = serde_json::from_slice(&results.data).expect("JSON");
     assert_eq!(results, said, "the recording says what the program said");
     assert_eq!(results["ticks"].as_u64(), Some(recording.tick_count()));
 
-    let stop = recording.events().iter().find(|e| e.kind == EventKind::Order(OrderKind::Stop)).expect("an order");
-    let off = EventKind::State { from: State::Running, to: State::Disarmed };
-    assert!(recording.events().iter().any(|e| e.tick == stop.tick && e.kind == off), "{:?}", recording.events());
+    let stop = recording
+        .events()
+        .iter()
+        .find(|e| e.kind == EventKind::Order(OrderKind::Stop))
+        .expect("an order");
+    let off = EventKind::State {
+        from: State::Running,
+        to: State::Disarmed,
+    };
+    assert!(
+        recording
+            .events()
+            .iter()
+            .any(|e| e.tick == stop.tick && e.kind == off),
+        "{:?}",
+        recording.events()
+    );
     let ticks = ticks(&recording);
-    let (before, after): (Vec<TickRecord>, Vec<TickRecord>) = ticks.into_iter().partition(|r| r.tick < stop.tick);
-    assert!(before.iter().any(|record| record.command_a != 0.0), "there was a current to stop");
-    assert!(after.iter().all(|record| record.command_a.to_bits() == 0), "none from the order's tick on");
+    let (before, after): (Vec<TickRecord>, Vec<TickRecord>) =
+        ticks.into_iter().partition(|r| r.tick < stop.tick);
+    assert!(
+        before.iter().any(|record| record.command_a != 0.0),
+        "there was a current to stop"
+    );
+    assert!(
+        after.iter().all(|record| record.command_a.to_bits() == 0),
+        "none from the order's tick on"
+    );
     // A tenth of a second is recorded after the stop; ticks that came late count as well.
     let watched = recording.last_tick() - stop.tick;
-    assert!((RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&watched) && after.len() as u64 >= RATE_HZ / 10, "{watched}");
-    assert_eq!(recording.tick_count() + recording.overruns(), recording.last_tick() + 1);
+    assert!(
+        (RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&watched) && after.len() as u64 >= RATE_HZ / 10,
+        "{watched}"
+    );
+    assert_eq!(
+        recording.tick_count() + recording.overruns(),
+        recording.last_tick() + 1
+    );
 
-    let replay = bench(&["replay", "--json"]).arg(&path).output().expect("it runs");
+    let replay = bench(&["replay", "--json"])
+        .arg(&path)
+        .output()
+        .expect("it runs");
     assert_eq!(replay.status.code(), Some(0), "{}", stderr(&replay));
 }
 
@@ -74,6 +109,10 @@ fn a_second_ctrl_c_neither_hurts_nor_is_needed() {
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let recording = Recording::open(&recording_in(folder.path())).expect("a recording");
     assert!(!recording.truncated());
-    let stops = recording.events().iter().filter(|e| e.kind == EventKind::Order(OrderKind::Stop)).count();
+    let stops = recording
+        .events()
+        .iter()
+        .filter(|e| e.kind == EventKind::Order(OrderKind::Stop))
+        .count();
     assert_eq!(stops, 1);
 }

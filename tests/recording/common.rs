@@ -13,7 +13,11 @@ pub const PERIOD_NS: u64 = 200_000;
 pub const CONFIG: &str = "profile = \"stage\"\n[loop]\nservo_rate_hz = 5000\n";
 
 pub fn header() -> Header {
-    let metadata = [("version", "0.1.0"), ("host", "test"), ("policy", "virtual")];
+    let metadata = [
+        ("version", "0.1.0"),
+        ("host", "test"),
+        ("policy", "virtual"),
+    ];
     Header {
         config_toml: CONFIG.into(),
         period_ns: PERIOD_NS,
@@ -51,33 +55,71 @@ pub fn run(ticks: u64) -> Vec<Published> {
     let event = |tick, kind| Published::Event(Event { tick, kind });
     let mut run = vec![
         event(0, EventKind::Order(OrderKind::Arm)),
-        event(0, EventKind::State { from: State::Disarmed, to: State::Armed }),
+        event(
+            0,
+            EventKind::State {
+                from: State::Disarmed,
+                to: State::Armed,
+            },
+        ),
     ];
     run.extend((0..ticks).map(|n| Published::Tick(tick(n))));
-    run.push(event(ticks - 1, EventKind::Trip(Trip::Travel { position_m: 4.1e-3, limit_m: 4e-3 })));
+    run.push(event(
+        ticks - 1,
+        EventKind::Trip(Trip::Travel {
+            position_m: 4.1e-3,
+            limit_m: 4e-3,
+        }),
+    ));
     run
 }
 
 /// Writes `run` and finishes with one result.
 pub fn write(path: &Path, run: &[Published]) -> Totals {
     let mut recorder = Recorder::create(path, &header()).expect("a fresh file");
-    run.iter().for_each(|p| recorder.record(p).expect("a good disk"));
-    recorder.finish(&[("result.json", "application/json", b"{\"outcome\":\"completed\"}")]).expect("a good disk")
+    run.iter()
+        .for_each(|p| recorder.record(p).expect("a good disk"));
+    recorder
+        .finish(&[(
+            "result.json",
+            "application/json",
+            b"{\"outcome\":\"completed\"}",
+        )])
+        .expect("a good disk")
 }
 
 /// All bits of a tick: `==` takes -0.0 for 0.0 and no NaN for itself.
 pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4], Option<u64>) {
     let floats = [t.reference_m, t.position_m, t.requested_a, t.command_a].map(f64::to_bits);
-    let rest = TickRecord { reference_m: 0.0, position_m: 0.0, requested_a: 0.0, command_a: 0.0, actual_a: None, ..*t };
+    let rest = TickRecord {
+        reference_m: 0.0,
+        position_m: 0.0,
+        requested_a: 0.0,
+        command_a: 0.0,
+        actual_a: None,
+        ..*t
+    };
     (rest, floats, t.actual_a.map(f64::to_bits))
 }
 
 pub fn ticks_of(run: &[Published]) -> Vec<TickRecord> {
-    let tick = |p: &Published| if let Published::Tick(t) = p { Some(*t) } else { None };
+    let tick = |p: &Published| {
+        if let Published::Tick(t) = p {
+            Some(*t)
+        } else {
+            None
+        }
+    };
     run.iter().filter_map(tick).collect()
 }
 
 pub fn events_of(run: &[Published]) -> Vec<Event> {
-    let event = |p: &Published| if let Published::Event(e) = p { Some(*e) } else { None };
+    let event = |p: &Published| {
+        if let Published::Event(e) = p {
+            Some(*e)
+        } else {
+            None
+        }
+    };
     run.iter().filter_map(event).collect()
 }

@@ -11,7 +11,10 @@ use crate::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
 /// 100 ms a tick: few ticks make many chunks, so that much of the file is structure.
 fn slow_run(ticks: u64) -> Vec<Published> {
     let slow = |p: Published| match p {
-        Published::Tick(t) => Published::Tick(TickRecord { scheduled_ns: t.tick * 100_000_000, ..t }),
+        Published::Tick(t) => Published::Tick(TickRecord {
+            scheduled_ns: t.tick * 100_000_000,
+            ..t
+        }),
         event => event,
     };
     run(ticks).into_iter().map(slow).collect()
@@ -29,7 +32,11 @@ static ORIGINAL: LazyLock<Original> = LazyLock::new(|| {
     let path = file.path().join("original.mcap");
     write(&path, &published);
     let bytes = std::fs::read(&path).expect("just written");
-    Original { ticks: ticks_of(&published), events: events_of(&published), bytes }
+    Original {
+        ticks: ticks_of(&published),
+        events: events_of(&published),
+        bytes,
+    }
 });
 
 /// Reads `bytes` in both ways; what is handed out must have been recorded, all of it if the file claims to be complete.
@@ -38,7 +45,8 @@ fn judge(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
     let opened = Recording::open(path);
     if let Ok(recording) = &opened {
         nothing_is_false(recording, bytes.len())?;
-        let all = recording.tick_count() == ORIGINAL.ticks.len() as u64 && *recording.events() == ORIGINAL.events;
+        let all = recording.tick_count() == ORIGINAL.ticks.len() as u64
+            && *recording.events() == ORIGINAL.events;
         prop_assert!(all || recording.truncated(), "incomplete without saying so");
     }
     match Recording::salvage(path) {
@@ -49,13 +57,30 @@ fn judge(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
 }
 
 fn nothing_is_false(recording: &Recording, of_bytes: usize) -> Result<(), TestCaseError> {
-    let ticks: Vec<_> = recording.ticks().and_then(Iterator::collect).expect("has just been read");
+    let ticks: Vec<_> = recording
+        .ticks()
+        .and_then(Iterator::collect)
+        .expect("has just been read");
     prop_assert_eq!(ticks.len() as u64, recording.tick_count());
-    prop_assert!(ticks.iter().map(bits).eq(ORIGINAL.ticks[..ticks.len()].iter().map(bits)), "altered ticks");
-    prop_assert!(ORIGINAL.events.starts_with(recording.events()), "altered events");
-    prop_assert!(recording.config_toml().is_none_or(|c| c == CONFIG), "altered configuration");
+    prop_assert!(
+        ticks
+            .iter()
+            .map(bits)
+            .eq(ORIGINAL.ticks[..ticks.len()].iter().map(bits)),
+        "altered ticks"
+    );
+    prop_assert!(
+        ORIGINAL.events.starts_with(recording.events()),
+        "altered events"
+    );
+    prop_assert!(
+        recording.config_toml().is_none_or(|c| c == CONFIG),
+        "altered configuration"
+    );
     match recording.cut() {
-        Some(cut) => prop_assert!(cut.at_byte <= of_bytes as u64 && cut.of_bytes == of_bytes as u64),
+        Some(cut) => {
+            prop_assert!(cut.at_byte <= of_bytes as u64 && cut.of_bytes == of_bytes as u64)
+        }
         None => prop_assert_eq!(&recording.metadata()["host"], "test"),
     }
     Ok(())
@@ -68,7 +93,10 @@ fn a_file_cut_at_any_byte_gives_what_stands_before_the_cut_or_an_error() {
     for length in 0..ORIGINAL.bytes.len() {
         judge(&ORIGINAL.bytes[..length], &path).unwrap_or_else(|e| panic!("cut at {length}: {e}"));
         let opened = Recording::open(&path);
-        assert!(opened.is_err_and(|e| !e.to_string().is_empty()) || opened_truncated(&path), "cut at {length}");
+        assert!(
+            opened.is_err_and(|e| !e.to_string().is_empty()) || opened_truncated(&path),
+            "cut at {length}"
+        );
     }
 }
 
@@ -130,7 +158,8 @@ fn records(bytes: &[u8]) -> Vec<(usize, usize, u8)> {
     let mut found = Vec::new();
     let mut at = mcap::MAGIC.len();
     while bytes[at] != mcap::records::op::DATA_END {
-        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("eight bytes")) as usize + 9;
+        let length =
+            u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("eight bytes")) as usize + 9;
         found.push((at, length, bytes[at]));
         at += length;
     }
@@ -138,7 +167,11 @@ fn records(bytes: &[u8]) -> Vec<(usize, usize, u8)> {
 }
 
 fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
-    records(bytes).iter().filter(|r| r.2 == mcap::records::op::CHUNK).map(|r| (r.0, r.1)).collect()
+    records(bytes)
+        .iter()
+        .filter(|r| r.2 == mcap::records::op::CHUNK)
+        .map(|r| (r.0, r.1))
+        .collect()
 }
 
 fn open(bytes: &[u8]) -> Result<Recording, RecordingError> {
@@ -151,9 +184,18 @@ fn open(bytes: &[u8]) -> Result<Recording, RecordingError> {
 #[test]
 fn an_attachment_that_ends_before_its_crc_is_refused() {
     // Two times, an empty name, an empty media type, an empty content and no CRC.
-    let bytes = [mcap::MAGIC, &record(mcap::records::op::ATTACHMENT, &[0; 8 + 8 + 4 + 4 + 8])].concat();
+    let bytes = [
+        mcap::MAGIC,
+        &record(mcap::records::op::ATTACHMENT, &[0; 8 + 8 + 4 + 4 + 8]),
+    ]
+    .concat();
     let refused = open(&bytes).expect_err("refused");
-    assert!(refused.to_string().contains("an attachment shorter than its own header"), "{refused}");
+    assert!(
+        refused
+            .to_string()
+            .contains("an attachment shorter than its own header"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -163,8 +205,14 @@ fn a_chunk_that_vanished_from_a_cut_file_is_noticed() {
     let end = chunks[4].0;
     let without = [&ORIGINAL.bytes[..at], &ORIGINAL.bytes[at + length..end]].concat();
     let refused = open(&without).expect_err("refused");
-    assert!(refused.to_string().contains("of /loop is missing"), "{refused}");
-    assert!(open(&ORIGINAL.bytes[..end]).is_ok_and(|r| r.truncated()), "the same with that chunk");
+    assert!(
+        refused.to_string().contains("of /loop is missing"),
+        "{refused}"
+    );
+    assert!(
+        open(&ORIGINAL.bytes[..end]).is_ok_and(|r| r.truncated()),
+        "the same with that chunk"
+    );
 }
 
 #[test]
@@ -174,31 +222,47 @@ fn a_chunk_without_its_crc_is_refused() {
     let crc = chunks[2].0 + 9 + 8 + 8 + 8; // behind opcode, length, two times and a size
     bytes[crc..crc + 4].fill(0);
     let refused = open(&bytes).expect_err("refused");
-    assert!(refused.to_string().contains("a chunk without a CRC"), "{refused}");
+    assert!(
+        refused.to_string().contains("a chunk without a CRC"),
+        "{refused}"
+    );
 }
 
 #[test]
 fn each_kind_of_useless_file_is_told_apart_with_a_remedy() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let says = |name: &str, words: &str| {
-        let error = Recording::open(&dir.path().join(name)).expect_err(name).to_string();
+        let error = Recording::open(&dir.path().join(name))
+            .expect_err(name)
+            .to_string();
         assert!(error.contains(words) && error.contains(name), "{error}");
     };
-    let put = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).expect("temporary file");
+    let put = |name: &str, bytes: &[u8]| {
+        std::fs::write(dir.path().join(name), bytes).expect("temporary file")
+    };
 
     says("absent.mcap", "no such file; check the name");
     put("table.csv", b"time,position\n0.0,1.0\n");
-    says("table.csv", "not an MCAP file; give a recording made by bench");
+    says(
+        "table.csv",
+        "not an MCAP file; give a recording made by bench",
+    );
     put("nothing.mcap", b"");
     says("nothing.mcap", "not an MCAP file");
     put("foreign.mcap", &foreign());
-    says("foreign.mcap", "without bench's channel /loop (it has /imu of none)");
+    says(
+        "foreign.mcap",
+        "without bench's channel /loop (it has /imu of none)",
+    );
     put("head.mcap", &ORIGINAL.bytes[..chunks(&ORIGINAL.bytes)[1].0]);
     says("head.mcap", "holds no ticks (it was cut off");
     put("barely.mcap", mcap::MAGIC);
     says("barely.mcap", "holds no ticks (it was cut off");
     let path = dir.path().join("idle.mcap");
-    Recorder::create(&path, &Header::default()).expect("fresh").finish(&[]).expect("good disk");
+    Recorder::create(&path, &Header::default())
+        .expect("fresh")
+        .finish(&[])
+        .expect("good disk");
     says("idle.mcap", "holds no ticks (it is complete)");
     std::fs::create_dir(dir.path().join("folder")).expect("temporary");
     says("folder", "cannot read the recording");
@@ -208,10 +272,21 @@ fn each_kind_of_useless_file_is_told_apart_with_a_remedy() {
 fn foreign() -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::Writer::new(&mut out).expect("memory");
-    let schema = writer.add_schema("none", "jsonschema", b"{}").expect("memory");
-    let channel = writer.add_channel(schema, "/imu", "json", &Default::default()).expect("memory");
-    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
-    writer.write_to_known_channel(&header, b"{}").expect("memory");
+    let schema = writer
+        .add_schema("none", "jsonschema", b"{}")
+        .expect("memory");
+    let channel = writer
+        .add_channel(schema, "/imu", "json", &Default::default())
+        .expect("memory");
+    let header = mcap::records::MessageHeader {
+        channel_id: channel,
+        sequence: 0,
+        log_time: 0,
+        publish_time: 0,
+    };
+    writer
+        .write_to_known_channel(&header, b"{}")
+        .expect("memory");
     writer.finish().expect("memory");
     drop(writer);
     out.into_inner()

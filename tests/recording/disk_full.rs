@@ -11,7 +11,10 @@ use rtrb::RingBuffer;
 use crate::common::{header, tick};
 
 fn dev_full() -> File {
-    OpenOptions::new().write(true).open("/dev/full").expect("Linux has /dev/full")
+    OpenOptions::new()
+        .write(true)
+        .open("/dev/full")
+        .expect("Linux has /dev/full")
 }
 
 /// A disk with room for so many bytes.
@@ -38,17 +41,29 @@ impl Write for SmallDisk {
 
 #[test]
 fn a_disk_that_is_full_from_the_start_is_told_at_once_with_a_remedy() {
-    let refused = Recorder::over(Box::new(dev_full()), Path::new("full.mcap"), &header()).err().expect("full");
-    assert!(matches!(refused, RecordingError::Write { ticks: 0, .. }), "{refused:?}");
+    let refused = Recorder::over(Box::new(dev_full()), Path::new("full.mcap"), &header())
+        .err()
+        .expect("full");
+    assert!(
+        matches!(refused, RecordingError::Write { ticks: 0, .. }),
+        "{refused:?}"
+    );
     let text = refused.to_string();
-    assert!(text.contains("full.mcap") && text.contains("No space left") && text.contains("free space"), "{text}");
+    assert!(
+        text.contains("full.mcap") && text.contains("No space left") && text.contains("free space"),
+        "{text}"
+    );
 }
 
 #[test]
 fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("filled.mcap");
-    let disk = SmallDisk { file: File::create_new(&path).expect("fresh"), room: 1 << 20, full: dev_full() };
+    let disk = SmallDisk {
+        file: File::create_new(&path).expect("fresh"),
+        room: 1 << 20,
+        full: dev_full(),
+    };
     let recorder = Recorder::over(Box::new(disk), &path, &header()).expect("room for the head");
     let (mut ring, consumer) = RingBuffer::new(1024);
     let handle = spawn(recorder, consumer).expect("a thread");
@@ -61,13 +76,20 @@ fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account
         failed_after = failed_after.or(health.failed().then_some(n));
     }
     let failed_after = failed_after.expect("the failure shows while the loop still runs");
-    assert!((5_000..25_000).contains(&failed_after), "1 MiB are some 11,000 ticks; told at {failed_after}");
+    assert!(
+        (5_000..25_000).contains(&failed_after),
+        "1 MiB are some 11,000 ticks; told at {failed_after}"
+    );
     drop(ring);
 
     let error = handle.join().err().expect("the disk was full");
     assert!(error.to_string().contains("No space left"), "{error}");
     assert!(health.failed());
-    assert_eq!(health.written() + health.thrown_away(), 40_000, "every record is accounted for");
+    assert_eq!(
+        health.written() + health.thrown_away(),
+        40_000,
+        "every record is accounted for"
+    );
     assert!(health.thrown_away() >= 15_000, "{}", health.thrown_away());
     what_was_written_is_readable(&path, health.written());
 }
@@ -76,7 +98,10 @@ fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account
 fn push(ring: &mut rtrb::Producer<Published>, published: Published) {
     let patience = Instant::now() + Duration::from_secs(10);
     while ring.is_full() {
-        assert!(Instant::now() < patience, "the ring is not emptied any more");
+        assert!(
+            Instant::now() < patience,
+            "the ring is not emptied any more"
+        );
         std::thread::sleep(Duration::from_micros(100));
     }
     ring.push(published).expect("has room");
@@ -86,6 +111,13 @@ fn what_was_written_is_readable(path: &Path, written: u64) {
     let recording = Recording::open(path).expect("readable up to where the disk was full");
     assert!(recording.truncated());
     // The chunk in which the disk filled up (2500 ticks) is lost.
-    assert!((written - 2 * 2500..=written).contains(&recording.tick_count()), "{}", recording.tick_count());
-    assert_eq!(recording.ticks().expect("readable").count() as u64, recording.tick_count());
+    assert!(
+        (written - 2 * 2500..=written).contains(&recording.tick_count()),
+        "{}",
+        recording.tick_count()
+    );
+    assert_eq!(
+        recording.ticks().expect("readable").count() as u64,
+        recording.tick_count()
+    );
 }

@@ -18,16 +18,38 @@ fn read_back(published: &[Published]) -> (Recording, Vec<TickRecord>) {
     let (_dir, path) = fresh();
     write(&path, published);
     let recording = Recording::open(&path).expect("complete");
-    let ticks = recording.ticks().expect("complete").collect::<Result<_, _>>().expect("complete");
+    let ticks = recording
+        .ticks()
+        .expect("complete")
+        .collect::<Result<_, _>>()
+        .expect("complete");
     (recording, ticks)
 }
 
 #[test]
 fn every_field_of_a_tick_comes_back_with_every_bit() {
     let nan_with_payload = f64::from_bits(0x7ff8_0000_dead_beef);
-    let doubles = [0.0, -0.0, f64::MIN_POSITIVE / 8.0, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, nan_with_payload];
-    let validities = [Validity::Valid, Validity::OutOfRange, Validity::Faulty, Validity::Missing];
-    let states = [State::Disarmed, State::Armed, State::Running, State::Tripped];
+    let doubles = [
+        0.0,
+        -0.0,
+        f64::MIN_POSITIVE / 8.0,
+        f64::MAX,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        nan_with_payload,
+    ];
+    let validities = [
+        Validity::Valid,
+        Validity::OutOfRange,
+        Validity::Faulty,
+        Validity::Missing,
+    ];
+    let states = [
+        State::Disarmed,
+        State::Armed,
+        State::Running,
+        State::Tripped,
+    ];
     let odd = |n: usize| TickRecord {
         tick: n as u64,
         scheduled_ns: u64::MAX - 100 + n as u64,
@@ -47,30 +69,74 @@ fn every_field_of_a_tick_comes_back_with_every_bit() {
     };
     let put: Vec<_> = (0..28).map(odd).collect();
     let (_, got) = read_back(&put.iter().map(|t| Published::Tick(*t)).collect::<Vec<_>>());
-    assert_eq!(got.iter().map(bits).collect::<Vec<_>>(), put.iter().map(bits).collect::<Vec<_>>());
+    assert_eq!(
+        got.iter().map(bits).collect::<Vec<_>>(),
+        put.iter().map(bits).collect::<Vec<_>>()
+    );
 }
 
 #[test]
 fn every_kind_of_event_comes_back_unchanged_and_in_order() {
     let trips = [
-        Trip::Travel { position_m: -4.1e-3, limit_m: 4e-3 },
-        Trip::PeakCurrent { command_a: -0.0, limit_a: 3.0 },
-        Trip::ContinuousCurrent { thermal_a: 1.1, limit_a: 1.0 },
+        Trip::Travel {
+            position_m: -4.1e-3,
+            limit_m: 4e-3,
+        },
+        Trip::PeakCurrent {
+            command_a: -0.0,
+            limit_a: 3.0,
+        },
+        Trip::ContinuousCurrent {
+            thermal_a: 1.1,
+            limit_a: 1.0,
+        },
         Trip::CommandNotFinite,
         Trip::ProbeInvalid,
-        Trip::ProbeStale { age_s: 0.1 + 0.2, limit_s: 0.01 },
-        Trip::ProbeStuck { unchanged_s: 0.05, limit_s: 0.04 },
-        Trip::Overruns { count: u32::MAX, limit: 10 },
-        Trip::CurrentNotFollowed { actual_a: -0.75, command_a: 0.25 },
-        Trip::Amplifier { code: i64::MIN, words: None },
+        Trip::ProbeStale {
+            age_s: 0.1 + 0.2,
+            limit_s: 0.01,
+        },
+        Trip::ProbeStuck {
+            unchanged_s: 0.05,
+            limit_s: 0.04,
+        },
+        Trip::Overruns {
+            count: u32::MAX,
+            limit: 10,
+        },
+        Trip::CurrentNotFollowed {
+            actual_a: -0.75,
+            command_a: 0.25,
+        },
+        Trip::Amplifier {
+            code: i64::MIN,
+            words: None,
+        },
     ];
-    let states = [State::Disarmed, State::Armed, State::Running, State::Tripped];
-    let orders = [OrderKind::Arm, OrderKind::Start, OrderKind::Stop, OrderKind::Clear];
+    let states = [
+        State::Disarmed,
+        State::Armed,
+        State::Running,
+        State::Tripped,
+    ];
+    let orders = [
+        OrderKind::Arm,
+        OrderKind::Start,
+        OrderKind::Stop,
+        OrderKind::Clear,
+    ];
     let mut kinds: Vec<_> = orders.map(EventKind::Order).into();
-    kinds.extend(states.iter().flat_map(|from| states.map(|to| EventKind::State { from: *from, to })));
+    kinds.extend(
+        states
+            .iter()
+            .flat_map(|from| states.map(|to| EventKind::State { from: *from, to })),
+    );
     kinds.extend(trips.map(EventKind::Trip));
     kinds.extend([EventKind::Completed, EventKind::Lost { records: u64::MAX }]);
-    let put: Vec<_> = (0..).zip(kinds).map(|(tick, kind)| Event { tick, kind }).collect();
+    let put: Vec<_> = (0..)
+        .zip(kinds)
+        .map(|(tick, kind)| Event { tick, kind })
+        .collect();
     let mut published: Vec<_> = put.iter().map(|e| Published::Event(*e)).collect();
     published.insert(3, Published::Tick(tick(0)));
     let (recording, _) = read_back(&published);
@@ -86,8 +152,18 @@ fn configuration_metadata_and_results_are_in_the_file() {
     assert_eq!(recording.metadata()["host"], "test");
     assert_eq!(recording.period_ns(), Some(PERIOD_NS));
     let result = recording.attachment("result.json").expect("attached");
-    assert_eq!((result.media_type.as_str(), &result.data[..2]), ("application/json", &b"{\""[..]));
-    assert_eq!((recording.tick_count(), recording.first_tick(), recording.last_tick()), (10, 0, 9));
+    assert_eq!(
+        (result.media_type.as_str(), &result.data[..2]),
+        ("application/json", &b"{\""[..])
+    );
+    assert_eq!(
+        (
+            recording.tick_count(),
+            recording.first_tick(),
+            recording.last_tick()
+        ),
+        (10, 0, 9)
+    );
     assert_eq!((ticks.len(), recording.truncated()), (10, false));
 }
 
@@ -97,8 +173,16 @@ fn an_existing_file_is_never_overwritten() {
     write(&path, &run(10));
     let before = std::fs::read(&path).expect("just written");
     let refused = Recorder::create(&path, &header()).err().expect("refused");
-    assert!(matches!(refused, RecordingError::Exists { .. }), "{refused}");
-    assert!(refused.to_string().contains("never overwritten; choose another name"), "{refused}");
+    assert!(
+        matches!(refused, RecordingError::Exists { .. }),
+        "{refused}"
+    );
+    assert!(
+        refused
+            .to_string()
+            .contains("never overwritten; choose another name"),
+        "{refused}"
+    );
     assert_eq!(std::fs::read(&path).expect("still there"), before);
 }
 
@@ -106,32 +190,66 @@ fn an_existing_file_is_never_overwritten() {
 fn two_runs_in_virtual_pace_have_the_same_bytes_and_one_bit_makes_another_digest() {
     let (dir, path) = fresh();
     let published = run(12_000);
-    let (one, two) = (write(&path, &published), write(&dir.path().join("two.mcap"), &published));
-    assert_eq!(std::fs::read(&one.path).expect("written"), std::fs::read(&two.path).expect("written"));
+    let (one, two) = (
+        write(&path, &published),
+        write(&dir.path().join("two.mcap"), &published),
+    );
+    assert_eq!(
+        std::fs::read(&one.path).expect("written"),
+        std::fs::read(&two.path).expect("written")
+    );
     assert_eq!(one.loop_digest, two.loop_digest);
-    assert_eq!(Recording::open(&path).expect("complete").loop_digest(), one.loop_digest);
+    assert_eq!(
+        Recording::open(&path).expect("complete").loop_digest(),
+        one.loop_digest
+    );
 
     let mut other = published;
-    let Some(Published::Tick(t)) = other.get_mut(6000) else { panic!("a tick") };
+    let Some(Published::Tick(t)) = other.get_mut(6000) else {
+        panic!("a tick")
+    };
     t.command_a = f64::from_bits(t.command_a.to_bits() ^ 1);
-    assert_ne!(write(&dir.path().join("other.mcap"), &other).loop_digest, one.loop_digest);
+    assert_ne!(
+        write(&dir.path().join("other.mcap"), &other).loop_digest,
+        one.loop_digest
+    );
 }
 
 #[test]
 fn missing_ticks_are_overruns_if_the_loop_says_so_and_lost_otherwise() {
-    let overrun = TickRecord { missed_ticks: 2, ..tick(13) }; // 11 and 12 passed unserved
-    let mut published: Vec<_> = (0..=10).map(tick).chain([overrun]).map(Published::Tick).collect();
+    let overrun = TickRecord {
+        missed_ticks: 2,
+        ..tick(13)
+    }; // 11 and 12 passed unserved
+    let mut published: Vec<_> = (0..=10)
+        .map(tick)
+        .chain([overrun])
+        .map(Published::Tick)
+        .collect();
     published.extend((20..25).map(tick).map(Published::Tick)); // 14..=19: nobody answers for six ticks
     let (_dir, path) = fresh();
     let totals = write(&path, &published);
-    assert_eq!((totals.ticks, totals.overruns, totals.lost_records), (17, 2, 6));
+    assert_eq!(
+        (totals.ticks, totals.overruns, totals.lost_records),
+        (17, 2, 6)
+    );
     assert_eq!((totals.first_tick, totals.last_tick), (Some(0), Some(24)));
 
     let recording = Recording::open(&path).expect("complete");
     assert_eq!((recording.overruns(), recording.lost_records()), (2, 6));
     let expected = [
-        Gap { after_tick: 10, before_tick: 13, missed: 2, lost: 0 },
-        Gap { after_tick: 13, before_tick: 20, missed: 0, lost: 6 },
+        Gap {
+            after_tick: 10,
+            before_tick: 13,
+            missed: 2,
+            lost: 0,
+        },
+        Gap {
+            after_tick: 13,
+            before_tick: 20,
+            missed: 0,
+            lost: 6,
+        },
     ];
     assert_eq!(recording.gaps(), expected);
 }
@@ -141,7 +259,11 @@ fn each_second_is_summed_up_and_the_whole_run_too() {
     // Lateness 1..=5000 ns in the first second, ten times that in the second; compute 700 ns throughout.
     let late = |n: u64| {
         let woke_ns = n * PERIOD_NS + (n % 5000 + 1) * if n < 5000 { 1 } else { 10 };
-        TickRecord { woke_ns, done_ns: woke_ns + 700, ..tick(n) }
+        TickRecord {
+            woke_ns,
+            done_ns: woke_ns + 700,
+            ..tick(n)
+        }
     };
     let published: Vec<_> = (0..10_000).map(|n| Published::Tick(late(n))).collect();
     let (_dir, path) = fresh();
@@ -151,16 +273,38 @@ fn each_second_is_summed_up_and_the_whole_run_too() {
 
     assert_eq!(timings.len(), 2);
     let (first, second) = (&timings[0], &timings[1]);
-    assert_eq!((first.first_tick, first.last_tick, first.ticks), (0, 4999, 5000));
-    assert_eq!((second.first_tick, second.last_tick, second.ticks), (5000, 9999, 5000));
-    assert!(within(first.lateness_p50_ns, 2500) && within(first.lateness_p99_ns, 4950), "{first:?}");
-    assert!(within(second.lateness_p50_ns, 25_000) && within(second.lateness_p9999_ns, 50_000), "{second:?}");
-    assert_eq!((first.lateness_max_ns, second.lateness_max_ns), (5000, 50_000));
+    assert_eq!(
+        (first.first_tick, first.last_tick, first.ticks),
+        (0, 4999, 5000)
+    );
+    assert_eq!(
+        (second.first_tick, second.last_tick, second.ticks),
+        (5000, 9999, 5000)
+    );
+    assert!(
+        within(first.lateness_p50_ns, 2500) && within(first.lateness_p99_ns, 4950),
+        "{first:?}"
+    );
+    assert!(
+        within(second.lateness_p50_ns, 25_000) && within(second.lateness_p9999_ns, 50_000),
+        "{second:?}"
+    );
+    assert_eq!(
+        (first.lateness_max_ns, second.lateness_max_ns),
+        (5000, 50_000)
+    );
     assert_eq!((first.compute_p50_ns, second.compute_max_ns), (700, 700));
     // Of 10,000 ticks the 9900th smallest lateness is number 4800 and something of the second second: the first has
     // 5000 below 5000 ns; in the second 10 k <= x, so rank 9900 solves min(x, 5000) + x / 10 = 9900: x = 49,000.
-    assert!(within(totals.lateness.p99_ns, 49_000), "{:?}", totals.lateness);
-    assert_eq!((totals.lateness.max_ns, totals.compute.p9999_ns), (50_000, 700));
+    assert!(
+        within(totals.lateness.p99_ns, 49_000),
+        "{:?}",
+        totals.lateness
+    );
+    assert_eq!(
+        (totals.lateness.max_ns, totals.compute.p9999_ns),
+        (50_000, 700)
+    );
 }
 
 #[test]
@@ -168,15 +312,24 @@ fn at_most_half_a_second_dies_with_the_process() {
     let (_dir, path) = fresh();
     let mut recorder = Recorder::create(&path, &header()).expect("fresh");
     let published = run(7_499); // 1.4998 s: the chunks up to 0.5 and 1.0 s are full
-    published.iter().for_each(|p| recorder.record(p).expect("good disk"));
+    published
+        .iter()
+        .for_each(|p| recorder.record(p).expect("good disk"));
     std::mem::forget(recorder); // as a killed process leaves it: nothing more is written
 
     let recording = Recording::open(&path).expect("readable up to the cut");
     assert!(recording.truncated());
     assert_eq!(recording.tick_count(), 5000);
     assert_eq!(recording.config_toml(), Some(CONFIG));
-    let ticks: Vec<_> = recording.ticks().expect("opened").map(|t| t.expect("readable")).collect();
-    assert_eq!(ticks.iter().map(bits).collect::<Vec<_>>(), (0..5000).map(|n| bits(&tick(n))).collect::<Vec<_>>());
+    let ticks: Vec<_> = recording
+        .ticks()
+        .expect("opened")
+        .map(|t| t.expect("readable"))
+        .collect();
+    assert_eq!(
+        ticks.iter().map(bits).collect::<Vec<_>>(),
+        (0..5000).map(|n| bits(&tick(n))).collect::<Vec<_>>()
+    );
 }
 
 #[test]
@@ -184,8 +337,20 @@ fn ticks_out_of_order_are_refused() {
     let (_dir, path) = fresh();
     let mut recorder = Recorder::create(&path, &header()).expect("fresh");
     recorder.record(&Published::Tick(tick(5))).expect("first");
-    let refused = recorder.record(&Published::Tick(tick(5))).expect_err("twice");
-    assert!(matches!(refused, RecordingError::Order { tick: 5, after: 5, .. }), "{refused}");
+    let refused = recorder
+        .record(&Published::Tick(tick(5)))
+        .expect_err("twice");
+    assert!(
+        matches!(
+            refused,
+            RecordingError::Order {
+                tick: 5,
+                after: 5,
+                ..
+            }
+        ),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -201,13 +366,36 @@ fn what_was_recovered_from_a_cut_file_is_complete_and_tells_of_the_cut() {
     let whole = Recording::open(&recovered.totals.path).expect("complete");
     let old = Recording::open(&cut).expect("readable");
     assert!(old.truncated() && !whole.truncated());
-    assert!((5000..12_000).contains(&whole.tick_count()), "{}", whole.tick_count());
+    assert!(
+        (5000..12_000).contains(&whole.tick_count()),
+        "{}",
+        whole.tick_count()
+    );
     assert_eq!(whole.loop_digest(), old.loop_digest());
-    assert_eq!(whole.events(), &events_of(&published)[..2], "the last event stood behind the cut");
-    assert_eq!((whole.config_toml(), whole.period_ns()), (Some(CONFIG), Some(PERIOD_NS)));
-    assert!(whole.metadata()["recovered"].starts_with("readable up to byte"), "{:?}", whole.metadata());
-    assert_eq!(recovered.cut.expect("was cut").of_bytes, bytes.len() as u64 * 6 / 10);
-    assert_eq!(ticks_of(&published)[..whole.tick_count() as usize].last().map(|t| t.tick), Some(whole.last_tick()));
+    assert_eq!(
+        whole.events(),
+        &events_of(&published)[..2],
+        "the last event stood behind the cut"
+    );
+    assert_eq!(
+        (whole.config_toml(), whole.period_ns()),
+        (Some(CONFIG), Some(PERIOD_NS))
+    );
+    assert!(
+        whole.metadata()["recovered"].starts_with("readable up to byte"),
+        "{:?}",
+        whole.metadata()
+    );
+    assert_eq!(
+        recovered.cut.expect("was cut").of_bytes,
+        bytes.len() as u64 * 6 / 10
+    );
+    assert_eq!(
+        ticks_of(&published)[..whole.tick_count() as usize]
+            .last()
+            .map(|t| t.tick),
+        Some(whole.last_tick())
+    );
 }
 
 #[test]
@@ -216,7 +404,12 @@ fn a_tick_in_whose_place_three_were_missed_is_late_by_three_periods_more() {
     let ticks = [0, 1, 5].map(|number| {
         let missed_ticks = if number == 5 { 3 } else { 0 };
         let woke_ns = number * PERIOD_NS + 100;
-        Published::Tick(TickRecord { missed_ticks, woke_ns, done_ns: woke_ns + 1, ..tick(number) })
+        Published::Tick(TickRecord {
+            missed_ticks,
+            woke_ns,
+            done_ns: woke_ns + 1,
+            ..tick(number)
+        })
     });
     let totals = write(&folder.path().join("late.mcap"), &ticks);
     assert_eq!(totals.overruns, 3);

@@ -11,18 +11,32 @@ fn all_that_was_pushed_before_the_loop_ended_is_in_the_recording() {
     let path = dir.path().join("run.mcap");
     let published = run(20_000);
     let (mut ring, consumer) = RingBuffer::new(published.len());
-    let handle = spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
+    let handle =
+        spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
     let health = handle.health();
-    published.iter().for_each(|p| ring.push(*p).expect("a ring for all"));
+    published
+        .iter()
+        .for_each(|p| ring.push(*p).expect("a ring for all"));
     drop(ring);
 
     let recorder = handle.join().expect("a good disk");
     assert_eq!(recorder.ticks(), 20_000);
-    let totals = recorder.finish(&[("result.json", "application/json", b"{}")]).expect("a good disk");
-    assert_eq!((totals.ticks, totals.events, totals.lost_records), (20_000, 3, 0));
-    assert_eq!((health.written(), health.thrown_away(), health.failed()), (20_003, 0, false));
+    let totals = recorder
+        .finish(&[("result.json", "application/json", b"{}")])
+        .expect("a good disk");
+    assert_eq!(
+        (totals.ticks, totals.events, totals.lost_records),
+        (20_000, 3, 0)
+    );
+    assert_eq!(
+        (health.written(), health.thrown_away(), health.failed()),
+        (20_003, 0, false)
+    );
     let recording = Recording::open(&path).expect("complete");
-    assert_eq!((recording.tick_count(), recording.truncated()), (20_000, false));
+    assert_eq!(
+        (recording.tick_count(), recording.truncated()),
+        (20_000, false)
+    );
     assert!(recording.attachment("result.json").is_some());
 }
 
@@ -32,17 +46,31 @@ fn what_did_not_fit_into_the_ring_is_counted_as_lost() {
     let path = dir.path().join("lossy.mcap");
     let (mut ring, consumer) = RingBuffer::new(100);
     // The recorder begins after the loop: of 150 ticks the ring takes 100, then one event tells of the other 50.
-    let refused = (0..150).filter(|n| ring.push(Published::Tick(tick(*n))).is_err()).count() as u64;
+    let refused = (0..150)
+        .filter(|n| ring.push(Published::Tick(tick(*n))).is_err())
+        .count() as u64;
     assert_eq!(refused, 50);
-    let handle = spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
+    let handle =
+        spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
     while ring.slots() < 100 {
         std::thread::yield_now();
     }
-    ring.push(Published::Event(Event { tick: 150, kind: EventKind::Lost { records: refused } })).expect("room");
+    ring.push(Published::Event(Event {
+        tick: 150,
+        kind: EventKind::Lost { records: refused },
+    }))
+    .expect("room");
     ring.push(Published::Tick(tick(150))).expect("room");
     drop(ring);
 
-    let totals = handle.join().expect("a good disk").finish(&[]).expect("a good disk");
-    assert_eq!((totals.ticks, totals.lost_records, totals.overruns), (101, 50, 0));
+    let totals = handle
+        .join()
+        .expect("a good disk")
+        .finish(&[])
+        .expect("a good disk");
+    assert_eq!(
+        (totals.ticks, totals.lost_records, totals.overruns),
+        (101, 50, 0)
+    );
     assert_eq!(Recording::open(&path).expect("complete").lost_records(), 50);
 }

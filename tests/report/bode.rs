@@ -21,13 +21,19 @@ const RUN: &str = "stage · operating point 8 % of L · asymmetry +10 % · chirp
                    0 overruns, 0 lost · seed 1 · run-0007.mcap";
 
 fn texts(svg: &str) -> Vec<String> {
-    svg::words(svg).into_iter().map(|words| words.text).collect()
+    svg::words(svg)
+        .into_iter()
+        .map(|words| words.text)
+        .collect()
 }
 
 fn assert_shows(svg: &str, expected: &[&str]) {
     let texts = texts(svg);
     for text in expected {
-        assert!(texts.iter().any(|shown| shown == text), "{text:?} is not among {texts:?}");
+        assert!(
+            texts.iter().any(|shown| shown == text),
+            "{text:?} is not among {texts:?}"
+        );
     }
 }
 
@@ -35,15 +41,22 @@ fn assert_shows(svg: &str, expected: &[&str]) {
 fn assert_tidy(svg: &str) {
     let words = svg::words(svg);
     for word in &words {
-        let inside = word.left >= 0.0 && word.right <= WIDTH && word.top >= 0.0 && word.bottom <= HEIGHT;
+        let inside =
+            word.left >= 0.0 && word.right <= WIDTH && word.top >= 0.0 && word.bottom <= HEIGHT;
         assert!(inside, "{word:?} leaves the page");
     }
     for (k, a) in words.iter().enumerate() {
-        assert!(words[k + 1..].iter().all(|b| !overlap(a, b)), "{a:?} runs into another");
+        assert!(
+            words[k + 1..].iter().all(|b| !overlap(a, b)),
+            "{a:?} runs into another"
+        );
     }
     for kind in ["polyline", "polygon"] {
         for (x, y) in svg::points(svg, kind, "").concat() {
-            assert!((LEFT..=RIGHT).contains(&x) && (0.0..=HEIGHT).contains(&y), "({x}, {y})");
+            assert!(
+                (LEFT..=RIGHT).contains(&x) && (0.0..=HEIGHT).contains(&y),
+                "({x}, {y})"
+            );
         }
     }
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
@@ -55,10 +68,35 @@ fn overlap(a: &Words, b: &Words) -> bool {
 
 #[test]
 fn the_plot_of_a_run_names_its_axes_with_units_and_its_curves_in_a_legend() {
-    let svg = bode("bode-run.svg", &measured(), Some(&SampledPlant::stage()), RUN);
+    let svg = bode(
+        "bode-run.svg",
+        &measured(),
+        Some(&SampledPlant::stage()),
+        RUN,
+    );
     assert_tidy(&svg);
-    assert_shows(&svg, &["FRF from current to displacement", "Magnitude (m/A)", "Phase (deg)", "Coherence"]);
-    assert_shows(&svg, &["Frequency (Hz)", "1", "10", "100", "10⁻⁴", "10⁻⁶", "0", "measured (band: ±2σ)"]);
+    assert_shows(
+        &svg,
+        &[
+            "FRF from current to displacement",
+            "Magnitude (m/A)",
+            "Phase (deg)",
+            "Coherence",
+        ],
+    );
+    assert_shows(
+        &svg,
+        &[
+            "Frequency (Hz)",
+            "1",
+            "10",
+            "100",
+            "10⁻⁴",
+            "10⁻⁶",
+            "0",
+            "measured (band: ±2σ)",
+        ],
+    );
     assert!(texts(&svg).join(" ").contains("run-0007.mcap"));
 }
 
@@ -67,7 +105,11 @@ fn the_plot_of_4000_frequencies_stays_below_400_kilobytes() {
     let frf = measured();
     let svg = bode("bode-run.svg", &frf, Some(&SampledPlant::stage()), RUN);
     println!("{} frequencies in {} bytes", frf.len(), svg.len());
-    assert!(frf.len() > 4000 && (50_000..400_000).contains(&svg.len()), "{} bytes", svg.len());
+    assert!(
+        frf.len() > 4000 && (50_000..400_000).contains(&svg.len()),
+        "{} bytes",
+        svg.len()
+    );
 }
 
 #[test]
@@ -76,15 +118,30 @@ fn a_peak_narrower_than_a_pixel_is_drawn_to_its_top() {
     let mut response = vec![Complex::from(1e-4); 100_000];
     // Neither the first nor the last of the 112 samples of its pixel column.
     response[50_050] = Complex::from(1e-3);
-    let trace = [Trace { name: "peak", curve: Curve::Model { frequency_hz: &frequency_hz, response: &response } }];
+    let trace = [Trace {
+        name: "peak",
+        curve: Curve::Model {
+            frequency_hz: &frequency_hz,
+            response: &response,
+        },
+    }];
     let svg = bode_svg(Unit::MetresPerAmpere, &trace, "", "").unwrap();
     let curves = svg::points(&svg, "polyline", MODEL);
     // Legend, magnitude, phase. The axis is 1.12 decades high, the peak one decade of it.
     let ys = curves[1].iter().map(|point| point.1);
-    let (top, bottom) = ys.fold((f64::MAX, f64::MIN), |(top, bottom), y| (y.min(top), y.max(bottom)));
-    let frame = svg::points(&svg, "polyline", "#5A5A5A")[0].iter().map(|p| p.1).fold(f64::MIN, f64::max);
+    let (top, bottom) = ys.fold((f64::MAX, f64::MIN), |(top, bottom), y| {
+        (y.min(top), y.max(bottom))
+    });
+    let frame = svg::points(&svg, "polyline", "#5A5A5A")[0]
+        .iter()
+        .map(|p| p.1)
+        .fold(f64::MIN, f64::max);
     let panel = frame - svg::points(&svg, "polyline", "#5A5A5A")[0][0].1;
-    assert!(((bottom - top) / panel - 1.0 / 1.12).abs() < 0.01, "{} of {panel}", bottom - top);
+    assert!(
+        ((bottom - top) / panel - 1.0 / 1.12).abs() < 0.01,
+        "{} of {panel}",
+        bottom - top
+    );
     // In the middle of the axis.
     let peak = curves[1].iter().find(|point| point.1 == top).unwrap();
     assert!((peak.0 - 5290.0).abs() < 10.0, "{peak:?}");
@@ -93,17 +150,28 @@ fn a_peak_narrower_than_a_pixel_is_drawn_to_its_top() {
 
 #[test]
 fn a_measured_curve_lies_within_its_band_and_both_within_the_frame() {
-    let svg =
-        bode("bode-short-and-noisy.svg", &short_and_noisy(), Some(&SampledPlant::stage()), "8 s at 4 mA and less");
+    let svg = bode(
+        "bode-short-and-noisy.svg",
+        &short_and_noisy(),
+        Some(&SampledPlant::stage()),
+        "8 s at 4 mA and less",
+    );
     assert_tidy(&svg);
     let frames = svg::points(&svg, "polyline", "#5A5A5A");
     assert_eq!(frames.len(), 3);
     let inside = |point: &(f64, f64), frame: &[(f64, f64)]| {
-        point.0 >= frame[0].0 && point.0 <= frame[1].0 && point.1 >= frame[0].1 && point.1 <= frame[2].1
+        point.0 >= frame[0].0
+            && point.0 <= frame[1].0
+            && point.1 >= frame[0].1
+            && point.1 <= frame[2].1
     };
     let legend = 1;
     for points in svg::points(&svg, "polyline", MEASURED).iter().skip(legend) {
-        assert!(points.iter().all(|point| frames.iter().any(|frame| inside(point, frame))));
+        assert!(
+            points
+                .iter()
+                .all(|point| frames.iter().any(|frame| inside(point, frame)))
+        );
     }
     // One polygon in the legend, one each around magnitude and phase, none around coherence.
     assert_eq!(svg::points(&svg, "polygon", MEASURED).len(), 3);
@@ -116,29 +184,70 @@ fn where_two_sigma_reach_zero_the_curve_is_faint_and_has_no_say_in_the_axis() {
         frf.response[k] = Complex::from(1e-9);
         frf.magnitude_sigma[k] = 1e-9;
     }
-    let svg =
-        bode_svg(Unit::MetresPerAmpere, &[Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "").unwrap();
+    let svg = bode_svg(
+        Unit::MetresPerAmpere,
+        &[Trace {
+            name: "measured",
+            curve: Curve::Measured(&frf),
+        }],
+        "",
+        "",
+    )
+    .unwrap();
     assert!(svg.contains(&format!("opacity=\"0.3\" stroke=\"{MEASURED}\"")));
-    assert!(!texts(&svg).iter().any(|text| text.contains("10⁻⁹")), "{:?}", texts(&svg));
+    assert!(
+        !texts(&svg).iter().any(|text| text.contains("10⁻⁹")),
+        "{:?}",
+        texts(&svg)
+    );
 }
 
 #[test]
 fn a_flat_response_gets_a_decade_and_half_a_turn_of_axis() {
     let svg = bode("bode-flat.svg", &flat(), None, "all equal");
     assert_tidy(&svg);
-    assert_shows(&svg, &["10⁻⁴", "5·10⁻⁵", "2·10⁻⁴", "\u{2212}90", "0", "90", "1", "10", "100"]);
+    assert_shows(
+        &svg,
+        &[
+            "10⁻⁴",
+            "5·10⁻⁵",
+            "2·10⁻⁴",
+            "\u{2212}90",
+            "0",
+            "90",
+            "1",
+            "10",
+            "100",
+        ],
+    );
 }
 
 /// The first column of the phase is that of the lowest frequency: at DC the stage follows the current.
 #[test]
 fn the_phase_begins_at_0_and_runs_on_below_minus_360_degrees_where_zeros_are_not_minimum_phase() {
-    let svg = bode("bode-run.svg", &measured(), Some(&SampledPlant::stage()), RUN);
+    let svg = bode(
+        "bode-run.svg",
+        &measured(),
+        Some(&SampledPlant::stage()),
+        RUN,
+    );
     assert_shows(&svg, &["0", "\u{2212}180", "\u{2212}360", "\u{2212}540"]);
     let left = |point: &(f64, f64)| point.0 == LEFT;
-    let begins = svg::points(&svg, "polyline", MEASURED).concat().into_iter().filter(left).nth(2).unwrap().1;
-    let mut zero =
-        svg::words(&svg).into_iter().filter(|words| words.text == "0").map(|words| (words.top + words.bottom) / 2.0);
-    assert!(zero.any(|y| (y - begins).abs() < 20.0), "begins at {begins}");
+    let begins = svg::points(&svg, "polyline", MEASURED)
+        .concat()
+        .into_iter()
+        .filter(left)
+        .nth(2)
+        .unwrap()
+        .1;
+    let mut zero = svg::words(&svg)
+        .into_iter()
+        .filter(|words| words.text == "0")
+        .map(|words| (words.top + words.bottom) / 2.0);
+    assert!(
+        zero.any(|y| (y - begins).abs() < 20.0),
+        "begins at {begins}"
+    );
 }
 
 #[test]
@@ -147,7 +256,12 @@ fn frequencies_without_input_leave_a_gap_and_a_lone_frequency_is_a_dot() {
     frf.resolution_hz = frf.frequency_hz.iter().map(|f| 0.05 * f).collect();
     let keep_only = |column: &mut Vec<f64>| {
         let kept = |k: usize| k < 40 || k == 50 || k > 60;
-        *column = column.iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, value)| *value).collect();
+        *column = column
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| kept(*k))
+            .map(|(_, value)| *value)
+            .collect();
     };
     for column in [
         &mut frf.frequency_hz,
@@ -159,7 +273,12 @@ fn frequencies_without_input_leave_a_gap_and_a_lone_frequency_is_a_dot() {
         keep_only(column);
     }
     frf.response.truncate(frf.frequency_hz.len());
-    let svg = bode("bode-gap.svg", &frf, None, "no input from 6 to 16 Hz but at one frequency");
+    let svg = bode(
+        "bode-gap.svg",
+        &frf,
+        None,
+        "no input from 6 to 16 Hz but at one frequency",
+    );
     // Legend, then in each of three panels the stretches below, between (a point) and above.
     assert_eq!(svg::points(&svg, "polyline", MEASURED).len(), 1 + 3 * 3);
     assert!(svg.matches("<circle").count() >= 3);
@@ -169,26 +288,63 @@ fn frequencies_without_input_leave_a_gap_and_a_lone_frequency_is_a_dot() {
 fn a_model_over_a_measured_curve_is_dashed_so_that_both_are_seen_and_alone_it_is_not() {
     let frf = flat();
     let response = vec![Complex::from(1.5e-4); frf.len()];
-    let curve = Curve::Model { frequency_hz: &frf.frequency_hz, response: &response };
-    let model = Trace { name: "model", curve };
+    let curve = Curve::Model {
+        frequency_hz: &frf.frequency_hz,
+        response: &response,
+    };
+    let model = Trace {
+        name: "model",
+        curve,
+    };
     let alone = bode_svg(Unit::MetresPerAmpere, std::slice::from_ref(&model), "", "").unwrap();
     assert_eq!(svg::points(&alone, "polyline", MODEL).len(), 3);
-    let both =
-        bode_svg(Unit::MetresPerAmpere, &[model, Trace { name: "measured", curve: Curve::Measured(&frf) }], "", "")
-            .unwrap();
+    let both = bode_svg(
+        Unit::MetresPerAmpere,
+        &[
+            model,
+            Trace {
+                name: "measured",
+                curve: Curve::Measured(&frf),
+            },
+        ],
+        "",
+        "",
+    )
+    .unwrap();
     // 890 pixels in each of two panels, 30 in the legend; a dash every 11 pixels: 81 + 81 + 3, and 6 of the 11 drawn.
     let dashes = svg::points(&both, "polyline", MODEL);
     assert_eq!(dashes.len(), 165);
-    assert!(dashes.iter().filter(|dash| dash[dash.len() - 1].0 - dash[0].0 == 60.0).count() > 150);
+    assert!(
+        dashes
+            .iter()
+            .filter(|dash| dash[dash.len() - 1].0 - dash[0].0 == 60.0)
+            .count()
+            > 150
+    );
 }
 
 #[test]
 fn models_alone_make_a_plot_without_coherence() {
     let frequency_hz = frequencies(0.5, 1000.0, 3000);
-    let (stage, first) = (SampledPlant::stage(), SampledPlant::new(&[(183.9, 0.4715, 0.0088)]));
+    let (stage, first) = (
+        SampledPlant::stage(),
+        SampledPlant::new(&[(183.9, 0.4715, 0.0088)]),
+    );
     let (whole, alone) = (model(&stage, &frequency_hz), model(&first, &frequency_hz));
-    let curve = |response| Curve::Model { frequency_hz: &frequency_hz, response };
-    let traces = [Trace { name: "stage", curve: curve(&whole) }, Trace { name: "first mode", curve: curve(&alone) }];
+    let curve = |response| Curve::Model {
+        frequency_hz: &frequency_hz,
+        response,
+    };
+    let traces = [
+        Trace {
+            name: "stage",
+            curve: curve(&whole),
+        },
+        Trace {
+            name: "first mode",
+            curve: curve(&alone),
+        },
+    ];
     let svg = bode_svg(Unit::MetresPerAmpere, &traces, "Model", "stage, 8 % of L").unwrap();
     keep("bode-models.svg", &svg);
     assert_tidy(&svg);
@@ -200,8 +356,13 @@ fn models_alone_make_a_plot_without_coherence() {
 fn a_narrow_band_has_labels_too() {
     let frequency_hz = frequencies(80.0, 90.0, 500);
     let response = model(&SampledPlant::stage(), &frequency_hz);
-    let trace =
-        [Trace { name: "close modes", curve: Curve::Model { frequency_hz: &frequency_hz, response: &response } }];
+    let trace = [Trace {
+        name: "close modes",
+        curve: Curve::Model {
+            frequency_hz: &frequency_hz,
+            response: &response,
+        },
+    }];
     let svg = bode_svg(Unit::MetresPerAmpere, &trace, "Close modes", "").unwrap();
     keep("bode-narrow.svg", &svg);
     assert_tidy(&svg);
@@ -210,8 +371,13 @@ fn a_narrow_band_has_labels_too() {
 
 #[test]
 fn a_single_frequency_is_a_plot_as_well() {
-    let trace =
-        [Trace { name: "one", curve: Curve::Model { frequency_hz: &[29.3], response: &[Complex::from(1e-4)] } }];
+    let trace = [Trace {
+        name: "one",
+        curve: Curve::Model {
+            frequency_hz: &[29.3],
+            response: &[Complex::from(1e-4)],
+        },
+    }];
     assert_tidy(&bode_svg(Unit::MetresPerAmpere, &trace, "One", "").unwrap());
 }
 
@@ -219,35 +385,85 @@ fn a_single_frequency_is_a_plot_as_well() {
 fn long_titles_and_many_names_are_wrapped_and_letters_that_mean_something_to_svg_are_escaped() {
     let frf = flat();
     let name = "a measured response with a <long> name & more";
-    let traces: Vec<Trace> = (0..5).map(|_| Trace { name, curve: Curve::Measured(&frf) }).collect();
-    let svg = bode_svg(Unit::MetresPerAmpere, &traces, &"title ".repeat(40), &"x".repeat(500)).unwrap();
+    let traces: Vec<Trace> = (0..5)
+        .map(|_| Trace {
+            name,
+            curve: Curve::Measured(&frf),
+        })
+        .collect();
+    let svg = bode_svg(
+        Unit::MetresPerAmpere,
+        &traces,
+        &"title ".repeat(40),
+        &"x".repeat(500),
+    )
+    .unwrap();
     keep("bode-long.svg", &svg);
     assert_tidy(&svg);
     assert!(svg.contains("&lt;long&gt; name &amp; more") && !svg.contains("<long>"));
 }
 
 fn draw(curve: Curve) -> ReportError {
-    bode_svg(Unit::MetresPerAmpere, &[Trace { name: "bad", curve }], "", "").unwrap_err()
+    bode_svg(
+        Unit::MetresPerAmpere,
+        &[Trace { name: "bad", curve }],
+        "",
+        "",
+    )
+    .unwrap_err()
 }
 
 #[test]
 fn what_cannot_be_drawn_is_refused_by_name() {
     let one = [Complex::from(1.0)];
     let two = [Complex::from(1.0), Complex::from(f64::NAN)];
-    assert_eq!(bode_svg(Unit::MetresPerAmpere, &[], "", "").unwrap_err(), ReportError::NoTrace);
-    assert_eq!(draw(Curve::Measured(&Frf::default())), ReportError::Empty { name: "bad".into() });
-    let error = draw(Curve::Model { frequency_hz: &[1.0, 2.0], response: &one });
-    assert_eq!(error.to_string(), "the trace \"bad\" has 2 frequencies, but a column of 1 values");
-    for frequency_hz in [[0.0, 1.0], [2.0, 1.0], [-1.0, 1.0], [f64::NAN, 1.0], [1.0, f64::INFINITY]] {
-        let error = draw(Curve::Model { frequency_hz: &frequency_hz, response: &two });
+    assert_eq!(
+        bode_svg(Unit::MetresPerAmpere, &[], "", "").unwrap_err(),
+        ReportError::NoTrace
+    );
+    assert_eq!(
+        draw(Curve::Measured(&Frf::default())),
+        ReportError::Empty { name: "bad".into() }
+    );
+    let error = draw(Curve::Model {
+        frequency_hz: &[1.0, 2.0],
+        response: &one,
+    });
+    assert_eq!(
+        error.to_string(),
+        "the trace \"bad\" has 2 frequencies, but a column of 1 values"
+    );
+    for frequency_hz in [
+        [0.0, 1.0],
+        [2.0, 1.0],
+        [-1.0, 1.0],
+        [f64::NAN, 1.0],
+        [1.0, f64::INFINITY],
+    ] {
+        let error = draw(Curve::Model {
+            frequency_hz: &frequency_hz,
+            response: &two,
+        });
         assert!(matches!(error, ReportError::Frequency { .. }), "{error}");
     }
-    let error = draw(Curve::Model { frequency_hz: &[1.0, 2.0], response: &two });
+    let error = draw(Curve::Model {
+        frequency_hz: &[1.0, 2.0],
+        response: &two,
+    });
     assert!(error.to_string().contains("not finite at 2 Hz"), "{error}");
-    let error = draw(Curve::Model { frequency_hz: &[1.0], response: &[Complex::from(0.0)] });
+    let error = draw(Curve::Model {
+        frequency_hz: &[1.0],
+        response: &[Complex::from(0.0)],
+    });
     assert_eq!(error, ReportError::NoMagnitude);
-    let ragged = Frf { coherence: vec![1.0], ..flat() };
-    assert!(matches!(draw(Curve::Measured(&ragged)), ReportError::Lengths { values: 1, .. }));
+    let ragged = Frf {
+        coherence: vec![1.0],
+        ..flat()
+    };
+    assert!(matches!(
+        draw(Curve::Measured(&ragged)),
+        ReportError::Lengths { values: 1, .. }
+    ));
 }
 
 proptest! {

@@ -10,7 +10,10 @@ const BLUE: &str = "#0072B2";
 const VERMILION: &str = "#D55E00";
 
 fn place(re: f64, im: f64, covariance: [[f64; 2]; 2]) -> Place {
-    Place { s: Complex::new(re, im), covariance }
+    Place {
+        s: Complex::new(re, im),
+        covariance,
+    }
 }
 
 fn none() -> [[f64; 2]; 2] {
@@ -20,8 +23,15 @@ fn none() -> [[f64; 2]; 2] {
 /// Two close modes, and a zero on either side between them.
 fn map(covariance: [[f64; 2]; 2]) -> PoleZeroMap {
     PoleZeroMap {
-        poles: vec![place(-1.6, 184.0, none()), place(-2.0, 516.0, none()), place(-2.1, 539.0, none())],
-        zeros: vec![place(-14.9, 530.0, covariance), place(10.7, 530.0, covariance)],
+        poles: vec![
+            place(-1.6, 184.0, none()),
+            place(-2.0, 516.0, none()),
+            place(-2.1, 539.0, none()),
+        ],
+        zeros: vec![
+            place(-14.9, 530.0, covariance),
+            place(10.7, 530.0, covariance),
+        ],
         others: vec![place(-3.0, 1700.0, none())],
         up_to_rad_s: 650.0,
     }
@@ -30,7 +40,11 @@ fn map(covariance: [[f64; 2]; 2]) -> PoleZeroMap {
 #[test]
 fn the_closest_pair_is_that_of_the_poles_that_count() {
     let mut map = map([[1.0, 0.0], [0.0, 1.0]]);
-    map.poles.extend([place(-5.0, 1700.0, none()), place(-5.0, 1701.0, none()), place(-4.0, 0.0, none())]);
+    map.poles.extend([
+        place(-5.0, 1700.0, none()),
+        place(-5.0, 1701.0, none()),
+        place(-4.0, 0.0, none()),
+    ]);
     assert_eq!(map.close_pair(), Some((516.0, 539.0)));
     assert_eq!(PoleZeroMap::default().close_pair(), None);
 }
@@ -45,7 +59,8 @@ fn an_ellipse_has_on_the_page_the_extent_that_its_covariance_has_on_the_axes() {
     let extent = |outline: &[(f64, f64)]| {
         let of = |part: fn(&(f64, f64)) -> f64| {
             let values: Vec<f64> = outline.iter().map(part).collect();
-            values.iter().copied().fold(f64::MIN, f64::max) - values.iter().copied().fold(f64::MAX, f64::min)
+            values.iter().copied().fold(f64::MIN, f64::max)
+                - values.iter().copied().fold(f64::MAX, f64::min)
         };
         (of(|p| p.0), of(|p| p.1))
     };
@@ -54,20 +69,31 @@ fn an_ellipse_has_on_the_page_the_extent_that_its_covariance_has_on_the_axes() {
     let k = (-2.0 * 0.05f64.ln()).sqrt();
     let width = 400.0 * 4.0 * k / (10.7 + 0.45 * 2.0 * k + 1.45 * 2.0 * k);
     let height = 250.0 * 2.0 / 2.9;
-    let ellipses: Vec<(f64, f64)> =
-        areas(VERMILION).iter().filter(|outline| outline.len() > 10).map(|outline| extent(outline)).collect();
+    let ellipses: Vec<(f64, f64)> = areas(VERMILION)
+        .iter()
+        .filter(|outline| outline.len() > 10)
+        .map(|outline| extent(outline))
+        .collect();
     // A page's coordinates are rounded to whole tenths of a pixel.
-    let found = ellipses.iter().any(|e| (e.0 / 10.0 - width).abs() < 0.3 && (e.1 / 10.0 - height).abs() < 0.3);
+    let found = ellipses
+        .iter()
+        .any(|e| (e.0 / 10.0 - width).abs() < 0.3 && (e.1 / 10.0 - height).abs() < 0.3);
     assert!(found, "{width} x {height}: {ellipses:?}");
 }
 
 #[test]
 fn zeros_known_exactly_or_not_at_all_are_drawn_without_ellipses() {
-    for covariance in
-        [none(), [[f64::INFINITY, 0.0], [0.0, f64::INFINITY]], [[f64::NAN, 0.0], [0.0, 1.0]], [[4.0, 0.0], [0.0, 0.0]]]
-    {
+    for covariance in [
+        none(),
+        [[f64::INFINITY, 0.0], [0.0, f64::INFINITY]],
+        [[f64::NAN, 0.0], [0.0, 1.0]],
+        [[4.0, 0.0], [0.0, 0.0]],
+    ] {
         let svg = pole_zero_svg(&map(covariance), "a <map> & more", "").unwrap();
-        assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("<map>"), "{covariance:?}");
+        assert!(
+            !svg.contains("NaN") && !svg.contains("inf") && !svg.contains("<map>"),
+            "{covariance:?}"
+        );
         assert!(svg.contains("a &lt;map&gt; &amp; more"));
     }
 }
@@ -81,6 +107,13 @@ fn a_zero_with_an_ellipse_far_larger_than_the_map_stays_in_its_frame() {
 
 #[test]
 fn a_map_of_nothing_is_an_empty_frame_and_a_chart_of_no_order_an_error() {
-    assert!(pole_zero_svg(&PoleZeroMap::default(), "", "").unwrap().contains("imaginary axis"));
-    assert_eq!(stability_svg(&[], &[], (1.0, 2.0), "", ""), Err(ReportError::NoTrace));
+    assert!(
+        pole_zero_svg(&PoleZeroMap::default(), "", "")
+            .unwrap()
+            .contains("imaginary axis")
+    );
+    assert_eq!(
+        stability_svg(&[], &[], (1.0, 2.0), "", ""),
+        Err(ReportError::NoTrace)
+    );
 }

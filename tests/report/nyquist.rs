@@ -13,16 +13,34 @@ const BLUE: &str = "#0072B2";
 
 /// Circles of confidence of a measured response: a sample in the legend has four corners, they have more.
 fn circles(frf: &Frf) -> usize {
-    let measured = [Trace { name: "measured", curve: Curve::Measured(frf) }];
+    let measured = [Trace {
+        name: "measured",
+        curve: Curve::Measured(frf),
+    }];
     let svg = nyquist_svg(Unit::MetresPerAmpere, &measured, None, "Nyquist", "").unwrap();
-    svg::points(&svg, "polygon", BLUE).iter().filter(|outline| outline.len() > 10).count()
+    svg::points(&svg, "polygon", BLUE)
+        .iter()
+        .filter(|outline| outline.len() > 10)
+        .count()
 }
 
 #[test]
 fn circles_of_confidence_upon_each_other_are_drawn_once_and_those_side_by_side_all() {
-    let still = Frf { magnitude_sigma: vec![1.5e-5; 100], ..flat() };
+    let still = Frf {
+        magnitude_sigma: vec![1.5e-5; 100],
+        ..flat()
+    };
     assert_eq!(circles(&still), 1, "more would hide the curve");
     // A hundred around the origin, of which every second may have one: 0.126 of their magnitude apart. Radii are 2.45 sigma: 0.049.
-    let response = (0..100).map(|k| Complex::from_polar(1.5e-4, TAU * f64::from(k) / 100.0)).collect();
-    assert_eq!(circles(&Frf { magnitude_sigma: vec![3e-6; 100], response, ..flat() }), 50);
+    let response = (0..100)
+        .map(|k| Complex::from_polar(1.5e-4, TAU * f64::from(k) / 100.0))
+        .collect();
+    assert_eq!(
+        circles(&Frf {
+            magnitude_sigma: vec![3e-6; 100],
+            response,
+            ..flat()
+        }),
+        50
+    );
 }

@@ -16,7 +16,9 @@ pub fn model(plant: &SampledPlant, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
 
 /// Frequencies from one to another, evenly spaced on a logarithmic axis.
 pub fn frequencies(from_hz: f64, to_hz: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|k| from_hz * (to_hz / from_hz).powf(k as f64 / (count - 1) as f64)).collect()
+    (0..count)
+        .map(|k| from_hz * (to_hz / from_hz).powf(k as f64 / (count - 1) as f64))
+        .collect()
 }
 
 /// The whole run on the stage, with its noise.
@@ -27,9 +29,19 @@ pub fn measured() -> Frf {
 
 /// A run of eight seconds with too little current.
 pub fn short_and_noisy() -> Frf {
-    let input_a: Vec<f64> = stage::chirp_of(6.0, 0.5, 1.5).iter().map(|u| 0.01 * u).collect();
+    let input_a: Vec<f64> = stage::chirp_of(6.0, 0.5, 1.5)
+        .iter()
+        .map(|u| 0.01 * u)
+        .collect();
     let output_m = SampledPlant::stage().simulate(&input_a);
-    let signals = stage::with_noise(&Signals { rate_hz: RATE_HZ, input_a, output_m }, 1);
+    let signals = stage::with_noise(
+        &Signals {
+            rate_hz: RATE_HZ,
+            input_a,
+            output_m,
+        },
+        1,
+    );
     local::estimate(&signals, (1.0, 300.0), &EstimatorSettings::default()).unwrap()
 }
 
@@ -49,12 +61,27 @@ pub fn flat() -> Frf {
 /// A plot of a measured response, and of the stage where the model is given as well; kept as a file of this name.
 pub fn bode(name: &str, frf: &Frf, plant: Option<&SampledPlant>, subtitle: &str) -> String {
     let response = plant.map(|plant| model(plant, &frf.frequency_hz));
-    let mut traces = vec![Trace { name: "measured", curve: Curve::Measured(frf) }];
+    let mut traces = vec![Trace {
+        name: "measured",
+        curve: Curve::Measured(frf),
+    }];
     if let Some(response) = &response {
-        let curve = Curve::Model { frequency_hz: &frf.frequency_hz, response };
-        traces.push(Trace { name: "model: sampled plant with 1 kHz current loop and one tick of delay", curve });
+        let curve = Curve::Model {
+            frequency_hz: &frf.frequency_hz,
+            response,
+        };
+        traces.push(Trace {
+            name: "model: sampled plant with 1 kHz current loop and one tick of delay",
+            curve,
+        });
     }
-    let svg = bode_svg(Unit::MetresPerAmpere, &traces, "FRF from current to displacement", subtitle).unwrap();
+    let svg = bode_svg(
+        Unit::MetresPerAmpere,
+        &traces,
+        "FRF from current to displacement",
+        subtitle,
+    )
+    .unwrap();
     keep(name, &svg);
     svg
 }

@@ -20,10 +20,20 @@ struct Run {
 impl Run {
     fn of(arguments: &[&str]) -> Run {
         let folder = tempfile::tempdir().unwrap();
-        let output =
-            Command::new(env!("CARGO_BIN_EXE_bench")).args(arguments).current_dir(folder.path()).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        Run { answer: serde_json::from_slice(&output.stdout).unwrap(), folder }
+        let output = Command::new(env!("CARGO_BIN_EXE_bench"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        Run {
+            answer: serde_json::from_slice(&output.stdout).unwrap(),
+            folder,
+        }
     }
 
     fn path(&self, relative: &str) -> PathBuf {
@@ -31,7 +41,10 @@ impl Run {
     }
 
     fn pictures(&self) -> Vec<(&'static str, String)> {
-        let read = |kind| std::fs::read_to_string(self.path(self.answer["plots"][kind].as_str().unwrap())).unwrap();
+        let read = |kind| {
+            std::fs::read_to_string(self.path(self.answer["plots"][kind].as_str().unwrap()))
+                .unwrap()
+        };
         KINDS.iter().map(|kind| (*kind, read(*kind))).collect()
     }
 
@@ -44,7 +57,18 @@ impl Run {
 fn run() -> &'static Run {
     static RUN: OnceLock<Run> = OnceLock::new();
     let title = format!("title={}", toml::Value::from(TITLE));
-    RUN.get_or_init(|| Run::of(&["chirp", "--operating-point", "8%", "--asymmetry", "10%", "--set", &title, "--json"]))
+    RUN.get_or_init(|| {
+        Run::of(&[
+            "chirp",
+            "--operating-point",
+            "8%",
+            "--asymmetry",
+            "10%",
+            "--set",
+            &title,
+            "--json",
+        ])
+    })
 }
 
 #[test]
@@ -52,7 +76,12 @@ fn every_picture_and_the_page_stand_beside_the_recording_under_its_name() {
     let answer = &run().answer;
     let recording = Path::new(answer["recording"].as_str().unwrap());
     let stem = recording.file_stem().unwrap().to_string_lossy();
-    let beside = |what: &str| recording.with_file_name(format!("{stem}_{what}")).display().to_string();
+    let beside = |what: &str| {
+        recording
+            .with_file_name(format!("{stem}_{what}"))
+            .display()
+            .to_string()
+    };
     for kind in KINDS {
         assert_eq!(answer["plots"][kind], beside(&format!("{kind}.svg")));
     }
@@ -65,7 +94,10 @@ fn identify_overwrites_neither_pictures_nor_page() {
     let again = Run::of(&[
         "identify",
         "--json",
-        &run().path(run().answer["recording"].as_str().unwrap()).display().to_string(),
+        &run()
+            .path(run().answer["recording"].as_str().unwrap())
+            .display()
+            .to_string(),
     ]);
     assert_ne!(again.answer["report"], run().answer["report"]);
     assert!(again.page().contains("detected"));
@@ -74,10 +106,35 @@ fn identify_overwrites_neither_pictures_nor_page() {
 #[test]
 fn pictures_say_what_is_along_their_axes_and_in_which_unit() {
     let labels: [(&str, &[&str]); 5] = [
-        ("bode", &["Magnitude (m/A)", "Phase (deg)", "Coherence", "Frequency (Hz)"]),
-        ("coherence", &["Coherence (ratio)", "1 less coherence (ratio)", "Frequency (Hz)"]),
-        ("nyquist", &["Real part of H (um/A)", "Imaginary part of H (um/A)"]),
-        ("pole_zero", &["Real part of s (rad/s)", "Imaginary part of s (rad/s)", "imaginary axis"]),
+        (
+            "bode",
+            &[
+                "Magnitude (m/A)",
+                "Phase (deg)",
+                "Coherence",
+                "Frequency (Hz)",
+            ],
+        ),
+        (
+            "coherence",
+            &[
+                "Coherence (ratio)",
+                "1 less coherence (ratio)",
+                "Frequency (Hz)",
+            ],
+        ),
+        (
+            "nyquist",
+            &["Real part of H (um/A)", "Imaginary part of H (um/A)"],
+        ),
+        (
+            "pole_zero",
+            &[
+                "Real part of s (rad/s)",
+                "Imaginary part of s (rad/s)",
+                "imaginary axis",
+            ],
+        ),
         ("stability", &["Order (number of modes)", "Frequency (Hz)"]),
     ];
     for ((kind, picture), (named, labels)) in run().pictures().iter().zip(labels) {
@@ -99,13 +156,18 @@ fn nothing_is_no_number_or_outside_of_its_picture() {
         let inside = |(x, y): &(f64, f64)| (0.0..=width).contains(x) && (0.0..=height).contains(y);
         for element in ["polyline", "polygon"] {
             assert!(
-                svg::points(&picture, element, "").concat().iter().all(inside),
+                svg::points(&picture, element, "")
+                    .concat()
+                    .iter()
+                    .all(inside),
                 "{kind}: a {element} leaves the page"
             );
         }
         for words in svg::words(&picture) {
-            let within =
-                words.left >= -1.0 && words.right <= width + 1.0 && words.top >= -1.0 && words.bottom <= height + 1.0;
+            let within = words.left >= -1.0
+                && words.right <= width + 1.0
+                && words.top >= -1.0
+                && words.bottom <= height + 1.0;
             assert!(within, "{kind}: {words:?}");
         }
     }
@@ -115,18 +177,33 @@ fn nothing_is_no_number_or_outside_of_its_picture() {
 fn every_picture_has_paper_below_its_ink_so_that_it_is_read_on_a_dark_ground_as_well() {
     for (kind, picture) in run().pictures() {
         let (width, height) = size(&picture);
-        let first = picture.lines().find(|line| !line.starts_with("<svg ")).expect("something drawn");
-        assert!(first.starts_with("<rect ") && first.contains("fill=\"#FFFFFF\""), "{kind}: {first}");
+        let first = picture
+            .lines()
+            .find(|line| !line.starts_with("<svg "))
+            .expect("something drawn");
+        assert!(
+            first.starts_with("<rect ") && first.contains("fill=\"#FFFFFF\""),
+            "{kind}: {first}"
+        );
         let number = |name| svg::attribute(first, name).and_then(|text| text.parse::<f64>().ok());
         // In tenths of a pixel; the last may be missing.
         for (name, whole) in [("x", 0.0), ("y", 0.0), ("width", width), ("height", height)] {
-            assert!(number(name).is_some_and(|is| (is - whole).abs() <= 1.0), "{kind}: {name} in {first}");
+            assert!(
+                number(name).is_some_and(|is| (is - whole).abs() <= 1.0),
+                "{kind}: {name} in {first}"
+            );
         }
     }
 }
 
 fn size(picture: &str) -> (f64, f64) {
-    let view = picture.split("viewBox=\"0 0 ").nth(1).unwrap().split('"').next().unwrap();
+    let view = picture
+        .split("viewBox=\"0 0 ")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap();
     let (width, height) = view.split_once(' ').unwrap();
     (width.parse().unwrap(), height.parse().unwrap())
 }
@@ -134,28 +211,54 @@ fn size(picture: &str) -> (f64, f64) {
 #[test]
 fn pictures_and_page_are_well_formed_by_other_programs() {
     let answer = &run().answer;
-    let mut files: Vec<Value> = KINDS.iter().map(|kind| answer["plots"][kind].clone()).collect();
+    let mut files: Vec<Value> = KINDS
+        .iter()
+        .map(|kind| answer["plots"][kind].clone())
+        .collect();
     files.push(answer["report"].clone());
-    let files: Vec<Value> = files.iter().map(|file| json!(run().path(file.as_str().unwrap()))).collect();
-    let Some(answers) = truth::ask_of("pages.py", &files) else { return };
+    let files: Vec<Value> = files
+        .iter()
+        .map(|file| json!(run().path(file.as_str().unwrap())))
+        .collect();
+    let Some(answers) = truth::ask_of("pages.py", &files) else {
+        return;
+    };
     for (file, answer) in files.iter().zip(answers) {
         assert_eq!(answer["errors"], json!([]), "{file}");
-        assert!(answer["elements"].as_u64().is_some_and(|count| count > 20), "{file}: {answer}");
+        assert!(
+            answer["elements"].as_u64().is_some_and(|count| count > 20),
+            "{file}: {answer}"
+        );
     }
 }
 
 #[test]
 fn the_page_says_the_verdict_and_why_before_anything_else_and_holds_all_of_the_run() {
     let (page, answer) = (run().page(), &run().answer);
-    let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("`{text}` is not on the page"));
+    let at = |text: &str| {
+        page.find(text)
+            .unwrap_or_else(|| panic!("`{text}` is not on the page"))
+    };
     assert_eq!(answer["cnmp"], "detected");
     assert!(at("<strong>detected</strong>") < at(answer["why"].as_str().unwrap()));
-    let order = ["<strong>", "<h2>Modes", "<h2>Zeros", "<svg", "<h2>The loop", "<h2>Configuration"].map(at);
+    let order = [
+        "<strong>",
+        "<h2>Modes",
+        "<h2>Zeros",
+        "<svg",
+        "<h2>The loop",
+        "<h2>Configuration",
+    ]
+    .map(at);
     assert!(order.is_sorted(), "{order:?}");
     assert_eq!(page.matches("<svg ").count(), KINDS.len());
     let modes = answer["modes"].as_array().unwrap().len();
     let zeros = answer["zeros"].as_array().unwrap().len();
-    assert_eq!(page.matches("<tr><td").count(), modes + zeros, "a row a mode and a zero");
+    assert_eq!(
+        page.matches("<tr><td").count(),
+        modes + zeros,
+        "a row a mode and a zero"
+    );
     for text in ["virtual", "CNMP", "±", "prefers-color-scheme:dark"] {
         at(text);
     }
@@ -168,7 +271,11 @@ fn the_page_needs_nothing_from_elsewhere_and_escapes_the_title() {
         assert!(!page.contains(load), "{load}");
     }
     for (at, _) in page.match_indices("http") {
-        assert!(page[at..].starts_with("http://www.w3.org/2000/svg"), "{}", &page[at..at + 60]);
+        assert!(
+            page[at..].starts_with("http://www.w3.org/2000/svg"),
+            "{}",
+            &page[at..at + 60]
+        );
     }
     assert!(page.contains("<h1>a &lt;b&gt; &amp; &quot;c&quot;</h1>") && !page.contains("<b>"));
 }
@@ -176,9 +283,27 @@ fn the_page_needs_nothing_from_elsewhere_and_escapes_the_title() {
 #[test]
 fn where_no_mode_is_told_the_page_says_so_and_has_no_map() {
     // A millionth of an ampere moves the stage by less than the probe's noise.
-    let run = Run::of(&["chirp", "--amplitude", "1e-6", "--duration", "20", "--start", "1", "--stop", "300", "--json"]);
-    assert_eq!((&run.answer["cnmp"], &run.answer["plots"]["pole_zero"]), (&json!("undecided"), &Value::Null));
+    let run = Run::of(&[
+        "chirp",
+        "--amplitude",
+        "1e-6",
+        "--duration",
+        "20",
+        "--start",
+        "1",
+        "--stop",
+        "300",
+        "--json",
+    ]);
+    assert_eq!(
+        (&run.answer["cnmp"], &run.answer["plots"]["pole_zero"]),
+        (&json!("undecided"), &Value::Null)
+    );
     let page = run.page();
-    assert!(page.contains("<strong>undecided</strong>") && !page.contains("<h2>Modes"), "{}", run.answer["why"]);
+    assert!(
+        page.contains("<strong>undecided</strong>") && !page.contains("<h2>Modes"),
+        "{}",
+        run.answer["why"]
+    );
     assert_eq!(page.matches("<svg ").count(), 3);
 }

@@ -12,8 +12,18 @@ pub struct Words {
 
 /// The points of all elements of a kind (`polyline`, `polygon`) in a colour.
 pub fn points(svg: &str, kind: &str, colour: &str) -> Vec<Vec<(f64, f64)>> {
-    let elements = svg.lines().filter(|line| line.starts_with(&format!("<{kind} ")) && line.contains(colour));
-    elements.map(|line| attribute(line, "points").unwrap().split_whitespace().map(pair).collect()).collect()
+    let elements = svg
+        .lines()
+        .filter(|line| line.starts_with(&format!("<{kind} ")) && line.contains(colour));
+    elements
+        .map(|line| {
+            attribute(line, "points")
+                .unwrap()
+                .split_whitespace()
+                .map(pair)
+                .collect()
+        })
+        .collect()
 }
 
 fn pair(text: &str) -> (f64, f64) {
@@ -57,7 +67,13 @@ fn boxed(tag: &str, text: &str) -> Words {
         "0.5ex" => size / 2.0,
         _ => size,
     };
-    Words { text, left: x - before, right: x - before + width, top: y - above, bottom: y - above + size }
+    Words {
+        text,
+        left: x - before,
+        right: x - before + width,
+        top: y - above,
+        bottom: y - above + size,
+    }
 }
 
 /// The value of an attribute of a tag.

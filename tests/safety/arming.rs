@@ -19,7 +19,12 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::faulty_rig::Fault;
 use crate::rig::{Bench, Says, Still, Told, Watched, says, stage};
 
-const STATES: [State; 4] = [State::Disarmed, State::Armed, State::Running, State::Tripped];
+const STATES: [State; 4] = [
+    State::Disarmed,
+    State::Armed,
+    State::Running,
+    State::Tripped,
+];
 
 /// Where each change leads, column by column: the diagram in `rt/arming.rs` and nothing else.
 const ARROWS: [(Change, [State; 4]); 5] = {
@@ -44,7 +49,10 @@ fn bench_in(state: State, trip: bool) -> Bench {
         faults.push((TRIP..TRIP + 1, Fault::Says(Validity::Faulty)));
     }
     if state == State::Tripped {
-        faults.push((MAKE_TRIPPED..MAKE_TRIPPED + 1, Fault::Says(Validity::Faulty)));
+        faults.push((
+            MAKE_TRIPPED..MAKE_TRIPPED + 1,
+            Fault::Says(Validity::Faulty),
+        ));
     }
     let mut bench = Bench::still(&stage(), &faults);
     if state != State::Disarmed {
@@ -73,13 +81,37 @@ fn every_arrow_of_the_diagram_is_there_and_no_other() {
                 Change::Trip => {}
             }
             let record = bench.tick();
-            assert_eq!((record.state, bench.state()), (to, to), "{change:?} in {from:?}");
-            let moved: Vec<_> = bench.events()[events..].iter().filter(|e| is_move(&e.kind)).map(|e| e.kind).collect();
-            let expected = if from == to { vec![] } else { vec![EventKind::State { from, to }] };
+            assert_eq!(
+                (record.state, bench.state()),
+                (to, to),
+                "{change:?} in {from:?}"
+            );
+            let moved: Vec<_> = bench.events()[events..]
+                .iter()
+                .filter(|e| is_move(&e.kind))
+                .map(|e| e.kind)
+                .collect();
+            let expected = if from == to {
+                vec![]
+            } else {
+                vec![EventKind::State { from, to }]
+            };
             assert_eq!(moved, expected, "{change:?} in {from:?}");
-            assert_eq!(bench.is_on(), matches!(to, State::Armed | State::Running), "{change:?} in {from:?}");
-            assert_eq!(record.command_a != 0.0, to == State::Running, "{change:?} in {from:?}: {record:?}");
-            assert_eq!(from.after(change), (from != to).then_some(to), "{change:?} in {from:?}");
+            assert_eq!(
+                bench.is_on(),
+                matches!(to, State::Armed | State::Running),
+                "{change:?} in {from:?}"
+            );
+            assert_eq!(
+                record.command_a != 0.0,
+                to == State::Running,
+                "{change:?} in {from:?}: {record:?}"
+            );
+            assert_eq!(
+                from.after(change),
+                (from != to).then_some(to),
+                "{change:?} in {from:?}"
+            );
         }
     }
 }
@@ -94,8 +126,16 @@ fn a_program_at_its_end_disarms_in_the_tick_after_its_last_command() {
     bench.run(20);
     let commands: Vec<bool> = bench.ticks().iter().map(|r| r.command_a != 0.0).collect();
     assert_eq!(commands, [[true; 10], [false; 10]].concat());
-    assert_eq!((bench.state(), bench.is_on(), bench.handed_back), (State::Disarmed, false, 1));
-    assert!(bench.events().iter().any(|e| e.tick == 9 && e.kind == EventKind::Completed));
+    assert_eq!(
+        (bench.state(), bench.is_on(), bench.handed_back),
+        (State::Disarmed, false, 1)
+    );
+    assert!(
+        bench
+            .events()
+            .iter()
+            .any(|e| e.tick == 9 && e.kind == EventKind::Completed)
+    );
     assert!(bench.servo().completed());
 }
 
@@ -119,16 +159,34 @@ fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start(
         bench.order(Order::Stop);
         assert_eq!(bench.tick().state, State::Tripped);
     }
-    assert!(bench.told()[told..].iter().all(|(_, told)| *told == Told::Disable), "nothing but off, again and again");
-    assert_eq!((bench.servo().last_trip(), bench.handed_back), (Some(trip), 50));
+    assert!(
+        bench.told()[told..]
+            .iter()
+            .all(|(_, told)| *told == Told::Disable),
+        "nothing but off, again and again"
+    );
+    assert_eq!(
+        (bench.servo().last_trip(), bench.handed_back),
+        (Some(trip), 50)
+    );
 
     bench.order(Order::Clear);
-    assert_eq!((bench.tick().state, bench.is_on()), (State::Disarmed, false));
+    assert_eq!(
+        (bench.tick().state, bench.is_on()),
+        (State::Disarmed, false)
+    );
     bench.order(Order::Start(says(|_| 0.1)));
-    assert_eq!((bench.tick().state, bench.is_on()), (State::Disarmed, false), "start alone does nothing");
+    assert_eq!(
+        (bench.tick().state, bench.is_on()),
+        (State::Disarmed, false),
+        "start alone does nothing"
+    );
     bench.order(Order::Arm);
     let armed = bench.tick();
-    assert_eq!((armed.state, armed.command_a, bench.is_on()), (State::Armed, 0.0, true));
+    assert_eq!(
+        (armed.state, armed.command_a, bench.is_on()),
+        (State::Armed, 0.0, true)
+    );
     bench.order(Order::Start(says(|_| 0.1)));
     let running = bench.tick();
     assert_eq!((running.state, running.command_a), (State::Running, 0.1));
@@ -142,7 +200,11 @@ fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
     assert_eq!(bench.state(), State::Tripped);
     bench.order(Order::Clear);
     bench.tick();
-    assert_eq!(bench.state(), State::Tripped, "the amplifier keeps its fault");
+    assert_eq!(
+        bench.state(),
+        State::Tripped,
+        "the amplifier keeps its fault"
+    );
     bench.run(100);
     bench.order(Order::Clear);
     bench.tick();
@@ -152,12 +214,19 @@ fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
 #[test]
 fn a_run_after_a_cleared_trip_does_not_carry_the_old_trip_along() {
     let mut bench = bench_in(State::Tripped, false);
-    for order in [Order::Clear, Order::Arm, Order::Start(Box::new(Says(|_| 0.1, 5)))] {
+    for order in [
+        Order::Clear,
+        Order::Arm,
+        Order::Start(Box::new(Says(|_| 0.1, 5))),
+    ] {
         bench.order(order);
     }
     assert!(bench.servo().last_trip().is_some());
     bench.run(10);
-    assert_eq!((bench.servo().last_trip(), bench.servo().completed()), (None, true));
+    assert_eq!(
+        (bench.servo().last_trip(), bench.servo().completed()),
+        (None, true)
+    );
 }
 
 #[test]
@@ -167,7 +236,9 @@ fn an_arm_order_that_changes_nothing_does_not_touch_the_amplifier() {
         let told = bench.told().len();
         bench.order(Order::Arm);
         bench.run(3);
-        let enabled = bench.told()[told..].iter().any(|(_, told)| matches!(told, Told::Enable { .. }));
+        let enabled = bench.told()[told..]
+            .iter()
+            .any(|(_, told)| matches!(told, Told::Enable { .. }));
         assert!(!enabled, "enabled anew while {state:?}");
     }
 }
@@ -199,20 +270,42 @@ fn the_schedule_begins_anew_after_the_amplifier_was_enabled_and_at_no_other_orde
     let (servo, orders, _records) = loop_around(Still::default());
     let restarts = Arc::new(AtomicU64::new(0));
     let program = Order::Start(Box::new(Says(|_| 0.1, 10)));
-    let late = vec![(0, Order::Arm), (1, program), (4, Order::Arm), (5, Order::Clear), (6, Order::Arm)];
-    let clock = Handing { restarts: Arc::clone(&restarts), orders, late };
+    let late = vec![
+        (0, Order::Arm),
+        (1, program),
+        (4, Order::Arm),
+        (5, Order::Clear),
+        (6, Order::Arm),
+    ];
+    let clock = Handing {
+        restarts: Arc::clone(&restarts),
+        orders,
+        late,
+    };
     let ended = thread::run(servo, clock, 5);
     assert!(ended.completed && ended.trip.is_none());
-    assert_eq!(restarts.load(Ordering::Relaxed), 1, "a schedule that begins anew in a run hides a late tick");
+    assert_eq!(
+        restarts.load(Ordering::Relaxed),
+        1,
+        "a schedule that begins anew in a run hides a late tick"
+    );
 }
 
 fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Order>, Consumer<Published>) {
     let (outlet, records) = RingBuffer::new(4096);
     let (orders, taken) = RingBuffer::new(16);
     let (spent, _) = RingBuffer::new(16);
-    let connections =
-        Connections { orders: taken, spent, outlet: Outlet::new(outlet), progress: Arc::new(Progress::default()) };
-    (Servo::new(Box::new(rig), Interlocks::new(&stage()), connections), orders, records)
+    let connections = Connections {
+        orders: taken,
+        spent,
+        outlet: Outlet::new(outlet),
+        progress: Arc::new(Progress::default()),
+    };
+    (
+        Servo::new(Box::new(rig), Interlocks::new(&stage()), connections),
+        orders,
+        records,
+    )
 }
 
 /// A program with a mistake in it.
@@ -221,7 +314,11 @@ struct Panics;
 impl Program for Panics {
     fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
         assert!(tick < 10, "the mistake");
-        Decision { reference_m: 0.0, requested_a: 0.1, active: true }
+        Decision {
+            reference_m: 0.0,
+            requested_a: 0.1,
+            active: true,
+        }
     }
     fn ticks(&self) -> u64 {
         100
@@ -237,7 +334,9 @@ fn a_panic_in_the_loop_leaves_the_amplifier_off() {
     let died = std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
     assert!(died.is_err(), "the program panics at its tenth tick");
     let told = log.lock().expect("not poisoned").clone();
-    let currents = told.iter().filter(|(_, t)| matches!(t, Told::Command { current_a, .. } if *current_a != 0.0));
+    let currents = told
+        .iter()
+        .filter(|(_, t)| matches!(t, Told::Command { current_a, .. } if *current_a != 0.0));
     assert_eq!(currents.count(), 10);
     assert_eq!(told.last().map(|(_, told)| *told), Some(Told::Disable));
 }
@@ -245,7 +344,11 @@ fn a_panic_in_the_loop_leaves_the_amplifier_off() {
 #[test]
 fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
     let mut config = stage();
-    (config.chirp.quiet_before_s, config.chirp.duration_s, config.chirp.quiet_after_s) = (0.0, 0.2, 0.0);
+    (
+        config.chirp.quiet_before_s,
+        config.chirp.duration_s,
+        config.chirp.quiet_after_s,
+    ) = (0.0, 0.2, 0.0);
     let plan = Plan::chirp(config);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a_file");
@@ -255,7 +358,9 @@ fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
         for pace in [Pace::Virtual, Pace::Realtime] {
             let rig = Watched::new(Still::default());
             let log = Arc::clone(&rig.log);
-            let error = session::run(&plan, Box::new(rig), pace, out, &mut |_, _| {}).err().expect("no recording");
+            let error = session::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
+                .err()
+                .expect("no recording");
             assert!(error.to_string().contains("nothing moved"), "{error}");
             // The loop's thread holds the log until it is gone.
             let gone = (0..1000).any(|_| {
@@ -264,7 +369,10 @@ fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
             });
             assert!(gone, "the loop runs without leave");
             let told = log.lock().expect("not poisoned").clone();
-            assert!(told.iter().all(|(_, told)| *told == Told::Disable), "{told:?}");
+            assert!(
+                told.iter().all(|(_, told)| *told == Told::Disable),
+                "{told:?}"
+            );
         }
     }
 }

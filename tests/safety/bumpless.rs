@@ -30,12 +30,20 @@ fn config(controller: &str, seed: u64) -> Config {
 
 fn controller(config: &Config) -> Controller {
     let text = ControllerText::find(&config.control.controller).expect("a controller");
-    Controller::new(&text.sections(config.servo.rate_hz).expect("valid"), config.servo.period_s())
+    Controller::new(
+        &text.sections(config.servo.rate_hz).expect("valid"),
+        config.servo.period_s(),
+    )
 }
 
 fn program(config: &Config, settle: u64, closed: u64) -> Control {
-    let reference =
-        reference(&config.control.reference, &config.chirp, None, config.servo.period_s()).expect("no file");
+    let reference = reference(
+        &config.control.reference,
+        &config.chirp,
+        None,
+        config.servo.period_s(),
+    )
+    .expect("no file");
     Control::new(controller(config), reference, settle, closed)
 }
 
@@ -44,11 +52,18 @@ fn program(config: &Config, settle: u64, closed: u64) -> Control {
 fn largest_gains(config: &Config, ticks: usize) -> Vec<f64> {
     let mut controller = controller(config);
     let impulse = (0..ticks).map(|tick| controller.update(if tick == 0 { 1.0 } else { 0.0 }).abs());
-    impulse.scan(0.0, |sum, h| Some(*sum + h).inspect(|s| *sum = *s)).collect()
+    impulse
+        .scan(0.0, |sum, h| Some(*sum + h).inspect(|s| *sum = *s))
+        .collect()
 }
 
 fn closed(bench: &Bench, from: u64) -> Vec<TickRecord> {
-    bench.ticks().iter().filter(|r| r.tick >= from && r.flags & flag::ACTIVE != 0).copied().collect()
+    bench
+        .ticks()
+        .iter()
+        .filter(|r| r.tick >= from && r.flags & flag::ACTIVE != 0)
+        .copied()
+        .collect()
 }
 
 /// The first commands are those of a controller at rest that sees nothing but the rest's noise.
@@ -60,10 +75,20 @@ fn makes_no_jump(config: &Config, records: &[TickRecord], offset_m: f64, what: &
             (record.reference_m - offset_m).abs() < REST_M,
             "{what}: the origin is where the stage rests: {record:?}"
         );
-        assert!((record.position_m - record.reference_m).abs() < REST_M, "{what}: {record:?}");
-        assert!(record.command_a.abs() <= gain * REST_M, "{what}: beyond {} A: {record:?}", gain * REST_M);
+        assert!(
+            (record.position_m - record.reference_m).abs() < REST_M,
+            "{what}: {record:?}"
+        );
+        assert!(
+            record.command_a.abs() <= gain * REST_M,
+            "{what}: beyond {} A: {record:?}",
+            gain * REST_M
+        );
     }
-    assert!(records.iter().any(|r| r.command_a != 0.0), "{what}: the loop is closed");
+    assert!(
+        records.iter().any(|r| r.command_a != 0.0),
+        "{what}: the loop is closed"
+    );
     // Were the origin zero, the offset itself would go through the controller: 300 um in place of REST_M.
 }
 
@@ -74,12 +99,20 @@ fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
             let mut config = config(name, seed);
             config.control.reference = ReferenceSettings::Hold;
             let rig = SimulatedRig::new(&config).expect("a rig");
-            let mut bench = Bench::around(&config, FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(offset_m))]));
+            let mut bench = Bench::around(
+                &config,
+                FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(offset_m))]),
+            );
             bench.order(Order::Arm);
             bench.order(Order::Start(Box::new(program(&config, 2500, 2500))));
             bench.run(5000);
             assert_eq!(bench.trips(), []);
-            makes_no_jump(&config, &closed(&bench, 0), offset_m, &format!("{name}, offset {offset_m}"));
+            makes_no_jump(
+                &config,
+                &closed(&bench, 0),
+                offset_m,
+                &format!("{name}, offset {offset_m}"),
+            );
         }
     }
 }
@@ -88,15 +121,26 @@ fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
 fn no_current_flows_while_the_origin_is_found() {
     let config = config("fast", 1);
     let rig = SimulatedRig::new(&config).expect("a rig");
-    let mut bench = Bench::around(&config, FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(300e-6))]));
+    let mut bench = Bench::around(
+        &config,
+        FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(300e-6))]),
+    );
     bench.order(Order::Arm);
     bench.order(Order::Start(Box::new(program(&config, 2500, 100))));
     bench.run(2500);
-    assert!(bench.ticks().iter().all(|r| r.state == State::Running && r.command_a.to_bits() == 0));
+    assert!(
+        bench
+            .ticks()
+            .iter()
+            .all(|r| r.state == State::Running && r.command_a.to_bits() == 0)
+    );
     let mean_m = bench.ticks().iter().map(|r| r.position_m).sum::<f64>() / 2500.0;
     let origin_m = bench.ticks().last().expect("ticks").reference_m;
     // A running mean of 2500 numbers of 3e-4, each step rounded at 1e-16 of it.
-    assert!((origin_m - mean_m).abs() < 1e-16, "{origin_m:e} for {mean_m:e}");
+    assert!(
+        (origin_m - mean_m).abs() < 1e-16,
+        "{origin_m:e} for {mean_m:e}"
+    );
 }
 
 #[test]
@@ -106,12 +150,18 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
         // constants of its first mode (zeta w = 1.66 1/s), 50 um e^-16 = 6 pm.
         let mut config = config(name, 5);
         let rig = SimulatedRig::new(&config).expect("a rig");
-        let mut bench = Bench::around(&config, FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(100e-6))]));
+        let mut bench = Bench::around(
+            &config,
+            FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(100e-6))]),
+        );
         bench.order(Order::Arm);
         bench.order(Order::Start(Box::new(program(&config, 2500, 10_000))));
         bench.run(12_500);
         let end = *bench.ticks().last().expect("ticks");
-        assert!((end.reference_m - 150e-6).abs() < REST_M && end.command_a.abs() > 0.01, "{name}: {end:?}");
+        assert!(
+            (end.reference_m - 150e-6).abs() < REST_M && end.command_a.abs() > 0.01,
+            "{name}: {end:?}"
+        );
         bench.run(50_000);
 
         config.control.reference = ReferenceSettings::Hold;
@@ -125,10 +175,18 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
         // Bit for bit what a new program decides that sees the same positions.
         let mut fresh = program(&config, 2500, 2500);
         let records = bench.ticks();
-        for (tick, record) in records.iter().filter(|r| r.tick >= from && r.state == State::Running).enumerate() {
+        for (tick, record) in records
+            .iter()
+            .filter(|r| r.tick >= from && r.state == State::Running)
+            .enumerate()
+        {
             let decision = fresh.decide(tick as u64, record.position_m);
             let bits = [record.requested_a, record.reference_m].map(f64::to_bits);
-            assert_eq!([decision.requested_a, decision.reference_m].map(f64::to_bits), bits, "{name}: {record:?}");
+            assert_eq!(
+                [decision.requested_a, decision.reference_m].map(f64::to_bits),
+                bits,
+                "{name}: {record:?}"
+            );
         }
     }
 }
@@ -140,14 +198,28 @@ fn a_controller_that_was_used_before_starts_from_rest() {
         config.control.reference = ReferenceSettings::Hold;
         let mut used = controller(&config);
         let moved = (0..1000).map(|_| used.update(100e-6)).last();
-        assert!(moved.is_some_and(|current_a| current_a.abs() > 1e-3), "{moved:?}");
-        let hold =
-            || reference(&ReferenceSettings::Hold, &config.chirp, None, config.servo.period_s()).expect("no file");
+        assert!(
+            moved.is_some_and(|current_a| current_a.abs() > 1e-3),
+            "{moved:?}"
+        );
+        let hold = || {
+            reference(
+                &ReferenceSettings::Hold,
+                &config.chirp,
+                None,
+                config.servo.period_s(),
+            )
+            .expect("no file")
+        };
         let mut after = Control::new(used, hold(), 10, 100);
         let mut fresh = Control::new(controller(&config), hold(), 10, 100);
         for tick in 0..110 {
             let position_m = 1e-6 * (tick % 3) as f64;
-            assert_eq!(after.decide(tick, position_m), fresh.decide(tick, position_m), "{name} at tick {tick}");
+            assert_eq!(
+                after.decide(tick, position_m),
+                fresh.decide(tick, position_m),
+                "{name} at tick {tick}"
+            );
         }
     }
 }

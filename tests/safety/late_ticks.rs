@@ -10,7 +10,9 @@ use bench::rt::record::{Published, TickRecord, flag};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
 use bench::rt::thread::{self, Ended};
 use bench::sim::SimulatedRig;
-use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick};
+use bench_hal::{
+    AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
+};
 use rtrb::{Consumer, RingBuffer};
 
 use crate::rig::{Says, Still, stage};
@@ -23,11 +25,22 @@ struct Jerky {
 
 impl Clock for Jerky {
     fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
-        let missed = self.late.iter().find(|(call, _)| *call == self.calls).map_or(0, |(_, missed)| *missed);
+        let missed = self
+            .late
+            .iter()
+            .find(|(call, _)| *call == self.calls)
+            .map_or(0, |(_, missed)| *missed);
         self.calls += 1;
         let number = number + u64::from(missed);
         let scheduled_ns = number * 200_000;
-        Moment { tick: Tick { number, scheduled_ns }, woke_ns: scheduled_ns + 1000, missed }
+        Moment {
+            tick: Tick {
+                number,
+                scheduled_ns,
+            },
+            woke_ns: scheduled_ns + 1000,
+            missed,
+        }
     }
     fn now_ns(&self, tick: Tick) -> u64 {
         tick.scheduled_ns + 2000
@@ -48,11 +61,21 @@ fn run(
     let (mut orders, taken) = RingBuffer::new(16);
     let (spent, _spent) = RingBuffer::new(16);
     assert!(orders.push(Order::Arm).is_ok() && orders.push(Order::Start(program)).is_ok());
-    let connections =
-        Connections { orders: taken, spent, outlet: Outlet::new(outlet), progress: Arc::new(Progress::default()) };
+    let connections = Connections {
+        orders: taken,
+        spent,
+        outlet: Outlet::new(outlet),
+        progress: Arc::new(Progress::default()),
+    };
     let servo = Servo::new(Box::new(rig), Interlocks::new(&config), connections);
     let ended = thread::run(servo, clock, tail);
-    let records = records.into_chunk().filter_map(|p| if let Published::Tick(r) = p { Some(r) } else { None });
+    let records = records.into_chunk().filter_map(|p| {
+        if let Published::Tick(r) = p {
+            Some(r)
+        } else {
+            None
+        }
+    });
     (ended, records.collect())
 }
 
@@ -69,8 +92,17 @@ impl IntoChunk for Consumer<Published> {
 
 #[test]
 fn missed_ticks_are_counted_flagged_and_leave_a_gap_in_the_numbers() {
-    let clock = Jerky { late: vec![(10, 1), (11, 7), (30, 20)], calls: 0 };
-    let (ended, records) = run(Still::default(), Box::new(Says(|_| 0.1, 100)), clock, 50, 10);
+    let clock = Jerky {
+        late: vec![(10, 1), (11, 7), (30, 20)],
+        calls: 0,
+    };
+    let (ended, records) = run(
+        Still::default(),
+        Box::new(Says(|_| 0.1, 100)),
+        clock,
+        50,
+        10,
+    );
     assert!(ended.completed && ended.lost_records == 0);
     // 100 ticks of the run and the tail, which begins with the tick of completion: 110 served.
     assert_eq!(records.len(), 110);
@@ -83,9 +115,16 @@ fn missed_ticks_are_counted_flagged_and_leave_a_gap_in_the_numbers() {
             _ => 0,
         };
         expected += u64::from(missed);
-        assert_eq!((record.tick, record.missed_ticks), (expected, missed), "{record:?}");
+        assert_eq!(
+            (record.tick, record.missed_ticks),
+            (expected, missed),
+            "{record:?}"
+        );
         assert_eq!(record.flags & flag::OVERRUN != 0, missed > 0, "{record:?}");
-        assert_eq!((record.scheduled_ns, record.woke_ns - record.scheduled_ns), (record.tick * 200_000, 1000));
+        assert_eq!(
+            (record.scheduled_ns, record.woke_ns - record.scheduled_ns),
+            (record.tick * 200_000, 1000)
+        );
         expected += 1;
     }
     assert_eq!(expected, 110 + 28);
@@ -97,7 +136,11 @@ struct Asked(Arc<Mutex<Vec<u64>>>, u64);
 impl Program for Asked {
     fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
         self.0.lock().expect("not poisoned").push(tick);
-        Decision { reference_m: 0.0, requested_a: 0.1, active: true }
+        Decision {
+            reference_m: 0.0,
+            requested_a: 0.1,
+            active: true,
+        }
     }
     fn ticks(&self) -> u64 {
         self.1
@@ -108,13 +151,31 @@ impl Program for Asked {
 fn a_program_goes_on_where_it_was_and_no_missed_tick_is_made_up_for() {
     // Were ticks caught up, there would be more ticks than calls of the clock, or the program would skip or repeat some.
     let asked = Arc::default();
-    let clock = Jerky { late: vec![(10, 3), (20, 5)], calls: 0 };
-    let (ended, records) = run(Still::default(), Box::new(Asked(Arc::clone(&asked), 50)), clock, 50, 0);
+    let clock = Jerky {
+        late: vec![(10, 3), (20, 5)],
+        calls: 0,
+    };
+    let (ended, records) = run(
+        Still::default(),
+        Box::new(Asked(Arc::clone(&asked), 50)),
+        clock,
+        50,
+        0,
+    );
     assert!(ended.completed);
-    assert_eq!(*asked.lock().expect("not poisoned"), (0..50).collect::<Vec<u64>>());
-    let steps: Vec<u64> = records.windows(2).map(|pair| pair[1].tick - pair[0].tick).collect();
+    assert_eq!(
+        *asked.lock().expect("not poisoned"),
+        (0..50).collect::<Vec<u64>>()
+    );
+    let steps: Vec<u64> = records
+        .windows(2)
+        .map(|pair| pair[1].tick - pair[0].tick)
+        .collect();
     assert!(steps.iter().all(|step| *step >= 1));
-    assert_eq!(steps.iter().filter(|step| **step > 1).collect::<Vec<_>>(), [&4, &6]);
+    assert_eq!(
+        steps.iter().filter(|step| **step > 1).collect::<Vec<_>>(),
+        [&4, &6]
+    );
 }
 
 /// A probe that holds up the loop once.
@@ -150,35 +211,69 @@ fn in_real_time_every_scheduled_tick_is_either_served_or_counted_as_missed() {
     // 500 Hz for a second. The probe hangs for 20 ms in one tick: ten periods, so the tick after it is due nine periods
     // before it can be served at the soonest.
     let clock = Realtime::new(0.002);
-    let (ended, records) = run(Hangs(Still::default(), 100), Box::new(Says(|_| 0.1, 500)), clock, u32::MAX, 20);
+    let (ended, records) = run(
+        Hangs(Still::default(), 100),
+        Box::new(Says(|_| 0.1, 500)),
+        clock,
+        u32::MAX,
+        20,
+    );
     assert!(ended.completed && ended.lost_records == 0);
     let missed: u64 = records.iter().map(|r| u64::from(r.missed_ticks)).sum();
     let last = records.last().expect("ticks").tick;
-    assert_eq!(records.len() as u64 + missed, last + 1, "scheduled ticks are 0 to {last}");
+    assert_eq!(
+        records.len() as u64 + missed,
+        last + 1,
+        "scheduled ticks are 0 to {last}"
+    );
     assert_eq!(records.len(), 520);
     let most = records.iter().map(|r| r.missed_ticks).max().expect("ticks");
     assert!(most >= 9, "{most} missed at once");
     for pair in records.windows(2) {
-        assert_eq!(pair[1].tick - pair[0].tick, 1 + u64::from(pair[1].missed_ticks));
+        assert_eq!(
+            pair[1].tick - pair[0].tick,
+            1 + u64::from(pair[1].missed_ticks)
+        );
         assert_eq!(pair[1].flags & flag::OVERRUN != 0, pair[1].missed_ticks > 0);
     }
     for record in &records {
         assert_eq!(record.scheduled_ns, record.tick * 2_000_000);
-        assert!(record.woke_ns >= record.scheduled_ns, "no tick begins before it is due: {record:?}");
+        assert!(
+            record.woke_ns >= record.scheduled_ns,
+            "no tick begins before it is due: {record:?}"
+        );
         // The tick is the latest that is due, whatever the machine does: less than a period late (but for rounding), or it
         // would be another one.
-        assert!(record.woke_ns < record.scheduled_ns + 2_000_000 + 10, "{record:?}");
+        assert!(
+            record.woke_ns < record.scheduled_ns + 2_000_000 + 10,
+            "{record:?}"
+        );
     }
 }
 
 #[test]
 fn more_missed_ticks_than_allowed_stop_the_run_in_real_time() {
     let clock = Realtime::new(0.002);
-    let (ended, records) = run(Hangs(Still::default(), 100), Box::new(Says(|_| 0.1, 5000)), clock, 4, 0);
-    let (trip, at) = ended.trip.expect("the hanging probe makes eight missed ticks, four are allowed");
+    let (ended, records) = run(
+        Hangs(Still::default(), 100),
+        Box::new(Says(|_| 0.1, 5000)),
+        clock,
+        4,
+        0,
+    );
+    let (trip, at) = ended
+        .trip
+        .expect("the hanging probe makes eight missed ticks, four are allowed");
     assert_eq!((trip.reason(), ended.completed), ("overruns", false));
     let last = records.last().expect("ticks");
-    assert_eq!((last.tick, last.command_a.to_bits(), last.flags & flag::TRIPPED), (at, 0, flag::TRIPPED));
+    assert_eq!(
+        (
+            last.tick,
+            last.command_a.to_bits(),
+            last.flags & flag::TRIPPED
+        ),
+        (at, 0, flag::TRIPPED)
+    );
 }
 
 #[test]
@@ -186,7 +281,10 @@ fn through_missed_ticks_the_simulated_amplifier_holds_the_last_command_after_its
     for delay in 0..4 {
         let mut config = stage();
         config.servo.computing_delay_periods = delay;
-        let now = |number| Tick { number, scheduled_ns: number * 200_000 };
+        let now = |number| Tick {
+            number,
+            scheduled_ns: number * 200_000,
+        };
         let current_a = |number: u64| 0.1 * (number % 7) as f64;
         let rigs = [(); 2].map(|()| SimulatedRig::new(&config).expect("a rig"));
         let [mut missing, mut serving] = rigs;
@@ -196,7 +294,11 @@ fn through_missed_ticks_the_simulated_amplifier_holds_the_last_command_after_its
         // Of every ten ticks four are missed by the one; the other repeats its last command in them, as a hold does.
         for number in 0..1000u64 {
             let missed = (4..8).contains(&(number % 10));
-            let held_a = current_a(if missed { number - number % 10 + 3 } else { number });
+            let held_a = current_a(if missed {
+                number - number % 10 + 3
+            } else {
+                number
+            });
             serving.latest(now(number));
             serving.command(held_a).expect("enabled");
             if !missed {
@@ -206,6 +308,10 @@ fn through_missed_ticks_the_simulated_amplifier_holds_the_last_command_after_its
                 assert_eq!(positions[0], positions[1], "delay {delay}, tick {number}");
             }
         }
-        assert!(serving.true_position_m() > 1e-5, "something moved: {}", serving.true_position_m());
+        assert!(
+            serving.true_position_m() > 1e-5,
+            "something moved: {}",
+            serving.true_position_m()
+        );
     }
 }

@@ -51,7 +51,10 @@ fn faults() -> impl Strategy<Value = Vec<(Range<u64>, Fault)>> {
         Just(Fault::Refuses(8)),
         Just(Fault::DoesNotEnable(7)),
     ];
-    prop::collection::vec((0..TICKS, 1..12u64, fault).prop_map(|(at, ticks, f)| (at..at + ticks, f)), 0..4)
+    prop::collection::vec(
+        (0..TICKS, 1..12u64, fault).prop_map(|(at, ticks, f)| (at..at + ticks, f)),
+        0..4,
+    )
 }
 
 fn late() -> impl Strategy<Value = Vec<(u64, u32)>> {
@@ -65,24 +68,45 @@ fn run(orders: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, u3
         for (_, given) in orders.iter().filter(|(at, _)| *at == step).take(16) {
             bench.order(match *given {
                 Given::Arm => Order::Arm,
-                Given::Start(current_a, ticks) => Order::Start(Box::new(Says(move |_| current_a, ticks))),
+                Given::Start(current_a, ticks) => {
+                    Order::Start(Box::new(Says(move |_| current_a, ticks)))
+                }
                 Given::Stop => Order::Stop,
                 Given::Clear => Order::Clear,
             });
         }
-        bench.late_tick(late.iter().find(|(at, _)| *at == step).map_or(0, |(_, missed)| *missed));
+        bench.late_tick(
+            late.iter()
+                .find(|(at, _)| *at == step)
+                .map_or(0, |(_, missed)| *missed),
+        );
         let off = matches!(bench.state(), State::Disarmed | State::Tripped);
-        assert_eq!(bench.is_on(), !off, "the amplifier is on in {:?}", bench.state());
+        assert_eq!(
+            bench.is_on(),
+            !off,
+            "the amplifier is on in {:?}",
+            bench.state()
+        );
     }
     bench
 }
 
 /// Whether a current may flow after these events: by the words of the requirement, not by the machine.
 fn may_flow(events: &[Event]) -> bool {
-    let place = |wanted: &dyn Fn(&EventKind) -> bool| events.iter().rposition(|event| wanted(&event.kind));
-    let state = |wanted: State| place(&|kind| matches!(kind, EventKind::State { to, .. } if *to == wanted));
+    let place =
+        |wanted: &dyn Fn(&EventKind) -> bool| events.iter().rposition(|event| wanted(&event.kind));
+    let state =
+        |wanted: State| place(&|kind| matches!(kind, EventKind::State { to, .. } if *to == wanted));
     let trip = place(&|kind| matches!(kind, EventKind::Trip(_)));
-    let clear = place(&|kind| matches!(kind, EventKind::State { from: State::Tripped, to: State::Disarmed }));
+    let clear = place(&|kind| {
+        matches!(
+            kind,
+            EventKind::State {
+                from: State::Tripped,
+                to: State::Disarmed
+            }
+        )
+    });
     let (armed, running) = (state(State::Armed), state(State::Running));
     let off = state(State::Disarmed).max(state(State::Tripped));
     trip <= clear && armed > trip.max(clear).max(off) && running > armed
@@ -93,10 +117,13 @@ fn prove(bench: &Bench) -> Result<(), TestCaseError> {
     for record in bench.ticks().iter() {
         // Completion is published after the record of its tick; everything else before it.
         let until = events.iter().filter(|e| e.tick <= record.tick).count();
-        let completed = events[..until].iter().rposition(|e| e.kind == EventKind::Completed && e.tick == record.tick);
+        let completed = events[..until]
+            .iter()
+            .rposition(|e| e.kind == EventKind::Completed && e.tick == record.tick);
         let known = &events[..completed.unwrap_or(until)];
         let went_out = told.iter().any(|(tick, told)| {
-            *tick == record.tick && matches!(told, Told::Command { current_a, refused: false } if *current_a != 0.0)
+            *tick == record.tick
+                && matches!(told, Told::Command { current_a, refused: false } if *current_a != 0.0)
         });
         let nonsense = told.iter().any(|(tick, told)| {
             *tick == record.tick
@@ -111,8 +138,15 @@ fn prove(bench: &Bench) -> Result<(), TestCaseError> {
         prop_assert_eq!(record.command_a != 0.0, went_out, "{:?}", record);
     }
     let numbers: Vec<u64> = bench.ticks().iter().map(|r| r.tick + 1).collect();
-    let missed: u64 = bench.ticks().iter().map(|r| u64::from(r.missed_ticks)).sum();
-    prop_assert_eq!(numbers.len() as u64 + missed, *numbers.last().expect("ticks"));
+    let missed: u64 = bench
+        .ticks()
+        .iter()
+        .map(|r| u64::from(r.missed_ticks))
+        .sum();
+    prop_assert_eq!(
+        numbers.len() as u64 + missed,
+        *numbers.last().expect("ticks")
+    );
     Ok(())
 }
 
@@ -142,19 +176,33 @@ fn the_property_sees_runs_trips_clears_and_completions() {
     });
     let (mut with_current, mut trips, mut second_runs, mut completed) = (0, 0, 0, 0);
     for _ in 0..500 {
-        let tree = (orders(), faults(), late()).new_tree(&mut runner).expect("generators without filters");
+        let tree = (orders(), faults(), late())
+            .new_tree(&mut runner)
+            .expect("generators without filters");
         let (orders, faults, late) = proptest::strategy::ValueTree::current(&tree);
         let bench = run(&orders, &faults, &late);
         let events = bench.events();
-        let trip = events.iter().position(|e| matches!(e.kind, EventKind::Trip(_)));
-        let is_start = |e: &Event| matches!(e.kind, EventKind::State { to: State::Running, .. });
+        let trip = events
+            .iter()
+            .position(|e| matches!(e.kind, EventKind::Trip(_)));
+        let is_start = |e: &Event| {
+            matches!(
+                e.kind,
+                EventKind::State {
+                    to: State::Running,
+                    ..
+                }
+            )
+        };
         with_current += usize::from(bench.ticks().iter().any(|r| r.command_a != 0.0));
         trips += usize::from(trip.is_some());
         second_runs += usize::from(trip.is_some_and(|trip| events[trip..].iter().any(is_start)));
         completed += usize::from(events.iter().any(|e| e.kind == EventKind::Completed));
     }
     assert!(
-        [with_current, trips, second_runs, completed].iter().all(|n| *n >= 25),
+        [with_current, trips, second_runs, completed]
+            .iter()
+            .all(|n| *n >= 25),
         "of 500: {with_current} with current, {trips} trips, {second_runs} runs after one, {completed} completed"
     );
 }
@@ -171,7 +219,10 @@ fn in_virtual_pace_nothing_is_lost_however_many_orders_a_tick_takes() {
     let before = bench.all.len();
     bench.tick();
     let published = bench.all.len() - before;
-    assert!(published <= bench::rt::outlet::SLOTS_PER_TICK, "{published} in one tick");
+    assert!(
+        published <= bench::rt::outlet::SLOTS_PER_TICK,
+        "{published} in one tick"
+    );
     // Order, state, trip, state for each arm order, order and state for each clear order; then the record.
     assert_eq!(published, 8 * (4 + 2) + 1);
 }

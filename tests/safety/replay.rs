@@ -16,9 +16,16 @@ use crate::rig::{Bench, stage};
 
 fn short_chirp(sweep: Sweep) -> Plan {
     let mut config: Config = stage();
-    (config.chirp.sweep, config.chirp.duration_s, config.chirp.fade_in_s) = (sweep, 1.0, 0.2);
+    (
+        config.chirp.sweep,
+        config.chirp.duration_s,
+        config.chirp.fade_in_s,
+    ) = (sweep, 1.0, 0.2);
     (config.chirp.quiet_before_s, config.chirp.quiet_after_s) = (0.1, 0.1);
-    config.chirp.amplitude = vec![AmplitudePoint { frequency_hz: 1.0, current_a: 0.2 }];
+    config.chirp.amplitude = vec![AmplitudePoint {
+        frequency_hz: 1.0,
+        current_a: 0.2,
+    }];
     Plan::chirp(config)
 }
 
@@ -46,21 +53,40 @@ fn is_the_same(path: &Path, what: &str) {
     let recording = Recording::open(path).expect("a recording");
     let replayed = replayed(path);
     assert_eq!((replayed.different, replayed.first), (0, None), "{what}");
-    assert_eq!(replayed.ticks, recording.tick_count(), "{what}: every tick is compared");
+    assert_eq!(
+        replayed.ticks,
+        recording.tick_count(),
+        "{what}: every tick is compared"
+    );
 }
 
 #[test]
 fn chirps_and_closed_loops_replay_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut hold = control("fast");
-    hold.config.control.reference = ReferenceSettings::Sine { amplitude_m: 20e-6, frequency_hz: 3.0 };
-    let plans = [short_chirp(Sweep::Linear), short_chirp(Sweep::Logarithmic), control("fast"), control("slow"), hold];
+    hold.config.control.reference = ReferenceSettings::Sine {
+        amplitude_m: 20e-6,
+        frequency_hz: 3.0,
+    };
+    let plans = [
+        short_chirp(Sweep::Linear),
+        short_chirp(Sweep::Logarithmic),
+        control("fast"),
+        control("slow"),
+        hold,
+    ];
     for plan in plans {
         let path = record(&plan, &[], folder.path());
         let recording = Recording::open(&path).expect("a recording");
-        let moving =
-            recording.ticks().expect("readable").filter(|r| r.as_ref().is_ok_and(|r| r.command_a != 0.0)).count();
-        assert!(moving > 4000, "something is there to compare: {moving} commands");
+        let moving = recording
+            .ticks()
+            .expect("readable")
+            .filter(|r| r.as_ref().is_ok_and(|r| r.command_a != 0.0))
+            .count();
+        assert!(
+            moving > 4000,
+            "something is there to compare: {moving} commands"
+        );
         is_the_same(&path, plan.kind.name());
     }
 }
@@ -92,7 +118,11 @@ fn a_run_that_tripped_replays_bit_for_bit_whatever_tripped_it() {
             });
             assert_eq!(trip, Some((reason, at)));
             // The loop goes on for a tenth of a second after a trip.
-            assert!((at + 499..=at + 502).contains(&recording.last_tick()), "{}", recording.last_tick());
+            assert!(
+                (at + 499..=at + 502).contains(&recording.last_tick()),
+                "{}",
+                recording.last_tick()
+            );
             is_the_same(&path, &format!("{reason} in {}", plan.kind.name()));
         }
     }
@@ -107,12 +137,20 @@ fn a_trip_of_the_controllers_own_making_replays_bit_for_bit() {
     std::fs::write(&file, text).expect("a file");
     let mut config = stage();
     config.control.controller = file.display().to_string();
-    config.control.reference = ReferenceSettings::Step { amplitude_m: 500e-6, at_s: 0.01 };
+    config.control.reference = ReferenceSettings::Step {
+        amplitude_m: 500e-6,
+        at_s: 0.01,
+    };
     let path = record(&Plan::control(config).expect("a plan"), &[], folder.path());
     // The recording carries the controller: its file may be gone.
     std::fs::remove_file(file).expect("it was there");
     let recording = Recording::open(&path).expect("a recording");
-    assert!(recording.events().iter().any(|e| matches!(e.kind, EventKind::Trip(t) if t.reason() == "peak_current")));
+    assert!(
+        recording
+            .events()
+            .iter()
+            .any(|e| matches!(e.kind, EventKind::Trip(t) if t.reason() == "peak_current"))
+    );
     is_the_same(&path, "peak current");
 }
 
@@ -126,7 +164,8 @@ fn rewritten(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
     };
     let mut new = Recorder::create(to, &header).expect("a new file");
     for attachment in old.attachments().iter().filter(|a| a.name != "config.toml") {
-        new.attach(&attachment.name, &attachment.media_type, &attachment.data).expect("a good disk");
+        new.attach(&attachment.name, &attachment.media_type, &attachment.data)
+            .expect("a good disk");
     }
     let mut events = old.events().iter().peekable();
     for record in old.ticks().expect("readable") {
@@ -151,8 +190,16 @@ fn one_altered_bit_of_the_probe_is_found_at_its_tick() {
         let path = record(&control(controller), &[], folder.path());
         let at = 5000;
         let original = Recording::open(&path).expect("a recording");
-        let was = original.ticks().expect("readable").nth(at as usize).expect("5000 ticks").expect("readable");
-        assert!(was.flags & flag::ACTIVE != 0 && was.position_m.abs() > 1e-6, "{was:?}");
+        let was = original
+            .ticks()
+            .expect("readable")
+            .nth(at as usize)
+            .expect("5000 ticks")
+            .expect("readable");
+        assert!(
+            was.flags & flag::ACTIVE != 0 && was.position_m.abs() > 1e-6,
+            "{was:?}"
+        );
 
         let same = folder.path().join(format!("{controller}_same.mcap"));
         rewritten(&path, &same, |_| {});
@@ -166,7 +213,11 @@ fn one_altered_bit_of_the_probe_is_found_at_its_tick() {
         });
         let found = replayed(&altered);
         let first = found.first.expect("a difference");
-        assert_eq!((first.tick, first.recorded_a.to_bits()), (at, was.command_a.to_bits()), "{controller}");
+        assert_eq!(
+            (first.tick, first.recorded_a.to_bits()),
+            (at, was.command_a.to_bits()),
+            "{controller}"
+        );
         assert!(first.replayed_a.to_bits() != was.command_a.to_bits() && found.different >= 1);
     }
 }
@@ -189,7 +240,11 @@ fn an_altered_command_order_or_flag_is_found_at_its_tick() {
             }
         });
         let found = replayed(&altered);
-        assert_eq!((found.first.map(|d| d.tick), found.different), (Some(3000), 1), "alteration {n}");
+        assert_eq!(
+            (found.first.map(|d| d.tick), found.different),
+            (Some(3000), 1),
+            "alteration {n}"
+        );
     }
 }
 
@@ -205,13 +260,22 @@ fn clears_that_the_amplifier_refused_and_took_replay_as_they_were() {
     bench.order(Order::Clear);
     bench.run(100);
     let metadata = [("run".to_string(), plan.kind.name().to_string())].into();
-    let header = Header { config_toml: plan.config_toml().expect("a configuration"), metadata, ..Header::default() };
+    let header = Header {
+        config_toml: plan.config_toml().expect("a configuration"),
+        metadata,
+        ..Header::default()
+    };
     let path = folder.path().join("cleared.mcap");
     let mut recorder = Recorder::create(&path, &header).expect("a new file");
     for (name, kind, text) in plan.attachments() {
-        recorder.attach(name, kind, text.as_bytes()).expect("a good disk");
+        recorder
+            .attach(name, kind, text.as_bytes())
+            .expect("a good disk");
     }
-    bench.all.iter().for_each(|published| recorder.record(published).expect("a good disk"));
+    bench
+        .all
+        .iter()
+        .for_each(|published| recorder.record(published).expect("a good disk"));
     recorder.finish(&[]).expect("a good disk");
     is_the_same(&path, "two clears, the first one refused");
 }
@@ -234,28 +298,62 @@ fn recordings_that_cannot_be_replayed_say_why() {
     let write = |name: &str, header: &Header, ticks: &[TickRecord]| {
         let path = folder.path().join(name);
         let mut recorder = Recorder::create(&path, header).expect("a new file");
-        ticks.iter().for_each(|t| recorder.record(&Published::Tick(*t)).expect("a good disk"));
+        ticks
+            .iter()
+            .for_each(|t| recorder.record(&Published::Tick(*t)).expect("a good disk"));
         recorder.finish(&[]).expect("a good disk");
-        replay(&Recording::open(&path).expect("a recording")).expect_err("it has no plan").to_string()
+        replay(&Recording::open(&path).expect("a recording"))
+            .expect_err("it has no plan")
+            .to_string()
     };
-    let tick = |tick| TickRecord { tick, scheduled_ns: tick * 200_000, ..TickRecord::default() };
+    let tick = |tick| TickRecord {
+        tick,
+        scheduled_ns: tick * 200_000,
+        ..TickRecord::default()
+    };
     let ticks = [tick(0), tick(1)];
     let plan = control("fast");
     let whole = plan.config_toml().expect("a configuration");
     let kind = |kind: &str| [("run".to_string(), kind.to_string())].into();
 
-    let foreign = write("foreign.mcap", &Header { config_toml: "a = 1\n".into(), ..Header::default() }, &ticks);
+    let foreign = write(
+        "foreign.mcap",
+        &Header {
+            config_toml: "a = 1\n".into(),
+            ..Header::default()
+        },
+        &ticks,
+    );
     assert!(foreign.contains("configuration"), "{foreign}");
-    let text = write("text.mcap", &Header { config_toml: "not toml".into(), ..Header::default() }, &ticks);
+    let text = write(
+        "text.mcap",
+        &Header {
+            config_toml: "not toml".into(),
+            ..Header::default()
+        },
+        &ticks,
+    );
     assert!(text.contains("configuration"), "{text}");
-    let header = Header { config_toml: whole.clone(), ..Header::default() };
+    let header = Header {
+        config_toml: whole.clone(),
+        ..Header::default()
+    };
     let kindless = write("kindless.mcap", &header, &ticks);
-    assert!(kindless.contains("kind of run") && kindless.contains("bench chirp"), "{kindless}");
-    let header = Header { metadata: kind(Kind::Control.name()), ..header };
+    assert!(
+        kindless.contains("kind of run") && kindless.contains("bench chirp"),
+        "{kindless}"
+    );
+    let header = Header {
+        metadata: kind(Kind::Control.name()),
+        ..header
+    };
     let without = write("without.mcap", &header, &ticks);
     assert!(without.contains("controller"), "{without}");
     let lost = write("lost.mcap", &header, &[tick(0), tick(5)]);
-    assert!(lost.contains("4 records") && lost.contains("tick 0"), "{lost}");
+    assert!(
+        lost.contains("4 records") && lost.contains("tick 0"),
+        "{lost}"
+    );
 }
 
 #[test]
@@ -263,7 +361,10 @@ fn a_recording_whose_times_run_backwards_is_replayed_without_a_panic() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = record(&control("fast"), &[], folder.path());
     let backwards = folder.path().join("backwards.mcap");
-    rewritten(&path, &backwards, |record| record.scheduled_ns = 1_000_000_000_000 - record.scheduled_ns);
-    let outcome: Result<Replayed, ReplayError> = replay(&Recording::open(&backwards).expect("a recording"));
+    rewritten(&path, &backwards, |record| {
+        record.scheduled_ns = 1_000_000_000_000 - record.scheduled_ns
+    });
+    let outcome: Result<Replayed, ReplayError> =
+        replay(&Recording::open(&backwards).expect("a recording"));
     assert!(outcome.is_ok(), "{outcome:?}");
 }

@@ -19,7 +19,11 @@ fn control(controller: &str, seed: u64) -> Plan {
 fn chirp(sweep: Sweep, seed: u64) -> Plan {
     let mut config: Config = stage();
     (config.chirp.sweep, config.chirp.duration_s, config.sim.seed) = (sweep, 2.0, seed);
-    (config.chirp.quiet_before_s, config.chirp.quiet_after_s, config.chirp.fade_in_s) = (0.1, 0.1, 0.5);
+    (
+        config.chirp.quiet_before_s,
+        config.chirp.quiet_after_s,
+        config.chirp.fade_in_s,
+    ) = (0.1, 0.1, 0.5);
     config.chirp.amplitude.truncate(1);
     Plan::chirp(config)
 }
@@ -57,7 +61,10 @@ fn a_run_of_two_seconds_has_the_digest_that_it_has_on_every_machine() {
     // settings and a command (the test below reads the code for it) and sums have a fixed order. It changes with the
     // profile `stage`, the simulated rig, the controller and the fields of a tick: whoever changes one of them on purpose
     // puts the new value here.
-    assert_eq!(format!("{:016x}", digest(&control("fast", 1))), "dbb9f5439d1e94ff");
+    assert_eq!(
+        format!("{:016x}", digest(&control("fast", 1))),
+        "dbb9f5439d1e94ff"
+    );
 }
 
 /// Everything between the settings and a command.
@@ -84,30 +91,57 @@ const PATH_OF_A_RUN: [&str; 18] = [
 
 /// Functions of `f64` that differ from platform to platform in their last bit; `sqrt`, `abs`, `floor`, `round` do not.
 const OF_THE_PLATFORM: [&str; 28] = [
-    "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
-    "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "powi", "hypot", "cbrt", "arg", "to_polar",
+    "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh",
+    "asinh", "acosh", "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10",
+    "powf", "powi", "hypot", "cbrt", "arg", "to_polar",
 ];
 
 /// Calls that allocate, lock, print or ask the system: not in the loop's modules, whoever calls them.
-const NOT_IN_A_TICK: [&str; 9] =
-    ["Mutex", "RwLock", "Condvar", "println!", "print!", "eprintln!", "dbg!", "std::fs", "std::io"];
+const NOT_IN_A_TICK: [&str; 9] = [
+    "Mutex",
+    "RwLock",
+    "Condvar",
+    "println!",
+    "print!",
+    "eprintln!",
+    "dbg!",
+    "std::fs",
+    "std::io",
+];
 
 fn sources(of: &str) -> Vec<(String, String)> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(of);
     let files = if path.is_dir() {
-        let entries = std::fs::read_dir(&path).expect("a folder").map(|entry| entry.expect("an entry").path());
+        let entries = std::fs::read_dir(&path)
+            .expect("a folder")
+            .map(|entry| entry.expect("an entry").path());
         entries.collect()
     } else {
         vec![path]
     };
-    let code = |text: String| text.split("#[cfg(test)]").next().unwrap_or_default().to_string();
-    let read =
-        |file: std::path::PathBuf| (file.display().to_string(), code(std::fs::read_to_string(&file).expect("text")));
-    files.into_iter().filter(|file| file.extension().is_some_and(|e| e == "rs")).map(read).collect()
+    let code = |text: String| {
+        text.split("#[cfg(test)]")
+            .next()
+            .unwrap_or_default()
+            .to_string()
+    };
+    let read = |file: std::path::PathBuf| {
+        (
+            file.display().to_string(),
+            code(std::fs::read_to_string(&file).expect("text")),
+        )
+    };
+    files
+        .into_iter()
+        .filter(|file| file.extension().is_some_and(|e| e == "rs"))
+        .map(read)
+        .collect()
 }
 
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
+    text.lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim_start().starts_with("//"))
 }
 
 #[test]
@@ -115,23 +149,38 @@ fn no_function_of_the_platforms_libm_stands_between_the_settings_and_a_command()
     for (file, text) in PATH_OF_A_RUN.iter().flat_map(|of| sources(of)) {
         for (number, line) in lines(&text) {
             for name in OF_THE_PLATFORM {
-                let called =
-                    [format!(".{name}("), format!("f64::{name}(")].iter().any(|call| line.contains(call.as_str()));
+                let called = [format!(".{name}("), format!("f64::{name}(")]
+                    .iter()
+                    .any(|call| line.contains(call.as_str()));
                 assert!(!called, "{file}:{}: use libm: {line}", number + 1);
             }
         }
     }
     // nalgebra's own functions come from libm as well, and its products from no kernel that is chosen by the processor.
     let manifest =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).expect("a manifest");
-    let nalgebra = manifest.lines().find(|line| line.starts_with("nalgebra")).expect("a dependency");
-    assert!(nalgebra.contains("default-features = false") && nalgebra.contains("libm-force"), "{nalgebra}");
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"))
+            .expect("a manifest");
+    let nalgebra = manifest
+        .lines()
+        .find(|line| line.starts_with("nalgebra"))
+        .expect("a dependency");
+    assert!(
+        nalgebra.contains("default-features = false") && nalgebra.contains("libm-force"),
+        "{nalgebra}"
+    );
     assert!(!nalgebra.contains("\"std\""), "{nalgebra}");
 }
 
 #[test]
 fn no_lock_no_print_and_no_file_is_in_the_code_of_a_tick() {
-    let tick = ["rt/servo.rs", "rt/interlock.rs", "rt/arming.rs", "rt/program.rs", "rt/outlet.rs", "rt/record.rs"];
+    let tick = [
+        "rt/servo.rs",
+        "rt/interlock.rs",
+        "rt/arming.rs",
+        "rt/program.rs",
+        "rt/outlet.rs",
+        "rt/record.rs",
+    ];
     let others = [
         "control/biquad.rs",
         "control/controller.rs",

@@ -13,7 +13,8 @@ use bench::rt::program::{Decision, Program};
 use bench::rt::record::{Event, EventKind, Published, TickRecord};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
 use bench_hal::{
-    AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig, Tick, Validity,
+    AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
+    Tick, Validity,
 };
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -37,22 +38,43 @@ impl CurrentAmplifier for Still {
         Ok(())
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
-        let disabled = DeviceError { what: "the amplifier is disabled", remedy: "arm the loop", code: 1 };
-        if self.enabled { Ok(current_a) } else { Err(disabled) }
+        let disabled = DeviceError {
+            what: "the amplifier is disabled",
+            remedy: "arm the loop",
+            code: 1,
+        };
+        if self.enabled {
+            Ok(current_a)
+        } else {
+            Err(disabled)
+        }
     }
     fn disable(&mut self) {
         self.enabled = false;
     }
     fn status(&self) -> AmplifierStatus {
-        if self.enabled { AmplifierStatus::Enabled } else { AmplifierStatus::Disabled }
+        if self.enabled {
+            AmplifierStatus::Enabled
+        } else {
+            AmplifierStatus::Disabled
+        }
     }
 }
 
 impl DisplacementProbe for Still {
     fn latest(&mut self, _now: Tick) -> Reading {
         self.sequence += 1;
-        let position_m = if self.sequence.is_multiple_of(2) { 1e-9 } else { -1e-9 };
-        Reading { position_m, sequence: self.sequence, age_ns: 0, validity: Validity::Valid }
+        let position_m = if self.sequence.is_multiple_of(2) {
+            1e-9
+        } else {
+            -1e-9
+        };
+        Reading {
+            position_m,
+            sequence: self.sequence,
+            age_ns: 0,
+            validity: Validity::Valid,
+        }
     }
 }
 
@@ -76,23 +98,35 @@ pub struct Watched<R> {
 
 impl<R> Watched<R> {
     pub fn new(inner: R) -> Self {
-        Watched { inner, log: Log::default(), now: Arc::default() }
+        Watched {
+            inner,
+            log: Log::default(),
+            now: Arc::default(),
+        }
     }
 
     fn note(&self, told: Told) {
-        self.log.lock().expect("no test panics with it").push((self.now.load(Ordering::Relaxed), told));
+        self.log
+            .lock()
+            .expect("no test panics with it")
+            .push((self.now.load(Ordering::Relaxed), told));
     }
 }
 
 impl<R: Rig> CurrentAmplifier for Watched<R> {
     fn enable(&mut self) -> Result<(), DeviceError> {
         let answer = self.inner.enable();
-        self.note(Told::Enable { refused: answer.is_err() });
+        self.note(Told::Enable {
+            refused: answer.is_err(),
+        });
         answer
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         let answer = self.inner.command(current_a);
-        self.note(Told::Command { current_a, refused: answer.is_err() });
+        self.note(Told::Command {
+            current_a,
+            refused: answer.is_err(),
+        });
         answer
     }
     fn disable(&mut self) {
@@ -124,7 +158,11 @@ pub struct Says<F>(pub F, pub u64);
 
 impl<F: FnMut(u64) -> f64 + Send> Program for Says<F> {
     fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
-        Decision { reference_m: 0.0, requested_a: (self.0)(tick), active: true }
+        Decision {
+            reference_m: 0.0,
+            requested_a: (self.0)(tick),
+            active: true,
+        }
     }
     fn ticks(&self) -> u64 {
         self.1
@@ -172,7 +210,9 @@ impl Bench {
             spent,
             log,
             now,
-            clock: Virtual { period_s: config.servo.period_s() },
+            clock: Virtual {
+                period_s: config.servo.period_s(),
+            },
             next: 0,
             all: Vec::new(),
             handed_back: 0,
@@ -185,7 +225,11 @@ impl Bench {
     }
 
     /// A stage that stands still, with a program that runs from tick 0.
-    pub fn running(config: &Config, faults: &[(Range<u64>, Fault)], program: Box<dyn Program>) -> Bench {
+    pub fn running(
+        config: &Config,
+        faults: &[(Range<u64>, Fault)],
+        program: Box<dyn Program>,
+    ) -> Bench {
         let mut bench = Bench::still(config, faults);
         bench.order(Order::Arm);
         bench.order(Order::Start(program));
@@ -194,7 +238,10 @@ impl Bench {
 
     /// Taken at the next tick.
     pub fn order(&mut self, order: Order) {
-        assert!(self.orders.push(order).is_ok(), "the ring of orders is full");
+        assert!(
+            self.orders.push(order).is_ok(),
+            "the ring of orders is full"
+        );
     }
 
     pub fn tick(&mut self) -> TickRecord {
@@ -205,9 +252,19 @@ impl Bench {
     pub fn late_tick(&mut self, missed: u32) -> TickRecord {
         let number = self.next + u64::from(missed);
         let scheduled_ns = (number as f64 * self.clock.period_s * 1e9).round() as u64;
-        let tick = Tick { number, scheduled_ns };
+        let tick = Tick {
+            number,
+            scheduled_ns,
+        };
         self.now.store(number, Ordering::Relaxed);
-        self.servo.tick(&Moment { tick, woke_ns: scheduled_ns, missed }, &self.clock);
+        self.servo.tick(
+            &Moment {
+                tick,
+                woke_ns: scheduled_ns,
+                missed,
+            },
+            &self.clock,
+        );
         self.next = number + 1;
         while let Ok(published) = self.published.pop() {
             self.all.push(published);
@@ -215,7 +272,10 @@ impl Bench {
         while self.spent.pop().is_ok() {
             self.handed_back += 1;
         }
-        *self.ticks().last().expect("every tick publishes its record")
+        *self
+            .ticks()
+            .last()
+            .expect("every tick publishes its record")
     }
 
     pub fn run(&mut self, ticks: u64) {
@@ -229,18 +289,33 @@ impl Bench {
     }
 
     pub fn events(&self) -> Vec<Event> {
-        let event = |p: &Published| if let Published::Event(event) = p { Some(*event) } else { None };
+        let event = |p: &Published| {
+            if let Published::Event(event) = p {
+                Some(*event)
+            } else {
+                None
+            }
+        };
         self.all.iter().filter_map(event).collect()
     }
 
     /// State after the last tick, by the events.
     pub fn state(&self) -> State {
-        let to = |event: &Event| if let EventKind::State { to, .. } = event.kind { Some(to) } else { None };
+        let to = |event: &Event| {
+            if let EventKind::State { to, .. } = event.kind {
+                Some(to)
+            } else {
+                None
+            }
+        };
         self.events().iter().rev().find_map(to).unwrap_or_default()
     }
 
     pub fn trips(&self) -> Vec<Event> {
-        self.events().into_iter().filter(|event| matches!(event.kind, EventKind::Trip(_))).collect()
+        self.events()
+            .into_iter()
+            .filter(|event| matches!(event.kind, EventKind::Trip(_)))
+            .collect()
     }
 
     /// All that the amplifier was told so far.
@@ -251,7 +326,10 @@ impl Bench {
     /// Whether the amplifier is on after all it was told.
     pub fn is_on(&self) -> bool {
         let told = self.told();
-        let last = told.iter().rev().find(|(_, told)| matches!(told, Told::Enable { .. } | Told::Disable));
+        let last = told
+            .iter()
+            .rev()
+            .find(|(_, told)| matches!(told, Told::Enable { .. } | Told::Disable));
         matches!(last, Some((_, Told::Enable { refused: false })))
     }
 
@@ -259,9 +337,14 @@ impl Bench {
     pub fn recorded(&self) -> (tempfile::TempDir, Recording) {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("loop.mcap");
-        let header = Header { period_ns: (self.clock.period_s * 1e9).round() as u64, ..Header::default() };
+        let header = Header {
+            period_ns: (self.clock.period_s * 1e9).round() as u64,
+            ..Header::default()
+        };
         let mut recorder = Recorder::create(&path, &header).expect("a new file");
-        self.all.iter().for_each(|published| recorder.record(published).expect("a good disk"));
+        self.all
+            .iter()
+            .for_each(|published| recorder.record(published).expect("a good disk"));
         recorder.finish(&[]).expect("a good disk");
         (folder, Recording::open(&path).expect("a recording"))
     }
@@ -271,11 +354,28 @@ impl Bench {
         let (_folder, recording) = self.recorded();
         let last = self.ticks().last().expect("ticks").tick;
         assert!(!recording.truncated());
-        assert_eq!((recording.first_tick(), recording.last_tick(), recording.lost_records()), (0, last, 0));
-        assert_eq!(recording.tick_count() + recording.overruns(), last + 1, "every tick is there or counted as missed");
-        let is_it =
-            |event: &Event| event.tick == at && matches!(event.kind, EventKind::Trip(trip) if trip.reason() == reason);
-        assert!(recording.events().iter().any(is_it), "the trip is in the recording: {:?}", recording.events());
+        assert_eq!(
+            (
+                recording.first_tick(),
+                recording.last_tick(),
+                recording.lost_records()
+            ),
+            (0, last, 0)
+        );
+        assert_eq!(
+            recording.tick_count() + recording.overruns(),
+            last + 1,
+            "every tick is there or counted as missed"
+        );
+        let is_it = |event: &Event| {
+            event.tick == at
+                && matches!(event.kind, EventKind::Trip(trip) if trip.reason() == reason)
+        };
+        assert!(
+            recording.events().iter().any(is_it),
+            "the trip is in the recording: {:?}",
+            recording.events()
+        );
     }
 
     pub fn servo(&self) -> &Servo {
@@ -288,7 +388,13 @@ pub struct Records<'a>(&'a [Published]);
 
 impl<'a> Records<'a> {
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &'a TickRecord> + use<'a> {
-        self.0.iter().filter_map(|p| if let Published::Tick(record) = p { Some(record) } else { None })
+        self.0.iter().filter_map(|p| {
+            if let Published::Tick(record) = p {
+                Some(record)
+            } else {
+                None
+            }
+        })
     }
 
     pub fn last(&self) -> Option<&'a TickRecord> {
@@ -296,6 +402,9 @@ impl<'a> Records<'a> {
     }
 
     pub fn at(&self, tick: u64) -> TickRecord {
-        *self.iter().find(|record| record.tick == tick).expect("a record of the tick")
+        *self
+            .iter()
+            .find(|record| record.tick == tick)
+            .expect("a record of the tick")
     }
 }

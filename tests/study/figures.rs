@@ -9,23 +9,32 @@ use crate::truth;
 pub const XY: &str = "model study --config xy --vary plant.secondary_mass_deviation.*=+-0.15";
 
 pub fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key].as_array().unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
+    answer[key]
+        .as_array()
+        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
 }
 
 /// Probabilities of 0, 1, 2, ... pairs.
 fn probabilities(counted: &Value) -> Vec<f64> {
-    list(counted, "probabilities").iter().map(|one| number(&one["probability"])).collect()
+    list(counted, "probabilities")
+        .iter()
+        .map(|one| number(&one["probability"]))
+        .collect()
 }
 
 fn share(counted: &Value, key: &str) -> f64 {
-    let effect = list(counted, "settings").iter().find(|one| one["key"] == key);
+    let effect = list(counted, "settings")
+        .iter()
+        .find(|one| one["key"] == key);
     number(&effect.unwrap_or_else(|| panic!("{key} is not there: {counted}"))["share"])
 }
 
 /// What a couple explains beyond its settings; 0 where it does not stand out.
 fn couple(counted: &Value, keys: [&str; 2]) -> f64 {
-    let found =
-        list(counted, "couples").iter().find(|one| keys.iter().all(|key| list(one, "keys").contains(&json!(key))));
+    let found = list(counted, "couples").iter().find(|one| {
+        keys.iter()
+            .all(|key| list(one, "keys").contains(&json!(key)))
+    });
     found.map_or(0.0, |one| number(&one["share"]))
 }
 
@@ -33,7 +42,10 @@ fn couple(counted: &Value, keys: [&str; 2]) -> f64 {
 fn the_xy_stage_within_15_per_cent_has_0_1_2_3_pairs_in_60_2_38_8_1_0_0_per_cent_of_20_000_draws() {
     for seed in [1, 2, 3] {
         let answer = Bench::new().json(&format!("{XY} --draws 20000 --seed {seed}"));
-        assert_eq!((&answer["draws"], &answer["not_analysed"]["draws"]), (&json!(20_000), &json!(0)));
+        assert_eq!(
+            (&answer["draws"], &answer["not_analysed"]["draws"]),
+            (&json!(20_000), &json!(0))
+        );
         let counted = &answer["cnmp_pairs"];
         // The sigma of a probability near one half is 0.35 points; the expected ones are themselves of 20,000 draws: 0.5 points
         // between two such, of which 1.2 are 2.4.
@@ -49,10 +61,18 @@ fn the_xy_stage_within_15_per_cent_has_0_1_2_3_pairs_in_60_2_38_8_1_0_0_per_cent
             );
             let [p, low, high] = ["probability", "low", "high"].map(|key| number(&one[key]));
             // 95 % are 1.96 sigma to either side: 0.7 points at most, and 0.02 where nothing was found.
-            assert!(low <= p && p <= high && high - low < 0.0145 && high > low, "{one}");
+            assert!(
+                low <= p && p <= high && high - low < 0.0145 && high > low,
+                "{one}"
+            );
         }
         // One pair of 20,000 would be 0.005 %.
-        near("the probability of any", number(&counted["any"]["probability"]), 0.398, 0.012);
+        near(
+            "the probability of any",
+            number(&counted["any"]["probability"]),
+            0.398,
+            0.012,
+        );
     }
 }
 
@@ -63,9 +83,10 @@ fn none_of_100_000_draws_is_miscounted() {
     let config = bench.json("config show --config xy");
     // 100 draws next to the borders between counts, and 100 at random, with 60 digits; all of them in double precision by
     // numpy, which has other roundings.
-    let question =
-        json!({"what": "digits", "config": config, "csv": bench.path("draws.csv"), "hardest": 100, "seed": 1});
-    let Some(answers) = truth::ask_of("study.py", &[question]) else { return };
+    let question = json!({"what": "digits", "config": config, "csv": bench.path("draws.csv"), "hardest": 100, "seed": 1});
+    let Some(answers) = truth::ask_of("study.py", &[question]) else {
+        return;
+    };
     let answer = &answers[0];
     assert_eq!(answer["draws"], 100_000);
     assert_eq!(answer["differ_with_60_digits"], json!([]), "{answer}");
@@ -74,21 +95,41 @@ fn none_of_100_000_draws_is_miscounted() {
     // apart, at roundings of 1e-15. Some have pairs, some have none.
     let ease = list(answer, "ease_of_the_hardest");
     let (checked, with_pairs) = (number(&answer["checked"]), number(&answer["with_pairs"]));
-    assert!(number(&ease[0]) < 1e-10 && number(&ease[99]) < 1e-7, "{answer}");
-    assert!((195.0..=200.0).contains(&checked) && (20.0..180.0).contains(&with_pairs), "{answer}");
+    assert!(
+        number(&ease[0]) < 1e-10 && number(&ease[99]) < 1e-7,
+        "{answer}"
+    );
+    assert!(
+        (195.0..=200.0).contains(&checked) && (20.0..180.0).contains(&with_pairs),
+        "{answer}"
+    );
 }
 
 #[test]
 fn the_shares_of_the_xy_stage_are_those_of_pick_and_freeze() {
     let bench = Bench::new();
     let answer = bench.json(&format!("{XY} --draws 40000"));
-    let groups = [&["sL"][..], &["sR"], &["gL"], &["sT"], &["sL", "sR"], &["sL", "sT"], &["gL", "gR"]];
+    let groups = [
+        &["sL"][..],
+        &["sR"],
+        &["gL"],
+        &["sT"],
+        &["sL", "sR"],
+        &["sL", "sT"],
+        &["gL", "gR"],
+    ];
     let config = bench.json("config show --config xy");
-    let question =
-        json!({"what": "shares", "config": config, "limit": 0.15, "draws": 60_000, "seed": 5, "groups": groups});
-    let Some(answers) = truth::ask_of("study.py", &[question]) else { return };
+    let question = json!({"what": "shares", "config": config, "limit": 0.15, "draws": 60_000, "seed": 5, "groups": groups});
+    let Some(answers) = truth::ask_of("study.py", &[question]) else {
+        return;
+    };
     let counted = &answer["cnmp_pairs"];
-    near("the probability of any", number(&counted["any"]["probability"]), number(&answers[0]["probability"]), 0.015);
+    near(
+        "the probability of any",
+        number(&counted["any"]["probability"]),
+        number(&answers[0]["probability"]),
+        0.015,
+    );
     let key = |place: &str| format!("plant.secondary_mass_deviation.{place}");
     for (group, truth) in groups.iter().zip(list(&answers[0], "shares")) {
         let alone: f64 = group.iter().map(|place| share(counted, &key(place))).sum();
@@ -97,14 +138,27 @@ fn the_shares_of_the_xy_stage_are_those_of_pick_and_freeze() {
             _ => alone,
         };
         // Both are estimates, with a sigma of 0.004 each. A couple loses up to 1/28 of the variance within its classes.
-        let lost = if group.len() > 1 { 1.0 / 28.0 } else { 1.0 / 18.0f64.powi(2) };
+        let lost = if group.len() > 1 {
+            1.0 / 28.0
+        } else {
+            1.0 / 18.0f64.powi(2)
+        };
         let difference = together - number(&truth["share"]);
-        assert!((-0.025 - lost..=0.025).contains(&difference), "{group:?}: {together}, and {truth}");
+        assert!(
+            (-0.025 - lost..=0.025).contains(&difference),
+            "{group:?}: {together}, and {truth}"
+        );
     }
     // What tells most: sL alone, upwards; and against sR.
     let first = &list(counted, "settings")[0];
-    assert_eq!((&first["key"], &first["direction"]), (&json!(key("sL")), &json!("+")));
-    assert!(list(&list(counted, "couples")[0], "keys").contains(&json!(key("sR"))), "{counted}");
+    assert_eq!(
+        (&first["key"], &first["direction"]),
+        (&json!(key("sL")), &json!("+"))
+    );
+    assert!(
+        list(&list(counted, "couples")[0], "keys").contains(&json!(key("sR"))),
+        "{counted}"
+    );
 }
 
 /// Whether R (x + 100)(x + 121) + u x (x + 121) + v x (x + 100) with R = 1 has complex roots.
@@ -124,12 +178,21 @@ fn two_residues_within_tolerances_have_the_probabilities_and_shares_of_the_close
     let at = |k: usize, nominal: f64| nominal + 0.95 * ((k as f64 + 0.5) / 500.0 - 1.0);
     let yes = |i: usize, j: usize| f64::from(complex(at(i, -1.0), at(j, 1.0)));
     let n = 1000;
-    let rows: Vec<f64> = (0..n).map(|i| (0..n).map(|j| yes(i, j)).sum::<f64>() / n as f64).collect();
-    let columns: Vec<f64> = (0..n).map(|j| (0..n).map(|i| yes(i, j)).sum::<f64>() / n as f64).collect();
+    let rows: Vec<f64> = (0..n)
+        .map(|i| (0..n).map(|j| yes(i, j)).sum::<f64>() / n as f64)
+        .collect();
+    let columns: Vec<f64> = (0..n)
+        .map(|j| (0..n).map(|i| yes(i, j)).sum::<f64>() / n as f64)
+        .collect();
     let p = rows.iter().sum::<f64>() / n as f64;
-    let index = |means: &[f64]| means.iter().map(|m| (m - p).powi(2)).sum::<f64>() / n as f64 / (p * (1.0 - p));
+    let index = |means: &[f64]| {
+        means.iter().map(|m| (m - p).powi(2)).sum::<f64>() / n as f64 / (p * (1.0 - p))
+    };
     let (of_u, of_v) = (index(&rows), index(&columns));
-    assert!((0.1..0.9).contains(&p) && of_u > 0.02 && of_v > 0.02, "a case that tells something: {p} {of_u} {of_v}");
+    assert!(
+        (0.1..0.9).contains(&p) && of_u > 0.02 && of_v > 0.02,
+        "a case that tells something: {p} {of_u} {of_v}"
+    );
 
     let [u, v] = ["u", "v"].map(|name| format!("plant.modes.{name}.residue_per_kg"));
     for seed in [1, 2, 3] {
@@ -138,15 +201,24 @@ fn two_residues_within_tolerances_have_the_probabilities_and_shares_of_the_close
         ));
         let counted = &answer["cnmp_pairs"];
         // Five sigma of 40,000 draws.
-        near("the probability", number(&counted["any"]["probability"]), p, 5.0 * 0.5 / 200.0);
+        near(
+            "the probability",
+            number(&counted["any"]["probability"]),
+            p,
+            5.0 * 0.5 / 200.0,
+        );
         // Sigma of a share below 2 sqrt(S)/200; classes take 1/18^2 of a line.
         near("the share of u", share(counted, &u), of_u, 0.03);
         near("the share of v", share(counted, &v), of_v, 0.03);
         // There is nothing else: the couple has the rest, less the 1/28 that its classes lose on one border, or two.
         let rest = 1.0 - of_u - of_v - couple(counted, [&u, &v]);
         assert!((-0.03..2.0 / 28.0 + 0.03).contains(&rest), "{rest}");
-        let unexplained = 1.0 - number(&counted["share_alone"]) - number(&counted["share_of_couples"]);
-        assert!((-0.03..2.0 / 28.0 + 0.03).contains(&unexplained), "{unexplained}");
+        let unexplained =
+            1.0 - number(&counted["share_alone"]) - number(&counted["share_of_couples"]);
+        assert!(
+            (-0.03..2.0 / 28.0 + 0.03).contains(&unexplained),
+            "{unexplained}"
+        );
     }
 }
 
@@ -155,20 +227,37 @@ fn a_normal_tolerance_has_the_tails_of_a_normal_distribution() {
     let bench = Bench::new();
     // SR4DoF has CNMP zeros between two asymmetries, which `bench model locus` finds by bisection.
     let stage = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018 --operating-point 5%";
-    let locus = bench.json(&format!("model locus {stage} --vary plant.mass_asymmetry --from -10% --to 20%"));
-    let [low, high] = list(&locus, "changes") else { panic!("{}", locus["changes"]) };
-    let (low, width) = (number(&low["value"]), number(&high["value"]) - number(&low["value"]));
+    let locus = bench.json(&format!(
+        "model locus {stage} --vary plant.mass_asymmetry --from -10% --to 20%"
+    ));
+    let [low, high] = list(&locus, "changes") else {
+        panic!("{}", locus["changes"])
+    };
+    let (low, width) = (
+        number(&low["value"]),
+        number(&high["value"]) - number(&low["value"]),
+    );
     // Nominal value and sigma, and the part of the distribution between the two: Phi(1) - Phi(-1), Phi(1) - 1/2, Phi(2) - 1/2.
-    for (nominal, sigma, between) in
-        [(low + width / 2.0, width / 2.0, 0.682_689), (low, width, 0.341_345), (low, width / 2.0, 0.477_250)]
-    {
+    for (nominal, sigma, between) in [
+        (low + width / 2.0, width / 2.0, 0.682_689),
+        (low, width, 0.341_345),
+        (low, width / 2.0, 0.477_250),
+    ] {
         let answer = bench.json(&format!(
             "model study {stage} --asymmetry {nominal:?} --vary plant.mass_asymmetry=normal:{sigma:?} --draws 20000"
         ));
         let bound = 5.0 * f64::sqrt(between * (1.0 - between) / 20_000.0);
-        near("the part between", number(&answer["cnmp_pairs"]["any"]["probability"]), between, bound);
+        near(
+            "the part between",
+            number(&answer["cnmp_pairs"]["any"]["probability"]),
+            between,
+            bound,
+        );
         // One setting decides all, but for the classes that the two borders run through.
-        assert!((0.85..=1.001).contains(&share(&answer["cnmp_pairs"], "plant.mass_asymmetry")), "{answer}");
+        assert!(
+            (0.85..=1.001).contains(&share(&answer["cnmp_pairs"], "plant.mass_asymmetry")),
+            "{answer}"
+        );
     }
 }
 
@@ -176,12 +265,21 @@ fn a_normal_tolerance_has_the_tails_of_a_normal_distribution() {
 fn damping_delays_the_zeros_and_both_are_counted() {
     let bench = Bench::new();
     // Heavily damped, the XY stage keeps its zeros in the left half plane.
-    let answer = bench.json(&format!("{XY} --draws 1000 --damped --set plant.damping.ratio=0.3"));
-    let [without, with] = ["cnmp_pairs", "damped_cnmp_pairs"].map(|key| number(&answer[key]["any"]["probability"]));
-    assert!((0.32..0.48).contains(&without) && with < 0.01, "{without} {with}");
+    let answer = bench.json(&format!(
+        "{XY} --draws 1000 --damped --set plant.damping.ratio=0.3"
+    ));
+    let [without, with] =
+        ["cnmp_pairs", "damped_cnmp_pairs"].map(|key| number(&answer[key]["any"]["probability"]));
+    assert!(
+        (0.32..0.48).contains(&without) && with < 0.01,
+        "{without} {with}"
+    );
     // Hardly damped, they are counted as without damping, but for those next to the border.
-    let answer = bench.json(&format!("{XY} --draws 1000 --damped --set plant.damping.ratio=1e-6"));
-    let [without, with] = ["cnmp_pairs", "damped_cnmp_pairs"].map(|key| number(&answer[key]["any"]["probability"]));
+    let answer = bench.json(&format!(
+        "{XY} --draws 1000 --damped --set plant.damping.ratio=1e-6"
+    ));
+    let [without, with] =
+        ["cnmp_pairs", "damped_cnmp_pairs"].map(|key| number(&answer[key]["any"]["probability"]));
     near("the probability with little damping", with, without, 0.005);
     assert!(bench.json(&format!("{XY} --draws 10"))["damped_cnmp_pairs"].is_null());
 }
@@ -190,12 +288,18 @@ fn damping_delays_the_zeros_and_both_are_counted() {
 fn the_same_seed_gives_the_same_draws_and_another_one_others() {
     let bench = Bench::new();
     let table = |options: &str| {
-        assert_eq!(bench.run(&format!("{XY} {options} --csv draws.csv")).code, 0);
+        assert_eq!(
+            bench.run(&format!("{XY} {options} --csv draws.csv")).code,
+            0
+        );
         bench.read("draws.csv")
     };
     let first = table("--draws 700 --seed 4 --threads 1");
     assert_eq!(first, table("--draws 700 --seed 4 --threads 3"));
-    assert_eq!(first.lines().take(501).collect::<Vec<_>>(), table("--draws 500 --seed 4").lines().collect::<Vec<_>>());
+    assert_eq!(
+        first.lines().take(501).collect::<Vec<_>>(),
+        table("--draws 500 --seed 4").lines().collect::<Vec<_>>()
+    );
     assert_ne!(first, table("--draws 700 --seed 5"));
 }
 
@@ -211,6 +315,10 @@ fn the_text_says_what_was_drawn_how_likely_pairs_are_and_why() {
         "with damping",
         "couples of them",
     ] {
-        assert!(answer.out.contains(words), "`{words}` is not in\n{}", answer.out);
+        assert!(
+            answer.out.contains(words),
+            "`{words}` is not in\n{}",
+            answer.out
+        );
     }
 }

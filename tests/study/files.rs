@@ -20,17 +20,37 @@ fn shards_in_any_order_on_any_number_of_threads_join_into_the_answer_of_the_whol
     let bench = Bench::new();
     let whole = whole(&bench);
     for (count, threads) in [(1, 1), (3, 2), (7, 3)] {
-        let files: Vec<String> = (1..=count).rev().map(|index| format!("{count}_{index}.study")).collect();
+        let files: Vec<String> = (1..=count)
+            .rev()
+            .map(|index| format!("{count}_{index}.study"))
+            .collect();
         for (file, index) in files.iter().zip((1..=count).rev()) {
-            let answer =
-                bench.run(&format!("{XY} {DRAWS} --shard {index}/{count} --file {file} --threads {threads} --json"));
-            assert_eq!((answer.code, answer.json()["shard"].is_null()), (0, count == 1), "{}", answer.err);
+            let answer = bench.run(&format!(
+                "{XY} {DRAWS} --shard {index}/{count} --file {file} --threads {threads} --json"
+            ));
+            assert_eq!(
+                (answer.code, answer.json()["shard"].is_null()),
+                (0, count == 1),
+                "{}",
+                answer.err
+            );
         }
         let joined = bench.run(&format!("model study --json --join {}", files.join(" ")));
         assert_eq!((joined.code, &joined.out), (0, &whole), "{}", joined.err);
     }
-    assert_eq!(bench.run(&format!("{XY} {DRAWS} --json --threads 5")).out, whole);
-    assert_eq!(bench.run(&format!("model study --csv joined.csv --join {}", "1_1.study")).code, 0);
+    assert_eq!(
+        bench.run(&format!("{XY} {DRAWS} --json --threads 5")).out,
+        whole
+    );
+    assert_eq!(
+        bench
+            .run(&format!(
+                "model study --csv joined.csv --join {}",
+                "1_1.study"
+            ))
+            .code,
+        0
+    );
     assert_eq!(bench.run(&format!("{XY} {DRAWS} --csv whole.csv")).code, 0);
     assert_eq!(bench.read("joined.csv"), bench.read("whole.csv"));
 }
@@ -39,10 +59,15 @@ fn shards_in_any_order_on_any_number_of_threads_join_into_the_answer_of_the_whol
 fn shards_that_make_up_no_whole_are_refused_with_what_is_wrong() {
     let bench = Bench::new();
     for index in 1..=3 {
-        assert_eq!(shard(&bench, &format!("{index}/3"), &format!("{index}.study")).code, 0);
+        assert_eq!(
+            shard(&bench, &format!("{index}/3"), &format!("{index}.study")).code,
+            0
+        );
     }
     assert_eq!(shard(&bench, "2/4", "of_four.study").code, 0);
-    let other = bench.run(&format!("{XY} {DRAWS} --shard 2/3 --file other.study --seed 9 --operating-point 2mm"));
+    let other = bench.run(&format!(
+        "{XY} {DRAWS} --shard 2/3 --file other.study --seed 9 --operating-point 2mm"
+    ));
     assert_eq!(other.code, 0, "{}", other.err);
     std::fs::copy(bench.path("2.study"), bench.path("again.study")).expect("a copy");
     let cut = std::fs::read(bench.path("2.study")).expect("a file");
@@ -50,19 +75,43 @@ fn shards_that_make_up_no_whole_are_refused_with_what_is_wrong() {
     for (files, code, words) in [
         ("1.study 3.study", 1, &["of 3 shards", "no file of 2"][..]),
         ("3.study", 1, &["no file of 1, 2"]),
-        ("1.study 2.study again.study 3.study", 1, &["shard 2/3", "more than once", "2.study, again.study"]),
-        ("1.study cut.study 3.study", 1, &["cut.study (shard 2/3) lacks", "start it again"]),
-        ("1.study of_four.study 3.study", 2, &["of_four.study", "`shard.count` is 4 there, 3 here"]),
+        (
+            "1.study 2.study again.study 3.study",
+            1,
+            &["shard 2/3", "more than once", "2.study, again.study"],
+        ),
+        (
+            "1.study cut.study 3.study",
+            1,
+            &["cut.study (shard 2/3) lacks", "start it again"],
+        ),
+        (
+            "1.study of_four.study 3.study",
+            2,
+            &["of_four.study", "`shard.count` is 4 there, 3 here"],
+        ),
         (
             "1.study other.study 3.study",
             2,
-            &["`seed` is 9 there, 1 here", "`plant.operating_point_m` is 0.002 there, 0.003 here"],
+            &[
+                "`seed` is 9 there, 1 here",
+                "`plant.operating_point_m` is 0.002 there, 0.003 here",
+            ],
         ),
         ("1.study nowhere.study", 1, &["cannot open nowhere.study"]),
     ] {
         let answer = bench.run(&format!("model study --json --join {files}"));
-        assert_eq!((answer.code, answer.out.as_str()), (code, ""), "{files}: {}", answer.err);
-        assert!(words.iter().all(|word| answer.err.contains(word)), "{files}: {}", answer.err);
+        assert_eq!(
+            (answer.code, answer.out.as_str()),
+            (code, ""),
+            "{files}: {}",
+            answer.err
+        );
+        assert!(
+            words.iter().all(|word| answer.err.contains(word)),
+            "{files}: {}",
+            answer.err
+        );
     }
 }
 
@@ -72,20 +121,55 @@ fn a_file_cut_anywhere_goes_on_to_the_same_answer() {
     let whole = whole(&bench);
     assert_eq!(bench.run(&format!("{XY} {DRAWS} --file a.study")).code, 0);
     let bytes = std::fs::read(bench.path("a.study")).expect("a file");
-    let header = bytes.iter().position(|byte| *byte == b'\n').expect("a line") + 1;
-    let (last, all) =
-        (bytes[..bytes.len() - 1].iter().rposition(|byte| *byte == b'\n').expect("lines") + 1, bytes.len());
-    for length in
-        [0, 1, header / 2, header - 1, header, header + 1, header + 100, last, last + 1, all - 2, all - 1, all]
-    {
+    let header = bytes
+        .iter()
+        .position(|byte| *byte == b'\n')
+        .expect("a line")
+        + 1;
+    let (last, all) = (
+        bytes[..bytes.len() - 1]
+            .iter()
+            .rposition(|byte| *byte == b'\n')
+            .expect("lines")
+            + 1,
+        bytes.len(),
+    );
+    for length in [
+        0,
+        1,
+        header / 2,
+        header - 1,
+        header,
+        header + 1,
+        header + 100,
+        last,
+        last + 1,
+        all - 2,
+        all - 1,
+        all,
+    ] {
         bench.write("cut.study", &bytes[..length]);
         let answer = bench.run(&format!("{XY} {DRAWS} --file cut.study --json"));
-        assert_eq!((answer.code, &answer.out), (0, &whole), "cut at {length} of {all}: {}", answer.err);
+        assert_eq!(
+            (answer.code, &answer.out),
+            (0, &whole),
+            "cut at {length} of {all}: {}",
+            answer.err
+        );
         let torn = length > header && length != last && length != all;
-        assert_eq!(answer.err.contains("damaged lines"), torn, "cut at {length} of {all}: {}", answer.err);
+        assert_eq!(
+            answer.err.contains("damaged lines"),
+            torn,
+            "cut at {length} of {all}: {}",
+            answer.err
+        );
         // Now it is whole: nothing is left to do.
         let again = bench.run(&format!("{XY} {DRAWS} --file cut.study --json"));
-        assert!(again.out == whole && again.err.contains("2600 of 2600 draws are done already"), "{}", again.err);
+        assert!(
+            again.out == whole && again.err.contains("2600 of 2600 draws are done already"),
+            "{}",
+            again.err
+        );
     }
 }
 
@@ -100,19 +184,41 @@ fn a_changed_block_is_not_believed() {
     let digit = line.rfind("0,").expect("a count");
     let changed = [
         format!("{}1{}", &line[..digit], &line[digit + 1..]),
-        format!("{}{}", if line.starts_with('0') { '1' } else { '0' }, &line[1..]),
+        format!(
+            "{}{}",
+            if line.starts_with('0') { '1' } else { '0' },
+            &line[1..]
+        ),
         line.replacen("\"first\":", "\"first\":1", 1),
         String::new(),
         "null".to_string(),
     ];
-    assert_eq!(bench.run(&format!("{XY} {DRAWS} --seed 2 --file other.study")).code, 0);
-    let foreign = bench.read("other.study").lines().nth(2).expect("a block").to_string();
+    assert_eq!(
+        bench
+            .run(&format!("{XY} {DRAWS} --seed 2 --file other.study"))
+            .code,
+        0
+    );
+    let foreign = bench
+        .read("other.study")
+        .lines()
+        .nth(2)
+        .expect("a block")
+        .to_string();
     for wrong in changed.into_iter().chain([foreign]) {
         bench.write("a.study", text.replace(&line, &wrong));
         let joined = bench.run("model study --json --join a.study");
-        assert!(joined.code == 1 && joined.err.contains("lacks 500 draws"), "{wrong}: {}", joined.err);
+        assert!(
+            joined.code == 1 && joined.err.contains("lacks 500 draws"),
+            "{wrong}: {}",
+            joined.err
+        );
         let answer = bench.run(&format!("{XY} {DRAWS} --file a.study --json"));
-        assert!(answer.err.contains("1 damaged lines do not count"), "{wrong}: {}", answer.err);
+        assert!(
+            answer.err.contains("1 damaged lines do not count"),
+            "{wrong}: {}",
+            answer.err
+        );
         assert_eq!((answer.code, &answer.out), (0, &whole), "{wrong}");
     }
 }
@@ -126,9 +232,18 @@ fn a_file_of_other_settings_is_refused_with_what_differs_and_left_as_it_is() {
         ("--shard 2/2", &["`shard.index` is 1 there, 2 here"][..]),
         ("--shard 1/3", &["`shard.count` is 2 there, 3 here"]),
         ("--shard 1/2 --seed 8", &["`seed` is 1 there, 8 here"]),
-        ("--shard 1/2 --damped", &["`damped` is false there, true here"]),
-        ("--shard 1/2 --set plant.layout=mirror_away", &["`plant.layout` is \"pinwheel\" there, \"mirror_away\" here"]),
-        ("--shard 1/2 --vary plant.beam_length_m=+-1%", &["`varied.8` is null there", "plant.beam_length_m"]),
+        (
+            "--shard 1/2 --damped",
+            &["`damped` is false there, true here"],
+        ),
+        (
+            "--shard 1/2 --set plant.layout=mirror_away",
+            &["`plant.layout` is \"pinwheel\" there, \"mirror_away\" here"],
+        ),
+        (
+            "--shard 1/2 --vary plant.beam_length_m=+-1%",
+            &["`varied.8` is null there", "plant.beam_length_m"],
+        ),
     ] {
         let answer = bench.run(&format!("{XY} {DRAWS} --file a.study {arguments}"));
         answer.is_refused(&[words, &["a.study", "other settings"]].concat());
@@ -141,17 +256,34 @@ fn a_file_of_other_settings_is_refused_with_what_differs_and_left_as_it_is() {
 #[test]
 fn a_file_that_is_no_study_is_refused_and_left_as_it_is() {
     let bench = Bench::new();
-    for content in ["hello", "\n", "{\"format\":\"bench study 1\"}\n", "00000000 {}\n", "\u{0}\u{1}", "a,b\n1,2\n"] {
+    for content in [
+        "hello",
+        "\n",
+        "{\"format\":\"bench study 1\"}\n",
+        "00000000 {}\n",
+        "\u{0}\u{1}",
+        "a,b\n1,2\n",
+    ] {
         bench.write("a.study", content);
-        for arguments in [format!("{XY} --file a.study"), "model study --join a.study".into()] {
-            bench.run(&arguments).is_refused(&["a.study is not a study", "left as it is"]);
+        for arguments in [
+            format!("{XY} --file a.study"),
+            "model study --join a.study".into(),
+        ] {
+            bench
+                .run(&arguments)
+                .is_refused(&["a.study is not a study", "left as it is"]);
             assert_eq!(bench.read("a.study"), content);
         }
     }
     bench.write("latin.study", [0xff, 0xfe, b'\n']);
-    bench.run(&format!("{XY} --file latin.study")).is_refused(&["is not a study"]);
+    bench
+        .run(&format!("{XY} --file latin.study"))
+        .is_refused(&["is not a study"]);
     for (file, why) in [("nowhere/a.study", "No such file"), (".", "directory")] {
         let answer = bench.run(&format!("{XY} --file {file}"));
-        assert!(answer.code == 1 && answer.err.contains(why) && answer.err.contains(file), "{answer:?}");
+        assert!(
+            answer.code == 1 && answer.err.contains(why) && answer.err.contains(file),
+            "{answer:?}"
+        );
     }
 }

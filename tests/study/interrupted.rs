@@ -14,15 +14,25 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 fn start(bench: &Bench, arguments: &str) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
-    command.current_dir(bench.path("")).args(arguments.split_whitespace()).stdin(Stdio::null());
-    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
+    command
+        .current_dir(bench.path(""))
+        .args(arguments.split_whitespace())
+        .stdin(Stdio::null());
+    command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts")
 }
 
 /// Waits until the file holds some blocks of about 1.1 kB, and header.
 fn until_written(child: &mut Child, file: &Path) {
     let patience = Instant::now() + PATIENCE;
     while std::fs::metadata(file).map_or(0, |file| file.len()) < 10_000 {
-        assert!(child.try_wait().expect("a child of ours").is_none(), "it ended early");
+        assert!(
+            child.try_wait().expect("a child of ours").is_none(),
+            "it ended early"
+        );
         assert!(Instant::now() < patience, "nothing is written");
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -44,11 +54,15 @@ fn lines(text: &str) -> (u64, usize) {
         .split_inclusive('\n')
         .skip(1)
         .map(|line| {
-            let block: serde_json::Value = serde_json::from_str(line.strip_suffix('\n')?.split_once(' ')?.1).ok()?;
+            let block: serde_json::Value =
+                serde_json::from_str(line.strip_suffix('\n')?.split_once(' ')?.1).ok()?;
             Some(block["cnmp_pairs"].as_array()?.len() as u64)
         })
         .collect();
-    (blocks.iter().flatten().sum(), blocks.iter().filter(|block| block.is_none()).count())
+    (
+        blocks.iter().flatten().sum(),
+        blocks.iter().filter(|block| block.is_none()).count(),
+    )
 }
 
 #[test]
@@ -60,11 +74,21 @@ fn ctrl_c_and_sigterm_leave_a_whole_file_and_say_how_to_go_on() {
         signal(&child, number);
         let output = ended(child);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{said}");
+        assert_eq!(
+            (output.status.code(), output.stdout.len()),
+            (Some(1), 0),
+            "{said}"
+        );
         let (draws, torn) = lines(&bench.read("a.study"));
         assert_eq!(torn, 0, "{said}");
-        assert!(said.contains(&format!("stopped after {draws} of 3000000 draws")) && draws >= 1000, "{said}");
-        assert!(said.contains("started again with the same arguments it goes on from a.study"), "{said}");
+        assert!(
+            said.contains(&format!("stopped after {draws} of 3000000 draws")) && draws >= 1000,
+            "{said}"
+        );
+        assert!(
+            said.contains("started again with the same arguments it goes on from a.study"),
+            "{said}"
+        );
     }
     // Without a file there is nothing to go on from, which is said.
     let bench = Bench::new();
@@ -74,7 +98,13 @@ fn ctrl_c_and_sigterm_leave_a_whole_file_and_say_how_to_go_on() {
     let output = ended(child);
     let said = String::from_utf8_lossy(&output.stderr);
     // The signal may come before the program listens for it, on a machine that is busy; then it just ends.
-    assert!(output.status.code().is_none_or(|code| code == 1 && said.contains("nothing is kept")), "{said}");
+    assert!(
+        output
+            .status
+            .code()
+            .is_none_or(|code| code == 1 && said.contains("nothing is kept")),
+        "{said}"
+    );
     assert_eq!(bench.files(), [""; 0]);
 }
 
@@ -89,7 +119,13 @@ fn what_a_killed_process_has_done_is_kept_and_gone_on_from() {
     let (kept, torn) = lines(&bench.read("a.study"));
     assert!((1000..40_000).contains(&kept) && torn <= 1, "{kept} {torn}");
     let answer = bench.run(&format!("{arguments} --file a.study"));
-    assert!(answer.err.contains(&format!("{kept} of 40000 draws are done already")), "{}", answer.err);
+    assert!(
+        answer
+            .err
+            .contains(&format!("{kept} of 40000 draws are done already")),
+        "{}",
+        answer.err
+    );
     assert_eq!((answer.code, answer.out), (0, bench.run(&arguments).out));
 }
 
@@ -98,13 +134,24 @@ fn two_processes_do_not_work_on_one_file() {
     let bench = Bench::new();
     let mut child = start(&bench, &format!("{XY} {LONG} --file a.study"));
     until_written(&mut child, &bench.path("a.study"));
-    for arguments in [format!("{XY} {LONG} --file a.study"), "model study --join a.study".into()] {
+    for arguments in [
+        format!("{XY} {LONG} --file a.study"),
+        "model study --join a.study".into(),
+    ] {
         let answer = bench.run(&arguments);
-        assert!(answer.code == 1 && answer.err.contains("another `bench` is at work on it"), "{answer:?}");
+        assert!(
+            answer.code == 1 && answer.err.contains("another `bench` is at work on it"),
+            "{answer:?}"
+        );
     }
     signal(&child, libc::SIGKILL);
     ended(child);
-    assert!(bench.run("model study --join a.study").err.contains("lacks"));
+    assert!(
+        bench
+            .run("model study --join a.study")
+            .err
+            .contains("lacks")
+    );
 }
 
 #[test]
@@ -114,20 +161,45 @@ fn a_full_disk_is_told_and_what_was_done_is_kept() {
     // 32 blocks of 512 bytes (1024 in some shells): 16 or 32 kB of some 70 kB.
     let script = "trap '' XFSZ; ulimit -f 32; exec \"$0\" \"$@\"";
     let mut command = Command::new("sh");
-    command.current_dir(bench.path("")).args(["-c", script, env!("CARGO_BIN_EXE_bench")]);
-    let output = command.args(arguments.split_whitespace()).output().expect("a shell");
+    command
+        .current_dir(bench.path(""))
+        .args(["-c", script, env!("CARGO_BIN_EXE_bench")]);
+    let output = command
+        .args(arguments.split_whitespace())
+        .output()
+        .expect("a shell");
     let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{said}");
-    for words in ["cannot write a.study", "File too large", "make room and start it again with the same arguments"] {
+    assert_eq!(
+        (output.status.code(), output.stdout.len()),
+        (Some(1), 0),
+        "{said}"
+    );
+    for words in [
+        "cannot write a.study",
+        "File too large",
+        "make room and start it again with the same arguments",
+    ] {
         assert!(said.contains(words), "`{words}` is not in {said}");
     }
     assert!(!said.contains("panicked"), "{said}");
     let (kept, _) = lines(&bench.read("a.study"));
     assert!((1000..30_000).contains(&kept), "{kept}");
     let answer = bench.run(&arguments);
-    assert!(answer.err.contains(&format!("{kept} of 30000 draws are done already")), "{}", answer.err);
-    assert_eq!((answer.code, answer.out), (0, bench.run(&format!("{XY} --draws 30000 --json")).out));
+    assert!(
+        answer
+            .err
+            .contains(&format!("{kept} of 30000 draws are done already")),
+        "{}",
+        answer.err
+    );
+    assert_eq!(
+        (answer.code, answer.out),
+        (0, bench.run(&format!("{XY} --draws 30000 --json")).out)
+    );
     // A table that does not fit is a failure as well.
     let full = bench.run(&format!("{XY} --draws 1000 --csv /dev/full"));
-    assert!(full.code == 1 && full.err.contains("cannot write /dev/full"), "{full:?}");
+    assert!(
+        full.code == 1 && full.err.contains("cannot write /dev/full"),
+        "{full:?}"
+    );
 }

@@ -11,10 +11,19 @@ fn a_tolerance_that_is_none_is_refused() {
     for (tolerance, words) in [
         (
             "plant.motion_mass_kg=+-1%",
-            &["`plant.motion_mass_kg` is not a setting", "nearest is `plant.motion_stage_mass_kg`"][..],
+            &[
+                "`plant.motion_mass_kg` is not a setting",
+                "nearest is `plant.motion_stage_mass_kg`",
+            ][..],
         ),
-        ("plant.*.zz=+-1%", &["`plant.*.zz` is not a setting of this plant"]),
-        ("loop.rate_hz=+-1%", &["`loop.rate_hz` is not of the plant", "`plant.`"]),
+        (
+            "plant.*.zz=+-1%",
+            &["`plant.*.zz` is not a setting of this plant"],
+        ),
+        (
+            "loop.rate_hz=+-1%",
+            &["`loop.rate_hz` is not of the plant", "`plant.`"],
+        ),
         ("plant.layout=+-1", &["`plant.layout` is no quantity"]),
         ("plant.beam_length_m", &["KEY=uniform:LOW:HIGH"]),
         ("plant.beam_length_m=1%", &["KEY=+-LIMIT"]),
@@ -22,17 +31,35 @@ fn a_tolerance_that_is_none_is_refused() {
         ("plant.beam_length_m=uniform:1um:-1um", &["empty tolerance"]),
         ("plant.beam_length_m=normal:0", &["above zero"]),
         ("plant.youngs_modulus_pa=+-1mm", &["no length"]),
-        ("plant.secondary_mass_deviation.sL=+-15%", &["is of the nominal value", "as in 0.15"]),
+        (
+            "plant.secondary_mass_deviation.sL=+-15%",
+            &["is of the nominal value", "as in 0.15"],
+        ),
         // Out of range at one end; a normal one at six sigma; a relation between two settings.
-        ("plant.secondary_mass_deviation.sL=uniform:-1:0", &["reaches -1", "allowed is -0.9 to 9", "narrow it"]),
-        ("plant.motion_stage_mass_kg=normal:20%", &["`plant.motion_stage_mass_kg` reaches -0.05", "allowed is"]),
-        ("plant.operating_point_m=+-50mm", &["beyond the length of the beams"]),
+        (
+            "plant.secondary_mass_deviation.sL=uniform:-1:0",
+            &["reaches -1", "allowed is -0.9 to 9", "narrow it"],
+        ),
+        (
+            "plant.motion_stage_mass_kg=normal:20%",
+            &["`plant.motion_stage_mass_kg` reaches -0.05", "allowed is"],
+        ),
+        (
+            "plant.operating_point_m=+-50mm",
+            &["beyond the length of the beams"],
+        ),
     ] {
         let answer = bench.run_with(["model", "study", "--config", "xy", "--vary", tolerance]);
         answer.is_refused(words);
     }
-    bench.run(&format!("{XY} --vary plant.secondary_mass_deviation.sL=+-0.1")).is_refused(&["varies already"]);
-    bench.run("model study --config four-mass --vary plant.free_bodies=+-1").is_refused(&["no quantity"]);
+    bench
+        .run(&format!(
+            "{XY} --vary plant.secondary_mass_deviation.sL=+-0.1"
+        ))
+        .is_refused(&["varies already"]);
+    bench
+        .run("model study --config four-mass --vary plant.free_bodies=+-1")
+        .is_refused(&["no quantity"]);
     assert_eq!(bench.files(), [""; 0]);
 }
 
@@ -43,7 +70,10 @@ fn a_call_that_is_none_is_refused() {
         (format!("{XY} --draws 0"), &["0 draws", "from 1 to"][..]),
         (format!("{XY} --draws 1000000000"), &["from 1 to 100000000"]),
         (format!("{XY} --draws -1"), &["'-1'"]),
-        (format!("{XY} --shard 3/2 --file a"), &["`3/2` is no shard", "I from 1 to N"]),
+        (
+            format!("{XY} --shard 3/2 --file a"),
+            &["`3/2` is no shard", "I from 1 to N"],
+        ),
         (format!("{XY} --shard 0/2 --file a"), &["`0/2` is no shard"]),
         (format!("{XY} --shard one --file a"), &["`one` is no shard"]),
         (format!("{XY} --shard 1/2"), &["--file"]),
@@ -63,11 +93,13 @@ const APART: &str = "[plant]\nmodel = \"lumped\"\n[plant.nodes]\na = { mass_kg =
 fn a_plant_without_a_response_is_refused() {
     let bench = Bench::new();
     bench.write("apart.toml", APART);
-    bench.run("model study --config apart.toml --vary plant.nodes.*.mass_kg=+-10%").is_refused(&[
-        "nominal plant cannot be analysed",
-        "residues of all modes are zero",
-        "join the two",
-    ]);
+    bench
+        .run("model study --config apart.toml --vary plant.nodes.*.mass_kg=+-10%")
+        .is_refused(&[
+            "nominal plant cannot be analysed",
+            "residues of all modes are zero",
+            "join the two",
+        ]);
     bench.write(
         "silent.toml",
         "[plant]\nmodel = \"modal\"\n[plant.modes]\nu = { omega_rad_s = 1.0, residue_per_kg = 0.0 }\n",
@@ -83,18 +115,30 @@ fn draws_that_cannot_be_analysed_are_counted_told_and_in_no_probability() {
     // Beams of 10 to 30 mm, and an operating point of 0 to 25 mm: each end is allowed with the other's nominal value, but
     // beyond the length of the beams there is none. Of u < v, u uniform on 10..30 and v on 0..25: (15 x 15/2)/(20 x 25).
     let stage = "--config chapter2 --set plant.beam_length_m=0.02 --set plant.operating_point_m=0.01 --set plant.beam_thickness_m=2e-4";
-    let vary = "--vary plant.beam_length_m=+-10mm --vary plant.operating_point_m=uniform:-10mm:9.9mm";
-    let answer = bench.json(&format!("model study {stage} {vary} --draws 4000 --csv draws.csv"));
+    let vary =
+        "--vary plant.beam_length_m=+-10mm --vary plant.operating_point_m=uniform:-10mm:9.9mm";
+    let answer = bench.json(&format!(
+        "model study {stage} {vary} --draws 4000 --csv draws.csv"
+    ));
     // v on 0..19.9 mm: u < v in (9.9 x 9.9/2)/(20 x 19.9).
     let expected = 9.9 * 9.9 / 2.0 / (20.0 * 19.9);
     let failed = number(&answer["not_analysed"]["draws"]);
-    assert!((failed / 4000.0 - expected).abs() < 5.0 * f64::sqrt(expected * (1.0 - expected) / 4000.0), "{failed}");
+    assert!(
+        (failed / 4000.0 - expected).abs() < 5.0 * f64::sqrt(expected * (1.0 - expected) / 4000.0),
+        "{failed}"
+    );
     let examples = list(&answer["not_analysed"], "examples");
     assert!(
-        examples.len() == 5 && examples[0]["why"].as_str().is_some_and(|why| why.contains("beyond the length")),
+        examples.len() == 5
+            && examples[0]["why"]
+                .as_str()
+                .is_some_and(|why| why.contains("beyond the length")),
         "{answer}"
     );
-    let counted: f64 = list(&answer["cnmp_pairs"], "probabilities").iter().map(|one| number(&one["draws"])).sum();
+    let counted: f64 = list(&answer["cnmp_pairs"], "probabilities")
+        .iter()
+        .map(|one| number(&one["draws"]))
+        .sum();
     assert_eq!(counted + failed, 4000.0);
     let table = bench.read("draws.csv");
     let missing: Vec<&str> = table.lines().filter(|line| line.ends_with(',')).collect();
@@ -102,7 +146,15 @@ fn draws_that_cannot_be_analysed_are_counted_told_and_in_no_probability() {
     let first = format!("{},", examples[0]["draw"]);
     assert!(missing[0].starts_with(&first), "{} {first}", missing[0]);
     let text = bench.run(&format!("model study {stage} {vary} --draws 400"));
-    assert!(text.out.contains("draws could not be analysed, and are in no probability"), "{}", text.out);
+    assert!(
+        text.out
+            .contains("draws could not be analysed, and are in no probability"),
+        "{}",
+        text.out
+    );
     // All of them, and it is still an answer.
-    assert_eq!(bench.json(&format!("{XY} --draws 1"))["not_analysed"], json!({"draws": 0, "examples": []}));
+    assert_eq!(
+        bench.json(&format!("{XY} --draws 1"))["not_analysed"],
+        json!({"draws": 0, "examples": []})
+    );
 }

@@ -6,21 +6,35 @@ use crate::program::Bench;
 #[test]
 fn the_csv_has_a_row_a_draw_with_settings_and_pairs() {
     let bench = Bench::new();
-    assert_eq!(bench.run(&format!("{XY} --draws 100 --damped --csv draws.csv")).code, 0);
+    assert_eq!(
+        bench
+            .run(&format!("{XY} --draws 100 --damped --csv draws.csv"))
+            .code,
+        0
+    );
     let table = bench.read("draws.csv");
     let header: Vec<&str> = table.lines().next().expect("a header").split(',').collect();
-    let places =
-        ["sL", "sR", "sT", "sB", "gL", "gR", "gT", "gB"].map(|p| format!("plant.secondary_mass_deviation.{p}"));
-    assert_eq!((header.len(), header[0], header[9], header[10]), (11, "draw", "cnmp_pairs", "damped_cnmp_pairs"));
+    let places = ["sL", "sR", "sT", "sB", "gL", "gR", "gT", "gB"]
+        .map(|p| format!("plant.secondary_mass_deviation.{p}"));
+    assert_eq!(
+        (header.len(), header[0], header[9], header[10]),
+        (11, "draw", "cnmp_pairs", "damped_cnmp_pairs")
+    );
     assert_eq!(header[1..9], places);
     for (number, line) in table.lines().skip(1).enumerate() {
-        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+        let cells: Vec<f64> = line
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
         assert!(
             cells.len() == 11
                 && cells[0] == number as f64
                 && cells[9..].iter().all(|pairs| (0.0..=4.0).contains(pairs))
         );
-        assert!(cells[1..9].iter().all(|deviation| deviation.abs() <= 0.15), "{line}");
+        assert!(
+            cells[1..9].iter().all(|deviation| deviation.abs() <= 0.15),
+            "{line}"
+        );
     }
     assert_eq!(table.lines().count(), 101);
 }
@@ -29,7 +43,11 @@ fn the_csv_has_a_row_a_draw_with_settings_and_pairs() {
 #[cfg(not(feature = "parquet"))]
 fn without_the_feature_parquet_is_refused_before_anything_is_computed() {
     let bench = Bench::new();
-    for command in [XY, "model map", "model locus --vary plant.mass_asymmetry --from 0 --to 1%"] {
+    for command in [
+        XY,
+        "model map",
+        "model locus --vary plant.mass_asymmetry --from 0 --to 1%",
+    ] {
         bench
             .run(&format!("{command} --parquet t.parquet --csv t.csv"))
             .is_refused(&["--features parquet", "--csv FILE"]);
@@ -61,9 +79,15 @@ mod parquet {
             let answer = bench.run(&format!("{command} --csv t.csv --parquet t.parquet"));
             assert_eq!(answer.code, 0, "{}", answer.err);
             let question = json!({"what": "tables", "csv": bench.path("t.csv"), "parquet": bench.path("t.parquet")});
-            let Some(answers) = truth::ask_of("tables.py", &[question]) else { return };
+            let Some(answers) = truth::ask_of("tables.py", &[question]) else {
+                return;
+            };
             assert_eq!(answers[0]["differences"], json!([]), "{command}");
-            assert_eq!(number(&answers[0]["rows"]) as usize, bench.read("t.csv").lines().count() - 1, "{command}");
+            assert_eq!(
+                number(&answers[0]["rows"]) as usize,
+                bench.read("t.csv").lines().count() - 1,
+                "{command}"
+            );
             assert_eq!(answers[0]["has_nulls"], command == beams, "{command}");
         }
     }

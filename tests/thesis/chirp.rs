@@ -7,7 +7,8 @@ use crate::recording::Recording;
 use crate::truth;
 
 const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
-const NOISE_FREE: &str = "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[]";
+const NOISE_FREE: &str =
+    "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[]";
 
 /// A row of the CSV, in its order.
 type Row = [f64; 7];
@@ -17,7 +18,10 @@ fn rows(bench: &Bench, answer: &Value) -> Vec<Row> {
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some(HEADER));
     let row = |line: &str| {
-        let numbers: Vec<f64> = line.split(',').map(|field| field.parse().expect("a number")).collect();
+        let numbers: Vec<f64> = line
+            .split(',')
+            .map(|field| field.parse().expect("a number"))
+            .collect();
         Row::try_from(numbers).unwrap_or_else(|_| panic!("not seven columns: {line}"))
     };
     lines.map(row).collect()
@@ -36,7 +40,8 @@ struct Error {
 fn errors(bench: &Bench, settings: &str, rows: &[Row]) -> Option<Vec<Error>> {
     let frequencies: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     let config = bench.json(&format!("config show {settings}"));
-    let answers = truth::ask(&[json!({"what": "frf", "config": config, "frequency_hz": frequencies})])?;
+    let answers =
+        truth::ask(&[json!({"what": "frf", "config": config, "frequency_hz": frequencies})])?;
     let error = |(row, h): (&Row, &Value)| {
         let (re, im) = (number(&h[0]), number(&h[1]));
         let turns = (row[2] - im.atan2(re).to_degrees()) / 360.0;
@@ -49,21 +54,42 @@ fn errors(bench: &Bench, settings: &str, rows: &[Row]) -> Option<Vec<Error>> {
             phase_sigma_deg: row[5],
         }
     };
-    Some(rows.iter().zip(answers[0].as_array().expect("a list")).map(error).collect())
+    Some(
+        rows.iter()
+            .zip(answers[0].as_array().expect("a list"))
+            .map(error)
+            .collect(),
+    )
 }
 
 #[test]
-fn without_noise_the_response_is_the_rigs_within_0_2_per_cent_and_0_1_degrees_resonances_included() {
+fn without_noise_the_response_is_the_rigs_within_0_2_per_cent_and_0_1_degrees_resonances_included()
+{
     let bench = Bench::new();
     let rows = rows(&bench, &bench.json(&format!("chirp {NOISE_FREE}")));
-    let Some(errors) = errors(&bench, NOISE_FREE, &rows) else { return };
-    let inside: Vec<&Error> = errors.iter().filter(|e| (0.5..=450.0).contains(&e.frequency_hz)).collect();
+    let Some(errors) = errors(&bench, NOISE_FREE, &rows) else {
+        return;
+    };
+    let inside: Vec<&Error> = errors
+        .iter()
+        .filter(|e| (0.5..=450.0).contains(&e.frequency_hz))
+        .collect();
     // Eight to a per cent of frequency at the top of the band: the modes' peaks, 0.8 % wide at half their power, are well sampled.
     assert!(inside.len() > 4000, "{}", inside.len());
     for e in inside {
         let relative = e.magnitude / e.truth_m_per_a;
-        assert!(relative.abs() < 0.002, "{} % of the magnitude at {} Hz", 100.0 * relative, e.frequency_hz);
-        assert!(e.phase_deg.abs() < 0.1, "{} deg at {} Hz", e.phase_deg, e.frequency_hz);
+        assert!(
+            relative.abs() < 0.002,
+            "{} % of the magnitude at {} Hz",
+            100.0 * relative,
+            e.frequency_hz
+        );
+        assert!(
+            e.phase_deg.abs() < 0.1,
+            "{} deg at {} Hz",
+            e.phase_deg,
+            e.frequency_hz
+        );
     }
 }
 
@@ -72,19 +98,36 @@ fn with_noise_the_stated_sigmas_hold_and_are_small() {
     for seed in [1, 2] {
         let (bench, settings) = (Bench::new(), format!("--seed {seed}"));
         let rows = rows(&bench, &bench.json(&format!("chirp {settings}")));
-        let Some(errors) = errors(&bench, &settings, &rows) else { return };
+        let Some(errors) = errors(&bench, &settings, &rows) else {
+            return;
+        };
         // Two sigma of a Gaussian hold 95.4 %. Neighbouring bins share data, so that the share varies by some per cent;
         // a sigma that is too large by half would hold 99.7 %, twice too large 99.99 %.
         for (what, within) in [
-            ("magnitude", (|e: &Error| e.magnitude.abs() <= 2.0 * e.magnitude_sigma) as fn(&Error) -> bool),
-            ("phase", |e: &Error| e.phase_deg.abs() <= 2.0 * e.phase_sigma_deg),
+            (
+                "magnitude",
+                (|e: &Error| e.magnitude.abs() <= 2.0 * e.magnitude_sigma) as fn(&Error) -> bool,
+            ),
+            ("phase", |e: &Error| {
+                e.phase_deg.abs() <= 2.0 * e.phase_sigma_deg
+            }),
         ] {
             let share = errors.iter().filter(|e| within(e)).count() as f64 / errors.len() as f64;
-            assert!((0.90..0.999).contains(&share), "seed {seed}: {share} of the errors of {what} within two sigma");
+            assert!(
+                (0.90..0.999).contains(&share),
+                "seed {seed}: {share} of the errors of {what} within two sigma"
+            );
         }
-        for e in errors.iter().filter(|e| (1.0..=200.0).contains(&e.frequency_hz)) {
+        for e in errors
+            .iter()
+            .filter(|e| (1.0..=200.0).contains(&e.frequency_hz))
+        {
             let relative = e.magnitude_sigma / e.truth_m_per_a;
-            assert!(relative < 0.01, "seed {seed}: sigma is {relative} of |H| at {} Hz", e.frequency_hz);
+            assert!(
+                relative < 0.01,
+                "seed {seed}: sigma is {relative} of |H| at {} Hz",
+                e.frequency_hz
+            );
         }
     }
 }
@@ -112,15 +155,30 @@ fn the_answer_the_files_and_the_recording_are_as_promised() {
     ] {
         assert!(answer.get(key).is_some(), "{key} is missing: {answer}");
     }
-    assert_eq!((&answer["outcome"], &answer["trip"]), (&json!("completed"), &Value::Null));
-    assert_eq!((&answer["overruns"], &answer["lost_records"]), (&json!(0), &json!(0)));
-    assert!(["detected", "excluded", "undecided"].contains(&answer["cnmp"].as_str().expect("a word")));
+    assert_eq!(
+        (&answer["outcome"], &answer["trip"]),
+        (&json!("completed"), &Value::Null)
+    );
+    assert_eq!(
+        (&answer["overruns"], &answer["lost_records"]),
+        (&json!(0), &json!(0))
+    );
+    assert!(
+        ["detected", "excluded", "undecided"].contains(&answer["cnmp"].as_str().expect("a word"))
+    );
     // 2 s of quiet, 110 s of sweep, 8 s of quiet and 0.1 s after the motor went off, at 5 kHz.
     let ticks = number(&answer["ticks"]);
     assert!((600_500.0..=600_501.0).contains(&ticks), "{ticks}");
-    let messages = Recording::open(&bench.path(answer["recording"].as_str().expect("a path"))).messages("/loop");
+    let messages = Recording::open(&bench.path(answer["recording"].as_str().expect("a path")))
+        .messages("/loop");
     assert_eq!(messages.len() as f64, ticks, "a message a tick");
-    assert!(messages.iter().enumerate().all(|(index, message)| message["tick"] == index), "numbered without a gap");
+    assert!(
+        messages
+            .iter()
+            .enumerate()
+            .all(|(index, message)| message["tick"] == index),
+        "numbered without a gap"
+    );
     let svg = bench.read(answer["plot"].as_str().expect("a path"));
     for text in ["<svg", "Hz", "m/A", "deg", "oherence"] {
         assert!(svg.contains(text), "`{text}` is not in the plot");
@@ -140,7 +198,11 @@ fn the_phase_is_given_with_and_without_the_delay() {
         let turned = (without[2] - with[2]).rem_euclid(360.0);
         let expected = 360.0 * with[0] * 2e-4;
         // What the phases show beyond the configuration is known to a microsecond: 0.2 degrees at 500 Hz.
-        assert!((turned - expected).abs() < 0.3, "{} Hz: {turned} for {expected}", with[0]);
+        assert!(
+            (turned - expected).abs() < 0.3,
+            "{} Hz: {turned} for {expected}",
+            with[0]
+        );
         assert!((with[1] / without[1] - 1.0).abs() < 1e-12);
     }
 }
@@ -148,12 +210,27 @@ fn the_phase_is_given_with_and_without_the_delay() {
 #[test]
 fn rows_rise_in_frequency_over_the_whole_band_and_are_sound() {
     let bench = Bench::new();
-    let rows = rows(&bench, &bench.json("chirp --duration 40 --start 1 --stop 300"));
+    let rows = rows(
+        &bench,
+        &bench.json("chirp --duration 40 --start 1 --stop 300"),
+    );
     assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
     let (first, last) = (rows[0][0], rows[rows.len() - 1][0]);
     // A bin is 1/50 s wide.
-    assert!((1.0..1.03).contains(&first) && (299.5..=300.0).contains(&last), "{first} to {last} Hz");
-    for [_, magnitude, phase, coherence, magnitude_sigma, phase_sigma, resolution] in rows {
+    assert!(
+        (1.0..1.03).contains(&first) && (299.5..=300.0).contains(&last),
+        "{first} to {last} Hz"
+    );
+    for [
+        _,
+        magnitude,
+        phase,
+        coherence,
+        magnitude_sigma,
+        phase_sigma,
+        resolution,
+    ] in rows
+    {
         assert!(magnitude > 0.0 && magnitude_sigma > 0.0 && phase_sigma > 0.0 && resolution > 0.0);
         assert!((0.0..=1.0).contains(&coherence) && phase > -180.0 && phase <= 180.0);
     }
@@ -162,9 +239,13 @@ fn rows_rise_in_frequency_over_the_whole_band_and_are_sound() {
 #[test]
 fn the_same_seed_gives_the_same_run_bit_for_bit_and_another_one_does_not() {
     let digest = |seed: u32| {
-        let answer =
-            Bench::new().json(&format!("chirp --duration 10 --start 5 --stop 100 --amplitude 0.05 --seed {seed}"));
-        answer["loop_digest"].as_str().expect("a digest").to_string()
+        let answer = Bench::new().json(&format!(
+            "chirp --duration 10 --start 5 --stop 100 --amplitude 0.05 --seed {seed}"
+        ));
+        answer["loop_digest"]
+            .as_str()
+            .expect("a digest")
+            .to_string()
     };
     let (one, again, other) = (digest(7), digest(7), digest(8));
     assert_eq!(one, again);
@@ -177,7 +258,10 @@ fn identify_makes_the_same_csv_from_the_recording() {
     let chirp = bench.json("chirp --duration 20 --start 2 --stop 200");
     let recording = chirp["recording"].as_str().expect("a path");
     let identified = bench.json(&format!("identify {recording}"));
-    assert_ne!(chirp["frf_csv"], identified["frf_csv"], "nothing is overwritten");
+    assert_ne!(
+        chirp["frf_csv"], identified["frf_csv"],
+        "nothing is overwritten"
+    );
     let text = |answer: &Value| bench.read(answer["frf_csv"].as_str().expect("a path"));
     assert_eq!(text(&chirp), text(&identified));
 }

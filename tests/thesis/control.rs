@@ -13,7 +13,11 @@ fn measured(answer: &Value, key: &str) -> f64 {
 /// `bench control`, expected to run to its end.
 fn run(arguments: &str) -> Value {
     let answer = Bench::new().json(&format!("control {arguments}"));
-    assert_eq!((&answer["outcome"], &answer["trip"]), (&json!("completed"), &Value::Null), "{arguments}");
+    assert_eq!(
+        (&answer["outcome"], &answer["trip"]),
+        (&json!("completed"), &Value::Null),
+        "{arguments}"
+    );
     answer
 }
 
@@ -21,29 +25,58 @@ fn run(arguments: &str) -> Value {
 fn a_step_of_50_um_settles_as_predicted_the_fast_one_below_a_tenth_of_a_second() {
     for (controller, thesis_s) in [("fast", 0.0858), ("slow", 0.1663)] {
         let answer = run(&format!("--{controller} --duration 3"));
-        let (predicted, found) =
-            (number(&answer["predicted"]["settling_time_s"]), measured(&answer, "settling_time_s"));
-        near(&format!("settling of the {controller} loop"), found, predicted, 0.1 * predicted);
+        let (predicted, found) = (
+            number(&answer["predicted"]["settling_time_s"]),
+            measured(&answer, "settling_time_s"),
+        );
+        near(
+            &format!("settling of the {controller} loop"),
+            found,
+            predicted,
+            0.1 * predicted,
+        );
         // As measured on the stage that was built (section 6.2.3), whose modes are not exactly the model's.
-        near(&format!("settling of the {controller} loop in the thesis"), found, thesis_s, 0.2 * thesis_s);
-        assert!(controller == "slow" || (0.05..0.1).contains(&found), "{found} s");
+        near(
+            &format!("settling of the {controller} loop in the thesis"),
+            found,
+            thesis_s,
+            0.2 * thesis_s,
+        );
+        assert!(
+            controller == "slow" || (0.05..0.1).contains(&found),
+            "{found} s"
+        );
     }
 }
 
 #[test]
 fn the_predicted_step_is_that_of_python() {
     let bench = Bench::new();
-    let settings = ["--set control.controller=fast", "--set control.controller=slow"];
-    let question =
-        |s: &&str| json!({"what": "step", "config": bench.json(&format!("config show {s}")), "seconds": 2.8});
-    let Some(answers) = truth::ask(&settings.iter().map(question).collect::<Vec<_>>()) else { return };
+    let settings = [
+        "--set control.controller=fast",
+        "--set control.controller=slow",
+    ];
+    let question = |s: &&str| json!({"what": "step", "config": bench.json(&format!("config show {s}")), "seconds": 2.8});
+    let Some(answers) = truth::ask(&settings.iter().map(question).collect::<Vec<_>>()) else {
+        return;
+    };
     for (settings, truth) in settings.iter().zip(&answers) {
         // The step comes 0.2 s after the loop closed: 2.8 s of 3 s are left.
         let answer = bench.json(&format!("control {settings} --duration 3"));
         let predicted = &answer["predicted"];
         let settled = number(&truth["settling_time_s"]);
-        near(settings, number(&predicted["settling_time_s"]), settled, 1.01 * 2e-4);
-        near(settings, number(&predicted["overshoot_percent"]), number(&truth["overshoot_percent"]), 1e-6);
+        near(
+            settings,
+            number(&predicted["settling_time_s"]),
+            settled,
+            1.01 * 2e-4,
+        );
+        near(
+            settings,
+            number(&predicted["overshoot_percent"]),
+            number(&truth["overshoot_percent"]),
+            1e-6,
+        );
     }
 }
 
@@ -51,32 +84,62 @@ fn the_predicted_step_is_that_of_python() {
 fn a_step_in_the_very_first_tick_is_measured_like_any_other() {
     let answer = run("--fast --duration 3 --set control.reference.at_s=0");
     let predicted = number(&answer["predicted"]["settling_time_s"]);
-    near("settling", measured(&answer, "settling_time_s"), predicted, 0.1 * predicted);
+    near(
+        "settling",
+        measured(&answer, "settling_time_s"),
+        predicted,
+        0.1 * predicted,
+    );
     let overshoot = number(&answer["predicted"]["overshoot_percent"]);
     // Six sigma of 0.05 um over a step of 50 um.
-    near("overshoot", measured(&answer, "overshoot_percent"), overshoot, 0.6);
+    near(
+        "overshoot",
+        measured(&answer, "overshoot_percent"),
+        overshoot,
+        0.6,
+    );
 }
 
 fn hold(arguments: &str) -> f64 {
     let answer = run(&format!("--reference hold --duration 60 {arguments}"));
     // What drifts by is slow: the mean over a minute is well below sigma.
-    near("mean error", measured(&answer, "steady_state_mean_error_m"), 0.0, 1e-8);
+    near(
+        "mean error",
+        measured(&answer, "steady_state_mean_error_m"),
+        0.0,
+        1e-8,
+    );
     measured(&answer, "steady_state_sigma_m")
 }
 
 #[test]
 fn holding_still_has_the_sigmas_of_the_thesis_with_the_same_floor() {
     for seed in [1, 2, 3, 4] {
-        near("sigma of the fast loop", hold(&format!("--fast --seed {seed}")), 50e-9, 3e-9);
-        near("sigma of the slow loop", hold(&format!("--slow --seed {seed}")), 66e-9, 4e-9);
+        near(
+            "sigma of the fast loop",
+            hold(&format!("--fast --seed {seed}")),
+            50e-9,
+            3e-9,
+        );
+        near(
+            "sigma of the slow loop",
+            hold(&format!("--slow --seed {seed}")),
+            66e-9,
+            4e-9,
+        );
     }
 }
 
 #[test]
 fn the_fast_loop_holds_as_well_at_any_operating_point() {
-    let sigmas: Vec<f64> =
-        ["0%", "2%", "4%", "6%", "8%"].map(|point| hold(&format!("--fast --operating-point {point}"))).into();
-    let (lowest, highest) = sigmas.iter().fold((1.0, 0.0), |(low, high): (f64, f64), s| (low.min(*s), high.max(*s)));
+    let sigmas: Vec<f64> = ["0%", "2%", "4%", "6%", "8%"]
+        .map(|point| hold(&format!("--fast --operating-point {point}")))
+        .into();
+    let (lowest, highest) = sigmas
+        .iter()
+        .fold((1.0, 0.0), |(low, high): (f64, f64), s| {
+            (low.min(*s), high.max(*s))
+        });
     assert!(lowest > 47e-9 && highest < 52e-9, "{sigmas:?}");
     assert!(highest - lowest < 2.5e-9, "{sigmas:?}");
 }
@@ -86,15 +149,24 @@ fn the_sigmas_are_those_of_the_spectra_by_python() {
     let bench = Bench::new();
     let runs = ["fast", "slow"].map(|name| format!("--set control.controller={name}"));
     // The steady state begins 0.5 s after the loop closed.
-    let question =
-        |s: &String| json!({"what": "sigma", "config": bench.json(&format!("config show {s}")), "seconds": 59.5});
-    let Some(answers) = truth::ask(&runs.iter().map(question).collect::<Vec<_>>()) else { return };
+    let question = |s: &String| json!({"what": "sigma", "config": bench.json(&format!("config show {s}")), "seconds": 59.5});
+    let Some(answers) = truth::ask(&runs.iter().map(question).collect::<Vec<_>>()) else {
+        return;
+    };
     for (settings, truth) in runs.iter().zip(&answers) {
         let (sigma, spread) = (number(&truth["sigma_m"]), number(&truth["relative_spread"]));
-        assert!(spread < 0.03, "{spread}: a minute tells sigma to some per cent");
+        assert!(
+            spread < 0.03,
+            "{spread}: a minute tells sigma to some per cent"
+        );
         for seed in [5, 6] {
             // Four standard deviations, and half a per cent for the floor held over each tick and the sum over the lines.
-            near(settings, hold(&format!("{settings} --seed {seed}")), sigma, (4.0 * spread + 0.005) * sigma);
+            near(
+                settings,
+                hold(&format!("{settings} --seed {seed}")),
+                sigma,
+                (4.0 * spread + 0.005) * sigma,
+            );
         }
     }
 }
@@ -106,26 +178,62 @@ fn with_the_lighter_stage_2_the_fast_loop_trips_and_the_recording_says_why() {
     assert_eq!(answer.code, 1, "{}", answer.err);
     let answer = answer.json();
     assert_eq!(answer["outcome"], "tripped");
-    assert_eq!(answer["predicted"]["stable"], false, "and it was known before");
+    assert_eq!(
+        answer["predicted"]["stable"], false,
+        "and it was known before"
+    );
     assert_eq!(answer["measured"], Value::Null);
     let trip = &answer["trip"];
     let recording = Recording::open(&bench.path(answer["recording"].as_str().expect("a path")));
     let ticks = recording.messages("/loop");
     assert_eq!(json!(ticks.len()), answer["ticks"]);
-    assert!(ticks.iter().enumerate().all(|(index, message)| message["tick"] == index), "numbered without a gap");
-    let trips: Vec<Value> = recording.messages("/event").into_iter().filter(|e| e["kind"] == "trip").collect();
+    assert!(
+        ticks
+            .iter()
+            .enumerate()
+            .all(|(index, message)| message["tick"] == index),
+        "numbered without a gap"
+    );
+    let trips: Vec<Value> = recording
+        .messages("/event")
+        .into_iter()
+        .filter(|e| e["kind"] == "trip")
+        .collect();
     assert_eq!(trips.len(), 1, "one trip, latched");
-    assert_eq!((&trips[0]["reason"], &trips[0]["tick"]), (&trip["reason"], &trip["tick"]));
+    assert_eq!(
+        (&trips[0]["reason"], &trips[0]["tick"]),
+        (&trip["reason"], &trip["tick"])
+    );
     let limit = number(&trips[0]["limit"]);
-    assert!(number(&trips[0]["value"]).abs() > limit && limit > 0.0, "value and limit: {}", trips[0]);
+    assert!(
+        number(&trips[0]["value"]).abs() > limit && limit > 0.0,
+        "value and limit: {}",
+        trips[0]
+    );
     let tripped_at = trip["tick"].as_u64().expect("a tick") as usize;
     // In the tick of the trip the current is off, and it stays off: 0.1 s are recorded after it.
-    assert!(ticks[tripped_at..].iter().all(|tick| tick["command_a"] == 0.0));
-    assert!(ticks[..tripped_at].iter().any(|tick| number(&tick["command_a"]).abs() > 0.1));
-    assert!(ticks.len() >= tripped_at + 500, "{} ticks, tripped at {tripped_at}", ticks.len());
+    assert!(
+        ticks[tripped_at..]
+            .iter()
+            .all(|tick| tick["command_a"] == 0.0)
+    );
+    assert!(
+        ticks[..tripped_at]
+            .iter()
+            .any(|tick| number(&tick["command_a"]).abs() > 0.1)
+    );
+    assert!(
+        ticks.len() >= tripped_at + 500,
+        "{} ticks, tripped at {tripped_at}",
+        ticks.len()
+    );
     let results: Value = serde_json::from_str(&recording.attachment("results.json")).expect("JSON");
     assert_eq!(results["trip"]["reason"], trip["reason"]);
-    assert!(recording.attachment("config.toml").contains("mass_asymmetry = -0.1"));
+    assert!(
+        recording
+            .attachment("config.toml")
+            .contains("mass_asymmetry = -0.1")
+    );
 }
 
 #[test]
@@ -133,7 +241,12 @@ fn with_the_lighter_stage_2_the_slow_loop_works() {
     let answer = run("--slow --asymmetry -10% --duration 3");
     assert_eq!(answer["predicted"]["stable"], true);
     let predicted = number(&answer["predicted"]["settling_time_s"]);
-    near("settling", measured(&answer, "settling_time_s"), predicted, 0.1 * predicted);
+    near(
+        "settling",
+        measured(&answer, "settling_time_s"),
+        predicted,
+        0.1 * predicted,
+    );
 }
 
 #[test]
@@ -141,37 +254,69 @@ fn a_run_is_repeated_bit_for_bit_by_its_replay() {
     let bench = Bench::new();
     for arguments in ["--fast --duration 1", "--fast --asymmetry -10%"] {
         let answer = bench.run(&format!("control {arguments} --json")).json();
-        let replayed = bench.json(&format!("replay {}", answer["recording"].as_str().expect("a path")));
-        assert_eq!((&replayed["identical"], &replayed["different"]), (&json!(true), &json!(0)));
+        let replayed = bench.json(&format!(
+            "replay {}",
+            answer["recording"].as_str().expect("a path")
+        ));
+        assert_eq!(
+            (&replayed["identical"], &replayed["different"]),
+            (&json!(true), &json!(0))
+        );
         assert_eq!(replayed["ticks"], answer["ticks"]);
     }
 }
 
 /// Reference and position, both relative to where the stage rested, from the tick at which the loop closed.
 fn followed(bench: &Bench, answer: &Value) -> Vec<(f64, f64)> {
-    let ticks = Recording::open(&bench.path(answer["recording"].as_str().expect("a path"))).messages("/loop");
+    let ticks = Recording::open(&bench.path(answer["recording"].as_str().expect("a path")))
+        .messages("/loop");
     let closed = |tick: &&Value| tick["flags"].as_u64().expect("flags") & 1 == 1;
-    let first = ticks.iter().position(|tick| closed(&tick)).expect("the loop closes");
+    let first = ticks
+        .iter()
+        .position(|tick| closed(&tick))
+        .expect("the loop closes");
     let origin = number(&ticks[first - 1]["reference_m"]);
-    let pair = |tick: &Value| (number(&tick["reference_m"]) - origin, number(&tick["position_m"]) - origin);
+    let pair = |tick: &Value| {
+        (
+            number(&tick["reference_m"]) - origin,
+            number(&tick["position_m"]) - origin,
+        )
+    };
     ticks.iter().filter(closed).map(pair).collect()
 }
 
 #[test]
 fn every_kind_of_reference_is_followed_tick_by_tick() {
     let bench = Bench::new();
-    bench.write("way.csv", "time_s,reference_m\n0,0\n0.5,0\n1.5,20e-6\n2.0,-10e-6\n");
+    bench.write(
+        "way.csv",
+        "time_s,reference_m\n0,0\n0.5,0\n1.5,20e-6\n2.0,-10e-6\n",
+    );
     let ramp = |t: f64, from: f64, to: f64, length: f64| ((t - from) / length).clamp(0.0, 1.0) * to;
     type Way = Box<dyn Fn(f64) -> f64>;
     let ways: [(&str, Way); 5] = [
-        ("step --amplitude -30um", Box::new(|t| if t > 0.19999 { -30e-6 } else { 0.0 })),
+        (
+            "step --amplitude -30um",
+            Box::new(|t| if t > 0.19999 { -30e-6 } else { 0.0 }),
+        ),
         ("hold", Box::new(|_| 0.0)),
-        ("ramp --amplitude 40um --speed 5e-5", Box::new(move |t| ramp(t, 0.2, 40e-6, 0.8))),
-        ("sine --amplitude 20um --frequency 2", Box::new(|t| 20e-6 * (std::f64::consts::TAU * 2.0 * t).sin())),
-        ("way.csv", Box::new(move |t| ramp(t, 0.5, 20e-6, 1.0) + ramp(t, 1.5, -30e-6, 0.5))),
+        (
+            "ramp --amplitude 40um --speed 5e-5",
+            Box::new(move |t| ramp(t, 0.2, 40e-6, 0.8)),
+        ),
+        (
+            "sine --amplitude 20um --frequency 2",
+            Box::new(|t| 20e-6 * (std::f64::consts::TAU * 2.0 * t).sin()),
+        ),
+        (
+            "way.csv",
+            Box::new(move |t| ramp(t, 0.5, 20e-6, 1.0) + ramp(t, 1.5, -30e-6, 0.5)),
+        ),
     ];
     for (arguments, way) in ways {
-        let answer = bench.json(&format!("control --fast --duration 3 --reference {arguments}"));
+        let answer = bench.json(&format!(
+            "control --fast --duration 3 --reference {arguments}"
+        ));
         let run = followed(&bench, &answer);
         assert_eq!(run.len(), 15_000, "{arguments}");
         for (tick, (reference, _)) in run.iter().enumerate() {
@@ -181,7 +326,10 @@ fn every_kind_of_reference_is_followed_tick_by_tick() {
         // floor's lowest line, 0.05 um at 8 Hz over four cycles.
         let rest = &run[12_500..];
         let mean = rest.iter().map(|(r, y)| r - y).sum::<f64>() / rest.len() as f64;
-        assert!(arguments.starts_with("sine") || mean.abs() < 2e-8, "{arguments}: {mean} m left over");
+        assert!(
+            arguments.starts_with("sine") || mean.abs() < 2e-8,
+            "{arguments}: {mean} m left over"
+        );
     }
 }
 
@@ -189,20 +337,38 @@ fn every_kind_of_reference_is_followed_tick_by_tick() {
 fn a_sine_is_followed_with_the_error_that_the_sensitivity_predicts() {
     let bench = Bench::new();
     let omega = std::f64::consts::TAU * 5.0;
-    let question = json!({"what": "loop", "config": bench.json("config show"), "omega_rad_s": [omega]});
-    let Some(answers) = truth::ask(&[question]) else { return };
+    let question =
+        json!({"what": "loop", "config": bench.json("config show"), "omega_rad_s": [omega]});
+    let Some(answers) = truth::ask(&[question]) else {
+        return;
+    };
     let sensitivity = number(&answers[0]["sensitivity"][0]);
-    let answer = bench.json("control --fast --duration 8.5 --reference sine --amplitude 20um --frequency 5");
+    let answer =
+        bench.json("control --fast --duration 8.5 --reference sine --amplitude 20um --frequency 5");
     // The error is a sine of |S| A; the 50 nm of the steady state add as squares. 0.5 s to settle leave 40 whole cycles.
     let expected = (0.5 * (sensitivity * 20e-6).powi(2) + 50e-9f64.powi(2)).sqrt();
-    near("RMS error", measured(&answer, "steady_state_sigma_m"), expected, 0.02 * expected);
+    near(
+        "RMS error",
+        measured(&answer, "steady_state_sigma_m"),
+        expected,
+        0.02 * expected,
+    );
 }
 
 #[test]
 fn the_answer_has_the_promised_keys() {
     let answer = run("--fast --duration 1");
-    for key in ["outcome", "trip", "ticks", "overruns", "lost_records", "recording", "predicted", "measured", "timing"]
-    {
+    for key in [
+        "outcome",
+        "trip",
+        "ticks",
+        "overruns",
+        "lost_records",
+        "recording",
+        "predicted",
+        "measured",
+        "timing",
+    ] {
         assert!(answer.get(key).is_some(), "{key} is missing: {answer}");
     }
     for key in [
@@ -216,14 +382,32 @@ fn the_answer_has_the_promised_keys() {
         "crossings",
         "continuous",
     ] {
-        assert!(answer["predicted"].get(key).is_some(), "predicted.{key} is missing: {answer}");
+        assert!(
+            answer["predicted"].get(key).is_some(),
+            "predicted.{key} is missing: {answer}"
+        );
     }
-    for key in ["settling_time_s", "overshoot_percent", "steady_state_mean_error_m", "steady_state_sigma_m"] {
-        assert!(answer["measured"][key].is_f64(), "measured.{key} is missing: {answer}");
+    for key in [
+        "settling_time_s",
+        "overshoot_percent",
+        "steady_state_mean_error_m",
+        "steady_state_sigma_m",
+    ] {
+        assert!(
+            answer["measured"][key].is_f64(),
+            "measured.{key} is missing: {answer}"
+        );
     }
-    for (key, inner) in [("lateness_ns", "p50"), ("lateness_ns", "p9999"), ("compute_ns", "p99"), ("compute_ns", "max")]
-    {
-        assert!(answer["timing"][key][inner].is_u64(), "timing.{key}.{inner} is missing: {answer}");
+    for (key, inner) in [
+        ("lateness_ns", "p50"),
+        ("lateness_ns", "p9999"),
+        ("compute_ns", "p99"),
+        ("compute_ns", "max"),
+    ] {
+        assert!(
+            answer["timing"][key][inner].is_u64(),
+            "timing.{key}.{inner} is missing: {answer}"
+        );
     }
     assert_eq!(answer["timing"]["pace"], "virtual");
     assert!(answer["timing"]["policy"].is_string());

@@ -6,11 +6,14 @@ use crate::program::{Bench, near, number};
 use crate::truth;
 
 fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key].as_array().unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
+    answer[key]
+        .as_array()
+        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
 }
 
 /// The stage of Chapter 2 with the printed m3 and D = 1 %.
-const ONE_PER_CENT: &str = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018 --asymmetry 1%";
+const ONE_PER_CENT: &str =
+    "--config chapter2 --set plant.secondary_stage_mass_kg=0.018 --asymmetry 1%";
 
 fn over_operating_point(bench: &Bench, count: u32) -> Value {
     bench.json(&format!(
@@ -26,12 +29,31 @@ fn over_the_operating_point_the_zeros_leave_the_axis_at_3_40_and_come_back_at_6_
         let changes = list(&answer, "changes");
         assert_eq!(changes.len(), 2, "with {count} values: {answer}");
         // Printed in steps of 0.05 %: the first and the last with zeros.
-        near("the lower end", number(&changes[0]["value"]) / 0.0475, 0.0340, 5e-4);
-        near("the upper end", number(&changes[1]["value"]) / 0.0475, 0.0675, 5e-4);
-        for (change, (before, after)) in changes.iter().zip([("MMP", "CMP-CNMP"), ("CMP-CNMP", "MMP")]) {
+        near(
+            "the lower end",
+            number(&changes[0]["value"]) / 0.0475,
+            0.0340,
+            5e-4,
+        );
+        near(
+            "the upper end",
+            number(&changes[1]["value"]) / 0.0475,
+            0.0675,
+            5e-4,
+        );
+        for (change, (before, after)) in changes
+            .iter()
+            .zip([("MMP", "CMP-CNMP"), ("CMP-CNMP", "MMP")])
+        {
             assert_eq!(change["at"], "imaginary axis");
-            assert!(change["before"].as_str().expect("words").contains(before), "{change}");
-            assert!(change["after"].as_str().expect("words").contains(after), "{change}");
+            assert!(
+                change["before"].as_str().expect("words").contains(before),
+                "{change}"
+            );
+            assert!(
+                change["after"].as_str().expect("words").contains(after),
+                "{change}"
+            );
         }
     }
 }
@@ -41,7 +63,9 @@ fn python_finds_the_same_ends_of_the_band() {
     let bench = Bench::new();
     let config = bench.json(&format!("config show {ONE_PER_CENT}"));
     let points: Vec<f64> = (4..=60).map(|i| 0.0025 * f64::from(i)).collect();
-    let Some(answers) = truth::ask(&[json!({"what": "bands", "config": config, "operating_points": points})]) else {
+    let Some(answers) =
+        truth::ask(&[json!({"what": "bands", "config": config, "operating_points": points})])
+    else {
         return;
     };
     let answer = over_operating_point(&bench, 30);
@@ -49,7 +73,12 @@ fn python_finds_the_same_ends_of_the_band() {
     assert_eq!((ours.len(), theirs.len()), (2, 2));
     for (change, edge) in ours.iter().zip(theirs) {
         // Both call a pair complex from 1e-7 of its size on: 1e-14 beside the end, and the rounding of either pencil.
-        near("an end of the band", number(&change["value"]) / 0.0475, number(edge), 1e-9);
+        near(
+            "an end of the band",
+            number(&change["value"]) / 0.0475,
+            number(edge),
+            1e-9,
+        );
     }
 }
 
@@ -60,10 +89,25 @@ fn where_zeros_meet_the_residue_of_mode_r_is_the_critical_one() {
     for change in list(&over_operating_point(&Bench::new(), 30), "changes") {
         let form = &change["closed_form"];
         let of = |key: &str| number(&form[key]);
-        near("aR by Eq. (4-5), shifted", of("eq_4_5_shifted") / of("residue_r"), 1.0, 1e-5);
-        near("b2 by Eq. (4-6), shifted", of("eq_4_6_shifted") / of("b2"), 1.0, 1e-5);
+        near(
+            "aR by Eq. (4-5), shifted",
+            of("eq_4_5_shifted") / of("residue_r"),
+            1.0,
+            1e-5,
+        );
+        near(
+            "b2 by Eq. (4-6), shifted",
+            of("eq_4_6_shifted") / of("b2"),
+            1.0,
+            1e-5,
+        );
         // As a double integrator mode R is too slow by (18/153)^2 = 1.4 % in the squares of frequencies.
-        near("aR by Eq. (4-5)", of("eq_4_5") / of("residue_r"), 1.014, 2e-3);
+        near(
+            "aR by Eq. (4-5)",
+            of("eq_4_5") / of("residue_r"),
+            1.014,
+            2e-3,
+        );
     }
 }
 
@@ -72,13 +116,22 @@ fn the_tracks_are_the_zeros_of_model_modes_and_do_not_jump() {
     let bench = Bench::new();
     let answer = over_operating_point(&bench, 101);
     let (values, tracks) = (list(&answer, "values"), list(&answer, "tracks"));
-    let at = |track: &Value, k: usize| (number(&track["re_rad_s"][k]), number(&track["im_rad_s"][k]));
+    let at =
+        |track: &Value, k: usize| (number(&track["re_rad_s"][k]), number(&track["im_rad_s"][k]));
     for k in [0, 30, 60, 100] {
-        let modes = bench.json(&format!("model modes {ONE_PER_CENT} --operating-point {}", values[k]));
+        let modes = bench.json(&format!(
+            "model modes {ONE_PER_CENT} --operating-point {}",
+            values[k]
+        ));
         for track in tracks {
             let (re, im) = at(track, k);
-            let distance = |zero: &Value| (number(&zero["re_rad_s"]) - re).hypot(number(&zero["im_rad_s"]) - im);
-            let nearest = list(&modes, "zeros").iter().map(distance).fold(f64::MAX, f64::min);
+            let distance = |zero: &Value| {
+                (number(&zero["re_rad_s"]) - re).hypot(number(&zero["im_rad_s"]) - im)
+            };
+            let nearest = list(&modes, "zeros")
+                .iter()
+                .map(distance)
+                .fold(f64::MAX, f64::min);
             near("the distance to a zero", nearest, 0.0, 1e-6);
         }
     }
@@ -93,7 +146,9 @@ fn the_tracks_are_the_zeros_of_model_modes_and_do_not_jump() {
         }
     }
     let csv = bench.read("tracks.csv");
-    assert!(csv.starts_with("plant.operating_point_m,zero_1_re_rad_s,zero_1_im_rad_s,zero_2_re_rad_s"));
+    assert!(
+        csv.starts_with("plant.operating_point_m,zero_1_re_rad_s,zero_1_im_rad_s,zero_2_re_rad_s")
+    );
     assert_eq!(csv.lines().count(), 102);
 }
 
@@ -112,9 +167,19 @@ fn damping_delays_the_change_to_cnmp_zeros() {
             .collect::<Vec<_>>()
     };
     let (undamped, damped) = (locus(""), locus("--damped"));
-    assert_eq!((undamped.len(), damped.len()), (2, 2), "{undamped:?} {damped:?}");
-    assert!(damped.iter().all(|(at, _)| at == "imaginary axis"), "{damped:?}");
-    assert!(damped[0].1 > undamped[0].1 && damped[1].1 < undamped[1].1, "{undamped:?} {damped:?}");
+    assert_eq!(
+        (undamped.len(), damped.len()),
+        (2, 2),
+        "{undamped:?} {damped:?}"
+    );
+    assert!(
+        damped.iter().all(|(at, _)| at == "imaginary axis"),
+        "{damped:?}"
+    );
+    assert!(
+        damped[0].1 > undamped[0].1 && damped[1].1 < undamped[1].1,
+        "{undamped:?} {damped:?}"
+    );
 }
 
 #[test]
@@ -122,7 +187,12 @@ fn the_critical_damping_is_printed_as_0_2240() {
     let answer = Bench::new().json("model critical-damping");
     near("Eq. (3-16)", number(&answer["eq_3_16"]), 0.2240, 5e-5);
     // The double root of the crossing condition, solved with scipy: 0.22438943.
-    near("the damping that touches", number(&answer["touching"]), 0.224_389_43, 1e-8);
+    near(
+        "the damping that touches",
+        number(&answer["touching"]),
+        0.224_389_43,
+        1e-8,
+    );
 }
 
 #[test]
@@ -134,16 +204,33 @@ fn the_opening_angle_is_the_integral_of_eq_1_2() {
         list(&answer, "zeros")[0].clone()
     };
     let bounds: Vec<Value> = bands.iter().map(|band| bound(*band)).collect();
-    let zero = [number(&bounds[0]["re_rad_s"]), number(&bounds[0]["im_rad_s"])];
+    let zero = [
+        number(&bounds[0]["re_rad_s"]),
+        number(&bounds[0]["im_rad_s"]),
+    ];
     near("the zero", zero[0], 12.8, 0.05);
-    let questions: Vec<Value> =
-        bands.iter().map(|band| json!({"what": "angle", "zeros": [[zero[0], zero[1], band]]})).collect();
-    let Some(answers) = truth::ask(&questions) else { return };
+    let questions: Vec<Value> = bands
+        .iter()
+        .map(|band| json!({"what": "angle", "zeros": [[zero[0], zero[1], band]]}))
+        .collect();
+    let Some(answers) = truth::ask(&questions) else {
+        return;
+    };
     for (bound, answer) in bounds.iter().zip(&answers) {
         let angle = number(&answer[0]);
-        near("Theta", number(&bound["opening_angle_deg"]).to_radians(), angle, 1e-10);
+        near(
+            "Theta",
+            number(&bound["opening_angle_deg"]).to_radians(),
+            angle,
+            1e-10,
+        );
         let peak = (1.0f64 / 0.3).powf(angle / (std::f64::consts::PI - angle));
-        near("the peak", number(&bound["sensitivity_peak"]) / peak, 1.0, 1e-8);
+        near(
+            "the peak",
+            number(&bound["sensitivity_peak"]) / peak,
+            1.0,
+            1e-8,
+        );
     }
 }
 
@@ -155,15 +242,25 @@ fn the_fast_loop_keeps_to_the_bound_of_its_zeros() {
     let margins = bench.json("margins --fast --continuous");
     assert_eq!(margins["stable"], true);
     let band = number(&margins["sensitivity_bandwidth_rad_s"]);
-    let answer = bench.json(&format!("model bounds --alpha 0.70710678 --bandwidth {band}"));
+    let answer = bench.json(&format!(
+        "model bounds --alpha 0.70710678 --bandwidth {band}"
+    ));
     let bounds = list(&answer, "damped_zeros");
     assert_eq!(bounds.len(), 1, "one CNMP pair: {answer}");
     let peak = 10f64.powf(number(&margins["sensitivity_peak_db"]) / 20.0);
     let least = number(&bounds[0]["sensitivity_peak"]);
-    assert!(1.0 < least && least < peak, "{least} is guaranteed, {peak} is there");
+    assert!(
+        1.0 < least && least < peak,
+        "{least} is guaranteed, {peak} is there"
+    );
     // The other way round: a band for a peak, and the peak of that band.
     let answer = bench.json("model bounds --alpha 0.4 --peak 2.5");
-    near("the peak of the band", number(&list(&answer, "damped_zeros")[0]["sensitivity_peak"]), 2.5, 1e-9);
+    near(
+        "the peak of the band",
+        number(&list(&answer, "damped_zeros")[0]["sensitivity_peak"]),
+        2.5,
+        1e-9,
+    );
 }
 
 #[test]
@@ -171,19 +268,33 @@ fn model_modes_tells_the_bound_beside_the_zeros() {
     let bench = Bench::new();
     let (modes, bounds) = (bench.json("model modes"), bench.json("model bounds"));
     assert_eq!(modes["bounds"], bounds["zeros"]);
-    assert!(bench.run("model modes").out.contains("|S| < 0.5 with a peak below 2: up to 530.4 rad/s"));
+    assert!(
+        bench
+            .run("model modes")
+            .out
+            .contains("|S| < 0.5 with a peak below 2: up to 530.4 rad/s")
+    );
 }
 
 #[test]
 fn a_setting_that_moves_no_zero_is_said_to_move_none() {
-    let answer = Bench::new().run("model locus --vary sim.probe_noise_rms_m --from 0 --to 1e-9 --count 3");
-    assert!(answer.out.contains("the zeros do not depend on sim.probe_noise_rms_m"), "{answer:?}");
+    let answer =
+        Bench::new().run("model locus --vary sim.probe_noise_rms_m --from 0 --to 1e-9 --count 3");
+    assert!(
+        answer
+            .out
+            .contains("the zeros do not depend on sim.probe_noise_rms_m"),
+        "{answer:?}"
+    );
 }
 
 #[test]
 fn a_stage_without_zeros_in_the_right_half_plane_has_no_bound() {
     let answer = Bench::new().json("model bounds --asymmetry -10%");
-    assert!(list(&answer, "zeros").is_empty() && list(&answer, "damped_zeros").is_empty(), "{answer}");
+    assert!(
+        list(&answer, "zeros").is_empty() && list(&answer, "damped_zeros").is_empty(),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -198,24 +309,39 @@ fn the_stage_as_built_is_read_from_table_3_3() {
     }
     // At rest in Y one mode shows: no table is about that.
     let answer = bench.json("model sequence --operating-point 0%");
-    assert_eq!((&answer["dominant_sequence"], &answer["table"]), (&json!("[R]"), &Value::Null));
+    assert_eq!(
+        (&answer["dominant_sequence"], &answer["table"]),
+        (&json!("[R]"), &Value::Null)
+    );
 }
 
 #[test]
 fn the_step_of_the_stage_is_as_its_zeros_foretell() {
     let bench = Bench::new();
     for asymmetry in ["10%", "2%", "-10%"] {
-        let answer = bench.json(&format!("model step --asymmetry {asymmetry} --csv step.csv --count 500"));
+        let answer = bench.json(&format!(
+            "model step --asymmetry {asymmetry} --csv step.csv --count 500"
+        ));
         assert_eq!(answer["foretold"]["agrees"], true, "{answer}");
         assert_eq!(answer["initial_undershoot"], false);
         // k4 + k5 = 72 kN/m holds the motor at rest.
         near("the end", number(&answer["end_m_per_n"]) * 72e3, 1.0, 1e-2);
         let csv = bench.read("step.csv");
-        assert!(csv.starts_with("time_s,displacement_m_per_n,mode_1_m_per_n,mode_2_m_per_n,mode_3_m_per_n\n0e0,0e0,"));
+        assert!(csv.starts_with(
+            "time_s,displacement_m_per_n,mode_1_m_per_n,mode_2_m_per_n,mode_3_m_per_n\n0e0,0e0,"
+        ));
         assert_eq!(csv.lines().count(), 501);
         for line in csv.lines().skip(1) {
-            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("a number")).collect();
-            near("the sum of the modes", cells[1], cells[2..].iter().sum(), 1e-15);
+            let cells: Vec<f64> = line
+                .split(',')
+                .map(|cell| cell.parse().expect("a number"))
+                .collect();
+            near(
+                "the sum of the modes",
+                cells[1],
+                cells[2..].iter().sum(),
+                1e-15,
+            );
         }
     }
 }

@@ -7,20 +7,27 @@ use crate::program::{Bench, near, number};
 const PRINTED: &str = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018";
 
 fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key].as_array().unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
+    answer[key]
+        .as_array()
+        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
 }
 
 /// The operating points with a CNMP pair at one of the asymmetries, by its place.
 fn band(answer: &Value, column: usize) -> Vec<f64> {
-    let rows = list(answer, "operating_points").iter().zip(list(answer, "cnmp_pairs"));
-    rows.filter(|(_, row)| row[column] == 1).map(|(point, _)| number(point)).collect()
+    let rows = list(answer, "operating_points")
+        .iter()
+        .zip(list(answer, "cnmp_pairs"));
+    rows.filter(|(_, row)| row[column] == 1)
+        .map(|(point, _)| number(point))
+        .collect()
 }
 
 #[test]
 fn at_one_per_cent_the_band_reaches_from_3_399_to_6_765_per_cent_of_l() {
     // Points 0.002 % apart: the first and the last with zeros stand at most so far inside of the printed ends.
-    let answer =
-        Bench::new().json(&format!("model map {PRINTED} --operating-points 0%:15%:7501 --asymmetries 0%:1%:2"));
+    let answer = Bench::new().json(&format!(
+        "model map {PRINTED} --operating-points 0%:15%:7501 --asymmetries 0%:1%:2"
+    ));
     let band = band(&answer, 1);
     near("its lower end", band[0], 0.03399, 2.5e-5);
     near("its upper end", band[band.len() - 1], 0.06765, 2.5e-5);
@@ -31,10 +38,17 @@ fn at_one_per_cent_the_band_reaches_from_3_399_to_6_765_per_cent_of_l() {
 #[test]
 fn without_excess_mass_there_are_none_up_to_15_per_cent_of_l() {
     for profile in ["stage", "chapter2"] {
-        let answer = Bench::new()
-            .json(&format!("model map --config {profile} --operating-points -15%:15%:301 --asymmetries -20%:0%:81"));
+        let answer = Bench::new().json(&format!(
+            "model map --config {profile} --operating-points -15%:15%:301 --asymmetries -20%:0%:81"
+        ));
         for row in list(&answer, "cnmp_pairs") {
-            assert!(row.as_array().expect("a row").iter().all(|pairs| *pairs == 0), "{profile}: {row}");
+            assert!(
+                row.as_array()
+                    .expect("a row")
+                    .iter()
+                    .all(|pairs| *pairs == 0),
+                "{profile}: {row}"
+            );
         }
     }
 }
@@ -42,15 +56,23 @@ fn without_excess_mass_there_are_none_up_to_15_per_cent_of_l() {
 #[test]
 fn the_csv_holds_every_point_and_the_text_draws_it() {
     let bench = Bench::new();
-    let answer =
-        bench.run(&format!("model map {PRINTED} --operating-points 3%:7%:5 --asymmetries -0.01:0.01:3 --csv map.csv"));
+    let answer = bench.run(&format!(
+        "model map {PRINTED} --operating-points 3%:7%:5 --asymmetries -0.01:0.01:3 --csv map.csv"
+    ));
     assert_eq!(answer.code, 0, "{}", answer.err);
     // By the band above: at +1 % zeros at 4, 5 and 6 % of L.
     assert_eq!(answer.out.matches("..1").count(), 3, "{}", answer.out);
     assert_eq!(answer.out.matches("...\n").count(), 2, "{}", answer.out);
     let csv = bench.read("map.csv");
-    assert_eq!((csv.lines().count(), csv.lines().next()), (16, Some("operating_point,mass_asymmetry,cnmp_pairs")));
-    assert_eq!(csv.lines().filter(|line| line.ends_with(",1")).count(), 3, "{csv}");
+    assert_eq!(
+        (csv.lines().count(), csv.lines().next()),
+        (16, Some("operating_point,mass_asymmetry,cnmp_pairs"))
+    );
+    assert_eq!(
+        csv.lines().filter(|line| line.ends_with(",1")).count(),
+        3,
+        "{csv}"
+    );
 }
 
 #[test]
@@ -68,6 +90,11 @@ fn what_is_no_map_is_refused_with_the_remedy() {
         ("--asymmetry 5%", "leave them out"),
     ] {
         let answer = bench.run(&format!("model map {arguments}"));
-        assert!(answer.code == 2 && answer.err.contains(remedy), "{arguments}: {} {}", answer.code, answer.err);
+        assert!(
+            answer.code == 2 && answer.err.contains(remedy),
+            "{arguments}: {} {}",
+            answer.code,
+            answer.err
+        );
     }
 }

@@ -12,7 +12,12 @@ fn margins(arguments: &str) -> Value {
 /// Asserts a figure of the answer to a relative tolerance.
 #[track_caller]
 fn within(answer: &Value, key: &str, expected: f64, relative: f64) {
-    near(key, number(&answer[key]), expected, relative * expected.abs());
+    near(
+        key,
+        number(&answer[key]),
+        expected,
+        relative * expected.abs(),
+    );
 }
 
 #[test]
@@ -22,12 +27,17 @@ fn the_fast_controller_in_continuous_time_has_the_margins_of_the_thesis() {
     within(&found, "crossover_rad_s", 284.3, 0.01);
     within(&found, "phase_margin_deg", 42.0, 0.01);
     within(&found, "modulus_margin", 0.497, 0.01);
-    assert_eq!((&found["stable"], &found["continuous"]), (&json!(true), &json!(true)));
+    assert_eq!(
+        (&found["stable"], &found["continuous"]),
+        (&json!(true), &json!(true))
+    );
 }
 
 #[test]
 fn with_a_damping_ratio_of_0_004_in_every_mode_the_fast_controller_has_41_4_degrees() {
-    let found = margins("--fast --continuous --set plant.damping.kind=uniform --set plant.damping.ratio=0.004");
+    let found = margins(
+        "--fast --continuous --set plant.damping.kind=uniform --set plant.damping.ratio=0.004",
+    );
     within(&found, "crossover_rad_s", 284.3, 0.01);
     within(&found, "phase_margin_deg", 41.4, 0.01);
     within(&found, "modulus_margin", 0.497, 0.01);
@@ -40,47 +50,89 @@ fn the_slow_controller_in_continuous_time_has_18_7_rad_s_and_72_9_degrees() {
     assert_eq!(found["stable"], true);
     // The ringing first mode crosses |L| = 1 again, further from -1 in phase: the margin is that of the first crossing.
     within(&found, "phase_margin_deg", 72.9, 0.01);
-    near("of the first crossing", number(&found["crossings"][0]["phase_margin_deg"]), 72.9, 0.729);
+    near(
+        "of the first crossing",
+        number(&found["crossings"][0]["phase_margin_deg"]),
+        72.9,
+        0.729,
+    );
 }
 
 #[test]
 fn sampling_costs_the_fast_controller_its_margin() {
-    for (rate_hz, phase_deg, phase_tolerance, modulus) in
-        [(5000, 34.5, 1.0, Some(0.423)), (2000, 27.0, 1.0, None), (1000, 15.0, 1.0, Some(0.20))]
-    {
+    for (rate_hz, phase_deg, phase_tolerance, modulus) in [
+        (5000, 34.5, 1.0, Some(0.423)),
+        (2000, 27.0, 1.0, None),
+        (1000, 15.0, 1.0, Some(0.20)),
+    ] {
         // At 1 kHz the default excitation, up to 500 Hz, would reach half the rate.
-        let found = margins(&format!("--fast --set loop.rate_hz={rate_hz} --set chirp.stop_hz=400"));
-        near(&format!("phase margin at {rate_hz} Hz"), number(&found["phase_margin_deg"]), phase_deg, phase_tolerance);
+        let found = margins(&format!(
+            "--fast --set loop.rate_hz={rate_hz} --set chirp.stop_hz=400"
+        ));
+        near(
+            &format!("phase margin at {rate_hz} Hz"),
+            number(&found["phase_margin_deg"]),
+            phase_deg,
+            phase_tolerance,
+        );
         if let Some(modulus) = modulus {
-            near(&format!("modulus margin at {rate_hz} Hz"), number(&found["modulus_margin"]), modulus, 0.01);
+            near(
+                &format!("modulus margin at {rate_hz} Hz"),
+                number(&found["modulus_margin"]),
+                modulus,
+                0.01,
+            );
         }
-        assert_eq!((&found["stable"], &found["continuous"]), (&json!(true), &json!(false)));
+        assert_eq!(
+            (&found["stable"], &found["continuous"]),
+            (&json!(true), &json!(false))
+        );
     }
 }
 
 #[test]
 fn with_the_lighter_stage_2_the_fast_controller_is_unstable_and_the_slow_one_is_not() {
     for time in ["", "--continuous"] {
-        assert_eq!(margins(&format!("--fast --asymmetry -10% {time}"))["stable"], false);
-        assert_eq!(margins(&format!("--slow --asymmetry -10% {time}"))["stable"], true);
+        assert_eq!(
+            margins(&format!("--fast --asymmetry -10% {time}"))["stable"],
+            false
+        );
+        assert_eq!(
+            margins(&format!("--slow --asymmetry -10% {time}"))["stable"],
+            true
+        );
     }
 }
 
 #[test]
 fn each_period_of_delay_turns_the_loop_by_omega_t_and_leaves_its_gain() {
-    let of = |delay: u32| margins(&format!("--fast --set loop.computing_delay_periods={delay}"));
+    let of = |delay: u32| {
+        margins(&format!(
+            "--fast --set loop.computing_delay_periods={delay}"
+        ))
+    };
     let (none, one, three) = (of(0), of(1), of(3));
     let (w, period_s) = (number(&none["crossover_rad_s"]), 2e-4);
     for (answer, periods) in [(&one, 1.0), (&three, 3.0)] {
         near("crossover", number(&answer["crossover_rad_s"]), w, 1e-9 * w);
         let turned = number(&none["phase_margin_deg"]) - number(&answer["phase_margin_deg"]);
-        near("the turn", turned, (w * period_s * periods).to_degrees(), 1e-6);
+        near(
+            "the turn",
+            turned,
+            (w * period_s * periods).to_degrees(),
+            1e-6,
+        );
     }
 }
 
 #[test]
 fn the_peak_of_the_sensitivity_is_the_reciprocal_of_the_modulus_margin() {
-    for arguments in ["--fast", "--slow", "--fast --continuous", "--fast --asymmetry -10%"] {
+    for arguments in [
+        "--fast",
+        "--slow",
+        "--fast --continuous",
+        "--fast --asymmetry -10%",
+    ] {
         let found = margins(arguments);
         let from_peak = 10f64.powf(-number(&found["sensitivity_peak_db"]) / 20.0);
         within(&found, "modulus_margin", from_peak, 1e-12);
@@ -90,11 +142,17 @@ fn the_peak_of_the_sensitivity_is_the_reciprocal_of_the_modulus_margin() {
 #[test]
 fn without_gain_there_is_no_crossing_and_the_loop_is_as_stable_as_the_stage() {
     let bench = Bench::new();
-    bench.write("off.toml", "title = \"off\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 0.0\n");
+    bench.write(
+        "off.toml",
+        "title = \"off\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 0.0\n",
+    );
     for time in ["", "--continuous"] {
         let found = bench.json(&format!("margins --controller off.toml {time}"));
         assert_eq!(found["stable"], true, "{time}");
-        assert_eq!((&found["crossover_rad_s"], &found["crossings"]), (&Value::Null, &json!([])));
+        assert_eq!(
+            (&found["crossover_rad_s"], &found["crossings"]),
+            (&Value::Null, &json!([]))
+        );
         assert_eq!(found["modulus_margin"], 1.0);
     }
 }
@@ -103,10 +161,21 @@ fn without_gain_there_is_no_crossing_and_the_loop_is_as_stable_as_the_stage() {
 fn controller(draw: &mut Draw) -> String {
     // The stage's static compliance is 154.4 um/A: an integrator of K A/um/s crosses at 154.4 K rad/s.
     let gain = draw.over_decades(3.0, 120.0) / 154.4;
-    let (zero, pole, low_pass) =
-        (draw.over_decades(20.0, 500.0), draw.over_decades(100.0, 3000.0), draw.over_decades(300.0, 5000.0));
-    let (notch, depth, width) = (draw.between(300.0, 700.0), draw.over_decades(0.005, 0.5), draw.between(0.1, 1.0));
-    let prewarp = if *draw.one_of(&[true, false]) { format!("prewarp_rad_s = {notch:?}\n") } else { String::new() };
+    let (zero, pole, low_pass) = (
+        draw.over_decades(20.0, 500.0),
+        draw.over_decades(100.0, 3000.0),
+        draw.over_decades(300.0, 5000.0),
+    );
+    let (notch, depth, width) = (
+        draw.between(300.0, 700.0),
+        draw.over_decades(0.005, 0.5),
+        draw.between(0.1, 1.0),
+    );
+    let prewarp = if *draw.one_of(&[true, false]) {
+        format!("prewarp_rad_s = {notch:?}\n")
+    } else {
+        String::new()
+    };
     let (w, zeta) = (draw.over_decades(400.0, 4000.0), draw.between(0.3, 1.2));
     let (a, b) = (draw.over_decades(300.0, 3000.0), draw.between(0.4, 1.5));
     // Every section but the integrator has unit gain at rest: `low_pass` and `pole/zero` stand in the gain.
@@ -131,9 +200,15 @@ fn margins_of_all_controllers_over_operating_points_and_rates_equal_those_of_pyt
         let name = match index % 3 {
             0 => "fast".to_string(),
             1 => "slow".to_string(),
-            _ => bench.write(&format!("{index}.toml"), controller(&mut draw)).display().to_string(),
+            _ => bench
+                .write(&format!("{index}.toml"), controller(&mut draw))
+                .display()
+                .to_string(),
         };
-        let (point, rate_hz) = (draw.between(0.0, 9.0), draw.one_of(&[1000, 2000, 5000, 20_000]));
+        let (point, rate_hz) = (
+            draw.between(0.0, 9.0),
+            draw.one_of(&[1000, 2000, 5000, 20_000]),
+        );
         let asymmetry = draw.one_of(&["10%", "5%", "-2%", "-10%"]);
         let delay = draw.one_of(&[0, 1, 1, 2]);
         let settings = format!(
@@ -143,35 +218,76 @@ fn margins_of_all_controllers_over_operating_points_and_rates_equal_those_of_pyt
         drawn.extend([(settings.clone(), false), (settings, true)]);
     }
     let question = |(settings, continuous): &(String, bool)| json!({"what": "margins", "config": bench.json(&format!("config show {settings}")), "continuous": continuous});
-    let Some(answers) = truth::ask(&drawn.iter().map(question).collect::<Vec<_>>()) else { return };
+    let Some(answers) = truth::ask(&drawn.iter().map(question).collect::<Vec<_>>()) else {
+        return;
+    };
     for ((settings, continuous), truth) in drawn.iter().zip(&answers) {
         let time = if *continuous { "--continuous" } else { "" };
-        same_margins(&bench.json(&format!("margins {settings} {time}")), truth, &format!("{settings} {time}"));
+        same_margins(
+            &bench.json(&format!("margins {settings} {time}")),
+            truth,
+            &format!("{settings} {time}"),
+        );
     }
-    let stable = answers.iter().filter(|truth| truth["stable"] == true).count();
-    assert!((8..=40).contains(&stable), "both cases must be among the draws: {stable} of 48 are stable");
+    let stable = answers
+        .iter()
+        .filter(|truth| truth["stable"] == true)
+        .count();
+    assert!(
+        (8..=40).contains(&stable),
+        "both cases must be among the draws: {stable} of 48 are stable"
+    );
 }
 
 /// To 1e-4 relative; angles also to 1e-4 degrees, where they are small.
 fn same_margins(ours: &Value, truth: &Value, settings: &str) {
     // A pole that is 1e-6 rad/s from the border may be on either side by rounding.
-    assert!(number(&truth["border_rad_s"]) > 1e-6, "draw another: {settings}");
+    assert!(
+        number(&truth["border_rad_s"]) > 1e-6,
+        "draw another: {settings}"
+    );
     assert_eq!(ours["stable"], truth["stable"], "{settings}");
     let same = |what: &str, ours: &Value, truth: &Value| match truth.as_f64() {
-        None => assert!(ours.is_null(), "{what} is {ours}, Python finds none: {settings}"),
+        None => assert!(
+            ours.is_null(),
+            "{what} is {ours}, Python finds none: {settings}"
+        ),
         Some(expected) => {
-            near(&format!("{what} with {settings}"), number(ours), expected, 1e-4 * expected.abs().max(1.0));
+            near(
+                &format!("{what} with {settings}"),
+                number(ours),
+                expected,
+                1e-4 * expected.abs().max(1.0),
+            );
         }
     };
-    for key in ["crossover_rad_s", "phase_margin_deg", "gain_margin_db", "sensitivity_bandwidth_rad_s"] {
+    for key in [
+        "crossover_rad_s",
+        "phase_margin_deg",
+        "gain_margin_db",
+        "sensitivity_bandwidth_rad_s",
+    ] {
         same(key, &ours[key], &truth[key]);
     }
     let modulus = number(&truth["modulus_margin"]);
-    near(&format!("modulus margin with {settings}"), number(&ours["modulus_margin"]), modulus, 1e-4 * modulus);
+    near(
+        &format!("modulus margin with {settings}"),
+        number(&ours["modulus_margin"]),
+        modulus,
+        1e-4 * modulus,
+    );
     let crossings = |answer: &Value| answer["crossings"].as_array().expect("a list").clone();
-    assert_eq!(crossings(ours).len(), crossings(truth).len(), "crossings with {settings}");
+    assert_eq!(
+        crossings(ours).len(),
+        crossings(truth).len(),
+        "crossings with {settings}"
+    );
     for (ours, truth) in crossings(ours).iter().zip(&crossings(truth)) {
         same("a crossing", &ours["rad_s"], &truth["rad_s"]);
-        same("its phase margin", &ours["phase_margin_deg"], &truth["phase_margin_deg"]);
+        same(
+            "its phase margin",
+            &ours["phase_margin_deg"],
+            &truth["phase_margin_deg"],
+        );
     }
 }

@@ -7,31 +7,53 @@ use crate::truth;
 
 /// The modes at Table 2-2's operating point.
 fn table_2_2(asymmetry: &str) -> Value {
-    Bench::new().json(&format!("model modes --config chapter2 --operating-point 5% --asymmetry {asymmetry}"))
+    Bench::new().json(&format!(
+        "model modes --config chapter2 --operating-point 5% --asymmetry {asymmetry}"
+    ))
 }
 
 fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key].as_array().unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
+    answer[key]
+        .as_array()
+        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
 }
 
 fn signs(answer: &Value) -> String {
-    list(answer, "modes").iter().map(|mode| mode["sign"].as_str().expect("a sign")).collect()
+    list(answer, "modes")
+        .iter()
+        .map(|mode| mode["sign"].as_str().expect("a sign"))
+        .collect()
 }
 
 /// `model modes` at an operating point and an asymmetry, both ratios.
 fn at(bench: &Bench, profile: &str, point: f64, asymmetry: f64) -> Value {
-    bench.json(&format!("model modes --config {profile} --operating-point {}% --asymmetry {asymmetry}", point * 100.0))
+    bench.json(&format!(
+        "model modes --config {profile} --operating-point {}% --asymmetry {asymmetry}",
+        point * 100.0
+    ))
 }
 
 #[test]
 fn the_eight_frequencies_are_those_of_table_2_2() {
-    for (asymmetry, expected) in [("0", [18.164, 27.580, 153.240, 154.301]), ("5%", [18.151, 27.569, 150.126, 153.859])]
-    {
+    for (asymmetry, expected) in [
+        ("0", [18.164, 27.580, 153.240, 154.301]),
+        ("5%", [18.151, 27.569, 150.126, 153.859]),
+    ] {
         let answer = table_2_2(asymmetry);
         assert_eq!(list(&answer, "modes").len(), 4);
         for (mode, hz) in list(&answer, "modes").iter().zip(expected) {
-            near("a frequency of Table 2-2", number(&mode["frequency_hz"]), hz, 0.01);
-            near("its rad/s", number(&mode["omega_rad_s"]), hz * std::f64::consts::TAU, 0.01 * std::f64::consts::TAU);
+            near(
+                "a frequency of Table 2-2",
+                number(&mode["frequency_hz"]),
+                hz,
+                0.01,
+            );
+            near(
+                "its rad/s",
+                number(&mode["omega_rad_s"]),
+                hz * std::f64::consts::TAU,
+                0.01 * std::f64::consts::TAU,
+            );
         }
     }
 }
@@ -54,11 +76,22 @@ fn the_eigenvectors_are_those_of_table_2_2() {
     ];
     for (asymmetry, expected) in [("0", symmetric), ("5%", asymmetric)] {
         let answer = table_2_2(asymmetry);
-        for (number_of, (mode, printed)) in list(&answer, "modes").iter().zip(expected).enumerate() {
+        for (number_of, (mode, printed)) in list(&answer, "modes").iter().zip(expected).enumerate()
+        {
             let shape: Vec<f64> = list(mode, "shape").iter().map(number).collect();
-            let side = shape.iter().zip(printed).map(|(ours, theirs)| ours * theirs).sum::<f64>().signum();
+            let side = shape
+                .iter()
+                .zip(printed)
+                .map(|(ours, theirs)| ours * theirs)
+                .sum::<f64>()
+                .signum();
             for (ours, theirs) in shape.iter().zip(printed) {
-                near(&format!("an element of mode {} at {asymmetry}", number_of + 1), side * ours, theirs, 5e-4);
+                near(
+                    &format!("an element of mode {} at {asymmetry}", number_of + 1),
+                    side * ours,
+                    theirs,
+                    5e-4,
+                );
             }
         }
     }
@@ -72,7 +105,10 @@ fn the_signs_alternate_where_stage_2_is_the_heavier_and_do_not_where_it_is_the_l
         assert_eq!(answer["sign_sequence"], sequence, "at {asymmetry}");
         // The Y mode is the slowest, and between this motor and this probe it does not show.
         assert_eq!(signs(&answer), format!("0{sequence}"), "at {asymmetry}");
-        for mode in list(&answer, "modes").iter().filter(|mode| mode["sign"] != "0") {
+        for mode in list(&answer, "modes")
+            .iter()
+            .filter(|mode| mode["sign"] != "0")
+        {
             let positive = number(&mode["residue"]) > 0.0;
             assert_eq!(mode["sign"], if positive { "+" } else { "-" });
         }
@@ -86,7 +122,12 @@ fn a_symmetric_stage_hides_its_fourth_mode() {
     assert_eq!(answer["sign_sequence"], "+-");
     // By symmetry the even modes have x1 = 0 exactly: what is left is rounding, 1e-16 of the largest residue and some.
     for index in [1, 3] {
-        near("a hidden residue", number(&list(&answer, "modes")[index]["residue"]), 0.0, 1e-12);
+        near(
+            "a hidden residue",
+            number(&list(&answer, "modes")[index]["residue"]),
+            0.0,
+            1e-12,
+        );
     }
 }
 
@@ -98,10 +139,22 @@ fn at_rest_in_y_only_the_rigid_body_mode_shows() {
             let answer = at(&Bench::new(), profile, 0.0, asymmetry);
             assert_eq!(answer["sign_sequence"], "+");
             assert_eq!(answer["cnmp_pairs"], 0);
-            let shown = list(&answer, "modes").iter().find(|mode| mode["sign"] == "+").expect("the one mode");
-            let stiffness = if profile == "stage" { 72_000.0 } else { 8_800.0 };
+            let shown = list(&answer, "modes")
+                .iter()
+                .find(|mode| mode["sign"] == "+")
+                .expect("the one mode");
+            let stiffness = if profile == "stage" {
+                72_000.0
+            } else {
+                8_800.0
+            };
             let compliance = number(&shown["residue"]) / number(&shown["omega_rad_s"]).powi(2);
-            near("the compliance times the stiffness", compliance * stiffness, 1.0, 1e-12);
+            near(
+                "the compliance times the stiffness",
+                compliance * stiffness,
+                1.0,
+                1e-12,
+            );
         }
     }
 }
@@ -134,8 +187,15 @@ fn without_excess_mass_on_stage_2_there_are_no_cnmp_zeros_at_any_operating_point
             for step in 0..=30 {
                 let point = 0.005 * f64::from(step);
                 let answer = at(&bench, profile, point, asymmetry);
-                assert_eq!(answer["cnmp_pairs"], 0, "{profile} at {point} of L, D = {asymmetry}");
-                assert!(list(&answer, "zeros").iter().all(|zero| number(&zero["re_rad_s"]) <= 0.0));
+                assert_eq!(
+                    answer["cnmp_pairs"], 0,
+                    "{profile} at {point} of L, D = {asymmetry}"
+                );
+                assert!(
+                    list(&answer, "zeros")
+                        .iter()
+                        .all(|zero| number(&zero["re_rad_s"]) <= 0.0)
+                );
             }
         }
     }
@@ -147,12 +207,26 @@ fn one_per_cent_of_excess_mass_gives_cnmp_zeros_between_3_40_and_6_75_per_cent_o
     let bench = Bench::new();
     let pairs = |per_cent: f64| {
         let at = format!("--operating-point {per_cent}% --asymmetry 1%");
-        let answer =
-            bench.json(&format!("model modes --config chapter2 --set plant.secondary_stage_mass_kg=0.018 {at}"));
+        let answer = bench.json(&format!(
+            "model modes --config chapter2 --set plant.secondary_stage_mass_kg=0.018 {at}"
+        ));
         number(&answer["cnmp_pairs"])
     };
-    let found: Vec<(f64, f64)> = [3.35, 3.40, 3.45, 5.0, 6.70, 6.75, 6.80].map(|point| (point, pairs(point))).into();
-    assert_eq!(found, [(3.35, 0.0), (3.40, 1.0), (3.45, 1.0), (5.0, 1.0), (6.70, 1.0), (6.75, 1.0), (6.80, 0.0)]);
+    let found: Vec<(f64, f64)> = [3.35, 3.40, 3.45, 5.0, 6.70, 6.75, 6.80]
+        .map(|point| (point, pairs(point)))
+        .into();
+    assert_eq!(
+        found,
+        [
+            (3.35, 0.0),
+            (3.40, 1.0),
+            (3.45, 1.0),
+            (5.0, 1.0),
+            (6.70, 1.0),
+            (6.75, 1.0),
+            (6.80, 0.0)
+        ]
+    );
 }
 
 #[test]
@@ -161,7 +235,10 @@ fn the_close_modes_of_a_symmetric_stage_cross_at_6_580_per_cent_of_l_and_152_42_
     let bench = Bench::new();
     let below = at(&bench, "chapter2", 0.06575, 0.0);
     let above = at(&bench, "chapter2", 0.06585, 0.0);
-    assert_eq!((signs(&below), signs(&above)), ("+0-0".to_string(), "+00-".to_string()));
+    assert_eq!(
+        (signs(&below), signs(&above)),
+        ("+0-0".to_string(), "+00-".to_string())
+    );
     for answer in [&below, &above] {
         for mode in &list(answer, "modes")[2..] {
             // Both modes move by some 10 Hz over 1 % of L: 0.05 Hz over the 0.005 % to the crossing.
@@ -175,11 +252,23 @@ fn moving_to_the_other_side_changes_nothing_of_the_transfer_function() {
     // Y1o to -Y1o is y to -y in Eq. (2-5).
     let bench = Bench::new();
     for (point, asymmetry) in [(0.08, 0.1), (0.034, -0.03)] {
-        let (here, there) = (at(&bench, "stage", point, asymmetry), at(&bench, "stage", -point, asymmetry));
+        let (here, there) = (
+            at(&bench, "stage", point, asymmetry),
+            at(&bench, "stage", -point, asymmetry),
+        );
         assert_eq!(here["sign_sequence"], there["sign_sequence"]);
-        for (key, field) in [("modes", "residue"), ("modes", "omega_rad_s"), ("zeros", "im_rad_s")] {
+        for (key, field) in [
+            ("modes", "residue"),
+            ("modes", "omega_rad_s"),
+            ("zeros", "im_rad_s"),
+        ] {
             for (a, b) in list(&here, key).iter().zip(list(&there, key)) {
-                near(field, number(&a[field]), number(&b[field]), 1e-9 * number(&a[field]).abs().max(1e-3));
+                near(
+                    field,
+                    number(&a[field]),
+                    number(&b[field]),
+                    1e-9 * number(&a[field]).abs().max(1e-3),
+                );
             }
         }
     }
@@ -194,35 +283,74 @@ fn python_finds_the_same_band_of_cnmp_zeros_and_the_same_crossing() {
         json!({"what": "bands", "config": bench.json(&format!("config show {one}")), "operating_points": points}),
         json!({"what": "crossing", "config": bench.json("config show --config chapter2 --asymmetry 0")}),
     ];
-    let Some(answers) = truth::ask(&questions) else { return };
+    let Some(answers) = truth::ask(&questions) else {
+        return;
+    };
     let edges: Vec<f64> = list(&answers[0], "edges").iter().map(number).collect();
     assert_eq!(edges.len(), 2);
     near("the lower limit of the band", edges[0], 0.0340, 5e-5);
     near("the upper limit of the band", edges[1], 0.0675, 2e-4);
     let pairs = |point: f64| {
-        number(&bench.json(&format!("model modes {one} --operating-point {}%", point * 100.0))["cnmp_pairs"])
+        number(
+            &bench.json(&format!(
+                "model modes {one} --operating-point {}%",
+                point * 100.0
+            ))["cnmp_pairs"],
+        )
     };
     for (edge, inwards) in [(edges[0], 1e-6), (edges[1], -1e-6)] {
         // One part in 30,000 of the limit itself on either side.
-        assert_eq!((pairs(edge - inwards), pairs(edge + inwards)), (0.0, 1.0), "around {edge}");
+        assert_eq!(
+            (pairs(edge - inwards), pairs(edge + inwards)),
+            (0.0, 1.0),
+            "around {edge}"
+        );
     }
-    near("the crossing", number(&answers[1]["operating_point"]), 0.06580, 5e-6);
-    near("its frequency", number(&answers[1]["frequency_hz"]), 152.42, 5e-3);
+    near(
+        "the crossing",
+        number(&answers[1]["operating_point"]),
+        0.06580,
+        5e-6,
+    );
+    near(
+        "its frequency",
+        number(&answers[1]["frequency_hz"]),
+        152.42,
+        5e-3,
+    );
 }
 
 /// Settings drawn around both profiles.
 fn settings(draw: &mut Draw) -> String {
     let mut sets = vec![format!("--config {}", draw.one_of(&["stage", "chapter2"]))];
     let mut set = |key: &str, value: String| sets.push(format!("--set plant.{key}={value}"));
-    set("motion_stage_mass_kg", format!("{:?}", draw.between(0.1, 0.6)));
-    set("secondary_stage_mass_kg", format!("{:?}", draw.between(0.01, 0.09)));
-    set("intermediate_stage_mass_kg", format!("{:?}", draw.between(0.1, 1.0)));
-    set("spring_stiffness_n_per_m", format!("{:?}", draw.over_decades(2e3, 6e4)));
-    set("beam_thickness_m", format!("{:?}", draw.between(0.5e-3, 0.8e-3)));
+    set(
+        "motion_stage_mass_kg",
+        format!("{:?}", draw.between(0.1, 0.6)),
+    );
+    set(
+        "secondary_stage_mass_kg",
+        format!("{:?}", draw.between(0.01, 0.09)),
+    );
+    set(
+        "intermediate_stage_mass_kg",
+        format!("{:?}", draw.between(0.1, 1.0)),
+    );
+    set(
+        "spring_stiffness_n_per_m",
+        format!("{:?}", draw.over_decades(2e3, 6e4)),
+    );
+    set(
+        "beam_thickness_m",
+        format!("{:?}", draw.between(0.5e-3, 0.8e-3)),
+    );
     set("beam_length_m", format!("{:?}", draw.between(0.04, 0.06)));
     set("poisson_ratio", format!("{:?}", draw.between(0.2, 0.4)));
     let damping = match draw.one_of(&[0, 1, 2]) {
-        0 => format!("{{kind=\"uniform\",ratio={:?}}}", draw.over_decades(1e-4, 0.05)),
+        0 => format!(
+            "{{kind=\"uniform\",ratio={:?}}}",
+            draw.over_decades(1e-4, 0.05)
+        ),
         1 => {
             let (mass, stiffness) = (draw.over_decades(1e-3, 10.0), draw.over_decades(1e-7, 1e-4));
             format!("{{kind=\"rayleigh\",mass_per_s={mass:?},stiffness_s={stiffness:?}}}")
@@ -236,15 +364,21 @@ fn settings(draw: &mut Draw) -> String {
     };
     set("damping", damping);
     let (point, asymmetry) = (draw.between(-12.0, 12.0), draw.between(-20.0, 20.0));
-    format!("{} --operating-point {point}% --asymmetry {asymmetry}%", sets.join(" "))
+    format!(
+        "{} --operating-point {point}% --asymmetry {asymmetry}%",
+        sets.join(" ")
+    )
 }
 
 #[test]
 fn modes_residues_and_zeros_of_random_stages_equal_those_of_python() {
     let (bench, mut draw) = (Bench::new(), Draw(2_718));
     let drawn: Vec<String> = (0..48).map(|_| settings(&mut draw)).collect();
-    let question = |s: &String| json!({"what": "model", "config": bench.json(&format!("config show {s}"))});
-    let Some(answers) = truth::ask(&drawn.iter().map(question).collect::<Vec<_>>()) else { return };
+    let question =
+        |s: &String| json!({"what": "model", "config": bench.json(&format!("config show {s}"))});
+    let Some(answers) = truth::ask(&drawn.iter().map(question).collect::<Vec<_>>()) else {
+        return;
+    };
     let mut with_cnmp = 0;
     for (settings, truth) in drawn.iter().zip(&answers) {
         let ours = bench.json(&format!("model modes {settings}"));
@@ -252,36 +386,64 @@ fn modes_residues_and_zeros_of_random_stages_equal_those_of_python() {
         with_cnmp += usize::from(ours["cnmp_pairs"] == 1);
         same_modes(list(&ours, "modes"), list(truth, "modes"), settings);
         for kind in ["zeros", "damped_zeros"] {
-            same_zeros(list(&ours, kind), list(truth, kind), &format!("{kind} of {settings}"));
+            same_zeros(
+                list(&ours, kind),
+                list(truth, kind),
+                &format!("{kind} of {settings}"),
+            );
         }
     }
-    assert!((5..=43).contains(&with_cnmp), "both cases must be among the draws: {with_cnmp} of 48 have CNMP zeros");
+    assert!(
+        (5..=43).contains(&with_cnmp),
+        "both cases must be among the draws: {with_cnmp} of 48 have CNMP zeros"
+    );
 }
 
 /// Relative 1e-6; of a residue, or 1e-12 of the largest one (a mode that hardly shows is a difference of large numbers).
 fn same_modes(ours: &[Value], truth: &[Value], settings: &str) {
     assert_eq!(ours.len(), truth.len());
-    let largest = truth.iter().map(|mode| number(&mode["residue"]).abs()).fold(0.0, f64::max);
+    let largest = truth
+        .iter()
+        .map(|mode| number(&mode["residue"]).abs())
+        .fold(0.0, f64::max);
     for (mode, truth) in ours.iter().zip(truth) {
         for field in ["omega_rad_s", "damping_ratio"] {
             let expected = number(&truth[field]);
-            near(&format!("{field} of {settings}"), number(&mode[field]), expected, 1e-6 * expected);
+            near(
+                &format!("{field} of {settings}"),
+                number(&mode[field]),
+                expected,
+                1e-6 * expected,
+            );
         }
         let expected = number(&truth["residue"]);
         let tolerance = (1e-6 * expected.abs()).max(1e-12 * largest);
-        near(&format!("a residue of {settings}"), number(&mode["residue"]), expected, tolerance);
+        near(
+            &format!("a residue of {settings}"),
+            number(&mode["residue"]),
+            expected,
+            tolerance,
+        );
     }
 }
 
 /// Each zero of one list is one of the other's, to 1e-6 of its magnitude, and they are equally many.
 fn same_zeros(ours: &[Value], truth: &[Value], what: &str) {
     assert_eq!(ours.len(), truth.len(), "{what}");
-    let mut left: Vec<(f64, f64)> = truth.iter().map(|z| (number(&z[0]), number(&z[1]))).collect();
+    let mut left: Vec<(f64, f64)> = truth
+        .iter()
+        .map(|z| (number(&z[0]), number(&z[1])))
+        .collect();
     for zero in ours {
         let (re, im) = (number(&zero["re_rad_s"]), number(&zero["im_rad_s"]));
         let distance = |z: &(f64, f64)| (z.0 - re).hypot(z.1 - im);
-        let nearest = (0..left.len()).min_by(|&a, &b| distance(&left[a]).total_cmp(&distance(&left[b]))).expect("one");
+        let nearest = (0..left.len())
+            .min_by(|&a, &b| distance(&left[a]).total_cmp(&distance(&left[b])))
+            .expect("one");
         let found = left.swap_remove(nearest);
-        assert!(distance(&found) <= 1e-6 * re.hypot(im), "{what}: {re} {im:+}j, Python has {found:?}");
+        assert!(
+            distance(&found) <= 1e-6 * re.hypot(im),
+            "{what}: {re} {im:+}j, Python has {found:?}"
+        );
     }
 }

@@ -23,7 +23,9 @@ pub struct Answer {
 
 impl Bench {
     pub fn new() -> Bench {
-        Bench { folder: tempfile::tempdir().expect("a temporary folder") }
+        Bench {
+            folder: tempfile::tempdir().expect("a temporary folder"),
+        }
     }
 
     /// Runs `bench` with arguments as typed, parted by blanks.
@@ -62,8 +64,15 @@ impl Bench {
     /// Names of everything in the folder.
     pub fn files(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.folder.path()).expect("the folder");
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<String> = entries
+            .map(|entry| {
+                entry
+                    .expect("an entry")
+                    .file_name()
+                    .to_string_lossy()
+                    .into_owned()
+            })
+            .collect();
         names.sort();
         names
     }
@@ -73,12 +82,22 @@ impl Bench {
 /// limit is some hundred times what the longest command takes.
 pub fn run_in(folder: &Path, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Answer {
     let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_bench"));
-    command.current_dir(folder).env_remove("BENCH_LOG").args(arguments).timeout(Duration::from_secs(300));
+    command
+        .current_dir(folder)
+        .env_remove("BENCH_LOG")
+        .args(arguments)
+        .timeout(Duration::from_secs(300));
     let output = command.output().expect("bench starts");
     let (out, err) = (text(output.stdout), text(output.stderr));
     assert!(!err.contains("panicked"), "{command:?}: {err}");
-    let code = output.status.code().unwrap_or_else(|| panic!("{command:?} was killed: {}: {err}", output.status));
-    assert!((0..=3).contains(&code), "{command:?} ended with {code}: {err}");
+    let code = output
+        .status
+        .code()
+        .unwrap_or_else(|| panic!("{command:?} was killed: {}: {err}", output.status));
+    assert!(
+        (0..=3).contains(&code),
+        "{command:?} ended with {code}: {err}"
+    );
     Answer { code, out, err }
 }
 
@@ -90,11 +109,19 @@ impl Answer {
     /// Standard output as the one JSON object that must be there, and nothing else.
     pub fn json(&self) -> Value {
         let mut values = serde_json::Deserializer::from_str(&self.out).into_iter::<Value>();
-        let first =
-            values.next().unwrap_or_else(|| panic!("nothing on standard output; on standard error: {}", self.err));
+        let first = values.next().unwrap_or_else(|| {
+            panic!(
+                "nothing on standard output; on standard error: {}",
+                self.err
+            )
+        });
         let value = first.unwrap_or_else(|e| panic!("{e}: {}", self.out));
         assert!(value.is_object(), "not an object: {value}");
-        assert!(values.next().is_none(), "more than one JSON value on standard output: {}", self.out);
+        assert!(
+            values.next().is_none(),
+            "more than one JSON value on standard output: {}",
+            self.out
+        );
         value
     }
 
@@ -103,20 +130,29 @@ impl Answer {
         assert_eq!(self.code, 2, "{self:?}");
         assert_eq!(self.out, "", "standard output of a refused command");
         for word in words {
-            assert!(self.err.contains(word), "`{word}` is not in the message: {}", self.err);
+            assert!(
+                self.err.contains(word),
+                "`{word}` is not in the message: {}",
+                self.err
+            );
         }
     }
 }
 
 /// A number of an answer.
 pub fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("a number is expected, there is {value}"))
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("a number is expected, there is {value}"))
 }
 
 /// Asserts that a figure is within a tolerance of what is expected, both in its unit.
 #[track_caller]
 pub fn near(what: &str, figure: f64, expected: f64, tolerance: f64) {
-    assert!((figure - expected).abs() <= tolerance, "{what} is {figure}, expected {expected} +- {tolerance}");
+    assert!(
+        (figure - expected).abs() <= tolerance,
+        "{what} is {figure}, expected {expected} +- {tolerance}"
+    );
 }
 
 /// Random numbers for settings: SplitMix64, the same on every machine.

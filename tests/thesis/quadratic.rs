@@ -8,8 +8,7 @@ use crate::recording::Recording;
 use crate::truth;
 
 /// No noise, no floor, and the plant alone.
-const CLEAN: &str =
-    "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[] --set sim.unmodelled=[]";
+const CLEAN: &str = "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[] --set sim.unmodelled=[]";
 
 /// A short sweep through all modes at 1 kHz.
 const SHORT: &str = "--set loop.rate_hz=1000 --set chirp.quiet_before_s=0.05 --set chirp.quiet_after_s=0.05 --set chirp.fade_in_s=0.05 --set chirp.fade_out_s=0.05 --sweep linear --start 15 --stop 120 --duration 0.6";
@@ -33,14 +32,36 @@ fn the_motion_is_that_of_all_coordinates_under_their_constraints() {
     let options = format!("{CLEAN} {SHORT} --amplitude 0.7 --set sim.geometry=quadratic");
     let (commands, positions) = course(&bench, &options);
     // A command acts from the next tick on.
-    let held: Vec<f64> = std::iter::once(0.0).chain(commands.iter().copied()).take(commands.len()).collect();
-    let config = bench.json(&format!("config show {CLEAN} --set loop.rate_hz=1000 --set sim.geometry=quadratic"));
+    let held: Vec<f64> = std::iter::once(0.0)
+        .chain(commands.iter().copied())
+        .take(commands.len())
+        .collect();
+    let config = bench.json(&format!(
+        "config show {CLEAN} --set loop.rate_hz=1000 --set sim.geometry=quadratic"
+    ));
     let question = json!({"what": "trajectory", "config": config, "setpoint_a": held});
-    let Some(answers) = truth::ask_of("plants.py", &[question]) else { return };
-    let truth: Vec<f64> = answers[0]["position_m"].as_array().expect("a list").iter().map(number).collect();
-    let error = largest(positions.iter().zip(&truth).map(|(ours, truth)| ours - truth));
+    let Some(answers) = truth::ask_of("plants.py", &[question]) else {
+        return;
+    };
+    let truth: Vec<f64> = answers[0]["position_m"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(number)
+        .collect();
+    let error = largest(
+        positions
+            .iter()
+            .zip(&truth)
+            .map(|(ours, truth)| ours - truth),
+    );
     let linear = course(&bench, &format!("{CLEAN} {SHORT} --amplitude 0.7")).1;
-    let bent = largest(positions.iter().zip(&linear).map(|(quadratic, linear)| quadratic - linear));
+    let bent = largest(
+        positions
+            .iter()
+            .zip(&linear)
+            .map(|(quadratic, linear)| quadratic - linear),
+    );
     // Steps of 20 us turn the close modes by 0.011 rad and shift their phase by (0.011)^4/120 of it: 5e-8 rad over the 380 rad
     // of the sweep, 2e-12 m of the 40 um that they contribute. What is not linear is ten thousand times more.
     assert!(error < 1e-11, "{error} m");
@@ -52,14 +73,28 @@ fn the_difference_to_the_linear_rig_falls_with_the_square_of_the_amplitude() {
     let bench = Bench::new();
     let difference = |amplitude: f64| {
         let at = |geometry: &str| {
-            course(&bench, &format!("{CLEAN} {SHORT} --amplitude {amplitude} --set sim.geometry={geometry}")).1
+            course(
+                &bench,
+                &format!("{CLEAN} {SHORT} --amplitude {amplitude} --set sim.geometry={geometry}"),
+            )
+            .1
         };
-        largest(at("quadratic").iter().zip(&at("linear")).map(|(quadratic, linear)| quadratic - linear))
+        largest(
+            at("quadratic")
+                .iter()
+                .zip(&at("linear"))
+                .map(|(quadratic, linear)| quadratic - linear),
+        )
     };
     let differences = [0.01, 0.02, 0.04].map(difference);
     // The equations' first term beyond the linear ones is quadratic; the next one is 1e-3 of it at 0.04 A.
     for pair in differences.windows(2) {
-        near("the ratio at twice the amplitude", pair[1] / pair[0], 4.0, 0.05);
+        near(
+            "the ratio at twice the amplitude",
+            pair[1] / pair[0],
+            4.0,
+            0.05,
+        );
     }
     assert!(differences[0] > 1e-12, "{differences:?}");
 }
@@ -72,55 +107,96 @@ fn change(options: &str, (low_hz, high_hz): (f64, f64)) -> (f64, f64) {
         let arguments = format!("chirp {CLEAN} {options} --set sim.geometry={geometry}");
         let answer = bench.json(&arguments);
         let text = bench.read(answer["frf_csv"].as_str().expect("a path"));
-        let row = |line: &str| line.split(',').map(|field| field.parse().expect("a number")).collect::<Vec<f64>>();
-        (number(&answer["expected_travel_m"]), text.lines().skip(1).map(row).collect::<Vec<_>>())
+        let row = |line: &str| {
+            line.split(',')
+                .map(|field| field.parse().expect("a number"))
+                .collect::<Vec<f64>>()
+        };
+        (
+            number(&answer["expected_travel_m"]),
+            text.lines().skip(1).map(row).collect::<Vec<_>>(),
+        )
     };
     let ((travel_m, linear), (_, quadratic)) = (run("linear"), run("quadratic"));
-    let pairs = linear.iter().zip(&quadratic).filter(|(row, _)| (low_hz..high_hz).contains(&row[0]));
+    let pairs = linear
+        .iter()
+        .zip(&quadratic)
+        .filter(|(row, _)| (low_hz..high_hz).contains(&row[0]));
     let changes = pairs.map(|(linear, quadratic)| {
         assert_eq!(linear[0], quadratic[0]);
         let turns = (quadratic[2] - linear[2]) / 360.0;
-        f64::max(100.0 * (quadratic[1] / linear[1] - 1.0).abs(), 360.0 * (turns - turns.round()).abs())
+        f64::max(
+            100.0 * (quadratic[1] / linear[1] - 1.0).abs(),
+            360.0 * (turns - turns.round()).abs(),
+        )
     });
     (changes.fold(0.0, f64::max), travel_m)
 }
 
 /// A flat sweep so slow (0.5 Hz/s) that the modes swing fully.
-const SLOWLY: &str =
-    "--set chirp.quiet_after_s=20 --set chirp.fade_in_s=1 --set chirp.fade_out_s=1 --sweep linear --duration 40";
+const SLOWLY: &str = "--set chirp.quiet_after_s=20 --set chirp.fade_in_s=1 --set chirp.fade_out_s=1 --sweep linear --duration 40";
 
 /// Around modes u and v.
 const CLOSE_MODES_HZ: (f64, f64) = (79.0, 90.0);
 
 #[test]
 fn around_modes_u_and_v_0_114_a_or_17_um_change_the_response_by_one_degree() {
-    let at =
-        |amplitude_a: f64| change(&format!("{SLOWLY} --start 74 --stop 95 --amplitude {amplitude_a}"), CLOSE_MODES_HZ);
+    let at = |amplitude_a: f64| {
+        change(
+            &format!("{SLOWLY} --start 74 --stop 95 --amplitude {amplitude_a}"),
+            CLOSE_MODES_HZ,
+        )
+    };
     // The change goes with the square of the amplitude, given with three digits.
     let ((limit, travel_m), (half, _)) = (at(0.114), at(0.057));
     near("the change in degrees or per cent", limit, 1.0, 0.02);
     near("the travel", travel_m, 16.9e-6, 0.1e-6);
-    near("the change at half the amplitude", half / limit, 0.25, 0.005);
+    near(
+        "the change at half the amplitude",
+        half / limit,
+        0.25,
+        0.005,
+    );
 }
 
 #[test]
 fn around_mode_r_no_travel_inside_the_soft_limit_changes_the_response() {
-    let (change, travel_m) = change(&format!("{SLOWLY} --start 24 --stop 35 --amplitude 0.1"), (27.5, 31.0));
+    let (change, travel_m) = change(
+        &format!("{SLOWLY} --start 24 --stop 35 --amplitude 0.1"),
+        (27.5, 31.0),
+    );
     // All stages move alike in X: hardly a beam bends. 0.9 mm is the limit.
     assert!(travel_m > 0.8e-3, "{travel_m}");
     assert!(change < 0.002, "{change}");
 }
 
 #[test]
-fn the_chirp_of_the_profile_is_six_times_larger_there_than_what_changes_the_response_by_one_per_cent() {
-    let points = [(0.1, 0.4), (8.0, 0.4), (20.0, 0.1), (45.0, 0.1), (70.0, 1.0), (150.0, 3.0)];
+fn the_chirp_of_the_profile_is_six_times_larger_there_than_what_changes_the_response_by_one_per_cent()
+ {
+    let points = [
+        (0.1, 0.4),
+        (8.0, 0.4),
+        (20.0, 0.1),
+        (45.0, 0.1),
+        (70.0, 1.0),
+        (150.0, 3.0),
+    ];
     let scaled = |share: f64| {
         let point = |(hz, a): (f64, f64)| {
             let current_a = if hz > 50.0 { share * a } else { a };
             format!("{{frequency_hz={hz:?},current_a={current_a:?}}}")
         };
-        change(&format!("--set chirp.amplitude=[{}]", points.map(point).join(",")), CLOSE_MODES_HZ).0
+        change(
+            &format!("--set chirp.amplitude=[{}]", points.map(point).join(",")),
+            CLOSE_MODES_HZ,
+        )
+        .0
     };
     near("the change in per cent, as it is", scaled(1.0), 33.2, 0.5);
-    near("the change in per cent, at a sixth", scaled(1.0 / 6.0), 1.0, 0.03);
+    near(
+        "the change in per cent, at a sixth",
+        scaled(1.0 / 6.0),
+        1.0,
+        0.03,
+    );
 }

@@ -14,13 +14,17 @@ pub struct Recording {
 
 impl Recording {
     pub fn open(path: &Path) -> Recording {
-        Recording { bytes: std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())) }
+        Recording {
+            bytes: std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())),
+        }
     }
 
     /// All messages of a channel, a JSON object each.
     pub fn messages(&self, topic: &str) -> Vec<Value> {
         let stream = mcap::MessageStream::new(&self.bytes).expect("a complete MCAP file");
-        let messages = stream.map(|message| message.expect("a whole message")).filter(|m| m.channel.topic == topic);
+        let messages = stream
+            .map(|message| message.expect("a whole message"))
+            .filter(|m| m.channel.topic == topic);
         let mut fields = None;
         let decode = |message: mcap::Message| {
             let schema = message.channel.schema.clone().expect("a schema");
@@ -32,8 +36,14 @@ impl Recording {
 
     /// An attachment, as text.
     pub fn attachment(&self, name: &str) -> String {
-        let summary = mcap::Summary::read(&self.bytes).expect("readable").expect("a summary: the file was closed");
-        let index = summary.attachment_indexes.iter().find(|a| a.name == name).expect("the attachment");
+        let summary = mcap::Summary::read(&self.bytes)
+            .expect("readable")
+            .expect("a summary: the file was closed");
+        let index = summary
+            .attachment_indexes
+            .iter()
+            .find(|a| a.name == name)
+            .expect("the attachment");
         let attachment = mcap::read::attachment(&self.bytes, index).expect("a whole attachment");
         String::from_utf8(attachment.data.into_owned()).expect("UTF-8")
     }
@@ -48,8 +58,14 @@ struct Field {
 fn fields_of(descriptor: &[u8], message: &str) -> Vec<Field> {
     let set = FileDescriptorSet::decode(descriptor).expect("a descriptor set");
     let file = &set.file[0];
-    let name = message.strip_prefix(&format!("{}.", file.package())).expect("a name in the package");
-    let message = file.message_type.iter().find(|m| m.name() == name).expect("the message");
+    let name = message
+        .strip_prefix(&format!("{}.", file.package()))
+        .expect("a name in the package");
+    let message = file
+        .message_type
+        .iter()
+        .find(|m| m.name() == name)
+        .expect("the message");
     let field = |f: &prost_types::FieldDescriptorProto| Field {
         number: f.number() as u32,
         name: f.name().to_string(),
@@ -65,13 +81,21 @@ fn decoded(mut data: &[u8], fields: &[Field]) -> Value {
         Type::String => json!(""),
         _ => json!(0),
     };
-    let mut object: Map<String, Value> = fields.iter().map(|field| (field.name.clone(), default(field))).collect();
+    let mut object: Map<String, Value> = fields
+        .iter()
+        .map(|field| (field.name.clone(), default(field)))
+        .collect();
     while !data.is_empty() {
         let key = varint(&mut data);
-        let field = fields.iter().find(|f| u64::from(f.number) == key >> 3).expect("a field of the schema");
+        let field = fields
+            .iter()
+            .find(|f| u64::from(f.number) == key >> 3)
+            .expect("a field of the schema");
         let value = match key & 7 {
             0 => json!(varint(&mut data)),
-            1 => json!(f64::from_le_bytes(take(&mut data, 8).try_into().expect("eight bytes"))),
+            1 => json!(f64::from_le_bytes(
+                take(&mut data, 8).try_into().expect("eight bytes")
+            )),
             2 => {
                 let length = varint(&mut data) as usize;
                 json!(std::str::from_utf8(take(&mut data, length)).expect("UTF-8"))

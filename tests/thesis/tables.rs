@@ -37,19 +37,35 @@ fn drawn(draw: &mut Draw, class: usize) -> ModalSum {
 /// origin or infinity, where rounding decides.
 fn truth_of(sum: &ModalSum) -> Option<Truth> {
     let terms = sum.terms();
-    let squares: Vec<f64> = terms.iter().map(|t| t.omega_rad_s * t.omega_rad_s).collect();
+    let squares: Vec<f64> = terms
+        .iter()
+        .map(|t| t.omega_rad_s * t.omega_rad_s)
+        .collect();
     let mut numerator = [Sum::default(); 4];
     for (i, term) in terms.iter().enumerate() {
-        let others: Vec<f64> = (0..terms.len()).filter(|j| *j != i).map(|j| squares[j]).collect();
+        let others: Vec<f64> = (0..terms.len())
+            .filter(|j| *j != i)
+            .map(|j| squares[j])
+            .collect();
         add_product(&mut numerator, term.residue_per_kg, &others);
     }
     add_product(&mut numerator, sum.constant_m_per_n(), &squares);
-    let degree = if sum.constant_m_per_n() == 0.0 { terms.len() - 1 } else { terms.len() };
+    let degree = if sum.constant_m_per_n() == 0.0 {
+        terms.len() - 1
+    } else {
+        terms.len()
+    };
     let well = numerator[0].is_well() && numerator[degree].is_well();
-    let roots = if degree == 1 { vec![-numerator[0].value / numerator[1].value] } else { quadratic(&numerator)? };
+    let roots = if degree == 1 {
+        vec![-numerator[0].value / numerator[1].value]
+    } else {
+        quadratic(&numerator)?
+    };
     let on_axis = roots.iter().filter(|x| **x < 0.0).map(|x| (-x).sqrt());
     let (wu, wv) = match terms {
-        [first, .., last] if sum.is_free() && terms.len() == 2 => (first.omega_rad_s, last.omega_rad_s),
+        [first, .., last] if sum.is_free() && terms.len() == 2 => {
+            (first.omega_rad_s, last.omega_rad_s)
+        }
         [.., u, v] => (u.omega_rad_s, v.omega_rad_s),
         _ => return None,
     };
@@ -65,7 +81,11 @@ fn truth_of(sum: &ModalSum) -> Option<Truth> {
     let mut mmp: Vec<Place> = on_axis.map(place).collect();
     mmp.sort_by_key(|place| *place as u8);
     let real = roots.iter().filter(|x| **x > 0.0).count();
-    let kinds = Kinds { mmp: mmp.len(), real, quartets: usize::from(roots.is_empty()) };
+    let kinds = Kinds {
+        mmp: mmp.len(),
+        real,
+        quartets: usize::from(roots.is_empty()),
+    };
     well.then_some(Truth { kinds, mmp })
 }
 
@@ -98,7 +118,10 @@ fn add_product(to: &mut [Sum; 4], factor: f64, roots: &[f64]) {
         }
         product = next;
     }
-    product.iter().enumerate().for_each(|(power, c)| to[power].add(*c));
+    product
+        .iter()
+        .enumerate()
+        .for_each(|(power, c)| to[power].add(*c));
 }
 
 /// The real roots, none where they are complex.
@@ -139,7 +162,9 @@ fn literal(printed: &[&str], names: &[&str]) -> bool {
         (Some((piece, rest)), Some((name, others))) if piece == name => literal(rest, others),
         (Some((piece, rest)), Some((name, others))) => {
             let any = !["DI", "DC", "-DC", "-DI"].contains(piece) && piece.len() > 1;
-            any && name.len() == 1 && piece.contains(name) && (literal(rest, others) || literal(printed, others))
+            any && name.len() == 1
+                && piece.contains(name)
+                && (literal(rest, others) || literal(printed, others))
         }
         _ => false,
     }
@@ -159,8 +184,14 @@ fn the_tables_foretell_the_kinds_of_zeros_of_random_plants_in_every_row() {
         let sequence = Sequence::of(&sum).expect("a sequence");
         let table = table_of(&sum).expect("a table");
         assert_eq!(table.name, TABLES[index % 4].name);
-        let row = table.row(&sum, &sequence).unwrap_or_else(|| panic!("no row for {sequence}: {sum:?}"));
-        assert!(row.kinds.contains(&truth.kinds), "{row:?}: {} computed for {sequence}: {sum:?}", truth.kinds);
+        let row = table
+            .row(&sum, &sequence)
+            .unwrap_or_else(|| panic!("no row for {sequence}: {sum:?}"));
+        assert!(
+            row.kinds.contains(&truth.kinds),
+            "{row:?}: {} computed for {sequence}: {sum:?}",
+            truth.kinds
+        );
         assert_eq!(row.mmp, truth.mmp, "{row:?}: {sequence}: {sum:?}");
         let turned = sum.terms()[0].residue_per_kg < 0.0;
         let count = visits.entry((row.table, row.number)).or_default();
@@ -171,12 +202,33 @@ fn the_tables_foretell_the_kinds_of_zeros_of_random_plants_in_every_row() {
     }
     assert!(skipped < 100, "{skipped} draws within rounding of a change");
     let rows: usize = TABLES.iter().map(|table| table.rows.len()).sum();
-    assert_eq!((rows, visits.len()), (27, 27), "rows that were never visited");
+    assert_eq!(
+        (rows, visits.len()),
+        (27, 27),
+        "rows that were never visited"
+    );
     let often = |[printed, other]: &[u32; 2]| *printed >= 10 && printed + other >= 300;
-    assert!(visits.values().all(often), "a row visited too rarely: {visits:?}");
+    assert!(
+        visits.values().all(often),
+        "a row visited too rarely: {visits:?}"
+    );
     // The rows whose printed sequence is too narrow; everywhere else the words hold literally.
-    let wider: Vec<(&str, usize)> = visits.iter().filter(|(_, count)| count[1] > 0).map(|(row, _)| *row).collect();
-    assert_eq!(wider, [("3-3", 5), ("3-3", 7), ("3-3", 8), ("3-3", 9), ("3-4", 4), ("3-4", 7)]);
+    let wider: Vec<(&str, usize)> = visits
+        .iter()
+        .filter(|(_, count)| count[1] > 0)
+        .map(|(row, _)| *row)
+        .collect();
+    assert_eq!(
+        wider,
+        [
+            ("3-3", 5),
+            ("3-3", 7),
+            ("3-3", 8),
+            ("3-3", 9),
+            ("3-4", 4),
+            ("3-4", 7)
+        ]
+    );
 }
 
 #[test]
@@ -188,12 +240,18 @@ fn a_slow_mode_in_place_of_the_double_integrator_is_read_by_the_same_table() {
         let mut terms = free.terms().to_vec();
         terms[0].omega_rad_s = terms[1].omega_rad_s * draw.over_decades(1e-2, 0.99);
         let sum = ModalSum::new(terms, 0.0).expect("residues that are not zero");
-        let Some(truth) = truth_of(&sum) else { continue };
+        let Some(truth) = truth_of(&sum) else {
+            continue;
+        };
         let sequence = Sequence::of(&sum).expect("a sequence");
         match table_of(&sum).and_then(|table| table.row(&sum, &sequence)) {
             Some(row) => {
                 read += 1;
-                assert!(row.kinds.contains(&truth.kinds), "{row:?}: {} for {sequence}: {sum:?}", truth.kinds);
+                assert!(
+                    row.kinds.contains(&truth.kinds),
+                    "{row:?}: {} for {sequence}: {sum:?}",
+                    truth.kinds
+                );
             }
             // A zero below mode R: the sequence does not begin with it.
             None => {
@@ -212,7 +270,8 @@ fn python_finds_the_same_kinds_with_60_digits_in_every_row() {
     let mut visits: BTreeMap<(&str, usize), u32> = BTreeMap::new();
     for index in 0..60_000 {
         let sum = drawn(&mut draw, index % 4);
-        let row = table_of(&sum).and_then(|table| table.row(&sum, &Sequence::of(&sum).expect("a sequence")));
+        let row = table_of(&sum)
+            .and_then(|table| table.row(&sum, &Sequence::of(&sum).expect("a sequence")));
         let row = row.unwrap_or_else(|| panic!("no row: {sum:?}"));
         let count = visits.entry((row.table, row.number)).or_default();
         *count += 1;
@@ -222,17 +281,31 @@ fn python_finds_the_same_kinds_with_60_digits_in_every_row() {
     }
     assert!(plants.len() >= 27 * 20, "{visits:?}");
     let questions: Vec<Value> = plants.iter().map(|(_, sum)| question(sum)).collect();
-    let Some(answers) = truth::ask(&questions) else { return };
+    let Some(answers) = truth::ask(&questions) else {
+        return;
+    };
     for ((row, sum), answer) in plants.iter().zip(&answers) {
         let count = |key: &str| answer[key].as_u64().expect("a count") as usize;
-        let kinds = Kinds { mmp: count("mmp"), real: count("real"), quartets: count("quartets") };
-        assert_eq!(kinds, Kinds::of(&sum.undamped_zeros().expect("zeros")), "{sum:?}");
+        let kinds = Kinds {
+            mmp: count("mmp"),
+            real: count("real"),
+            quartets: count("quartets"),
+        };
+        assert_eq!(
+            kinds,
+            Kinds::of(&sum.undamped_zeros().expect("zeros")),
+            "{sum:?}"
+        );
         assert!(row.kinds.contains(&kinds), "{row:?}: {kinds}, {sum:?}");
     }
 }
 
 fn question(sum: &ModalSum) -> Value {
-    let terms: Vec<[f64; 3]> = sum.terms().iter().map(|t| [t.omega_rad_s, t.damping_ratio, t.residue_per_kg]).collect();
+    let terms: Vec<[f64; 3]> = sum
+        .terms()
+        .iter()
+        .map(|t| [t.omega_rad_s, t.damping_ratio, t.residue_per_kg])
+        .collect();
     json!({"what": "modal", "terms": terms, "constant": sum.constant_m_per_n()})
 }
 
@@ -252,32 +325,53 @@ fn many_modes(draw: &mut Draw) -> ModalSum {
 fn zeros_of_random_modal_plants_are_those_of_60_digit_polynomials_with_and_without_damping() {
     let mut draw = Draw(141);
     let plants: Vec<ModalSum> = (0..150).map(|_| many_modes(&mut draw)).collect();
-    let Some(answers) = truth::ask(&plants.iter().map(question).collect::<Vec<_>>()) else { return };
+    let Some(answers) = truth::ask(&plants.iter().map(question).collect::<Vec<_>>()) else {
+        return;
+    };
     for (sum, answer) in plants.iter().zip(&answers) {
-        for (key, zeros) in [("zeros", sum.undamped_zeros()), ("damped_zeros", sum.damped_zeros())] {
+        for (key, zeros) in [
+            ("zeros", sum.undamped_zeros()),
+            ("damped_zeros", sum.damped_zeros()),
+        ] {
             let zeros = zeros.expect("zeros");
             let truth = answer[key].as_array().expect("a list");
             assert_eq!(zeros.len(), truth.len(), "{key} of {sum:?}");
             for z in truth {
-                let (re, im) = (z[0].as_f64().expect("a number"), z[1].as_f64().expect("a number"));
-                let nearest = zeros.iter().map(|zero| (zero.s.re - re).hypot(zero.s.im - im)).fold(f64::MAX, f64::min);
+                let (re, im) = (
+                    z[0].as_f64().expect("a number"),
+                    z[1].as_f64().expect("a number"),
+                );
+                let nearest = zeros
+                    .iter()
+                    .map(|zero| (zero.s.re - re).hypot(zero.s.im - im))
+                    .fold(f64::MAX, f64::min);
                 // Two decades of frequencies: the pencil's rounding of 1e-16 on the largest square against the least, and
                 // the root of it where two zeros are near each other.
-                assert!(nearest < 1e-7 * re.hypot(im), "{key}: {re}{im:+}j of {sum:?}: {zeros:?}");
+                assert!(
+                    nearest < 1e-7 * re.hypot(im),
+                    "{key}: {re}{im:+}j of {sum:?}: {zeros:?}"
+                );
             }
         }
     }
 }
 
 #[test]
-fn a_step_begins_against_its_end_exactly_with_an_odd_number_of_real_zeros_in_the_right_half_plane() {
+fn a_step_begins_against_its_end_exactly_with_an_odd_number_of_real_zeros_in_the_right_half_plane()
+{
     let mut draw = Draw(299);
     let (mut with, mut more) = ([0; 2], 0);
     for index in 0..8000 {
         let sum = drawn(&mut draw, index % 3);
-        let Some(truth) = truth_of(&sum) else { continue };
+        let Some(truth) = truth_of(&sum) else {
+            continue;
+        };
         let initial = StepResponse::new(&sum).initial();
-        assert_eq!(initial.has_undershoot(), truth.kinds.real % 2 == 1, "{sum:?}: {initial:?}");
+        assert_eq!(
+            initial.has_undershoot(),
+            truth.kinds.real % 2 == 1,
+            "{sum:?}: {initial:?}"
+        );
         with[usize::from(initial.has_undershoot())] += 1;
         if sum.is_free() {
             // The window holds every zero crossing there is: each real zero s = x makes the integral of y exp(-x t) vanish.

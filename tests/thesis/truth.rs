@@ -18,11 +18,16 @@ pub fn ask(questions: &[Value]) -> Option<Vec<Value>> {
 pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
     if let Err(why) = available(&python, script) {
-        assert!(std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"), "Python is required here: {why}");
+        assert!(
+            std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"),
+            "Python is required here: {why}"
+        );
         eprintln!("not tested: {why}\npip install -r .ci/python-packages.txt, or set BENCH_PYTHON");
         return None;
     }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/python")
+        .join(script);
     let mut child = Command::new(&python)
         .arg(script)
         .env("OPENBLAS_NUM_THREADS", "1")
@@ -33,9 +38,18 @@ pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
         .expect("has just run");
     let questions_json = serde_json::to_vec(questions).expect("JSON");
     // The script reads all of its input before it writes: neither side can block the other.
-    child.stdin.take().expect("piped").write_all(&questions_json).expect("an open pipe");
+    child
+        .stdin
+        .take()
+        .expect("piped")
+        .write_all(&questions_json)
+        .expect("an open pipe");
     let output = child.wait_with_output().expect("an answer");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let answers: Vec<Value> = serde_json::from_slice(&output.stdout).expect("a JSON array");
     assert_eq!(answers.len(), questions.len());
     Some(answers)

@@ -94,7 +94,8 @@ impl Traffic {
         match self.exchange {
             Exchange::Asynchronous { .. } => f64::from(PDO_BITS),
             Exchange::Synchronous { status_every } => {
-                f64::from(SYNC_BITS + PDO_BITS) + f64::from(PDO_BITS) / f64::from(status_every.max(1))
+                f64::from(SYNC_BITS + PDO_BITS)
+                    + f64::from(PDO_BITS) / f64::from(status_every.max(1))
             }
         }
     }
@@ -122,17 +123,23 @@ impl Traffic {
     /// The load, or why the bus cannot carry it, with the figures. What is not a number does not fit.
     pub fn check(&self) -> Result<f64, BudgetError> {
         let load = self.load();
-        if load <= self.load_limit { Ok(load) } else { Err(self.refusal(load)) }
+        if load <= self.load_limit {
+            Ok(load)
+        } else {
+            Err(self.refusal(load))
+        }
     }
 
     fn refusal(&self, load: f64) -> BudgetError {
         let (what, remedy) = match self.exchange {
-            Exchange::Asynchronous { .. } => {
-                ("an asynchronous set-point", "lower the rate or the status rate, or raise the bit rate")
-            }
-            Exchange::Synchronous { .. } => {
-                ("an exchange with SYNC", "take asynchronous set-points, ask for status less often, or lower the rate")
-            }
+            Exchange::Asynchronous { .. } => (
+                "an asynchronous set-point",
+                "lower the rate or the status rate, or raise the bit rate",
+            ),
+            Exchange::Synchronous { .. } => (
+                "an exchange with SYNC",
+                "take asynchronous set-points, ask for status less often, or lower the rate",
+            ),
         };
         BudgetError {
             what,
@@ -172,12 +179,21 @@ mod tests {
             assert_eq!(base_frame_bits(bytes), stuffed(34 + 8 * bytes) + 13);
             assert_eq!(extended_frame_bits(bytes), stuffed(54 + 8 * bytes) + 13);
         }
-        assert_eq!((base_frame_bits(0), base_frame_bits(4), base_frame_bits(8)), (55, 95, 135));
+        assert_eq!(
+            (base_frame_bits(0), base_frame_bits(4), base_frame_bits(8)),
+            (55, 95, 135)
+        );
         assert_eq!(extended_frame_bits(8), 160);
     }
 
     fn traffic(rate_hz: f64, exchange: Exchange) -> Traffic {
-        Traffic { bit_rate: 1_000_000, rate_hz, exchange, heartbeat_hz: 0.0, load_limit: 1.0 }
+        Traffic {
+            bit_rate: 1_000_000,
+            rate_hz,
+            exchange,
+            heartbeat_hz: 0.0,
+            load_limit: 1.0,
+        }
     }
 
     #[test]
@@ -193,15 +209,25 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused_with_the_figures() {
-        let refused = traffic(5000.0, Exchange::Synchronous { status_every: 1 }).check().unwrap_err();
+        let refused = traffic(5000.0, Exchange::Synchronous { status_every: 1 })
+            .check()
+            .unwrap_err();
         assert_eq!(
             refused.to_string(),
             "an exchange with SYNC at 5000 Hz needs 245 us of the 200 us of a tick and loads the bus of 1000000 bit/s to \
              122.5 %; 100 % is the limit, which allows 4082 Hz: take asynchronous set-points, ask for status less often, or \
              lower the rate"
         );
-        assert!(traffic(5000.0, Exchange::Asynchronous { status_hz: 1000.0 }).check().is_ok());
-        assert!(traffic(f64::NAN, Exchange::Asynchronous { status_hz: 0.0 }).check().is_err());
+        assert!(
+            traffic(5000.0, Exchange::Asynchronous { status_hz: 1000.0 })
+                .check()
+                .is_ok()
+        );
+        assert!(
+            traffic(f64::NAN, Exchange::Asynchronous { status_hz: 0.0 })
+                .check()
+                .is_err()
+        );
     }
 
     #[test]

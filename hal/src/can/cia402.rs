@@ -130,13 +130,19 @@ impl State {
             State::OperationEnabled => Some(SWITCH_ON),
             State::SwitchedOn => Some(SHUTDOWN),
             State::ReadyToSwitchOn | State::QuickStopActive => Some(DISABLE_VOLTAGE),
-            State::SwitchOnDisabled | State::NotReadyToSwitchOn | State::FaultReactionActive | State::Fault => None,
+            State::SwitchOnDisabled
+            | State::NotReadyToSwitchOn
+            | State::FaultReactionActive
+            | State::Fault => None,
         }
     }
 
     /// Whether the power stage is certainly without current.
     pub const fn is_off(self) -> bool {
-        !matches!(self, State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive)
+        !matches!(
+            self,
+            State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive
+        )
     }
 }
 
@@ -195,8 +201,16 @@ mod tests {
         assert_eq!(State::decode(0x60), Some(State::SwitchOnDisabled));
         assert_eq!(State::decode(0x28), Some(State::Fault));
         assert_eq!(State::decode(0x2F), Some(State::FaultReactionActive));
-        assert_eq!(State::decode(0x01), None, "ready without the quick-stop bit is no state");
-        assert_eq!(State::decode(0x48), None, "fault and switch-on disabled at once is no state");
+        assert_eq!(
+            State::decode(0x01),
+            None,
+            "ready without the quick-stop bit is no state"
+        );
+        assert_eq!(
+            State::decode(0x48),
+            None,
+            "fault and switch-on disabled at once is no state"
+        );
     }
 
     #[test]
@@ -209,17 +223,46 @@ mod tests {
 
     #[test]
     fn controlwords_are_those_of_the_standard() {
-        let words = [SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, DISABLE_VOLTAGE, QUICK_STOP].map(Order::decode);
+        let words = [
+            SHUTDOWN,
+            SWITCH_ON,
+            ENABLE_OPERATION,
+            DISABLE_VOLTAGE,
+            QUICK_STOP,
+        ]
+        .map(Order::decode);
         use Order::*;
-        assert_eq!(words, [Shutdown, SwitchOn, EnableOperation, DisableVoltage, QuickStop].map(Some));
+        assert_eq!(
+            words,
+            [
+                Shutdown,
+                SwitchOn,
+                EnableOperation,
+                DisableVoltage,
+                QuickStop
+            ]
+            .map(Some)
+        );
         assert_eq!(Order::decode(FAULT_RESET | ENABLE_OPERATION), None);
-        assert_eq!(Order::decode(0x0D), Some(DisableVoltage), "without bit 1 there is no voltage");
+        assert_eq!(
+            Order::decode(0x0D),
+            Some(DisableVoltage),
+            "without bit 1 there is no voltage"
+        );
     }
 
     #[test]
     fn a_fault_is_never_left_by_the_way_up() {
         assert_eq!(State::Fault.towards_enabled(), None);
-        assert!(ALL.iter().filter_map(|state| state.towards_enabled()).all(|word| word & FAULT_RESET == 0));
-        assert!(ALL.iter().filter_map(|state| state.towards_disabled()).all(|word| word & FAULT_RESET == 0));
+        assert!(
+            ALL.iter()
+                .filter_map(|state| state.towards_enabled())
+                .all(|word| word & FAULT_RESET == 0)
+        );
+        assert!(
+            ALL.iter()
+                .filter_map(|state| state.towards_disabled())
+                .all(|word| word & FAULT_RESET == 0)
+        );
     }
 }

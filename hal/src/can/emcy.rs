@@ -27,13 +27,22 @@ impl Emergency {
     pub const fn frame(&self, node: u8) -> CanFrame {
         let [low, high] = self.code.to_le_bytes();
         let v = self.vendor;
-        CanFrame::new(cob_id(node), [low, high, self.register, v[0], v[1], v[2], v[3], v[4]])
+        CanFrame::new(
+            cob_id(node),
+            [low, high, self.register, v[0], v[1], v[2], v[3], v[4]],
+        )
     }
 
     /// Reads the eight bytes.
     pub fn decode(data: &[u8]) -> Option<Emergency> {
-        let &[low, high, register, a, b, c, d, e] = data else { return None };
-        Some(Emergency { code: u16::from_le_bytes([low, high]), register, vendor: [a, b, c, d, e] })
+        let &[low, high, register, a, b, c, d, e] = data else {
+            return None;
+        };
+        Some(Emergency {
+            code: u16::from_le_bytes([low, high]),
+            register,
+            vendor: [a, b, c, d, e],
+        })
     }
 }
 
@@ -104,9 +113,21 @@ const fn class(code: u16) -> &'static str {
 
 /// The set bits of the error register (object 0x1001) in words.
 pub fn register_words(register: u8) -> impl Iterator<Item = &'static str> {
-    const WORDS: [&str; 8] =
-        ["generic", "current", "voltage", "temperature", "communication", "device profile", "reserved", "manufacturer"];
-    WORDS.into_iter().enumerate().filter(move |(bit, _)| register >> bit & 1 == 1).map(|(_, word)| word)
+    const WORDS: [&str; 8] = [
+        "generic",
+        "current",
+        "voltage",
+        "temperature",
+        "communication",
+        "device profile",
+        "reserved",
+        "manufacturer",
+    ];
+    WORDS
+        .into_iter()
+        .enumerate()
+        .filter(move |(bit, _)| register >> bit & 1 == 1)
+        .map(|(_, word)| word)
 }
 
 #[cfg(test)]
@@ -116,19 +137,32 @@ mod tests {
     #[test]
     fn an_emergency_carries_code_register_and_vendor_bytes() {
         // The bytes for over-current at the output of node 5, error register generic + current.
-        let emergency = Emergency { code: 0x2310, register: 0x03, vendor: [1, 2, 3, 4, 5] };
+        let emergency = Emergency {
+            code: 0x2310,
+            register: 0x03,
+            vendor: [1, 2, 3, 4, 5],
+        };
         let frame = emergency.frame(5);
-        assert_eq!((frame.id(), frame.data()), (Id::standard(0x085), &[0x10, 0x23, 3, 1, 2, 3, 4, 5][..]));
+        assert_eq!(
+            (frame.id(), frame.data()),
+            (Id::standard(0x085), &[0x10, 0x23, 3, 1, 2, 3, 4, 5][..])
+        );
         assert_eq!(Emergency::decode(frame.data()), Some(emergency));
         assert_eq!(Emergency::decode(&frame.data()[..7]), None);
     }
 
     #[test]
     fn every_code_has_words() {
-        assert_eq!(text(0x8130), "heartbeat or life guard lost: the drive no longer heard its master");
+        assert_eq!(
+            text(0x8130),
+            "heartbeat or life guard lost: the drive no longer heard its master"
+        );
         assert_eq!(text(0x4299), "temperature of the drive");
         assert_eq!(text(0xFF12), "specific to the drive");
         assert!((0..=u16::MAX).all(|code| !text(code).is_empty()));
-        assert_eq!(register_words(0b1000_0011).collect::<Vec<_>>(), ["generic", "current", "manufacturer"]);
+        assert_eq!(
+            register_words(0b1000_0011).collect::<Vec<_>>(),
+            ["generic", "current", "manufacturer"]
+        );
     }
 }

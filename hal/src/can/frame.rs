@@ -10,12 +10,18 @@ pub struct Id {
 impl Id {
     /// An 11-bit identifier; higher bits are dropped.
     pub const fn standard(raw: u16) -> Id {
-        Id { raw: raw as u32 & 0x7FF, extended: false }
+        Id {
+            raw: raw as u32 & 0x7FF,
+            extended: false,
+        }
     }
 
     /// A 29-bit identifier; higher bits are dropped.
     pub const fn extended(raw: u32) -> Id {
-        Id { raw: raw & 0x1FFF_FFFF, extended: true }
+        Id {
+            raw: raw & 0x1FFF_FFFF,
+            extended: true,
+        }
     }
 
     /// The number without the format.
@@ -47,14 +53,22 @@ impl CanFrame {
             data[at] = bytes[at];
             at += 1;
         }
-        CanFrame { id, length: N as u8, data }
+        CanFrame {
+            id,
+            length: N as u8,
+            data,
+        }
     }
 
     /// A frame of as many bytes as `bytes` has, `None` if they are more than eight.
     pub fn from_slice(id: Id, bytes: &[u8]) -> Option<CanFrame> {
         let mut data = [0; 8];
         data.get_mut(..bytes.len())?.copy_from_slice(bytes);
-        Some(CanFrame { id, length: bytes.len() as u8, data })
+        Some(CanFrame {
+            id,
+            length: bytes.len() as u8,
+            data,
+        })
     }
 
     /// The identifier.
@@ -64,7 +78,9 @@ impl CanFrame {
 
     /// The bytes.
     pub fn data(&self) -> &[u8] {
-        self.data.get(..usize::from(self.length)).unwrap_or(&self.data)
+        self.data
+            .get(..usize::from(self.length))
+            .unwrap_or(&self.data)
     }
 }
 
@@ -76,14 +92,21 @@ mod tests {
     fn identifiers_keep_their_width() {
         assert_eq!(Id::standard(0xFFFF).raw(), 0x7FF);
         assert_eq!(Id::extended(u32::MAX).raw(), 0x1FFF_FFFF);
-        assert_ne!(Id::standard(0x17), Id::extended(0x17), "the same number in another format is another identifier");
+        assert_ne!(
+            Id::standard(0x17),
+            Id::extended(0x17),
+            "the same number in another format is another identifier"
+        );
     }
 
     #[test]
     fn a_frame_holds_up_to_eight_bytes() {
         let id = Id::standard(1);
         assert_eq!(CanFrame::new(id, [1, 2, 3]).data(), [1, 2, 3]);
-        assert_eq!(CanFrame::from_slice(id, &[7; 8]).map(|frame| frame.data().len()), Some(8));
+        assert_eq!(
+            CanFrame::from_slice(id, &[7; 8]).map(|frame| frame.data().len()),
+            Some(8)
+        );
         assert_eq!(CanFrame::from_slice(id, &[7; 9]), None);
     }
 }

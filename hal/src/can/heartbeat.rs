@@ -48,7 +48,11 @@ mod tests {
         assert_eq!((frame.id(), frame.data()), (Id::standard(0x705), &[5][..]));
         assert_eq!(decode(&[0]), Some(State::BootUp));
         assert_eq!(decode(&[0x7F]), Some(State::PreOperational));
-        assert_eq!(decode(&[0x85]), Some(State::Operational), "bit 7 toggles in node guarding");
+        assert_eq!(
+            decode(&[0x85]),
+            Some(State::Operational),
+            "bit 7 toggles in node guarding"
+        );
         assert_eq!(decode(&[1]), None);
         assert_eq!(decode(&[]), None);
     }

@@ -47,7 +47,9 @@ impl Command {
             Command::ResetNode,
             Command::ResetCommunication,
         ];
-        all.into_iter().find(|known| *known as u8 == command).map(|known| (known, node))
+        all.into_iter()
+            .find(|known| *known as u8 == command)
+            .map(|known| (known, node))
     }
 }
 
@@ -94,7 +96,10 @@ mod tests {
         .iter()
         .map(|command| command.frame(5).data().to_vec())
         .collect();
-        assert_eq!(bytes, [[0x01, 5], [0x02, 5], [0x80, 5], [0x81, 5], [0x82, 5]]);
+        assert_eq!(
+            bytes,
+            [[0x01, 5], [0x02, 5], [0x80, 5], [0x81, 5], [0x82, 5]]
+        );
         assert_eq!(Command::decode(&[0x81, 0]), Some((Command::ResetNode, 0)));
         assert_eq!(Command::decode(&[0x03, 0]), None);
         assert_eq!(Command::decode(&[0x01]), None);

@@ -104,7 +104,11 @@ pub struct Value {
 
 impl Value {
     const fn new(index: u16, sub: u8, number: u32, bytes: usize) -> Value {
-        Value { address: Address::new(index, sub), number, bytes }
+        Value {
+            address: Address::new(index, sub),
+            number,
+            bytes,
+        }
     }
 }
 
@@ -123,18 +127,32 @@ impl Pdo {
         let on = cob_id(self.direction, self.number, self.node).raw() | cob_id_now & NO_REMOTE;
         let off = Value::new(self.parameters(), 1, on | OFF, 4);
         let clear = Value::new(self.parameters() + 0x200, 0, 0, 1);
-        [off, clear].into_iter().chain(self.layout()).chain([Value::new(self.parameters(), 1, on, 4)]).collect()
+        [off, clear]
+            .into_iter()
+            .chain(self.layout())
+            .chain([Value::new(self.parameters(), 1, on, 4)])
+            .collect()
     }
 
     /// Entries, count, transmission type and times: what must read back as written.
     pub fn layout(&self) -> Vec<Value> {
         let (parameters, mapping) = (self.parameters(), self.parameters() + 0x200);
-        let entries = (1..).zip(&self.entries).map(|(sub, entry)| Value::new(mapping, sub, entry.0, 4));
+        let entries = (1..)
+            .zip(&self.entries)
+            .map(|(sub, entry)| Value::new(mapping, sub, entry.0, 4));
         let count = Value::new(mapping, 0, self.entries.len() as u32, 1);
         let transmission = Value::new(parameters, 2, u32::from(self.transmission), 1);
-        let inhibit = self.inhibit_100us.map(|time| Value::new(parameters, 3, u32::from(time), 2));
-        let timer = self.event_timer_ms.map(|time| Value::new(parameters, 5, u32::from(time), 2));
-        entries.chain([count, transmission]).chain(inhibit).chain(timer).collect()
+        let inhibit = self
+            .inhibit_100us
+            .map(|time| Value::new(parameters, 3, u32::from(time), 2));
+        let timer = self
+            .event_timer_ms
+            .map(|time| Value::new(parameters, 5, u32::from(time), 2));
+        entries
+            .chain([count, transmission])
+            .chain(inhibit)
+            .chain(timer)
+            .collect()
     }
 }
 
@@ -167,7 +185,13 @@ mod tests {
         assert_eq!(ids, [0x205, 0x305, 0x405, 0x505]);
         let ids = [1, 2, 3, 4].map(|number| cob_id(Direction::Transmit, number, 5).raw());
         assert_eq!(ids, [0x185, 0x285, 0x385, 0x485]);
-        assert_eq!((parameters(Direction::Receive, 1), parameters(Direction::Transmit, 4)), (0x1400, 0x1803));
+        assert_eq!(
+            (
+                parameters(Direction::Receive, 1),
+                parameters(Direction::Transmit, 4)
+            ),
+            (0x1400, 0x1803)
+        );
     }
 
     #[test]
@@ -185,7 +209,14 @@ mod tests {
         let written: Vec<_> = pdo
             .sequence(NO_REMOTE | 0x123)
             .iter()
-            .map(|value| (value.address.index, value.address.sub, value.number, value.bytes))
+            .map(|value| {
+                (
+                    value.address.index,
+                    value.address.sub,
+                    value.number,
+                    value.bytes,
+                )
+            })
             .collect();
         assert_eq!(
             written,

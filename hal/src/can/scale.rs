@@ -33,10 +33,14 @@ impl Scale {
     /// 1000 counts are `reference_a`; commands beyond `limit_a` are limited. `None` unless both are positive and finite
     /// and the limit is at least one count.
     pub fn new(reference_a: f64, limit_a: f64) -> Option<Scale> {
-        let sound = reference_a.is_finite() && reference_a > 0.0 && limit_a.is_finite() && limit_a > 0.0;
+        let sound =
+            reference_a.is_finite() && reference_a > 0.0 && limit_a.is_finite() && limit_a > 0.0;
         // Rounded down but for the last bits of the division, so the limit is never exceeded.
         let limit = (limit_a / reference_a * 1000.0 + 1e-9).floor();
-        (sound && limit >= 1.0).then_some(Scale { reference_a, limit: limit.min(f64::from(i16::MAX)) as i16 })
+        (sound && limit >= 1.0).then_some(Scale {
+            reference_a,
+            limit: limit.min(f64::from(i16::MAX)) as i16,
+        })
     }
 
     /// The nearest count within the limit. Not a number is zero current.
@@ -63,8 +67,18 @@ mod tests {
 
     #[test]
     fn senseless_scales_are_refused() {
-        for (reference_a, limit_a) in [(0.0, 1.0), (-1.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY), (1.0, 0.0005)] {
-            assert_eq!(Scale::new(reference_a, limit_a), None, "{reference_a} {limit_a}");
+        for (reference_a, limit_a) in [
+            (0.0, 1.0),
+            (-1.0, 1.0),
+            (f64::NAN, 1.0),
+            (1.0, f64::INFINITY),
+            (1.0, 0.0005),
+        ] {
+            assert_eq!(
+                Scale::new(reference_a, limit_a),
+                None,
+                "{reference_a} {limit_a}"
+            );
         }
     }
 
@@ -72,7 +86,10 @@ mod tests {
     fn what_is_not_a_number_is_no_current() {
         let scale = Scale::new(4.0, 4.0).unwrap();
         assert_eq!(scale.counts(f64::NAN), 0);
-        assert_eq!((scale.counts(f64::INFINITY), scale.counts(f64::NEG_INFINITY)), (1000, -1000));
+        assert_eq!(
+            (scale.counts(f64::INFINITY), scale.counts(f64::NEG_INFINITY)),
+            (1000, -1000)
+        );
     }
 
     proptest! {

@@ -29,7 +29,9 @@ pub const fn status_id(node: u8) -> Id {
 
 /// The motor current of a STATUS frame, in units of 0.1 A.
 pub fn status_current(data: &[u8]) -> Option<i16> {
-    let &[_, _, _, _, high, low, _, _] = data else { return None };
+    let &[_, _, _, _, high, low, _, _] = data else {
+        return None;
+    };
     Some(i16::from_be_bytes([high, low]))
 }
 
@@ -52,11 +54,23 @@ const NOT_SENT: u32 = 5;
 
 const fn text(code: u32) -> FaultText {
     let (what, remedy) = match code {
-        SILENT => ("the VESC sends no STATUS", "check its power and cable, and that CAN status 1 is on in VESC Tool"),
-        BUS_OFF => ("the CAN bus is off or passive", "check cable, termination and bit rate, then clear the fault"),
-        BUS_FAILED => ("the CAN interface failed", "`ip link set IFACE up`, then clear the fault"),
+        SILENT => (
+            "the VESC sends no STATUS",
+            "check its power and cable, and that CAN status 1 is on in VESC Tool",
+        ),
+        BUS_OFF => (
+            "the CAN bus is off or passive",
+            "check cable, termination and bit rate, then clear the fault",
+        ),
+        BUS_FAILED => (
+            "the CAN interface failed",
+            "`ip link set IFACE up`, then clear the fault",
+        ),
         NOT_ARMED => ("the VESC is not enabled", "arm first"),
-        NOT_SENT => ("a command could not be sent", "check that the VESC is on the bus; lower the rate"),
+        NOT_SENT => (
+            "a command could not be sent",
+            "check that the VESC is on the bus; lower the rate",
+        ),
         _ => ("unknown fault", "please report the code"),
     };
     FaultText { what, remedy }
@@ -64,7 +78,11 @@ const fn text(code: u32) -> FaultText {
 
 const fn error(code: u32) -> DeviceError {
     let FaultText { what, remedy } = text(code);
-    DeviceError { what, remedy, code: code as i64 }
+    DeviceError {
+        what,
+        remedy,
+        code: code as i64,
+    }
 }
 
 /// What the watch tells the tick.
@@ -77,7 +95,9 @@ struct Shared {
 
 impl Shared {
     fn latch(&self, code: u32) {
-        let _ = self.fault.compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire); // the first one counts
+        let _ = self
+            .fault
+            .compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire); // the first one counts
     }
 }
 
@@ -97,7 +117,9 @@ impl Vesc {
     pub fn open(settings: VescSettings, host: Box<dyn Host>) -> Result<Vesc, String> {
         let limit_a = settings.current_limit_a;
         if !(limit_a > 0.0 && limit_a <= 1000.0) {
-            return Err(format!("current_limit_a = {limit_a} cannot be: above 0, at most 1000"));
+            return Err(format!(
+                "current_limit_a = {limit_a} cannot be: above 0, at most 1000"
+            ));
         }
         let claim = host.claim(settings.node).map_err(|held| held.to_string())?;
         let status = [status_id(settings.node)];
@@ -105,9 +127,24 @@ impl Vesc {
         let watched = host.endpoint(&status).map_err(|error| error.to_string())?;
         let shared = Arc::new(Shared::default());
         let timeout_ns = settings.status_timeout.as_nanos() as u64;
-        let watch = Watch { bus: watched, shared: Arc::clone(&shared), timeout_ns, heard_ns: host.now_ns() };
-        let running = host.start("can-vesc", Box::new(watch)).map_err(|error| error.to_string())?;
-        Ok(Vesc { _watch: running, bus, host, shared, settings, is_on: false, _claim: claim })
+        let watch = Watch {
+            bus: watched,
+            shared: Arc::clone(&shared),
+            timeout_ns,
+            heard_ns: host.now_ns(),
+        };
+        let running = host
+            .start("can-vesc", Box::new(watch))
+            .map_err(|error| error.to_string())?;
+        Ok(Vesc {
+            _watch: running,
+            bus,
+            host,
+            shared,
+            settings,
+            is_on: false,
+            _claim: claim,
+        })
     }
 
     fn no_fault(&self) -> Result<(), DeviceError> {
@@ -123,7 +160,11 @@ impl CurrentAmplifier for Vesc {
         self.host.sleep(self.settings.status_timeout);
         self.no_fault()?;
         self.is_on = self.shared.is_heard.load(Ordering::Acquire);
-        if self.is_on { Ok(()) } else { Err(error(SILENT)) }
+        if self.is_on {
+            Ok(())
+        } else {
+            Err(error(SILENT))
+        }
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
@@ -136,7 +177,9 @@ impl CurrentAmplifier for Vesc {
         }
         let limit_a = self.settings.current_limit_a;
         let current_ma = (current_a.clamp(-limit_a, limit_a) * 1e3) as i32; // towards zero; not a number becomes 0
-        self.bus.send(&set_current(self.settings.node, current_ma)).map_err(|_| error(NOT_SENT))?;
+        self.bus
+            .send(&set_current(self.settings.node, current_ma))
+            .map_err(|_| error(NOT_SENT))?;
         Ok(f64::from(current_ma) * 1e-3)
     }
 
@@ -187,12 +230,18 @@ struct Watch {
 impl Watch {
     fn take(&mut self, event: BusEvent, now_ns: u64) {
         match event {
-            BusEvent::Condition(Condition::BusOff | Condition::Passive) => self.shared.latch(BUS_OFF),
+            BusEvent::Condition(Condition::BusOff | Condition::Passive) => {
+                self.shared.latch(BUS_OFF)
+            }
             BusEvent::Condition(_) => {}
             BusEvent::Frame(frame) => {
-                let Some(tenths) = status_current(frame.data()) else { return };
+                let Some(tenths) = status_current(frame.data()) else {
+                    return;
+                };
                 self.heard_ns = now_ns;
-                self.shared.current_tenths.store(i32::from(tenths), Ordering::Release);
+                self.shared
+                    .current_tenths
+                    .store(i32::from(tenths), Ordering::Release);
                 self.shared.is_heard.store(true, Ordering::Release);
             }
         }
@@ -201,7 +250,10 @@ impl Watch {
 
 impl Task for Watch {
     fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
-        let received = self.bus.receive(wait).inspect_err(|_| self.shared.latch(BUS_FAILED));
+        let received = self
+            .bus
+            .receive(wait)
+            .inspect_err(|_| self.shared.latch(BUS_FAILED));
         if let Ok(Some(event)) = received {
             self.take(event, now_ns());
         }

@@ -111,13 +111,25 @@ impl Writing {
     pub fn new(settings: Settings) -> Result<Self, SerialError> {
         positive("unit_m", settings.unit_m)?;
         positive("upper_m - lower_m", settings.upper_m - settings.lower_m)?;
-        let words =
-            |name, texts: &[String]| texts.iter().map(|text| Pattern::bytes(name, text)).collect::<Result<_, _>>();
+        let words = |name, texts: &[String]| {
+            texts
+                .iter()
+                .map(|text| Pattern::bytes(name, text))
+                .collect::<Result<_, _>>()
+        };
         let writing = Self {
             line: Pattern::compile("line", &settings.line)?,
-            error: settings.error.as_deref().map(|text| Pattern::compile("error", text)).transpose()?,
+            error: settings
+                .error
+                .as_deref()
+                .map(|text| Pattern::compile("error", text))
+                .transpose()?,
             terminator: Pattern::bytes("terminator", &settings.terminator)?,
-            request: settings.request.as_deref().map(|text| Pattern::bytes("request", text)).transpose()?,
+            request: settings
+                .request
+                .as_deref()
+                .map(|text| Pattern::bytes("request", text))
+                .transpose()?,
             invalid: words("invalid", &settings.invalid)?,
             over: words("over", &settings.over)?,
             under: words("under", &settings.under)?,
@@ -127,12 +139,26 @@ impl Writing {
     }
 
     fn check(&self) -> Result<(), SerialError> {
-        let refuse = |name, value: &str, wants| Err(SerialError::Setting { name, value: format!("{value:?}"), wants });
+        let refuse = |name, value: &str, wants| {
+            Err(SerialError::Setting {
+                name,
+                value: format!("{value:?}"),
+                wants,
+            })
+        };
         let settings = &self.settings;
         if self.line.holes() != (1, 0) {
-            return refuse("line", &settings.line, "{value} exactly once, and no {code}");
+            return refuse(
+                "line",
+                &settings.line,
+                "{value} exactly once, and no {code}",
+            );
         }
-        if self.error.as_ref().is_some_and(|error| error.holes() != (0, 1)) {
+        if self
+            .error
+            .as_ref()
+            .is_some_and(|error| error.holes() != (0, 1))
+        {
             return refuse(
                 "error",
                 settings.error.as_deref().unwrap_or_default(),
@@ -140,10 +166,18 @@ impl Writing {
             );
         }
         if !(1..=4).contains(&self.terminator.len()) {
-            return refuse("terminator", &settings.terminator, "1 to 4 characters, such as \\r or \\r\\n");
+            return refuse(
+                "terminator",
+                &settings.terminator,
+                "1 to 4 characters, such as \\r or \\r\\n",
+            );
         }
         if !settings.offset_m.is_finite() {
-            return refuse("offset_m", &settings.offset_m.to_string(), "a finite number of metres");
+            return refuse(
+                "offset_m",
+                &settings.offset_m.to_string(),
+                "a finite number of metres",
+            );
         }
         Ok(())
     }
@@ -151,48 +185,96 @@ impl Writing {
     /// What `line` (without terminator) says; `None` if it fits no pattern.
     fn read(&self, line: &[u8]) -> Option<Event> {
         if let Some(code) = self.error.as_ref().and_then(|error| error.read(line)?.code) {
-            let code = Decimal::read(code).filter(|code| code.decimals == 0)?.digits;
-            let known = self.settings.error_words.iter().find(|(number, _)| *number == code);
-            let words = known.map_or("the probe reports an error; its manual lists the number", |(_, words)| words);
+            let code = Decimal::read(code)
+                .filter(|code| code.decimals == 0)?
+                .digits;
+            let known = self
+                .settings
+                .error_words
+                .iter()
+                .find(|(number, _)| *number == code);
+            let words = known.map_or(
+                "the probe reports an error; its manual lists the number",
+                |(_, words)| words,
+            );
             return Some(Event::Fault { code, words });
         }
         let text = self.line.read(line)?.value?;
         let is = |words: &[Vec<u8>]| words.iter().any(|word| word == text);
-        let Settings { lower_m, upper_m, .. } = self.settings;
+        let Settings {
+            lower_m, upper_m, ..
+        } = self.settings;
         if is(&self.invalid) {
-            return Some(Event::Fault { code: 0, words: "the probe cannot measure: no target, or too little light" });
+            return Some(Event::Fault {
+                code: 0,
+                words: "the probe cannot measure: no target, or too little light",
+            });
         } else if is(&self.over) {
-            return Some(Event::OutOfRange(Sample { raw: i64::MAX, position_m: upper_m }));
+            return Some(Event::OutOfRange(Sample {
+                raw: i64::MAX,
+                position_m: upper_m,
+            }));
         } else if is(&self.under) {
-            return Some(Event::OutOfRange(Sample { raw: i64::MIN, position_m: lower_m }));
+            return Some(Event::OutOfRange(Sample {
+                raw: i64::MIN,
+                position_m: lower_m,
+            }));
         }
         let wanted = self.line.decimals();
-        let number =
-            Decimal::read(text).filter(|number| wanted.is_none_or(|wanted| wanted as i32 == number.decimals))?;
+        let number = Decimal::read(text)
+            .filter(|number| wanted.is_none_or(|wanted| wanted as i32 == number.decimals))?;
         Some(self.event(number))
     }
 
     fn event(&self, number: Decimal) -> Event {
-        let Settings { unit_m, offset_m, lower_m, upper_m, .. } = self.settings;
+        let Settings {
+            unit_m,
+            offset_m,
+            lower_m,
+            upper_m,
+            ..
+        } = self.settings;
         let position_m = number.to_f64() * unit_m + offset_m;
-        let sample = Sample { raw: number.digits, position_m: position_m.clamp(lower_m, upper_m) };
-        if (lower_m..=upper_m).contains(&position_m) { Event::Value(sample) } else { Event::OutOfRange(sample) }
+        let sample = Sample {
+            raw: number.digits,
+            position_m: position_m.clamp(lower_m, upper_m),
+        };
+        if (lower_m..=upper_m).contains(&position_m) {
+            Event::Value(sample)
+        } else {
+            Event::OutOfRange(sample)
+        }
     }
 
     /// The line, with terminator, by which a probe makes `statement`; empty if these settings have no words for it.
     pub fn write(&self, statement: Statement) -> Vec<u8> {
         let line = match statement {
             Statement::Metres(position_m) => self.write_metres(position_m),
-            Statement::Invalid => self.settings.invalid.first().and_then(|word| self.line.write(word, 0)),
+            Statement::Invalid => self
+                .settings
+                .invalid
+                .first()
+                .and_then(|word| self.line.write(word, 0)),
             Statement::Error(code) => self.error.as_ref().and_then(|error| error.write("", code)),
         };
-        line.map_or_else(Vec::new, |line| [line.as_slice(), &self.terminator].concat())
+        line.map_or_else(Vec::new, |line| {
+            [line.as_slice(), &self.terminator].concat()
+        })
     }
 
     fn write_metres(&self, position_m: f64) -> Option<Vec<u8>> {
-        let Settings { unit_m, offset_m, lower_m, upper_m, .. } = self.settings;
+        let Settings {
+            unit_m,
+            offset_m,
+            lower_m,
+            upper_m,
+            ..
+        } = self.settings;
         let number = (position_m - offset_m) / unit_m;
-        let (width, decimals) = (self.line.width().unwrap_or(0), self.line.decimals().unwrap_or(4));
+        let (width, decimals) = (
+            self.line.width().unwrap_or(0),
+            self.line.decimals().unwrap_or(4),
+        );
         let text = match (self.settings.over.first(), self.settings.under.first()) {
             (Some(over), _) if position_m > upper_m => over.clone(),
             (_, Some(under)) if position_m < lower_m => under.clone(),
@@ -223,7 +305,13 @@ impl Ascii {
     pub fn new(settings: Settings) -> Result<Self, SerialError> {
         let writing = Writing::new(settings)?;
         let (window, damage) = (Window::default(), Damage::default());
-        Ok(Self { writing, window, damage, whole: false, message_bytes: 0 })
+        Ok(Self {
+            writing,
+            window,
+            damage,
+            whole: false,
+            message_bytes: 0,
+        })
     }
 
     fn take_line(&mut self, out: &mut dyn FnMut(Event)) {

@@ -66,13 +66,25 @@ pub struct Settings {
 impl Settings {
     /// A probe of this range at the factory's addresses.
     pub fn new(range_m: f64) -> Self {
-        Self { range_m, probe_address: 0x7E, master_address: 0x01, counter: CounterMeaning::default() }
+        Self {
+            range_m,
+            probe_address: 0x7E,
+            master_address: 0x01,
+            counter: CounterMeaning::default(),
+        }
     }
 
     /// The request for all values since the last one.
     pub fn request(&self) -> [u8; 6] {
         let (to, from) = (self.probe_address, self.master_address);
-        [SHORT, to, from, READ_VALUES, sum(&[to, from, READ_VALUES]), END]
+        [
+            SHORT,
+            to,
+            from,
+            READ_VALUES,
+            sum(&[to, from, READ_VALUES]),
+            END,
+        ]
     }
 
     /// The probe's answer with the newest [`BATCH_MAX`] of `values`, oldest first: the device's side.
@@ -80,7 +92,15 @@ impl Settings {
         let values = &values[values.len().saturating_sub(BATCH_MAX)..];
         let m = values.len() as u8; // at most BATCH_MAX
         let le = LE_EMPTY + 4 * m;
-        let mut frame = vec![LONG, le, le, LONG, self.master_address, self.probe_address, VALUES];
+        let mut frame = vec![
+            LONG,
+            le,
+            le,
+            LONG,
+            self.master_address,
+            self.probe_address,
+            VALUES,
+        ];
         frame.extend(counter.to_le_bytes());
         frame.extend([m, 0]);
         frame.extend(values.iter().flat_map(|value| value.to_le_bytes()));
@@ -100,8 +120,15 @@ impl Settings {
 
     fn event(&self, raw: i32) -> Event {
         let position_m = self.metres(raw.clamp(0, FULL_SCALE));
-        let sample = Sample { raw: i64::from(raw), position_m };
-        if (0..=FULL_SCALE).contains(&raw) { Event::Value(sample) } else { Event::OutOfRange(sample) }
+        let sample = Sample {
+            raw: i64::from(raw),
+            position_m,
+        };
+        if (0..=FULL_SCALE).contains(&raw) {
+            Event::Value(sample)
+        } else {
+            Event::OutOfRange(sample)
+        }
     }
 }
 
@@ -127,7 +154,14 @@ impl Capancdt {
         positive("range_m", settings.range_m)?;
         let request = settings.request();
         let (window, damage) = (Window::default(), Damage::default());
-        Ok(Self { settings, request, window, damage, newest: None, message_bytes: 0 })
+        Ok(Self {
+            settings,
+            request,
+            window,
+            damage,
+            newest: None,
+            message_bytes: 0,
+        })
     }
 
     fn search(&mut self, out: &mut dyn FnMut(Event)) {
@@ -155,9 +189,14 @@ impl Capancdt {
         data[..length].copy_from_slice(&self.window.held()[..length]);
         self.window.drop_front(length);
         let data = &data[7..length - 2]; // an answer has 13 bytes or more: Verdict
-        let (counter, values) = (u16::from_le_bytes([data[0], data[1]]), data[4..].as_chunks::<4>().0);
+        let (counter, values) = (
+            u16::from_le_bytes([data[0], data[1]]),
+            data[4..].as_chunks::<4>().0,
+        );
         let fresh = self.follow_counter(counter, values.len(), out);
-        values[values.len() - fresh..].iter().for_each(|raw| out(self.settings.event(i32::from_le_bytes(*raw))));
+        values[values.len() - fresh..]
+            .iter()
+            .for_each(|raw| out(self.settings.event(i32::from_le_bytes(*raw))));
         out(Event::AnswerEnd);
     }
 
@@ -167,7 +206,9 @@ impl Capancdt {
             CounterMeaning::NewestValue => counter,
             CounterMeaning::OldestValue => counter.wrapping_add(batch as u16).wrapping_sub(1),
         };
-        let Some(before) = self.newest.replace(newest) else { return batch };
+        let Some(before) = self.newest.replace(newest) else {
+            return batch;
+        };
         let mut advance = usize::from(newest.wrapping_sub(before));
         if advance >= 0x8000 {
             out(Event::Restart);
@@ -228,22 +269,43 @@ impl Verdict {
     }
 
     fn of_long(bytes: &[u8], settings: &Settings) -> Self {
-        let Some(&le) = bytes.get(1) else { return Self::Incomplete };
-        let Some(m) = batch_of(le) else { return Self::Foreign };
-        let header = [LONG, le, le, LONG, settings.master_address, settings.probe_address, VALUES];
+        let Some(&le) = bytes.get(1) else {
+            return Self::Incomplete;
+        };
+        let Some(m) = batch_of(le) else {
+            return Self::Foreign;
+        };
+        let header = [
+            LONG,
+            le,
+            le,
+            LONG,
+            settings.master_address,
+            settings.probe_address,
+            VALUES,
+        ];
         if !begins(bytes, &header) {
             return Self::Foreign;
         }
         let length = usize::from(le) + AROUND;
-        let Some(frame) = bytes.get(..length) else { return Self::Incomplete };
+        let Some(frame) = bytes.get(..length) else {
+            return Self::Incomplete;
+        };
         let (body, tail) = (&frame[4..length - 2], &frame[length - 2..]);
-        if tail == [sum(body), END] && body[5] == m { Self::Answer(length) } else { Self::Foreign }
+        if tail == [sum(body), END] && body[5] == m {
+            Self::Answer(length)
+        } else {
+            Self::Foreign
+        }
     }
 }
 
 /// Whether `bytes` is `pattern`, as far as there are bytes.
 fn begins(bytes: &[u8], pattern: &[u8]) -> bool {
-    bytes.iter().zip(pattern).all(|(byte, wanted)| byte == wanted)
+    bytes
+        .iter()
+        .zip(pattern)
+        .all(|(byte, wanted)| byte == wanted)
 }
 
 /// Values in an answer of this length; `None` if no answer has it.

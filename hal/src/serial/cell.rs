@@ -50,14 +50,25 @@ pub(super) struct Reader {
 /// A cell that holds a `Missing` measurement.
 pub(super) fn cell() -> (Writer, Reader) {
     let slots = std::array::from_fn(|_| words(Measurement::default()).map(AtomicU64::new));
-    let shared = Arc::new(Shared { slots, waiting: AtomicU8::new(1) });
-    (Writer { shared: shared.clone(), own: 0 }, Reader { shared, own: 2 })
+    let shared = Arc::new(Shared {
+        slots,
+        waiting: AtomicU8::new(1),
+    });
+    (
+        Writer {
+            shared: shared.clone(),
+            own: 0,
+        },
+        Reader { shared, own: 2 },
+    )
 }
 
 impl Writer {
     pub(super) fn publish(&mut self, measurement: Measurement) {
         let slot = &self.shared.slots[usize::from(self.own)];
-        slot.iter().zip(words(measurement)).for_each(|(word, value)| word.store(value, Ordering::Relaxed));
+        slot.iter()
+            .zip(words(measurement))
+            .for_each(|(word, value)| word.store(value, Ordering::Relaxed));
         self.own = self.shared.waiting.swap(self.own | NEW, Ordering::AcqRel) & SLOT;
     }
 }
@@ -68,12 +79,19 @@ impl Reader {
             self.own = self.shared.waiting.swap(self.own, Ordering::AcqRel) & SLOT;
         }
         let slot = &self.shared.slots[usize::from(self.own)];
-        measurement(std::array::from_fn(|word| slot[word].load(Ordering::Relaxed)))
+        measurement(std::array::from_fn(|word| {
+            slot[word].load(Ordering::Relaxed)
+        }))
     }
 }
 
 fn words(measurement: Measurement) -> [u64; 4] {
-    let Measurement { position_m, sequence, made_ns, validity } = measurement;
+    let Measurement {
+        position_m,
+        sequence,
+        made_ns,
+        validity,
+    } = measurement;
     [position_m.to_bits(), sequence, made_ns, validity as u64]
 }
 
@@ -84,7 +102,12 @@ fn measurement([position, sequence, made_ns, validity]: [u64; 4]) -> Measurement
         2 => Validity::Faulty,
         _ => Validity::Missing,
     };
-    Measurement { position_m: f64::from_bits(position), sequence, made_ns, validity }
+    Measurement {
+        position_m: f64::from_bits(position),
+        sequence,
+        made_ns,
+        validity,
+    }
 }
 
 #[cfg(test)]
@@ -93,14 +116,29 @@ mod tests {
 
     /// A measurement whose every word follows from its sequence number.
     fn consistent(sequence: u64) -> Measurement {
-        let validity =
-            [Validity::Valid, Validity::OutOfRange, Validity::Faulty, Validity::Missing][sequence as usize % 4];
-        Measurement { position_m: sequence as f64 * 0.5, sequence, made_ns: !sequence, validity }
+        let validity = [
+            Validity::Valid,
+            Validity::OutOfRange,
+            Validity::Faulty,
+            Validity::Missing,
+        ][sequence as usize % 4];
+        Measurement {
+            position_m: sequence as f64 * 0.5,
+            sequence,
+            made_ns: !sequence,
+            validity,
+        }
     }
 
     #[test]
     fn before_the_first_value_there_is_none() {
-        assert_eq!(cell().1.newest(), Measurement { validity: Validity::Missing, ..Measurement::default() });
+        assert_eq!(
+            cell().1.newest(),
+            Measurement {
+                validity: Validity::Missing,
+                ..Measurement::default()
+            }
+        );
     }
 
     #[test]
@@ -117,13 +155,18 @@ mod tests {
         const LAST: u64 = 2_000_000;
         let (mut writer, mut reader) = cell();
         writer.publish(consistent(0));
-        let publishing =
-            std::thread::spawn(move || (1..=LAST).for_each(|sequence| writer.publish(consistent(sequence))));
+        let publishing = std::thread::spawn(move || {
+            (1..=LAST).for_each(|sequence| writer.publish(consistent(sequence)))
+        });
         let (mut before, mut changes) = (0, 0u64);
         while before < LAST {
             let taken = reader.newest();
             assert_eq!(taken, consistent(taken.sequence), "torn");
-            assert!(taken.sequence >= before, "{} after {before}", taken.sequence);
+            assert!(
+                taken.sequence >= before,
+                "{} after {before}",
+                taken.sequence
+            );
             changes += u64::from(taken.sequence != before);
             before = taken.sequence;
         }

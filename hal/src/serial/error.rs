@@ -76,7 +76,9 @@ pub enum SerialError {
         source: serialport::Error,
     },
     /// No thread for the reader.
-    #[error("no thread for the reader of the port: {source}; raise the limit of processes (ulimit -u)")]
+    #[error(
+        "no thread for the reader of the port: {source}; raise the limit of processes (ulimit -u)"
+    )]
     Thread {
         /// The system's words.
         source: std::io::Error,
@@ -88,7 +90,11 @@ pub(super) fn positive(name: &'static str, value: f64) -> Result<(), SerialError
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(SerialError::Setting { name, value: value.to_string(), wants: "a finite number above zero" })
+    Err(SerialError::Setting {
+        name,
+        value: value.to_string(),
+        wants: "a finite number above zero",
+    })
 }
 
 /// What went wrong while running, as a number that fits an atomic.
@@ -103,24 +109,45 @@ pub(super) enum Trouble {
 }
 
 impl Trouble {
-    const ALL: [Self; 5] = [Self::ReadFailed, Self::WriteFailed, Self::HungUp, Self::Timeout, Self::Restart];
+    const ALL: [Self; 5] = [
+        Self::ReadFailed,
+        Self::WriteFailed,
+        Self::HungUp,
+        Self::Timeout,
+        Self::Restart,
+    ];
 
     /// The error of this number; `None` if there was none.
     pub(super) fn describe(number: u32, code: i64) -> Option<DeviceError> {
-        let trouble = Self::ALL.into_iter().find(|trouble| *trouble as u32 == number)?;
+        let trouble = Self::ALL
+            .into_iter()
+            .find(|trouble| *trouble as u32 == number)?;
         let (what, remedy) = trouble.words();
         Some(DeviceError { what, remedy, code })
     }
 
     fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::ReadFailed => {
-                ("the serial port cannot be read", "see the kernel's log for the adapter; open the probe again")
-            }
-            Self::WriteFailed => ("the serial port takes no request", "check adapter and cable; open the probe again"),
-            Self::HungUp => ("the serial port is gone", "plug the cable in and open the probe again"),
-            Self::Timeout => ("the probe did not answer", "check its power, wiring, address, baud rate and parity"),
-            Self::Restart => ("the probe's counter went back: it restarted", "check the probe's supply"),
+            Self::ReadFailed => (
+                "the serial port cannot be read",
+                "see the kernel's log for the adapter; open the probe again",
+            ),
+            Self::WriteFailed => (
+                "the serial port takes no request",
+                "check adapter and cable; open the probe again",
+            ),
+            Self::HungUp => (
+                "the serial port is gone",
+                "plug the cable in and open the probe again",
+            ),
+            Self::Timeout => (
+                "the probe did not answer",
+                "check its power, wiring, address, baud rate and parity",
+            ),
+            Self::Restart => (
+                "the probe's counter went back: it restarted",
+                "check the probe's supply",
+            ),
         }
     }
 }

@@ -85,14 +85,19 @@ pub(super) struct Window<const N: usize> {
 
 impl<const N: usize> Default for Window<N> {
     fn default() -> Self {
-        Self { bytes: [0; N], len: 0 }
+        Self {
+            bytes: [0; N],
+            len: 0,
+        }
     }
 }
 
 impl<const N: usize> Window<N> {
     /// Appends a byte; `false` if there was no room for it.
     pub(super) fn push(&mut self, byte: u8) -> bool {
-        let Some(slot) = self.bytes.get_mut(self.len) else { return false };
+        let Some(slot) = self.bytes.get_mut(self.len) else {
+            return false;
+        };
         *slot = byte;
         self.len += 1;
         true

@@ -65,17 +65,33 @@ struct Unanswered {
 impl Exchange {
     /// A conversation not begun.
     pub(super) fn new(times: Times, now_ns: u64) -> Self {
-        let state = State::OutOfStep { silence_ns: 2 * times.timeout_ns, heard_ns: now_ns };
-        Self { times, state, unanswered: None }
+        let state = State::OutOfStep {
+            silence_ns: 2 * times.timeout_ns,
+            heard_ns: now_ns,
+        };
+        Self {
+            times,
+            state,
+            unanswered: None,
+        }
     }
 
     /// Until when there is nothing to do but listen.
     pub(super) fn listen_until_ns(&self) -> u64 {
         match self.state {
             State::Rest { until_ns } => until_ns,
-            State::OutOfStep { silence_ns, heard_ns } => heard_ns + silence_ns,
-            State::Waiting { heard_ns: Some(heard_ns), .. } => heard_ns + self.times.quiet_ns,
-            State::Waiting { sent_ns, heard_ns: None } => sent_ns + self.times.timeout_ns,
+            State::OutOfStep {
+                silence_ns,
+                heard_ns,
+            } => heard_ns + silence_ns,
+            State::Waiting {
+                heard_ns: Some(heard_ns),
+                ..
+            } => heard_ns + self.times.quiet_ns,
+            State::Waiting {
+                sent_ns,
+                heard_ns: None,
+            } => sent_ns + self.times.timeout_ns,
         }
     }
 
@@ -84,8 +100,15 @@ impl Exchange {
         let until_ns = self.listen_until_ns();
         match self.state {
             _ if now_ns < until_ns => Step::Listen { until_ns },
-            State::Waiting { sent_ns, heard_ns: None } => {
-                self.unanswered.get_or_insert(Unanswered { first_ns: sent_ns, latest_ns: sent_ns, apart_ns: 0 });
+            State::Waiting {
+                sent_ns,
+                heard_ns: None,
+            } => {
+                self.unanswered.get_or_insert(Unanswered {
+                    first_ns: sent_ns,
+                    latest_ns: sent_ns,
+                    apart_ns: 0,
+                });
                 self.state = State::Rest { until_ns: now_ns };
                 Step::TimedOut
             }
@@ -95,7 +118,10 @@ impl Exchange {
 
     /// A request goes out; `now_ns` is before its first byte.
     pub(super) fn sent(&mut self, now_ns: u64) {
-        self.state = State::Waiting { sent_ns: now_ns, heard_ns: None };
+        self.state = State::Waiting {
+            sent_ns: now_ns,
+            heard_ns: None,
+        };
         if let Some(unanswered) = &mut self.unanswered {
             unanswered.apart_ns = unanswered.apart_ns.max(now_ns - unanswered.latest_ns);
             unanswered.latest_ns = now_ns;
@@ -117,13 +143,22 @@ impl Exchange {
     /// The probe sends what it measured before it heard the request, so its newest value is as old as the request, and
     /// counts from there, however late the answer.
     pub(super) fn answered(&mut self, answers: u32, now_ns: u64) -> Option<u64> {
-        let State::Waiting { sent_ns, .. } = self.state else { return None };
+        let State::Waiting { sent_ns, .. } = self.state else {
+            return None;
+        };
         let unanswered = self.unanswered.take();
         if answers == 1 && unanswered.is_none() {
-            self.state = State::Rest { until_ns: sent_ns + self.times.interval_ns };
+            self.state = State::Rest {
+                until_ns: sent_ns + self.times.interval_ns,
+            };
         } else {
-            let apart_ns = unanswered.map_or(0, |unanswered| unanswered.apart_ns).max(self.times.timeout_ns);
-            self.state = State::OutOfStep { silence_ns: 2 * apart_ns, heard_ns: now_ns };
+            let apart_ns = unanswered
+                .map_or(0, |unanswered| unanswered.apart_ns)
+                .max(self.times.timeout_ns);
+            self.state = State::OutOfStep {
+                silence_ns: 2 * apart_ns,
+                heard_ns: now_ns,
+            };
         }
         (answers == 1).then_some(unanswered.map_or(sent_ns, |unanswered| unanswered.first_ns))
     }
@@ -136,7 +171,11 @@ mod tests {
 
     use super::*;
 
-    const TIMES: Times = Times { interval_ns: 1000, timeout_ns: 500, quiet_ns: 100 };
+    const TIMES: Times = Times {
+        interval_ns: 1000,
+        timeout_ns: 500,
+        quiet_ns: 100,
+    };
 
     /// An exchange after the silence at the start, with a request at 1000.
     fn asked() -> Exchange {
@@ -173,15 +212,27 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_after_timeouts_is_as_old_as_the_first_request_without_one_and_then_the_line_must_fall_silent() {
+    fn an_answer_after_timeouts_is_as_old_as_the_first_request_without_one_and_then_the_line_must_fall_silent()
+     {
         let mut exchange = asked();
         for now_ns in [1500, 2000] {
             assert_eq!(exchange.step(now_ns), Step::TimedOut);
             exchange.sent(now_ns);
         }
-        assert_eq!(exchange.answered(1, 2100), Some(1000), "it may be the answer to the very first");
-        assert!(!exchange.heard(2600), "the answer to the second: thrown away");
-        assert_eq!(exchange.step(3599), Step::Listen { until_ns: 3600 }, "and it starts the silence anew");
+        assert_eq!(
+            exchange.answered(1, 2100),
+            Some(1000),
+            "it may be the answer to the very first"
+        );
+        assert!(
+            !exchange.heard(2600),
+            "the answer to the second: thrown away"
+        );
+        assert_eq!(
+            exchange.step(3599),
+            Step::Listen { until_ns: 3600 },
+            "and it starts the silence anew"
+        );
         assert_eq!(exchange.step(3600), Step::Send);
         exchange.sent(3600);
         assert_eq!(exchange.answered(1, 3700), Some(3600));

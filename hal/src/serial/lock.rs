@@ -24,27 +24,44 @@ impl PortLock {
     /// Takes the lock of `device` (a resolved path, `port` as configured), or names the process that has it.
     pub(super) fn take(lock_dir: &Path, port: &Path, device: &Path) -> Result<Self, SerialError> {
         let path = lock_dir.join(name_of(device));
-        let file = open(&path).map_err(|source| SerialError::Lock { path: path.clone(), source })?;
+        let file = open(&path).map_err(|source| SerialError::Lock {
+            path: path.clone(),
+            source,
+        })?;
         match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
             Ok(mut held) => {
                 sign(&mut held).map_err(|source| SerialError::Lock { path, source })?;
                 Ok(Self { _held: held })
             }
-            Err((mut file, _)) => Err(SerialError::Held { path: port.to_owned(), pid: read_pid(&mut file) }),
+            Err((mut file, _)) => Err(SerialError::Held {
+                path: port.to_owned(),
+                pid: read_pid(&mut file),
+            }),
         }
     }
 }
 
 /// `bench-dev-ttyUSB0.lock` for /dev/ttyUSB0.
 fn name_of(device: &Path) -> PathBuf {
-    let name = device.to_string_lossy().trim_start_matches('/').replace('/', "-");
+    let name = device
+        .to_string_lossy()
+        .trim_start_matches('/')
+        .replace('/', "-");
     format!("bench-{name}.lock").into()
 }
 
 /// Opens the file for every user of the port: in a shared, sticky directory only its maker may create it.
 fn open(path: &Path) -> std::io::Result<File> {
     let existing = OpenOptions::new().read(true).write(true).open(path);
-    existing.or_else(|_| OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(0o666).open(path))
+    existing.or_else(|_| {
+        OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o666)
+            .open(path)
+    })
 }
 
 fn sign(file: &mut File) -> std::io::Result<()> {

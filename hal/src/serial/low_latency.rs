@@ -53,8 +53,13 @@ fn check(result: libc::c_int) -> Result<(), Note> {
     }
     let error = io::Error::last_os_error();
     let remedy = match error.raw_os_error() {
-        Some(libc::EPERM | libc::EACCES) => "let root run `setserial PORT low_latency`, or grant CAP_SYS_ADMIN",
+        Some(libc::EPERM | libc::EACCES) => {
+            "let root run `setserial PORT low_latency`, or grant CAP_SYS_ADMIN"
+        }
         _ => "this driver has no such switch; readings may be older than on a port that has it",
     };
-    Err(Note { what: format!("no low latency: {error}"), remedy })
+    Err(Note {
+        what: format!("no low latency: {error}"),
+        remedy,
+    })
 }

@@ -56,7 +56,13 @@ pub struct Settings {
 impl Settings {
     /// A probe of this range that sends nothing but the displacement.
     pub fn new(range_m: f64) -> Self {
-        Self { range_m, cycle: Cycle { values: 1, displacement: 0 } }
+        Self {
+            range_m,
+            cycle: Cycle {
+                values: 1,
+                displacement: 0,
+            },
+        }
     }
 
     /// Metres of `x` counts from the start of the range.
@@ -66,23 +72,39 @@ impl Settings {
 
     /// Counts at `position_m`, rounded, within what the probe can say: the device's side.
     pub fn counts(&self, position_m: f64) -> u32 {
-        ((position_m / self.range_m * 100.0 + 1.0) / 102.0 * 65520.0).round().clamp(0.0, 65520.0) as u32
+        ((position_m / self.range_m * 100.0 + 1.0) / 102.0 * 65520.0)
+            .round()
+            .clamp(0.0, 65520.0) as u32
     }
 
     fn event(&self, x: u32) -> Event {
         if x > VALUE_MAX {
-            return Event::Fault { code: i64::from(x), words: words(x) };
+            return Event::Fault {
+                code: i64::from(x),
+                words: words(x),
+            };
         }
         let position_m = self.metres(x).clamp(0.0, self.range_m);
-        let sample = Sample { raw: i64::from(x), position_m };
-        if (RANGE_START..=RANGE_END).contains(&x) { Event::Value(sample) } else { Event::OutOfRange(sample) }
+        let sample = Sample {
+            raw: i64::from(x),
+            position_m,
+        };
+        if (RANGE_START..=RANGE_END).contains(&x) {
+            Event::Value(sample)
+        } else {
+            Event::OutOfRange(sample)
+        }
     }
 }
 
 /// The three bytes of the 18 bits of `x`: the device's side.
 pub fn message(x: u32, first: bool) -> [u8; 3] {
     let six = |shift: u32| (x >> shift) as u8 & 0x3F;
-    [six(0), 0x40 | six(6), 0x80 | u8::from(!first) << 6 | six(12)]
+    [
+        six(0),
+        0x40 | six(6),
+        0x80 | u8::from(!first) << 6 | six(12),
+    ]
 }
 
 /// Words for an error value. The manual at hand says only that errors have 18 bits; the list is from memory of it.
@@ -131,13 +153,25 @@ impl Optoncdt {
     /// A decoder that has heard nothing yet.
     pub fn new(settings: Settings) -> Result<Self, SerialError> {
         positive("range_m", settings.range_m)?;
-        let Cycle { values, displacement } = settings.cycle;
+        let Cycle {
+            values,
+            displacement,
+        } = settings.cycle;
         if !(1..=32).contains(&values) || displacement >= values {
             let value = format!("{displacement} of {values}");
             let wants = "1 to 32 values a cycle, and the displacement one of them, counted from 0";
-            return Err(SerialError::Setting { name: "cycle", value, wants });
+            return Err(SerialError::Setting {
+                name: "cycle",
+                value,
+                wants,
+            });
         }
-        Ok(Self { settings, held: Held::Nothing, place: None, damage: Damage::default() })
+        Ok(Self {
+            settings,
+            held: Held::Nothing,
+            place: None,
+            damage: Damage::default(),
+        })
     }
 
     /// The message is broken: what is held, and `more` bytes, belong to nothing.
@@ -150,9 +184,14 @@ impl Optoncdt {
     }
 
     fn take_message(&mut self, x: u32, first: bool, out: &mut dyn FnMut(Event)) {
-        let Cycle { values, displacement } = self.settings.cycle;
+        let Cycle {
+            values,
+            displacement,
+        } = self.settings.cycle;
         let place = if first { Some(0) } else { self.place };
-        let Some(place) = place.filter(|place| *place < values) else { return self.break_off(3, out) };
+        let Some(place) = place.filter(|place| *place < values) else {
+            return self.break_off(3, out);
+        };
         self.damage.end(out);
         self.place = Some(place + 1);
         if place == displacement {

@@ -24,7 +24,10 @@ pub(super) struct Pattern {
 #[derive(Clone, Debug, PartialEq)]
 enum Piece {
     Literal(Vec<u8>),
-    Value { width: Option<usize>, decimals: Option<usize> },
+    Value {
+        width: Option<usize>,
+        decimals: Option<usize>,
+    },
     Code,
     Skip,
 }
@@ -64,24 +67,44 @@ impl Decimal {
         if !(1..=15).contains(&count) || !whole.iter().chain(fraction).all(u8::is_ascii_digit) {
             return None;
         }
-        let digits = whole.iter().chain(fraction).fold(0, |sum, digit| 10 * sum + i64::from(digit - b'0'));
-        Some(Self { digits: if negative { -digits } else { digits }, decimals: fraction.len() as i32 })
+        let digits = whole
+            .iter()
+            .chain(fraction)
+            .fold(0, |sum, digit| 10 * sum + i64::from(digit - b'0'));
+        Some(Self {
+            digits: if negative { -digits } else { digits },
+            decimals: fraction.len() as i32,
+        })
     }
 }
 
 impl Pattern {
     /// Compiles `text`, the setting `name`.
     pub(super) fn compile(name: &'static str, text: &str) -> Result<Self, SerialError> {
-        let refuse = |wants| SerialError::Setting { name, value: format!("{text:?}"), wants };
+        let refuse = |wants| SerialError::Setting {
+            name,
+            value: format!("{text:?}"),
+            wants,
+        };
         let mut pieces = Vec::new();
         let mut rest = text;
         while let Some(next) = rest.chars().next() {
-            let (piece, after) = if next == '{' { hole(rest) } else { literal(rest) }.map_err(refuse)?;
+            let (piece, after) = if next == '{' {
+                hole(rest)
+            } else {
+                literal(rest)
+            }
+            .map_err(refuse)?;
             pieces.push(piece);
             rest = after;
         }
-        if pieces.windows(2).any(|pair| pair[0].is_open() && !matches!(pair[1], Piece::Literal(_))) {
-            return Err(refuse("a literal after every hole without a size, or nobody knows where the hole ends"));
+        if pieces
+            .windows(2)
+            .any(|pair| pair[0].is_open() && !matches!(pair[1], Piece::Literal(_)))
+        {
+            return Err(refuse(
+                "a literal after every hole without a size, or nobody knows where the hole ends",
+            ));
         }
         Ok(Self { pieces })
     }
@@ -91,19 +114,33 @@ impl Pattern {
         match Self::compile(name, text)?.pieces.as_slice() {
             [] => Ok(Vec::new()),
             [Piece::Literal(bytes)] => Ok(bytes.clone()),
-            _ => Err(SerialError::Setting { name, value: format!("{text:?}"), wants: "plain text, without {holes}" }),
+            _ => Err(SerialError::Setting {
+                name,
+                value: format!("{text:?}"),
+                wants: "plain text, without {holes}",
+            }),
         }
     }
 
     /// How many `{value}` and how many `{code}` it has.
     pub(super) fn holes(&self) -> (usize, usize) {
-        let count = |wanted: fn(&Piece) -> bool| self.pieces.iter().filter(|piece| wanted(piece)).count();
-        (count(|piece| matches!(piece, Piece::Value { .. })), count(|piece| matches!(piece, Piece::Code)))
+        let count =
+            |wanted: fn(&Piece) -> bool| self.pieces.iter().filter(|piece| wanted(piece)).count();
+        (
+            count(|piece| matches!(piece, Piece::Value { .. })),
+            count(|piece| matches!(piece, Piece::Code)),
+        )
     }
 
     /// The number of digits after the point that `{value}` asks for.
     pub(super) fn decimals(&self) -> Option<usize> {
-        self.pieces.iter().find_map(|piece| if let Piece::Value { decimals, .. } = piece { *decimals } else { None })
+        self.pieces.iter().find_map(|piece| {
+            if let Piece::Value { decimals, .. } = piece {
+                *decimals
+            } else {
+                None
+            }
+        })
     }
 
     /// The holes of `line`, if it matches.
@@ -129,7 +166,9 @@ impl Pattern {
         for piece in &self.pieces {
             match piece {
                 Piece::Literal(bytes) => line.extend(bytes),
-                Piece::Value { width: Some(width), .. } if *width != value.len() => return None,
+                Piece::Value {
+                    width: Some(width), ..
+                } if *width != value.len() => return None,
                 Piece::Value { .. } => line.extend(value.bytes()),
                 Piece::Code => line.extend(code.to_string().bytes()),
                 Piece::Skip => {}
@@ -140,22 +179,38 @@ impl Pattern {
 
     /// The width that `{value}` asks for.
     pub(super) fn width(&self) -> Option<usize> {
-        self.pieces.iter().find_map(|piece| if let Piece::Value { width, .. } = piece { *width } else { None })
+        self.pieces.iter().find_map(|piece| {
+            if let Piece::Value { width, .. } = piece {
+                *width
+            } else {
+                None
+            }
+        })
     }
 }
 
 impl Piece {
     /// Whether only what follows says where it ends.
     fn is_open(&self) -> bool {
-        matches!(self, Self::Value { width: None, .. } | Self::Code | Self::Skip)
+        matches!(
+            self,
+            Self::Value { width: None, .. } | Self::Code | Self::Skip
+        )
     }
 
     /// Bytes of `rest` that belong to this piece.
     fn extent(&self, rest: &[u8], next: Option<&Piece>) -> Option<usize> {
         match (self, next) {
             (Self::Literal(bytes), _) => rest.starts_with(bytes).then_some(bytes.len()),
-            (Self::Value { width: Some(width), .. }, _) => Some(*width),
-            (_, Some(Self::Literal(end))) => rest.windows(end.len()).position(|window| window == end),
+            (
+                Self::Value {
+                    width: Some(width), ..
+                },
+                _,
+            ) => Some(*width),
+            (_, Some(Self::Literal(end))) => {
+                rest.windows(end.len()).position(|window| window == end)
+            }
             _ => Some(rest.len()),
         }
     }
@@ -163,12 +218,19 @@ impl Piece {
 
 /// Reads a hole at the start of `text`; returns it and what follows.
 fn hole(text: &str) -> Result<(Piece, &str), &'static str> {
-    let (inside, after) = text[1..].split_once('}').ok_or("a } for every {, or \\{ for the character itself")?;
+    let (inside, after) = text[1..]
+        .split_once('}')
+        .ok_or("a } for every {, or \\{ for the character itself")?;
     let piece = match inside.split_once(':') {
-        None if inside == "value" => Piece::Value { width: None, decimals: None },
+        None if inside == "value" => Piece::Value {
+            width: None,
+            decimals: None,
+        },
         None if inside == "code" => Piece::Code,
         None if inside == "skip" => Piece::Skip,
-        Some(("value", size)) => sized(size).ok_or("{value:W} or {value:W.D} with W from 1 to 20 and D below W")?,
+        Some(("value", size)) => {
+            sized(size).ok_or("{value:W} or {value:W.D} with W from 1 to 20 and D below W")?
+        }
         _ => return Err("{value}, {value:W.D}, {code} or {skip}"),
     };
     Ok((piece, after))
@@ -180,7 +242,10 @@ fn sized(size: &str) -> Option<Piece> {
         Some((width, decimals)) => (width.parse().ok()?, Some(decimals.parse().ok()?)),
     };
     let fits = (1..=20).contains(&width) && decimals.is_none_or(|decimals| decimals < width);
-    fits.then_some(Piece::Value { width: Some(width), decimals })
+    fits.then_some(Piece::Value {
+        width: Some(width),
+        decimals,
+    })
 }
 
 /// Reads plain text up to the next hole; returns it and what follows.
@@ -189,7 +254,8 @@ fn literal(text: &str) -> Result<(Piece, &str), &'static str> {
     let mut rest = text;
     while let Some(next) = rest.chars().next().filter(|next| *next != '{') {
         let taken = if next == '\\' {
-            let (byte, taken) = escape(rest).ok_or("\\r, \\n, \\t, \\\\, \\{ or \\xNN after a backslash")?;
+            let (byte, taken) =
+                escape(rest).ok_or("\\r, \\n, \\t, \\\\, \\{ or \\xNN after a backslash")?;
             bytes.push(byte);
             taken
         } else {
@@ -230,27 +296,61 @@ mod tests {
         assert_eq!(value("M1,{value:8.4}", "M1,-01.2345"), two(-12345, 4));
         assert_eq!(value("{skip}={value}mm", "distance= 3.5mm"), two(35, 1));
         assert_eq!(value("\\x02{value}\\x03", "\u{2}7\u{3}"), two(7, 0));
-        assert_eq!(value("{value:3}{value:2}", "12345"), two(45, 0), "the last one holds");
+        assert_eq!(
+            value("{value:3}{value:2}", "12345"),
+            two(45, 0),
+            "the last one holds"
+        );
     }
 
     #[test]
     fn what_does_not_match_as_a_whole_is_no_value() {
-        for line in
-            ["", "M1,", "M1,+01.234", "M1,+01.23456", "M2,+01.2345", "M1,+01.2345 ", " M1,+01.2345", "M1,XXXXXXXX"]
-        {
+        for line in [
+            "",
+            "M1,",
+            "M1,+01.234",
+            "M1,+01.23456",
+            "M2,+01.2345",
+            "M1,+01.2345 ",
+            " M1,+01.2345",
+            "M1,XXXXXXXX",
+        ] {
             assert_eq!(value("M1,{value:8}", line), None, "{line:?}");
         }
     }
 
     #[test]
     fn a_number_is_one_number_and_nothing_else() {
-        for text in
-            ["", "+", "-", ".", "+.", "1.2.3", "1e3", "--1", "1-", "0x1", "1 ", "nan", "inf", "1234567890123456"]
-        {
+        for text in [
+            "",
+            "+",
+            "-",
+            ".",
+            "+.",
+            "1.2.3",
+            "1e3",
+            "--1",
+            "1-",
+            "0x1",
+            "1 ",
+            "nan",
+            "inf",
+            "1234567890123456",
+        ] {
             assert_eq!(Decimal::read(text.as_bytes()), None, "{text:?}");
         }
-        for (text, expected) in [("0.1", 0.1), (".5", 0.5), ("5.", 5.0), ("  -2.75", -2.75), ("+000123", 123.0)] {
-            assert_eq!(Decimal::read(text.as_bytes()).map(Decimal::to_f64), Some(expected), "{text:?}");
+        for (text, expected) in [
+            ("0.1", 0.1),
+            (".5", 0.5),
+            ("5.", 5.0),
+            ("  -2.75", -2.75),
+            ("+000123", 123.0),
+        ] {
+            assert_eq!(
+                Decimal::read(text.as_bytes()).map(Decimal::to_f64),
+                Some(expected),
+                "{text:?}"
+            );
         }
     }
 
@@ -267,7 +367,10 @@ mod tests {
             ("\\", "backslash"),
         ] {
             let error = Pattern::compile("line", pattern).unwrap_err().to_string();
-            assert!(error.contains("line") && error.contains(word), "{pattern}: {error}");
+            assert!(
+                error.contains("line") && error.contains(word),
+                "{pattern}: {error}"
+            );
         }
         assert!(Pattern::bytes("terminator", "{value}").is_err());
     }

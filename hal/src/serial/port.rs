@@ -57,7 +57,13 @@ pub struct PortSettings {
 impl PortSettings {
     /// This port at this rate, 8N1, low latency, locks in /run/lock.
     pub fn new(path: impl Into<PathBuf>, baud: u32) -> Self {
-        Self { path: path.into(), baud, parity: Parity::None, low_latency: true, lock_dir: "/run/lock".into() }
+        Self {
+            path: path.into(),
+            baud,
+            parity: Parity::None,
+            low_latency: true,
+            lock_dir: "/run/lock".into(),
+        }
     }
 
     /// Nanoseconds for which `bytes` keep the line busy.
@@ -86,21 +92,37 @@ impl Port {
     pub(super) fn open(settings: &PortSettings) -> Result<(Self, Vec<Note>), SerialError> {
         super::error::positive("baud", settings.baud.into())?;
         let path = &settings.path;
-        let device = path.canonicalize().map_err(|source| refused(path, source.into()))?;
+        let device = path
+            .canonicalize()
+            .map_err(|source| refused(path, source.into()))?;
         let lock = PortLock::take(&settings.lock_dir, path, &device)?;
-        let builder = serialport::new(device.to_string_lossy(), settings.baud).parity(settings.parity.asked());
+        let builder = serialport::new(device.to_string_lossy(), settings.baud)
+            .parity(settings.parity.asked());
         let terminal = TTYPort::open(&builder).map_err(|source| refused(path, source))?;
         let mut notes = Vec::new();
         let pseudo = is_pseudo_terminal(&device);
         let got = terminal.parity().map_err(|source| refused(path, source))?;
         notes.extend(parity_note(settings, got, pseudo)?);
-        check_baud(settings, terminal.baud_rate().map_err(|source| refused(path, source))?)?;
+        check_baud(
+            settings,
+            terminal
+                .baud_rate()
+                .map_err(|source| refused(path, source))?,
+        )?;
         // What arrived before we listened is of unknown age.
-        terminal.clear(ClearBuffer::Input).map_err(|source| refused(path, source))?;
+        terminal
+            .clear(ClearBuffer::Input)
+            .map_err(|source| refused(path, source))?;
         if settings.low_latency {
             notes.extend(low_latency::ask(terminal.as_raw_fd()).err());
         }
-        Ok((Self { terminal, _lock: lock }, notes))
+        Ok((
+            Self {
+                terminal,
+                _lock: lock,
+            },
+            notes,
+        ))
     }
 
     /// Bytes that arrive within `wait`, at most as many as fit; 0 if none do. An error means that the port is lost.
@@ -125,7 +147,10 @@ fn set_timeout(terminal: &mut TTYPort, wait: Duration) -> io::Result<()> {
 }
 
 pub(super) fn is_nothing(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock)
+    matches!(
+        error.kind(),
+        io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock
+    )
 }
 
 /// The library's error in our words.
@@ -141,7 +166,8 @@ fn refused(path: &Path, source: serialport::Error) -> SerialError {
 
 /// Whether the device is the slave of a pseudo terminal: majors 136 to 143 [Linux, admin-guide/devices.txt].
 fn is_pseudo_terminal(device: &Path) -> bool {
-    std::fs::metadata(device).is_ok_and(|device| (136..=143).contains(&libc::major(device.st_rdev())))
+    std::fs::metadata(device)
+        .is_ok_and(|device| (136..=143).contains(&libc::major(device.st_rdev())))
 }
 
 /// A pseudo terminal takes even parity without a word and reads back none; elsewhere that is an error.
@@ -154,9 +180,15 @@ fn parity_note(
         return Ok(None);
     }
     if pseudo_terminal {
-        let what =
-            format!("{}: a pseudo terminal has no parity: {:?} was dropped", settings.path.display(), settings.parity);
-        return Ok(Some(Note { what, remedy: "damage that parity would catch goes unseen here; a real port has it" }));
+        let what = format!(
+            "{}: a pseudo terminal has no parity: {:?} was dropped",
+            settings.path.display(),
+            settings.parity
+        );
+        return Ok(Some(Note {
+            what,
+            remedy: "damage that parity would catch goes unseen here; a real port has it",
+        }));
     }
     Err(SerialError::NotTaken {
         path: settings.path.clone(),
@@ -186,24 +218,51 @@ mod tests {
     use super::*;
 
     fn even() -> PortSettings {
-        PortSettings { parity: Parity::Even, ..PortSettings::new("/dev/ttyX", 230_400) }
+        PortSettings {
+            parity: Parity::Even,
+            ..PortSettings::new("/dev/ttyX", 230_400)
+        }
     }
 
     #[test]
     fn parity_dropped_by_a_pseudo_terminal_is_said_and_elsewhere_refused() {
-        let note = parity_note(&even(), serialport::Parity::None, true).unwrap().unwrap();
+        let note = parity_note(&even(), serialport::Parity::None, true)
+            .unwrap()
+            .unwrap();
         assert!(note.what.contains("Even was dropped"), "{note:?}");
-        let error = parity_note(&even(), serialport::Parity::None, false).unwrap_err().to_string();
-        assert!(error.contains("parity Even was asked for, the port has None"), "{error}");
-        assert_eq!(parity_note(&even(), serialport::Parity::Even, false).unwrap(), None);
+        let error = parity_note(&even(), serialport::Parity::None, false)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("parity Even was asked for, the port has None"),
+            "{error}"
+        );
+        assert_eq!(
+            parity_note(&even(), serialport::Parity::Even, false).unwrap(),
+            None
+        );
     }
 
     #[test]
     fn what_the_system_refuses_is_told_apart() {
-        let of = |kind| refused(Path::new("/dev/ttyX"), serialport::Error::new(kind, "words"));
-        assert!(matches!(of(ErrorKind::Io(io::ErrorKind::PermissionDenied)), SerialError::Permission { .. }));
-        assert!(matches!(of(ErrorKind::Io(io::ErrorKind::NotFound)), SerialError::Missing { .. }));
-        assert!(matches!(of(ErrorKind::NoDevice), SerialError::Held { pid: None, .. }));
+        let of = |kind| {
+            refused(
+                Path::new("/dev/ttyX"),
+                serialport::Error::new(kind, "words"),
+            )
+        };
+        assert!(matches!(
+            of(ErrorKind::Io(io::ErrorKind::PermissionDenied)),
+            SerialError::Permission { .. }
+        ));
+        assert!(matches!(
+            of(ErrorKind::Io(io::ErrorKind::NotFound)),
+            SerialError::Missing { .. }
+        ));
+        assert!(matches!(
+            of(ErrorKind::NoDevice),
+            SerialError::Held { pid: None, .. }
+        ));
         assert!(matches!(of(ErrorKind::Unknown), SerialError::Open { .. }));
     }
 
@@ -211,7 +270,10 @@ mod tests {
     fn a_rate_two_percent_off_is_refused_with_both_figures() {
         assert!(check_baud(&even(), 230_400 + 4_608).is_ok());
         let error = check_baud(&even(), 225_000).unwrap_err().to_string();
-        assert!(error.contains("230400") && error.contains("225000"), "{error}");
+        assert!(
+            error.contains("230400") && error.contains("225000"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -58,7 +58,11 @@ impl Default for Polling {
     /// As fast as the probe answers; 100 ms for an answer, 20 ms of silence after a damaged one.
     fn default() -> Self {
         let ms = Duration::from_millis;
-        Self { interval: ms(0), timeout: ms(100), quiet: ms(20) }
+        Self {
+            interval: ms(0),
+            timeout: ms(100),
+            quiet: ms(20),
+        }
     }
 }
 
@@ -82,7 +86,13 @@ impl ProbeSettings {
     /// This probe on this port, as it reads.
     pub fn new(port: PortSettings, protocol: Protocol) -> Self {
         let (polling, mounting) = (Polling::default(), Mounting::default());
-        Self { port, protocol, polling, mounting, latency: Duration::ZERO }
+        Self {
+            port,
+            protocol,
+            polling,
+            mounting,
+            latency: Duration::ZERO,
+        }
     }
 
     fn check(&self) -> Result<(), SerialError> {
@@ -92,12 +102,20 @@ impl ProbeSettings {
             return refuse("gain", gain.to_string(), "a finite number other than zero");
         }
         if !offset_m.is_finite() {
-            return refuse("offset_m", offset_m.to_string(), "a finite number of metres");
+            return refuse(
+                "offset_m",
+                offset_m.to_string(),
+                "a finite number of metres",
+            );
         }
         let Polling { timeout, quiet, .. } = self.polling;
         if quiet.is_zero() || timeout < quiet {
             let value = format!("{quiet:?}, {timeout:?}");
-            return refuse("quiet, timeout", value, "above zero, and the timeout no shorter than the quiet");
+            return refuse(
+                "quiet, timeout",
+                value,
+                "above zero, and the timeout no shorter than the quiet",
+            );
         }
         Ok(())
     }
@@ -135,16 +153,24 @@ impl SerialProbe {
     /// The same; `prepare` runs first in the reader's thread, to give it a name, a priority or a processor. The thread
     /// should run just below the loop: whatever delays it makes readings look younger than they are, up to 20 ms, by
     /// which time they are not handed out.
-    pub fn open_with(settings: ProbeSettings, prepare: impl FnOnce() + Send + 'static) -> Result<Self, SerialError> {
+    pub fn open_with(
+        settings: ProbeSettings,
+        prepare: impl FnOnce() + Send + 'static,
+    ) -> Result<Self, SerialError> {
         settings.check()?;
         let decoder = settings.protocol.decoder()?;
         let (port, notes) = Port::open(&settings.port)?;
         let (writer, newest) = cell::cell();
-        let (counters, stop) = (Arc::new(Counters::default()), Arc::new(AtomicBool::new(false)));
+        let (counters, stop) = (
+            Arc::new(Counters::default()),
+            Arc::new(AtomicBool::new(false)),
+        );
         let clock = Clock::start();
         let reader = ReaderThread {
             port,
-            exchange: decoder.request().map(|_| Exchange::new(times(settings.polling), clock.now_ns())),
+            exchange: decoder
+                .request()
+                .map(|_| Exchange::new(times(settings.polling), clock.now_ns())),
             decoder,
             line: settings.port,
             mounting: settings.mounting,
@@ -155,12 +181,21 @@ impl SerialProbe {
             stop: stop.clone(),
         };
         counters.running.store(true, Relaxed);
-        let thread = thread::Builder::new().name("serial-probe".into()).spawn(move || {
-            prepare();
-            reader.run();
-        });
+        let thread = thread::Builder::new()
+            .name("serial-probe".into())
+            .spawn(move || {
+                prepare();
+                reader.run();
+            });
         let thread = Some(thread.map_err(|source| SerialError::Thread { source })?);
-        Ok(Self { newest, clock, watch: Watch { counters }, notes, stop, thread })
+        Ok(Self {
+            newest,
+            clock,
+            watch: Watch { counters },
+            notes,
+            stop,
+            thread,
+        })
     }
 
     /// What the port did not take, for a person.
@@ -181,7 +216,12 @@ impl SerialProbe {
     fn reading_at(&mut self, now_ns: u64) -> Reading {
         let newest = self.newest.newest();
         let age_ns = now_ns.saturating_sub(newest.made_ns);
-        Reading { position_m: newest.position_m, sequence: newest.sequence, age_ns, validity: newest.validity }
+        Reading {
+            position_m: newest.position_m,
+            sequence: newest.sequence,
+            age_ns,
+            validity: newest.validity,
+        }
     }
 }
 
@@ -204,7 +244,10 @@ impl Drop for SerialProbe {
 
 impl fmt::Debug for SerialProbe {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SerialProbe").field("notes", &self.notes).field("statistics", &self.statistics()).finish()
+        f.debug_struct("SerialProbe")
+            .field("notes", &self.notes)
+            .field("statistics", &self.statistics())
+            .finish()
     }
 }
 

@@ -32,7 +32,10 @@ pub struct Mounting {
 impl Default for Mounting {
     /// As the probe reads.
     fn default() -> Self {
-        Self { gain: 1.0, offset_m: 0.0 }
+        Self {
+            gain: 1.0,
+            offset_m: 0.0,
+        }
     }
 }
 
@@ -62,7 +65,9 @@ impl Clock {
     pub(super) const OPENED: Duration = Duration::from_secs(3600);
 
     pub(super) fn start() -> Self {
-        Self { opened: Instant::now() }
+        Self {
+            opened: Instant::now(),
+        }
     }
 
     pub(super) fn now_ns(self) -> u64 {
@@ -109,24 +114,39 @@ impl Harvest {
 
 impl Publisher {
     pub(super) fn new(cell: Writer, counters: Arc<Counters>) -> Self {
-        Self { cell, counters, newest: Measurement::default(), rate: Rate::default() }
+        Self {
+            cell,
+            counters,
+            newest: Measurement::default(),
+            rate: Rate::default(),
+        }
     }
 
     /// Takes note of what a read brought; with the time it was made (and only then) the newest goes to the loop.
     fn publish(&mut self, harvest: &Harvest, made_ns: Option<u64>, mounting: Mounting) {
         self.newest.sequence += harvest.made;
-        let Some((position_m, validity)) = harvest.newest else { return };
-        let Some(made_ns) = made_ns else { return add(&self.counters.ageless, harvest.values) };
+        let Some((position_m, validity)) = harvest.newest else {
+            return;
+        };
+        let Some(made_ns) = made_ns else {
+            return add(&self.counters.ageless, harvest.values);
+        };
         add(&self.counters.superseded, harvest.values - 1);
         add(&self.counters.published, 1);
         let position_m = mounting.gain * position_m + mounting.offset_m;
-        self.newest = Measurement { position_m, validity, made_ns, ..self.newest };
+        self.newest = Measurement {
+            position_m,
+            validity,
+            made_ns,
+            ..self.newest
+        };
         self.cell.publish(self.newest);
     }
 
     /// The port is lost: the last measurement stays what it was, but is no longer to be used.
     fn lose(&mut self, trouble: Trouble, error: &io::Error) {
-        self.counters.trouble(trouble, error.raw_os_error().unwrap_or(0).into());
+        self.counters
+            .trouble(trouble, error.raw_os_error().unwrap_or(0).into());
         if self.newest.validity != Validity::Missing {
             self.newest.validity = Validity::Faulty;
             self.cell.publish(self.newest);
@@ -157,7 +177,10 @@ impl ReaderThread {
     fn turn(&mut self) -> Result<(), (Trouble, io::Error)> {
         let mut bytes = [0; 4096];
         let wait = self.wait();
-        let count = self.port.read(&mut bytes, wait).map_err(|error| (trouble_of(&error), error))?;
+        let count = self
+            .port
+            .read(&mut bytes, wait)
+            .map_err(|error| (trouble_of(&error), error))?;
         let now_ns = self.clock.now_ns();
         let late = count >= BACKLOG || now_ns - self.looked_ns > AWAY_NS;
         self.looked_ns = now_ns;
@@ -179,13 +202,19 @@ impl ReaderThread {
     /// How long to listen; what is due must not wait, but what has arrived comes first.
     fn wait(&self) -> Duration {
         let until_ns = self.exchange.as_ref().map(Exchange::listen_until_ns);
-        until_ns.map_or(SLICE, |until_ns| SLICE.min(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))))
+        until_ns.map_or(SLICE, |until_ns| {
+            SLICE.min(Duration::from_nanos(
+                until_ns.saturating_sub(self.clock.now_ns()),
+            ))
+        })
     }
 
     fn ask(&mut self) -> io::Result<()> {
         let counters = &self.publisher.counters;
         self.decoder.reset(&mut |event| counters.count(event));
-        let Some((request, exchange)) = self.decoder.request().zip(self.exchange.as_mut()) else { return Ok(()) };
+        let Some((request, exchange)) = self.decoder.request().zip(self.exchange.as_mut()) else {
+            return Ok(());
+        };
         exchange.sent(self.clock.now_ns());
         self.port.write(request, SLICE)
     }
@@ -215,12 +244,18 @@ impl ReaderThread {
             Some(_) if harvest.answers == 0 => None,
             Some(exchange) => exchange.answered(harvest.answers, now_ns),
             None if late => None,
-            None => Some(now_ns.saturating_sub(self.line.line_time_ns(self.decoder.message_bytes()))),
+            None => {
+                Some(now_ns.saturating_sub(self.line.line_time_ns(self.decoder.message_bytes())))
+            }
         };
         known_ns.map(|known_ns| known_ns.saturating_sub(self.latency_ns))
     }
 }
 
 fn trouble_of(error: &io::Error) -> Trouble {
-    if error.kind() == io::ErrorKind::BrokenPipe { Trouble::HungUp } else { Trouble::ReadFailed }
+    if error.kind() == io::ErrorKind::BrokenPipe {
+        Trouble::HungUp
+    } else {
+        Trouble::ReadFailed
+    }
 }

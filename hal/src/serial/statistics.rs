@@ -113,7 +113,10 @@ impl Counters {
             restarts: read(&self.restarts),
             rate_hz: f64::from_bits(read(&self.rate_bits)),
             running: self.running.load(Relaxed),
-            last_error: Trouble::describe(self.trouble.load(Relaxed), self.trouble_code.load(Relaxed)),
+            last_error: Trouble::describe(
+                self.trouble.load(Relaxed),
+                self.trouble_code.load(Relaxed),
+            ),
         }
     }
 }
@@ -135,7 +138,10 @@ impl Rate {
             return None;
         }
         let rate_hz = (values - self.values) as f64 / (window_ns as f64 * 1e-9);
-        *self = Self { since_ns: now_ns, values };
+        *self = Self {
+            since_ns: now_ns,
+            values,
+        };
         Some(rate_hz)
     }
 }

@@ -24,7 +24,8 @@ fn condition(bus: &mut dyn CanBus) -> Condition {
 
 /// One test, since there is one adapter: the parts build upon each other.
 #[test]
-fn warning_is_no_fault_bus_off_latches_one_with_its_remedy_and_after_down_and_up_clearing_suffices() {
+fn warning_is_no_fault_bus_off_latches_one_with_its_remedy_and_after_down_and_up_clearing_suffices()
+{
     let adapter = Adapter::new();
     let name = adapter.name.clone();
     let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // nobody's: conditions only
@@ -34,17 +35,28 @@ fn warning_is_no_fault_bus_off_latches_one_with_its_remedy_and_after_down_and_up
     assert_eq!(condition(listener.as_mut()), Condition::Warning);
     rig.gives(-1.0, -1.0);
     let seen = Interface::read(&name).unwrap();
-    assert_eq!((seen.state, seen.is_healthy, seen.bit_rate), (Some("error warning"), true, Some(BIT_RATE)));
+    assert_eq!(
+        (seen.state, seen.is_healthy, seen.bit_rate),
+        (Some("error warning"), true, Some(BIT_RATE))
+    );
 
     adapter.goes_bus_off();
     assert_eq!(condition(listener.as_mut()), Condition::BusOff);
     assert_eq!(rig.fault(), faults::BUS_OFF);
     let text = fault_text(faults::BUS_OFF);
     assert_eq!(text.what, "the CAN controller is in bus-off");
-    assert!(text.remedy.contains("`ip link set IFACE down` and up again, then clear the fault"), "{}", text.remedy);
+    assert!(
+        text.remedy
+            .contains("`ip link set IFACE down` and up again, then clear the fault"),
+        "{}",
+        text.remedy
+    );
     assert_eq!(Interface::read(&name).unwrap().state, Some("bus off"));
     let refused = SocketPort::open(&name, BIT_RATE).unwrap_err().to_string();
-    assert!(refused.contains("is in state bus off; check cable, termination and bit rate"), "{refused}");
+    assert!(
+        refused.contains("is in state bus off; check cable, termination and bit rate"),
+        "{refused}"
+    );
     assert!(rig.drive.reset_fault().is_err(), "still off");
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_OFF));
 

@@ -7,13 +7,20 @@ use crate::support::vcan::Vcan;
 use crate::support::{Rig, host, open, settings};
 
 #[test]
-fn an_interface_set_down_is_a_fault_the_drive_stops_by_itself_and_with_the_interface_up_clearing_suffices() {
+fn an_interface_set_down_is_a_fault_the_drive_stops_by_itself_and_with_the_interface_up_clearing_suffices()
+ {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     vcan.set_up(false);
     assert_eq!(rig.fault(), faults::BUS_DOWN);
     let text = fault_text(faults::BUS_DOWN);
-    assert_eq!((text.what, text.remedy), ("the CAN interface is down", "`ip link set IFACE up`, then clear the fault"));
+    assert_eq!(
+        (text.what, text.remedy),
+        (
+            "the CAN interface is down",
+            "`ip link set IFACE up`, then clear the fault"
+        )
+    );
     assert!(rig.drive.reset_fault().is_err(), "still down");
     vcan.set_up(true);
     rig.recovers();
@@ -26,7 +33,13 @@ fn an_adapter_pulled_out_is_a_fault_the_drive_stops_by_itself_and_starting_anew_
     vcan.unplug();
     assert_eq!(rig.fault(), faults::BUS_GONE);
     let text = fault_text(faults::BUS_GONE);
-    assert_eq!((text.what, text.remedy), ("the CAN interface is gone", "plug the adapter in, then start anew"));
+    assert_eq!(
+        (text.what, text.remedy),
+        (
+            "the CAN interface is gone",
+            "plug the adapter in, then start anew"
+        )
+    );
     let Rig { drive, far_end } = rig;
     drop(drive);
     vcan.plug_in();

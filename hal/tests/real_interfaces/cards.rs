@@ -20,13 +20,22 @@ fn a_drive_on_another_card_runs_and_the_cards_tell_bit_rate_state_and_error_coun
     for card in ["can0", "can1"] {
         let seen = Interface::read(card).unwrap();
         assert!(seen.is_up && seen.is_healthy, "{seen:?}");
-        assert_eq!((seen.bit_rate, seen.state), (Some(BIT_RATE), Some("error active")));
-        assert_eq!((seen.error_counters, seen.restart_ms), (Some((0, 0)), Some(100)));
+        assert_eq!(
+            (seen.bit_rate, seen.state),
+            (Some(BIT_RATE), Some("error active"))
+        );
+        assert_eq!(
+            (seen.error_counters, seen.restart_ms),
+            (Some((0, 0)), Some(100))
+        );
     }
     drop(rig.drive);
     let seen = inspect(&host("can0"), 5, Duration::from_secs(3)).unwrap();
     assert_eq!(seen.name.as_deref(), Some("simulated CANopen drive"));
 
     let refused = SocketPort::open("can0", 500_000).unwrap_err().to_string();
-    assert!(refused.contains("can0 runs at 1000000 bit/s, the configuration says 500000"), "{refused}");
+    assert!(
+        refused.contains("can0 runs at 1000000 bit/s, the configuration says 500000"),
+        "{refused}"
+    );
 }

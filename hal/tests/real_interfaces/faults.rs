@@ -28,12 +28,18 @@ fn a_fault_of_the_drive_is_told_in_the_words_of_its_emergency_message() {
     is_found_and_cleared(DeviceFault::Drive(0x4210), faults::EMERGENCY + 0x4210);
     let text = fault_text(faults::EMERGENCY + 0x4210);
     assert_eq!(text.what, "drive too hot");
-    assert!(text.remedy.contains("remove the cause, then clear the fault"));
+    assert!(
+        text.remedy
+            .contains("remove the cause, then clear the fault")
+    );
 }
 
 #[test]
 fn a_drive_that_only_sends_an_emergency_message_is_found() {
-    is_found_and_cleared(DeviceFault::EmergencyOnly(0x2310), faults::EMERGENCY + 0x2310);
+    is_found_and_cleared(
+        DeviceFault::EmergencyOnly(0x2310),
+        faults::EMERGENCY + 0x2310,
+    );
 }
 
 #[test]
@@ -90,7 +96,11 @@ fn a_drive_that_does_not_obey_disable_is_stopped_by_nmt_and_one_that_ignores_tha
         let mut rig = vcan.running();
         rig.far_end.device().inject(misbehaviour);
         rig.drive.disable();
-        assert_eq!(rig.far_end.current_a(), 1.0, "{misbehaviour:?}: it does not obey");
+        assert_eq!(
+            rig.far_end.current_a(),
+            1.0,
+            "{misbehaviour:?}: it does not obey"
+        );
         rig.far_end.goes_off();
         assert_eq!(rig.fault(), faults::STILL_ENABLED, "{misbehaviour:?}");
         rig.recovers();
@@ -102,7 +112,9 @@ fn a_loop_that_stops_commanding_is_switched_off() {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     let code = i64::from(faults::COMMANDS_STOPPED);
-    wait_for("a loop that stands still is missed", || rig.far_end.current_a() == 0.0);
+    wait_for("a loop that stands still is missed", || {
+        rig.far_end.current_a() == 0.0
+    });
     assert_eq!(rig.drive.enable().unwrap_err().code, code);
     rig.recovers();
 }

@@ -13,15 +13,19 @@ fn refusal(name: &str) -> String {
 fn a_name_that_no_interface_has_is_refused_with_the_name_and_how_to_find_the_right_one() {
     let refused = refusal("can77");
     assert!(refused.starts_with("CAN interface can77: "), "{refused}");
-    assert!(refused.ends_with("`ip link show type can` lists what there is"), "{refused}");
+    assert!(
+        refused.ends_with("`ip link show type can` lists what there is"),
+        "{refused}"
+    );
 }
 
 #[test]
 fn an_interface_that_is_down_is_refused_with_the_command_that_brings_it_up() {
     let vcan = Vcan::down();
     let name = &vcan.name;
-    let remedy =
-        format!("CAN interface {name} is down; bring it up with `ip link set {name} up type can bitrate 1000000`");
+    let remedy = format!(
+        "CAN interface {name} is down; bring it up with `ip link set {name} up type can bitrate 1000000`"
+    );
     assert_eq!(refusal(name), remedy);
     assert!(!Interface::read(name).unwrap().is_up);
 }

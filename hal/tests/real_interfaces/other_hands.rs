@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use bench_hal::can::budget::Exchange;
-use bench_hal::can::drive::{CanopenDrive, DriveSettings, ExpectedIdentity, fault_text, faults, inspect};
+use bench_hal::can::drive::{
+    CanopenDrive, DriveSettings, ExpectedIdentity, fault_text, faults, inspect,
+};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 
 use crate::support::python::{PythonDrive, script};
@@ -43,33 +45,57 @@ fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
     assert!(drive.enable().is_err(), "a fault is not left by enabling");
     assert_eq!(other.shows(), "08 0 OPERATIONAL");
     drive.reset_fault().unwrap();
-    assert_eq!((drive.status(), other.shows().as_str()), (AmplifierStatus::Disabled, "40 0 OPERATIONAL"));
+    assert_eq!(
+        (drive.status(), other.shows().as_str()),
+        (AmplifierStatus::Disabled, "40 0 OPERATIONAL")
+    );
 }
 
 #[test]
-fn a_drive_of_other_hands_is_brought_up_runs_both_ways_fails_with_its_words_is_cleared_and_left_off() {
+fn a_drive_of_other_hands_is_brought_up_runs_both_ways_fails_with_its_words_is_cleared_and_left_off()
+ {
     let vcan = Vcan::up();
     let mut other = PythonDrive::new(&vcan.name);
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
     assert_eq!(seen.name.as_deref(), Some("a drive of other hands"));
-    let identity = ExpectedIdentity { vendor: Some(0x123), serial: Some(42), ..ExpectedIdentity::default() };
-    for exchange in [Exchange::Asynchronous { status_hz: 50.0 }, Exchange::Synchronous { status_every: 1 }] {
-        let settings = DriveSettings { identity, exchange, rate_hz: 100.0, ..settings() };
-        let mut drive = open(&vcan.name, settings).unwrap_or_else(|error| panic!("{exchange:?}: {error}"));
+    let identity = ExpectedIdentity {
+        vendor: Some(0x123),
+        serial: Some(42),
+        ..ExpectedIdentity::default()
+    };
+    for exchange in [
+        Exchange::Asynchronous { status_hz: 50.0 },
+        Exchange::Synchronous { status_every: 1 },
+    ] {
+        let settings = DriveSettings {
+            identity,
+            exchange,
+            rate_hz: 100.0,
+            ..settings()
+        };
+        let mut drive =
+            open(&vcan.name, settings).unwrap_or_else(|error| panic!("{exchange:?}: {error}"));
         runs(&mut drive, &mut other);
         fails_and_recovers(&mut drive, &mut other);
         runs(&mut drive, &mut other);
         drop(drive);
-        wait_for("off and pre-operational", || other.shows() == "40 0 PRE-OPERATIONAL");
+        wait_for("off and pre-operational", || {
+            other.shows() == "40 0 PRE-OPERATIONAL"
+        });
     }
 }
 
 #[test]
-fn a_master_of_other_hands_finds_configures_and_runs_the_simulated_drive_which_misses_it_when_it_falls_silent() {
+fn a_master_of_other_hands_finds_configures_and_runs_the_simulated_drive_which_misses_it_when_it_falls_silent()
+ {
     let vcan = Vcan::up();
     let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let output = script("canopen_master.py", &vcan.name).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.contains("all well"), "{said}");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && said.contains("all well"),
+        "{said}"
+    );
     assert_eq!(far_end.current_a(), 0.0);
 }

@@ -23,10 +23,15 @@ fn a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free() {
     let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let mut emergencies = host(&vcan.name).endpoint(&[emcy::cob_id(5)]).unwrap();
     let mut child = the_same_test_in_a_process_of_its_own(&vcan.name);
-    wait_for("the other process drives 1 A", || far_end.current_a() == 1.0);
+    wait_for("the other process drives 1 A", || {
+        far_end.current_a() == 1.0
+    });
 
     let refused = refusal(&vcan.name, settings());
-    let holder = format!("node 5 is driven by process {} already; end that first", child.id());
+    let holder = format!(
+        "node 5 is driven by process {} already; end that first",
+        child.id()
+    );
     assert!(refused.starts_with(&holder), "{refused}");
     assert_eq!(far_end.current_a(), 1.0, "the refused one changed nothing");
 
@@ -34,16 +39,24 @@ fn a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free() {
     child.wait().unwrap();
     far_end.goes_off();
     assert_eq!(far_end.device().power_state(), State::SwitchOnDisabled);
-    assert_eq!(first_emergency(emergencies.as_mut()), 0x8130, "the drive's own heartbeat consumer says so");
+    assert_eq!(
+        first_emergency(emergencies.as_mut()),
+        0x8130,
+        "the drive's own heartbeat consumer says so"
+    );
 
-    let drive = open(&vcan.name, settings()).unwrap_or_else(|error| panic!("the node is free: {error}"));
+    let drive =
+        open(&vcan.name, settings()).unwrap_or_else(|error| panic!("the node is free: {error}"));
     Rig { drive, far_end }.enabled();
 }
 
 fn the_same_test_in_a_process_of_its_own(interface: &str) -> Child {
     let name = "process::a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free";
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", name, "--nocapture"]).env(INTERFACE, interface).stdout(Stdio::null());
+    command
+        .args(["--exact", name, "--nocapture"])
+        .env(INTERFACE, interface)
+        .stdout(Stdio::null());
     command.spawn().unwrap()
 }
 
@@ -62,6 +75,8 @@ fn command_for_ever(interface: &str) -> ! {
 /// The code of the first emergency message that came.
 fn first_emergency(bus: &mut dyn CanBus) -> u16 {
     let event = bus.receive(Duration::from_secs(10)).unwrap();
-    let Some(BusEvent::Frame(frame)) = event else { panic!("{event:?}") };
+    let Some(BusEvent::Frame(frame)) = event else {
+        panic!("{event:?}")
+    };
     emcy::Emergency::decode(frame.data()).unwrap().code
 }

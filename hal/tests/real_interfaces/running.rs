@@ -14,21 +14,41 @@ use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, Rig, host, refusal, settings, wait_for};
 
 #[test]
-fn a_drive_is_brought_up_follows_quantised_currents_says_what_it_measures_and_goes_to_zero_when_disabled() {
-    for exchange in [Exchange::Asynchronous { status_hz: 500.0 }, Exchange::Synchronous { status_every: 1 }] {
+fn a_drive_is_brought_up_follows_quantised_currents_says_what_it_measures_and_goes_to_zero_when_disabled()
+ {
+    for exchange in [
+        Exchange::Asynchronous { status_hz: 500.0 },
+        Exchange::Synchronous { status_every: 1 },
+    ] {
         let vcan = Vcan::up();
-        let mut rig = vcan.rig(DriveSettings { exchange, ..settings() });
+        let mut rig = vcan.rig(DriveSettings {
+            exchange,
+            ..settings()
+        });
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
         rig.drive.enable().unwrap();
-        assert_eq!((rig.drive.status(), rig.far_end.current_a()), (AmplifierStatus::Enabled, 0.0));
+        assert_eq!(
+            (rig.drive.status(), rig.far_end.current_a()),
+            (AmplifierStatus::Enabled, 0.0)
+        );
         // 1 A of 4 A is 250 counts; 0.9985 A is 249.6 counts, so 250; beyond the limit of 4 A 1000 counts remain.
-        for (wanted_a, given_a) in [(1.0, 1.0), (-2.0, -2.0), (0.9985, 1.0), (-0.003, -0.004), (9.0, 4.0)] {
+        for (wanted_a, given_a) in [
+            (1.0, 1.0),
+            (-2.0, -2.0),
+            (0.9985, 1.0),
+            (-0.003, -0.004),
+            (9.0, 4.0),
+        ] {
             rig.gives(wanted_a, given_a);
         }
         rig.drive.disable();
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
         rig.far_end.goes_off();
-        assert_eq!(rig.far_end.device().power_state(), State::SwitchOnDisabled, "{exchange:?}");
+        assert_eq!(
+            rig.far_end.device().power_state(),
+            State::SwitchOnDisabled,
+            "{exchange:?}"
+        );
     }
 }
 
@@ -39,7 +59,8 @@ fn closing_leaves_the_drive_off_pre_operational_and_not_watching() {
     drop(drive);
     wait_for("it is pre-operational and watches nobody", || {
         let device = far_end.device();
-        (device.nmt_state(), device.read(Address::new(0x1016, 1))) == (nmt::State::PreOperational, 0)
+        (device.nmt_state(), device.read(Address::new(0x1016, 1)))
+            == (nmt::State::PreOperational, 0)
     });
     far_end.goes_off();
 }
@@ -49,12 +70,30 @@ fn a_drive_says_who_it_is_and_another_than_configured_is_refused() {
     let vcan = Vcan::up();
     let _far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(3)).unwrap();
-    assert_eq!(seen.name.as_deref(), Some("simulated CANopen drive"), "read in four segments");
-    assert_eq!((seen.identity, seen.rated_current_a), ([0x402, 1, 0x1_0000, 1].map(Some), Some(4.0)));
-    let identity = ExpectedIdentity { serial: Some(7), ..ExpectedIdentity::default() };
-    let refused = refusal(&vcan.name, DriveSettings { identity, ..settings() });
+    assert_eq!(
+        seen.name.as_deref(),
+        Some("simulated CANopen drive"),
+        "read in four segments"
+    );
+    assert_eq!(
+        (seen.identity, seen.rated_current_a),
+        ([0x402, 1, 0x1_0000, 1].map(Some), Some(4.0))
+    );
+    let identity = ExpectedIdentity {
+        serial: Some(7),
+        ..ExpectedIdentity::default()
+    };
+    let refused = refusal(
+        &vcan.name,
+        DriveSettings {
+            identity,
+            ..settings()
+        },
+    );
     assert!(
-        refused.contains("the serial number of node 5 is 0x00000001, the configuration says 0x00000007"),
+        refused.contains(
+            "the serial number of node 5 is 0x00000001, the configuration says 0x00000007"
+        ),
         "{refused}"
     );
 }
@@ -63,9 +102,17 @@ fn a_drive_says_who_it_is_and_another_than_configured_is_refused() {
 fn an_endpoint_hears_exactly_its_identifiers_in_exactly_their_format() {
     let vcan = Vcan::up();
     let host = host(&vcan.name);
-    let (mut all, ids) = (host.endpoint(&[]).unwrap(), [Id::standard(0x185), Id::extended(0x905)]);
+    let (mut all, ids) = (
+        host.endpoint(&[]).unwrap(),
+        [Id::standard(0x185), Id::extended(0x905)],
+    );
     let mut some = host.endpoint(&ids).unwrap();
-    let others = [Id::extended(0x185), Id::standard(0x105), Id::standard(0x186), Id::extended(0x1000_0905)];
+    let others = [
+        Id::extended(0x185),
+        Id::standard(0x105),
+        Id::standard(0x186),
+        Id::extended(0x1000_0905),
+    ];
     for id in others.into_iter().chain(ids) {
         all.send(&CanFrame::new(id, [1, 2])).unwrap();
     }
@@ -74,5 +121,9 @@ fn an_endpoint_hears_exactly_its_identifiers_in_exactly_their_format() {
         assert_eq!(heard, Some(BusEvent::Frame(CanFrame::new(id, [1, 2]))));
     }
     assert_eq!(some.receive(Duration::from_millis(50)), Ok(None));
-    assert_eq!(all.receive(Duration::from_millis(50)), Ok(None), "nobody hears himself");
+    assert_eq!(
+        all.receive(Duration::from_millis(50)),
+        Ok(None),
+        "nobody hears himself"
+    );
 }

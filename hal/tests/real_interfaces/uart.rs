@@ -11,7 +11,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use bench_hal::serial::device::{Fault, SimulatedProbe, simulate};
-use bench_hal::serial::{Parity, Polling, PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics, capancdt};
+use bench_hal::serial::{
+    Parity, Polling, PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics, capancdt,
+};
 use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
 use nix::sys::termios::{ControlFlags, tcgetattr};
 use serialport::SerialPort;
@@ -33,14 +35,24 @@ struct FarProbe {
 
 impl FarProbe {
     fn new(protocol: &Protocol) -> FarProbe {
-        let line = serialport::new(THERE, BAUD).parity(serialport::Parity::Even).timeout(Duration::from_millis(1));
-        let line = line.open_native().expect("two UARTs: use .ci/vm/run --uart-pair");
+        let line = serialport::new(THERE, BAUD)
+            .parity(serialport::Parity::Even)
+            .timeout(Duration::from_millis(1));
+        let line = line
+            .open_native()
+            .expect("two UARTs: use .ci/vm/run --uart-pair");
         assert_eq!(line.parity().unwrap(), serialport::Parity::Even);
         let probe = Arc::new(Mutex::new(simulate(protocol, 200.0).unwrap()));
         let stop = Arc::new(AtomicBool::new(false));
         let serving = (Arc::clone(&probe), Arc::clone(&stop));
-        let thread = Some(std::thread::spawn(move || serve(line, &serving.0, &serving.1)));
-        FarProbe { probe, stop, thread }
+        let thread = Some(std::thread::spawn(move || {
+            serve(line, &serving.0, &serving.1)
+        }));
+        FarProbe {
+            probe,
+            stop,
+            thread,
+        }
     }
 
     fn ask_fault(&self, fault: Fault) {
@@ -51,7 +63,10 @@ impl FarProbe {
 impl Drop for FarProbe {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
-        self.thread.take().into_iter().for_each(|thread| thread.join().unwrap());
+        self.thread
+            .take()
+            .into_iter()
+            .for_each(|thread| thread.join().unwrap());
     }
 }
 
@@ -60,18 +75,28 @@ fn serve(mut line: serialport::TTYPort, probe: &Mutex<Box<dyn SimulatedProbe>>, 
     while !stop.load(Ordering::Acquire) {
         let count = line.read(&mut bytes).unwrap_or(0); // nothing in time
         let now_ns = started.elapsed().as_nanos() as u64;
-        let answer = probe.lock().unwrap().handle(&bytes[..count], now_ns, POSITION_M);
+        let answer = probe
+            .lock()
+            .unwrap()
+            .handle(&bytes[..count], now_ns, POSITION_M);
         line.write_all(&answer).unwrap();
     }
 }
 
 /// Looks until the statistics please; every reading on the way is either right or not valid.
-fn look_until(probe: &mut SerialProbe, what: &str, mut pleases: impl FnMut(&Reading, &Statistics) -> bool) -> Reading {
+fn look_until(
+    probe: &mut SerialProbe,
+    what: &str,
+    mut pleases: impl FnMut(&Reading, &Statistics) -> bool,
+) -> Reading {
     let (mut seen, mut sequence) = (Reading::default(), 0);
     wait_for(what, || {
         seen = probe.latest(Tick::default());
         let is_right = (seen.position_m - POSITION_M).abs() < 0.05e-6;
-        assert!(seen.validity != Validity::Valid || is_right, "a false value: {seen:?}");
+        assert!(
+            seen.validity != Validity::Valid || is_right,
+            "a false value: {seen:?}"
+        );
         assert!(seen.sequence >= sequence, "{sequence} before {seen:?}");
         sequence = seen.sequence;
         pleases(&seen, &probe.statistics())
@@ -82,20 +107,35 @@ fn look_until(probe: &mut SerialProbe, what: &str, mut pleases: impl FnMut(&Read
 /// Waits for so many more valid readings.
 fn reads(probe: &mut SerialProbe, more: u64) {
     let goal = probe.statistics().published + more;
-    look_until(probe, "readings", |seen, statistics| statistics.published >= goal && seen.validity == Validity::Valid);
+    look_until(probe, "readings", |seen, statistics| {
+        statistics.published >= goal && seen.validity == Validity::Valid
+    });
 }
 
 /// Whether the chip was told to make and to check even parity.
 fn is_even(path: &str) -> bool {
-    let flags = tcgetattr(std::fs::File::open(path).unwrap()).unwrap().control_flags;
+    let flags = tcgetattr(std::fs::File::open(path).unwrap())
+        .unwrap()
+        .control_flags;
     flags.contains(ControlFlags::PARENB) && !flags.contains(ControlFlags::PARODD)
 }
 
 fn settings(protocol: &Protocol, locks: &Path) -> ProbeSettings {
-    let port = PortSettings { parity: Parity::Even, lock_dir: locks.into(), ..PortSettings::new(HERE, BAUD) };
+    let port = PortSettings {
+        parity: Parity::Even,
+        lock_dir: locks.into(),
+        ..PortSettings::new(HERE, BAUD)
+    };
     // The emulated machine may stand still: an answer has a second, and is over after 200 ms of silence.
-    let polling = Polling { timeout: Duration::from_secs(1), quiet: Duration::from_millis(200), ..Polling::default() };
-    ProbeSettings { polling, ..ProbeSettings::new(port, protocol.clone()) }
+    let polling = Polling {
+        timeout: Duration::from_secs(1),
+        quiet: Duration::from_millis(200),
+        ..Polling::default()
+    };
+    ProbeSettings {
+        polling,
+        ..ProbeSettings::new(port, protocol.clone())
+    }
 }
 
 /// One test, since there is one pair.
@@ -104,7 +144,14 @@ fn a_probe_over_8e1_is_read_rightly_and_damage_silence_and_a_restart_never_give_
     let protocol = Protocol::Capancdt(capancdt::Settings::new(RANGE_M));
     let (far, locks) = (FarProbe::new(&protocol), tempfile::tempdir().unwrap());
     let mut probe = SerialProbe::open(settings(&protocol, locks.path())).unwrap();
-    assert!(probe.notes().iter().all(|note| !note.what.contains("parity")), "{:?}", probe.notes());
+    assert!(
+        probe
+            .notes()
+            .iter()
+            .all(|note| !note.what.contains("parity")),
+        "{:?}",
+        probe.notes()
+    );
     reads(&mut probe, 50);
     assert!(is_even(HERE) && is_even(THERE));
 
@@ -117,13 +164,23 @@ fn a_probe_over_8e1_is_read_rightly_and_damage_silence_and_a_restart_never_give_
 
     far.ask_fault(Fault::Silence);
     let before = probe.statistics().timeouts;
-    let last = look_until(&mut probe, "silence", |_, statistics| statistics.timeouts >= before + 2);
+    let last = look_until(&mut probe, "silence", |_, statistics| {
+        statistics.timeouts >= before + 2
+    });
     let error = probe.statistics().last_error.unwrap().to_string();
-    assert!(error.contains("the probe did not answer") && error.contains("baud rate and parity"), "{error}");
-    assert!(last.age_ns > 1_000_000_000, "an old value says that it is old: {last:?}");
+    assert!(
+        error.contains("the probe did not answer") && error.contains("baud rate and parity"),
+        "{error}"
+    );
+    assert!(
+        last.age_ns > 1_000_000_000,
+        "an old value says that it is old: {last:?}"
+    );
 
     far.ask_fault(Fault::Reset);
-    look_until(&mut probe, "the restart", |_, statistics| statistics.restarts == 1);
+    look_until(&mut probe, "the restart", |_, statistics| {
+        statistics.restarts == 1
+    });
     far.ask_fault(Fault::None);
     reads(&mut probe, 20);
 }

@@ -28,31 +28,41 @@ fn keyence() -> Ascii {
 /// A capaNCDT answer.
 fn answer() -> impl Strategy<Value = Vec<u8>> {
     let settings = capancdt::Settings::new(1e-3);
-    (0..=40u16, vec(-2..=0xF0_0002, 0..=20)).prop_map(move |(counter, values)| settings.answer(counter, &values))
+    (0..=40u16, vec(-2..=0xF0_0002, 0..=20))
+        .prop_map(move |(counter, values)| settings.answer(counter, &values))
 }
 
 /// Bytes that look like the protocols': messages, parts and damaged copies of them, their marking bytes, and noise.
 fn line() -> impl Strategy<Value = Vec<u8>> {
-    let keyence = "(\\+|-)[0-9]{2}\\.[0-9]{4}\r|ER,[A-Z]{2},[0-9]{2}\r|[+X]FFFFFFF\r|[-+.0-9 ]{0,12}\r";
+    let keyence =
+        "(\\+|-)[0-9]{2}\\.[0-9]{4}\r|ER,[A-Z]{2},[0-9]{2}\r|[+X]FFFFFFF\r|[-+.0-9 ]{0,12}\r";
     let whole = prop_oneof![
         answer(),
         Just(capancdt::Settings::new(1e-3).request().to_vec()),
         (0..0x4_0000u32, any::<bool>()).prop_map(|(x, first)| message(x, first).to_vec()),
-        proptest::string::string_regex(keyence).unwrap().prop_map(String::into_bytes),
+        proptest::string::string_regex(keyence)
+            .unwrap()
+            .prop_map(String::into_bytes),
     ];
-    let spoilt = (whole, any::<Index>(), any::<u8>(), 0..4u8).prop_map(|(mut bytes, at, flip, how)| {
-        let at = at.index(bytes.len());
-        match how {
-            0 => bytes[at] ^= flip,
-            1 => bytes.truncate(at),
-            2 => drop(bytes.remove(at)),
-            _ => {}
-        }
-        bytes
-    });
-    let marks = proptest::sample::select(b"\x68\x10\x16\x13\x01\x7E\x08\x07\x0B\x0D+-.0123456789XFER,".to_vec());
-    vec(prop_oneof![4 => spoilt, 1 => vec(marks, 0..40), 1 => vec(any::<u8>(), 0..60)], 0..20)
-        .prop_map(|parts| parts.concat())
+    let spoilt =
+        (whole, any::<Index>(), any::<u8>(), 0..4u8).prop_map(|(mut bytes, at, flip, how)| {
+            let at = at.index(bytes.len());
+            match how {
+                0 => bytes[at] ^= flip,
+                1 => bytes.truncate(at),
+                2 => drop(bytes.remove(at)),
+                _ => {}
+            }
+            bytes
+        });
+    let marks = proptest::sample::select(
+        b"\x68\x10\x16\x13\x01\x7E\x08\x07\x0B\x0D+-.0123456789XFER,".to_vec(),
+    );
+    vec(
+        prop_oneof![4 => spoilt, 1 => vec(marks, 0..40), 1 => vec(any::<u8>(), 0..60)],
+        0..20,
+    )
+    .prop_map(|parts| parts.concat())
 }
 
 /// Feeds `bytes` in slices that end at `cuts`.
@@ -60,7 +70,9 @@ fn sliced(decoder: &mut dyn Decoder, bytes: &[u8], cuts: &[Index]) -> Vec<Event>
     let mut cuts: Vec<usize> = cuts.iter().map(|cut| cut.index(bytes.len() + 1)).collect();
     cuts.extend([0, bytes.len()]);
     cuts.sort_unstable();
-    cuts.windows(2).flat_map(|cut| events(decoder, &bytes[cut[0]..cut[1]])).collect()
+    cuts.windows(2)
+        .flat_map(|cut| events(decoder, &bytes[cut[0]..cut[1]]))
+        .collect()
 }
 
 proptest! {
@@ -133,7 +145,10 @@ fn of_ten_million_random_bytes_none_is_a_capancdt_value() {
     let noise = Noise(1).bytes(TEN_MILLION);
     let found = events(&mut capa(), &noise);
     assert_eq!((valid(&found), naive::capancdt(&noise)), (vec![], vec![]));
-    assert!(damaged(&found) > noise.len() as u64 - 200, "all of it is damage, but for what is still held");
+    assert!(
+        damaged(&found) > noise.len() as u64 - 200,
+        "all of it is damage, but for what is still held"
+    );
 }
 
 #[test]
@@ -142,8 +157,15 @@ fn of_ten_million_random_bytes_3_83_in_1000_are_an_optoncdt_value() {
     let expected = TEN_MILLION as f64 / 64.0 / 4.0 * 64235.0 / 65536.0;
     let noise = Noise(2).bytes(TEN_MILLION);
     let found = valid(&events(&mut opto(), &noise));
-    println!("optoNCDT: {} valid values in {TEN_MILLION} random bytes, {expected:.0} expected", found.len());
-    assert!(is_expected(found.len(), expected), "{} instead of {expected}", found.len());
+    println!(
+        "optoNCDT: {} valid values in {TEN_MILLION} random bytes, {expected:.0} expected",
+        found.len()
+    );
+    assert!(
+        is_expected(found.len(), expected),
+        "{} instead of {expected}",
+        found.len()
+    );
     assert_eq!(found, naive::optoncdt(&noise));
 }
 
@@ -155,13 +177,24 @@ fn of_ten_million_random_bytes_none_is_a_keyence_value() {
 
 #[test]
 fn of_ten_million_random_characters_of_its_alphabet_11_in_a_million_are_a_keyence_value() {
-    let noise: Vec<u8> =
-        Noise(4).bytes(TEN_MILLION).iter().map(|byte| b"0123456789+-.XF\r"[usize::from(byte >> 4)]).collect();
+    let noise: Vec<u8> = Noise(4)
+        .bytes(TEN_MILLION)
+        .iter()
+        .map(|byte| b"0123456789+-.XF\r"[usize::from(byte >> 4)])
+        .collect();
     // CR before and after, a sign or digit, two digits, the point, four digits: in 16 characters each. All below 1 m.
-    let expected = TEN_MILLION as f64 * (1.0 / 16.0f64).powi(3) * (12.0 / 16.0) * (10.0 / 16.0f64).powi(6);
+    let expected =
+        TEN_MILLION as f64 * (1.0 / 16.0f64).powi(3) * (12.0 / 16.0) * (10.0 / 16.0f64).powi(6);
     let settings = ascii::Settings::keyence_lk_g(1.0);
     let found = valid(&events(&mut Ascii::new(settings).unwrap(), &noise));
-    println!("Keyence: {} valid values in {TEN_MILLION} random characters, {expected:.0} expected", found.len());
-    assert!(is_expected(found.len(), expected), "{} instead of {expected}", found.len());
+    println!(
+        "Keyence: {} valid values in {TEN_MILLION} random characters, {expected:.0} expected",
+        found.len()
+    );
+    assert!(
+        is_expected(found.len(), expected),
+        "{} instead of {expected}",
+        found.len()
+    );
     assert_eq!(found, naive::keyence(&noise, 1000.0));
 }

@@ -7,10 +7,12 @@ use crate::support::{damaged, events, valid};
 
 /// The manuals' example: counter 290, three values, the first 0x3244B1.
 const EXAMPLE: [u8; 25] = [
-    0x68, 0x13, 0x13, 0x68, 0x01, 0x7E, 0x08, // SD LE LE SD DA SA FC: 19 bytes from DA to the end of data
+    0x68, 0x13, 0x13, 0x68, 0x01, 0x7E,
+    0x08, // SD LE LE SD DA SA FC: 19 bytes from DA to the end of data
     0x22, 0x01, 0x03, 0x00, // counter 0x0122, m, filler
     0xB1, 0x44, 0x32, 0x00, 0xAC, 0x44, 0x32, 0x00, 0xB9, 0x44, 0x32, 0x00, //
-    0x25, 0x16, // 01 + 7E + 08 + 22 + 01 + 03 + B1 + 44 + 32 + AC + 44 + 32 + B9 + 44 + 32 = 0x425
+    0x25,
+    0x16, // 01 + 7E + 08 + 22 + 01 + 03 + B1 + 44 + 32 + AC + 44 + 32 + B9 + 44 + 32 = 0x425
 ];
 
 fn settings() -> Settings {
@@ -36,14 +38,22 @@ fn the_manuals_answer_is_three_values_near_41_89_micrometres() {
     let found = events(&mut decoder(), &EXAMPLE);
     assert_eq!(valid(&found), [0x3244B1, 0x3244AC, 0x3244B9]);
     assert_eq!((found.len(), found.last()), (4, Some(&Event::AnswerEnd)));
-    let Event::Value(Sample { position_m, .. }) = found[0] else { panic!("{found:?}") };
+    let Event::Value(Sample { position_m, .. }) = found[0] else {
+        panic!("{found:?}")
+    };
     // 0x3244B1 / 0xF00000 = 20.945 %, of 200 um 41.89 um
-    assert!((position_m / 200e-6 - 0.20945).abs() < 5e-6 && (position_m - 41.89e-6).abs() < 5e-9, "{position_m}");
+    assert!(
+        (position_m / 200e-6 - 0.20945).abs() < 5e-6 && (position_m - 41.89e-6).abs() < 5e-9,
+        "{position_m}"
+    );
 }
 
 #[test]
 fn the_encoder_writes_the_manuals_answer() {
-    assert_eq!(settings().answer(290, &[0x3244B1, 0x3244AC, 0x3244B9]), EXAMPLE);
+    assert_eq!(
+        settings().answer(290, &[0x3244B1, 0x3244AC, 0x3244B9]),
+        EXAMPLE
+    );
 }
 
 #[test]
@@ -52,7 +62,11 @@ fn no_answer_with_one_wrong_byte_is_believed() {
         for flip in 1..=255 {
             let mut bytes = EXAMPLE;
             bytes[at] ^= flip;
-            assert_eq!(valid(&events(&mut decoder(), &bytes)), [], "byte {at} ^ {flip:#x}");
+            assert_eq!(
+                valid(&events(&mut decoder(), &bytes)),
+                [],
+                "byte {at} ^ {flip:#x}"
+            );
         }
     }
 }
@@ -66,7 +80,10 @@ fn an_answer_whose_m_contradicts_its_length_is_not_believed() {
 
 #[test]
 fn the_answer_of_another_address_is_not_ours() {
-    let other = Settings { probe_address: 0x7D, ..settings() };
+    let other = Settings {
+        probe_address: 0x7D,
+        ..settings()
+    };
     assert_eq!(valid(&raws(&[other.answer(1, &[5])])), []);
 }
 
@@ -86,7 +103,10 @@ fn beyond_full_scale_and_below_zero_the_position_is_the_ranges_end() {
 
 #[test]
 fn a_counter_that_advanced_further_than_the_batch_shows_the_gap() {
-    let found = raws(&[settings().answer(65534, &[1]), settings().answer(3, &[2, 3])]);
+    let found = raws(&[
+        settings().answer(65534, &[1]),
+        settings().answer(3, &[2, 3]),
+    ]);
     // 65534 -> 3 is 5 measurements, two of them are here
     assert!(found.contains(&Event::Gap(3)), "{found:?}");
     assert_eq!(valid(&found), [1, 2, 3]);
@@ -94,25 +114,56 @@ fn a_counter_that_advanced_further_than_the_batch_shows_the_gap() {
 
 #[test]
 fn a_value_sent_twice_is_handed_out_once() {
-    let found = raws(&[settings().answer(7, &[1, 2]), settings().answer(7, &[1, 2]), settings().answer(8, &[1, 2, 3])]);
+    let found = raws(&[
+        settings().answer(7, &[1, 2]),
+        settings().answer(7, &[1, 2]),
+        settings().answer(8, &[1, 2, 3]),
+    ]);
     assert_eq!(valid(&found), [1, 2, 3]);
-    assert_eq!(found.iter().filter(|event| **event == Event::Withheld(2)).count(), 2);
+    assert_eq!(
+        found
+            .iter()
+            .filter(|event| **event == Event::Withheld(2))
+            .count(),
+        2
+    );
 }
 
 #[test]
 fn after_a_restart_the_first_batch_is_withheld_and_the_next_is_new() {
-    let found = raws(&[settings().answer(500, &[1]), settings().answer(2, &[8, 9]), settings().answer(3, &[10])]);
-    assert!(found.contains(&Event::Restart) && found.contains(&Event::Withheld(2)), "{found:?}");
+    let found = raws(&[
+        settings().answer(500, &[1]),
+        settings().answer(2, &[8, 9]),
+        settings().answer(3, &[10]),
+    ]);
+    assert!(
+        found.contains(&Event::Restart) && found.contains(&Event::Withheld(2)),
+        "{found:?}"
+    );
     assert_eq!(valid(&found), [1, 10]);
 }
 
 #[test]
 fn a_counter_of_the_oldest_value_is_followed_over_changing_batches() {
-    let oldest = Settings { counter: CounterMeaning::OldestValue, ..settings() };
-    let bytes = [oldest.answer(10, &[1, 2, 3]), oldest.answer(13, &[4]), oldest.answer(16, &[7, 8])].concat();
+    let oldest = Settings {
+        counter: CounterMeaning::OldestValue,
+        ..settings()
+    };
+    let bytes = [
+        oldest.answer(10, &[1, 2, 3]),
+        oldest.answer(13, &[4]),
+        oldest.answer(16, &[7, 8]),
+    ]
+    .concat();
     let found = events(&mut Capancdt::new(oldest).unwrap(), &bytes);
     assert_eq!(valid(&found), [1, 2, 3, 4, 7, 8]);
-    assert_eq!(found.iter().filter(|event| matches!(event, Event::Gap(_))).collect::<Vec<_>>(), [&Event::Gap(2)]);
+    assert_eq!(
+        found
+            .iter()
+            .filter(|event| matches!(event, Event::Gap(_)))
+            .collect::<Vec<_>>(),
+        [&Event::Gap(2)]
+    );
 }
 
 #[test]
@@ -123,7 +174,10 @@ fn an_answer_without_values_ends_an_exchange_and_is_no_measurement() {
 #[test]
 fn the_echo_of_the_request_is_not_damage() {
     let found = raws(&[settings().request().to_vec(), settings().answer(1, &[4])]);
-    assert_eq!((found[0], damaged(&found), valid(&found)), (Event::Echo, 0, vec![4]));
+    assert_eq!(
+        (found[0], damaged(&found), valid(&found)),
+        (Event::Echo, 0, vec![4])
+    );
 }
 
 #[test]

@@ -18,7 +18,8 @@ fn is_exclusive(terminal: &TTYPort) -> bool {
 }
 
 fn shared(rehearsal: &Rehearsal) -> TTYPort {
-    TTYPort::open(&serialport::new(rehearsal.path.to_string_lossy(), 921_600).exclusive(false)).unwrap()
+    TTYPort::open(&serialport::new(rehearsal.path.to_string_lossy(), 921_600).exclusive(false))
+        .unwrap()
 }
 
 #[test]
@@ -35,9 +36,16 @@ fn one_reader_after_the_other_is_served_by_the_same_probe() {
 fn the_mark_of_exclusive_use_that_a_killed_reader_leaves_is_taken_off() {
     let rehearsal = Rehearsal::new(&optoncdt(), 1000.0, still);
     let watch = shared(&rehearsal);
-    let killed = std::fs::File::options().read(true).write(true).open(&rehearsal.path).unwrap();
+    let killed = std::fs::File::options()
+        .read(true)
+        .write(true)
+        .open(&rehearsal.path)
+        .unwrap();
     // SAFETY: the descriptor is open; TIOCEXCL takes no argument.
-    assert_eq!(unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) }, 0);
+    assert_eq!(
+        unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) },
+        0
+    );
     drop(killed);
     for _ in 0..10_000 {
         if !is_exclusive(&watch) {
@@ -57,9 +65,15 @@ fn what_nobody_reads_is_lost_as_on_a_wire() {
     }
     rehearsal.ask_fault(Fault::Silence);
     let waiting = nobody.bytes_to_read().unwrap();
-    assert!(waiting < 2048 + 1024, "{waiting} bytes of {} wait", rehearsal.sent());
+    assert!(
+        waiting < 2048 + 1024,
+        "{waiting} bytes of {} wait",
+        rehearsal.sent()
+    );
     drop(nobody);
     rehearsal.ask_fault(Fault::None);
     let mut probe = rehearsal.open(&optoncdt());
-    until(&mut probe, "young", |reading, _| reading.age_ns < 20_000_000 && reading.sequence > 0);
+    until(&mut probe, "young", |reading, _| {
+        reading.age_ns < 20_000_000 && reading.sequence > 0
+    });
 }

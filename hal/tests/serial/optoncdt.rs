@@ -16,7 +16,10 @@ fn the_bits_are_where_the_manual_has_them() {
     // x = 32760 = 0b0111_111111_111000: L 00 111000, M 01 111111, H 10 00 0111; d = (32760 * 102 / 65520 - 1) / 100 = 50 %
     let bytes = [0b0011_1000, 0b0111_1111, 0b1000_0111];
     assert_eq!(message(32760, true), bytes);
-    assert_eq!(message(32760, false), [0b0011_1000, 0b0111_1111, 0b1100_0111]);
+    assert_eq!(
+        message(32760, false),
+        [0b0011_1000, 0b0111_1111, 0b1100_0111]
+    );
     let found = decode(&bytes);
     assert!(
         matches!(found[..], [Event::Value(Sample { raw: 32760, position_m })] if (position_m - 5e-3).abs() < 1e-15),
@@ -28,18 +31,50 @@ fn the_bits_are_where_the_manual_has_them() {
 fn the_range_ends_where_the_manual_says() {
     let found = decode(&[642, 643, 64877, 64878].map(|x| message(x, true)).concat());
     // 643 is 0.001 % and 64877 is 99.999 % of the range: one count is 0.00156 %
-    let Event::Value(Sample { position_m: start_m, .. }) = found[1] else { panic!("{found:?}") };
-    let Event::Value(Sample { position_m: end_m, .. }) = found[2] else { panic!("{found:?}") };
-    assert!((0.0..0.16e-6).contains(&start_m) && (0.0..0.16e-6).contains(&(RANGE_M - end_m)), "{start_m} {end_m}");
-    assert_eq!(found[0], Event::OutOfRange(Sample { raw: 642, position_m: 0.0 }));
-    assert_eq!(found[3], Event::OutOfRange(Sample { raw: 64878, position_m: RANGE_M }));
+    let Event::Value(Sample {
+        position_m: start_m,
+        ..
+    }) = found[1]
+    else {
+        panic!("{found:?}")
+    };
+    let Event::Value(Sample {
+        position_m: end_m, ..
+    }) = found[2]
+    else {
+        panic!("{found:?}")
+    };
+    assert!(
+        (0.0..0.16e-6).contains(&start_m) && (0.0..0.16e-6).contains(&(RANGE_M - end_m)),
+        "{start_m} {end_m}"
+    );
+    assert_eq!(
+        found[0],
+        Event::OutOfRange(Sample {
+            raw: 642,
+            position_m: 0.0
+        })
+    );
+    assert_eq!(
+        found[3],
+        Event::OutOfRange(Sample {
+            raw: 64878,
+            position_m: RANGE_M
+        })
+    );
 }
 
 #[test]
 fn a_value_of_more_than_16_bits_is_an_error_with_words() {
     let found = decode(&message(262_076, true));
-    assert!(matches!(found[..], [Event::Fault { code: 262_076, words }] if words.contains("no peak")), "{found:?}");
-    assert!(matches!(decode(&message(65_536, true))[..], [Event::Fault { code: 65_536, .. }]));
+    assert!(
+        matches!(found[..], [Event::Fault { code: 262_076, words }] if words.contains("no peak")),
+        "{found:?}"
+    );
+    assert!(matches!(
+        decode(&message(65_536, true))[..],
+        [Event::Fault { code: 65_536, .. }]
+    ));
 }
 
 #[test]
@@ -61,18 +96,48 @@ fn a_lost_byte_costs_its_value_and_no_other() {
         let mut decoder = Optoncdt::new(Settings::new(RANGE_M)).unwrap();
         let mut found = events(&mut decoder, &bytes);
         decoder.reset(&mut |event| found.push(event));
-        assert_eq!((valid(&found), damaged(&found)), (expected, 2), "without byte {lost}");
+        assert_eq!(
+            (valid(&found), damaged(&found)),
+            (expected, 2),
+            "without byte {lost}"
+        );
     }
 }
 
 #[test]
 fn further_values_of_a_cycle_are_counted_from_its_first() {
-    let cycle = Cycle { values: 3, displacement: 1 };
-    let mut decoder = Optoncdt::new(Settings { range_m: RANGE_M, cycle }).unwrap();
-    let of_cycle = |x| [message(x, true), message(x + 1, false), message(x + 2, false)].concat();
-    assert_eq!(valid(&events(&mut decoder, &[of_cycle(1000), of_cycle(2000)].concat())), [1001, 2001]);
+    let cycle = Cycle {
+        values: 3,
+        displacement: 1,
+    };
+    let mut decoder = Optoncdt::new(Settings {
+        range_m: RANGE_M,
+        cycle,
+    })
+    .unwrap();
+    let of_cycle = |x| {
+        [
+            message(x, true),
+            message(x + 1, false),
+            message(x + 2, false),
+        ]
+        .concat()
+    };
+    assert_eq!(
+        valid(&events(
+            &mut decoder,
+            &[of_cycle(1000), of_cycle(2000)].concat()
+        )),
+        [1001, 2001]
+    );
     // The first value of a cycle is damaged: nobody knows which the further ones are, until the next cycle.
-    assert_eq!(valid(&events(&mut decoder, &[&of_cycle(3000)[1..], &of_cycle(4000)].concat())), [4001]);
+    assert_eq!(
+        valid(&events(
+            &mut decoder,
+            &[&of_cycle(3000)[1..], &of_cycle(4000)].concat()
+        )),
+        [4001]
+    );
 }
 
 #[test]

@@ -57,7 +57,9 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let structure = plant::build(&config.plant)?;
     let bounds = |zeros: Vec<Zero>| {
         let bounds = Bound::of(&zeros, args.alpha, args.peak).into_iter();
-        bounds.map(|b| row(args.alpha, &b, args.bandwidth.unwrap_or(b.bandwidth_rad_s))).collect()
+        bounds
+            .map(|b| row(args.alpha, &b, args.bandwidth.unwrap_or(b.bandwidth_rad_s)))
+            .collect()
     };
     let report = Report {
         profile: args.bench.profile().into(),
@@ -66,12 +68,18 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         zeros: bounds(zeros::undamped_zeros(&structure)?),
         damped_zeros: bounds(zeros::damped_zeros(&structure)?),
     };
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&text(&report))
+    }
 }
 
 fn demands(args: &Args) -> Result<(), CliError> {
     let refuse = |what: &str, value: f64, limits: &str| {
-        Err(CliError::Usage(format!("{what} is {value}; it is {limits} (Eqs. 1-1 and 1-3)")))
+        Err(CliError::Usage(format!(
+            "{what} is {value}; it is {limits} (Eqs. 1-1 and 1-3)"
+        )))
     };
     if !(args.alpha > 0.0 && args.alpha < 1.0) {
         return refuse("--alpha", args.alpha, "a ratio between 0 and 1");
@@ -80,21 +88,28 @@ fn demands(args: &Args) -> Result<(), CliError> {
         return refuse("--peak", args.peak, "a ratio above 1");
     }
     match args.bandwidth {
-        Some(omega) if !(omega > 0.0 && omega.is_finite()) => refuse("--bandwidth", omega, "in rad/s and above 0"),
+        Some(omega) if !(omega > 0.0 && omega.is_finite()) => {
+            refuse("--bandwidth", omega, "in rad/s and above 0")
+        }
         _ => Ok(()),
     }
 }
 
 /// The bounds of zeros for |S| < 0.5 in the band and a peak of 2.
 pub(super) fn usual(zeros: &[Zero]) -> Vec<BoundJson> {
-    Bound::of(zeros, ALPHA, PEAK).iter().map(|bound| row(ALPHA, bound, bound.bandwidth_rad_s)).collect()
+    Bound::of(zeros, ALPHA, PEAK)
+        .iter()
+        .map(|bound| row(ALPHA, bound, bound.bandwidth_rad_s))
+        .collect()
 }
 
 /// The narrowest of the usual bounds in words.
 pub(super) fn usual_text(bounds: &[BoundJson]) -> String {
     let narrowest = bounds.first().map(|b| b.bandwidth_rad_s);
     narrowest.map_or(String::new(), |omega| {
-        format!("|S| < {ALPHA} with a peak below {PEAK}: up to {omega:.1} rad/s at most (Eq. 1-3)\n")
+        format!(
+            "|S| < {ALPHA} with a peak below {PEAK}: up to {omega:.1} rad/s at most (Eq. 1-3)\n"
+        )
     })
 }
 
@@ -111,7 +126,14 @@ fn row(alpha: f64, bound: &Bound, bandwidth_rad_s: f64) -> BoundJson {
 }
 
 fn text(report: &Report) -> String {
-    let header = ["re rad/s", "im rad/s", "kind", "band rad/s", "angle deg", "peak of |S|"];
+    let header = [
+        "re rad/s",
+        "im rad/s",
+        "kind",
+        "band rad/s",
+        "angle deg",
+        "peak of |S|",
+    ];
     let row = |b: &BoundJson| {
         vec![
             format!("{:+.4}", b.re_rad_s),

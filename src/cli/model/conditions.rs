@@ -23,10 +23,20 @@ pub(super) struct Args {
     #[arg(long, value_name = "KEY", default_value = "plant.operating_point_m", requires_all = ["from", "to"])]
     vary: String,
     /// First value; 3.8mm for a length, 8% for a ratio or of the beam length
-    #[arg(long, value_name = "A", default_value = "0", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "A",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
     from: String,
     /// Last value; the veering point has to be between
-    #[arg(long, value_name = "B", default_value = "15%", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "B",
+        default_value = "15%",
+        allow_hyphen_values = true
+    )]
     to: String,
     /// Values of the grid; between them it is refined where zeros change
     #[arg(long, value_name = "N", default_value_t = 101, value_parser = clap::value_parser!(u32).range(2..=10_000))]
@@ -140,7 +150,13 @@ pub(super) struct Row {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
-    let sweep = Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count };
+    let sweep = Sweep {
+        bench: &args.bench,
+        vary: &args.vary,
+        from: &args.from,
+        to: &args.to,
+        count: args.count,
+    };
     let values = sweep.values()?;
     let mut loci = Loci::follow(&values, |value| sweep.at(value))?;
     let pair = meeting_pair(&args.modes, &loci)?;
@@ -150,7 +166,11 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let closest = loci.at(course.stations[course.closest].value)?.clone();
     let at = loci.at(value)?.clone();
     let report = report(args, &values, &course, pair, [&closest, &at])?;
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&text(&report))
+    }
 }
 
 /// The two modes as asked, or the first that meet inside the range.
@@ -189,17 +209,25 @@ fn explained(args: &Args, sweep: &Sweep, course: &Course) -> Result<f64, CliErro
     match &args.at {
         Some(text) => {
             let value = sweep.value(text)?;
-            let outside = || CliError::Usage(format!("--at {value} is outside of the range {low} to {high}"));
+            let outside = || {
+                CliError::Usage(format!(
+                    "--at {value} is outside of the range {low} to {high}"
+                ))
+            };
             Some(value).filter(inside).ok_or_else(outside)
         }
-        None => Ok(own(args)?.filter(inside).unwrap_or(course.stations[course.closest].value)),
+        None => Ok(own(args)?
+            .filter(inside)
+            .unwrap_or(course.stations[course.closest].value)),
     }
 }
 
 /// The setting's value in the configuration.
 fn own(args: &Args) -> Result<Option<f64>, CliError> {
     let config = serde_json::to_value(args.bench.load(Purpose::Model, &[])?).unwrap_or_default();
-    Ok(config.pointer(&format!("/{}", args.vary.replace('.', "/"))).and_then(serde_json::Value::as_f64))
+    Ok(config
+        .pointer(&format!("/{}", args.vary.replace('.', "/")))
+        .and_then(serde_json::Value::as_f64))
 }
 
 fn report(
@@ -210,7 +238,10 @@ fn report(
     [closest, at]: [&ModesAt; 2],
 ) -> Result<Report, CliError> {
     let here = crate::veering::station(at, pair, as_configured(at))?;
-    let on_grid = course.stations.iter().filter(|station| values.contains(&station.value));
+    let on_grid = course
+        .stations
+        .iter()
+        .filter(|station| values.contains(&station.value));
     Ok(Report {
         profile: args.bench.profile().into(),
         vary: args.vary.clone(),
@@ -222,7 +253,10 @@ fn report(
         cnmp_bands: course.bands(),
         assumptions: assumptions(at, pair, &here),
         here: explain(&here),
-        sides: [Side::Before, Side::After].into_iter().map(|side| side_json(&Stretch::of(course, side))).collect(),
+        sides: [Side::Before, Side::After]
+            .into_iter()
+            .map(|side| side_json(&Stretch::of(course, side)))
+            .collect(),
         p4_1: tally(on_grid.clone()),
         rows: on_grid.filter_map(row).collect(),
     })
@@ -233,13 +267,18 @@ fn frequencies_hz(modes: &CloseModes) -> [f64; 2] {
 }
 
 fn assumptions(at: &ModesAt, pair: [usize; 2], here: &Station) -> Assumptions {
-    let damping_ratio = pair.map(|mode| at.damping_ratio(mode)).into_iter().fold(0.0, f64::max);
+    let damping_ratio = pair
+        .map(|mode| at.damping_ratio(mode))
+        .into_iter()
+        .fold(0.0, f64::max);
     let half_gap = at.gap_rad_s(pair) / (at.omega_rad_s[pair[0]] + at.omega_rad_s[pair[1]]);
     let remainder = here.modes.map(|modes| modes.remainder);
     Assumptions {
         damping_ratio,
         damping_over_half_gap: Some(damping_ratio / half_gap).filter(|ratio| ratio.is_finite()),
-        mode_r: remainder.and_then(|remainder| remainder.mode).map(|mode| mode + 1),
+        mode_r: remainder
+            .and_then(|remainder| remainder.mode)
+            .map(|mode| mode + 1),
         others_ratio: remainder.map(|remainder| remainder.others_ratio),
         nearness_ratio: remainder.map(|remainder| remainder.nearness_ratio),
         integrator_ratio: remainder.map(|remainder| remainder.integrator_ratio),
@@ -247,17 +286,29 @@ fn assumptions(at: &ModesAt, pair: [usize; 2], here: &Station) -> Assumptions {
 }
 
 fn tally<'a>(stations: impl Iterator<Item = &'a Station>) -> Tally {
-    stations.filter_map(p4_1).fold(Tally::default(), |sum, next| Tally {
-        values: sum.values + 1,
-        appear: sum.appear + usize::from(next.foretold == Foretold::Appear),
-        wrong_by_equation: sum.wrong_by_equation + usize::from(next.foretold.is_contradicted_by(next.equation)),
-        wrong_by_plant: sum.wrong_by_plant + usize::from(next.foretold.is_contradicted_by(next.plant)),
-    })
+    stations
+        .filter_map(p4_1)
+        .fold(Tally::default(), |sum, next| Tally {
+            values: sum.values + 1,
+            appear: sum.appear + usize::from(next.foretold == Foretold::Appear),
+            wrong_by_equation: sum.wrong_by_equation
+                + usize::from(next.foretold.is_contradicted_by(next.equation)),
+            wrong_by_plant: sum.wrong_by_plant
+                + usize::from(next.foretold.is_contradicted_by(next.plant)),
+        })
 }
 
 fn side_json(stretch: &Stretch) -> SideJson {
-    let propositions = stretch.propositions().into_iter().map(proposition_json).collect();
-    SideJson { side: stretch.side.name(), stretch: stretch.range(), propositions }
+    let propositions = stretch
+        .propositions()
+        .into_iter()
+        .map(proposition_json)
+        .collect();
+    SideJson {
+        side: stretch.side.name(),
+        stretch: stretch.range(),
+        propositions,
+    }
 }
 
 fn proposition_json(p: Proposition) -> PropositionJson {
@@ -274,7 +325,13 @@ fn proposition_json(p: Proposition) -> PropositionJson {
 
 fn condition_json(c: Condition) -> ConditionJson {
     let finite = |limit: f64| Some(limit).filter(|limit| limit.is_finite());
-    ConditionJson { name: c.name, holds: c.holds, figure: c.figure, limits: c.limits.map(finite), margin: c.margin }
+    ConditionJson {
+        name: c.name,
+        holds: c.holds,
+        figure: c.figure,
+        limits: c.limits.map(finite),
+        margin: c.margin,
+    }
 }
 
 fn row(station: &Station) -> Option<Row> {
@@ -306,7 +363,12 @@ fn lie(lie: Lie) -> &'static str {
 fn explain(station: &Station) -> Option<Here> {
     let (modes, proposition) = (station.modes?, p4_1(station)?);
     let remedies = vec![on_signs(&modes), on_gap(&modes)];
-    Some(Here { value: station.value, row: row(station)?, proposition: proposition_json(proposition), remedies })
+    Some(Here {
+        value: station.value,
+        row: row(station)?,
+        proposition: proposition_json(proposition),
+        remedies,
+    })
 }
 
 /// What C4-1 asks for.
@@ -321,7 +383,11 @@ fn on_signs(modes: &CloseModes) -> String {
     };
     let signs: String = residues.iter().map(sign).collect();
     let size = condition.margin.abs() * 100.0;
-    let wanted = if pattern(residues) > 0.0 { "+-+" } else { "-+-" };
+    let wanted = if pattern(residues) > 0.0 {
+        "+-+"
+    } else {
+        "-+-"
+    };
     match condition.holds {
         true => format!(
             "C4-1 holds by {size:.1} %: signs {signs}; to break it turn the smallest, a{name} = {value:+.4e} 1/kg, by moving actuator or sensor (`bench model placement`) or by the asymmetry"
@@ -334,7 +400,11 @@ fn on_signs(modes: &CloseModes) -> String {
 
 /// What C4-2 asks for, as factors on wv^2 - wu^2 with residues as they are.
 fn on_gap(modes: &CloseModes) -> String {
-    let (condition, figure, [low, high]) = (c4_2(modes), modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
+    let (condition, figure, [low, high]) = (
+        c4_2(modes),
+        modes.signed_b2_per_kg(),
+        modes.critical_b2_per_kg(),
+    );
     match condition {
         _ if !modes.are_opposed() => {
             "C4-2 fails: the residues of modes u and v do not have opposite signs, so that no gap between them gives CMP-CNMP zeros".into()

@@ -5,13 +5,26 @@ use super::conditions::{Assumptions, ConditionJson, Here, PropositionJson, Repor
 
 pub(super) fn text(report: &Report) -> String {
     let [u, v] = report.modes;
-    let verb = if report.meeting == "crossing" { "cross" } else { "veer" };
+    let verb = if report.meeting == "crossing" {
+        "cross"
+    } else {
+        "veer"
+    };
     let bands = match report.cnmp_bands.as_slice() {
         [] => "none".into(),
-        bands => bands.iter().map(|[from, to]| format!("{from:.9} to {to:.9}")).collect::<Vec<_>>().join(", "),
+        bands => bands
+            .iter()
+            .map(|[from, to]| format!("{from:.9} to {to:.9}"))
+            .collect::<Vec<_>>()
+            .join(", "),
     };
     let here = report.here.as_ref().map_or_else(
-        || format!("at {} the modes cross: there is nothing to explain there, give another --at\n", report.value),
+        || {
+            format!(
+                "at {} the modes cross: there is nothing to explain there, give another --at\n",
+                report.value
+            )
+        },
         here_text,
     );
     let sides: String = report.sides.iter().map(side_text).collect();
@@ -34,9 +47,20 @@ pub(super) fn text(report: &Report) -> String {
 
 fn here_text(here: &Here) -> String {
     let proposition = &here.proposition;
-    let zeros = if proposition.plant { "CNMP zeros" } else { "no CNMP zeros" };
-    let remedies: String = here.remedies.iter().map(|remedy| format!("  {remedy}\n")).collect();
-    format!("at {:.9}: {zeros} (P4-1: {})\n{remedies}", here.value, proposition.foretold)
+    let zeros = if proposition.plant {
+        "CNMP zeros"
+    } else {
+        "no CNMP zeros"
+    };
+    let remedies: String = here
+        .remedies
+        .iter()
+        .map(|remedy| format!("  {remedy}\n"))
+        .collect();
+    format!(
+        "at {:.9}: {zeros} (P4-1: {})\n{remedies}",
+        here.value, proposition.foretold
+    )
 }
 
 fn assumptions_text(a: &Assumptions) -> String {
@@ -64,7 +88,11 @@ fn side_text(side: &SideJson) -> String {
 fn proposition_text(p: &PropositionJson) -> String {
     let premises: Vec<String> = p.premises.iter().map(premise_text).collect();
     let there = |quartet: bool| if quartet { "appear" } else { "absent" };
-    let differs = if p.agrees_with_equation && p.agrees_with_plant { "" } else { " DIFFERS" };
+    let differs = if p.agrees_with_equation && p.agrees_with_plant {
+        ""
+    } else {
+        " DIFFERS"
+    };
     format!(
         "  {:5} {}: foretold {}; Eq. (4-1) {}, plant {}{differs}\n",
         p.name,
@@ -76,7 +104,12 @@ fn proposition_text(p: &PropositionJson) -> String {
 }
 
 fn premise_text(c: &ConditionJson) -> String {
-    format!("{} {} ({:+.3})", c.name, if c.holds { "holds" } else { "fails" }, c.margin)
+    format!(
+        "{} {} ({:+.3})",
+        c.name,
+        if c.holds { "holds" } else { "fails" },
+        c.margin
+    )
 }
 
 /// A screen of rows; the JSON has all.
@@ -99,7 +132,8 @@ fn rows_text(report: &Report) -> String {
     let step = report.rows.len().div_ceil(25).max(1);
     let rows = report.rows.iter().step_by(step).map(|row| {
         let small = |x: f64| format!("{x:+.4e}");
-        let limit = |which: usize| row.c4_2.limits[which].map_or("-".into(), |x| format!("{x:.4e}"));
+        let limit =
+            |which: usize| row.c4_2.limits[which].map_or("-".into(), |x| format!("{x:.4e}"));
         vec![
             format!("{:.6}", row.value),
             format!("{:.4}", row.u_hz),

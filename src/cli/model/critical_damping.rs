@@ -34,7 +34,8 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let eta = args.omega_u / args.omega_v;
-    let dampings = zeros::critical_damping(eta, args.ratio).zip(zeros::touching_damping(eta, args.ratio));
+    let dampings =
+        zeros::critical_damping(eta, args.ratio).zip(zeros::touching_damping(eta, args.ratio));
     let Some((eq_3_16, touching)) = dampings else {
         return Err(CliError::Usage(format!(
             "omega_u = {} rad/s, omega_v = {} rad/s, ratio = {}: Eq. (3-16) asks for 0 < omega_u < omega_v and a ratio above (omega_v/omega_u)^2",
@@ -42,8 +43,18 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         )));
     };
     let (omega_u_rad_s, omega_v_rad_s, ratio) = (args.omega_u, args.omega_v, args.ratio);
-    let report = Report { omega_u_rad_s, omega_v_rad_s, ratio, eq_3_16, touching };
-    if args.json { print_json(&report) } else { print_text(&text(&report)) }
+    let report = Report {
+        omega_u_rad_s,
+        omega_v_rad_s,
+        ratio,
+        eq_3_16,
+        touching,
+    };
+    if args.json {
+        print_json(&report)
+    } else {
+        print_text(&text(&report))
+    }
 }
 
 fn text(report: &Report) -> String {

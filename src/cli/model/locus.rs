@@ -55,7 +55,9 @@ struct TrackJson {
 impl TrackJson {
     /// Whether the zero stays where it is.
     fn stands(&self) -> bool {
-        [&self.re_rad_s, &self.im_rad_s].into_iter().all(|part| part.windows(2).all(|pair| pair[0] == pair[1]))
+        [&self.re_rad_s, &self.im_rad_s]
+            .into_iter()
+            .all(|part| part.windows(2).all(|pair| pair[0] == pair[1]))
     }
 }
 
@@ -94,20 +96,43 @@ enum ClosedForm {
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     args.table.check()?;
     let values = sweep(args).values()?;
-    let plane = if args.damped { Plane::Damped } else { Plane::Undamped };
+    let plane = if args.damped {
+        Plane::Damped
+    } else {
+        Plane::Undamped
+    };
     let locus = Locus::follow(plane, &values, |value| zeros(args, value))?;
-    args.table.write(|| Column::of_rows(names(args, &locus), (0..values.len()).map(|k| row(&locus, k))))?;
+    args.table.write(|| {
+        Column::of_rows(
+            names(args, &locus),
+            (0..values.len()).map(|k| row(&locus, k)),
+        )
+    })?;
     let report = report(args, &locus)?;
-    if args.bench.json { print_json(&report) } else { print_text(&(text(&report) + &args.table.told("tracks"))) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&(text(&report) + &args.table.told("tracks")))
+    }
 }
 
 fn sweep(args: &Args) -> Sweep<'_> {
-    Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count }
+    Sweep {
+        bench: &args.bench,
+        vary: &args.vary,
+        from: &args.from,
+        to: &args.to,
+        count: args.count,
+    }
 }
 
 fn zeros(args: &Args, value: f64) -> Result<Vec<zeros::Zero>, CliError> {
     let structure = sweep(args).at(value)?;
-    Ok(if args.damped { zeros::damped_zeros(&structure)? } else { zeros::undamped_zeros(&structure)? })
+    Ok(if args.damped {
+        zeros::damped_zeros(&structure)?
+    } else {
+        zeros::undamped_zeros(&structure)?
+    })
 }
 
 fn report(args: &Args, locus: &Locus) -> Result<Report, CliError> {
@@ -122,9 +147,16 @@ fn report(args: &Args, locus: &Locus) -> Result<Report, CliError> {
         tracks: locus
             .tracks
             .iter()
-            .map(|track| TrackJson { re_rad_s: part(track, |s| s.re), im_rad_s: part(track, |s| s.im) })
+            .map(|track| TrackJson {
+                re_rad_s: part(track, |s| s.re),
+                im_rad_s: part(track, |s| s.im),
+            })
             .collect(),
-        changes: locus.changes.iter().map(|change| change_json(args, change)).collect::<Result<_, _>>()?,
+        changes: locus
+            .changes
+            .iter()
+            .map(|change| change_json(args, change))
+            .collect::<Result<_, _>>()?,
         csv: args.table.csv(),
     })
 }
@@ -147,36 +179,52 @@ fn closed_form(args: &Args, value: f64) -> Result<Option<ClosedForm>, CliError> 
     Ok(match (sum.terms(), args.damped) {
         ([r, u, v], false) => {
             let nearest = |to: f64, of: [f64; 2]| {
-                if (of[0] - to).abs() < (of[1] - to).abs() { of[0] } else { of[1] }
+                if (of[0] - to).abs() < (of[1] - to).abs() {
+                    of[0]
+                } else {
+                    of[1]
+                }
             };
             let b2 = r.residue_per_kg + u.residue_per_kg + v.residue_per_kg;
             let free = zeros::critical_residues(0.0, u, v);
             let shifted = zeros::critical_residues(r.omega_rad_s, u, v);
             let sums = zeros::critical_sums(r.omega_rad_s, u, v);
-            free.zip(shifted).zip(sums).map(|((free, shifted), sums)| ClosedForm::ThreeModes {
-                residue_r: r.residue_per_kg,
-                eq_4_5: nearest(r.residue_per_kg, free),
-                eq_4_5_shifted: nearest(r.residue_per_kg, shifted),
-                b2,
-                eq_4_6_shifted: nearest(b2, sums),
-            })
+            free.zip(shifted)
+                .zip(sums)
+                .map(|((free, shifted), sums)| ClosedForm::ThreeModes {
+                    residue_r: r.residue_per_kg,
+                    eq_4_5: nearest(r.residue_per_kg, free),
+                    eq_4_5_shifted: nearest(r.residue_per_kg, shifted),
+                    b2,
+                    eq_4_6_shifted: nearest(b2, sums),
+                })
         }
-        ([u, v], true) => zeros::two_mode_break_points(u, v)
-            .map(|points| ClosedForm::TwoModes { eq_3_14_rad_s: points.map(|s| Some(s).filter(|s| s.is_finite())) }),
+        ([u, v], true) => zeros::two_mode_break_points(u, v).map(|points| ClosedForm::TwoModes {
+            eq_3_14_rad_s: points.map(|s| Some(s).filter(|s| s.is_finite())),
+        }),
         _ => None,
     })
 }
 
 fn names(args: &Args, locus: &Locus) -> Vec<String> {
     let zero = |n: usize| ["re", "im"].map(|part| format!("zero_{n}_{part}_rad_s"));
-    [args.vary.clone()].into_iter().chain((1..=locus.tracks.len()).flat_map(zero)).collect()
+    [args.vary.clone()]
+        .into_iter()
+        .chain((1..=locus.tracks.len()).flat_map(zero))
+        .collect()
 }
 
 /// A zero at infinity is infinite in its real part.
 fn row(locus: &Locus, index: usize) -> Vec<f64> {
     let infinite = nalgebra::Complex::new(f64::INFINITY, 0.0);
-    let places = locus.tracks.iter().map(|track| track[index].unwrap_or(infinite));
-    [locus.values[index]].into_iter().chain(places.flat_map(|s| [s.re, s.im])).collect()
+    let places = locus
+        .tracks
+        .iter()
+        .map(|track| track[index].unwrap_or(infinite));
+    [locus.values[index]]
+        .into_iter()
+        .chain(places.flat_map(|s| [s.re, s.im]))
+        .collect()
 }
 
 fn text(report: &Report) -> String {
@@ -190,19 +238,35 @@ fn text(report: &Report) -> String {
     };
     let row = |k: usize| {
         let places = report.tracks.iter().map(|track| place(track, k));
-        [format!("{:.6}", report.values[k])].into_iter().chain(places).collect::<Vec<_>>()
+        [format!("{:.6}", report.values[k])]
+            .into_iter()
+            .chain(places)
+            .collect::<Vec<_>>()
     };
     // A screen of rows; the file and the JSON have all.
     let step = report.values.len().div_ceil(25);
     let rows: Vec<Vec<String>> = (0..report.values.len()).step_by(step).map(row).collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let which = if report.damped { "with damping" } else { "without damping, one of each pair s, -s" };
-    let changes: String = match report.changes.as_slice() {
-        [] if report.tracks.iter().all(TrackJson::stands) => format!("the zeros do not depend on {}\n", report.vary),
-        [] => "the kinds of the zeros do not change\n".into(),
-        changes => changes.iter().map(|change| change_text(&report.vary, change)).collect(),
+    let which = if report.damped {
+        "with damping"
+    } else {
+        "without damping, one of each pair s, -s"
     };
-    format!("{}: zeros {which}\n\n{}\n{changes}", report.profile, table(&header, &rows))
+    let changes: String = match report.changes.as_slice() {
+        [] if report.tracks.iter().all(TrackJson::stands) => {
+            format!("the zeros do not depend on {}\n", report.vary)
+        }
+        [] => "the kinds of the zeros do not change\n".into(),
+        changes => changes
+            .iter()
+            .map(|change| change_text(&report.vary, change))
+            .collect(),
+    };
+    format!(
+        "{}: zeros {which}\n\n{}\n{changes}",
+        report.profile,
+        table(&header, &rows)
+    )
 }
 
 fn change_text(key: &str, change: &ChangeJson) -> String {
@@ -211,14 +275,26 @@ fn change_text(key: &str, change: &ChangeJson) -> String {
         _ => String::new(),
     };
     let closed = match &change.closed_form {
-        Some(ClosedForm::ThreeModes { residue_r, eq_4_5, eq_4_5_shifted, b2, eq_4_6_shifted }) => format!(
+        Some(ClosedForm::ThreeModes {
+            residue_r,
+            eq_4_5,
+            eq_4_5_shifted,
+            b2,
+            eq_4_6_shifted,
+        }) => format!(
             "    residue of mode R {residue_r:.6} 1/kg; critical by Eq. (4-5) {eq_4_5:.6} (mode R at 0 rad/s), {eq_4_5_shifted:.6} (at its frequency)\n    sum of residues {b2:.6} 1/kg; critical by Eq. (4-6) {eq_4_6_shifted:.6}\n"
         ),
         Some(ClosedForm::TwoModes { eq_3_14_rad_s }) => {
             let points = eq_3_14_rad_s.map(|s| s.map_or("infinity".into(), |s| format!("{s:.4}")));
-            format!("    break points by Eq. (3-14) {} and {} rad/s\n", points[0], points[1])
+            format!(
+                "    break points by Eq. (3-14) {} and {} rad/s\n",
+                points[0], points[1]
+            )
         }
         None => String::new(),
     };
-    format!("{key} = {:.9}: {} to {}, {}{place}\n{closed}", change.value, change.before, change.after, change.at)
+    format!(
+        "{key} = {:.9}: {} to {}, {}{place}\n{closed}",
+        change.value, change.before, change.after, change.at
+    )
 }

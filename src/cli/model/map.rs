@@ -18,10 +18,20 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     /// Operating points as ratios of the beam length: 0:0.15:31, 0%:15%:31
-    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "0%:15%:31", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "FROM:TO:COUNT",
+        default_value = "0%:15%:31",
+        allow_hyphen_values = true
+    )]
     operating_points: Spaced,
     /// Mass asymmetries m2/m3 - 1: -0.1:0.1:41, -10%:10%:41
-    #[arg(long, value_name = "FROM:TO:COUNT", default_value = "-10%:10%:41", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "FROM:TO:COUNT",
+        default_value = "-10%:10%:41",
+        allow_hyphen_values = true
+    )]
     asymmetries: Spaced,
     #[command(flatten)]
     table: TableOptions,
@@ -41,23 +51,36 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let (points, asymmetries) = (&args.operating_points.0[..], &args.asymmetries.0[..]);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let cnmp_pairs = zeros::cnmp_map(&settings, points, asymmetries, threads)?;
-    let report = Report { operating_points: points, asymmetries, cnmp_pairs };
+    let report = Report {
+        operating_points: points,
+        asymmetries,
+        cnmp_pairs,
+    };
     args.table.write(|| columns(&report))?;
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report, args.bench.profile())) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&text(&report, args.bench.profile()))
+    }
 }
 
 /// The plant, found valid at the ends of both grids.
 fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
     if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
-        let what =
-            "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
+        let what = "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
         return Err(CliError::Usage(what.into()));
     }
     let settings = sr4dof(args, &[])?;
     let ends = |grid: &Spaced| [grid.0[0], grid.0[grid.0.len() - 1]];
-    for (point, asymmetry) in ends(&args.operating_points).into_iter().zip(ends(&args.asymmetries)) {
+    for (point, asymmetry) in ends(&args.operating_points)
+        .into_iter()
+        .zip(ends(&args.asymmetries))
+    {
         let point_m = point * settings.beam_length_m;
-        let sets = [format!("plant.operating_point_m={point_m:?}"), format!("plant.mass_asymmetry={asymmetry:?}")];
+        let sets = [
+            format!("plant.operating_point_m={point_m:?}"),
+            format!("plant.mass_asymmetry={asymmetry:?}"),
+        ];
         sr4dof(args, &sets)?;
     }
     Ok(settings)
@@ -76,7 +99,11 @@ fn sr4dof(args: &Args, sets: &[String]) -> Result<Sr4dofSettings, CliError> {
 /// A row for each point of the map.
 fn columns(report: &Report) -> Vec<Column> {
     let column = |axis: usize| cells(report).map(|cell| cell[axis]).collect();
-    let counts = report.cnmp_pairs.iter().flatten().map(|&pairs| Some(u64::from(pairs)));
+    let counts = report
+        .cnmp_pairs
+        .iter()
+        .flatten()
+        .map(|&pairs| Some(u64::from(pairs)));
     vec![
         Column::real("operating_point", column(0)),
         Column::real("mass_asymmetry", column(1)),
@@ -86,16 +113,31 @@ fn columns(report: &Report) -> Vec<Column> {
 
 /// Operating point, asymmetry and count of each point of the map.
 fn cells<'a>(report: &'a Report) -> impl Iterator<Item = [f64; 3]> + 'a {
-    report.operating_points.iter().zip(&report.cnmp_pairs).flat_map(|(&point, row)| {
-        report.asymmetries.iter().zip(row).map(move |(&asymmetry, &pairs)| [point, asymmetry, f64::from(pairs)])
-    })
+    report
+        .operating_points
+        .iter()
+        .zip(&report.cnmp_pairs)
+        .flat_map(|(&point, row)| {
+            report
+                .asymmetries
+                .iter()
+                .zip(row)
+                .map(move |(&asymmetry, &pairs)| [point, asymmetry, f64::from(pairs)])
+        })
 }
 
 fn text(report: &Report, profile: &str) -> String {
     let (rows, columns) = (report.operating_points.len(), report.asymmetries.len());
     let fits = rows <= PICTURE.0 && columns <= PICTURE.1;
-    let rest = if fits { picture(report) } else { format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1) };
-    format!("{profile}: CNMP zeros without damping at {}\n{rest}", summary(report))
+    let rest = if fits {
+        picture(report)
+    } else {
+        format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1)
+    };
+    format!(
+        "{profile}: CNMP zeros without damping at {}\n{rest}",
+        summary(report)
+    )
 }
 
 fn summary(report: &Report) -> String {
@@ -103,22 +145,52 @@ fn summary(report: &Report) -> String {
     let with: Vec<[f64; 3]> = cells(report).filter(|cell| cell[2] > 0.0).collect();
     let range = |axis: usize| {
         let ends = with.iter().map(|cell| 100.0 * cell[axis]);
-        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
         format!("{low:.3} to {high:.3} %")
     };
     if with.is_empty() {
         return format!("none of {all} points");
     }
-    format!("{} of {all} points: Y1o from {} of L, asymmetry from {}", with.len(), range(0), range(1))
+    format!(
+        "{} of {all} points: Y1o from {} of L, asymmetry from {}",
+        with.len(),
+        range(0),
+        range(1)
+    )
 }
 
 /// A line for each operating point, a character for each asymmetry: its CNMP pairs, `.` for none.
 fn picture(report: &Report) -> String {
-    let symbol = |&pairs: &u8| if pairs == 0 { '.' } else { char::from(b'0' + pairs.min(9)) };
-    let line = |(point, row): (&f64, &Vec<u8>)| {
-        format!("{:>9.3} %  {}\n", 100.0 * point, row.iter().map(symbol).collect::<String>())
+    let symbol = |&pairs: &u8| {
+        if pairs == 0 {
+            '.'
+        } else {
+            char::from(b'0' + pairs.min(9))
+        }
     };
-    let lines: String = report.operating_points.iter().zip(&report.cnmp_pairs).map(line).collect();
-    let (first, last) = (report.asymmetries[0], report.asymmetries[report.asymmetries.len() - 1]);
-    format!("{:>11}  asymmetry from {:+.2} to {:+.2} %\n{lines}", "Y1o/L", 100.0 * first, 100.0 * last)
+    let line = |(point, row): (&f64, &Vec<u8>)| {
+        format!(
+            "{:>9.3} %  {}\n",
+            100.0 * point,
+            row.iter().map(symbol).collect::<String>()
+        )
+    };
+    let lines: String = report
+        .operating_points
+        .iter()
+        .zip(&report.cnmp_pairs)
+        .map(line)
+        .collect();
+    let (first, last) = (
+        report.asymmetries[0],
+        report.asymmetries[report.asymmetries.len() - 1],
+    );
+    format!(
+        "{:>11}  asymmetry from {:+.2} to {:+.2} %\n{lines}",
+        "Y1o/L",
+        100.0 * first,
+        100.0 * last
+    )
 }

@@ -27,10 +27,20 @@ pub(super) struct Args {
     #[arg(long, value_name = "KEY", default_value = "plant.operating_point_m", requires_all = ["from", "to"])]
     vary: String,
     /// First value; 3.8mm for a length, 8% for a ratio or of the beam length
-    #[arg(long, value_name = "A", default_value = "0.5%", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "A",
+        default_value = "0.5%",
+        allow_hyphen_values = true
+    )]
     from: String,
     /// Last value; the veering point has to be between
-    #[arg(long, value_name = "B", default_value = "15%", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "B",
+        default_value = "15%",
+        allow_hyphen_values = true
+    )]
     to: String,
     /// Values at which each placement is tried
     #[arg(long, value_name = "N", default_value_t = 41, value_parser = clap::value_parser!(u32).range(2..=1_000))]
@@ -116,14 +126,23 @@ struct Tried<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
-    let sweep = Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count };
+    let sweep = Sweep {
+        bench: &args.bench,
+        vary: &args.vary,
+        from: &args.from,
+        to: &args.to,
+        count: args.count,
+    };
     let values = sweep.values()?;
     let places = places(&sweep, values[0])?;
-    let weights = [("--actuator", &args.actuator), ("--sensor", &args.sensor)].map(|(option, text)| {
-        text.as_ref()
-            .map(|text| Weights::parse(option, text, &places).map(|weights| (text.clone(), weights)))
-            .transpose()
-    });
+    let weights =
+        [("--actuator", &args.actuator), ("--sensor", &args.sensor)].map(|(option, text)| {
+            text.as_ref()
+                .map(|text| {
+                    Weights::parse(option, text, &places).map(|weights| (text.clone(), weights))
+                })
+                .transpose()
+        });
     let [actuator, sensor] = weights;
     let chosen = [actuator?, sensor?];
     let mut loci = Loci::follow(&values, |value| sweep.at(value))?;
@@ -131,10 +150,22 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let (meeting, closest) = loci.meeting(pair)?;
     veers(meeting, closest.value, pair)?;
     let (path, place) = with_closest(&loci, &values, &closest);
-    let ports = path.iter().map(|at| places_at(&sweep, at.value)).collect::<Result<Vec<_>, _>>()?;
-    let tried = Tried { path, ports, closest: place, pair };
+    let ports = path
+        .iter()
+        .map(|at| places_at(&sweep, at.value))
+        .collect::<Result<Vec<_>, _>>()?;
+    let tried = Tried {
+        path,
+        ports,
+        closest: place,
+        pair,
+    };
     let report = report(args, &tried, &chosen, meeting.name())?;
-    if args.bench.json { print_json(&report) } else { print_text(&text(&report)) }
+    if args.bench.json {
+        print_json(&report)
+    } else {
+        print_text(&text(&report))
+    }
 }
 
 /// The modes at the values of the grid and at the veering point, and the place of that one among them.
@@ -145,7 +176,13 @@ fn with_closest<'a, F: FnMut(f64) -> Result<Structure, CliError>>(
 ) -> (Vec<&'a ModesAt>, usize) {
     let mut path: Vec<&ModesAt> = values.iter().map(|value| loci.near(*value)).collect();
     let rising = values[0] < values[values.len() - 1];
-    let before = |at: &&ModesAt| if rising { at.value < closest.value } else { at.value > closest.value };
+    let before = |at: &&ModesAt| {
+        if rising {
+            at.value < closest.value
+        } else {
+            at.value > closest.value
+        }
+    };
     let place = path.partition_point(before);
     if path.get(place).is_none_or(|at| at.value != closest.value) {
         path.insert(place, closest);
@@ -198,16 +235,28 @@ impl Tries {
 
 impl Tried<'_> {
     /// Force and sensor vector at each value.
-    fn vectors(&self, of: impl Fn(&ModesAt, &[Port]) -> [DVector<f64>; 2]) -> Vec<[DVector<f64>; 2]> {
-        self.path.iter().zip(&self.ports).map(|(at, ports)| of(at, ports)).collect()
+    fn vectors(
+        &self,
+        of: impl Fn(&ModesAt, &[Port]) -> [DVector<f64>; 2],
+    ) -> Vec<[DVector<f64>; 2]> {
+        self.path
+            .iter()
+            .zip(&self.ports)
+            .map(|(at, ports)| of(at, ports))
+            .collect()
     }
 
     fn chosen(&self, [actuator, sensor]: &[Chosen; 2]) -> Vec<[DVector<f64>; 2]> {
         let or = |chosen: &Chosen, ports: &[Port], own: &DVector<f64>| {
-            chosen.as_ref().map_or_else(|| own.clone(), |(_, weights)| weights.row(ports))
+            chosen
+                .as_ref()
+                .map_or_else(|| own.clone(), |(_, weights)| weights.row(ports))
         };
         self.vectors(|at, ports| {
-            [or(actuator, ports, &at.structure().force), or(sensor, ports, &at.structure().sensor)]
+            [
+                or(actuator, ports, &at.structure().force),
+                or(sensor, ports, &at.structure().sensor),
+            ]
         })
     }
 
@@ -219,8 +268,11 @@ impl Tried<'_> {
     fn all(&self, names: &[String; 2], own: &[[DVector<f64>; 2]]) -> Result<Tries, CliError> {
         let (ports, mut tries) = (&self.ports[0], Tries::default());
         let row = |k: usize, place: usize| self.ports[k][place].row.clone();
-        let vectors = |of: &dyn Fn(usize) -> [DVector<f64>; 2]| (0..own.len()).map(of).collect::<Vec<_>>();
-        let other = names.each_ref().map(|name| !ports.iter().any(|port| port.name == *name));
+        let vectors =
+            |of: &dyn Fn(usize) -> [DVector<f64>; 2]| (0..own.len()).map(of).collect::<Vec<_>>();
+        let other = names
+            .each_ref()
+            .map(|name| !ports.iter().any(|port| port.name == *name));
         for i in 0..ports.len() {
             for j in 0..ports.len() {
                 let pair = vectors(&|k| [row(k, i), row(k, j)]);
@@ -235,17 +287,27 @@ impl Tried<'_> {
                 tries.add(&names[0], &ports[i].name, self.trial(&pair))?;
             }
         }
-        tries.done.sort_by(|(a, _), (b, _)| a.rank().partial_cmp(&b.rank()).unwrap_or(std::cmp::Ordering::Equal));
+        tries.done.sort_by(|(a, _), (b, _)| {
+            a.rank()
+                .partial_cmp(&b.rank())
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
         Ok(tries)
     }
 
     /// The name of a place whose vector is the same at every value, or what it is called otherwise.
     fn name(&self, chosen: &Chosen, own: &[[DVector<f64>; 2]], which: usize) -> String {
         let same = |place: usize| {
-            own.iter().zip(&self.ports).all(|(own, ports)| (&own[which] - &ports[place].row).amax() < 1e-12)
+            own.iter()
+                .zip(&self.ports)
+                .all(|(own, ports)| (&own[which] - &ports[place].row).amax() < 1e-12)
         };
-        let known = (0..self.ports[0].len()).find(|place| same(*place)).map(|place| self.ports[0][place].name.clone());
-        known.or_else(|| chosen.as_ref().map(|(text, _)| text.clone())).unwrap_or_else(|| "as configured".into())
+        let known = (0..self.ports[0].len())
+            .find(|place| same(*place))
+            .map(|place| self.ports[0][place].name.clone());
+        known
+            .or_else(|| chosen.as_ref().map(|(text, _)| text.clone()))
+            .unwrap_or_else(|| "as configured".into())
     }
 }
 
@@ -264,20 +326,43 @@ fn json(actuator: &str, sensor: &str, trial: &Trial) -> TrialJson {
     }
 }
 
-fn report(args: &Args, tried: &Tried, chosen: &[Chosen; 2], meeting: &'static str) -> Result<Report, CliError> {
+fn report(
+    args: &Args,
+    tried: &Tried,
+    chosen: &[Chosen; 2],
+    meeting: &'static str,
+) -> Result<Report, CliError> {
     let own = tried.chosen(chosen);
     let names = [0, 1].map(|which| tried.name(&chosen[which], &own, which));
-    let here = tried.trial(&own)?.map(|trial| json(&names[0], &names[1], &trial));
-    let Tries { done, silent, not_computed } = tried.all(&names, &own)?;
+    let here = tried
+        .trial(&own)?
+        .map(|trial| json(&names[0], &names[1], &trial));
+    let Tries {
+        done,
+        silent,
+        not_computed,
+    } = tried.all(&names, &own)?;
     let trials: Vec<TrialJson> = done.into_iter().map(|(_, json)| json).collect();
     let present = here.as_ref().map_or(0.0, |here| here.remainder_per_kg);
     let best = |fits: &dyn Fn(&TrialJson) -> bool| {
         let shows = |trial: &&TrialJson| trial.remainder_per_kg >= LEAST_REMAINDER * present;
-        trials.iter().filter(shows).find(|trial| fits(trial)).cloned()
+        trials
+            .iter()
+            .filter(shows)
+            .find(|trial| fits(trial))
+            .cloned()
     };
     let places = [0, tried.closest, tried.path.len() - 1];
-    let pictures: Vec<Picture> =
-        places.map(|k| Picture::of(tried.path[k], tried.path[tried.closest], tried.pair, &own[k])).into();
+    let pictures: Vec<Picture> = places
+        .map(|k| {
+            Picture::of(
+                tried.path[k],
+                tried.path[tried.closest],
+                tried.pair,
+                &own[k],
+            )
+        })
+        .into();
     if let Some(path) = &args.svg {
         draw(path, args, &pictures, &names)?;
     }
@@ -315,18 +400,38 @@ fn picture_json(picture: &Picture) -> PictureJson {
     }
 }
 
-fn draw(path: &Path, args: &Args, pictures: &[Picture], names: &[String; 2]) -> Result<(), CliError> {
+fn draw(
+    path: &Path,
+    args: &Args,
+    pictures: &[Picture],
+    names: &[String; 2],
+) -> Result<(), CliError> {
     let panel = |(when, picture): (&str, &Picture)| QuadrantPanel {
         title: format!("{when}: {:.6}", picture.value),
         picture: picture.clone(),
     };
-    let panels: Vec<QuadrantPanel> =
-        ["before", "at the veering point", "after"].into_iter().zip(pictures).map(panel).collect();
-    let title = format!("{}: actuator at {}, probe at {}", args.bench.profile(), names[0], names[1]);
-    let subtitle = format!("Quadrants of the two close shapes over {} (section 4.2.4)", args.vary);
-    let svg = quadrants_svg(&panels, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))?;
+    let panels: Vec<QuadrantPanel> = ["before", "at the veering point", "after"]
+        .into_iter()
+        .zip(pictures)
+        .map(panel)
+        .collect();
+    let title = format!(
+        "{}: actuator at {}, probe at {}",
+        args.bench.profile(),
+        names[0],
+        names[1]
+    );
+    let subtitle = format!(
+        "Quadrants of the two close shapes over {} (section 4.2.4)",
+        args.vary
+    );
+    let svg =
+        quadrants_svg(&panels, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))?;
     let failed = |e: std::io::Error| {
-        CliError::Failed(format!("cannot write {}: {e}; free some space or choose another file", path.display()))
+        CliError::Failed(format!(
+            "cannot write {}: {e}; free some space or choose another file",
+            path.display()
+        ))
     };
     std::fs::write(path, svg).map_err(failed)
 }

@@ -33,7 +33,11 @@ pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
     let modal = Modal::of(&plant::build(&config.plant)?)?;
     let report = report(options.profile(), &modal)?;
-    if options.json { print_json(&report) } else { print_text(&text(&report)) }
+    if options.json {
+        print_json(&report)
+    } else {
+        print_text(&text(&report))
+    }
 }
 
 fn report(profile: &str, modal: &Modal) -> Result<Report, CliError> {
@@ -58,7 +62,13 @@ fn report(profile: &str, modal: &Modal) -> Result<Report, CliError> {
 
 fn text(report: &Report) -> String {
     let read = match &report.table {
-        Some(row) => format!("{} (Table {}, row {}: {})", row.kinds.join(" or "), row.table, row.row, row.printed),
+        Some(row) => format!(
+            "{} (Table {}, row {}: {})",
+            row.kinds.join(" or "),
+            row.table,
+            row.row,
+            row.printed
+        ),
         None => "no row of Tables 3-1 to 3-4 has this sequence".into(),
     };
     let verdict = match report.agree {

@@ -57,8 +57,13 @@ struct Foretold {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
-    if let Some(seconds) = args.duration.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
-        return Err(CliError::Usage(format!("--duration is {seconds}; it is in seconds and above 0")));
+    if let Some(seconds) = args
+        .duration
+        .filter(|seconds| !(*seconds > 0.0 && seconds.is_finite()))
+    {
+        return Err(CliError::Usage(format!(
+            "--duration is {seconds}; it is in seconds and above 0"
+        )));
     }
     args.table.check()?;
     let config = args.bench.load(Purpose::Model, &[])?;
@@ -66,7 +71,12 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let response = StepResponse::new(&sum);
     let initial = response.initial();
     let seconds = args.duration.unwrap_or(initial.window_s);
-    let rows = (0..args.count).map(|k| row(&response, seconds * f64::from(k) / f64::from(args.count - 1)));
+    let rows = (0..args.count).map(|k| {
+        row(
+            &response,
+            seconds * f64::from(k) / f64::from(args.count - 1),
+        )
+    });
     args.table.write(|| Column::of_rows(names(&sum), rows))?;
     let report = report(args, &sum, &response, initial)?;
     if args.bench.json {
@@ -78,14 +88,26 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 
 fn names(sum: &ModalSum) -> Vec<String> {
     let modes = (1..=sum.terms().len()).map(|number| format!("mode_{number}_m_per_n"));
-    ["time_s", "displacement_m_per_n"].into_iter().map(String::from).chain(modes).collect()
+    ["time_s", "displacement_m_per_n"]
+        .into_iter()
+        .map(String::from)
+        .chain(modes)
+        .collect()
 }
 
 fn row(response: &StepResponse, time_s: f64) -> Vec<f64> {
-    [time_s, response.position_m(time_s)].into_iter().chain(response.parts_m(time_s)).collect()
+    [time_s, response.position_m(time_s)]
+        .into_iter()
+        .chain(response.parts_m(time_s))
+        .collect()
 }
 
-fn report(args: &Args, sum: &ModalSum, response: &StepResponse, initial: InitialStep) -> Result<Report, CliError> {
+fn report(
+    args: &Args,
+    sum: &ModalSum,
+    response: &StepResponse,
+    initial: InitialStep,
+) -> Result<Report, CliError> {
     let kinds = Kinds::of(&sum.undamped_zeros()?);
     let crossings = initial.zero_crossings_s.len();
     let (undershoot, least, most) = (kinds.real % 2 == 1, kinds.real, kinds.in_right_half_plane());
@@ -115,11 +137,20 @@ fn report(args: &Args, sum: &ModalSum, response: &StepResponse, initial: Initial
 fn text(report: &Report) -> String {
     let times = |times: &[f64]| match times {
         [] => String::new(),
-        _ => format!(" (at {} ms)", times.iter().map(|t| format!("{:.3}", t * 1e3)).collect::<Vec<_>>().join(", ")),
+        _ => format!(
+            " (at {} ms)",
+            times
+                .iter()
+                .map(|t| format!("{:.3}", t * 1e3))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
     };
     let yes = |yes: bool| if yes { "yes" } else { "no" };
     let foretold = &report.foretold;
-    let end = report.end_m_per_n.map_or("goes on for ever".into(), |end| format!("{:.4} um/N", end * 1e6));
+    let end = report.end_m_per_n.map_or("goes on for ever".into(), |end| {
+        format!("{:.4} um/N", end * 1e6)
+    });
     format!(
         "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N   foretold: {}\n  zero crossings      {}{} in the first {:.3} ms   foretold: at least {}, {} where each zero in the right half plane shows\n  reversals           {}{} in the first {:.3} ms\n{}",
         report.profile,
@@ -136,6 +167,10 @@ fn text(report: &Report) -> String {
         report.reversals,
         times(&report.reversals_s),
         report.initial_s * 1e3,
-        if foretold.agrees { "" } else { "  NOT as foretold\n" },
+        if foretold.agrees {
+            ""
+        } else {
+            "  NOT as foretold\n"
+        },
     )
 }

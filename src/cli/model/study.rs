@@ -11,8 +11,8 @@ use super::super::{CliError, Outcome};
 use crate::config::Purpose;
 use crate::session::stoppable;
 use crate::study::{
-    Answer, Block, Counted, Couple, Deviation, Effect, Opened, Plan, Probability, Results, Shard, StudyError,
-    StudyFile, Tolerance, Varied, count, joined,
+    Answer, Block, Counted, Couple, Deviation, Effect, Opened, Plan, Probability, Results, Shard,
+    StudyError, StudyFile, Tolerance, Varied, count, joined,
 };
 
 /// What varies, and how often it is drawn.
@@ -53,7 +53,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     args.table.check()?;
-    let results = if args.join.is_empty() { drawn(args)? } else { joined(&args.join)? };
+    let results = if args.join.is_empty() {
+        drawn(args)?
+    } else {
+        joined(&args.join)?
+    };
     if !results.is_done() {
         eprintln!("bench: {}", stopped(args, &results));
         return Ok(Outcome::Failed);
@@ -75,7 +79,11 @@ fn drawn(args: &Args) -> Result<Results, CliError> {
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let (mut file, mut results) = match &args.file {
         Some(path) => {
-            let Opened { file, results, dropped } = StudyFile::open(path, &plan, shard)?;
+            let Opened {
+                file,
+                results,
+                dropped,
+            } = StudyFile::open(path, &plan, shard)?;
             went_on(&results, dropped);
             (Some(file), results)
         }
@@ -111,7 +119,10 @@ fn fill(
 }
 
 fn threads(args: &Args) -> usize {
-    args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+    args.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        usize::from,
+    )
 }
 
 fn went_on(results: &Results, dropped: usize) {
@@ -120,38 +131,81 @@ fn went_on(results: &Results, dropped: usize) {
     }
     if results.done() > 0 {
         let draws = results.shard.draws(&results.plan);
-        eprintln!("bench: {} of {} draws are done already", results.done(), draws.end - draws.start);
+        eprintln!(
+            "bench: {} of {} draws are done already",
+            results.done(),
+            draws.end - draws.start
+        );
     }
 }
 
 fn stopped(args: &Args, results: &Results) -> String {
     let draws = results.shard.draws(&results.plan);
-    let kept = args.file.as_ref().map_or("nothing is kept: with --file FILE it can go on".into(), |path| {
-        format!("started again with the same arguments it goes on from {}", path.display())
-    });
-    format!("stopped after {} of {} draws; {kept}", results.done(), draws.end - draws.start)
+    let kept = args.file.as_ref().map_or(
+        "nothing is kept: with --file FILE it can go on".into(),
+        |path| {
+            format!(
+                "started again with the same arguments it goes on from {}",
+                path.display()
+            )
+        },
+    );
+    format!(
+        "stopped after {} of {} draws; {kept}",
+        results.done(),
+        draws.end - draws.start
+    )
 }
 
 /// A row a draw: what it gave each setting, and its pairs.
 fn columns(results: &Results) -> Vec<Column> {
     let plan = &results.plan;
-    let numbers = || results.blocks().flat_map(|block| (block.first..).take(block.cnmp_pairs.len()));
+    let numbers = || {
+        results
+            .blocks()
+            .flat_map(|block| (block.first..).take(block.cnmp_pairs.len()))
+    };
     let values = |index: usize| -> Vec<f64> {
         let of = |block: &Block| plan.from_draw(block.first).take(block.cnmp_pairs.len());
-        results.blocks().flat_map(of).map(|drawn| drawn.values[index]).collect()
+        results
+            .blocks()
+            .flat_map(of)
+            .map(|drawn| drawn.values[index])
+            .collect()
     };
     let counts = |of: fn(&Block) -> &Vec<Option<u32>>| {
-        results.blocks().flat_map(move |block| of(block).iter().map(|pairs| pairs.map(u64::from)))
+        results
+            .blocks()
+            .flat_map(move |block| of(block).iter().map(|pairs| pairs.map(u64::from)))
     };
     let draw = [Column::count("draw", numbers().map(Some))];
-    let settings = plan.varied.iter().enumerate().map(|(index, one)| Column::real(&one.key, values(index)));
-    let pairs = [Column::count("cnmp_pairs", counts(|block| &block.cnmp_pairs))];
-    let damped = plan.damped.then(|| Column::count("damped_cnmp_pairs", counts(|block| &block.damped_cnmp_pairs)));
-    draw.into_iter().chain(settings).chain(pairs).chain(damped).collect()
+    let settings = plan
+        .varied
+        .iter()
+        .enumerate()
+        .map(|(index, one)| Column::real(&one.key, values(index)));
+    let pairs = [Column::count(
+        "cnmp_pairs",
+        counts(|block| &block.cnmp_pairs),
+    )];
+    let damped = plan.damped.then(|| {
+        Column::count(
+            "damped_cnmp_pairs",
+            counts(|block| &block.damped_cnmp_pairs),
+        )
+    });
+    draw.into_iter()
+        .chain(settings)
+        .chain(pairs)
+        .chain(damped)
+        .collect()
 }
 
 fn text(answer: &Answer) -> String {
-    let shard = answer.shard.as_ref().map_or(String::new(), |shard| format!(" of shard {shard}"));
+    let shard = answer
+        .shard
+        .as_ref()
+        .map_or(String::new(), |shard| format!(" of shard {shard}"));
     let tolerances: Vec<Vec<String>> = answer.varied.iter().map(tolerance).collect();
     format!(
         "{}: {} draws{shard}, seed {}\n\n{}\nwithout damping\n{}{}{}",
@@ -160,14 +214,22 @@ fn text(answer: &Answer) -> String {
         answer.seed,
         table(&["setting", "nominal", "tolerance"], &tolerances),
         counted(&answer.cnmp_pairs),
-        answer.damped_cnmp_pairs.as_ref().map_or(String::new(), |part| format!("\nwith damping\n{}", counted(part))),
+        answer
+            .damped_cnmp_pairs
+            .as_ref()
+            .map_or(String::new(), |part| format!(
+                "\nwith damping\n{}",
+                counted(part)
+            )),
         not_analysed(answer),
     )
 }
 
 fn tolerance(one: &Varied) -> Vec<String> {
     let deviation = match one.deviation {
-        Deviation::Uniform { low, high } => format!("{:+} to {:+}, uniform", rounded(low), rounded(high)),
+        Deviation::Uniform { low, high } => {
+            format!("{:+} to {:+}, uniform", rounded(low), rounded(high))
+        }
         Deviation::Normal { sigma } => format!("sigma {}, normal", rounded(sigma)),
     };
     vec![one.key.clone(), rounded(one.nominal).to_string(), deviation]
@@ -181,15 +243,36 @@ fn rounded(x: f64) -> f64 {
 fn counted(counted: &Counted) -> String {
     let line = |p: &Probability| {
         let pairs = p.pairs.map_or("any".into(), |pairs| pairs.to_string());
-        vec![pairs, p.draws.to_string(), percent(p.probability), format!("{} to {}", percent(p.low), percent(p.high))]
+        vec![
+            pairs,
+            p.draws.to_string(),
+            percent(p.probability),
+            format!("{} to {}", percent(p.low), percent(p.high)),
+        ]
     };
-    let probabilities: Vec<Vec<String>> = counted.probabilities.iter().chain([&counted.any]).map(line).collect();
+    let probabilities: Vec<Vec<String>> = counted
+        .probabilities
+        .iter()
+        .chain([&counted.any])
+        .map(line)
+        .collect();
     let settings: Vec<Vec<String>> = counted.settings.iter().map(effect).collect();
     format!(
         "{}\nwhat decides whether there are pairs: share of the variance that a setting explains alone\n{}{}",
-        table(&["CNMP pairs", "draws", "probability %", "95 % by Wilson"], &probabilities),
         table(
-            &["setting", "share %", "noise %", "direction", "pairs in % in its lower third", "middle", "upper"],
+            &["CNMP pairs", "draws", "probability %", "95 % by Wilson"],
+            &probabilities
+        ),
+        table(
+            &[
+                "setting",
+                "share %",
+                "noise %",
+                "direction",
+                "pairs in % in its lower third",
+                "middle",
+                "upper"
+            ],
             &settings
         ),
         couples(counted),
@@ -198,8 +281,18 @@ fn counted(counted: &Counted) -> String {
 
 fn couples(counted: &Counted) -> String {
     let rows: Vec<Vec<String>> = counted.couples.iter().map(couple).collect();
-    let header = ["settings", "share %", "noise %", "pairs in % on one side of both medians", "on opposite sides"];
-    let strong = if rows.is_empty() { String::new() } else { format!("\n{}", table(&header, &rows)) };
+    let header = [
+        "settings",
+        "share %",
+        "noise %",
+        "pairs in % on one side of both medians",
+        "on opposite sides",
+    ];
+    let strong = if rows.is_empty() {
+        String::new()
+    } else {
+        format!("\n{}", table(&header, &rows))
+    };
     format!(
         "alone they explain {} %, couples of them beyond that {} %; the rest takes three or more together\n{strong}",
         maybe(counted.share_alone),
@@ -210,13 +303,26 @@ fn couples(counted: &Counted) -> String {
 fn effect(effect: &Effect) -> Vec<String> {
     let shares = [effect.share, effect.share_noise].map(maybe);
     let thirds = effect.probability_by_third.map(maybe);
-    [effect.key.clone()].into_iter().chain(shares).chain([effect.direction.to_string()]).chain(thirds).collect()
+    [effect.key.clone()]
+        .into_iter()
+        .chain(shares)
+        .chain([effect.direction.to_string()])
+        .chain(thirds)
+        .collect()
 }
 
 fn couple(couple: &Couple) -> Vec<String> {
-    let sides = [couple.probability_same_side, couple.probability_opposite_sides].map(maybe);
+    let sides = [
+        couple.probability_same_side,
+        couple.probability_opposite_sides,
+    ]
+    .map(maybe);
     let shares = [couple.share, couple.share_noise].map(percent);
-    [couple.keys.join(" x ")].into_iter().chain(shares).chain(sides).collect()
+    [couple.keys.join(" x ")]
+        .into_iter()
+        .chain(shares)
+        .chain(sides)
+        .collect()
 }
 
 fn percent(ratio: f64) -> String {
@@ -231,8 +337,11 @@ fn not_analysed(answer: &Answer) -> String {
     if answer.not_analysed.draws == 0 {
         return String::new();
     }
-    let examples =
-        answer.not_analysed.examples.iter().map(|failure| format!("  draw {}: {}\n", failure.draw, failure.why));
+    let examples = answer
+        .not_analysed
+        .examples
+        .iter()
+        .map(|failure| format!("  draw {}: {}\n", failure.draw, failure.why));
     format!(
         "\n{} draws could not be analysed, and are in no probability:\n{}",
         answer.not_analysed.draws,

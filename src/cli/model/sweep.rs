@@ -21,12 +21,23 @@ impl Sweep<'_> {
     pub fn values(&self) -> Result<Vec<f64>, CliError> {
         self.refuse_options()?;
         let config = self.bench.load(Purpose::Model, &[])?;
-        let (from, to) = (self.number(&config, self.from)?, self.number(&config, self.to)?);
+        let (from, to) = (
+            self.number(&config, self.from)?,
+            self.number(&config, self.to)?,
+        );
         if from == to {
-            return Err(CliError::Usage(format!("an empty sweep: --from and --to are both {from}; give two values")));
+            return Err(CliError::Usage(format!(
+                "an empty sweep: --from and --to are both {from}; give two values"
+            )));
         }
         let last = f64::from(self.count - 1);
-        let value = |k: u32| if k + 1 == self.count { to } else { from + (to - from) * f64::from(k) / last };
+        let value = |k: u32| {
+            if k + 1 == self.count {
+                to
+            } else {
+                from + (to - from) * f64::from(k) / last
+            }
+        };
         Ok((0..self.count).map(value).collect())
     }
 
@@ -42,23 +53,28 @@ impl Sweep<'_> {
 
     /// The configuration at a value.
     pub fn config(&self, value: f64) -> Result<Config, CliError> {
-        self.bench.load(Purpose::Model, &[format!("{}={value:?}", self.vary)])
+        self.bench
+            .load(Purpose::Model, &[format!("{}={value:?}", self.vary)])
     }
 
     fn refuse_options(&self) -> Result<(), CliError> {
-        let option = (self.vary == "plant.operating_point_m" && self.bench.operating_point.is_some())
+        let option = (self.vary == "plant.operating_point_m"
+            && self.bench.operating_point.is_some())
             || (self.vary == "plant.mass_asymmetry" && self.bench.asymmetry.is_some());
         match option {
-            true => {
-                Err(CliError::Usage(format!("--vary {} and an option that fixes it: leave out the option", self.vary)))
-            }
+            true => Err(CliError::Usage(format!(
+                "--vary {} and an option that fixes it: leave out the option",
+                self.vary
+            ))),
             false => Ok(()),
         }
     }
 
     fn number(&self, config: &Config, text: &str) -> Result<f64, CliError> {
         match quantity::parse(text).map_err(|e| CliError::Usage(e.to_string()))? {
-            Quantity::Ratio(ratio) if self.vary.ends_with("_m") => Ok(ratio * beam_length_m(config, self.vary)?),
+            Quantity::Ratio(ratio) if self.vary.ends_with("_m") => {
+                Ok(ratio * beam_length_m(config, self.vary)?)
+            }
             Quantity::Bare(value) | Quantity::Metres(value) | Quantity::Ratio(value) => Ok(value),
         }
     }
@@ -66,6 +82,12 @@ impl Sweep<'_> {
 
 fn beam_length_m(config: &Config, key: &str) -> Result<f64, CliError> {
     let plant = serde_json::to_value(&config.plant).unwrap_or_default();
-    let length_m = plant.get("beam_length_m").and_then(serde_json::Value::as_f64);
-    length_m.ok_or_else(|| CliError::Usage(format!("this plant has no beams: give {key} in metres, not in per cent")))
+    let length_m = plant
+        .get("beam_length_m")
+        .and_then(serde_json::Value::as_f64);
+    length_m.ok_or_else(|| {
+        CliError::Usage(format!(
+            "this plant has no beams: give {key} in metres, not in per cent"
+        ))
+    })
 }

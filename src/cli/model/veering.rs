@@ -19,10 +19,20 @@ pub(super) struct Args {
     #[arg(long, value_name = "KEY", default_value = "plant.operating_point_m", requires_all = ["from", "to"])]
     vary: String,
     /// First value; 3.8mm for a length, 8% for a ratio or of the beam length
-    #[arg(long, value_name = "A", default_value = "0", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "A",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
     from: String,
     /// Last value
-    #[arg(long, value_name = "B", default_value = "15%", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "B",
+        default_value = "15%",
+        allow_hyphen_values = true
+    )]
     to: String,
     /// Values of the grid; between them it is refined where it must be
     #[arg(long, value_name = "N", default_value_t = 101, value_parser = clap::value_parser!(u32).range(2..=100_000))]
@@ -68,22 +78,41 @@ struct Shares {
 
 impl Shares {
     fn of(at: &ModesAt, pair: [usize; 2]) -> Shares {
-        Shares { value: at.value, shares: pair.map(|mode| at.shares(mode)) }
+        Shares {
+            value: at.value,
+            shares: pair.map(|mode| at.shares(mode)),
+        }
     }
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     args.table.check()?;
-    let sweep = Sweep { bench: &args.bench, vary: &args.vary, from: &args.from, to: &args.to, count: args.count };
+    let sweep = Sweep {
+        bench: &args.bench,
+        vary: &args.vary,
+        from: &args.from,
+        to: &args.to,
+        count: args.count,
+    };
     let values = sweep.values()?;
     let config = args.bench.load(Purpose::Model, &[])?;
-    let coordinates: Vec<String> = config.plant.coordinates().into_iter().map(String::from).collect();
+    let coordinates: Vec<String> = config
+        .plant
+        .coordinates()
+        .into_iter()
+        .map(String::from)
+        .collect();
     let mut loci = Loci::follow(&values, |value| sweep.at(value))?;
-    let pair = pair(&args.modes, loci.path()[0].omega_rad_s.len(), loci.closest_pair())?;
+    let pair = pair(
+        &args.modes,
+        loci.path()[0].omega_rad_s.len(),
+        loci.closest_pair(),
+    )?;
     let (meeting, closest) = loci.meeting(pair)?;
     let grid: Vec<&ModesAt> = values.iter().map(|&value| loci.near(value)).collect();
     let names = || names(&args.vary, &coordinates, &closest, pair);
-    args.table.write(|| Column::of_rows(names(), grid.iter().map(|at| row(at, pair))))?;
+    args.table
+        .write(|| Column::of_rows(names(), grid.iter().map(|at| row(at, pair))))?;
     let report = report(args, coordinates, &grid, pair, (meeting, &closest));
     if args.bench.json {
         print_json(&report)
@@ -93,8 +122,13 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// The two modes from 0.
-pub(super) fn pair(asked: &[usize], count: usize, closest: Option<[usize; 2]>) -> Result<[usize; 2], CliError> {
-    let places = |&[i, j]: &[usize; 2]| i != j && [i, j].iter().all(|mode| (1..=count).contains(mode));
+pub(super) fn pair(
+    asked: &[usize],
+    count: usize,
+    closest: Option<[usize; 2]>,
+) -> Result<[usize; 2], CliError> {
+    let places =
+        |&[i, j]: &[usize; 2]| i != j && [i, j].iter().all(|mode| (1..=count).contains(mode));
     match asked {
         [] => closest.ok_or_else(|| {
             CliError::Usage(
@@ -142,14 +176,26 @@ fn report(
 
 fn names(vary: &str, coordinates: &[String], at: &ModesAt, pair: [usize; 2]) -> Vec<String> {
     let frequencies = (1..=at.omega_rad_s.len()).map(|mode| format!("mode_{mode}_hz"));
-    let shapes = pair.iter().flat_map(|mode| coordinates.iter().map(move |name| format!("mode_{}_{name}", mode + 1)));
-    [vary.to_string()].into_iter().chain(frequencies).chain(shapes).collect()
+    let shapes = pair.iter().flat_map(|mode| {
+        coordinates
+            .iter()
+            .map(move |name| format!("mode_{}_{name}", mode + 1))
+    });
+    [vary.to_string()]
+        .into_iter()
+        .chain(frequencies)
+        .chain(shapes)
+        .collect()
 }
 
 fn row(at: &ModesAt, pair: [usize; 2]) -> Vec<f64> {
     let frequencies = at.omega_rad_s.iter().map(|&w| hz(w));
     let shapes = pair.iter().flat_map(|&mode| at.shape(mode));
-    [at.value].into_iter().chain(frequencies).chain(shapes).collect()
+    [at.value]
+        .into_iter()
+        .chain(frequencies)
+        .chain(shapes)
+        .collect()
 }
 
 fn text(report: &Report) -> String {
@@ -177,21 +223,40 @@ fn loci_table(report: &Report) -> String {
     let [u, v] = report.modes;
     let row = |k: usize| {
         let frequency = |mode: usize| format!("{:.4}", report.frequencies_hz[mode - 1][k]);
-        vec![format!("{:.6}", report.values[k]), frequency(u), frequency(v)]
+        vec![
+            format!("{:.6}", report.values[k]),
+            frequency(u),
+            frequency(v),
+        ]
     };
     let step = report.values.len().div_ceil(25);
     let rows: Vec<Vec<String>> = (0..report.values.len()).step_by(step).map(row).collect();
-    table(&[&report.vary, &format!("mode {u} Hz"), &format!("mode {v} Hz")], &rows)
+    table(
+        &[
+            &report.vary,
+            &format!("mode {u} Hz"),
+            &format!("mode {v} Hz"),
+        ],
+        &rows,
+    )
 }
 
 fn shares_table(report: &Report) -> String {
-    let header: Vec<&str> =
-        [report.vary.as_str(), "mode"].into_iter().chain(report.coordinates.iter().map(String::as_str)).collect();
+    let header: Vec<&str> = [report.vary.as_str(), "mode"]
+        .into_iter()
+        .chain(report.coordinates.iter().map(String::as_str))
+        .collect();
     let places = [&report.before, &report.closest, &report.after];
     let row = |at: &Shares, which: usize| {
         let shares = at.shares[which].iter().map(|share| format!("{share:.4}"));
-        [format!("{:.6}", at.value), report.modes[which].to_string()].into_iter().chain(shares).collect::<Vec<_>>()
+        [format!("{:.6}", at.value), report.modes[which].to_string()]
+            .into_iter()
+            .chain(shares)
+            .collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<String>> = places.into_iter().flat_map(|at| [row(at, 0), row(at, 1)]).collect();
+    let rows: Vec<Vec<String>> = places
+        .into_iter()
+        .flat_map(|at| [row(at, 0), row(at, 1)])
+        .collect();
     table(&header, &rows)
 }

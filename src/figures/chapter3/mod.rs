@@ -49,7 +49,10 @@ fn sequence(sum: &ModalSum) -> Result<String, FigureError> {
 /// The response to a step of 1 N.
 fn step(sum: &ModalSum, seconds: f64, count: usize) -> Vec<(f64, f64)> {
     let response = StepResponse::new(sum);
-    even(0.0, seconds, count).into_iter().map(|t| (t, response.position_m(t))).collect()
+    even(0.0, seconds, count)
+        .into_iter()
+        .map(|t| (t, response.position_m(t)))
+        .collect()
 }
 
 fn initial(sum: &ModalSum) -> InitialStep {
@@ -57,9 +60,17 @@ fn initial(sum: &ModalSum) -> InitialStep {
 }
 
 fn step_chart(heading: &str, seconds: f64) -> Chart {
-    Chart::new(heading, Scale::linear("Time (s)").within(0.0, seconds), Scale::linear("Position (m for 1 N)"))
+    Chart::new(
+        heading,
+        Scale::linear("Time (s)").within(0.0, seconds),
+        Scale::linear("Position (m for 1 N)"),
+    )
 }
 
 fn zero_line(chart: Chart) -> Chart {
-    chart.line("", Pen::solid(crate::report::colours::GREY).thin(), vec![(0.0, 0.0), (1e3, 0.0)])
+    chart.line(
+        "",
+        Pen::solid(crate::report::colours::GREY).thin(),
+        vec![(0.0, 0.0), (1e3, 0.0)],
+    )
 }

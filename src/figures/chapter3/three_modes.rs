@@ -15,7 +15,11 @@ const KEY: &str = "plant.modes.R.residue_per_kg";
 
 /// Eq. (3-7) with wu = 0.9 and wv = 1.1 rad/s and given residues of u and v; that of R varies.
 fn pair(au: f64, av: f64) -> Model {
-    Model::modes(&[ModeOf("R", 0.0, 1.0, 0.0), ModeOf("u", 0.9, au, 0.0), ModeOf("v", 1.1, av, 0.0)])
+    Model::modes(&[
+        ModeOf("R", 0.0, 1.0, 0.0),
+        ModeOf("u", 0.9, au, 0.0),
+        ModeOf("v", 1.1, av, 0.0),
+    ])
 }
 
 /// The zeros depend on the ratios of the residues only: R from large to small is v from small to large.
@@ -24,21 +28,34 @@ fn ratios() -> Vec<f64> {
 }
 
 pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
-    let cases = [("a", 2.0), ("b", -0.5), ("c", -0.85), ("d", -1.2), ("e", -2.0), ("f", 0.5)];
+    let cases = [
+        ("a", 2.0),
+        ("b", -0.5),
+        ("c", -0.85),
+        ("d", -1.2),
+        ("e", -2.0),
+        ("f", 0.5),
+    ];
     let mut content = Content::new("Locus of the zeros as αv grows from 0, with a constant ratio αu/αv: solid for αv > 0 (the root locus of T), dashed for αv < 0 (the complementary one). First quadrant; the other three mirror it.")
         .setting("Eq. (3-7); αR = 1 and |αv| from 1e-4 to 1e4, which is the same as αv = ±1 and αR from 1e4 to 1e-4")
         .assumed("wu = 0.9, wv = 1.1 rad/s and six ratios αu/αv, one in each range between −∞, −(wv/wu)^2 = −1.49, −1, −(wu/wv)^2 = −0.67, 0 and one more");
     let mut charts = Vec::new();
     let mut meetings = 0;
     for (letter, ratio) in cases {
-        let mut chart = plane(&format!("({letter}) αu/αv = {}", signed(ratio, 2)), (0.0, 2.0), (0.0, 2.0));
-        for (sign, name, pen) in [(1.0, "αv > 0", Pen::solid(VERMILION)), (-1.0, "αv < 0", Pen::dashed(BLUE))] {
+        let mut chart = plane(
+            &format!("({letter}) αu/αv = {}", signed(ratio, 2)),
+            (0.0, 2.0),
+            (0.0, 2.0),
+        );
+        for (sign, name, pen) in [
+            (1.0, "αv > 0", Pen::solid(VERMILION)),
+            (-1.0, "αv < 0", Pen::dashed(BLUE)),
+        ] {
             let model = pair(ratio * sign, sign);
             let locus = locus(&model.varied(KEY)?, Plane::Undamped, &ratios())?;
-            let complex = locus
-                .changes
-                .iter()
-                .any(|change| change.after.contains("CMP-CNMP") || change.before.contains("CMP-CNMP"));
+            let complex = locus.changes.iter().any(|change| {
+                change.after.contains("CMP-CNMP") || change.before.contains("CMP-CNMP")
+            });
             meetings += usize::from(complex && !(sign * ratio < 0.0 && sign > 0.0));
             chart = changes(tracks(chart, name, pen, &locus, Part::Quadrant), &locus);
             if complex {
@@ -46,25 +63,45 @@ pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
                     .changes
                     .iter()
                     .filter(|c| matches!(c.crossing, Crossing::ImaginaryAxis | Crossing::RealAxis))
-                    .map(|c| format!("αv = {} at {}", signed(sign / c.value, 4), signed(c.s.norm(), 4)))
+                    .map(|c| {
+                        format!(
+                            "αv = {} at {}",
+                            signed(sign / c.value, 4),
+                            signed(c.s.norm(), 4)
+                        )
+                    })
                     .collect();
                 content = content.compare(Comparison::unprinted(
                     &format!("({letter}) zeros meet, αu/αv = {}", signed(ratio, 2)),
                     text.join("; "),
                 ));
-                content = content
-                    .command(model.command("model locus", &format!("--vary {KEY} --from 1e4 --to 1e-4 --count 1001")));
+                content = content.command(model.command(
+                    "model locus",
+                    &format!("--vary {KEY} --from 1e4 --to 1e-4 --count 1001"),
+                ));
             }
         }
-        charts.push(chart.points("poles", INK, Symbol::Cross, vec![(0.0, 0.9), (0.0, 1.1), (0.0, 0.0)]));
+        charts.push(chart.points(
+            "poles",
+            INK,
+            Symbol::Cross,
+            vec![(0.0, 0.9), (0.0, 1.1), (0.0, 0.0)],
+        ));
     }
     let rest = charts.split_off(3);
-    Ok(content.row(280.0, charts).row(280.0, rest).compare(Comparison::holds(
-        "CMP-CNMP zeros",
-        "only where αu < 0 and αv > 0",
-        meetings == 0,
-        if meetings == 0 { "in no other case" } else { "in others too" },
-    )))
+    Ok(content
+        .row(280.0, charts)
+        .row(280.0, rest)
+        .compare(Comparison::holds(
+            "CMP-CNMP zeros",
+            "only where αu < 0 and αv > 0",
+            meetings == 0,
+            if meetings == 0 {
+                "in no other case"
+            } else {
+                "in others too"
+            },
+        )))
 }
 
 pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
@@ -73,7 +110,10 @@ pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
         (
             "αu < 0, αv > 0",
             VERMILION,
-            &[-0.1, -0.3, -0.5, -0.6, -0.67, -0.75, -0.85, -0.95, -1.05, -1.2, -1.5, -2.0, -3.0, -6.0],
+            &[
+                -0.1, -0.3, -0.5, -0.6, -0.67, -0.75, -0.85, -0.95, -1.05, -1.2, -1.5, -2.0, -3.0,
+                -6.0,
+            ],
         ),
         ("αu > 0, αv > 0", BLUE, &[0.1, 0.5, 2.0, 10.0]),
         ("αv < 0", GREEN, &[-0.3, -0.8, -1.3, -3.0, 0.5, 2.0]),
@@ -82,16 +122,50 @@ pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
         let sign = if name == "αv < 0" { -1.0 } else { 1.0 };
         let mut name = name;
         for ratio in family {
-            let locus = locus(&pair(ratio * sign, sign).varied(KEY)?, Plane::Undamped, &geometric(1e5, 1e-5, 321))?;
-            chart = tracks(chart, name, Pen { width: 1.1, ..Pen::solid(colour) }, &locus, Part::Quadrant);
+            let locus = locus(
+                &pair(ratio * sign, sign).varied(KEY)?,
+                Plane::Undamped,
+                &geometric(1e5, 1e-5, 321),
+            )?;
+            chart = tracks(
+                chart,
+                name,
+                Pen {
+                    width: 1.1,
+                    ..Pen::solid(colour)
+                },
+                &locus,
+                Part::Quadrant,
+            );
             name = "";
         }
     }
-    let even = locus(&pair(-1.0, 1.0).varied(KEY)?, Plane::Undamped, &geometric(1e5, 1e-5, 321))?;
-    chart = tracks(chart, "αu = −αv", Pen { width: 2.4, ..Pen::solid(INK) }, &even, Part::Quadrant);
-    let complex = even.tracks.iter().flatten().flatten().filter(|s| s.re.abs() > 1e-3 && s.im.abs() > 1e-3);
-    let (low, high) =
-        complex.map(|s| s.norm()).fold((f64::INFINITY, 0.0f64), |(low, high), r| (low.min(r), high.max(r)));
+    let even = locus(
+        &pair(-1.0, 1.0).varied(KEY)?,
+        Plane::Undamped,
+        &geometric(1e5, 1e-5, 321),
+    )?;
+    chart = tracks(
+        chart,
+        "αu = −αv",
+        Pen {
+            width: 2.4,
+            ..Pen::solid(INK)
+        },
+        &even,
+        Part::Quadrant,
+    );
+    let complex = even
+        .tracks
+        .iter()
+        .flatten()
+        .flatten()
+        .filter(|s| s.re.abs() > 1e-3 && s.im.abs() > 1e-3);
+    let (low, high) = complex
+        .map(|s| s.norm())
+        .fold((f64::INFINITY, 0.0f64), |(low, high), r| {
+            (low.min(r), high.max(r))
+        });
     let chart = chart.points("poles", INK, Symbol::Cross, vec![(0.0, 0.9), (0.0, 1.1)]);
     Ok(Content::new("The family of the loci over αu/αv. First quadrant; the other three mirror it. Loci leave the axes for αu < 0 < αv only; for αu = −αv the locus is a circle.")
         .setting("Eq. (3-7), as Fig 3-9")
@@ -121,15 +195,25 @@ pub(in super::super) fn fig_3_11(_: &Workshop) -> Result<Content, FigureError> {
         (0.01, Pen::dashed(BLUE), "[R]-[u]-[R]-[v]", "dual MMP"),
         (0.3, Pen::solid(VERMILION), "[R]-[u]-[v]", "CMP-CNMP"),
     ] {
-        chart = chart.line(&format!("modes u and v, α0 = {size}"), pen, part(10.0, size, &over)).line(
-            "",
-            pen,
-            part(11.0, size, &over),
-        );
+        chart = chart
+            .line(
+                &format!("modes u and v, α0 = {size}"),
+                pen,
+                part(10.0, size, &over),
+            )
+            .line("", pen, part(11.0, size, &over));
         let sum = equal_pair(size)?;
         content = content
-            .compare(Comparison::words(&format!("sequence, α0 = {size}"), printed, &sequence(&sum)?))
-            .compare(Comparison::words(&format!("zeros, α0 = {size}"), expected, &kinds(&sum.undamped_zeros()?)))
+            .compare(Comparison::words(
+                &format!("sequence, α0 = {size}"),
+                printed,
+                &sequence(&sum)?,
+            ))
+            .compare(Comparison::words(
+                &format!("zeros, α0 = {size}"),
+                expected,
+                &kinds(&sum.undamped_zeros()?),
+            ))
             .command(
                 Model::modes(&[
                     ModeOf("R", 0.0, 1.0, 0.0),
@@ -148,57 +232,112 @@ pub(in super::super) fn fig_3_11(_: &Workshop) -> Result<Content, FigureError> {
     ];
     let large = [("P5", 10.0 / 1.3f64.sqrt(), 0.0)];
     for (name, w, aside) in small {
-        chart = chart.points("", BLUE, Symbol::Dot, vec![(w, 1.0 / (w * w))]).text((w, 1.0 / (w * w)), aside, name);
+        chart = chart
+            .points("", BLUE, Symbol::Dot, vec![(w, 1.0 / (w * w))])
+            .text((w, 1.0 / (w * w)), aside, name);
     }
     for (name, w, _) in large {
-        chart = chart.points("", VERMILION, Symbol::Dot, vec![(w, 1.0 / (w * w))]).text(
-            (w, 1.0 / (w * w)),
-            (-14.0, -10.0),
-            name,
-        );
+        chart = chart
+            .points("", VERMILION, Symbol::Dot, vec![(w, 1.0 / (w * w))])
+            .text((w, 1.0 / (w * w)), (-14.0, -10.0), name);
     }
     let middle = (0.5f64 * (100.0 + 121.0)).sqrt();
     let p6 = (middle, 0.3 / (middle * middle - 100.0));
-    let chart = chart.points("", VERMILION, Symbol::Dot, vec![p6]).text(p6, (0.0, -14.0), "P6");
+    let chart = chart
+        .points("", VERMILION, Symbol::Dot, vec![p6])
+        .text(p6, (0.0, -14.0), "P6");
     Ok(content.row(360.0, [chart]))
 }
 
 /// Eq. (3-9): damping ratios 0.0005, 0.001, 0.001.
 fn eq_3_9(size: f64) -> Result<ModalSum, FigureError> {
-    sum(&[(1.0, 0.0005, 1.0), (10.0, 0.001, -size), (11.0, 0.001, size)])
+    sum(&[
+        (1.0, 0.0005, 1.0),
+        (10.0, 0.001, -size),
+        (11.0, 0.001, size),
+    ])
 }
 
 fn model_3_9(size: f64) -> Model {
-    Model::modes(&[ModeOf("R", 1.0, 1.0, 0.0005), ModeOf("u", 10.0, -size, 0.001), ModeOf("v", 11.0, size, 0.001)])
+    Model::modes(&[
+        ModeOf("R", 1.0, 1.0, 0.0005),
+        ModeOf("u", 10.0, -size, 0.001),
+        ModeOf("v", 11.0, size, 0.001),
+    ])
 }
 
 pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
-    let cases = [(0.01, BLUE, "dual MMP"), (5.0, GREEN, "CMP-CNMP"), (21.0, VERMILION, "dual RMP-RNMP")];
+    let cases = [
+        (0.01, BLUE, "dual MMP"),
+        (5.0, GREEN, "CMP-CNMP"),
+        (21.0, VERMILION, "dual RMP-RNMP"),
+    ];
     let mut content = Content::new("A slow mode R and two close modes with growing residues: Bode plot, step response, migration of the zeros, and the beginning of the step response.")
         .setting("Eq. (3-9); αu = −α0, αv = α0 (printed as αu = α0), α0 = 0.01, 5 and 21 1/kg");
     let mut curves = Vec::new();
     let mut steps = step_chart("(b) Step response", 10.0);
     for (size, colour, expected) in cases {
         let sum = eq_3_9(size)?;
-        curves.push(Curve::new(&format!("α0 = {size}"), Pen::solid(colour), response(&sum, 0.3, 50.0)?));
-        steps = steps.line(&format!("α0 = {size}"), Pen::solid(colour), step(&sum, 10.0, 3001));
+        curves.push(Curve::new(
+            &format!("α0 = {size}"),
+            Pen::solid(colour),
+            response(&sum, 0.3, 50.0)?,
+        ));
+        steps = steps.line(
+            &format!("α0 = {size}"),
+            Pen::solid(colour),
+            step(&sum, 10.0, 3001),
+        );
         content = content
-            .compare(Comparison::words(&format!("zeros, α0 = {size}"), expected, &kinds(&sum.undamped_zeros()?)))
+            .compare(Comparison::words(
+                &format!("zeros, α0 = {size}"),
+                expected,
+                &kinds(&sum.undamped_zeros()?),
+            ))
             .command(model_3_9(size).command("model step", ""));
     }
     let (gain, phase) = bode("(a) Bode plot", W, "|G| (m/N)", &curves);
     // α0 over αR = 1, with mode R as a double integrator: α01 and α02 of section 3.2.4.
-    let model = Model::modes(&[ModeOf("R", 0.0, 1.0, 0.0), ModeOf("u", 10.0, -1.0, 0.0), ModeOf("v", 11.0, 1.0, 0.0)]);
-    let locus_of = locus(&model.varied(KEY)?, Plane::Undamped, &geometric(1e3, 1e-3, 141))?;
-    let places = |size: f64| Ok::<_, FigureError>(super::super::plane::places(&equal_pair(size)?.undamped_zeros()?));
-    let mut map = plane("(c) Migration of the zeros, mode R as a double integrator", (-34.0, 34.0), (-2.0, 18.0));
-    map = changes(tracks(map, "zeros", Pen::solid(INK), &locus_of, Part::Upper), &locus_of);
-    let sizes = [(0.5, BLUE), (5.0, GREEN), (10.0, PURPLE), (15.0, ORANGE), (21.0, VERMILION)];
+    let model = Model::modes(&[
+        ModeOf("R", 0.0, 1.0, 0.0),
+        ModeOf("u", 10.0, -1.0, 0.0),
+        ModeOf("v", 11.0, 1.0, 0.0),
+    ]);
+    let locus_of = locus(
+        &model.varied(KEY)?,
+        Plane::Undamped,
+        &geometric(1e3, 1e-3, 141),
+    )?;
+    let places = |size: f64| {
+        Ok::<_, FigureError>(super::super::plane::places(
+            &equal_pair(size)?.undamped_zeros()?,
+        ))
+    };
+    let mut map = plane(
+        "(c) Migration of the zeros, mode R as a double integrator",
+        (-34.0, 34.0),
+        (-2.0, 18.0),
+    );
+    map = changes(
+        tracks(map, "zeros", Pen::solid(INK), &locus_of, Part::Upper),
+        &locus_of,
+    );
+    let sizes = [
+        (0.5, BLUE),
+        (5.0, GREEN),
+        (10.0, PURPLE),
+        (15.0, ORANGE),
+        (21.0, VERMILION),
+    ];
     let mut starts = zero_line(step_chart("(d) Beginning of the step response", 0.5));
     for (size, colour) in sizes {
         map = map.points(&format!("α0 = {size}"), colour, Symbol::Ring, places(size)?);
         let sum = eq_3_9(size)?;
-        starts = starts.line(&format!("α0 = {size}"), Pen::solid(colour), step(&sum, 0.5, 501));
+        starts = starts.line(
+            &format!("α0 = {size}"),
+            Pen::solid(colour),
+            step(&sum, 0.5, 501),
+        );
         let start = initial(&sum);
         let early = start.zero_crossings_s.iter().filter(|t| **t < 0.6).count();
         content = content.compare(Comparison::unprinted(
@@ -211,7 +350,11 @@ pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
         ));
     }
     let breaks = |crossing| {
-        locus_of.changes.iter().find(|change| change.crossing == crossing).map_or(f64::NAN, |change| 1.0 / change.value)
+        locus_of
+            .changes
+            .iter()
+            .find(|change| change.crossing == crossing)
+            .map_or(f64::NAN, |change| 1.0 / change.value)
     };
     Ok(content
         .row(220.0, [gain, steps])
@@ -239,7 +382,10 @@ pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
             )
             .remark("the locus against the formula"),
         )
-        .command(model.command("model locus", &format!("--vary {KEY} --from 1e3 --to 1e-3 --count 1001"))))
+        .command(model.command(
+            "model locus",
+            &format!("--vary {KEY} --from 1e3 --to 1e-3 --count 1001"),
+        )))
 }
 
 pub(in super::super) fn fig_3_13(_: &Workshop) -> Result<Content, FigureError> {
@@ -248,9 +394,10 @@ pub(in super::super) fn fig_3_13(_: &Workshop) -> Result<Content, FigureError> {
     let mut content = Content::new("Nyquist plots of a double integrator and two close modes with alternating signs: the corner between the two resonance circles lies left of the origin where mode R takes back over (dual MMP), right of it where it does not (CMP-CNMP).")
         .setting("Eq. (3-7), αR = 1, αu = −α0, αv = α0, positive frequencies")
         .assumed("wu = 10, wv = 11 rad/s, α0 = 0.02 (dual MMP) and 0.15 1/kg (CMP-CNMP); damping ratio 0.004 of u and v");
-    for (name, size, colour, expected, drop) in
-        [("Dual MMP", 0.02, BLUE, "left", 0.0), ("CMP-CNMP", 0.15, VERMILION, "right", 360.0)]
-    {
+    for (name, size, colour, expected, drop) in [
+        ("Dual MMP", 0.02, BLUE, "left", 0.0),
+        ("CMP-CNMP", 0.15, VERMILION, "right", 360.0),
+    ] {
         let sum = sum(&[(0.0, 0.0, 1.0), (10.0, zeta, -size), (11.0, zeta, size)])?;
         let curve = Curve::new("", Pen::solid(colour), response(&sum, 5.0, 100.0)?);
         let largest = size / (2.0 * zeta * 100.0);
@@ -264,11 +411,13 @@ pub(in super::super) fn fig_3_13(_: &Workshop) -> Result<Content, FigureError> {
             .directed("", curve.pen, curve.polar()),
         );
         charts.push(
-            origin(nyquist(&format!("{name}, near the origin"), (-0.03, 0.03), (-0.03, 0.03), "G (m/N)")).directed(
-                "",
-                curve.pen,
-                curve.polar(),
-            ),
+            origin(nyquist(
+                &format!("{name}, near the origin"),
+                (-0.03, 0.03),
+                (-0.03, 0.03),
+                "G (m/N)",
+            ))
+            .directed("", curve.pen, curve.polar()),
         );
         // Between the resonances, where both modes add: the corner.
         let corner = sum.response(nalgebra::Complex::new(0.0, 10.5)).re;
@@ -310,14 +459,26 @@ fn controller(gain: f64, pair: Option<(f64, f64, f64)>) -> String {
 }
 
 /// Name, file of the controller, size of the residues, additional zeros and poles, colour.
-type Case = (&'static str, &'static str, f64, Option<(f64, f64, f64)>, Colour);
+type Case = (
+    &'static str,
+    &'static str,
+    f64,
+    Option<(f64, f64, f64)>,
+    Colour,
+);
 
 pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
     let zeta = 0.01;
     let cases: [Case; 3] = [
         ("Dual MMP", "3-14a.controller.toml", 0.3, None, BLUE),
         ("CMP-CNMP", "3-14b.controller.toml", 1.65, None, VERMILION),
-        ("Dual MMP, with an additional pole-zero pair", "3-14c.controller.toml", 0.3, Some((11.0, 13.0, zeta)), GREEN),
+        (
+            "Dual MMP, with an additional pole-zero pair",
+            "3-14c.controller.toml",
+            0.3,
+            Some((11.0, 13.0, zeta)),
+            GREEN,
+        ),
     ];
     let mut content = Content::new("Nyquist plots of open loops, plant and lead: with two circles of opposite directions one grows towards −1; an additional pair of zeros and poles turns them into one direction.")
         .setting("plant of Eq. (6-3)")
@@ -325,25 +486,45 @@ pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
     let mut charts = Vec::new();
     for (name, file, size, pair, colour) in cases {
         let text = controller(13.7 / 1.82, pair);
-        let model =
-            Model::modes(&[ModeOf("R", 0.0, 7.98, 0.0), ModeOf("u", 10.0, -size, zeta), ModeOf("v", 12.0, size, zeta)])
-                .set("motor.force_constant_n_per_a=1.0");
+        let model = Model::modes(&[
+            ModeOf("R", 0.0, 7.98, 0.0),
+            ModeOf("u", 10.0, -size, zeta),
+            ModeOf("v", 12.0, size, zeta),
+        ])
+        .set("motor.force_constant_n_per_a=1.0");
         let sum = model.sum()?;
-        let sections = ControllerText { name: file.into(), text: text.clone() }.sections(5000.0)?;
+        let sections = ControllerText {
+            name: file.into(),
+            text: text.clone(),
+        }
+        .sections(5000.0)?;
         let features = [(10.0, zeta), (12.0, zeta), (11.0, zeta), (13.0, zeta)];
         let at = |w: f64| {
             let s = nalgebra::Complex::new(0.0, w);
             (w, sum.response(s) * continuous_response(&sections, s))
         };
-        let curve =
-            Curve::new("L", Pen::solid(colour), control::grid(1.5, 200.0, &features).into_iter().map(at).collect());
-        let size = curve.points.iter().filter(|(w, _)| *w > 8.0).map(|(_, l)| l.norm()).fold(1.4, f64::max);
+        let curve = Curve::new(
+            "L",
+            Pen::solid(colour),
+            control::grid(1.5, 200.0, &features)
+                .into_iter()
+                .map(at)
+                .collect(),
+        );
+        let size = curve
+            .points
+            .iter()
+            .filter(|(w, _)| *w > 8.0)
+            .map(|(_, l)| l.norm())
+            .fold(1.4, f64::max);
         let polar = |heading: &str, size: f64| {
-            critical(nyquist(heading, (-size, size), (-1.05 * size, 1.05 * size), "L")).directed(
-                "",
-                curve.pen,
-                curve.polar(),
-            )
+            critical(nyquist(
+                heading,
+                (-size, size),
+                (-1.05 * size, 1.05 * size),
+                "L",
+            ))
+            .directed("", curve.pen, curve.polar())
         };
         charts.push(polar(name, size));
         if pair.is_some() {
@@ -355,7 +536,14 @@ pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
                 format!(
                     "{}; least |1 + L| {}",
                     kinds(&sum.undamped_zeros()?),
-                    signed(curve.points.iter().map(|(_, l)| (l + 1.0).norm()).fold(f64::INFINITY, f64::min), 3)
+                    signed(
+                        curve
+                            .points
+                            .iter()
+                            .map(|(_, l)| (l + 1.0).norm())
+                            .fold(f64::INFINITY, f64::min),
+                        3
+                    )
                 ),
             ))
             .file(file, &text)

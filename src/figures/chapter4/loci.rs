@@ -19,7 +19,12 @@ struct Pair {
     omega_rad_s: f64,
 }
 
-fn pair(model: &Model, key: &str, values: &[f64], modes: Option<[usize; 2]>) -> Result<Pair, FigureError> {
+fn pair(
+    model: &Model,
+    key: &str,
+    values: &[f64],
+    modes: Option<[usize; 2]>,
+) -> Result<Pair, FigureError> {
     let varied = model.varied(key)?;
     let mut loci = Loci::follow(values, |value| varied.structure(value))?;
     let modes = modes.or(loci.closest_pair()).unwrap_or([0, 1]);
@@ -30,8 +35,16 @@ fn pair(model: &Model, key: &str, values: &[f64], modes: Option<[usize; 2]>) -> 
         (a.min(b), a.max(b))
     };
     Ok(Pair {
-        slow: loci.path().iter().map(|at| (at.value, sorted(at).0)).collect(),
-        fast: loci.path().iter().map(|at| (at.value, sorted(at).1)).collect(),
+        slow: loci
+            .path()
+            .iter()
+            .map(|at| (at.value, sorted(at).0))
+            .collect(),
+        fast: loci
+            .path()
+            .iter()
+            .map(|at| (at.value, sorted(at).1))
+            .collect(),
         meeting: meeting.name(),
         value: at.value,
         omega_rad_s: 0.5 * (sorted(&at).0 + sorted(&at).1),
@@ -39,8 +52,15 @@ fn pair(model: &Model, key: &str, values: &[f64], modes: Option<[usize; 2]>) -> 
 }
 
 fn drawn(chart: Chart, name: &str, pen: Pen, pair: &Pair, scale: (f64, f64)) -> Chart {
-    let scaled = |points: &[(f64, f64)]| points.iter().map(|(x, y)| (x * scale.0, y * scale.1)).collect::<Vec<_>>();
-    chart.line(name, pen, scaled(&pair.slow)).line("", pen, scaled(&pair.fast))
+    let scaled = |points: &[(f64, f64)]| {
+        points
+            .iter()
+            .map(|(x, y)| (x * scale.0, y * scale.1))
+            .collect::<Vec<_>>()
+    };
+    chart
+        .line(name, pen, scaled(&pair.slow))
+        .line("", pen, scaled(&pair.fast))
 }
 
 pub(in crate::figures) fn fig_4_1(_: &Workshop) -> Result<Content, FigureError> {
@@ -58,11 +78,24 @@ pub(in crate::figures) fn fig_4_1(_: &Workshop) -> Result<Content, FigureError> 
             .set("plant.nodes.b.mass_kg=50.0")
             .set(&format!("plant.nodes.v.mass_kg={:?}", 1.0 + rho));
         let pair = pair(&model, K, &values, Some([1, 2]))?;
-        chart = drawn(chart, &format!("ρ = {rho}"), Pen::solid(colour), &pair, (1.0, 1.0));
+        chart = drawn(
+            chart,
+            &format!("ρ = {rho}"),
+            Pen::solid(colour),
+            &pair,
+            (1.0, 1.0),
+        );
         let expected = if rho == 0.0 { "crossing" } else { "veering" };
         content = content
-            .compare(Comparison::words(&format!("loci at ρ = {rho}"), expected, pair.meeting))
-            .command(model.command("model veering", &format!("--vary {K} --from 0 --to 0.03 --modes 2,3")));
+            .compare(Comparison::words(
+                &format!("loci at ρ = {rho}"),
+                expected,
+                pair.meeting,
+            ))
+            .command(model.command(
+                "model veering",
+                &format!("--vary {K} --from 0 --to 0.03 --modes 2,3"),
+            ));
         content = content.compare(match rho == 0.01 {
             true => Comparison::number(
                 "veering point at ρ = 0.01 (section 4.4.1: close to 0.02)",
@@ -73,7 +106,11 @@ pub(in crate::figures) fn fig_4_1(_: &Workshop) -> Result<Content, FigureError> 
             ),
             false => Comparison::unprinted(
                 &format!("where, ρ = {rho}"),
-                format!("k = {} N/m, {} rad/s", signed(pair.value, 5), signed(pair.omega_rad_s, 4)),
+                format!(
+                    "k = {} N/m, {} rad/s",
+                    signed(pair.value, 5),
+                    signed(pair.omega_rad_s, 4)
+                ),
             ),
         });
     }
@@ -88,7 +125,10 @@ pub(in crate::figures) fn fig_4_7(_: &Workshop) -> Result<Content, FigureError> 
     );
     let mut content = Content::new("Natural frequencies of the two close modes of the SR4DoF over the operating point. (a) is a drawing of the mechanism.")
         .setting("profile chapter2 with m3 = 18 g, as printed in Table 2-1");
-    for (asymmetry, pen, expected) in [(0.0, Pen::dashed(INK), "crossing"), (0.01, Pen::solid(VERMILION), "veering")] {
+    for (asymmetry, pen, expected) in [
+        (0.0, Pen::dashed(INK), "crossing"),
+        (0.01, Pen::solid(VERMILION), "veering"),
+    ] {
         let model = sr4dof(asymmetry);
         let pair = pair(&model, Y, &even(0.0, 0.12 * L, 121), Some([2, 3]))?;
         let name = format!("asymmetry {} %", signed(100.0 * asymmetry, 0));
@@ -97,9 +137,16 @@ pub(in crate::figures) fn fig_4_7(_: &Workshop) -> Result<Content, FigureError> 
             .compare(Comparison::words(&name, expected, pair.meeting))
             .compare(Comparison::unprinted(
                 &format!("where, {name}"),
-                format!("{} % of L, {} Hz", signed(100.0 * pair.value / L, 3), signed(pair.omega_rad_s / TAU, 2)),
+                format!(
+                    "{} % of L, {} Hz",
+                    signed(100.0 * pair.value / L, 3),
+                    signed(pair.omega_rad_s / TAU, 2)
+                ),
             ))
-            .command(model.command("model veering", "--vary plant.operating_point_m --from 0 --to 12%"));
+            .command(model.command(
+                "model veering",
+                "--vary plant.operating_point_m --from 0 --to 12%",
+            ));
     }
     Ok(content.row(340.0, [chart]))
 }

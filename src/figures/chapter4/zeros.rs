@@ -27,7 +27,11 @@ impl Study<'_> {
     fn curves(&self) -> Result<Vec<Curve>, FigureError> {
         let varied = self.model.varied(self.key)?;
         let curve = |(name, value, colour): &(String, f64, Colour)| {
-            let points = response(&varied.sum(*value)?, self.band.0 * self.per, self.band.1 * self.per)?;
+            let points = response(
+                &varied.sum(*value)?,
+                self.band.0 * self.per,
+                self.band.1 * self.per,
+            )?;
             let points = points.into_iter().map(|(w, g)| (w / self.per, g)).collect();
             Ok(Curve::new(name, Pen::solid(*colour), points))
         };
@@ -35,7 +39,11 @@ impl Study<'_> {
     }
 
     fn bode(&self, heading: &str, band: (f64, f64)) -> Result<(Chart, Chart), FigureError> {
-        let parts: Vec<Curve> = self.curves()?.iter().map(|curve| curve.part(band.0, band.1)).collect();
+        let parts: Vec<Curve> = self
+            .curves()?
+            .iter()
+            .map(|curve| curve.part(band.0, band.1))
+            .collect();
         Ok(bode(heading, self.frequency, "|G| (m/N)", &parts))
     }
 
@@ -46,12 +54,31 @@ impl Study<'_> {
     fn map(&self, heading: &str, locus: &Locus) -> Result<Chart, FigureError> {
         let varied = self.model.varied(self.key)?;
         let mut chart = plane(heading, self.re, self.im);
-        chart = changes(tracks(chart, "migration of the zeros", Pen::solid(GREY), locus, Part::Upper), locus);
+        chart = changes(
+            tracks(
+                chart,
+                "migration of the zeros",
+                Pen::solid(GREY),
+                locus,
+                Part::Upper,
+            ),
+            locus,
+        );
         for (name, value, colour) in &self.cases {
             let structure = varied.structure(*value)?;
-            let poles = varied.sum(*value)?.terms().iter().map(|term| (0.0, term.omega_rad_s)).collect();
+            let poles = varied
+                .sum(*value)?
+                .terms()
+                .iter()
+                .map(|term| (0.0, term.omega_rad_s))
+                .collect();
             chart = chart
-                .points(&format!("zeros, {name}"), *colour, Symbol::Ring, places(&undamped_zeros(&structure)?))
+                .points(
+                    &format!("zeros, {name}"),
+                    *colour,
+                    Symbol::Ring,
+                    places(&undamped_zeros(&structure)?),
+                )
                 .points(&format!("poles, {name}"), *colour, Symbol::Cross, poles);
         }
         Ok(chart)
@@ -74,7 +101,10 @@ pub(in crate::figures) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> 
         model: &model,
         key: K,
         values: even(0.0, 0.13, 131),
-        cases: vec![("k = 0".into(), 0.0, BLUE), ("k = 0.02".into(), 0.02, VERMILION)],
+        cases: vec![
+            ("k = 0".into(), 0.0, BLUE),
+            ("k = 0.02".into(), 0.02, VERMILION),
+        ],
         band: (0.1, 2.0),
         per: 1.0,
         frequency: W,
@@ -84,7 +114,10 @@ pub(in crate::figures) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> 
     let (a, a_phase) = study.bode("(a) Bode plot", study.band)?;
     let (near, near_phase) = study.bode("(a) the close modes", (1.0, 1.15))?;
     let locus = study.locus()?;
-    let map = study.map("(b) Poles and zeros of the close modes, k from 0 to 0.13 N/m", &locus)?;
+    let map = study.map(
+        "(b) Poles and zeros of the close modes, k from 0 to 0.13 N/m",
+        &locus,
+    )?;
     let quartet = undamped_zeros(&three_mass(0.02).structure()?)?;
     let zero = quartet
         .iter()
@@ -127,9 +160,19 @@ pub(in crate::figures) fn fig_4_8(_: &Workshop) -> Result<Content, FigureError> 
     let (a, a_phase) = study.bode("(a) Bode plot", study.band)?;
     let (b, b_phase) = study.bode("(b) the close modes", (150.0, 162.0))?;
     let locus = study.locus()?;
-    let map = study.map("(c) Poles and zeros of the close modes, 1 to 9 % of L", &locus)?;
-    let at = |ratio: f64| Ok::<_, FigureError>(kinds(&undamped_zeros(&model.varied(Y)?.structure(ratio * L)?)?));
-    let ends: Vec<String> = axis_changes(&locus).iter().map(|value| signed(100.0 * value / L, 3)).collect();
+    let map = study.map(
+        "(c) Poles and zeros of the close modes, 1 to 9 % of L",
+        &locus,
+    )?;
+    let at = |ratio: f64| {
+        Ok::<_, FigureError>(kinds(&undamped_zeros(
+            &model.varied(Y)?.structure(ratio * L)?,
+        )?))
+    };
+    let ends: Vec<String> = axis_changes(&locus)
+        .iter()
+        .map(|value| signed(100.0 * value / L, 3))
+        .collect();
     // The Y mode, which does not show, has a pair of zeros of its own.
     let shown = |kinds: String| match kinds.as_str() {
         "3 x MMP" => "dual MMP".to_string(),
@@ -170,18 +213,34 @@ pub(in crate::figures) fn fig_4_10(_: &Workshop) -> Result<Content, FigureError>
     let map = study.map("(b) Poles and zeros, k23 from 1 to 300 N/m", &locus)?;
     let found = axis_changes(&locus);
     let at = |index: usize| found.get(index).copied().unwrap_or(f64::NAN);
-    Ok(Content::new("Four masses: Bode plot with three values of k23, and the migration of poles and zeros.")
-        .setting("profile four-mass; damping ratio 0.005 in the Bode plot, none in (b)")
-        .assumed("values of k23: 20, 100 and 250 N/m")
-        .row(230.0, [a, a_phase])
-        .row(400.0, [map])
-        .compare(
-            Comparison::within("zeros leave the imaginary axis", 50.0, 0, at(0), "N/m", 1e-3)
-                .remark("by the reading of section 4.4.3; the figure is missing"),
+    Ok(Content::new(
+        "Four masses: Bode plot with three values of k23, and the migration of poles and zeros.",
+    )
+    .setting("profile four-mass; damping ratio 0.005 in the Bode plot, none in (b)")
+    .assumed("values of k23: 20, 100 and 250 N/m")
+    .row(230.0, [a, a_phase])
+    .row(400.0, [map])
+    .compare(
+        Comparison::within(
+            "zeros leave the imaginary axis",
+            50.0,
+            0,
+            at(0),
+            "N/m",
+            1e-3,
         )
-        .compare(
-            Comparison::within("zeros come back to the imaginary axis", 200.0, 0, at(1), "N/m", 1e-3)
-                .remark("likewise"),
+        .remark("by the reading of section 4.4.3; the figure is missing"),
+    )
+    .compare(
+        Comparison::within(
+            "zeros come back to the imaginary axis",
+            200.0,
+            0,
+            at(1),
+            "N/m",
+            1e-3,
         )
-        .command(model.command("model locus", &format!("--vary {K23} --from 1 --to 300"))))
+        .remark("likewise"),
+    )
+    .command(model.command("model locus", &format!("--vary {K23} --from 1 --to 300"))))
 }

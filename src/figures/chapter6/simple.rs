@@ -67,7 +67,11 @@ fn eq_6_1(zeta: f64) -> Model {
 
 /// Eq. (6-3) with wu = 10, wv = 12 rad/s: residues of u and v.
 fn eq_6_3(au: f64, av: f64, zeta: f64) -> Model {
-    let modes = [ModeOf("R", 0.0, 7.98, 0.0), ModeOf("u", 10.0, au, zeta), ModeOf("v", 12.0, av, zeta)];
+    let modes = [
+        ModeOf("R", 0.0, 7.98, 0.0),
+        ModeOf("u", 10.0, au, zeta),
+        ModeOf("v", 12.0, av, zeta),
+    ];
     Model::modes(&modes).set(UNIT_FORCE)
 }
 
@@ -77,29 +81,57 @@ fn margins_command(model: &Model, file: &str) -> String {
 
 /// Moduli as text.
 fn listed(values: &[f64], digits: usize) -> String {
-    values.iter().map(|value| signed(*value, digits)).collect::<Vec<_>>().join(", ")
+    values
+        .iter()
+        .map(|value| signed(*value, digits))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn spread(values: &[f64]) -> f64 {
-    let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, 0.0f64), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
     high - low
 }
 
 pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
     let dampings = [0.001, 0.01, 0.05];
     let file = "6-2.controller.toml";
-    let loops =
-        dampings.iter().map(|zeta| closed_loop(&eq_6_1(*zeta), file, Some(EQ_6_2))).collect::<Result<Vec<_>, _>>()?;
-    let pen = |k: usize| if k == 1 { Pen::solid(COLOURS[k]) } else { Pen::dashed(COLOURS[k]) };
+    let loops = dampings
+        .iter()
+        .map(|zeta| closed_loop(&eq_6_1(*zeta), file, Some(EQ_6_2)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let pen = |k: usize| {
+        if k == 1 {
+            Pen::solid(COLOURS[k])
+        } else {
+            Pen::dashed(COLOURS[k])
+        }
+    };
     let name = |k: usize| format!("ζ = {}", dampings[k]);
-    let ls: Vec<Curve> =
-        loops.iter().enumerate().map(|(k, of)| Curve::new(&name(k), pen(k), open(of, 0.1, 100.0))).collect();
-    let ts: Vec<Curve> = ls.iter().map(|l| Curve::new(&l.name, l.pen, closed(&l.points))).collect();
+    let ls: Vec<Curve> = loops
+        .iter()
+        .enumerate()
+        .map(|(k, of)| Curve::new(&name(k), pen(k), open(of, 0.1, 100.0)))
+        .collect();
+    let ts: Vec<Curve> = ls
+        .iter()
+        .map(|l| Curve::new(&l.name, l.pen, closed(&l.points)))
+        .collect();
     let (a, a_phase) = bode("(a) Open loop L = P C", W, "|L|", &ls[1..2]);
     let (c, c_phase) = bode("(c) Closed loop T = L/(1 + L)", W, "|T|", &ts);
-    let b = ls.iter().fold(critical(nyquist("(b) Nyquist plot of L", (-1.6, 3.4), (-2.5, 2.5), "L")), |chart, l| {
-        chart.directed(&l.name, l.pen, l.polar())
-    });
+    let b = ls.iter().fold(
+        critical(nyquist(
+            "(b) Nyquist plot of L",
+            (-1.6, 3.4),
+            (-2.5, 2.5),
+            "L",
+        )),
+        |chart, l| chart.directed(&l.name, l.pen, l.polar()),
+    );
     let d = Chart::new(
         "(d) Step response of T",
         Scale::linear("Time (s)").within(0.0, 12.0),
@@ -110,7 +142,13 @@ pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
     let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
     let peaks: Vec<f64> = ts
         .iter()
-        .map(|t| t.points.iter().filter(|(w, _)| *w > 5.0).map(|(_, t)| t.norm()).fold(0.0, f64::max))
+        .map(|t| {
+            t.points
+                .iter()
+                .filter(|(w, _)| *w > 5.0)
+                .map(|(_, t)| t.norm())
+                .fold(0.0, f64::max)
+        })
         .collect();
     let decibels: Vec<f64> = peaks.iter().map(|peak| 20.0 * peak.log10()).collect();
     Ok(Content::new("A controller with a bandwidth below the first resonance: open loop, Nyquist plot with three damping ratios of the plant, closed loop and its step response.")
@@ -143,21 +181,35 @@ fn plant(au: f64, av: f64) -> Result<Plant, FigureError> {
     let points = super::super::model::response(&sum, 1.0, 100.0)?;
     let curve = Curve::new("G", Pen::solid(BLUE), points);
     let zeros = sum.damped_zeros()?;
-    let map =
-        pole_zero(plane("(b) Poles and zeros", (-8.0, 8.0), (-1.0, 14.0)), ("poles", "zeros"), VERMILION, &sum, &zeros);
+    let map = pole_zero(
+        plane("(b) Poles and zeros", (-8.0, 8.0), (-1.0, 14.0)),
+        ("poles", "zeros"),
+        VERMILION,
+        &sum,
+        &zeros,
+    );
     Ok(Plant {
-        bode: bode("(a) Bode plot", W, "|G| (m/N)", std::slice::from_ref(&curve)),
+        bode: bode(
+            "(a) Bode plot",
+            W,
+            "|G| (m/N)",
+            std::slice::from_ref(&curve),
+        ),
         map,
-        whole: nyquist("(c) Nyquist plot of G in m/N", (-9.0, 9.0), (-9.0, 9.0), "G").directed(
-            "",
-            Pen::solid(BLUE),
-            curve.polar(),
-        ),
-        corner: origin(nyquist("(c) the same near the origin", (-0.6, 0.6), (-0.6, 0.6), "G")).directed(
-            "",
-            Pen::solid(BLUE),
-            curve.polar(),
-        ),
+        whole: nyquist(
+            "(c) Nyquist plot of G in m/N",
+            (-9.0, 9.0),
+            (-9.0, 9.0),
+            "G",
+        )
+        .directed("", Pen::solid(BLUE), curve.polar()),
+        corner: origin(nyquist(
+            "(c) the same near the origin",
+            (-0.6, 0.6),
+            (-0.6, 0.6),
+            "G",
+        ))
+        .directed("", Pen::solid(BLUE), curve.polar()),
         kinds: kinds(&sum.undamped_zeros()?),
         signs: sign_sequence(&modal),
         model,
@@ -176,19 +228,23 @@ fn plant_settings(au: f64, av: f64) -> String {
 fn compensated(heading: &str, model: &Model, text: &str, size: f64) -> Result<Chart, FigureError> {
     let of = closed_loop(model, "compensation", Some(text))?;
     let l = Curve::new("", Pen::solid(VERMILION), open(&of, 8.0, 15.0));
-    let plain =
-        closed_loop(model, "none", Some("title = \"none\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n"))?;
+    let plain = closed_loop(
+        model,
+        "none",
+        Some("title = \"none\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n"),
+    )?;
     let g = Curve::new("", Pen::dashed(BLUE), open(&plain, 8.0, 15.0));
-    Ok(nyquist(heading, (-size, size), (-size, size), "G C").directed("G", g.pen, g.polar()).directed(
-        "G with the compensation",
-        l.pen,
-        l.polar(),
-    ))
+    Ok(nyquist(heading, (-size, size), (-size, size), "G C")
+        .directed("G", g.pen, g.polar())
+        .directed("G with the compensation", l.pen, l.polar()))
 }
 
 pub(in super::super) fn fig_6_3(_: &Workshop) -> Result<Content, FigureError> {
     let plant = plant(-1.65, 1.52)?;
-    let only_notch = format!("title = \"notch\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n{}", notch());
+    let only_notch = format!(
+        "title = \"notch\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n{}",
+        notch()
+    );
     let d = compensated(
         "(d) Desired compensation: u turned clockwise, v counter-clockwise",
         &plant.model,
@@ -213,8 +269,12 @@ pub(in super::super) fn fig_6_5(_: &Workshop) -> Result<Content, FigureError> {
         169.0 / 121.0 * 1e-6,
         biquad((11.0, 0.001), (13.0, 0.001))
     );
-    let d =
-        compensated("(d) With the additional pole-zero pair of Eq. (6-5), damping 0.001", &plant.model, &pair, 14.0)?;
+    let d = compensated(
+        "(d) With the additional pole-zero pair of Eq. (6-5), damping 0.001",
+        &plant.model,
+        &pair,
+        14.0,
+    )?;
     Ok(Content::new("A plant with non-alternating signs: Bode plot, poles and zeros, Nyquist plot, and the additional pair that turns both circles into one direction.")
         .setting(plant_settings(1.65, -1.52))
         .row(180.0, [plant.bode.0, plant.map])
@@ -228,23 +288,41 @@ pub(in super::super) fn fig_6_5(_: &Workshop) -> Result<Content, FigureError> {
 pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
     let (file, text) = ("6-4.controller.toml", eq_6_4());
     let dampings = [0.0005, 0.001, 0.002, 0.01];
-    let notch =
-        ControllerText { name: "notch".into(), text: format!("title = \"notch\"\n{}", notch()) }.sections(5000.0)?;
+    let notch = ControllerText {
+        name: "notch".into(),
+        text: format!("title = \"notch\"\n{}", notch()),
+    }
+    .sections(5000.0)?;
     let at = |w: f64| (w, notch[0].response(Complex::new(0.0, w)));
-    let of_notch = control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)]).into_iter().map(at);
-    let (gain, phase) =
-        bode("(a) Notch of Eq. (6-4)", W, "Magnitude (1)", &[Curve::new("", Pen::solid(BLUE), of_notch.collect())]);
+    let of_notch = control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)])
+        .into_iter()
+        .map(at);
+    let (gain, phase) = bode(
+        "(a) Notch of Eq. (6-4)",
+        W,
+        "Magnitude (1)",
+        &[Curve::new("", Pen::solid(BLUE), of_notch.collect())],
+    );
     let mut wide = critical(nyquist(
         "(b) Nyquist plot of L, with four damping ratios of the plant",
         (-14.0, 14.0),
         (-14.0, 14.0),
         "L",
     ));
-    let mut near = critical(nyquist("(b) the same near −1", (-2.2, 1.2), (-1.7, 1.7), "L"));
+    let mut near = critical(nyquist(
+        "(b) the same near −1",
+        (-2.2, 1.2),
+        (-1.7, 1.7),
+        "L",
+    ));
     let mut margins = Vec::new();
     for (k, zeta) in dampings.iter().enumerate() {
         let of = closed_loop(&eq_6_3(-1.65, 1.52, *zeta), file, Some(&text))?;
-        let l = Curve::new(&format!("ζ = {zeta}"), Pen::solid(COLOURS[k]), open(&of, 1.0, 200.0));
+        let l = Curve::new(
+            &format!("ζ = {zeta}"),
+            Pen::solid(COLOURS[k]),
+            open(&of, 1.0, 200.0),
+        );
         wide = wide.directed(&l.name, l.pen, l.polar());
         near = near.directed("", l.pen, l.polar());
         margins.push(of.margins(true));
@@ -265,7 +343,10 @@ pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
 
 pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
     let model = eq_6_3(1.65, -1.52, 0.001);
-    let cases = [(0.001, "6-6a.controller.toml", BLUE), (0.01, "6-6c.controller.toml", VERMILION)];
+    let cases = [
+        (0.001, "6-6a.controller.toml", BLUE),
+        (0.01, "6-6c.controller.toml", VERMILION),
+    ];
     let mut content = Content::new("The loop with non-alternating signs and an additional pole-zero pair: as lightly damped as the plant's modes (a, b), and with ten times the damping (c, d).")
         .setting(format!("{}; controller of Eq. (6-5)", plant_settings(1.65, -1.52)));
     let mut charts = Vec::new();
@@ -273,7 +354,11 @@ pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
     for (zeta, file, colour) in cases {
         let text = eq_6_5(zeta);
         let of = closed_loop(&model, file, Some(&text))?;
-        let l = Curve::new(&format!("L, ζ = {zeta}"), Pen::solid(colour), open(&of, 1.0, 100.0));
+        let l = Curve::new(
+            &format!("L, ζ = {zeta}"),
+            Pen::solid(colour),
+            open(&of, 1.0, 100.0),
+        );
         charts.push((
             bode(
                 &format!("({}) Bode plot of L", if zeta < 0.005 { "a" } else { "c" }),
@@ -283,14 +368,19 @@ pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
             ),
             l,
         ));
-        content = content.file(file, &text).command(margins_command(&model, file));
+        content = content
+            .file(file, &text)
+            .command(margins_command(&model, file));
         loops.push((zeta, of));
     }
-    let [(a, la), (c, lc)] = charts.try_into().map_err(|_| FigureError::Run("two cases".into()))?;
+    let [(a, la), (c, lc)] = charts
+        .try_into()
+        .map_err(|_| FigureError::Run("two cases".into()))?;
     let near = |heading: &str, l: &Curve| {
         critical(nyquist(heading, (-2.6, 1.4), (-2.0, 2.0), "L")).directed("", l.pen, l.polar())
     };
-    let between = |of: &ClosedLoop| -360.0 + of.continuous_loop(9.0).arg().to_degrees().rem_euclid(360.0);
+    let between =
+        |of: &ClosedLoop| -360.0 + of.continuous_loop(9.0).arg().to_degrees().rem_euclid(360.0);
     let margins: Vec<_> = loops.iter().map(|(_, of)| of.margins(true)).collect();
     Ok(content
         .row(190.0, [a.0, c.0])
@@ -320,5 +410,8 @@ pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
 
 fn verdict(margins: &crate::control::Margins) -> String {
     let stable = if margins.stable { "stable" } else { "unstable" };
-    format!("{stable}, modulus margin {}", signed(margins.modulus_margin, 3))
+    format!(
+        "{stable}, modulus margin {}",
+        signed(margins.modulus_margin, 3)
+    )
 }

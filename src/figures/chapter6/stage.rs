@@ -37,16 +37,34 @@ fn pen(which: Which) -> Pen {
 fn measured(workshop: &Workshop) -> Result<(Curve, Curve), FigureError> {
     let analysis = workshop.chirp()?;
     let points = |values: &[Complex<f64>]| {
-        analysis.frf.frequency_hz.iter().zip(values).map(|(f, h)| (TAU * f, h * UM)).collect::<Vec<_>>()
+        analysis
+            .frf
+            .frequency_hz
+            .iter()
+            .zip(values)
+            .map(|(f, h)| (TAU * f, h * UM))
+            .collect::<Vec<_>>()
     };
     let model = Curve::new("model", Pen::dashed(VERMILION), points(&analysis.model));
-    Ok((Curve::new("measured by a chirp", Pen::solid(BLUE), points(&analysis.frf.response)), model))
+    Ok((
+        Curve::new(
+            "measured by a chirp",
+            Pen::solid(BLUE),
+            points(&analysis.frf.response),
+        ),
+        model,
+    ))
 }
 
 /// Where a response is largest between two frequencies.
 fn peak_rad_s(curve: &Curve, low: f64, high: f64) -> f64 {
-    let inside = curve.points.iter().filter(|(w, _)| (low..=high).contains(w));
-    inside.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm())).map_or(f64::NAN, |(w, _)| *w)
+    let inside = curve
+        .points
+        .iter()
+        .filter(|(w, _)| (low..=high).contains(w));
+    inside
+        .max_by(|a, b| a.1.norm().total_cmp(&b.1.norm()))
+        .map_or(f64::NAN, |(w, _)| *w)
 }
 
 pub(in super::super) fn fig_6_7(workshop: &Workshop) -> Result<Content, FigureError> {
@@ -55,12 +73,25 @@ pub(in super::super) fn fig_6_7(workshop: &Workshop) -> Result<Content, FigureEr
     let (ours, theirs) = measured(workshop)?;
     let whole = [ours.part(6.0, 2000.0), theirs.part(6.0, 2000.0)];
     let near = [ours.part(400.0, 700.0), theirs.part(400.0, 700.0)];
-    let (a, a_phase) = bode("(a) From current to displacement", W, "Magnitude (µm/A)", &whole);
+    let (a, a_phase) = bode(
+        "(a) From current to displacement",
+        W,
+        "Magnitude (µm/A)",
+        &whole,
+    );
     let (b, b_phase) = bode("(b) The close modes", W, "Magnitude (µm/A)", &near);
-    let [.., u, v] = sum.terms() else { return Err(FigureError::Run("three modes".into())) };
+    let [.., u, v] = sum.terms() else {
+        return Err(FigureError::Run("three modes".into()));
+    };
     let first = &sum.terms()[0];
-    let close = format!("{} and {} rad/s", signed(u.omega_rad_s, 1), signed(v.omega_rad_s, 1));
-    let near_500 = [u, v].iter().all(|term| (term.omega_rad_s / 500.0 - 1.0).abs() < 0.1);
+    let close = format!(
+        "{} and {} rad/s",
+        signed(u.omega_rad_s, 1),
+        signed(v.omega_rad_s, 1)
+    );
+    let near_500 = [u, v]
+        .iter()
+        .all(|term| (term.omega_rad_s / 500.0 - 1.0).abs() < 0.1);
     Ok(Content::new("The frequency response of the stage, measured by a chirp and by the model: whole, and around the two close modes.")
         .setting(format!("mass asymmetry +10 %, operating point 8 % of L; {RIG}"))
         .setting("the model has the hold, the delay and the current loop of the rig")
@@ -83,11 +114,19 @@ fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
     let of = closed_loop(&model, which.name(), None)?;
     let l = Curve::new("", pen(which), open(&of, 1.0, 3000.0));
     let (gain, phase) = bode("(a) Bode plot of L", W, "|L|", std::slice::from_ref(&l));
-    let size = l.points.iter().filter(|(w, _)| *w > 60.0).map(|(_, l)| l.norm()).fold(6.0, f64::max);
+    let size = l
+        .points
+        .iter()
+        .filter(|(w, _)| *w > 60.0)
+        .map(|(_, l)| l.norm())
+        .fold(6.0, f64::max);
     let polar = |heading: &str, size: f64| {
         critical(nyquist(heading, (-size, size), (-size, size), "L")).directed("", l.pen, l.polar())
     };
-    let (wide, near) = (polar("(b) Nyquist plot of L", 1.05 * size), polar("(b) the same near −1", 1.5));
+    let (wide, near) = (
+        polar("(b) Nyquist plot of L", 1.05 * size),
+        polar("(b) the same near −1", 1.5),
+    );
     let margins = of.margins(true);
     let content = Content::new(&format!("Open loop of the {} controller, {equation}, with the model of the stage.", which.name()))
         .setting("profile stage, mass asymmetry +10 %, operating point 8 % of L; continuous time, without hold, delay and amplifier")
@@ -100,19 +139,35 @@ fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
 /// Crossover and phase margin, each within half of its last printed digit; 18 and 70 are printed as round figures.
 fn with_margins(content: Content, which: Which, margins: &Margins, of: &str) -> Content {
     let (crossover, phase) = printed(which);
-    let computed = (margins.crossover_rad_s.unwrap_or(f64::NAN), margins.phase_margin_deg.unwrap_or(f64::NAN));
+    let computed = (
+        margins.crossover_rad_s.unwrap_or(f64::NAN),
+        margins.phase_margin_deg.unwrap_or(f64::NAN),
+    );
     let remark = match which {
-        Which::Slow => "printed as 10 % of the first resonance, which is 183.9 rad/s here and 179 there",
-        Which::Fast => "the first mode, whose frequency is 183.9 rad/s here and 179 there, sets the gain at crossover",
+        Which::Slow => {
+            "printed as 10 % of the first resonance, which is 183.9 rad/s here and 179 there"
+        }
+        Which::Fast => {
+            "the first mode, whose frequency is 183.9 rad/s here and 179 there, sets the gain at crossover"
+        }
     };
     let phase_remark = match which {
         Which::Slow => "with the crossover; the printed one is a round figure",
         Which::Fast => "",
     };
     content
-        .compare(Comparison::number(&format!("crossover{of}"), crossover, 0, computed.0, "rad/s").remark(remark))
-        .compare(Comparison::number(&format!("phase margin{of}"), phase, 0, computed.1, "deg").remark(phase_remark))
-        .compare(Comparison::unprinted(&format!("modulus margin{of}"), signed(margins.modulus_margin, 3)))
+        .compare(
+            Comparison::number(&format!("crossover{of}"), crossover, 0, computed.0, "rad/s")
+                .remark(remark),
+        )
+        .compare(
+            Comparison::number(&format!("phase margin{of}"), phase, 0, computed.1, "deg")
+                .remark(phase_remark),
+        )
+        .compare(Comparison::unprinted(
+            &format!("modulus margin{of}"),
+            signed(margins.modulus_margin, 3),
+        ))
 }
 
 pub(in super::super) fn fig_6_8(_: &Workshop) -> Result<Content, FigureError> {
@@ -124,27 +179,53 @@ pub(in super::super) fn fig_6_10(_: &Workshop) -> Result<Content, FigureError> {
 }
 
 pub(in super::super) fn fig_6_9(_: &Workshop) -> Result<Content, FigureError> {
-    let points = [(0.02, GREEN), (0.04, PURPLE), (0.06, BLUE), (0.08, VERMILION)];
+    let points = [
+        (0.02, GREEN),
+        (0.04, PURPLE),
+        (0.06, BLUE),
+        (0.08, VERMILION),
+    ];
     let mut content = Content::new("The two close modes as the operating point moves from 2 to 8 % of L, with a positive and a negative mass asymmetry.")
         .setting("profile stage, model without hold and delay")
         .assumed("asymmetries of +10 % and -10 %, operating points of 2, 4, 6 and 8 % of L");
     let (mut gains, mut phases) = (Vec::new(), Vec::new());
-    for (heading, asymmetry, signs) in [("(a) Asymmetry +10 %", 0.1, "+-+"), ("(b) Asymmetry −10 %", -0.1, "++-")] {
+    for (heading, asymmetry, signs) in [
+        ("(a) Asymmetry +10 %", 0.1, "+-+"),
+        ("(b) Asymmetry −10 %", -0.1, "++-"),
+    ] {
         let curve = |(point, colour): &(f64, _)| {
             let sum = Model::stage().at(*point, asymmetry).sum()?;
-            let points = response(&sum, 420.0, 700.0)?.into_iter().map(|(w, g)| (w, g * UM)).collect();
-            Ok(Curve::new(&format!("{:.0} % of L", 100.0 * point), Pen::solid(*colour), points))
+            let points = response(&sum, 420.0, 700.0)?
+                .into_iter()
+                .map(|(w, g)| (w, g * UM))
+                .collect();
+            Ok(Curve::new(
+                &format!("{:.0} % of L", 100.0 * point),
+                Pen::solid(*colour),
+                points,
+            ))
         };
-        let curves = points.iter().map(curve).collect::<Result<Vec<_>, FigureError>>()?;
+        let curves = points
+            .iter()
+            .map(curve)
+            .collect::<Result<Vec<_>, FigureError>>()?;
         let (gain, phase) = bode(heading, W, "|G| (µm/N)", &curves);
         gains.push(gain);
         phases.push(phase);
         let model = Model::stage().at(0.08, asymmetry);
         let cnmp = crate::zeros::cnmp_pairs(&crate::zeros::undamped_zeros(&model.structure()?)?);
         let at = format!("at asymmetry {} %", signed(100.0 * asymmetry, 0));
-        let expected = if asymmetry > 0.0 { "observed" } else { "eliminated" };
+        let expected = if asymmetry > 0.0 {
+            "observed"
+        } else {
+            "eliminated"
+        };
         content = content
-            .compare(Comparison::words(&format!("signs of the residues {at}"), signs, &sign_sequence(&model.modal()?)))
+            .compare(Comparison::words(
+                &format!("signs of the residues {at}"),
+                signs,
+                &sign_sequence(&model.modal()?),
+            ))
             .compare(Comparison::words(
                 &format!("CMP-CNMP zeros {at}, 8 % of L"),
                 expected,
@@ -162,7 +243,11 @@ pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
         .setting("profile stage, asymmetry +10 %, operating point 8 % of L; (a) in continuous time; (b) as the loop at 5 kHz runs it, with hold, delay and amplifier");
     for (which, settling) in [(Which::Slow, 0.1663), (Which::Fast, 0.0858)] {
         let of = closed_loop(&model, which.name(), None)?;
-        curves.push(Curve::new(which.name(), pen(which), closed(&open(&of, 1.0, 3000.0))));
+        curves.push(Curve::new(
+            which.name(),
+            pen(which),
+            closed(&open(&of, 1.0, 3000.0)),
+        ));
         let course = step(&of, 0.4);
         let positions: Vec<f64> = course.iter().map(|point| point.1).collect();
         let figures = step_figures(&positions, 1.0, of.chain().period_s());
@@ -180,32 +265,61 @@ pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
         .fold(f64::INFINITY, f64::min);
     let (a, a_phase) = bode("(a) Closed loop T = L/(1 + L)", W, "|T|", &curves);
     let b = steps.into_iter().fold(
-        Chart::new("(b) Step response", Scale::linear("Time (s)").within(0.0, 0.4), Scale::linear("Position/step (1)")),
+        Chart::new(
+            "(b) Step response",
+            Scale::linear("Time (s)").within(0.0, 0.4),
+            Scale::linear("Position/step (1)"),
+        ),
         |chart, (which, course)| chart.line(which.name(), pen(which), course),
     );
-    Ok(content.row(230.0, [a]).row(180.0, [a_phase]).row(280.0, [b]).compare(Comparison::holds(
-        "|T| of the fast controller below its crossover",
-        "below 0 dB in a certain region",
-        dip < 1.0,
-        &format!("down to {} dB", signed(20.0 * dip.log10(), 2)),
-    )))
+    Ok(content
+        .row(230.0, [a])
+        .row(180.0, [a_phase])
+        .row(280.0, [b])
+        .compare(Comparison::holds(
+            "|T| of the fast controller below its crossover",
+            "below 0 dB in a certain region",
+            dip < 1.0,
+            &format!("down to {} dB", signed(20.0 * dip.log10(), 2)),
+        )))
 }
 
 /// L of the measured plant and the ideal controller.
 fn measured_loop(workshop: &Workshop, which: Which) -> Result<Curve, FigureError> {
     let analysis = workshop.chirp()?;
     let sections = ControllerText::find(which.name())?.sections(5000.0)?;
-    let at = |(f, h): (&f64, &Complex<f64>)| (TAU * f, h * continuous_response(&sections, Complex::new(0.0, TAU * f)));
-    let points = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response).map(at).collect();
-    Ok(Curve::new(&format!("{}, measured plant", which.name()), pen(which), points))
+    let at = |(f, h): (&f64, &Complex<f64>)| {
+        (
+            TAU * f,
+            h * continuous_response(&sections, Complex::new(0.0, TAU * f)),
+        )
+    };
+    let points = analysis
+        .frf
+        .frequency_hz
+        .iter()
+        .zip(&analysis.frf.response)
+        .map(at)
+        .collect();
+    Ok(Curve::new(
+        &format!("{}, measured plant", which.name()),
+        pen(which),
+        points,
+    ))
 }
 
 /// Where |L| first falls through 1 in rad/s, and 180 deg + arg L there, between two measured frequencies.
 fn measured_margins(l: &Curve) -> Option<(f64, f64)> {
-    let pair = l.points.windows(2).find(|pair| pair[0].1.norm() >= 1.0 && pair[1].1.norm() < 1.0)?;
+    let pair = l
+        .points
+        .windows(2)
+        .find(|pair| pair[0].1.norm() >= 1.0 && pair[1].1.norm() < 1.0)?;
     let part = pair[0].1.norm().ln() / (pair[0].1.norm() / pair[1].1.norm()).ln();
     let value = pair[0].1 + (pair[1].1 - pair[0].1) * part;
-    Some((pair[0].0 + (pair[1].0 - pair[0].0) * part, (-value).arg().to_degrees()))
+    Some((
+        pair[0].0 + (pair[1].0 - pair[0].0) * part,
+        (-value).arg().to_degrees(),
+    ))
 }
 
 pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureError> {
@@ -217,7 +331,11 @@ pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureE
         let model = Curve::new("model", Pen::dashed(INK).thin(), open(&of, 6.0, 2500.0));
         let l = measured_loop(workshop, which)?.part(6.0, 2500.0);
         let (crossover, phase) = measured_margins(&l).unwrap_or((f64::NAN, f64::NAN));
-        let smallest = l.points.iter().map(|(_, l)| (l + 1.0).norm()).fold(f64::INFINITY, f64::min);
+        let smallest = l
+            .points
+            .iter()
+            .map(|(_, l)| (l + 1.0).norm())
+            .fold(f64::INFINITY, f64::min);
         polar.push(
             critical(nyquist(
                 &format!("({}) Nyquist plot, {}", letters[1], which.name()),
@@ -230,27 +348,45 @@ pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureE
         );
         ts.push(Curve::new(&l.name, l.pen, closed(&l.points)));
         ss.push(Curve::new(&l.name, l.pen, sensitivity(&l.points)));
-        bodes.push(bode(&format!("({}) Open loop, {}", letters[0], which.name()), W, "|L|", &[l, model]));
-        content = with_margins(content, which, &of.margins(true), &format!(", {} controller, model", which.name()))
-            .compare(
-                Comparison::unprinted(
-                    &format!("{} controller, measured plant", which.name()),
-                    format!(
-                        "crossover {} rad/s, phase margin {} deg, least |1 + L| {}",
-                        signed(crossover, 1),
-                        signed(phase, 1),
-                        signed(smallest, 3)
-                    ),
-                )
-                .remark("the measured plant has hold, computing delay and current loop in it: 0.46 ms"),
+        bodes.push(bode(
+            &format!("({}) Open loop, {}", letters[0], which.name()),
+            W,
+            "|L|",
+            &[l, model],
+        ));
+        content = with_margins(
+            content,
+            which,
+            &of.margins(true),
+            &format!(", {} controller, model", which.name()),
+        )
+        .compare(
+            Comparison::unprinted(
+                &format!("{} controller, measured plant", which.name()),
+                format!(
+                    "crossover {} rad/s, phase margin {} deg, least |1 + L| {}",
+                    signed(crossover, 1),
+                    signed(phase, 1),
+                    signed(smallest, 3)
+                ),
             )
-            .command(Model::stage().command("margins", &format!("--{} --continuous", which.name())))
-            .command(Model::stage().command("margins", &format!("--{}", which.name())));
+            .remark("the measured plant has hold, computing delay and current loop in it: 0.46 ms"),
+        )
+        .command(Model::stage().command("margins", &format!("--{} --continuous", which.name())))
+        .command(Model::stage().command("margins", &format!("--{}", which.name())));
     }
-    let [(a, a_phase), (c, c_phase)] = bodes.try_into().map_err(|_| FigureError::Run("two loops".into()))?;
+    let [(a, a_phase), (c, c_phase)] = bodes
+        .try_into()
+        .map_err(|_| FigureError::Run("two loops".into()))?;
     let (e, _) = bode("(e) Closed loop T", W, "|T|", &ts);
     let (f, _) = bode("(f) Sensitivity S", W, "|S|", &ss);
-    let low = |curve: &Curve| curve.points.iter().find(|(w, _)| *w >= 10.0).map_or(f64::NAN, |(_, s)| s.norm());
+    let low = |curve: &Curve| {
+        curve
+            .points
+            .iter()
+            .find(|(w, _)| *w >= 10.0)
+            .map_or(f64::NAN, |(_, s)| s.norm())
+    };
     let (slow, fast) = (low(&ss[0]), low(&ss[1]));
     Ok(content
         .row(220.0, [a, c])
@@ -267,7 +403,11 @@ pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureE
 }
 
 /// Steady state of `bench control --reference hold`.
-fn hold(workshop: &Workshop, which: Which, operating_point: Option<f64>) -> Result<Closed, FigureError> {
+fn hold(
+    workshop: &Workshop,
+    which: Which,
+    operating_point: Option<f64>,
+) -> Result<Closed, FigureError> {
     let model = Model::stage()
         .set(&format!("control.controller={}", which.name()))
         .set("control.reference={kind=\"hold\"}")
@@ -286,19 +426,30 @@ const BAR_UM: f64 = 0.03;
 
 /// Probability density over the position in micrometres, as the outline of bars of the probe's quantisation.
 fn density(closed: &Closed) -> Vec<(f64, f64)> {
-    let errors = closed.course.iter().zip(&closed.reference).map(|(y, r)| (r.1 - y.1) * UM);
+    let errors = closed
+        .course
+        .iter()
+        .zip(&closed.reference)
+        .map(|(y, r)| (r.1 - y.1) * UM);
     let settled: Vec<f64> = errors.skip(2500).collect();
     let bars = 12;
     let mut counts = vec![0.0; 2 * bars + 1];
     for error in &settled {
         let bar = (error / BAR_UM).round() as i64 + bars as i64;
-        if let Some(count) = usize::try_from(bar).ok().and_then(|bar| counts.get_mut(bar)) {
+        if let Some(count) = usize::try_from(bar)
+            .ok()
+            .and_then(|bar| counts.get_mut(bar))
+        {
             *count += 1.0;
         }
     }
     let edge = |k: usize| (k as f64 - bars as f64 - 0.5) * BAR_UM;
     let height = |count: &f64| count / settled.len() as f64 / BAR_UM;
-    counts.iter().enumerate().flat_map(|(k, count)| [(edge(k), height(count)), (edge(k + 1), height(count))]).collect()
+    counts
+        .iter()
+        .enumerate()
+        .flat_map(|(k, count)| [(edge(k), height(count)), (edge(k + 1), height(count))])
+        .collect()
 }
 
 pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureError> {
@@ -321,22 +472,43 @@ pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureE
         a = a.line(
             which.name(),
             pen(which),
-            run.course.iter().map(|(t, y)| (t - 0.2, y * UM)).filter(|(t, _)| *t < 0.5).collect(),
+            run.course
+                .iter()
+                .map(|(t, y)| (t - 0.2, y * UM))
+                .filter(|(t, _)| *t < 0.5)
+                .collect(),
         );
         let held = hold(workshop, which, None)?;
         let outline = density(&held);
-        let area = outline.iter().copied().chain([(outline[outline.len() - 1].0, 0.0), (outline[0].0, 0.0)]).collect();
-        b = b.mark(Mark::Area { name: String::new(), colour: pen(which).colour, strength: 0.15, outline: area }).line(
-            which.name(),
-            pen(which),
-            outline,
-        );
-        let settled = run.measured.step.and_then(|step| step.settling_time_s).unwrap_or(f64::NAN);
+        let area = outline
+            .iter()
+            .copied()
+            .chain([(outline[outline.len() - 1].0, 0.0), (outline[0].0, 0.0)])
+            .collect();
+        b = b
+            .mark(Mark::Area {
+                name: String::new(),
+                colour: pen(which).colour,
+                strength: 0.15,
+                outline: area,
+            })
+            .line(which.name(), pen(which), outline);
+        let settled = run
+            .measured
+            .step
+            .and_then(|step| step.settling_time_s)
+            .unwrap_or(f64::NAN);
         let controller = which.name();
         content = content
             .compare(
-                Comparison::number(&format!("settling time, {controller}"), settling, 4, settled, "s")
-                    .remark("one run with noise, to 2 % of the step; the first mode still rings then"),
+                Comparison::number(
+                    &format!("settling time, {controller}"),
+                    settling,
+                    4,
+                    settled,
+                    "s",
+                )
+                .remark("one run with noise, to 2 % of the step; the first mode still rings then"),
             )
             .compare(
                 Comparison::within(
@@ -347,12 +519,15 @@ pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureE
                     "µm",
                     0.003,
                 )
-                .remark("by one run of 60 s; from run to run it differs by up to 0.003 µm (six seeds)"),
+                .remark(
+                    "by one run of 60 s; from run to run it differs by up to 0.003 µm (six seeds)",
+                ),
             )
             .command(Model::stage().command("control", &format!("--{controller}")))
-            .command(
-                Model::stage().command("control", &format!("--{controller} --reference hold --duration {HOLD_S:.0}")),
-            );
+            .command(Model::stage().command(
+                "control",
+                &format!("--{controller} --reference hold --duration {HOLD_S:.0}"),
+            ));
     }
     let centre = hold(workshop, Which::Fast, Some(0.0))?;
     Ok(content
@@ -368,8 +543,8 @@ pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureE
             )
             .remark("by one run of 60 s"),
         )
-        .command(
-            Model::stage()
-                .command("control", &format!("--fast --reference hold --duration {HOLD_S:.0} --operating-point 0%")),
-        ))
+        .command(Model::stage().command(
+            "control",
+            &format!("--fast --reference hold --duration {HOLD_S:.0} --operating-point 0%"),
+        )))
 }

@@ -34,11 +34,19 @@ pub fn blocks(
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
     let blocks = cut(&Record::new(signals), &bins, settings);
     let (low_hz, high_hz) = band_hz;
-    if blocks.is_empty() { Err(IdentifyError::NotExcited { low_hz, high_hz }) } else { Ok(blocks) }
+    if blocks.is_empty() {
+        Err(IdentifyError::NotExcited { low_hz, high_hz })
+    } else {
+        Ok(blocks)
+    }
 }
 
 /// The blocks between two bins.
-pub(super) fn cut(of: &impl Bins, bins: &RangeInclusive<usize>, settings: &EstimatorSettings) -> Vec<Block> {
+pub(super) fn cut(
+    of: &impl Bins,
+    bins: &RangeInclusive<usize>,
+    settings: &EstimatorSettings,
+) -> Vec<Block> {
     let noise = noise_of(settings);
     let floor = NoiseFloor::of(of, (*bins.start() as f64, *bins.end() as f64), &noise);
     let (mut blocks, mut low) = (Vec::new(), *bins.start());
@@ -46,7 +54,12 @@ pub(super) fn cut(of: &impl Bins, bins: &RangeInclusive<usize>, settings: &Estim
         let next = low + (WIDTH_RATIO * low as f64).floor().max(1.0) as usize;
         let high = (next - 1).min(*bins.end());
         let middle = 0.5 * (low + high) as f64;
-        blocks.extend(block(of, low, high, floor.power(middle, noise.half_width(middle, of.bin_hz()))));
+        blocks.extend(block(
+            of,
+            low,
+            high,
+            floor.power(middle, noise.half_width(middle, of.bin_hz())),
+        ));
         low = next;
     }
     blocks
@@ -54,14 +67,22 @@ pub(super) fn cut(of: &impl Bins, bins: &RangeInclusive<usize>, settings: &Estim
 
 /// The curves whose residual is the noise.
 fn noise_of(settings: &EstimatorSettings) -> EstimatorSettings {
-    EstimatorSettings { min_half_width_bins: settings.min_half_width_bins, ..EstimatorSettings::default() }
+    EstimatorSettings {
+        min_half_width_bins: settings.min_half_width_bins,
+        ..EstimatorSettings::default()
+    }
 }
 
 fn block(of: &impl Bins, low: usize, high: usize, noise: f64) -> Option<Block> {
     let sum = |term: &dyn Fn(usize) -> Complex<f64>| (low..=high).map(term).sum::<Complex<f64>>();
     let (drive, weight) = (sum(&|k| of.drive(k)), |k: usize| of.drive(k).norm());
     let all = (low..=high).map(weight).sum::<f64>();
-    let moment = |term: &dyn Fn(f64) -> f64| (low..=high).map(|k| weight(k) * term(k as f64)).sum::<f64>() / all;
+    let moment = |term: &dyn Fn(f64) -> f64| {
+        (low..=high)
+            .map(|k| weight(k) * term(k as f64))
+            .sum::<f64>()
+            / all
+    };
     let centre = low as f64 + moment(&|k| k - low as f64);
     let block = Block {
         frequency_hz: centre * of.bin_hz(),
@@ -69,6 +90,7 @@ fn block(of: &impl Bins, low: usize, high: usize, noise: f64) -> Option<Block> {
         response: sum(&|k| of.cross(k)) / drive,
         variance: noise * (low..=high).map(|k| of.power(k)).sum::<f64>() / drive.norm_sqr(),
     };
-    let sound = block.variance > 0.0 && block.variance.is_finite() && block.response.norm().is_finite();
+    let sound =
+        block.variance > 0.0 && block.variance.is_finite() && block.response.norm().is_finite();
     (sound && centre.is_finite()).then_some(block)
 }

@@ -74,19 +74,28 @@ pub(super) struct Drawn {
 
 /// The curve through a window; none where the input is dead.
 pub(super) fn fit(window: &Window, settings: &EstimatorSettings) -> Option<Drawn> {
-    let EstimatorSettings { curve, transient, .. } = *settings;
+    let EstimatorSettings {
+        curve, transient, ..
+    } = *settings;
     let degree = window.degree(curve, transient);
     let polynomial = polynomial(window, degree, transient)?;
     if curve != Curve::Rational || degree < 2 {
         return Some(polynomial);
     }
-    let rational = rational(window, transient, |linear| explains(&polynomial.fitted, linear) > WORTH_A_LOOK);
-    Some(rational.filter(|found| explains(&polynomial.fitted, &found.fitted) > CALLED_FOR).unwrap_or(polynomial))
+    let rational = rational(window, transient, |linear| {
+        explains(&polynomial.fitted, linear) > WORTH_A_LOOK
+    });
+    Some(
+        rational
+            .filter(|found| explains(&polynomial.fitted, &found.fitted) > CALLED_FOR)
+            .unwrap_or(polynomial),
+    )
 }
 
 /// The power that a pole explains over that of the noise that is left: Fisher's F.
 fn explains(polynomial: &Fitted, rational: &Fitted) -> f64 {
-    let explained = (polynomial.residual - rational.residual) / (polynomial.freedom - rational.freedom);
+    let explained =
+        (polynomial.residual - rational.residual) / (polynomial.freedom - rational.freedom);
     // 0/0 where the polynomial explains all: f64::max keeps the 0.
     (explained * rational.freedom / rational.residual).max(0.0)
 }
@@ -94,14 +103,29 @@ fn explains(polynomial: &Fitted, rational: &Fitted) -> f64 {
 impl Window {
     /// Whether there is input in the middle, or to both sides of it: beyond the outermost bin with input is no answer.
     fn encloses_input(&self) -> bool {
-        let alive = || self.x.iter().zip(&self.input).filter(|(_, u)| u.norm_sqr() > 0.0).map(|(x, _)| *x);
+        let alive = || {
+            self.x
+                .iter()
+                .zip(&self.input)
+                .filter(|(_, u)| u.norm_sqr() > 0.0)
+                .map(|(x, _)| *x)
+        };
         alive().any(|x| x <= 0.0) && alive().any(|x| x >= 0.0)
     }
 
     /// The share of the output's power without this residual; an output that is not there is not coherent with anything.
     pub(super) fn coherence(&self, residual: f64) -> f64 {
-        let power: f64 = self.output.iter().zip(&self.root).map(|(y, root)| y.norm_sqr() * root * root).sum();
-        if power > 0.0 { 1.0 - residual / power } else { 0.0 }
+        let power: f64 = self
+            .output
+            .iter()
+            .zip(&self.root)
+            .map(|(y, root)| y.norm_sqr() * root * root)
+            .sum();
+        if power > 0.0 {
+            1.0 - residual / power
+        } else {
+            0.0
+        }
     }
 
     /// The degree that so few bins allow: twice as many as there are unknowns, and one.
@@ -109,22 +133,42 @@ impl Window {
         let most = if curve == Curve::Constant { 0 } else { 2 };
         let alive = self.input.iter().filter(|u| u.norm_sqr() > 0.0).count();
         let unknowns = |degree: usize| (degree + 1) * if transient { 2 } else { 1 };
-        (1..=most).rev().find(|degree| alive > 2 * unknowns(*degree)).unwrap_or(0)
+        (1..=most)
+            .rev()
+            .find(|degree| alive > 2 * unknowns(*degree))
+            .unwrap_or(0)
     }
 
     /// root x^i `factor`, i = 0 ..= degree.
-    fn powers(&self, degree: usize, factor: impl Fn(usize) -> Complex<f64>) -> Vec<Vec<Complex<f64>>> {
-        let mut column: Vec<Complex<f64>> = self.root.iter().enumerate().map(|(j, r)| factor(j) * r).collect();
+    fn powers(
+        &self,
+        degree: usize,
+        factor: impl Fn(usize) -> Complex<f64>,
+    ) -> Vec<Vec<Complex<f64>>> {
+        let mut column: Vec<Complex<f64>> = self
+            .root
+            .iter()
+            .enumerate()
+            .map(|(j, r)| factor(j) * r)
+            .collect();
         let mut columns = vec![column.clone()];
         for _ in 0..degree {
-            column.iter_mut().zip(&self.x).for_each(|(entry, x)| *entry *= x);
+            column
+                .iter_mut()
+                .zip(&self.x)
+                .for_each(|(entry, x)| *entry *= x);
             columns.push(column.clone());
         }
         columns
     }
 
     /// The columns of B U/A, and of T/A, with `below` = 1/A.
-    fn numerators(&self, degree: usize, transient: bool, below: &[Complex<f64>]) -> Vec<Vec<Complex<f64>>> {
+    fn numerators(
+        &self,
+        degree: usize,
+        transient: bool,
+        below: &[Complex<f64>],
+    ) -> Vec<Vec<Complex<f64>>> {
         let mut columns = self.powers(degree, |j| self.input[j] * below[j]);
         if transient {
             columns.extend(self.powers(degree, |j| below[j]));
@@ -133,8 +177,13 @@ impl Window {
     }
 
     fn fitted(&self, squares: &Squares) -> Fitted {
-        let weighted =
-            |of: &dyn Fn(usize) -> f64| self.root.iter().enumerate().map(|(j, root)| root * root * of(j)).sum::<f64>();
+        let weighted = |of: &dyn Fn(usize) -> f64| {
+            self.root
+                .iter()
+                .enumerate()
+                .map(|(j, root)| root * root * of(j))
+                .sum::<f64>()
+        };
         let residual = squares.residual.iter().map(|e| e.norm_sqr()).sum();
         Fitted {
             response: squares.solution[0],
@@ -153,12 +202,24 @@ fn polynomial(window: &Window, degree: usize, transient: bool) -> Option<Drawn> 
         false => window.powers(degree, |j| window.input[j]),
         true => window.numerators(degree, true, &vec![Complex::from(1.0); window.x.len()]),
     };
-    let right = window.output.iter().zip(&window.root).map(|(y, root)| y * root).collect();
+    let right = window
+        .output
+        .iter()
+        .zip(&window.root)
+        .map(|(y, root)| y * root)
+        .collect();
     let squares = squares::solve(columns, right)?;
-    Some(Drawn { fitted: window.fitted(&squares), squares })
+    Some(Drawn {
+        fitted: window.fitted(&squares),
+        squares,
+    })
 }
 
-fn rational(window: &Window, transient: bool, worth_a_look: impl Fn(&Fitted) -> bool) -> Option<Drawn> {
+fn rational(
+    window: &Window,
+    transient: bool,
+    worth_a_look: impl Fn(&Fitted) -> bool,
+) -> Option<Drawn> {
     let mut a = Complex::default();
     let mut over = Vec::new();
     for fit in 0..REWEIGHTED {
@@ -182,20 +243,36 @@ fn reweighted(window: &Window, transient: bool, before: Complex<f64>) -> Option<
 }
 
 /// Steps of Gauss and Newton on the error of the output: d/da of B U/A is -x B U/A^2.
-fn refined(window: &Window, transient: bool, mut a: Complex<f64>, mut over: Vec<Complex<f64>>) -> Option<Drawn> {
+fn refined(
+    window: &Window,
+    transient: bool,
+    mut a: Complex<f64>,
+    mut over: Vec<Complex<f64>>,
+) -> Option<Drawn> {
     for step in 0..STEPS {
         let below = below(window, a)?;
         let mut columns = window.numerators(2, transient, &below);
         let model = sum(&columns, &over);
-        columns.push((0..model.len()).map(|j| -model[j] * below[j] * window.x[j]).collect());
-        let left = (0..model.len()).map(|j| window.output[j] * window.root[j] - model[j]).collect();
+        columns.push(
+            (0..model.len())
+                .map(|j| -model[j] * below[j] * window.x[j])
+                .collect(),
+        );
+        let left = (0..model.len())
+            .map(|j| window.output[j] * window.root[j] - model[j])
+            .collect();
         let squares = squares::solve(columns, left)?;
         let change = *squares.solution.last()?;
-        over.iter_mut().zip(&squares.solution).for_each(|(b, by)| *b += by);
+        over.iter_mut()
+            .zip(&squares.solution)
+            .for_each(|(b, by)| *b += by);
         a += change;
         if change.norm() < SMALL || step + 1 == STEPS {
             // What the linear model leaves is what is left, up to the square of a small step.
-            let fitted = Fitted { response: over[0], ..window.fitted(&squares) };
+            let fitted = Fitted {
+                response: over[0],
+                ..window.fitted(&squares)
+            };
             return Some(Drawn { fitted, squares });
         }
     }
@@ -212,5 +289,13 @@ fn below(window: &Window, a: Complex<f64>) -> Option<Vec<Complex<f64>>> {
 }
 
 fn sum(columns: &[Vec<Complex<f64>>], factors: &[Complex<f64>]) -> Vec<Complex<f64>> {
-    (0..columns[0].len()).map(|j| columns.iter().zip(factors).map(|(column, b)| column[j] * b).sum()).collect()
+    (0..columns[0].len())
+        .map(|j| {
+            columns
+                .iter()
+                .zip(factors)
+                .map(|(column, b)| column[j] * b)
+                .sum()
+        })
+        .collect()
 }

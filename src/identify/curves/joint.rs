@@ -77,11 +77,21 @@ pub fn estimate(
         return Err(IdentifyError::Lengths { input, output });
     }
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    let Answers { command, position, error } = Answers::of(loop_signals);
+    let Answers {
+        command,
+        position,
+        error,
+    } = Answers::of(loop_signals);
     let places = settings.places(&bins, band_hz, position.bin_hz());
     let (low_hz, high_hz) = band_hz;
-    let plant = Instrumental { input: &command, output: &position };
-    let loop_gain = Instrumental { input: &error, output: &position };
+    let plant = Instrumental {
+        input: &command,
+        output: &position,
+    };
+    let loop_gain = Instrumental {
+        input: &error,
+        output: &position,
+    };
     let joint = Joint {
         plant: collected(forward(&plant, &places, settings)),
         blocks: blocks::cut(&plant, &bins, settings),
@@ -89,7 +99,11 @@ pub fn estimate(
         sensitivity: collected(forward(&error, &places, settings)),
         loop_gain: collected(forward(&loop_gain, &places, settings)),
     };
-    if joint.blocks.is_empty() { Err(IdentifyError::NotExcited { low_hz, high_hz }) } else { Ok(joint) }
+    if joint.blocks.is_empty() {
+        Err(IdentifyError::NotExcited { low_hz, high_hz })
+    } else {
+        Ok(joint)
+    }
 }
 
 /// What answers the reference, each a record with the reference as its input.
@@ -100,7 +114,12 @@ struct Answers {
 }
 
 impl Answers {
-    fn of(LoopSignals { signals, reference_m }: &LoopSignals) -> Answers {
+    fn of(
+        LoopSignals {
+            signals,
+            reference_m,
+        }: &LoopSignals,
+    ) -> Answers {
         let fft = RealFft::new(signals.len());
         let of = |samples: &[f64]| {
             let mut spectrum = fft.transform(&mut samples.to_vec());
@@ -108,10 +127,21 @@ impl Answers {
             spectrum
         };
         let reference = of(reference_m);
-        let by_reference =
-            |output| Record::of(Spectra { input: reference.clone(), output }, signals.rate_hz / signals.len() as f64);
+        let by_reference = |output| {
+            Record::of(
+                Spectra {
+                    input: reference.clone(),
+                    output,
+                },
+                signals.rate_hz / signals.len() as f64,
+            )
+        };
         let position = of(&signals.output_m);
-        let error = reference.iter().zip(&position).map(|(r, y)| r - y).collect();
+        let error = reference
+            .iter()
+            .zip(&position)
+            .map(|(r, y)| r - y)
+            .collect();
         Answers {
             command: by_reference(of(&signals.input_a)),
             position: by_reference(position),
@@ -138,7 +168,10 @@ impl Bins for Instrumental<'_> {
     fn fit(&self, place: f64, half_width: f64, settings: &EstimatorSettings) -> Option<Fitted> {
         let side = |record: &Record| {
             let window = record.window(place, half_width);
-            Some(Side { drawn: curve::fit(&window, settings)?, window })
+            Some(Side {
+                drawn: curve::fit(&window, settings)?,
+                window,
+            })
         };
         ratio(&side(self.input)?, &side(self.output)?)
     }
@@ -165,7 +198,12 @@ struct Side {
 impl Side {
     /// The response to the reference at a bin, by the curve.
     fn response(&self, j: usize) -> Complex<f64> {
-        let Window { root, input, output, .. } = &self.window;
+        let Window {
+            root,
+            input,
+            output,
+            ..
+        } = &self.window;
         (output[j] * root[j] - self.drawn.squares.residual[j]) / (input[j] * root[j])
     }
 }
@@ -187,7 +225,9 @@ fn ratio(input: &Side, output: &Side) -> Option<Fitted> {
     let root = &output.window.root;
     let sum = |of: &dyn Fn(&Part, f64) -> f64| -> f64 {
         let alive = (0..root.len()).filter(|j| output.window.input[*j].norm_sqr() > 0.0);
-        alive.map(|j| of(&part(input, output, response, j), root[j] * root[j])).sum()
+        alive
+            .map(|j| of(&part(input, output, response, j), root[j] * root[j]))
+            .sum()
     };
     let fitted = Fitted {
         response,
@@ -196,7 +236,8 @@ fn ratio(input: &Side, output: &Side) -> Option<Fitted> {
         freedom: sum(&|part, w| w * part.freedom),
         ..above
     };
-    (fitted.gain.is_finite() && fitted.residual.is_finite() && fitted.freedom > 0.0).then_some(fitted)
+    (fitted.gain.is_finite() && fitted.residual.is_finite() && fitted.freedom > 0.0)
+        .then_some(fitted)
 }
 
 fn part(input: &Side, output: &Side, ratio: Complex<f64>, j: usize) -> Part {

@@ -35,7 +35,9 @@ use super::bins::Bins;
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
 use crate::identify::estimator::{between, inverted};
-use crate::identify::{Curve, Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, Signals, band};
+use crate::identify::{
+    Curve, Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, Signals, band,
+};
 
 /// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` at which there was any input.
 ///
@@ -44,7 +46,11 @@ use crate::identify::{Curve, Estimator, EstimatorSettings, Frf, FrfPoint, Identi
 ///
 /// # Errors
 /// When the signals, the band or the settings allow no estimate: see [`IdentifyError`].
-pub fn estimate(signals: &Signals, band_hz: (f64, f64), settings: &EstimatorSettings) -> Result<Frf, IdentifyError> {
+pub fn estimate(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &EstimatorSettings,
+) -> Result<Frf, IdentifyError> {
     settings.check()?;
     signals.check()?;
     let sampling = (signals.rate_hz, signals.len());
@@ -63,7 +69,14 @@ fn of_record(
     let bins = band::bins(band_hz, rate_hz, samples)?;
     let places = settings.places(&bins, band_hz, record.bin_hz());
     let frf = collected(points(record, &places, settings));
-    if frf.is_empty() { Err(IdentifyError::NotExcited { low_hz: band_hz.0, high_hz: band_hz.1 }) } else { Ok(frf) }
+    if frf.is_empty() {
+        Err(IdentifyError::NotExcited {
+            low_hz: band_hz.0,
+            high_hz: band_hz.1,
+        })
+    } else {
+        Ok(frf)
+    }
 }
 
 pub(super) fn collected(points: Vec<Option<FrfPoint>>) -> Frf {
@@ -77,26 +90,55 @@ pub(super) fn collected(points: Vec<Option<FrfPoint>>) -> Frf {
 /// The estimate at each place, as settings choose.
 fn points(record: &Record, places: &[f64], settings: &EstimatorSettings) -> Vec<Option<FrfPoint>> {
     let h1 = || forward(record, places, settings);
-    let h2 = || forward(&record.swapped(), places, settings).into_iter().map(|point| point.map(inverted));
+    let h2 = || {
+        forward(&record.swapped(), places, settings)
+            .into_iter()
+            .map(|point| point.map(inverted))
+    };
     match settings.estimator {
         Estimator::H1 => h1(),
         Estimator::H2 => h2().collect(),
-        Estimator::Hv => h1().into_iter().zip(h2()).map(|(h1, h2)| Some(between(h1?, h2?))).collect(),
+        Estimator::Hv => h1()
+            .into_iter()
+            .zip(h2())
+            .map(|(h1, h2)| Some(between(h1?, h2?)))
+            .collect(),
     }
 }
 
 /// From input to output, all noise on the output; nothing where the input is dead.
-pub(super) fn forward(bins: &impl Bins, places: &[f64], settings: &EstimatorSettings) -> Vec<Option<FrfPoint>> {
-    let (Some(low), Some(high)) = (places.first(), places.last()) else { return Vec::new() };
+pub(super) fn forward(
+    bins: &impl Bins,
+    places: &[f64],
+    settings: &EstimatorSettings,
+) -> Vec<Option<FrfPoint>> {
+    let (Some(low), Some(high)) = (places.first(), places.last()) else {
+        return Vec::new();
+    };
     let floor = NoiseFloor::of(bins, (*low, *high), settings);
-    places.iter().map(|place| point(bins, *place, settings, &floor)).collect()
+    places
+        .iter()
+        .map(|place| point(bins, *place, settings, &floor))
+        .collect()
 }
 
-fn point(bins: &impl Bins, place: f64, settings: &EstimatorSettings, floor: &NoiseFloor) -> Option<FrfPoint> {
+fn point(
+    bins: &impl Bins,
+    place: f64,
+    settings: &EstimatorSettings,
+    floor: &NoiseFloor,
+) -> Option<FrfPoint> {
     let half_width = settings.half_width(place, bins.bin_hz());
-    let fitted = bins.fit(place, half_width, settings).filter(|fitted| fitted.enclosed)?;
+    let fitted = bins
+        .fit(place, half_width, settings)
+        .filter(|fitted| fitted.enclosed)?;
     let wider = bins.fit(place, 2.0 * half_width, settings)?;
-    let bias = (wider.response - fitted.response) / if settings.curve == Curve::Constant { 3.0 } else { 15.0 };
+    let bias = (wider.response - fitted.response)
+        / if settings.curve == Curve::Constant {
+            3.0
+        } else {
+            15.0
+        };
     Some(FrfPoint {
         frequency_hz: place * bins.bin_hz(),
         response: fitted.response,

@@ -22,15 +22,25 @@ pub(super) struct NoiseFloor {
 
 impl NoiseFloor {
     /// The noise between two places, and somewhat beyond.
-    pub(super) fn of(bins: &impl Bins, (low, high): (f64, f64), settings: &EstimatorSettings) -> Self {
-        Self { rests: left(bins, (low, high), settings) }
+    pub(super) fn of(
+        bins: &impl Bins,
+        (low, high): (f64, f64),
+        settings: &EstimatorSettings,
+    ) -> Self {
+        Self {
+            rests: left(bins, (low, high), settings),
+        }
     }
 
     /// E|N|^2 in a bin around a place, weighted towards it.
     pub(super) fn power(&self, place: f64, half_width: f64) -> f64 {
         let reach = NOISE_WIDTH * half_width;
-        let low = self.rests.partition_point(|rest| rest.place <= place - reach);
-        let near = self.rests[low..].iter().take_while(|rest| rest.place < place + reach);
+        let low = self
+            .rests
+            .partition_point(|rest| rest.place <= place - reach);
+        let near = self.rests[low..]
+            .iter()
+            .take_while(|rest| rest.place < place + reach);
         let (residual, freedom) = near.fold((0.0, 0.0), |(residual, freedom), rest| {
             let w = libm::cos(core::f64::consts::FRAC_PI_2 * (rest.place - place) / reach).powi(2);
             (residual + w * rest.residual, freedom + w * rest.freedom)
@@ -48,7 +58,11 @@ fn left(bins: &impl Bins, (low, high): (f64, f64), settings: &EstimatorSettings)
     while place <= end {
         let half_width = settings.half_width(place, bins.bin_hz());
         let fitted = bins.fit(place, half_width, settings);
-        rests.extend(fitted.map(|f| Rest { place, residual: f.residual, freedom: f.freedom }));
+        rests.extend(fitted.map(|f| Rest {
+            place,
+            residual: f.residual,
+            freedom: f.freedom,
+        }));
         place += half_width;
     }
     rests

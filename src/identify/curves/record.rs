@@ -20,20 +20,36 @@ pub(super) struct Record {
 
 impl Record {
     pub(super) fn new(signals: &Signals) -> Self {
-        Self::of(Spectra::new(signals), signals.rate_hz / signals.len() as f64)
+        Self::of(
+            Spectra::new(signals),
+            signals.rate_hz / signals.len() as f64,
+        )
     }
 
     pub(super) fn of(Spectra { mut input, output }: Spectra, bin_hz: f64) -> Self {
         let power = input[1..].iter().map(|u| u.norm_sqr()).sum::<f64>() / (input.len() - 1) as f64;
-        for u in input.iter_mut().filter(|u| u.norm_sqr() <= DEAD_RATIO * DEAD_RATIO * power) {
+        for u in input
+            .iter_mut()
+            .filter(|u| u.norm_sqr() <= DEAD_RATIO * DEAD_RATIO * power)
+        {
             *u = Complex::default();
         }
-        Self { input, output, bin_hz }
+        Self {
+            input,
+            output,
+            bin_hz,
+        }
     }
 
     /// From output to input, where there is an input.
     pub(super) fn swapped(&self) -> Self {
-        let alive = |(u, y): (&Complex<f64>, &Complex<f64>)| if u.norm_sqr() > 0.0 { *y } else { Complex::default() };
+        let alive = |(u, y): (&Complex<f64>, &Complex<f64>)| {
+            if u.norm_sqr() > 0.0 {
+                *y
+            } else {
+                Complex::default()
+            }
+        };
         Self {
             input: self.input.iter().zip(&self.output).map(alive).collect(),
             output: self.input.clone(),
@@ -45,9 +61,19 @@ impl Record {
     pub(super) fn window(&self, place: f64, half_width: f64) -> Window {
         let low = (place - half_width).floor().max(0.0) as usize + 1;
         let high = ((place + half_width).ceil() as usize - 1).min(self.last_bin());
-        let x: Vec<f64> = (low..=high).map(|k| (k as f64 - place) / half_width).collect();
-        let root = x.iter().map(|x| libm::cos(core::f64::consts::FRAC_PI_2 * x)).collect();
-        Window { x, root, input: self.input[low..=high].to_vec(), output: self.output[low..=high].to_vec() }
+        let x: Vec<f64> = (low..=high)
+            .map(|k| (k as f64 - place) / half_width)
+            .collect();
+        let root = x
+            .iter()
+            .map(|x| libm::cos(core::f64::consts::FRAC_PI_2 * x))
+            .collect();
+        Window {
+            x,
+            root,
+            input: self.input[low..=high].to_vec(),
+            output: self.output[low..=high].to_vec(),
+        }
     }
 }
 

@@ -41,7 +41,12 @@ impl EstimatorSettings {
     pub fn check(&self) -> Result<(), IdentifyError> {
         check_setting("min_half_width_bins", self.min_half_width_bins, 2.0, 1e4)?;
         check_setting("resolution_ratio", self.resolution_ratio, 0.0, 0.1)?;
-        check_setting("frequencies", self.frequencies.map_or(2.0, |count| count as f64), 2.0, 1e6)?;
+        check_setting(
+            "frequencies",
+            self.frequencies.map_or(2.0, |count| count as f64),
+            2.0,
+            1e6,
+        )?;
         let mut above_hz = f64::MIN_POSITIVE;
         for point in &self.resolution {
             check_setting("resolution.frequency_hz", point.frequency_hz, above_hz, 1e5)?;

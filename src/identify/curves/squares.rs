@@ -21,7 +21,10 @@ pub(super) struct Squares {
 }
 
 /// Solves for `columns`, of equal length with `right`; `None` where they are not independent, or not finite.
-pub(super) fn solve(mut columns: Vec<Vec<Complex<f64>>>, mut right: Vec<Complex<f64>>) -> Option<Squares> {
+pub(super) fn solve(
+    mut columns: Vec<Vec<Complex<f64>>>,
+    mut right: Vec<Complex<f64>>,
+) -> Option<Squares> {
     let count = columns.len();
     // R of columns = Q R, row by row, with Q* right as its last column.
     let mut above = vec![vec![Complex::default(); count + 1]; count];
@@ -43,7 +46,12 @@ pub(super) fn solve(mut columns: Vec<Vec<Complex<f64>>>, mut right: Vec<Complex<
         above[d][count] = take_off(q, &mut right);
     }
     let solution = back(&above, |d| above[d][count]);
-    Some(Squares { solution, residual: right, first: first(&columns, &above), leverage: leverage(&columns) })
+    Some(Squares {
+        solution,
+        residual: right,
+        first: first(&columns, &above),
+        leverage: leverage(&columns),
+    })
 }
 
 fn power(column: &[Complex<f64>]) -> f64 {
@@ -61,7 +69,9 @@ fn take_off(q: &[Complex<f64>], column: &mut [Complex<f64>]) -> Complex<f64> {
 fn back(above: &[Vec<Complex<f64>>], right: impl Fn(usize) -> Complex<f64>) -> Vec<Complex<f64>> {
     let mut solution = vec![Complex::default(); above.len()];
     for d in (0..above.len()).rev() {
-        let known: Complex<f64> = (d + 1..above.len()).map(|e| above[d][e] * solution[e]).sum();
+        let known: Complex<f64> = (d + 1..above.len())
+            .map(|e| above[d][e] * solution[e])
+            .sum();
         solution[d] = (right(d) - known) / above[d][d];
     }
     solution
@@ -73,12 +83,20 @@ fn first(q: &[Vec<Complex<f64>>], above: &[Vec<Complex<f64>>]) -> Vec<Complex<f6
     let mut row = vec![Complex::default(); above.len()];
     for d in 0..above.len() {
         let known: Complex<f64> = (0..d).map(|e| row[e] * above[e][d]).sum();
-        let one = if d == 0 { Complex::from(1.0) } else { Complex::default() };
+        let one = if d == 0 {
+            Complex::from(1.0)
+        } else {
+            Complex::default()
+        };
         row[d] = (one - known) / above[d][d];
     }
-    (0..q[0].len()).map(|j| row.iter().zip(q).map(|(v, q)| v * q[j].conj()).sum()).collect()
+    (0..q[0].len())
+        .map(|j| row.iter().zip(q).map(|(v, q)| v * q[j].conj()).sum())
+        .collect()
 }
 
 fn leverage(q: &[Vec<Complex<f64>>]) -> Vec<f64> {
-    (0..q[0].len()).map(|j| q.iter().map(|q| q[j].norm_sqr()).sum()).collect()
+    (0..q[0].len())
+        .map(|j| q.iter().map(|q| q[j].norm_sqr()).sum())
+        .collect()
 }

@@ -31,7 +31,9 @@ pub fn with_distortion(blocks: &[Block]) -> Vec<Block> {
     if blocks.len() < 2 * REACH + 1 {
         return blocks.to_vec();
     }
-    let rough: Vec<f64> = (0..blocks.len()).map(|k| roughness(blocks, k) / blocks[k].response.norm_sqr()).collect();
+    let rough: Vec<f64> = (0..blocks.len())
+        .map(|k| roughness(blocks, k) / blocks[k].response.norm_sqr())
+        .collect();
     let around = |k: usize| {
         let near = &rough[k.saturating_sub(REACH)..(k + REACH + 1).min(rough.len())];
         near.iter().sum::<f64>() / near.len() as f64
@@ -49,15 +51,23 @@ fn roughness(blocks: &[Block], line: usize) -> f64 {
     let low = line.saturating_sub(REACH).min(blocks.len() - 2 * REACH - 1);
     let near = &blocks[low..low + 2 * REACH + 1];
     let reach_hz = near[2 * REACH].frequency_hz - near[0].frequency_hz;
-    let x: Vec<f64> =
-        near.iter().map(|b| 2.0 * REACH as f64 * (b.frequency_hz - blocks[line].frequency_hz) / reach_hz).collect();
+    let x: Vec<f64> = near
+        .iter()
+        .map(|b| 2.0 * REACH as f64 * (b.frequency_hz - blocks[line].frequency_hz) / reach_hz)
+        .collect();
     let mut below = vec![Complex::new(1.0, 0.0); x.len()];
     let mut left = f64::INFINITY;
     for _ in 0..FITS {
-        let Some(curve) = curve(&x, near, &below) else { break };
+        let Some(curve) = curve(&x, near, &below) else {
+            break;
+        };
         below = x.iter().map(|x| not_zero(curve[3] * *x + 1.0)).collect();
         let at = |k: usize| (curve[0] + curve[1] * x[k] + curve[2] * (x[k] * x[k])) / below[k];
-        left = near.iter().enumerate().map(|(k, block)| (block.response - at(k)).norm_sqr()).sum();
+        left = near
+            .iter()
+            .enumerate()
+            .map(|(k, block)| (block.response - at(k)).norm_sqr())
+            .sum();
     }
     left / (x.len() - PARAMETERS) as f64
 }
@@ -73,14 +83,28 @@ fn curve(x: &[f64], near: &[Block], below: &[Complex<f64>]) -> Option<DVector<Co
         entry / below[k]
     });
     // Columns of the same size: the last is in other units.
-    let size: Vec<f64> = matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
-    let scaled = DMatrix::from_fn(x.len(), PARAMETERS, |k, column| matrix[(k, column)] / size[column]);
+    let size: Vec<f64> = matrix
+        .column_iter()
+        .map(|column| column.norm().max(f64::MIN_POSITIVE))
+        .collect();
+    let scaled = DMatrix::from_fn(x.len(), PARAMETERS, |k, column| {
+        matrix[(k, column)] / size[column]
+    });
     let right = DVector::from_fn(x.len(), |k, _| h(k) / below[k]);
-    let finite = scaled.iter().chain(right.iter()).all(|entry| entry.re.is_finite() && entry.im.is_finite());
+    let finite = scaled
+        .iter()
+        .chain(right.iter())
+        .all(|entry| entry.re.is_finite() && entry.im.is_finite());
     let solved = finite.then(|| scaled.svd(true, true).solve(&right, ALIKE).ok())??;
-    Some(DVector::from_fn(PARAMETERS, |column, _| solved[column] / size[column]))
+    Some(DVector::from_fn(PARAMETERS, |column, _| {
+        solved[column] / size[column]
+    }))
 }
 
 fn not_zero(below: Complex<f64>) -> Complex<f64> {
-    if below.norm() < SHARPEST { Complex::new(SHARPEST, 0.0) } else { below }
+    if below.norm() < SHARPEST {
+        Complex::new(SHARPEST, 0.0)
+    } else {
+        below
+    }
 }

@@ -75,7 +75,8 @@ pub fn harmonics(
 ) -> Result<Option<Harmonics>, IdentifyError> {
     let lines = lines(signals, band_hz, repetition)?;
     let scale = Scale::of(&lines, signals.rate_hz, repetition.period);
-    let levels = |of: &mut dyn Iterator<Item = &Line>| of.map(|line| scale.level(line)).collect::<Vec<_>>();
+    let levels =
+        |of: &mut dyn Iterator<Item = &Line>| of.map(|line| scale.level(line)).collect::<Vec<_>>();
     let left_out = |parity: usize| lines.iter().filter(move |line| line.number % 2 == parity);
     let quiet = |line: &&Line| mean(&line.input).norm() <= QUIET_RATIO * scale.largest_input;
     let found = Harmonics {
@@ -114,7 +115,10 @@ impl Scale {
     }
 
     fn level(&self, line: &Line) -> Level {
-        let (power, of_mean) = (mean(&line.output).norm_sqr(), variance_of_mean(&line.output));
+        let (power, of_mean) = (
+            mean(&line.output).norm_sqr(),
+            variance_of_mean(&line.output),
+        );
         let freedom = self.periods as f64 - 1.0;
         Level {
             frequency_hz: line.number as f64 * self.line_hz,
@@ -135,9 +139,14 @@ impl Harmonics {
     /// The same around a frequency: the mean of the nearest of some lines, which rise; 0 where there are none.
     pub fn around_m2(&self, lines: &[Level], frequency_hz: f64) -> f64 {
         let above = lines.partition_point(|line| line.frequency_hz < frequency_hz);
-        let first = above.saturating_sub(AROUND / 2).min(lines.len().saturating_sub(AROUND));
+        let first = above
+            .saturating_sub(AROUND / 2)
+            .min(lines.len().saturating_sub(AROUND));
         let near = &lines[first..(first + AROUND).min(lines.len())];
-        near.iter().map(|line| self.beyond_noise_m2(line)).sum::<f64>() / near.len().max(1) as f64
+        near.iter()
+            .map(|line| self.beyond_noise_m2(line))
+            .sum::<f64>()
+            / near.len().max(1) as f64
     }
 }
 
@@ -184,19 +193,34 @@ mod tests {
 
     /// Odd lines up to [`LAST`], the third of each four left out.
     fn excited_lines() -> Vec<usize> {
-        (1..=LAST).step_by(2).enumerate().filter(|(place, _)| place % 4 != 2).map(|(_, k)| k).collect()
+        (1..=LAST)
+            .step_by(2)
+            .enumerate()
+            .filter(|(place, _)| place % 4 != 2)
+            .map(|(_, k)| k)
+            .collect()
     }
 
     /// A record of `periods` of y = filter(u + a u^2 + b u^3), u of amplitude 1 a line, with white noise on every sample.
     fn record(seed: u64, (a, b): (f64, f64), noise_m: f64, periods: usize) -> Signals {
         let mut random = Pcg64::seed_from_u64(seed);
-        let lines: Vec<(usize, f64)> =
-            excited_lines().into_iter().map(|k| (k, std::f64::consts::TAU * uniform(&mut random))).collect();
+        let lines: Vec<(usize, f64)> = excited_lines()
+            .into_iter()
+            .map(|k| (k, std::f64::consts::TAU * uniform(&mut random)))
+            .collect();
         let turn = std::f64::consts::TAU / PERIOD as f64;
         let input: Vec<f64> = (0..PERIOD)
-            .map(|n| lines.iter().map(|(k, phase)| (turn * (k * n % PERIOD) as f64 + phase).cos()).sum())
+            .map(|n| {
+                lines
+                    .iter()
+                    .map(|(k, phase)| (turn * (k * n % PERIOD) as f64 + phase).cos())
+                    .sum()
+            })
             .collect();
-        let mut static_part: Vec<f64> = input.iter().map(|u| u + a * u * u + b * u * u * u).collect();
+        let mut static_part: Vec<f64> = input
+            .iter()
+            .map(|u| u + a * u * u + b * u * u * u)
+            .collect();
         let fft = crate::identify::spectrum::RealFft::new(PERIOD);
         let spectrum = fft.transform(&mut static_part);
         let output: Vec<f64> = (0..PERIOD)
@@ -210,27 +234,52 @@ mod tests {
                 (1..PERIOD / 2).map(of).sum()
             })
             .collect();
-        let repeated = |one: &[f64]| one.iter().copied().cycle().take(periods * PERIOD).collect::<Vec<f64>>();
-        let output_m = repeated(&output).into_iter().map(|y| y + noise_m * normal(&mut random)).collect();
-        Signals { rate_hz: PERIOD as f64, input_a: repeated(&input), output_m }
+        let repeated = |one: &[f64]| {
+            one.iter()
+                .copied()
+                .cycle()
+                .take(periods * PERIOD)
+                .collect::<Vec<f64>>()
+        };
+        let output_m = repeated(&output)
+            .into_iter()
+            .map(|y| y + noise_m * normal(&mut random))
+            .collect();
+        Signals {
+            rate_hz: PERIOD as f64,
+            input_a: repeated(&input),
+            output_m,
+        }
     }
 
     fn shown(signals: &Signals) -> Harmonics {
-        let repetition = Repetition { period: PERIOD, skip: 0 };
-        harmonics(signals, (1.0, LAST as f64), repetition).unwrap().expect("lines left out")
+        let repetition = Repetition {
+            period: PERIOD,
+            skip: 0,
+        };
+        harmonics(signals, (1.0, LAST as f64), repetition)
+            .unwrap()
+            .expect("lines left out")
     }
 
     /// E |Y|^2 as a square of an RMS at a line, of products of `order` lines: the sum over all unordered choices of signed lines
     /// that add up to it, each of a phase of its own, of (their orders x coefficient x amplitudes)^2.
     fn by_products(line: usize, order: usize, coefficient: f64) -> f64 {
-        let signed: Vec<i64> = excited_lines().iter().flat_map(|k| [-(*k as i64), *k as i64]).collect();
+        let signed: Vec<i64> = excited_lines()
+            .iter()
+            .flat_map(|k| [-(*k as i64), *k as i64])
+            .collect();
         let (target, half) = (line as i64, 0.5f64);
         let mut sum = 0.0;
         for (i, a) in signed.iter().enumerate() {
             for (j, b) in signed.iter().enumerate().skip(i) {
                 if order == 2 {
                     let orders = if i == j { 1.0 } else { 2.0 };
-                    sum += if a + b == target { (orders * half * half * coefficient).powi(2) } else { 0.0 };
+                    sum += if a + b == target {
+                        (orders * half * half * coefficient).powi(2)
+                    } else {
+                        0.0
+                    };
                     continue;
                 }
                 for (l, c) in signed.iter().enumerate().skip(j) {
@@ -239,7 +288,11 @@ mod tests {
                         (false, false) => 6.0,
                         _ => 3.0,
                     };
-                    sum += if a + b + c == target { (orders * half.powi(3) * coefficient).powi(2) } else { 0.0 };
+                    sum += if a + b + c == target {
+                        (orders * half.powi(3) * coefficient).powi(2)
+                    } else {
+                        0.0
+                    };
                 }
             }
         }
@@ -255,11 +308,19 @@ mod tests {
         let seeds = 300;
         for seed in 0..seeds {
             let harmonics = shown(&record(seed, (a, b), 1e-3, 6));
-            let sum = |lines: &[Level]| lines.iter().map(|l| harmonics.beyond_noise_m2(l)).sum::<f64>();
+            let sum = |lines: &[Level]| {
+                lines
+                    .iter()
+                    .map(|l| harmonics.beyond_noise_m2(l))
+                    .sum::<f64>()
+            };
             (odd, even) = (odd + sum(&harmonics.odd), even + sum(&harmonics.even));
         }
-        let expected_odd: f64 =
-            (1..=LAST).step_by(2).filter(|k| !excited_lines().contains(k)).map(|k| by_products(k, 3, b)).sum();
+        let expected_odd: f64 = (1..=LAST)
+            .step_by(2)
+            .filter(|k| !excited_lines().contains(k))
+            .map(|k| by_products(k, 3, b))
+            .sum();
         let expected_even: f64 = (2..=LAST).step_by(2).map(|k| by_products(k, 2, a)).sum();
         // A line's power is that of a sum of many phases, its sigma its mean, and that of all lines no larger were they one: 1/sqrt(300) =
         // 5.8 %, of which three.
@@ -271,13 +332,23 @@ mod tests {
 
     #[test]
     fn even_distortion_alone_shows_at_even_lines_and_odd_at_odd_ones() {
-        for (terms, odd, even) in [((1e-3, 0.0), false, true), ((0.0, 2e-5), true, false), ((1e-3, 2e-5), true, true)] {
+        for (terms, odd, even) in [
+            ((1e-3, 0.0), false, true),
+            ((0.0, 2e-5), true, false),
+            ((1e-3, 2e-5), true, true),
+        ] {
             let harmonics = shown(&record(4, terms, 1e-4, 6));
-            let (by_odd, by_even) = (by_noise_alone(&harmonics.odd), by_noise_alone(&harmonics.even));
+            let (by_odd, by_even) = (
+                by_noise_alone(&harmonics.odd),
+                by_noise_alone(&harmonics.even),
+            );
             // Found by far; where it is not, noise explains it: once in a thousand it would not.
             assert_eq!(by_odd < 1e-9, odd, "{terms:?}: {by_odd}");
             assert_eq!(by_even < 1e-9, even, "{terms:?}: {by_even}");
-            assert!((by_odd > 1e-3) != odd && (by_even > 1e-3) != even, "{terms:?}: {by_odd} {by_even}");
+            assert!(
+                (by_odd > 1e-3) != odd && (by_even > 1e-3) != even,
+                "{terms:?}: {by_odd} {by_even}"
+            );
         }
     }
 
@@ -292,8 +363,12 @@ mod tests {
                 below[0] += u32::from(probability < 0.1);
                 below[1] += u32::from(probability < 1e-3);
             }
-            let high: Vec<f64> =
-                harmonics.even.iter().filter(|l| l.frequency_hz > 20.0).map(|line| line.noise_m2).collect();
+            let high: Vec<f64> = harmonics
+                .even
+                .iter()
+                .filter(|l| l.frequency_hz > 20.0)
+                .map(|line| line.noise_m2)
+                .collect();
             level += high.iter().sum::<f64>() / high.len() as f64;
         }
         // 400 probabilities: 40 below 0.1, of which sigma is 6; three of these. Below 0.001 are 0.4; five and more come once in
@@ -314,19 +389,31 @@ mod tests {
             *u += 1e-3 * (turn * left_out * n as f64).cos();
         }
         let fewer = shown(&signals);
-        assert_eq!((fewer.odd.len(), fewer.even.len()), (all.odd.len() - 1, all.even.len()));
+        assert_eq!(
+            (fewer.odd.len(), fewer.even.len()),
+            (all.odd.len() - 1, all.even.len())
+        );
         assert!(fewer.odd.iter().all(|line| line.frequency_hz != left_out));
         // Every line excited: a pulse.
         for (n, u) in signals.input_a.iter_mut().enumerate() {
             *u = f64::from(u8::from(n % PERIOD == 0));
         }
-        let repetition = Repetition { period: PERIOD, skip: 0 };
+        let repetition = Repetition {
+            period: PERIOD,
+            skip: 0,
+        };
         assert_eq!(harmonics(&signals, (1.0, 79.0), repetition), Ok(None));
     }
 
     #[test]
     fn the_probability_is_that_of_a_sum_of_exponentials() {
-        let level = |surprise| Level { frequency_hz: 1.0, input_a2: 0.0, power_m2: 0.0, noise_m2: 0.0, surprise };
+        let level = |surprise| Level {
+            frequency_hz: 1.0,
+            input_a2: 0.0,
+            power_m2: 0.0,
+            noise_m2: 0.0,
+            surprise,
+        };
         assert_eq!(by_noise_alone(&[]), 1.0);
         // exp(-x), (1 + x) exp(-x): two roundings of numbers near 1.
         assert!((by_noise_alone(&[level(2.0)]) - (-2.0f64).exp()).abs() < 1e-15);

@@ -75,8 +75,15 @@ pub struct Linearity {
 impl Linearity {
     /// What the lines say.
     pub fn of(harmonics: Harmonics) -> Linearity {
-        let bands = octaves(&harmonics.excited).into_iter().map(|lines| share(&harmonics, lines)).collect();
-        Linearity { whole: share(&harmonics, &harmonics.excited), bands, harmonics }
+        let bands = octaves(&harmonics.excited)
+            .into_iter()
+            .map(|lines| share(&harmonics, lines))
+            .collect();
+        Linearity {
+            whole: share(&harmonics, &harmonics.excited),
+            bands,
+            harmonics,
+        }
     }
 
     /// The blocks with the power of odd distortion in their variances, where it was found: to a fit it is a noise that more
@@ -85,7 +92,10 @@ impl Linearity {
         if !self.whole.odd.is_some_and(|odd| odd.is_found()) {
             return blocks.to_vec();
         }
-        let with = |block: &Block| Block { variance: block.variance + self.odd_variance(block.frequency_hz), ..*block };
+        let with = |block: &Block| Block {
+            variance: block.variance + self.odd_variance(block.frequency_hz),
+            ..*block
+        };
         blocks.iter().map(with).collect()
     }
 
@@ -108,7 +118,11 @@ impl Distortion {
 impl Share {
     /// What distortion takes of the coherence.
     pub fn missing_by_distortion(&self) -> f64 {
-        self.odd.iter().chain(&self.even).map(|kind| kind.missing).sum()
+        self.odd
+            .iter()
+            .chain(&self.even)
+            .map(|kind| kind.missing)
+            .sum()
     }
 
     /// The mean coherence that a linear response has with one period.
@@ -129,8 +143,17 @@ impl Share {
 
     /// The same in words, with the remedy.
     pub fn words(&self) -> String {
-        let part = |ratio: f64| if ratio == 0.0 { "0".into() } else { format!("{ratio:.2e}") };
-        let (noise, distortion) = (part(self.missing_by_noise), part(self.missing_by_distortion()));
+        let part = |ratio: f64| {
+            if ratio == 0.0 {
+                "0".into()
+            } else {
+                format!("{ratio:.2e}")
+            }
+        };
+        let (noise, distortion) = (
+            part(self.missing_by_noise),
+            part(self.missing_by_distortion()),
+        );
         let kinds = self.kinds();
         match self.cause() {
             Cause::Geometry => format!(
@@ -156,7 +179,11 @@ impl Share {
             Some(_) => Some(format!("{name} not beyond noise")),
             None => Some(format!("{name} not looked for")),
         };
-        [word("odd", self.odd), word("even", self.even)].into_iter().flatten().collect::<Vec<_>>().join(", ")
+        [word("odd", self.odd), word("even", self.even)]
+            .into_iter()
+            .flatten()
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
@@ -181,7 +208,11 @@ fn octaves(lines: &[Level]) -> Vec<&[Level]> {
             end_hz *= 2.0;
             count = rest.partition_point(|line| line.frequency_hz < end_hz);
         }
-        count = if rest.len() - count < LEAST_LINES { rest.len() } else { count };
+        count = if rest.len() - count < LEAST_LINES {
+            rest.len()
+        } else {
+            count
+        };
         parts.push(&rest[..count]);
         rest = &rest[count..];
     }
@@ -191,17 +222,25 @@ fn octaves(lines: &[Level]) -> Vec<&[Level]> {
 /// What some excited lines and those left out between them show.
 fn share(harmonics: &Harmonics, excited: &[Level]) -> Share {
     let ends = excited.first().zip(excited.last());
-    let band_hz = ends.map_or((0.0, 0.0), |(first, last)| (first.frequency_hz, last.frequency_hz));
+    let band_hz = ends.map_or((0.0, 0.0), |(first, last)| {
+        (first.frequency_hz, last.frequency_hz)
+    });
     let found = |lines: &[Level]| {
         let within = |f: f64| lines.partition_point(|line| line.frequency_hz < f);
         by_noise_alone(&lines[within(band_hz.0)..within(band_hz.1)])
     };
-    let probabilities = [&harmonics.odd, &harmonics.even].map(|lines| (!lines.is_empty()).then(|| found(lines)));
+    let probabilities =
+        [&harmonics.odd, &harmonics.even].map(|lines| (!lines.is_empty()).then(|| found(lines)));
     let mut sums = Sums::default();
     for line in excited {
         let around = |lines: &[Level]| harmonics.around_m2(lines, line.frequency_hz);
         let distortion = [around(&harmonics.odd), around(&harmonics.even)];
-        sums.add(harmonics.beyond_noise_m2(line), line.noise_m2, distortion, probabilities);
+        sums.add(
+            harmonics.beyond_noise_m2(line),
+            line.noise_m2,
+            distortion,
+            probabilities,
+        );
     }
     sums.share(band_hz, excited.len(), probabilities)
 }
@@ -219,9 +258,21 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, output_m2: f64, noise_m2: f64, distortion_m2: Both<f64>, probabilities: Both<Option<f64>>) {
+    fn add(
+        &mut self,
+        output_m2: f64,
+        noise_m2: f64,
+        distortion_m2: Both<f64>,
+        probabilities: Both<Option<f64>>,
+    ) {
         let counts = |k: usize| probabilities[k].is_some_and(|p| p < FALSE_ALARM);
-        let counted = [0, 1].map(|k| if counts(k) { distortion_m2[k].max(0.0) } else { 0.0 });
+        let counted = [0, 1].map(|k| {
+            if counts(k) {
+                distortion_m2[k].max(0.0)
+            } else {
+                0.0
+            }
+        });
         let all_m2 = output_m2.max(0.0) + noise_m2 + counted[0] + counted[1];
         let part = |power_m2: f64| if all_m2 > 0.0 { power_m2 / all_m2 } else { 0.0 };
         self.output_m2 += output_m2;
@@ -259,7 +310,10 @@ mod tests {
     use super::*;
 
     /// Lines 1, 3, 5 ... of 1 Hz, every fourth left out, and the even ones between, all of them alike but for chance, which there is not.
-    fn harmonics((output_m2, noise_m2, odd_m2, even_m2): (f64, f64, f64, f64), surprise: Both<f64>) -> Harmonics {
+    fn harmonics(
+        (output_m2, noise_m2, odd_m2, even_m2): (f64, f64, f64, f64),
+        surprise: Both<f64>,
+    ) -> Harmonics {
         let level = |k: usize, power_m2: f64, surprise: f64| Level {
             frequency_hz: k as f64,
             input_a2: 4.0,
@@ -270,9 +324,20 @@ mod tests {
         let odd: Vec<usize> = (1..200).step_by(2).collect();
         let left_out = |k: &usize| k / 2 % 4 == 2;
         Harmonics {
-            excited: odd.iter().filter(|k| !left_out(k)).map(|k| level(*k, output_m2, 0.0)).collect(),
-            odd: odd.iter().filter(|k| left_out(k)).map(|k| level(*k, odd_m2, surprise[0])).collect(),
-            even: (2..200).step_by(2).map(|k| level(k, even_m2, surprise[1])).collect(),
+            excited: odd
+                .iter()
+                .filter(|k| !left_out(k))
+                .map(|k| level(*k, output_m2, 0.0))
+                .collect(),
+            odd: odd
+                .iter()
+                .filter(|k| left_out(k))
+                .map(|k| level(*k, odd_m2, surprise[0]))
+                .collect(),
+            even: (2..200)
+                .step_by(2)
+                .map(|k| level(k, even_m2, surprise[1]))
+                .collect(),
             periods: 8,
         }
     }
@@ -294,7 +359,12 @@ mod tests {
             assert!((found - expected).abs() < 1e-14, "{found} for {expected}");
         }
         assert!(odd.is_found() && even.is_found());
-        let blocks = [Block { frequency_hz: 51.0, spread_hz: 0.0, response: 1.0.into(), variance: 1.0 }];
+        let blocks = [Block {
+            frequency_hz: 51.0,
+            spread_hz: 0.0,
+            response: 1.0.into(),
+            variance: 1.0,
+        }];
         // 0.02 m^2 over 4 A^2.
         assert!((linearity.with_odd_distortion(&blocks)[0].variance - 1.005).abs() < 1e-14);
     }
@@ -303,12 +373,42 @@ mod tests {
     fn what_is_larger_is_the_cause_and_what_is_not_found_is_none() {
         let of = |powers, surprise| Linearity::of(harmonics(powers, surprise)).whole;
         for (powers, surprise, cause, words) in [
-            ((1.0, 0.01, 0.0, 0.07), [1.0, 20.0], Cause::Geometry, ["even found", "less amplitude"]),
-            ((1.0, 0.01, 0.02, 0.0), [20.0, 1.0], Cause::Geometry, ["odd found", "even not beyond noise"]),
-            ((1.0, 0.1, 0.0, 0.07), [1.0, 20.0], Cause::Noise, ["even found", "longer or more amplitude"]),
-            ((1.0, 0.01, 0.02, 0.07), [1.0, 1.0], Cause::Noise, ["odd not beyond noise", "longer or more amplitude"]),
-            ((1.0, 1e-4, 0.0, 0.0), [1.0, 1.0], Cause::None, ["nothing to speak of", "not beyond noise"]),
-            ((1.0, 1e-6, 0.0, 1e-5), [1.0, 20.0], Cause::Geometry, ["even found", "longer does not"]),
+            (
+                (1.0, 0.01, 0.0, 0.07),
+                [1.0, 20.0],
+                Cause::Geometry,
+                ["even found", "less amplitude"],
+            ),
+            (
+                (1.0, 0.01, 0.02, 0.0),
+                [20.0, 1.0],
+                Cause::Geometry,
+                ["odd found", "even not beyond noise"],
+            ),
+            (
+                (1.0, 0.1, 0.0, 0.07),
+                [1.0, 20.0],
+                Cause::Noise,
+                ["even found", "longer or more amplitude"],
+            ),
+            (
+                (1.0, 0.01, 0.02, 0.07),
+                [1.0, 1.0],
+                Cause::Noise,
+                ["odd not beyond noise", "longer or more amplitude"],
+            ),
+            (
+                (1.0, 1e-4, 0.0, 0.0),
+                [1.0, 1.0],
+                Cause::None,
+                ["nothing to speak of", "not beyond noise"],
+            ),
+            (
+                (1.0, 1e-6, 0.0, 1e-5),
+                [1.0, 20.0],
+                Cause::Geometry,
+                ["even found", "longer does not"],
+            ),
         ] {
             let share = of(powers, surprise);
             assert_eq!(share.cause(), cause, "{powers:?}");
@@ -321,17 +421,36 @@ mod tests {
     #[test]
     fn where_odd_distortion_is_not_found_blocks_stay_as_they_are() {
         let linearity = Linearity::of(harmonics((1.0, 0.01, 0.02, 0.07), [1.0, 20.0]));
-        let blocks = [Block { frequency_hz: 51.0, spread_hz: 0.0, response: 1.0.into(), variance: 1.0 }];
+        let blocks = [Block {
+            frequency_hz: 51.0,
+            spread_hz: 0.0,
+            response: 1.0.into(),
+            variance: 1.0,
+        }];
         assert_eq!(linearity.with_odd_distortion(&blocks), blocks);
     }
 
     #[test]
     fn bands_are_octaves_with_enough_lines_and_hold_every_line_once() {
         let linearity = Linearity::of(harmonics((1.0, 0.01, 0.0, 0.0), [1.0, 1.0]));
-        assert!(linearity.bands.iter().all(|band| band.lines >= LEAST_LINES), "{:?}", linearity.bands);
-        assert_eq!(linearity.bands.iter().map(|band| band.lines).sum::<usize>(), linearity.whole.lines);
+        assert!(
+            linearity.bands.iter().all(|band| band.lines >= LEAST_LINES),
+            "{:?}",
+            linearity.bands
+        );
+        assert_eq!(
+            linearity.bands.iter().map(|band| band.lines).sum::<usize>(),
+            linearity.whole.lines
+        );
         assert_eq!(linearity.whole.lines, 75);
         // 32 odd lines from 1 to 63 Hz less 8, 33 from 65 to 129 Hz less 8, 35 to 199 Hz less 9.
-        assert_eq!(linearity.bands.iter().map(|band| band.lines).collect::<Vec<_>>(), [24, 25, 26]);
+        assert_eq!(
+            linearity
+                .bands
+                .iter()
+                .map(|band| band.lines)
+                .collect::<Vec<_>>(),
+            [24, 25, 26]
+        );
     }
 }

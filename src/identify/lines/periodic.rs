@@ -56,16 +56,28 @@ pub struct Periods {
 ///
 /// # Errors
 /// When the signals, the band or the periods allow no estimate: see [`IdentifyError`].
-pub fn estimate(signals: &Signals, band_hz: (f64, f64), repetition: Repetition) -> Result<Periods, IdentifyError> {
+pub fn estimate(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    repetition: Repetition,
+) -> Result<Periods, IdentifyError> {
     let lines = lines(signals, band_hz, repetition)?;
     let line_hz = signals.rate_hz / repetition.period as f64;
     let count = lines.first().map_or(0, |line| line.input.len());
-    let mut periods = Periods { frf: Frf::default(), blocks: Vec::new(), count };
+    let mut periods = Periods {
+        frf: Frf::default(),
+        blocks: Vec::new(),
+        count,
+    };
     for line in excited(&lines) {
         periods.take(line, line_hz);
     }
     let (low_hz, high_hz) = band_hz;
-    if periods.blocks.is_empty() { Err(IdentifyError::NotExcited { low_hz, high_hz }) } else { Ok(periods) }
+    if periods.blocks.is_empty() {
+        Err(IdentifyError::NotExcited { low_hz, high_hz })
+    } else {
+        Ok(periods)
+    }
 }
 
 /// Every line of a band, one entry a period.
@@ -85,10 +97,23 @@ pub(super) fn lines(
 impl Periods {
     fn take(&mut self, line: &Line, line_hz: f64) {
         let (frequency_hz, response) = (line.number as f64 * line_hz, line.response());
-        let variance = line.variance().max(ROUNDING * ROUNDING * response.norm_sqr());
-        let point = FrfPoint { frequency_hz, response, coherence: line.coherence(), variance, resolution_hz: line_hz };
+        let variance = line
+            .variance()
+            .max(ROUNDING * ROUNDING * response.norm_sqr());
+        let point = FrfPoint {
+            frequency_hz,
+            response,
+            coherence: line.coherence(),
+            variance,
+            resolution_hz: line_hz,
+        };
         if self.frf.push(point) && variance > 0.0 {
-            self.blocks.push(Block { frequency_hz, spread_hz: 0.0, response, variance });
+            self.blocks.push(Block {
+                frequency_hz,
+                spread_hz: 0.0,
+                response,
+                variance,
+            });
         }
     }
 }
@@ -97,24 +122,41 @@ impl Periods {
 fn count(samples: usize, Repetition { period, skip }: Repetition) -> Result<usize, IdentifyError> {
     if period < LEAST_PERIOD || period > samples {
         let (value, least, most) = (period as f64, LEAST_PERIOD as f64, samples as f64);
-        return Err(IdentifyError::Setting { name: "period", value, least, most });
+        return Err(IdentifyError::Setting {
+            name: "period",
+            value,
+            least,
+            most,
+        });
     }
     let count = (samples / period).saturating_sub(skip).saturating_sub(1);
     if count < LEAST_PERIODS {
         let periods = samples / period;
-        return Err(IdentifyError::Periods { periods, skip, least: LEAST_PERIODS + 1 });
+        return Err(IdentifyError::Periods {
+            periods,
+            skip,
+            least: LEAST_PERIODS + 1,
+        });
     }
     Ok(count)
 }
 
 /// The spectra of the periods, drift taken off.
-fn spectra(samples: &[f64], Repetition { period, skip }: Repetition, count: usize) -> Vec<Vec<Complex<f64>>> {
+fn spectra(
+    samples: &[f64],
+    Repetition { period, skip }: Repetition,
+    count: usize,
+) -> Vec<Vec<Complex<f64>>> {
     let fft = RealFft::new(period);
     let of = |p: usize| {
         let start = (skip + p) * period;
         let slope = drift(samples, start, period) / period as f64;
         let straight = |(n, x): (usize, &f64)| x - slope * n as f64;
-        let mut straight: Vec<f64> = samples[start..start + period].iter().enumerate().map(straight).collect();
+        let mut straight: Vec<f64> = samples[start..start + period]
+            .iter()
+            .enumerate()
+            .map(straight)
+            .collect();
         fft.transform(&mut straight)
     };
     (0..count).map(of).collect()
@@ -123,10 +165,15 @@ fn spectra(samples: &[f64], Repetition { period, skip }: Repetition, count: usiz
 /// By how much a signal drifts over the period from `start` on: the mean of `x[n + period] - x[n]` for n around `start`, as far to
 /// both sides as there are samples.
 fn drift(samples: &[f64], start: usize, period: usize) -> f64 {
-    let reach = (period / DRIFT_PART).min(start).min(samples.len().saturating_sub(start + period + 1));
+    let reach = (period / DRIFT_PART)
+        .min(start)
+        .min(samples.len().saturating_sub(start + period + 1));
     let around = start - reach..=start + reach;
     let size = around.clone().count() as f64;
-    around.map(|n| samples[n + period] - samples[n]).sum::<f64>() / size
+    around
+        .map(|n| samples[n + period] - samples[n])
+        .sum::<f64>()
+        / size
 }
 
 /// One line of the spectrum over all periods.
@@ -139,8 +186,14 @@ pub(super) struct Line {
 
 impl Line {
     fn of(number: usize, input: &[Vec<Complex<f64>>], output: &[Vec<Complex<f64>>]) -> Line {
-        let line = |spectra: &[Vec<Complex<f64>>]| spectra.iter().map(|spectrum| spectrum[number]).collect();
-        Line { number, input: line(input), output: line(output) }
+        let line = |spectra: &[Vec<Complex<f64>>]| {
+            spectra.iter().map(|spectrum| spectrum[number]).collect()
+        };
+        Line {
+            number,
+            input: line(input),
+            output: line(output),
+        }
     }
 
     fn response(&self) -> Complex<f64> {
@@ -150,16 +203,30 @@ impl Line {
     /// E|error of H|^2.
     fn variance(&self) -> f64 {
         let response = self.response();
-        let left: Vec<_> = self.output.iter().zip(&self.input).map(|(y, u)| y - response * u).collect();
+        let left: Vec<_> = self
+            .output
+            .iter()
+            .zip(&self.input)
+            .map(|(y, u)| y - response * u)
+            .collect();
         variance_of_mean(&left) / mean(&self.input).norm_sqr()
     }
 
     /// |sum Y conj(U)|^2 / (sum |U|^2 sum |Y|^2) over the periods.
     fn coherence(&self) -> f64 {
         let power = |line: &[Complex<f64>]| line.iter().map(|x| x.norm_sqr()).sum::<f64>();
-        let cross: Complex<f64> = self.output.iter().zip(&self.input).map(|(y, u)| y * u.conj()).sum();
+        let cross: Complex<f64> = self
+            .output
+            .iter()
+            .zip(&self.input)
+            .map(|(y, u)| y * u.conj())
+            .sum();
         let output = power(&self.output);
-        if output > 0.0 { (cross.norm() / power(&self.input)) * (cross.norm() / output) } else { 0.0 }
+        if output > 0.0 {
+            (cross.norm() / power(&self.input)) * (cross.norm() / output)
+        } else {
+            0.0
+        }
     }
 }
 
@@ -175,7 +242,10 @@ pub(super) fn variance_of_mean(values: &[Complex<f64>]) -> f64 {
 
 /// The lines whose input is above its own noise, and not of another order than the largest.
 pub(super) fn excited(lines: &[Line]) -> impl Iterator<Item = &Line> {
-    let largest = lines.iter().map(|line| mean(&line.input).norm()).fold(0.0, f64::max);
+    let largest = lines
+        .iter()
+        .map(|line| mean(&line.input).norm())
+        .fold(0.0, f64::max);
     lines.iter().filter(move |line| {
         let amplitude = mean(&line.input).norm();
         let sigma = variance_of_mean(&line.input).sqrt();

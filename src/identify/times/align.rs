@@ -38,17 +38,29 @@ impl Readings {
     /// The positions at `start_s + k period_s`, k from 0 to `count` - 1. With fewer than two readings there is nothing to
     /// interpolate, and the answer is empty.
     pub fn at_regular_times(&self, start_s: f64, period_s: f64, count: usize) -> Vec<f64> {
-        let (Some(first_s), Some(last_s)) = (self.time_s.first(), self.time_s.last()) else { return Vec::new() };
+        let (Some(first_s), Some(last_s)) = (self.time_s.first(), self.time_s.last()) else {
+            return Vec::new();
+        };
         let spacing_s = (last_s - first_s) / (self.time_s.len().saturating_sub(1)) as f64;
         if !(spacing_s > 0.0 && spacing_s.is_finite()) {
             return Vec::new();
         }
         // A grid finer than the loop would have cells without readings; one coarser loses none.
-        let step_s = if spacing_s < 1.05 * period_s { period_s } else { spacing_s };
-        let from_s = if step_s == period_s { start_s } else { *first_s };
+        let step_s = if spacing_s < 1.05 * period_s {
+            period_s
+        } else {
+            spacing_s
+        };
+        let from_s = if step_s == period_s {
+            start_s
+        } else {
+            *first_s
+        };
         let cells = ((last_s - from_s) / step_s).round().max(0.0) as usize + 1;
         let grid = Grid::through(self, from_s, step_s, cells);
-        (0..count).map(|k| grid.at(start_s + k as f64 * period_s)).collect()
+        (0..count)
+            .map(|k| grid.at(start_s + k as f64 * period_s))
+            .collect()
     }
 }
 
@@ -64,10 +76,20 @@ impl Grid {
     fn through(readings: &Readings, from_s: f64, step_s: f64, cells: usize) -> Grid {
         let nearest = nearest(readings, from_s, step_s, cells);
         let values = nearest.iter().map(|(_, position_m)| *position_m).collect();
-        let mut grid = Grid { from_s, step_s, values };
+        let mut grid = Grid {
+            from_s,
+            step_s,
+            values,
+        };
         for _ in 0..REPETITIONS {
-            let missed: Vec<f64> = nearest.iter().map(|(time_s, position_m)| position_m - grid.at(*time_s)).collect();
-            grid.values.iter_mut().zip(&missed).for_each(|(value, missed)| *value += missed);
+            let missed: Vec<f64> = nearest
+                .iter()
+                .map(|(time_s, position_m)| position_m - grid.at(*time_s))
+                .collect();
+            grid.values
+                .iter_mut()
+                .zip(&missed)
+                .for_each(|(value, missed)| *value += missed);
         }
         grid
     }
@@ -76,7 +98,9 @@ impl Grid {
     fn at(&self, time_s: f64) -> f64 {
         let last = self.values.len() as i64 - 1;
         let value = |place: i64| self.values[place.clamp(0, last) as usize];
-        weights_at((time_s - self.from_s) / self.step_s).map(|(place, weight)| weight * value(place)).sum()
+        weights_at((time_s - self.from_s) / self.step_s)
+            .map(|(place, weight)| weight * value(place))
+            .sum()
     }
 }
 
@@ -86,7 +110,9 @@ fn nearest(readings: &Readings, from_s: f64, step_s: f64, cells: usize) -> Vec<(
     let times = &readings.time_s;
     let of = |cell: usize| {
         let at_s = from_s + cell as f64 * step_s;
-        while index + 1 < times.len() && (times[index + 1] - at_s).abs() <= (times[index] - at_s).abs() {
+        while index + 1 < times.len()
+            && (times[index + 1] - at_s).abs() <= (times[index] - at_s).abs()
+        {
             index += 1;
         }
         (times[index], readings.position_m[index])
@@ -100,8 +126,11 @@ mod tests {
 
     /// Three tones, at rest at both ends.
     fn signal(time_s: f64) -> f64 {
-        let fade =
-            if (0.0..=4.0).contains(&time_s) { (std::f64::consts::PI * time_s / 4.0).sin().powi(2) } else { 0.0 };
+        let fade = if (0.0..=4.0).contains(&time_s) {
+            (std::f64::consts::PI * time_s / 4.0).sin().powi(2)
+        } else {
+            0.0
+        };
         fade * [(3.0, 1.0), (31.0, 0.4), (170.0, 0.2)]
             .map(|(hz, a): (f64, f64)| a * (std::f64::consts::TAU * hz * time_s).sin())
             .iter()
@@ -111,7 +140,9 @@ mod tests {
     fn random() -> impl FnMut() -> f64 {
         let mut seed = 7u64;
         move || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (seed >> 11) as f64 / (1u64 << 53) as f64
         }
     }
@@ -119,7 +150,13 @@ mod tests {
     fn largest_error(readings: &Readings, offset_s: f64) -> f64 {
         let regular = readings.at_regular_times(offset_s, 1e-3, 4000);
         let error = |(k, y): (usize, &f64)| (y - signal(offset_s + k as f64 * 1e-3)).abs();
-        regular.iter().enumerate().skip(20).take(3960).map(error).fold(0.0, f64::max)
+        regular
+            .iter()
+            .enumerate()
+            .skip(20)
+            .take(3960)
+            .map(error)
+            .fold(0.0, f64::max)
     }
 
     #[test]
@@ -130,7 +167,11 @@ mod tests {
             readings.push(time_s, signal(time_s));
         });
         // 170 Hz is 0.52 of half the probe's rate, deep inside the pass band of the window: 1e-4, and the table's 1e-7.
-        assert!(largest_error(&readings, -0.0017) < 1e-3, "{}", largest_error(&readings, -0.0017));
+        assert!(
+            largest_error(&readings, -0.0017) < 1e-3,
+            "{}",
+            largest_error(&readings, -0.0017)
+        );
     }
 
     #[test]
@@ -141,7 +182,11 @@ mod tests {
             readings.push(time_s, signal(time_s));
         });
         // Taken as they are, the readings err by 0.2 x 2 pi 170 Hz x 125 us = 2.7 %.
-        assert!(largest_error(&readings, -0.000325) < 1e-3, "{}", largest_error(&readings, -0.000325));
+        assert!(
+            largest_error(&readings, -0.000325) < 1e-3,
+            "{}",
+            largest_error(&readings, -0.000325)
+        );
     }
 
     #[test]
@@ -155,6 +200,10 @@ mod tests {
         assert!(readings.position_m.iter().all(|y| *y < 2.0));
         // A lost reading is filled by its neighbour's, and the iteration finds what is consistent: 10 % at 170 Hz.
         assert!(largest_error(&readings, 0.0) < 0.25);
-        assert!(Readings::default().at_regular_times(0.0, 1e-3, 5).is_empty());
+        assert!(
+            Readings::default()
+                .at_regular_times(0.0, 1e-3, 5)
+                .is_empty()
+        );
     }
 }

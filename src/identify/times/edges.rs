@@ -51,7 +51,13 @@ mod tests {
         let step = |(k, ((set, before), late)): (usize, ((&f64, &f64), &f64))| {
             Complex::from_polar(1.0, -omega * (k as f64 + late)) * (set - before)
         };
-        set_a.iter().zip(before).zip(late).enumerate().map(step).sum()
+        set_a
+            .iter()
+            .zip(before)
+            .zip(late)
+            .enumerate()
+            .map(step)
+            .sum()
     }
 
     #[test]
@@ -64,20 +70,39 @@ mod tests {
         let regular = at_regular_times(&set_a, &late);
         // White steps of 0.5 A: a spectrum of 20 or so; the kernel is flat to 1e-4, its table to 1e-7.
         for omega in [0.01, 0.1, 0.5, 1.0, 1.8, 2.4] {
-            let (truth, ours) = (spectrum(&set_a, &late, omega), spectrum(&regular, &vec![0.0; n], omega));
+            let (truth, ours) = (
+                spectrum(&set_a, &late, omega),
+                spectrum(&regular, &vec![0.0; n], omega),
+            );
             let untouched = spectrum(&set_a, &vec![0.0; n], omega);
             assert!((truth - ours).norm() < 0.02, "{omega}: {truth} {ours}");
-            assert!(omega < 0.4 || (truth - untouched).norm() > 0.5, "the times matter: {truth} {untouched}");
+            assert!(
+                omega < 0.4 || (truth - untouched).norm() > 0.5,
+                "the times matter: {truth} {untouched}"
+            );
         }
     }
 
     #[test]
     fn regular_times_change_nothing_and_a_shift_by_whole_periods_is_a_shift() {
-        let set_a: Vec<f64> = (0..200).map(|k| if k < 150 { (0.3 * f64::from(k)).sin() } else { 0.0 }).collect();
+        let set_a: Vec<f64> = (0..200)
+            .map(|k| {
+                if k < 150 {
+                    (0.3 * f64::from(k)).sin()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
         let same = at_regular_times(&set_a, &[0.0; 200]);
         let later = at_regular_times(&set_a, &[2.0; 200]);
         // A sum of 200 steps, each exact to a rounding.
         assert!(set_a.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-13));
-        assert!(set_a.iter().zip(&later[2..]).all(|(a, b)| (a - b).abs() < 1e-13));
+        assert!(
+            set_a
+                .iter()
+                .zip(&later[2..])
+                .all(|(a, b)| (a - b).abs() < 1e-13)
+        );
     }
 }

@@ -34,7 +34,11 @@ fn weights() -> Vec<f64> {
     let one = |i: usize| {
         let x = i as f64 / TABLE as f64;
         let inside = 1.0 - (x / HALF_WIDTH as f64) * (x / HALF_WIDTH as f64);
-        if inside < 0.0 { 0.0 } else { sinc(x) * bessel_i0(BETA * inside.sqrt()) / bessel_i0(BETA) }
+        if inside < 0.0 {
+            0.0
+        } else {
+            sinc(x) * bessel_i0(BETA * inside.sqrt()) / bessel_i0(BETA)
+        }
     };
     (0..=HALF_WIDTH as usize * TABLE + 1).map(one).collect()
 }
@@ -42,7 +46,11 @@ fn weights() -> Vec<f64> {
 /// sin(pi x)/(pi x).
 fn sinc(x: f64) -> f64 {
     let angle = std::f64::consts::PI * x;
-    if angle == 0.0 { 1.0 } else { libm::sin(angle) / angle }
+    if angle == 0.0 {
+        1.0
+    } else {
+        libm::sin(angle) / angle
+    }
 }
 
 /// The modified Bessel function of order 0 by its series, sum of ((x/2)^k/k!)^2.

@@ -23,7 +23,10 @@ pub struct Held {
 }
 
 fn who(pid: Option<NonZeroU32>) -> String {
-    pid.map_or_else(|| "another process".to_owned(), |pid| format!("process {pid}"))
+    pid.map_or_else(
+        || "another process".to_owned(),
+        |pid| format!("process {pid}"),
+    )
 }
 
 fn kill(pid: Option<NonZeroU32>) -> String {
@@ -43,10 +46,14 @@ impl Claim {
     /// Claims `node` on `interface`, or tells the process that has it.
     pub fn new(interface: &str, node: u8) -> Result<Claim, Held> {
         let name = format!("bench-can/{interface}/{node}");
-        let address = SocketAddr::from_abstract_name(&name).map_err(|_| Held { node, pid: None })?;
+        let address =
+            SocketAddr::from_abstract_name(&name).map_err(|_| Held { node, pid: None })?;
         match UnixListener::bind_addr(&address) {
             Ok(listener) => Ok(Claim(Some(listener))),
-            Err(_) => Err(Held { node, pid: holder(&name).ok().flatten() }),
+            Err(_) => Err(Held {
+                node,
+                pid: holder(&name).ok().flatten(),
+            }),
         }
     }
 }
@@ -58,7 +65,9 @@ fn holder(name: &str) -> nix::Result<Option<NonZeroU32>> {
     let fd = std::os::fd::AsRawFd::as_raw_fd(&socket);
     socket::connect(fd, &UnixAddr::new_abstract(name.as_bytes())?)?;
     let credentials = socket::getsockopt(&socket, sockopt::PeerCredentials)?;
-    Ok(u32::try_from(credentials.pid()).ok().and_then(NonZeroU32::new))
+    Ok(u32::try_from(credentials.pid())
+        .ok()
+        .and_then(NonZeroU32::new))
 }
 
 #[cfg(test)]
@@ -71,8 +80,9 @@ mod tests {
         let interface = format!("test-{me}");
         let first = Claim::new(&interface, 5).unwrap();
         let held = Claim::new(&interface, 5).unwrap_err();
-        let text =
-            format!("node 5 is driven by process {me} already; end that first (`kill {me}`), or choose another node");
+        let text = format!(
+            "node 5 is driven by process {me} already; end that first (`kill {me}`), or choose another node"
+        );
         assert_eq!((held.node, held.to_string()), (5, text));
         assert!(Claim::new(&interface, 6).is_ok(), "another node is free");
         drop(first);
@@ -81,7 +91,8 @@ mod tests {
 
     #[test]
     fn a_holder_that_is_not_known_is_not_to_be_killed() {
-        let text = "node 5 is driven by another process already; end that first, or choose another node";
+        let text =
+            "node 5 is driven by another process already; end that first, or choose another node";
         assert_eq!(Held { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller
     }
 }

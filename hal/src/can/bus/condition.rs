@@ -33,7 +33,11 @@ const RESTARTED: u32 = 0x100;
 impl Condition {
     /// Reads the class bits and data of an error frame.
     pub fn decode(class: u32, data: &[u8]) -> Condition {
-        let controller = if class & CONTROLLER != 0 { data.get(1).copied().unwrap_or(0) } else { 0 };
+        let controller = if class & CONTROLLER != 0 {
+            data.get(1).copied().unwrap_or(0)
+        } else {
+            0
+        };
         match () {
             () if class & BUS_OFF != 0 => Condition::BusOff,
             () if controller & 0x30 != 0 => Condition::Passive,
@@ -81,15 +85,31 @@ mod tests {
             (0x044, [0, 0x40, 0, 0, 0, 0, 0, 0], Condition::BusOff),
         ];
         for (class, data, condition) in cases {
-            assert_eq!(Condition::decode(class, &data), condition, "class {class:#x} {data:?}");
+            assert_eq!(
+                Condition::decode(class, &data),
+                condition,
+                "class {class:#x} {data:?}"
+            );
         }
-        assert_eq!(Condition::decode(0x004, &[]), Condition::Noise, "short data says nothing");
+        assert_eq!(
+            Condition::decode(0x004, &[]),
+            Condition::Noise,
+            "short data says nothing"
+        );
     }
 
     #[test]
     fn what_is_written_is_read_back() {
         use Condition::*;
-        for condition in [BusOff, Passive, Overflow, Warning, NoAcknowledge, Active, Noise] {
+        for condition in [
+            BusOff,
+            Passive,
+            Overflow,
+            Warning,
+            NoAcknowledge,
+            Active,
+            Noise,
+        ] {
             let (class, data) = condition.encode();
             assert_eq!(Condition::decode(class, &data), condition);
         }

@@ -34,19 +34,30 @@ pub struct InterfaceError {
 impl Interface {
     /// Asks for the state of interface `name`.
     pub fn read(name: &str) -> Result<Interface, InterfaceError> {
-        let error = |cause: String| InterfaceError { name: name.to_owned(), cause };
+        let error = |cause: String| InterfaceError {
+            name: name.to_owned(),
+            cause,
+        };
         let interface = CanInterface::open(name).map_err(|cause| error(cause.to_string()))?;
         if !is_can(name) {
-            return Err(error("this is another kind of network interface".to_owned()));
+            return Err(error(
+                "this is another kind of network interface".to_owned(),
+            ));
         }
-        let details = interface.details().map_err(|cause| error(cause.to_string()))?;
+        let details = interface
+            .details()
+            .map_err(|cause| error(cause.to_string()))?;
         let can = details.can;
         Ok(Interface {
             is_up: details.is_up,
             bit_rate: can.bit_timing.map(|timing| timing.bitrate),
             state: can.state.map(words),
-            is_healthy: can.state.is_none_or(|state| matches!(state, CanState::ErrorActive | CanState::ErrorWarning)),
-            error_counters: can.berr_counter.map(|counter| (counter.txerr, counter.rxerr)),
+            is_healthy: can.state.is_none_or(|state| {
+                matches!(state, CanState::ErrorActive | CanState::ErrorWarning)
+            }),
+            error_counters: can
+                .berr_counter
+                .map(|counter| (counter.txerr, counter.rxerr)),
             restart_ms: can.restart_ms,
         })
     }

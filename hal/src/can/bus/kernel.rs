@@ -8,10 +8,14 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum KernelError {
     /// The kernel has no CAN.
-    #[error("this kernel has no CAN; load it with `modprobe can_raw`, or boot a kernel that has it (CONFIG_CAN_RAW)")]
+    #[error(
+        "this kernel has no CAN; load it with `modprobe can_raw`, or boot a kernel that has it (CONFIG_CAN_RAW)"
+    )]
     Missing,
     /// This process may not use it.
-    #[error("this process may not open CAN sockets; run it outside the sandbox or container that forbids them")]
+    #[error(
+        "this process may not open CAN sockets; run it outside the sandbox or container that forbids them"
+    )]
     Denied,
     /// Anything else, with the system's number.
     #[error("a CAN socket cannot be had: {0}; see the kernel's messages (dmesg)")]
@@ -20,13 +24,20 @@ pub enum KernelError {
 
 /// Opens a raw CAN socket and closes it again.
 pub fn kernel_speaks_can() -> Result<(), KernelError> {
-    let opened = socket(AddressFamily::Can, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::CanRaw);
+    let opened = socket(
+        AddressFamily::Can,
+        SockType::Raw,
+        SockFlag::SOCK_CLOEXEC,
+        SockProtocol::CanRaw,
+    );
     opened.map(drop).map_err(of)
 }
 
 fn of(errno: Errno) -> KernelError {
     match errno {
-        Errno::EAFNOSUPPORT | Errno::EPROTONOSUPPORT | Errno::ESOCKTNOSUPPORT => KernelError::Missing,
+        Errno::EAFNOSUPPORT | Errno::EPROTONOSUPPORT | Errno::ESOCKTNOSUPPORT => {
+            KernelError::Missing
+        }
         Errno::EPERM | Errno::EACCES => KernelError::Denied,
         other => KernelError::Other(other),
     }
@@ -38,7 +49,11 @@ mod tests {
 
     #[test]
     fn a_kernel_without_can_is_told_from_a_process_that_may_not() {
-        assert!(of(Errno::EAFNOSUPPORT).to_string().contains("modprobe can_raw"));
+        assert!(
+            of(Errno::EAFNOSUPPORT)
+                .to_string()
+                .contains("modprobe can_raw")
+        );
         assert!(of(Errno::EPROTONOSUPPORT).to_string().contains("no CAN"));
         assert!(of(Errno::EPERM).to_string().contains("may not"));
         assert!(of(Errno::EMFILE).to_string().contains("EMFILE"));

@@ -36,9 +36,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl MemoryBus {
     /// A new endpoint that hears `ids`, or all if there are none.
     pub fn connect(&self, ids: &[Id]) -> MemoryEndpoint {
-        let mailbox = Arc::new(Mailbox { ids: ids.to_vec(), queue: Mutex::default(), arrived: Condvar::new() });
+        let mailbox = Arc::new(Mailbox {
+            ids: ids.to_vec(),
+            queue: Mutex::default(),
+            arrived: Condvar::new(),
+        });
         lock(&self.wire).mailboxes.push(Arc::clone(&mailbox));
-        MemoryEndpoint { bus: self.clone(), mailbox }
+        MemoryEndpoint {
+            bus: self.clone(),
+            mailbox,
+        }
     }
 
     /// Tells all endpoints of a condition, as their controllers would.
@@ -58,8 +65,13 @@ impl MemoryBus {
         if wire.is_down {
             return Err(BusError::Down);
         }
-        let others = wire.mailboxes.iter().filter(|mailbox| !Arc::ptr_eq(mailbox, from));
-        others.filter(|mailbox| mailbox.hears(frame.id())).for_each(|mailbox| mailbox.put(BusEvent::Frame(*frame)));
+        let others = wire
+            .mailboxes
+            .iter()
+            .filter(|mailbox| !Arc::ptr_eq(mailbox, from));
+        others
+            .filter(|mailbox| mailbox.hears(frame.id()))
+            .for_each(|mailbox| mailbox.put(BusEvent::Frame(*frame)));
         Ok(())
     }
 }
@@ -106,7 +118,10 @@ impl CanBus for MemoryEndpoint {
             return Err(BusError::Down);
         }
         let queue = lock(&self.mailbox.queue);
-        let waiting = self.mailbox.arrived.wait_timeout_while(queue, timeout, |queue| queue.is_empty());
+        let waiting = self
+            .mailbox
+            .arrived
+            .wait_timeout_while(queue, timeout, |queue| queue.is_empty());
         let (mut queue, _) = waiting.unwrap_or_else(PoisonError::into_inner);
         Ok(queue.pop_front())
     }
@@ -114,6 +129,8 @@ impl CanBus for MemoryEndpoint {
 
 impl Drop for MemoryEndpoint {
     fn drop(&mut self) {
-        lock(&self.bus.wire).mailboxes.retain(|mailbox| !Arc::ptr_eq(mailbox, &self.mailbox));
+        lock(&self.bus.wire)
+            .mailboxes
+            .retain(|mailbox| !Arc::ptr_eq(mailbox, &self.mailbox));
     }
 }

@@ -43,7 +43,9 @@ pub enum BusEvent {
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum BusError {
     /// The transmit queue is full: nobody takes the frames, or there are too many.
-    #[error("the transmit queue of the CAN interface is full; check that another node is on the bus and powered")]
+    #[error(
+        "the transmit queue of the CAN interface is full; check that another node is on the bus and powered"
+    )]
     QueueFull,
     /// The interface is down.
     #[error("the CAN interface is down; bring it up with `ip link set IFACE up`")]

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use socketcan::{
-    CanDataFrame, CanErrorFrame, CanFilter, CanFrame as Raw, CanSocket, EmbeddedFrame, Frame, Socket, SocketOptions,
+    CanDataFrame, CanErrorFrame, CanFilter, CanFrame as Raw, CanSocket, EmbeddedFrame, Frame,
+    Socket, SocketOptions,
 };
 use thiserror::Error;
 
@@ -25,7 +26,9 @@ pub enum PortError {
     #[error(transparent)]
     Interface(#[from] InterfaceError),
     /// It is down.
-    #[error("CAN interface {name} is down; bring it up with `ip link set {name} up type can bitrate {bit_rate}`")]
+    #[error(
+        "CAN interface {name} is down; bring it up with `ip link set {name} up type can bitrate {bit_rate}`"
+    )]
     Down {
         /// Its name.
         name: String,
@@ -63,9 +66,19 @@ impl SocketPort {
         let name = name.to_owned();
         match (interface.is_up, interface.bit_rate, interface.is_healthy) {
             (false, ..) => Err(PortError::Down { name, bit_rate }),
-            (_, Some(have), _) if have != bit_rate => Err(PortError::BitRate { name, have, want: bit_rate }),
-            (_, _, false) => Err(PortError::Unhealthy { name, state: interface.state.unwrap_or("unknown") }),
-            (_, bit_rate, _) => Ok(SocketPort { interface: name, is_virtual: bit_rate.is_none() }),
+            (_, Some(have), _) if have != bit_rate => Err(PortError::BitRate {
+                name,
+                have,
+                want: bit_rate,
+            }),
+            (_, _, false) => Err(PortError::Unhealthy {
+                name,
+                state: interface.state.unwrap_or("unknown"),
+            }),
+            (_, bit_rate, _) => Ok(SocketPort {
+                interface: name,
+                is_virtual: bit_rate.is_none(),
+            }),
         }
     }
 }
@@ -94,16 +107,25 @@ impl Port for SocketPort {
         }
         let io = |error: std::io::Error| BusError::from_io(&error);
         let (class, data) = condition.encode();
-        let frame = CanErrorFrame::new_error(class, &data).map_err(|_| BusError::Other(libc::EINVAL))?;
-        CanSocket::open(&self.interface).and_then(|socket| socket.write_frame(&frame)).map_err(io)
+        let frame =
+            CanErrorFrame::new_error(class, &data).map_err(|_| BusError::Other(libc::EINVAL))?;
+        CanSocket::open(&self.interface)
+            .and_then(|socket| socket.write_frame(&frame))
+            .map_err(io)
     }
 }
 
 /// Exactly this identifier in exactly this format, data frames only.
 fn filter(id: Id) -> CanFilter {
-    let (format, width) =
-        if id.is_extended() { (libc::CAN_EFF_FLAG, libc::CAN_EFF_MASK) } else { (0, libc::CAN_SFF_MASK) };
-    CanFilter::new(id.raw() | format, width | libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG)
+    let (format, width) = if id.is_extended() {
+        (libc::CAN_EFF_FLAG, libc::CAN_EFF_MASK)
+    } else {
+        (0, libc::CAN_SFF_MASK)
+    };
+    CanFilter::new(
+        id.raw() | format,
+        width | libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG,
+    )
 }
 
 struct SocketEndpoint {
@@ -113,11 +135,17 @@ struct SocketEndpoint {
 impl CanBus for SocketEndpoint {
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
         let raw = to_socketcan(frame).ok_or(BusError::Other(libc::EINVAL))?;
-        self.socket.write_frame(&raw).map_err(|error| BusError::from_io(&error))
+        self.socket
+            .write_frame(&raw)
+            .map_err(|error| BusError::from_io(&error))
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
-        let read = if timeout.is_zero() { self.socket.read_frame() } else { self.socket.read_frame_timeout(timeout) };
+        let read = if timeout.is_zero() {
+            self.socket.read_frame()
+        } else {
+            self.socket.read_frame_timeout(timeout)
+        };
         match read {
             Ok(raw) => Ok(from_socketcan(&raw)),
             Err(error) if is_nothing(&error) => Ok(None),
@@ -146,10 +174,17 @@ fn to_socketcan(frame: &CanFrame) -> Option<CanDataFrame> {
 fn from_socketcan(raw: &Raw) -> Option<BusEvent> {
     match raw {
         Raw::Data(data) => {
-            let id = if data.is_extended() { Id::extended(data.raw_id()) } else { Id::standard(data.raw_id() as u16) };
+            let id = if data.is_extended() {
+                Id::extended(data.raw_id())
+            } else {
+                Id::standard(data.raw_id() as u16)
+            };
             CanFrame::from_slice(id, data.data()).map(BusEvent::Frame)
         }
-        Raw::Error(error) => Some(BusEvent::Condition(Condition::decode(error.error_bits(), error.data()))),
+        Raw::Error(error) => Some(BusEvent::Condition(Condition::decode(
+            error.error_bits(),
+            error.data(),
+        ))),
         Raw::Remote(_) => None,
     }
 }
@@ -160,7 +195,12 @@ mod tests {
 
     #[test]
     fn frames_survive_the_way_to_socketcan_and_back() {
-        for id in [Id::standard(0x7FF), Id::standard(5), Id::extended(5), Id::extended(0x1FFF_FFFF)] {
+        for id in [
+            Id::standard(0x7FF),
+            Id::standard(5),
+            Id::extended(5),
+            Id::extended(0x1FFF_FFFF),
+        ] {
             for length in 0..=8 {
                 let frame = CanFrame::from_slice(id, &[0xA5; 8][..length]).unwrap();
                 let raw = Raw::Data(to_socketcan(&frame).unwrap());
@@ -172,18 +212,29 @@ mod tests {
     #[test]
     fn error_frames_become_conditions() {
         let off = socketcan::CanErrorFrame::new_error(0x040, &[]).unwrap();
-        assert_eq!(from_socketcan(&Raw::Error(off)), Some(BusEvent::Condition(Condition::BusOff)));
+        assert_eq!(
+            from_socketcan(&Raw::Error(off)),
+            Some(BusEvent::Condition(Condition::BusOff))
+        );
     }
 
     #[test]
     fn an_interface_that_is_not_there_is_named() {
-        let error = SocketPort::open("no-such-can", 1_000_000).unwrap_err().to_string();
-        assert!(error.contains("no-such-can") && error.contains("ip link"), "{error}");
+        let error = SocketPort::open("no-such-can", 1_000_000)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("no-such-can") && error.contains("ip link"),
+            "{error}"
+        );
     }
 
     #[test]
     fn a_network_interface_of_another_kind_is_refused_as_such() {
         let error = SocketPort::open("lo", 1_000_000).unwrap_err().to_string();
-        assert!(error.starts_with("CAN interface lo: this is another kind of network interface"), "{error}");
+        assert!(
+            error.starts_with("CAN interface lo: this is another kind of network interface"),
+            "{error}"
+        );
     }
 }

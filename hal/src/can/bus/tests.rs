@@ -6,7 +6,11 @@ const FRAME: CanFrame = CanFrame::new(ID, [1, 2]);
 #[test]
 fn endpoints_hear_the_others_but_not_themselves() {
     let bus = MemoryBus::default();
-    let (mut a, mut b, mut deaf) = (bus.connect(&[]), bus.connect(&[ID]), bus.connect(&[Id::standard(0x124)]));
+    let (mut a, mut b, mut deaf) = (
+        bus.connect(&[]),
+        bus.connect(&[ID]),
+        bus.connect(&[Id::standard(0x124)]),
+    );
     a.send(&FRAME).unwrap();
     assert_eq!(b.receive(Duration::ZERO), Ok(Some(BusEvent::Frame(FRAME))));
     assert_eq!(a.receive(Duration::ZERO), Ok(None));
@@ -28,21 +32,31 @@ struct Echo(Box<dyn CanBus>);
 impl Task for Echo {
     fn step(&mut self, _now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
         if let Some(BusEvent::Frame(frame)) = self.0.receive(wait)? {
-            self.0.send(&CanFrame::from_slice(Id::standard(0x222), frame.data()).unwrap())?;
+            self.0
+                .send(&CanFrame::from_slice(Id::standard(0x222), frame.data()).unwrap())?;
         }
         Ok(())
     }
 }
 
 fn echoes(host: &dyn Host) {
-    let running = host.start("echo", Box::new(Echo(host.endpoint(&[ID]).unwrap()))).unwrap();
+    let running = host
+        .start("echo", Box::new(Echo(host.endpoint(&[ID]).unwrap())))
+        .unwrap();
     let mut endpoint = host.endpoint(&[Id::standard(0x222)]).unwrap();
     endpoint.send(&FRAME).unwrap();
     let answer = endpoint.receive(Duration::from_secs(60)).unwrap();
-    assert_eq!(answer, Some(BusEvent::Frame(CanFrame::new(Id::standard(0x222), [1, 2]))));
+    assert_eq!(
+        answer,
+        Some(BusEvent::Frame(CanFrame::new(Id::standard(0x222), [1, 2])))
+    );
     drop(running);
     endpoint.send(&FRAME).unwrap();
-    assert_eq!(endpoint.receive(Duration::from_millis(20)), Ok(None), "a dropped task has ended");
+    assert_eq!(
+        endpoint.receive(Duration::from_millis(20)),
+        Ok(None),
+        "a dropped task has ended"
+    );
 }
 
 #[test]

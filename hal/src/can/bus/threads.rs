@@ -25,12 +25,19 @@ impl<P: Port> Threads<P> {
 
     /// Time began at `start`: for hosts that share a clock with others.
     pub fn since(port: P, start: Instant) -> Threads<P> {
-        Threads { port, start, prepare: Arc::new(|| {}) }
+        Threads {
+            port,
+            start,
+            prepare: Arc::new(|| {}),
+        }
     }
 
     /// `prepare` runs first in each thread that is started, to give it a priority or a processor.
     pub fn prepared(self, prepare: impl Fn() + Send + Sync + 'static) -> Threads<P> {
-        Threads { prepare: Arc::new(prepare), ..self }
+        Threads {
+            prepare: Arc::new(prepare),
+            ..self
+        }
     }
 }
 
@@ -63,7 +70,11 @@ impl<P: Port> Host for Threads<P> {
 
     fn start(&self, name: &str, mut task: Box<dyn Task>) -> std::io::Result<Running> {
         let mut running = Running::default();
-        let (stop, start, prepare) = (Arc::clone(&running.stop), self.start, Arc::clone(&self.prepare));
+        let (stop, start, prepare) = (
+            Arc::clone(&running.stop),
+            self.start,
+            Arc::clone(&self.prepare),
+        );
         let work = move || {
             prepare();
             while !stop.load(Ordering::Acquire) {
@@ -72,7 +83,11 @@ impl<P: Port> Host for Threads<P> {
                 }
             }
         };
-        running.thread = Some(std::thread::Builder::new().name(name.to_owned()).spawn(work)?);
+        running.thread = Some(
+            std::thread::Builder::new()
+                .name(name.to_owned())
+                .spawn(work)?,
+        );
         Ok(running)
     }
 }

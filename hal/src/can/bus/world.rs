@@ -8,7 +8,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::super::frame::{CanFrame, Id};
-use super::{BusError, BusEvent, CanBus, Condition, Host, MemoryBus, MemoryEndpoint, Port, Running, Task};
+use super::{
+    BusError, BusEvent, CanBus, Condition, Host, MemoryBus, MemoryEndpoint, Port, Running, Task,
+};
 
 const STEP_NS: u64 = 100_000;
 
@@ -53,13 +55,19 @@ impl World {
     }
 
     fn tasks(&self) -> std::sync::MutexGuard<'_, Tasks> {
-        self.shared.tasks.lock().unwrap_or_else(PoisonError::into_inner)
+        self.shared
+            .tasks
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Port for World {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
-        Ok(Box::new(WorldEndpoint { world: self.clone(), inner: self.shared.bus.connect(ids) }))
+        Ok(Box::new(WorldEndpoint {
+            world: self.clone(),
+            inner: self.shared.bus.connect(ids),
+        }))
     }
 
     fn tell(&self, condition: Condition) -> Result<(), BusError> {
@@ -97,7 +105,10 @@ impl CanBus for WorldEndpoint {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
-        let deadline_ns = self.world.now_ns().saturating_add(timeout.as_nanos() as u64);
+        let deadline_ns = self
+            .world
+            .now_ns()
+            .saturating_add(timeout.as_nanos() as u64);
         loop {
             match self.inner.receive(Duration::ZERO)? {
                 None if self.world.now_ns() < deadline_ns => self.world.advance(deadline_ns),

@@ -33,12 +33,26 @@ impl ObjectDictionary {
     /// Adds a number of `bytes` bytes.
     pub(super) fn add(&mut self, address: Address, bytes: usize, number: u32, access: Access) {
         let value = number.to_le_bytes()[..bytes].to_vec();
-        self.objects.insert(address, Object { value, access, is_text: false });
+        self.objects.insert(
+            address,
+            Object {
+                value,
+                access,
+                is_text: false,
+            },
+        );
     }
 
     /// Adds a text, whose length may change.
     pub(super) fn add_text(&mut self, address: Address, text: &str, access: Access) {
-        self.objects.insert(address, Object { value: text.as_bytes().to_vec(), access, is_text: true });
+        self.objects.insert(
+            address,
+            Object {
+                value: text.as_bytes().to_vec(),
+                access,
+                is_text: true,
+            },
+        );
     }
 
     /// Removes an object: a drive without that feature.
@@ -48,8 +62,15 @@ impl ObjectDictionary {
 
     /// The unsigned number at `address`, 0 if there is none.
     pub fn number(&self, address: Address) -> u32 {
-        let value = self.objects.get(&address).map_or(&[][..], |object| &object.value);
-        value.iter().take(4).rev().fold(0, |number, byte| number << 8 | u32::from(*byte))
+        let value = self
+            .objects
+            .get(&address)
+            .map_or(&[][..], |object| &object.value);
+        value
+            .iter()
+            .take(4)
+            .rev()
+            .fold(0, |number, byte| number << 8 | u32::from(*byte))
     }
 
     /// Sets a number from inside the drive.
@@ -62,7 +83,9 @@ impl ObjectDictionary {
 
     /// Bits of the object, 0 if there is none.
     fn bits(&self, address: Address) -> u32 {
-        self.objects.get(&address).map_or(0, |object| 8 * object.value.len() as u32)
+        self.objects
+            .get(&address)
+            .map_or(0, |object| 8 * object.value.len() as u32)
     }
 
     /// Whether `address` was written since this was asked last.
@@ -75,19 +98,30 @@ impl ObjectDictionary {
     /// The entries of the mapping at `index` that are in force.
     pub(super) fn mapping(&self, index: u16) -> Vec<Mapped> {
         let count = self.number(Address::new(index, 0)).min(8) as u8;
-        (1..=count).map(|sub| Mapped(self.number(Address::new(index, sub)))).collect()
+        (1..=count)
+            .map(|sub| Mapped(self.number(Address::new(index, sub))))
+            .collect()
     }
 
     fn check(&self, address: Address, number: u32) -> Result<(), AbortCode> {
         match (address.index, address.sub) {
             (0x1400..=0x1403 | 0x1800..=0x1803, 1) => self.check_cob_id(address, number),
-            (0x1400..=0x1403 | 0x1800..=0x1803, 2) if (241..=253).contains(&number) => Err(AbortCode::VALUE),
+            (0x1400..=0x1403 | 0x1800..=0x1803, 2) if (241..=253).contains(&number) => {
+                Err(AbortCode::VALUE)
+            }
             (0x1600..=0x1603 | 0x1A00..=0x1A03, 0) => self.check_count(address, number),
             (0x1600..=0x1603 | 0x1A00..=0x1A03, _) => self.check_entry(address, Mapped(number)),
             _ if address == object::MODE => {
-                let bit = (number as i8).checked_sub(1).and_then(|bit| 1u32.checked_shl(bit as u32)).unwrap_or(0);
+                let bit = (number as i8)
+                    .checked_sub(1)
+                    .and_then(|bit| 1u32.checked_shl(bit as u32))
+                    .unwrap_or(0);
                 let supported = self.number(object::SUPPORTED_MODES) & bit != 0;
-                if number == 0 || supported { Ok(()) } else { Err(AbortCode::VALUE) }
+                if number == 0 || supported {
+                    Ok(())
+                } else {
+                    Err(AbortCode::VALUE)
+                }
             }
             _ => Ok(()),
         }
@@ -97,7 +131,11 @@ impl ObjectDictionary {
     fn check_cob_id(&self, address: Address, number: u32) -> Result<(), AbortCode> {
         let now = self.number(address);
         let both_on = now & OFF == 0 && number & OFF == 0;
-        if both_on && now != number { Err(AbortCode::VALUE) } else { Ok(()) }
+        if both_on && now != number {
+            Err(AbortCode::VALUE)
+        } else {
+            Ok(())
+        }
     }
 
     /// Whether the PDO whose mapping is at `index` is on.
@@ -109,31 +147,55 @@ impl ObjectDictionary {
         if self.is_on(address.index) {
             return Err(AbortCode::STATE);
         }
-        let words = (1..=count.min(9)).map(|sub| Mapped(self.number(Address::new(address.index, sub as u8))));
+        let words = (1..=count.min(9))
+            .map(|sub| Mapped(self.number(Address::new(address.index, sub as u8))));
         let bits: u32 = words.map(|word| u32::from(word.bits())).sum();
-        if count > 8 || bits > 64 { Err(AbortCode::PDO_LENGTH) } else { Ok(()) }
+        if count > 8 || bits > 64 {
+            Err(AbortCode::PDO_LENGTH)
+        } else {
+            Ok(())
+        }
     }
 
     fn check_entry(&self, address: Address, word: Mapped) -> Result<(), AbortCode> {
         if self.is_on(address.index) || self.number(Address::new(address.index, 0)) != 0 {
             return Err(AbortCode::ACCESS);
         }
-        let Some(object) = self.objects.get(&word.address()) else { return Err(AbortCode::NO_OBJECT) };
-        let fits = object.access == Access::Mapped && self.bits(word.address()) == u32::from(word.bits());
-        if fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
+        let Some(object) = self.objects.get(&word.address()) else {
+            return Err(AbortCode::NO_OBJECT);
+        };
+        let fits =
+            object.access == Access::Mapped && self.bits(word.address()) == u32::from(word.bits());
+        if fits {
+            Ok(())
+        } else {
+            Err(AbortCode::NOT_MAPPABLE)
+        }
     }
 }
 
 impl Dictionary for ObjectDictionary {
     fn read(&self, address: Address) -> Result<Vec<u8>, AbortCode> {
-        let known = self.objects.range(Address::new(address.index, 0)..=Address::new(address.index, 255)).next();
-        let missing = if known.is_some() { AbortCode::NO_SUB_INDEX } else { AbortCode::NO_OBJECT };
-        self.objects.get(&address).map(|object| object.value.clone()).ok_or(missing)
+        let known = self
+            .objects
+            .range(Address::new(address.index, 0)..=Address::new(address.index, 255))
+            .next();
+        let missing = if known.is_some() {
+            AbortCode::NO_SUB_INDEX
+        } else {
+            AbortCode::NO_OBJECT
+        };
+        self.objects
+            .get(&address)
+            .map(|object| object.value.clone())
+            .ok_or(missing)
     }
 
     fn write(&mut self, address: Address, value: &[u8]) -> Result<(), AbortCode> {
         let before = self.read(address)?;
-        let Some(object) = self.objects.get(&address) else { return Err(AbortCode::NO_OBJECT) };
+        let Some(object) = self.objects.get(&address) else {
+            return Err(AbortCode::NO_OBJECT);
+        };
         let is_text = object.is_text;
         if object.access == Access::Read || object::SHOWN.contains(&address) {
             return Err(AbortCode::READ_ONLY);
@@ -142,7 +204,13 @@ impl Dictionary for ObjectDictionary {
             if before.len() != value.len() {
                 return Err(AbortCode::LENGTH);
             }
-            self.check(address, value.iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte)))?;
+            self.check(
+                address,
+                value
+                    .iter()
+                    .rev()
+                    .fold(0, |number, byte| number << 8 | u32::from(*byte)),
+            )?;
         }
         if let Some(object) = self.objects.get_mut(&address) {
             object.value = value.to_vec();

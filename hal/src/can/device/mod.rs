@@ -109,8 +109,8 @@ impl Device {
     /// What the drive measures as its current, in amperes, for a simulation of the motor. Otherwise it measures what it
     /// commands.
     pub fn set_measured_current_a(&mut self, current_a: Option<f64>) {
-        self.pdos.measured =
-            current_a.map(|current_a| (current_a / self.settings.reference_a() * 1000.0).round() as i16);
+        self.pdos.measured = current_a
+            .map(|current_a| (current_a / self.settings.reference_a() * 1000.0).round() as i16);
     }
 
     /// Misbehaves from now on.
@@ -178,15 +178,23 @@ impl Device {
             self.take_sync();
         } else if id == sdo::request_id(node) && self.state != nmt::State::Stopped {
             self.answer(frame.data());
-        } else if self.watched().is_some_and(|(master, _)| id == heartbeat::cob_id(master)) {
-            self.heard = heartbeat::decode(frame.data()).map(|_| self.now_ns).or(self.heard);
+        } else if self
+            .watched()
+            .is_some_and(|(master, _)| id == heartbeat::cob_id(master))
+        {
+            self.heard = heartbeat::decode(frame.data())
+                .map(|_| self.now_ns)
+                .or(self.heard);
         } else if self.state == nmt::State::Operational && !self.ignores_set_points() {
             self.take_set_point(frame);
         }
     }
 
     fn ignores_set_points(&self) -> bool {
-        matches!(self.misbehaviour, DeviceFault::SetPointsIgnored | DeviceFault::OrdersIgnored)
+        matches!(
+            self.misbehaviour,
+            DeviceFault::SetPointsIgnored | DeviceFault::OrdersIgnored
+        )
     }
 
     fn obey_nmt(&mut self, data: &[u8]) {
@@ -215,7 +223,8 @@ impl Device {
             self.send(CanFrame::new(sdo::answer_id(self.settings.node), answer));
         }
         if self.objects.take_written(object::CONTROLWORD) {
-            self.power.obey(self.objects.number(object::CONTROLWORD) as u16);
+            self.power
+                .obey(self.objects.number(object::CONTROLWORD) as u16);
         }
     }
 
@@ -226,7 +235,9 @@ impl Device {
 
     /// Heartbeat consumer: begins with the first heartbeat, reacts once to its loss (CiA 301, 7.2.8.3.2.2).
     fn watch_master(&mut self) {
-        let (Some((_, limit_ms)), Some(heard_ns)) = (self.watched(), self.heard) else { return };
+        let (Some((_, limit_ms)), Some(heard_ns)) = (self.watched(), self.heard) else {
+            return;
+        };
         if self.now_ns.saturating_sub(heard_ns) > u64::from(limit_ms) * 1_000_000 {
             self.heard = None;
             self.emergency(0x8130);
@@ -254,21 +265,30 @@ impl Device {
     }
 
     fn emergency(&mut self, code: u16) {
-        let emergency = Emergency { code, register: 0x01, vendor: [0; 5] };
+        let emergency = Emergency {
+            code,
+            register: 0x01,
+            vendor: [0; 5],
+        };
         self.send(emergency.frame(self.settings.node));
     }
 
     /// What the objects show of the states.
     fn reflect(&mut self) {
-        self.power.set_mode(self.objects.number(object::MODE) as u8 as i8);
+        self.power
+            .set_mode(self.objects.number(object::MODE) as u8 as i8);
         let status = match self.misbehaviour {
             DeviceFault::SenselessStatus => 0x0048,
             _ => self.power.statusword(),
         };
         let commanded = (self.current_a() / self.settings.reference_a() * 1000.0).round() as i16;
         self.objects.set(object::STATUSWORD, u32::from(status));
-        self.objects.set(object::ACTUAL, u32::from(self.pdos.measured.unwrap_or(commanded) as u16));
-        self.objects.set(object::MODE_DISPLAY, u32::from(self.power.mode() as u8));
+        self.objects.set(
+            object::ACTUAL,
+            u32::from(self.pdos.measured.unwrap_or(commanded) as u16),
+        );
+        self.objects
+            .set(object::MODE_DISPLAY, u32::from(self.power.mode() as u8));
     }
 
     fn send(&mut self, frame: CanFrame) {
@@ -277,7 +297,8 @@ impl Device {
             DeviceFault::Late(late_ms) => late_ms.saturating_mul(1_000_000),
             _ => 0,
         };
-        self.outbox.push_back((self.now_ns.saturating_add(late_ns), frame));
+        self.outbox
+            .push_back((self.now_ns.saturating_add(late_ns), frame));
     }
 
     fn release(&mut self, out: &mut Vec<CanFrame>) {

@@ -75,7 +75,10 @@ pub(super) fn dictionary(settings: &DeviceSettings) -> ObjectDictionary {
         pdo(&mut objects, Direction::Transmit, number, settings.node);
     }
     drive(&mut objects, settings);
-    settings.lacks.iter().for_each(|address| objects.remove(*address));
+    settings
+        .lacks
+        .iter()
+        .for_each(|address| objects.remove(*address));
     objects
 }
 
@@ -98,7 +101,12 @@ fn pdo(objects: &mut ObjectDictionary, direction: Direction, number: u8, node: u
     let index = super::super::pdo::parameters(direction, number);
     let off = if number == 1 { 0 } else { OFF };
     objects.add(Address::new(index, 0), 1, 5, Access::Read);
-    objects.add(Address::new(index, 1), 4, cob_id(direction, number, node).raw() | off, Access::Write);
+    objects.add(
+        Address::new(index, 1),
+        4,
+        cob_id(direction, number, node).raw() | off,
+        Access::Write,
+    );
     objects.add(Address::new(index, 2), 1, 255, Access::Write);
     objects.add(Address::new(index, 3), 2, 0, Access::Write);
     objects.add(Address::new(index, 5), 2, 0, Access::Write);
@@ -115,8 +123,18 @@ fn drive(objects: &mut ObjectDictionary, settings: &DeviceSettings) {
     objects.add(MODE, 1, 0, Access::Mapped);
     objects.add(MODE_DISPLAY, 1, 0, Access::Mapped);
     objects.add(TARGET, 2, 0, Access::Mapped);
-    objects.add(Address::new(0x6072, 0), 2, u32::from(settings.maximum_per_mille), Access::Write);
-    objects.add(Address::new(0x6075, 0), 4, settings.rated_current_ma, Access::Read);
+    objects.add(
+        Address::new(0x6072, 0),
+        2,
+        u32::from(settings.maximum_per_mille),
+        Access::Write,
+    );
+    objects.add(
+        Address::new(0x6075, 0),
+        4,
+        settings.rated_current_ma,
+        Access::Read,
+    );
     objects.add(ACTUAL, 2, 0, Access::Mapped);
     objects.add(Address::new(0x6087, 0), 4, 1000, Access::Write);
     objects.add(SUPPORTED_MODES, 4, settings.modes, Access::Read);

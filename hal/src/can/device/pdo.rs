@@ -78,7 +78,10 @@ impl Device {
             let pdo = self.pdo_parameters(Direction::Transmit, number);
             let sent = &mut self.pdos.sent[usize::from(number - 1)];
             sent.syncs = sent.syncs.saturating_add(1);
-            if pdo.is_on && (1..=240).contains(&pdo.transmission) && sent.syncs >= u32::from(pdo.transmission) {
+            if pdo.is_on
+                && (1..=240).contains(&pdo.transmission)
+                && sent.syncs >= u32::from(pdo.transmission)
+            {
                 sent.syncs = 0;
                 self.send_status(number, &pdo);
             }
@@ -96,7 +99,9 @@ impl Device {
                 continue;
             }
             let sent = self.pdos.sent[usize::from(number - 1)];
-            let since_ns = sent.at_ns.map_or(u64::MAX, |at_ns| self.now_ns.saturating_sub(at_ns));
+            let since_ns = sent
+                .at_ns
+                .map_or(u64::MAX, |at_ns| self.now_ns.saturating_sub(at_ns));
             let changed = sent.content != self.pack(&pdo);
             let timed = pdo.timer_ns > 0 && since_ns >= pdo.timer_ns;
             if (changed && since_ns >= pdo.inhibit_ns) || timed {
@@ -121,8 +126,16 @@ impl Device {
     /// The mapped objects in order; nothing is mapped, nothing is sent.
     fn pack(&self, pdo: &Parameters) -> Option<CanFrame> {
         let words = self.objects.mapping(pdo.mapping);
-        let bytes: Vec<u8> = words.iter().filter_map(|word| self.objects.read(word.address()).ok()).flatten().collect();
-        if bytes.is_empty() { None } else { CanFrame::from_slice(pdo.id, &bytes) }
+        let bytes: Vec<u8> = words
+            .iter()
+            .filter_map(|word| self.objects.read(word.address()).ok())
+            .flatten()
+            .collect();
+        if bytes.is_empty() {
+            None
+        } else {
+            CanFrame::from_slice(pdo.id, &bytes)
+        }
     }
 
     /// Writes the mapped objects; a frame shorter than its mapping is not taken (emergency 0x8210).
@@ -139,7 +152,8 @@ impl Device {
             let _ = self.objects.write(word.address(), value); // a value out of range is left out
         }
         if self.objects.take_written(object::CONTROLWORD) {
-            self.power.obey(self.objects.number(object::CONTROLWORD) as u16);
+            self.power
+                .obey(self.objects.number(object::CONTROLWORD) as u16);
         }
     }
 }

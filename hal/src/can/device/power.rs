@@ -1,6 +1,8 @@
 //! The power stage of the simulated drive: the state machine of CiA 402 from the drive's side.
 
-use super::super::cia402::{CYCLIC_TORQUE, FAULT_RESET, FOLLOWS_TARGET, Order, PROFILE_TORQUE, REMOTE, State};
+use super::super::cia402::{
+    CYCLIC_TORQUE, FAULT_RESET, FOLLOWS_TARGET, Order, PROFILE_TORQUE, REMOTE, State,
+};
 
 /// State, controlword and mode.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +16,12 @@ pub struct Power {
 
 impl Default for Power {
     fn default() -> Self {
-        Power { state: State::NotReadyToSwitchOn, controlword: 0, mode: 0, ignores_target: false }
+        Power {
+            state: State::NotReadyToSwitchOn,
+            controlword: 0,
+            mode: 0,
+            ignores_target: false,
+        }
     }
 }
 
@@ -80,7 +87,11 @@ impl Power {
     /// The statusword: state, voltage, remote, and whether the target is followed.
     pub fn statusword(&self) -> u16 {
         const VOLTAGE: u16 = 1 << 4;
-        let follows = if self.follows() && self.mode == CYCLIC_TORQUE { FOLLOWS_TARGET } else { 0 };
+        let follows = if self.follows() && self.mode == CYCLIC_TORQUE {
+            FOLLOWS_TARGET
+        } else {
+            0
+        };
         self.state.bits() | VOLTAGE | REMOTE | follows
     }
 }
@@ -94,7 +105,9 @@ const fn next(state: State, order: Order) -> State {
         (State::ReadyToSwitchOn, Order::EnableOperation) => State::OperationEnabled, // 3 and 4
         (State::OperationEnabled, Order::SwitchOn) => State::SwitchedOn,      // 5
         (State::SwitchedOn, Order::Shutdown) => State::ReadyToSwitchOn,       // 6
-        (State::ReadyToSwitchOn, Order::DisableVoltage | Order::QuickStop) => State::SwitchOnDisabled, // 7
+        (State::ReadyToSwitchOn, Order::DisableVoltage | Order::QuickStop) => {
+            State::SwitchOnDisabled
+        } // 7
         (State::OperationEnabled, Order::Shutdown) => State::ReadyToSwitchOn, // 8
         (State::OperationEnabled, Order::DisableVoltage) => State::SwitchOnDisabled, // 9
         (State::SwitchedOn, Order::DisableVoltage | Order::QuickStop) => State::SwitchOnDisabled, // 10
@@ -110,7 +123,12 @@ mod tests {
     use super::*;
 
     fn at(state: State) -> Power {
-        Power { state, controlword: 0, mode: CYCLIC_TORQUE, ignores_target: false }
+        Power {
+            state,
+            controlword: 0,
+            mode: CYCLIC_TORQUE,
+            ignores_target: false,
+        }
     }
 
     #[test]
@@ -127,28 +145,41 @@ mod tests {
             Fault,
         ];
         let arrows = [
-            (SwitchOnDisabled, SHUTDOWN, ReadyToSwitchOn),         // 2
-            (ReadyToSwitchOn, SWITCH_ON, SwitchedOn),              // 3
+            (SwitchOnDisabled, SHUTDOWN, ReadyToSwitchOn), // 2
+            (ReadyToSwitchOn, SWITCH_ON, SwitchedOn),      // 3
             (ReadyToSwitchOn, ENABLE_OPERATION, OperationEnabled), // 3, 4
-            (SwitchedOn, ENABLE_OPERATION, OperationEnabled),      // 4
-            (OperationEnabled, SWITCH_ON, SwitchedOn),             // 5
-            (SwitchedOn, SHUTDOWN, ReadyToSwitchOn),               // 6
-            (ReadyToSwitchOn, DISABLE_VOLTAGE, SwitchOnDisabled),  // 7
-            (ReadyToSwitchOn, QUICK_STOP, SwitchOnDisabled),       // 7
-            (OperationEnabled, SHUTDOWN, ReadyToSwitchOn),         // 8
+            (SwitchedOn, ENABLE_OPERATION, OperationEnabled), // 4
+            (OperationEnabled, SWITCH_ON, SwitchedOn),     // 5
+            (SwitchedOn, SHUTDOWN, ReadyToSwitchOn),       // 6
+            (ReadyToSwitchOn, DISABLE_VOLTAGE, SwitchOnDisabled), // 7
+            (ReadyToSwitchOn, QUICK_STOP, SwitchOnDisabled), // 7
+            (OperationEnabled, SHUTDOWN, ReadyToSwitchOn), // 8
             (OperationEnabled, DISABLE_VOLTAGE, SwitchOnDisabled), // 9
-            (SwitchedOn, DISABLE_VOLTAGE, SwitchOnDisabled),       // 10
-            (SwitchedOn, QUICK_STOP, SwitchOnDisabled),            // 10
-            (OperationEnabled, QUICK_STOP, QuickStopActive),       // 11
-            (QuickStopActive, DISABLE_VOLTAGE, SwitchOnDisabled),  // 12
-            (Fault, FAULT_RESET, SwitchOnDisabled),                // 15
+            (SwitchedOn, DISABLE_VOLTAGE, SwitchOnDisabled), // 10
+            (SwitchedOn, QUICK_STOP, SwitchOnDisabled),    // 10
+            (OperationEnabled, QUICK_STOP, QuickStopActive), // 11
+            (QuickStopActive, DISABLE_VOLTAGE, SwitchOnDisabled), // 12
+            (Fault, FAULT_RESET, SwitchOnDisabled),        // 15
         ];
         for state in states {
-            for word in [DISABLE_VOLTAGE, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, QUICK_STOP, FAULT_RESET] {
-                let arrow = arrows.iter().find(|(from, with, _)| (*from, *with) == (state, word));
+            for word in [
+                DISABLE_VOLTAGE,
+                SHUTDOWN,
+                SWITCH_ON,
+                ENABLE_OPERATION,
+                QUICK_STOP,
+                FAULT_RESET,
+            ] {
+                let arrow = arrows
+                    .iter()
+                    .find(|(from, with, _)| (*from, *with) == (state, word));
                 let mut power = at(state);
                 power.obey(word);
-                assert_eq!(power.state(), arrow.map_or(state, |(_, _, to)| *to), "{state:?} with {word:#06x}");
+                assert_eq!(
+                    power.state(),
+                    arrow.map_or(state, |(_, _, to)| *to),
+                    "{state:?} with {word:#06x}"
+                );
             }
         }
     }
@@ -164,7 +195,15 @@ mod tests {
             up.push(power.state());
         }
         use State::*;
-        assert_eq!(up, [SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, OperationEnabled]); // 2, 3, 4
+        assert_eq!(
+            up,
+            [
+                SwitchOnDisabled,
+                ReadyToSwitchOn,
+                SwitchedOn,
+                OperationEnabled
+            ]
+        ); // 2, 3, 4
         let mut down = Vec::new();
         while let Some(word) = power.state().towards_disabled() {
             power.obey(word);
@@ -193,7 +232,10 @@ mod tests {
     #[test]
     fn bit_12_says_that_the_target_is_followed_in_cyclic_torque_only() {
         let mut power = at(State::OperationEnabled);
-        assert_eq!(power.statusword() & (0x6F | FOLLOWS_TARGET | REMOTE), 0x27 | FOLLOWS_TARGET | REMOTE);
+        assert_eq!(
+            power.statusword() & (0x6F | FOLLOWS_TARGET | REMOTE),
+            0x27 | FOLLOWS_TARGET | REMOTE
+        );
         power.set_mode(PROFILE_TORQUE);
         assert!(power.follows() && power.statusword() & FOLLOWS_TARGET == 0);
         power.set_mode(CYCLIC_TORQUE);

@@ -35,7 +35,10 @@ pub struct DeviceTask {
 
 impl DeviceTask {
     /// Starts `device` on the bus of `host`; it runs until the handle is dropped.
-    pub fn start<D: ActingAmplifier + 'static>(host: &dyn Host, device: Arc<Mutex<D>>) -> std::io::Result<Running> {
+    pub fn start<D: ActingAmplifier + 'static>(
+        host: &dyn Host,
+        device: Arc<Mutex<D>>,
+    ) -> std::io::Result<Running> {
         DeviceTask::start_followed(host, device, Box::new(|_, _| {}))
     }
 
@@ -46,7 +49,13 @@ impl DeviceTask {
         follow: Follow,
     ) -> std::io::Result<Running> {
         let bus = host.endpoint(&[]).map_err(std::io::Error::other)?;
-        let task = DeviceTask { bus, device, follow, passed: Passed::default(), out: Vec::new() };
+        let task = DeviceTask {
+            bus,
+            device,
+            follow,
+            passed: Passed::default(),
+            out: Vec::new(),
+        };
         host.start("can-device", Box::new(task))
     }
 
@@ -85,11 +94,16 @@ impl Task for DeviceTask {
         let taken = self.take(now_ns, wait);
         self.poll(now_ns());
         let (bus, passed) = (&mut self.bus, &mut self.passed);
-        let sent = self.out.drain(..).try_for_each(|frame| bus.send(&frame).map(|()| passed.sent += 1));
+        let sent = self
+            .out
+            .drain(..)
+            .try_for_each(|frame| bus.send(&frame).map(|()| passed.sent += 1));
         taken.and(sent)
     }
 }
 
-fn lock<'a>(device: &'a Mutex<dyn ActingAmplifier + 'static>) -> MutexGuard<'a, dyn ActingAmplifier + 'static> {
+fn lock<'a>(
+    device: &'a Mutex<dyn ActingAmplifier + 'static>,
+) -> MutexGuard<'a, dyn ActingAmplifier + 'static> {
     device.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -9,19 +9,30 @@ fn booted() -> Device {
     let mut device = Device::new(DeviceSettings::default());
     let mut out = Vec::new();
     device.poll(0, &mut out);
-    assert_eq!(out.first(), Some(&CanFrame::new(heartbeat::cob_id(5), [0])), "the first word is the boot-up message");
+    assert_eq!(
+        out.first(),
+        Some(&CanFrame::new(heartbeat::cob_id(5), [0])),
+        "the first word is the boot-up message"
+    );
     device
 }
 
 fn ask(device: &mut Device, request: Request) -> Answer {
     let mut out = Vec::new();
-    device.handle(&CanFrame::new(sdo::request_id(5), request.encode()), device.now_ns, &mut out);
+    device.handle(
+        &CanFrame::new(sdo::request_id(5), request.encode()),
+        device.now_ns,
+        &mut out,
+    );
     Answer::decode(out.last().expect("an answer").data()).expect("a known answer")
 }
 
 fn write(device: &mut Device, index: u16, sub: u8, value: &[u8]) -> Result<(), AbortCode> {
     let address = Address::new(index, sub);
-    match ask(device, Request::Download(address, Start::Expedited(Part::new(value)))) {
+    match ask(
+        device,
+        Request::Download(address, Start::Expedited(Part::new(value))),
+    ) {
         Answer::Downloaded(_) => Ok(()),
         Answer::Abort(_, code) => Err(code),
         other => panic!("{other:?}"),
@@ -63,61 +74,125 @@ fn current_flows_only_with_operation_enabled() {
     set_point(&mut device, ENABLE_OPERATION, 250);
     assert_eq!(device.current_a(), 1.0, "250 of 1000 counts of 4 A");
     set_point(&mut device, QUICK_STOP, 250);
-    assert_eq!((device.current_a(), device.power_state()), (0.0, State::QuickStopActive));
+    assert_eq!(
+        (device.current_a(), device.power_state()),
+        (0.0, State::QuickStopActive)
+    );
 }
 
 #[test]
 fn the_rules_of_pdo_mapping_are_kept() {
     let mut device = booted();
     let word = Mapped::new(Address::new(0x6071, 0), 16).0.to_le_bytes();
-    assert_eq!(write(&mut device, 0x1600, 1, &word), Err(AbortCode::ACCESS), "the PDO is on");
+    assert_eq!(
+        write(&mut device, 0x1600, 1, &word),
+        Err(AbortCode::ACCESS),
+        "the PDO is on"
+    );
     assert_eq!(write(&mut device, 0x1600, 0, &[0]), Err(AbortCode::STATE));
-    assert_eq!(write(&mut device, 0x1400, 1, &0x0206u32.to_le_bytes()), Err(AbortCode::VALUE));
+    assert_eq!(
+        write(&mut device, 0x1400, 1, &0x0206u32.to_le_bytes()),
+        Err(AbortCode::VALUE)
+    );
     write(&mut device, 0x1400, 1, &0x8000_0205u32.to_le_bytes()).unwrap();
     write(&mut device, 0x1600, 1, &word).unwrap();
     let other = |index, bits| Mapped::new(Address::new(index, 0), bits).0.to_le_bytes();
-    assert_eq!(write(&mut device, 0x1600, 2, &other(0x6071, 8)), Err(AbortCode::NOT_MAPPABLE), "wrong width");
-    assert_eq!(write(&mut device, 0x1600, 2, &other(0x1017, 16)), Err(AbortCode::NOT_MAPPABLE));
-    assert_eq!(write(&mut device, 0x1600, 2, &other(0x7777, 16)), Err(AbortCode::NO_OBJECT));
+    assert_eq!(
+        write(&mut device, 0x1600, 2, &other(0x6071, 8)),
+        Err(AbortCode::NOT_MAPPABLE),
+        "wrong width"
+    );
+    assert_eq!(
+        write(&mut device, 0x1600, 2, &other(0x1017, 16)),
+        Err(AbortCode::NOT_MAPPABLE)
+    );
+    assert_eq!(
+        write(&mut device, 0x1600, 2, &other(0x7777, 16)),
+        Err(AbortCode::NO_OBJECT)
+    );
     for sub in 2..=5 {
         write(&mut device, 0x1600, sub, &word).unwrap();
     }
-    assert_eq!(write(&mut device, 0x1600, 0, &[5]), Err(AbortCode::PDO_LENGTH), "five times 16 bits are 80");
+    assert_eq!(
+        write(&mut device, 0x1600, 0, &[5]),
+        Err(AbortCode::PDO_LENGTH),
+        "five times 16 bits are 80"
+    );
     write(&mut device, 0x1600, 0, &[4]).unwrap();
-    assert_eq!(write(&mut device, 0x1600, 1, &word), Err(AbortCode::ACCESS), "the count is not 0");
+    assert_eq!(
+        write(&mut device, 0x1600, 1, &word),
+        Err(AbortCode::ACCESS),
+        "the count is not 0"
+    );
     assert_eq!(write(&mut device, 0x1400, 2, &[252]), Err(AbortCode::VALUE));
 }
 
 #[test]
 fn objects_are_refused_in_the_words_of_cia_301() {
     let mut device = booted();
-    assert_eq!(write(&mut device, 0x1018, 1, &[0; 4]), Err(AbortCode::READ_ONLY));
-    assert_eq!(write(&mut device, 0x6041, 0, &[0; 2]), Err(AbortCode::READ_ONLY));
+    assert_eq!(
+        write(&mut device, 0x1018, 1, &[0; 4]),
+        Err(AbortCode::READ_ONLY)
+    );
+    assert_eq!(
+        write(&mut device, 0x6041, 0, &[0; 2]),
+        Err(AbortCode::READ_ONLY)
+    );
     assert_eq!(write(&mut device, 0x6040, 0, &[0]), Err(AbortCode::LENGTH));
-    assert_eq!(write(&mut device, 0x7777, 0, &[0]), Err(AbortCode::NO_OBJECT));
-    assert_eq!(write(&mut device, 0x1018, 9, &[0]), Err(AbortCode::NO_SUB_INDEX));
-    assert_eq!(write(&mut device, 0x6060, 0, &[8]), Err(AbortCode::VALUE), "it has no position mode");
-    assert_eq!(write(&mut device, 0x6060, 0, &[0x80]), Err(AbortCode::VALUE));
+    assert_eq!(
+        write(&mut device, 0x7777, 0, &[0]),
+        Err(AbortCode::NO_OBJECT)
+    );
+    assert_eq!(
+        write(&mut device, 0x1018, 9, &[0]),
+        Err(AbortCode::NO_SUB_INDEX)
+    );
+    assert_eq!(
+        write(&mut device, 0x6060, 0, &[8]),
+        Err(AbortCode::VALUE),
+        "it has no position mode"
+    );
+    assert_eq!(
+        write(&mut device, 0x6060, 0, &[0x80]),
+        Err(AbortCode::VALUE)
+    );
 }
 
 #[test]
 fn a_heartbeat_once_heard_is_missed_and_the_drive_switches_off() {
     let mut device = operational();
-    write(&mut device, 0x1016, 1, &heartbeat::consumer_entry(0x7F, 50).to_le_bytes()).unwrap();
+    write(
+        &mut device,
+        0x1016,
+        1,
+        &heartbeat::consumer_entry(0x7F, 50).to_le_bytes(),
+    )
+    .unwrap();
     write(&mut device, 0x6007, 0, &[2, 0]).unwrap();
     for word in [SHUTDOWN, SWITCH_ON, ENABLE_OPERATION] {
         set_point(&mut device, word, 250);
     }
     let mut out = Vec::new();
     device.poll(1_000_000_000, &mut out);
-    assert_eq!(device.current_a(), 1.0, "nobody was heard yet, nobody is missed");
+    assert_eq!(
+        device.current_a(),
+        1.0,
+        "nobody was heard yet, nobody is missed"
+    );
     send(&mut device, heartbeat::frame(0x7F, nmt::State::Operational));
     device.poll(1_050_000_000, &mut out);
     assert_eq!(device.current_a(), 1.0, "50 ms are within the limit");
     out.clear();
     device.poll(1_050_000_001, &mut out);
-    assert_eq!((device.current_a(), device.power_state()), (0.0, State::SwitchOnDisabled));
-    let emergency = Emergency { code: 0x8130, register: 1, vendor: [0; 5] };
+    assert_eq!(
+        (device.current_a(), device.power_state()),
+        (0.0, State::SwitchOnDisabled)
+    );
+    let emergency = Emergency {
+        code: 0x8130,
+        register: 1,
+        vendor: [0; 5],
+    };
     assert!(out.contains(&emergency.frame(5)));
     assert_eq!(device.nmt_state(), nmt::State::PreOperational);
 }
@@ -142,7 +217,9 @@ fn set_points_are_taken_in_operational_only_and_not_if_too_short() {
     let out = send(&mut device, CanFrame::new(id, [SHUTDOWN as u8, 0, 0]));
     assert_eq!(device.power_state(), State::SwitchOnDisabled);
     assert_eq!(
-        out.first().and_then(|frame| Emergency::decode(frame.data())).map(|emergency| emergency.code),
+        out.first()
+            .and_then(|frame| Emergency::decode(frame.data()))
+            .map(|emergency| emergency.code),
         Some(0x8210)
     );
     send(&mut device, nmt::Command::EnterPreOperational.frame(0));
@@ -154,7 +231,13 @@ fn set_points_are_taken_in_operational_only_and_not_if_too_short() {
 fn a_note_of_any_length_is_kept() {
     let mut device = booted();
     let address = Address::new(0x2000, 0);
-    assert_eq!(ask(&mut device, Request::Download(address, Start::Segmented(Some(9)))), Answer::Downloaded(address));
+    assert_eq!(
+        ask(
+            &mut device,
+            Request::Download(address, Start::Segmented(Some(9)))
+        ),
+        Answer::Downloaded(address)
+    );
     for (toggle, last, bytes) in [(false, false, &b"bench no"[..7]), (true, true, b" 1")] {
         let part = Part::new(bytes);
         assert_eq!(
@@ -163,5 +246,8 @@ fn a_note_of_any_length_is_kept() {
         );
     }
     let started = ask(&mut device, Request::Upload(address));
-    assert_eq!(started, Answer::Uploaded(address, Start::Segmented(Some(9))));
+    assert_eq!(
+        started,
+        Answer::Uploaded(address, Start::Segmented(Some(9)))
+    );
 }

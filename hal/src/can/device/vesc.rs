@@ -52,13 +52,20 @@ impl VescDevice {
             self.misbehaviour,
             DeviceFault::Unplugged | DeviceFault::SetPointsIgnored | DeviceFault::OrdersIgnored
         );
-        if let (false, true, Ok(bytes)) = (deaf, frame.id() == self.command_id(), frame.data().try_into()) {
+        if let (false, true, Ok(bytes)) = (
+            deaf,
+            frame.id() == self.command_id(),
+            frame.data().try_into(),
+        ) {
             (self.target_ma, self.commanded_ns) = (i32::from_be_bytes(bytes), Some(self.now_ns));
         }
     }
 
     fn let_go_in_time(&mut self) {
-        if self.commanded_ns.is_some_and(|at_ns| self.now_ns.saturating_sub(at_ns) > TIMEOUT_NS) {
+        if self
+            .commanded_ns
+            .is_some_and(|at_ns| self.now_ns.saturating_sub(at_ns) > TIMEOUT_NS)
+        {
             (self.target_ma, self.commanded_ns) = (0, None);
         }
     }
@@ -78,7 +85,8 @@ impl VescDevice {
             _ => (&bytes[..], 0),
         };
         let frame = CanFrame::from_slice(status_id(self.node), bytes);
-        self.outbox.extend(frame.map(|frame| (self.now_ns.saturating_add(late_ns), frame)));
+        self.outbox
+            .extend(frame.map(|frame| (self.now_ns.saturating_add(late_ns), frame)));
     }
 }
 
@@ -92,13 +100,20 @@ impl ActingAmplifier for VescDevice {
         self.now_ns = self.now_ns.max(now_ns);
         self.let_go_in_time();
         self.tell_status();
-        while let Some((_, frame)) = self.outbox.pop_front_if(|(due_ns, _)| *due_ns <= self.now_ns) {
+        while let Some((_, frame)) = self
+            .outbox
+            .pop_front_if(|(due_ns, _)| *due_ns <= self.now_ns)
+        {
             out.push(frame);
         }
     }
 
     fn current_a(&self) -> f64 {
-        if self.misbehaviour == DeviceFault::TargetIgnored { 0.0 } else { f64::from(self.target_ma) * 1e-3 }
+        if self.misbehaviour == DeviceFault::TargetIgnored {
+            0.0
+        } else {
+            f64::from(self.target_ma) * 1e-3
+        }
     }
 
     fn set_measured_current_a(&mut self, current_a: Option<f64>) {
@@ -106,7 +121,11 @@ impl ActingAmplifier for VescDevice {
     }
 
     fn state(&self) -> &'static str {
-        if self.is_enabled() { "driving" } else { "released" }
+        if self.is_enabled() {
+            "driving"
+        } else {
+            "released"
+        }
     }
 
     /// A VESC holds the motor as long as somebody commands, be it zero.
@@ -131,7 +150,11 @@ impl ActingAmplifier for VescDevice {
         }
         if fault == DeviceFault::Reset {
             let now_ns = self.now_ns;
-            *self = VescDevice { now_ns, due_ns: now_ns + STATUS_NS, ..VescDevice::new(self.node) };
+            *self = VescDevice {
+                now_ns,
+                due_ns: now_ns + STATUS_NS,
+                ..VescDevice::new(self.node)
+            };
             return;
         }
         self.misbehaviour = fault;

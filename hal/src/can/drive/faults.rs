@@ -64,38 +64,46 @@ pub const NOT_FINITE: u32 = 0x0005_0004;
 /// What a code means and what to do about it.
 pub const fn fault_text(code: u32) -> FaultText {
     let (what, remedy) = match code {
-        HEARTBEAT_LOST => {
-            ("the drive's heartbeat is lost", "check the drive's power and the CAN cable, then clear the fault")
-        }
+        HEARTBEAT_LOST => (
+            "the drive's heartbeat is lost",
+            "check the drive's power and the CAN cable, then clear the fault",
+        ),
         RESTARTED => (
             "the drive restarted by itself",
             "check its supply for dips, then clear the fault: that configures it again",
         ),
-        NOT_OPERATIONAL => {
-            ("the drive left the NMT state operational", "look for another NMT master on the bus, then clear the fault")
-        }
+        NOT_OPERATIONAL => (
+            "the drive left the NMT state operational",
+            "look for another NMT master on the bus, then clear the fault",
+        ),
         MALFORMED => (
             "a frame of the drive is not laid out as configured",
             "look for a second node with the same number, then clear the fault",
         ),
-        NOT_CONFIGURED => {
-            ("the drive did not take its configuration again", "open the drive anew: the error names the object")
-        }
+        NOT_CONFIGURED => (
+            "the drive did not take its configuration again",
+            "open the drive anew: the error names the object",
+        ),
         DRIVE_FAULT => (
             "the drive is in Fault and sent no emergency message",
             "read the drive's display or its error history 0x1003, remove the cause, then clear the fault",
         ),
-        SWITCHED_OFF => {
-            ("the drive switched itself off", "check its enable input and its supply, then clear the fault")
-        }
+        SWITCHED_OFF => (
+            "the drive switched itself off",
+            "check its enable input and its supply, then clear the fault",
+        ),
         TARGET_IGNORED => (
             "the drive does not follow its target (bit 12 of the statusword)",
             "check limits, limit switches and the mode of operation in the drive, then clear the fault",
         ),
-        STATUS_LOST => ("the drive sends no status frames", "check the bus load, then clear the fault"),
-        NOT_ENABLED => {
-            ("the drive did not reach Operation Enabled in time", "check its power stage supply and its enable input")
-        }
+        STATUS_LOST => (
+            "the drive sends no status frames",
+            "check the bus load, then clear the fault",
+        ),
+        NOT_ENABLED => (
+            "the drive did not reach Operation Enabled in time",
+            "check its power stage supply and its enable input",
+        ),
         NOT_REMOTE => (
             "the drive does not listen to CAN (bit 9 of the statusword)",
             "switch the drive from local to remote, and close its commissioning program",
@@ -108,16 +116,30 @@ pub const fn fault_text(code: u32) -> FaultText {
             "the CAN controller is in bus-off",
             "check cable, termination and bit rate; `ip link set IFACE down` and up again, then clear the fault",
         ),
-        BUS_PASSIVE => {
-            ("the CAN controller is error passive", "check cable, termination and bit rate, then clear the fault")
-        }
-        BUS_DOWN => ("the CAN interface is down", "`ip link set IFACE up`, then clear the fault"),
-        BUS_GONE => ("the CAN interface is gone", "plug the adapter in, then start anew"),
-        OVERFLOW => ("received CAN frames were lost", "lower the traffic on the bus, then clear the fault"),
-        QUEUE_FULL => {
-            ("the transmit queue of the CAN interface is full", "check that the drive is on the bus; lower the rate")
-        }
-        BUS_FAILED => ("the CAN interface failed", "read the kernel's messages (dmesg), then clear the fault"),
+        BUS_PASSIVE => (
+            "the CAN controller is error passive",
+            "check cable, termination and bit rate, then clear the fault",
+        ),
+        BUS_DOWN => (
+            "the CAN interface is down",
+            "`ip link set IFACE up`, then clear the fault",
+        ),
+        BUS_GONE => (
+            "the CAN interface is gone",
+            "plug the adapter in, then start anew",
+        ),
+        OVERFLOW => (
+            "received CAN frames were lost",
+            "lower the traffic on the bus, then clear the fault",
+        ),
+        QUEUE_FULL => (
+            "the transmit queue of the CAN interface is full",
+            "check that the drive is on the bus; lower the rate",
+        ),
+        BUS_FAILED => (
+            "the CAN interface failed",
+            "read the kernel's messages (dmesg), then clear the fault",
+        ),
         COMMANDS_STOPPED => (
             "the loop stopped commanding and the drive was switched off",
             "look for overruns; the limit is the setting command_timeout",
@@ -127,7 +149,10 @@ pub const fn fault_text(code: u32) -> FaultText {
             "cut the drive's power, find the cause, then clear the fault",
         ),
         NOT_ARMED => ("the drive is not enabled", "arm first"),
-        NOT_FINITE => ("the commanded current is not a number", "this is a fault of the program; please report it"),
+        NOT_FINITE => (
+            "the commanded current is not a number",
+            "this is a fault of the program; please report it",
+        ),
         _ if code >> 16 == EMERGENCY >> 16 => (
             emcy::text(code as u16),
             "the drive says so in an emergency message; remove the cause, then clear the fault",
@@ -150,7 +175,11 @@ pub(super) const fn explains(code: u32, first: u32) -> bool {
 /// A fault as the answer to a call.
 pub(super) const fn device_error(code: u32) -> DeviceError {
     let FaultText { what, remedy } = fault_text(code);
-    DeviceError { what, remedy, code: code as i64 }
+    DeviceError {
+        what,
+        remedy,
+        code: code as i64,
+    }
 }
 
 /// The code of a failure of the interface.
@@ -169,7 +198,9 @@ pub(super) const fn of_condition(condition: Condition) -> Option<u32> {
         Condition::BusOff => Some(BUS_OFF),
         Condition::Passive => Some(BUS_PASSIVE),
         Condition::Overflow => Some(OVERFLOW),
-        Condition::Warning | Condition::NoAcknowledge | Condition::Active | Condition::Noise => None,
+        Condition::Warning | Condition::NoAcknowledge | Condition::Active | Condition::Noise => {
+            None
+        }
     }
 }
 
@@ -204,9 +235,14 @@ mod tests {
             NOT_ARMED,
             NOT_FINITE,
         ];
-        let whats: std::collections::HashSet<_> = codes.iter().map(|code| fault_text(*code).what).collect();
+        let whats: std::collections::HashSet<_> =
+            codes.iter().map(|code| fault_text(*code).what).collect();
         assert_eq!(whats.len(), codes.len());
-        assert!(codes.iter().all(|code| fault_text(*code).what != "unknown fault"));
+        assert!(
+            codes
+                .iter()
+                .all(|code| fault_text(*code).what != "unknown fault")
+        );
         assert_eq!(fault_text(EMERGENCY + 0x4210).what, "drive too hot");
         assert_eq!(fault_text(0x0009_0000).what, "unknown fault");
     }

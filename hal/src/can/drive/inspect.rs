@@ -32,7 +32,11 @@ pub struct Inspection {
 }
 
 /// Heartbeat consumer and producer, and what the drive does when it hears nobody (0x6007).
-pub const NEEDED: [Address; 3] = [Address::new(0x1016, 1), Address::new(0x1017, 0), ABORT_CONNECTION];
+pub const NEEDED: [Address; 3] = [
+    Address::new(0x1016, 1),
+    Address::new(0x1017, 0),
+    ABORT_CONNECTION,
+];
 /// What a drive does when it hears nobody; not needed where its own reaction is trusted.
 pub const ABORT_CONNECTION: Address = Address::new(0x6007, 0);
 /// Past errors that are read, at most.
@@ -49,7 +53,12 @@ impl Inspection {
 /// readers would take each other's answers.
 pub fn inspect(host: &dyn Host, node: u8, timeout: Duration) -> Result<Inspection, SdoError> {
     let mut bus = host.endpoint(&[answer_id(node)])?;
-    let mut channel = Channel { bus: bus.as_mut(), host, node, timeout };
+    let mut channel = Channel {
+        bus: bus.as_mut(),
+        host,
+        node,
+        timeout,
+    };
     let device_type = present(channel.read_u32(Address::new(0x1000, 0)))?;
     let mut identity = [None; 4];
     for (sub, field) in (1..).zip(&mut identity) {
@@ -58,13 +67,19 @@ pub fn inspect(host: &dyn Host, node: u8, timeout: Duration) -> Result<Inspectio
     let name = present(channel.read(Address::new(0x1008, 0)))?;
     Ok(Inspection {
         device_type,
-        name: name.map(|name| String::from_utf8_lossy(&name).trim_end_matches('\0').to_owned()),
+        name: name.map(|name| {
+            String::from_utf8_lossy(&name)
+                .trim_end_matches('\0')
+                .to_owned()
+        }),
         identity,
         error_register: present(channel.read_u8(Address::new(0x1001, 0)))?,
         statusword: present(channel.read_u16(Address::new(0x6041, 0)))?,
         modes: present(channel.read_u32(Address::new(0x6502, 0)))?,
-        rated_current_a: present(channel.read_u32(Address::new(0x6075, 0)))?.map(|milli| f64::from(milli) * 1e-3),
-        maximum_current_ratio: present(channel.read_u16(Address::new(0x6072, 0)))?.map(|mille| f64::from(mille) * 1e-3),
+        rated_current_a: present(channel.read_u32(Address::new(0x6075, 0)))?
+            .map(|milli| f64::from(milli) * 1e-3),
+        maximum_current_ratio: present(channel.read_u16(Address::new(0x6072, 0)))?
+            .map(|mille| f64::from(mille) * 1e-3),
         past_errors: past_errors(&mut channel)?,
         lacks: lacks(&mut channel)?,
     })
@@ -72,9 +87,16 @@ pub fn inspect(host: &dyn Host, node: u8, timeout: Duration) -> Result<Inspectio
 
 /// Sub-index 0 counts them, 1 is the latest.
 fn past_errors(channel: &mut Channel<'_>) -> Result<Vec<u16>, SdoError> {
-    let count = present(channel.read_u8(Address::new(0x1003, 0)))?.unwrap_or(0).min(PAST_ERRORS);
+    let count = present(channel.read_u8(Address::new(0x1003, 0)))?
+        .unwrap_or(0)
+        .min(PAST_ERRORS);
     let entries = (1..=count).map(|sub| present(channel.read_u32(Address::new(0x1003, sub))));
-    Ok(entries.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().map(|entry| entry as u16).collect())
+    Ok(entries
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .flatten()
+        .map(|entry| entry as u16)
+        .collect())
 }
 
 fn lacks(channel: &mut Channel<'_>) -> Result<Vec<Address>, SdoError> {

@@ -70,12 +70,29 @@ impl CanopenDrive {
         let configured = configure(&settings, bus.as_mut(), host.as_ref())?;
         let shared = Arc::new(Shared::default());
         let monitor = Monitor::new(&settings, Arc::clone(&shared), host.now_ns());
-        let task = Box::new(Service { bus: watched, monitor });
+        let task = Box::new(Service {
+            bus: watched,
+            monitor,
+        });
         let service = host.start("can-service", task).map_err(OpenError::Thread)?;
-        let Configured { scale, mode, identity } = configured;
+        let Configured {
+            scale,
+            mode,
+            identity,
+        } = configured;
         let last_error = None;
-        let mut drive =
-            CanopenDrive { service, bus, host, shared, settings, scale, mode, identity, last_error, _claim: claim };
+        let mut drive = CanopenDrive {
+            service,
+            bus,
+            host,
+            shared,
+            settings,
+            scale,
+            mode,
+            identity,
+            last_error,
+            _claim: claim,
+        };
         drive.shared.set_restarted(false);
         drive.start()?;
         Ok(drive)
@@ -104,13 +121,17 @@ impl CanopenDrive {
     /// NMT start, and wait until the drive's heartbeat says operational.
     fn start(&mut self) -> Result<(), OpenError> {
         self.shared.set_must_follow(self.mode == CYCLIC_TORQUE);
-        self.bus.send(&nmt::Command::Start.frame(self.settings.node))?;
+        self.bus
+            .send(&nmt::Command::Start.frame(self.settings.node))?;
         let operational = |shared: &Shared| shared.nmt() == Some(nmt::State::Operational);
         if self.wait_for(self.settings.state_timeout, operational) {
             return Ok(());
         }
         let (node, timeout) = (self.settings.node, self.settings.state_timeout);
-        Err(OpenError::NotOperational { node, timeout_ms: timeout.as_millis() })
+        Err(OpenError::NotOperational {
+            node,
+            timeout_ms: timeout.as_millis(),
+        })
     }
 
     /// Everything that a restart or another master has undone.
@@ -135,16 +156,21 @@ impl CanopenDrive {
     }
 
     fn deadline_ns(&self) -> u64 {
-        self.host.now_ns().saturating_add(self.settings.state_timeout.as_nanos() as u64)
+        self.host
+            .now_ns()
+            .saturating_add(self.settings.state_timeout.as_nanos() as u64)
     }
 
     /// One set-point, with SYNC if the exchange has it. *In the tick.*
     fn exchange(&mut self, controlword: u16, target: i16) -> Result<(), DeviceError> {
         let frame = set_point(self.settings.node, controlword, target);
-        let sent = self.bus.send(&frame).and_then(|()| match self.settings.exchange {
-            Exchange::Asynchronous { .. } => Ok(()),
-            Exchange::Synchronous { .. } => self.bus.send(&sync::FRAME),
-        });
+        let sent = self
+            .bus
+            .send(&frame)
+            .and_then(|()| match self.settings.exchange {
+                Exchange::Asynchronous { .. } => Ok(()),
+                Exchange::Synchronous { .. } => self.bus.send(&sync::FRAME),
+            });
         sent.map_err(|error| faults::device_error(faults::of_bus_error(error)))
     }
 
@@ -158,22 +184,42 @@ impl CanopenDrive {
     /// Off, no longer watched by the drive, pre-operational.
     fn leave_in_order(&mut self) {
         self.disable();
-        let settled = |shared: &Shared| shared.state().is_none_or(State::is_off) || shared.fault() != 0;
+        let settled =
+            |shared: &Shared| shared.state().is_none_or(State::is_off) || shared.fault() != 0;
         let is_off = self.wait_for(self.settings.state_timeout, settled);
         if is_off && self.shared.fault() == 0 {
             let mut channel = channel(&self.settings, self.bus.as_mut(), self.host.as_ref());
             let _ = channel.write(Address::new(0x1016, 1), &[0; 4]); // else it will miss us and say so: no harm
-            let _ = self.bus.send(&nmt::Command::EnterPreOperational.frame(self.settings.node));
+            let _ = self
+                .bus
+                .send(&nmt::Command::EnterPreOperational.frame(self.settings.node));
         }
     }
 }
 
-fn channel<'a>(settings: &DriveSettings, bus: &'a mut dyn CanBus, host: &'a dyn Host) -> Channel<'a> {
-    Channel { bus, host, node: settings.node, timeout: settings.sdo_timeout }
+fn channel<'a>(
+    settings: &DriveSettings,
+    bus: &'a mut dyn CanBus,
+    host: &'a dyn Host,
+) -> Channel<'a> {
+    Channel {
+        bus,
+        host,
+        node: settings.node,
+        timeout: settings.sdo_timeout,
+    }
 }
 
-fn configure(settings: &DriveSettings, bus: &mut dyn CanBus, host: &dyn Host) -> Result<Configured, OpenError> {
-    Setup { channel: channel(settings, bus, host), settings }.run()
+fn configure(
+    settings: &DriveSettings,
+    bus: &mut dyn CanBus,
+    host: &dyn Host,
+) -> Result<Configured, OpenError> {
+    Setup {
+        channel: channel(settings, bus, host),
+        settings,
+    }
+    .run()
 }
 
 impl CurrentAmplifier for CanopenDrive {
@@ -219,7 +265,9 @@ impl CurrentAmplifier for CanopenDrive {
     }
 
     fn actual_current_a(&self) -> Option<f64> {
-        self.shared.actual().map(|counts| self.scale.amperes(counts))
+        self.shared
+            .actual()
+            .map(|counts| self.scale.amperes(counts))
     }
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {

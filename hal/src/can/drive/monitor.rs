@@ -26,12 +26,19 @@ const IDLE_SYNC_NS: u64 = 20_000_000;
 
 /// The three identifiers that a drive sends by itself, and nothing else, reach the monitor.
 pub(super) fn heard_ids(node: u8) -> [Id; 3] {
-    [heartbeat::cob_id(node), emcy::cob_id(node), pdo::cob_id(Direction::Transmit, 1, node)]
+    [
+        heartbeat::cob_id(node),
+        emcy::cob_id(node),
+        pdo::cob_id(Direction::Transmit, 1, node),
+    ]
 }
 
 /// The set-point frame, and the SYNC that makes a synchronous drive take it.
 pub(super) fn set_point(node: u8, controlword: u16, target: i16) -> CanFrame {
-    CanFrame::new(pdo::cob_id(Direction::Receive, 1, node), pdo::pack(controlword, target))
+    CanFrame::new(
+        pdo::cob_id(Direction::Receive, 1, node),
+        pdo::pack(controlword, target),
+    )
 }
 
 /// The watch after a disable: until the drive says that it is off.
@@ -110,9 +117,15 @@ impl Monitor {
                     self.shared.latch(code);
                 }
             }
-            BusEvent::Frame(frame) if frame.id() == heartbeat::cob_id(self.node) => self.heartbeat(frame, now_ns),
-            BusEvent::Frame(frame) if frame.id() == emcy::cob_id(self.node) => self.emergency(frame),
-            BusEvent::Frame(frame) if frame.id() == pdo::cob_id(Direction::Transmit, 1, self.node) => {
+            BusEvent::Frame(frame) if frame.id() == heartbeat::cob_id(self.node) => {
+                self.heartbeat(frame, now_ns)
+            }
+            BusEvent::Frame(frame) if frame.id() == emcy::cob_id(self.node) => {
+                self.emergency(frame)
+            }
+            BusEvent::Frame(frame)
+                if frame.id() == pdo::cob_id(Direction::Transmit, 1, self.node) =>
+            {
                 self.status(frame, now_ns)
             }
             BusEvent::Frame(_) => {}
@@ -120,7 +133,9 @@ impl Monitor {
     }
 
     fn heartbeat(&mut self, frame: &CanFrame, now_ns: u64) {
-        let Some(state) = heartbeat::decode(frame.data()) else { return self.shared.latch(faults::MALFORMED) };
+        let Some(state) = heartbeat::decode(frame.data()) else {
+            return self.shared.latch(faults::MALFORMED);
+        };
         self.heard_ns = now_ns;
         self.shared.set_nmt(state);
         if state == nmt::State::Operational {
@@ -143,7 +158,8 @@ impl Monitor {
         self.shared.set_emergency(emergency.code);
         let matters = self.is_in_use() || self.shared.fault() == faults::DRIVE_FAULT;
         if emergency.code != 0 && matters {
-            self.shared.latch(faults::EMERGENCY + u32::from(emergency.code));
+            self.shared
+                .latch(faults::EMERGENCY + u32::from(emergency.code));
         }
     }
 
@@ -155,10 +171,14 @@ impl Monitor {
         self.shared.set_status(statusword, actual);
         match (State::decode(statusword), self.shared.intent()) {
             (_, Intent::Resetting) => {}
-            (Some(State::Fault | State::FaultReactionActive), _) => self.shared.latch(self.drive_fault()),
+            (Some(State::Fault | State::FaultReactionActive), _) => {
+                self.shared.latch(self.drive_fault())
+            }
             (None, Intent::On) => self.shared.latch(faults::MALFORMED),
             (Some(State::OperationEnabled), Intent::On) if self.shared.follows() => {}
-            (Some(State::OperationEnabled), Intent::On) => self.shared.latch(faults::TARGET_IGNORED),
+            (Some(State::OperationEnabled), Intent::On) => {
+                self.shared.latch(faults::TARGET_IGNORED)
+            }
             (Some(_), Intent::On) => self.shared.latch(faults::SWITCHED_OFF),
             _ => {}
         }
@@ -212,7 +232,12 @@ impl Monitor {
             last_command_ns: now_ns,
         });
         let status_count = self.shared.status_count();
-        let watch = OffWatch { since_ns: now_ns, repeat_ns: now_ns, status_count, escalated: false };
+        let watch = OffWatch {
+            since_ns: now_ns,
+            repeat_ns: now_ns,
+            status_count,
+            escalated: false,
+        };
         self.off = (intent == Intent::Off && was_in_use).then_some(watch);
     }
 
@@ -223,12 +248,20 @@ impl Monitor {
             (on.commands, on.last_command_ns) = (commands, now_ns);
             on.first_command_ns = on.first_command_ns.or(Some(now_ns));
         }
-        if on.first_command_ns.is_some() && now_ns.saturating_sub(on.last_command_ns) > self.command_timeout_ns {
+        if on.first_command_ns.is_some()
+            && now_ns.saturating_sub(on.last_command_ns) > self.command_timeout_ns
+        {
             self.shared.latch(faults::COMMANDS_STOPPED);
         }
         // A synchronous drive answers SYNCs, which begin with the first command.
-        let since_ns = if self.is_synchronous { on.first_command_ns } else { Some(on.since_ns) };
-        let overdue = |since_ns: u64| now_ns.saturating_sub(since_ns.max(self.status_ns)) > self.status_timeout_ns;
+        let since_ns = if self.is_synchronous {
+            on.first_command_ns
+        } else {
+            Some(on.since_ns)
+        };
+        let overdue = |since_ns: u64| {
+            now_ns.saturating_sub(since_ns.max(self.status_ns)) > self.status_timeout_ns
+        };
         if since_ns.is_some_and(overdue) {
             self.shared.latch(faults::STATUS_LOST);
         }
@@ -256,8 +289,10 @@ impl Monitor {
 
     /// A status frame since the disable says off.
     fn is_confirmed_off(&self, watch: &OffWatch) -> bool {
-        let is_off =
-            matches!(self.shared.state(), Some(State::SwitchOnDisabled | State::NotReadyToSwitchOn | State::Fault));
+        let is_off = matches!(
+            self.shared.state(),
+            Some(State::SwitchOnDisabled | State::NotReadyToSwitchOn | State::Fault)
+        );
         is_off && self.shared.status_count() != watch.status_count
     }
 

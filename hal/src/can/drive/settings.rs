@@ -27,7 +27,10 @@ impl TorqueMode {
             TorqueMode::Cyclic => &[CYCLIC_TORQUE],
             TorqueMode::Profile => &[PROFILE_TORQUE],
         };
-        candidates.iter().copied().find(|mode| supported >> (mode - 1) & 1 == 1)
+        candidates
+            .iter()
+            .copied()
+            .find(|mode| supported >> (mode - 1) & 1 == 1)
     }
 }
 
@@ -145,7 +148,11 @@ impl DriveSettings {
             return refuse("node", self.node.to_string(), "1 to 127");
         }
         if !(1..=127).contains(&self.own_node) || self.own_node == self.node {
-            return refuse("own_node", self.own_node.to_string(), "1 to 127, and not that of the drive");
+            return refuse(
+                "own_node",
+                self.own_node.to_string(),
+                "1 to 127, and not that of the drive",
+            );
         }
         self.check_exchange()?;
         self.check_times()?;
@@ -164,10 +171,14 @@ impl DriveSettings {
             Exchange::Synchronous { status_every } if !(1..=240).contains(&status_every) => {
                 refuse("status_every", status_every.to_string(), "1 to 240")
             }
-            _ if !(1.0..=1e6).contains(&self.rate_hz) => refuse("rate_hz", self.rate_hz.to_string(), "1 to 1000000 Hz"),
-            _ if !(self.load_limit > 0.0 && self.load_limit <= 1.0) => {
-                refuse("load_limit", self.load_limit.to_string(), "above 0, at most 1")
+            _ if !(1.0..=1e6).contains(&self.rate_hz) => {
+                refuse("rate_hz", self.rate_hz.to_string(), "1 to 1000000 Hz")
             }
+            _ if !(self.load_limit > 0.0 && self.load_limit <= 1.0) => refuse(
+                "load_limit",
+                self.load_limit.to_string(),
+                "above 0, at most 1",
+            ),
             _ => Ok(()),
         }
     }
@@ -179,19 +190,43 @@ impl DriveSettings {
             ("own_heartbeat_period", self.own_heartbeat_period),
             ("own_heartbeat_timeout", self.own_heartbeat_timeout),
         ];
-        let unfit = |time: &Duration| time.as_millis() == 0 || time.as_millis() > u128::from(u16::MAX);
+        let unfit =
+            |time: &Duration| time.as_millis() == 0 || time.as_millis() > u128::from(u16::MAX);
         if let Some((name, time)) = times.iter().find(|(_, time)| unfit(time)) {
-            return Err(OpenError::Setting { name, value: format!("{time:?}"), limit: "1 ms to 65.535 s" });
+            return Err(OpenError::Setting {
+                name,
+                value: format!("{time:?}"),
+                limit: "1 ms to 65.535 s",
+            });
         }
         let twice = "at least twice the period, or one late heartbeat is a fault";
         let timeouts = [
-            ("heartbeat_timeout", self.heartbeat_period, self.heartbeat_timeout),
-            ("own_heartbeat_timeout", self.own_heartbeat_period, self.own_heartbeat_timeout),
+            (
+                "heartbeat_timeout",
+                self.heartbeat_period,
+                self.heartbeat_timeout,
+            ),
+            (
+                "own_heartbeat_timeout",
+                self.own_heartbeat_period,
+                self.own_heartbeat_timeout,
+            ),
             ("status_timeout", self.status_period(), self.status_timeout),
-            ("command_timeout", Duration::from_secs_f64(1.0 / self.rate_hz), self.command_timeout),
+            (
+                "command_timeout",
+                Duration::from_secs_f64(1.0 / self.rate_hz),
+                self.command_timeout,
+            ),
         ];
-        match timeouts.iter().find(|(_, period, timeout)| *timeout < 2 * *period) {
-            Some((name, _, timeout)) => Err(OpenError::Setting { name, value: format!("{timeout:?}"), limit: twice }),
+        match timeouts
+            .iter()
+            .find(|(_, period, timeout)| *timeout < 2 * *period)
+        {
+            Some((name, _, timeout)) => Err(OpenError::Setting {
+                name,
+                value: format!("{timeout:?}"),
+                limit: twice,
+            }),
             None => Ok(()),
         }
     }
@@ -199,8 +234,12 @@ impl DriveSettings {
     /// Time between status frames: in whole milliseconds where the drive's timer makes it.
     pub(super) fn status_period(&self) -> Duration {
         match self.exchange {
-            Exchange::Asynchronous { status_hz } => Duration::from_millis((1000.0 / status_hz).ceil() as u64),
-            Exchange::Synchronous { status_every } => Duration::from_secs_f64(f64::from(status_every) / self.rate_hz),
+            Exchange::Asynchronous { status_hz } => {
+                Duration::from_millis((1000.0 / status_hz).ceil() as u64)
+            }
+            Exchange::Synchronous { status_every } => {
+                Duration::from_secs_f64(f64::from(status_every) / self.rate_hz)
+            }
         }
     }
 }
@@ -220,11 +259,20 @@ mod tests {
         assert!(DriveSettings::default().check().is_ok());
         assert_eq!(refusal(|s| s.node = 0), "node = 0 cannot be: 1 to 127");
         assert!(refusal(|s| s.own_node = 5).contains("not that of the drive"));
-        assert!(refusal(|s| s.heartbeat_timeout = Duration::from_millis(30)).contains("at least twice the period"));
+        assert!(
+            refusal(|s| s.heartbeat_timeout = Duration::from_millis(30))
+                .contains("at least twice the period")
+        );
         assert!(refusal(|s| s.own_heartbeat_period = Duration::ZERO).contains("1 ms to 65.535 s"));
-        assert!(refusal(|s| s.exchange = Exchange::Synchronous { status_every: 0 }).contains("1 to 240"));
+        assert!(
+            refusal(|s| s.exchange = Exchange::Synchronous { status_every: 0 })
+                .contains("1 to 240")
+        );
         for rate_hz in [f64::NAN, 0.0, 1e-300, f64::INFINITY] {
-            assert!(refusal(|s| s.rate_hz = rate_hz).contains("1 to 1000000 Hz"), "{rate_hz}");
+            assert!(
+                refusal(|s| s.rate_hz = rate_hz).contains("1 to 1000000 Hz"),
+                "{rate_hz}"
+            );
         }
         let exchange = Exchange::Synchronous { status_every: 1 };
         let refused = refusal(|s| (s.rate_hz, s.exchange) = (5000.0, exchange));
@@ -234,9 +282,18 @@ mod tests {
     #[test]
     fn cyclic_torque_comes_first_and_profile_torque_is_the_fallback() {
         let (profile, cyclic) = (1 << 3, 1 << 9);
-        assert_eq!(TorqueMode::CyclicElseProfile.choose(profile | cyclic), Some(CYCLIC_TORQUE));
-        assert_eq!(TorqueMode::CyclicElseProfile.choose(profile), Some(PROFILE_TORQUE));
+        assert_eq!(
+            TorqueMode::CyclicElseProfile.choose(profile | cyclic),
+            Some(CYCLIC_TORQUE)
+        );
+        assert_eq!(
+            TorqueMode::CyclicElseProfile.choose(profile),
+            Some(PROFILE_TORQUE)
+        );
         assert_eq!(TorqueMode::Cyclic.choose(profile), None);
-        assert_eq!(TorqueMode::Profile.choose(profile | cyclic), Some(PROFILE_TORQUE));
+        assert_eq!(
+            TorqueMode::Profile.choose(profile | cyclic),
+            Some(PROFILE_TORQUE)
+        );
     }
 }

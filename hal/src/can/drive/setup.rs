@@ -44,14 +44,20 @@ pub(super) struct Setup<'a> {
 impl Setup<'_> {
     /// All of it, in pre-operational: nothing moves and no process data flow.
     pub(super) fn run(&mut self) -> Result<Configured, OpenError> {
-        self.channel.bus.send(&nmt::Command::EnterPreOperational.frame(self.settings.node))?;
+        self.channel
+            .bus
+            .send(&nmt::Command::EnterPreOperational.frame(self.settings.node))?;
         let identity = self.check_identity()?;
         self.switch_off()?;
         let scale = self.scale()?;
         self.watch_each_other()?;
         self.map()?;
         let mode = self.choose_mode()?;
-        Ok(Configured { scale, mode, identity })
+        Ok(Configured {
+            scale,
+            mode,
+            identity,
+        })
     }
 
     fn check_identity(&mut self) -> Result<[Option<u32>; 4], OpenError> {
@@ -70,7 +76,12 @@ impl Setup<'_> {
                 (have, _) => have?,
             };
             if let Some(want) = want.filter(|want| *want != have) {
-                return Err(OpenError::Identity { node: self.settings.node, field, have, want });
+                return Err(OpenError::Identity {
+                    node: self.settings.node,
+                    field,
+                    have,
+                    want,
+                });
             }
             *said = Some(have);
         }
@@ -89,7 +100,11 @@ impl Setup<'_> {
         let have_a = f64::from(self.channel.read_u32(RATED_CURRENT)?) * 1e-3;
         let agrees = (have_a - want_a).abs() < 0.5e-3;
         if !agrees {
-            return Err(OpenError::RatedCurrent { node, have_a, want_a });
+            return Err(OpenError::RatedCurrent {
+                node,
+                have_a,
+                want_a,
+            });
         }
         let reference_a = match self.settings.reference {
             Reference::Rated => have_a,
@@ -97,7 +112,10 @@ impl Setup<'_> {
         };
         Scale::new(reference_a, self.settings.current_limit_a).ok_or(OpenError::Setting {
             name: "current_limit_a",
-            value: format!("{} A with 1000 counts = {reference_a} A", self.settings.current_limit_a),
+            value: format!(
+                "{} A with 1000 counts = {reference_a} A",
+                self.settings.current_limit_a
+            ),
             limit: "both positive, the limit at least one count",
         })
     }
@@ -107,14 +125,20 @@ impl Setup<'_> {
         let (settings, node) = (self.settings, self.settings.node);
         let own_timeout_ms = milliseconds(settings.own_heartbeat_timeout);
         let entry = heartbeat::consumer_entry(settings.own_node, own_timeout_ms);
-        self.put(HEARTBEAT_PRODUCER, u32::from(milliseconds(settings.heartbeat_period)), 2)?;
+        self.put(
+            HEARTBEAT_PRODUCER,
+            u32::from(milliseconds(settings.heartbeat_period)),
+            2,
+        )?;
         let no_stop = |error| match error {
             OpenError::Sdo(cause) if cause.means_absent() => OpenError::NoStop { node, cause },
             other => other,
         };
         self.put(HEARTBEAT_CONSUMER, entry, 4).map_err(no_stop)?;
         match settings.abort_connection {
-            Some(option) => self.put(ABORT_CONNECTION, u32::from(option as u16), 2).map_err(no_stop),
+            Some(option) => self
+                .put(ABORT_CONNECTION, u32::from(option as u16), 2)
+                .map_err(no_stop),
             None => Ok(()),
         }
     }
@@ -123,7 +147,8 @@ impl Setup<'_> {
         for pdo in self.pdos() {
             let cob_id_now = self.channel.read_u32(pdo.cob_id_address())?;
             for value in pdo.sequence(cob_id_now) {
-                self.write(value).map_err(|error| self.no_timer(value.address, error))?;
+                self.write(value)
+                    .map_err(|error| self.no_timer(value.address, error))?;
             }
             for value in pdo.layout() {
                 self.verify(value)?;
@@ -138,9 +163,10 @@ impl Setup<'_> {
     fn no_timer(&self, address: Address, error: OpenError) -> OpenError {
         let is_time = matches!((address.index, address.sub), (0x1800, 3 | 5));
         match error {
-            OpenError::Sdo(cause) if is_time && cause.means_absent() => {
-                OpenError::NoTimer { node: self.settings.node, cause }
-            }
+            OpenError::Sdo(cause) if is_time && cause.means_absent() => OpenError::NoTimer {
+                node: self.settings.node,
+                cause,
+            },
             other => other,
         }
     }
@@ -184,24 +210,37 @@ impl Setup<'_> {
             Err(error) if error.means_absent() => u32::MAX, // optional: then 0x6061 tells
             other => other?,
         };
-        let mode = self.settings.mode.choose(supported).ok_or(OpenError::Modes { node, supported })?;
+        let mode = self
+            .settings
+            .mode
+            .choose(supported)
+            .ok_or(OpenError::Modes { node, supported })?;
         if mode == PROFILE_TORQUE {
             self.put(SLOPE, self.settings.torque_slope, 4)?;
         }
-        self.write(Value { address: MODE, number: u32::from(mode as u8), bytes: 1 })?;
+        self.write(Value {
+            address: MODE,
+            number: u32::from(mode as u8),
+            bytes: 1,
+        })?;
         self.wait_for_mode(mode)
     }
 
     /// Some drives need a moment to change their mode.
     fn wait_for_mode(&mut self, want: i8) -> Result<i8, OpenError> {
-        let deadline_ns = self.channel.host.now_ns() + self.settings.state_timeout.as_nanos() as u64;
+        let deadline_ns =
+            self.channel.host.now_ns() + self.settings.state_timeout.as_nanos() as u64;
         loop {
             let have = self.channel.read_u8(MODE_DISPLAY)? as i8;
             if have == want {
                 return Ok(want);
             }
             if self.channel.host.now_ns() >= deadline_ns {
-                return Err(OpenError::ModeDisplay { node: self.settings.node, have, want });
+                return Err(OpenError::ModeDisplay {
+                    node: self.settings.node,
+                    have,
+                    want,
+                });
             }
             self.channel.host.sleep(Duration::from_millis(5));
         }
@@ -209,24 +248,48 @@ impl Setup<'_> {
 
     /// Writes and verifies a number.
     fn put(&mut self, address: Address, number: u32, bytes: usize) -> Result<(), OpenError> {
-        let value = Value { address, number, bytes };
+        let value = Value {
+            address,
+            number,
+            bytes,
+        };
         self.write(value)?;
         self.verify(value)
     }
 
     fn write(&mut self, value: Value) -> Result<(), OpenError> {
         let bytes = value.number.to_le_bytes();
-        Ok(self.channel.write(value.address, bytes.get(..value.bytes).unwrap_or(&bytes))?)
+        Ok(self
+            .channel
+            .write(value.address, bytes.get(..value.bytes).unwrap_or(&bytes))?)
     }
 
     fn verify(&mut self, value: Value) -> Result<(), OpenError> {
         let bytes = self.channel.read(value.address)?;
         let (node, address, have) = (self.settings.node, value.address, bytes.len());
         if have != value.bytes {
-            return Err(SdoError::Length { node, address, have, want: value.bytes }.into());
+            return Err(SdoError::Length {
+                node,
+                address,
+                have,
+                want: value.bytes,
+            }
+            .into());
         }
-        let have = bytes.iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte));
+        let have = bytes
+            .iter()
+            .rev()
+            .fold(0, |number, byte| number << 8 | u32::from(*byte));
         let want = value.number;
-        if have == want { Ok(()) } else { Err(OpenError::Verification { node, address, have, want }) }
+        if have == want {
+            Ok(())
+        } else {
+            Err(OpenError::Verification {
+                node,
+                address,
+                have,
+                want,
+            })
+        }
     }
 }

@@ -109,7 +109,9 @@ impl Shared {
 
     /// Keeps the first fault, but for a code that says more exactly what the first one was.
     pub(super) fn latch(&self, code: u32) {
-        let kept = self.fault.compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire);
+        let kept = self
+            .fault
+            .compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire);
         if kept.is_err_and(|first| super::faults::explains(code, first)) {
             self.fault.store(code, Ordering::Release);
         }
@@ -130,7 +132,9 @@ impl Shared {
 
     /// Whether the drive follows the target, where it says so.
     pub(super) fn follows(&self) -> bool {
-        let bit = self.statusword().is_some_and(|word| word & FOLLOWS_TARGET != 0);
+        let bit = self
+            .statusword()
+            .is_some_and(|word| word & FOLLOWS_TARGET != 0);
         bit || !self.must_follow.load(Ordering::Acquire)
     }
 

@@ -51,7 +51,9 @@ impl CanopenDrive {
     /// may come; what that means is the caller's business.
     fn wait_for_fresh_heartbeat(&self) {
         self.shared.forget_nmt();
-        self.wait_for(self.settings.heartbeat_timeout, |shared| shared.nmt().is_some());
+        self.wait_for(self.settings.heartbeat_timeout, |shared| {
+            shared.nmt().is_some()
+        });
     }
 
     /// A status frame that was sent after this call began: the drive and the bus are alive now.
@@ -71,7 +73,10 @@ impl CanopenDrive {
     fn leave_fault(&mut self) -> Result<(), u32> {
         let deadline_ns = self.deadline_ns();
         let pause = LOOK.max(2 * self.settings.status_period());
-        while matches!(self.shared.state(), None | Some(State::Fault | State::FaultReactionActive)) {
+        while matches!(
+            self.shared.state(),
+            None | Some(State::Fault | State::FaultReactionActive)
+        ) {
             if self.host.now_ns() >= deadline_ns {
                 return Err(faults::FAULT_REMAINS);
             }

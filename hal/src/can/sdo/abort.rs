@@ -70,7 +70,9 @@ impl AbortCode {
             0x0800_0000 => "general error",
             0x0800_0020 => "data cannot be transferred or stored to the application",
             0x0800_0021 => "data cannot be transferred or stored because of local control",
-            0x0800_0022 => "data cannot be transferred or stored because of the present device state",
+            0x0800_0022 => {
+                "data cannot be transferred or stored because of the present device state"
+            }
             0x0800_0023 => "no object dictionary is present, or its dynamic generation failed",
             0x0800_0024 => "no data available",
             _ => "abort code unknown to CiA 301",
@@ -116,7 +118,8 @@ mod tests {
         .into_iter()
         .flat_map(|(base, range)| range.map(move |low| base + low))
         .collect();
-        let texts: std::collections::HashSet<_> = known.iter().map(|code| AbortCode(*code).text()).collect();
+        let texts: std::collections::HashSet<_> =
+            known.iter().map(|code| AbortCode(*code).text()).collect();
         assert_eq!((known.len(), texts.len()), (31, 31));
         assert!(!texts.contains(AbortCode(1).text()));
         assert_eq!(

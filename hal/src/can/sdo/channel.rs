@@ -22,7 +22,9 @@ pub enum SdoError {
         code: AbortCode,
     },
     /// The node broke the protocol.
-    #[error("node {node} answers {address} against the rules: {code}; look for a second node with the same number")]
+    #[error(
+        "node {node} answers {address} against the rules: {code}; look for a second node with the same number"
+    )]
     Protocol {
         /// Which node.
         node: u8,
@@ -90,7 +92,12 @@ impl Channel<'_> {
     fn read_number<const N: usize>(&mut self, address: Address) -> Result<[u8; N], SdoError> {
         let bytes = self.read(address)?;
         let have = bytes.len();
-        bytes.try_into().map_err(|_| SdoError::Length { node: self.node, address, have, want: N })
+        bytes.try_into().map_err(|_| SdoError::Length {
+            node: self.node,
+            address,
+            have,
+            want: N,
+        })
     }
 
     /// Reads a u8.
@@ -114,14 +121,23 @@ impl Channel<'_> {
         self.transfer(client, first, address).map(|_| ())
     }
 
-    fn transfer(&mut self, mut client: Client, first: [u8; 8], address: Address) -> Result<Vec<u8>, SdoError> {
+    fn transfer(
+        &mut self,
+        mut client: Client,
+        first: [u8; 8],
+        address: Address,
+    ) -> Result<Vec<u8>, SdoError> {
         self.forget_earlier_answers()?;
         self.send(first)?;
         let mut deadline_ns = self.deadline_ns();
         loop {
             let Some(frame) = self.receive(deadline_ns)? else {
                 self.send(client.time_out())?;
-                return Err(SdoError::Timeout { node: self.node, address, timeout_ms: self.timeout.as_millis() });
+                return Err(SdoError::Timeout {
+                    node: self.node,
+                    address,
+                    timeout_ms: self.timeout.as_millis(),
+                });
             };
             match client.answer(frame.data()) {
                 Progress::Send(next) => {
@@ -130,7 +146,9 @@ impl Channel<'_> {
                 }
                 Progress::Done(data) => return Ok(data),
                 Progress::Ignored => {}
-                Progress::Failed(failure, farewell) => return Err(self.fail(failure, farewell, address)),
+                Progress::Failed(failure, farewell) => {
+                    return Err(self.fail(failure, farewell, address));
+                }
             }
         }
     }
@@ -140,8 +158,16 @@ impl Channel<'_> {
             let _ = self.send(bytes); // the transfer has failed already; the node's own time limit ends it there
         }
         match failure {
-            Failure::Aborted(code) => SdoError::Aborted { node: self.node, address, code },
-            Failure::Protocol(code) => SdoError::Protocol { node: self.node, address, code },
+            Failure::Aborted(code) => SdoError::Aborted {
+                node: self.node,
+                address,
+                code,
+            },
+            Failure::Protocol(code) => SdoError::Protocol {
+                node: self.node,
+                address,
+                code,
+            },
         }
     }
 
@@ -156,11 +182,15 @@ impl Channel<'_> {
     }
 
     fn deadline_ns(&self) -> u64 {
-        self.host.now_ns().saturating_add(self.timeout.as_nanos() as u64)
+        self.host
+            .now_ns()
+            .saturating_add(self.timeout.as_nanos() as u64)
     }
 
     fn send(&mut self, bytes: [u8; 8]) -> Result<(), SdoError> {
-        Ok(self.bus.send(&CanFrame::new(request_id(self.node), bytes))?)
+        Ok(self
+            .bus
+            .send(&CanFrame::new(request_id(self.node), bytes))?)
     }
 
     /// The next answer of the node before the deadline.
@@ -168,7 +198,9 @@ impl Channel<'_> {
         loop {
             let left = Duration::from_nanos(deadline_ns.saturating_sub(self.host.now_ns()));
             match self.bus.receive(left)? {
-                Some(BusEvent::Frame(frame)) if frame.id() == answer_id(self.node) => return Ok(Some(frame)),
+                Some(BusEvent::Frame(frame)) if frame.id() == answer_id(self.node) => {
+                    return Ok(Some(frame));
+                }
                 _ if self.host.now_ns() >= deadline_ns => return Ok(None),
                 _ => {}
             }

@@ -26,11 +26,19 @@ enum State {
     /// The upload was asked for.
     Asked,
     /// Segments come in.
-    Reading { data: Vec<u8>, size: Option<u32>, toggle: bool },
+    Reading {
+        data: Vec<u8>,
+        size: Option<u32>,
+        toggle: bool,
+    },
     /// The download was begun; what is left goes in segments.
     Began { data: Vec<u8>, expedited: bool },
     /// Segments go out; `sent` bytes so far, the segment with `toggle` awaits its answer.
-    Writing { data: Vec<u8>, sent: usize, toggle: bool },
+    Writing {
+        data: Vec<u8>,
+        sent: usize,
+        toggle: bool,
+    },
     /// Over.
     Finished,
 }
@@ -60,7 +68,13 @@ pub enum Failure {
 impl Client {
     /// Begins to read; send the bytes.
     pub fn upload(address: Address) -> (Client, [u8; 8]) {
-        (Client { address, state: State::Asked }, Request::Upload(address).encode())
+        (
+            Client {
+                address,
+                state: State::Asked,
+            },
+            Request::Upload(address).encode(),
+        )
     }
 
     /// Begins to write; send the bytes. One to four bytes go expedited, all else in segments.
@@ -70,8 +84,14 @@ impl Client {
             true => Start::Expedited(Part::new(data)),
             false => Start::Segmented(Some(data.len() as u32)),
         };
-        let state = State::Began { data: data.to_vec(), expedited };
-        (Client { address, state }, Request::Download(address, start).encode())
+        let state = State::Began {
+            data: data.to_vec(),
+            expedited,
+        };
+        (
+            Client { address, state },
+            Request::Download(address, start).encode(),
+        )
     }
 
     /// Gives up because no answer came in time: the bytes to send.
@@ -82,32 +102,52 @@ impl Client {
 
     /// Takes what came from the node.
     pub fn answer(&mut self, data: &[u8]) -> Progress {
-        let Some(answer) = Answer::decode(data) else { return Progress::Ignored };
+        let Some(answer) = Answer::decode(data) else {
+            return Progress::Ignored;
+        };
         match (std::mem::replace(&mut self.state, State::Finished), answer) {
             (State::Finished, _) => Progress::Ignored,
             (_, Answer::Abort(address, code)) if address == self.address => {
                 Progress::Failed(Failure::Aborted(code), None)
             }
-            (State::Asked, Answer::Uploaded(address, start)) if address == self.address => self.begin_reading(start),
-            (State::Reading { data, size, toggle }, Answer::UploadedSegment { toggle: theirs, last, part }) => {
+            (State::Asked, Answer::Uploaded(address, start)) if address == self.address => {
+                self.begin_reading(start)
+            }
+            (
+                State::Reading { data, size, toggle },
+                Answer::UploadedSegment {
+                    toggle: theirs,
+                    last,
+                    part,
+                },
+            ) => {
                 if toggle != theirs {
                     return self.protest(AbortCode::TOGGLE);
                 }
                 self.read_on(data, size, toggle, last, part)
             }
-            (State::Began { data, expedited }, Answer::Downloaded(address)) if address == self.address => {
+            (State::Began { data, expedited }, Answer::Downloaded(address))
+                if address == self.address =>
+            {
                 if expedited {
                     Progress::Done(Vec::new())
                 } else {
                     self.write_on(data, 0, false)
                 }
             }
-            (State::Writing { data, sent, toggle }, Answer::DownloadedSegment { toggle: theirs }) => {
+            (
+                State::Writing { data, sent, toggle },
+                Answer::DownloadedSegment { toggle: theirs },
+            ) => {
                 if toggle != theirs {
                     return self.protest(AbortCode::TOGGLE);
                 }
                 let done = sent >= data.len();
-                if done { Progress::Done(Vec::new()) } else { self.write_on(data, sent, !toggle) }
+                if done {
+                    Progress::Done(Vec::new())
+                } else {
+                    self.write_on(data, sent, !toggle)
+                }
             }
             (state, _) => {
                 self.state = state;
@@ -117,27 +157,47 @@ impl Client {
     }
 
     fn protest(&self, code: AbortCode) -> Progress {
-        Progress::Failed(Failure::Protocol(code), Some(Request::Abort(self.address, code).encode()))
+        Progress::Failed(
+            Failure::Protocol(code),
+            Some(Request::Abort(self.address, code).encode()),
+        )
     }
 
     fn begin_reading(&mut self, start: Start) -> Progress {
         match start {
             Start::Expedited(part) => Progress::Done(part.bytes().to_vec()),
-            Start::Segmented(Some(size)) if size as usize > LONGEST => self.protest(AbortCode::MEMORY),
+            Start::Segmented(Some(size)) if size as usize > LONGEST => {
+                self.protest(AbortCode::MEMORY)
+            }
             Start::Segmented(size) => {
-                self.state = State::Reading { data: Vec::new(), size, toggle: false };
+                self.state = State::Reading {
+                    data: Vec::new(),
+                    size,
+                    toggle: false,
+                };
                 Progress::Send(Request::UploadSegment { toggle: false }.encode())
             }
         }
     }
 
-    fn read_on(&mut self, mut data: Vec<u8>, size: Option<u32>, toggle: bool, last: bool, part: Part) -> Progress {
+    fn read_on(
+        &mut self,
+        mut data: Vec<u8>,
+        size: Option<u32>,
+        toggle: bool,
+        last: bool,
+        part: Part,
+    ) -> Progress {
         data.extend_from_slice(part.bytes());
         if data.len() > LONGEST {
             return self.protest(AbortCode::MEMORY);
         }
         if !last {
-            self.state = State::Reading { data, size, toggle: !toggle };
+            self.state = State::Reading {
+                data,
+                size,
+                toggle: !toggle,
+            };
             return Progress::Send(Request::UploadSegment { toggle: !toggle }.encode());
         }
         match size {

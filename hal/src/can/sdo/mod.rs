@@ -71,14 +71,19 @@ impl Part {
     /// The first bytes of `bytes`, at most seven.
     pub fn new(bytes: &[u8]) -> Part {
         let length = bytes.len().min(7);
-        let mut part = Part { bytes: [0; 7], length: length as u8 };
+        let mut part = Part {
+            bytes: [0; 7],
+            length: length as u8,
+        };
         part.bytes[..length].copy_from_slice(&bytes[..length]);
         part
     }
 
     /// The bytes.
     pub fn bytes(&self) -> &[u8] {
-        self.bytes.get(..usize::from(self.length)).unwrap_or(&self.bytes)
+        self.bytes
+            .get(..usize::from(self.length))
+            .unwrap_or(&self.bytes)
     }
 }
 
@@ -143,11 +148,23 @@ pub enum Answer {
 
 fn initiate(command: u8, address: Address, data: [u8; 4]) -> [u8; 8] {
     let [low, high] = address.index.to_le_bytes();
-    [command, low, high, address.sub, data[0], data[1], data[2], data[3]]
+    [
+        command,
+        low,
+        high,
+        address.sub,
+        data[0],
+        data[1],
+        data[2],
+        data[3],
+    ]
 }
 
 fn address_of(frame: [u8; 8]) -> Address {
-    Address { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
+    Address {
+        index: u16::from_le_bytes([frame[1], frame[2]]),
+        sub: frame[3],
+    }
 }
 
 fn word_of(frame: [u8; 8]) -> u32 {
@@ -170,7 +187,11 @@ fn encode_start(specifier: u8, address: Address, start: Start) -> [u8; 8] {
 
 fn decode_start(frame: [u8; 8]) -> Start {
     let (expedited, sized) = (frame[0] & 0b10 != 0, frame[0] & 0b01 != 0);
-    let length = if sized { 4 - usize::from(frame[0] >> 2 & 0b11) } else { 4 };
+    let length = if sized {
+        4 - usize::from(frame[0] >> 2 & 0b11)
+    } else {
+        4
+    };
     match (expedited, sized) {
         (true, _) => Start::Expedited(Part::new(&frame[4..4 + length])),
         (false, true) => Start::Segmented(Some(word_of(frame))),
@@ -187,7 +208,11 @@ fn encode_segment(toggle: bool, last: bool, part: Part) -> [u8; 8] {
 
 fn decode_segment(frame: [u8; 8]) -> (bool, bool, Part) {
     let length = 7 - usize::from(frame[0] >> 1 & 0b111);
-    (toggle_of(frame), frame[0] & 1 != 0, Part::new(&frame[1..1 + length]))
+    (
+        toggle_of(frame),
+        frame[0] & 1 != 0,
+        Part::new(&frame[1..1 + length]),
+    )
 }
 
 fn toggle_of(frame: [u8; 8]) -> bool {
@@ -201,7 +226,9 @@ impl Request {
             Request::Download(address, start) => encode_start(1 << 5, address, start),
             Request::DownloadSegment { toggle, last, part } => encode_segment(toggle, last, part),
             Request::Upload(address) => initiate(2 << 5, address, [0; 4]),
-            Request::UploadSegment { toggle } => initiate(3 << 5 | u8::from(toggle) << 4, Address::new(0, 0), [0; 4]),
+            Request::UploadSegment { toggle } => {
+                initiate(3 << 5 | u8::from(toggle) << 4, Address::new(0, 0), [0; 4])
+            }
             Request::Abort(address, code) => initiate(4 << 5, address, code.0.to_le_bytes()),
         }
     }

@@ -63,24 +63,39 @@ impl Server {
 
     /// The address of the transfer under way, zero if there is none.
     fn address(&self) -> Address {
-        self.transfer.as_ref().map_or(Address::new(0, 0), |transfer| transfer.address)
+        self.transfer
+            .as_ref()
+            .map_or(Address::new(0, 0), |transfer| transfer.address)
     }
 
-    fn upload(&mut self, address: Address, dictionary: &impl Dictionary) -> Result<Answer, (Address, AbortCode)> {
+    fn upload(
+        &mut self,
+        address: Address,
+        dictionary: &impl Dictionary,
+    ) -> Result<Answer, (Address, AbortCode)> {
         self.transfer = None;
         let data = dictionary.read(address).map_err(|code| (address, code))?;
         if (1..=4).contains(&data.len()) {
-            return Ok(Answer::Uploaded(address, Start::Expedited(Part::new(&data))));
+            return Ok(Answer::Uploaded(
+                address,
+                Start::Expedited(Part::new(&data)),
+            ));
         }
         let size = data.len() as u32;
-        self.transfer = Some(Transfer { address, toggle: false, kind: Kind::Reading { data, sent: 0 } });
+        self.transfer = Some(Transfer {
+            address,
+            toggle: false,
+            kind: Kind::Reading { data, sent: 0 },
+        });
         Ok(Answer::Uploaded(address, Start::Segmented(Some(size))))
     }
 
     fn upload_segment(&mut self, toggle: bool) -> Result<Answer, (Address, AbortCode)> {
         let address = self.address();
         let transfer = self.continued(toggle)?;
-        let Kind::Reading { data, sent } = &mut transfer.kind else { return Err((address, AbortCode::COMMAND)) };
+        let Kind::Reading { data, sent } = &mut transfer.kind else {
+            return Err((address, AbortCode::COMMAND));
+        };
         let part = Part::new(data.get(*sent..).unwrap_or_default());
         *sent += part.bytes().len();
         let last = *sent >= data.len();
@@ -98,11 +113,22 @@ impl Server {
     ) -> Result<Answer, (Address, AbortCode)> {
         self.transfer = None;
         match start {
-            Start::Expedited(part) => dictionary.write(address, part.bytes()).map_err(|code| (address, code))?,
-            Start::Segmented(Some(size)) if size as usize > LONGEST => return Err((address, AbortCode::MEMORY)),
+            Start::Expedited(part) => dictionary
+                .write(address, part.bytes())
+                .map_err(|code| (address, code))?,
+            Start::Segmented(Some(size)) if size as usize > LONGEST => {
+                return Err((address, AbortCode::MEMORY));
+            }
             Start::Segmented(size) => {
-                let kind = Kind::Writing { data: Vec::new(), size };
-                self.transfer = Some(Transfer { address, toggle: false, kind });
+                let kind = Kind::Writing {
+                    data: Vec::new(),
+                    size,
+                };
+                self.transfer = Some(Transfer {
+                    address,
+                    toggle: false,
+                    kind,
+                });
             }
         }
         Ok(Answer::Downloaded(address))
@@ -117,7 +143,9 @@ impl Server {
     ) -> Result<Answer, (Address, AbortCode)> {
         let address = self.address();
         let transfer = self.continued(toggle)?;
-        let Kind::Writing { data, size } = &mut transfer.kind else { return Err((address, AbortCode::COMMAND)) };
+        let Kind::Writing { data, size } = &mut transfer.kind else {
+            return Err((address, AbortCode::COMMAND));
+        };
         data.extend_from_slice(part.bytes());
         if data.len() > LONGEST {
             return Err((address, AbortCode::MEMORY));
@@ -126,7 +154,9 @@ impl Server {
             if size.is_some_and(|size| size as usize != data.len()) {
                 return Err((address, AbortCode::LENGTH));
             }
-            dictionary.write(address, data).map_err(|code| (address, code))?;
+            dictionary
+                .write(address, data)
+                .map_err(|code| (address, code))?;
             self.transfer = None;
         }
         Ok(Answer::DownloadedSegment { toggle })
@@ -134,7 +164,9 @@ impl Server {
 
     /// The transfer under way, if the segment has the expected toggle bit, which is then turned.
     fn continued(&mut self, toggle: bool) -> Result<&mut Transfer, (Address, AbortCode)> {
-        let Some(transfer) = &mut self.transfer else { return Err((Address::new(0, 0), AbortCode::COMMAND)) };
+        let Some(transfer) = &mut self.transfer else {
+            return Err((Address::new(0, 0), AbortCode::COMMAND));
+        };
         if transfer.toggle != toggle {
             return Err((transfer.address, AbortCode::TOGGLE));
         }

@@ -6,8 +6,11 @@ use super::super::bus::{Port, World};
 use super::super::device::{ActingAmplifier, DeviceFault, DeviceTask, VescDevice};
 use super::*;
 
-const SETTINGS: VescSettings =
-    VescSettings { node: 23, current_limit_a: 60.0, status_timeout: Duration::from_millis(100) };
+const SETTINGS: VescSettings = VescSettings {
+    node: 23,
+    current_limit_a: 60.0,
+    status_timeout: Duration::from_millis(100),
+};
 
 struct Rig {
     vesc: Vesc,
@@ -30,13 +33,21 @@ fn rig() -> Rig {
     let (world, device) = (World::default(), Arc::new(Mutex::new(VescDevice::new(23))));
     let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
     let vesc = Vesc::open(SETTINGS, Box::new(world.clone())).unwrap();
-    Rig { vesc, world, device, _running: running }
+    Rig {
+        vesc,
+        world,
+        device,
+        _running: running,
+    }
 }
 
 #[test]
 fn fifty_one_amperes_to_node_23_are_the_bytes_of_the_documentation() {
     let frame = set_current(23, 51_000);
-    assert_eq!((frame.id(), frame.data()), (Id::extended(0x0117), &[0x00, 0x00, 0xC7, 0x38][..]));
+    assert_eq!(
+        (frame.id(), frame.data()),
+        (Id::extended(0x0117), &[0x00, 0x00, 0xC7, 0x38][..])
+    );
     assert_eq!(status_id(23), Id::extended(0x0917));
     assert_eq!(status_current(&[0, 0, 0, 0, 0xFF, 0xF6, 0, 0]), Some(-10)); // -1 A
     assert_eq!(status_current(&[0; 7]), None);
@@ -45,18 +56,31 @@ fn fifty_one_amperes_to_node_23_are_the_bytes_of_the_documentation() {
 #[test]
 fn a_vesc_follows_and_tells_its_current() {
     let mut rig = rig();
-    assert_eq!(rig.vesc.command(1.0).unwrap_err().code, i64::from(NOT_ARMED));
+    assert_eq!(
+        rig.vesc.command(1.0).unwrap_err().code,
+        i64::from(NOT_ARMED)
+    );
     rig.vesc.enable().unwrap();
     assert_eq!(rig.vesc.status(), AmplifierStatus::Enabled);
-    assert_eq!(rig.vesc.command(-1.2345), Ok(-1.234), "whole milliamperes, towards zero");
+    assert_eq!(
+        rig.vesc.command(-1.2345),
+        Ok(-1.234),
+        "whole milliamperes, towards zero"
+    );
     assert_eq!(rig.vesc.command(99.0), Ok(60.0), "limited");
     assert_eq!(rig.vesc.command(-1.2345), Ok(-1.234));
     rig.world.sleep(Duration::from_millis(40));
     assert_eq!(rig.current_a(), -1.234);
-    assert!((rig.vesc.actual_current_a().unwrap() + 1.2).abs() < 1e-9, "0.1 A is what STATUS tells");
+    assert!(
+        (rig.vesc.actual_current_a().unwrap() + 1.2).abs() < 1e-9,
+        "0.1 A is what STATUS tells"
+    );
     rig.vesc.disable();
     rig.world.sleep(Duration::from_millis(1));
-    assert_eq!((rig.current_a(), rig.vesc.status()), (0.0, AmplifierStatus::Disabled));
+    assert_eq!(
+        (rig.current_a(), rig.vesc.status()),
+        (0.0, AmplifierStatus::Disabled)
+    );
 }
 
 #[test]
@@ -81,7 +105,11 @@ fn a_silent_vesc_and_a_dead_bus_are_faults_until_cleared() {
         rig.inject(DeviceFault::None);
         rig.world.sleep(Duration::from_millis(240));
         rig.vesc.reset_fault().unwrap();
-        assert_eq!(rig.vesc.status(), AmplifierStatus::Disabled, "cleared is not enabled");
+        assert_eq!(
+            rig.vesc.status(),
+            AmplifierStatus::Disabled,
+            "cleared is not enabled"
+        );
         rig.vesc.enable().unwrap();
     }
 }
@@ -94,7 +122,10 @@ fn a_vesc_that_no_longer_hears_us_lets_go_by_itself() {
     rig.world.sleep(Duration::from_millis(1));
     rig.inject(DeviceFault::Unplugged);
     rig.world.sleep(Duration::from_millis(490));
-    assert_eq!((rig.current_a(), rig.vesc.status()), (1.0, AmplifierStatus::Fault(SILENT)));
+    assert_eq!(
+        (rig.current_a(), rig.vesc.status()),
+        (1.0, AmplifierStatus::Fault(SILENT))
+    );
     rig.world.sleep(Duration::from_millis(20));
     assert_eq!(rig.current_a(), 0.0);
 }

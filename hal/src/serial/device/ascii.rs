@@ -23,7 +23,14 @@ impl AsciiDevice {
     /// A probe just switched on.
     pub fn new(writing: Writing, rate_hz: f64) -> Self {
         let (sampler, ailing) = (Sampler::new(rate_hz), Ailing::default());
-        Self { writing, sampler, newest_m: 0.0, heard: Vec::new(), ailing, cut: false }
+        Self {
+            writing,
+            sampler,
+            newest_m: 0.0,
+            heard: Vec::new(),
+            ailing,
+            cut: false,
+        }
     }
 
     /// Makes the measurements that are due; returns their lines if the probe speaks by itself.
@@ -31,7 +38,9 @@ impl AsciiDevice {
         let mut lines = Vec::new();
         let (lower_m, upper_m) = (self.writing.settings.lower_m, self.writing.settings.upper_m);
         for _ in 0..self.sampler.due(now_ns) {
-            self.newest_m = self.ailing.measure(position_m, upper_m + 2.0 * (upper_m - lower_m));
+            self.newest_m = self
+                .ailing
+                .measure(position_m, upper_m + 2.0 * (upper_m - lower_m));
             if self.writing.request().is_none() {
                 lines.extend(self.line());
             }
@@ -41,7 +50,11 @@ impl AsciiDevice {
 
     fn line(&mut self) -> Vec<u8> {
         let line = self.writing.write(Statement::Metres(self.newest_m));
-        let lost = if std::mem::take(&mut self.cut) { line.len() / 2 } else { 0 };
+        let lost = if std::mem::take(&mut self.cut) {
+            line.len() / 2
+        } else {
+            0
+        };
         line[lost..].to_vec()
     }
 

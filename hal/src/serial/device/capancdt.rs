@@ -23,7 +23,14 @@ impl CapancdtDevice {
     /// A probe just switched on.
     pub fn new(settings: Settings, rate_hz: f64) -> Self {
         let (unsent, heard) = (VecDeque::new(), VecDeque::new());
-        Self { settings, sampler: Sampler::new(rate_hz), counter: 0, unsent, heard, ailing: Ailing::default() }
+        Self {
+            settings,
+            sampler: Sampler::new(rate_hz),
+            counter: 0,
+            unsent,
+            heard,
+            ailing: Ailing::default(),
+        }
     }
 
     fn measure(&mut self, now_ns: u64, position_m: f64) {

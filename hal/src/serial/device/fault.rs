@@ -49,7 +49,11 @@ pub(super) struct Ailing {
 impl Ailing {
     /// A new fault; what a former one held back is lost.
     pub(super) fn ask(&mut self, fault: Fault) {
-        *self = Self { fault, noise: self.noise, ..Self::default() };
+        *self = Self {
+            fault,
+            noise: self.noise,
+            ..Self::default()
+        };
     }
 
     /// What is measured at `position_m` with `beyond_m` a place out of range.
@@ -57,7 +61,9 @@ impl Ailing {
         self.measurements = self.measurements.wrapping_add(1);
         match self.fault {
             Fault::Stuck => *self.stuck_m.get_or_insert(position_m),
-            Fault::Jump { every, by_m } if self.measurements.is_multiple_of(every.max(1)) => position_m + by_m,
+            Fault::Jump { every, by_m } if self.measurements.is_multiple_of(every.max(1)) => {
+                position_m + by_m
+            }
             Fault::OutOfRange => beyond_m,
             _ => position_m,
         }
@@ -67,7 +73,9 @@ impl Ailing {
     pub(super) fn send(&mut self, mut bytes: Vec<u8>, now_ns: u64) -> Vec<u8> {
         match self.fault {
             Fault::Silence => bytes.clear(),
-            Fault::Corrupt { every } => bytes.iter_mut().for_each(|byte| self.corrupt(byte, every.max(1))),
+            Fault::Corrupt { every } => bytes
+                .iter_mut()
+                .for_each(|byte| self.corrupt(byte, every.max(1))),
             Fault::Late { by_ns } => return self.hold_back(bytes, now_ns, by_ns),
             _ => {}
         }
@@ -77,7 +85,10 @@ impl Ailing {
     fn corrupt(&mut self, byte: &mut u8, every: u32) {
         self.bytes = self.bytes.wrapping_add(1);
         if self.bytes.is_multiple_of(every) {
-            self.noise = self.noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223); // Numerical Recipes
+            self.noise = self
+                .noise
+                .wrapping_mul(1_664_525)
+                .wrapping_add(1_013_904_223); // Numerical Recipes
             *byte ^= (self.noise >> 24) as u8 | 1; // never the same byte
         }
     }

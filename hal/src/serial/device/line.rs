@@ -45,19 +45,32 @@ impl Line {
     /// Opens the port of `settings` and takes it for this process; with what it did not take.
     pub fn port(settings: PortSettings) -> Result<(Line, Vec<Note>), SerialError> {
         let (port, notes) = Port::open(&settings)?;
-        Ok((Line::new(End::Port(port), settings.path.clone(), settings), notes))
+        Ok((
+            Line::new(End::Port(port), settings.path.clone(), settings),
+            notes,
+        ))
     }
 
     /// Makes a pseudo terminal that carries bytes as fast as the line of `settings`; its slave is for the reader.
     pub fn terminal(settings: PortSettings) -> Result<Line, SerialError> {
         let made = TTYPort::pair();
-        let (master, slave) = made.map_err(|source| SerialError::Open { path: "/dev/ptmx".into(), source })?;
+        let (master, slave) = made.map_err(|source| SerialError::Open {
+            path: "/dev/ptmx".into(),
+            source,
+        })?;
         let path = slave.name().unwrap_or_default().into();
         Ok(Line::new(End::Terminal { master, slave }, path, settings))
     }
 
     fn new(end: End, path: PathBuf, settings: PortSettings) -> Line {
-        Line { end, path, settings, sending: VecDeque::new(), busy_ns: 0, freed_ns: 0 }
+        Line {
+            end,
+            path,
+            settings,
+            sending: VecDeque::new(),
+            busy_ns: 0,
+            freed_ns: 0,
+        }
     }
 
     /// The port, or the slave of the pseudo terminal.
@@ -71,7 +84,13 @@ impl Line {
             End::Port(port) => port.read(buffer, wait),
             End::Terminal { master, .. } => {
                 master.set_timeout(wait).map_err(io::Error::from)?;
-                master.read(buffer).or_else(|error| if is_nothing(&error) { Ok(0) } else { Err(error) })
+                master.read(buffer).or_else(|error| {
+                    if is_nothing(&error) {
+                        Ok(0)
+                    } else {
+                        Err(error)
+                    }
+                })
             }
         }
     }
@@ -82,7 +101,11 @@ impl Line {
             return;
         }
         let is_port = matches!(self.end, End::Port(_));
-        let line_ns = if is_port { 0 } else { self.settings.line_time_ns((asked + bytes.len()) as u32) };
+        let line_ns = if is_port {
+            0
+        } else {
+            self.settings.line_time_ns((asked + bytes.len()) as u32)
+        };
         self.busy_ns = self.busy_ns.max(now_ns) + line_ns;
         self.sending.push_back((self.busy_ns, bytes));
     }
@@ -115,14 +138,22 @@ impl Line {
                 master.write_all(bytes)
             }
         };
-        written.or_else(|error| if is_nothing(&error) { Ok(()) } else { Err(error) })
+        written.or_else(|error| {
+            if is_nothing(&error) {
+                Ok(())
+            } else {
+                Err(error)
+            }
+        })
     }
 
     /// Takes off the mark of exclusive use that a reader leaves on the slave when it is killed: on a port it goes with the
     /// last closing, but here the slave stays open, and the next reader would be refused. Readers keep each other out by
     /// their locks.
     fn free_slave(&mut self, now_ns: u64) {
-        let End::Terminal { slave, .. } = &self.end else { return };
+        let End::Terminal { slave, .. } = &self.end else {
+            return;
+        };
         if now_ns < self.freed_ns {
             return;
         }

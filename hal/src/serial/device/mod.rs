@@ -47,7 +47,10 @@ pub fn simulate(protocol: &Protocol, rate_hz: f64) -> Result<Box<dyn SimulatedPr
     Ok(match protocol.clone() {
         Protocol::Capancdt(settings) => Box::new(CapancdtDevice::new(settings, rate_hz)),
         Protocol::Optoncdt(settings) => Box::new(OptoncdtDevice::new(settings, rate_hz)),
-        Protocol::Ascii(settings) => Box::new(AsciiDevice::new(super::ascii::Writing::new(settings)?, rate_hz)),
+        Protocol::Ascii(settings) => Box::new(AsciiDevice::new(
+            super::ascii::Writing::new(settings)?,
+            rate_hz,
+        )),
     })
 }
 
@@ -63,13 +66,18 @@ impl Sampler {
     const MOST: u64 = 10_000;
 
     fn new(rate_hz: f64) -> Self {
-        Self { period_ns: ((1e9 / rate_hz) as u64).max(1), next_ns: None }
+        Self {
+            period_ns: ((1e9 / rate_hz) as u64).max(1),
+            next_ns: None,
+        }
     }
 
     /// How many measurements fell due up to `now_ns`; the first at the first call.
     fn due(&mut self, now_ns: u64) -> u64 {
         let next_ns = *self.next_ns.get_or_insert(now_ns);
-        let Some(late_ns) = now_ns.checked_sub(next_ns) else { return 0 };
+        let Some(late_ns) = now_ns.checked_sub(next_ns) else {
+            return 0;
+        };
         let count = late_ns / self.period_ns + 1;
         self.next_ns = Some(next_ns + count * self.period_ns);
         count.min(Self::MOST)
@@ -85,6 +93,9 @@ mod tests {
         let mut often = Sampler::new(1000.0);
         let mut rarely = Sampler::new(1000.0);
         let counted: u64 = (0..=10_000).map(|step| often.due(step * 100_000)).sum();
-        assert_eq!([counted, rarely.due(0) + rarely.due(1_000_000_000)], [1001; 2]);
+        assert_eq!(
+            [counted, rarely.due(0) + rarely.due(1_000_000_000)],
+            [1001; 2]
+        );
     }
 }

@@ -17,16 +17,32 @@ pub struct OptoncdtDevice {
 impl OptoncdtDevice {
     /// A probe just switched on.
     pub fn new(settings: Settings, rate_hz: f64) -> Self {
-        Self { settings, sampler: Sampler::new(rate_hz), ailing: Ailing::default(), cut: false }
+        Self {
+            settings,
+            sampler: Sampler::new(rate_hz),
+            ailing: Ailing::default(),
+            cut: false,
+        }
     }
 
     /// One cycle; the values that are not the displacement are zero.
     fn cycle(&mut self, position_m: f64) -> Vec<u8> {
         let measured_m = self.ailing.measure(position_m, 2.0 * self.settings.range_m);
         let displacement = self.settings.cycle.displacement;
-        let value = |place| if place == displacement { self.settings.counts(measured_m) } else { 0 };
-        let bytes = (0..self.settings.cycle.values).flat_map(|place| message(value(place), place == 0));
-        let kept = if std::mem::take(&mut self.cut) { 2 } else { usize::MAX };
+        let value = |place| {
+            if place == displacement {
+                self.settings.counts(measured_m)
+            } else {
+                0
+            }
+        };
+        let bytes =
+            (0..self.settings.cycle.values).flat_map(|place| message(value(place), place == 0));
+        let kept = if std::mem::take(&mut self.cut) {
+            2
+        } else {
+            usize::MAX
+        };
         bytes.take(kept).collect()
     }
 }

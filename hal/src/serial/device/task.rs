@@ -47,15 +47,29 @@ impl ProbeTask {
         prepare: impl FnOnce() + Send + 'static,
     ) -> io::Result<ProbeTask> {
         let (stop, carried) = (Arc::<AtomicBool>::default(), Arc::<Carried>::default());
-        let mut carrier = Carrier { line, probe, now_ns, measure_m, carried: Arc::clone(&carried) };
+        let mut carrier = Carrier {
+            line,
+            probe,
+            now_ns,
+            measure_m,
+            carried: Arc::clone(&carried),
+        };
         let stopped = Arc::clone(&stop);
         let work = move || {
             prepare();
             while !stopped.load(Relaxed) && carrier.turn().is_ok() {}
             carrier.carried.is_lost.store(true, Relaxed);
         };
-        let thread = Some(thread::Builder::new().name("probe-device".into()).spawn(work)?);
-        Ok(ProbeTask { stop, carried, thread })
+        let thread = Some(
+            thread::Builder::new()
+                .name("probe-device".into())
+                .spawn(work)?,
+        );
+        Ok(ProbeTask {
+            stop,
+            carried,
+            thread,
+        })
     }
 
     /// The counts.
@@ -105,7 +119,11 @@ impl<N: Fn() -> u64, M: FnMut(u64) -> f64> Carrier<N, M> {
             if due_ns > now_ns {
                 break;
             }
-            let at_ns = if turn < MOST_MEASUREMENTS { due_ns } else { now_ns };
+            let at_ns = if turn < MOST_MEASUREMENTS {
+                due_ns
+            } else {
+                now_ns
+            };
             let bytes = probe.poll(at_ns, (self.measure_m)(at_ns));
             self.line.give(bytes, 0, at_ns);
             self.carried.measurements.fetch_add(1, Relaxed);
@@ -123,7 +141,10 @@ impl<N: Fn() -> u64, M: FnMut(u64) -> f64> Carrier<N, M> {
 
     fn wait(&self) -> Duration {
         let now_ns = (self.now_ns)();
-        let due_ns = [lock(&self.probe).due_ns(), self.line.due_ns()].into_iter().flatten().min();
+        let due_ns = [lock(&self.probe).due_ns(), self.line.due_ns()]
+            .into_iter()
+            .flatten()
+            .min();
         Duration::from_nanos(due_ns.unwrap_or(now_ns).saturating_sub(now_ns).min(LOOK_NS))
     }
 }

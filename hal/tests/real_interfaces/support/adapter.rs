@@ -49,7 +49,11 @@ impl Adapter {
         tcsetattr(&pty.slave, SetArg::TCSANOW, &raw).unwrap();
         let (master, terminal) = (File::from(pty.master), File::from(pty.slave));
         let heard = master.try_clone().unwrap();
-        let far_side = FarSide { line: Arc::new(Mutex::new(master)), node: Arc::default(), is_off: Arc::default() };
+        let far_side = FarSide {
+            line: Arc::new(Mutex::new(master)),
+            node: Arc::default(),
+            is_off: Arc::default(),
+        };
         std::thread::spawn({
             let far_side = far_side.clone();
             move || far_side.hear(heard)
@@ -58,7 +62,12 @@ impl Adapter {
         let interface = CanInterface::open(&name).unwrap();
         interface.set_bitrate(BIT_RATE, None).unwrap();
         interface.bring_up().unwrap();
-        Adapter { name, interface, far_side, _terminal: terminal }
+        Adapter {
+            name,
+            interface,
+            far_side,
+            _terminal: terminal,
+        }
     }
 
     pub fn far_side(&self) -> FarSide {
@@ -93,7 +102,11 @@ fn attach(terminal: &File) -> String {
     // SAFETY: the kernel writes a name with its zero, IFNAMSIZ bytes at most.
     let named = unsafe { libc::ioctl(fd, libc::SIOCGIFNAME as libc::Ioctl, name.as_mut_ptr()) };
     assert_eq!(named, 0, "the name of the interface");
-    std::ffi::CStr::from_bytes_until_nul(&name).unwrap().to_str().unwrap().to_owned()
+    std::ffi::CStr::from_bytes_until_nul(&name)
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .to_owned()
 }
 
 impl FarSide {
@@ -133,7 +146,10 @@ impl Port for FarSide {
     fn endpoint(&self, _ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         let (sender, frames) = channel();
         *self.node.lock().unwrap() = Some(sender);
-        Ok(Box::new(FarNode { far_side: self.clone(), frames }))
+        Ok(Box::new(FarNode {
+            far_side: self.clone(),
+            frames,
+        }))
     }
 }
 
@@ -145,8 +161,16 @@ struct FarNode {
 impl CanBus for FarNode {
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
         if !self.far_side.is_off.load(Ordering::Acquire) {
-            let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
-            self.far_side.write(&format!("t{:03X}{}{data}", frame.id().raw(), frame.data().len()));
+            let data: String = frame
+                .data()
+                .iter()
+                .map(|byte| format!("{byte:02X}"))
+                .collect();
+            self.far_side.write(&format!(
+                "t{:03X}{}{data}",
+                frame.id().raw(),
+                frame.data().len()
+            ));
         }
         Ok(())
     }

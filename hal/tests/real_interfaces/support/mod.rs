@@ -44,7 +44,10 @@ pub fn open(name: &str, settings: DriveSettings) -> Result<CanopenDrive, OpenErr
 
 /// Why it did not open.
 pub fn refusal(name: &str, settings: DriveSettings) -> String {
-    open(name, settings).err().expect("this must not open").to_string()
+    open(name, settings)
+        .err()
+        .expect("this must not open")
+        .to_string()
 }
 
 pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
@@ -66,8 +69,13 @@ impl FarEnd {
     /// hears it takes it for a restart.
     pub fn new(name: &str, host: &dyn Host) -> FarEnd {
         let mut bus = self::host(name).endpoint(&[heartbeat::cob_id(5)]).unwrap();
-        let far_end = FarEnd::again(host, Arc::new(Mutex::new(Device::new(DeviceSettings::default()))));
-        wait_for("the drive has started", || bus.receive(Duration::from_secs(1)).unwrap().is_some());
+        let far_end = FarEnd::again(
+            host,
+            Arc::new(Mutex::new(Device::new(DeviceSettings::default()))),
+        );
+        wait_for("the drive has started", || {
+            bus.receive(Duration::from_secs(1)).unwrap().is_some()
+        });
         far_end
     }
 
@@ -126,9 +134,11 @@ impl Rig {
     pub fn gives(&mut self, wanted_a: f64, given_a: f64) {
         assert_eq!(self.drive.command(wanted_a), Ok(given_a));
         let near = |current_a: f64| (current_a - given_a).abs() < 1e-9;
-        self.command_until(wanted_a, &format!("{given_a} A flow and come back"), |rig| {
-            near(rig.far_end.current_a()) && rig.drive.actual_current_a().is_some_and(near)
-        });
+        self.command_until(
+            wanted_a,
+            &format!("{given_a} A flow and come back"),
+            |rig| near(rig.far_end.current_a()) && rig.drive.actual_current_a().is_some_and(near),
+        );
         assert_eq!(self.drive.status(), AmplifierStatus::Enabled);
     }
 
@@ -140,21 +150,40 @@ impl Rig {
 
     /// The fault that a loop meets which commands on; afterwards it is refused and no current flows.
     pub fn fault(&mut self) -> u32 {
-        self.command_until(1.0, "a fault", |rig| matches!(rig.drive.status(), AmplifierStatus::Fault(_)));
-        let AmplifierStatus::Fault(code) = self.drive.status() else { panic!("the fault did not stay") };
+        self.command_until(1.0, "a fault", |rig| {
+            matches!(rig.drive.status(), AmplifierStatus::Fault(_))
+        });
+        let AmplifierStatus::Fault(code) = self.drive.status() else {
+            panic!("the fault did not stay")
+        };
         self.far_end.goes_off();
-        assert!(self.drive.command(1.0).is_err(), "a heedless loop is refused");
-        assert!(self.drive.enable().is_err(), "a fault is not left by enabling");
+        assert!(
+            self.drive.command(1.0).is_err(),
+            "a heedless loop is refused"
+        );
+        assert!(
+            self.drive.enable().is_err(),
+            "a fault is not left by enabling"
+        );
         code
     }
 
     /// With the cause gone: cleared by a person, off, and enabled only when asked.
     pub fn recovers(&mut self) {
         self.far_end.device().inject(DeviceFault::None);
-        self.drive.reset_fault().unwrap_or_else(|error| panic!("{error}: {:?}", self.drive.last_error()));
-        assert_eq!((self.drive.status(), self.far_end.current_a()), (AmplifierStatus::Disabled, 0.0));
+        self.drive
+            .reset_fault()
+            .unwrap_or_else(|error| panic!("{error}: {:?}", self.drive.last_error()));
+        assert_eq!(
+            (self.drive.status(), self.far_end.current_a()),
+            (AmplifierStatus::Disabled, 0.0)
+        );
         self.drive.enable().unwrap();
-        assert_eq!(self.far_end.current_a(), 0.0, "an old command does not come back");
+        assert_eq!(
+            self.far_end.current_a(),
+            0.0,
+            "an old command does not come back"
+        );
         self.gives(0.5, 0.5);
     }
 }

@@ -5,9 +5,15 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 /// The script `name` on `interface`, with the python of `.ci/run`.
 pub fn script(name: &str, interface: &str) -> Command {
-    let python = std::env::var_os("BENCH_PYTHON").expect("BENCH_PYTHON: a python with .ci/python-packages.txt");
+    let python = std::env::var_os("BENCH_PYTHON")
+        .expect("BENCH_PYTHON: a python with .ci/python-packages.txt");
     let mut command = Command::new(python);
-    command.arg(format!("{}/tests/python/{name}", env!("CARGO_MANIFEST_DIR"))).arg(interface);
+    command
+        .arg(format!(
+            "{}/tests/python/{name}",
+            env!("CARGO_MANIFEST_DIR")
+        ))
+        .arg(interface);
     command
 }
 
@@ -22,10 +28,19 @@ impl PythonDrive {
     /// On the bus; returns when it has started.
     pub fn new(interface: &str) -> PythonDrive {
         let mut command = script("canopen_drive.py", interface);
-        let mut process = command.arg("5").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let mut process = command
+            .arg("5")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
         let questions = process.stdin.take().unwrap();
         let answers = BufReader::new(process.stdout.take().unwrap());
-        let mut drive = PythonDrive { process, questions, answers };
+        let mut drive = PythonDrive {
+            process,
+            questions,
+            answers,
+        };
         assert_eq!(drive.answer(), "ready");
         drive
     }

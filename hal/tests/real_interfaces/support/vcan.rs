@@ -28,19 +28,33 @@ impl Vcan {
     }
 
     fn named(name: String) -> Vcan {
-        let interface = CanInterface::create_vcan(&name, None).expect("root, and a kernel with vcan: use .ci/vm/check");
-        Vcan { name, interface: Some(interface) }
+        let interface = CanInterface::create_vcan(&name, None)
+            .expect("root, and a kernel with vcan: use .ci/vm/check");
+        Vcan {
+            name,
+            interface: Some(interface),
+        }
     }
 
     /// `ip link set IFACE up`, or down.
     pub fn set_up(&self, is_up: bool) {
         let interface = self.interface.as_ref().unwrap();
-        if is_up { interface.bring_up() } else { interface.bring_down() }.unwrap();
+        if is_up {
+            interface.bring_up()
+        } else {
+            interface.bring_down()
+        }
+        .unwrap();
     }
 
     /// `ip link del`: the adapter is pulled out.
     pub fn unplug(&mut self) {
-        self.interface.take().unwrap().delete().map_err(|(_, error)| error).unwrap();
+        self.interface
+            .take()
+            .unwrap()
+            .delete()
+            .map_err(|(_, error)| error)
+            .unwrap();
     }
 
     /// The adapter is plugged in again and has the same name.

@@ -15,12 +15,30 @@ pub fn events(decoder: &mut dyn Decoder, bytes: &[u8]) -> Vec<Event> {
 
 /// Raw counts of the valid values among `events`.
 pub fn valid(events: &[Event]) -> Vec<i64> {
-    events.iter().filter_map(|event| if let Event::Value(sample) = event { Some(sample.raw) } else { None }).collect()
+    events
+        .iter()
+        .filter_map(|event| {
+            if let Event::Value(sample) = event {
+                Some(sample.raw)
+            } else {
+                None
+            }
+        })
+        .collect()
 }
 
 /// Bytes that were said to be damaged.
 pub fn damaged(events: &[Event]) -> u64 {
-    events.iter().map(|event| if let Event::Damaged(bytes) = event { u64::from(*bytes) } else { 0 }).sum()
+    events
+        .iter()
+        .map(|event| {
+            if let Event::Damaged(bytes) = event {
+                u64::from(*bytes)
+            } else {
+                0
+            }
+        })
+        .sum()
 }
 
 /// A generator of repeatable noise (xorshift64*).

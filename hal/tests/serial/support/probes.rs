@@ -13,13 +13,23 @@ pub fn optoncdt() -> Protocol {
 }
 
 pub fn keyence() -> Protocol {
-    Protocol::Ascii(ascii::Settings { lower_m: 0.0, upper_m: RANGE_M, ..ascii::Settings::keyence_lk_g(RANGE_M) })
+    Protocol::Ascii(ascii::Settings {
+        lower_m: 0.0,
+        upper_m: RANGE_M,
+        ..ascii::Settings::keyence_lk_g(RANGE_M)
+    })
 }
 
 pub fn keyence_polled() -> Protocol {
     let settings = ascii::Settings::keyence_lk_g(RANGE_M);
     let (request, line) = (Some("M1\\r".into()), "M1,{value:8.4}".into());
-    Protocol::Ascii(ascii::Settings { request, line, lower_m: 0.0, upper_m: RANGE_M, ..settings })
+    Protocol::Ascii(ascii::Settings {
+        request,
+        line,
+        lower_m: 0.0,
+        upper_m: RANGE_M,
+        ..settings
+    })
 }
 
 pub fn all() -> [Protocol; 4] {

@@ -33,14 +33,24 @@ impl Rehearsal {
         let (path, started) = (line.path().to_owned(), Instant::now());
         let device: Shared = Arc::new(Mutex::new(simulate(protocol, rate_hz).unwrap()));
         let now_ns = move || started.elapsed().as_nanos() as u64;
-        let task = Some(ProbeTask::start(line, Arc::clone(&device), now_ns, motion, || {}).unwrap());
+        let task =
+            Some(ProbeTask::start(line, Arc::clone(&device), now_ns, motion, || {}).unwrap());
         let locks = tempfile::tempdir().unwrap();
-        Self { path, locks, started, device, task }
+        Self {
+            path,
+            locks,
+            started,
+            device,
+            task,
+        }
     }
 
     /// Settings of the driver for this probe.
     pub fn settings(&self, protocol: &Protocol) -> ProbeSettings {
-        let port = PortSettings { lock_dir: self.locks.path().into(), ..PortSettings::new(&self.path, BAUD) };
+        let port = PortSettings {
+            lock_dir: self.locks.path().into(),
+            ..PortSettings::new(&self.path, BAUD)
+        };
         ProbeSettings::new(port, protocol.clone())
     }
 
@@ -59,7 +69,9 @@ impl Rehearsal {
 
     /// Bytes that the probe has sent.
     pub fn sent(&self) -> u64 {
-        self.task.as_ref().map_or(0, |task| task.carried().sent.load(Relaxed))
+        self.task
+            .as_ref()
+            .map_or(0, |task| task.carried().sent.load(Relaxed))
     }
 
     /// Pulls the cable: the terminal hangs up.
@@ -74,11 +86,18 @@ pub fn latest(probe: &mut SerialProbe) -> Reading {
 }
 
 /// Watches the probe until a reading pleases, checking that its sequence never falls; panics if none ever does.
-pub fn until(probe: &mut SerialProbe, what: &str, mut pleases: impl FnMut(&Reading, &Statistics) -> bool) -> Reading {
+pub fn until(
+    probe: &mut SerialProbe,
+    what: &str,
+    mut pleases: impl FnMut(&Reading, &Statistics) -> bool,
+) -> Reading {
     let (begun, mut before) = (Instant::now(), latest(probe));
     while begun.elapsed() < HANGS {
         let (reading, statistics) = (latest(probe), probe.statistics());
-        assert!(reading.sequence >= before.sequence, "{before:?} before {reading:?}");
+        assert!(
+            reading.sequence >= before.sequence,
+            "{before:?} before {reading:?}"
+        );
         if pleases(&reading, &statistics) {
             return reading;
         }
@@ -91,5 +110,7 @@ pub fn until(probe: &mut SerialProbe, what: &str, mut pleases: impl FnMut(&Readi
 /// Waits until so many more measurements have been handed out than at the call.
 pub fn more(probe: &mut SerialProbe, count: u64) -> Reading {
     let before = probe.statistics().published;
-    until(probe, "more readings", |_, statistics| statistics.published >= before + count)
+    until(probe, "more readings", |_, statistics| {
+        statistics.published >= before + count
+    })
 }

@@ -106,7 +106,9 @@ fn ten_million_random_frames_do_not_panic() {
     let mut monitor = Monitor::new(&DriveSettings::default(), Arc::clone(&shared), 0);
     let mut device = Device::new(DeviceSettings::default());
     let (mut client, _) = super::super::super::sdo::Client::upload(Address::new(0x1008, 0));
-    let ids = [0x000u16, 0x080, 0x085, 0x185, 0x205, 0x585, 0x605, 0x705, 0x77F];
+    let ids = [
+        0x000u16, 0x080, 0x085, 0x185, 0x205, 0x585, 0x605, 0x705, 0x77F,
+    ];
     let (mut random, mut out) = (0x9E37_79B9_7F4A_7C15u64, Vec::new());
     for n in 0..10_000_000u64 {
         random ^= random << 13;

@@ -15,21 +15,37 @@ fn a_drive_comes_up_follows_quantised_currents_and_goes_down() {
         assert_eq!(rig.device_current_a(), 0.0, "enabled means zero current");
 
         // 1 A of 4 A is 250 counts; 0.9985 A is 249.6 counts, so 250; beyond the limit of 4 A 1000 counts remain.
-        for (wanted_a, given_a) in [(1.0, 1.0), (0.9985, 1.0), (-0.003, -0.004), (9.0, 4.0), (-9.0, -4.0)] {
+        for (wanted_a, given_a) in [
+            (1.0, 1.0),
+            (0.9985, 1.0),
+            (-0.003, -0.004),
+            (9.0, 4.0),
+            (-9.0, -4.0),
+        ] {
             assert_eq!(rig.drive.command(wanted_a), Ok(given_a));
             rig.sleep_ms(1);
-            assert!((rig.device_current_a() - given_a).abs() < 1e-12, "{exchange:?}: {wanted_a}");
+            assert!(
+                (rig.device_current_a() - given_a).abs() < 1e-12,
+                "{exchange:?}: {wanted_a}"
+            );
         }
         assert_eq!(rig.run_ms(-2.0, 20), 20);
         assert_eq!(rig.drive.actual_current_a(), Some(-2.0));
 
         rig.drive.disable();
         rig.sleep_ms(5);
-        assert_eq!((rig.device_current_a(), rig.device().power_state()), (0.0, State::SwitchOnDisabled));
+        assert_eq!(
+            (rig.device_current_a(), rig.device().power_state()),
+            (0.0, State::SwitchOnDisabled)
+        );
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
         rig.drive.disable();
         rig.drive.enable().unwrap();
-        assert_eq!(rig.device_current_a(), 0.0, "an old set-point does not come back");
+        assert_eq!(
+            rig.device_current_a(),
+            0.0,
+            "an old set-point does not come back"
+        );
     }
 }
 
@@ -45,87 +61,183 @@ fn synchronous_set_points_take_effect_with_their_sync() {
 fn the_drive_is_told_to_watch_us_and_to_switch_off() {
     let rig = rig(ASYNCHRONOUS);
     let device = rig.device();
-    assert_eq!(device.read(Address::new(0x1016, 1)), 0x007F_0046, "node 0x7F, 70 ms");
+    assert_eq!(
+        device.read(Address::new(0x1016, 1)),
+        0x007F_0046,
+        "node 0x7F, 70 ms"
+    );
     assert_eq!(device.read(Address::new(0x1017, 0)), 20);
     assert_eq!(device.read(Address::new(0x6007, 0)), 2);
     assert_eq!(device.read(Address::new(0x1A00, 1)), 0x6041_0010);
-    assert_eq!((device.read(Address::new(0x1800, 3)), device.read(Address::new(0x1800, 5))), (20, 2), "2 ms both");
+    assert_eq!(
+        (
+            device.read(Address::new(0x1800, 3)),
+            device.read(Address::new(0x1800, 5))
+        ),
+        (20, 2),
+        "2 ms both"
+    );
 }
 
 #[test]
 fn profile_torque_is_the_fallback() {
-    let device = DeviceSettings { modes: 1 << (PROFILE_TORQUE - 1), ..DeviceSettings::default() };
+    let device = DeviceSettings {
+        modes: 1 << (PROFILE_TORQUE - 1),
+        ..DeviceSettings::default()
+    };
     let mut rig = open(DriveSettings::default(), device.clone()).unwrap();
     assert_eq!(rig.drive.mode(), PROFILE_TORQUE);
-    assert_eq!(rig.device().read(Address::new(0x6087, 0)), u32::MAX, "the slope is the largest");
+    assert_eq!(
+        rig.device().read(Address::new(0x6087, 0)),
+        u32::MAX,
+        "the slope is the largest"
+    );
     rig.drive.enable().unwrap();
     rig.run_ms(1.0, 5);
     assert_eq!(rig.device_current_a(), 1.0);
-    let refused = refusal(DriveSettings { mode: TorqueMode::Cyclic, ..DriveSettings::default() }, device);
+    let refused = refusal(
+        DriveSettings {
+            mode: TorqueMode::Cyclic,
+            ..DriveSettings::default()
+        },
+        device,
+    );
     assert!(refused.contains("0x6502 = 0x00000008"), "{refused}");
 }
 
 #[test]
 fn a_target_in_per_mille_of_the_maximum_is_scaled_so() {
     // 0x6072 = 1500 per mille of 4 A: 1000 counts are 6 A, one count 6 mA.
-    let settings = DriveSettings { reference: Reference::Maximum, ..DriveSettings::default() };
-    let device = DeviceSettings { reference: Reference::Maximum, ..DeviceSettings::default() };
+    let settings = DriveSettings {
+        reference: Reference::Maximum,
+        ..DriveSettings::default()
+    };
+    let device = DeviceSettings {
+        reference: Reference::Maximum,
+        ..DeviceSettings::default()
+    };
     let mut rig = open(settings, device).unwrap();
     rig.drive.enable().unwrap();
     let given_a = rig.drive.command(1.0).unwrap();
     rig.sleep_ms(1);
-    assert!((given_a - 167.0 * 6e-3).abs() < 1e-12 && (rig.device_current_a() - given_a).abs() < 1e-12);
+    assert!(
+        (given_a - 167.0 * 6e-3).abs() < 1e-12 && (rig.device_current_a() - given_a).abs() < 1e-12
+    );
 }
 
 #[test]
 fn another_drive_than_configured_is_refused() {
-    let with = |identity| DriveSettings { identity, ..DriveSettings::default() };
-    let vendor = ExpectedIdentity { vendor: Some(0x402), ..ExpectedIdentity::default() };
+    let with = |identity| DriveSettings {
+        identity,
+        ..DriveSettings::default()
+    };
+    let vendor = ExpectedIdentity {
+        vendor: Some(0x402),
+        ..ExpectedIdentity::default()
+    };
     assert!(open(with(vendor), DeviceSettings::default()).is_ok());
-    let serial = ExpectedIdentity { serial: Some(7), ..vendor };
+    let serial = ExpectedIdentity {
+        serial: Some(7),
+        ..vendor
+    };
     let refused = refusal(with(serial), DeviceSettings::default());
     assert!(
-        refused.contains("the serial number of node 5 is 0x00000001, the configuration says 0x00000007"),
+        refused.contains(
+            "the serial number of node 5 is 0x00000001, the configuration says 0x00000007"
+        ),
         "{refused}"
     );
-    let refused =
-        refusal(DriveSettings { rated_current_a: 4.5, ..DriveSettings::default() }, DeviceSettings::default());
-    assert!(refused.contains("is 4 A, the configuration says 4.5 A"), "{refused}");
+    let refused = refusal(
+        DriveSettings {
+            rated_current_a: 4.5,
+            ..DriveSettings::default()
+        },
+        DeviceSettings::default(),
+    );
+    assert!(
+        refused.contains("is 4 A, the configuration says 4.5 A"),
+        "{refused}"
+    );
 }
 
 #[test]
 fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
-    let device = DeviceSettings { lacks: vec![Address::new(0x6007, 0)], ..DeviceSettings::default() };
+    let device = DeviceSettings {
+        lacks: vec![Address::new(0x6007, 0)],
+        ..DeviceSettings::default()
+    };
     let refused = refusal(DriveSettings::default(), device.clone());
     assert!(refused.contains("prove it by unplugging"), "{refused}");
-    assert!(open(DriveSettings { abort_connection: None, ..DriveSettings::default() }, device).is_ok());
-    let device = DeviceSettings { lacks: vec![Address::new(0x1016, 1)], ..DeviceSettings::default() };
-    let trusting = DriveSettings { abort_connection: None, ..DriveSettings::default() };
+    assert!(
+        open(
+            DriveSettings {
+                abort_connection: None,
+                ..DriveSettings::default()
+            },
+            device
+        )
+        .is_ok()
+    );
+    let device = DeviceSettings {
+        lacks: vec![Address::new(0x1016, 1)],
+        ..DeviceSettings::default()
+    };
+    let trusting = DriveSettings {
+        abort_connection: None,
+        ..DriveSettings::default()
+    };
     assert!(refusal(trusting, device).contains("0x1016:01"));
 }
 
 #[test]
 fn a_drive_without_a_timer_for_its_status_is_refused_with_sync_as_the_way_out() {
     for sub in [3, 5] {
-        let device = DeviceSettings { lacks: vec![Address::new(0x1800, sub)], ..DeviceSettings::default() };
+        let device = DeviceSettings {
+            lacks: vec![Address::new(0x1800, sub)],
+            ..DeviceSettings::default()
+        };
         let refused = refusal(DriveSettings::default(), device.clone());
         let remedy = "choose the synchronous exchange, in which the drive answers SYNC";
-        assert!(refused.contains(&format!("0x1800:0{sub}")) && refused.ends_with(remedy), "{refused}");
-        assert!(open(DriveSettings { exchange: SYNCHRONOUS, ..DriveSettings::default() }, device).is_ok());
+        assert!(
+            refused.contains(&format!("0x1800:0{sub}")) && refused.ends_with(remedy),
+            "{refused}"
+        );
+        assert!(
+            open(
+                DriveSettings {
+                    exchange: SYNCHRONOUS,
+                    ..DriveSettings::default()
+                },
+                device
+            )
+            .is_ok()
+        );
     }
 }
 
 #[test]
 fn optional_objects_may_be_missing() {
-    let lacks = [0x1801, 0x1802, 0x1803].map(|index| Address::new(index, 1)).to_vec();
-    let lacks = [lacks, vec![Address::new(0x6502, 0), Address::new(0x1008, 0)]].concat();
-    let device = DeviceSettings { modes: 1 << 9, lacks: lacks[..3].to_vec(), ..DeviceSettings::default() };
+    let lacks = [0x1801, 0x1802, 0x1803]
+        .map(|index| Address::new(index, 1))
+        .to_vec();
+    let lacks = [
+        lacks,
+        vec![Address::new(0x6502, 0), Address::new(0x1008, 0)],
+    ]
+    .concat();
+    let device = DeviceSettings {
+        modes: 1 << 9,
+        lacks: lacks[..3].to_vec(),
+        ..DeviceSettings::default()
+    };
     assert!(open(DriveSettings::default(), device).is_ok());
 }
 
 #[test]
 fn silence_on_the_bus_is_told_with_what_to_check() {
-    let error = CanopenDrive::open(DriveSettings::default(), Box::new(World::default())).err().unwrap();
+    let error = CanopenDrive::open(DriveSettings::default(), Box::new(World::default()))
+        .err()
+        .unwrap();
     assert_eq!(
         error.to_string(),
         "node 5 did not answer to 0x1018:01 within 500 ms; check its power, node number, bit rate and the bus termination"
@@ -140,33 +252,69 @@ fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
     world.sleep(Duration::from_millis(1));
     let before = device.lock().unwrap().objects().clone();
     let seen = inspect(&world, 5, Duration::from_millis(100)).unwrap();
-    assert_eq!(seen.name.as_deref(), Some("simulated CANopen drive"), "read in four segments");
+    assert_eq!(
+        seen.name.as_deref(),
+        Some("simulated CANopen drive"),
+        "read in four segments"
+    );
     assert_eq!(seen.identity[0], Some(0x402));
-    assert_eq!((seen.state(), seen.rated_current_a), (Some(State::SwitchOnDisabled), Some(4.0)));
-    assert_eq!((seen.device_type, seen.maximum_current_ratio), (Some(0x0002_0192), Some(1.5)), "profile 402");
+    assert_eq!(
+        (seen.state(), seen.rated_current_a),
+        (Some(State::SwitchOnDisabled), Some(4.0))
+    );
+    assert_eq!(
+        (seen.device_type, seen.maximum_current_ratio),
+        (Some(0x0002_0192), Some(1.5)),
+        "profile 402"
+    );
     assert_eq!((seen.past_errors, seen.lacks), (vec![], vec![]));
-    assert_eq!(format!("{before:?}"), format!("{:?}", device.lock().unwrap().objects()));
+    assert_eq!(
+        format!("{before:?}"),
+        format!("{:?}", device.lock().unwrap().objects())
+    );
 }
 
 #[test]
 fn a_drive_looked_at_tells_which_objects_it_lacks() {
     let world = World::default();
-    let lacks = vec![Address::new(0x6007, 0), Address::new(0x6502, 0), Address::new(0x1008, 0)];
-    let device = Arc::new(Mutex::new(Device::new(DeviceSettings { lacks, ..DeviceSettings::default() })));
+    let lacks = vec![
+        Address::new(0x6007, 0),
+        Address::new(0x6502, 0),
+        Address::new(0x1008, 0),
+    ];
+    let device = Arc::new(Mutex::new(Device::new(DeviceSettings {
+        lacks,
+        ..DeviceSettings::default()
+    })));
     let _running = DeviceTask::start(&world, device).unwrap();
     let seen = inspect(&world, 5, Duration::from_millis(100)).unwrap();
-    assert_eq!((seen.lacks, seen.modes, seen.name), (vec![Address::new(0x6007, 0)], None, None));
+    assert_eq!(
+        (seen.lacks, seen.modes, seen.name),
+        (vec![Address::new(0x6007, 0)], None, None)
+    );
 }
 
 #[test]
 fn closing_leaves_the_drive_off_and_not_watching() {
-    let Rig { mut drive, world, device, _running } = rig(ASYNCHRONOUS);
+    let Rig {
+        mut drive,
+        world,
+        device,
+        _running,
+    } = rig(ASYNCHRONOUS);
     drive.enable().unwrap();
     drive.command(1.0).unwrap();
     drop(drive);
     world.sleep(Duration::from_millis(500));
     let device = device.lock().unwrap();
-    assert_eq!((device.current_a(), device.power_state()), (0.0, State::SwitchOnDisabled));
-    assert_eq!(device.read(Address::new(0x1016, 1)), 0, "it does not miss us");
+    assert_eq!(
+        (device.current_a(), device.power_state()),
+        (0.0, State::SwitchOnDisabled)
+    );
+    assert_eq!(
+        device.read(Address::new(0x1016, 1)),
+        0,
+        "it does not miss us"
+    );
     assert_eq!(device.nmt_state(), nmt::State::PreOperational);
 }

@@ -16,16 +16,37 @@ fn running(exchange: Exchange) -> Rig {
 /// The fault is found within `most_ms`, the current is zero within 3 ms more and stays so whatever the loop does.
 fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
     let found_ms = rig.run_ms(1.0, most_ms + 1);
-    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(code), "{}", fault_text(code).what);
-    assert!(found_ms <= most_ms, "{}: {found_ms} ms", fault_text(code).what);
+    assert_eq!(
+        rig.drive.status(),
+        AmplifierStatus::Fault(code),
+        "{}",
+        fault_text(code).what
+    );
+    assert!(
+        found_ms <= most_ms,
+        "{}: {found_ms} ms",
+        fault_text(code).what
+    );
     rig.sleep_ms(3);
     for _ in 0..300 {
         assert_eq!(rig.device_current_a(), 0.0, "{}", fault_text(code).what);
-        assert_eq!(rig.drive.command(1.0).unwrap_err().code, i64::from(code), "a heedless loop is refused");
+        assert_eq!(
+            rig.drive.command(1.0).unwrap_err().code,
+            i64::from(code),
+            "a heedless loop is refused"
+        );
         rig.sleep_ms(1);
     }
-    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(code), "the first cause stays until a person clears it");
-    assert_eq!(rig.drive.enable().unwrap_err().code, i64::from(code), "a fault is not left by enabling");
+    assert_eq!(
+        rig.drive.status(),
+        AmplifierStatus::Fault(code),
+        "the first cause stays until a person clears it"
+    );
+    assert_eq!(
+        rig.drive.enable().unwrap_err().code,
+        i64::from(code),
+        "a fault is not left by enabling"
+    );
     assert_eq!(rig.device_current_a(), 0.0);
 }
 
@@ -33,7 +54,9 @@ fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
 fn recovers(rig: &mut Rig) {
     rig.device().inject(DeviceFault::None);
     rig.sleep_ms(50);
-    rig.drive.reset_fault().unwrap_or_else(|error| panic!("{error}: {:?}", rig.drive.last_error()));
+    rig.drive
+        .reset_fault()
+        .unwrap_or_else(|error| panic!("{error}: {:?}", rig.drive.last_error()));
     assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
     assert_eq!(rig.device_current_a(), 0.0);
     rig.drive.enable().unwrap();
@@ -48,7 +71,10 @@ const STATUS_MS: u32 = 3;
 fn faults_of_the_drive_are_found_with_the_next_status_frame() {
     let cases = [
         (DeviceFault::Drive(0x2310), faults::EMERGENCY + 0x2310),
-        (DeviceFault::EmergencyOnly(0x4210), faults::EMERGENCY + 0x4210),
+        (
+            DeviceFault::EmergencyOnly(0x4210),
+            faults::EMERGENCY + 0x4210,
+        ),
         (DeviceFault::TargetIgnored, faults::TARGET_IGNORED),
         (DeviceFault::SwitchesOff, faults::SWITCHED_OFF),
         (DeviceFault::ShortFrames, faults::MALFORMED),
@@ -87,7 +113,10 @@ fn a_silent_drive_is_found_by_its_missing_heartbeat_while_it_is_off() {
         "70 ms from the last heartbeat, which is up to 20 ms old"
     );
     rig.sleep_ms(23);
-    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::HEARTBEAT_LOST));
+    assert_eq!(
+        rig.drive.status(),
+        AmplifierStatus::Fault(faults::HEARTBEAT_LOST)
+    );
     recovers(&mut rig);
 }
 
@@ -97,7 +126,10 @@ fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
         let mut rig = running(exchange);
         rig.device().inject(DeviceFault::Unplugged);
         assert!(rig.run_ms(1.0, 30) <= 22);
-        assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::STATUS_LOST));
+        assert_eq!(
+            rig.drive.status(),
+            AmplifierStatus::Fault(faults::STATUS_LOST)
+        );
         rig.sleep_ms(71); // 70 ms after the last heartbeat heard, whatever we do
         assert_eq!(rig.device_current_a(), 0.0);
         recovers(&mut rig);
@@ -107,16 +139,25 @@ fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
 #[test]
 fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat_said() {
     // The drive misses us 40 ms after the last heartbeat (up to 20 ms old) it heard; we miss its own after 70 ms.
-    let settings = DriveSettings { own_heartbeat_timeout: Duration::from_millis(40), ..DriveSettings::default() };
+    let settings = DriveSettings {
+        own_heartbeat_timeout: Duration::from_millis(40),
+        ..DriveSettings::default()
+    };
     let mut rig = open(settings, DeviceSettings::default()).unwrap();
     rig.drive.enable().unwrap();
     rig.run_ms(1.0, 50);
     rig.device().inject(DeviceFault::Unplugged);
     rig.sleep_ms(42);
     assert_eq!(rig.device().nmt_state(), nmt::State::PreOperational);
-    assert_eq!(rig.drive.shared.nmt(), Some(nmt::State::Operational), "as far as we know");
+    assert_eq!(
+        rig.drive.shared.nmt(),
+        Some(nmt::State::Operational),
+        "as far as we know"
+    );
     rig.device().inject(DeviceFault::None);
-    rig.drive.reset_fault().unwrap_or_else(|error| panic!("{error}"));
+    rig.drive
+        .reset_fault()
+        .unwrap_or_else(|error| panic!("{error}"));
     recovers(&mut rig);
 }
 
@@ -167,7 +208,11 @@ fn an_adapter_that_is_pulled_out_is_gone_though_it_goes_down_first() {
     let mut monitor = Monitor::new(&DriveSettings::default(), Arc::clone(&shared), 0);
     monitor.fail(BusError::Down);
     monitor.fail(BusError::Gone);
-    assert_eq!(shared.fault(), faults::BUS_GONE, "its remedy is another: the interface does not come back by itself");
+    assert_eq!(
+        shared.fault(),
+        faults::BUS_GONE,
+        "its remedy is another: the interface does not come back by itself"
+    );
     monitor.fail(BusError::Down);
     assert_eq!(shared.fault(), faults::BUS_GONE);
 }
@@ -178,14 +223,29 @@ fn a_killed_process_is_missed_by_the_drive() {
     // SIGKILL: no thread of ours runs on, nothing is sent any more.
     rig.drive.service = Running::default();
     rig.sleep_ms(48);
-    assert_eq!(rig.device_current_a(), 1.0, "70 ms from the last heartbeat, which is up to 20 ms old");
+    assert_eq!(
+        rig.device_current_a(),
+        1.0,
+        "70 ms from the last heartbeat, which is up to 20 ms old"
+    );
     rig.sleep_ms(24);
-    assert_eq!((rig.device_current_a(), rig.device().power_state()), (0.0, State::SwitchOnDisabled));
-    let Rig { drive, world, device, _running } = rig;
+    assert_eq!(
+        (rig.device_current_a(), rig.device().power_state()),
+        (0.0, State::SwitchOnDisabled)
+    );
+    let Rig {
+        drive,
+        world,
+        device,
+        _running,
+    } = rig;
     std::mem::forget(drive);
     let mut next = CanopenDrive::open(DriveSettings::default(), Box::new(world)).unwrap();
     next.enable().unwrap(); // the next run starts cleanly
-    assert_eq!(device.lock().unwrap().power_state(), State::OperationEnabled);
+    assert_eq!(
+        device.lock().unwrap().power_state(),
+        State::OperationEnabled
+    );
 }
 
 #[test]
@@ -193,10 +253,17 @@ fn a_loop_that_stops_commanding_is_switched_off() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.sleep_ms(18);
-        assert_eq!(rig.device_current_a(), 1.0, "the limit is 20 ms after the last command");
+        assert_eq!(
+            rig.device_current_a(),
+            1.0,
+            "the limit is 20 ms after the last command"
+        );
         rig.sleep_ms(6);
         assert_eq!(rig.device_current_a(), 0.0);
-        assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::COMMANDS_STOPPED));
+        assert_eq!(
+            rig.drive.status(),
+            AmplifierStatus::Fault(faults::COMMANDS_STOPPED)
+        );
         recovers(&mut rig);
     }
 }
@@ -222,22 +289,35 @@ fn a_disable_that_was_lost_is_repeated() {
         assert_eq!(rig.device_current_a(), 1.0);
         rig.device().inject(DeviceFault::None);
         rig.sleep_ms(11); // repeated every 10 ms
-        assert_eq!((rig.device_current_a(), rig.drive.status()), (0.0, AmplifierStatus::Disabled), "{exchange:?}");
+        assert_eq!(
+            (rig.device_current_a(), rig.drive.status()),
+            (0.0, AmplifierStatus::Disabled),
+            "{exchange:?}"
+        );
     }
 }
 
 #[test]
 fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
-    for (misbehaviour, most_ms) in [(DeviceFault::SetPointsIgnored, 85), (DeviceFault::OrdersIgnored, 175)] {
+    for (misbehaviour, most_ms) in [
+        (DeviceFault::SetPointsIgnored, 85),
+        (DeviceFault::OrdersIgnored, 175),
+    ] {
         let mut rig = running(ASYNCHRONOUS);
         rig.device().inject(misbehaviour);
         rig.drive.disable();
         rig.sleep_ms(60);
-        assert_eq!((rig.device_current_a(), rig.drive.status()), (1.0, AmplifierStatus::Disabled));
+        assert_eq!(
+            (rig.device_current_a(), rig.drive.status()),
+            (1.0, AmplifierStatus::Disabled)
+        );
         // 70 ms unconfirmed (+ one repeat of 10 ms): NMT stop; 70 ms later the drive misses our heartbeat.
         rig.sleep_ms(most_ms - 60);
         assert_eq!(rig.device_current_a(), 0.0, "{misbehaviour:?}");
-        assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::STILL_ENABLED));
+        assert_eq!(
+            rig.drive.status(),
+            AmplifierStatus::Fault(faults::STILL_ENABLED)
+        );
         recovers(&mut rig);
     }
 }
@@ -246,12 +326,22 @@ fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_o
 fn a_command_that_is_not_a_number_never_reaches_the_drive() {
     let mut rig = running(ASYNCHRONOUS);
     for nonsense in [f64::NAN, f64::INFINITY] {
-        assert_eq!(rig.drive.command(nonsense).unwrap_err().code, i64::from(faults::NOT_FINITE));
+        assert_eq!(
+            rig.drive.command(nonsense).unwrap_err().code,
+            i64::from(faults::NOT_FINITE)
+        );
     }
     rig.sleep_ms(2);
-    assert_eq!(rig.device_current_a(), 1.0, "the last command stands until the loop disables");
+    assert_eq!(
+        rig.device_current_a(),
+        1.0,
+        "the last command stands until the loop disables"
+    );
     rig.drive.disable();
-    assert_eq!(rig.drive.command(1.0).unwrap_err().code, i64::from(faults::NOT_ARMED));
+    assert_eq!(
+        rig.drive.command(1.0).unwrap_err().code,
+        i64::from(faults::NOT_ARMED)
+    );
 }
 
 #[test]
@@ -260,8 +350,15 @@ fn a_fault_that_persists_is_not_cleared() {
     rig.device().inject(DeviceFault::Drive(0x3220));
     rig.sleep_ms(5);
     rig.device().inject(DeviceFault::SetPointsIgnored); // it does not hear the reset
-    assert_eq!(rig.drive.reset_fault().unwrap_err().code, i64::from(faults::FAULT_REMAINS));
-    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::EMERGENCY + 0x3220), "the cause, not the attempt");
+    assert_eq!(
+        rig.drive.reset_fault().unwrap_err().code,
+        i64::from(faults::FAULT_REMAINS)
+    );
+    assert_eq!(
+        rig.drive.status(),
+        AmplifierStatus::Fault(faults::EMERGENCY + 0x3220),
+        "the cause, not the attempt"
+    );
     recovers(&mut rig);
 }
 
@@ -275,7 +372,12 @@ fn a_drive_in_fault_at_opening_is_opened_but_not_reset() {
     world.sleep(Duration::from_millis(5));
     let drive = CanopenDrive::open(DriveSettings::default(), Box::new(world.clone())).unwrap();
     world.sleep(Duration::from_millis(10));
-    let mut rig = Rig { drive, world, device, _running: running };
+    let mut rig = Rig {
+        drive,
+        world,
+        device,
+        _running: running,
+    };
     assert_eq!(
         rig.drive.status(),
         AmplifierStatus::Fault(faults::DRIVE_FAULT),

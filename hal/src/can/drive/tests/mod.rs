@@ -24,14 +24,26 @@ fn open(settings: DriveSettings, device: DeviceSettings) -> Result<Rig, OpenErro
     let device = Arc::new(Mutex::new(Device::new(device)));
     let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
     let drive = CanopenDrive::open(settings, Box::new(world.clone()))?;
-    Ok(Rig { drive, world, device, _running: running })
+    Ok(Rig {
+        drive,
+        world,
+        device,
+        _running: running,
+    })
 }
 
 const ASYNCHRONOUS: Exchange = Exchange::Asynchronous { status_hz: 500.0 };
 const SYNCHRONOUS: Exchange = Exchange::Synchronous { status_every: 2 };
 
 fn rig(exchange: Exchange) -> Rig {
-    open(DriveSettings { exchange, ..DriveSettings::default() }, DeviceSettings::default()).unwrap()
+    open(
+        DriveSettings {
+            exchange,
+            ..DriveSettings::default()
+        },
+        DeviceSettings::default(),
+    )
+    .unwrap()
 }
 
 /// Why it did not open.
