@@ -2,13 +2,12 @@
 //! estimator, of the local one, and of all that `bench chirp` makes of them, modes and verdict included.
 //! `benches/welch_scipy.py` measures scipy's csd on as many samples beside the first.
 
-#[path = "../tests/common/unrecorded.rs"]
-mod unrecorded;
+use bench_test_support::unrecorded;
 
 use bench::config::{Config, Source, load};
-use bench::fit::{View, fit};
+use bench::identify::modal::{View, fit};
+use bench::identify::verdict::{Case, Verdict, verdict};
 use bench::identify::{Estimator, EstimatorSettings, Signals, blocks, local, welch};
-use bench::verdict::{Case, Verdict, verdict};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// Samples of a segment.

@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 
 use bench::config::{Config, Source, load};
 use bench::control::{Controller, ControllerText};
+use bench::experiment::Plan;
 use bench::recording::{self, Header, Recorder};
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
 use bench::rt::outlet::Outlet;
 use bench::rt::servo::{Connections, Order, Progress, Servo};
 use bench::rt::thread::run;
-use bench::session::Plan;
-use bench::sim::SimulatedRig;
 use bench_hal::{Reading, Tick, Validity};
 use criterion::{Criterion, criterion_group, criterion_main};
 use rtrb::RingBuffer;

@@ -2,7 +2,7 @@
 //! microseconds a point are seconds a map. `benches/map_numpy.py` measures numpy's batched pencil beside it.
 
 use bench::config::{PlantSettings, Source, Sr4dofSettings, load};
-use bench::zeros::cnmp_map;
+use bench::model::zeros::cnmp_map;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Values along either side.

@@ -66,27 +66,16 @@
 //! force positive displacement; u = C (r - y). Micrometres appear in controllers' gains, which are printed in amperes per
 //! micrometre, and in what a person reads.
 
-pub mod acting;
-pub mod calibration;
-pub mod campaign;
 pub mod cli;
 pub mod config;
 pub mod control;
-pub mod devices;
 pub mod doctor;
 pub mod excitation;
-pub mod figures;
-pub mod fit;
+pub mod experiment;
 pub mod identify;
-mod kept;
-pub mod plant;
+pub mod model;
 pub mod recording;
 pub mod report;
+pub mod rig;
 pub mod rt;
-pub mod run_report;
-pub mod session;
-pub mod sim;
-pub mod study;
-pub mod veering;
-pub mod verdict;
-pub mod zeros;
+pub mod util;

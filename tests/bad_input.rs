@@ -2,8 +2,7 @@
 //!
 //! `program::run_in` asserts that of every single call; the tests below say what the sentence must hold.
 
-#[path = "thesis/program.rs"]
-mod program;
+use bench_test_support::program;
 
 use std::path::Path;
 

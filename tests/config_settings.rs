@@ -1,7 +1,6 @@
 //! Settings: three layers of TOML, one schema, and messages that say where, what, the limit and the remedy.
 
-#[path = "thesis/program.rs"]
-mod program;
+use bench_test_support::program;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

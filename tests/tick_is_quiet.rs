@@ -8,18 +8,17 @@ use bench::config::{
 };
 use bench::control::{Controller, ControllerText};
 use bench::excitation::{Chirp, Quiet as NoCurrent, of, reference};
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Moment, Realtime, Virtual};
 use bench::rt::interlock::Interlocks;
 use bench::rt::outlet::Outlet;
 use bench::rt::program::{Control, Decision, Excite, Program};
 use bench::rt::record::{EventKind, Published};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
-use bench::sim::SimulatedRig;
 use bench_hal::{Tick, Validity};
 use rtrb::{Consumer, Producer, RingBuffer};
 
-#[path = "common/faulty_rig.rs"]
-mod faulty_rig;
+use bench_test_support::faulty_rig;
 use faulty_rig::{Fault, FaultyRig};
 
 #[global_allocator]

@@ -11,11 +11,11 @@ use super::linearity_output::LinearityMade;
 use super::loop_output::LoopMade;
 use super::modal_output::Shown;
 use crate::config::Config;
-use crate::fit::{FittedMode, ModalFit};
+use crate::experiment::{AnalysisError, analyse};
+use crate::identify::modal::{FittedMode, ModalFit};
 use crate::identify::{Unit, csv};
 use crate::recording::Recording;
-use crate::run_report::{Analysed, AnalysedRun, KINDS, page, pictures};
-use crate::session::{AnalysisError, analyse};
+use crate::report::run_pages::{Analysed, AnalysedRun, KINDS, page, pictures};
 
 /// The files that were made and what the response shows; `null` where the run gave no response.
 #[derive(Clone, Debug, Serialize)]

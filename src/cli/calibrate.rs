@@ -8,15 +8,16 @@ use serde::Serialize;
 use super::options::{BenchOptions, print_json, print_text};
 use super::run_options::{RunOptions, RunReport, finish};
 use super::{CliError, Outcome};
-use crate::calibration::{
-    AmplifierCalibration, Calibration, ChainCalibration, Fit, ProbeCalibration, fit,
-};
 use crate::config::{Config, ExcitationKind, Purpose};
 use crate::excitation::{self, Extremes, Staircase};
-use crate::plant::{self, Modal, PlantError, Sampled};
+use crate::experiment::calibration::{Fit, fit};
+use crate::experiment::{Plan, analyse, unless_stopped};
+use crate::model::plant::{self, Modal, PlantError, Sampled};
 use crate::recording::Recording;
-use crate::session::{Plan, analyse, unless_stopped};
-use crate::sim;
+use crate::rig::calibration::{
+    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
+};
+use crate::rig::simulated;
 
 /// Which bench, and where the result goes.
 #[derive(Clone, Debug, clap::Args)]
@@ -85,7 +86,7 @@ fn check(config: &Config) -> Result<(), CliError> {
     compliance_m_per_a(config)?;
     let (period_s, force_constant) = (config.servo.period_s(), config.motor.force_constant_n_per_a);
     let rig = Sampled::new(
-        &sim::modes(config)?,
+        &simulated::modes(config)?,
         config.amplifier.bandwidth_hz,
         force_constant,
         period_s,

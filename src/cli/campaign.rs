@@ -12,14 +12,14 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::progress::Progress;
 use super::spaced::Spaced;
 use super::{CliError, Outcome};
-use crate::campaign::{
+use crate::config::{Config, Purpose, profiles};
+use crate::experiment::campaign::{
     Answer, Found, Grid, Place, Point, Store, Tolerances, measured, order, picture, work,
 };
-use crate::config::{Config, Purpose, profiles};
-use crate::devices;
-use crate::kept::write_whole;
+use crate::experiment::{self, Plan, Run, stoppable};
+use crate::rig::devices;
 use crate::rt::thread::Pace;
-use crate::session::{self, Plan, Run, stoppable};
+use crate::util::atomic_file::write_whole;
 
 /// Section 5.2.2 was identified at 1 kHz; the sweep has to stay below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
@@ -249,7 +249,7 @@ impl Bench<'_> {
     fn measure(&self, place: Place, folder: &Path) -> Result<Option<Point>, CliError> {
         self.measure_by(place, folder, |plan| {
             let rig = devices::simulate(&plan.config)?.rig;
-            let run = session::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {});
+            let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {});
             run.map_err(|error| CliError::Failed(error.to_string()))
         })
     }

@@ -7,9 +7,9 @@ use super::CliError;
 use super::campaign::Bench;
 use super::person::AtTerminal;
 use super::run_options::{RunOptions, finish};
-use crate::campaign::{Attended, CampaignError, Place, Point, Rest, Stage, Store};
+use crate::experiment::Plan;
+use crate::experiment::campaign::{Attended, CampaignError, Place, Point, Rest, Stage, Store};
 use crate::recording::Recording;
-use crate::session::Plan;
 
 /// The configured devices, and the folder of the campaign.
 pub(super) struct OnDevices<'a> {

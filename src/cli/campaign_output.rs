@@ -5,8 +5,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::table::table;
-use crate::campaign::{Answer, Offset, PutOn, Recommendation, Told, Tolerances};
-use crate::verdict::Cnmp;
+use crate::experiment::campaign::{Answer, Offset, PutOn, Recommendation, Told, Tolerances};
+use crate::identify::verdict::Cnmp;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

@@ -7,10 +7,10 @@ use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::excitation::{self, Extremes};
-use crate::plant::Sampled;
+use crate::experiment::{Plan, unless_stopped};
+use crate::model::plant::Sampled;
 use crate::recording::Recording;
-use crate::session::{Plan, unless_stopped};
-use crate::sim;
+use crate::rig::simulated;
 use serde::Serialize;
 use std::path::Path;
 
@@ -184,7 +184,7 @@ pub(super) fn rig(config: &Config) -> Result<Sampled, CliError> {
         config.motor.force_constant_n_per_a,
     );
     Ok(Sampled::new(
-        &sim::modes(config)?,
+        &simulated::modes(config)?,
         bandwidth_hz,
         force_constant,
         config.servo.period_s(),

@@ -11,7 +11,7 @@ use super::{CliError, Outcome};
 use crate::config::{AmplitudePoint, Config, ExcitationKind};
 use crate::excitation::{Cap, Extremes, LARGEST_SPAN, of, shaped, words};
 use crate::identify::csv;
-use crate::plant::{self, Chain, Modal};
+use crate::model::plant::{self, Chain, Modal};
 
 /// Frequencies at which the model is looked at, beside those of its modes: 0.2 % apart over four decades.
 const GRID: usize = 4000;

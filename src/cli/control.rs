@@ -10,10 +10,11 @@ use super::margins::{closed_loop, enough, text as margins_text};
 use super::options::BenchOptions;
 use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
-use crate::config::{Config, Purpose, ReferenceSettings, quantity};
+use crate::config::{Config, Purpose, ReferenceSettings};
 use crate::control::{ClosedLoop, Margins, StepFigures, step_figures};
+use crate::experiment::{Measured, Plan, measure};
 use crate::recording::Recording;
-use crate::session::{Measured, Plan, measure};
+use crate::util::quantity;
 
 /// A step is predicted over as many ticks at most: 200 s at 5 kHz, however long the run.
 const PREDICTED_TICKS: usize = 1_000_000;

@@ -11,11 +11,11 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::options::{BenchOptions, print_json};
 use super::{CliError, Outcome};
-use crate::acting::probe::End;
-use crate::acting::rehearsal::Cast;
-use crate::acting::schedule::Planned;
-use crate::acting::{ActingError, ActingFault, Entry, Rehearsal, Schedule, fault};
 use crate::config::Purpose;
+use crate::rig::emulator::probe::End;
+use crate::rig::emulator::rehearsal::Cast;
+use crate::rig::emulator::schedule::Planned;
+use crate::rig::emulator::{ActingError, ActingFault, Entry, Rehearsal, Schedule, fault};
 
 /// How often orders, signals and faults are looked for.
 const BEAT: Duration = Duration::from_millis(2);

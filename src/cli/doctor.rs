@@ -9,7 +9,7 @@ use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::control::Margins;
 use crate::doctor::{Runs, examine};
-use crate::session::Plan;
+use crate::experiment::Plan;
 
 /// Which bench, and where runs are recorded.
 #[derive(Clone, Debug, clap::Args)]

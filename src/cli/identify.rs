@@ -10,8 +10,8 @@ use super::options::{print_json, print_text};
 use super::run_options::TripJson;
 use super::{CliError, Outcome};
 use crate::config::Config;
+use crate::experiment::{Ending, Kind, Plan};
 use crate::recording::Recording;
-use crate::session::{Ending, Kind, Plan};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]

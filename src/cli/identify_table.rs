@@ -8,11 +8,11 @@ use super::analysis_output::{Drawn, Plots, drawn, free, in_folder, plots_text};
 use super::modal_output::Shown;
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
+use crate::experiment::{ForeignAnalysis, analyse_signals};
 use crate::identify::periodic::Repetition;
 use crate::identify::table::{self, Clock, Columns};
 use crate::identify::{Signals, Unit, csv};
-use crate::run_report::AnalysedTable;
-use crate::session::{ForeignAnalysis, analyse_signals};
+use crate::report::run_pages::AnalysedTable;
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
 const WHOLE_SAMPLES: f64 = 1e-3;

@@ -12,9 +12,9 @@ use super::table::table;
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::excitation;
-use crate::fit::{Estimate, FittedMode, SIGMAS_95};
+use crate::experiment::{ModeOverAmplitude, Plan, over_amplitude};
+use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
-use crate::session::{ModeOverAmplitude, Plan, over_amplitude};
 
 /// Odd lines, one in four left out.
 const LINES: [&str; 2] = [

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::CliError;
 use super::analysis_output::free;
+use crate::experiment::ClosedResponses;
 use crate::identify::{Frf, Unit, csv};
-use crate::session::ClosedResponses;
 
 /// The part of the report that a closed loop makes.
 #[derive(Clone, Debug, Serialize)]

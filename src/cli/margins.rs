@@ -7,7 +7,7 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
-use crate::plant::{self, Modal};
+use crate::model::plant::{self, Modal};
 
 /// Which loop.
 #[derive(Clone, Debug, clap::Args)]

@@ -13,7 +13,6 @@ mod config;
 mod control;
 mod device;
 mod doctor;
-mod figures;
 mod identify;
 mod identify_table;
 mod linearity;
@@ -64,8 +63,6 @@ enum Command {
     Model(model::Args),
     /// Crossover, phase, gain and modulus margin of a controller with the model
     Margins(margins::Args),
-    /// The figures and tables of the thesis, computed: one SVG a figure and one page of HTML
-    Figures(figures::Args),
     /// The analysis of `bench chirp`, from a recording or from a CSV of other hands
     Identify(identify::Args),
     /// Run the recorded probe through the same loop and compare every command bit for bit
@@ -90,7 +87,6 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Model(args) => model::run(&args),
         Command::Margins(args) => margins::run(&args),
-        Command::Figures(args) => figures::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::table::table;
-use crate::fit::{FittedMode, ModalFit, SIGMAS_95};
-use crate::verdict::{UncertainZero, Verdict};
+use crate::identify::modal::{FittedMode, ModalFit, SIGMAS_95};
+use crate::identify::verdict::{UncertainZero, Verdict};
 
 /// The part of the report that a fit makes; its names are a contract.
 #[derive(Clone, Debug, Serialize)]
@@ -177,7 +177,7 @@ fn zero(zero: &UncertainZero) -> ZeroJson {
     }
 }
 
-fn order(order: &crate::fit::Order) -> OrderJson {
+fn order(order: &crate::identify::modal::Order) -> OrderJson {
     let modes = &order.parameters.modes;
     OrderJson {
         frequency_hz: modes.iter().map(|mode| hz(mode.omega_rad_s)).collect(),

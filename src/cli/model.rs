@@ -22,8 +22,8 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::table::table;
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
-use crate::plant::{self, Modal};
-use crate::zeros::{self, Zero};
+use crate::model::plant::{self, Modal};
+use crate::model::zeros::{self, Zero};
 
 /// What to compute.
 #[derive(Clone, Debug, clap::Args)]

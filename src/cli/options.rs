@@ -4,9 +4,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::CliError;
-use crate::config::quantity::{self, Quantity};
 use crate::config::{Config, PlantSettings, Purpose, Source, load};
-use crate::devices;
+use crate::rig::devices;
+use crate::util::quantity::{self, Quantity};
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]

@@ -2,18 +2,18 @@
 
 use std::process::ExitCode;
 
-use crate::calibration::CalibrationError;
-use crate::campaign::{AnswerError, CampaignError};
 use crate::config::ConfigError;
 use crate::control::ControllerError;
-use crate::devices::DevicesError;
 use crate::excitation::ExcitationError;
+use crate::experiment::PlanError;
+use crate::experiment::campaign::{AnswerError, CampaignError};
 use crate::identify::IdentifyError;
 use crate::identify::table::TableError;
-use crate::plant::PlantError;
+use crate::model::plant::PlantError;
+use crate::model::study::StudyError;
 use crate::recording::RecordingError;
-use crate::session::PlanError;
-use crate::study::StudyError;
+use crate::rig::calibration::CalibrationError;
+use crate::rig::devices::DevicesError;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::CliError;
-use crate::campaign::{Person, Question, Reply};
-use crate::config::quantity::{self, Quantity};
+use crate::experiment::campaign::{Person, Question, Reply};
+use crate::util::quantity::{self, Quantity};
 
 /// Ctrl-C is looked for so often while an answer is waited for.
 const LOOK: Duration = Duration::from_millis(100);

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
+use crate::experiment::{Replayed, replay};
 use crate::recording::Recording;
-use crate::session::{Replayed, replay};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]

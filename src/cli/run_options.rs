@@ -10,13 +10,13 @@ use serde::Serialize;
 use super::options::print_text;
 use super::progress::Progress;
 use super::{CliError, Outcome};
-use crate::calibration::{CalibratedRig, Calibration, use_of};
 use crate::config::Config;
-use crate::devices;
+use crate::experiment::{Ending, Plan, Run, SessionError};
 use crate::recording::{Quantiles, Totals};
+use crate::rig::calibration::{CalibratedRig, Calibration, use_of};
+use crate::rig::devices;
 use crate::rt::arming::Trip;
 use crate::rt::thread::Pace;
-use crate::session::{Ending, Plan, Run, SessionError};
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]
@@ -127,7 +127,7 @@ impl RunOptions {
         let pace = self.pace(&plan.config)?;
         let (plan, rig) = self.open(plan, calibration)?;
         let progress = Progress::new(what);
-        let run = crate::session::run(&plan, rig, pace, &self.out, &mut |done, total| {
+        let run = crate::experiment::run(&plan, rig, pace, &self.out, &mut |done, total| {
             progress.show(done, total)
         });
         progress.close();

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::config::quantity;
+use crate::util::quantity;
 
 /// Values of a grid, at most.
 const MOST: usize = 10_000;

@@ -4,7 +4,7 @@
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
-use super::quantity::{self, Quantity};
+use crate::util::quantity::{self, Quantity};
 
 /// Something wrong at a path.
 #[derive(Clone, Debug, PartialEq)]

@@ -27,7 +27,6 @@ mod motor_amplifier_probe;
 mod place;
 mod plant;
 pub mod profiles;
-pub mod quantity;
 mod relations;
 mod servo;
 mod settings;

@@ -6,7 +6,7 @@ use super::controller::continuous_response;
 use super::margins::{Margins, grid, margins};
 use super::{Controller, Section};
 use crate::config::Config;
-use crate::plant::{Chain, Mode};
+use crate::model::plant::{Chain, Mode};
 
 /// Everything that decides the margins of a loop.
 #[derive(Clone, Debug)]

@@ -88,7 +88,7 @@ pub(super) fn margins(
 
 /// A logarithmic grid, denser where light damping makes the response turn: around each resonance or antiresonance (w,
 /// zeta) points at w (1 + zeta sinh x), which follow its circle evenly.
-pub(crate) fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64> {
+pub fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64> {
     const PER_DECADE: f64 = 400.0;
     let decades = libm::log10(high_rad_s / low_rad_s);
     let count = libm::ceil(decades * PER_DECADE) as usize;

@@ -23,7 +23,7 @@ pub use biquad::Biquad;
 pub use closed_loop::ClosedLoop;
 pub use controller::{Controller, continuous_response};
 pub use file::{ControllerError, ControllerFile, ControllerText};
-pub(crate) use margins::grid;
+pub use margins::grid;
 pub use margins::{Crossing, Margins};
 pub use section::Section;
 pub use step_figures::{StepFigures, StepMeter, step_figures};

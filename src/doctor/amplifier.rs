@@ -13,7 +13,7 @@ use super::finding::{Finding, Verdict};
 use super::report::Report;
 use super::{bus_load, drive, vesc};
 use crate::config::{AmplifierDevice, Config};
-use crate::devices::amplifier::{drive_settings, vesc_settings};
+use crate::rig::devices::amplifier::{drive_settings, vesc_settings};
 
 /// How long the bus is listened to.
 const LISTEN: Duration = Duration::from_millis(300);

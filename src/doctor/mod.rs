@@ -35,7 +35,7 @@ pub mod vesc;
 use std::path::Path;
 
 use crate::config::Config;
-use crate::devices;
+use crate::rig::devices;
 use crate::rt::thread::Pace;
 
 pub use amplifier::{on_bus, watch};

@@ -3,8 +3,8 @@
 use super::finding::Finding;
 use crate::config::Config;
 use crate::control::Margins;
-use crate::devices;
 use crate::excitation::{self, Excitation};
+use crate::rig::devices;
 
 /// Subject of what concerns `bench chirp` alone.
 pub const CHIRP: &str = "chirp";

@@ -10,7 +10,7 @@ use super::finding::Finding;
 use super::system::line;
 use super::usb::Usb;
 use crate::config::{LineSettings, Parity};
-use crate::devices::ProbeError;
+use crate::rig::devices::ProbeError;
 
 const SUBJECT: &str = "serial port";
 /// An adapter that collects bytes for longer is told, in milliseconds.

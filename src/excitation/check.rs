@@ -2,7 +2,7 @@
 
 use super::{Amplitude, Excitation, Extremes};
 use crate::config::{Config, ExcitationKind};
-use crate::plant::Sampled;
+use crate::model::plant::Sampled;
 
 /// A periodic analysis takes lines below a hundredth of the largest for ones that were not excited; half of that is kept clear.
 pub const LARGEST_SPAN: f64 = 50.0;
@@ -176,8 +176,8 @@ mod tests {
     fn checked(change: &dyn Fn(&mut Config)) -> Result<Extremes, ExcitationError> {
         let mut config = load(&Source::default()).unwrap();
         change(&mut config);
-        let structure = crate::plant::build(&config.plant).unwrap();
-        let modes = crate::plant::Modal::of(&structure).unwrap().modes;
+        let structure = crate::model::plant::build(&config.plant).unwrap();
+        let modes = crate::model::plant::Modal::of(&structure).unwrap().modes;
         let (bandwidth_hz, force_constant) = (
             config.amplifier.bandwidth_hz,
             config.motor.force_constant_n_per_a,

@@ -2,7 +2,7 @@
 
 use super::Excitation;
 use crate::config::Config;
-use crate::plant::Sampled;
+use crate::model::plant::Sampled;
 
 /// The extremes of an excitation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -30,12 +30,14 @@ mod error;
 mod estimator;
 mod frf;
 mod lines;
+pub mod modal;
 mod moments;
 pub mod repeated;
 mod signals;
 mod spectrum;
 pub mod table;
 mod times;
+pub mod verdict;
 pub mod welch;
 
 pub use crate::config::{Curve, Estimator, ResolutionPoint};

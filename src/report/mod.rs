@@ -28,6 +28,7 @@ pub mod phase;
 mod pole_zero;
 mod quadrants;
 mod responses;
+pub mod run_pages;
 mod sheet;
 mod stability;
 mod trace;

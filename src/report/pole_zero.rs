@@ -7,7 +7,7 @@ use super::colours::{BLUE, Colour, GREY, INK, VERMILION};
 use super::ellipse::{Ellipse, SIGMAS_95_PLANE};
 use super::sheet::{Row, sheet_svg};
 use super::{ReportError, number};
-use crate::fit::SIGMAS_95;
+use crate::identify::modal::SIGMAS_95;
 
 /// Zeros enlarged at most: those nearest to the imaginary axis, in their sigmas.
 const ENLARGED: usize = 3;

@@ -7,7 +7,7 @@ use super::ReportError;
 use super::canvas::{self, Canvas, TextForm};
 use super::header::Header;
 use super::panel::INK;
-use crate::veering::Picture;
+use crate::model::veering::Picture;
 
 const LEFT: f64 = 24.0;
 const SIDE: f64 = 300.0;

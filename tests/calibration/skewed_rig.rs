@@ -1,5 +1,5 @@
 //! A simulated stage behind an amplifier and a probe that are not what they say.
-use bench::sim::SimulatedRig;
+use bench::rig::simulated::SimulatedRig;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
 /// What is wrong with the devices: current = gain (command) + offset; reading = gain (position) + offset.

@@ -1,15 +1,15 @@
 //! The static steps: what was put into the rig comes out of the fit.
 use std::path::Path;
 
-use bench::calibration::{
-    AmplifierCalibration, CalibratedRig, Calibration, ChainCalibration, Fit, FitError,
-    ProbeCalibration, fit,
-};
 use bench::config::{Config, ScaleBy, Source, load};
+use bench::experiment::calibration::{Fit, FitError, fit};
+use bench::experiment::{self, Plan};
 use bench::recording::Recording;
+use bench::rig::calibration::{
+    AmplifierCalibration, CalibratedRig, Calibration, ChainCalibration, ProbeCalibration,
+};
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
-use bench::session::{self, Plan};
-use bench::sim::SimulatedRig;
 use bench_hal::Rig;
 
 use crate::skewed_rig::{Skew, SkewedRig};
@@ -24,7 +24,7 @@ fn config() -> Config {
 
 fn recorded(rig: Box<dyn Rig>, config: &Config, folder: &Path) -> Recording {
     let plan = Plan::calibrate(config.clone());
-    let run = session::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let run = experiment::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     assert!(run.ended.completed, "{:?}", run.ended);
     run.finish("{}").expect("a good disk");

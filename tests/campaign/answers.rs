@@ -1,5 +1,5 @@
 //! Offset and recommendation on regions that are known in closed form.
-use bench::campaign::{Region, Said, Tolerances, contradicted, offset, recommend};
+use bench::experiment::campaign::{Region, Said, Tolerances, contradicted, offset, recommend};
 
 /// How exactly both are set.
 const TOLERANCES: Tolerances = Tolerances {

@@ -2,15 +2,15 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use bench::campaign::{
+use bench::config::{Config, Purpose, Source, load};
+use bench::experiment::campaign::{
     AnswerError, Attended, CampaignError, Finding, Grid, Load, Person, Place, Point, PutOn,
     Question, Reply, Rest, Stage, measured, order,
 };
-use bench::config::{Config, Purpose, Source, load};
+use bench::experiment::{Plan, run};
 use bench::recording::Recording;
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
-use bench::session::{Plan, run};
-use bench::sim::SimulatedRig;
 use bench_hal::Validity;
 
 use crate::faulty_rig::{Fault, FaultyRig};

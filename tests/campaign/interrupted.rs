@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::campaign::{Grid, Place, Point, Store};
 use bench::config::{Source, load};
-use bench::verdict::Cnmp;
+use bench::experiment::campaign::{Grid, Place, Point, Store};
+use bench::identify::verdict::Cnmp;
 use serde_json::Value;
 
 use crate::program::Bench;

@@ -1,6 +1,6 @@
 //! What a person is told to put on, against the statics of the stage with its constraints not linearised.
-use bench::campaign::Load;
 use bench::config::{Config, PlantSettings, Purpose, Source, Sr4dofSettings, load};
+use bench::experiment::campaign::Load;
 
 fn config(sets: &[&str]) -> Config {
     let sets = sets.iter().map(|set| set.to_string()).collect();

@@ -2,14 +2,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use bench::acting::{ActingFault, Amplifier, Journal, Stage};
 use bench::config::{AmplifierDevice, Config, Source, load};
-use bench::devices::amplifier::{drive_settings, vesc_settings};
+use bench::experiment::Plan;
+use bench::rig::devices::amplifier::{drive_settings, vesc_settings};
+use bench::rig::emulator::{ActingFault, Amplifier, Journal, Stage};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
 use bench::rt::record::{EventKind, Published};
 use bench::rt::servo::Order;
-use bench::session::Plan;
 use bench_hal::can::bus::{Host, World};
 use bench_hal::can::drive::CanopenDrive;
 use bench_hal::can::drive::faults::*;
@@ -187,7 +187,7 @@ struct Lab {
 }
 
 /// The driver, opened on the bus.
-fn driver(config: &Config, world: &World) -> bench::devices::Amplifier {
+fn driver(config: &Config, world: &World) -> bench::rig::devices::Amplifier {
     let host = Box::new(world.clone());
     match &config.amplifier.device {
         AmplifierDevice::Canopen(device) => {

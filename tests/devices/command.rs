@@ -113,7 +113,7 @@ impl Device {
 
     /// A reader of the served probe, as `bench control` would open it.
     fn reader(&self) -> SerialProbe {
-        bench::devices::probe::open(&config(&self.link(), self.folder.path()))
+        bench::rig::devices::probe::open(&config(&self.link(), self.folder.path()))
             .expect("the probe is served")
     }
 }
@@ -188,7 +188,7 @@ fn every_protocol_is_served_and_read_in_the_stages_metres() {
             ..Source::default()
         });
         let mut reader =
-            bench::devices::probe::open(&config.expect("valid")).expect("the probe is served");
+            bench::rig::devices::probe::open(&config.expect("valid")).expect("the probe is served");
         until(&mut reader, "at rest", is_at_rest);
     }
 }

@@ -3,13 +3,5 @@
 //! real drivers against the acting devices of `bench device`. Each test has been seen to fail with the line it guards broken.
 mod amplifier;
 mod command;
-#[path = "../common/faulty_rig.rs"]
-#[allow(
-    dead_code,
-    reason = "the rig below knows it; here the devices themselves fail"
-)]
-mod faulty_rig;
 mod probe;
-#[path = "../safety/rig.rs"]
-#[allow(dead_code, reason = "not every test of the loop needs all of it")]
-mod rig;
+use bench_test_support::loop_rig as rig;

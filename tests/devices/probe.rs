@@ -5,15 +5,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use bench::acting::probe::{End, Probe};
-use bench::acting::{ActingFault, Stage};
 use bench::config::{Config, Source, load};
-use bench::devices;
+use bench::experiment::Plan;
+use bench::rig::devices;
+use bench::rig::emulator::probe::{End, Probe};
+use bench::rig::emulator::{ActingFault, Stage};
 use bench::rt::arming::State;
 use bench::rt::program::Program;
 use bench::rt::record::EventKind;
 use bench::rt::servo::Order;
-use bench::session::Plan;
 use bench_hal::serial::Watch;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
 

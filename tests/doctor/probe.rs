@@ -1,7 +1,7 @@
 //! The probe's port: acting probes on pseudo terminals, seen by the program itself.
 
 use bench::config::{Config, Source, load};
-use bench::devices::probe::settings;
+use bench::rig::devices::probe::settings;
 use bench_hal::serial::device::Fault;
 use bench_hal::serial::{Protocol, SerialProbe};
 use nix::fcntl::{Flock, FlockArg};

@@ -1,5 +1,5 @@
 //! N repetitions of a chirp, or N times the periods, are worth sqrt(N).
-use bench::session::Analysis;
+use bench::experiment::Analysis;
 
 use crate::rig::{SILENT, analysed, config, of_kind};
 

@@ -1,7 +1,7 @@
 //! Noise is told from geometry: by the lines that a multisine leaves out, and by several amplitudes.
-use bench::fit::FittedMode;
+use bench::experiment::Analysis;
 use bench::identify::linearity::Cause;
-use bench::session::Analysis;
+use bench::identify::modal::FittedMode;
 use serde_json::Value;
 
 use crate::program::{Bench, number};

@@ -3,11 +3,8 @@ mod averages;
 mod identified;
 mod linearity;
 mod plans;
-#[path = "../thesis/program.rs"]
-mod program;
+use bench_test_support::program;
 mod rig;
-#[path = "../common/simulated.rs"]
-mod simulated;
-#[path = "../thesis/truth.rs"]
-mod truth;
+use bench_test_support::simulated;
+use bench_test_support::truth;
 mod unfinished;

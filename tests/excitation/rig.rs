@@ -2,8 +2,8 @@
 use std::path::{Path, PathBuf};
 
 use bench::config::{Config, Purpose, Source, load};
+use bench::experiment::{Analysis, Plan};
 use bench::recording::Recording;
-use bench::session::{Analysis, Plan};
 
 use crate::simulated;
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use bench::figures::{Content, Made, Workshop, make_all, selected};
 use bench::report::{Chart, Mark};
+use thesis_figures::{Content, Made, Workshop, make_all, selected};
 
 /// Where they are kept, to look at.
 pub fn folder() -> PathBuf {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use bench::figures::{FIGURES, Make, Verdict, selected};
+use thesis_figures::{FIGURES, Make, Verdict, selected};
 
 use crate::all::{all, content, folder};
 

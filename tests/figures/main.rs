@@ -5,18 +5,7 @@ mod all;
 mod command;
 mod content;
 mod pictures;
-#[path = "../thesis/program.rs"]
-mod program;
-#[allow(
-    dead_code,
-    reason = "made for the tests of report, which use all of it"
-)]
-#[path = "../report/svg.rs"]
-mod svg;
-#[allow(
-    dead_code,
-    reason = "made for the tests of the thesis, which use all of it"
-)]
-#[path = "../thesis/truth.rs"]
-mod truth;
+use bench_test_support::program;
+use bench_test_support::svg;
+use bench_test_support::truth;
 mod values;

@@ -1,9 +1,9 @@
 //! Pictures and page: well-formed, labelled, within their frames, and complete in themselves.
 
-use bench::figures::page;
 use bench::report::{Chart, Mark, Pen, Row, Scale, ScaleKind, Symbol, colours, sheet_svg};
 use proptest::prelude::*;
 use serde_json::json;
+use thesis_figures::page;
 
 use crate::all::{all, folder};
 use crate::{svg, truth};

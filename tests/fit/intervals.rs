@@ -1,6 +1,6 @@
 //! Intervals hold the truth as often as they say.
-use bench::fit::{Estimate, View, fit};
-use bench::verdict::zeros;
+use bench::identify::modal::{Estimate, View, fit};
+use bench::identify::verdict::zeros;
 
 use crate::synthetic::{blocks, stage};
 
@@ -40,7 +40,7 @@ fn of_modes_at_any_noise() {
 #[test]
 fn of_the_complex_zeros_as_ellipses() {
     let truth = stage();
-    let exact = bench::zeros::ModalSum::new(truth.clone(), 0.0)
+    let exact = bench::model::zeros::ModalSum::new(truth.clone(), 0.0)
         .unwrap()
         .damped_zeros()
         .unwrap();

@@ -3,8 +3,7 @@ mod intervals;
 mod modes;
 mod response;
 mod rig;
-#[path = "../common/simulated.rs"]
-mod simulated;
+use bench_test_support::simulated;
 mod stage;
 mod synthetic;
 mod under_control;

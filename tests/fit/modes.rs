@@ -1,6 +1,6 @@
 //! Which modes there are.
-use bench::fit::{FitError, View, fit};
 use bench::identify::Block;
+use bench::identify::modal::{FitError, View, fit};
 use nalgebra::Complex;
 
 use crate::synthetic::{blocks, stage, term};
@@ -20,7 +20,7 @@ fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
         let modes = fit.modes();
         assert_eq!(modes.len(), 3, "{ratio}: {modes:?}");
         for (mode, truth) in modes.iter().zip(truth) {
-            let off = |estimate: bench::fit::Estimate, truth: f64| {
+            let off = |estimate: bench::identify::modal::Estimate, truth: f64| {
                 (estimate.value - truth).abs() / estimate.sigma
             };
             // Nine numbers of a normal distribution: beyond 5 sigma once in 200,000.

@@ -1,7 +1,7 @@
 //! The response and the poles of a fit whose parameters are known: closed form.
 
-use bench::fit::{ModalFit, Parameters, View};
-use bench::zeros::Term;
+use bench::identify::modal::{ModalFit, Parameters, View};
+use bench::model::zeros::Term;
 use nalgebra::{Complex, DMatrix};
 
 const DELAY_S: f64 = 3e-4;

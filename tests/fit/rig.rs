@@ -1,8 +1,8 @@
 //! A chirp on the simulated stage, and what its analysis says, against the model's own zeros with damping.
 use bench::config::{Config, Source, load};
-use bench::plant;
-use bench::session::{Analysis, Plan};
-use bench::zeros::{cnmp_pairs, damped_zeros};
+use bench::experiment::{Analysis, Plan};
+use bench::model::plant;
+use bench::model::zeros::{cnmp_pairs, damped_zeros};
 
 use crate::simulated;
 

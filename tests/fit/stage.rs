@@ -3,9 +3,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bench::config::{Config, Source, UnmodelledMode, load};
-use bench::fit::{Estimate, FittedMode};
-use bench::plant::{self, Modal};
-use bench::session::Analysis;
+use bench::experiment::Analysis;
+use bench::identify::modal::{Estimate, FittedMode};
+use bench::model::plant::{self, Modal};
 
 use crate::rig::{analysed, config};
 

@@ -1,6 +1,6 @@
 //! Responses by closed form, with noise of known power.
 use bench::identify::Block;
-use bench::zeros::Term;
+use bench::model::zeros::Term;
 use nalgebra::Complex;
 
 /// Numbers of mean 0 and variance 1, near enough normal: sums of twelve.

@@ -2,12 +2,12 @@
 use std::f64::consts::TAU;
 
 use bench::config::{Config, ReferenceSettings, Source, load};
-use bench::plant::Chain;
+use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
+use bench::identify::verdict::Cnmp;
+use bench::model::plant::Chain;
 use bench::recording::Recording;
+use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
-use bench::session::{Analysis, AnalysisError, Plan, analyse};
-use bench::sim;
-use bench::verdict::Cnmp;
 
 use crate::rig::analysed;
 use crate::simulated;
@@ -41,7 +41,7 @@ const CARRIED: f64 = 0.0025;
 fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_within_1_percent() {
     let (closed, plain) = (swept(&[]), config(&[]));
     let open = analysed(&plain, &plain).frf;
-    let rig = Chain::of_mean_age(&plain, &sim::modes(&plain).expect("modes"));
+    let rig = Chain::of_mean_age(&plain, &simulated_modes(&plain).expect("modes"));
     let mut carried = 0;
     for (k, f) in closed
         .frf
@@ -154,7 +154,7 @@ fn a_planned_sweep_keeps_travel_and_current() {
             && (foreseen.current_a / current_a - 1.0).abs() < 0.02
     );
     assert_eq!(
-        bench::session::replay(&recording)
+        bench::experiment::replay(&recording)
             .expect("a replay")
             .different,
         0

@@ -1,10 +1,10 @@
 //! Verdicts on the simulated stage: never a wrong one, and few that say nothing.
 use bench::config::Config;
-use bench::fit::{Estimate, ModalFit, View, fit};
+use bench::experiment::Analysis;
 use bench::identify::Block;
-use bench::plant::{self, Modal};
-use bench::session::Analysis;
-use bench::verdict::{Case, Cnmp, Verdict, verdict};
+use bench::identify::modal::{Estimate, ModalFit, View, fit};
+use bench::identify::verdict::{Case, Cnmp, Verdict, verdict};
+use bench::model::plant::{self, Modal};
 use nalgebra::Complex;
 
 use crate::rig::{analysed, config, truth};
@@ -147,7 +147,7 @@ fn a_chain_that_answers_later_than_believed_is_never_taken_for_cnmp_zeros() {
     }
 }
 
-fn judged(modes: &[bench::zeros::Term], sigma_m_per_n: f64, expected: usize) -> Verdict {
+fn judged(modes: &[bench::model::zeros::Term], sigma_m_per_n: f64, expected: usize) -> Verdict {
     let blocks = blocks(modes, 0.0, sigma_m_per_n, 12);
     judged_by(
         &fit(&blocks, &View::Bare).expect("modes"),
@@ -225,7 +225,9 @@ fn where_the_zeros_touch_the_axis_nothing_is_said() {
         plant::build(&config(&sets).plant).expect("a model")
     };
     let pairs = |d: f64| {
-        bench::zeros::cnmp_pairs(&bench::zeros::damped_zeros(&structure(d)).expect("zeros"))
+        bench::model::zeros::cnmp_pairs(
+            &bench::model::zeros::damped_zeros(&structure(d)).expect("zeros"),
+        )
     };
     let (mut low, mut high) = (-0.02, 0.02);
     assert!(pairs(low) == 0 && pairs(high) == 1);

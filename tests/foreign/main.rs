@@ -1,9 +1,7 @@
 //! Signals of other hands: a CSV with named columns, periodic or not, in any units.
 
-#[path = "../thesis/program.rs"]
-mod program;
-#[path = "../identify/python.rs"]
-mod python;
+use bench_test_support::program;
+use bench_test_support::python;
 
 mod motor_bench;
 mod once;

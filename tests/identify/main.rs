@@ -6,11 +6,10 @@ mod csv;
 mod curves;
 mod joint;
 mod noise;
-mod python;
+use bench_test_support::python;
 mod repeated;
 mod seeds;
 mod sides;
-mod stage;
-#[path = "../common/unrecorded.rs"]
-mod unrecorded;
+use bench_test_support::stage;
+use bench_test_support::unrecorded;
 mod welch;

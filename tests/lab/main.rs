@@ -2,6 +2,5 @@
 mod aliases;
 mod margins;
 mod measured;
-#[path = "../common/simulated.rs"]
-mod simulated;
+use bench_test_support::simulated;
 mod wires;

@@ -1,8 +1,8 @@
 //! A chirp over the simulated chain of the profile `lab`, against the closed form.
 use bench::config::Config;
-use bench::plant::Mode;
-use bench::session::{Analysis, Plan};
-use bench::sim;
+use bench::experiment::{Analysis, Plan};
+use bench::model::plant::Mode;
+use bench::rig::simulated::modes as simulated_modes;
 use nalgebra::Complex;
 
 use crate::aliases::{lab, response};
@@ -49,7 +49,7 @@ fn a_slow_probe_of_its_own_clock_blurs_nothing() {
     let config = lab(&QUIET);
     let (analysis, modes) = (
         measured(&config, &config),
-        sim::modes(&config).expect("modes"),
+        simulated_modes(&config).expect("modes"),
     );
     let all = ratios(&analysis, &config, &modes, (0.5, 140.0));
     assert!(all.len() > 1000);

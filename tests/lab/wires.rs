@@ -4,12 +4,12 @@ use std::path::Path;
 
 use bench::config::Config;
 use bench::excitation::{Chirp, Excitation};
-use bench::plant::Mode;
+use bench::experiment::{Plan, analyse};
+use bench::model::plant::Mode;
 use bench::recording::{Header, Recorder, Recording};
+use bench::rig::simulated::{self, LiveStage};
 use bench::rt::arming::State;
 use bench::rt::record::{Published, TickRecord, flag};
-use bench::session::{Plan, analyse};
-use bench::sim::{self, LiveStage};
 use bench_hal::Validity;
 
 use crate::aliases::{lab, response};
@@ -123,7 +123,7 @@ fn off(config: &Config, wires: &Wires) -> (f64, f64, f64) {
         mean.probe.latency_s,
         mean.probe.transport_s,
     ) = (None, age_s - WOKE_S, 0.0);
-    let modes: Vec<Mode> = sim::modes(config).expect("modes");
+    let modes: Vec<Mode> = simulated::modes(config).expect("modes");
     let points = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response);
     // Around a resonance the estimator's own resolution counts, whatever the wires do.
     let narrow = [(27.0, 32.0), (80.0, 88.0)];

@@ -6,16 +6,6 @@ mod nyquist;
 mod phase;
 mod pictures;
 mod run;
-#[allow(
-    dead_code,
-    reason = "made for the tests of identify, which use all of it"
-)]
-#[path = "../identify/stage.rs"]
-mod stage;
-mod svg;
-#[allow(
-    dead_code,
-    reason = "made for the tests of the thesis, which use all of it"
-)]
-#[path = "../thesis/truth.rs"]
-mod truth;
+use bench_test_support::stage;
+use bench_test_support::svg;
+use bench_test_support::truth;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use bench::experiment::{self, Plan};
 use bench::rt::arming::{Change, State};
 use bench::rt::clock::{Clock, Moment, Virtual};
 use bench::rt::interlock::Interlocks;
@@ -12,7 +13,6 @@ use bench::rt::program::{Decision, Program};
 use bench::rt::record::{EventKind, Published};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
 use bench::rt::thread::{self, Pace};
-use bench::session::{self, Plan};
 use bench_hal::{Rig, Tick, Validity};
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -358,7 +358,7 @@ fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
         for pace in [Pace::Virtual, Pace::Realtime] {
             let rig = Watched::new(Still::default());
             let log = Arc::clone(&rig.log);
-            let error = session::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
+            let error = experiment::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
                 .err()
                 .expect("no recording");
             assert!(error.to_string().contains("nothing moved"), "{error}");

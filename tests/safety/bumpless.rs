@@ -4,11 +4,11 @@ use std::ops::Range;
 use bench::config::{Config, ReferenceSettings};
 use bench::control::{Controller, ControllerText};
 use bench::excitation::reference;
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Program};
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::servo::Order;
-use bench::sim::SimulatedRig;
 
 use crate::faulty_rig::{Fault, FaultyRig};
 use crate::rig::{Bench, stage};

@@ -2,6 +2,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Moment, Realtime};
 use bench::rt::interlock::Interlocks;
 use bench::rt::outlet::Outlet;
@@ -9,7 +10,6 @@ use bench::rt::program::{Decision, Program};
 use bench::rt::record::{Published, TickRecord, flag};
 use bench::rt::servo::{Connections, Order, Progress, Servo};
 use bench::rt::thread::{self, Ended};
-use bench::sim::SimulatedRig;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
 };

@@ -1,11 +1,10 @@
 //! What the loop promises whoever stands beside the motor. Each test has been seen to fail with the line it guards broken.
 mod arming;
 mod bumpless;
-#[path = "../common/faulty_rig.rs"]
-mod faulty_rig;
+use bench_test_support::faulty_rig;
 mod late_ticks;
 mod orders_and_faults;
 mod replay;
 mod reproducible;
-mod rig;
+use bench_test_support::loop_rig as rig;
 mod trips;

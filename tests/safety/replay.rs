@@ -3,12 +3,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use bench::config::{AmplitudePoint, Config, ReferenceSettings, Sweep};
+use bench::experiment::{self, Kind, Plan, ReplayError, Replayed, replay};
 use bench::recording::{Header, Recorder, Recording};
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::record::{EventKind, Published, TickRecord, flag};
 use bench::rt::servo::Order;
 use bench::rt::thread::Pace;
-use bench::session::{self, Kind, Plan, ReplayError, Replayed, replay};
-use bench::sim::SimulatedRig;
 use bench_hal::Validity;
 
 use crate::faulty_rig::{Fault, FaultyRig};
@@ -39,7 +39,7 @@ fn control(controller: &str) -> Plan {
 fn record(plan: &Plan, faults: &[(Range<u64>, Fault)], folder: &Path) -> PathBuf {
     let rig = SimulatedRig::new(&plan.config).expect("a rig");
     let rig = Box::new(FaultyRig::new(rig, faults));
-    let run = session::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     path

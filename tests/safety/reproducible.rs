@@ -2,9 +2,9 @@
 use std::path::Path;
 
 use bench::config::{Config, Sweep};
+use bench::experiment::{self, Plan};
+use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
-use bench::session::{self, Plan};
-use bench::sim::SimulatedRig;
 
 use crate::rig::stage;
 
@@ -31,7 +31,8 @@ fn chirp(sweep: Sweep, seed: u64) -> Plan {
 fn digest(plan: &Plan) -> u64 {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
-    let run = session::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
+    let run =
+        experiment::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
     assert!(run.ended.completed, "{:?}", run.ended);
     run.finish("{}").expect("a good disk").loop_digest
 }

@@ -2,11 +2,8 @@
 //!
 //! Truth comes from closed forms and from `tests/python/study.py`, which shares no line with the program.
 
-#[path = "../thesis/program.rs"]
-mod program;
-#[path = "../thesis/truth.rs"]
-#[allow(dead_code, reason = "each test binary takes what it needs")]
-mod truth;
+use bench_test_support::program;
+use bench_test_support::truth;
 
 mod figures;
 mod files;

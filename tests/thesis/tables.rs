@@ -5,7 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use bench::zeros::{Kinds, ModalSum, Place, Row, Sequence, StepResponse, TABLES, Term, table_of};
+use bench::model::zeros::{
+    Kinds, ModalSum, Place, Row, Sequence, StepResponse, TABLES, Term, table_of,
+};
 use serde_json::{Value, json};
 
 use crate::program::Draw;

@@ -6,8 +6,8 @@ use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use crate::config::Purpose;
-use crate::plant;
-use crate::zeros::{self, Bound, Zero};
+use crate::model::plant;
+use crate::model::zeros::{self, Bound, Zero};
 
 /// |S| in the band, if nothing else is asked for.
 const ALPHA: f64 = 0.5;

@@ -9,10 +9,12 @@ use super::conditions_text::text;
 use super::sweep::Sweep;
 use super::veering::{self, hz};
 use crate::config::Purpose;
-use crate::plant::Structure;
-use crate::veering::conditions::{Condition, c4_1, c4_2, deciding_residue, pattern};
-use crate::veering::propositions::{Foretold, Proposition, Side, Stretch, p4_1};
-use crate::veering::{CloseModes, Course, Lie, Loci, Meeting, ModesAt, Station, as_configured};
+use crate::model::plant::Structure;
+use crate::model::veering::conditions::{Condition, c4_1, c4_2, deciding_residue, pattern};
+use crate::model::veering::propositions::{Foretold, Proposition, Side, Stretch, p4_1};
+use crate::model::veering::{
+    CloseModes, Course, Lie, Loci, Meeting, ModesAt, Station, as_configured,
+};
 
 /// What varies, which modes, and where to look closely.
 #[derive(Clone, Debug, clap::Args)]
@@ -237,7 +239,7 @@ fn report(
     pair: [usize; 2],
     [closest, at]: [&ModesAt; 2],
 ) -> Result<Report, CliError> {
-    let here = crate::veering::station(at, pair, as_configured(at))?;
+    let here = crate::model::veering::station(at, pair, as_configured(at))?;
     let on_grid = course
         .stations
         .iter()

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::super::CliError;
 use super::super::options::{print_json, print_text};
-use crate::zeros;
+use crate::model::zeros;
 
 /// Two close modes beside a double integrator (Eq. 3-15).
 #[derive(Clone, Debug, clap::Args)]

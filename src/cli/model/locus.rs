@@ -7,8 +7,8 @@ use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use super::sweep::Sweep;
-use crate::plant::Modal;
-use crate::zeros::{self, Change, Locus, ModalSum, Plane};
+use crate::model::plant::Modal;
+use crate::model::zeros::{self, Change, Locus, ModalSum, Plane};
 
 /// What varies, and where.
 #[derive(Clone, Debug, clap::Args)]

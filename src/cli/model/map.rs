@@ -7,7 +7,7 @@ use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::spaced::Spaced;
 use crate::config::{PlantSettings, Purpose, Sr4dofSettings};
-use crate::zeros;
+use crate::model::zeros;
 
 /// The largest picture for people: lines and characters.
 const PICTURE: (usize, usize) = (60, 120);

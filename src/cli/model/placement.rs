@@ -11,9 +11,9 @@ use super::conditions::{meeting_pair, veers};
 use super::placement_text::text;
 use super::ports::Weights;
 use super::sweep::Sweep;
-use crate::plant::{PlantError, Port, Structure};
+use crate::model::plant::{PlantError, Port, Structure};
+use crate::model::veering::{Loci, ModesAt, Picture, Trial, trial};
 use crate::report::{QuadrantPanel, quadrants_svg};
-use crate::veering::{Loci, ModesAt, Picture, Trial, trial};
 
 /// Placements with less than this of the present aR are not recommended: what is to be controlled hardly shows there.
 pub(super) const LEAST_REMAINDER: f64 = 0.1;
@@ -202,7 +202,7 @@ fn places(sweep: &Sweep, value: f64) -> Result<Vec<Port>, CliError> {
 }
 
 fn places_at(sweep: &Sweep, value: f64) -> Result<Vec<Port>, CliError> {
-    Ok(crate::plant::ports(&sweep.config(value)?.plant))
+    Ok(crate::model::plant::ports(&sweep.config(value)?.plant))
 }
 
 /// What was typed, and what it means.

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::super::CliError;
-use crate::plant::Port;
+use crate::model::plant::Port;
 
 /// A sum of ports with their weights, by place.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use crate::config::Purpose;
-use crate::plant::{self, Modal};
-use crate::zeros::{self, Kinds, ModalSum, Sequence};
+use crate::model::plant::{self, Modal};
+use crate::model::zeros::{self, Kinds, ModalSum, Sequence};
 
 #[derive(Debug, Serialize)]
 struct Report {

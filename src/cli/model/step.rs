@@ -6,8 +6,8 @@ use super::super::CliError;
 use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use crate::config::Purpose;
-use crate::plant::{self, Modal};
-use crate::zeros::{InitialStep, Kinds, ModalSum, Sequence, StepResponse};
+use crate::model::plant::{self, Modal};
+use crate::model::zeros::{InitialStep, Kinds, ModalSum, Sequence, StepResponse};
 
 /// Which step response.
 #[derive(Clone, Debug, clap::Args)]

@@ -9,8 +9,8 @@ use super::super::progress::Progress;
 use super::super::table::table;
 use super::super::{CliError, Outcome};
 use crate::config::Purpose;
-use crate::session::stoppable;
-use crate::study::{
+use crate::experiment::stoppable;
+use crate::model::study::{
     Answer, Block, Counted, Couple, Deviation, Effect, Opened, Plan, Probability, Results, Shard,
     StudyError, StudyFile, Tolerance, Varied, count, joined,
 };

@@ -2,9 +2,9 @@
 
 use super::super::CliError;
 use super::super::options::BenchOptions;
-use crate::config::quantity::{self, Quantity};
 use crate::config::{Config, Purpose};
-use crate::plant::{self, Structure};
+use crate::model::plant::{self, Structure};
+use crate::util::quantity::{self, Quantity};
 
 /// `count` values of the setting `vary`, two or more.
 #[derive(Clone, Copy, Debug)]

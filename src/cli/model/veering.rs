@@ -8,7 +8,7 @@ use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use super::sweep::Sweep;
 use crate::config::Purpose;
-use crate::veering::{Loci, Meeting, ModesAt};
+use crate::model::veering::{Loci, Meeting, ModesAt};
 
 /// What varies, and which modes.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,0 +1,59 @@
+//! Loops, and the curves that are drawn of them.
+
+use nalgebra::Complex;
+
+use super::super::FigureError;
+use super::super::model::Model;
+use bench::control::{ClosedLoop, ControllerText};
+use bench::model::plant::Modal;
+
+/// The loop of a plant with a controller: a name of the program's own, or a file's name and its text.
+pub(crate) fn closed_loop(
+    model: &Model,
+    name: &str,
+    text: Option<&str>,
+) -> Result<ClosedLoop, FigureError> {
+    let config = model.config()?;
+    let controller = match text {
+        Some(text) => ControllerText {
+            name: name.into(),
+            text: text.into(),
+        },
+        None => ControllerText::find(name)?,
+    };
+    let sections = controller.sections(config.servo.rate_hz)?;
+    Ok(ClosedLoop::new(
+        &config,
+        Modal::of(&bench::model::plant::build(&config.plant)?)?.modes,
+        sections,
+    ))
+}
+
+/// L(jw) in continuous time.
+pub(crate) fn open(of: &ClosedLoop, low_rad_s: f64, high_rad_s: f64) -> Vec<(f64, Complex<f64>)> {
+    of.frequencies(low_rad_s, high_rad_s)
+        .into_iter()
+        .map(|w| (w, of.continuous_loop(w)))
+        .collect()
+}
+
+/// T = L/(1 + L).
+pub(crate) fn closed(open: &[(f64, Complex<f64>)]) -> Vec<(f64, Complex<f64>)> {
+    open.iter().map(|(w, l)| (*w, l / (l + 1.0))).collect()
+}
+
+/// S = 1/(1 + L).
+pub(crate) fn sensitivity(open: &[(f64, Complex<f64>)]) -> Vec<(f64, Complex<f64>)> {
+    open.iter().map(|(w, l)| (*w, (l + 1.0).inv())).collect()
+}
+
+/// Time in seconds and position after a step of height 1.
+pub(crate) fn step(of: &ClosedLoop, seconds: f64) -> Vec<(f64, f64)> {
+    let period_s = of.chain().period_s();
+    let positions = of.simulate((seconds / period_s).round() as usize, |_| 1.0);
+    positions
+        .into_iter()
+        .enumerate()
+        .map(|(k, y)| (k as f64 * period_s, y))
+        .collect()
+}

@@ -1,0 +1,417 @@
+//! Figs 6-2 to 6-6: plants by their modes, Eqs. (6-1) to (6-5).
+
+use super::super::bode::{Curve, bode, critical, nyquist, origin};
+use super::super::content::signed;
+use super::super::model::{ModeOf, Model, kinds};
+use super::super::plane::{plane, pole_zero};
+use super::super::{Comparison, Content, FigureError, Workshop};
+use super::loops::{closed, closed_loop, open, step};
+use nalgebra::Complex;
+
+use bench::control::{self, ClosedLoop, ControllerText};
+use bench::model::zeros::sign_sequence;
+use bench::report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
+use bench::report::{Chart, Pen, Scale};
+
+const W: &str = "Frequency (rad/s)";
+const COLOURS: [Colour; 4] = [BLUE, VERMILION, GREEN, PURPLE];
+
+/// Newtons for amperes one to one, so that L is the product of the printed equations.
+const UNIT_FORCE: &str = "motor.force_constant_n_per_a=1.0";
+
+const EQ_6_2: &str = "\
+# Eq. (6-2): 1/s and a low pass at half of the first resonance. Gains are amperes per micrometre: 1e-6 is 1 A/m.
+title = \"Eq. (6-2)\"
+
+[[section]]
+kind = \"integrator\"
+gain_a_per_um = 1e-6
+
+[[section]]
+kind = \"pole_pair\"
+omega_rad_s = 5.0
+damping_ratio = 0.7
+";
+
+/// The lead of Eqs. (6-4) and (6-5) with a gain beside it, (1 + s/1.82)/(1 + s/13.7).
+fn lead(title: &str, gain: f64) -> String {
+    format!(
+        "# Gains are amperes per micrometre: 1e-6 is 1 A/m.\ntitle = \"{title}\"\n\n[[section]]\nkind = \"gain\"\ngain_a_per_um = {:?}\n\n[[section]]\nkind = \"zero_pole\"\nzero_rad_s = 1.82\npole_rad_s = 13.7\n",
+        gain * 1e-6 * 13.7 / 1.82
+    )
+}
+
+fn biquad(zeros: (f64, f64), poles: (f64, f64)) -> String {
+    let ((wz, zz), (wp, zp)) = (zeros, poles);
+    format!(
+        "\n[[section]]\nkind = \"biquad\"\nzeros_rad_s = {wz:?}\nzeros_damping_ratio = {zz:?}\npoles_rad_s = {wp:?}\npoles_damping_ratio = {zp:?}\n"
+    )
+}
+
+fn notch() -> String {
+    biquad((11.0, 0.01), (11.0, 0.4))
+}
+
+fn eq_6_4() -> String {
+    lead("Eq. (6-4)", 1.0) + &notch()
+}
+
+fn eq_6_5(zeta: f64) -> String {
+    lead("Eq. (6-5)", 169.0 / 121.0) + &biquad((11.0, zeta), (13.0, zeta))
+}
+
+/// Eq. (6-1).
+fn eq_6_1(zeta: f64) -> Model {
+    Model::modes(&[ModeOf("r", 10.0, 100.0, zeta)]).set(UNIT_FORCE)
+}
+
+/// Eq. (6-3) with wu = 10, wv = 12 rad/s: residues of u and v.
+fn eq_6_3(au: f64, av: f64, zeta: f64) -> Model {
+    let modes = [
+        ModeOf("R", 0.0, 7.98, 0.0),
+        ModeOf("u", 10.0, au, zeta),
+        ModeOf("v", 12.0, av, zeta),
+    ];
+    Model::modes(&modes).set(UNIT_FORCE)
+}
+
+fn margins_command(model: &Model, file: &str) -> String {
+    model.command("margins", &format!("--continuous --controller {file}"))
+}
+
+/// Moduli as text.
+fn listed(values: &[f64], digits: usize) -> String {
+    values
+        .iter()
+        .map(|value| signed(*value, digits))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn spread(values: &[f64]) -> f64 {
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, 0.0f64), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    high - low
+}
+
+pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
+    let dampings = [0.001, 0.01, 0.05];
+    let file = "6-2.controller.toml";
+    let loops = dampings
+        .iter()
+        .map(|zeta| closed_loop(&eq_6_1(*zeta), file, Some(EQ_6_2)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let pen = |k: usize| {
+        if k == 1 {
+            Pen::solid(COLOURS[k])
+        } else {
+            Pen::dashed(COLOURS[k])
+        }
+    };
+    let name = |k: usize| format!("ζ = {}", dampings[k]);
+    let ls: Vec<Curve> = loops
+        .iter()
+        .enumerate()
+        .map(|(k, of)| Curve::new(&name(k), pen(k), open(of, 0.1, 100.0)))
+        .collect();
+    let ts: Vec<Curve> = ls
+        .iter()
+        .map(|l| Curve::new(&l.name, l.pen, closed(&l.points)))
+        .collect();
+    let (a, a_phase) = bode("(a) Open loop L = P C", W, "|L|", &ls[1..2]);
+    let (c, c_phase) = bode("(c) Closed loop T = L/(1 + L)", W, "|T|", &ts);
+    let b = ls.iter().fold(
+        critical(nyquist(
+            "(b) Nyquist plot of L",
+            (-1.6, 3.4),
+            (-2.5, 2.5),
+            "L",
+        )),
+        |chart, l| chart.directed(&l.name, l.pen, l.polar()),
+    );
+    let d = Chart::new(
+        "(d) Step response of T",
+        Scale::linear("Time (s)").within(0.0, 12.0),
+        Scale::linear("Position/step (1)"),
+    )
+    .line("ζ = 0.01", pen(1), step(&loops[1], 12.0));
+    let margins: Vec<_> = loops.iter().map(|of| of.margins(true)).collect();
+    let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
+    let peaks: Vec<f64> = ts
+        .iter()
+        .map(|t| {
+            t.points
+                .iter()
+                .filter(|(w, _)| *w > 5.0)
+                .map(|(_, t)| t.norm())
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    let decibels: Vec<f64> = peaks.iter().map(|peak| 20.0 * peak.log10()).collect();
+    Ok(Content::new("A controller with a bandwidth below the first resonance: open loop, Nyquist plot with three damping ratios of the plant, closed loop and its step response.")
+        .setting("plant of Eq. (6-1), w = 10 rad/s, damping ratio 0.01 where no other is named; controller of Eq. (6-2); continuous time, the step sampled at 5 kHz")
+        .assumed("damping ratios of the other two curves: 0.001 and 0.05")
+        .row(190.0, [a, c])
+        .row(160.0, [a_phase, c_phase])
+        .row(400.0, [b, d])
+        .compare(Comparison::within("crossover as a ratio of the first resonance", 0.1, 1, margins[1].crossover_rad_s.unwrap_or(f64::NAN) / 10.0, "", 0.05))
+        .compare(Comparison::holds("modulus margin with damping 0.001, 0.01, 0.05", "unchanged regardless of the damping ratio", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02: the circle of the resonance grows away from -1"))
+        .compare(Comparison::holds("peak of |T| at the resonance with damping 0.001, 0.01, 0.05, in dB", "the smaller the damping, the closer to 0 dB", decibels[0].abs() < decibels[1].abs() && decibels[1].abs() < decibels[2].abs(), &listed(&decibels, 2)))
+        .file(file, EQ_6_2)
+        .command(margins_command(&eq_6_1(0.01), file)))
+}
+
+/// Bode plot, poles and zeros, and Nyquist plot of a plant of Eq. (6-3).
+struct Plant {
+    model: Model,
+    bode: (Chart, Chart),
+    map: Chart,
+    whole: Chart,
+    corner: Chart,
+    kinds: String,
+    signs: String,
+}
+
+fn plant(au: f64, av: f64) -> Result<Plant, FigureError> {
+    let model = eq_6_3(au, av, 0.001);
+    let (sum, modal) = (model.sum()?, model.modal()?);
+    let points = super::super::model::response(&sum, 1.0, 100.0)?;
+    let curve = Curve::new("G", Pen::solid(BLUE), points);
+    let zeros = sum.damped_zeros()?;
+    let map = pole_zero(
+        plane("(b) Poles and zeros", (-8.0, 8.0), (-1.0, 14.0)),
+        ("poles", "zeros"),
+        VERMILION,
+        &sum,
+        &zeros,
+    );
+    Ok(Plant {
+        bode: bode(
+            "(a) Bode plot",
+            W,
+            "|G| (m/N)",
+            std::slice::from_ref(&curve),
+        ),
+        map,
+        whole: nyquist(
+            "(c) Nyquist plot of G in m/N",
+            (-9.0, 9.0),
+            (-9.0, 9.0),
+            "G",
+        )
+        .directed("", Pen::solid(BLUE), curve.polar()),
+        corner: origin(nyquist(
+            "(c) the same near the origin",
+            (-0.6, 0.6),
+            (-0.6, 0.6),
+            "G",
+        ))
+        .directed("", Pen::solid(BLUE), curve.polar()),
+        kinds: kinds(&sum.undamped_zeros()?),
+        signs: sign_sequence(&modal),
+        model,
+    })
+}
+
+fn plant_settings(au: f64, av: f64) -> String {
+    format!(
+        "Eq. (6-3) with residues of R, u, v of 7.98, {}, {} 1/kg, wu = 10 and wv = 12 rad/s, damping ratio 0.001",
+        signed(au, 2),
+        signed(av, 2)
+    )
+}
+
+/// L with a compensation drawn over G, both in units of their largest circle.
+fn compensated(heading: &str, model: &Model, text: &str, size: f64) -> Result<Chart, FigureError> {
+    let of = closed_loop(model, "compensation", Some(text))?;
+    let l = Curve::new("", Pen::solid(VERMILION), open(&of, 8.0, 15.0));
+    let plain = closed_loop(
+        model,
+        "none",
+        Some("title = \"none\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n"),
+    )?;
+    let g = Curve::new("", Pen::dashed(BLUE), open(&plain, 8.0, 15.0));
+    Ok(nyquist(heading, (-size, size), (-size, size), "G C")
+        .directed("G", g.pen, g.polar())
+        .directed("G with the compensation", l.pen, l.polar()))
+}
+
+pub(in super::super) fn fig_6_3(_: &Workshop) -> Result<Content, FigureError> {
+    let plant = plant(-1.65, 1.52)?;
+    let only_notch = format!(
+        "title = \"notch\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n{}",
+        notch()
+    );
+    let d = compensated(
+        "(d) Desired compensation: u turned clockwise, v counter-clockwise",
+        &plant.model,
+        &only_notch,
+        9.0,
+    )?;
+    Ok(Content::new("A plant with alternating signs: Bode plot, poles and zeros, Nyquist plot, and the compensation that turns both circles away from -1.")
+        .setting(plant_settings(-1.65, 1.52))
+        .assumed("(d) shows the notch of Eq. (6-4) as the compensation; the thesis draws arrows")
+        .row(180.0, [plant.bode.0, plant.map])
+        .row(180.0, [plant.bode.1, plant.corner])
+        .row(400.0, [plant.whole, d])
+        .compare(Comparison::words("signs of the residues", "+-+", &plant.signs))
+        .compare(Comparison::words("zeros without damping", "CMP-CNMP", &plant.kinds))
+        .command(plant.model.command("model modes", "")))
+}
+
+pub(in super::super) fn fig_6_5(_: &Workshop) -> Result<Content, FigureError> {
+    let plant = plant(1.65, -1.52)?;
+    let pair = format!(
+        "title = \"pair\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = {:?}\n{}",
+        169.0 / 121.0 * 1e-6,
+        biquad((11.0, 0.001), (13.0, 0.001))
+    );
+    let d = compensated(
+        "(d) With the additional pole-zero pair of Eq. (6-5), damping 0.001",
+        &plant.model,
+        &pair,
+        14.0,
+    )?;
+    Ok(Content::new("A plant with non-alternating signs: Bode plot, poles and zeros, Nyquist plot, and the additional pair that turns both circles into one direction.")
+        .setting(plant_settings(1.65, -1.52))
+        .row(180.0, [plant.bode.0, plant.map])
+        .row(180.0, [plant.bode.1, plant.corner])
+        .row(400.0, [plant.whole, d])
+        .compare(Comparison::words("signs of the residues", "++-", &plant.signs))
+        .compare(Comparison::holds("zeros without damping", "no CMP-CNMP zeros", !plant.kinds.contains("CMP-CNMP"), &plant.kinds))
+        .command(plant.model.command("model modes", "")))
+}
+
+pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
+    let (file, text) = ("6-4.controller.toml", eq_6_4());
+    let dampings = [0.0005, 0.001, 0.002, 0.01];
+    let notch = ControllerText {
+        name: "notch".into(),
+        text: format!("title = \"notch\"\n{}", notch()),
+    }
+    .sections(5000.0)?;
+    let at = |w: f64| (w, notch[0].response(Complex::new(0.0, w)));
+    let of_notch = control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)])
+        .into_iter()
+        .map(at);
+    let (gain, phase) = bode(
+        "(a) Notch of Eq. (6-4)",
+        W,
+        "Magnitude (1)",
+        &[Curve::new("", Pen::solid(BLUE), of_notch.collect())],
+    );
+    let mut wide = critical(nyquist(
+        "(b) Nyquist plot of L, with four damping ratios of the plant",
+        (-14.0, 14.0),
+        (-14.0, 14.0),
+        "L",
+    ));
+    let mut near = critical(nyquist(
+        "(b) the same near −1",
+        (-2.2, 1.2),
+        (-1.7, 1.7),
+        "L",
+    ));
+    let mut margins = Vec::new();
+    for (k, zeta) in dampings.iter().enumerate() {
+        let of = closed_loop(&eq_6_3(-1.65, 1.52, *zeta), file, Some(&text))?;
+        let l = Curve::new(
+            &format!("ζ = {zeta}"),
+            Pen::solid(COLOURS[k]),
+            open(&of, 1.0, 200.0),
+        );
+        wide = wide.directed(&l.name, l.pen, l.polar());
+        near = near.directed("", l.pen, l.polar());
+        margins.push(of.margins(true));
+    }
+    let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
+    Ok(Content::new("The notch between the two modes, and the open loop with the controller of Eq. (6-4): the circles grow away from -1, however light the damping.")
+        .setting(format!("{}; controller of Eq. (6-4)", plant_settings(-1.65, 1.52)))
+        .assumed("damping ratios of the plant: 0.0005, 0.001, 0.002, 0.01")
+        .row(150.0, [gain, phase])
+        .row(430.0, [wide, near])
+        .compare(Comparison::within("crossover (printed: around 4)", 4.0, 0, margins[1].crossover_rad_s.unwrap_or(f64::NAN), "rad/s", 0.5))
+        .compare(Comparison::within("modulus margin (printed: around 0.5)", 0.5, 1, moduli[1], "", 0.05).remark("with Eq. (6-4) exactly as printed; the thesis gives crossover and margin as round figures"))
+        .compare(Comparison::holds("modulus margin with damping 0.0005, 0.001, 0.002, 0.01", "unchanged", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02"))
+        .compare(Comparison::holds("closed loop", "stable", margins.iter().all(|m| m.stable), if margins.iter().all(|m| m.stable) { "stable with all four" } else { "unstable" }))
+        .file(file, &text)
+        .command(margins_command(&eq_6_3(-1.65, 1.52, 0.001), file)))
+}
+
+pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
+    let model = eq_6_3(1.65, -1.52, 0.001);
+    let cases = [
+        (0.001, "6-6a.controller.toml", BLUE),
+        (0.01, "6-6c.controller.toml", VERMILION),
+    ];
+    let mut content = Content::new("The loop with non-alternating signs and an additional pole-zero pair: as lightly damped as the plant's modes (a, b), and with ten times the damping (c, d).")
+        .setting(format!("{}; controller of Eq. (6-5)", plant_settings(1.65, -1.52)));
+    let mut charts = Vec::new();
+    let mut loops: Vec<(f64, ClosedLoop)> = Vec::new();
+    for (zeta, file, colour) in cases {
+        let text = eq_6_5(zeta);
+        let of = closed_loop(&model, file, Some(&text))?;
+        let l = Curve::new(
+            &format!("L, ζ = {zeta}"),
+            Pen::solid(colour),
+            open(&of, 1.0, 100.0),
+        );
+        charts.push((
+            bode(
+                &format!("({}) Bode plot of L", if zeta < 0.005 { "a" } else { "c" }),
+                W,
+                "|L|",
+                std::slice::from_ref(&l),
+            ),
+            l,
+        ));
+        content = content
+            .file(file, &text)
+            .command(margins_command(&model, file));
+        loops.push((zeta, of));
+    }
+    let [(a, la), (c, lc)] = charts
+        .try_into()
+        .map_err(|_| FigureError::Run("two cases".into()))?;
+    let near = |heading: &str, l: &Curve| {
+        critical(nyquist(heading, (-2.6, 1.4), (-2.0, 2.0), "L")).directed("", l.pen, l.polar())
+    };
+    let between =
+        |of: &ClosedLoop| -360.0 + of.continuous_loop(9.0).arg().to_degrees().rem_euclid(360.0);
+    let margins: Vec<_> = loops.iter().map(|(_, of)| of.margins(true)).collect();
+    Ok(content
+        .row(190.0, [a.0, c.0])
+        .row(170.0, [a.1, c.1])
+        .row(420.0, [near("(b) Nyquist plot near −1, ζ = 0.001", &la), near("(d) Nyquist plot near −1, ζ = 0.01", &lc)])
+        .compare(Comparison::within(
+            "phase at which the resonances start and end, ζ = 0.001 (at 9 rad/s; printed: about)",
+            -135.0,
+            0,
+            between(&loops[0].1),
+            "deg",
+            5.0,
+        ))
+        .compare(Comparison::holds(
+            "ζ = 0.001",
+            "all circles grow away from -1",
+            margins[0].stable,
+            &verdict(&margins[0]),
+        ))
+        .compare(Comparison::holds(
+            "ζ = 0.01",
+            "a stability problem: the circle of mode v cannot be turned to a safe place",
+            !margins[1].stable || margins[1].modulus_margin < 0.5 * margins[0].modulus_margin,
+            &verdict(&margins[1]),
+        ).remark("with the printed numbers the loop stays stable, but the circle of mode v has turned towards -1 and the modulus margin falls")))
+}
+
+fn verdict(margins: &bench::control::Margins) -> String {
+    let stable = if margins.stable { "stable" } else { "unstable" };
+    format!(
+        "{stable}, modulus margin {}",
+        signed(margins.modulus_margin, 3)
+    )
+}

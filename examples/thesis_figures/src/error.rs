@@ -1,0 +1,57 @@
+//! Why a figure could not be made.
+
+use bench::config::ConfigError;
+use bench::control::ControllerError;
+use bench::experiment::{AnalysisError, SessionError};
+use bench::model::plant::PlantError;
+use bench::recording::RecordingError;
+use bench::report::ReportError;
+use bench::rig::devices::DevicesError;
+
+/// A figure that could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FigureError {
+    /// A number that no figure has.
+    #[error("no figure or table is called {unknown}; there are {known}")]
+    Unknown {
+        /// What was asked for.
+        unknown: String,
+        /// All that there are.
+        known: String,
+    },
+    /// A plant's settings are refused.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A plant cannot be analysed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// A controller is refused.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    /// The picture cannot be drawn.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The simulated stage cannot be made.
+    #[error(transparent)]
+    Devices(#[from] DevicesError),
+    /// A run of the simulated stage failed.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// Its recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// Its recording carries no response.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// A run ended early.
+    #[error("{0}; run the command below the figure to see why")]
+    Run(String),
+    /// A file cannot be written.
+    #[error("cannot write {path}: {why}; free some space or choose another folder with --output")]
+    Write {
+        /// Which.
+        path: String,
+        /// The system's words.
+        why: String,
+    },
+}

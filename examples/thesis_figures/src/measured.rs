@@ -1,0 +1,137 @@
+//! Runs of the simulated stage, through the session, as `bench chirp` and `bench control` make them.
+
+use std::cell::OnceCell;
+use std::path::{Path, PathBuf};
+
+use super::FigureError;
+use super::model::Model;
+use bench::config::Config;
+use bench::experiment::{self, Analysis, Measured, Plan};
+use bench::recording::Recording;
+use bench::rig::devices;
+use bench::rt::record::{TickRecord, flag};
+use bench::rt::thread::Pace;
+
+/// Where runs are recorded, and what was measured already: several figures show the same run.
+#[derive(Debug)]
+pub struct Workshop {
+    folder: PathBuf,
+    chirp: OnceCell<Analysis>,
+    steps: [OnceCell<Closed>; 2],
+}
+
+/// One of the two controllers of section 6.2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Which {
+    /// Eq. (6-6).
+    Slow,
+    /// Eq. (6-7).
+    Fast,
+}
+
+impl Which {
+    pub fn name(self) -> &'static str {
+        match self {
+            Which::Slow => "slow",
+            Which::Fast => "fast",
+        }
+    }
+}
+
+/// A closed-loop run.
+#[derive(Clone, Debug)]
+pub(crate) struct Closed {
+    /// Time in seconds after the loop closed, and position in metres relative to where the stage rested.
+    pub course: Vec<(f64, f64)>,
+    /// The reference likewise.
+    pub reference: Vec<(f64, f64)>,
+    /// Its figures.
+    pub measured: Measured,
+}
+
+impl Workshop {
+    /// Recordings of runs go into `folder`, which need not be there; whoever gives it removes it.
+    pub fn new(folder: &Path) -> Workshop {
+        Workshop {
+            folder: folder.into(),
+            chirp: OnceCell::new(),
+            steps: [OnceCell::new(), OnceCell::new()],
+        }
+    }
+
+    /// The frequency response of `bench chirp`.
+    pub(crate) fn chirp(&self) -> Result<&Analysis, FigureError> {
+        if let Some(known) = self.chirp.get() {
+            return Ok(known);
+        }
+        let config = Model::stage().config()?;
+        let recording = self.run(&Plan::chirp(config.clone()), "chirp")?;
+        let analysis = experiment::analyse(&recording, &config)?;
+        Ok(self.chirp.get_or_init(|| analysis))
+    }
+
+    /// The step of `bench control`.
+    pub(crate) fn step(&self, which: Which) -> Result<&Closed, FigureError> {
+        let cell = &self.steps[which as usize];
+        if let Some(known) = cell.get() {
+            return Ok(known);
+        }
+        let config = Model::stage()
+            .set(&format!("control.controller={}", which.name()))
+            .config()?;
+        let closed = self.closed(config)?;
+        Ok(cell.get_or_init(|| closed))
+    }
+
+    /// Any closed-loop run.
+    pub(crate) fn closed(&self, config: Config) -> Result<Closed, FigureError> {
+        let plan = Plan::control(config.clone()).map_err(experiment::SessionError::Plan)?;
+        let recording = self.run(&plan, "control")?;
+        let measured = experiment::measure(&recording, &config)?;
+        let measured = measured
+            .ok_or_else(|| FigureError::Run("the run ended before its steady state".into()))?;
+        let ticks: Vec<TickRecord> = recording.ticks()?.collect::<Result<_, _>>()?;
+        Ok(closed(&ticks, config.servo.period_s(), measured))
+    }
+
+    fn run(&self, plan: &Plan, what: &str) -> Result<Recording, FigureError> {
+        let rig = devices::simulate(&plan.config)?.rig;
+        let mut run = experiment::run(plan, rig, Pace::Virtual, &self.folder, &mut |_, _| {})?;
+        run.totals()?;
+        let path = run.path.clone();
+        if let Some((trip, tick)) = run.ended.trip {
+            return Err(FigureError::Run(format!(
+                "`bench {what}` tripped at tick {tick}: {trip}"
+            )));
+        }
+        if !run.ended.completed {
+            return Err(FigureError::Run(format!("`bench {what}` was stopped")));
+        }
+        run.finish("{}")?;
+        Ok(Recording::open(&path)?)
+    }
+}
+
+/// The ticks with the loop closed, relative to where the stage rested before.
+fn closed(ticks: &[TickRecord], period_s: f64, measured: Measured) -> Closed {
+    let active: Vec<&TickRecord> = ticks
+        .iter()
+        .filter(|tick| tick.flags & flag::ACTIVE != 0)
+        .collect();
+    let origin_m = ticks
+        .iter()
+        .rfind(|tick| active.first().is_some_and(|first| tick.tick < first.tick));
+    let origin_m = origin_m.map_or(0.0, |tick| tick.reference_m);
+    let course = |of: fn(&TickRecord) -> f64| {
+        active
+            .iter()
+            .enumerate()
+            .map(|(k, tick)| (k as f64 * period_s, of(tick) - origin_m))
+            .collect()
+    };
+    Closed {
+        course: course(|tick| tick.position_m),
+        reference: course(|tick| tick.reference_m),
+        measured,
+    }
+}

@@ -1,0 +1,182 @@
+//! What a recording under control shows: the plant, and the loop around it.
+
+use nalgebra::Complex;
+
+use super::analysis::{AnalysisError, Seen};
+use super::plan::{Plan, PlanError};
+use crate::config::{Config, ReferenceSettings};
+use crate::control::{ClosedLoop, ControllerError, Margins};
+use crate::identify::joint::{self, Joint, LoopSignals};
+use crate::identify::modal::Estimate;
+use crate::identify::{EstimatorSettings, Frf};
+use crate::model::plant::{self, Modal};
+use crate::recording::Recording;
+
+/// A recording of a closed loop that shows no plant.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ClosedLoopError {
+    /// The reference stayed where it was, or was a single sine or step.
+    #[error(
+        "the reference of this recording, {kind}, does not sweep the band of [chirp]; repeat the run with `bench control --reference chirp`"
+    )]
+    Reference {
+        /// Its kind.
+        kind: &'static str,
+    },
+    /// The recording does not say what ran.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Its controller is not one.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+}
+
+/// The loop as measured, and by the model at the same frequencies.
+#[derive(Clone, Debug)]
+pub struct ClosedResponses {
+    /// T, from reference to reading.
+    pub complementary: Frf,
+    /// S, from reference to error.
+    pub sensitivity: Frf,
+    /// L = P C, from error to reading.
+    pub loop_gain: Frf,
+    /// L by the model, at the frequencies of `loop_gain`.
+    pub model_loop: Vec<Complex<f64>>,
+    /// Margins of the model's loop.
+    pub predicted: Margins,
+    /// Those of the measured one.
+    pub margins: MeasuredMargins,
+}
+
+/// Margins of the measured loop, within the band that was swept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasuredMargins {
+    /// Lowest frequency in rad/s at which |L| falls through 1.
+    pub crossover_rad_s: Option<f64>,
+    /// 180 degrees + arg L there.
+    pub phase_margin_deg: Option<Estimate>,
+    /// 1/max|S|.
+    pub modulus_margin: Estimate,
+    /// Where |S| is largest, in rad/s.
+    pub sensitivity_peak_rad_s: f64,
+}
+
+/// The plant by the reference as instrument, and the loop.
+pub(super) fn seen(
+    signals: &LoopSignals,
+    band_hz: (f64, f64),
+    recording: &Recording,
+    config: &Config,
+) -> Result<Seen, AnalysisError> {
+    swept(&config.control.reference)?;
+    let Joint {
+        plant,
+        blocks,
+        complementary,
+        sensitivity,
+        loop_gain,
+    } = joint::estimate(signals, band_hz, &EstimatorSettings::from(&config.identify))?;
+    let model = model(recording, config)?;
+    let model_loop = loop_gain
+        .frequency_hz
+        .iter()
+        .map(|f| model.sampled_loop(TURN * f))
+        .collect();
+    let margins = margins(&loop_gain, &sensitivity);
+    let predicted = model.margins(false);
+    let closed = ClosedResponses {
+        complementary,
+        sensitivity,
+        loop_gain,
+        model_loop,
+        predicted,
+        margins,
+    };
+    Ok(Seen {
+        frf: plant,
+        blocks,
+        closed: Some(closed),
+    })
+}
+
+const TURN: f64 = 2.0 * std::f64::consts::PI;
+
+/// Refuses references that do not sweep; a file may.
+fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
+    let kind = match reference {
+        ReferenceSettings::Chirp { .. } | ReferenceSettings::File { .. } => return Ok(()),
+        ReferenceSettings::Hold => "hold",
+        ReferenceSettings::Step { .. } => "step",
+        ReferenceSettings::Ramp { .. } => "ramp",
+        ReferenceSettings::Sine { .. } => "sine",
+    };
+    Err(ClosedLoopError::Reference { kind })
+}
+
+/// The loop of the recorded controller around the configured model.
+fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, AnalysisError> {
+    let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
+    let plan = Plan::of(recording).map_err(ClosedLoopError::Plan)?;
+    let text = plan
+        .controller
+        .ok_or(ClosedLoopError::Plan(PlanError::Missing("controller")))?;
+    let sections = text
+        .sections(config.servo.rate_hz)
+        .map_err(ClosedLoopError::Controller)?;
+    Ok(ClosedLoop::new(config, modes, sections))
+}
+
+fn margins(loop_gain: &Frf, sensitivity: &Frf) -> MeasuredMargins {
+    let crossing = loop_gain
+        .response
+        .windows(2)
+        .position(|pair| pair[0].norm() > 1.0 && pair[1].norm() <= 1.0);
+    let peak = (0..sensitivity.len()).max_by(|a, b| {
+        sensitivity.response[*a]
+            .norm_sqr()
+            .total_cmp(&sensitivity.response[*b].norm_sqr())
+    });
+    let modulus_margin = peak.map_or(
+        Estimate {
+            value: f64::NAN,
+            sigma: f64::NAN,
+        },
+        |k| {
+            let size = sensitivity.response[k].norm();
+            Estimate {
+                value: 1.0 / size,
+                sigma: sensitivity.magnitude_sigma[k] / (size * size),
+            }
+        },
+    );
+    MeasuredMargins {
+        crossover_rad_s: crossing.map(|k| TURN * crossed(loop_gain, k)),
+        phase_margin_deg: crossing.map(|k| phase_margin_deg(loop_gain, k)),
+        modulus_margin,
+        sensitivity_peak_rad_s: peak.map_or(f64::NAN, |k| TURN * sensitivity.frequency_hz[k]),
+    }
+}
+
+/// Where |L| is 1 between two frequencies: ln |L| over ln f is a straight line.
+fn crossed(loop_gain: &Frf, k: usize) -> f64 {
+    let share = share(loop_gain, k);
+    loop_gain.frequency_hz[k]
+        * (loop_gain.frequency_hz[k + 1] / loop_gain.frequency_hz[k]).powf(share)
+}
+
+fn share(loop_gain: &Frf, k: usize) -> f64 {
+    let height = |k: usize| loop_gain.response[k].norm().ln();
+    height(k) / (height(k) - height(k + 1))
+}
+
+fn phase_margin_deg(loop_gain: &Frf, k: usize) -> Estimate {
+    let (from, to) = (loop_gain.response[k], loop_gain.response[k + 1]);
+    let turned = (to / from).arg() * share(loop_gain, k);
+    let value = (-from * Complex::from_polar(1.0, turned))
+        .arg()
+        .to_degrees();
+    Estimate {
+        value,
+        sigma: loop_gain.phase_sigma_rad[k].to_degrees(),
+    }
+}

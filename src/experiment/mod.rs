@@ -1,0 +1,37 @@
+//! One run of the bench, from arming to the closed file.
+//!
+//! ```text
+//!  Plan (config -> program, texts)  ->  run: loop thread + recorder thread, tokio supervising from outside  ->  Run
+//!                                                                                    Recording -> replay
+//! ```
+//!
+//! tokio never stands in the loop's way: it watches counters, signals and the recorder's health, and talks to the loop
+//! through the ring of orders alone.
+
+mod amplitudes;
+mod analysis;
+pub mod calibration;
+pub mod campaign;
+mod closed_loop;
+mod ending;
+mod foreign;
+mod gathered;
+mod measure;
+mod name;
+mod patterns;
+mod plan;
+mod replay;
+mod run;
+mod stop;
+mod swept;
+
+pub use amplitudes::{ModeOverAmplitude, over_amplitude};
+pub use analysis::{Analysis, AnalysisError, analyse};
+pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};
+pub use ending::Ending;
+pub use foreign::{ForeignAnalysis, analyse_signals};
+pub use measure::{Measured, measure};
+pub use plan::{Kind, Plan, PlanError};
+pub use replay::{Difference, ReplayError, Replayed, replay};
+pub use run::{Run, SessionError, run};
+pub use stop::{stoppable, unless_stopped};

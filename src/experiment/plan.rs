@@ -1,0 +1,235 @@
+//! What a run will do: made from the configuration and the texts it names, all of which travel with the recording, so that
+//! the same plan can be made again from it.
+
+use super::swept;
+use crate::config::{Config, ConfigError, ReferenceSettings, whole};
+use crate::control::{Controller, ControllerError, ControllerText};
+use crate::excitation::{
+    self, Chirp, Excitation, ExcitationError, Extremes, Quiet, ReferenceError, Staircase,
+    reference, reference_text,
+};
+use crate::model::plant::PlantError;
+use crate::recording::Recording;
+use crate::rt::program::{Control, Excite, Program};
+
+/// Name of the attachment with the controller's text.
+const CONTROLLER: &str = "controller.toml";
+/// Name of the attachment with the calibration in use.
+const CALIBRATION: &str = "calibration.toml";
+/// Name of the attachment with the reference's points.
+const REFERENCE: &str = "reference.csv";
+/// Metadata key of the kind of run.
+pub(super) const KIND: &str = "run";
+
+/// The kind of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// An excitation, open loop.
+    Chirp,
+    /// A closed loop with a reference.
+    Control,
+    /// Static steps.
+    Calibrate,
+    /// No current: where the stage rests.
+    Quiet,
+}
+
+impl Kind {
+    /// The name in file names and metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Chirp => "chirp",
+            Kind::Control => "control",
+            Kind::Calibrate => "calibrate",
+            Kind::Quiet => "quiet",
+        }
+    }
+}
+
+/// A run that cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// The configuration is refused.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The controller is refused.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    /// The reference is refused.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The model that a swept reference is planned from cannot be analysed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// A swept reference that the interlocks would trip.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
+    /// A swept reference for a loop that runs away by the model.
+    #[error(
+        "by the model this loop is unstable: a swept reference would run away until an interlock trips; `bench margins` shows the loop; choose a controller, an operating point or an asymmetry with which it is stable"
+    )]
+    Unstable,
+    /// A recording without what a plan needs.
+    #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
+    Missing(&'static str),
+    /// A configuration that cannot be written down.
+    #[error("the configuration cannot be written as TOML: {0}")]
+    Text(String),
+}
+
+/// Everything that decides the commands of a run, but the probe.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What kind of run it is.
+    pub kind: Kind,
+    /// The settings.
+    pub config: Config,
+    /// The controller, for a closed loop.
+    pub controller: Option<ControllerText>,
+    /// The calibration in use.
+    pub calibration: Option<String>,
+    /// Which devices, for the recording's metadata.
+    pub devices: Vec<(&'static str, String)>,
+    /// What a swept reference would do by the model.
+    pub foreseen: Option<Extremes>,
+    /// The reference's file, if it has one.
+    reference: Option<String>,
+}
+
+impl Plan {
+    /// An excitation.
+    pub fn chirp(config: Config) -> Plan {
+        Plan::excitation(Kind::Chirp, config)
+    }
+
+    /// Static steps.
+    pub fn calibrate(config: Config) -> Plan {
+        Plan::excitation(Kind::Calibrate, config)
+    }
+
+    /// No current.
+    pub fn quiet(config: Config) -> Plan {
+        Plan::excitation(Kind::Quiet, config)
+    }
+
+    fn excitation(kind: Kind, config: Config) -> Plan {
+        Plan {
+            kind,
+            config,
+            controller: None,
+            calibration: None,
+            devices: Vec::new(),
+            foreseen: None,
+            reference: None,
+        }
+    }
+
+    /// A closed loop. A swept reference without amplitudes gets them here, from the model, so that they travel with the
+    /// recording.
+    pub fn control(config: Config) -> Result<Plan, PlanError> {
+        let controller = ControllerText::find(&config.control.controller)?;
+        let (config, foreseen) = swept::planned(config, &controller)?;
+        let reference = reference_text(&config.control.reference)?;
+        Ok(Plan {
+            controller: Some(controller),
+            reference,
+            foreseen,
+            ..Plan::excitation(Kind::Control, config)
+        })
+    }
+
+    /// The plan of a recorded run.
+    pub fn of(recording: &Recording) -> Result<Plan, PlanError> {
+        let config = whole(
+            "the recording's configuration",
+            recording
+                .config_toml()
+                .ok_or(PlanError::Missing("configuration"))?,
+        )?;
+        let text = |name| {
+            recording
+                .attachment(name)
+                .map(|a| String::from_utf8_lossy(&a.data).into_owned())
+        };
+        let kind = match recording.metadata().get(KIND).map(String::as_str) {
+            Some("chirp") => Kind::Chirp,
+            Some("control") => Kind::Control,
+            Some("calibrate") => Kind::Calibrate,
+            Some("quiet") => Kind::Quiet,
+            _ => return Err(PlanError::Missing("kind of run")),
+        };
+        let controller = text(CONTROLLER).map(|text| ControllerText {
+            name: config.control.controller.clone(),
+            text,
+        });
+        let calibration = text(CALIBRATION);
+        Ok(Plan {
+            controller,
+            calibration,
+            reference: text(REFERENCE),
+            ..Plan::excitation(kind, config)
+        })
+    }
+
+    /// The program of the loop.
+    pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
+        let (config, period_s) = (&self.config, self.config.servo.period_s());
+        match self.kind {
+            Kind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
+            Kind::Calibrate => {
+                return Ok(Box::new(Excite(Staircase::new(
+                    &config.calibrate,
+                    period_s,
+                ))));
+            }
+            Kind::Quiet => return Ok(Box::new(Excite(Quiet::new(&config.campaign, period_s)))),
+            Kind::Control => {}
+        }
+        let text = self
+            .controller
+            .as_ref()
+            .ok_or(PlanError::Missing("controller"))?;
+        let controller = Controller::new(&text.sections(config.servo.rate_hz)?, period_s);
+        let reference = reference(
+            &config.control.reference,
+            &config.chirp,
+            self.reference.as_deref(),
+            period_s,
+        )?;
+        let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
+        let closed = match config.control.reference {
+            ReferenceSettings::Chirp { .. } => Chirp::new(&config.chirp, period_s).ticks(),
+            _ => ticks(config.control.duration_s),
+        };
+        let settle = ticks(config.control.settle_s);
+        Ok(Box::new(Control::new(
+            controller, reference, settle, closed,
+        )))
+    }
+
+    /// The effective configuration as TOML.
+    pub fn config_toml(&self) -> Result<String, PlanError> {
+        toml::to_string(&self.config).map_err(|e| PlanError::Text(e.to_string()))
+    }
+
+    /// Texts that the configuration names, for the recording.
+    pub fn attachments(&self) -> Vec<(&'static str, &'static str, &str)> {
+        let controller = self
+            .controller
+            .as_ref()
+            .map(|c| (CONTROLLER, "application/toml", c.text.as_str()));
+        let reference = self
+            .reference
+            .as_ref()
+            .map(|text| (REFERENCE, "text/csv", text.as_str()));
+        let calibration = self
+            .calibration
+            .as_ref()
+            .map(|text| (CALIBRATION, "application/toml", text.as_str()));
+        controller
+            .into_iter()
+            .chain(reference)
+            .chain(calibration)
+            .collect()
+    }
+}

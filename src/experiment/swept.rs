@@ -1,0 +1,69 @@
+//! A swept reference before its run: its amplitudes, where it has none, and what it would do.
+
+use super::plan::PlanError;
+use crate::config::{Config, ReferenceSettings, recheck};
+use crate::control::{ClosedLoop, ControllerText, swept_reference};
+use crate::excitation::{Chirp, Excitation, Extremes, reference, within};
+use crate::rig::simulated;
+
+/// The configuration with amplitudes by the model of the whole rig, and what the run would do by it; as it is, and nothing,
+/// of another reference. Refused where an interlock would trip.
+pub(super) fn planned(
+    mut config: Config,
+    controller: &ControllerText,
+) -> Result<(Config, Option<Extremes>), PlanError> {
+    let ReferenceSettings::Chirp {
+        amplitude,
+        travel_m,
+    } = &config.control.reference
+    else {
+        return Ok((config, None));
+    };
+    let closed_loop = ClosedLoop::new(
+        &config,
+        simulated::modes(&config)?,
+        controller.sections(config.servo.rate_hz)?,
+    );
+    let amplitude = match amplitude.is_empty() {
+        true => swept_reference(
+            &closed_loop,
+            &config.chirp,
+            *travel_m,
+            config.interlock.soft_limit_m,
+        ),
+        false => amplitude.clone(),
+    };
+    config.control.reference = ReferenceSettings::Chirp {
+        amplitude,
+        travel_m: *travel_m,
+    };
+    // What is not allowed now could not be read back from the recording.
+    recheck(&config)?;
+    // What a loop that runs away would do has no largest current to lower.
+    let unstable = |error| {
+        if closed_loop.margins(false).stable {
+            error
+        } else {
+            PlanError::Unstable
+        }
+    };
+    let extremes = foreseen(&config, &closed_loop).map_err(unstable)?;
+    Ok((config, Some(extremes)))
+}
+
+/// The run by the linear model, against every interlock.
+fn foreseen(config: &Config, closed_loop: &ClosedLoop) -> Result<Extremes, PlanError> {
+    let period_s = config.servo.period_s();
+    let reference = reference(&config.control.reference, &config.chirp, None, period_s)?;
+    let chirp = Chirp::new(&config.chirp, period_s);
+    let course = closed_loop.course(chirp.ticks() as usize, |tick| reference.at_m(tick as u64));
+    let extremes = Extremes::over(course, config);
+    let frequency_hz = chirp.frequency_at_hz(extremes.travel_tick);
+    within(
+        &extremes,
+        config,
+        frequency_hz,
+        "the amplitudes of control.reference and of chirp",
+    )?;
+    Ok(extremes)
+}

@@ -1,0 +1,10 @@
+//! What can be computed without a bench.
+//!
+//! ```text
+//!  settings -> plant (structure, modes, sampled responses) -> zeros (kinds, loci, maps) -> veering -> study (tolerances)
+//! ```
+
+pub mod plant;
+pub mod study;
+pub mod veering;
+pub mod zeros;

@@ -1,0 +1,284 @@
+//! By how much a setting deviates: as a person types it, and as a distribution.
+
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::StudyError;
+use crate::util::quantity::{self, Quantity};
+
+/// Where a normal deviation ends, in standard deviations: two values in 10^9 lie beyond, and are put there.
+const NORMAL_END: f64 = 6.0;
+
+/// The distribution of a setting's deviation from its nominal value, in the setting's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "distribution", rename_all = "snake_case")]
+pub enum Deviation {
+    /// As likely anywhere between two limits.
+    Uniform {
+        /// The lower limit.
+        low: f64,
+        /// The upper limit.
+        high: f64,
+    },
+    /// Gaussian about the nominal value, cut off at 6 sigma.
+    Normal {
+        /// Its standard deviation.
+        sigma: f64,
+    },
+}
+
+impl Deviation {
+    /// Its ends.
+    pub fn ends(&self) -> [f64; 2] {
+        match *self {
+            Deviation::Uniform { low, high } => [low, high],
+            Deviation::Normal { sigma } => [-NORMAL_END * sigma, NORMAL_END * sigma],
+        }
+    }
+
+    /// The deviation and its rank, the probability of a smaller one, from two independent numbers, uniform in [0, 1).
+    ///
+    /// A normal one by Box and Muller, sqrt(-2 ln(1 - a)) cos(2 pi b).
+    pub(super) fn drawn(&self, [a, b]: [f64; 2]) -> (f64, f64) {
+        match *self {
+            Deviation::Uniform { low, high } => (low + (high - low) * a, a),
+            Deviation::Normal { sigma } => {
+                let unit = libm::sqrt(-2.0 * libm::log(1.0 - a))
+                    * libm::cos(2.0 * std::f64::consts::PI * b);
+                let unit = unit.clamp(-NORMAL_END, NORMAL_END);
+                (
+                    sigma * unit,
+                    0.5 * libm::erfc(-unit * std::f64::consts::FRAC_1_SQRT_2),
+                )
+            }
+        }
+    }
+}
+
+/// Which settings deviate, and by how much: `KEY=uniform:LOW:HIGH`, `KEY=normal:SIGMA`, or `KEY=+-LIMIT` for a uniform one.
+///
+/// A bare number or a length is added to the nominal value; a percentage is of the nominal value. `*` in the key stands for
+/// any part of a name between dots.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance {
+    text: String,
+    pattern: String,
+    amounts: Amounts,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Amounts {
+    Uniform(Quantity, Quantity),
+    Normal(Quantity),
+}
+
+impl FromStr for Tolerance {
+    type Err = StudyError;
+
+    fn from_str(text: &str) -> Result<Tolerance, StudyError> {
+        let wrong = |why: String| StudyError::Tolerance {
+            text: text.into(),
+            why,
+        };
+        let usage = "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
+        let (pattern, amounts) = text.split_once('=').ok_or_else(|| wrong(usage.into()))?;
+        let number = |text: &str| quantity::parse(text).map_err(|e| wrong(e.to_string()));
+        let limit = ["+-", "±"]
+            .iter()
+            .find_map(|sign| amounts.trim().strip_prefix(sign));
+        let parts: Vec<&str> = amounts.split(':').map(str::trim).collect();
+        let amounts = match (limit, parts.as_slice()) {
+            (Some(limit), _) => {
+                let limit = number(limit)?;
+                Amounts::Uniform(scaled(limit, -1.0), limit)
+            }
+            (None, ["uniform", low, high]) => Amounts::Uniform(number(low)?, number(high)?),
+            (None, ["normal", sigma]) => Amounts::Normal(number(sigma)?),
+            _ => return Err(wrong(usage.into())),
+        };
+        Ok(Tolerance {
+            text: text.into(),
+            pattern: pattern.trim().into(),
+            amounts,
+        })
+    }
+}
+
+fn scaled(quantity: Quantity, factor: f64) -> Quantity {
+    match quantity {
+        Quantity::Bare(x) => Quantity::Bare(x * factor),
+        Quantity::Metres(x) => Quantity::Metres(x * factor),
+        Quantity::Ratio(x) => Quantity::Ratio(x * factor),
+    }
+}
+
+impl Tolerance {
+    /// The key, perhaps with `*`.
+    pub fn pattern(&self) -> &str {
+        &self.pattern
+    }
+
+    /// Whether it is about this key.
+    pub fn matches(&self, key: &str) -> bool {
+        let (patterns, parts) = (self.pattern.split('.'), key.split('.'));
+        patterns.clone().count() == parts.clone().count()
+            && patterns.zip(parts).all(|(p, part)| glob(p, part))
+    }
+
+    /// The deviation of one of its settings from a nominal value. Refuses one that is empty, that is a length where there is
+    /// none, or that is a ratio of zero.
+    pub fn deviation(&self, key: &str, nominal: f64) -> Result<Deviation, StudyError> {
+        let amount = |quantity| self.amount(key, nominal, quantity);
+        match self.amounts {
+            Amounts::Uniform(low, high) => {
+                let (low, high) = (amount(low)?, amount(high)?);
+                let why = format!(
+                    "an empty tolerance of `{key}`: from {low} to {high}; give a lower and a higher limit"
+                );
+                if low < high {
+                    Ok(Deviation::Uniform { low, high })
+                } else {
+                    Err(self.wrong(why))
+                }
+            }
+            Amounts::Normal(sigma) => {
+                let sigma = amount(sigma)?;
+                let why =
+                    format!("the standard deviation of `{key}` is {sigma}; give one above zero");
+                if sigma > 0.0 {
+                    Ok(Deviation::Normal { sigma })
+                } else {
+                    Err(self.wrong(why))
+                }
+            }
+        }
+    }
+
+    fn amount(&self, key: &str, nominal: f64, quantity: Quantity) -> Result<f64, StudyError> {
+        match quantity {
+            Quantity::Bare(x) => Ok(x),
+            Quantity::Metres(x) if key.ends_with("_m") => Ok(x),
+            Quantity::Metres(_) => Err(self.wrong(format!("`{key}` is no length; give a bare number in its unit"))),
+            Quantity::Ratio(_) if nominal == 0.0 => Err(self.wrong(format!(
+                "a percentage is of the nominal value, and that of `{key}` is 0; give a bare number in its unit, as in 0.15"
+            ))),
+            Quantity::Ratio(x) => Ok(x * nominal.abs()),
+        }
+    }
+
+    /// A refusal of this tolerance.
+    pub fn wrong(&self, why: String) -> StudyError {
+        StudyError::Tolerance {
+            text: self.text.clone(),
+            why,
+        }
+    }
+}
+
+/// Whether `text` is `pattern`, in which a `*` stands for any characters.
+fn glob(pattern: &str, text: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == text,
+        Some((head, tail)) => text.strip_prefix(head).is_some_and(|rest| {
+            let ends = rest.char_indices().map(|(at, _)| at).chain([rest.len()]);
+            ends.into_iter().any(|at| glob(tail, &rest[at..]))
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn deviation(text: &str, key: &str, nominal: f64) -> Result<Deviation, StudyError> {
+        text.parse::<Tolerance>().unwrap().deviation(key, nominal)
+    }
+
+    #[test]
+    fn limits_are_added_and_percentages_are_of_the_nominal_value() {
+        let uniform = |low, high| Ok(Deviation::Uniform { low, high });
+        assert_eq!(deviation("k=uniform:-0.5:2", "k", 7.0), uniform(-0.5, 2.0));
+        assert_eq!(deviation("k=+-50%", "k", -3.0), uniform(-1.5, 1.5));
+        assert_eq!(deviation("k = ±2", "k", 0.0), uniform(-2.0, 2.0));
+        assert_eq!(
+            deviation("y_m=uniform:-1mm:0.5", "y_m", 0.0),
+            uniform(-1e-3, 0.5)
+        );
+        assert_eq!(
+            deviation("k=normal:25%", "k", 4.0),
+            Ok(Deviation::Normal { sigma: 1.0 })
+        );
+    }
+
+    #[test]
+    fn a_star_stands_for_part_of_one_name() {
+        let tolerance: Tolerance = "plant.*.s*=+-1".parse().unwrap();
+        for (key, good) in [
+            ("plant.a.s", true),
+            ("plant.a.sL", true),
+            ("plant.a.gL", false),
+            ("plant.a.b.sL", false),
+        ] {
+            assert_eq!(tolerance.matches(key), good, "{key}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_tolerance_is_refused_with_the_text() {
+        for text in [
+            "k",
+            "k=",
+            "k=uniform:1",
+            "k=uniform:1:x",
+            "k=normal:",
+            "k=gauss:1",
+            "k=+-",
+            "k=uniform:1:2:3",
+        ] {
+            let error = text.parse::<Tolerance>().unwrap_err().to_string();
+            assert!(error.contains(text), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_tolerance_that_means_nothing_for_its_setting_is_refused() {
+        for (text, word) in [
+            ("k=uniform:1:1", "empty"),
+            ("k=uniform:2:1", "empty"),
+            ("k=+-0", "empty"),
+            ("k=normal:0", "above zero"),
+            ("k=normal:-1", "above zero"),
+            ("k=+-1mm", "no length"),
+            ("k=+-5%", "nominal value"),
+        ] {
+            let error = deviation(text, "k", 0.0).unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains(text), "{error}");
+        }
+    }
+
+    #[test]
+    fn ranks_are_those_of_the_distributions() {
+        let uniform = Deviation::Uniform {
+            low: -1.0,
+            high: 3.0,
+        };
+        assert_eq!(uniform.drawn([0.25, 0.9]), (0.0, 0.25));
+        let normal = Deviation::Normal { sigma: 2.0 };
+        // sqrt(-2 ln(1 - a)) = 1 at a = 1 - exp(-1/2); the normal distribution function at 1 is 0.8413447460685429.
+        let one = 1.0 - (-0.5f64).exp();
+        for (b, value, rank) in [
+            (0.0, 2.0, 0.841_344_746_068_542_9),
+            (0.5, -2.0, 0.158_655_253_931_457_05),
+            (0.25, 0.0, 0.5),
+        ] {
+            let drawn = normal.drawn([one, b]);
+            assert!(
+                (drawn.0 - value).abs() < 1e-14 && (drawn.1 - rank).abs() < 1e-14,
+                "{drawn:?}"
+            );
+        }
+        // Ten roundings of 1e-16 beside the largest number there is below 1.
+        assert_eq!(normal.drawn([1.0 - f64::EPSILON / 2.0, 0.0]).0, 12.0);
+    }
+}

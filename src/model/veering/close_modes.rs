@@ -1,0 +1,140 @@
+//! Two close modes and what all others leave beside them, as the sum of Eq. (4-1):
+//!
+//! ```text
+//!   G(s) = aR/s^2 + au/(s^2 + wu^2) + av/(s^2 + wv^2),   wv > wu > 0
+//! ```
+//!
+//! The thesis takes one mode R for all others (Assumption A4-4) and that mode as a double integrator (A4-5). No stage obeys
+//! either exactly. Here aR is the residue of the double integrator that equals all other modes together at w0 = sqrt(wu wv),
+//!
+//! ```text
+//!   aR = -w0^2 (sum over the others of ri/(wi^2 - w0^2))
+//! ```
+//!
+//! which is the residue of mode R where the two assumptions hold, and of the modes' sum to first order in the gap where they
+//! do not: a band as narrow as that between two close modes sees of the others little more than one number. How far they
+//! hold is a number each of [`Remainder`].
+
+use crate::model::plant::PlantError;
+use crate::model::zeros::{ModalSum, Term, Zero};
+
+/// Two modes, and the others as a double integrator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloseModes {
+    /// The slower of the two.
+    pub u: Term,
+    /// The faster.
+    pub v: Term,
+    /// All others.
+    pub remainder: Remainder,
+}
+
+/// All other modes, seen from the middle of the two.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Remainder {
+    /// aR in 1/kg.
+    pub residue_per_kg: f64,
+    /// Mode R: that with the largest part at w0, by its place; `None` where no other mode has any.
+    pub mode: Option<usize>,
+    /// Assumption A4-4: what the others beside mode R give there, over what mode R gives; 0 where it is alone.
+    pub others_ratio: f64,
+    /// Assumption A4-4: wR/wu of a mode R below the two, wv/wR of one above; 0 is as far away as can be.
+    pub nearness_ratio: f64,
+    /// Assumption A4-5: by how much the others' sum departs from the double integrator's at wu or wv, as a ratio of it.
+    pub integrator_ratio: f64,
+}
+
+impl CloseModes {
+    /// Of all modes the two of `pair`, in either order; `None` where their frequencies are the same or one is 0.
+    pub fn of(terms: &[Term], pair: [usize; 2]) -> Option<CloseModes> {
+        let [i, j] = pair.map(|mode| terms[mode]);
+        let (u, v) = if i.omega_rad_s < j.omega_rad_s {
+            (i, j)
+        } else {
+            (j, i)
+        };
+        let apart = 0.0 < u.omega_rad_s && u.omega_rad_s < v.omega_rad_s;
+        apart.then(|| CloseModes {
+            u,
+            v,
+            remainder: Remainder::of(terms, pair, [u.omega_rad_s, v.omega_rad_s]),
+        })
+    }
+
+    /// The residues aR, au, av in 1/kg.
+    pub fn residues_per_kg(&self) -> [f64; 3] {
+        [
+            self.remainder.residue_per_kg,
+            self.u.residue_per_kg,
+            self.v.residue_per_kg,
+        ]
+    }
+
+    /// wv^2 - wu^2 over wu^2.
+    pub fn spread_ratio(&self) -> f64 {
+        let (wu, wv) = (self.u.omega_rad_s, self.v.omega_rad_s);
+        (wv - wu) * (wv + wu) / (wu * wu)
+    }
+
+    /// b2-hat of Eq. (4-9) in 1/kg, where the printed w_D is read as wv - wu.
+    pub fn b2_per_kg(&self) -> f64 {
+        self.spread_ratio() * self.residues_per_kg().iter().sum::<f64>()
+    }
+
+    /// |b21-hat| and |b22-hat| of Eq. (4-10) in 1/kg, the smaller first. They are critical only where au av < 0.
+    pub fn critical_b2_per_kg(&self) -> [f64; 2] {
+        let root = |term: &Term| {
+            term.residue_per_kg.abs().sqrt() * (term.omega_rad_s / self.u.omega_rad_s)
+        };
+        let (ru, rv) = (root(&self.u), root(&self.v));
+        [(rv - ru) * (rv - ru), (rv + ru) * (rv + ru)]
+    }
+
+    /// b2-hat in the direction of av: positive where the parabola of Eq. (4-3) opens towards Pu and Pv.
+    pub fn signed_b2_per_kg(&self) -> f64 {
+        self.b2_per_kg() * self.v.residue_per_kg.signum()
+    }
+
+    /// Whether au av < 0, so that b21-hat and b22-hat exist.
+    pub fn are_opposed(&self) -> bool {
+        self.u.residue_per_kg * self.v.residue_per_kg < 0.0
+    }
+
+    /// Zeros of Eq. (4-1), as eigenvalues of a pencil: no formula of this chapter is in them.
+    pub fn zeros(&self) -> Result<Vec<Zero>, PlantError> {
+        let remainder = Term::undamped(0.0, self.remainder.residue_per_kg);
+        ModalSum::new(vec![remainder, self.u, self.v], 0.0)?.undamped_zeros()
+    }
+}
+
+impl Remainder {
+    fn of(terms: &[Term], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
+        let others = || {
+            terms
+                .iter()
+                .enumerate()
+                .filter(|(mode, _)| !pair.contains(mode))
+        };
+        let all = |w: f64| others().map(|(_, term)| term.part(w)).sum::<f64>();
+        let middle = (wu * wv).sqrt();
+        let residue_per_kg = -middle * middle * all(middle);
+        let largest =
+            others().max_by(|a, b| a.1.part(middle).abs().total_cmp(&b.1.part(middle).abs()));
+        let largest = largest.filter(|(_, term)| term.part(middle) != 0.0);
+        let departure = |w: f64| (-w * w * all(w) / residue_per_kg - 1.0).abs();
+        let near = |w: f64| if w < wu { w / wu } else { wv / w };
+        Remainder {
+            residue_per_kg,
+            mode: largest.map(|(mode, _)| mode),
+            others_ratio: largest.map_or(0.0, |(_, term)| {
+                ((all(middle) - term.part(middle)) / term.part(middle)).abs()
+            }),
+            nearness_ratio: largest.map_or(0.0, |(_, term)| near(term.omega_rad_s)),
+            integrator_ratio: if residue_per_kg == 0.0 {
+                0.0
+            } else {
+                departure(wu).max(departure(wv))
+            },
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! The CNMP map: how many pairs of CNMP zeros SR4DoF has over operating point and mass asymmetry.
+//!
+//! With x1 = 0 at the probe and x4 = 0 in the virtual motions (q of Eq. 2-5 is the row of x4), the pencil of `zeros.rs` has
+//! the unknowns y1, y2, y3 and, with b = a^2, masses in m3, springs in k, kappa = k4/k, the form A + u B:
+//!
+//! ```text
+//!  A = [ 2 + 2 b kappa   -1  -1 - 4 b kappa ]   B = [ m1 + 2 b (m3 + m4)            0           -2 b m3 - 4 b m4        ]
+//!      [-1 - 2 b kappa    2       4 b kappa ]       [ b m2 - 2 b (m3 + m4)   m2 (1 - b)          2 b m3 + 4 b m4        ]
+//!      [-1 - 2 b kappa    0   2 + 4 b kappa ]       [-b m3 - 2 b m4                 0   m3 (1 + b) + 4 b m4        ]
+//! ```
+//!
+//! Its determinant is a cubic in u = s^2, and no root of it is computed: the sign of the discriminant says whether two of
+//! the three are complex, which is one CNMP pair. Where rounding could turn that sign, the pencil itself decides.
+
+use super::{cnmp_pairs, undamped_zeros};
+use crate::config::Sr4dofSettings;
+use crate::model::plant::{Beam, PlantError, sr4dof};
+
+/// The discriminant's sign counts beyond this ratio to the sum of its terms' sizes, each term taken with all of its sums
+/// without cancellation (`Sized`).
+///
+/// Rounding: an entry of A or B is exact to 8 roundings of its size, a coefficient, a sum of up to 12 products of three,
+/// to 3 x 8 + 2 + 11, the discriminant, of degree 4, to 4 x 37 + 8 = 156: 2e-14. The pencil calls a pair real up to a ratio
+/// of imaginary part to size of 1e-7, and its own rounding parts two equal values by that much: the square of their
+/// distance, 4e-14 of the terms, must be decided there too. 1e-9 stands well above both, and leaves to the pencil pairs
+/// closer than some 3e-5 of their size.
+const DECIDED: f64 = 1e-9;
+
+/// CNMP pairs of the zeros without damping, one row for each operating point (ratios Y1o/L), in it one for each mass
+/// asymmetry D = m2/m3 - 1, on up to `threads` threads (at least one).
+///
+/// Equals [`cnmp_pairs`] of [`undamped_zeros`] at each point (Fig 2-2, Eq. 2-5). `settings` give all but the two. Fails as
+/// these do.
+pub fn cnmp_map(
+    settings: &Sr4dofSettings,
+    operating_points: &[f64],
+    asymmetries: &[f64],
+    threads: usize,
+) -> Result<Vec<Vec<u8>>, PlantError> {
+    let rows = operating_points.len().div_ceil(threads.max(1)).max(1);
+    let row = |&point: &f64| {
+        asymmetries
+            .iter()
+            .map(|&d| count(settings, point, d))
+            .collect::<Result<Vec<u8>, _>>()
+    };
+    let part = |points: &[f64]| points.iter().map(row).collect::<Result<Vec<_>, _>>();
+    let parts = std::thread::scope(|scope| {
+        let running: Vec<_> = operating_points
+            .chunks(rows)
+            .map(|points| scope.spawn(move || part(points)))
+            .collect();
+        running
+            .into_iter()
+            .map(joined)
+            .collect::<Result<Vec<_>, _>>()
+    })?;
+    Ok(parts.into_iter().flatten().collect())
+}
+
+/// What a thread returned; its panic goes on in this one.
+fn joined<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    thread
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+fn count(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, PlantError> {
+    match by_discriminant(settings, point, asymmetry) {
+        Some(complex) => Ok(u8::from(complex)),
+        None => by_pencil(settings, point, asymmetry),
+    }
+}
+
+fn by_pencil(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, PlantError> {
+    let operating_point_m = point * settings.beam_length_m;
+    let there = Sr4dofSettings {
+        operating_point_m,
+        mass_asymmetry: asymmetry,
+        ..settings.clone()
+    };
+    // Three values of u hold one complex pair at most.
+    Ok(u8::from(
+        cnmp_pairs(&undamped_zeros(&sr4dof::undamped(&there))?) > 0,
+    ))
+}
+
+/// Whether two of the three u are complex; none where that cannot be told.
+fn by_discriminant(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Option<bool> {
+    let discriminant = discriminant(cubic(settings, point, asymmetry));
+    let decided = discriminant.value.abs() > DECIDED * discriminant.size;
+    decided.then_some(discriminant.value < 0.0)
+}
+
+/// A number with the size of what it was summed from.
+#[derive(Clone, Copy)]
+struct Sized {
+    value: f64,
+    size: f64,
+}
+
+impl Sized {
+    fn of(value: f64) -> Sized {
+        Sized {
+            value,
+            size: value.abs(),
+        }
+    }
+}
+
+impl std::ops::Add for Sized {
+    type Output = Sized;
+    fn add(self, other: Sized) -> Sized {
+        Sized {
+            value: self.value + other.value,
+            size: self.size + other.size,
+        }
+    }
+}
+
+impl std::ops::Sub for Sized {
+    type Output = Sized;
+    fn sub(self, other: Sized) -> Sized {
+        Sized {
+            value: self.value - other.value,
+            size: self.size + other.size,
+        }
+    }
+}
+
+impl std::ops::Mul for Sized {
+    type Output = Sized;
+    fn mul(self, other: Sized) -> Sized {
+        Sized {
+            value: self.value * other.value,
+            size: self.size * other.size,
+        }
+    }
+}
+
+/// Coefficients of 1 and u.
+type Linear = [Sized; 2];
+
+/// p q - r s, by powers of u.
+fn minor([p, q]: [Linear; 2], [r, s]: [Linear; 2]) -> [Sized; 3] {
+    let middle = (p[0] * q[1] + p[1] * q[0]) - (r[0] * s[1] + r[1] * s[0]);
+    [p[0] * q[0] - r[0] * s[0], middle, p[1] * q[1] - r[1] * s[1]]
+}
+
+/// det(A + u B) by powers of u, developed by the second column.
+fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Sized; 4] {
+    let b = (0.6 * point) * (0.6 * point);
+    let m3 = settings.secondary_stage_mass_kg;
+    let (m1, m2, m4) = (
+        settings.motion_stage_mass_kg / m3,
+        1.0 + asymmetry,
+        settings.intermediate_stage_mass_kg / m3,
+    );
+    let bk = b * settings.spring_stiffness_n_per_m / Beam::from(settings).parallelogram_n_per_m();
+    let entry = |constant: f64, linear: Sized| [Sized::of(constant), linear];
+    let (near, far) = (Sized::of(b * (1.0 + m4)), Sized::of(b * (2.0 + 4.0 * m4)));
+    let none = Sized::of(0.0);
+    let r11 = entry(2.0 + 2.0 * bk, Sized::of(m1) + near + near);
+    let r13 = entry(-1.0 - 4.0 * bk, none - far);
+    let r21 = entry(-1.0 - 2.0 * bk, Sized::of(b * m2) - near - near);
+    let r22 = entry(2.0, Sized::of(m2) - Sized::of(b * m2));
+    let r23 = entry(4.0 * bk, far);
+    let r31 = entry(-1.0 - 2.0 * bk, Sized::of(-b * (1.0 + 2.0 * m4)));
+    let r33 = entry(2.0 + 4.0 * bk, Sized::of(1.0 + b * (1.0 + 4.0 * m4)));
+    let first = minor([r21, r33], [r23, r31]);
+    let second = minor([r11, r33], [r13, r31]);
+    [
+        first[0] + r22[0] * second[0],
+        first[1] + r22[0] * second[1] + r22[1] * second[0],
+        first[2] + r22[0] * second[2] + r22[1] * second[1],
+        r22[1] * second[2],
+    ]
+}
+
+/// Of d + c u + b u^2 + a u^3: below zero for one real and two complex roots.
+fn discriminant([d, c, b, a]: [Sized; 4]) -> Sized {
+    let times = |factor: f64, x: Sized| Sized::of(factor) * x;
+    let (bb, cc, ad) = (b * b, c * c, a * d);
+    times(18.0, ad * b * c) + bb * cc
+        - times(4.0, bb * b * d)
+        - times(4.0, a * cc * c)
+        - times(27.0, ad * ad)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{PlantSettings, Source, load};
+    use rand_core::Rng;
+
+    fn chapter2(sets: &[&str]) -> Sr4dofSettings {
+        let sets = sets.iter().map(|set| set.to_string()).collect();
+        let source = Source {
+            config: Some("chapter2".into()),
+            sets,
+            ..Source::default()
+        };
+        let PlantSettings::Sr4dof(settings) = load(&source).unwrap().plant else {
+            panic!("not SR4DoF")
+        };
+        settings
+    }
+
+    fn grid(from: f64, to: f64, count: u32) -> Vec<f64> {
+        (0..count)
+            .map(|k| from + (to - from) * f64::from(k) / f64::from(count - 1))
+            .collect()
+    }
+
+    /// Uniform in [0, 1), by the generator that the simulation takes.
+    fn draws(seed: u64) -> impl FnMut() -> f64 {
+        let mut random = rand_pcg::Pcg64::new(u128::from(seed), 1);
+        move || (random.next_u64() >> 11) as f64 / 2f64.powi(53)
+    }
+
+    #[test]
+    fn the_count_is_the_pencils_on_random_stages() {
+        let mut draw = draws(4);
+        let mut settings = chapter2(&[]);
+        let (mut complex, mut undecided) = (0, 0);
+        for _ in 0..20_000 {
+            let mut between = |low: f64, high: f64| low * (high / low).powf(draw());
+            settings.motion_stage_mass_kg = between(0.01, 2.0);
+            settings.secondary_stage_mass_kg = between(0.002, 0.2);
+            settings.intermediate_stage_mass_kg = between(0.01, 2.0);
+            settings.spring_stiffness_n_per_m = between(10.0, 1e5);
+            let (point, asymmetry) = (0.3 * draw() - 0.15, draw() - 0.5);
+            let pencil = by_pencil(&settings, point, asymmetry).unwrap();
+            assert_eq!(
+                count(&settings, point, asymmetry).unwrap(),
+                pencil,
+                "{settings:?} {point} {asymmetry}"
+            );
+            complex += u32::from(pencil);
+            undecided += u32::from(by_discriminant(&settings, point, asymmetry).is_none());
+        }
+        assert!(
+            (200..=19_800).contains(&complex),
+            "both counts must be among the draws: {complex} of 20,000"
+        );
+        assert!(
+            undecided <= 2_000,
+            "the pencil is the exception: {undecided} of 20,000"
+        );
+    }
+
+    #[test]
+    fn the_count_is_the_pencils_all_over_a_map() {
+        let settings = chapter2(&["plant.secondary_stage_mass_kg=0.018"]);
+        let (points, asymmetries) = (grid(-0.15, 0.15, 200), grid(-0.05, 0.15, 200));
+        let map = cnmp_map(&settings, &points, &asymmetries, 2).unwrap();
+        for (row, &point) in map.iter().zip(&points) {
+            for (&cell, &asymmetry) in row.iter().zip(&asymmetries) {
+                assert_eq!(
+                    cell,
+                    by_pencil(&settings, point, asymmetry).unwrap(),
+                    "at {point}, {asymmetry}"
+                );
+            }
+        }
+        assert_eq!(
+            map,
+            cnmp_map(&settings, &points, &asymmetries, 1).unwrap(),
+            "whatever the number of threads"
+        );
+    }
+
+    #[test]
+    fn where_two_zeros_meet_the_pencil_decides() {
+        // At D = 1 %, m3 = 18 g they leave the imaginary axis at 3.399 % of L: there no count may hang on the last bit.
+        let settings = chapter2(&["plant.secondary_stage_mass_kg=0.018"]);
+        for point in grid(0.03398, 0.03400, 201) {
+            assert_eq!(
+                count(&settings, point, 0.01),
+                by_pencil(&settings, point, 0.01),
+                "at {point}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_empty_grid_is_an_empty_map() {
+        assert_eq!(cnmp_map(&chapter2(&[]), &[], &[0.1], 2), Ok(vec![]));
+        assert_eq!(cnmp_map(&chapter2(&[]), &[0.1], &[], 0), Ok(vec![vec![]]));
+    }
+}

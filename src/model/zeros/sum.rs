@@ -1,0 +1,163 @@
+//! A transfer function as the sum of its modes and, perhaps, a constant:
+//! G(s) = R + sum of r_i/(s^2 + 2 zeta_i w_i s + w_i^2) (Eqs. 3-2, 3-6, 3-10, 3-11 with beta = 0).
+//!
+//! A mode of w = 0 is a double integrator r/s^2, the constant is what a mode far above all others leaves of itself.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::Zero;
+use super::kinds::{self, System};
+use crate::model::plant::{Modal, Mode, PlantError, Sign};
+
+/// One mode, seen from outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Term {
+    /// Undamped natural frequency in rad/s; 0 for a double integrator.
+    pub omega_rad_s: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Residue in 1/kg.
+    pub residue_per_kg: f64,
+}
+
+impl Term {
+    /// A mode without damping.
+    pub fn undamped(omega_rad_s: f64, residue_per_kg: f64) -> Term {
+        Term {
+            omega_rad_s,
+            damping_ratio: 0.0,
+            residue_per_kg,
+        }
+    }
+
+    /// 1/(s^2 + 2 zeta w s + w^2) in s^2.
+    pub fn resonance(&self, s: Complex<f64>) -> Complex<f64> {
+        let (w, zeta) = (self.omega_rad_s, self.damping_ratio);
+        (s * s + s * (2.0 * zeta * w) + w * w).inv()
+    }
+
+    /// Its part of the undamped G at s = j `omega_rad_s`, in m/N.
+    pub fn part(&self, omega_rad_s: f64) -> f64 {
+        self.residue_per_kg / ((self.omega_rad_s - omega_rad_s) * (self.omega_rad_s + omega_rad_s))
+    }
+}
+
+/// The sum, slowest mode first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalSum {
+    terms: Vec<Term>,
+    constant_m_per_n: f64,
+}
+
+impl ModalSum {
+    /// A sum; its modes may come in any order. One whose residues and constant are all zero is refused.
+    pub fn new(mut terms: Vec<Term>, constant_m_per_n: f64) -> Result<ModalSum, PlantError> {
+        terms.retain(|term| term.residue_per_kg != 0.0);
+        terms.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+        if terms.is_empty() && constant_m_per_n == 0.0 {
+            return Err(PlantError::NoResponse);
+        }
+        Ok(ModalSum {
+            terms,
+            constant_m_per_n,
+        })
+    }
+
+    /// The modes of a structure that show between its actuator and its probe ([`Modal::signs`]).
+    pub fn visible(modal: &Modal) -> Result<ModalSum, PlantError> {
+        let shown = modal
+            .modes
+            .iter()
+            .zip(modal.signs())
+            .filter(|(_, sign)| *sign != Sign::None);
+        let term = |(mode, _): (&Mode, Sign)| Term {
+            omega_rad_s: mode.omega_rad_s,
+            damping_ratio: mode.damping_ratio,
+            residue_per_kg: mode.residue_per_kg(),
+        };
+        ModalSum::new(shown.map(term).collect(), 0.0)
+    }
+
+    /// The modes with a residue, slowest first.
+    pub fn terms(&self) -> &[Term] {
+        &self.terms
+    }
+
+    /// R in m/N.
+    pub fn constant_m_per_n(&self) -> f64 {
+        self.constant_m_per_n
+    }
+
+    /// Whether the slowest mode is a double integrator.
+    pub fn is_free(&self) -> bool {
+        self.terms
+            .first()
+            .is_some_and(|term| term.omega_rad_s == 0.0)
+    }
+
+    /// G(s) in m/N.
+    pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
+        let part = |t: &Term| t.resonance(s) * t.residue_per_kg;
+        self.terms.iter().map(part).sum::<Complex<f64>>() + self.constant_m_per_n
+    }
+
+    /// Zeros without damping, slowest first.
+    pub fn undamped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
+        self.by(kinds::undamped)
+    }
+
+    /// Zeros with damping, slowest first.
+    pub fn damped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
+        self.by(kinds::damped)
+    }
+
+    /// Unit masses on springs, one a mode, each pushed and seen by the root of its residue, and the constant beside them.
+    fn by(
+        &self,
+        zeros: fn(&System) -> Result<Vec<Zero>, PlantError>,
+    ) -> Result<Vec<Zero>, PlantError> {
+        if self.terms.is_empty() {
+            return Ok(Vec::new());
+        }
+        let vector = |of: fn(&Term) -> f64| {
+            DVector::from_iterator(self.terms.len(), self.terms.iter().map(of))
+        };
+        zeros(&System {
+            mass: &DMatrix::identity(self.terms.len(), self.terms.len()),
+            damping: &DMatrix::from_diagonal(&vector(|t| 2.0 * t.damping_ratio * t.omega_rad_s)),
+            stiffness: &DMatrix::from_diagonal(&vector(|t| t.omega_rad_s * t.omega_rad_s)),
+            force: &vector(|t| t.residue_per_kg.abs().sqrt().copysign(t.residue_per_kg)),
+            sensor: &vector(|t| t.residue_per_kg.abs().sqrt()),
+            constant_m_per_n: self.constant_m_per_n,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_gives_the_zeros_of_the_closed_form() {
+        // r/(u + w^2) + R = 0 at u = -w^2 - r/R: on the imaginary axis for r/R > -w^2, real below.
+        for (residue, constant) in [(2.0, 0.5), (-3.0, 0.5), (1.0, 1e-9), (1e-9, -1.0)] {
+            let sum = ModalSum::new(vec![Term::undamped(2.0, residue)], constant).unwrap();
+            let u = -4.0 - residue / constant;
+            let zeros = sum.undamped_zeros().unwrap();
+            assert_eq!(zeros.len(), 2);
+            for zero in zeros {
+                // A pencil of one row: some rounding, of the sum of the two as well.
+                let tolerance = 1e-14 * (u.abs() + 4.0);
+                assert!((zero.s * zero.s - u).norm() < tolerance, "{zero:?} for {u}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sum_of_nothing_is_refused() {
+        assert_eq!(
+            ModalSum::new(vec![Term::undamped(1.0, 0.0)], 0.0),
+            Err(PlantError::NoResponse)
+        );
+    }
+}

@@ -1,0 +1,178 @@
+//! The moving stage: amplifier current, modes, floor and mechanical stop, carried from tick to tick.
+//!
+//! With linear geometry the modes are those of the plant and those that it leaves out, exactly carried over whole periods.
+//! With quadratic geometry the plant is a [`Body`] of its own, carried in fine steps, and the modes are the others.
+
+use super::body::Body;
+use super::floor::Line;
+use super::noise::Gaussian;
+use crate::config::Config;
+use crate::model::plant::{Load, Mode, Motion, Sampled};
+
+/// Steps of at most this length resolve the contact with the stop: its frequency against the lightest effective mass,
+/// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, turns by 0.1 rad a step.
+const CONTACT_STEP_S: f64 = 20e-6;
+
+/// Position and velocity at a moment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    position_m: f64,
+    velocity_m_per_s: f64,
+}
+
+impl Place {
+    /// The position at a share of the way to `after`, `length_s` later: the cubic through both places (Hermite).
+    pub(super) fn towards(&self, after: &Place, length_s: f64, share: f64) -> f64 {
+        let rise_m = after.position_m - self.position_m;
+        let (start_m, end_m) = (
+            self.velocity_m_per_s * length_s,
+            after.velocity_m_per_s * length_s,
+        );
+        let bend_m =
+            3.0 * rise_m - 2.0 * start_m - end_m + share * (start_m + end_m - 2.0 * rise_m);
+        self.position_m + share * (start_m + share * bend_m)
+    }
+}
+
+/// The state of the simulated mechanics.
+#[derive(Clone, Debug)]
+pub(super) struct Stage {
+    whole: Sampled,
+    fine: Sampled,
+    fine_steps: usize,
+    motion: Motion,
+    body: Option<Body>,
+    floor: Vec<Line>,
+    floor_m_per_s2: f64,
+    stop_m: f64,
+    stop_stiffness_n_per_m: f64,
+    stop_damping_n_s_per_m: f64,
+}
+
+impl Stage {
+    /// A stage at rest, to be carried by periods of `period_s`: `modes`, and a body where the plant is not among them.
+    pub(super) fn new(config: &Config, modes: &[Mode], body: Option<Body>, period_s: f64) -> Self {
+        let contact_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
+        let fine_steps = body
+            .as_ref()
+            .map_or(0, |body| body.steps(period_s))
+            .max(contact_steps);
+        let (bandwidth_hz, force_constant) = (
+            config.amplifier.bandwidth_hz,
+            config.motor.force_constant_n_per_a,
+        );
+        let sampled = |period_s| Sampled::new(modes, bandwidth_hz, force_constant, period_s);
+        let line = |(index, line)| {
+            Line::new(
+                line,
+                period_s,
+                Gaussian::new(config.sim.seed, 1 + index as u64),
+            )
+        };
+        let whole = sampled(period_s);
+        Stage {
+            motion: whole.at_rest(),
+            body,
+            whole,
+            fine: sampled(period_s / fine_steps as f64),
+            fine_steps,
+            floor: config.sim.floor.iter().enumerate().map(line).collect(),
+            floor_m_per_s2: 0.0,
+            stop_m: config.sim.stop_m,
+            stop_stiffness_n_per_m: config.sim.stop_stiffness_n_per_m,
+            stop_damping_n_s_per_m: config.sim.stop_damping_n_s_per_m,
+        }
+    }
+
+    /// The current in amperes.
+    pub(super) fn current_a(&self) -> f64 {
+        self.motion.current_a
+    }
+
+    /// Displacement at the probe in metres.
+    pub(super) fn position_m(&self) -> f64 {
+        let modes_m = self.whole.position_m(&self.motion);
+        self.body
+            .as_ref()
+            .map_or(modes_m, |body| body.position_m() + modes_m)
+    }
+
+    /// Where it is and where it goes.
+    pub(super) fn place(&self) -> Place {
+        Place {
+            position_m: self.position_m(),
+            velocity_m_per_s: self.velocity_m_per_s(),
+        }
+    }
+
+    /// Velocity at the probe in metres per second.
+    fn velocity_m_per_s(&self) -> f64 {
+        let modes_m_per_s = self.whole.velocity_m_per_s(&self.motion);
+        self.body.as_ref().map_or(modes_m_per_s, |body| {
+            body.velocity_m_per_s() + modes_m_per_s
+        })
+    }
+
+    /// Length of a period in seconds.
+    pub(super) fn period_s(&self) -> f64 {
+        self.whole.period_s
+    }
+
+    /// Length of a fine step in seconds.
+    pub(super) fn fine_step_s(&self) -> f64 {
+        self.fine.period_s
+    }
+
+    /// Fine steps in a period.
+    pub(super) fn fine_steps(&self) -> usize {
+        self.fine_steps
+    }
+
+    /// One period with the set-point held. Where the stop may be touched, and always with a body, in fine steps.
+    pub(super) fn advance(&mut self, setpoint_a: f64) {
+        self.shake();
+        let reach_m = self.position_m().abs() + self.velocity_m_per_s().abs() * self.whole.period_s;
+        if self.body.is_none() && reach_m < self.stop_m {
+            let floor_m_per_s2 = self.floor_m_per_s2;
+            return self.whole.step(&mut self.motion, setpoint_a, |block| {
+                -floor_m_per_s2 * block.floor
+            });
+        }
+        for _ in 0..self.fine_steps {
+            self.advance_finely(setpoint_a);
+        }
+    }
+
+    /// The floor's acceleration for the next period.
+    pub(super) fn shake(&mut self) {
+        self.floor_m_per_s2 = self.floor.iter_mut().map(Line::next).sum();
+    }
+
+    /// One fine step, with the stop.
+    pub(super) fn advance_finely(&mut self, setpoint_a: f64) {
+        let (contact_n, floor_m_per_s2) = (self.contact_n(), self.floor_m_per_s2);
+        if let Some(body) = &mut self.body {
+            let load = Load {
+                probe_n: contact_n,
+                floor_m_per_s2,
+            };
+            body.step(self.fine.period_s, self.motion.current_a, setpoint_a, load);
+        }
+        self.fine.step(&mut self.motion, setpoint_a, |block| {
+            contact_n * block.output - floor_m_per_s2 * block.floor
+        });
+    }
+
+    /// Force of the stop on the stage: a spring and a damper that push and never pull.
+    fn contact_n(&self) -> f64 {
+        let position_m = self.position_m();
+        let depth_m = position_m.abs() - self.stop_m;
+        if depth_m <= 0.0 {
+            return 0.0;
+        }
+        let side = position_m.signum();
+        let inward = self.stop_stiffness_n_per_m * depth_m
+            + self.stop_damping_n_s_per_m * side * self.velocity_m_per_s();
+        -side * inward.max(0.0)
+    }
+}

@@ -1,0 +1,4 @@
+//! Small helpers without a subject of their own.
+
+pub mod atomic_file;
+pub mod quantity;

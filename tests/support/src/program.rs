@@ -1,0 +1,206 @@
+//! The program as a person or a script meets it: arguments in; exit code, text and files out.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A folder of its own to work in.
+pub struct Bench {
+    folder: TempDir,
+    program: PathBuf,
+}
+
+/// What came back.
+#[derive(Debug)]
+pub struct Answer {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+impl Bench {
+    #[allow(clippy::new_without_default, reason = "a test names what it makes")]
+    pub fn new() -> Bench {
+        Bench::of(bench_program())
+    }
+
+    /// Another program in a folder of its own.
+    pub fn of(program: impl Into<PathBuf>) -> Bench {
+        Bench {
+            folder: tempfile::tempdir().expect("a temporary folder"),
+            program: program.into(),
+        }
+    }
+
+    /// Runs `bench` with arguments as typed, parted by blanks.
+    pub fn run(&self, arguments: &str) -> Answer {
+        self.run_with(arguments.split_whitespace())
+    }
+
+    /// Runs `bench` with exactly these arguments.
+    pub fn run_with(&self, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Answer {
+        run_program(&self.program, self.folder.path(), arguments)
+    }
+
+    /// The one JSON object of a command that is expected to end with exit code 0.
+    pub fn json(&self, arguments: &str) -> Value {
+        let answer = self.run(&format!("{arguments} --json"));
+        assert_eq!(answer.code, 0, "bench {arguments}: {}", answer.err);
+        answer.json()
+    }
+
+    /// Writes a file and returns its path.
+    pub fn write(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, text).expect("a writable folder");
+        path
+    }
+
+    pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn read(&self, name: impl AsRef<Path>) -> String {
+        let path = self.path(name);
+        std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    }
+
+    /// Names of everything in the folder.
+    pub fn files(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.folder.path()).expect("the folder");
+        let mut names: Vec<String> = entries
+            .map(|entry| {
+                entry
+                    .expect("an entry")
+                    .file_name()
+                    .to_string_lossy()
+                    .into_owned()
+            })
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+/// The program under test, as cargo names it to integration tests.
+fn bench_program() -> PathBuf {
+    std::env::var_os("CARGO_BIN_EXE_bench")
+        .expect("set by cargo test")
+        .into()
+}
+
+/// Runs `bench` in a folder; see [`run_program`].
+pub fn run_in(folder: &Path, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Answer {
+    run_program(&bench_program(), folder, arguments)
+}
+
+/// Runs a program in a folder. It must neither panic nor die of a signal, nor hang: the time limit is some hundred times
+/// what the longest command takes.
+pub fn run_program(
+    program: &Path,
+    folder: &Path,
+    arguments: impl IntoIterator<Item = impl AsRef<OsStr>>,
+) -> Answer {
+    let mut command = assert_cmd::Command::new(program);
+    command
+        .current_dir(folder)
+        .env_remove("BENCH_LOG")
+        .args(arguments)
+        .timeout(Duration::from_secs(300));
+    let output = command.output().expect("bench starts");
+    let (out, err) = (text(output.stdout), text(output.stderr));
+    assert!(!err.contains("panicked"), "{command:?}: {err}");
+    let code = output
+        .status
+        .code()
+        .unwrap_or_else(|| panic!("{command:?} was killed: {}: {err}", output.status));
+    assert!(
+        (0..=3).contains(&code),
+        "{command:?} ended with {code}: {err}"
+    );
+    Answer { code, out, err }
+}
+
+fn text(bytes: Vec<u8>) -> String {
+    String::from_utf8(bytes).expect("UTF-8")
+}
+
+impl Answer {
+    /// Standard output as the one JSON object that must be there, and nothing else.
+    pub fn json(&self) -> Value {
+        let mut values = serde_json::Deserializer::from_str(&self.out).into_iter::<Value>();
+        let first = values.next().unwrap_or_else(|| {
+            panic!(
+                "nothing on standard output; on standard error: {}",
+                self.err
+            )
+        });
+        let value = first.unwrap_or_else(|e| panic!("{e}: {}", self.out));
+        assert!(value.is_object(), "not an object: {value}");
+        assert!(
+            values.next().is_none(),
+            "more than one JSON value on standard output: {}",
+            self.out
+        );
+        value
+    }
+
+    /// Refused as usage: exit code 2, nothing on standard output, and all of `words` in the message.
+    pub fn is_refused(&self, words: &[&str]) {
+        assert_eq!(self.code, 2, "{self:?}");
+        assert_eq!(self.out, "", "standard output of a refused command");
+        for word in words {
+            assert!(
+                self.err.contains(word),
+                "`{word}` is not in the message: {}",
+                self.err
+            );
+        }
+    }
+}
+
+/// A number of an answer.
+pub fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("a number is expected, there is {value}"))
+}
+
+/// Asserts that a figure is within a tolerance of what is expected, both in its unit.
+#[track_caller]
+pub fn near(what: &str, figure: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (figure - expected).abs() <= tolerance,
+        "{what} is {figure}, expected {expected} +- {tolerance}"
+    );
+}
+
+/// Random numbers for settings: SplitMix64, the same on every machine.
+pub struct Draw(pub u64);
+
+impl Draw {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
+    }
+
+    /// Uniform between two limits.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// As likely in one decade as in another.
+    pub fn over_decades(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+
+    /// One of several.
+    pub fn one_of<'a, T>(&mut self, of: &'a [T]) -> &'a T {
+        &of[(self.next() % of.len() as u64) as usize]
+    }
+}

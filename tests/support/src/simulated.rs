@@ -1,0 +1,33 @@
+//! Runs on the simulated stage, recorded and analysed as they are on the command line.
+use std::path::{Path, PathBuf};
+
+use bench::config::Config;
+use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
+use bench::recording::Recording;
+use bench::rig::simulated::SimulatedRig;
+use bench::rt::thread::{Ended, Pace};
+
+/// The recording of a run by `plan`, and how the run ended.
+pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, Ended) {
+    let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
+    let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let ended = (run.path.clone(), run.ended.clone());
+    run.finish("{}").expect("a good disk");
+    ended
+}
+
+/// The recording of a run by `plan` that comes to its end.
+pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
+    let (path, ended) = ended(plan, folder);
+    assert!(ended.completed, "{ended:?}");
+    path
+}
+
+/// The analysis of a run by `plan`, believing `believed`.
+pub fn analysed(plan: &Plan, believed: &Config) -> Result<Analysis, AnalysisError> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    analyse(
+        &Recording::open(&recorded(plan, folder.path())).expect("a recording"),
+        believed,
+    )
+}

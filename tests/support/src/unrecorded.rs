@@ -1,0 +1,30 @@
+//! The default excitation on the simulated stage, straight from the rig, without loop and recording.
+use bench::config::Config;
+use bench::excitation::{Chirp, Excitation};
+use bench::identify::Signals;
+use bench::rig::simulated::SimulatedRig;
+use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+
+/// Commands and readings of the chirp of a configuration.
+pub fn chirp(config: &Config) -> Signals {
+    let chirp = Chirp::new(&config.chirp, config.servo.period_s());
+    let mut rig = SimulatedRig::new(config).expect("a rig");
+    rig.enable().expect("an amplifier");
+    let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
+    for number in 0..chirp.ticks() {
+        let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;
+        output_m.push(
+            rig.latest(Tick {
+                number,
+                scheduled_ns,
+            })
+            .position_m,
+        );
+        input_a.push(rig.command(chirp.current_a(number)).expect("enabled"));
+    }
+    Signals {
+        rate_hz: config.servo.rate_hz,
+        input_a,
+        output_m,
+    }
+}
