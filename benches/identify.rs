@@ -5,9 +5,9 @@
 use bench_test_support::unrecorded;
 
 use bench::config::{Config, Source, load};
-use bench::identify::modal::{View, fit};
-use bench::identify::verdict::{Case, Verdict, verdict};
-use bench::identify::{Estimator, EstimatorSettings, Signals, blocks, local, welch};
+use bench::identify::modal::{MeasurementChain, fit};
+use bench::identify::verdict::{Verdict, VerdictInput, verdict};
+use bench::identify::{Estimator, EstimatorSettings, Signals, frf_data, local, welch};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// Samples of a segment.
@@ -28,13 +28,13 @@ fn config() -> Config {
 }
 
 fn judged(signals: &Signals, config: &Config) -> Verdict {
-    let blocks = blocks(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
-    let view = View::Bench(config);
-    let fit = fit(&blocks, &view).expect("modes");
-    verdict(&Case {
+    let frf_data = frf_data(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
+    let view = MeasurementChain::Bench(config);
+    let fit = fit(&frf_data, &view).expect("modes");
+    verdict(&VerdictInput {
         fit: &fit,
         view: &view,
-        blocks: &blocks,
+        frf_data: &frf_data,
         up_to_rad_s: 650.0,
         expected_modes: Some(3),
     })

@@ -15,8 +15,8 @@ use bench::recording::{self, Header, Recorder};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
-use bench::rt::outlet::Outlet;
-use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench::rt::publisher::Publisher;
+use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::run;
 use bench_hal::{Reading, Tick, Validity};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -94,19 +94,19 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     let recorder =
         Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
     let (producer, consumer) = RingBuffer::new(1 << 16);
-    let (mut orders, taken) = RingBuffer::new(4);
-    let (spent, _kept) = RingBuffer::new(4);
+    let (mut requests, taken) = RingBuffer::new(4);
+    let (retired, _kept) = RingBuffer::new(4);
     let progress = Arc::new(Progress::default());
     let connections = Connections {
-        orders: taken,
-        spent,
-        outlet: Outlet::new(producer),
+        requests: taken,
+        retired,
+        publisher: Publisher::new(producer),
         progress,
     };
     let rig = Box::new(SimulatedRig::new(config).expect("valid"));
     let servo = Servo::new(rig, Interlocks::new(config), connections);
-    for order in [Order::Arm, Order::Start(plan.program().expect("valid"))] {
-        assert!(orders.push(order).is_ok());
+    for order in [Request::Arm, Request::Start(plan.program().expect("valid"))] {
+        assert!(requests.push(order).is_ok());
     }
     let recorder = recording::spawn(recorder, consumer).expect("a thread");
     let start = Instant::now();

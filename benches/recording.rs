@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use bench::recording::{Header, Recorder, Recording};
-use bench::rt::record::{Published, TickRecord};
+use bench::rt::record::{LoopMessage, TickRecord};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Two minutes at 5 kHz.
@@ -23,7 +23,7 @@ fn tick(number: u64) -> TickRecord {
     }
 }
 
-fn write(path: &Path, ticks: &[Published]) {
+fn write(path: &Path, ticks: &[LoopMessage]) {
     let header = Header {
         period_ns: 200_000,
         ..Header::default()
@@ -38,7 +38,7 @@ fn write(path: &Path, ticks: &[Published]) {
 fn recording(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("bench.mcap");
-    let ticks: Vec<Published> = (0..TICKS).map(|n| Published::Tick(tick(n))).collect();
+    let ticks: Vec<LoopMessage> = (0..TICKS).map(|n| LoopMessage::Tick(tick(n))).collect();
     let mut group = c.benchmark_group("recording of 600,000 ticks");
     group
         .throughput(Throughput::Elements(TICKS))

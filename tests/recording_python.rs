@@ -7,7 +7,7 @@ use std::process::Command;
 
 use bench::recording::{Header, Recorder};
 use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, Published, TickRecord};
+use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_hal::Validity;
 use serde_json::{Value, json};
 
@@ -90,7 +90,7 @@ fn record(path: &Path) {
     let mut recorder = Recorder::create(path, &header).expect("a fresh file");
     for n in 0..TICKS {
         recorder
-            .record(&Published::Tick(tick(n)))
+            .record(&LoopMessage::Tick(tick(n)))
             .expect("a good disk");
     }
     let trip = Trip::Travel {
@@ -105,7 +105,7 @@ fn record(path: &Path) {
         },
     ] {
         recorder
-            .record(&Published::Event(Event {
+            .record(&LoopMessage::Event(Event {
                 tick: TICKS - 1,
                 kind,
             }))

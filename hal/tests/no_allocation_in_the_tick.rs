@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bench_hal::can::budget::Exchange;
-use bench_hal::can::bus::{BusError, BusEvent, CanBus, Host, Port, Running, Task, World};
-use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
+use bench_hal::can::bus::{
+    BusError, BusEvent, CanBus, Host, Port, SimulatedHost, Task, TaskHandle,
+};
+use bench_hal::can::device::{AmplifierTask, Device, DeviceFault, EmulatedDriveSettings};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
 use bench_hal::can::{CanFrame, Id};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
@@ -17,7 +19,7 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 /// A world whose endpoints can be made to swallow what is sent: the bus in memory itself allocates, a socket does not.
 struct Quiet {
-    world: World,
+    world: SimulatedHost,
     swallow: Arc<AtomicBool>,
 }
 
@@ -37,7 +39,7 @@ impl Host for Quiet {
     fn sleep(&self, time: Duration) {
         self.world.sleep(time);
     }
-    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<Running> {
+    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
         self.world.start(name, task)
     }
 }
@@ -79,9 +81,9 @@ fn command_status_and_disable_allocate_nothing() {
         Exchange::Asynchronous { status_hz: 500.0 },
         Exchange::Synchronous { status_every: 1 },
     ] {
-        let (world, swallow) = (World::default(), Arc::new(AtomicBool::new(false)));
-        let device = Arc::new(Mutex::new(Device::new(DeviceSettings::default())));
-        let _running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+        let (world, swallow) = (SimulatedHost::default(), Arc::new(AtomicBool::new(false)));
+        let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default())));
+        let _running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
         let host = Quiet {
             world: world.clone(),
             swallow: Arc::clone(&swallow),

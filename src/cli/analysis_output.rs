@@ -15,11 +15,11 @@ use crate::experiment::{AnalysisError, analyse};
 use crate::identify::modal::{FittedMode, ModalFit};
 use crate::identify::{Unit, csv};
 use crate::recording::Recording;
-use crate::report::run_pages::{Analysed, AnalysedRun, KINDS, page, pictures};
+use crate::report::run_pages::{PLOT_KINDS, ReportSource, RunReport, page, pictures};
 
 /// The files that were made and what the response shows; `null` where the run gave no response.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Made {
+pub(super) struct AnalysisOutputs {
     frf_csv: Option<String>,
     /// The same with the delay, measured as below, taken out of the phases.
     frf_without_delay_csv: Option<String>,
@@ -66,7 +66,7 @@ pub(super) fn make(
     recording: &Recording,
     config: &Config,
     beside: &Path,
-) -> Result<Made, CliError> {
+) -> Result<AnalysisOutputs, CliError> {
     let analysis = &analyse(recording, config)?;
     let csv_path = free(beside, "frf", "csv");
     csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere)
@@ -75,13 +75,13 @@ pub(super) fn make(
     let plain = analysis.frf.earlier(analysis.measured_delay_s());
     csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere)
         .map_err(|e| CliError::Failed(e.to_string()))?;
-    let run = AnalysedRun {
+    let run = RunReport {
         analysis,
         config,
         recording,
     };
     let Drawn { plots, report } = drawn(&run, beside)?;
-    Ok(Made {
+    Ok(AnalysisOutputs {
         frf_csv: Some(csv_path.display().to_string()),
         frf_without_delay_csv: Some(plain_path.display().to_string()),
         plot: plots.get("bode").cloned().flatten(),
@@ -104,10 +104,10 @@ pub(super) fn make(
     })
 }
 
-impl Made {
+impl AnalysisOutputs {
     /// Nothing was made.
-    pub fn nothing(why: &str) -> Made {
-        Made {
+    pub fn nothing(why: &str) -> AnalysisOutputs {
+        AnalysisOutputs {
             frf_csv: None,
             frf_without_delay_csv: None,
             plot: None,
@@ -127,8 +127,8 @@ impl Made {
     }
 
     /// A person stopped the analysis.
-    pub fn stopped() -> Made {
-        Made::nothing(STOPPED)
+    pub fn stopped() -> AnalysisOutputs {
+        AnalysisOutputs::nothing(STOPPED)
     }
 
     pub fn is_stopped(&self) -> bool {
@@ -186,7 +186,7 @@ pub(super) struct Drawn {
 }
 
 /// Draws a record; the files stand beside a path under its name.
-pub(super) fn drawn(record: &dyn Analysed, beside: &Path) -> Result<Drawn, CliError> {
+pub(super) fn drawn(record: &dyn ReportSource, beside: &Path) -> Result<Drawn, CliError> {
     let pictures = pictures(record).map_err(|e| CliError::Failed(e.to_string()))?;
     let mut plots = no_plots();
     for picture in &pictures {
@@ -213,7 +213,7 @@ pub(super) fn plots_text(plots: &Plots) -> String {
 
 /// Every name, and no picture.
 fn no_plots() -> Plots {
-    KINDS.into_iter().map(|kind| (kind, None)).collect()
+    PLOT_KINDS.into_iter().map(|kind| (kind, None)).collect()
 }
 
 /// The path under which a file would stand in a folder, which is made if it is not there; without one its own.

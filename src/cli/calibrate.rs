@@ -11,8 +11,8 @@ use super::{CliError, Outcome};
 use crate::config::{Config, ExcitationKind, Purpose};
 use crate::excitation::{self, Extremes, Staircase};
 use crate::experiment::calibration::{Fit, fit};
-use crate::experiment::{Plan, analyse, unless_stopped};
-use crate::model::plant::{self, Modal, PlantError, Sampled};
+use crate::experiment::{Plan, abandon_on_signal, analyse};
+use crate::model::plant::{self, DiscretePlant, ModalModel, PlantError};
 use crate::recording::Recording;
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
@@ -85,7 +85,7 @@ fn shorten(config: &mut Config) {
 fn check(config: &Config) -> Result<(), CliError> {
     compliance_m_per_a(config)?;
     let (period_s, force_constant) = (config.servo.period_s(), config.motor.force_constant_n_per_a);
-    let rig = Sampled::new(
+    let rig = DiscretePlant::new(
         &simulated::modes(config)?,
         config.amplifier.bandwidth_hz,
         force_constant,
@@ -244,12 +244,12 @@ fn measure_delay(
     let plan = Plan::chirp(config.clone());
     let mut run =
         args.run
-            .run_calibrated(&plan, "chirp for the delay", Some(calibration.clone()))?;
+            .run_with_calibration(&plan, "chirp for the delay", Some(calibration.clone()))?;
     let totals = run.totals()?;
     let report = RunReport::new(&run, &totals);
     if report.outcome == "completed" {
         let (path, config) = (run.path.clone(), config.clone());
-        let analysed = unless_stopped(move || -> Result<_, CliError> {
+        let analysed = abandon_on_signal(move || -> Result<_, CliError> {
             Ok(analyse(&Recording::open(&path)?, &config)?)
         });
         let analysed = analysed
@@ -265,7 +265,7 @@ fn measure_delay(
 
 /// The static compliance of the model, from current to displacement.
 fn compliance_m_per_a(config: &Config) -> Result<f64, CliError> {
-    let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
+    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
     if modes.iter().any(|mode| mode.omega_rad_s == 0.0) {
         return Err(
             PlantError::FreeBody("a static compliance, which `bench calibrate` measures,").into(),

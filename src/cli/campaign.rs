@@ -10,13 +10,13 @@ use super::campaign_output::Report;
 use super::chirp::check;
 use super::options::{BenchOptions, print_json, print_text};
 use super::progress::Progress;
-use super::spaced::Spaced;
+use super::value_range::ValueRange;
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose, profiles};
 use crate::experiment::campaign::{
     Answer, Found, Grid, Place, Point, Store, Tolerances, measured, order, picture, work,
 };
-use crate::experiment::{self, Plan, Run, stoppable};
+use crate::experiment::{self, Plan, Run, stop_on_signal};
 use crate::rig::devices;
 use crate::rt::thread::Pace;
 use crate::util::atomic_file::write_whole;
@@ -36,7 +36,7 @@ pub(super) struct Args {
         default_value = "0%:8%:15",
         allow_hyphen_values = true
     )]
-    operating_points: Spaced,
+    operating_points: ValueRange,
     /// Mass asymmetries m2/m3 - 1 that are put on
     #[arg(
         long,
@@ -44,7 +44,7 @@ pub(super) struct Args {
         default_value = "-10%:10%:10",
         allow_hyphen_values = true
     )]
-    asymmetries: Spaced,
+    asymmetries: ValueRange,
     /// Folder of the campaign: what is done is kept there, and the same command goes on from it
     #[arg(long, value_name = "DIR", default_value = "campaign")]
     out: PathBuf,
@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         grid: &grid,
         keep: args.keep_recordings,
     };
-    let worked = stoppable(|stop| match attended(args, &config) {
+    let worked = stop_on_signal(|stop| match attended(args, &config) {
         true => {
             let attended = OnDevices {
                 bench: &bench,

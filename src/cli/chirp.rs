@@ -1,14 +1,14 @@
 //! `bench chirp`: excite, record, estimate the frequency response.
 
-use super::analysis_output::{Made, make};
+use super::analysis_output::{AnalysisOutputs, make};
 use super::chirp_plan::{Expected, shape, show};
 use super::options::BenchOptions;
 use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::excitation::{self, Extremes};
-use crate::experiment::{Plan, unless_stopped};
-use crate::model::plant::Sampled;
+use crate::experiment::{Plan, abandon_on_signal};
+use crate::model::plant::DiscretePlant;
 use crate::recording::Recording;
 use crate::rig::simulated;
 use serde::Serialize;
@@ -25,7 +25,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "KIND")]
     excitation: Option<String>,
     #[command(flatten)]
-    band: BandOptions,
+    band: ExcitationOptions,
     /// Length of the sweep in seconds
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     duration: Option<f64>,
@@ -39,7 +39,7 @@ pub(super) struct Args {
 
 /// Which frequencies, and with how much.
 #[derive(Clone, Debug, clap::Args)]
-pub(super) struct BandOptions {
+pub(super) struct ExcitationOptions {
     /// First frequency in hertz
     #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
     start: Option<f64>,
@@ -55,7 +55,7 @@ pub(super) struct BandOptions {
     shape: Option<String>,
 }
 
-impl BandOptions {
+impl ExcitationOptions {
     pub(super) fn sets(&self) -> Vec<String> {
         let number = |(key, value): (&str, Option<f64>)| {
             value.map(|v| format!("chirp.{key}={}", toml::Value::from(v)))
@@ -121,7 +121,7 @@ struct Report {
     expected_travel_m: f64,
     expected: Expected,
     #[serde(flatten)]
-    made: Made,
+    made: AnalysisOutputs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -136,7 +136,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let report = RunReport::new(&run, &totals);
     let made = match report.outcome {
         "completed" => analysed(&run.path, &config)?,
-        _ => Made::nothing("the run did not come to its end"),
+        _ => AnalysisOutputs::nothing("the run did not come to its end"),
     };
     let report = Report {
         run: report,
@@ -153,12 +153,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 /// The analysis, which a person may stop: the recording is whole all the same.
-pub(super) fn analysed(path: &Path, config: &Config) -> Result<Made, CliError> {
+pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
     let (of, config) = (path.to_path_buf(), config.clone());
-    let made = unless_stopped(move || make(&Recording::open(&of)?, &config, &of));
+    let made = abandon_on_signal(move || make(&Recording::open(&of)?, &config, &of));
     let made = made
         .map_err(|error| CliError::Failed(error.to_string()))?
-        .unwrap_or(Ok(Made::stopped()));
+        .unwrap_or(Ok(AnalysisOutputs::stopped()));
     let kept = |error| {
         CliError::Failed(format!(
             "{error}; the run itself is whole, in {}",
@@ -178,12 +178,12 @@ pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
 }
 
 /// The model of the whole rig.
-pub(super) fn rig(config: &Config) -> Result<Sampled, CliError> {
+pub(super) fn rig(config: &Config) -> Result<DiscretePlant, CliError> {
     let (bandwidth_hz, force_constant) = (
         config.amplifier.bandwidth_hz,
         config.motor.force_constant_n_per_a,
     );
-    Ok(Sampled::new(
+    Ok(DiscretePlant::new(
         &simulated::modes(config)?,
         bandwidth_hz,
         force_constant,

@@ -9,9 +9,9 @@ use super::chirp::rig;
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
 use crate::config::{AmplitudePoint, Config, ExcitationKind};
-use crate::excitation::{Cap, Extremes, LARGEST_SPAN, of, shaped, words};
+use crate::excitation::{CurrentLimit, Extremes, LARGEST_SPAN, of, shaped_amplitude, words};
 use crate::identify::csv;
-use crate::model::plant::{self, Chain, Modal};
+use crate::model::plant::{self, LoopPlant, ModalModel};
 
 /// Frequencies at which the model is looked at, beside those of its modes: 0.2 % apart over four decades.
 const GRID: usize = 4000;
@@ -146,7 +146,7 @@ pub(super) fn shape(
     } else {
         f64::INFINITY
     };
-    config.chirp.amplitude = shaped(&response, travel_m, Cap::of(&config), span);
+    config.chirp.amplitude = shaped_amplitude(&response, travel_m, CurrentLimit::of(&config), span);
     if kind == ExcitationKind::Multisine {
         lower_to(&mut config, travel_m)?;
     }
@@ -166,8 +166,8 @@ fn lower_to(config: &mut Config, travel_m: f64) -> Result<(), CliError> {
 
 /// Frequency in hertz and |G| of the chain of the model over the band.
 fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
-    let modal = Modal::of(&plant::build(&config.plant)?)?;
-    let chain = Chain::of_mean_age(config, &modal.modes);
+    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
+    let chain = LoopPlant::with_mean_age(config, &modal.modes);
     let (low_hz, high_hz) = config.chirp.band_hz();
     let grid = (0..=GRID).map(|k| low_hz * libm::pow(high_hz / low_hz, k as f64 / GRID as f64));
     let modes = modal.modes.iter().map(|mode| mode.omega_rad_s / (2.0 * PI));

@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-use super::analysis_output::Made;
+use super::analysis_output::AnalysisOutputs;
 use super::chirp::analysed;
 use super::chirp_plan::Expected;
-use super::choice::Choice;
-use super::margins::{closed_loop, enough, text as margins_text};
+use super::controller_choice::ControllerChoice;
+use super::margins::{closed_loop, require_modulus_margin, text as margins_text};
 use super::options::BenchOptions;
 use super::run_options::{RunOptions, RunReport, close};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose, ReferenceSettings};
-use crate::control::{ClosedLoop, Margins, StepFigures, step_figures};
+use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
 use crate::experiment::{Measured, Plan, measure};
 use crate::recording::Recording;
 use crate::util::quantity;
@@ -25,7 +25,7 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     #[command(flatten)]
-    choice: Choice,
+    choice: ControllerChoice,
     #[command(flatten)]
     run: RunOptions,
     /// What to follow: step, hold, ramp, sine, chirp (identification in closed loop), or a CSV file with time_s,reference_m
@@ -152,7 +152,7 @@ struct Report {
     expected: Option<Expected>,
     /// What a swept reference shows of plant and loop.
     #[serde(flatten)]
-    made: Option<Made>,
+    made: Option<AnalysisOutputs>,
 }
 
 #[derive(Debug, Serialize)]
@@ -160,14 +160,14 @@ struct Predicted {
     #[serde(flatten)]
     margins: Margins,
     #[serde(flatten)]
-    step: Option<StepFigures>,
+    step: Option<StepMetrics>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.sets()?)?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins(false);
-    enough(&config, &margins)?;
+    require_modulus_margin(&config, &margins)?;
     let step = if margins.stable {
         predicted_step(&config, &closed_loop)
     } else {
@@ -186,10 +186,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     let made = match (swept, completed) {
         (true, true) => Some(analysed(&run.path, &plan.config)?),
-        (true, false) => Some(Made::nothing("the run did not come to its end")),
+        (true, false) => Some(AnalysisOutputs::nothing("the run did not come to its end")),
         (false, _) => None,
     };
-    let expected = plan.foreseen.as_ref().map(Expected::of);
+    let expected = plan.predicted_extremes.as_ref().map(Expected::of);
     let report = Report {
         run: report,
         predicted,
@@ -198,7 +198,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         made,
     };
     close(run, &report, args.bench.json, &text(&report, &config))?;
-    let stopped = report.made.as_ref().is_some_and(Made::is_stopped);
+    let stopped = report
+        .made
+        .as_ref()
+        .is_some_and(AnalysisOutputs::is_stopped);
     Ok(if stopped {
         Outcome::Failed
     } else {
@@ -207,7 +210,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 /// The step by the linear model, if the reference is one that happens.
-fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepFigures> {
+fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetrics> {
     let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else {
         return None;
     };
@@ -215,7 +218,7 @@ fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepFigur
     let ticks = ((after_s * config.servo.rate_hz) as usize).min(PREDICTED_TICKS);
     let positions = closed_loop.simulate(ticks, |_| amplitude_m);
     (amplitude_m != 0.0 && ticks > 0)
-        .then(|| step_figures(&positions, amplitude_m, config.servo.period_s()))
+        .then(|| step_metrics(&positions, amplitude_m, config.servo.period_s()))
 }
 
 fn text(report: &Report, config: &Config) -> String {

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::chirp;
-use super::margins::{closed_loop, enough};
+use super::margins::{closed_loop, require_modulus_margin};
 use super::options::{BenchOptions, print_json, print_text};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::control::Margins;
-use crate::doctor::{Runs, examine};
+use crate::doctor::{RunChecks, examine};
 use crate::experiment::Plan;
 
 /// Which bench, and where runs are recorded.
@@ -39,11 +39,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 /// The very checks that `bench chirp` and `bench control` make before they open a device.
-fn runs(args: &Args) -> Runs {
+fn runs(args: &Args) -> RunChecks {
     let chirp = || Ok(chirp::check(&args.bench.load(Purpose::Chirp, &[])?)?.travel_m);
     let control = || loop_margins(&args.bench.load(Purpose::Control, &[])?);
     let words = |error: CliError| error.to_string();
-    Runs {
+    RunChecks {
         chirp: chirp().map_err(words),
         control: control().map_err(words),
     }
@@ -51,7 +51,7 @@ fn runs(args: &Args) -> Runs {
 
 fn loop_margins(config: &Config) -> Result<Margins, CliError> {
     let margins = closed_loop(config)?.margins(false);
-    enough(config, &margins)?;
+    require_modulus_margin(config, &margins)?;
     Plan::control(config.clone())?.program()?;
     Ok(margins)
 }

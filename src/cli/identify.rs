@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::analysis_output::{Made, in_folder, make};
-use super::identify_table::{self, TableOptions};
+use super::analysis_output::{AnalysisOutputs, in_folder, make};
+use super::identify_external::{self, ExternalOptions};
 use super::options::{print_json, print_text};
-use super::run_options::TripJson;
+use super::run_options::TripReport;
 use super::{CliError, Outcome};
 use crate::config::Config;
-use crate::experiment::{Ending, Kind, Plan};
+use crate::experiment::{Ending, Plan, RunKind};
 use crate::recording::Recording;
 
 /// Which recording.
@@ -19,7 +19,7 @@ pub(super) struct Args {
     /// The recording (MCAP) of a chirp, or a CSV of other hands with --input and --output
     recording: PathBuf,
     #[command(flatten)]
-    table: TableOptions,
+    table: ExternalOptions,
     /// Folder of the results; that of the recording or CSV without it
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -33,30 +33,35 @@ pub(super) struct Args {
 struct Report {
     /// `completed`, `tripped`, `stopped`, or `cut_off` where the file ends before the run does.
     outcome: &'static str,
-    trip: Option<TripJson>,
+    trip: Option<TripReport>,
     recording: String,
     ticks: u64,
     overruns: u64,
     lost_records: u64,
     truncated: bool,
     #[serde(flatten)]
-    made: Made,
+    made: AnalysisOutputs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     if args.table.is_meant(&args.recording) {
-        return identify_table::run(&args.recording, args.out.as_deref(), &args.table, args.json);
+        return identify_external::run(
+            &args.recording,
+            args.out.as_deref(),
+            &args.table,
+            args.json,
+        );
     }
     let recording = Recording::open(&args.recording)?;
     let plan = Plan::of(&recording)?;
-    if plan.kind == Kind::Calibrate {
+    if plan.kind == RunKind::Calibrate {
         let what = "is the recording of static steps, which `bench calibrate` analyses";
         return Err(CliError::Usage(format!(
             "{} {what}",
             args.recording.display()
         )));
     }
-    if plan.kind == Kind::Quiet {
+    if plan.kind == RunKind::Quiet {
         let what = "is a quiet run of `bench campaign`, in which no current flowed: it says where the stage rests";
         return Err(CliError::Usage(format!(
             "{} {what}",
@@ -66,7 +71,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let ending = Ending::of(&recording);
     let report = Report {
         outcome: ending.name(),
-        trip: TripJson::of(&ending),
+        trip: TripReport::of(&ending),
         recording: args.recording.display().to_string(),
         ticks: recording.tick_count(),
         overruns: recording.overruns(),

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::analysis_output::Made;
-use super::chirp::{BandOptions, analysed, check};
+use super::analysis_output::AnalysisOutputs;
+use super::chirp::{ExcitationOptions, analysed, check};
 use super::chirp_plan::Expected;
 use super::modal_output::{ModeJson, mode};
 use super::options::{BenchOptions, print_json, print_text};
@@ -12,7 +12,7 @@ use super::table::table;
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::excitation;
-use crate::experiment::{ModeOverAmplitude, Plan, over_amplitude};
+use crate::experiment::{ModeOverAmplitude, Plan, modes_over_amplitude};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
 
@@ -32,7 +32,7 @@ pub(super) struct Args {
     #[command(flatten)]
     run: RunOptions,
     #[command(flatten)]
-    band: BandOptions,
+    band: ExcitationOptions,
     /// Amplitudes as ratios of the planned one, one run each
     #[arg(
         long,
@@ -102,7 +102,7 @@ struct RunMade {
     #[serde(flatten)]
     run: RunReport,
     #[serde(flatten)]
-    made: Made,
+    made: AnalysisOutputs,
 }
 
 impl RunMade {
@@ -146,7 +146,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         }
     }
     let fitted: Vec<Vec<FittedMode>> = runs.iter().map(|run| run.made.fitted.clone()).collect();
-    let modes = over_amplitude(&fitted);
+    let modes = modes_over_amplitude(&fitted);
     let report = report(runs, &modes);
     if args.bench.json {
         print_json(&report)?;
@@ -173,7 +173,7 @@ fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<R
     let told = RunReport::new(&run, &totals);
     let made = match told.outcome {
         "completed" => analysed(&run.path, config)?,
-        _ => Made::nothing("the run did not come to its end"),
+        _ => AnalysisOutputs::nothing("the run did not come to its end"),
     };
     let made = RunMade {
         scale,
@@ -335,7 +335,7 @@ mod tests {
             damping_ratio: known(0.01),
             residue_per_kg: known(0.5),
         };
-        let said = |runs: &[Vec<FittedMode>]| report(Vec::new(), &over_amplitude(runs)).why;
+        let said = |runs: &[Vec<FittedMode>]| report(Vec::new(), &modes_over_amplitude(runs)).why;
         let both = vec![mode(29.0), mode(82.0)];
         // 90 Hz is no 82 Hz: nothing shifts, but of that mode nothing is known.
         let why = said(&[both.clone(), vec![mode(29.0), mode(90.0)]]);

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::table::table;
-use crate::identify::linearity::{Distortion, Linearity, Share};
+use crate::identify::linearity::{BandLinearity, Distortion, Linearity};
 
 /// The part of the report that tells distortion from noise; its names are a contract.
 #[derive(Clone, Debug, Serialize)]
@@ -42,7 +42,7 @@ struct ShareJson {
 }
 
 impl ShareJson {
-    fn of(share: &Share) -> ShareJson {
+    fn of(share: &BandLinearity) -> ShareJson {
         let ratio = |kind: Option<Distortion>| kind.map(|kind| kind.ratio);
         let probability = |kind: Option<Distortion>| kind.map(|kind| kind.by_noise_alone);
         ShareJson {

@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use super::choice::Choice;
+use super::controller_choice::ControllerChoice;
 use super::options::{BenchOptions, print_json, print_text};
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
-use crate::model::plant::{self, Modal};
+use crate::model::plant::{self, ModalModel};
 
 /// Which loop.
 #[derive(Clone, Debug, clap::Args)]
@@ -15,7 +15,7 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     #[command(flatten)]
-    choice: Choice,
+    choice: ControllerChoice,
     /// Leave out sampling, delay and amplifier
     #[arg(long)]
     continuous: bool,
@@ -54,12 +54,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
     let sections =
         ControllerText::find(&config.control.controller)?.sections(config.servo.rate_hz)?;
-    let modal = Modal::of(&plant::build(&config.plant)?)?;
+    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
     Ok(ClosedLoop::new(config, modal.modes, sections))
 }
 
 /// Refuses a loop with less than the configured modulus margin.
-pub(super) fn enough(config: &Config, margins: &Margins) -> Result<(), CliError> {
+pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Result<(), CliError> {
     let least = config.control.least_modulus_margin;
     let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
     if least > 0.0 && !margins.stable {

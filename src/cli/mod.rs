@@ -7,14 +7,14 @@ mod campaign_attended;
 mod campaign_output;
 mod chirp;
 mod chirp_plan;
-mod choice;
 mod columns;
 mod config;
 mod control;
-mod device;
+mod controller_choice;
 mod doctor;
+mod emulate;
 mod identify;
-mod identify_table;
+mod identify_external;
 mod linearity;
 mod linearity_output;
 mod loop_output;
@@ -28,8 +28,8 @@ mod progress;
 mod recover;
 mod replay;
 mod run_options;
-mod spaced;
 mod table;
+mod value_range;
 
 use clap::{Parser, Subcommand};
 
@@ -70,7 +70,7 @@ enum Command {
     /// Make a cut-off recording readable and say what was lost
     Recover(recover::Args),
     /// Act as the configured devices, with the simulated stage behind them: a rehearsal without hardware
-    Device(device::Args),
+    Device(emulate::Args),
     /// The effective settings, their validation, their schema
     Config(config::Args),
     /// Could a run start? System, devices, recordings, each finding with its remedy; nothing moves
@@ -90,7 +90,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Identify(args) => identify::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
-        Command::Device(args) => device::run(&args),
+        Command::Device(args) => emulate::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Doctor(args) => doctor::run(&args),
     }

@@ -71,7 +71,7 @@ impl Shown {
             fit_chi2_per_freedom: fit.map(|fit| fit.chi2_per_freedom),
             fit_delay_s: fit.map(|fit| fit.delay_s().value),
             fit_delay_sigma_s: fit.map(|fit| fit.delay_s().sigma),
-            phase_fall_deg: verdict.phase.map(|phase| -phase.beyond_deg),
+            phase_fall_deg: verdict.phase.map(|phase| -phase.excess_phase_deg),
             orders: fit.map_or(Vec::new(), |fit| fit.orders.iter().map(order).collect()),
         }
     }
@@ -177,7 +177,7 @@ fn zero(zero: &UncertainZero) -> ZeroJson {
     }
 }
 
-fn order(order: &crate::identify::modal::Order) -> OrderJson {
+fn order(order: &crate::identify::modal::ModelOrder) -> OrderJson {
     let modes = &order.parameters.modes;
     OrderJson {
         frequency_hz: modes.iter().map(|mode| hz(mode.omega_rad_s)).collect(),

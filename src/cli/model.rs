@@ -22,7 +22,7 @@ use super::options::{BenchOptions, print_json, print_text};
 use super::table::table;
 use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
-use crate::model::plant::{self, Modal};
+use crate::model::plant::{self, ModalModel};
 use crate::model::zeros::{self, Zero};
 
 /// What to compute.
@@ -124,7 +124,7 @@ struct ZeroJson {
 impl Modes {
     fn of(config: &Config, profile: &str) -> Result<Modes, CliError> {
         let structure = plant::build(&config.plant)?;
-        let modal = Modal::of(&structure)?;
+        let modal = ModalModel::of(&structure)?;
         let (undamped, damped) = (
             zeros::undamped_zeros(&structure)?,
             zeros::damped_zeros(&structure)?,
@@ -219,7 +219,7 @@ impl Modes {
     }
 }
 
-fn modes(modal: &Modal) -> Vec<ModeJson> {
+fn modes(modal: &ModalModel) -> Vec<ModeJson> {
     let of = |(mode, sign): (&plant::Mode, plant::Sign)| ModeJson {
         omega_rad_s: mode.omega_rad_s,
         frequency_hz: mode.omega_rad_s / (2.0 * std::f64::consts::PI),

@@ -8,7 +8,7 @@ use crate::excitation::ExcitationError;
 use crate::experiment::PlanError;
 use crate::experiment::campaign::{AnswerError, CampaignError};
 use crate::identify::IdentifyError;
-use crate::identify::table::TableError;
+use crate::identify::table::ExternalCsvError;
 use crate::model::plant::PlantError;
 use crate::model::study::StudyError;
 use crate::recording::RecordingError;
@@ -79,7 +79,7 @@ pub enum CliError {
     Identify(#[from] IdentifyError),
     /// The table is no record.
     #[error(transparent)]
-    Table(#[from] TableError),
+    Table(#[from] ExternalCsvError),
     /// There is no such study, or its file cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -100,9 +100,9 @@ impl CliError {
         match self {
             CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
             CliError::Table(
-                TableError::NoColumn { .. }
-                | TableError::Ambiguous { .. }
-                | TableError::Same { .. },
+                ExternalCsvError::NoColumn { .. }
+                | ExternalCsvError::Ambiguous { .. }
+                | ExternalCsvError::Same { .. },
             ) => Outcome::Usage,
             CliError::Table(_) => Outcome::Failed,
             CliError::Campaign(CampaignError::File { .. } | CampaignError::Rest { .. }) => {

@@ -11,9 +11,9 @@ use super::options::print_text;
 use super::progress::Progress;
 use super::{CliError, Outcome};
 use crate::config::Config;
-use crate::experiment::{Ending, Plan, Run, SessionError};
+use crate::experiment::{Ending, Plan, Run, RunError};
 use crate::recording::{Quantiles, Totals};
-use crate::rig::calibration::{CalibratedRig, Calibration, use_of};
+use crate::rig::calibration::{CalibratedRig, Calibration, load_calibration};
 use crate::rig::devices;
 use crate::rt::arming::Trip;
 use crate::rt::thread::Pace;
@@ -94,7 +94,7 @@ impl RunOptions {
         let mut plan = plan.clone();
         let used = match given {
             Some(calibration) => Some((calibration, Vec::new())),
-            None => use_of(
+            None => load_calibration(
                 &config.calibration,
                 &opened.amplifier,
                 &opened.probe,
@@ -114,11 +114,11 @@ impl RunOptions {
 
     /// Runs a plan on the rig of its configuration, with progress on a terminal.
     pub fn run(&self, plan: &Plan, what: &'static str) -> Result<Run, CliError> {
-        self.run_calibrated(plan, what, None)
+        self.run_with_calibration(plan, what, None)
     }
 
     /// The same, with a calibration other than the configured one.
-    pub fn run_calibrated(
+    pub fn run_with_calibration(
         &self,
         plan: &Plan,
         what: &'static str,
@@ -132,7 +132,7 @@ impl RunOptions {
         });
         progress.close();
         run.map_err(|error| match error {
-            SessionError::Plan(plan) => CliError::from(plan),
+            RunError::Plan(plan) => CliError::from(plan),
             other => CliError::Failed(other.to_string()),
         })
     }
@@ -161,7 +161,7 @@ pub(super) fn close(
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct RunReport {
     pub outcome: &'static str,
-    pub trip: Option<TripJson>,
+    pub trip: Option<TripReport>,
     pub ticks: u64,
     pub overruns: u64,
     pub lost_records: u64,
@@ -172,7 +172,7 @@ pub(super) struct RunReport {
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct TripJson {
+pub(super) struct TripReport {
     reason: &'static str,
     tick: u64,
     text: String,
@@ -209,10 +209,10 @@ impl From<&Quantiles> for QuantilesJson {
     }
 }
 
-impl TripJson {
+impl TripReport {
     /// Of a run that tripped.
-    pub(super) fn of(ending: &Ending) -> Option<TripJson> {
-        let told = |(trip, tick): (Trip, u64)| TripJson {
+    pub(super) fn of(ending: &Ending) -> Option<TripReport> {
+        let told = |(trip, tick): (Trip, u64)| TripReport {
             reason: trip.reason(),
             tick,
             text: trip.to_string(),
@@ -238,7 +238,7 @@ impl RunReport {
         let ending = Ending::from(&run.ended);
         RunReport {
             outcome: ending.name(),
-            trip: TripJson::of(&ending),
+            trip: TripReport::of(&ending),
             ticks: totals.ticks,
             overruns: totals.overruns,
             // A loss at the very end leaves no gap: the loop's own count tells.

@@ -56,15 +56,15 @@ pub struct CalibrationSettings {
     #[schemars(range(min = 0.0, max = 100000.0))]
     pub valid_days: f64,
     /// What happens when it is older.
-    pub when_expired: WhenUnfit,
+    pub when_expired: OnInvalidCalibration,
     /// What happens when it is of other devices.
-    pub when_foreign: WhenUnfit,
+    pub when_foreign: OnInvalidCalibration,
 }
 
 /// What happens when a calibration is not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum WhenUnfit {
+pub enum OnInvalidCalibration {
     /// A warning; the run goes on with it.
     Warn,
     /// The run is refused.

@@ -72,10 +72,10 @@ pub struct CanopenSettings {
     pub identity: IdentitySettings,
     /// What the drive does when it no longer hears us (0x6007).
     #[serde(default)]
-    pub when_unheard: WhenUnheard,
+    pub when_unheard: OnCommunicationLoss,
     /// Who is lost after what time.
     #[serde(default)]
-    pub times: CanopenTimes,
+    pub times: CanopenTimeouts,
 }
 
 fn own_node() -> u8 {
@@ -169,7 +169,7 @@ pub struct IdentitySettings {
 /// What a drive does when it no longer hears us (0x6007).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum WhenUnheard {
+pub enum OnCommunicationLoss {
     /// It goes into fault (1).
     Fault,
     /// It disables the voltage (2).
@@ -184,7 +184,7 @@ pub enum WhenUnheard {
 /// Who is lost after what time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct CanopenTimes {
+pub struct CanopenTimeouts {
     /// Between heartbeats of the drive, in seconds.
     #[schemars(range(min = 0.001, max = 60.0))]
     pub heartbeat_s: f64,
@@ -211,9 +211,9 @@ pub struct CanopenTimes {
     pub state_s: f64,
 }
 
-impl Default for CanopenTimes {
+impl Default for CanopenTimeouts {
     fn default() -> Self {
-        CanopenTimes {
+        CanopenTimeouts {
             heartbeat_s: 0.02,
             heartbeat_lost_s: 0.07,
             own_heartbeat_s: 0.02,

@@ -41,7 +41,7 @@ pub struct LocalSettings {
     pub frequencies: Option<usize>,
     /// The shape of the response within a neighbourhood.
     #[serde(default)]
-    pub curve: Curve,
+    pub curve: LocalModel,
     /// Which signal has noise.
     #[serde(default)]
     pub estimator: Estimator,
@@ -65,7 +65,7 @@ pub struct ResolutionPoint {
 /// What shape a response is given within a neighbourhood of frequencies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Curve {
+pub enum LocalModel {
     /// A constant: the weighted mean. Its bias grows with the square of the half-width.
     Constant,
     /// A parabola: bias of the fourth power.

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::check::{self, Finding};
 use super::place::line_of;
-use super::profiles::{self, Embedded};
+use super::profiles::{self, EmbeddedFile};
 use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, excited, relations, schema};
 
 /// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
@@ -129,7 +129,7 @@ fn checked(layers: &[Layer], purpose: Purpose) -> Result<Config, ConfigError> {
 }
 
 /// Checks a configuration that was changed after it was loaded.
-pub(crate) fn recheck(config: &Config) -> Result<(), ConfigError> {
+pub(crate) fn validate(config: &Config) -> Result<(), ConfigError> {
     let value = Value::try_from(config).map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
     let mut findings = check::check(&schema(), &value);
     findings.extend(cross_checks(config, Purpose::Model));
@@ -207,7 +207,7 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
     Ok(layers)
 }
 
-fn read(name: &str, known: &[Embedded], what: &'static str) -> Result<String, ConfigError> {
+fn read(name: &str, known: &[EmbeddedFile], what: &'static str) -> Result<String, ConfigError> {
     let path = Path::new(name);
     if !path.exists() {
         return Err(ConfigError::NotFound {
@@ -225,7 +225,7 @@ fn read(name: &str, known: &[Embedded], what: &'static str) -> Result<String, Co
 /// The text of an embedded file by its name, or of any file by its path.
 pub(crate) fn text_of(
     name: &str,
-    known: &[Embedded],
+    known: &[EmbeddedFile],
     what: &'static str,
 ) -> Result<String, ConfigError> {
     match profiles::find(known, name) {

@@ -2,7 +2,7 @@
 
 /// A TOML file of `bench-config/`, embedded.
 #[derive(Clone, Copy, Debug)]
-pub struct Embedded {
+pub struct EmbeddedFile {
     /// The name a person types.
     pub name: &'static str,
     /// The text of the file.
@@ -13,68 +13,68 @@ pub struct Embedded {
 pub const DEFAULT: &str = "stage";
 
 /// All profiles. A new one is one file and one line.
-pub const PROFILES: &[Embedded] = &[
-    Embedded {
+pub const PROFILES: &[EmbeddedFile] = &[
+    EmbeddedFile {
         name: "stage",
         text: include_str!("../../bench-config/stage.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "chapter2",
         text: include_str!("../../bench-config/chapter2.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "xy",
         text: include_str!("../../bench-config/xy.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "three-mass",
         text: include_str!("../../bench-config/three-mass.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "four-mass",
         text: include_str!("../../bench-config/four-mass.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "lab",
         text: include_str!("../../bench-config/lab.toml"),
     },
 ];
 
 /// All controllers. A new one is one file and one line.
-pub const CONTROLLERS: &[Embedded] = &[
-    Embedded {
+pub const CONTROLLERS: &[EmbeddedFile] = &[
+    EmbeddedFile {
         name: "fast",
         text: include_str!("../../bench-config/controllers/fast.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "slow",
         text: include_str!("../../bench-config/controllers/slow.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "lab",
         text: include_str!("../../bench-config/controllers/lab.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "xy",
         text: include_str!("../../bench-config/controllers/xy.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "three-mass",
         text: include_str!("../../bench-config/controllers/three-mass.toml"),
     },
-    Embedded {
+    EmbeddedFile {
         name: "four-mass",
         text: include_str!("../../bench-config/controllers/four-mass.toml"),
     },
 ];
 
 /// The entry called `name`.
-pub fn find(list: &[Embedded], name: &str) -> Option<Embedded> {
+pub fn find(list: &[EmbeddedFile], name: &str) -> Option<EmbeddedFile> {
     list.iter().copied().find(|entry| entry.name == name)
 }
 
 /// The names of a list, for messages.
-pub fn names(list: &[Embedded]) -> String {
+pub fn names(list: &[EmbeddedFile]) -> String {
     list.iter()
         .map(|entry| entry.name)
         .collect::<Vec<_>>()

@@ -41,7 +41,7 @@ fn asymmetry_offset(config: &Config) -> Option<Finding> {
 }
 
 /// Refuses a plant whose settings, each within its range, do not go together.
-pub(crate) fn relations_of(plant: &PlantSettings) -> Result<(), ConfigError> {
+pub(crate) fn check_plant_relations(plant: &PlantSettings) -> Result<(), ConfigError> {
     let findings = of(plant);
     let line = |finding: &Finding| format!("  `{}` {}", finding.path, finding.what);
     if findings.is_empty() {

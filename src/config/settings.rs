@@ -12,8 +12,8 @@ use super::excitation::{
 };
 use super::identify::IdentifySettings;
 use super::interlock::InterlockSettings;
-use super::motor_amplifier_probe::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::plant::PlantSettings;
+use super::rig::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::servo::LoopSettings;
 use super::sim::SimSettings;
 

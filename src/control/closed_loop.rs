@@ -6,7 +6,7 @@ use super::controller::continuous_response;
 use super::margins::{Margins, grid, margins};
 use super::{Controller, Section};
 use crate::config::Config;
-use crate::model::plant::{Chain, Mode};
+use crate::model::plant::{LoopPlant, Mode};
 
 /// Everything that decides the margins of a loop.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub struct ClosedLoop {
     modes: Vec<Mode>,
     force_constant_n_per_a: f64,
     sections: Vec<Section>,
-    chain: Chain,
+    chain: LoopPlant,
     controller: Controller,
 }
 
@@ -22,7 +22,7 @@ impl ClosedLoop {
     /// The loop of a configuration around `modes`.
     pub fn new(config: &Config, modes: Vec<Mode>, sections: Vec<Section>) -> ClosedLoop {
         ClosedLoop {
-            chain: Chain::new(config, &modes),
+            chain: LoopPlant::new(config, &modes),
             controller: Controller::new(&sections, config.servo.period_s()),
             modes,
             force_constant_n_per_a: config.motor.force_constant_n_per_a,
@@ -31,7 +31,7 @@ impl ClosedLoop {
     }
 
     /// Hold, amplifier, modes, delays and the probe's rate.
-    pub fn chain(&self) -> &Chain {
+    pub fn chain(&self) -> &LoopPlant {
         &self.chain
     }
 

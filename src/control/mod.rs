@@ -16,7 +16,7 @@ mod controller;
 mod file;
 mod margins;
 mod section;
-mod step_figures;
+mod step_metrics;
 mod swept;
 
 pub use biquad::Biquad;
@@ -26,5 +26,5 @@ pub use file::{ControllerError, ControllerFile, ControllerText};
 pub use margins::grid;
 pub use margins::{Crossing, Margins};
 pub use section::Section;
-pub use step_figures::{StepFigures, StepMeter, step_figures};
-pub use swept::swept_reference;
+pub use step_metrics::{StepMeter, StepMetrics, step_metrics};
+pub use swept::swept_reference_amplitudes;

@@ -21,7 +21,7 @@ const BETWEEN: usize = 32;
 
 /// The amplitudes in metres over the band of `chirp`, whose own are those of the command in amperes; the stage moves by
 /// `travel_m` at most, and no amplitude is above `most_m`.
-pub fn swept_reference(
+pub fn swept_reference_amplitudes(
     closed_loop: &ClosedLoop,
     chirp: &ChirpSettings,
     travel_m: f64,

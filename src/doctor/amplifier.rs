@@ -3,13 +3,13 @@
 
 use std::time::Duration;
 
-use bench_hal::can::bus::{Held, Host, SocketPort, Threads};
+use bench_hal::can::bus::{Host, NodeInUse, SocketPort, SystemHost};
 use bench_hal::can::drive::{DriveSettings, inspect};
 use bench_hal::can::vesc::VescSettings;
 
 use super::can_interface;
 use super::can_nodes::{self, Heard};
-use super::finding::{Finding, Verdict};
+use super::finding::{Finding, Severity};
 use super::report::Report;
 use super::{bus_load, drive, vesc};
 use crate::config::{AmplifierDevice, Config};
@@ -29,7 +29,7 @@ pub(super) fn examine(config: &Config, report: &mut Report) {
             let Some(host) = interface(&device.interface, device.bit_rate, report) else {
                 return;
             };
-            on_bus(&host, &settings, device.maximum_current_ratio, report);
+            examine_canopen_drive(&host, &settings, device.maximum_current_ratio, report);
         }
         AmplifierDevice::Vesc(device) => {
             let (load, finding) = bus_load::of_vesc(config.servo.rate_hz, device.bit_rate);
@@ -49,24 +49,29 @@ pub(super) fn examine(config: &Config, report: &mut Report) {
 }
 
 /// The bus behind an interface, if it can be used as it is.
-fn interface(name: &str, bit_rate: u32, report: &mut Report) -> Option<Threads<SocketPort>> {
+fn interface(name: &str, bit_rate: u32, report: &mut Report) -> Option<SystemHost<SocketPort>> {
     let found = can_interface::findings(&can_interface::gather(name, bit_rate));
     let is_usable = found
         .iter()
-        .all(|finding| finding.verdict < Verdict::Failure);
+        .all(|finding| finding.verdict < Severity::Failure);
     report.find(found);
     if !is_usable {
         return None;
     }
     let opened = SocketPort::open(name, bit_rate);
     opened
-        .map(Threads::new)
+        .map(SystemHost::new)
         .map_err(|error| report.find([Finding::refused("CAN interface", &error)]))
         .ok()
 }
 
 /// A CANopen drive on a bus: who is there, and what the drive says of itself. Read only.
-pub fn on_bus(host: &dyn Host, settings: &DriveSettings, maximum_ratio: f64, report: &mut Report) {
+pub fn examine_canopen_drive(
+    host: &dyn Host,
+    settings: &DriveSettings,
+    maximum_ratio: f64,
+    report: &mut Report,
+) {
     let node = settings.node;
     let _claim = match host.claim(node) {
         Ok(claim) => claim,
@@ -117,7 +122,7 @@ fn listen(
     }
 }
 
-fn held(subject: &'static str, Held { node, pid }: Held) -> Finding {
+fn held(subject: &'static str, NodeInUse { node, pid }: NodeInUse) -> Finding {
     let (who, remedy) = match pid {
         None => ("another process".into(), "end it first".into()),
         Some(pid) => (

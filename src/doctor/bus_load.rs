@@ -87,7 +87,7 @@ fn judge(load: &BusLoad, exchange: &str, bit_rate: u32) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::Severity;
 
     #[test]
     fn a_drive_at_1_khz_with_sync_and_100_heartbeats_a_second_loads_1_mbit_to_20_percent() {
@@ -98,7 +98,7 @@ mod tests {
             ..DriveSettings::default()
         });
         assert!((load.load - 0.204).abs() < 1e-9, "{load:?}");
-        assert_eq!(finding.verdict, Verdict::Ok);
+        assert_eq!(finding.verdict, Severity::Ok);
         assert!(
             finding.what.contains("20.4 % of 1000000 bit/s"),
             "{}",
@@ -111,8 +111,8 @@ mod tests {
         // 67 + 32 + floor(85 / 4) = 120 bits a set-point, 160 a STATUS: 5 kHz on 500 kbit/s are 121.6 %.
         let (load, finding) = of_vesc(5000.0, 500_000);
         assert!((load.load - 1.216).abs() < 1e-9, "{load:?}");
-        assert_eq!(finding.verdict, Verdict::Failure);
-        assert_eq!(of_vesc(3500.0, 500_000).1.verdict, Verdict::Warning);
-        assert_eq!(of_vesc(1000.0, 500_000).1.verdict, Verdict::Ok);
+        assert_eq!(finding.verdict, Severity::Failure);
+        assert_eq!(of_vesc(3500.0, 500_000).1.verdict, Severity::Warning);
+        assert_eq!(of_vesc(1000.0, 500_000).1.verdict, Severity::Ok);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bench_hal::can::bus::{Interface, KernelError, kernel_speaks_can};
+use bench_hal::can::bus::{Interface, KernelError, check_can_support};
 
 use super::finding::Finding;
 use super::system::line;
@@ -62,7 +62,7 @@ pub fn gather(name: &str, bit_rate: u32) -> InterfaceFacts {
     InterfaceFacts {
         name: name.to_string(),
         bit_rate,
-        kernel: kernel_speaks_can(),
+        kernel: check_can_support(),
         link,
         others: can_interfaces(net),
         queue_length: property("tx_queue_len").and_then(|text| text.parse().ok()),
@@ -220,7 +220,7 @@ fn queue(name: &str, length: u32) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict::{self, Failure, Note, Ok, Warning};
+    use crate::doctor::Severity::{self, Failure, Note, Ok, Warning};
 
     fn sound() -> Interface {
         Interface {
@@ -250,7 +250,7 @@ mod tests {
     }
 
     /// What is not ok.
-    fn verdicts(found: &[Finding]) -> Vec<(&'static str, Verdict)> {
+    fn verdicts(found: &[Finding]) -> Vec<(&'static str, Severity)> {
         found
             .iter()
             .map(|f| (f.subject, f.verdict))

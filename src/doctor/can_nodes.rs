@@ -227,7 +227,7 @@ fn cry(node: u8, emergency: &Emergency) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::Severity;
 
     fn heard(frames: &[CanFrame]) -> Heard {
         let mut heard = Heard {
@@ -240,7 +240,7 @@ mod tests {
         heard
     }
 
-    fn worst(heard: &Heard) -> Verdict {
+    fn worst(heard: &Heard) -> Severity {
         findings(heard, 5, 1_000_000)
             .iter()
             .map(|finding| finding.verdict)
@@ -267,10 +267,10 @@ mod tests {
 
     #[test]
     fn another_master_is_a_warning() {
-        assert_eq!(worst(&heard(&[sync::FRAME])), Verdict::Warning);
+        assert_eq!(worst(&heard(&[sync::FRAME])), Severity::Warning);
         assert_eq!(
             worst(&heard(&[nmt::Command::Start.frame(9)])),
-            Verdict::Warning
+            Severity::Warning
         );
         let commanded = heard(&[CanFrame::new(Id::standard(0x205), [0; 4])]);
         assert!(
@@ -280,7 +280,7 @@ mod tests {
         );
         assert_eq!(
             worst(&heard(&[CanFrame::new(Id::standard(0x206), [0; 4])])),
-            Verdict::Ok,
+            Severity::Ok,
             "another's drive"
         );
     }
@@ -295,10 +295,10 @@ mod tests {
         .frame(5);
         let found = findings(&heard(&[frame]), 5, 1_000_000);
         assert_eq!(found[1].what, "node 5 sent emergency 0x4210: drive too hot");
-        assert_eq!(found[1].verdict, Verdict::Warning);
+        assert_eq!(found[1].verdict, Severity::Warning);
         assert_eq!(
             worst(&heard(&[Emergency::default().frame(5)])),
-            Verdict::Note
+            Severity::Note
         );
     }
 
@@ -313,11 +313,14 @@ mod tests {
         ] {
             heard.take(BusEvent::Condition(condition));
         }
-        let verdicts: Vec<Verdict> = findings(&heard, 5, 1_000_000)
+        let verdicts: Vec<Severity> = findings(&heard, 5, 1_000_000)
             .iter()
             .map(|f| f.verdict)
             .collect();
-        assert_eq!(verdicts, [Verdict::Ok, Verdict::Failure, Verdict::Warning]);
+        assert_eq!(
+            verdicts,
+            [Severity::Ok, Severity::Failure, Severity::Warning]
+        );
     }
 
     #[test]

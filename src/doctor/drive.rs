@@ -205,7 +205,7 @@ fn watch(seen: &Inspection, settings: &DriveSettings) -> Option<Finding> {
     let needed =
         |address: &&_| settings.abort_connection.is_some() || **address != ABORT_CONNECTION;
     let lacking: Vec<String> = seen
-        .lacks
+        .missing_objects
         .iter()
         .filter(needed)
         .map(|address| address.to_string())
@@ -277,7 +277,7 @@ fn errors(seen: &Inspection) -> Vec<Finding> {
         .error_register
         .filter(|register| *register != 0)
         .map(|register| {
-            let words: Vec<&str> = emcy::register_words(register).collect();
+            let words: Vec<&str> = emcy::register_names(register).collect();
             let what = format!("error register 0x{register:02X}: {}", words.join(", "));
             Finding::warning(
                 SUBJECT,
@@ -304,8 +304,8 @@ fn errors(seen: &Inspection) -> Vec<Finding> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict::{self, Failure, Note, Warning};
-    use bench_hal::can::drive::{ExpectedIdentity, NEEDED, TorqueMode};
+    use crate::doctor::Severity::{self, Failure, Note, Warning};
+    use bench_hal::can::drive::{ExpectedIdentity, REQUIRED_OBJECTS, TorqueMode};
 
     fn sound() -> Inspection {
         Inspection {
@@ -318,14 +318,14 @@ mod tests {
             rated_current_a: Some(4.0),
             maximum_current_ratio: Some(1.5),
             past_errors: vec![],
-            lacks: vec![],
+            missing_objects: vec![],
         }
     }
 
-    fn bad(seen: Inspection, settings: &DriveSettings) -> Vec<(Verdict, String)> {
+    fn bad(seen: Inspection, settings: &DriveSettings) -> Vec<(Severity, String)> {
         let found = findings(&seen, settings, 1.5).into_iter();
         found
-            .filter(|finding| finding.verdict != Verdict::Ok)
+            .filter(|finding| finding.verdict != Severity::Ok)
             .map(|finding| (finding.verdict, finding.what))
             .collect()
     }
@@ -463,7 +463,7 @@ mod tests {
             ),
             (
                 Inspection {
-                    lacks: vec![ABORT_CONNECTION],
+                    missing_objects: vec![ABORT_CONNECTION],
                     ..sound()
                 },
                 Failure,
@@ -554,7 +554,7 @@ mod tests {
         assert_eq!(
             bad(
                 Inspection {
-                    lacks: vec![ABORT_CONNECTION],
+                    missing_objects: vec![ABORT_CONNECTION],
                     ..sound()
                 },
                 &own
@@ -564,7 +564,7 @@ mod tests {
         assert_eq!(
             bad(
                 Inspection {
-                    lacks: NEEDED.to_vec(),
+                    missing_objects: REQUIRED_OBJECTS.to_vec(),
                     ..sound()
                 },
                 &own

@@ -7,7 +7,7 @@ use serde::Serialize;
 /// How grave a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum Severity {
     /// As it should be.
     Ok,
     /// Good to know.
@@ -18,14 +18,14 @@ pub enum Verdict {
     Failure,
 }
 
-impl Verdict {
+impl Severity {
     /// As people read it.
     pub fn word(self) -> &'static str {
         match self {
-            Verdict::Ok => "ok",
-            Verdict::Note => "note",
-            Verdict::Warning => "WARNING",
-            Verdict::Failure => "FAILURE",
+            Severity::Ok => "ok",
+            Severity::Note => "note",
+            Severity::Warning => "WARNING",
+            Severity::Failure => "FAILURE",
         }
     }
 }
@@ -38,7 +38,7 @@ pub struct Finding {
     /// What was found, with its figures.
     pub what: String,
     /// How grave it is.
-    pub verdict: Verdict,
+    pub verdict: Severity,
     /// What to do about it.
     pub remedy: Option<String>,
 }
@@ -46,7 +46,7 @@ pub struct Finding {
 impl Finding {
     fn new(
         subject: &'static str,
-        verdict: Verdict,
+        verdict: Severity,
         what: impl Into<String>,
         remedy: Option<String>,
     ) -> Finding {
@@ -60,7 +60,7 @@ impl Finding {
 
     /// As it should be.
     pub fn ok(subject: &'static str, what: impl Into<String>) -> Finding {
-        Finding::new(subject, Verdict::Ok, what, None)
+        Finding::new(subject, Severity::Ok, what, None)
     }
 
     /// Good to know.
@@ -69,7 +69,7 @@ impl Finding {
         what: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Finding {
-        Finding::new(subject, Verdict::Note, what, Some(remedy.into()))
+        Finding::new(subject, Severity::Note, what, Some(remedy.into()))
     }
 
     /// The run starts nevertheless.
@@ -78,7 +78,7 @@ impl Finding {
         what: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Finding {
-        Finding::new(subject, Verdict::Warning, what, Some(remedy.into()))
+        Finding::new(subject, Severity::Warning, what, Some(remedy.into()))
     }
 
     /// The run does not start, or trips at once.
@@ -87,17 +87,17 @@ impl Finding {
         what: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Finding {
-        Finding::new(subject, Verdict::Failure, what, Some(remedy.into()))
+        Finding::new(subject, Severity::Failure, what, Some(remedy.into()))
     }
 
     /// The run does not start because of an error, whose text is `what; remedy`.
     pub fn refused(subject: &'static str, error: &impl Display) -> Finding {
         let (what, remedy) = parted(&error.to_string());
-        Finding::new(subject, Verdict::Failure, what, remedy)
+        Finding::new(subject, Severity::Failure, what, remedy)
     }
 
     /// No graver than `worst`.
-    pub fn at_most(self, worst: Verdict) -> Finding {
+    pub fn at_most(self, worst: Severity) -> Finding {
         Finding {
             verdict: self.verdict.min(worst),
             ..self
@@ -132,9 +132,12 @@ mod tests {
     fn verdicts_are_softened_never_sharpened() {
         let warning = Finding::warning("x", "y", "z");
         assert_eq!(
-            warning.clone().at_most(Verdict::Note).verdict,
-            Verdict::Note
+            warning.clone().at_most(Severity::Note).verdict,
+            Severity::Note
         );
-        assert_eq!(warning.at_most(Verdict::Failure).verdict, Verdict::Warning);
+        assert_eq!(
+            warning.at_most(Severity::Failure).verdict,
+            Severity::Warning
+        );
     }
 }

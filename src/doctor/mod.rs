@@ -38,15 +38,15 @@ use crate::config::Config;
 use crate::rig::devices;
 use crate::rt::thread::Pace;
 
-pub use amplifier::{on_bus, watch};
-pub use finding::{Finding, Verdict};
+pub use amplifier::{examine_canopen_drive, watch};
+pub use finding::{Finding, Severity};
 pub use report::{Figures, Report};
-pub use runs::Runs;
+pub use runs::RunChecks;
 pub use trial::{Lateness, Trial, trial};
 
 /// Looks at everything that the runs of `config` need. `runs` is what their commands say of it; `out` is the folder for
 /// recordings.
-pub fn examine(config: &Config, runs: &Runs, out: &Path) -> Report {
+pub fn examine(config: &Config, runs: &RunChecks, out: &Path) -> Report {
     let pace = if devices::is_simulated(config) {
         Pace::Virtual
     } else {
@@ -95,7 +95,7 @@ fn probe(config: &Config, report: &mut Report) {
     let found = serial_port::findings(&facts);
     let is_usable = found
         .iter()
-        .all(|finding| finding.verdict < Verdict::Failure);
+        .all(|finding| finding.verdict < Severity::Failure);
     report.find(found);
     if !is_usable {
         return;

@@ -323,7 +323,7 @@ fn damage(seen: &Readings) -> Finding {
 mod tests {
     use super::*;
     use crate::config::{Source, load};
-    use crate::doctor::Verdict::{self, Failure, Note, Warning};
+    use crate::doctor::Severity::{self, Failure, Note, Warning};
 
     fn lab() -> Config {
         load(&Source {
@@ -350,10 +350,10 @@ mod tests {
         }
     }
 
-    fn bad(seen: Readings) -> Vec<(Verdict, String)> {
+    fn bad(seen: Readings) -> Vec<(Severity, String)> {
         let found = findings(&seen, &lab()).into_iter();
         found
-            .filter(|finding| finding.verdict != Verdict::Ok)
+            .filter(|finding| finding.verdict != Severity::Ok)
             .map(|finding| (finding.verdict, finding.what))
             .collect()
     }

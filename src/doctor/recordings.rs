@@ -125,7 +125,7 @@ fn room(facts: &SpaceFacts) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::Severity;
 
     fn sound() -> SpaceFacts {
         SpaceFacts {
@@ -141,47 +141,47 @@ mod tests {
     #[test]
     fn each_trouble_has_its_verdict() {
         let cases = [
-            (sound(), Verdict::Ok),
+            (sound(), Severity::Ok),
             (
                 SpaceFacts {
                     free_bytes: None,
                     ..sound()
                 },
-                Verdict::Note,
+                Severity::Note,
             ),
             (
                 SpaceFacts {
                     free_bytes: Some(50_000_000),
                     ..sound()
                 },
-                Verdict::Warning,
+                Severity::Warning,
             ),
             (
                 SpaceFacts {
                     free_bytes: Some(4096),
                     ..sound()
                 },
-                Verdict::Failure,
+                Severity::Failure,
             ),
             (
                 SpaceFacts {
                     refused: Some("EROFS".into()),
                     ..sound()
                 },
-                Verdict::Failure,
+                Severity::Failure,
             ),
             (
                 SpaceFacts {
                     is_folder: false,
                     ..sound()
                 },
-                Verdict::Failure,
+                Severity::Failure,
             ),
         ];
         for (facts, expected) in cases {
             let found = findings(&facts);
             assert_eq!((found.len(), found[0].verdict), (1, expected), "{facts:?}");
-            assert_eq!(found[0].remedy.is_some(), expected != Verdict::Ok);
+            assert_eq!(found[0].remedy.is_some(), expected != Severity::Ok);
         }
     }
 

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::bus_load::BusLoad;
 use super::can_nodes::BusFigures;
 use super::drive::DriveFigures;
-use super::finding::{Finding, Verdict};
+use super::finding::{Finding, Severity};
 use super::readings::Readings;
 use super::recordings::Space;
 use super::runs::{CHIRP, CONTROL};
@@ -57,7 +57,7 @@ impl Report {
     pub(super) fn conclude(&mut self) {
         let stops = |run: &str, finding: &Finding| {
             let is_anothers = [CHIRP, CONTROL].contains(&finding.subject) && finding.subject != run;
-            finding.verdict == Verdict::Failure && !is_anothers
+            finding.verdict == Severity::Failure && !is_anothers
         };
         let could = |run: &&str| !self.findings.iter().any(|finding| stops(run, finding));
         self.could_start = [CHIRP, CONTROL].into_iter().filter(could).collect();
@@ -110,12 +110,12 @@ impl Report {
     }
 
     fn counts(&self) -> String {
-        let mut counts: BTreeMap<Verdict, usize> = BTreeMap::new();
+        let mut counts: BTreeMap<Severity, usize> = BTreeMap::new();
         self.findings
             .iter()
             .for_each(|finding| *counts.entry(finding.verdict).or_default() += 1);
-        let word = |verdict: Verdict, count: usize| match (verdict, count) {
-            (Verdict::Ok, _) => format!("{count} ok"),
+        let word = |verdict: Severity, count: usize| match (verdict, count) {
+            (Severity::Ok, _) => format!("{count} ok"),
             (_, 1) => format!("1 {}", verdict.word().to_lowercase()),
             _ => format!("{count} {}s", verdict.word().to_lowercase()),
         };

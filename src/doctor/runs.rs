@@ -13,7 +13,7 @@ pub const CONTROL: &str = "control";
 
 /// The answers of the commands' own checks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Runs {
+pub struct RunChecks {
     /// The travel in metres that `bench chirp` expects, or why it refuses.
     pub chirp: Result<f64, String>,
     /// The margins of the loop that `bench control` closes, or why it refuses.
@@ -44,7 +44,7 @@ pub fn kinds(config: &Config) -> Vec<Finding> {
 }
 
 /// What the commands' checks mean; `least` is the modulus margin asked for.
-pub fn findings(runs: &Runs, least: f64) -> Vec<Finding> {
+pub fn findings(runs: &RunChecks, least: f64) -> Vec<Finding> {
     vec![chirp(&runs.chirp), control(&runs.control, least)]
 }
 
@@ -110,7 +110,7 @@ fn refused(subject: &'static str, why: &str, otherwise: &str) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::Severity;
 
     fn margins(stable: bool) -> Margins {
         Margins {
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    fn verdicts(runs: &Runs) -> Vec<Verdict> {
+    fn verdicts(runs: &RunChecks) -> Vec<Severity> {
         findings(runs, 0.4)
             .iter()
             .map(|finding| finding.verdict)
@@ -135,26 +135,26 @@ mod tests {
 
     #[test]
     fn what_a_command_refuses_is_a_failure_with_its_remedy() {
-        let good = Runs {
+        let good = RunChecks {
             chirp: Ok(1e-4),
             control: Ok(margins(true)),
         };
-        assert_eq!(verdicts(&good), [Verdict::Ok, Verdict::Ok]);
+        assert_eq!(verdicts(&good), [Severity::Ok, Severity::Ok]);
         let why = "refused: margin 0.3; choose a controller; nothing moved".to_string();
-        let bad = Runs {
+        let bad = RunChecks {
             control: Err(why),
             ..good.clone()
         };
-        assert_eq!(verdicts(&bad), [Verdict::Ok, Verdict::Failure]);
+        assert_eq!(verdicts(&bad), [Severity::Ok, Severity::Failure]);
         assert_eq!(
             findings(&bad, 0.4)[1].remedy.as_deref(),
             Some("choose a controller")
         );
-        let wild = Runs {
+        let wild = RunChecks {
             chirp: Err("too far".into()),
             control: Ok(margins(false)),
         };
-        assert_eq!(verdicts(&wild), [Verdict::Failure, Verdict::Warning]);
+        assert_eq!(verdicts(&wild), [Severity::Failure, Severity::Warning]);
         assert!(
             findings(&wild, 0.0)[0]
                 .remedy

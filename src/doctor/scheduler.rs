@@ -5,7 +5,7 @@ use nix::sched::{CpuSet, sched_getaffinity};
 use nix::sys::resource::{Resource, getrlimit};
 use nix::unistd::Pid;
 
-use super::finding::{Finding, Verdict, parted};
+use super::finding::{Finding, Severity, parted};
 use super::trial::Trial;
 use crate::config::LoopSettings;
 use crate::rt::thread::{Pace, Scheduling};
@@ -57,9 +57,9 @@ fn allowed() -> Vec<usize> {
 /// What that means for a loop at this pace: a run starts without all of it, and says so.
 pub fn findings(facts: &SchedulerFacts, pace: Pace) -> Vec<Finding> {
     let worst = if pace == Pace::Virtual {
-        Verdict::Note
+        Severity::Note
     } else {
-        Verdict::Warning
+        Severity::Warning
     };
     let findings = [Some(priority(facts)), Some(memory(facts)), processor(facts)];
     findings
@@ -186,7 +186,7 @@ mod tests {
         assert!(
             findings(&granted(), Pace::Realtime)
                 .iter()
-                .all(|f| f.verdict == Verdict::Ok)
+                .all(|f| f.verdict == Severity::Ok)
         );
         assert_eq!(
             findings(
@@ -205,7 +205,7 @@ mod tests {
     fn what_is_refused_is_a_warning_with_limit_and_remedy_and_no_failure() {
         let found = findings(&refused(), Pace::Realtime);
         assert!(
-            found.iter().all(|f| f.verdict == Verdict::Warning),
+            found.iter().all(|f| f.verdict == Severity::Warning),
             "{found:?}"
         );
         assert!(
@@ -228,7 +228,7 @@ mod tests {
         assert!(
             findings(&refused(), Pace::Virtual)
                 .iter()
-                .all(|f| f.verdict == Verdict::Note)
+                .all(|f| f.verdict == Severity::Note)
         );
     }
 

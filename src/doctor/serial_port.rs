@@ -220,7 +220,7 @@ fn forbidden(facts: &PortFacts, device: &Path) -> Finding {
 
 /// Why the probe could not be opened; what [`findings`] has said already is not said twice.
 pub fn refusal(error: &ProbeError, facts: &PortFacts) -> Finding {
-    let ProbeError::Serial(SerialError::Held { pid, .. }) = error else {
+    let ProbeError::Serial(SerialError::PortInUse { pid, .. }) = error else {
         return Finding::refused(SUBJECT, error);
     };
     let pids: Vec<u32> = pid.map_or_else(|| facts.holders.clone(), |pid| vec![pid]);
@@ -283,7 +283,7 @@ fn latency(usb: &Usb) -> Option<Finding> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict::{Failure, Note as Noted, Ok, Warning};
+    use crate::doctor::Severity::{Failure, Note as Noted, Ok, Warning};
 
     fn sound() -> PortFacts {
         PortFacts {
@@ -417,7 +417,7 @@ mod tests {
     #[test]
     fn who_holds_a_port_is_named_by_lock_or_by_its_open_files() {
         let held = |pid| {
-            ProbeError::Serial(SerialError::Held {
+            ProbeError::Serial(SerialError::PortInUse {
                 path: "/dev/ttyUSB0".into(),
                 pid,
             })

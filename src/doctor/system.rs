@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nix::time::{ClockId, clock_getres};
 
-use super::finding::{Finding, Verdict};
+use super::finding::{Finding, Severity};
 use crate::rt::thread::Pace;
 
 /// What the system is.
@@ -81,9 +81,9 @@ fn governors(folder: &Path) -> Vec<String> {
 /// What that means for a loop at this pace.
 pub fn findings(facts: &SystemFacts, pace: Pace) -> Vec<Finding> {
     let worst = if pace == Pace::Virtual {
-        Verdict::Note
+        Severity::Note
     } else {
-        Verdict::Warning
+        Severity::Warning
     };
     let findings = [
         kernel(facts),
@@ -179,11 +179,11 @@ mod tests {
         }
     }
 
-    fn verdicts(facts: &SystemFacts, pace: Pace) -> Vec<(&'static str, Verdict)> {
+    fn verdicts(facts: &SystemFacts, pace: Pace) -> Vec<(&'static str, Severity)> {
         findings(facts, pace)
             .into_iter()
             .map(|f| (f.subject, f.verdict))
-            .filter(|(_, v)| *v != Verdict::Ok)
+            .filter(|(_, v)| *v != Severity::Ok)
             .collect()
     }
 
@@ -216,49 +216,49 @@ mod tests {
                     preemption: "PREEMPT_DYNAMIC".into(),
                     ..sound()
                 },
-                ("kernel", Verdict::Note),
+                ("kernel", Severity::Note),
             ),
             (
                 SystemFacts {
                     clock_step_ns: 4_000_000,
                     ..sound()
                 },
-                ("clock", Verdict::Warning),
+                ("clock", Severity::Warning),
             ),
             (
                 SystemFacts {
                     governors: vec!["powersave".into()],
                     ..sound()
                 },
-                ("processors", Verdict::Warning),
+                ("processors", Severity::Warning),
             ),
             (
                 SystemFacts {
                     governors: vec!["performance".into(), "schedutil".into()],
                     ..sound()
                 },
-                ("processors", Verdict::Warning),
+                ("processors", Severity::Warning),
             ),
             (
                 SystemFacts {
                     rt_runtime_us: Some(100_000),
                     ..sound()
                 },
-                ("throttling", Verdict::Warning),
+                ("throttling", Severity::Warning),
             ),
             (
                 SystemFacts {
                     rt_runtime_us: Some(0),
                     ..sound()
                 },
-                ("throttling", Verdict::Warning),
+                ("throttling", Severity::Warning),
             ),
         ];
         for (facts, expected) in cases {
             assert_eq!(verdicts(&facts, Pace::Realtime), [expected]);
             assert_eq!(
                 verdicts(&facts, Pace::Virtual),
-                [(expected.0, Verdict::Note)],
+                [(expected.0, Severity::Note)],
                 "nobody waits for a clock"
             );
         }

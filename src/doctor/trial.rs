@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::finding::Finding;
 use crate::config::LoopSettings;
 use crate::rt::clock::{Clock, Realtime};
-use crate::rt::outlet::Outlet;
+use crate::rt::publisher::Publisher;
 use crate::rt::thread::{Pace, Scheduling, become_realtime};
 
 /// How long it is watched.
@@ -46,7 +46,7 @@ pub struct Lateness {
     pub max_s: f64,
 }
 
-/// Runs such a thread for about a second. Its memory is unlocked again.
+/// RunChecks such a thread for about a second. Its memory is unlocked again.
 pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
     let settings = settings.clone();
     let work = move || {
@@ -69,13 +69,13 @@ pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
 fn watch(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
     let ticks = (settings.rate_hz * WATCHED.as_secs_f64()).ceil() as u64;
     let mut late_ns: Vec<u64> = Vec::with_capacity(ticks as usize);
-    let (outlet, mut clock) = (
-        Outlet::new(RingBuffer::new(1).0),
+    let (publisher, mut clock) = (
+        Publisher::new(RingBuffer::new(1).0),
         Realtime::new(settings.period_s()),
     );
     let (mut number, mut missed) = (0, 0);
     while number < ticks {
-        let moment = clock.wait(number, &outlet);
+        let moment = clock.wait(number, &publisher);
         let slept_through_ns = f64::from(moment.missed) * settings.period_s() * 1e9;
         late_ns.push(
             moment.woke_ns.saturating_sub(moment.tick.scheduled_ns) + slept_through_ns as u64,
@@ -156,7 +156,7 @@ pub fn finding(lateness: &Lateness, overruns_per_s: u32, pace: Pace) -> Finding 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::Severity;
 
     fn lateness(late_ns: &[u64], missed: u64) -> Lateness {
         let scheduling = Scheduling {
@@ -185,18 +185,18 @@ mod tests {
     fn a_tick_late_is_a_warning_and_what_trips_the_interlock_a_failure() {
         let verdict =
             |late_ns: &[u64], missed, pace| finding(&lateness(late_ns, missed), 50, pace).verdict;
-        assert_eq!(verdict(&[5000, 900_000], 0, Pace::Realtime), Verdict::Ok);
+        assert_eq!(verdict(&[5000, 900_000], 0, Pace::Realtime), Severity::Ok);
         assert_eq!(
             verdict(&[5000, 1_100_000], 1, Pace::Realtime),
-            Verdict::Warning
+            Severity::Warning
         );
         assert_eq!(
             verdict(&[5000, 51_500_000], 51, Pace::Realtime),
-            Verdict::Failure
+            Severity::Failure
         );
         assert_eq!(
             verdict(&[5000, 51_500_000], 51, Pace::Virtual),
-            Verdict::Note
+            Severity::Note
         );
     }
 

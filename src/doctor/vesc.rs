@@ -60,10 +60,10 @@ fn current(node: u8, tenths: i16) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict::{self, Failure, Ok, Warning};
+    use crate::doctor::Severity::{self, Failure, Ok, Warning};
     use std::time::Duration;
 
-    fn verdicts(vesc: u8, count: u64, tenths: i16) -> Vec<Verdict> {
+    fn verdicts(vesc: u8, count: u64, tenths: i16) -> Vec<Severity> {
         let settings = VescSettings {
             node: 23,
             current_limit_a: 1.0,

@@ -2,7 +2,7 @@
 
 use super::{Amplitude, Excitation, Extremes};
 use crate::config::{Config, ExcitationKind};
-use crate::model::plant::Sampled;
+use crate::model::plant::DiscretePlant;
 
 /// A periodic analysis takes lines below a hundredth of the largest for ones that were not excited; half of that is kept clear.
 pub const LARGEST_SPAN: f64 = 50.0;
@@ -80,7 +80,7 @@ pub enum ExcitationError {
 pub fn check(
     excitation: &(impl Excitation + ?Sized),
     config: &Config,
-    plant: &Sampled,
+    plant: &DiscretePlant,
 ) -> Result<Extremes, ExcitationError> {
     span(config)?;
     let extremes = Extremes::of(excitation, config, plant);
@@ -177,12 +177,14 @@ mod tests {
         let mut config = load(&Source::default()).unwrap();
         change(&mut config);
         let structure = crate::model::plant::build(&config.plant).unwrap();
-        let modes = crate::model::plant::Modal::of(&structure).unwrap().modes;
+        let modes = crate::model::plant::ModalModel::of(&structure)
+            .unwrap()
+            .modes;
         let (bandwidth_hz, force_constant) = (
             config.amplifier.bandwidth_hz,
             config.motor.force_constant_n_per_a,
         );
-        let plant = Sampled::new(
+        let plant = DiscretePlant::new(
             &modes,
             bandwidth_hz,
             force_constant,

@@ -2,7 +2,7 @@
 
 use super::Excitation;
 use crate::config::Config;
-use crate::model::plant::Sampled;
+use crate::model::plant::DiscretePlant;
 
 /// The extremes of an excitation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ impl Extremes {
     pub fn of(
         excitation: &(impl Excitation + ?Sized),
         config: &Config,
-        plant: &Sampled,
+        plant: &DiscretePlant,
     ) -> Extremes {
         let mut motion = plant.at_rest();
         let course = (0..excitation.ticks()).map(|tick| {

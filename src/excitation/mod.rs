@@ -34,7 +34,7 @@ pub use prbs::prbs;
 pub use quiet::Quiet;
 pub use reference::{Reference, ReferenceError, reference, reference_text};
 pub use repeated::Repeated;
-pub use shape::{Cap, MOST_POINTS, shaped};
+pub use shape::{CurrentLimit, MOST_POINTS, shaped_amplitude};
 pub use staircase::Staircase;
 pub use stepped_sine::SteppedSine;
 

@@ -16,23 +16,23 @@ const CLOSE: f64 = 0.01;
 
 /// What the current may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cap {
+pub struct CurrentLimit {
     /// Amplitude in amperes at any frequency.
     pub current_a: f64,
     /// Change in amperes per second: A <= this/(2 pi f).
     pub slew_a_per_s: f64,
 }
 
-impl Cap {
+impl CurrentLimit {
     /// A share of what motor and amplifier allow; a sine of the continuous current has sqrt 2 times its amplitude.
-    pub fn of(config: &Config) -> Cap {
+    pub fn of(config: &Config) -> CurrentLimit {
         let (motor, amplifier, share) =
             (&config.motor, &config.amplifier, config.shape.current_ratio);
         let continuous_a = std::f64::consts::SQRT_2 * motor.continuous_current_a();
         let current_a = continuous_a
             .min(motor.peak_current_a())
             .min(amplifier.current_limit_a);
-        Cap {
+        CurrentLimit {
             current_a: share * current_a,
             slew_a_per_s: share * amplifier.slew_limit_a_per_s,
         }
@@ -47,7 +47,12 @@ impl Cap {
 /// The amplitude by which |G| moves the stage by `travel_m`, up to `cap`; `response` is (frequency in hertz, |G| in metres per
 /// ampere) with rising frequencies. At most [`MOST_POINTS`] points. `span` is how many times the least amplitude the largest
 /// may be.
-pub fn shaped(response: &[(f64, f64)], travel_m: f64, cap: Cap, span: f64) -> Vec<AmplitudePoint> {
+pub fn shaped_amplitude(
+    response: &[(f64, f64)],
+    travel_m: f64,
+    cap: CurrentLimit,
+    span: f64,
+) -> Vec<AmplitudePoint> {
     let wanted = |(frequency_hz, gain): &(f64, f64)| {
         let limit_a = cap.at_a(*frequency_hz);
         let current_a = if *gain > 0.0 {
@@ -108,7 +113,7 @@ mod tests {
     use super::*;
     use crate::excitation::Amplitude;
 
-    const CAP: Cap = Cap {
+    const CAP: CurrentLimit = CurrentLimit {
         current_a: 2.0,
         slew_a_per_s: 4000.0,
     };
@@ -129,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_displacement_is_alike_where_the_current_suffices_and_the_current_full_where_not() {
-        let points = shaped(&response(), 100e-6, CAP, f64::INFINITY);
+        let points = shaped_amplitude(&response(), 100e-6, CAP, f64::INFINITY);
         assert!(
             (10..=MOST_POINTS).contains(&points.len()),
             "{}",
@@ -161,7 +166,7 @@ mod tests {
 
     #[test]
     fn the_largest_is_no_more_times_the_least_than_asked_for() {
-        let points = shaped(&response(), 100e-6, CAP, 50.0);
+        let points = shaped_amplitude(&response(), 100e-6, CAP, 50.0);
         let least = points
             .iter()
             .map(|p| p.current_a)
@@ -179,14 +184,14 @@ mod tests {
         let noisy: Vec<(f64, f64)> = (1..3000)
             .map(|k| (f64::from(k), 1e-6 * (1.0 + f64::from(k * k % 97))))
             .collect();
-        let points = shaped(&noisy, 1e-4, CAP, f64::INFINITY);
+        let points = shaped_amplitude(&noisy, 1e-4, CAP, f64::INFINITY);
         assert_eq!(points.len(), MOST_POINTS);
         assert!(
             points
                 .windows(2)
                 .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz)
         );
-        let dead = shaped(&[(1.0, 0.0), (10.0, 0.0)], 1e-4, CAP, f64::INFINITY);
+        let dead = shaped_amplitude(&[(1.0, 0.0), (10.0, 0.0)], 1e-4, CAP, f64::INFINITY);
         assert_eq!(
             dead.iter()
                 .map(|p| (p.current_a * 1e9).round() / 1e9)

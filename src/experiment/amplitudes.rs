@@ -37,7 +37,7 @@ impl ModeOverAmplitude {
 /// The modes of the first run in the others. Of z = (x - x_1)/sqrt(sigma^2 + sigma_1^2), |z| is beyond chance where
 /// erfc(|z|/sqrt 2) < 1 %/(all figures that are compared): so all figures of a linear stage together are said to shift once in a hundred
 /// campaigns at most (Bonferroni).
-pub fn over_amplitude(runs: &[Vec<FittedMode>]) -> Vec<ModeOverAmplitude> {
+pub fn modes_over_amplitude(runs: &[Vec<FittedMode>]) -> Vec<ModeOverAmplitude> {
     let Some((first, others)) = runs.split_first() else {
         return Vec::new();
     };
@@ -117,7 +117,7 @@ mod tests {
             vec![mode(180.3, 0.01), mode(500.0, 0.00403)],
             vec![mode(180.0, 0.01), mode(504.0, 0.004), mode(530.0, 0.004)],
         ];
-        let modes = over_amplitude(&runs);
+        let modes = modes_over_amplitude(&runs);
         assert_eq!(modes.len(), 2);
         // sigma of a difference is 1.41e-3; twelve figures are compared, |z| < 3.34 is chance: 4.7e-3.
         assert!(!modes[0].shifts(), "1.7e-3: {:?}", modes[0]);
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn a_mode_is_no_other_one_that_happens_to_be_near() {
         // 510 is nearer to 504 than half of the way from 500; 540 is farther than 5 % from 510.
-        let modes = over_amplitude(&[
+        let modes = modes_over_amplitude(&[
             vec![mode(500.0, 0.01), mode(510.0, 0.01)],
             vec![mode(508.0, 0.01)],
             Vec::new(),
@@ -144,10 +144,10 @@ mod tests {
             .map(|mode| mode.by_run.iter().flatten().count())
             .collect::<Vec<_>>();
         assert_eq!(found, [1, 2]);
-        let far = over_amplitude(&[vec![mode(510.0, 0.01)], vec![mode(540.0, 0.01)]]);
+        let far = modes_over_amplitude(&[vec![mode(510.0, 0.01)], vec![mode(540.0, 0.01)]]);
         assert!(far[0].by_run[1].is_none() && !far[0].shifts());
-        assert!(over_amplitude(&[]).is_empty());
-        let free = over_amplitude(&[
+        assert!(modes_over_amplitude(&[]).is_empty());
+        let free = modes_over_amplitude(&[
             vec![mode(0.0, 0.0), mode(180.0, 0.01)],
             vec![mode(0.0, 0.0)],
         ]);
@@ -178,7 +178,7 @@ mod tests {
         };
         let shifted = (0..2000)
             .filter(|_| {
-                over_amplitude(&[run(), run(), run()])
+                modes_over_amplitude(&[run(), run(), run()])
                     .iter()
                     .any(|mode| mode.shifts())
             })

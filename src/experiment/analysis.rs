@@ -6,15 +6,17 @@ use super::closed_loop::{self, ClosedLoopError, ClosedResponses};
 use super::ending::Ending;
 use super::gathered::{Gathered, Ran};
 use super::patterns::{Taken, taken};
-use super::plan::{KIND, Kind};
+use super::plan::{KIND, RunKind};
 use crate::config::Config;
 use crate::excitation::{self, Excitation};
-use crate::identify::delay::{self, Delay};
+use crate::identify::delay::{self, ExcessDelay};
 use crate::identify::linearity::Linearity;
-use crate::identify::modal::{self, FitError, ModalFit, View};
-use crate::identify::verdict::{Case, Verdict, verdict};
-use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, blocks, response};
-use crate::model::plant::{self, Chain, Modal, Mode, PlantError, Sign};
+use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
+use crate::identify::verdict::{Verdict, VerdictInput, verdict};
+use crate::identify::{
+    EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, frf_data, response,
+};
+use crate::model::plant::{self, LoopPlant, ModalModel, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
 use crate::rt::record::flag;
@@ -66,7 +68,7 @@ pub struct Analysis {
     /// Mean time in seconds from a command to the position that its reading shows, by the model.
     pub delay_s: f64,
     /// How much later than the model the chain answers, by its phases up to the last mode of the model.
-    pub beyond: Option<Delay>,
+    pub beyond: Option<ExcessDelay>,
     /// Missing ticks that were filled in: the current held, the position on a straight line.
     pub filled_ticks: u64,
     /// The modes that the response shows, or why none are told.
@@ -87,7 +89,7 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     let closed = recording
         .metadata()
         .get(KIND)
-        .is_some_and(|kind| kind == Kind::Control.name());
+        .is_some_and(|kind| kind == RunKind::Control.name());
     let Ran {
         loop_signals,
         filled_ticks,
@@ -113,7 +115,7 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
 /// A response in both its forms.
 pub(super) struct Seen {
     pub(super) frf: Frf,
-    pub(super) blocks: Vec<Block>,
+    pub(super) frf_data: Vec<FrfDatum>,
     pub(super) closed: Option<ClosedResponses>,
 }
 
@@ -122,26 +124,28 @@ fn open_loop(
     band_hz: (f64, f64),
     config: &Config,
 ) -> Result<(Seen, Option<Linearity>), AnalysisError> {
-    let (frf, blocks, linearity) = match taken(signals, &excitation::of(config).pattern(), band_hz)?
-    {
-        Taken::Lines(frf, blocks, linearity) => (frf, blocks, linearity.map(|boxed| *boxed)),
-        Taken::Record(signals) => {
-            let frf = response(&signals, band_hz, &config.identify)?;
-            (
-                frf,
-                blocks(
-                    &signals,
-                    band_hz,
-                    &EstimatorSettings::from(&config.identify),
-                )?,
-                None,
-            )
-        }
-    };
+    let (frf, frf_data, linearity) =
+        match taken(signals, &excitation::of(config).pattern(), band_hz)? {
+            Taken::Lines(frf, frf_data, linearity) => {
+                (frf, frf_data, linearity.map(|boxed| *boxed))
+            }
+            Taken::Record(signals) => {
+                let frf = response(&signals, band_hz, &config.identify)?;
+                (
+                    frf,
+                    frf_data(
+                        &signals,
+                        band_hz,
+                        &EstimatorSettings::from(&config.identify),
+                    )?,
+                    None,
+                )
+            }
+        };
     Ok((
         Seen {
             frf,
-            blocks,
+            frf_data,
             closed: None,
         },
         linearity,
@@ -152,28 +156,28 @@ fn open_loop(
 fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, AnalysisError> {
     let Seen {
         frf,
-        blocks,
+        frf_data,
         closed,
     } = seen;
-    let modal = Modal::of(&plant::build(&config.plant)?)?;
+    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
     let last_rad_s = LAST_MODE
         * modal
             .modes
             .iter()
             .map(|mode| mode.omega_rad_s)
             .fold(0.0, f64::max);
-    let chain = Chain::of_mean_age(config, &modal.modes);
+    let chain = LoopPlant::with_mean_age(config, &modal.modes);
     let model: Vec<_> = frf
         .frequency_hz
         .iter()
         .map(|f| chain.response(2.0 * std::f64::consts::PI * f))
         .collect();
     let beyond = delay::beyond(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
-    let fit = modal::fit(&blocks, &View::Bench(config));
+    let fit = modal::fit(&frf_data, &MeasurementChain::Bench(config));
     let verdict = judge(
         &fit,
-        &blocks,
-        &View::Bench(config),
+        &frf_data,
+        &MeasurementChain::Bench(config),
         last_rad_s,
         Some(&modal),
     )?;
@@ -201,23 +205,23 @@ impl Analysis {
 /// What the fit says of CNMP zeros up to `up_to_rad_s`, beside the modes that the model has there.
 pub(super) fn judge(
     fit: &Result<ModalFit, FitError>,
-    blocks: &[Block],
-    view: &View<'_>,
+    frf_data: &[FrfDatum],
+    view: &MeasurementChain<'_>,
     up_to_rad_s: f64,
-    model: Option<&Modal>,
+    model: Option<&ModalModel>,
 ) -> Result<Verdict, AnalysisError> {
     let fit = match fit {
         Ok(fit) => fit,
         Err(error) => return Ok(Verdict::undecided(error.to_string())),
     };
     let shows =
-        |(mode, sign): &(&Mode, Sign)| *sign != Sign::None && mode.omega_rad_s <= up_to_rad_s;
+        |(mode, sign): &(&Mode, Sign)| *sign != Sign::Hidden && mode.omega_rad_s <= up_to_rad_s;
     let expected_modes =
         model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
-    Ok(verdict(&Case {
+    Ok(verdict(&VerdictInput {
         fit,
         view,
-        blocks,
+        frf_data,
         up_to_rad_s,
         expected_modes,
     })?)

@@ -2,7 +2,7 @@
 
 use crate::config::{CalibrateSettings, Config, ScaleBy};
 use crate::excitation::Staircase;
-use crate::identify::Moments;
+use crate::identify::RunningStats;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
 
@@ -140,9 +140,9 @@ fn straight(fit: &Fit, settings: &CalibrateSettings) -> Result<(), FitError> {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
-    command_a: Moments,
-    position_m: Moments,
-    actual_a: Moments,
+    command_a: RunningStats,
+    position_m: RunningStats,
+    actual_a: RunningStats,
 }
 
 fn levels(recording: &Recording, staircase: &Staircase) -> Result<Vec<Level>, FitError> {

@@ -6,10 +6,10 @@ use super::analysis::{AnalysisError, Seen};
 use super::plan::{Plan, PlanError};
 use crate::config::{Config, ReferenceSettings};
 use crate::control::{ClosedLoop, ControllerError, Margins};
-use crate::identify::joint::{self, Joint, LoopSignals};
+use crate::identify::joint::{self, JointEstimate, LoopSignals};
 use crate::identify::modal::Estimate;
 use crate::identify::{EstimatorSettings, Frf};
-use crate::model::plant::{self, Modal};
+use crate::model::plant::{self, ModalModel};
 use crate::recording::Recording;
 
 /// A recording of a closed loop that shows no plant.
@@ -69,9 +69,9 @@ pub(super) fn seen(
     config: &Config,
 ) -> Result<Seen, AnalysisError> {
     swept(&config.control.reference)?;
-    let Joint {
+    let JointEstimate {
         plant,
-        blocks,
+        frf_data,
         complementary,
         sensitivity,
         loop_gain,
@@ -94,7 +94,7 @@ pub(super) fn seen(
     };
     Ok(Seen {
         frf: plant,
-        blocks,
+        frf_data,
         closed: Some(closed),
     })
 }
@@ -115,7 +115,7 @@ fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
 
 /// The loop of the recorded controller around the configured model.
 fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, AnalysisError> {
-    let modes = Modal::of(&plant::build(&config.plant)?)?.modes;
+    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
     let plan = Plan::of(recording).map_err(ClosedLoopError::Plan)?;
     let text = plan
         .controller

@@ -3,7 +3,7 @@
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
 use crate::rt::record::EventKind;
-use crate::rt::thread::Ended;
+use crate::rt::thread::LoopOutcome;
 
 /// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,8 +18,8 @@ pub enum Ending {
     CutOff,
 }
 
-impl From<&Ended> for Ending {
-    fn from(ended: &Ended) -> Ending {
+impl From<&LoopOutcome> for Ending {
+    fn from(ended: &LoopOutcome) -> Ending {
         Ending::by(ended.trip, ended.completed)
     }
 }

@@ -3,7 +3,7 @@
 use super::AnalysisError;
 use crate::identify::align::Readings;
 use crate::identify::joint::LoopSignals;
-use crate::identify::{Moments, Signals, edges};
+use crate::identify::{RunningStats, Signals, edges};
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
 
@@ -30,7 +30,7 @@ pub(super) struct Gathered {
     late: Vec<f64>,
     readings: Readings,
     /// Mean, and extremes, of the time in seconds from a tick to the measurement it had: minus the age.
-    offset_s: Moments,
+    offset_s: RunningStats,
     offset_range_s: (f64, f64),
     before: Option<TickRecord>,
     first_s: f64,
@@ -59,7 +59,7 @@ impl Gathered {
             reference_m: Vec::new(),
             late: Vec::new(),
             readings: Readings::default(),
-            offset_s: Moments::default(),
+            offset_s: RunningStats::default(),
             offset_range_s: (f64::INFINITY, f64::NEG_INFINITY),
             before: None,
             first_s: 0.0,

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::config::{Config, ReferenceSettings};
-use crate::control::{StepFigures, StepMeter};
-use crate::identify::Moments;
+use crate::control::{StepMeter, StepMetrics};
+use crate::identify::RunningStats;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::flag;
 
@@ -14,7 +14,7 @@ pub struct Measured {
     /// Settling and overshoot, where the reference is a step; a settling band (2 % of the step) below three sigma of the
     /// steady state is lost in it, and there is no settling time.
     #[serde(flatten)]
-    pub step: Option<StepFigures>,
+    pub step: Option<StepMetrics>,
     /// Mean of r - y in metres over the steady state.
     pub steady_state_mean_error_m: f64,
     /// Standard deviation of r - y in metres over the steady state.
@@ -35,7 +35,7 @@ pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured
     };
     let steady = change.saturating_add(tick(config.control.steady_after_s));
     let (mut step, mut error, mut origin_m, mut active) =
-        (StepMeter::new(height_m), Moments::default(), 0.0, 0);
+        (StepMeter::new(height_m), RunningStats::default(), 0.0, 0);
     for record in recording.ticks()? {
         let record = record?;
         if record.flags & flag::ACTIVE == 0 {
@@ -61,7 +61,7 @@ pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured
     let step = (height_m != 0.0).then(|| {
         let figures = step.figures(config.servo.period_s());
         let seen = 0.02 * height_m.abs() > 3.0 * sigma;
-        StepFigures {
+        StepMetrics {
             settling_time_s: figures.settling_time_s.filter(|_| seen),
             ..figures
         }

@@ -5,13 +5,13 @@
 //! | from rest to rest, once | the whole record, as configured |
 //! | from rest to rest, repeated | the mean of the repetitions, tick by tick, as one record: the same signal with less noise |
 //! | periodic | each line from the periods after the settled ones, the noise from their scatter, and, where lines were left out, odd distortion as a noise of its own |
-//! | one sine after the other | each sine from its blocks, likewise |
+//! | one sine after the other | each sine from its frf_data, likewise |
 
 use crate::excitation::{Pattern, Window};
 use crate::identify::harmonics::harmonics;
 use crate::identify::linearity::Linearity;
 use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::{Block, Frf, IdentifyError, Signals, repeated};
+use crate::identify::{Frf, FrfDatum, IdentifyError, Signals, repeated};
 
 /// Lines to either side over which the noise is averaged for a fit.
 const NEIGHBOURS: usize = 4;
@@ -21,7 +21,7 @@ pub(super) enum Taken {
     /// A record from rest to rest.
     Record(Signals),
     /// A response at single frequencies; how linear it is, where lines between were left out.
-    Lines(Frf, Vec<Block>, Option<Box<Linearity>>),
+    Lines(Frf, Vec<FrfDatum>, Option<Box<Linearity>>),
 }
 
 /// Takes a run apart.
@@ -46,15 +46,15 @@ pub(super) fn taken(
                 period: *period,
                 skip: *skip,
             };
-            let Periods { frf, blocks, .. } = periodic::estimate(&whole, band_hz, repetition)?;
+            let Periods { frf, frf_data, .. } = periodic::estimate(&whole, band_hz, repetition)?;
             let linearity =
                 harmonics(&whole, band_hz, repetition)?.map(|lines| Box::new(Linearity::of(lines)));
-            let blocks = linearity
+            let frf_data = linearity
                 .as_ref()
-                .map_or_else(|| blocks.clone(), |l| l.with_odd_distortion(&blocks));
+                .map_or_else(|| frf_data.clone(), |l| l.with_odd_distortion(&frf_data));
             Ok(Taken::Lines(
                 frf,
-                with_noise_of_neighbours(&blocks),
+                with_noise_of_neighbours(&frf_data),
                 linearity,
             ))
         }
@@ -62,17 +62,18 @@ pub(super) fn taken(
     }
 }
 
-/// The blocks with the mean variance of the lines around each: the noise of a line alone, by the scatter of a few periods, comes
+/// The frf_data with the mean variance of the lines around each: the noise of a line alone, by the scatter of a few periods, comes
 /// out far too small now and then, and a fit would take such a line for a mode.
-fn with_noise_of_neighbours(blocks: &[Block]) -> Vec<Block> {
+fn with_noise_of_neighbours(frf_data: &[FrfDatum]) -> Vec<FrfDatum> {
     let around = |k: usize| {
-        let near = &blocks[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(blocks.len())];
+        let near =
+            &frf_data[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(frf_data.len())];
         near.iter().map(|block| block.variance).sum::<f64>() / near.len() as f64
     };
-    blocks
+    frf_data
         .iter()
         .enumerate()
-        .map(|(k, block)| Block {
+        .map(|(k, block)| FrfDatum {
             variance: around(k),
             ..*block
         })
@@ -89,13 +90,13 @@ fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     }
 }
 
-/// Each sine by its blocks; the frequencies rise, whichever way the sines went.
+/// Each sine by its frf_data; the frequencies rise, whichever way the sines went.
 fn stepped(
     signals: &Signals,
     windows: &[Window],
     (low_hz, high_hz): (f64, f64),
 ) -> Result<Taken, IdentifyError> {
-    let (mut frf, mut blocks) = (Frf::default(), Vec::new());
+    let (mut frf, mut frf_data) = (Frf::default(), Vec::new());
     let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
     // A run that was stopped has those that it came to.
     let whole = |window: &&Window| window.start + window.period * window.periods <= signals.len();
@@ -107,21 +108,21 @@ fn stepped(
         match sine(signals, window, hz(window)) {
             Ok(Periods {
                 frf: one,
-                blocks: of_one,
+                frf_data: of_one,
                 ..
             }) => {
                 append(&mut frf, one);
-                blocks.extend(of_one);
+                frf_data.extend(of_one);
             }
             // A sine that did not come through is no reason to lose the others.
             Err(IdentifyError::NotExcited { .. }) => {}
             Err(error) => return Err(error),
         }
     }
-    if blocks.is_empty() {
+    if frf_data.is_empty() {
         return Err(IdentifyError::NotExcited { low_hz, high_hz });
     }
-    Ok(Taken::Lines(frf, with_noise_of_neighbours(&blocks), None))
+    Ok(Taken::Lines(frf, with_noise_of_neighbours(&frf_data), None))
 }
 
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {

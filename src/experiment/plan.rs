@@ -23,7 +23,7 @@ pub(super) const KIND: &str = "run";
 
 /// The kind of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum RunKind {
     /// An excitation, open loop.
     Chirp,
     /// A closed loop with a reference.
@@ -34,14 +34,14 @@ pub enum Kind {
     Quiet,
 }
 
-impl Kind {
+impl RunKind {
     /// The name in file names and metadata.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Chirp => "chirp",
-            Kind::Control => "control",
-            Kind::Calibrate => "calibrate",
-            Kind::Quiet => "quiet",
+            RunKind::Chirp => "chirp",
+            RunKind::Control => "control",
+            RunKind::Calibrate => "calibrate",
+            RunKind::Quiet => "quiet",
         }
     }
 }
@@ -81,7 +81,7 @@ pub enum PlanError {
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// What kind of run it is.
-    pub kind: Kind,
+    pub kind: RunKind,
     /// The settings.
     pub config: Config,
     /// The controller, for a closed loop.
@@ -91,7 +91,7 @@ pub struct Plan {
     /// Which devices, for the recording's metadata.
     pub devices: Vec<(&'static str, String)>,
     /// What a swept reference would do by the model.
-    pub foreseen: Option<Extremes>,
+    pub predicted_extremes: Option<Extremes>,
     /// The reference's file, if it has one.
     reference: Option<String>,
 }
@@ -99,27 +99,27 @@ pub struct Plan {
 impl Plan {
     /// An excitation.
     pub fn chirp(config: Config) -> Plan {
-        Plan::excitation(Kind::Chirp, config)
+        Plan::excitation(RunKind::Chirp, config)
     }
 
     /// Static steps.
     pub fn calibrate(config: Config) -> Plan {
-        Plan::excitation(Kind::Calibrate, config)
+        Plan::excitation(RunKind::Calibrate, config)
     }
 
     /// No current.
     pub fn quiet(config: Config) -> Plan {
-        Plan::excitation(Kind::Quiet, config)
+        Plan::excitation(RunKind::Quiet, config)
     }
 
-    fn excitation(kind: Kind, config: Config) -> Plan {
+    fn excitation(kind: RunKind, config: Config) -> Plan {
         Plan {
             kind,
             config,
             controller: None,
             calibration: None,
             devices: Vec::new(),
-            foreseen: None,
+            predicted_extremes: None,
             reference: None,
         }
     }
@@ -128,13 +128,13 @@ impl Plan {
     /// recording.
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
-        let (config, foreseen) = swept::planned(config, &controller)?;
+        let (config, predicted_extremes) = swept::planned(config, &controller)?;
         let reference = reference_text(&config.control.reference)?;
         Ok(Plan {
             controller: Some(controller),
             reference,
-            foreseen,
-            ..Plan::excitation(Kind::Control, config)
+            predicted_extremes,
+            ..Plan::excitation(RunKind::Control, config)
         })
     }
 
@@ -152,10 +152,10 @@ impl Plan {
                 .map(|a| String::from_utf8_lossy(&a.data).into_owned())
         };
         let kind = match recording.metadata().get(KIND).map(String::as_str) {
-            Some("chirp") => Kind::Chirp,
-            Some("control") => Kind::Control,
-            Some("calibrate") => Kind::Calibrate,
-            Some("quiet") => Kind::Quiet,
+            Some("chirp") => RunKind::Chirp,
+            Some("control") => RunKind::Control,
+            Some("calibrate") => RunKind::Calibrate,
+            Some("quiet") => RunKind::Quiet,
             _ => return Err(PlanError::Missing("kind of run")),
         };
         let controller = text(CONTROLLER).map(|text| ControllerText {
@@ -175,15 +175,15 @@ impl Plan {
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
         match self.kind {
-            Kind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
-            Kind::Calibrate => {
+            RunKind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
+            RunKind::Calibrate => {
                 return Ok(Box::new(Excite(Staircase::new(
                     &config.calibrate,
                     period_s,
                 ))));
             }
-            Kind::Quiet => return Ok(Box::new(Excite(Quiet::new(&config.campaign, period_s)))),
-            Kind::Control => {}
+            RunKind::Quiet => return Ok(Box::new(Excite(Quiet::new(&config.campaign, period_s)))),
+            RunKind::Control => {}
         }
         let text = self
             .controller

@@ -12,12 +12,12 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::plan::{Plan, PlanError};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::{State, Trip};
-use crate::rt::clock::{Clock, Moment};
+use crate::rt::clock::{Clock, TickTiming};
 use crate::rt::interlock::Interlocks;
-use crate::rt::outlet::{Outlet, SLOTS_PER_TICK};
 use crate::rt::program::Program;
-use crate::rt::record::{Event, EventKind, OrderKind, Published, TickRecord, flag};
-use crate::rt::servo::{Connections, Order, Progress, Servo};
+use crate::rt::publisher::{Publisher, SLOTS_PER_TICK};
+use crate::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord, flag};
+use crate::rt::servo::{Connections, Progress, Request, Servo};
 
 /// A recording that cannot be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -72,12 +72,12 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     }
     let plan = Plan::of(recording)?;
     let (published, records) = RingBuffer::new(64);
-    let (orders, taken) = RingBuffer::new(64);
-    let (spent, collected) = RingBuffer::new(64);
+    let (requests, taken) = RingBuffer::new(64);
+    let (retired, collected) = RingBuffer::new(64);
     let connections = Connections {
-        orders: taken,
-        spent,
-        outlet: Outlet::new(published),
+        requests: taken,
+        retired,
+        publisher: Publisher::new(published),
         progress: Arc::new(Progress::default()),
     };
     let (to_rig, seen) = RingBuffer::new(4);
@@ -94,7 +94,7 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     let program = plan.program()?;
     let mut comparison = Comparison {
         servo,
-        orders,
+        requests,
         to_rig,
         enabled,
         cleared,
@@ -121,11 +121,11 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
 
 struct Comparison {
     servo: Servo,
-    orders: Producer<Order>,
+    requests: Producer<Request>,
     to_rig: Producer<Seen>,
     enabled: Producer<bool>,
     cleared: Producer<()>,
-    records: Consumer<Published>,
+    records: Consumer<LoopMessage>,
     collected: Consumer<Box<dyn Program>>,
     program: Option<Box<dyn Program>>,
     replayed: Replayed,
@@ -140,7 +140,7 @@ struct Seen {
 }
 
 impl Comparison {
-    /// The events up to a tick: orders for the loop, and what the amplifier did; whether it made the loop trip.
+    /// The events up to a tick: requests for the loop, and what the amplifier did; whether it made the loop trip.
     fn take<'a>(
         &mut self,
         events: &mut Peekable<impl Iterator<Item = &'a Event>>,
@@ -151,7 +151,7 @@ impl Comparison {
         let mut tripped = false;
         while let Some(event) = events.next_if(|event| event.tick <= tick) {
             match event.kind {
-                EventKind::Order(kind) => self.order(kind),
+                EventKind::Request(kind) => self.order(kind),
                 EventKind::State {
                     from: State::Disarmed,
                     to: State::Armed,
@@ -175,15 +175,15 @@ impl Comparison {
         tripped
     }
 
-    fn order(&mut self, kind: OrderKind) {
+    fn order(&mut self, kind: RequestKind) {
         let order = match kind {
-            OrderKind::Arm => Some(Order::Arm),
-            OrderKind::Start => self.program.take().map(Order::Start),
-            OrderKind::Stop => Some(Order::Stop),
-            OrderKind::Clear => Some(Order::Clear),
+            RequestKind::Arm => Some(Request::Arm),
+            RequestKind::Start => self.program.take().map(Request::Start),
+            RequestKind::Stop => Some(Request::Stop),
+            RequestKind::Clear => Some(Request::Clear),
         };
         // The loop empties its ring at every tick.
-        let _ = order.map(|order| self.orders.push(order));
+        let _ = order.map(|order| self.requests.push(order));
     }
 
     fn tick(&mut self, seen: &Seen) {
@@ -192,7 +192,7 @@ impl Comparison {
             number: recorded.tick,
             scheduled_ns: recorded.scheduled_ns,
         };
-        let moment = Moment {
+        let moment = TickTiming {
             tick,
             woke_ns: recorded.woke_ns,
             missed: recorded.missed_ticks,
@@ -202,7 +202,7 @@ impl Comparison {
         self.servo.tick(&moment, &RecordedClock(recorded.done_ns));
         while self.collected.pop().is_ok() {}
         while let Ok(published) = self.records.pop() {
-            if let Published::Tick(now) = published {
+            if let LoopMessage::Tick(now) = published {
                 self.compare(recorded, &now);
             }
         }
@@ -303,8 +303,8 @@ impl DisplacementProbe for RecordedRig {
 struct RecordedClock(u64);
 
 impl Clock for RecordedClock {
-    fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
-        Moment {
+    fn wait(&mut self, number: u64, _outlet: &Publisher) -> TickTiming {
+        TickTiming {
             tick: Tick {
                 number,
                 scheduled_ns: 0,

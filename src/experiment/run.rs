@@ -16,10 +16,10 @@ use super::plan::{KIND, Plan, PlanError};
 use super::stop::signals;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
-use crate::rt::outlet::Outlet;
 use crate::rt::program::Program;
-use crate::rt::servo::{Connections, ORDERS_PER_TICK, Order, Progress, Servo};
-use crate::rt::thread::{Ended, Pace, Prepared, Scheduling, prepare};
+use crate::rt::publisher::Publisher;
+use crate::rt::servo::{Connections, Progress, REQUESTS_PER_TICK, Request, Servo};
+use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, should the disk hang for a while.
 const RING_SLOTS: usize = 1 << 16;
@@ -30,7 +30,7 @@ const BEAT: Duration = Duration::from_millis(5);
 
 /// A run that could not be made, or whose recording failed.
 #[derive(Debug, thiserror::Error)]
-pub enum SessionError {
+pub enum RunError {
     /// The plan is refused.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -68,7 +68,7 @@ pub struct Run {
     /// The file.
     pub path: PathBuf,
     /// How the loop ended.
-    pub ended: Ended,
+    pub ended: LoopOutcome,
     /// Its pace.
     pub pace: Pace,
     /// How it was scheduled.
@@ -98,40 +98,40 @@ pub fn run(
     pace: Pace,
     folder: &Path,
     watch: &mut dyn FnMut(u64, u64),
-) -> Result<Run, SessionError> {
+) -> Result<Run, RunError> {
     let program = plan.program()?;
     let total_ticks = program.ticks();
-    let (outlet, records) = RingBuffer::new(RING_SLOTS);
-    let (mut orders, taken) = RingBuffer::new(ORDERS_PER_TICK);
-    let (spent, _kept_until_the_end) = RingBuffer::new(16);
+    let (publisher, records) = RingBuffer::new(RING_SLOTS);
+    let (mut requests, taken) = RingBuffer::new(REQUESTS_PER_TICK);
+    let (retired, _kept_until_the_end) = RingBuffer::new(16);
     let progress = Arc::new(Progress::default());
     let connections = Connections {
-        orders: taken,
-        spent,
-        outlet: Outlet::new(outlet),
+        requests: taken,
+        retired,
+        publisher: Publisher::new(publisher),
         progress: Arc::clone(&progress),
     };
     let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
-    queue(&mut orders, program);
+    queue(&mut requests, program);
     let tail_ticks = (TAIL_S * plan.config.servo.rate_hz) as u64;
     let prepared =
-        prepare(servo, &plan.config.servo, pace, tail_ticks).map_err(|e| SessionError::System {
+        prepare(servo, &plan.config.servo, pace, tail_ticks).map_err(|e| RunError::System {
             what: "start the loop's thread",
             why: e.to_string(),
         })?;
     let recorder = create(plan, pace, &prepared, folder)?;
     let path = recorder.path().to_path_buf();
-    let recorder = recording::spawn(recorder, records).map_err(SessionError::Create)?;
+    let recorder = recording::spawn(recorder, records).map_err(RunError::Create)?;
     let scheduling = prepared.scheduling().clone();
     let mut supervisor = Supervisor {
-        orders,
+        requests,
         health: recorder.health(),
         stopped: false,
     };
     let watching = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
     let ended = supervisor.watch_over(prepared, watching)?;
     let recorder = recorder.join()?;
-    let ended = ended.map_err(|_| SessionError::LoopDied(path.clone()))?;
+    let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
     Ok(Run {
         path,
         ended,
@@ -143,10 +143,10 @@ pub fn run(
 }
 
 /// Arm and start: in the ring before the loop begins, so that they take effect at tick 0.
-fn queue(orders: &mut Producer<Order>, program: Box<dyn Program>) {
-    for order in [Order::Arm, Order::Start(program)] {
+fn queue(requests: &mut Producer<Request>, program: Box<dyn Program>) {
+    for order in [Request::Arm, Request::Start(program)] {
         // The ring is new and holds more than two.
-        let _ = orders.push(order);
+        let _ = requests.push(order);
     }
 }
 
@@ -154,24 +154,24 @@ fn queue(orders: &mut Producer<Order>, program: Box<dyn Program>) {
 fn create(
     plan: &Plan,
     pace: Pace,
-    prepared: &Prepared,
+    prepared: &PreparedLoop,
     folder: &Path,
-) -> Result<Recorder, SessionError> {
+) -> Result<Recorder, RunError> {
     let header = Header {
         config_toml: plan.config_toml()?,
         period_ns: libm::round(plan.config.servo.period_s() * 1e9) as u64,
         metadata: metadata(plan, pace, prepared.scheduling()),
     };
-    std::fs::create_dir_all(folder).map_err(|e| SessionError::Folder {
+    std::fs::create_dir_all(folder).map_err(|e| RunError::Folder {
         folder: folder.into(),
         why: e.to_string(),
     })?;
     let path = name::recording(folder, plan.kind.name(), SystemTime::now());
-    let mut recorder = Recorder::create(&path, &header).map_err(SessionError::Create)?;
+    let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
     for (name, media_type, text) in plan.attachments() {
         recorder
             .attach(name, media_type, text.as_bytes())
-            .map_err(SessionError::Create)?;
+            .map_err(RunError::Create)?;
     }
     Ok(recorder)
 }
@@ -205,7 +205,7 @@ fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String
 
 /// Watches from outside: signals, progress, the recorder's health.
 struct Supervisor {
-    orders: Producer<Order>,
+    requests: Producer<Request>,
     health: Arc<Health>,
     stopped: bool,
 }
@@ -213,10 +213,10 @@ struct Supervisor {
 impl Supervisor {
     fn watch_over(
         &mut self,
-        prepared: Prepared,
+        prepared: PreparedLoop,
         watch: impl FnMut(),
-    ) -> Result<std::thread::Result<Ended>, SessionError> {
-        let system = |e: std::io::Error| SessionError::System {
+    ) -> Result<std::thread::Result<LoopOutcome>, RunError> {
+        let system = |e: std::io::Error| RunError::System {
             what: "start the supervisor",
             why: e.to_string(),
         };
@@ -234,7 +234,7 @@ impl Supervisor {
 
     async fn until_finished(
         &mut self,
-        thread: &JoinHandle<Ended>,
+        thread: &JoinHandle<LoopOutcome>,
         signals: (Signal, Signal),
         mut watch: impl FnMut(),
     ) {
@@ -255,7 +255,7 @@ impl Supervisor {
     /// Zero current at the next tick boundary. Said once; the loop takes it, or has ended.
     fn stop(&mut self) {
         if !self.stopped {
-            self.stopped = self.orders.push(Order::Stop).is_ok();
+            self.stopped = self.requests.push(Request::Stop).is_ok();
         }
     }
 }

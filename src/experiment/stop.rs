@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::SessionError;
+use super::RunError;
 
 /// Interrupt (Ctrl-C) and terminate, from now on for the whole process.
 pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
@@ -17,9 +17,9 @@ pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
 
 /// Does `work` in a thread of its own and returns what it made; `None` if a person stops it before it is done. The thread
 /// is then left behind, and ends with the process: `work` must not hold what has to be closed in order.
-pub fn unless_stopped<T: Send + 'static>(
+pub fn abandon_on_signal<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
-) -> Result<Option<T>, SessionError> {
+) -> Result<Option<T>, RunError> {
     runtime()?.block_on(async {
         let (mut interrupt, mut terminate) = signals().map_err(system)?;
         let (tell, told) = tokio::sync::oneshot::channel();
@@ -37,7 +37,7 @@ pub fn unless_stopped<T: Send + 'static>(
 
 /// Does `work` in a thread of its own and waits until it ends. A person who stops it sets the flag that `work` is given; it
 /// then comes to an end in order.
-pub fn stoppable<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<T, SessionError> {
+pub fn stop_on_signal<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<T, RunError> {
     let (runtime, stop) = (runtime()?, AtomicBool::new(false));
     std::thread::scope(|scope| {
         runtime.block_on(async {
@@ -58,22 +58,22 @@ pub fn stoppable<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<
     })
 }
 
-fn runtime() -> Result<Runtime, SessionError> {
+fn runtime() -> Result<Runtime, RunError> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .map_err(system)
 }
 
-fn system(e: std::io::Error) -> SessionError {
-    SessionError::System {
+fn system(e: std::io::Error) -> RunError {
+    RunError::System {
         what: "start the analysis",
         why: e.to_string(),
     }
 }
 
-fn died(_: tokio::sync::oneshot::error::RecvError) -> SessionError {
-    SessionError::System {
+fn died(_: tokio::sync::oneshot::error::RecvError) -> RunError {
+    RunError::System {
         what: "finish the analysis",
         why: "its thread died of a panic".into(),
     }
@@ -85,14 +85,14 @@ mod tests {
 
     #[test]
     fn work_that_ends_gives_its_result() {
-        assert_eq!(unless_stopped(|| 7).unwrap(), Some(7));
+        assert_eq!(abandon_on_signal(|| 7).unwrap(), Some(7));
     }
 
     #[test]
     fn ctrl_c_and_sigterm_end_the_wait_and_not_the_process() {
         for number in [libc::SIGINT, libc::SIGTERM] {
             let (release, held) = std::sync::mpsc::channel::<()>();
-            let outcome = unless_stopped(move || {
+            let outcome = abandon_on_signal(move || {
                 // SAFETY: no memory is touched; the handlers were installed before this thread began.
                 unsafe { libc::raise(number) };
                 held.recv()
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn ctrl_c_and_sigterm_set_the_flag_and_wait_for_the_work() {
         for number in [libc::SIGINT, libc::SIGTERM] {
-            let ended = stoppable(|stop| {
+            let ended = stop_on_signal(|stop| {
                 // SAFETY: no memory is touched; the handlers were installed before this thread began.
                 unsafe { libc::raise(number) };
                 while !stop.load(Ordering::Relaxed) {
@@ -115,12 +115,12 @@ mod tests {
             });
             assert_eq!(ended.unwrap(), "in order");
         }
-        assert!(!stoppable(|stop| stop.load(Ordering::Relaxed)).unwrap());
+        assert!(!stop_on_signal(|stop| stop.load(Ordering::Relaxed)).unwrap());
     }
 
     #[test]
     fn work_that_panics_is_an_error() {
-        let outcome = unless_stopped(|| std::panic::panic_any("no one's fault"));
+        let outcome = abandon_on_signal(|| std::panic::panic_any("no one's fault"));
         assert!(outcome.unwrap_err().to_string().contains("panic"));
     }
 }

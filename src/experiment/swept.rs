@@ -1,8 +1,8 @@
 //! A swept reference before its run: its amplitudes, where it has none, and what it would do.
 
 use super::plan::PlanError;
-use crate::config::{Config, ReferenceSettings, recheck};
-use crate::control::{ClosedLoop, ControllerText, swept_reference};
+use crate::config::{Config, ReferenceSettings, validate};
+use crate::control::{ClosedLoop, ControllerText, swept_reference_amplitudes};
 use crate::excitation::{Chirp, Excitation, Extremes, reference, within};
 use crate::rig::simulated;
 
@@ -25,7 +25,7 @@ pub(super) fn planned(
         controller.sections(config.servo.rate_hz)?,
     );
     let amplitude = match amplitude.is_empty() {
-        true => swept_reference(
+        true => swept_reference_amplitudes(
             &closed_loop,
             &config.chirp,
             *travel_m,
@@ -38,7 +38,7 @@ pub(super) fn planned(
         travel_m: *travel_m,
     };
     // What is not allowed now could not be read back from the recording.
-    recheck(&config)?;
+    validate(&config)?;
     // What a loop that runs away would do has no largest current to lower.
     let unstable = |error| {
         if closed_loop.margins(false).stable {
@@ -47,12 +47,12 @@ pub(super) fn planned(
             PlanError::Unstable
         }
     };
-    let extremes = foreseen(&config, &closed_loop).map_err(unstable)?;
+    let extremes = predicted_extremes(&config, &closed_loop).map_err(unstable)?;
     Ok((config, Some(extremes)))
 }
 
 /// The run by the linear model, against every interlock.
-fn foreseen(config: &Config, closed_loop: &ClosedLoop) -> Result<Extremes, PlanError> {
+fn predicted_extremes(config: &Config, closed_loop: &ClosedLoop) -> Result<Extremes, PlanError> {
     let period_s = config.servo.period_s();
     let reference = reference(&config.control.reference, &config.chirp, None, period_s)?;
     let chirp = Chirp::new(&config.chirp, period_s);

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 /// The mean response over a few neighbouring bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
+pub struct FrfDatum {
     /// Its centre, weighted with the power of the input, in hertz.
     pub frequency_hz: f64,
     /// Standard deviation of its frequencies about the centre, weighted alike, in hertz.

@@ -19,7 +19,7 @@ const FEWEST: usize = 10;
 
 /// A delay beyond the model's.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Delay {
+pub struct ExcessDelay {
     /// tau in seconds: positive where the measurement lags the model.
     pub seconds: f64,
     /// Standard deviation of tau in seconds, by the scatter of the phases about the fit.
@@ -28,7 +28,7 @@ pub struct Delay {
 
 /// The delay of `measured` beyond `model`, both at the frequencies of `measured` up to `highest_hz`; `None` where too few
 /// of them say anything.
-pub fn beyond(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Option<Delay> {
+pub fn beyond(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Option<ExcessDelay> {
     let points: Vec<Point> = points(measured, model, highest_hz);
     if points.len() < FEWEST {
         return None;
@@ -46,7 +46,7 @@ pub fn beyond(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Option
         )
     });
     let scatter = square / (kept.len().saturating_sub(1).max(1)) as f64;
-    (kept.len() >= FEWEST).then(|| Delay {
+    (kept.len() >= FEWEST).then(|| ExcessDelay {
         seconds: tau_s,
         sigma_s: (scatter / weight).sqrt(),
     })

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
-//! - [`blocks()`]: the same record without smoothing, for a fit.
+//! - [`frf_data()`]: the same record without smoothing, for a fit.
 //! - [`joint::estimate`]: plant, loop and sensitivities of a stage under control.
 //! - [`response`]: as the configuration chooses.
 //! - [`repeated::mean`]: repetitions of one excitation, each at rest at its ends, averaged.
@@ -40,16 +40,16 @@ mod times;
 pub mod verdict;
 pub mod welch;
 
-pub use crate::config::{Curve, Estimator, ResolutionPoint};
-pub use block::Block;
+pub use crate::config::{Estimator, LocalModel, ResolutionPoint};
+pub use block::FrfDatum;
 pub use configured::response;
-pub use curves::blocks::blocks;
+pub use curves::frf_data::frf_data;
 pub use curves::settings::EstimatorSettings;
 pub use curves::{joint, local};
 pub use error::IdentifyError;
 pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
 pub use lines::distortion::with_distortion;
 pub use lines::{harmonics, linearity, periodic};
-pub use moments::Moments;
+pub use moments::RunningStats;
 pub use signals::Signals;
 pub use times::{align, edges};

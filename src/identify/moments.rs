@@ -2,7 +2,7 @@
 
 /// Mean and standard deviation in one pass (Welford 1962).
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Moments {
+pub struct RunningStats {
     /// Values so far.
     pub count: f64,
     /// Their mean.
@@ -10,7 +10,7 @@ pub struct Moments {
     squares: f64,
 }
 
-impl Moments {
+impl RunningStats {
     /// Takes a value in.
     pub fn push(&mut self, x: f64) {
         self.count += 1.0;
@@ -34,7 +34,7 @@ mod tests {
         let values: Vec<f64> = (0..10_000)
             .map(|k| 5e-5 + 1e-8 * f64::sin(f64::from(k) * 1.7))
             .collect();
-        let mut moments = Moments::default();
+        let mut moments = RunningStats::default();
         values.iter().for_each(|x| moments.push(*x));
         let mean = values.iter().sum::<f64>() / 1e4;
         let sigma = (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / 9999.0).sqrt();
@@ -43,6 +43,6 @@ mod tests {
             (moments.mean - mean).abs() < 1e-16
                 && (moments.sigma().unwrap() / sigma - 1.0).abs() < 1e-9
         );
-        assert_eq!(Moments::default().sigma(), None);
+        assert_eq!(RunningStats::default().sigma(), None);
     }
 }

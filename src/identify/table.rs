@@ -34,7 +34,7 @@ pub enum Clock {
 
 /// Why a table is no record.
 #[derive(Debug, Error)]
-pub enum TableError {
+pub enum ExternalCsvError {
     /// The file system said no.
     #[error("{path}: {source}")]
     Io {
@@ -135,9 +135,9 @@ pub enum TableError {
 ///
 /// # Errors
 /// When the file is no table, lacks a column, holds something else than numbers, or its times are not regular: see
-/// [`TableError`]. Whether the signals are fit for an estimator is [`Signals::check`]'s to say.
-pub fn read(path: &Path, columns: &Columns) -> Result<Signals, TableError> {
-    let text = std::fs::read(path).map_err(|source| TableError::Io {
+/// [`ExternalCsvError`]. Whether the signals are fit for an estimator is [`Signals::check`]'s to say.
+pub fn read(path: &Path, columns: &Columns) -> Result<Signals, ExternalCsvError> {
+    let text = std::fs::read(path).map_err(|source| ExternalCsvError::Io {
         path: path.to_owned(),
         source,
     })?;
@@ -173,8 +173,8 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Signals, TableError> {
 ///
 /// # Errors
 /// When the file cannot be read, or its first line holds no names.
-pub fn names(path: &Path) -> Result<Vec<String>, TableError> {
-    let text = std::fs::read(path).map_err(|source| TableError::Io {
+pub fn names(path: &Path) -> Result<Vec<String>, ExternalCsvError> {
+    let text = std::fs::read(path).map_err(|source| ExternalCsvError::Io {
         path: path.to_owned(),
         source,
     })?;
@@ -221,14 +221,14 @@ impl Table<'_> {
             .from_reader(self.text)
     }
 
-    fn no_table(&self, source: csv::Error) -> TableError {
-        TableError::NoTable {
+    fn no_table(&self, source: csv::Error) -> ExternalCsvError {
+        ExternalCsvError::NoTable {
             path: self.path.to_owned(),
             source,
         }
     }
 
-    fn numbers(&self, names: &[&str]) -> Result<Numbers, TableError> {
+    fn numbers(&self, names: &[&str]) -> Result<Numbers, ExternalCsvError> {
         let mut reader = self.reader();
         let header = reader
             .headers()
@@ -250,17 +250,21 @@ impl Table<'_> {
         Ok(found)
     }
 
-    fn places(&self, header: &csv::StringRecord, names: &[&str]) -> Result<Vec<usize>, TableError> {
+    fn places(
+        &self,
+        header: &csv::StringRecord,
+        names: &[&str],
+    ) -> Result<Vec<usize>, ExternalCsvError> {
         let twice = |(k, name): &(usize, &&str)| names[..*k].contains(*name);
         if let Some((_, name)) = names.iter().enumerate().find(twice) {
-            return Err(TableError::Same {
+            return Err(ExternalCsvError::Same {
                 name: name.to_string(),
             });
         }
         names.iter().map(|name| self.place(header, name)).collect()
     }
 
-    fn place(&self, header: &csv::StringRecord, name: &str) -> Result<usize, TableError> {
+    fn place(&self, header: &csv::StringRecord, name: &str) -> Result<usize, ExternalCsvError> {
         let (path, name) = (self.path.to_owned(), name.to_owned());
         let mut places = header
             .iter()
@@ -269,8 +273,8 @@ impl Table<'_> {
             .map(|(place, _)| place);
         match (places.next(), places.next()) {
             (Some(place), None) => Ok(place),
-            (Some(_), Some(_)) => Err(TableError::Ambiguous { path, name }),
-            (None, _) => Err(TableError::NoColumn {
+            (Some(_), Some(_)) => Err(ExternalCsvError::Ambiguous { path, name }),
+            (None, _) => Err(ExternalCsvError::NoColumn {
                 path,
                 name,
                 there: header.iter().collect::<Vec<_>>().join(", "),
@@ -278,10 +282,10 @@ impl Table<'_> {
         }
     }
 
-    fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, TableError> {
+    fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, ExternalCsvError> {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         let (path, column, text) = (self.path.to_owned(), column.to_owned(), text.to_owned());
-        number.ok_or(TableError::Cell {
+        number.ok_or(ExternalCsvError::Cell {
             path,
             line,
             column,
@@ -290,9 +294,14 @@ impl Table<'_> {
     }
 
     /// Samples per second, from the first to the last.
-    fn rate_hz(&self, column: &str, time_s: &[f64], lines: &[u64]) -> Result<f64, TableError> {
+    fn rate_hz(
+        &self,
+        column: &str,
+        time_s: &[f64],
+        lines: &[u64],
+    ) -> Result<f64, ExternalCsvError> {
         let [first_s, .., last_s] = time_s else {
-            return Err(TableError::TooShort {
+            return Err(ExternalCsvError::TooShort {
                 path: self.path.to_owned(),
                 samples: time_s.len(),
             });
@@ -301,7 +310,7 @@ impl Table<'_> {
         if let Some(k) = steps_s.iter().position(|step_s| *step_s <= 0.0) {
             let (path, column) = (self.path.to_owned(), column.to_owned());
             let (time_s, before_s) = (time_s[k + 1], time_s[k]);
-            return Err(TableError::Backwards {
+            return Err(ExternalCsvError::Backwards {
                 path,
                 line: lines[k + 1],
                 column,
@@ -313,7 +322,7 @@ impl Table<'_> {
         let irregular = |step_s: &f64| (step_s - median_s).abs() > IRREGULAR * median_s;
         if let Some(k) = steps_s.iter().position(irregular) {
             let path = self.path.to_owned();
-            return Err(TableError::Irregular {
+            return Err(ExternalCsvError::Irregular {
                 path,
                 line: lines[k + 1],
                 step_s: steps_s[k],

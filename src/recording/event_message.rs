@@ -2,12 +2,12 @@
 
 use super::messages::{Event as Message, Unknown, unknown};
 use crate::rt::arming::{State, Trip};
-use crate::rt::record::{Event, EventKind, OrderKind};
+use crate::rt::record::{Event, EventKind, RequestKind};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
         let message = match event.kind {
-            EventKind::Order(order) => of_order(order),
+            EventKind::Request(order) => of_order(order),
             EventKind::State { from, to } => of_state(from, to),
             EventKind::Trip(trip) => of_trip(trip),
             EventKind::Completed => of("completed", "the program came to its end".into()),
@@ -34,7 +34,7 @@ fn of(kind: &str, text: String) -> Message {
     }
 }
 
-fn of_order(order: OrderKind) -> Message {
+fn of_order(order: RequestKind) -> Message {
     let name = order_name(order);
     Message {
         order: name.into(),
@@ -69,12 +69,12 @@ fn of_trip(trip: Trip) -> Message {
     }
 }
 
-fn order_name(order: OrderKind) -> &'static str {
+fn order_name(order: RequestKind) -> &'static str {
     match order {
-        OrderKind::Arm => "arm",
-        OrderKind::Start => "start",
-        OrderKind::Stop => "stop",
-        OrderKind::Clear => "clear",
+        RequestKind::Arm => "arm",
+        RequestKind::Start => "start",
+        RequestKind::Stop => "stop",
+        RequestKind::Clear => "clear",
     }
 }
 
@@ -83,7 +83,7 @@ impl TryFrom<&Message> for Event {
 
     fn try_from(message: &Message) -> Result<Event, Unknown> {
         let kind = match message.kind.as_str() {
-            "order" => EventKind::Order(order(&message.order)?),
+            "order" => EventKind::Request(order(&message.order)?),
             "state" => EventKind::State {
                 from: state("from", &message.from)?,
                 to: state("to", &message.to)?,
@@ -102,12 +102,12 @@ impl TryFrom<&Message> for Event {
     }
 }
 
-fn order(name: &str) -> Result<OrderKind, Unknown> {
-    const ALL: [OrderKind; 4] = [
-        OrderKind::Arm,
-        OrderKind::Start,
-        OrderKind::Stop,
-        OrderKind::Clear,
+fn order(name: &str) -> Result<RequestKind, Unknown> {
+    const ALL: [RequestKind; 4] = [
+        RequestKind::Arm,
+        RequestKind::Start,
+        RequestKind::Stop,
+        RequestKind::Clear,
     ];
     ALL.into_iter()
         .find(|o| order_name(*o) == name)

@@ -11,7 +11,7 @@ use super::messages::Timing;
 use super::stream::{Stream, Ticks, decode, published};
 use super::walk::{Contents, Part, Stop, Walk};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
-use crate::rt::record::{Event, Published};
+use crate::rt::record::{Event, LoopMessage};
 
 /// A file inside the recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -215,13 +215,13 @@ impl Found {
         Ok(())
     }
 
-    fn published(&mut self, published: Published) -> Result<(), String> {
+    fn published(&mut self, published: LoopMessage) -> Result<(), String> {
         match published {
-            Published::Event(event) => {
+            LoopMessage::Event(event) => {
                 self.account.event(&event);
                 self.events.push(event);
             }
-            Published::Tick(tick) => {
+            LoopMessage::Tick(tick) => {
                 let refused = |last| format!("tick {} follows tick {last}", tick.tick);
                 self.gaps
                     .extend(self.account.tick(&tick).map_err(|e| refused(e.0))?);

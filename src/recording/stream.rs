@@ -7,20 +7,20 @@ use prost::Message;
 use super::messages;
 use super::walk::{Part, Stop, Walk};
 use super::{RecordingError, Topic};
-use crate::rt::record::{Event, Published, TickRecord};
+use crate::rt::record::{Event, LoopMessage, TickRecord};
 
 /// Ticks and events of a recording, read as they are asked for.
 pub(super) struct Stream {
     path: PathBuf,
     walk: Walk,
-    chunk: Vec<Published>,
+    chunk: Vec<LoopMessage>,
     next: usize,
     /// How many there are still to come, by the first reading.
     left: u64,
 }
 
 impl Iterator for Stream {
-    type Item = Result<Published, RecordingError>;
+    type Item = Result<LoopMessage, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.left = self.left.checked_sub(1)?;
@@ -96,8 +96,8 @@ impl Iterator for Ticks {
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             match self.0.next()? {
-                Ok(Published::Tick(tick)) => return Some(Ok(tick)),
-                Ok(Published::Event(_)) => {}
+                Ok(LoopMessage::Tick(tick)) => return Some(Ok(tick)),
+                Ok(LoopMessage::Event(_)) => {}
                 Err(error) => return Some(Err(error)),
             }
         }
@@ -105,16 +105,16 @@ impl Iterator for Ticks {
 }
 
 /// The loop's own record of a message on `/loop` or `/event`.
-pub(super) fn published(topic: Topic, data: &[u8]) -> Result<Published, String> {
+pub(super) fn published(topic: Topic, data: &[u8]) -> Result<LoopMessage, String> {
     if topic == Topic::Loop {
         let message: messages::Loop = decode(data)?;
         return TickRecord::try_from(&message)
-            .map(Published::Tick)
+            .map(LoopMessage::Tick)
             .map_err(|e| e.to_string());
     }
     let message: messages::Event = decode(data)?;
     Event::try_from(&message)
-        .map(Published::Event)
+        .map(LoopMessage::Event)
         .map_err(|e| e.to_string())
 }
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 use rtrb::Consumer;
 
 use super::{Recorder, RecordingError};
-use crate::rt::record::Published;
+use crate::rt::record::LoopMessage;
 
 /// How long the thread rests when the ring is empty: a few ticks at 5 kHz, so the ring hardly fills, and an idle recorder
 /// costs next to nothing.
@@ -74,7 +74,7 @@ impl RecorderHandle {
 /// throws away and says so in [`Health`] at once.
 pub fn spawn(
     recorder: Recorder,
-    ring: Consumer<Published>,
+    ring: Consumer<LoopMessage>,
 ) -> Result<RecorderHandle, RecordingError> {
     let health = Arc::new(Health::default());
     let seen = Arc::clone(&health);
@@ -89,7 +89,7 @@ pub fn spawn(
 
 fn run(
     mut recorder: Recorder,
-    mut ring: Consumer<Published>,
+    mut ring: Consumer<LoopMessage>,
     health: &Health,
 ) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
@@ -127,7 +127,7 @@ impl Drop for Alarm<'_> {
 }
 
 fn take(
-    published: &Published,
+    published: &LoopMessage,
     recorder: &mut Recorder,
     outcome: &mut Result<(), RecordingError>,
     health: &Health,

@@ -17,7 +17,7 @@ use super::messages;
 use super::schema::descriptor_set;
 use super::timing::{Quantiles, Tally};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
-use crate::rt::record::{Event, Published, TickRecord};
+use crate::rt::record::{Event, LoopMessage, TickRecord};
 
 /// A chunk is closed and handed to the operating system at every multiple of this scheduled time, whatever the rate:
 /// what dies with the process is half a second at most. At 5 kHz a chunk holds 2500 ticks, some 260 kB before
@@ -124,10 +124,10 @@ impl Recorder {
     }
 
     /// Writes what the loop published. After an error the recording is cut off; nothing more can be written.
-    pub fn record(&mut self, published: &Published) -> Result<(), RecordingError> {
+    pub fn record(&mut self, published: &LoopMessage) -> Result<(), RecordingError> {
         match published {
-            Published::Tick(tick) => self.tick(tick),
-            Published::Event(event) => self.event(event),
+            LoopMessage::Tick(tick) => self.tick(tick),
+            LoopMessage::Event(event) => self.event(event),
         }
     }
 

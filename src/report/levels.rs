@@ -4,7 +4,7 @@ use super::ReportError;
 use super::chart::{Chart, Pen, Scale, Symbol};
 use super::colours::{BLUE, GREEN, GREY, VERMILION};
 use super::sheet::{Row, sheet_svg};
-use crate::identify::harmonics::Level;
+use crate::identify::harmonics::LineLevel;
 
 /// Points of an averaged line over the band at most.
 const COLUMNS: f64 = 120.0;
@@ -13,11 +13,11 @@ const COLUMNS: f64 = 120.0;
 #[derive(Clone, Copy, Debug)]
 pub struct LevelLines<'a> {
     /// Those that were excited.
-    pub output: &'a [Level],
+    pub output: &'a [LineLevel],
     /// Odd ones left out.
-    pub odd: &'a [Level],
+    pub odd: &'a [LineLevel],
     /// Even ones.
-    pub even: &'a [Level],
+    pub even: &'a [LineLevel],
     /// Periods of the mean.
     pub periods: usize,
 }
@@ -41,10 +41,10 @@ pub fn levels_svg(
         range: (ends_hz.0 < ends_hz.1).then_some(ends_hz),
         ..Scale::logarithmic("Frequency (Hz)")
     };
-    let mut all: Vec<Level> = [lines.output, lines.odd, lines.even].concat();
+    let mut all: Vec<LineLevel> = [lines.output, lines.odd, lines.even].concat();
     all.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let periods = lines.periods.max(1) as f64;
-    let power = |level: &Level| level.power_m2;
+    let power = |level: &LineLevel| level.power_m2;
     let chart = Chart::new(
         "",
         frequency,
@@ -78,17 +78,17 @@ pub fn levels_svg(
     sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart])])
 }
 
-fn each(lines: &[Level]) -> Vec<(f64, f64)> {
+fn each(lines: &[LineLevel]) -> Vec<(f64, f64)> {
     shown(lines.iter().map(|line| (line.frequency_hz, line.power_m2)))
 }
 
 /// RMS over all lines within the same part of ln f.
-fn averaged(lines: &[Level], of: impl Fn(&Level) -> f64) -> Vec<(f64, f64)> {
+fn averaged(lines: &[LineLevel], of: impl Fn(&LineLevel) -> f64) -> Vec<(f64, f64)> {
     let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
         return Vec::new();
     };
     let width = libm::log(last.frequency_hz / first.frequency_hz) / COLUMNS;
-    let column = |line: &Level| {
+    let column = |line: &LineLevel| {
         if width > 0.0 {
             (libm::log(line.frequency_hz / first.frequency_hz) / width).floor()
         } else {
@@ -97,7 +97,7 @@ fn averaged(lines: &[Level], of: impl Fn(&Level) -> f64) -> Vec<(f64, f64)> {
     };
     shown(lines.chunk_by(|a, b| column(a) == column(b)).map(|near| {
         let mean =
-            |of: &dyn Fn(&Level) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
+            |of: &dyn Fn(&LineLevel) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
         (mean(&|line| line.frequency_hz), mean(&of))
     }))
 }
@@ -116,14 +116,14 @@ mod tests {
 
     #[test]
     fn columns_are_root_mean_squares_and_lines_without_power_are_left_out() {
-        let level = |frequency_hz: f64, power_m2: f64| Level {
+        let level = |frequency_hz: f64, power_m2: f64| LineLevel {
             frequency_hz,
             input_a2: 1.0,
             power_m2,
             noise_m2: 1.0,
             surprise: 0.0,
         };
-        let power = |level: &Level| level.power_m2;
+        let power = |level: &LineLevel| level.power_m2;
         // 1 to 1000 Hz: a column is exp(ln(1000)/120) = 5.9 % wide; 1 Hz begins the first, 100 and 101 Hz share the 80th.
         let lines = [
             level(1.0, 9.0),

@@ -7,7 +7,7 @@ use super::ReportError;
 use super::canvas::{self, Canvas, TextForm};
 use super::header::Header;
 use super::panel::INK;
-use crate::model::veering::Picture;
+use crate::model::veering::QuadrantDiagram;
 
 const LEFT: f64 = 24.0;
 const SIDE: f64 = 300.0;
@@ -28,7 +28,7 @@ pub struct QuadrantPanel {
     /// When.
     pub title: String,
     /// What.
-    pub picture: Picture,
+    pub picture: QuadrantDiagram,
 }
 
 /// The quadrants side by side, as an SVG document. The longer vector of a panel reaches the
@@ -59,7 +59,7 @@ pub fn quadrants_svg(
 }
 
 /// The longer of the two vectors, a part of its whole length.
-fn longest(picture: &Picture) -> f64 {
+fn longest(picture: &QuadrantDiagram) -> f64 {
     [picture.actuator, picture.sensor]
         .into_iter()
         .map(|[x, y]| libm::hypot(x, y))
@@ -148,7 +148,11 @@ fn draw(
     )
 }
 
-fn captions(canvas: &Canvas, picture: &Picture, (x, y): (f64, f64)) -> Result<(), ReportError> {
+fn captions(
+    canvas: &Canvas,
+    picture: &QuadrantDiagram,
+    (x, y): (f64, f64),
+) -> Result<(), ReportError> {
     let place = |quadrant: Option<usize>| {
         quadrant.map_or("on a line".into(), |quadrant| {
             format!("in {}", NUMERALS[quadrant - 1])

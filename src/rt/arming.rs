@@ -34,7 +34,7 @@ pub enum State {
 
 /// What may happen to the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
+pub enum Transition {
     /// The amplifier was enabled.
     Arm,
     /// A program was handed over.
@@ -49,13 +49,13 @@ pub enum Change {
 
 impl State {
     /// The state after `change`, or `None` where the diagram has no such arrow.
-    pub fn after(self, change: Change) -> Option<State> {
+    pub fn after(self, change: Transition) -> Option<State> {
         match (self, change) {
-            (State::Disarmed, Change::Arm) => Some(State::Armed),
-            (State::Armed, Change::Start) => Some(State::Running),
-            (State::Armed | State::Running, Change::Stop) => Some(State::Disarmed),
-            (State::Armed | State::Running, Change::Trip) => Some(State::Tripped),
-            (State::Tripped, Change::Clear) => Some(State::Disarmed),
+            (State::Disarmed, Transition::Arm) => Some(State::Armed),
+            (State::Armed, Transition::Start) => Some(State::Running),
+            (State::Armed | State::Running, Transition::Stop) => Some(State::Disarmed),
+            (State::Armed | State::Running, Transition::Trip) => Some(State::Tripped),
+            (State::Tripped, Transition::Clear) => Some(State::Disarmed),
             _ => None,
         }
     }

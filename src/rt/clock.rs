@@ -4,11 +4,11 @@ use bench_hal::Tick;
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
-use super::outlet::Outlet;
+use super::publisher::Publisher;
 
 /// When a tick began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Moment {
+pub struct TickTiming {
     /// The tick to serve.
     pub tick: Tick,
     /// When it really began, in nanoseconds since the loop started.
@@ -21,7 +21,7 @@ pub struct Moment {
 pub trait Clock {
     /// Waits for the tick `number`, or, where that has passed by more than a period, for none: then the moment is that of
     /// the latest tick due, and says how many were missed.
-    fn wait(&mut self, number: u64, outlet: &Outlet) -> Moment;
+    fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming;
 
     /// Nanoseconds since the loop started, asked within `tick`. *In the tick.*
     fn now_ns(&self, tick: Tick) -> u64;
@@ -47,12 +47,12 @@ pub struct Virtual {
 }
 
 impl Clock for Virtual {
-    fn wait(&mut self, number: u64, outlet: &Outlet) -> Moment {
-        while !outlet.has_room() && !outlet.is_abandoned() {
+    fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming {
+        while !publisher.has_room() && !publisher.is_abandoned() {
             std::thread::yield_now();
         }
         let tick = tick(number, self.period_s);
-        Moment {
+        TickTiming {
             tick,
             woke_ns: tick.scheduled_ns,
             missed: 0,
@@ -98,7 +98,7 @@ fn monotonic_ns() -> i128 {
 }
 
 impl Clock for Realtime {
-    fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
+    fn wait(&mut self, number: u64, _outlet: &Publisher) -> TickTiming {
         let due = self.origin_ns + i128::from(tick(number, self.period_s).scheduled_ns);
         let until = TimeSpec::new((due / 1_000_000_000) as i64, (due % 1_000_000_000) as i64);
         // A signal may end the sleep early: sleep on until the time has come.
@@ -112,7 +112,7 @@ impl Clock for Realtime {
         let woke_ns = self.elapsed_ns().max(0) as u64;
         let late_ns = woke_ns.saturating_sub(tick(number, self.period_s).scheduled_ns);
         let missed = (late_ns as f64 * 1e-9 / self.period_s) as u32;
-        Moment {
+        TickTiming {
             tick: tick(number + u64::from(missed), self.period_s),
             woke_ns,
             missed,

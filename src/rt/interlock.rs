@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use bench_hal::{Reading, Tick, Validity};
 
 use super::arming::Trip;
-use super::following::Following;
+use super::following_error::Following;
 use crate::config::Config;
 
 /// Limits and what must be remembered to check them.

@@ -1,10 +1,10 @@
 //! The real-time loop.
 //!
 //! ```text
-//!            orders (ring)                       records, events (ring)
+//!            requests (ring)                       records, events (ring)
 //!  supervisor ----------->  Servo::tick  ------------------------------>  recorder
 //!             <-----------    read -> check -> decide -> write -> publish
-//!             spent programs (ring)
+//!             retired programs (ring)
 //! ```
 //!
 //! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`clock`] its two paces, [`program`] what it
@@ -12,10 +12,10 @@
 
 pub mod arming;
 pub mod clock;
-mod following;
+mod following_error;
 pub mod interlock;
-pub mod outlet;
 pub mod program;
+pub mod publisher;
 pub mod record;
 pub mod servo;
 pub mod thread;

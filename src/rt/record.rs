@@ -67,7 +67,7 @@ pub struct Event {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
     /// An order of the supervisor was taken.
-    Order(OrderKind),
+    Request(RequestKind),
     /// The arming machine went from one state to another.
     State {
         /// State before.
@@ -88,7 +88,7 @@ pub enum EventKind {
 
 /// Orders, as they appear in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OrderKind {
+pub enum RequestKind {
     /// Enable the amplifier.
     Arm,
     /// Run the program that came with the order.
@@ -101,7 +101,7 @@ pub enum OrderKind {
 
 /// What goes through the ring from the loop to the recorder.
 #[derive(Clone, Copy, Debug)]
-pub enum Published {
+pub enum LoopMessage {
     /// The signals of a tick.
     Tick(TickRecord),
     /// A change.

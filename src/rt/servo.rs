@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Validity};
 use rtrb::{Consumer, Producer};
 
-use super::arming::{Change, State, Trip};
-use super::clock::{Clock, Moment};
+use super::arming::{State, Transition, Trip};
+use super::clock::{Clock, TickTiming};
 use super::interlock::Interlocks;
-use super::outlet::Outlet;
 use super::program::{Decision, Program};
-use super::record::{EventKind, OrderKind, TickRecord, flag};
+use super::publisher::Publisher;
+use super::record::{EventKind, RequestKind, TickRecord, flag};
 
 /// The answer of a driver to a command was not a number.
 const NONSENSE: DeviceError = DeviceError {
@@ -21,10 +21,10 @@ const NONSENSE: DeviceError = DeviceError {
 };
 
 /// Orders that one tick takes; more wait for the next.
-pub const ORDERS_PER_TICK: usize = 16;
+pub const REQUESTS_PER_TICK: usize = 16;
 
 /// An order to the loop, taken at a tick boundary. What it carries is whole and immutable.
-pub enum Order {
+pub enum Request {
     /// Enable the amplifier.
     Arm,
     /// Run a program from the next tick on.
@@ -35,13 +35,13 @@ pub enum Order {
     Clear,
 }
 
-impl Order {
-    fn kind(&self) -> OrderKind {
+impl Request {
+    fn kind(&self) -> RequestKind {
         match self {
-            Order::Arm => OrderKind::Arm,
-            Order::Start(_) => OrderKind::Start,
-            Order::Stop => OrderKind::Stop,
-            Order::Clear => OrderKind::Clear,
+            Request::Arm => RequestKind::Arm,
+            Request::Start(_) => RequestKind::Start,
+            Request::Stop => RequestKind::Stop,
+            Request::Clear => RequestKind::Clear,
         }
     }
 }
@@ -60,9 +60,9 @@ pub struct Servo {
     state: State,
     program: Option<Box<dyn Program>>,
     run_tick: u64,
-    orders: Consumer<Order>,
-    spent: Producer<Box<dyn Program>>,
-    outlet: Outlet,
+    requests: Consumer<Request>,
+    retired: Producer<Box<dyn Program>>,
+    publisher: Publisher,
     progress: Arc<Progress>,
     trip: Option<(Trip, u64)>,
     completed: bool,
@@ -72,11 +72,11 @@ pub struct Servo {
 /// The ends of the rings that the loop holds.
 pub struct Connections {
     /// Orders of the supervisor.
-    pub orders: Consumer<Order>,
+    pub requests: Consumer<Request>,
     /// Programs that are done with: freed outside.
-    pub spent: Producer<Box<dyn Program>>,
+    pub retired: Producer<Box<dyn Program>>,
     /// To the recorder.
-    pub outlet: Outlet,
+    pub publisher: Publisher,
     /// For whoever watches.
     pub progress: Arc<Progress>,
 }
@@ -85,9 +85,9 @@ impl Servo {
     /// A disarmed loop around a rig.
     pub fn new(rig: Box<dyn Rig>, interlocks: Interlocks, connections: Connections) -> Self {
         let Connections {
-            orders,
-            spent,
-            outlet,
+            requests,
+            retired,
+            publisher,
             progress,
         } = connections;
         Servo {
@@ -96,9 +96,9 @@ impl Servo {
             state: State::Disarmed,
             program: None,
             run_tick: 0,
-            orders,
-            spent,
-            outlet,
+            requests,
+            retired,
+            publisher,
             progress,
             trip: None,
             completed: false,
@@ -107,7 +107,7 @@ impl Servo {
     }
 
     /// One tick. Allocates nothing, takes no lock, prints nothing, calls no system function but clock and devices.
-    pub fn tick(&mut self, moment: &Moment, clock: &impl Clock) {
+    pub fn tick(&mut self, moment: &TickTiming, clock: &impl Clock) {
         let now = moment.tick;
         self.take_orders(now.number);
         let reading = self.rig.latest(now); // read
@@ -119,7 +119,7 @@ impl Servo {
         self.finish_run(now.number);
     }
 
-    fn check(&mut self, reading: &Reading, moment: &Moment) -> Result<(), Trip> {
+    fn check(&mut self, reading: &Reading, moment: &TickTiming) -> Result<(), Trip> {
         let timing = self.interlocks.check_timing(moment.missed, moment.tick);
         let reading = self.interlocks.check_reading(reading, moment.tick);
         let is_on = matches!(self.state, State::Armed | State::Running);
@@ -163,7 +163,7 @@ impl Servo {
 
     fn publish(
         &mut self,
-        moment: &Moment,
+        moment: &TickTiming,
         done_ns: u64,
         reading: &Reading,
         decision: &Decision,
@@ -173,7 +173,7 @@ impl Servo {
         let tripped_now = self
             .trip
             .is_some_and(|(_, tick)| tick == moment.tick.number);
-        self.outlet.record(TickRecord {
+        self.publisher.record(TickRecord {
             tick: moment.tick.number,
             scheduled_ns: moment.tick.scheduled_ns,
             woke_ns: moment.woke_ns,
@@ -213,20 +213,22 @@ impl Servo {
             .is_some_and(|program| self.run_tick >= program.ticks())
         {
             self.completed = true;
-            self.outlet.event(tick, EventKind::Completed);
-            self.switch_off(Change::Stop, tick);
+            self.publisher.event(tick, EventKind::Completed);
+            self.switch_off(Transition::Stop, tick);
         }
     }
 
     fn take_orders(&mut self, tick: u64) {
-        for _ in 0..ORDERS_PER_TICK {
-            let Ok(order) = self.orders.pop() else { return };
-            self.outlet.event(tick, EventKind::Order(order.kind()));
+        for _ in 0..REQUESTS_PER_TICK {
+            let Ok(order) = self.requests.pop() else {
+                return;
+            };
+            self.publisher.event(tick, EventKind::Request(order.kind()));
             match order {
-                Order::Arm => self.arm(tick),
-                Order::Start(program) => self.start(program, tick),
-                Order::Stop => self.switch_off(Change::Stop, tick),
-                Order::Clear => self.clear(tick),
+                Request::Arm => self.arm(tick),
+                Request::Start(program) => self.start(program, tick),
+                Request::Stop => self.switch_off(Transition::Stop, tick),
+                Request::Clear => self.clear(tick),
             }
         }
     }
@@ -234,11 +236,11 @@ impl Servo {
     /// Enabling may take its time; nothing moves yet, and the schedule begins anew after it. Where the order changes
     /// nothing, neither does it: a schedule that begins anew in the middle of a run would hide a late tick.
     fn arm(&mut self, tick: u64) {
-        if self.state.after(Change::Arm).is_none() {
+        if self.state.after(Transition::Arm).is_none() {
             return;
         }
         self.slow_order = true;
-        self.change(Change::Arm, tick);
+        self.change(Transition::Arm, tick);
         if let Err(error) = self.rig.enable() {
             self.trip(Trip::from(error), tick);
         }
@@ -246,18 +248,18 @@ impl Servo {
 
     /// A person's acknowledgement reaches the amplifier too; as long as that keeps its fault, the trip stays.
     fn clear(&mut self, tick: u64) {
-        if self.state.after(Change::Clear).is_none() {
+        if self.state.after(Transition::Clear).is_none() {
             return;
         }
         self.slow_order = true;
         if self.rig.reset_fault().is_ok() {
-            self.change(Change::Clear, tick);
+            self.change(Transition::Clear, tick);
         }
     }
 
     fn start(&mut self, program: Box<dyn Program>, tick: u64) {
         let before = self.state;
-        self.change(Change::Start, tick);
+        self.change(Transition::Start, tick);
         let old = if self.state == State::Running && before != State::Running {
             (self.run_tick, self.completed, self.trip) = (0, false, None);
             self.program.replace(program)
@@ -269,23 +271,23 @@ impl Servo {
 
     /// Zero current now, amplifier disabled, the reason published.
     fn trip(&mut self, trip: Trip, tick: u64) {
-        if self.state.after(Change::Trip).is_some() {
+        if self.state.after(Transition::Trip).is_some() {
             self.trip = Some((trip, tick));
-            self.outlet.event(tick, EventKind::Trip(trip));
-            self.switch_off(Change::Trip, tick);
+            self.publisher.event(tick, EventKind::Trip(trip));
+            self.switch_off(Transition::Trip, tick);
         }
     }
 
-    fn switch_off(&mut self, change: Change, tick: u64) {
+    fn switch_off(&mut self, change: Transition, tick: u64) {
         self.rig.disable();
         self.change(change, tick);
         let program = self.program.take();
         self.hand_back(program);
     }
 
-    fn change(&mut self, change: Change, tick: u64) {
+    fn change(&mut self, change: Transition, tick: u64) {
         if let Some(to) = self.state.after(change) {
-            self.outlet.event(
+            self.publisher.event(
                 tick,
                 EventKind::State {
                     from: self.state,
@@ -299,14 +301,14 @@ impl Servo {
     /// Memory is freed outside the loop; if nobody collects it, it is kept rather than freed here.
     fn hand_back(&mut self, program: Option<Box<dyn Program>>) {
         if let Some(rtrb::PushError::Full(program)) =
-            program.and_then(|program| self.spent.push(program).err())
+            program.and_then(|program| self.retired.push(program).err())
         {
             std::mem::forget(program);
         }
     }
 
     /// Whether an order since the last call took its time, so that the schedule must begin anew.
-    pub fn took_slow_order(&mut self) -> bool {
+    pub fn took_slow_request(&mut self) -> bool {
         std::mem::take(&mut self.slow_order)
     }
 
@@ -326,8 +328,8 @@ impl Servo {
     }
 
     /// The way to the recorder.
-    pub fn outlet(&self) -> &Outlet {
-        &self.outlet
+    pub fn publisher(&self) -> &Publisher {
+        &self.publisher
     }
 }
 

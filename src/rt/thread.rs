@@ -46,7 +46,7 @@ pub struct Scheduling {
 
 /// How a loop ended.
 #[derive(Clone, Debug, Default)]
-pub struct Ended {
+pub struct LoopOutcome {
     /// The trip, if there was one, and its tick.
     pub trip: Option<(Trip, u64)>,
     /// Whether the program ran to its end.
@@ -56,20 +56,20 @@ pub struct Ended {
 }
 
 /// A loop on its own thread, scheduled but waiting for leave to begin.
-pub struct Prepared {
-    thread: JoinHandle<Ended>,
+pub struct PreparedLoop {
+    thread: JoinHandle<LoopOutcome>,
     leave: Sender<()>,
     scheduling: Scheduling,
 }
 
-impl Prepared {
+impl PreparedLoop {
     /// How it is scheduled.
     pub fn scheduling(&self) -> &Scheduling {
         &self.scheduling
     }
 
     /// Lets it begin. Without this call it ends before its first tick.
-    pub fn begin(self) -> JoinHandle<Ended> {
+    pub fn begin(self) -> JoinHandle<LoopOutcome> {
         // The thread waits for this; if it died, joining it tells.
         let _ = self.leave.send(());
         self.thread
@@ -82,7 +82,7 @@ pub fn prepare(
     settings: &LoopSettings,
     pace: Pace,
     tail_ticks: u64,
-) -> std::io::Result<Prepared> {
+) -> std::io::Result<PreparedLoop> {
     let settings = settings.clone();
     let (leave, permitted) = channel();
     let (tell, told) = channel();
@@ -98,7 +98,7 @@ pub fn prepare(
             };
             let _ = tell.send(scheduling);
             if permitted.recv().is_err() {
-                return Ended::default();
+                return LoopOutcome::default();
             }
             match pace {
                 Pace::Virtual => run(
@@ -114,7 +114,7 @@ pub fn prepare(
     let scheduling = told
         .recv()
         .map_err(|_| std::io::Error::other("the loop's thread ended before it began"))?;
-    Ok(Prepared {
+    Ok(PreparedLoop {
         thread,
         leave,
         scheduling,
@@ -122,21 +122,21 @@ pub fn prepare(
 }
 
 /// Ticks until the loop has been off for `tail_ticks`.
-pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> Ended {
+pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutcome {
     let (mut number, mut off_ticks) = (0, 0);
     while off_ticks <= tail_ticks {
-        let moment = clock.wait(number, servo.outlet());
+        let moment = clock.wait(number, servo.publisher());
         servo.tick(&moment, &clock);
         number = moment.tick.number + 1;
-        if servo.took_slow_order() {
+        if servo.took_slow_request() {
             clock.restart(number);
         }
         off_ticks = if servo.is_off() { off_ticks + 1 } else { 0 };
     }
-    Ended {
+    LoopOutcome {
         trip: servo.last_trip(),
         completed: servo.completed(),
-        lost_records: servo.outlet().lost(),
+        lost_records: servo.publisher().lost(),
     }
 }
 
@@ -184,7 +184,7 @@ pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
 
 /// For the threads that serve the loop's devices: right below it, where that is permitted. Where it is not, the loop's own
 /// thread says so.
-pub fn below_the_loop(settings: &LoopSettings) -> impl Fn() + Send + Sync + Clone + use<> {
+pub fn device_thread_setup(settings: &LoopSettings) -> impl Fn() + Send + Sync + Clone + use<> {
     let priority = (settings.priority - 1).max(1);
     move || {
         let _ = set_fifo(priority);

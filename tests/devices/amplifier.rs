@@ -5,12 +5,12 @@ use std::time::Duration;
 use bench::config::{AmplifierDevice, Config, Source, load};
 use bench::experiment::Plan;
 use bench::rig::devices::amplifier::{drive_settings, vesc_settings};
-use bench::rig::emulator::{ActingFault, Amplifier, Journal, Stage};
+use bench::rig::emulator::{Amplifier, EmulatedFault, EventLog, Stage};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
-use bench::rt::record::{EventKind, Published};
-use bench::rt::servo::Order;
-use bench_hal::can::bus::{Host, World};
+use bench::rt::record::{EventKind, LoopMessage};
+use bench::rt::servo::Request;
+use bench_hal::can::bus::{Host, SimulatedHost};
 use bench_hal::can::drive::CanopenDrive;
 use bench_hal::can::drive::faults::*;
 use bench_hal::can::vesc::Vesc;
@@ -154,7 +154,7 @@ fn program(config: &Config, run: Run) -> Box<dyn Program> {
 
 /// Looks at the stage at every tick, and lets a tick's time pass first.
 struct Look {
-    world: World,
+    world: SimulatedHost,
     stage: Stage,
     due_ns: u64,
     sequence: u64,
@@ -182,12 +182,12 @@ struct Lab {
     bench: Bench,
     drive: Amplifier,
     stage: Stage,
-    world: World,
+    world: SimulatedHost,
     config: Config,
 }
 
 /// The driver, opened on the bus.
-fn driver(config: &Config, world: &World) -> bench::rig::devices::Amplifier {
+fn driver(config: &Config, world: &SimulatedHost) -> bench::rig::devices::Amplifier {
     let host = Box::new(world.clone());
     match &config.amplifier.device {
         AmplifierDevice::Canopen(device) => {
@@ -201,7 +201,7 @@ fn driver(config: &Config, world: &World) -> bench::rig::devices::Amplifier {
 }
 
 /// The driver in a loop that is disarmed.
-fn open(config: &Config, world: &World, stage: &Stage) -> Bench {
+fn open(config: &Config, world: &SimulatedHost, stage: &Stage) -> Bench {
     let amplifier = driver(config, world);
     let probe = Look {
         world: world.clone(),
@@ -218,9 +218,9 @@ impl Lab {
     }
 
     fn of(config: Config) -> Lab {
-        let world = World::default();
+        let world = SimulatedHost::default();
         let stage = Stage::new(&config).expect("a stage");
-        let (journal, _) = Journal::new();
+        let (journal, _) = EventLog::new();
         let drive = Amplifier::start(&config, Arc::new(world.clone()), stage.clone(), journal)
             .expect("a drive");
         let bench = open(&config, &world, &stage);
@@ -235,7 +235,7 @@ impl Lab {
 
     /// Armed, nothing running.
     fn arm(&mut self) {
-        self.bench.order(Order::Arm);
+        self.bench.order(Request::Arm);
         self.bench.run(50);
         assert_eq!(
             self.bench.state(),
@@ -254,7 +254,7 @@ impl Lab {
     /// Running, until a current flows that is worth stopping.
     fn run_until_current_flows(&mut self, run: Run) {
         self.arm();
-        self.bench.order(Order::Start(program(&self.config, run)));
+        self.bench.order(Request::Start(program(&self.config, run)));
         for _ in 0..2000 {
             self.bench.tick();
             if self.drive.current_a().abs() > 0.02 {
@@ -278,7 +278,7 @@ impl Lab {
     }
 
     fn ask(&self, word: &str) {
-        let Ok(ActingFault::Amplifier(fault)) = ActingFault::parse(word) else {
+        let Ok(EmulatedFault::Amplifier(fault)) = EmulatedFault::parse(word) else {
             panic!("{word} is a fault")
         };
         self.drive.ask(fault).expect("a bus in memory takes it");
@@ -346,9 +346,9 @@ impl Lab {
     fn next_run_completes(&mut self) {
         self.end();
         let clearing = if self.bench.state() == State::Tripped {
-            Order::Clear
+            Request::Clear
         } else {
-            Order::Stop
+            Request::Stop
         };
         self.bench.order(clearing);
         self.bench.run(100);
@@ -383,10 +383,10 @@ impl Lab {
     /// Nothing but a person's order clears it: a new program is refused as well.
     fn a_fault_of_the_drive_outlives_the_program(&mut self) {
         self.bench.run(10);
-        self.bench.order(Order::Arm);
+        self.bench.order(Request::Arm);
         self.bench.run(1);
         self.trips_naming(DRIVE_FAULT, 10..=10);
-        self.bench.order(Order::Clear);
+        self.bench.order(Request::Clear);
         self.bench.run(100);
     }
 
@@ -397,7 +397,7 @@ impl Lab {
         config.control.duration_s = 0.3;
         self.arm();
         self.bench
-            .order(Order::Start(program(&config, Run::Control)));
+            .order(Request::Start(program(&config, Run::Control)));
         self.bench.run(450);
         assert_eq!(self.bench.trips().len(), trips, "{:x?}", self.trip());
         assert!(self.bench.servo().completed() && self.is_off());
@@ -475,9 +475,9 @@ fn disarmed_a_fault_gives_no_current_and_keeps_the_bench_from_starting_into_it()
         assert_eq!(lab.ticks_enabled(AFTER), 0, "{}", case.word);
         assert_eq!(lab.bench.state(), State::Disarmed);
         let begin = lab.last_tick();
-        lab.bench.order(Order::Arm);
+        lab.bench.order(Request::Arm);
         lab.bench
-            .order(Order::Start(program(&lab.config, Run::Chirp)));
+            .order(Request::Start(program(&lab.config, Run::Chirp)));
         // 50 ms of quiet come first: what is there is found before a current flows.
         assert_eq!(lab.ticks_with_current(50), 0, "{}", case.word);
         match case.armed_into {
@@ -524,14 +524,14 @@ fn a_drive_that_ignores_its_switching_off_is_stopped_by_nmt_and_one_that_ignores
         let mut lab = Lab::new();
         lab.run_until_current_flows(Run::Chirp);
         lab.begin(word);
-        lab.bench.order(Order::Stop);
+        lab.bench.order(Request::Stop);
         let zero = lab.ticks_with_current(AFTER);
         assert!(
             (60..=off).contains(&zero),
             "{word}: current for {zero} ticks"
         );
         assert!(!lab.drive.is_enabled());
-        lab.bench.order(Order::Arm);
+        lab.bench.order(Request::Arm);
         lab.bench.run(1);
         let at = lab.last_tick();
         lab.trips_naming(STILL_ENABLED, at..=at);
@@ -571,7 +571,7 @@ fn a_loop_that_dies_leaves_no_current() {
         world,
         ..
     } = lab;
-    assert!(matches!(bench.all.last(), Some(Published::Tick(_))));
+    assert!(matches!(bench.all.last(), Some(LoopMessage::Tick(_))));
     drop(bench);
     world.sleep(Duration::from_millis(2));
     assert!(

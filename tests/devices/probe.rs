@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 use bench::config::{Config, Source, load};
 use bench::experiment::Plan;
 use bench::rig::devices;
-use bench::rig::emulator::probe::{End, Probe};
-use bench::rig::emulator::{ActingFault, Stage};
+use bench::rig::emulator::probe::{Probe, ProbeEndpoint};
+use bench::rig::emulator::{EmulatedFault, Stage};
 use bench::rt::arming::State;
 use bench::rt::program::Program;
 use bench::rt::record::EventKind;
-use bench::rt::servo::Order;
-use bench_hal::serial::Watch;
+use bench::rt::servo::Request;
+use bench_hal::serial::StatisticsHandle;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
 
 use crate::rig::Bench;
@@ -127,7 +127,7 @@ enum Pace {
 /// The loop with the serial driver, an acting probe at the other end, and the stage between both.
 struct Table {
     bench: Bench,
-    watch: Watch,
+    watch: StatisticsHandle,
     probe: Option<Probe>,
     stage: Stage,
     start: Instant,
@@ -152,7 +152,7 @@ impl Table {
         start: Instant,
         folder: Arc<tempfile::TempDir>,
     ) -> Table {
-        let end = End::Terminal(Some(folder.path().join("probe")));
+        let end = ProbeEndpoint::Terminal(Some(folder.path().join("probe")));
         let now_ns = move || start.elapsed().as_nanos() as u64;
         let acting =
             Probe::start(&config, &end, None, stage.clone(), now_ns).expect("a pseudo terminal");
@@ -210,7 +210,7 @@ impl Table {
     }
 
     fn ask(&self, word: &str) {
-        let Ok(ActingFault::Probe(fault)) = ActingFault::parse(word) else {
+        let Ok(EmulatedFault::Probe(fault)) = EmulatedFault::parse(word) else {
             panic!("{word} is a fault")
         };
         self.probe.as_ref().expect("the probe is there").ask(fault);
@@ -244,10 +244,10 @@ impl Table {
         if state == StateOf::Disarmed {
             return;
         }
-        self.bench.order(Order::Arm);
+        self.bench.order(Request::Arm);
         self.run(2);
         if state != StateOf::Armed {
-            self.bench.order(Order::Start(self.program(state)));
+            self.bench.order(Request::Start(self.program(state)));
             for _ in 0..TICKS {
                 self.tick();
                 if self.given_a().abs() > 0.02 {
@@ -261,12 +261,13 @@ impl Table {
     /// A person who has not noticed anything goes on to the next state: current would flow.
     fn go_on(&mut self, state: StateOf) {
         if state == StateOf::Disarmed {
-            self.bench.order(Order::Arm);
+            self.bench.order(Request::Arm);
         }
         if matches!(state, StateOf::Disarmed | StateOf::Armed)
             && self.bench.state() != State::Tripped
         {
-            self.bench.order(Order::Start(self.program(StateOf::Chirp)));
+            self.bench
+                .order(Request::Start(self.program(StateOf::Chirp)));
         }
     }
 
@@ -312,7 +313,7 @@ impl Table {
         self.pace = Pace::Readings;
         self.run(50); // of these the first may be of the time before
         if self.bench.state() == State::Tripped {
-            self.bench.order(Order::Clear);
+            self.bench.order(Request::Clear);
             self.run(1);
         }
         self.runs_cleanly();

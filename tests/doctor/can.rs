@@ -3,31 +3,31 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use bench::doctor::{Finding, Report, Verdict, on_bus, watch};
+use bench::doctor::{Finding, Report, Severity, examine_canopen_drive, watch};
 use std::num::NonZeroU32;
 
 use bench_hal::can::bus::{
-    BusError, BusEvent, CanBus, Claim, Held, Host, Port, Running, Task, World,
+    BusError, BusEvent, CanBus, Claim, Host, NodeInUse, Port, SimulatedHost, Task, TaskHandle,
 };
 use bench_hal::can::cia402::State;
-use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
+use bench_hal::can::device::{AmplifierTask, Device, DeviceFault, EmulatedDriveSettings};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
 use bench_hal::can::frame::{CanFrame, Id};
 use bench_hal::can::vesc::{VescSettings, status_id};
 use bench_hal::can::{nmt, sdo};
 
 /// A world with a drive that has just started.
-fn rig(settings: DeviceSettings) -> (World, Arc<Mutex<Device>>, Running) {
-    let world = World::default();
+fn rig(settings: EmulatedDriveSettings) -> (SimulatedHost, Arc<Mutex<Device>>, TaskHandle) {
+    let world = SimulatedHost::default();
     let device = Arc::new(Mutex::new(Device::new(settings)));
-    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     world.sleep(Duration::from_millis(5));
     (world, device, running)
 }
 
 fn examine(host: &dyn Host) -> Report {
     let mut report = Report::default();
-    on_bus(host, &DriveSettings::default(), 1.5, &mut report);
+    examine_canopen_drive(host, &DriveSettings::default(), 1.5, &mut report);
     report
 }
 
@@ -35,7 +35,7 @@ fn bad(report: &Report) -> Vec<&Finding> {
     report
         .findings
         .iter()
-        .filter(|finding| finding.verdict > Verdict::Note)
+        .filter(|finding| finding.verdict > Severity::Note)
         .collect()
 }
 
@@ -51,7 +51,7 @@ fn heard(ear: &mut dyn CanBus) -> Vec<CanFrame> {
 
 #[test]
 fn a_sound_drive_is_ok_and_asked_by_uploads_alone() {
-    let (world, device, _running) = rig(DeviceSettings::default());
+    let (world, device, _running) = rig(EmulatedDriveSettings::default());
     let mut ear = world.bus().connect(&[]);
     let objects = format!("{:?}", device.lock().unwrap().objects());
     let report = examine(&world);
@@ -80,18 +80,18 @@ fn a_sound_drive_is_ok_and_asked_by_uploads_alone() {
 
 #[test]
 fn a_drive_that_runs_stays_as_it_is() {
-    let (world, device, _running) = rig(DeviceSettings::default());
+    let (world, device, _running) = rig(EmulatedDriveSettings::default());
     let mut drive = CanopenDrive::open(DriveSettings::default(), Box::new(world.clone())).unwrap();
     bench_hal::CurrentAmplifier::enable(&mut drive).unwrap();
     bench_hal::CurrentAmplifier::command(&mut drive, 0.0).unwrap();
     let mut report = Report::default();
     // A bus in memory knows no claims: this is how a drive of another program looks.
-    on_bus(&world, &DriveSettings::default(), 1.5, &mut report);
+    examine_canopen_drive(&world, &DriveSettings::default(), 1.5, &mut report);
     assert!(
         report
             .findings
             .iter()
-            .all(|finding| finding.verdict < Verdict::Failure),
+            .all(|finding| finding.verdict < Severity::Failure),
         "{:?}",
         report.findings
     );
@@ -100,7 +100,7 @@ fn a_drive_that_runs_stays_as_it_is() {
 
 #[test]
 fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
-    let (world, device, _running) = rig(DeviceSettings::default());
+    let (world, device, _running) = rig(EmulatedDriveSettings::default());
     device.lock().unwrap().inject(DeviceFault::Drive(0x4210));
     let report = examine(&world);
     let words: Vec<&str> = bad(&report)
@@ -113,7 +113,7 @@ fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
         words[1].starts_with("state FAULT (statusword 0x"),
         "{words:?}"
     );
-    assert_eq!(bad(&report)[1].verdict, Verdict::Failure);
+    assert_eq!(bad(&report)[1].verdict, Severity::Failure);
     assert_eq!(
         device.lock().unwrap().power_state(),
         State::Fault,
@@ -123,9 +123,9 @@ fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
 
 #[test]
 fn a_drive_of_another_rating_is_refused_before_every_ampere_is_wrong() {
-    let (world, _device, _running) = rig(DeviceSettings {
+    let (world, _device, _running) = rig(EmulatedDriveSettings {
         rated_current_ma: 2000,
-        ..DeviceSettings::default()
+        ..EmulatedDriveSettings::default()
     });
     let report = examine(&world);
     assert_eq!(bad(&report).len(), 1);
@@ -139,11 +139,11 @@ fn a_drive_of_another_rating_is_refused_before_every_ampere_is_wrong() {
 
 #[test]
 fn silence_is_a_failure_that_says_what_to_check() {
-    let report = examine(&World::default());
+    let report = examine(&SimulatedHost::default());
     let [finding] = bad(&report)[..] else {
         panic!("{report:?}")
     };
-    assert_eq!(finding.verdict, Verdict::Failure);
+    assert_eq!(finding.verdict, Severity::Failure);
     assert!(
         finding
             .what
@@ -162,7 +162,7 @@ fn silence_is_a_failure_that_says_what_to_check() {
 
 #[test]
 fn a_stopped_node_is_told_from_an_absent_one_by_its_heartbeat() {
-    let (world, device, _running) = rig(DeviceSettings::default());
+    let (world, device, _running) = rig(EmulatedDriveSettings::default());
     let mut master = world.bus().connect(&[]);
     let write = [0x2B, 0x17, 0x10, 0, 50, 0, 0, 0]; // 0x1017 = 50 ms
     master
@@ -186,15 +186,15 @@ fn a_stopped_node_is_told_from_an_absent_one_by_its_heartbeat() {
 }
 
 /// A world in which another process has every node.
-struct Taken(World);
+struct Taken(SimulatedHost);
 
 impl Port for Taken {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         self.0.endpoint(ids)
     }
 
-    fn claim(&self, node: u8) -> Result<Claim, Held> {
-        Err(Held {
+    fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
+        Err(NodeInUse {
             node,
             pid: NonZeroU32::new(4711),
         })
@@ -210,20 +210,20 @@ impl Host for Taken {
         self.0.sleep(time);
     }
 
-    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<Running> {
+    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
         self.0.start(name, task)
     }
 }
 
 #[test]
 fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
-    let (world, _device, _running) = rig(DeviceSettings::default());
+    let (world, _device, _running) = rig(EmulatedDriveSettings::default());
     let mut ear = world.bus().connect(&[]);
     let report = examine(&Taken(world));
     let [finding] = &report.findings[..] else {
         panic!("{report:?}")
     };
-    assert_eq!(finding.verdict, Verdict::Failure);
+    assert_eq!(finding.verdict, Severity::Failure);
     assert_eq!(
         finding.what,
         "node 5 is held by process 4711; it was not asked anything"
@@ -233,7 +233,7 @@ fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
 
 #[test]
 fn a_node_is_free_again_afterwards() {
-    let (world, _device, _running) = rig(DeviceSettings::default());
+    let (world, _device, _running) = rig(EmulatedDriveSettings::default());
     examine(&world);
     assert!(CanopenDrive::open(DriveSettings::default(), Box::new(world)).is_ok());
 }
@@ -253,7 +253,7 @@ impl Task for Vesc {
 
 #[test]
 fn a_vesc_is_listened_to_and_sent_nothing() {
-    let world = World::default();
+    let world = SimulatedHost::default();
     let _running = world
         .start("vesc", Box::new(Vesc(world.endpoint(&[]).unwrap(), 0)))
         .unwrap();
@@ -270,7 +270,7 @@ fn a_vesc_is_listened_to_and_sent_nothing() {
     };
     assert_eq!(
         (find(23), find(24)),
-        (Some(Verdict::Ok), Some(Verdict::Failure))
+        (Some(Severity::Ok), Some(Severity::Failure))
     );
     assert!(
         heard(&mut ear)
@@ -281,7 +281,7 @@ fn a_vesc_is_listened_to_and_sent_nothing() {
 
 #[test]
 fn a_bus_that_is_down_is_a_failure() {
-    let world = World::default();
+    let world = SimulatedHost::default();
     world.bus().set_down(true);
     let report = examine(&world);
     assert_eq!(bad(&report)[0].what, "the CAN interface is down");

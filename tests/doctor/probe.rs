@@ -127,7 +127,7 @@ fn who_holds_a_terminal_without_our_lock_is_found_by_its_open_files() {
 #[test]
 fn a_silent_probe_is_a_failure_that_says_what_to_check() {
     let rehearsal = rehearsal();
-    rehearsal.ask_fault(Fault::Silence);
+    rehearsal.inject_fault(Fault::Silence);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
     assert!(
         found.len() == 1 && found[0].starts_with("failure: the probe says nothing: 0 bytes"),
@@ -138,7 +138,7 @@ fn a_silent_probe_is_a_failure_that_says_what_to_check() {
 #[test]
 fn a_target_out_of_range_is_a_failure() {
     let rehearsal = rehearsal();
-    rehearsal.ask_fault(Fault::OutOfRange);
+    rehearsal.inject_fault(Fault::OutOfRange);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
     assert!(
         found.len() == 1
@@ -150,7 +150,7 @@ fn a_target_out_of_range_is_a_failure() {
 #[test]
 fn a_damaged_line_is_a_warning_with_the_count() {
     let rehearsal = rehearsal();
-    rehearsal.ask_fault(Fault::Corrupt { every: 500 });
+    rehearsal.inject_fault(Fault::Corrupt { every: 500 });
     let report = doctor(&sets(&rehearsal));
     let found = on(&report, "readings");
     assert!(

@@ -72,7 +72,7 @@ fn constraints_as_they_are_make_even_and_odd_distortion_which_is_put_down_to_geo
     );
     assert_eq!(
         linearity.whole.cause(),
-        Cause::Geometry,
+        Cause::Nonlinearity,
         "{}",
         linearity.whole.words()
     );
@@ -81,7 +81,7 @@ fn constraints_as_they_are_make_even_and_odd_distortion_which_is_put_down_to_geo
         linearity
             .bands
             .iter()
-            .any(|band| band.cause() == Cause::Geometry && band.band_hz.0 > 20.0)
+            .any(|band| band.cause() == Cause::Nonlinearity && band.band_hz.0 > 20.0)
     );
 }
 
@@ -136,14 +136,14 @@ fn a_multisine_of_all_lines_and_a_chirp_say_nothing_of_it() {
 const HERE: &str = "--set loop.rate_hz=1000 --start 5 --stop 200 --set multisine.period_s=8 --set multisine.periods=9 --operating-point 8%";
 
 /// `bench linearity` in an empty folder, and the folder.
-fn over_amplitude(options: &str) -> (Value, Bench) {
+fn modes_over_amplitude(options: &str) -> (Value, Bench) {
     let bench = Bench::new();
     (bench.json(&format!("linearity {HERE} {options}")), bench)
 }
 
 #[test]
 fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
-    let (answer, bench) = over_amplitude("--shape model --scales 1,0.5,2");
+    let (answer, bench) = modes_over_amplitude("--shape model --scales 1,0.5,2");
     assert_eq!(answer["scales"], serde_json::json!([0.5, 1.0, 2.0]));
     assert_eq!(answer["shifted"], false, "{}", answer["why"]);
     let modes = answer["modes"].as_array().expect("modes");
@@ -191,7 +191,8 @@ fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
 
 #[test]
 fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift() {
-    let (answer, _) = over_amplitude("--shape model --scales 0.5,1,2 --set sim.geometry=quadratic");
+    let (answer, _) =
+        modes_over_amplitude("--shape model --scales 0.5,1,2 --set sim.geometry=quadratic");
     let even = |run: usize| number(&answer["runs"][run]["linearity"]["even_distortion_ratio"]);
     // Of second order: its amplitude grows with the square, its power over the output's with the square of the amplitude. From a power
     // that is found with more than 1000 lines, some percent each; higher even orders add at the largest.

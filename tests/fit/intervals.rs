@@ -1,8 +1,8 @@
 //! Intervals hold the truth as often as they say.
-use bench::identify::modal::{Estimate, View, fit};
+use bench::identify::modal::{Estimate, MeasurementChain, fit};
 use bench::identify::verdict::zeros;
 
-use crate::synthetic::{blocks, stage};
+use crate::synthetic::{frf_data, stage};
 
 const SEEDS: u64 = 200;
 
@@ -15,9 +15,12 @@ fn of_modes_at_any_noise() {
         let truth = stage();
         let mut held = [[0; 3]; 3];
         for seed in 0..SEEDS {
-            let modes = fit(&blocks(&truth, 2e-4, sigma_m_per_n, seed), &View::Bare)
-                .unwrap()
-                .modes();
+            let modes = fit(
+                &frf_data(&truth, 2e-4, sigma_m_per_n, seed),
+                &MeasurementChain::Bare,
+            )
+            .unwrap()
+            .modes();
             assert_eq!(modes.len(), 3, "{sigma_m_per_n} {seed}: {modes:?}");
             for ((mode, truth), held) in modes.iter().zip(&truth).zip(&mut held) {
                 let within =
@@ -51,7 +54,7 @@ fn of_the_complex_zeros_as_ellipses() {
         .s;
     let mut held = 0;
     for seed in 0..SEEDS {
-        let fit = fit(&blocks(&truth, 2e-4, 1e-9, seed), &View::Bare).unwrap();
+        let fit = fit(&frf_data(&truth, 2e-4, 1e-9, seed), &MeasurementChain::Bare).unwrap();
         let zeros = zeros(&fit).unwrap();
         let near = zeros
             .iter()

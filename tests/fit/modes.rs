@@ -1,9 +1,9 @@
 //! Which modes there are.
-use bench::identify::Block;
-use bench::identify::modal::{FitError, View, fit};
+use bench::identify::FrfDatum;
+use bench::identify::modal::{FitError, MeasurementChain, fit};
 use nalgebra::Complex;
 
-use crate::synthetic::{blocks, stage, term};
+use crate::synthetic::{frf_data, stage, term};
 
 /// Some thousandth of what the stage answers above its modes.
 const QUIET_M_PER_N: f64 = 1e-9;
@@ -16,7 +16,11 @@ fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
             term(82.0 * ratio, 0.004, -0.02 * opposite),
         );
         let truth = [term(29.0, 0.009, 0.47), low, high];
-        let fit = fit(&blocks(&truth, 0.0, QUIET_M_PER_N, 3), &View::Bare).unwrap();
+        let fit = fit(
+            &frf_data(&truth, 0.0, QUIET_M_PER_N, 3),
+            &MeasurementChain::Bare,
+        )
+        .unwrap();
         let modes = fit.modes();
         assert_eq!(modes.len(), 3, "{ratio}: {modes:?}");
         for (mode, truth) in modes.iter().zip(truth) {
@@ -49,7 +53,11 @@ fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
 #[test]
 fn a_delay_of_many_milliseconds_is_told_apart_from_the_modes() {
     for delay_s in [0.0, 1e-4, 1.7e-3, 6e-3, -2e-3] {
-        let fit = fit(&blocks(&stage(), delay_s, QUIET_M_PER_N, 5), &View::Bare).unwrap();
+        let fit = fit(
+            &frf_data(&stage(), delay_s, QUIET_M_PER_N, 5),
+            &MeasurementChain::Bare,
+        )
+        .unwrap();
         let delay = fit.delay_s();
         assert!(
             (delay.value - delay_s).abs() < 5.0 * delay.sigma,
@@ -65,9 +73,12 @@ fn a_mode_below_the_noise_is_not_claimed() {
     // At its peak the second mode answers 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, a twentieth of the noise of a block.
     let truth = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 1e-7)];
     for seed in 0..20 {
-        let modes = fit(&blocks(&truth, 0.0, QUIET_M_PER_N, seed), &View::Bare)
-            .unwrap()
-            .modes();
+        let modes = fit(
+            &frf_data(&truth, 0.0, QUIET_M_PER_N, seed),
+            &MeasurementChain::Bare,
+        )
+        .unwrap()
+        .modes();
         assert_eq!(modes.len(), 1, "{seed}: {modes:?}");
     }
 }
@@ -75,7 +86,11 @@ fn a_mode_below_the_noise_is_not_claimed() {
 #[test]
 fn a_free_body_with_a_flexible_mode_is_one_double_integrator_and_one_mode() {
     let truth = [term(0.0, 0.0, 2.0), term(48.0, 0.01, -1.2)];
-    let fit = fit(&blocks(&truth, 0.0, QUIET_M_PER_N, 8), &View::Bare).unwrap();
+    let fit = fit(
+        &frf_data(&truth, 0.0, QUIET_M_PER_N, 8),
+        &MeasurementChain::Bare,
+    )
+    .unwrap();
     let modes = fit.modes();
     assert_eq!(modes.len(), 2, "{modes:?}");
     assert_eq!(modes[0].omega_rad_s.value, 0.0);
@@ -90,26 +105,29 @@ fn a_free_body_with_a_flexible_mode_is_one_double_integrator_and_one_mode() {
 
 #[test]
 fn noise_alone_and_too_few_frequencies_are_refused() {
-    let noise: Vec<Block> = blocks(&[], 0.0, 1e-6, 4);
+    let noise: Vec<FrfDatum> = frf_data(&[], 0.0, 1e-6, 4);
     assert!(
-        matches!(fit(&noise, &View::Bare), Err(FitError::NoMode { .. })),
+        matches!(
+            fit(&noise, &MeasurementChain::Bare),
+            Err(FitError::NoMode { .. })
+        ),
         "{:?}",
-        fit(&noise, &View::Bare)
+        fit(&noise, &MeasurementChain::Bare)
     );
     assert!(matches!(
-        fit(&noise[..1], &View::Bare),
-        Err(FitError::TooFew { blocks: 1 })
+        fit(&noise[..1], &MeasurementChain::Bare),
+        Err(FitError::TooFew { frf_data: 1 })
     ));
     assert!(matches!(
-        fit(&[], &View::Bare),
-        Err(FitError::TooFew { blocks: 0 })
+        fit(&[], &MeasurementChain::Bare),
+        Err(FitError::TooFew { frf_data: 0 })
     ));
-    let dead: Vec<Block> = noise
+    let dead: Vec<FrfDatum> = noise
         .iter()
-        .map(|b| Block {
+        .map(|b| FrfDatum {
             response: Complex::new(0.0, 0.0),
             ..*b
         })
         .collect();
-    assert!(fit(&dead, &View::Bare).is_err());
+    assert!(fit(&dead, &MeasurementChain::Bare).is_err());
 }

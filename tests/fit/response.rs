@@ -1,13 +1,13 @@
 //! The response and the poles of a fit whose parameters are known: closed form.
 
-use bench::identify::modal::{ModalFit, Parameters, View};
-use bench::model::zeros::Term;
+use bench::identify::modal::{MeasurementChain, ModalFit, Parameters};
+use bench::model::zeros::ModalTerm;
 use nalgebra::{Complex, DMatrix};
 
 const DELAY_S: f64 = 3e-4;
 const REMAINDER_M_PER_N: f64 = 2e-6;
 
-fn fit(modes: Vec<Term>, covariance: DMatrix<f64>) -> ModalFit {
+fn fit(modes: Vec<ModalTerm>, covariance: DMatrix<f64>) -> ModalFit {
     let parameters = Parameters {
         modes,
         remainder_m_per_n: REMAINDER_M_PER_N,
@@ -22,8 +22,8 @@ fn fit(modes: Vec<Term>, covariance: DMatrix<f64>) -> ModalFit {
     }
 }
 
-fn term(omega_rad_s: f64, damping_ratio: f64, residue_per_kg: f64) -> Term {
-    Term {
+fn term(omega_rad_s: f64, damping_ratio: f64, residue_per_kg: f64) -> ModalTerm {
+    ModalTerm {
         omega_rad_s,
         damping_ratio,
         residue_per_kg,
@@ -38,10 +38,11 @@ fn the_response_is_the_sum_of_modes_and_remainder_late() {
         term(0.0, 0.0, 0.01),
     ];
     let frequency_hz = [1.0, 29.3, 82.0, 84.4, 300.0];
-    let response = fit(modes.clone(), DMatrix::zeros(9, 9)).response(&View::Bare, &frequency_hz);
+    let response =
+        fit(modes.clone(), DMatrix::zeros(9, 9)).response(&MeasurementChain::Bare, &frequency_hz);
     for (f, h) in frequency_hz.iter().zip(response) {
         let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * f);
-        let of = |t: &Term| {
+        let of = |t: &ModalTerm| {
             (s * s + s * (2.0 * t.damping_ratio * t.omega_rad_s) + t.omega_rad_s.powi(2)).inv()
         };
         let sum: Complex<f64> = modes

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bench::config::{Config, Source, UnmodelledMode, load};
 use bench::experiment::Analysis;
 use bench::identify::modal::{Estimate, FittedMode};
-use bench::model::plant::{self, Modal};
+use bench::model::plant::{self, ModalModel};
 
 use crate::rig::{analysed, config};
 
@@ -14,7 +14,7 @@ pub type Truth = [f64; 3];
 
 /// The modes of the model, slowest first.
 pub fn model(config: &Config) -> Vec<Truth> {
-    let modal = Modal::of(&plant::build(&config.plant).expect("a model")).expect("modes");
+    let modal = ModalModel::of(&plant::build(&config.plant).expect("a model")).expect("modes");
     modal
         .modes
         .iter()

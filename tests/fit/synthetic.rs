@@ -1,6 +1,6 @@
 //! Responses by closed form, with noise of known power.
-use bench::identify::Block;
-use bench::model::zeros::Term;
+use bench::identify::FrfDatum;
+use bench::model::zeros::ModalTerm;
 use nalgebra::Complex;
 
 /// Numbers of mean 0 and variance 1, near enough normal: sums of twelve.
@@ -15,8 +15,8 @@ pub fn normal(seed: u64) -> impl FnMut() -> f64 {
     move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
-pub fn term(hz: f64, damping_ratio: f64, residue_per_kg: f64) -> Term {
-    Term {
+pub fn term(hz: f64, damping_ratio: f64, residue_per_kg: f64) -> ModalTerm {
+    ModalTerm {
         omega_rad_s: std::f64::consts::TAU * hz,
         damping_ratio,
         residue_per_kg,
@@ -24,7 +24,7 @@ pub fn term(hz: f64, damping_ratio: f64, residue_per_kg: f64) -> Term {
 }
 
 /// The stage of Chapter 6 at D = +10 %, Y1o = 8 % of L, rounded.
-pub fn stage() -> Vec<Term> {
+pub fn stage() -> Vec<ModalTerm> {
     vec![
         term(29.27, 0.0088, 0.4715),
         term(82.23, 0.004, -0.0319),
@@ -32,9 +32,9 @@ pub fn stage() -> Vec<Term> {
     ]
 }
 
-pub fn response(modes: &[Term], hz: f64, delay_s: f64) -> Complex<f64> {
+pub fn response(modes: &[ModalTerm], hz: f64, delay_s: f64) -> Complex<f64> {
     let s = Complex::new(0.0, std::f64::consts::TAU * hz);
-    let part = |t: &Term| {
+    let part = |t: &ModalTerm| {
         let w = t.omega_rad_s;
         (s * s + s * (2.0 * t.damping_ratio * w) + w * w).inv() * t.residue_per_kg
     };
@@ -42,14 +42,14 @@ pub fn response(modes: &[Term], hz: f64, delay_s: f64) -> Complex<f64> {
 }
 
 /// 5 to 200 Hz, one block every twentieth of a percent; noise of `sigma_m_per_n`, in all.
-pub fn blocks(modes: &[Term], delay_s: f64, sigma_m_per_n: f64, seed: u64) -> Vec<Block> {
+pub fn frf_data(modes: &[ModalTerm], delay_s: f64, sigma_m_per_n: f64, seed: u64) -> Vec<FrfDatum> {
     let mut normal = normal(seed);
     let count = (200.0f64 / 5.0).ln() / 5e-4;
     let at = |k: usize| {
         let frequency_hz = 5.0 * (5e-4 * k as f64).exp();
         let noise = Complex::new(normal(), normal()) * (sigma_m_per_n / 2f64.sqrt());
         let response = response(modes, frequency_hz, delay_s) + noise;
-        Block {
+        FrfDatum {
             frequency_hz,
             spread_hz: 0.0,
             response,

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use bench::config::{Config, ReferenceSettings, Source, load};
 use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench::identify::verdict::Cnmp;
-use bench::model::plant::Chain;
+use bench::model::plant::LoopPlant;
 use bench::recording::Recording;
 use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
@@ -41,7 +41,7 @@ const CARRIED: f64 = 0.0025;
 fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_within_1_percent() {
     let (closed, plain) = (swept(&[]), config(&[]));
     let open = analysed(&plain, &plain).frf;
-    let rig = Chain::of_mean_age(&plain, &simulated_modes(&plain).expect("modes"));
+    let rig = LoopPlant::with_mean_age(&plain, &simulated_modes(&plain).expect("modes"));
     let mut carried = 0;
     for (k, f) in closed
         .frf
@@ -148,10 +148,10 @@ fn a_planned_sweep_keeps_travel_and_current() {
     // steady state it is planned by, by a tenth at this rate.
     assert!((5e-6..11.5e-6).contains(&travel_m), "{travel_m}");
     assert!((0.5..3.3).contains(&current_a), "{current_a}");
-    let foreseen = plan.foreseen.expect("a course");
+    let predicted_extremes = plan.predicted_extremes.expect("a course");
     assert!(
-        (foreseen.travel_m - travel_m).abs() < 0.5e-6
-            && (foreseen.current_a / current_a - 1.0).abs() < 0.02
+        (predicted_extremes.travel_m - travel_m).abs() < 0.5e-6
+            && (predicted_extremes.current_a / current_a - 1.0).abs() < 0.02
     );
     assert_eq!(
         bench::experiment::replay(&recording)

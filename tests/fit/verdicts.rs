@@ -1,15 +1,15 @@
 //! Verdicts on the simulated stage: never a wrong one, and few that say nothing.
 use bench::config::Config;
 use bench::experiment::Analysis;
-use bench::identify::Block;
-use bench::identify::modal::{Estimate, ModalFit, View, fit};
-use bench::identify::verdict::{Case, Cnmp, Verdict, verdict};
-use bench::model::plant::{self, Modal};
+use bench::identify::FrfDatum;
+use bench::identify::modal::{Estimate, MeasurementChain, ModalFit, fit};
+use bench::identify::verdict::{Cnmp, Verdict, VerdictInput, verdict};
+use bench::model::plant::{self, ModalModel};
 use nalgebra::Complex;
 
 use crate::rig::{analysed, config, truth};
 use crate::stage::{model, stands_for};
-use crate::synthetic::{blocks, normal, stage, term};
+use crate::synthetic::{frf_data, normal, stage, term};
 
 /// Points of the plane of section 5.2.2, operating point from 0 to 8 % of L and asymmetry from -10 to +10 %, by seed.
 fn points(count: usize, seed: u64) -> Vec<Vec<String>> {
@@ -147,21 +147,25 @@ fn a_chain_that_answers_later_than_believed_is_never_taken_for_cnmp_zeros() {
     }
 }
 
-fn judged(modes: &[bench::model::zeros::Term], sigma_m_per_n: f64, expected: usize) -> Verdict {
-    let blocks = blocks(modes, 0.0, sigma_m_per_n, 12);
+fn judged(
+    modes: &[bench::model::zeros::ModalTerm],
+    sigma_m_per_n: f64,
+    expected: usize,
+) -> Verdict {
+    let frf_data = frf_data(modes, 0.0, sigma_m_per_n, 12);
     judged_by(
-        &fit(&blocks, &View::Bare).expect("modes"),
-        &blocks,
+        &fit(&frf_data, &MeasurementChain::Bare).expect("modes"),
+        &frf_data,
         expected,
     )
 }
 
-fn judged_by(fit: &ModalFit, blocks: &[Block], expected: usize) -> Verdict {
+fn judged_by(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict {
     let up_to_rad_s = std::f64::consts::TAU * 110.0;
-    verdict(&Case {
+    verdict(&VerdictInput {
         fit,
-        view: &View::Bare,
-        blocks,
+        view: &MeasurementChain::Bare,
+        frf_data,
         up_to_rad_s,
         expected_modes: Some(expected),
     })
@@ -170,18 +174,18 @@ fn judged_by(fit: &ModalFit, blocks: &[Block], expected: usize) -> Verdict {
 
 #[test]
 fn what_is_not_a_number_is_never_sure() {
-    let blocks = blocks(&stage(), 0.0, 1e-9, 12);
-    let good = fit(&blocks, &View::Bare).expect("modes");
-    assert_eq!(judged_by(&good, &blocks, 3).cnmp, Cnmp::Detected);
+    let frf_data = frf_data(&stage(), 0.0, 1e-9, 12);
+    let good = fit(&frf_data, &MeasurementChain::Bare).expect("modes");
+    assert_eq!(judged_by(&good, &frf_data, 3).cnmp, Cnmp::Detected);
     let mut unknown = good.clone();
     unknown.covariance.fill(f64::NAN);
     let mut misfit = good.clone();
     misfit.chi2_per_freedom = f64::NAN;
     for fit in [unknown, misfit] {
-        assert_eq!(judged_by(&fit, &blocks, 3).cnmp, Cnmp::Undecided);
+        assert_eq!(judged_by(&fit, &frf_data, 3).cnmp, Cnmp::Undecided);
     }
     // A response of nothing has no phase, and no logarithm of its magnitude.
-    let mut dead = blocks.clone();
+    let mut dead = frf_data.clone();
     let valley = dead
         .iter()
         .position(|block| block.frequency_hz > 84.0)
@@ -190,11 +194,11 @@ fn what_is_not_a_number_is_never_sure() {
     assert_eq!(judged_by(&good, &dead, 3).cnmp, Cnmp::Undecided);
     // The same of a stage without CNMP zeros, which half a turn of nothing must not exclude.
     let calm = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
-    let mut blocks = crate::synthetic::blocks(&calm, 0.0, 1e-9, 12);
-    let fit = fit(&blocks, &View::Bare).expect("modes");
-    assert_eq!(judged_by(&fit, &blocks, 2).cnmp, Cnmp::Excluded);
-    blocks[valley].response = Complex::new(0.0, 0.0);
-    assert_eq!(judged_by(&fit, &blocks, 2).cnmp, Cnmp::Undecided);
+    let mut frf_data = crate::synthetic::frf_data(&calm, 0.0, 1e-9, 12);
+    let fit = fit(&frf_data, &MeasurementChain::Bare).expect("modes");
+    assert_eq!(judged_by(&fit, &frf_data, 2).cnmp, Cnmp::Excluded);
+    frf_data[valley].response = Complex::new(0.0, 0.0);
+    assert_eq!(judged_by(&fit, &frf_data, 2).cnmp, Cnmp::Undecided);
 }
 
 #[test]
@@ -239,7 +243,7 @@ fn where_the_zeros_touch_the_axis_nothing_is_said() {
             high = middle
         }
     }
-    let modal = Modal::of(&structure(low)).expect("modes");
+    let modal = ModalModel::of(&structure(low)).expect("modes");
     let terms: Vec<_> = modal
         .modes
         .iter()

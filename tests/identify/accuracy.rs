@@ -1,4 +1,4 @@
-use bench::identify::{Curve, EstimatorSettings, Frf, Signals, local};
+use bench::identify::{EstimatorSettings, Frf, LocalModel, Signals, local};
 
 use crate::stage::{self, SampledPlant};
 
@@ -52,7 +52,7 @@ fn without_noise_the_estimate_is_the_sampled_plant_within_a_tenth_of_a_percent_a
 #[test]
 fn what_a_parabola_takes_off_a_peak_is_within_two_sigma_even_without_noise() {
     let settings = EstimatorSettings {
-        curve: Curve::Polynomial,
+        curve: LocalModel::Polynomial,
         ..EstimatorSettings::default()
     };
     let frf = local::estimate(&stage::clean_run(), BAND_HZ, &settings).unwrap();
@@ -71,7 +71,7 @@ fn what_a_parabola_takes_off_a_peak_is_within_two_sigma_even_without_noise() {
 #[test]
 fn frequencies_rise_through_the_band_in_steps_no_wider_than_the_resolution() {
     let settings = EstimatorSettings {
-        curve: Curve::Polynomial,
+        curve: LocalModel::Polynomial,
         ..EstimatorSettings::default()
     };
     let frf = local::estimate(&stage::clean_run(), BAND_HZ, &settings).unwrap();

@@ -1,13 +1,13 @@
 //! What the shape of the curves, their resolution and their grid do.
 
-use bench::identify::{Curve, EstimatorSettings, Frf, ResolutionPoint, Signals, local};
+use bench::identify::{EstimatorSettings, Frf, LocalModel, ResolutionPoint, Signals, local};
 
 use crate::stage::{self, Dice, RATE_HZ, SampledPlant};
 
 /// Modes R, u and v in hertz.
 const PEAKS_HZ: [f64; 3] = [29.27, 82.23, 85.78];
 
-fn settings(curve: Curve) -> EstimatorSettings {
+fn settings(curve: LocalModel) -> EstimatorSettings {
     EstimatorSettings {
         curve,
         ..EstimatorSettings::default()
@@ -45,8 +45,12 @@ fn of_ten_seconds_a_pole_in_the_curve_tells_the_peaks_to_half_a_percent_and_noth
     let off = |curve| {
         off_at_peaks(&local::estimate(&ten_seconds(), (10.0, 120.0), &settings(curve)).unwrap())
     };
-    let [constant, polynomial, rational] =
-        [Curve::Constant, Curve::Polynomial, Curve::Rational].map(off);
+    let [constant, polynomial, rational] = [
+        LocalModel::Constant,
+        LocalModel::Polynomial,
+        LocalModel::Rational,
+    ]
+    .map(off);
     println!("constant {constant:.4}, polynomial {polynomial:.4}, rational {rational:.6}");
     assert!(rational < 0.005, "{rational}");
     assert!(
@@ -63,7 +67,7 @@ fn of_ten_seconds_with_the_noise_of_the_stage_the_peaks_are_within_two_sigma_nin
         let frf = local::estimate(
             &stage::with_noise(&clean, seed),
             (10.0, 120.0),
-            &settings(Curve::Rational),
+            &settings(LocalModel::Rational),
         )
         .unwrap();
         for (k, f) in frf.frequency_hz.iter().enumerate() {
@@ -99,7 +103,7 @@ fn where_no_mode_stands_the_rational_curve_is_the_parabola() {
         input_a,
         output_m,
     };
-    let [parabola, rational] = [Curve::Polynomial, Curve::Rational]
+    let [parabola, rational] = [LocalModel::Polynomial, LocalModel::Rational]
         .map(|curve| local::estimate(&signals, (10.0, 490.0), &settings(curve)).unwrap());
     let same = parabola
         .response
@@ -148,7 +152,7 @@ fn half_widths_are_those_of_the_list_on_straight_lines_between_its_points() {
     let settings = EstimatorSettings {
         resolution,
         frequencies: Some(50),
-        ..settings(Curve::Constant)
+        ..settings(LocalModel::Constant)
     };
     let frf = local::estimate(&stage::clean_run(), (1.5, 400.0), &settings).unwrap();
     for (f, width) in frf.frequency_hz.iter().zip(&frf.resolution_hz) {

@@ -1,7 +1,7 @@
 //! H1, H2 and Hv: noise on the output, on the input, on both.
 
 use bench::identify::{
-    Curve, Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch,
+    Estimator, EstimatorSettings, Frf, IdentifyError, LocalModel, Signals, local, welch,
 };
 use nalgebra::Complex;
 
@@ -33,7 +33,7 @@ fn signals(seed: u64, on_input: f64, on_output: f64) -> Signals {
     }
 }
 
-fn by_curves(curve: Curve) -> impl Fn(&Signals, Estimator) -> Result<Frf, IdentifyError> {
+fn by_curves(curve: LocalModel) -> impl Fn(&Signals, Estimator) -> Result<Frf, IdentifyError> {
     move |signals, estimator| {
         let settings = EstimatorSettings {
             curve,
@@ -51,9 +51,9 @@ fn by_segments(signals: &Signals, estimator: Estimator) -> Result<Frf, IdentifyE
 
 fn every_way() -> [(&'static str, Box<Estimate>); 4] {
     [
-        ("constant", Box::new(by_curves(Curve::Constant))),
-        ("polynomial", Box::new(by_curves(Curve::Polynomial))),
-        ("rational", Box::new(by_curves(Curve::Rational))),
+        ("constant", Box::new(by_curves(LocalModel::Constant))),
+        ("polynomial", Box::new(by_curves(LocalModel::Polynomial))),
+        ("rational", Box::new(by_curves(LocalModel::Rational))),
         ("welch", Box::new(by_segments)),
     ]
 }

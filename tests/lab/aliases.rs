@@ -3,7 +3,7 @@
 //! With s_k = j (w + 2 pi k/T), G(w) = sum over k of P(s_k) (1 - exp(-s_k T))/(s_k T) exp(-s_k d), where P is motor, amplifier and
 //! modes and d the delay; a free-running probe multiplies each term by (1 - exp(-s_k Tp))/(s_k Tp).
 use bench::config::{Config, Source, load};
-use bench::model::plant::{Modal, Mode, build};
+use bench::model::plant::{ModalModel, Mode, build};
 use nalgebra::Complex;
 
 pub fn lab(sets: &[&str]) -> Config {
@@ -17,7 +17,7 @@ pub fn lab(sets: &[&str]) -> Config {
 }
 
 pub fn modes(config: &Config) -> Vec<Mode> {
-    Modal::of(&build(&config.plant).expect("a model"))
+    ModalModel::of(&build(&config.plant).expect("a model"))
         .expect("modes")
         .modes
 }
@@ -26,12 +26,12 @@ fn hold(s: Complex<f64>, span_s: f64) -> Complex<f64> {
     (Complex::new(1.0, 0.0) - (-s * span_s).exp()) / (s * span_s)
 }
 
-/// The response in metres per ampere; `of_mean_age` leaves out the roll-off of the probe's rate.
+/// The response in metres per ampere; `with_mean_age` leaves out the roll-off of the probe's rate.
 pub fn response(
     config: &Config,
     modes: &[Mode],
     omega_rad_s: f64,
-    of_mean_age: bool,
+    with_mean_age: bool,
 ) -> Complex<f64> {
     let period_s = config.servo.period_s();
     let probe_s = config.probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
@@ -47,7 +47,7 @@ pub fn response(
             (s * s + s * 2.0 * zeta * w + w * w).inv() * m.force_gain * m.sensor_gain
         };
         let plant: Complex<f64> = modes.iter().map(modal).sum();
-        let probe = if of_mean_age {
+        let probe = if with_mean_age {
             (-s * probe_s / 2.0).exp()
         } else {
             hold(s, probe_s)

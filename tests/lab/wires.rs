@@ -9,7 +9,7 @@ use bench::model::plant::Mode;
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::simulated::{self, LiveStage};
 use bench::rt::arming::State;
-use bench::rt::record::{Published, TickRecord, flag};
+use bench::rt::record::{LoopMessage, TickRecord, flag};
 use bench_hal::Validity;
 
 use crate::aliases::{lab, response};
@@ -99,7 +99,7 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
             ..TickRecord::default()
         };
         recorder
-            .record(&Published::Tick(record))
+            .record(&LoopMessage::Tick(record))
             .expect("a good disk");
     }
     recorder.finish(&[]).expect("a good disk");

@@ -4,7 +4,7 @@ use std::process::Output;
 use std::time::Duration;
 
 use bench::recording::{Header, Recorder, Recording};
-use bench::rt::record::{Published, TickRecord};
+use bench::rt::record::{LoopMessage, TickRecord};
 
 use crate::common::{AT_1_KHZ, PATIENT, Running, bench, recording_in, stderr};
 
@@ -122,13 +122,14 @@ fn an_altered_recording_exits_with_1_and_names_the_tick() {
     for record in old.ticks().expect("readable") {
         let mut record: TickRecord = record.expect("readable");
         while let Some(event) = events.next_if(|event| event.tick <= record.tick) {
-            new.record(&Published::Event(*event)).expect("a good disk");
+            new.record(&LoopMessage::Event(*event))
+                .expect("a good disk");
         }
         // 2^30 of 2^52: a reading of 50 um alters by 12 pm, the command of this very tick by 460 A/m times that, 5 nA.
         if record.tick == 6000 {
             record.position_m = f64::from_bits(record.position_m.to_bits() ^ (1 << 30));
         }
-        new.record(&Published::Tick(record)).expect("a good disk");
+        new.record(&LoopMessage::Tick(record)).expect("a good disk");
     }
     new.finish(&[]).expect("a good disk");
     let output = replay(&altered);

@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM.
 use bench::recording::Recording;
 use bench::rt::arming::State;
-use bench::rt::record::{EventKind, OrderKind, TickRecord};
+use bench::rt::record::{EventKind, RequestKind, TickRecord};
 
 use crate::common::{RATE_HZ, Running, bench, minute, recording_in, stderr, ticks};
 
@@ -33,7 +33,7 @@ fn stopped_by(signal: i32, what: &str) {
     let stop = recording
         .events()
         .iter()
-        .find(|e| e.kind == EventKind::Order(OrderKind::Stop))
+        .find(|e| e.kind == EventKind::Request(RequestKind::Stop))
         .expect("an order");
     let off = EventKind::State {
         from: State::Running,
@@ -112,7 +112,7 @@ fn a_second_ctrl_c_neither_hurts_nor_is_needed() {
     let stops = recording
         .events()
         .iter()
-        .filter(|e| e.kind == EventKind::Order(OrderKind::Stop))
+        .filter(|e| e.kind == EventKind::Request(RequestKind::Stop))
         .count();
     assert_eq!(stops, 1);
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bench::recording::{Header, Recorder, Totals};
 use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, OrderKind, Published, TickRecord};
+use bench::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord};
 use bench_hal::Validity;
 
 /// 5 kHz.
@@ -51,10 +51,10 @@ pub fn tick(number: u64) -> TickRecord {
 }
 
 /// A whole run of `ticks` ticks: order, state and end as events among them.
-pub fn run(ticks: u64) -> Vec<Published> {
-    let event = |tick, kind| Published::Event(Event { tick, kind });
+pub fn run(ticks: u64) -> Vec<LoopMessage> {
+    let event = |tick, kind| LoopMessage::Event(Event { tick, kind });
     let mut run = vec![
-        event(0, EventKind::Order(OrderKind::Arm)),
+        event(0, EventKind::Request(RequestKind::Arm)),
         event(
             0,
             EventKind::State {
@@ -63,7 +63,7 @@ pub fn run(ticks: u64) -> Vec<Published> {
             },
         ),
     ];
-    run.extend((0..ticks).map(|n| Published::Tick(tick(n))));
+    run.extend((0..ticks).map(|n| LoopMessage::Tick(tick(n))));
     run.push(event(
         ticks - 1,
         EventKind::Trip(Trip::Travel {
@@ -75,7 +75,7 @@ pub fn run(ticks: u64) -> Vec<Published> {
 }
 
 /// Writes `run` and finishes with one result.
-pub fn write(path: &Path, run: &[Published]) -> Totals {
+pub fn write(path: &Path, run: &[LoopMessage]) -> Totals {
     let mut recorder = Recorder::create(path, &header()).expect("a fresh file");
     run.iter()
         .for_each(|p| recorder.record(p).expect("a good disk"));
@@ -102,9 +102,9 @@ pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4], Option<u64>) {
     (rest, floats, t.actual_a.map(f64::to_bits))
 }
 
-pub fn ticks_of(run: &[Published]) -> Vec<TickRecord> {
-    let tick = |p: &Published| {
-        if let Published::Tick(t) = p {
+pub fn ticks_of(run: &[LoopMessage]) -> Vec<TickRecord> {
+    let tick = |p: &LoopMessage| {
+        if let LoopMessage::Tick(t) = p {
             Some(*t)
         } else {
             None
@@ -113,9 +113,9 @@ pub fn ticks_of(run: &[Published]) -> Vec<TickRecord> {
     run.iter().filter_map(tick).collect()
 }
 
-pub fn events_of(run: &[Published]) -> Vec<Event> {
-    let event = |p: &Published| {
-        if let Published::Event(e) = p {
+pub fn events_of(run: &[LoopMessage]) -> Vec<Event> {
+    let event = |p: &LoopMessage| {
+        if let LoopMessage::Event(e) = p {
             Some(*e)
         } else {
             None

@@ -3,15 +3,15 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use bench::recording::{Header, Recorder, Recording, RecordingError};
-use bench::rt::record::{Event, Published, TickRecord};
+use bench::rt::record::{Event, LoopMessage, TickRecord};
 use proptest::prelude::*;
 
 use crate::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
 
 /// 100 ms a tick: few ticks make many chunks, so that much of the file is structure.
-fn slow_run(ticks: u64) -> Vec<Published> {
-    let slow = |p: Published| match p {
-        Published::Tick(t) => Published::Tick(TickRecord {
+fn slow_run(ticks: u64) -> Vec<LoopMessage> {
+    let slow = |p: LoopMessage| match p {
+        LoopMessage::Tick(t) => LoopMessage::Tick(TickRecord {
             scheduled_ns: t.tick * 100_000_000,
             ..t
         }),

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bench::recording::{Recorder, Recording, RecordingError, spawn};
-use bench::rt::record::Published;
+use bench::rt::record::LoopMessage;
 use rtrb::RingBuffer;
 
 use crate::common::{header, tick};
@@ -72,7 +72,7 @@ fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account
     // 40,000 ticks of some 90 bytes are more than three times the room.
     let mut failed_after = None;
     for n in 0..40_000 {
-        push(&mut ring, Published::Tick(tick(n)));
+        push(&mut ring, LoopMessage::Tick(tick(n)));
         failed_after = failed_after.or(health.failed().then_some(n));
     }
     let failed_after = failed_after.expect("the failure shows while the loop still runs");
@@ -95,7 +95,7 @@ fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account
 }
 
 /// The loop's end: never waits for the recorder, so a full ring here means that the thread stopped draining.
-fn push(ring: &mut rtrb::Producer<Published>, published: Published) {
+fn push(ring: &mut rtrb::Producer<LoopMessage>, published: LoopMessage) {
     let patience = Instant::now() + Duration::from_secs(10);
     while ring.is_full() {
         assert!(

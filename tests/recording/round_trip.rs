@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
 use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, OrderKind, Published, TickRecord};
+use bench::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord};
 use bench_hal::Validity;
 
 use crate::common::{CONFIG, PERIOD_NS, bits, events_of, header, run, tick, ticks_of, write};
@@ -14,7 +14,7 @@ fn fresh() -> (tempfile::TempDir, PathBuf) {
     (dir, path)
 }
 
-fn read_back(published: &[Published]) -> (Recording, Vec<TickRecord>) {
+fn read_back(published: &[LoopMessage]) -> (Recording, Vec<TickRecord>) {
     let (_dir, path) = fresh();
     write(&path, published);
     let recording = Recording::open(&path).expect("complete");
@@ -68,7 +68,11 @@ fn every_field_of_a_tick_comes_back_with_every_bit() {
         actual_a: n.is_multiple_of(2).then_some(doubles[(n + 4) % 7]),
     };
     let put: Vec<_> = (0..28).map(odd).collect();
-    let (_, got) = read_back(&put.iter().map(|t| Published::Tick(*t)).collect::<Vec<_>>());
+    let (_, got) = read_back(
+        &put.iter()
+            .map(|t| LoopMessage::Tick(*t))
+            .collect::<Vec<_>>(),
+    );
     assert_eq!(
         got.iter().map(bits).collect::<Vec<_>>(),
         put.iter().map(bits).collect::<Vec<_>>()
@@ -120,12 +124,12 @@ fn every_kind_of_event_comes_back_unchanged_and_in_order() {
         State::Tripped,
     ];
     let orders = [
-        OrderKind::Arm,
-        OrderKind::Start,
-        OrderKind::Stop,
-        OrderKind::Clear,
+        RequestKind::Arm,
+        RequestKind::Start,
+        RequestKind::Stop,
+        RequestKind::Clear,
     ];
-    let mut kinds: Vec<_> = orders.map(EventKind::Order).into();
+    let mut kinds: Vec<_> = orders.map(EventKind::Request).into();
     kinds.extend(
         states
             .iter()
@@ -137,8 +141,8 @@ fn every_kind_of_event_comes_back_unchanged_and_in_order() {
         .zip(kinds)
         .map(|(tick, kind)| Event { tick, kind })
         .collect();
-    let mut published: Vec<_> = put.iter().map(|e| Published::Event(*e)).collect();
-    published.insert(3, Published::Tick(tick(0)));
+    let mut published: Vec<_> = put.iter().map(|e| LoopMessage::Event(*e)).collect();
+    published.insert(3, LoopMessage::Tick(tick(0)));
     let (recording, _) = read_back(&published);
     assert_eq!(recording.events(), put);
     // Debug prints -0.0 as such, which == would let pass for 0.0.
@@ -205,7 +209,7 @@ fn two_runs_in_virtual_pace_have_the_same_bytes_and_one_bit_makes_another_digest
     );
 
     let mut other = published;
-    let Some(Published::Tick(t)) = other.get_mut(6000) else {
+    let Some(LoopMessage::Tick(t)) = other.get_mut(6000) else {
         panic!("a tick")
     };
     t.command_a = f64::from_bits(t.command_a.to_bits() ^ 1);
@@ -224,9 +228,9 @@ fn missing_ticks_are_overruns_if_the_loop_says_so_and_lost_otherwise() {
     let mut published: Vec<_> = (0..=10)
         .map(tick)
         .chain([overrun])
-        .map(Published::Tick)
+        .map(LoopMessage::Tick)
         .collect();
-    published.extend((20..25).map(tick).map(Published::Tick)); // 14..=19: nobody answers for six ticks
+    published.extend((20..25).map(tick).map(LoopMessage::Tick)); // 14..=19: nobody answers for six ticks
     let (_dir, path) = fresh();
     let totals = write(&path, &published);
     assert_eq!(
@@ -265,7 +269,7 @@ fn each_second_is_summed_up_and_the_whole_run_too() {
             ..tick(n)
         }
     };
-    let published: Vec<_> = (0..10_000).map(|n| Published::Tick(late(n))).collect();
+    let published: Vec<_> = (0..10_000).map(|n| LoopMessage::Tick(late(n))).collect();
     let (_dir, path) = fresh();
     let totals = write(&path, &published);
     let timings = Recording::open(&path).expect("complete").timings().to_vec();
@@ -336,9 +340,9 @@ fn at_most_half_a_second_dies_with_the_process() {
 fn ticks_out_of_order_are_refused() {
     let (_dir, path) = fresh();
     let mut recorder = Recorder::create(&path, &header()).expect("fresh");
-    recorder.record(&Published::Tick(tick(5))).expect("first");
+    recorder.record(&LoopMessage::Tick(tick(5))).expect("first");
     let refused = recorder
-        .record(&Published::Tick(tick(5)))
+        .record(&LoopMessage::Tick(tick(5)))
         .expect_err("twice");
     assert!(
         matches!(
@@ -404,7 +408,7 @@ fn a_tick_in_whose_place_three_were_missed_is_late_by_three_periods_more() {
     let ticks = [0, 1, 5].map(|number| {
         let missed_ticks = if number == 5 { 3 } else { 0 };
         let woke_ns = number * PERIOD_NS + 100;
-        Published::Tick(TickRecord {
+        LoopMessage::Tick(TickRecord {
             missed_ticks,
             woke_ns,
             done_ns: woke_ns + 1,

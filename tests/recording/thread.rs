@@ -1,6 +1,6 @@
 //! Between ring and disk.
 use bench::recording::{Recorder, Recording, spawn};
-use bench::rt::record::{Event, EventKind, Published};
+use bench::rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
 
 use crate::common::{header, run, tick};
@@ -47,7 +47,7 @@ fn what_did_not_fit_into_the_ring_is_counted_as_lost() {
     let (mut ring, consumer) = RingBuffer::new(100);
     // The recorder begins after the loop: of 150 ticks the ring takes 100, then one event tells of the other 50.
     let refused = (0..150)
-        .filter(|n| ring.push(Published::Tick(tick(*n))).is_err())
+        .filter(|n| ring.push(LoopMessage::Tick(tick(*n))).is_err())
         .count() as u64;
     assert_eq!(refused, 50);
     let handle =
@@ -55,12 +55,12 @@ fn what_did_not_fit_into_the_ring_is_counted_as_lost() {
     while ring.slots() < 100 {
         std::thread::yield_now();
     }
-    ring.push(Published::Event(Event {
+    ring.push(LoopMessage::Event(Event {
         tick: 150,
         kind: EventKind::Lost { records: refused },
     }))
     .expect("room");
-    ring.push(Published::Tick(tick(150))).expect("room");
+    ring.push(LoopMessage::Tick(tick(150))).expect("room");
     drop(ring);
 
     let totals = handle

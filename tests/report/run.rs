@@ -10,7 +10,7 @@ use crate::{svg, truth};
 
 /// A title that would break a page, and a picture, that did not escape it.
 const TITLE: &str = "a <b> & \"c\"";
-const KINDS: [&str; 5] = ["bode", "coherence", "nyquist", "pole_zero", "stability"];
+const PLOT_KINDS: [&str; 5] = ["bode", "coherence", "nyquist", "pole_zero", "stability"];
 
 struct Run {
     folder: tempfile::TempDir,
@@ -45,7 +45,7 @@ impl Run {
             std::fs::read_to_string(self.path(self.answer["plots"][kind].as_str().unwrap()))
                 .unwrap()
         };
-        KINDS.iter().map(|kind| (*kind, read(*kind))).collect()
+        PLOT_KINDS.iter().map(|kind| (*kind, read(*kind))).collect()
     }
 
     fn page(&self) -> String {
@@ -82,7 +82,7 @@ fn every_picture_and_the_page_stand_beside_the_recording_under_its_name() {
             .display()
             .to_string()
     };
-    for kind in KINDS {
+    for kind in PLOT_KINDS {
         assert_eq!(answer["plots"][kind], beside(&format!("{kind}.svg")));
     }
     assert_eq!(answer["plot"], answer["plots"]["bode"]);
@@ -211,7 +211,7 @@ fn size(picture: &str) -> (f64, f64) {
 #[test]
 fn pictures_and_page_are_well_formed_by_other_programs() {
     let answer = &run().answer;
-    let mut files: Vec<Value> = KINDS
+    let mut files: Vec<Value> = PLOT_KINDS
         .iter()
         .map(|kind| answer["plots"][kind].clone())
         .collect();
@@ -251,7 +251,7 @@ fn the_page_says_the_verdict_and_why_before_anything_else_and_holds_all_of_the_r
     ]
     .map(at);
     assert!(order.is_sorted(), "{order:?}");
-    assert_eq!(page.matches("<svg ").count(), KINDS.len());
+    assert_eq!(page.matches("<svg ").count(), PLOT_KINDS.len());
     let modes = answer["modes"].as_array().unwrap().len();
     let zeros = answer["zeros"].as_array().unwrap().len();
     assert_eq!(

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bench::experiment::{self, Plan};
-use bench::rt::arming::{Change, State};
-use bench::rt::clock::{Clock, Moment, Virtual};
+use bench::rt::arming::{State, Transition};
+use bench::rt::clock::{Clock, TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
-use bench::rt::outlet::Outlet;
 use bench::rt::program::{Decision, Program};
-use bench::rt::record::{EventKind, Published};
-use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench::rt::publisher::Publisher;
+use bench::rt::record::{EventKind, LoopMessage};
+use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::{self, Pace};
 use bench_hal::{Rig, Tick, Validity};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -27,15 +27,15 @@ const STATES: [State; 4] = [
 ];
 
 /// Where each change leads, column by column: the diagram in `rt/arming.rs` and nothing else.
-const ARROWS: [(Change, [State; 4]); 5] = {
+const ARROWS: [(Transition, [State; 4]); 5] = {
     use State::{Armed, Disarmed, Running, Tripped};
     [
         // from:          Disarmed  Armed     Running   Tripped
-        (Change::Arm, [Armed, Armed, Running, Tripped]),
-        (Change::Start, [Disarmed, Running, Running, Tripped]),
-        (Change::Stop, [Disarmed, Disarmed, Disarmed, Tripped]),
-        (Change::Trip, [Disarmed, Tripped, Tripped, Tripped]),
-        (Change::Clear, [Disarmed, Armed, Running, Disarmed]),
+        (Transition::Arm, [Armed, Armed, Running, Tripped]),
+        (Transition::Start, [Disarmed, Running, Running, Tripped]),
+        (Transition::Stop, [Disarmed, Disarmed, Disarmed, Tripped]),
+        (Transition::Trip, [Disarmed, Tripped, Tripped, Tripped]),
+        (Transition::Clear, [Disarmed, Armed, Running, Disarmed]),
     ]
 };
 
@@ -56,10 +56,10 @@ fn bench_in(state: State, trip: bool) -> Bench {
     }
     let mut bench = Bench::still(&stage(), &faults);
     if state != State::Disarmed {
-        bench.order(Order::Arm);
+        bench.order(Request::Arm);
     }
     if state == State::Running {
-        bench.order(Order::Start(says(|_| 0.1)));
+        bench.order(Request::Start(says(|_| 0.1)));
     }
     bench.run(TRIP);
     assert_eq!(bench.state(), state);
@@ -71,14 +71,14 @@ fn every_arrow_of_the_diagram_is_there_and_no_other() {
     for (column, from) in STATES.into_iter().enumerate() {
         for (change, to) in ARROWS {
             let to = to[column];
-            let mut bench = bench_in(from, change == Change::Trip);
+            let mut bench = bench_in(from, change == Transition::Trip);
             let events = bench.events().len();
             match change {
-                Change::Arm => bench.order(Order::Arm),
-                Change::Start => bench.order(Order::Start(says(|_| 0.2))),
-                Change::Stop => bench.order(Order::Stop),
-                Change::Clear => bench.order(Order::Clear),
-                Change::Trip => {}
+                Transition::Arm => bench.order(Request::Arm),
+                Transition::Start => bench.order(Request::Start(says(|_| 0.2))),
+                Transition::Stop => bench.order(Request::Stop),
+                Transition::Clear => bench.order(Request::Clear),
+                Transition::Trip => {}
             }
             let record = bench.tick();
             assert_eq!(
@@ -143,7 +143,7 @@ fn a_program_at_its_end_disarms_in_the_tick_after_its_last_command() {
 fn a_second_program_does_not_push_aside_the_one_that_runs() {
     let mut bench = Bench::running(&stage(), &[], says(|tick| 0.1 + tick as f64 * 1e-3));
     bench.run(5);
-    bench.order(Order::Start(says(|_| 5.0)));
+    bench.order(Request::Start(says(|_| 5.0)));
     let record = bench.tick();
     assert_eq!((record.command_a, bench.handed_back), (0.1 + 5.0 * 1e-3, 1));
 }
@@ -154,9 +154,9 @@ fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start(
     let trip = bench.servo().last_trip().expect("tripped");
     let told = bench.told().len();
     for _ in 0..50 {
-        bench.order(Order::Arm);
-        bench.order(Order::Start(says(|_| 0.1)));
-        bench.order(Order::Stop);
+        bench.order(Request::Arm);
+        bench.order(Request::Start(says(|_| 0.1)));
+        bench.order(Request::Stop);
         assert_eq!(bench.tick().state, State::Tripped);
     }
     assert!(
@@ -170,24 +170,24 @@ fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start(
         (Some(trip), 50)
     );
 
-    bench.order(Order::Clear);
+    bench.order(Request::Clear);
     assert_eq!(
         (bench.tick().state, bench.is_on()),
         (State::Disarmed, false)
     );
-    bench.order(Order::Start(says(|_| 0.1)));
+    bench.order(Request::Start(says(|_| 0.1)));
     assert_eq!(
         (bench.tick().state, bench.is_on()),
         (State::Disarmed, false),
         "start alone does nothing"
     );
-    bench.order(Order::Arm);
+    bench.order(Request::Arm);
     let armed = bench.tick();
     assert_eq!(
         (armed.state, armed.command_a, bench.is_on()),
         (State::Armed, 0.0, true)
     );
-    bench.order(Order::Start(says(|_| 0.1)));
+    bench.order(Request::Start(says(|_| 0.1)));
     let running = bench.tick();
     assert_eq!((running.state, running.command_a), (State::Running, 0.1));
 }
@@ -198,7 +198,7 @@ fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
     let mut bench = Bench::running(&stage(), &faults, says(|_| 0.1));
     bench.run(150);
     assert_eq!(bench.state(), State::Tripped);
-    bench.order(Order::Clear);
+    bench.order(Request::Clear);
     bench.tick();
     assert_eq!(
         bench.state(),
@@ -206,7 +206,7 @@ fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
         "the amplifier keeps its fault"
     );
     bench.run(100);
-    bench.order(Order::Clear);
+    bench.order(Request::Clear);
     bench.tick();
     assert_eq!((bench.state(), bench.is_on()), (State::Disarmed, false));
 }
@@ -215,9 +215,9 @@ fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
 fn a_run_after_a_cleared_trip_does_not_carry_the_old_trip_along() {
     let mut bench = bench_in(State::Tripped, false);
     for order in [
-        Order::Clear,
-        Order::Arm,
-        Order::Start(Box::new(Says(|_| 0.1, 5))),
+        Request::Clear,
+        Request::Arm,
+        Request::Start(Box::new(Says(|_| 0.1, 5))),
     ] {
         bench.order(order);
     }
@@ -234,7 +234,7 @@ fn an_arm_order_that_changes_nothing_does_not_touch_the_amplifier() {
     for state in STATES.into_iter().filter(|state| *state != State::Disarmed) {
         let mut bench = bench_in(state, false);
         let told = bench.told().len();
-        bench.order(Order::Arm);
+        bench.order(Request::Arm);
         bench.run(3);
         let enabled = bench.told()[told..]
             .iter()
@@ -246,16 +246,16 @@ fn an_arm_order_that_changes_nothing_does_not_touch_the_amplifier() {
 /// Orders that arrive while the loop runs: handed over by its clock, between two ticks.
 struct Handing {
     restarts: Arc<AtomicU64>,
-    orders: Producer<Order>,
-    late: Vec<(u64, Order)>,
+    requests: Producer<Request>,
+    late: Vec<(u64, Request)>,
 }
 
 impl Clock for Handing {
-    fn wait(&mut self, number: u64, outlet: &Outlet) -> Moment {
+    fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming {
         while self.late.first().is_some_and(|(tick, _)| *tick == number) {
-            assert!(self.orders.push(self.late.remove(0).1).is_ok());
+            assert!(self.requests.push(self.late.remove(0).1).is_ok());
         }
-        Virtual { period_s: 2e-4 }.wait(number, outlet)
+        Virtual { period_s: 2e-4 }.wait(number, publisher)
     }
     fn now_ns(&self, tick: Tick) -> u64 {
         tick.scheduled_ns
@@ -267,19 +267,19 @@ impl Clock for Handing {
 
 #[test]
 fn the_schedule_begins_anew_after_the_amplifier_was_enabled_and_at_no_other_order() {
-    let (servo, orders, _records) = loop_around(Still::default());
+    let (servo, requests, _records) = loop_around(Still::default());
     let restarts = Arc::new(AtomicU64::new(0));
-    let program = Order::Start(Box::new(Says(|_| 0.1, 10)));
+    let program = Request::Start(Box::new(Says(|_| 0.1, 10)));
     let late = vec![
-        (0, Order::Arm),
+        (0, Request::Arm),
         (1, program),
-        (4, Order::Arm),
-        (5, Order::Clear),
-        (6, Order::Arm),
+        (4, Request::Arm),
+        (5, Request::Clear),
+        (6, Request::Arm),
     ];
     let clock = Handing {
         restarts: Arc::clone(&restarts),
-        orders,
+        requests,
         late,
     };
     let ended = thread::run(servo, clock, 5);
@@ -291,19 +291,19 @@ fn the_schedule_begins_anew_after_the_amplifier_was_enabled_and_at_no_other_orde
     );
 }
 
-fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Order>, Consumer<Published>) {
-    let (outlet, records) = RingBuffer::new(4096);
-    let (orders, taken) = RingBuffer::new(16);
-    let (spent, _) = RingBuffer::new(16);
+fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Request>, Consumer<LoopMessage>) {
+    let (publisher, records) = RingBuffer::new(4096);
+    let (requests, taken) = RingBuffer::new(16);
+    let (retired, _) = RingBuffer::new(16);
     let connections = Connections {
-        orders: taken,
-        spent,
-        outlet: Outlet::new(outlet),
+        requests: taken,
+        retired,
+        publisher: Publisher::new(publisher),
         progress: Arc::new(Progress::default()),
     };
     (
         Servo::new(Box::new(rig), Interlocks::new(&stage()), connections),
-        orders,
+        requests,
         records,
     )
 }
@@ -329,8 +329,11 @@ impl Program for Panics {
 fn a_panic_in_the_loop_leaves_the_amplifier_off() {
     let rig = Watched::new(Still::default());
     let log = Arc::clone(&rig.log);
-    let (servo, mut orders, _records) = loop_around(rig);
-    assert!(orders.push(Order::Arm).is_ok() && orders.push(Order::Start(Box::new(Panics))).is_ok());
+    let (servo, mut requests, _records) = loop_around(rig);
+    assert!(
+        requests.push(Request::Arm).is_ok()
+            && requests.push(Request::Start(Box::new(Panics))).is_ok()
+    );
     let died = std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
     assert!(died.is_err(), "the program panics at its tenth tick");
     let told = log.lock().expect("not poisoned").clone();

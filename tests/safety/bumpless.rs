@@ -8,7 +8,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Program};
 use bench::rt::record::{TickRecord, flag};
-use bench::rt::servo::Order;
+use bench::rt::servo::Request;
 
 use crate::faulty_rig::{Fault, FaultyRig};
 use crate::rig::{Bench, stage};
@@ -103,8 +103,8 @@ fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
                 &config,
                 FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(offset_m))]),
             );
-            bench.order(Order::Arm);
-            bench.order(Order::Start(Box::new(program(&config, 2500, 2500))));
+            bench.order(Request::Arm);
+            bench.order(Request::Start(Box::new(program(&config, 2500, 2500))));
             bench.run(5000);
             assert_eq!(bench.trips(), []);
             makes_no_jump(
@@ -125,8 +125,8 @@ fn no_current_flows_while_the_origin_is_found() {
         &config,
         FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(300e-6))]),
     );
-    bench.order(Order::Arm);
-    bench.order(Order::Start(Box::new(program(&config, 2500, 100))));
+    bench.order(Request::Arm);
+    bench.order(Request::Start(Box::new(program(&config, 2500, 100))));
     bench.run(2500);
     assert!(
         bench
@@ -154,8 +154,8 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
             &config,
             FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(100e-6))]),
         );
-        bench.order(Order::Arm);
-        bench.order(Order::Start(Box::new(program(&config, 2500, 10_000))));
+        bench.order(Request::Arm);
+        bench.order(Request::Start(Box::new(program(&config, 2500, 10_000))));
         bench.run(12_500);
         let end = *bench.ticks().last().expect("ticks");
         assert!(
@@ -166,8 +166,8 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
 
         config.control.reference = ReferenceSettings::Hold;
         let from = bench.ticks().last().expect("ticks").tick + 1;
-        bench.order(Order::Arm);
-        bench.order(Order::Start(Box::new(program(&config, 2500, 2500))));
+        bench.order(Request::Arm);
+        bench.order(Request::Start(Box::new(program(&config, 2500, 2500))));
         bench.run(5000);
         let second = closed(&bench, from);
         makes_no_jump(&config, &second, 100e-6, &format!("{name}, second run"));

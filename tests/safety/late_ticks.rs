@@ -3,13 +3,13 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::clock::{Clock, Moment, Realtime};
+use bench::rt::clock::{Clock, Realtime, TickTiming};
 use bench::rt::interlock::Interlocks;
-use bench::rt::outlet::Outlet;
 use bench::rt::program::{Decision, Program};
-use bench::rt::record::{Published, TickRecord, flag};
-use bench::rt::servo::{Connections, Order, Progress, Servo};
-use bench::rt::thread::{self, Ended};
+use bench::rt::publisher::Publisher;
+use bench::rt::record::{LoopMessage, TickRecord, flag};
+use bench::rt::servo::{Connections, Progress, Request, Servo};
+use bench::rt::thread::{self, LoopOutcome};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
 };
@@ -24,7 +24,7 @@ struct Jerky {
 }
 
 impl Clock for Jerky {
-    fn wait(&mut self, number: u64, _outlet: &Outlet) -> Moment {
+    fn wait(&mut self, number: u64, _outlet: &Publisher) -> TickTiming {
         let missed = self
             .late
             .iter()
@@ -33,7 +33,7 @@ impl Clock for Jerky {
         self.calls += 1;
         let number = number + u64::from(missed);
         let scheduled_ns = number * 200_000;
-        Moment {
+        TickTiming {
             tick: Tick {
                 number,
                 scheduled_ns,
@@ -54,23 +54,23 @@ fn run(
     clock: impl Clock,
     overruns_per_s: u32,
     tail: u64,
-) -> (Ended, Vec<TickRecord>) {
+) -> (LoopOutcome, Vec<TickRecord>) {
     let mut config = stage();
     config.interlock.overruns_per_s = overruns_per_s;
-    let (outlet, records): (_, Consumer<Published>) = RingBuffer::new(1 << 14);
-    let (mut orders, taken) = RingBuffer::new(16);
-    let (spent, _spent) = RingBuffer::new(16);
-    assert!(orders.push(Order::Arm).is_ok() && orders.push(Order::Start(program)).is_ok());
+    let (publisher, records): (_, Consumer<LoopMessage>) = RingBuffer::new(1 << 14);
+    let (mut requests, taken) = RingBuffer::new(16);
+    let (retired, _spent) = RingBuffer::new(16);
+    assert!(requests.push(Request::Arm).is_ok() && requests.push(Request::Start(program)).is_ok());
     let connections = Connections {
-        orders: taken,
-        spent,
-        outlet: Outlet::new(outlet),
+        requests: taken,
+        retired,
+        publisher: Publisher::new(publisher),
         progress: Arc::new(Progress::default()),
     };
     let servo = Servo::new(Box::new(rig), Interlocks::new(&config), connections);
     let ended = thread::run(servo, clock, tail);
     let records = records.into_chunk().filter_map(|p| {
-        if let Published::Tick(r) = p {
+        if let LoopMessage::Tick(r) = p {
             Some(r)
         } else {
             None
@@ -81,11 +81,11 @@ fn run(
 
 /// All that is in a ring.
 trait IntoChunk {
-    fn into_chunk(self) -> impl Iterator<Item = Published>;
+    fn into_chunk(self) -> impl Iterator<Item = LoopMessage>;
 }
 
-impl IntoChunk for Consumer<Published> {
-    fn into_chunk(mut self) -> impl Iterator<Item = Published> {
+impl IntoChunk for Consumer<LoopMessage> {
+    fn into_chunk(mut self) -> impl Iterator<Item = LoopMessage> {
         std::iter::from_fn(move || self.pop().ok())
     }
 }

@@ -3,11 +3,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use bench::config::{AmplitudePoint, Config, ReferenceSettings, Sweep};
-use bench::experiment::{self, Kind, Plan, ReplayError, Replayed, replay};
+use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::record::{EventKind, Published, TickRecord, flag};
-use bench::rt::servo::Order;
+use bench::rt::record::{EventKind, LoopMessage, TickRecord, flag};
+use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench_hal::Validity;
 
@@ -171,10 +171,11 @@ fn rewritten(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
     for record in old.ticks().expect("readable") {
         let mut record = record.expect("readable");
         while let Some(event) = events.next_if(|event| event.tick <= record.tick) {
-            new.record(&Published::Event(*event)).expect("a good disk");
+            new.record(&LoopMessage::Event(*event))
+                .expect("a good disk");
         }
         alter(&mut record);
-        new.record(&Published::Tick(record)).expect("a good disk");
+        new.record(&LoopMessage::Tick(record)).expect("a good disk");
     }
     new.finish(&[]).expect("a good disk");
 }
@@ -255,9 +256,9 @@ fn clears_that_the_amplifier_refused_and_took_replay_as_they_were() {
     let faults = [(100..101, Fault::Faulted(77)), (0..200, Fault::Unclearable)];
     let mut bench = Bench::running(&plan.config, &faults, plan.program().expect("a program"));
     bench.run(150);
-    bench.order(Order::Clear);
+    bench.order(Request::Clear);
     bench.run(100);
-    bench.order(Order::Clear);
+    bench.order(Request::Clear);
     bench.run(100);
     let metadata = [("run".to_string(), plan.kind.name().to_string())].into();
     let header = Header {
@@ -298,9 +299,11 @@ fn recordings_that_cannot_be_replayed_say_why() {
     let write = |name: &str, header: &Header, ticks: &[TickRecord]| {
         let path = folder.path().join(name);
         let mut recorder = Recorder::create(&path, header).expect("a new file");
-        ticks
-            .iter()
-            .for_each(|t| recorder.record(&Published::Tick(*t)).expect("a good disk"));
+        ticks.iter().for_each(|t| {
+            recorder
+                .record(&LoopMessage::Tick(*t))
+                .expect("a good disk")
+        });
         recorder.finish(&[]).expect("a good disk");
         replay(&Recording::open(&path).expect("a recording"))
             .expect_err("it has no plan")
@@ -344,7 +347,7 @@ fn recordings_that_cannot_be_replayed_say_why() {
         "{kindless}"
     );
     let header = Header {
-        metadata: kind(Kind::Control.name()),
+        metadata: kind(RunKind::Control.name()),
         ..header
     };
     let without = write("without.mcap", &header, &ticks);

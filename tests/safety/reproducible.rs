@@ -179,7 +179,7 @@ fn no_lock_no_print_and_no_file_is_in_the_code_of_a_tick() {
         "rt/interlock.rs",
         "rt/arming.rs",
         "rt/program.rs",
-        "rt/outlet.rs",
+        "rt/publisher.rs",
         "rt/record.rs",
     ];
     let others = [

@@ -2,7 +2,7 @@
 use bench::config::Config;
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{EventKind, flag};
-use bench::rt::servo::Order;
+use bench::rt::servo::Request;
 use bench_hal::Validity;
 
 use crate::faulty_rig::Fault;
@@ -523,8 +523,8 @@ fn an_amplifier_that_claims_to_give_what_is_no_number_is_switched_off() {
 fn an_amplifier_that_cannot_be_enabled_trips_and_the_program_behind_it_does_not_start() {
     let mut bench = Bench::still(&stage(), &[(AT..AT + 1, Fault::DoesNotEnable(31))]);
     bench.run(AT);
-    bench.order(Order::Arm);
-    bench.order(Order::Start(constant()));
+    bench.order(Request::Arm);
+    bench.order(Request::Start(constant()));
     bench.run(1 + AFTER);
     assert!(matches!(
         prove_that_it_is_off(&bench, AT, "amplifier"),
@@ -544,7 +544,7 @@ fn an_armed_loop_without_a_program_trips_as_a_running_one() {
     ];
     for (fault, reason) in cases {
         let mut bench = Bench::still(&stage(), &[(AT..AT + 1, fault)]);
-        bench.order(Order::Arm);
+        bench.order(Request::Arm);
         bench.run(AT);
         assert_eq!(bench.state(), State::Armed);
         bench.run(1 + AFTER);
@@ -578,7 +578,7 @@ fn a_hot_motor_stays_hot_through_clear_and_arm() {
     let config: Config = stage();
     let mut bench = Bench::running(&config, &[], says(|_| 9.9));
     let first = first_trip(&mut bench, 0);
-    for order in [Order::Clear, Order::Arm, Order::Start(says(|_| 9.9))] {
+    for order in [Request::Clear, Request::Arm, Request::Start(says(|_| 9.9))] {
         bench.order(order);
     }
     // The tick of the trip cooled the winding by i_c^2/50,000, one of 9.9 A heats it 17 times as much: one at most passes.

@@ -6,7 +6,8 @@
 use std::collections::BTreeMap;
 
 use bench::model::zeros::{
-    Kinds, ModalSum, Place, Row, Sequence, StepResponse, TABLES, Term, table_of,
+    MmpLocation, ModalSum, ModalTerm, Sequence, StepResponse, TABLES, TableRow, ZeroCounts,
+    table_of,
 };
 use serde_json::{Value, json};
 
@@ -15,8 +16,8 @@ use crate::truth;
 
 /// What is true of a drawn plant.
 struct Truth {
-    kinds: Kinds,
-    mmp: Vec<Place>,
+    kinds: ZeroCounts,
+    mmp: Vec<MmpLocation>,
 }
 
 /// A plant of the class of one of the four tables, its slowest mode positive or negative.
@@ -25,7 +26,7 @@ fn drawn(draw: &mut Draw, class: usize) -> ModalSum {
     let (a, b, c) = (residue(), residue(), residue());
     let u = draw.over_decades(0.3, 3.0);
     let v = u * (1.0 + draw.over_decades(1e-3, 10.0));
-    let mode = Term::undamped;
+    let mode = ModalTerm::undamped;
     let (terms, constant) = match class {
         0 => (vec![mode(0.0, a), mode(v, b)], 0.0),
         1 => (vec![mode(u, a), mode(v, b)], 0.0),
@@ -35,7 +36,7 @@ fn drawn(draw: &mut Draw, class: usize) -> ModalSum {
     ModalSum::new(terms, constant).expect("residues that are not zero")
 }
 
-/// Kinds and places by the quadratic b2 x^2 + b1 x + b0; `None` within 1e-9 of where zeros meet, or pass through the
+/// ZeroCounts and places by the quadratic b2 x^2 + b1 x + b0; `None` within 1e-9 of where zeros meet, or pass through the
 /// origin or infinity, where rounding decides.
 fn truth_of(sum: &ModalSum) -> Option<Truth> {
     let terms = sum.terms();
@@ -73,17 +74,17 @@ fn truth_of(sum: &ModalSum) -> Option<Truth> {
     };
     let place = |w: f64| {
         if w < wu {
-            Place::BelowU
+            MmpLocation::BelowU
         } else if w < wv {
-            Place::Between
+            MmpLocation::Between
         } else {
-            Place::AboveV
+            MmpLocation::AboveV
         }
     };
-    let mut mmp: Vec<Place> = on_axis.map(place).collect();
+    let mut mmp: Vec<MmpLocation> = on_axis.map(place).collect();
     mmp.sort_by_key(|place| *place as u8);
     let real = roots.iter().filter(|x| **x > 0.0).count();
-    let kinds = Kinds {
+    let kinds = ZeroCounts {
         mmp: mmp.len(),
         real,
         quartets: usize::from(roots.is_empty()),
@@ -142,7 +143,7 @@ fn quadratic(of: &[Sum; 4]) -> Option<Vec<f64>> {
 }
 
 /// Whether a sequence is literally the printed one: `[uv]` any sequence of u and v, all else itself.
-fn is_as_printed(row: &Row, sequence: &Sequence, turned: bool) -> bool {
+fn is_as_printed(row: &TableRow, sequence: &Sequence, turned: bool) -> bool {
     let printed: Vec<&str> = row.printed[1..row.printed.len() - 1].split("]-[").collect();
     let names: Vec<String> = sequence.names();
     let names: Vec<&str> = names
@@ -268,7 +269,7 @@ fn a_slow_mode_in_place_of_the_double_integrator_is_read_by_the_same_table() {
 #[test]
 fn python_finds_the_same_kinds_with_60_digits_in_every_row() {
     let mut draw = Draw(577);
-    let mut plants: Vec<(&Row, ModalSum)> = Vec::new();
+    let mut plants: Vec<(&TableRow, ModalSum)> = Vec::new();
     let mut visits: BTreeMap<(&str, usize), u32> = BTreeMap::new();
     for index in 0..60_000 {
         let sum = drawn(&mut draw, index % 4);
@@ -288,14 +289,14 @@ fn python_finds_the_same_kinds_with_60_digits_in_every_row() {
     };
     for ((row, sum), answer) in plants.iter().zip(&answers) {
         let count = |key: &str| answer[key].as_u64().expect("a count") as usize;
-        let kinds = Kinds {
+        let kinds = ZeroCounts {
             mmp: count("mmp"),
             real: count("real"),
             quartets: count("quartets"),
         };
         assert_eq!(
             kinds,
-            Kinds::of(&sum.undamped_zeros().expect("zeros")),
+            ZeroCounts::of(&sum.undamped_zeros().expect("zeros")),
             "{sum:?}"
         );
         assert!(row.kinds.contains(&kinds), "{row:?}: {kinds}, {sum:?}");
@@ -315,7 +316,7 @@ fn question(sum: &ModalSum) -> Value {
 fn many_modes(draw: &mut Draw) -> ModalSum {
     let count = *draw.one_of(&[2, 3, 4, 6, 9]);
     let constant = *draw.one_of(&[0.0, 0.0, 1.0]) * draw.over_decades(1e-3, 1e3);
-    let term = |_| Term {
+    let term = |_| ModalTerm {
         omega_rad_s: draw.over_decades(0.1, 10.0),
         damping_ratio: draw.over_decades(1e-4, 0.1),
         residue_per_kg: draw.over_decades(1e-2, 1e2) * draw.one_of(&[1.0, -1.0]),

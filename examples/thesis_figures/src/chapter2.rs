@@ -5,9 +5,9 @@ use super::content::signed;
 use super::model::{Model, even, response};
 use super::{Comparison, Content, FigureError, Workshop};
 use bench::config::{PlantSettings, Sr4dofSettings};
-use bench::model::plant::{self, Modal, Mode, sr4dof};
+use bench::model::plant::{self, ModalModel, Mode, sr4dof};
 use bench::model::veering::{Loci, ModesAt};
-use bench::model::zeros::{Plane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
+use bench::model::zeros::{LocusPlane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
 use bench::report::colours::{BLUE, Colour, GREEN, GREY, INK, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
 
@@ -223,7 +223,7 @@ pub(crate) fn fig_2_4(_: &Workshop) -> Result<Content, FigureError> {
 fn discriminant(settings: &Sr4dofSettings) -> Result<(f64, bool), FigureError> {
     let structure = plant::build(&PlantSettings::Sr4dof(settings.clone()))?;
     let zeros = undamped_zeros(&structure)?;
-    let b3: f64 = Modal::of(&structure)?
+    let b3: f64 = ModalModel::of(&structure)?
         .modes
         .iter()
         .map(Mode::residue_per_kg)
@@ -346,7 +346,7 @@ pub(crate) fn fig_2_5(_: &Workshop) -> Result<Content, FigureError> {
         .set("plant.mass_asymmetry=0.01");
     let locus = super::plane::locus(
         &band.varied("plant.operating_point_m")?,
-        Plane::Undamped,
+        LocusPlane::Undamped,
         &even(0.000475, 0.007125, 41),
     )?;
     let ends: Vec<String> = locus

@@ -2,7 +2,7 @@
 
 use bench::config::ConfigError;
 use bench::control::ControllerError;
-use bench::experiment::{AnalysisError, SessionError};
+use bench::experiment::{AnalysisError, RunError};
 use bench::model::plant::PlantError;
 use bench::recording::RecordingError;
 use bench::report::ReportError;
@@ -36,7 +36,7 @@ pub enum FigureError {
     Devices(#[from] DevicesError),
     /// A run of the simulated stage failed.
     #[error(transparent)]
-    Session(#[from] SessionError),
+    Session(#[from] RunError),
     /// Its recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),

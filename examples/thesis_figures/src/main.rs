@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bench::experiment::unless_stopped;
+use bench::experiment::abandon_on_signal;
 use clap::Parser;
 use serde::Serialize;
 use thesis_figures::{Comparison, FigureError, Made, Verdict, Workshop, make_all, selected};
@@ -76,7 +76,7 @@ fn run(args: &Args) -> Result<(), Failure> {
             &mut show_progress,
         )
     };
-    let made = unless_stopped(work);
+    let made = abandon_on_signal(work);
     // The recordings were only there to be measured; if some stay, they are hidden and named after the process.
     let _ = std::fs::remove_dir_all(&runs);
     let Some(made) = made.map_err(|error| (1, error.to_string()))? else {

@@ -85,7 +85,7 @@ impl Workshop {
 
     /// Any closed-loop run.
     pub(crate) fn closed(&self, config: Config) -> Result<Closed, FigureError> {
-        let plan = Plan::control(config.clone()).map_err(experiment::SessionError::Plan)?;
+        let plan = Plan::control(config.clone()).map_err(experiment::RunError::Plan)?;
         let recording = self.run(&plan, "control")?;
         let measured = experiment::measure(&recording, &config)?;
         let measured = measured

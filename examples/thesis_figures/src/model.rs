@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::FigureError;
 use bench::config::{Config, PlantSettings, Source, load};
 use bench::control;
-use bench::model::plant::{self, Modal, Structure};
+use bench::model::plant::{self, ModalModel, Structure};
 use bench::model::zeros::{ModalSum, Zero};
 
 /// A profile and settings over it, from which both the numbers and the printed command come.
@@ -93,8 +93,8 @@ impl Model {
     }
 
     /// Its modes.
-    pub fn modal(&self) -> Result<Modal, FigureError> {
-        Ok(Modal::of(&self.structure()?)?)
+    pub fn modal(&self) -> Result<ModalModel, FigureError> {
+        Ok(ModalModel::of(&self.structure()?)?)
     }
 
     /// The modes that show.
@@ -133,7 +133,9 @@ impl Varied {
 
     /// The modes that show at a value.
     pub fn sum(&self, value: f64) -> Result<ModalSum, FigureError> {
-        Ok(ModalSum::visible(&Modal::of(&self.structure(value)?)?)?)
+        Ok(ModalSum::visible(&ModalModel::of(
+            &self.structure(value)?,
+        )?)?)
     }
 }
 
@@ -194,5 +196,5 @@ pub(crate) fn response(
 
 /// Zeros without damping in words: kinds by pairs and quartets.
 pub(crate) fn kinds(zeros: &[Zero]) -> String {
-    bench::model::zeros::Kinds::of(zeros).to_string()
+    bench::model::zeros::ZeroCounts::of(zeros).to_string()
 }

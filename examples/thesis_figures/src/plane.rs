@@ -4,7 +4,9 @@ use nalgebra::Complex;
 
 use super::FigureError;
 use super::model::Varied;
-use bench::model::zeros::{Change, Locus, ModalSum, Plane, Zero, damped_zeros, undamped_zeros};
+use bench::model::zeros::{
+    KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
+};
 use bench::report::colours::{BLUE, Colour, GREY, INK};
 use bench::report::{Chart, Mark, Pen, Scale, Symbol};
 
@@ -52,10 +54,14 @@ pub(crate) enum Part {
 }
 
 /// Zeros of a plant over a setting, dense where they meet.
-pub(crate) fn locus(varied: &Varied, plane: Plane, values: &[f64]) -> Result<Locus, FigureError> {
+pub(crate) fn locus(
+    varied: &Varied,
+    plane: LocusPlane,
+    values: &[f64],
+) -> Result<Locus, FigureError> {
     follow(plane, values, |value| {
         let structure = varied.structure(value)?;
-        Ok(if plane == Plane::Undamped {
+        Ok(if plane == LocusPlane::Undamped {
             undamped_zeros(&structure)?
         } else {
             damped_zeros(&structure)?
@@ -66,7 +72,7 @@ pub(crate) fn locus(varied: &Varied, plane: Plane, values: &[f64]) -> Result<Loc
 /// Follows zeros again with more values: close to where they meet, beside which they run as the root of the distance, and
 /// where they move far from one value to the next.
 pub(crate) fn follow(
-    plane: Plane,
+    plane: LocusPlane,
     values: &[f64],
     mut zeros: impl FnMut(f64) -> Result<Vec<Zero>, FigureError>,
 ) -> Result<Locus, FigureError> {
@@ -178,7 +184,7 @@ fn views(track: &[Option<Complex<f64>>], part: Part) -> Vec<Vec<(f64, f64)>> {
 
 /// Where zeros meet, on the axes.
 pub(crate) fn changes(chart: Chart, locus: &Locus) -> Chart {
-    let finite = |change: &&Change| change.s.re.is_finite() && change.s.norm() > 0.0;
+    let finite = |change: &&KindChange| change.s.re.is_finite() && change.s.norm() > 0.0;
     let points: Vec<(f64, f64)> = locus
         .changes
         .iter()

@@ -9,8 +9,8 @@ use super::{Comparison, Content, FigureError, Workshop};
 use bench::config::{PlantSettings, XySettings};
 use bench::model::plant;
 use bench::model::zeros::{
-    Kinds, ModalSum, Place, Row, Sequence, TABLES, Table, Term, phase_drop_deg, table_of,
-    undamped_zeros,
+    MmpLocation, ModalSum, ModalTerm, Sequence, TABLES, Table, TableRow, ZeroCounts,
+    phase_drop_deg, table_of, undamped_zeros,
 };
 
 const TAU: f64 = std::f64::consts::TAU;
@@ -225,7 +225,7 @@ impl Draw {
         let (a, b, c) = (self.decades(1e-2, 1e2), self.residue(), self.residue());
         let u = self.decades(0.3, 3.0);
         let v = u * (1.0 + self.decades(0.01, 10.0));
-        let mode = Term::undamped;
+        let mode = ModalTerm::undamped;
         let (terms, constant) = match class {
             0 => (vec![mode(0.0, a), mode(v, b)], 0.0),
             1 => (vec![mode(u, a), mode(v, b)], 0.0),
@@ -241,18 +241,18 @@ impl Draw {
 struct Drawn {
     count: usize,
     as_printed: usize,
-    example: Option<(ModalSum, String, Kinds)>,
+    example: Option<(ModalSum, String, ZeroCounts)>,
 }
 
 /// Where the MMP zeros lie between the last two resonances.
-fn mmp_places(sum: &ModalSum) -> Result<Vec<Place>, FigureError> {
+fn mmp_places(sum: &ModalSum) -> Result<Vec<MmpLocation>, FigureError> {
     let omegas: Vec<f64> = sum.terms().iter().map(|term| term.omega_rad_s).collect();
     let v = omegas[omegas.len() - 1];
     let u = omegas[omegas.len() - 2];
     let place = |w: f64| match (w < u, w < v) {
-        (true, _) => Place::BelowU,
-        (false, true) => Place::Between,
-        _ => Place::AboveV,
+        (true, _) => MmpLocation::BelowU,
+        (false, true) => MmpLocation::Between,
+        _ => MmpLocation::AboveV,
     };
     let zeros = sum.undamped_zeros()?;
     let mmp = zeros
@@ -273,7 +273,7 @@ fn drawn(index: usize) -> Result<(Vec<Drawn>, usize), FigureError> {
             outside += 1;
             continue;
         };
-        let kinds = Kinds::of(&sum.undamped_zeros()?);
+        let kinds = ZeroCounts::of(&sum.undamped_zeros()?);
         let slot = &mut rows[row.number - 1];
         slot.count += 1;
         slot.as_printed += usize::from(row.kinds.contains(&kinds) && mmp_places(&sum)? == row.mmp);
@@ -283,19 +283,19 @@ fn drawn(index: usize) -> Result<(Vec<Drawn>, usize), FigureError> {
     Ok((rows, outside))
 }
 
-fn kinds_of(row: &Row) -> String {
+fn kinds_of(row: &TableRow) -> String {
     row.kinds
         .iter()
-        .map(Kinds::to_string)
+        .map(ZeroCounts::to_string)
         .collect::<Vec<_>>()
         .join(" or ")
 }
 
-fn places_of(row: &Row) -> String {
-    let word = |place: &Place| match place {
-        Place::BelowU => "(0, wu)",
-        Place::Between => "(wu, wv)",
-        Place::AboveV => "(wv, ∞)",
+fn places_of(row: &TableRow) -> String {
+    let word = |place: &MmpLocation| match place {
+        MmpLocation::BelowU => "(0, wu)",
+        MmpLocation::Between => "(wu, wv)",
+        MmpLocation::AboveV => "(wv, ∞)",
     };
     let mut words: Vec<&str> = row.mmp.iter().map(word).collect();
     words.dedup();
@@ -307,7 +307,7 @@ fn places_of(row: &Row) -> String {
 }
 
 fn example_words(sum: &ModalSum) -> String {
-    let term = |term: &Term| {
+    let term = |term: &ModalTerm| {
         format!(
             "{} at {} rad/s",
             signed(term.residue_per_kg, 4),

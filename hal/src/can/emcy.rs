@@ -11,7 +11,7 @@ use super::frame::{CanFrame, Id};
 pub struct Emergency {
     /// The code, see [`text`]; 0 says that the error is gone.
     pub code: u16,
-    /// Object 0x1001, see [`register_words`].
+    /// Object 0x1001, see [`register_names`].
     pub register: u8,
     /// Meaning in the drive's manual.
     pub vendor: [u8; 5],
@@ -112,7 +112,7 @@ const fn class(code: u16) -> &'static str {
 }
 
 /// The set bits of the error register (object 0x1001) in words.
-pub fn register_words(register: u8) -> impl Iterator<Item = &'static str> {
+pub fn register_names(register: u8) -> impl Iterator<Item = &'static str> {
     const WORDS: [&str; 8] = [
         "generic",
         "current",
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(text(0xFF12), "specific to the drive");
         assert!((0..=u16::MAX).all(|code| !text(code).is_empty()));
         assert_eq!(
-            register_words(0b1000_0011).collect::<Vec<_>>(),
+            register_names(0b1000_0011).collect::<Vec<_>>(),
             ["generic", "current", "manufacturer"]
         );
     }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 use std::time::Duration;
 
-use super::bus::{BusError, BusEvent, CanBus, Claim, Condition, Host, Running, Task};
+use super::bus::{BusError, BusEvent, CanBus, Claim, Condition, Host, Task, TaskHandle};
 use super::frame::{CanFrame, Id};
 use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
 
@@ -103,7 +103,7 @@ impl Shared {
 
 /// A VESC in current control.
 pub struct Vesc {
-    _watch: Running,
+    _watch: TaskHandle,
     bus: Box<dyn CanBus>,
     host: Box<dyn Host>,
     shared: Arc<Shared>,

@@ -39,7 +39,7 @@ pub struct Settings {
     /// A line that reports an error: literals, `{skip}`, and `{code}` once.
     pub error: Option<String>,
     /// What the error numbers mean.
-    pub error_words: &'static [(i64, &'static str)],
+    pub error_texts: &'static [(i64, &'static str)],
     /// What to send to get a line; none if the probe speaks by itself.
     pub request: Option<String>,
     /// Metres of one unit of the number: 1e-3 if it is in millimetres.
@@ -62,7 +62,7 @@ impl Settings {
             over: vec!["+FFFFFFF".into()],
             under: vec!["-FFFFFFF".into()],
             error: Some("ER,{skip},{code}".into()),
-            error_words: KEYENCE_ERRORS,
+            error_texts: KEYENCE_ERRORS,
             request: None,
             unit_m: 1e-3,
             offset_m: 0.0,
@@ -190,7 +190,7 @@ impl Writing {
                 .digits;
             let known = self
                 .settings
-                .error_words
+                .error_texts
                 .iter()
                 .find(|(number, _)| *number == code);
             let words = known.map_or(

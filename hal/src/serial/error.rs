@@ -39,7 +39,7 @@ pub enum SerialError {
         path.display(),
         pid.map_or("another process".to_string(), |pid| format!("process {pid}"))
     )]
-    Held {
+    PortInUse {
         /// The port as configured.
         path: PathBuf,
         /// Who holds it, if it says so.

@@ -33,7 +33,7 @@ impl PortLock {
                 sign(&mut held).map_err(|source| SerialError::Lock { path, source })?;
                 Ok(Self { _held: held })
             }
-            Err((mut file, _)) => Err(SerialError::Held {
+            Err((mut file, _)) => Err(SerialError::PortInUse {
                 path: port.to_owned(),
                 pid: read_pid(&mut file),
             }),

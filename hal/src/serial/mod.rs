@@ -43,6 +43,6 @@ mod statistics;
 pub use error::SerialError;
 pub use event::{Decoder, Event, Sample};
 pub use port::{Note, Parity, PortSettings};
-pub use probe::{Polling, ProbeSettings, Protocol, SerialProbe, Watch};
+pub use probe::{Polling, ProbeSettings, Protocol, SerialProbe, StatisticsHandle};
 pub use reader::Mounting;
 pub use statistics::Statistics;

@@ -159,7 +159,7 @@ fn refused(path: &Path, source: serialport::Error) -> SerialError {
     match source.kind() {
         ErrorKind::Io(io::ErrorKind::NotFound) => SerialError::Missing { path },
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => SerialError::Permission { path },
-        ErrorKind::NoDevice => SerialError::Held { path, pid: None },
+        ErrorKind::NoDevice => SerialError::PortInUse { path, pid: None },
         _ => SerialError::Open { path, source },
     }
 }
@@ -261,7 +261,7 @@ mod tests {
         ));
         assert!(matches!(
             of(ErrorKind::NoDevice),
-            SerialError::Held { pid: None, .. }
+            SerialError::PortInUse { pid: None, .. }
         ));
         assert!(matches!(of(ErrorKind::Unknown), SerialError::Open { .. }));
     }

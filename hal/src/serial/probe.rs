@@ -125,7 +125,7 @@ impl ProbeSettings {
 pub struct SerialProbe {
     newest: Reader,
     clock: Clock,
-    watch: Watch,
+    watch: StatisticsHandle,
     notes: Vec<Note>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -133,11 +133,11 @@ pub struct SerialProbe {
 
 /// Sees the statistics of a probe while the loop has the probe itself.
 #[derive(Clone, Debug)]
-pub struct Watch {
+pub struct StatisticsHandle {
     counters: Arc<Counters>,
 }
 
-impl Watch {
+impl StatisticsHandle {
     /// The counts up to now.
     pub fn statistics(&self) -> Statistics {
         self.counters.snapshot()
@@ -191,7 +191,7 @@ impl SerialProbe {
         Ok(Self {
             newest,
             clock,
-            watch: Watch { counters },
+            watch: StatisticsHandle { counters },
             notes,
             stop,
             thread,
@@ -209,7 +209,7 @@ impl SerialProbe {
     }
 
     /// A way to the statistics that another thread may keep.
-    pub fn watch(&self) -> Watch {
+    pub fn watch(&self) -> StatisticsHandle {
         self.watch.clone()
     }
 

@@ -129,7 +129,7 @@ impl Publisher {
             return;
         };
         let Some(made_ns) = made_ns else {
-            return add(&self.counters.ageless, harvest.values);
+            return add(&self.counters.unknown_age, harvest.values);
         };
         add(&self.counters.superseded, harvest.values - 1);
         add(&self.counters.published, 1);

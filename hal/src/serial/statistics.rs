@@ -18,7 +18,7 @@ pub struct Statistics {
     /// Of these: older than another that arrived with them, so not handed out.
     pub superseded: u64,
     /// Of these: not handed out because nobody can say when they were made.
-    pub ageless: u64,
+    pub unknown_age: u64,
     /// Measurements that the probe's counter says were made and that never arrived.
     pub gaps: u64,
     /// Values received that were not known to be new (not among `values`).
@@ -48,7 +48,7 @@ pub(super) struct Counters {
     pub values: AtomicU64,
     pub published: AtomicU64,
     pub superseded: AtomicU64,
-    pub ageless: AtomicU64,
+    pub unknown_age: AtomicU64,
     pub gaps: AtomicU64,
     pub withheld: AtomicU64,
     pub out_of_range: AtomicU64,
@@ -103,7 +103,7 @@ impl Counters {
             values: read(&self.values),
             published: read(&self.published),
             superseded: read(&self.superseded),
-            ageless: read(&self.ageless),
+            unknown_age: read(&self.unknown_age),
             gaps: read(&self.gaps),
             withheld: read(&self.withheld),
             out_of_range: read(&self.out_of_range),

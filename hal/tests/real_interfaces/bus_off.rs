@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bench_hal::can::Id;
-use bench_hal::can::bus::{BusEvent, CanBus, Condition, Interface, Port, SocketPort, Threads};
+use bench_hal::can::bus::{BusEvent, CanBus, Condition, Interface, Port, SocketPort, SystemHost};
 use bench_hal::can::drive::{fault_text, faults};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 
@@ -29,7 +29,7 @@ fn warning_is_no_fault_bus_off_latches_one_with_its_remedy_and_after_down_and_up
     let adapter = Adapter::new();
     let name = adapter.name.clone();
     let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // nobody's: conditions only
-    let mut rig = Rig::new(&name, &Threads::new(adapter.far_side()), settings()).enabled();
+    let mut rig = Rig::new(&name, &SystemHost::new(adapter.far_side()), settings()).enabled();
 
     adapter.says("sw096000");
     assert_eq!(condition(listener.as_mut()), Condition::Warning);

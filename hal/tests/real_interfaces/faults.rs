@@ -59,7 +59,7 @@ fn frames_of_a_wrong_length_are_found() {
 
 #[test]
 fn a_statusword_that_no_state_has_is_found() {
-    is_found_and_cleared(DeviceFault::SenselessStatus, faults::MALFORMED);
+    is_found_and_cleared(DeviceFault::InvalidStatusword, faults::MALFORMED);
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn a_drive_whose_answers_are_late_is_found() {
 
 #[test]
 fn a_drive_that_does_not_obey_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
-    for misbehaviour in [DeviceFault::SetPointsIgnored, DeviceFault::OrdersIgnored] {
+    for misbehaviour in [DeviceFault::SetPointsIgnored, DeviceFault::CommandsIgnored] {
         let vcan = Vcan::up();
         let mut rig = vcan.running();
         rig.far_end.device().inject(misbehaviour);

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::device::{Fault, SimulatedProbe, simulate};
+use bench_hal::serial::device::{EmulatedProbe, Fault, simulate};
 use bench_hal::serial::{
     Parity, Polling, PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics, capancdt,
 };
@@ -28,7 +28,7 @@ const POSITION_M: f64 = 60e-6;
 
 /// A capaNCDT at the far end, with a stage that stands still.
 struct FarProbe {
-    probe: Arc<Mutex<Box<dyn SimulatedProbe>>>,
+    probe: Arc<Mutex<Box<dyn EmulatedProbe>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -55,8 +55,8 @@ impl FarProbe {
         }
     }
 
-    fn ask_fault(&self, fault: Fault) {
-        self.probe.lock().unwrap().ask_fault(fault);
+    fn inject_fault(&self, fault: Fault) {
+        self.probe.lock().unwrap().inject_fault(fault);
     }
 }
 
@@ -70,7 +70,7 @@ impl Drop for FarProbe {
     }
 }
 
-fn serve(mut line: serialport::TTYPort, probe: &Mutex<Box<dyn SimulatedProbe>>, stop: &AtomicBool) {
+fn serve(mut line: serialport::TTYPort, probe: &Mutex<Box<dyn EmulatedProbe>>, stop: &AtomicBool) {
     let (started, mut bytes) = (Instant::now(), [0; 64]);
     while !stop.load(Ordering::Acquire) {
         let count = line.read(&mut bytes).unwrap_or(0); // nothing in time
@@ -155,14 +155,14 @@ fn a_probe_over_8e1_is_read_rightly_and_damage_silence_and_a_restart_never_give_
     reads(&mut probe, 50);
     assert!(is_even(HERE) && is_even(THERE));
 
-    far.ask_fault(Fault::Corrupt { every: 251 }); // after a pause an answer has up to 93 bytes
+    far.inject_fault(Fault::Corrupt { every: 251 }); // after a pause an answer has up to 93 bytes
     let damaged = probe.statistics().damaged_bytes;
     let goal = probe.statistics().published + 10;
     look_until(&mut probe, "damage, and values between", |_, statistics| {
         statistics.damaged_bytes > damaged + 100 && statistics.published > goal
     });
 
-    far.ask_fault(Fault::Silence);
+    far.inject_fault(Fault::Silence);
     let before = probe.statistics().timeouts;
     let last = look_until(&mut probe, "silence", |_, statistics| {
         statistics.timeouts >= before + 2
@@ -177,10 +177,10 @@ fn a_probe_over_8e1_is_read_rightly_and_damage_silence_and_a_restart_never_give_
         "an old value says that it is old: {last:?}"
     );
 
-    far.ask_fault(Fault::Reset);
+    far.inject_fault(Fault::Reset);
     look_until(&mut probe, "the restart", |_, statistics| {
         statistics.restarts == 1
     });
-    far.ask_fault(Fault::None);
+    far.inject_fault(Fault::None);
     reads(&mut probe, 20);
 }

@@ -15,7 +15,7 @@ use crate::support::rehearsal::{Rehearsal, latest, more, until};
 fn before_the_first_value_the_reading_is_missing() {
     for protocol in all() {
         let rehearsal = Rehearsal::new(&protocol, 1000.0, still);
-        rehearsal.ask_fault(Fault::Silence);
+        rehearsal.inject_fault(Fault::Silence);
         let mut probe = rehearsal.open(&protocol);
         let turns = |probe: &mut SerialProbe| {
             (
@@ -56,7 +56,7 @@ fn a_reading_of_a_polled_probe_is_never_older_than_its_age_says_however_late_the
             Fault::None,
             Fault::Late { by_ns: 100_000_000 },
         ] {
-            rehearsal.ask_fault(fault);
+            rehearsal.inject_fault(fault);
             more_checked(&rehearsal, &mut probe, 8);
         }
     }
@@ -75,12 +75,12 @@ fn answers_later_than_the_timeout_are_used_with_their_true_age() {
     })
     .unwrap();
     more(&mut probe, 3);
-    rehearsal.ask_fault(Fault::Late { by_ns: 100_000_000 });
+    rehearsal.inject_fault(Fault::Late { by_ns: 100_000_000 });
     until(&mut probe, "timed out", |_, statistics| {
         statistics.timeouts > 3
     });
     assert!(more(&mut probe, 2).age_ns >= 100_000_000);
-    rehearsal.ask_fault(Fault::None);
+    rehearsal.inject_fault(Fault::None);
     until(&mut probe, "young again", |reading, _| {
         reading.age_ns < 30_000_000
     });
@@ -122,7 +122,7 @@ fn late_values_of_a_stream_are_still_values_and_their_lateness_cannot_be_known()
         let rehearsal = Rehearsal::new(&protocol, 1000.0, still);
         let mut probe = rehearsal.open(&protocol);
         more(&mut probe, 3);
-        rehearsal.ask_fault(Fault::Late { by_ns: 50_000_000 });
+        rehearsal.inject_fault(Fault::Late { by_ns: 50_000_000 });
         assert!(is_near(more(&mut probe, 50).position_m, 60e-6));
     }
 }
@@ -146,7 +146,7 @@ fn what_came_before_the_port_was_open_is_not_read() {
     for protocol in [optoncdt(), keyence()] {
         let rehearsal = Rehearsal::new(&protocol, 1000.0, still);
         std::thread::sleep(Duration::from_millis(50)); // some fifty values wait in the terminal
-        rehearsal.ask_fault(Fault::Silence);
+        rehearsal.inject_fault(Fault::Silence);
         let mut probe = rehearsal.open(&protocol);
         std::thread::sleep(Duration::from_millis(50));
         assert_eq!(
@@ -163,8 +163,8 @@ fn what_a_reader_finds_after_it_was_kept_from_looking_is_not_handed_out() {
     let kept = || std::thread::sleep(Duration::from_millis(100));
     let mut probe = SerialProbe::open_with(rehearsal.settings(&optoncdt()), kept).unwrap();
     until(&mut probe, "read", |_, statistics| statistics.values > 0);
-    until(&mut probe, "ageless", |_, statistics| {
-        statistics.ageless > 0
+    until(&mut probe, "a reading of unknown age", |_, statistics| {
+        statistics.unknown_age > 0
     });
     more(&mut probe, 3);
 }

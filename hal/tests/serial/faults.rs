@@ -38,7 +38,7 @@ fn a_healthy_probe_is_read_where_it_is() {
         );
         assert_eq!(
             statistics.values,
-            statistics.published + statistics.superseded + statistics.ageless,
+            statistics.published + statistics.superseded + statistics.unknown_age,
             "{statistics:?}"
         );
         until(probe, "a rate", |_, statistics| statistics.rate_hz > 0.0);
@@ -63,7 +63,7 @@ fn mounting_turns_and_shifts_the_reading() {
 #[test]
 fn silence_leaves_the_sequence_and_lets_the_age_grow() {
     against_each(still, |rehearsal, probe, protocol| {
-        rehearsal.ask_fault(Fault::Silence);
+        rehearsal.inject_fault(Fault::Silence);
         let old = until(probe, "old", |reading, _| reading.age_ns > 30_000_000); // nothing more is under way
         let older = until(probe, "older", |reading, _| reading.age_ns > 150_000_000);
         assert_eq!(
@@ -71,7 +71,7 @@ fn silence_leaves_the_sequence_and_lets_the_age_grow() {
             (old.sequence, old.position_m),
             "{protocol:?}"
         );
-        rehearsal.ask_fault(Fault::None);
+        rehearsal.inject_fault(Fault::None);
         until(probe, "young again", |reading, _| {
             reading.age_ns < 30_000_000 && reading.sequence > older.sequence
         });
@@ -84,7 +84,7 @@ fn a_polled_probe_that_falls_silent_is_reported_with_a_remedy() {
         let rehearsal = Rehearsal::new(&protocol, 1000.0, still);
         let mut probe = rehearsal.open(&protocol);
         more(&mut probe, 3);
-        rehearsal.ask_fault(Fault::Silence);
+        rehearsal.inject_fault(Fault::Silence);
         until(&mut probe, "timed out", |_, statistics| {
             statistics.timeouts >= 2
         });
@@ -99,7 +99,7 @@ fn a_polled_probe_that_falls_silent_is_reported_with_a_remedy() {
 #[test]
 fn damaged_bytes_are_counted_and_good_values_still_come() {
     against_each(still, |rehearsal, probe, protocol| {
-        rehearsal.ask_fault(Fault::Corrupt { every: 97 });
+        rehearsal.inject_fault(Fault::Corrupt { every: 97 });
         let damaged = probe.statistics().damaged_bytes;
         let goal = (damaged + 20, probe.statistics().published + 20);
         until(probe, "damaged and well", |reading, statistics| {
@@ -118,7 +118,7 @@ fn damaged_bytes_are_counted_and_good_values_still_come() {
 #[test]
 fn a_stuck_value_is_handed_on_as_what_it_is_new_values_that_do_not_change() {
     against_each(ramp, |rehearsal, probe, protocol| {
-        rehearsal.ask_fault(Fault::Stuck);
+        rehearsal.inject_fault(Fault::Stuck);
         more(probe, 10); // what was under way
         let first = latest(probe);
         let later = more(probe, 100);
@@ -134,7 +134,7 @@ fn a_stuck_value_is_handed_on_as_what_it_is_new_values_that_do_not_change() {
 #[test]
 fn a_jumping_value_is_handed_on() {
     against_each(still, |rehearsal, probe, protocol| {
-        rehearsal.ask_fault(Fault::Jump {
+        rehearsal.inject_fault(Fault::Jump {
             every: 2,
             by_m: 50e-6,
         });
@@ -151,13 +151,13 @@ fn a_jumping_value_is_handed_on() {
 #[test]
 fn out_of_range_is_said_and_the_position_is_the_ranges_end() {
     against_each(still, |rehearsal, probe, protocol| {
-        rehearsal.ask_fault(Fault::OutOfRange);
+        rehearsal.inject_fault(Fault::OutOfRange);
         let beyond = until(probe, "out of range", |reading, _| {
             reading.validity == Validity::OutOfRange
         });
         assert_eq!(beyond.position_m, RANGE_M, "{protocol:?}");
         assert!(probe.statistics().out_of_range > 0);
-        rehearsal.ask_fault(Fault::None);
+        rehearsal.inject_fault(Fault::None);
         until(probe, "back", |reading, _| {
             reading.validity == Validity::Valid && reading.sequence > beyond.sequence
         });
@@ -168,7 +168,7 @@ fn out_of_range_is_said_and_the_position_is_the_ranges_end() {
 fn after_a_reset_of_the_probe_readings_go_on_and_the_sequence_does_not_fall() {
     against_each(still, |rehearsal, probe, protocol| {
         let before = more(probe, 200);
-        rehearsal.ask_fault(Fault::Reset);
+        rehearsal.inject_fault(Fault::Reset);
         let after = more(probe, 50);
         assert!(
             after.sequence > before.sequence && after.validity == Validity::Valid,

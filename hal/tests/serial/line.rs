@@ -63,7 +63,7 @@ fn what_nobody_reads_is_lost_as_on_a_wire() {
     while rehearsal.sent() < 20_000 {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    rehearsal.ask_fault(Fault::Silence);
+    rehearsal.inject_fault(Fault::Silence);
     let waiting = nobody.bytes_to_read().unwrap();
     assert!(
         waiting < 2048 + 1024,
@@ -71,7 +71,7 @@ fn what_nobody_reads_is_lost_as_on_a_wire() {
         rehearsal.sent()
     );
     drop(nobody);
-    rehearsal.ask_fault(Fault::None);
+    rehearsal.inject_fault(Fault::None);
     let mut probe = rehearsal.open(&optoncdt());
     until(&mut probe, "young", |reading, _| {
         reading.age_ns < 20_000_000 && reading.sequence > 0

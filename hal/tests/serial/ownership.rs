@@ -48,7 +48,7 @@ fn another_name_of_the_same_port_is_the_same_port() {
     settings.port.path = link;
     assert!(matches!(
         refusal(settings),
-        SerialError::Held { pid: Some(_), .. }
+        SerialError::PortInUse { pid: Some(_), .. }
     ));
 }
 
@@ -91,7 +91,7 @@ fn another_process_is_named_and_its_port_is_free_after_its_violent_end() {
     );
     let error = refusal(rehearsal.settings(&protocol()));
     assert!(
-        matches!(error, SerialError::Held { pid: Some(pid), .. } if pid == other.id()),
+        matches!(error, SerialError::PortInUse { pid: Some(pid), .. } if pid == other.id()),
         "{error}"
     );
     other.kill().unwrap();

@@ -11,9 +11,9 @@ use super::veering::{self, hz};
 use crate::config::Purpose;
 use crate::model::plant::Structure;
 use crate::model::veering::conditions::{Condition, c4_1, c4_2, deciding_residue, pattern};
-use crate::model::veering::propositions::{Foretold, Proposition, Side, Stretch, p4_1};
+use crate::model::veering::propositions::{Interval, Prediction, Proposition, Side, p4_1};
 use crate::model::veering::{
-    CloseModes, Course, Lie, Loci, Meeting, ModesAt, Station, as_configured,
+    CloseModes, Loci, Meeting, ModesAt, Sample, Trajectory, ZeroConfiguration, as_configured,
 };
 
 /// What varies, which modes, and where to look closely.
@@ -162,7 +162,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let values = sweep.values()?;
     let mut loci = Loci::follow(&values, |value| sweep.at(value))?;
     let pair = meeting_pair(&args.modes, &loci)?;
-    let course = Course::along(&mut loci, pair, as_configured)?;
+    let course = Trajectory::along(&mut loci, pair, as_configured)?;
     veers(course.meeting, course.stations[course.closest].value, pair)?;
     let value = explained(args, &sweep, &course)?;
     let closest = loci.at(course.stations[course.closest].value)?.clone();
@@ -204,7 +204,7 @@ pub(super) fn veers(meeting: Meeting, value: f64, [i, j]: [usize; 2]) -> Result<
 }
 
 /// The value to explain: as asked, or the setting's own if it is in the range, or the veering point.
-fn explained(args: &Args, sweep: &Sweep, course: &Course) -> Result<f64, CliError> {
+fn explained(args: &Args, sweep: &Sweep, course: &Trajectory) -> Result<f64, CliError> {
     let ends = [0, course.stations.len() - 1].map(|index| course.stations[index].value);
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
     let inside = |value: &f64| (low..=high).contains(value);
@@ -235,7 +235,7 @@ fn own(args: &Args) -> Result<Option<f64>, CliError> {
 fn report(
     args: &Args,
     values: &[f64],
-    course: &Course,
+    course: &Trajectory,
     pair: [usize; 2],
     [closest, at]: [&ModesAt; 2],
 ) -> Result<Report, CliError> {
@@ -257,7 +257,7 @@ fn report(
         here: explain(&here),
         sides: [Side::Before, Side::After]
             .into_iter()
-            .map(|side| side_json(&Stretch::of(course, side)))
+            .map(|side| side_json(&Interval::of(course, side)))
             .collect(),
         p4_1: tally(on_grid.clone()),
         rows: on_grid.filter_map(row).collect(),
@@ -268,7 +268,7 @@ fn frequencies_hz(modes: &CloseModes) -> [f64; 2] {
     [hz(modes.u.omega_rad_s), hz(modes.v.omega_rad_s)]
 }
 
-fn assumptions(at: &ModesAt, pair: [usize; 2], here: &Station) -> Assumptions {
+fn assumptions(at: &ModesAt, pair: [usize; 2], here: &Sample) -> Assumptions {
     let damping_ratio = pair
         .map(|mode| at.damping_ratio(mode))
         .into_iter()
@@ -287,12 +287,12 @@ fn assumptions(at: &ModesAt, pair: [usize; 2], here: &Station) -> Assumptions {
     }
 }
 
-fn tally<'a>(stations: impl Iterator<Item = &'a Station>) -> Tally {
+fn tally<'a>(stations: impl Iterator<Item = &'a Sample>) -> Tally {
     stations
         .filter_map(p4_1)
         .fold(Tally::default(), |sum, next| Tally {
             values: sum.values + 1,
-            appear: sum.appear + usize::from(next.foretold == Foretold::Appear),
+            appear: sum.appear + usize::from(next.foretold == Prediction::Appear),
             wrong_by_equation: sum.wrong_by_equation
                 + usize::from(next.foretold.is_contradicted_by(next.equation)),
             wrong_by_plant: sum.wrong_by_plant
@@ -300,7 +300,7 @@ fn tally<'a>(stations: impl Iterator<Item = &'a Station>) -> Tally {
         })
 }
 
-fn side_json(stretch: &Stretch) -> SideJson {
+fn side_json(stretch: &Interval) -> SideJson {
     let propositions = stretch
         .propositions()
         .into_iter()
@@ -336,7 +336,7 @@ fn condition_json(c: Condition) -> ConditionJson {
     }
 }
 
-fn row(station: &Station) -> Option<Row> {
+fn row(station: &Sample) -> Option<Row> {
     let modes = station.modes?;
     let [u_hz, v_hz] = frequencies_hz(&modes);
     let [residue_r_per_kg, residue_u_per_kg, residue_v_per_kg] = modes.residues_per_kg();
@@ -354,15 +354,15 @@ fn row(station: &Station) -> Option<Row> {
     })
 }
 
-fn lie(lie: Lie) -> &'static str {
+fn lie(lie: ZeroConfiguration) -> &'static str {
     match lie {
-        Lie::Between => "dual MMP",
-        Lie::Quartet => "CMP-CNMP",
-        Lie::Elsewhere => "other",
+        ZeroConfiguration::Between => "dual MMP",
+        ZeroConfiguration::Quartet => "CMP-CNMP",
+        ZeroConfiguration::Elsewhere => "other",
     }
 }
 
-fn explain(station: &Station) -> Option<Here> {
+fn explain(station: &Sample) -> Option<Here> {
     let (modes, proposition) = (station.modes?, p4_1(station)?);
     let remedies = vec![on_signs(&modes), on_gap(&modes)];
     Some(Here {

@@ -7,8 +7,8 @@ use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use super::super::table::table;
 use super::sweep::Sweep;
-use crate::model::plant::Modal;
-use crate::model::zeros::{self, Change, Locus, ModalSum, Plane};
+use crate::model::plant::ModalModel;
+use crate::model::zeros::{self, KindChange, Locus, LocusPlane, ModalSum};
 
 /// What varies, and where.
 #[derive(Clone, Debug, clap::Args)]
@@ -97,9 +97,9 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     args.table.check()?;
     let values = sweep(args).values()?;
     let plane = if args.damped {
-        Plane::Damped
+        LocusPlane::Damped
     } else {
-        Plane::Undamped
+        LocusPlane::Undamped
     };
     let locus = Locus::follow(plane, &values, |value| zeros(args, value))?;
     args.table.write(|| {
@@ -161,7 +161,7 @@ fn report(args: &Args, locus: &Locus) -> Result<Report, CliError> {
     })
 }
 
-fn change_json(args: &Args, change: &Change) -> Result<ChangeJson, CliError> {
+fn change_json(args: &Args, change: &KindChange) -> Result<ChangeJson, CliError> {
     let finite = |x: f64| Some(x).filter(|x| x.is_finite());
     Ok(ChangeJson {
         value: change.value,
@@ -175,7 +175,7 @@ fn change_json(args: &Args, change: &Change) -> Result<ChangeJson, CliError> {
 }
 
 fn closed_form(args: &Args, value: f64) -> Result<Option<ClosedForm>, CliError> {
-    let sum = ModalSum::visible(&Modal::of(&sweep(args).at(value)?)?)?;
+    let sum = ModalSum::visible(&ModalModel::of(&sweep(args).at(value)?)?)?;
     Ok(match (sum.terms(), args.damped) {
         ([r, u, v], false) => {
             let nearest = |to: f64, of: [f64; 2]| {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::super::CliError;
 use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
-use super::super::spaced::Spaced;
+use super::super::value_range::ValueRange;
 use crate::config::{PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
 
@@ -24,7 +24,7 @@ pub(super) struct Args {
         default_value = "0%:15%:31",
         allow_hyphen_values = true
     )]
-    operating_points: Spaced,
+    operating_points: ValueRange,
     /// Mass asymmetries m2/m3 - 1: -0.1:0.1:41, -10%:10%:41
     #[arg(
         long,
@@ -32,7 +32,7 @@ pub(super) struct Args {
         default_value = "-10%:10%:41",
         allow_hyphen_values = true
     )]
-    asymmetries: Spaced,
+    asymmetries: ValueRange,
     #[command(flatten)]
     table: TableOptions,
 }
@@ -71,7 +71,7 @@ fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
         return Err(CliError::Usage(what.into()));
     }
     let settings = sr4dof(args, &[])?;
-    let ends = |grid: &Spaced| [grid.0[0], grid.0[grid.0.len() - 1]];
+    let ends = |grid: &ValueRange| [grid.0[0], grid.0[grid.0.len() - 1]];
     for (point, asymmetry) in ends(&args.operating_points)
         .into_iter()
         .zip(ends(&args.asymmetries))

@@ -12,7 +12,7 @@ use super::placement_text::text;
 use super::ports::Weights;
 use super::sweep::Sweep;
 use crate::model::plant::{PlantError, Port, Structure};
-use crate::model::veering::{Loci, ModesAt, Picture, Trial, trial};
+use crate::model::veering::{Loci, ModesAt, QuadrantDiagram, Trial, trial};
 use crate::report::{QuadrantPanel, quadrants_svg};
 
 /// Placements with less than this of the present aR are not recommended: what is to be controlled hardly shows there.
@@ -353,9 +353,9 @@ fn report(
             .cloned()
     };
     let places = [0, tried.closest, tried.path.len() - 1];
-    let pictures: Vec<Picture> = places
+    let pictures: Vec<QuadrantDiagram> = places
         .map(|k| {
-            Picture::of(
+            QuadrantDiagram::of(
                 tried.path[k],
                 tried.path[tried.closest],
                 tried.pair,
@@ -384,7 +384,7 @@ fn report(
     })
 }
 
-fn picture_json(picture: &Picture) -> PictureJson {
+fn picture_json(picture: &QuadrantDiagram) -> PictureJson {
     let [actuator_quadrant, sensor_quadrant] = picture.quadrants();
     PictureJson {
         value: picture.value,
@@ -403,10 +403,10 @@ fn picture_json(picture: &Picture) -> PictureJson {
 fn draw(
     path: &Path,
     args: &Args,
-    pictures: &[Picture],
+    pictures: &[QuadrantDiagram],
     names: &[String; 2],
 ) -> Result<(), CliError> {
-    let panel = |(when, picture): (&str, &Picture)| QuadrantPanel {
+    let panel = |(when, picture): (&str, &QuadrantDiagram)| QuadrantPanel {
         title: format!("{when}: {:.6}", picture.value),
         picture: picture.clone(),
     };

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::super::CliError;
 use super::super::options::{BenchOptions, print_json, print_text};
 use crate::config::Purpose;
-use crate::model::plant::{self, Modal};
-use crate::model::zeros::{self, Kinds, ModalSum, Sequence};
+use crate::model::plant::{self, ModalModel};
+use crate::model::zeros::{self, ModalSum, Sequence, ZeroCounts};
 
 #[derive(Debug, Serialize)]
 struct Report {
@@ -31,7 +31,7 @@ struct RowJson {
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
-    let modal = Modal::of(&plant::build(&config.plant)?)?;
+    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
     let report = report(options.profile(), &modal)?;
     if options.json {
         print_json(&report)
@@ -40,11 +40,11 @@ pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     }
 }
 
-fn report(profile: &str, modal: &Modal) -> Result<Report, CliError> {
+fn report(profile: &str, modal: &ModalModel) -> Result<Report, CliError> {
     let sum = ModalSum::visible(modal)?;
     let sequence = Sequence::of(&sum)?;
     let row = zeros::table_of(&sum).and_then(|table| table.row(&sum, &sequence));
-    let computed = Kinds::of(&sum.undamped_zeros()?);
+    let computed = ZeroCounts::of(&sum.undamped_zeros()?);
     Ok(Report {
         profile: profile.into(),
         sign_sequence: zeros::sign_sequence(modal),
@@ -53,7 +53,7 @@ fn report(profile: &str, modal: &Modal) -> Result<Report, CliError> {
             table: row.table,
             row: row.number,
             printed: row.printed,
-            kinds: row.kinds.iter().map(Kinds::to_string).collect(),
+            kinds: row.kinds.iter().map(ZeroCounts::to_string).collect(),
         }),
         computed: computed.to_string(),
         agree: row.map(|row| row.kinds.contains(&computed)),

@@ -6,8 +6,8 @@ use super::super::CliError;
 use super::super::columns::{Column, TableOptions};
 use super::super::options::{BenchOptions, print_json, print_text};
 use crate::config::Purpose;
-use crate::model::plant::{self, Modal};
-use crate::model::zeros::{InitialStep, Kinds, ModalSum, Sequence, StepResponse};
+use crate::model::plant::{self, ModalModel};
+use crate::model::zeros::{ModalSum, Sequence, StepFeatures, StepResponse, ZeroCounts};
 
 /// Which step response.
 #[derive(Clone, Debug, clap::Args)]
@@ -28,7 +28,7 @@ pub(super) struct Args {
 struct Report {
     profile: String,
     dominant_sequence: String,
-    /// Kinds of the zeros without damping, of the modes that show.
+    /// ZeroCounts of the zeros without damping, of the modes that show.
     zeros: String,
     end_m_per_n: Option<f64>,
     initial_undershoot: bool,
@@ -39,13 +39,13 @@ struct Report {
     reversals_s: Vec<f64>,
     window_s: f64,
     initial_s: f64,
-    foretold: Foretold,
+    foretold: Prediction,
     csv: Option<String>,
 }
 
 /// What the number of zeros in the right half plane says.
 #[derive(Debug, Serialize)]
-struct Foretold {
+struct Prediction {
     /// An odd number of RNMP zeros.
     initial_undershoot: bool,
     /// One a RNMP zero.
@@ -67,7 +67,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     }
     args.table.check()?;
     let config = args.bench.load(Purpose::Model, &[])?;
-    let sum = ModalSum::visible(&Modal::of(&plant::build(&config.plant)?)?)?;
+    let sum = ModalSum::visible(&ModalModel::of(&plant::build(&config.plant)?)?)?;
     let response = StepResponse::new(&sum);
     let initial = response.initial();
     let seconds = args.duration.unwrap_or(initial.window_s);
@@ -106,9 +106,9 @@ fn report(
     args: &Args,
     sum: &ModalSum,
     response: &StepResponse,
-    initial: InitialStep,
+    initial: StepFeatures,
 ) -> Result<Report, CliError> {
-    let kinds = Kinds::of(&sum.undamped_zeros()?);
+    let kinds = ZeroCounts::of(&sum.undamped_zeros()?);
     let crossings = initial.zero_crossings_s.len();
     let (undershoot, least, most) = (kinds.real % 2 == 1, kinds.real, kinds.in_right_half_plane());
     Ok(Report {
@@ -122,7 +122,7 @@ fn report(
         reversals: initial.reversals_s.len(),
         window_s: initial.window_s,
         initial_s: initial.initial_s,
-        foretold: Foretold {
+        foretold: Prediction {
             initial_undershoot: undershoot,
             least_zero_crossings: least,
             usual_zero_crossings: most,

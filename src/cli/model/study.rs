@@ -9,10 +9,10 @@ use super::super::progress::Progress;
 use super::super::table::table;
 use super::super::{CliError, Outcome};
 use crate::config::Purpose;
-use crate::experiment::stoppable;
+use crate::experiment::stop_on_signal;
 use crate::model::study::{
-    Answer, Block, Counted, Couple, Deviation, Effect, Opened, Plan, Probability, Results, Shard,
-    StudyError, StudyFile, Tolerance, Varied, count, joined,
+    Answer, Block, Counted, Deviation, Effect, Interaction, Opened, Plan, Probability, Results,
+    Shard, StudyError, StudyFile, Tolerance, Varied, count, joined,
 };
 
 /// What varies, and how often it is drawn.
@@ -89,7 +89,7 @@ fn drawn(args: &Args) -> Result<Results, CliError> {
         }
         None => (None, Results::none(plan.clone(), shard)),
     };
-    let worked = stoppable(|stop| fill(&mut results, file.as_mut(), threads(args), stop));
+    let worked = stop_on_signal(|stop| fill(&mut results, file.as_mut(), threads(args), stop));
     worked.map_err(|error| CliError::Failed(error.to_string()))??;
     Ok(results)
 }
@@ -311,7 +311,7 @@ fn effect(effect: &Effect) -> Vec<String> {
         .collect()
 }
 
-fn couple(couple: &Couple) -> Vec<String> {
+fn couple(couple: &Interaction) -> Vec<String> {
     let sides = [
         couple.probability_same_side,
         couple.probability_opposite_sides,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::grid::{of_plant, settings};
 use super::{AnswerError, CampaignError, Load, Point, Rest};
 use crate::config::{Config, PlantSettings, Sr4dofSettings};
-use crate::model::plant::{self, Modal, Mode, Sign};
+use crate::model::plant::{self, ModalModel, Mode, Sign};
 
 /// Standard deviations beyond which a difference is no noise: once in two million.
 const SIGMAS: f64 = 5.0;
@@ -157,7 +157,7 @@ pub fn modes(config: &Config, load: &Load, point: &Point) -> Result<Vec<ModeChec
 }
 
 fn modal(plant: &PlantSettings) -> Result<Vec<Mode>, AnswerError> {
-    Ok(Modal::of(&plant::build(plant)?)?.modes)
+    Ok(ModalModel::of(&plant::build(plant)?)?.modes)
 }
 
 fn more_asymmetric(plant: &PlantSettings, by: f64) -> Result<Sr4dofSettings, CampaignError> {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::CampaignError;
-use crate::config::{Config, PlantSettings, Sr4dofSettings, recheck};
+use crate::config::{Config, PlantSettings, Sr4dofSettings, validate};
 
 /// Points, at most: each takes a chirp of minutes.
 const MOST: usize = 10_000;
@@ -85,7 +85,7 @@ impl Grid {
         there.plant = PlantSettings::Sr4dof(settings);
         let index = place.row * self.asymmetries.len() + place.column;
         there.sim.seed = config.sim.seed.wrapping_add(index as u64) % SEEDS;
-        recheck(&there).map_err(|error| {
+        validate(&there).map_err(|error| {
             CampaignError::Grid(format!("the grid leaves what is allowed: {error}"))
         })?;
         Ok(there)

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::CampaignError;
-use crate::identify::Moments;
+use crate::identify::RunningStats;
 use crate::recording::Recording;
 use crate::rt::record::flag;
 use bench_hal::Validity;
@@ -57,10 +57,10 @@ impl Rest {
 
 /// Mean of all, and standard deviation of the means of the stretches.
 fn scatter(readings: &[f64]) -> (f64, f64) {
-    let (mut all, mut means) = (Moments::default(), Moments::default());
+    let (mut all, mut means) = (RunningStats::default(), RunningStats::default());
     let begin = |k: usize| k * readings.len() / STRETCHES;
     for k in 0..STRETCHES {
-        let mut within = Moments::default();
+        let mut within = RunningStats::default();
         readings[begin(k)..begin(k + 1)]
             .iter()
             .for_each(|x| within.push(*x));

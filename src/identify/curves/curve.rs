@@ -21,7 +21,7 @@
 use nalgebra::Complex;
 
 use super::squares::{self, Squares};
-use crate::identify::{Curve, EstimatorSettings};
+use crate::identify::{EstimatorSettings, LocalModel};
 
 /// Fits with the denominator of the one before.
 const REWEIGHTED: usize = 2;
@@ -79,7 +79,7 @@ pub(super) fn fit(window: &Window, settings: &EstimatorSettings) -> Option<Drawn
     } = *settings;
     let degree = window.degree(curve, transient);
     let polynomial = polynomial(window, degree, transient)?;
-    if curve != Curve::Rational || degree < 2 {
+    if curve != LocalModel::Rational || degree < 2 {
         return Some(polynomial);
     }
     let rational = rational(window, transient, |linear| {
@@ -129,8 +129,8 @@ impl Window {
     }
 
     /// The degree that so few bins allow: twice as many as there are unknowns, and one.
-    fn degree(&self, curve: Curve, transient: bool) -> usize {
-        let most = if curve == Curve::Constant { 0 } else { 2 };
+    fn degree(&self, curve: LocalModel, transient: bool) -> usize {
+        let most = if curve == LocalModel::Constant { 0 } else { 2 };
         let alive = self.input.iter().filter(|u| u.norm_sqr() > 0.0).count();
         let unknowns = |degree: usize| (degree + 1) * if transient { 2 } else { 1 };
         (1..=most)

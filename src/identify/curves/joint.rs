@@ -28,12 +28,12 @@
 use nalgebra::Complex;
 
 use super::bins::Bins;
-use super::blocks;
 use super::curve::{self, Drawn, Fitted, Window};
+use super::frf_data;
 use super::local::{collected, forward};
 use super::record::Record;
 use crate::identify::spectrum::{RealFft, Spectra};
-use crate::identify::{Block, EstimatorSettings, Frf, IdentifyError, Signals, band};
+use crate::identify::{EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, band};
 
 /// Reference, command and position of a loop that was closed: one sample a tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,11 +46,11 @@ pub struct LoopSignals {
 
 /// What they show.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
+pub struct JointEstimate {
     /// P, from command (A) to position (m).
     pub plant: Frf,
     /// The same without smoothing, for a fit.
-    pub blocks: Vec<Block>,
+    pub frf_data: Vec<FrfDatum>,
     /// T = P C/(1 + P C), from reference to position.
     pub complementary: Frf,
     /// S = 1/(1 + P C), from reference to error.
@@ -68,7 +68,7 @@ pub fn estimate(
     loop_signals: &LoopSignals,
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
-) -> Result<Joint, IdentifyError> {
+) -> Result<JointEstimate, IdentifyError> {
     let signals = &loop_signals.signals;
     settings.check()?;
     signals.check()?;
@@ -92,14 +92,14 @@ pub fn estimate(
         input: &error,
         output: &position,
     };
-    let joint = Joint {
+    let joint = JointEstimate {
         plant: collected(forward(&plant, &places, settings)),
-        blocks: blocks::cut(&plant, &bins, settings),
+        frf_data: frf_data::cut(&plant, &bins, settings),
         complementary: collected(forward(&position, &places, settings)),
         sensitivity: collected(forward(&error, &places, settings)),
         loop_gain: collected(forward(&loop_gain, &places, settings)),
     };
-    if joint.blocks.is_empty() {
+    if joint.frf_data.is_empty() {
         Err(IdentifyError::NotExcited { low_hz, high_hz })
     } else {
         Ok(joint)

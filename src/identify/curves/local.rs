@@ -36,7 +36,7 @@ use super::noise_floor::NoiseFloor;
 use super::record::Record;
 use crate::identify::estimator::{between, inverted};
 use crate::identify::{
-    Curve, Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, Signals, band,
+    Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, LocalModel, Signals, band,
 };
 
 /// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` at which there was any input.
@@ -134,7 +134,7 @@ fn point(
         .filter(|fitted| fitted.enclosed)?;
     let wider = bins.fit(place, 2.0 * half_width, settings)?;
     let bias = (wider.response - fitted.response)
-        / if settings.curve == Curve::Constant {
+        / if settings.curve == LocalModel::Constant {
             3.0
         } else {
             15.0

@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! Record (bins of U, Y) --Window--> curve (least squares) --NoiseFloor--> local: the response with its errors
-//!                                                                    '--> blocks: the same without smoothing
+//!                                                                    '--> frf_data: the same without smoothing
 //! joint: the same of a stage under control, by ratios of two curves
 //! ```
 
 mod bins;
-pub mod blocks;
 mod curve;
+pub mod frf_data;
 pub mod joint;
 pub mod local;
 mod noise_floor;

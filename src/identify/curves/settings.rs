@@ -1,7 +1,7 @@
 //! What a person chooses of the curves.
 
 use crate::identify::error::check_setting;
-use crate::identify::{Curve, Estimator, IdentifyError, ResolutionPoint};
+use crate::identify::{Estimator, IdentifyError, LocalModel, ResolutionPoint};
 
 /// How the default estimator trades resolution for noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct EstimatorSettings {
     /// So many frequencies, evenly on a logarithmic axis; else bins half of a half-width apart.
     pub frequencies: Option<usize>,
     /// The shape within a neighbourhood.
-    pub curve: Curve,
+    pub curve: LocalModel,
     /// Which signal has noise.
     pub estimator: Estimator,
     /// Whether the record begins or ends in motion.
@@ -29,7 +29,7 @@ impl Default for EstimatorSettings {
             resolution_ratio: 0.0025,
             resolution: Vec::new(),
             frequencies: None,
-            curve: Curve::default(),
+            curve: LocalModel::default(),
             estimator: Estimator::default(),
             transient: false,
         }

@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::identify::Block;
+use crate::identify::FrfDatum;
 
 /// Lines to either side.
 const REACH: usize = 8;
@@ -25,35 +25,37 @@ const SHARPEST: f64 = 1e-3;
 /// Singular values below this are those of parameters that say the same.
 const ALIKE: f64 = 1e-10;
 
-/// The blocks with the power of distortion in their variances; as they are where there are too few lines to
+/// The frf_data with the power of distortion in their variances; as they are where there are too few lines to
 /// tell. Where modes are closer than the lines of one curve, their difference from it is counted too.
-pub fn with_distortion(blocks: &[Block]) -> Vec<Block> {
-    if blocks.len() < 2 * REACH + 1 {
-        return blocks.to_vec();
+pub fn with_distortion(frf_data: &[FrfDatum]) -> Vec<FrfDatum> {
+    if frf_data.len() < 2 * REACH + 1 {
+        return frf_data.to_vec();
     }
-    let rough: Vec<f64> = (0..blocks.len())
-        .map(|k| roughness(blocks, k) / blocks[k].response.norm_sqr())
+    let rough: Vec<f64> = (0..frf_data.len())
+        .map(|k| roughness(frf_data, k) / frf_data[k].response.norm_sqr())
         .collect();
     let around = |k: usize| {
         let near = &rough[k.saturating_sub(REACH)..(k + REACH + 1).min(rough.len())];
         near.iter().sum::<f64>() / near.len() as f64
     };
     // A response of zero makes 0/0, and max() then keeps the noise.
-    let with = |(k, block): (usize, &Block)| Block {
+    let with = |(k, block): (usize, &FrfDatum)| FrfDatum {
         variance: block.variance.max(around(k) * block.response.norm_sqr()),
         ..*block
     };
-    blocks.iter().enumerate().map(with).collect()
+    frf_data.iter().enumerate().map(with).collect()
 }
 
 /// What the curve around a line leaves, per degree of freedom.
-fn roughness(blocks: &[Block], line: usize) -> f64 {
-    let low = line.saturating_sub(REACH).min(blocks.len() - 2 * REACH - 1);
-    let near = &blocks[low..low + 2 * REACH + 1];
+fn roughness(frf_data: &[FrfDatum], line: usize) -> f64 {
+    let low = line
+        .saturating_sub(REACH)
+        .min(frf_data.len() - 2 * REACH - 1);
+    let near = &frf_data[low..low + 2 * REACH + 1];
     let reach_hz = near[2 * REACH].frequency_hz - near[0].frequency_hz;
     let x: Vec<f64> = near
         .iter()
-        .map(|b| 2.0 * REACH as f64 * (b.frequency_hz - blocks[line].frequency_hz) / reach_hz)
+        .map(|b| 2.0 * REACH as f64 * (b.frequency_hz - frf_data[line].frequency_hz) / reach_hz)
         .collect();
     let mut below = vec![Complex::new(1.0, 0.0); x.len()];
     let mut left = f64::INFINITY;
@@ -73,7 +75,7 @@ fn roughness(blocks: &[Block], line: usize) -> f64 {
 }
 
 /// a, b, c, d of the curve, each line weighted with 1 over `below`.
-fn curve(x: &[f64], near: &[Block], below: &[Complex<f64>]) -> Option<DVector<Complex<f64>>> {
+fn curve(x: &[f64], near: &[FrfDatum], below: &[Complex<f64>]) -> Option<DVector<Complex<f64>>> {
     let h = |k: usize| near[k].response;
     let matrix = DMatrix::from_fn(x.len(), PARAMETERS, |k, column| {
         let entry = match column {

@@ -38,7 +38,7 @@ const AROUND: usize = 4;
 
 /// One line of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Level {
+pub struct LineLevel {
     /// Its frequency in hertz.
     pub frequency_hz: f64,
     /// Square of the RMS of the mean input in A^2.
@@ -55,11 +55,11 @@ pub struct Level {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonics {
     /// Those that were excited, all of them odd.
-    pub excited: Vec<Level>,
+    pub excited: Vec<LineLevel>,
     /// Odd ones that were left out.
-    pub odd: Vec<Level>,
+    pub odd: Vec<LineLevel>,
     /// Even ones.
-    pub even: Vec<Level>,
+    pub even: Vec<LineLevel>,
     /// Periods that were averaged.
     pub periods: usize,
 }
@@ -114,13 +114,13 @@ impl Scale {
         }
     }
 
-    fn level(&self, line: &Line) -> Level {
+    fn level(&self, line: &Line) -> LineLevel {
         let (power, of_mean) = (
             mean(&line.output).norm_sqr(),
             variance_of_mean(&line.output),
         );
         let freedom = self.periods as f64 - 1.0;
-        Level {
+        LineLevel {
             frequency_hz: line.number as f64 * self.line_hz,
             input_a2: self.square * mean(&line.input).norm_sqr(),
             power_m2: self.square * power,
@@ -132,12 +132,12 @@ impl Scale {
 
 impl Harmonics {
     /// What a line answers beyond noise, in m^2, without bias: below zero now and then.
-    pub fn beyond_noise_m2(&self, level: &Level) -> f64 {
+    pub fn beyond_noise_m2(&self, level: &LineLevel) -> f64 {
         level.power_m2 - level.noise_m2 / self.periods as f64
     }
 
     /// The same around a frequency: the mean of the nearest of some lines, which rise; 0 where there are none.
-    pub fn around_m2(&self, lines: &[Level], frequency_hz: f64) -> f64 {
+    pub fn around_m2(&self, lines: &[LineLevel], frequency_hz: f64) -> f64 {
         let above = lines.partition_point(|line| line.frequency_hz < frequency_hz);
         let first = above
             .saturating_sub(AROUND / 2)
@@ -152,7 +152,7 @@ impl Harmonics {
 
 /// The probability that noise alone gives lines as far beyond it: exp(-x) sum of x^j/j! for j below their number, x their sum of
 /// surprises. 1 without lines.
-pub fn by_noise_alone(lines: &[Level]) -> f64 {
+pub fn by_noise_alone(lines: &[LineLevel]) -> f64 {
     let x: f64 = lines.iter().map(|line| line.surprise).sum();
     if lines.is_empty() || x <= 0.0 {
         return 1.0;
@@ -308,7 +308,7 @@ mod tests {
         let seeds = 300;
         for seed in 0..seeds {
             let harmonics = shown(&record(seed, (a, b), 1e-3, 6));
-            let sum = |lines: &[Level]| {
+            let sum = |lines: &[LineLevel]| {
                 lines
                     .iter()
                     .map(|l| harmonics.beyond_noise_m2(l))
@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn the_probability_is_that_of_a_sum_of_exponentials() {
-        let level = |surprise| Level {
+        let level = |surprise| LineLevel {
             frequency_hz: 1.0,
             input_a2: 0.0,
             power_m2: 0.0,

@@ -12,8 +12,8 @@
 //! alone keep even distortion out of the response; odd distortion stays in it. Pintelon, Schoukens, System Identification, 2nd ed.,
 //! section 4.3: distortion at the excited lines is taken to be that at the lines around.
 
-use super::harmonics::{Harmonics, Level, by_noise_alone};
-use crate::identify::Block;
+use super::harmonics::{Harmonics, LineLevel, by_noise_alone};
+use crate::identify::FrfDatum;
 
 /// Distortion is found where noise alone gives as much with less than this probability.
 pub const FALSE_ALARM: f64 = 1e-3;
@@ -28,7 +28,7 @@ pub enum Cause {
     /// Noise: what differs from period to period.
     Noise,
     /// The stage itself: what is alike in every period, and yet no linear answer.
-    Geometry,
+    Nonlinearity,
     /// Nothing to speak of is missing.
     None,
 }
@@ -46,7 +46,7 @@ pub struct Distortion {
 
 /// What is found in a band.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Share {
+pub struct BandLinearity {
     /// Lowest and highest excited line in hertz.
     pub band_hz: (f64, f64),
     /// Excited lines.
@@ -67,9 +67,9 @@ pub struct Linearity {
     /// Line by line.
     pub harmonics: Harmonics,
     /// Over the whole band.
-    pub whole: Share,
+    pub whole: BandLinearity,
     /// By octaves, joined until each has 16 excited lines.
-    pub bands: Vec<Share>,
+    pub bands: Vec<BandLinearity>,
 }
 
 impl Linearity {
@@ -86,17 +86,17 @@ impl Linearity {
         }
     }
 
-    /// The blocks with the power of odd distortion in their variances, where it was found: to a fit it is a noise that more
+    /// The frf_data with the power of odd distortion in their variances, where it was found: to a fit it is a noise that more
     /// periods do not lessen.
-    pub fn with_odd_distortion(&self, blocks: &[Block]) -> Vec<Block> {
+    pub fn with_odd_distortion(&self, frf_data: &[FrfDatum]) -> Vec<FrfDatum> {
         if !self.whole.odd.is_some_and(|odd| odd.is_found()) {
-            return blocks.to_vec();
+            return frf_data.to_vec();
         }
-        let with = |block: &Block| Block {
+        let with = |block: &FrfDatum| FrfDatum {
             variance: block.variance + self.odd_variance(block.frequency_hz),
             ..*block
         };
-        blocks.iter().map(with).collect()
+        frf_data.iter().map(with).collect()
     }
 
     /// E|error of H|^2 at an excited line by odd distortion, in (m/A)^2.
@@ -115,7 +115,7 @@ impl Distortion {
     }
 }
 
-impl Share {
+impl BandLinearity {
     /// What distortion takes of the coherence.
     pub fn missing_by_distortion(&self) -> f64 {
         self.odd
@@ -133,7 +133,7 @@ impl Share {
     /// What the rest of the coherence is put down to.
     pub fn cause(&self) -> Cause {
         if self.missing_by_distortion() > self.missing_by_noise {
-            Cause::Geometry
+            Cause::Nonlinearity
         } else if self.missing_by_noise > LITTLE {
             Cause::Noise
         } else {
@@ -156,7 +156,7 @@ impl Share {
         );
         let kinds = self.kinds();
         match self.cause() {
-            Cause::Geometry => format!(
+            Cause::Nonlinearity => format!(
                 "a coherence of {:.5} lacks {distortion} by distortion ({kinds}) and {noise} by noise: geometry, not noise; less \
                  amplitude lessens it, longer does not, and odd lines alone keep even distortion out of the response",
                 self.coherence()
@@ -192,14 +192,14 @@ impl Cause {
     pub fn name(self) -> &'static str {
         match self {
             Cause::Noise => "noise",
-            Cause::Geometry => "geometry",
+            Cause::Nonlinearity => "geometry",
             Cause::None => "none",
         }
     }
 }
 
 /// The lines by octaves from the first on; one that has too few joins the next, at the end the one before.
-fn octaves(lines: &[Level]) -> Vec<&[Level]> {
+fn octaves(lines: &[LineLevel]) -> Vec<&[LineLevel]> {
     let (mut parts, mut rest) = (Vec::new(), lines);
     while let Some(first) = rest.first() {
         let mut end_hz = 2.0 * first.frequency_hz;
@@ -220,12 +220,12 @@ fn octaves(lines: &[Level]) -> Vec<&[Level]> {
 }
 
 /// What some excited lines and those left out between them show.
-fn share(harmonics: &Harmonics, excited: &[Level]) -> Share {
+fn share(harmonics: &Harmonics, excited: &[LineLevel]) -> BandLinearity {
     let ends = excited.first().zip(excited.last());
     let band_hz = ends.map_or((0.0, 0.0), |(first, last)| {
         (first.frequency_hz, last.frequency_hz)
     });
-    let found = |lines: &[Level]| {
+    let found = |lines: &[LineLevel]| {
         let within = |f: f64| lines.partition_point(|line| line.frequency_hz < f);
         by_noise_alone(&lines[within(band_hz.0)..within(band_hz.1)])
     };
@@ -233,7 +233,7 @@ fn share(harmonics: &Harmonics, excited: &[Level]) -> Share {
         [&harmonics.odd, &harmonics.even].map(|lines| (!lines.is_empty()).then(|| found(lines)));
     let mut sums = Sums::default();
     for line in excited {
-        let around = |lines: &[Level]| harmonics.around_m2(lines, line.frequency_hz);
+        let around = |lines: &[LineLevel]| harmonics.around_m2(lines, line.frequency_hz);
         let distortion = [around(&harmonics.odd), around(&harmonics.even)];
         sums.add(
             harmonics.beyond_noise_m2(line),
@@ -284,7 +284,12 @@ impl Sums {
         }
     }
 
-    fn share(&self, band_hz: (f64, f64), lines: usize, probabilities: Both<Option<f64>>) -> Share {
+    fn share(
+        &self,
+        band_hz: (f64, f64),
+        lines: usize,
+        probabilities: Both<Option<f64>>,
+    ) -> BandLinearity {
         let count = lines.max(1) as f64;
         let over_output = |power_m2: f64| power_m2 / self.output_m2.max(f64::MIN_POSITIVE);
         let kind = |k: usize| {
@@ -294,7 +299,7 @@ impl Sums {
                 by_noise_alone,
             })
         };
-        Share {
+        BandLinearity {
             band_hz,
             lines,
             noise_ratio: over_output(self.noise_m2),
@@ -314,7 +319,7 @@ mod tests {
         (output_m2, noise_m2, odd_m2, even_m2): (f64, f64, f64, f64),
         surprise: Both<f64>,
     ) -> Harmonics {
-        let level = |k: usize, power_m2: f64, surprise: f64| Level {
+        let level = |k: usize, power_m2: f64, surprise: f64| LineLevel {
             frequency_hz: k as f64,
             input_a2: 4.0,
             power_m2: power_m2 + noise_m2 / 8.0,
@@ -359,14 +364,14 @@ mod tests {
             assert!((found - expected).abs() < 1e-14, "{found} for {expected}");
         }
         assert!(odd.is_found() && even.is_found());
-        let blocks = [Block {
+        let frf_data = [FrfDatum {
             frequency_hz: 51.0,
             spread_hz: 0.0,
             response: 1.0.into(),
             variance: 1.0,
         }];
         // 0.02 m^2 over 4 A^2.
-        assert!((linearity.with_odd_distortion(&blocks)[0].variance - 1.005).abs() < 1e-14);
+        assert!((linearity.with_odd_distortion(&frf_data)[0].variance - 1.005).abs() < 1e-14);
     }
 
     #[test]
@@ -376,13 +381,13 @@ mod tests {
             (
                 (1.0, 0.01, 0.0, 0.07),
                 [1.0, 20.0],
-                Cause::Geometry,
+                Cause::Nonlinearity,
                 ["even found", "less amplitude"],
             ),
             (
                 (1.0, 0.01, 0.02, 0.0),
                 [20.0, 1.0],
-                Cause::Geometry,
+                Cause::Nonlinearity,
                 ["odd found", "even not beyond noise"],
             ),
             (
@@ -406,7 +411,7 @@ mod tests {
             (
                 (1.0, 1e-6, 0.0, 1e-5),
                 [1.0, 20.0],
-                Cause::Geometry,
+                Cause::Nonlinearity,
                 ["even found", "longer does not"],
             ),
         ] {
@@ -421,13 +426,13 @@ mod tests {
     #[test]
     fn where_odd_distortion_is_not_found_blocks_stay_as_they_are() {
         let linearity = Linearity::of(harmonics((1.0, 0.01, 0.02, 0.07), [1.0, 20.0]));
-        let blocks = [Block {
+        let frf_data = [FrfDatum {
             frequency_hz: 51.0,
             spread_hz: 0.0,
             response: 1.0.into(),
             variance: 1.0,
         }];
-        assert_eq!(linearity.with_odd_distortion(&blocks), blocks);
+        assert_eq!(linearity.with_odd_distortion(&frf_data), frf_data);
     }
 
     #[test]

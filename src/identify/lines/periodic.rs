@@ -17,7 +17,7 @@
 use nalgebra::Complex;
 
 use crate::identify::spectrum::RealFft;
-use crate::identify::{Block, Frf, FrfPoint, IdentifyError, Signals, band};
+use crate::identify::{Frf, FrfDatum, FrfPoint, IdentifyError, Signals, band};
 
 /// Periods that are averaged at least: with fewer the scatter says too little of itself.
 const LEAST_PERIODS: usize = 4;
@@ -47,7 +47,7 @@ pub struct Periods {
     /// The response at the excited lines, each as narrow as the period allows.
     pub frf: Frf,
     /// The same for a fit: one line a block.
-    pub blocks: Vec<Block>,
+    pub frf_data: Vec<FrfDatum>,
     /// Periods that were averaged.
     pub count: usize,
 }
@@ -66,14 +66,14 @@ pub fn estimate(
     let count = lines.first().map_or(0, |line| line.input.len());
     let mut periods = Periods {
         frf: Frf::default(),
-        blocks: Vec::new(),
+        frf_data: Vec::new(),
         count,
     };
     for line in excited(&lines) {
         periods.take(line, line_hz);
     }
     let (low_hz, high_hz) = band_hz;
-    if periods.blocks.is_empty() {
+    if periods.frf_data.is_empty() {
         Err(IdentifyError::NotExcited { low_hz, high_hz })
     } else {
         Ok(periods)
@@ -108,7 +108,7 @@ impl Periods {
             resolution_hz: line_hz,
         };
         if self.frf.push(point) && variance > 0.0 {
-            self.blocks.push(Block {
+            self.frf_data.push(FrfDatum {
                 frequency_hz,
                 spread_hz: 0.0,
                 response,

@@ -1,11 +1,11 @@
 //! From the measured response to the modes: how many, where, how damped, with which residue, and how sure.
 //!
 //! ```text
-//! blocks of bins --search--> orders 1, 2, ... by evidence --noise from what is left--> refine --> modes, R, tau, covariance
+//! frf_data of bins --search--> orders 1, 2, ... by evidence --noise from what is left--> refine --> modes, R, tau, covariance
 //! ```
 //!
 //! The model is the plant's own form, G(s) = R + sum of r_k/(s^2 + 2 zeta_k w_k s + w_k^2) (Eq. 3-2) with real residues, seen
-//! through hold, amplifier and delays ([`View`]). So every parameter is one of the mechanics, no pole is one of the
+//! through hold, amplifier and delays ([`MeasurementChain`]). So every parameter is one of the mechanics, no pole is one of the
 //! computation, and nothing is expanded into a polynomial.
 //!
 //! The noise is first that of the estimator, then what the fit leaves over around each block: where the model misses
@@ -22,10 +22,10 @@ use nalgebra::DMatrix;
 
 pub use refine::Parameters;
 pub use response::UncertainPole;
-pub use search::Order;
-pub use view::View;
+pub use search::ModelOrder;
+pub use view::MeasurementChain;
 
-use crate::identify::Block;
+use crate::identify::FrfDatum;
 use crate::model::plant::Sign;
 pub(crate) use refine::Entry;
 use refine::{Seen, covariance, refine};
@@ -47,10 +47,10 @@ pub enum FitError {
         high_hz: f64,
     },
     /// Fewer data than parameters.
-    #[error("{blocks} frequencies do not determine a mode; record for longer or widen the band")]
+    #[error("{frf_data} frequencies do not determine a mode; record for longer or widen the band")]
     TooFew {
         /// How many there are.
-        blocks: usize,
+        frf_data: usize,
     },
     /// The parameters cannot be told apart.
     #[error(
@@ -129,22 +129,22 @@ pub struct ModalFit {
     /// Covariance of w (rad/s), zeta, r (1/kg) of each mode (of a free body r alone), of R (m/N) and tau (s), in that order.
     pub covariance: DMatrix<f64>,
     /// All orders that were found worth it, for the stability chart.
-    pub orders: Vec<Order>,
+    pub orders: Vec<ModelOrder>,
     /// chi^2 over its degrees of freedom by the estimator's own noise: 1 where the model explains all but noise.
     pub chi2_per_freedom: f64,
     /// Frequencies that were fitted, in hertz.
     pub band_hz: (f64, f64),
 }
 
-/// Fits modes to the blocks of a record, as many as there is evidence for.
-pub fn fit(blocks: &[Block], view: &View<'_>) -> Result<ModalFit, FitError> {
-    let [first, .., last] = blocks else {
+/// Fits modes to the frf_data of a record, as many as there is evidence for.
+pub fn fit(frf_data: &[FrfDatum], view: &MeasurementChain<'_>) -> Result<ModalFit, FitError> {
+    let [first, .., last] = frf_data else {
         return Err(FitError::TooFew {
-            blocks: blocks.len(),
+            frf_data: frf_data.len(),
         });
     };
     let band_hz = (first.frequency_hz, last.frequency_hz);
-    let orders = search::orders(view, blocks);
+    let orders = search::orders(view, frf_data);
     let best = orders.last().ok_or(FitError::NoMode {
         low_hz: band_hz.0,
         high_hz: band_hz.1,
@@ -153,20 +153,20 @@ pub fn fit(blocks: &[Block], view: &View<'_>) -> Result<ModalFit, FitError> {
     start
         .modes
         .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
-    let blocks = &merged::merged(blocks, &start);
-    if 2 * blocks.len() <= start.entries().len() {
+    let frf_data = &merged::merged(frf_data, &start);
+    if 2 * frf_data.len() <= start.entries().len() {
         return Err(FitError::TooFew {
-            blocks: blocks.len(),
+            frf_data: frf_data.len(),
         });
     }
-    let start = search::without_the_needless(start, view, blocks);
-    let seen = Seen::of(&start, view, blocks);
-    let chi2_per_freedom = seen.chi2 / (2 * blocks.len() - start.entries().len()) as f64;
-    let blocks = with_noise_of(&seen, blocks, start.entries().len());
-    let (parameters, seen) = refine(start, view, &blocks, 0.0);
+    let start = search::without_the_needless(start, view, frf_data);
+    let seen = Seen::of(&start, view, frf_data);
+    let chi2_per_freedom = seen.chi2 / (2 * frf_data.len() - start.entries().len()) as f64;
+    let frf_data = with_noise_of(&seen, frf_data, start.entries().len());
+    let (parameters, seen) = refine(start, view, &frf_data, 0.0);
     let modes = parameters.modes.len();
     let covariance =
-        covariance(&parameters, &seen, &blocks).ok_or(FitError::Undetermined { modes })?;
+        covariance(&parameters, &seen, &frf_data).ok_or(FitError::Undetermined { modes })?;
     Ok(ModalFit {
         covariance,
         chi2_per_freedom,
@@ -176,23 +176,23 @@ pub fn fit(blocks: &[Block], view: &View<'_>) -> Result<ModalFit, FitError> {
     })
 }
 
-/// The blocks with the noise that a fit of `parameters` leaves over: the mean of |e|^2/v around each.
-fn with_noise_of(seen: &Seen, blocks: &[Block], parameters: usize) -> Vec<Block> {
-    let freedom = 1.0 - parameters as f64 / (2 * blocks.len()) as f64;
+/// The frf_data with the noise that a fit of `parameters` leaves over: the mean of |e|^2/v around each.
+fn with_noise_of(seen: &Seen, frf_data: &[FrfDatum], parameters: usize) -> Vec<FrfDatum> {
+    let freedom = 1.0 - parameters as f64 / (2 * frf_data.len()) as f64;
     let ratio: Vec<f64> = seen
         .left
         .iter()
-        .zip(blocks)
+        .zip(frf_data)
         .map(|(e, b)| e.norm_sqr() / b.variance / freedom)
         .collect();
     let around = |b: usize| {
         let near = &ratio[b.saturating_sub(NOISE_BLOCKS)..(b + NOISE_BLOCKS + 1).min(ratio.len())];
         near.iter().sum::<f64>() / near.len() as f64
     };
-    blocks
+    frf_data
         .iter()
         .enumerate()
-        .map(|(b, block)| Block {
+        .map(|(b, block)| FrfDatum {
             variance: block.variance * around(b),
             ..*block
         })
@@ -209,7 +209,7 @@ impl ModalFit {
                 .position(|entry| *entry == wanted)
                 .map_or(0.0, |i| self.covariance[(i, i)].sqrt())
         };
-        let of = |(k, term): (usize, &crate::model::zeros::Term)| FittedMode {
+        let of = |(k, term): (usize, &crate::model::zeros::ModalTerm)| FittedMode {
             omega_rad_s: Estimate {
                 value: term.omega_rad_s,
                 sigma: sigma(Entry::Omega(k)),

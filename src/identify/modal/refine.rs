@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! H(f) = exp(-j w tau) (R V_0(f) + sum of r_k V(f; w_k, zeta_k))        V: a mode of residue 1 through the view
-//! chi^2 = sum over blocks of 2 |H_b - H(f_b)|^2 / v_b                    v_b = E|error|^2
+//! chi^2 = sum over frf_data of 2 |H_b - H(f_b)|^2 / v_b                    v_b = E|error|^2
 //! ```
 //!
 //! by Levenberg and Marquardt's steps in ln w, ln zeta and tau, after each of which r and R, in which H is linear, are solved
@@ -14,9 +14,9 @@
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
 use super::normal::Normal;
-use super::view::{View, slopes};
-use crate::identify::Block;
-use crate::model::zeros::Term;
+use super::view::{MeasurementChain, slopes};
+use crate::identify::FrfDatum;
+use crate::model::zeros::ModalTerm;
 
 /// Steps at most.
 const STEPS: usize = 60;
@@ -37,7 +37,7 @@ const DAMPING: (f64, f64) = (1e-6, 2.0);
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameters {
     /// The modes; one of w = 0 is a free body.
-    pub modes: Vec<Term>,
+    pub modes: Vec<ModalTerm>,
     /// R: the compliance in m/N that modes above the band leave in it.
     pub remainder_m_per_n: f64,
     /// tau: how much later than the view all this answers, in seconds.
@@ -114,33 +114,45 @@ pub(super) struct Seen {
     parts: Vec<Vec<Complex<f64>>>,
     /// Of the constant compliance, late.
     constant: Vec<Complex<f64>>,
-    /// What the blocks have beyond the model.
+    /// What the frf_data have beyond the model.
     pub left: Vec<Complex<f64>>,
     /// chi^2.
     pub chi2: f64,
 }
 
 impl Seen {
-    pub(super) fn of(parameters: &Parameters, view: &View<'_>, blocks: &[Block]) -> Seen {
-        let mut seen = Seen::parts_of(parameters, view, blocks);
-        seen.look(parameters, blocks);
+    pub(super) fn of(
+        parameters: &Parameters,
+        view: &MeasurementChain<'_>,
+        frf_data: &[FrfDatum],
+    ) -> Seen {
+        let mut seen = Seen::parts_of(parameters, view, frf_data);
+        seen.look(parameters, frf_data);
         seen
     }
 
-    /// The same with the residues and R with which chi^2 is least, if the blocks tell them apart.
-    fn settled(parameters: Parameters, view: &View<'_>, blocks: &[Block]) -> (Parameters, Seen) {
-        let mut seen = Seen::parts_of(&parameters, view, blocks);
-        let settled = match seen.linear(blocks) {
+    /// The same with the residues and R with which chi^2 is least, if the frf_data tell them apart.
+    fn settled(
+        parameters: Parameters,
+        view: &MeasurementChain<'_>,
+        frf_data: &[FrfDatum],
+    ) -> (Parameters, Seen) {
+        let mut seen = Seen::parts_of(&parameters, view, frf_data);
+        let settled = match seen.linear(frf_data) {
             Some(linear) => parameters.with_linear(&linear),
             None => parameters,
         };
-        seen.look(&settled, blocks);
+        seen.look(&settled, frf_data);
         (settled, seen)
     }
 
-    fn parts_of(parameters: &Parameters, view: &View<'_>, blocks: &[Block]) -> Seen {
-        let nodes = view.nodes(parameters.delay_s, blocks);
-        let part = |m: &Term| view.mode((m.omega_rad_s, m.damping_ratio), &nodes);
+    fn parts_of(
+        parameters: &Parameters,
+        view: &MeasurementChain<'_>,
+        frf_data: &[FrfDatum],
+    ) -> Seen {
+        let nodes = view.nodes(parameters.delay_s, frf_data);
+        let part = |m: &ModalTerm| view.mode((m.omega_rad_s, m.damping_ratio), &nodes);
         let parts = parameters.modes.iter().map(part).collect();
         Seen {
             parts,
@@ -151,8 +163,8 @@ impl Seen {
     }
 
     /// What these parts, of the sizes of `parameters`, leave.
-    fn look(&mut self, parameters: &Parameters, blocks: &[Block]) {
-        let left = |(b, block): (usize, &Block)| {
+    fn look(&mut self, parameters: &Parameters, frf_data: &[FrfDatum]) {
+        let left = |(b, block): (usize, &FrfDatum)| {
             let modes: Complex<f64> = parameters
                 .modes
                 .iter()
@@ -161,21 +173,21 @@ impl Seen {
                 .sum();
             block.response - modes - self.constant[b] * parameters.remainder_m_per_n
         };
-        self.left = blocks.iter().enumerate().map(left).collect();
+        self.left = frf_data.iter().enumerate().map(left).collect();
         self.chi2 = self
             .left
             .iter()
-            .zip(blocks)
+            .zip(frf_data)
             .map(|(e, block)| 2.0 * e.norm_sqr() / block.variance)
             .sum();
     }
 
     /// The residues and R with which chi^2 is least: by normal equations in a unit diagonal, as an error of theirs is seen in
     /// the chi^2 of the step, which is then none.
-    fn linear(&self, blocks: &[Block]) -> Option<DVector<f64>> {
+    fn linear(&self, frf_data: &[FrfDatum]) -> Option<DVector<f64>> {
         let mut normal = Normal::of_size(self.parts.len() + 1);
         let mut row = Vec::with_capacity(self.parts.len() + 1);
-        for (b, block) in blocks.iter().enumerate() {
+        for (b, block) in frf_data.iter().enumerate() {
             row.clear();
             row.extend(
                 self.parts
@@ -193,7 +205,7 @@ impl Seen {
         &self,
         parameters: &Parameters,
         b: usize,
-        block: &Block,
+        block: &FrfDatum,
         slopes_out: &mut Vec<Complex<f64>>,
     ) {
         let omega = 2.0 * std::f64::consts::PI * block.frequency_hz;
@@ -212,10 +224,10 @@ impl Seen {
     }
 
     /// J^T W J and J^T W e.
-    fn normal(&self, parameters: &Parameters, blocks: &[Block]) -> Normal {
+    fn normal(&self, parameters: &Parameters, frf_data: &[FrfDatum]) -> Normal {
         let mut normal = Normal::of_size(parameters.entries().len());
         let mut row = Vec::with_capacity(normal.right.len());
-        for (b, block) in blocks.iter().enumerate() {
+        for (b, block) in frf_data.iter().enumerate() {
             self.slopes(parameters, b, block, &mut row);
             normal.add(&row, self.left[b], (2.0 / block.variance).sqrt());
         }
@@ -224,21 +236,21 @@ impl Seen {
 }
 
 /// Where the steps end, the last of which lowers chi^2 by less than `coarse` of it: the parameters, and what is left of the
-/// blocks there.
+/// frf_data there.
 pub(super) fn refine(
     start: Parameters,
-    view: &View<'_>,
-    blocks: &[Block],
+    view: &MeasurementChain<'_>,
+    frf_data: &[FrfDatum],
     coarse: f64,
 ) -> (Parameters, Seen) {
     if start.modes.is_empty() {
-        let seen = Seen::of(&start, view, blocks);
+        let seen = Seen::of(&start, view, frf_data);
         return (start, seen);
     }
     let entries = start.entries();
-    let (mut best, mut seen) = Seen::settled(start, view, blocks);
+    let (mut best, mut seen) = Seen::settled(start, view, frf_data);
     let mut damping = Damping::first();
-    let mut normal = seen.normal(&best, blocks);
+    let mut normal = seen.normal(&best, frf_data);
     for _ in 0..STEPS {
         let Some(step) = normal.solve(|i| {
             if entries[i].is_linear() {
@@ -249,7 +261,7 @@ pub(super) fn refine(
         }) else {
             break;
         };
-        let (next, there) = Seen::settled(best.moved(&entries, &step), view, blocks);
+        let (next, there) = Seen::settled(best.moved(&entries, &step), view, frf_data);
         let (gained, promised) = (seen.chi2 - there.chi2, normal.promised(&step));
         if gained.is_finite() && gained >= 0.0 {
             let done = gained < NOTHING + coarse * there.chi2 && damping.now < 1.0;
@@ -258,7 +270,7 @@ pub(super) fn refine(
                 break;
             }
             damping.lower(gained / promised);
-            normal = seen.normal(&best, blocks);
+            normal = seen.normal(&best, frf_data);
         } else if damping.now > 1e8 || promised < NOTHING {
             break;
         } else {
@@ -305,10 +317,10 @@ impl Damping {
 pub(super) fn covariance(
     parameters: &Parameters,
     seen: &Seen,
-    blocks: &[Block],
+    frf_data: &[FrfDatum],
 ) -> Option<DMatrix<f64>> {
     let entries = parameters.entries();
-    let (scale, unit) = seen.normal(parameters, blocks).scaled()?;
+    let (scale, unit) = seen.normal(parameters, frf_data).scaled()?;
     let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
     let natural = |i: usize| {
         scale[i]

@@ -3,9 +3,9 @@
 use nalgebra::Complex;
 
 use super::refine::Entry;
-use super::{ModalFit, View};
-use crate::identify::Block;
-use crate::model::zeros::Term;
+use super::{MeasurementChain, ModalFit};
+use crate::identify::FrfDatum;
+use crate::model::zeros::ModalTerm;
 
 /// A pole with its errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,14 +19,14 @@ pub struct UncertainPole {
 impl ModalFit {
     /// The response of the fit through `view`, its delay included, at frequencies in hertz; in the unit of what was fitted
     /// (m/A through a bench, m/N bare).
-    pub fn response(&self, view: &View<'_>, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
-        let at = |f: &f64| Block {
+    pub fn response(&self, view: &MeasurementChain<'_>, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
+        let at = |f: &f64| FrfDatum {
             frequency_hz: *f,
             spread_hz: 0.0,
             response: Complex::new(0.0, 0.0),
             variance: 1.0,
         };
-        let points: Vec<Block> = frequency_hz.iter().map(at).collect();
+        let points: Vec<FrfDatum> = frequency_hz.iter().map(at).collect();
         let nodes = view.nodes(self.parameters.delay_s, &points);
         let mut sum = view.constant(&nodes);
         sum.iter_mut()
@@ -48,7 +48,7 @@ impl ModalFit {
     pub fn poles(&self) -> Vec<UncertainPole> {
         let entries = self.parameters.entries();
         let place = |wanted: Entry| entries.iter().position(|entry| *entry == wanted);
-        let of = |(k, term): (usize, &Term)| {
+        let of = |(k, term): (usize, &ModalTerm)| {
             let places = place(Entry::Omega(k)).zip(place(Entry::Damping(k)));
             let sides = slopes(term);
             sides
@@ -83,7 +83,7 @@ impl ModalFit {
 }
 
 /// Each pole of a mode with d(Re s, Im s)/d(w, zeta).
-fn slopes(term: &Term) -> Vec<(Complex<f64>, [[f64; 2]; 2])> {
+fn slopes(term: &ModalTerm) -> Vec<(Complex<f64>, [[f64; 2]; 2])> {
     let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
     if zeta < 1.0 {
         let root = (1.0 - zeta * zeta).sqrt();

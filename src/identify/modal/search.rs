@@ -5,9 +5,9 @@ use nalgebra::Complex;
 
 use super::merged::merged;
 use super::refine::{Entry, Parameters, Seen, covariance, refine};
-use super::view::View;
-use crate::identify::Block;
-use crate::model::zeros::Term;
+use super::view::MeasurementChain;
+use crate::identify::FrfDatum;
+use crate::model::zeros::ModalTerm;
 
 /// Modes at most.
 const MOST: usize = 24;
@@ -20,7 +20,7 @@ const WORST: usize = 6;
 /// Candidates that are fitted, the best first, before the search ends.
 const TRIALS: usize = 3;
 /// A body on no spring.
-const FREE: Term = Term {
+const FREE: ModalTerm = ModalTerm {
     omega_rad_s: 0.0,
     damping_ratio: 0.0,
     residue_per_kg: 0.0,
@@ -29,16 +29,16 @@ const FREE: Term = Term {
 const DELAYS_A_PERIOD: f64 = 6.0;
 /// At most so many.
 const MOST_DELAYS: f64 = 2000.0;
-/// Where one mode for all below the blocks begins: its frequency as a ratio of the lowest, and its damping ratio.
+/// Where one mode for all below the frf_data begins: its frequency as a ratio of the lowest, and its damping ratio.
 const BELOW: (f64, f64) = (0.3, 0.4);
 /// A mode is seen whose residue is so many of its errors.
 const SEEN: f64 = 5.0;
 
-/// One look at the blocks.
+/// One look at the frf_data.
 struct Look {
     /// The error as a ratio of H that is added to the noise.
     rough: f64,
-    /// One block of how many is looked at. A mode of 0.2 % damping is eight blocks of a twentieth of a percent wide.
+    /// One block of how many is looked at. A mode of 0.2 % damping is eight frf_data of a twentieth of a percent wide.
     every: usize,
     /// A step that lowers chi^2 by less than this ratio of it is the last.
     coarse: f64,
@@ -65,7 +65,7 @@ const LOOKS: [Look; 3] = [
 
 /// The sum of one order.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Order {
+pub struct ModelOrder {
     /// The modes and the rest.
     pub parameters: Parameters,
     /// chi^2 over its degrees of freedom, with the errors that this order was sought with.
@@ -74,10 +74,10 @@ pub struct Order {
     pub evidence: f64,
 }
 
-/// How far chi^2 must fall for three more parameters, chosen as the best of `blocks` places, to be more than noise: the
+/// How far chi^2 must fall for three more parameters, chosen as the best of `frf_data` places, to be more than noise: the
 /// Bayesian criterion's 3 ln 2N, and again 2 ln N for the choice.
-fn threshold(blocks: usize) -> f64 {
-    let n = blocks as f64;
+fn threshold(frf_data: usize) -> f64 {
+    let n = frf_data as f64;
     3.0 * (2.0 * n).ln() + 2.0 * n.ln()
 }
 
@@ -86,10 +86,10 @@ fn threshold(blocks: usize) -> f64 {
 /// An error of a ratio of H is added to the noise, first a large one, then less, then none: so the modes come in the order
 /// of what they change, not of how well they were measured, and a rough model of all of them stands before the finest
 /// differences count.
-pub(super) fn orders(view: &View<'_>, blocks: &[Block]) -> Vec<Order> {
-    let (mut orders, mut now): (Vec<Order>, _) = (Vec::new(), Parameters::default());
+pub(super) fn orders(view: &MeasurementChain<'_>, frf_data: &[FrfDatum]) -> Vec<ModelOrder> {
+    let (mut orders, mut now): (Vec<ModelOrder>, _) = (Vec::new(), Parameters::default());
     for look in LOOKS {
-        let rough = roughened(blocks, &look, &now);
+        let rough = roughened(frf_data, &look, &now);
         let mut seen;
         (now, seen) = refine(now, view, &rough, look.coarse);
         while now.modes.len() < MOST {
@@ -101,7 +101,7 @@ pub(super) fn orders(view: &View<'_>, blocks: &[Block]) -> Vec<Order> {
                 .saturating_sub(next.entries().len())
                 .max(1) as f64;
             let chi2_per_freedom = there.chi2 / freedom;
-            orders.push(Order {
+            orders.push(ModelOrder {
                 parameters: next.clone(),
                 chi2_per_freedom,
                 evidence,
@@ -116,20 +116,20 @@ pub(super) fn orders(view: &View<'_>, blocks: &[Block]) -> Vec<Order> {
 /// the others take their place without a rise of chi^2 that says otherwise.
 pub(super) fn without_the_needless(
     sum: Parameters,
-    view: &View<'_>,
-    blocks: &[Block],
+    view: &MeasurementChain<'_>,
+    frf_data: &[FrfDatum],
 ) -> Parameters {
-    let needed = threshold(blocks.len());
-    let (now, seen) = refine(sum, view, blocks, 0.0);
-    let (mut now, mut seen) = with_one_below(now, seen, view, blocks);
+    let needed = threshold(frf_data.len());
+    let (now, seen) = refine(sum, view, frf_data, 0.0);
+    let (mut now, mut seen) = with_one_below(now, seen, view, frf_data);
     while now.modes.len() > 1 {
-        let Some(place) = weakest(&now, &seen, blocks) else {
+        let Some(place) = weakest(&now, &seen, frf_data) else {
             break;
         };
         let mut fewer = now.clone();
         fewer.modes.remove(place);
-        let (next, there) = refine(fewer, view, blocks, 0.0);
-        let misfit = (seen.chi2 / (2 * blocks.len()) as f64).max(1.0);
+        let (next, there) = refine(fewer, view, frf_data, 0.0);
+        let misfit = (seen.chi2 / (2 * frf_data.len()) as f64).max(1.0);
         if there.chi2 - seen.chi2 > needed * misfit {
             break;
         }
@@ -138,16 +138,16 @@ pub(super) fn without_the_needless(
     now
 }
 
-/// The sum with one mode in the place of all that lie below the blocks, if it does as well: friction takes a free body for
+/// The sum with one mode in the place of all that lie below the frf_data, if it does as well: friction takes a free body for
 /// several, none of which can be told from the others.
 fn with_one_below(
     sum: Parameters,
     seen: Seen,
-    view: &View<'_>,
-    blocks: &[Block],
+    view: &MeasurementChain<'_>,
+    frf_data: &[FrfDatum],
 ) -> (Parameters, Seen) {
-    let low_rad_s = 2.0 * std::f64::consts::PI * blocks[0].frequency_hz;
-    let (below, above): (Vec<Term>, Vec<Term>) = sum
+    let low_rad_s = 2.0 * std::f64::consts::PI * frf_data[0].frequency_hz;
+    let (below, above): (Vec<ModalTerm>, Vec<ModalTerm>) = sum
         .modes
         .iter()
         .partition(|mode| mode.omega_rad_s < low_rad_s);
@@ -155,7 +155,7 @@ fn with_one_below(
         return (sum, seen);
     }
     let residue_per_kg = below.iter().map(|mode| mode.residue_per_kg).sum();
-    let one = Term {
+    let one = ModalTerm {
         omega_rad_s: BELOW.0 * low_rad_s,
         damping_ratio: BELOW.1,
         residue_per_kg,
@@ -164,10 +164,10 @@ fn with_one_below(
         modes: [one].into_iter().chain(above).collect(),
         ..sum.clone()
     };
-    let (next, there) = refine(start, view, blocks, 0.0);
-    let misfit = (seen.chi2 / (2 * blocks.len()) as f64).max(1.0);
+    let (next, there) = refine(start, view, frf_data, 0.0);
+    let misfit = (seen.chi2 / (2 * frf_data.len()) as f64).max(1.0);
     let worse =
-        (there.chi2 - seen.chi2) / ((below.len() - 1) as f64 * threshold(blocks.len()) * misfit);
+        (there.chi2 - seen.chi2) / ((below.len() - 1) as f64 * threshold(frf_data.len()) * misfit);
     if worse <= 1.0 {
         (next, there)
     } else {
@@ -177,9 +177,9 @@ fn with_one_below(
 
 /// The mode whose residue is the smallest part of its error, if it is below five; where the modes cannot even be told
 /// apart, the smallest residue of all.
-fn weakest(now: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<usize> {
+fn weakest(now: &Parameters, seen: &Seen, frf_data: &[FrfDatum]) -> Option<usize> {
     let size = |k: &usize| now.modes[*k].residue_per_kg.abs();
-    let Some(covariance) = covariance(now, seen, blocks) else {
+    let Some(covariance) = covariance(now, seen, frf_data) else {
         return (0..now.modes.len()).min_by(|a, b| size(a).total_cmp(&size(b)));
     };
     let entries = now.entries();
@@ -193,17 +193,17 @@ fn weakest(now: &Parameters, seen: &Seen, blocks: &[Block]) -> Option<usize> {
     (in_errors(&weakest) < SEEN).then_some(weakest)
 }
 
-/// The blocks of a look: merged where what is known already leaves the response smooth, once modes are known.
-fn roughened(blocks: &[Block], look: &Look, known: &Parameters) -> Vec<Block> {
+/// The frf_data of a look: merged where what is known already leaves the response smooth, once modes are known.
+fn roughened(frf_data: &[FrfDatum], look: &Look, known: &Parameters) -> Vec<FrfDatum> {
     let more = look.rough * look.rough;
-    let rough = |b: &Block| Block {
+    let rough = |b: &FrfDatum| FrfDatum {
         variance: b.variance + more * b.response.norm_sqr(),
         ..*b
     };
     let fewer = if known.modes.is_empty() {
-        blocks.to_vec()
+        frf_data.to_vec()
     } else {
-        merged(blocks, known)
+        merged(frf_data, known)
     };
     fewer.iter().step_by(look.every).map(rough).collect()
 }
@@ -212,22 +212,22 @@ fn roughened(blocks: &[Block], look: &Look, known: &Parameters) -> Vec<Block> {
 fn one_more(
     now: &Parameters,
     seen: &Seen,
-    view: &View<'_>,
-    blocks: &[Block],
+    view: &MeasurementChain<'_>,
+    frf_data: &[FrfDatum],
     coarse: f64,
 ) -> Option<(Parameters, Seen, f64)> {
-    let needed = threshold(blocks.len());
+    let needed = threshold(frf_data.len());
     let evidence = |there: &Seen| {
-        let misfit = (there.chi2 / (2 * blocks.len()) as f64).max(1.0);
+        let misfit = (there.chi2 / (2 * frf_data.len()) as f64).max(1.0);
         (seen.chi2 - there.chi2) / (needed * misfit)
     };
-    let candidates = candidates(seen, view, blocks, now);
+    let candidates = candidates(seen, view, frf_data, now);
     if now.modes.is_empty() {
         // All that follows stands on the first: the best of all, a free body among them.
         let all = candidates.into_iter().take(TRIALS).chain([FREE]);
-        let starts = all.flat_map(|term| starts(term, seen, view, blocks));
+        let starts = all.flat_map(|term| starts(term, seen, view, frf_data));
         let (next, there) = starts
-            .map(|start| refine(start, view, blocks, coarse))
+            .map(|start| refine(start, view, frf_data, coarse))
             .min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?;
         let evidence = evidence(&there);
         return (evidence > 1.0).then_some((next, there, evidence));
@@ -235,31 +235,36 @@ fn one_more(
     candidates.into_iter().take(TRIALS).find_map(|term| {
         let mut start = now.clone();
         start.modes.push(term);
-        let (next, there) = refine(start, view, blocks, coarse);
+        let (next, there) = refine(start, view, frf_data, coarse);
         let evidence = evidence(&there);
         (evidence > 1.0).then_some((next, there, evidence))
     })
 }
 
 /// Where to begin with a first mode: at the delays with which it lowers chi^2 most, and the residue that does.
-fn starts(term: Term, seen: &Seen, view: &View<'_>, blocks: &[Block]) -> Vec<Parameters> {
+fn starts(
+    term: ModalTerm,
+    seen: &Seen,
+    view: &MeasurementChain<'_>,
+    frf_data: &[FrfDatum],
+) -> Vec<Parameters> {
     let part = view.mode(
         (term.omega_rad_s, term.damping_ratio),
-        &view.nodes(0.0, blocks),
+        &view.nodes(0.0, frf_data),
     );
-    let step_s = blocks
+    let step_s = frf_data
         .last()
         .map_or(0.0, |last| 1.0 / (DELAYS_A_PERIOD * last.frequency_hz));
     let half_period_s = std::f64::consts::PI
         / term
             .omega_rad_s
-            .max(2.0 * std::f64::consts::PI * blocks[0].frequency_hz);
+            .max(2.0 * std::f64::consts::PI * frf_data[0].frequency_hz);
     let reach = (half_period_s / step_s).min(MOST_DELAYS).ceil() as i32;
     let mut tried: Vec<(f64, Parameters)> = (-reach / 2..=reach)
         .map(|k| {
             let delay_s = f64::from(k) * step_s;
-            let (gain, residue_per_kg) = projected(seen, blocks, &part, delay_s);
-            let modes = vec![Term {
+            let (gain, residue_per_kg) = projected(seen, frf_data, &part, delay_s);
+            let modes = vec![ModalTerm {
                 residue_per_kg,
                 ..term
             }];
@@ -282,16 +287,22 @@ fn starts(term: Term, seen: &Seen, view: &View<'_>, blocks: &[Block]) -> Vec<Par
 }
 
 /// Modes that would lower chi^2, the best first, one for each place; a free body among them.
-fn candidates(seen: &Seen, view: &View<'_>, blocks: &[Block], now: &Parameters) -> Vec<Term> {
-    let (mut found, nodes): (Vec<(f64, Term)>, _) = (Vec::new(), view.nodes(now.delay_s, blocks));
-    for place in worst(seen, blocks, now.modes.is_empty()) {
-        let omega_rad_s = 2.0 * std::f64::consts::PI * blocks[place].frequency_hz;
+fn candidates(
+    seen: &Seen,
+    view: &MeasurementChain<'_>,
+    frf_data: &[FrfDatum],
+    now: &Parameters,
+) -> Vec<ModalTerm> {
+    let (mut found, nodes): (Vec<(f64, ModalTerm)>, _) =
+        (Vec::new(), view.nodes(now.delay_s, frf_data));
+    for place in worst(seen, frf_data, now.modes.is_empty()) {
+        let omega_rad_s = 2.0 * std::f64::consts::PI * frf_data[place].frequency_hz;
         let tried = DAMPINGS.map(|damping_ratio| {
             let part = view.mode((omega_rad_s, damping_ratio), &nodes);
-            let (gain, residue_per_kg) = projected(seen, blocks, &part, 0.0);
+            let (gain, residue_per_kg) = projected(seen, frf_data, &part, 0.0);
             (
                 gain,
-                Term {
+                ModalTerm {
                     omega_rad_s,
                     damping_ratio,
                     residue_per_kg,
@@ -302,10 +313,10 @@ fn candidates(seen: &Seen, view: &View<'_>, blocks: &[Block], now: &Parameters) 
     }
     if now.modes.iter().all(|mode| mode.omega_rad_s > 0.0) {
         let part = view.mode((0.0, 0.0), &nodes);
-        let (gain, residue_per_kg) = projected(seen, blocks, &part, 0.0);
+        let (gain, residue_per_kg) = projected(seen, frf_data, &part, 0.0);
         found.push((
             gain,
-            Term {
+            ModalTerm {
                 residue_per_kg,
                 ..FREE
             },
@@ -317,15 +328,15 @@ fn candidates(seen: &Seen, view: &View<'_>, blocks: &[Block], now: &Parameters) 
 
 /// The block furthest above the noise in each part of the band (the one of the greatest velocity, as long as there is no
 /// model at all), the worst of them.
-fn worst(seen: &Seen, blocks: &[Block], first: bool) -> Vec<usize> {
+fn worst(seen: &Seen, frf_data: &[FrfDatum], first: bool) -> Vec<usize> {
     let excess = |b: &usize| match first {
-        true => (blocks[*b].response * blocks[*b].frequency_hz).norm_sqr(),
-        false => seen.left[*b].norm_sqr() / blocks[*b].variance,
+        true => (frf_data[*b].response * frf_data[*b].frequency_hz).norm_sqr(),
+        false => seen.left[*b].norm_sqr() / frf_data[*b].variance,
     };
-    let size = blocks.len().div_ceil(PLACES);
-    let parts = (0..blocks.len())
+    let size = frf_data.len().div_ceil(PLACES);
+    let parts = (0..frf_data.len())
         .step_by(size)
-        .map(|low| low..(low + size).min(blocks.len()));
+        .map(|low| low..(low + size).min(frf_data.len()));
     let mut places: Vec<usize> = parts
         .filter_map(|part| part.max_by(|a, b| excess(a).total_cmp(&excess(b))))
         .collect();
@@ -335,9 +346,14 @@ fn worst(seen: &Seen, blocks: &[Block], first: bool) -> Vec<usize> {
 }
 
 /// By how much a part of the best real size, `delay_s` later, lowers chi^2, and that size.
-fn projected(seen: &Seen, blocks: &[Block], part: &[Complex<f64>], delay_s: f64) -> (f64, f64) {
+fn projected(
+    seen: &Seen,
+    frf_data: &[FrfDatum],
+    part: &[Complex<f64>],
+    delay_s: f64,
+) -> (f64, f64) {
     let (mut along, mut square) = (0.0, 0.0);
-    for ((part, left), block) in part.iter().zip(&seen.left).zip(blocks) {
+    for ((part, left), block) in part.iter().zip(&seen.left).zip(frf_data) {
         let late = part
             * Complex::from_polar(
                 1.0,

@@ -3,16 +3,16 @@
 use nalgebra::{Complex, DVector};
 
 use crate::config::Config;
-use crate::identify::Block;
-use crate::model::plant::{Chain, Mode};
-use crate::model::zeros::Term;
+use crate::identify::FrfDatum;
+use crate::model::plant::{LoopPlant, Mode};
+use crate::model::zeros::ModalTerm;
 
 /// A mode so far above everything that it is a constant: what modes above the band leave in it.
 const FAR_RAD_S: f64 = 1e6;
 
 /// What stands between set-point and reading beside the mechanics.
 #[derive(Clone, Copy, Debug)]
-pub enum View<'a> {
+pub enum MeasurementChain<'a> {
     /// Hold, motor, amplifier and the delays of a bench; input in amperes. Exact, what sampling folds back included.
     Bench(&'a Config),
     /// Nothing: input in newtons, or in a unit that takes its place.
@@ -42,16 +42,16 @@ impl Nodes {
     }
 }
 
-impl View<'_> {
-    /// Where `blocks` are looked at, `delay_s` later.
-    pub(super) fn nodes(&self, delay_s: f64, blocks: &[Block]) -> Nodes {
+impl MeasurementChain<'_> {
+    /// Where `frf_data` are looked at, `delay_s` later.
+    pub(super) fn nodes(&self, delay_s: f64, frf_data: &[FrfDatum]) -> Nodes {
         let turn = |angle: f64| {
             let (sine, cosine) = libm::sincos(angle);
             Complex::new(cosine, sine)
         };
         let period_s = match self {
-            View::Bench(config) => config.servo.period_s(),
-            View::Bare => 0.0,
+            MeasurementChain::Bench(config) => config.servo.period_s(),
+            MeasurementChain::Bare => 0.0,
         };
         let node = |hz: f64| {
             let omega_rad_s = 2.0 * std::f64::consts::PI * hz;
@@ -62,14 +62,14 @@ impl View<'_> {
                 late: turn(-omega_rad_s * delay_s),
             }
         };
-        let of = |block: &Block| match block.spread_hz {
+        let of = |block: &FrfDatum| match block.spread_hz {
             0.0 => (node(block.frequency_hz), None),
             spread_hz => (
                 node(block.frequency_hz - spread_hz),
                 Some(node(block.frequency_hz + spread_hz)),
             ),
         };
-        Nodes(blocks.iter().map(of).collect())
+        Nodes(frf_data.iter().map(of).collect())
     }
 
     /// The response of a mode of residue 1 over each block.
@@ -88,19 +88,19 @@ impl View<'_> {
             floor_gain: 0.0,
         };
         match self {
-            View::Bench(config) => {
-                let chain = Chain::of_mean_age(config, &[mode]);
+            MeasurementChain::Bench(config) => {
+                let chain = LoopPlant::with_mean_age(config, &[mode]);
                 nodes.over(|node| chain.response_at(node.z))
             }
-            View::Bare => nodes.over(|node| mode.resonance(node.s)),
+            MeasurementChain::Bare => nodes.over(|node| mode.resonance(node.s)),
         }
     }
 
-    /// What the blocks show of the mechanics alone, in m/N: hold, motor, amplifier and delays taken out, and `delay_s` more.
+    /// What the frf_data show of the mechanics alone, in m/N: hold, motor, amplifier and delays taken out, and `delay_s` more.
     /// What sampling folds back stays.
-    pub fn mechanics(&self, blocks: &[Block], delay_s: f64) -> Vec<Complex<f64>> {
-        let constant = self.constant(&self.nodes(delay_s, blocks));
-        blocks
+    pub fn mechanics(&self, frf_data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
+        let constant = self.constant(&self.nodes(delay_s, frf_data));
+        frf_data
             .iter()
             .zip(constant)
             .map(|(block, constant)| block.response / constant)
@@ -118,7 +118,7 @@ impl View<'_> {
 
 /// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, which sampling alters by what it folds
 /// back, a part in a thousand of a slope.
-pub(super) fn slopes(term: &Term, omega_rad_s: f64) -> [Complex<f64>; 2] {
+pub(super) fn slopes(term: &ModalTerm, omega_rad_s: f64) -> [Complex<f64>; 2] {
     let (s, w, zeta) = (
         Complex::new(0.0, omega_rad_s),
         term.omega_rad_s,

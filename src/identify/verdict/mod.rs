@@ -5,7 +5,7 @@
 //! 1. the zeros of the fit, each with its probability of lying in the right half plane;
 //! 2. the signs of the residues: two close modes of opposite signs beside a remainder are necessary for CNMP zeros between
 //!    them (sections 3.2.2 and 3.2.4);
-//! 3. the phase, which falls by a turn more than the magnitude asks for at each CNMP pair, whatever the modes ([`phase_fall`]).
+//! 3. the phase, which falls by a turn more than the magnitude asks for at each CNMP pair, whatever the modes ([`phase_drop`]).
 //!
 //! A verdict needs data that carry it: as many modes seen as the model has there, and errors that noise explains. Beyond
 //! the band of the verdict nothing is said. Every comparison asks what must hold, not what must not, so that a figure that
@@ -14,13 +14,13 @@
 mod phase;
 mod zeros;
 
-pub use phase::{PhaseFall, phase_fall};
+pub use phase::{PhaseDrop, phase_drop};
 pub use zeros::{UncertainZero, zeros};
 
 use serde::{Deserialize, Serialize};
 
-use crate::identify::Block;
-use crate::identify::modal::{FittedMode, ModalFit, SIGMAS_95, View};
+use crate::identify::FrfDatum;
+use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit, SIGMAS_95};
 use crate::model::plant::PlantError;
 use crate::model::zeros::ZeroKind;
 
@@ -70,7 +70,7 @@ pub struct Verdict {
     /// The zeros in the band of the verdict.
     pub zeros: Vec<UncertainZero>,
     /// The phase over the modes of the band, where there are two or more.
-    pub phase: Option<PhaseFall>,
+    pub phase: Option<PhaseDrop>,
 }
 
 impl Verdict {
@@ -96,13 +96,13 @@ impl Verdict {
 
 /// What the verdict is about.
 #[derive(Clone, Copy, Debug)]
-pub struct Case<'a> {
+pub struct VerdictInput<'a> {
     /// The modes that were fitted.
     pub fit: &'a ModalFit,
     /// Through what the mechanics were seen.
-    pub view: &'a View<'a>,
+    pub view: &'a MeasurementChain<'a>,
     /// What they were fitted to, frequencies rising.
-    pub blocks: &'a [Block],
+    pub frf_data: &'a [FrfDatum],
     /// Zeros and modes up to here count, in rad/s.
     pub up_to_rad_s: f64,
     /// Modes that the model has there, of those that show between its actuator and its probe.
@@ -110,8 +110,8 @@ pub struct Case<'a> {
 }
 
 /// Weighs the witnesses. Fails where the zeros of the fit cannot be computed.
-pub fn verdict(case: &Case<'_>) -> Result<Verdict, PlantError> {
-    let within = |w: f64| w <= case.up_to_rad_s && w >= case.blocks.first().map_or(0.0, omega);
+pub fn verdict(case: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
+    let within = |w: f64| w <= case.up_to_rad_s && w >= case.frf_data.first().map_or(0.0, omega);
     let zeros: Vec<UncertainZero> = zeros(case.fit)?
         .into_iter()
         .filter(|zero| within(zero.s.norm()))
@@ -136,7 +136,7 @@ pub fn verdict(case: &Case<'_>) -> Result<Verdict, PlantError> {
 }
 
 /// Why the data carry no verdict.
-fn doubt(case: &Case<'_>, modes: &[FittedMode]) -> Option<String> {
+fn doubt(case: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<String> {
     let misfit = case.fit.chi2_per_freedom;
     let described = misfit <= MISFIT;
     if !described {
@@ -181,7 +181,7 @@ fn unclear(zeros: &[UncertainZero]) -> Option<String> {
 fn weigh(
     zeros: &[UncertainZero],
     modes: &[FittedMode],
-    phase: Option<PhaseFall>,
+    phase: Option<PhaseDrop>,
 ) -> (Cnmp, String) {
     let right = |zero: &&UncertainZero| zero.s.re > 0.0;
     let pairs = zeros
@@ -217,17 +217,17 @@ fn weigh(
              magnitude asks for",
             if pairs == 1 { "" } else { "s" },
             signs(modes),
-            -phase.beyond_deg
+            -phase.excess_phase_deg
         ),
     )
 }
 
-fn contradiction(turns: i32, phase: PhaseFall) -> String {
+fn contradiction(turns: i32, phase: PhaseDrop) -> String {
     format!(
         "by the fit's zeros the phase falls by {} degrees beyond what the magnitude asks for, as measured by {:.0}; excite more \
          in the valley, or for longer",
         180 * turns,
-        -phase.beyond_deg
+        -phase.excess_phase_deg
     )
 }
 
@@ -245,23 +245,23 @@ fn signs(modes: &[FittedMode]) -> String {
 /// The phase from well below the first of the band's modes to its end.
 ///
 /// Beyond the end the magnitude is believed for as long as it stands out of the noise.
-fn fall(case: &Case<'_>, modes: &[FittedMode]) -> Option<PhaseFall> {
+fn fall(case: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<PhaseDrop> {
     let [first, .., _] = modes else { return None };
     let low = 0.5 * first.omega_rad_s.value;
-    let from = case.blocks.iter().position(|block| omega(block) >= low)?;
+    let from = case.frf_data.iter().position(|block| omega(block) >= low)?;
     let to = case
-        .blocks
+        .frf_data
         .iter()
         .rposition(|block| omega(block) <= case.up_to_rad_s)?;
-    let clear = |block: &&Block| block.response.norm_sqr() > CLEAR_POWER * block.variance;
-    let reach = to + 1 + case.blocks[to + 1..].iter().take_while(clear).count();
-    let omega_rad_s: Vec<f64> = case.blocks[..reach].iter().map(omega).collect();
+    let clear = |block: &&FrfDatum| block.response.norm_sqr() > CLEAR_POWER * block.variance;
+    let reach = to + 1 + case.frf_data[to + 1..].iter().take_while(clear).count();
+    let omega_rad_s: Vec<f64> = case.frf_data[..reach].iter().map(omega).collect();
     let mechanics = case
         .view
-        .mechanics(&case.blocks[..reach], case.fit.parameters.delay_s);
-    (from < to).then(|| phase_fall(&omega_rad_s, &mechanics, from, to))
+        .mechanics(&case.frf_data[..reach], case.fit.parameters.delay_s);
+    (from < to).then(|| phase_drop(&omega_rad_s, &mechanics, from, to))
 }
 
-fn omega(block: &Block) -> f64 {
+fn omega(block: &FrfDatum) -> f64 {
     2.0 * std::f64::consts::PI * block.frequency_hz
 }

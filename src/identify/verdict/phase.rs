@@ -15,9 +15,9 @@ use nalgebra::Complex;
 
 /// Half turns, and how far the difference is from that many.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhaseFall {
+pub struct PhaseDrop {
     /// The difference in degrees: measured less that of the magnitude, from the lower to the upper frequency.
-    pub beyond_deg: f64,
+    pub excess_phase_deg: f64,
     /// Its nearest number of half turns, falls counted positive: 2 a CNMP pair.
     pub half_turns: i32,
     /// From there to the difference, in degrees: 0 to 90.
@@ -31,24 +31,24 @@ const LAG: f64 = 0.15;
 
 /// The fall of the phase of `response` beyond that of its magnitude between two of its frequencies, by index. Frequencies
 /// rise, responses are not zero.
-pub fn phase_fall(
+pub fn phase_drop(
     omega_rad_s: &[f64],
     response: &[Complex<f64>],
     from: usize,
     to: usize,
-) -> PhaseFall {
+) -> PhaseDrop {
     let turned: f64 = response[from..=to]
         .windows(2)
         .map(|pair| (pair[1] / pair[0]).arg())
         .sum::<f64>();
     let asked =
         minimum_phase(omega_rad_s, response, to) - minimum_phase(omega_rad_s, response, from);
-    let beyond_deg = (turned - asked).to_degrees();
-    let half_turns = -(beyond_deg / 180.0).round();
-    PhaseFall {
-        beyond_deg,
+    let excess_phase_deg = (turned - asked).to_degrees();
+    let half_turns = -(excess_phase_deg / 180.0).round();
+    PhaseDrop {
+        excess_phase_deg,
         half_turns: half_turns as i32,
-        off_deg: (beyond_deg + 180.0 * half_turns).abs(),
+        off_deg: (excess_phase_deg + 180.0 * half_turns).abs(),
     }
 }
 
@@ -127,10 +127,10 @@ mod tests {
         (omega, response)
     }
 
-    fn fall(zeros: &[Complex<f64>]) -> PhaseFall {
+    fn fall(zeros: &[Complex<f64>]) -> PhaseDrop {
         let (omega, response) = of(zeros, 0.0);
         let at = |w: f64| omega.iter().position(|x| *x >= w).unwrap();
-        phase_fall(&omega, &response, at(300.0), at(900.0))
+        phase_drop(&omega, &response, at(300.0), at(900.0))
     }
 
     #[test]

@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::identify::modal::{Entry, Estimate, ModalFit};
 use crate::model::plant::PlantError;
-use crate::model::zeros::{ModalSum, Term, ZeroKind};
+use crate::model::zeros::{ModalSum, ModalTerm, ZeroKind};
 
 /// A zero with its errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ fn uncertain(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZero {
 /// d(Re z)/d theta and d(Im z)/d theta, 2 x parameters.
 fn rows(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
     let modes = &fit.parameters.modes;
-    let by_square = |t: &Term| -t.resonance(z) * t.resonance(z) * t.residue_per_kg;
+    let by_square = |t: &ModalTerm| -t.resonance(z) * t.resonance(z) * t.residue_per_kg;
     let by_z: Complex<f64> = modes
         .iter()
         .map(|t| by_square(t) * (z * 2.0 + 2.0 * t.damping_ratio * t.omega_rad_s))

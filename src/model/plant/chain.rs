@@ -17,7 +17,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::{Mode, Motion, Sampled};
+use super::{DiscretePlant, Mode, PlantState};
 use crate::config::Config;
 
 /// Nodes of the mean over a probe's period. The midpoint rule with n nodes errs by (w Tp)^2/(24 n^2): 1e-5 at w Tp = 1.
@@ -28,8 +28,8 @@ const ROUNDING: f64 = 1e-9;
 
 /// Hold, amplifier, modes, delays and the probe's own rate.
 #[derive(Clone, Debug)]
-pub struct Chain {
-    held: Sampled,
+pub struct LoopPlant {
+    held: DiscretePlant,
     taps: Vec<Tap>,
     delay_s: f64,
 }
@@ -43,33 +43,33 @@ struct Tap {
     setpoint: f64,
 }
 
-impl Chain {
+impl LoopPlant {
     /// The chain of a configuration around `modes`, as the loop sees it.
-    pub fn new(config: &Config, modes: &[Mode]) -> Chain {
-        Chain::over(config, modes, delays(config))
+    pub fn new(config: &Config, modes: &[Mode]) -> LoopPlant {
+        LoopPlant::over(config, modes, delays(config))
     }
 
     /// The same with readings that all have the mean age: without the roll-off of a free-running probe.
-    pub fn of_mean_age(config: &Config, modes: &[Mode]) -> Chain {
+    pub fn with_mean_age(config: &Config, modes: &[Mode]) -> LoopPlant {
         let delays = delays(config);
         let mean_s = delays.iter().sum::<f64>() / delays.len() as f64;
-        Chain::over(config, modes, vec![mean_s])
+        LoopPlant::over(config, modes, vec![mean_s])
     }
 
     /// The mean over `delays`.
-    fn over(config: &Config, modes: &[Mode], delays: Vec<f64>) -> Chain {
+    fn over(config: &Config, modes: &[Mode], delays: Vec<f64>) -> LoopPlant {
         let (bandwidth_hz, force_constant) = (
             config.amplifier.bandwidth_hz,
             config.motor.force_constant_n_per_a,
         );
         let period_s = config.servo.period_s();
-        let over = |span_s: f64| Sampled::new(modes, bandwidth_hz, force_constant, span_s);
+        let over = |span_s: f64| DiscretePlant::new(modes, bandwidth_hz, force_constant, span_s);
         let held = over(period_s);
         let share = 1.0 / delays.len() as f64;
         let taps = delays.iter().fold(Vec::new(), |taps, d| {
             add(taps, tap(&held, &over, *d), share)
         });
-        Chain {
+        LoopPlant {
             held,
             taps,
             delay_s: delays.iter().sum::<f64>() * share,
@@ -97,7 +97,7 @@ impl Chain {
         let current = self.held.current_response(z);
         let of = |tap: &Tap| {
             let moved: Complex<f64> = (tap.rows.iter().zip(&self.held.blocks))
-                .map(|(row, block)| Sampled::state_response(block, *row, z, current))
+                .map(|(row, block)| DiscretePlant::state_response(block, *row, z, current))
                 .sum();
             (moved + current * tap.current + tap.setpoint) * z.powi(-(tap.periods as i32))
         };
@@ -167,7 +167,7 @@ impl Chain {
 /// Where a chain is: its motion, and the readings on their way, by the tick at which they arrive.
 #[derive(Clone, Debug)]
 pub struct ChainState {
-    motion: Motion,
+    motion: PlantState,
     coming_m: Vec<f64>,
 }
 
@@ -183,7 +183,7 @@ fn delays(config: &Config) -> Vec<f64> {
     }
 }
 
-fn tap(held: &Sampled, over: &impl Fn(f64) -> Sampled, delay_s: f64) -> Tap {
+fn tap(held: &DiscretePlant, over: &impl Fn(f64) -> DiscretePlant, delay_s: f64) -> Tap {
     let ratio = delay_s / held.period_s;
     let whole = libm::floor(ratio + ROUNDING);
     let rest = ratio - whole;
@@ -250,7 +250,7 @@ impl Tap {
         self.setpoint += other.setpoint;
     }
 
-    fn of(&self, motion: &Motion, setpoint_a: f64) -> f64 {
+    fn of(&self, motion: &PlantState, setpoint_a: f64) -> f64 {
         let moved: f64 = self
             .rows
             .iter()
@@ -354,7 +354,7 @@ mod tests {
     fn the_response_is_the_sum_of_its_aliases() {
         for sets in CASES {
             let config = config(sets);
-            let chain = Chain::new(&config, &[mode()]);
+            let chain = LoopPlant::new(&config, &[mode()]);
             for omega_rad_s in [1.0, 150.0, 949.0, 1300.0, 2800.0] {
                 let (ours, exact) = (
                     chain.response(omega_rad_s),
@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn response_state_space_and_simulation_are_one_chain() {
         for sets in CASES {
-            let chain = Chain::new(&config(sets), &[mode()]);
+            let chain = LoopPlant::new(&config(sets), &[mode()]);
             let (a, b, c) = chain.state_space();
             let (mut x, mut state) = (DMatrix::zeros(a.nrows(), 1), chain.at_rest());
             for tick in 0..200 {
@@ -400,7 +400,7 @@ mod tests {
 
     #[test]
     fn the_delay_is_the_sum_of_its_parts() {
-        let chain = Chain::new(&config(CASES[3]), &[mode()]);
+        let chain = LoopPlant::new(&config(CASES[3]), &[mode()]);
         // A period of computing, 1.2 ms of transport, half the probe's period.
         assert!((chain.delay_s() - (0.001 + 0.0012 + 0.5 / 430.0)).abs() < 1e-12);
     }

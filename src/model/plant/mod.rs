@@ -1,7 +1,7 @@
 //! Models of the mechanics.
 //!
 //! ```text
-//!  settings -> Structure (M, C, K, vectors) -> modes (Modal) -> simulation, FRF, margins
+//!  settings -> Structure (M, C, K, vectors) -> modes (ModalModel) -> simulation, FRF, margins
 //!                          |                            |
 //!                          v                            v
 //!                       zeros (crate::model::zeros)         loci that veer or cross (crate::model::veering)
@@ -36,12 +36,12 @@ mod structure;
 mod xy;
 
 pub(crate) use beam::Beam;
-pub use chain::Chain;
+pub use chain::LoopPlant;
 pub(crate) use exponential::exponential;
-pub use modal::{Modal, Mode, Sign};
+pub use modal::{ModalModel, Mode, Sign};
 pub use port::Port;
-pub(crate) use quadratic::{Load, Quadratic, QuadraticState};
-pub use sampled::{Block, Motion, Sampled};
+pub(crate) use quadratic::{Disturbance, QuadraticSr4dof, QuadraticState};
+pub use sampled::{Block, DiscretePlant, PlantState};
 pub use sr4dof::holding_force_n;
 pub use structure::Structure;
 

@@ -1,4 +1,4 @@
-//! Modal form: G(s) = sum of r_i/(s^2 + 2 zeta_i w_i s + w_i^2), force (N) to displacement (m).
+//! ModalModel form: G(s) = sum of r_i/(s^2 + 2 zeta_i w_i s + w_i^2), force (N) to displacement (m).
 
 use nalgebra::{Complex, DVector};
 
@@ -14,11 +14,11 @@ pub struct Mode {
     pub damping_ratio: f64,
     /// Shape over the degrees of freedom, of unit length, positive at the probe.
     pub shape: DVector<f64>,
-    /// Modal force per newton, for the shape of unit modal mass.
+    /// ModalModel force per newton, for the shape of unit modal mass.
     pub force_gain: f64,
     /// Displacement at the probe, for the shape of unit modal mass.
     pub sensor_gain: f64,
-    /// Modal force per m/s^2 of the floor (against its acceleration), for the shape of unit modal mass.
+    /// ModalModel force per m/s^2 of the floor (against its acceleration), for the shape of unit modal mass.
     pub floor_gain: f64,
 }
 
@@ -52,7 +52,7 @@ pub enum Sign {
     /// Against it.
     Minus,
     /// The mode does not show between this actuator and this probe.
-    None,
+    Hidden,
 }
 
 impl Sign {
@@ -70,7 +70,7 @@ impl Sign {
         match self {
             Sign::Plus => '+',
             Sign::Minus => '-',
-            Sign::None => '0',
+            Sign::Hidden => '0',
         }
     }
 }
@@ -86,14 +86,14 @@ const VISIBLE_DAMPING: f64 = 1e-3;
 
 /// A structure as the sum of its modes, slowest first.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Modal {
+pub struct ModalModel {
     /// The modes.
     pub modes: Vec<Mode>,
 }
 
-impl Modal {
+impl ModalModel {
     /// The modes of a structure whose damping matrix its shapes make diagonal.
-    pub fn of(structure: &Structure) -> Result<Modal, PlantError> {
+    pub fn of(structure: &Structure) -> Result<ModalModel, PlantError> {
         let (values, shapes) = modes(&structure.mass, &structure.stiffness)?;
         let floor = HELD_RATIO * values.amax();
         let modes =
@@ -112,7 +112,7 @@ impl Modal {
                         false => Ok(mode(structure, w2.sqrt(), shape)),
                     }
                 });
-        let modal = Modal {
+        let modal = ModalModel {
             modes: modes.collect::<Result<_, _>>()?,
         };
         if modal.is_deaf() {
@@ -163,7 +163,7 @@ impl Modal {
                 peak <= VISIBLE_RATIO * self.others(index)
             };
             if hidden {
-                Sign::None
+                Sign::Hidden
             } else {
                 Sign::of(residue)
             }

@@ -26,7 +26,7 @@ use crate::config::{PlantSettings, Sr4dofSettings};
 
 /// The mechanism.
 #[derive(Clone, Debug)]
-pub(crate) struct Quadratic {
+pub(crate) struct QuadraticSr4dof {
     slope: f64,
     shortening_per_m: f64,
     /// m2 to m5.
@@ -49,7 +49,7 @@ pub(crate) struct QuadraticState {
 
 /// What acts on it besides the actuator, held over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Load {
+pub(crate) struct Disturbance {
     /// Force on stage 1 in X, at the probe, in newtons.
     pub probe_n: f64,
     /// The floor's acceleration in X in m/s^2.
@@ -63,18 +63,18 @@ struct Motion {
     bend_m_per_s2: f64,
 }
 
-impl Quadratic {
+impl QuadraticSr4dof {
     /// The mechanism of the settings.
-    pub fn of(settings: &PlantSettings) -> Result<Quadratic, PlantError> {
+    pub fn of(settings: &PlantSettings) -> Result<QuadraticSr4dof, PlantError> {
         match settings {
-            PlantSettings::Sr4dof(s) => Ok(Quadratic::new(s, &sr4dof::structure(s)?)),
+            PlantSettings::Sr4dof(s) => Ok(QuadraticSr4dof::new(s, &sr4dof::structure(s)?)),
             other => Err(PlantError::NotQuadratic {
                 model: other.model(),
             }),
         }
     }
 
-    fn new(s: &Sr4dofSettings, linear: &Structure) -> Quadratic {
+    fn new(s: &Sr4dofSettings, linear: &Structure) -> QuadraticSr4dof {
         let beam = Beam::from(s);
         let (m1, m3, m4) = (
             s.motion_stage_mass_kg,
@@ -90,7 +90,7 @@ impl Quadratic {
             0.0, -1.0, 2.0, 0.0,
             0.0, -1.0, 0.0, 2.0,
         );
-        Quadratic {
+        QuadraticSr4dof {
             slope: beam.shortening_per_m() * s.operating_point_m,
             shortening_per_m: beam.shortening_per_m(),
             masses_kg: [m2, m3, m4, m4],
@@ -103,7 +103,13 @@ impl Quadratic {
 
     /// One step of `step_s` by the classical Runge and Kutta rule of fourth order, with the actuator's force in newtons at
     /// its start, middle and end. Of a mode w the step h changes the phase by (w h)^5/120 and the size by (w h)^6/144.
-    pub fn step(&self, state: &mut QuadraticState, step_s: f64, force_n: [f64; 3], load: Load) {
+    pub fn step(
+        &self,
+        state: &mut QuadraticState,
+        step_s: f64,
+        force_n: [f64; 3],
+        load: Disturbance,
+    ) {
         let slope = |state: QuadraticState, force_n: f64| QuadraticState {
             place: state.rate,
             rate: self.acceleration(&state, force_n, load),
@@ -124,7 +130,12 @@ impl Quadratic {
     }
 
     /// z''.
-    fn acceleration(&self, state: &QuadraticState, force_n: f64, load: Load) -> Vector4<f64> {
+    fn acceleration(
+        &self,
+        state: &QuadraticState,
+        force_n: f64,
+        load: Disturbance,
+    ) -> Vector4<f64> {
         let motions = self.motions(state);
         let mut mass = self.straight;
         let mut force =
@@ -202,13 +213,13 @@ mod tests {
         }
     }
 
-    fn mechanism(s: &Sr4dofSettings) -> (Quadratic, Structure) {
+    fn mechanism(s: &Sr4dofSettings) -> (QuadraticSr4dof, Structure) {
         let linear = sr4dof::structure(s).unwrap();
-        (Quadratic::new(s, &linear), linear)
+        (QuadraticSr4dof::new(s, &linear), linear)
     }
 
     /// T + V of a state, by the definition: masses times velocities, springs times elongations.
-    fn energy(s: &Sr4dofSettings, q: &Quadratic, state: &QuadraticState) -> f64 {
+    fn energy(s: &Sr4dofSettings, q: &QuadraticSr4dof, state: &QuadraticState) -> f64 {
         let motions = q.motions(state);
         let x_speed = |motion: &Motion| motion.gradient.dot(&state.rate);
         let moving: f64 = motions
@@ -236,7 +247,7 @@ mod tests {
             for (place, rate, force_n) in [(1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0), (0.0, 0.0, 1.0)] {
                 let mut state = QuadraticState::default();
                 (state.place[axis], state.rate[axis]) = (place, rate);
-                let load = Load {
+                let load = Disturbance {
                     probe_n: 0.3 * force_n,
                     floor_m_per_s2: 0.2 * force_n,
                 };
@@ -267,7 +278,7 @@ mod tests {
         let before = energy(&s, &q, &state);
         let mut least = 1.0;
         for _ in 0..50_000 {
-            q.step(&mut state, 2e-5, [0.0; 3], Load::default());
+            q.step(&mut state, 2e-5, [0.0; 3], Disturbance::default());
             least = f64::min(least, energy(&s, &q, &state) / before);
         }
         // One second: the fastest mode, 540 rad/s, loses 2 * 540 rad * (540 * 2e-5)^5/144 = 1.1e-9 of its energy.
@@ -290,7 +301,7 @@ mod tests {
                 ..QuadraticState::default()
             };
             let step_s = 0.02 / steps as f64;
-            (0..steps).for_each(|_| q.step(&mut state, step_s, [0.1; 3], Load::default()));
+            (0..steps).for_each(|_| q.step(&mut state, step_s, [0.1; 3], Disturbance::default()));
             state.place
         };
         let exact = after(6400);

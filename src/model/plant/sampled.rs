@@ -31,7 +31,7 @@ pub struct Block {
 
 /// Where amplifier and modes are.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
+pub struct PlantState {
     /// The amplifier's current in amperes.
     pub current_a: f64,
     /// The states [q, q'/w] of each mode.
@@ -40,7 +40,7 @@ pub struct Motion {
 
 /// Amplifier and modes over one period.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sampled {
+pub struct DiscretePlant {
     /// Length of the period in seconds.
     pub period_s: f64,
     /// The current's share that is left after a period: exp(-wa T).
@@ -49,20 +49,20 @@ pub struct Sampled {
     pub blocks: Vec<Block>,
 }
 
-impl Sampled {
+impl DiscretePlant {
     /// Discretises `modes`, driven through an amplifier of `bandwidth_hz` and a motor of `force_constant_n_per_a`.
     pub fn new(
         modes: &[Mode],
         bandwidth_hz: f64,
         force_constant_n_per_a: f64,
         period_s: f64,
-    ) -> Sampled {
+    ) -> DiscretePlant {
         let lag_rad_s = 2.0 * std::f64::consts::PI * bandwidth_hz;
         let blocks = modes
             .iter()
             .map(|mode| block(mode, lag_rad_s, force_constant_n_per_a, period_s))
             .collect();
-        Sampled {
+        DiscretePlant {
             period_s,
             lag: libm::exp(-lag_rad_s * period_s),
             blocks,
@@ -75,7 +75,7 @@ impl Sampled {
     }
 
     /// row . [q, q'/w] of a block per ampere of set-point at the period's start, at z = exp(j w T), where the current is what
-    /// [`Sampled::current_response`] says.
+    /// [`DiscretePlant::current_response`] says.
     pub fn state_response(
         block: &Block,
         row: [f64; 2],
@@ -92,7 +92,7 @@ impl Sampled {
     }
 
     /// Response in metres per ampere from set-point to position at the period's start, at z = exp(j w T). Delays are
-    /// those of [`super::Chain`].
+    /// those of [`super::LoopPlant`].
     pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
         let current = self.current_response(z);
         self.blocks
@@ -102,15 +102,15 @@ impl Sampled {
     }
 
     /// Everything at rest.
-    pub fn at_rest(&self) -> Motion {
-        Motion {
+    pub fn at_rest(&self) -> PlantState {
+        PlantState {
             current_a: 0.0,
             states: vec![[0.0; 2]; self.blocks.len()],
         }
     }
 
     /// One period on, with the set-point held; `force` is what else acts on a mode, held as well.
-    pub fn step(&self, motion: &mut Motion, setpoint_a: f64, force: impl Fn(&Block) -> f64) {
+    pub fn step(&self, motion: &mut PlantState, setpoint_a: f64, force: impl Fn(&Block) -> f64) {
         let current_a = motion.current_a;
         for (block, x) in self.blocks.iter().zip(&mut motion.states) {
             let force = force(block);
@@ -126,7 +126,7 @@ impl Sampled {
     }
 
     /// Displacement at the probe in metres.
-    pub fn position_m(&self, motion: &Motion) -> f64 {
+    pub fn position_m(&self, motion: &PlantState) -> f64 {
         self.blocks
             .iter()
             .zip(&motion.states)
@@ -135,7 +135,7 @@ impl Sampled {
     }
 
     /// Velocity at the probe in metres per second.
-    pub fn velocity_m_per_s(&self, motion: &Motion) -> f64 {
+    pub fn velocity_m_per_s(&self, motion: &PlantState) -> f64 {
         self.blocks
             .iter()
             .zip(&motion.states)
@@ -214,8 +214,8 @@ mod tests {
     #[test]
     fn a_mode_swings_freely_as_in_closed_form() {
         let (mode, period_s) = (mode(), 2e-4);
-        let block =
-            Sampled::new(std::slice::from_ref(&mode), BANDWIDTH_HZ, 11.12, period_s).blocks[0];
+        let block = DiscretePlant::new(std::slice::from_ref(&mode), BANDWIDTH_HZ, 11.12, period_s)
+            .blocks[0];
         // Displaced and let go: q(t) = exp(-zeta w t) (cos wd t + zeta/sqrt(1 - zeta^2) sin wd t).
         let (mut x, zeta) = ([1.0, 0.0], mode.damping_ratio);
         let damped = (1.0 - zeta * zeta).sqrt();
@@ -235,8 +235,8 @@ mod tests {
 
     #[test]
     fn halving_the_period_changes_nothing_at_the_common_instants() {
-        let coarse = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 1e-3);
-        let fine = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 1e-3 / 4.0);
+        let coarse = DiscretePlant::new(&[mode()], BANDWIDTH_HZ, 11.12, 1e-3);
+        let fine = DiscretePlant::new(&[mode()], BANDWIDTH_HZ, 11.12, 1e-3 / 4.0);
         let ((a, b, _), (fa, fb, _)) = (coarse.state_space(), fine.state_space());
         let four = &fa * &fa * &fa * &fa;
         let held = (&fa * &fa * &fa + &fa * &fa + &fa + DMatrix::identity(3, 3)) * fb;
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_response_is_that_of_the_state_space() {
-        let sampled = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 2e-4);
+        let sampled = DiscretePlant::new(&[mode()], BANDWIDTH_HZ, 11.12, 2e-4);
         let (a, b, c) = sampled.state_space();
         let complex = |m: DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
         for angle in [1e-4, 0.03, 0.5, 3.0] {
@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn at_low_frequency_the_response_is_the_static_compliance() {
-        let sampled = Sampled::new(&[mode()], BANDWIDTH_HZ, 11.12, 2e-4);
+        let sampled = DiscretePlant::new(&[mode()], BANDWIDTH_HZ, 11.12, 2e-4);
         let compliance = 0.7 * 0.6 * 11.12 / (184.0 * 184.0);
         let z = Complex::new(1.0, 1e-9);
         assert!((sampled.response(z).re / compliance - 1.0).abs() < 1e-6);

@@ -59,7 +59,7 @@ pub struct Counted {
     /// Each setting, the strongest first.
     pub settings: Vec<Effect>,
     /// The strongest couples of settings that stand out.
-    pub couples: Vec<Couple>,
+    pub couples: Vec<Interaction>,
 }
 
 /// The probability of a number of pairs among the draws that were analysed.
@@ -96,7 +96,7 @@ pub struct Effect {
 
 /// What two settings explain beyond what each explains alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Couple {
+pub struct Interaction {
     /// The two settings.
     pub keys: [String; 2],
     /// The share of the variance of "has pairs".
@@ -204,7 +204,7 @@ fn direction([low, _, high]: &[Cell; 3]) -> char {
     }
 }
 
-fn couples(varied: &[Varied], effects: &Effects) -> Vec<Couple> {
+fn couples(varied: &[Varied], effects: &Effects) -> Vec<Interaction> {
     let strong = |(couple, share): ([usize; 2], Option<Share>)| {
         share
             .filter(|share| share.value > SIGNIFICANT * share.noise)
@@ -214,7 +214,7 @@ fn couples(varied: &[Varied], effects: &Effects) -> Vec<Couple> {
     strongest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
     let couple = |(couple, share): &([usize; 2], Share)| {
         let [same, opposite] = effects.halves(*couple).map(finite);
-        Couple {
+        Interaction {
             keys: couple.map(|index| varied[index].key.clone()),
             share: share.value,
             share_noise: share.noise,

@@ -5,9 +5,9 @@ use serde_json::Value;
 
 use super::{Count, Plan};
 use crate::config::{
-    LumpedSettings, ModalSettings, PlantSettings, Sr4dofSettings, XySettings, relations_of,
+    LumpedSettings, ModalSettings, PlantSettings, Sr4dofSettings, XySettings, check_plant_relations,
 };
-use crate::model::plant::{self, Modal, PlantError, Structure};
+use crate::model::plant::{self, ModalModel, PlantError, Structure};
 use crate::model::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
 
 /// A plant whose settings can be put in by their paths.
@@ -35,7 +35,7 @@ impl<'a> Counter<'a> {
     /// The count of a draw; or why its plant cannot be analysed.
     pub fn count(&mut self, values: &[f64]) -> Result<Count, String> {
         let plant = self.plant(values)?;
-        relations_of(&plant).map_err(|error| error.to_string())?;
+        check_plant_relations(&plant).map_err(|error| error.to_string())?;
         self.pairs(&plant).map_err(|error| error.to_string())
     }
 
@@ -80,7 +80,7 @@ impl<'a> Counter<'a> {
 
 /// The modes are asked first: what cannot move, is not held or does not respond has no zeros to count.
 fn undamped(structure: &Structure) -> Result<Count, PlantError> {
-    Modal::of(structure)?;
+    ModalModel::of(structure)?;
     Ok(Count {
         pairs: cnmp_pairs(&undamped_zeros(structure)?) as u32,
         damped_pairs: None,

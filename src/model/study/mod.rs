@@ -21,7 +21,7 @@ mod results;
 mod tolerance;
 mod workers;
 
-pub use answer::{Answer, Counted, Couple, Effect, NotAnalysed, Probability};
+pub use answer::{Answer, Counted, Effect, Interaction, NotAnalysed, Probability};
 pub(crate) use file::differences;
 pub use file::{Opened, StudyFile, joined};
 pub use plan::{Drawn, Plan, Shard, Varied};

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::counter::Counter;
 use super::{Deviation, StudyError, Tolerance};
-use crate::config::{Config, PlantSettings, nearest, recheck};
+use crate::config::{Config, PlantSettings, nearest, validate};
 
 /// Settings that may vary at once: the classes of all couples of them stay below 40 MB.
 const MOST_VARIED: usize = 64;
@@ -144,7 +144,7 @@ impl Plan {
                     ))
                 };
                 let plant = counter.plant(&values).map_err(reaches)?;
-                recheck(&Config {
+                validate(&Config {
                     plant,
                     ..config.clone()
                 })

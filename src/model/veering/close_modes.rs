@@ -16,15 +16,15 @@
 //! hold is a number each of [`Remainder`].
 
 use crate::model::plant::PlantError;
-use crate::model::zeros::{ModalSum, Term, Zero};
+use crate::model::zeros::{ModalSum, ModalTerm, Zero};
 
 /// Two modes, and the others as a double integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloseModes {
     /// The slower of the two.
-    pub u: Term,
+    pub u: ModalTerm,
     /// The faster.
-    pub v: Term,
+    pub v: ModalTerm,
     /// All others.
     pub remainder: Remainder,
 }
@@ -46,7 +46,7 @@ pub struct Remainder {
 
 impl CloseModes {
     /// Of all modes the two of `pair`, in either order; `None` where their frequencies are the same or one is 0.
-    pub fn of(terms: &[Term], pair: [usize; 2]) -> Option<CloseModes> {
+    pub fn of(terms: &[ModalTerm], pair: [usize; 2]) -> Option<CloseModes> {
         let [i, j] = pair.map(|mode| terms[mode]);
         let (u, v) = if i.omega_rad_s < j.omega_rad_s {
             (i, j)
@@ -83,7 +83,7 @@ impl CloseModes {
 
     /// |b21-hat| and |b22-hat| of Eq. (4-10) in 1/kg, the smaller first. They are critical only where au av < 0.
     pub fn critical_b2_per_kg(&self) -> [f64; 2] {
-        let root = |term: &Term| {
+        let root = |term: &ModalTerm| {
             term.residue_per_kg.abs().sqrt() * (term.omega_rad_s / self.u.omega_rad_s)
         };
         let (ru, rv) = (root(&self.u), root(&self.v));
@@ -102,13 +102,13 @@ impl CloseModes {
 
     /// Zeros of Eq. (4-1), as eigenvalues of a pencil: no formula of this chapter is in them.
     pub fn zeros(&self) -> Result<Vec<Zero>, PlantError> {
-        let remainder = Term::undamped(0.0, self.remainder.residue_per_kg);
+        let remainder = ModalTerm::undamped(0.0, self.remainder.residue_per_kg);
         ModalSum::new(vec![remainder, self.u, self.v], 0.0)?.undamped_zeros()
     }
 }
 
 impl Remainder {
-    fn of(terms: &[Term], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
+    fn of(terms: &[ModalTerm], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
         let others = || {
             terms
                 .iter()

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::{CloseModes, Loci, Meeting, ModesAt};
 use crate::model::plant::{PlantError, Structure};
-use crate::model::zeros::{Term, Zero, ZeroKind, undamped_zeros};
+use crate::model::zeros::{ModalTerm, Zero, ZeroKind, undamped_zeros};
 
 /// Bisections between two values: a step of the grid over 2^44 is below the rounding of a value.
 const BISECTIONS: usize = 44;
@@ -19,7 +19,7 @@ pub fn as_configured(at: &ModesAt) -> [DVector<f64>; 2] {
 
 /// How the zeros of the two modes lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lie {
+pub enum ZeroConfiguration {
     /// Two MMP pairs between wu and wv.
     Between,
     /// A CMP-CNMP quartet.
@@ -30,7 +30,7 @@ pub enum Lie {
 
 /// One value of the setting.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Station {
+pub struct Sample {
     /// The setting.
     pub value: f64,
     /// The two modes; `None` where they cross.
@@ -38,31 +38,31 @@ pub struct Station {
     /// Zeros of the whole plant without damping.
     pub zeros: Vec<Zero>,
     /// How the zeros of Eq. (4-1) lie; `None` where the modes cross.
-    pub equation: Option<Lie>,
+    pub equation: Option<ZeroConfiguration>,
     /// How the plant's zeros lie that belong to the two modes: those of a magnitude between the next slower and the next
     /// faster mode that shows.
-    pub plant: Lie,
+    pub plant: ZeroConfiguration,
 }
 
 /// The two modes over the range.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub struct Trajectory {
     /// What the loci do where they are closest.
     pub meeting: Meeting,
     /// In the order of the range; those of the loci's path, and what it takes between to see quartets that come and go.
-    pub stations: Vec<Station>,
+    pub stations: Vec<Sample>,
     /// The station where the modes are closest.
     pub closest: usize,
 }
 
-impl Course {
+impl Trajectory {
     /// The course of two modes along the loci, which are refined where they are closest, between the force and the probe
     /// that `ports` gives at a value.
     pub fn along<E, F>(
         loci: &mut Loci<F>,
         pair: [usize; 2],
         ports: impl Fn(&ModesAt) -> [DVector<f64>; 2],
-    ) -> Result<Course, E>
+    ) -> Result<Trajectory, E>
     where
         E: From<PlantError>,
         F: FnMut(f64) -> Result<Structure, E>,
@@ -77,7 +77,7 @@ impl Course {
         let rising = stations[0].value < stations[stations.len() - 1].value;
         let lies: [Lies; 2] = [|station| station.equation, |station| Some(station.plant)];
         for lie in lies {
-            let steps: Vec<[Station; 2]> = stations
+            let steps: Vec<[Sample; 2]> = stations
                 .windows(2)
                 .map(|step| [step[0].clone(), step[1].clone()])
                 .collect();
@@ -99,7 +99,7 @@ impl Course {
             .iter()
             .position(|station| station.value == closest_value)
             .unwrap_or(0);
-        Ok(Course {
+        Ok(Trajectory {
             meeting,
             stations,
             closest,
@@ -109,7 +109,7 @@ impl Course {
     /// The bands of values with a quartet of the plant that belongs to the two modes: from the first to the last station of
     /// each.
     pub fn bands(&self) -> Vec<[f64; 2]> {
-        let quartet = |station: &Station| station.plant == Lie::Quartet;
+        let quartet = |station: &Sample| station.plant == ZeroConfiguration::Quartet;
         let runs = self
             .stations
             .chunk_by(|a, b| quartet(a) == quartet(b))
@@ -124,7 +124,7 @@ pub fn station(
     at: &ModesAt,
     pair: [usize; 2],
     [force, sensor]: [DVector<f64>; 2],
-) -> Result<Station, PlantError> {
+) -> Result<Sample, PlantError> {
     let terms = at.terms(&force, &sensor);
     let zeros = undamped_zeros(&Structure {
         force,
@@ -142,10 +142,12 @@ pub fn station(
     let belonging = belonging(&terms, pair, &zeros);
     let plant = match &modes {
         Some(modes) => lie(modes, belonging.into_iter()),
-        None if belonging.iter().any(|zero| zero.kind == ZeroKind::Cnmp) => Lie::Quartet,
-        None => Lie::Elsewhere,
+        None if belonging.iter().any(|zero| zero.kind == ZeroKind::Cnmp) => {
+            ZeroConfiguration::Quartet
+        }
+        None => ZeroConfiguration::Elsewhere,
     };
-    Ok(Station {
+    Ok(Sample {
         value: at.value,
         modes,
         zeros,
@@ -154,28 +156,28 @@ pub fn station(
     })
 }
 
-fn lie<'a>(modes: &CloseModes, zeros: impl Iterator<Item = &'a Zero> + Clone) -> Lie {
+fn lie<'a>(modes: &CloseModes, zeros: impl Iterator<Item = &'a Zero> + Clone) -> ZeroConfiguration {
     let between = |w: f64| modes.u.omega_rad_s < w && w < modes.v.omega_rad_s;
     if zeros.clone().any(|zero| zero.kind == ZeroKind::Cnmp) {
-        Lie::Quartet
+        ZeroConfiguration::Quartet
     } else if zeros
         .filter(|zero| zero.kind == ZeroKind::Mmp && between(zero.s.im))
         .count()
         == 2
     {
-        Lie::Between
+        ZeroConfiguration::Between
     } else {
-        Lie::Elsewhere
+        ZeroConfiguration::Elsewhere
     }
 }
 
 /// The zeros whose magnitude is between the modes next to the two.
-fn belonging<'a>(terms: &[Term], pair: [usize; 2], zeros: &'a [Zero]) -> Vec<&'a Zero> {
+fn belonging<'a>(terms: &[ModalTerm], pair: [usize; 2], zeros: &'a [Zero]) -> Vec<&'a Zero> {
     let largest = terms
         .iter()
         .map(|term| term.residue_per_kg.abs())
         .fold(0.0, f64::max);
-    let shows = |(mode, term): &(usize, &Term)| {
+    let shows = |(mode, term): &(usize, &ModalTerm)| {
         !pair.contains(mode) && term.residue_per_kg.abs() > SILENT_RATIO * largest
     };
     let [i, j] = pair.map(|mode| terms[mode].omega_rad_s);
@@ -197,30 +199,34 @@ fn belonging<'a>(terms: &[Term], pair: [usize; 2], zeros: &'a [Zero]) -> Vec<&'a
 }
 
 /// Which zeros are looked at.
-type Lies = fn(&Station) -> Option<Lie>;
+type Lies = fn(&Sample) -> Option<ZeroConfiguration>;
 
 /// Whether between two stations a quartet begins or ends, or must have come and gone: from two zeros between the modes to
 /// none, with au av < 0 on both sides, they do not come but by meeting.
-fn hides(step: &[Station; 2], lie: Lies) -> bool {
+fn hides(step: &[Sample; 2], lie: Lies) -> bool {
     let lies = [lie(&step[0]), lie(&step[1])];
-    let opposed = |station: &Station| station.modes.is_some_and(|modes| modes.are_opposed());
+    let opposed = |station: &Sample| station.modes.is_some_and(|modes| modes.are_opposed());
     match lies
         .iter()
-        .filter(|lie| **lie == Some(Lie::Quartet))
+        .filter(|lie| **lie == Some(ZeroConfiguration::Quartet))
         .count()
     {
-        0 => lies[0] != lies[1] && lies.contains(&Some(Lie::Between)) && step.iter().all(opposed),
+        0 => {
+            lies[0] != lies[1]
+                && lies.contains(&Some(ZeroConfiguration::Between))
+                && step.iter().all(opposed)
+        }
         count => count == 1,
     }
 }
 
 /// Bisects a step for what it hides, to both ends of a quartet's band.
 fn fill<E>(
-    step: &[Station; 2],
+    step: &[Sample; 2],
     lie: Lies,
     depth: usize,
-    found: &mut Vec<Station>,
-    at: &mut impl FnMut(f64) -> Result<Station, E>,
+    found: &mut Vec<Sample>,
+    at: &mut impl FnMut(f64) -> Result<Sample, E>,
 ) -> Result<(), E> {
     let [low, high] = step;
     let value = 0.5 * (low.value + high.value);

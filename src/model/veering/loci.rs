@@ -13,8 +13,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::plant::{Modal, Mode, PlantError, Structure};
-use crate::model::zeros::Term;
+use crate::model::plant::{ModalModel, Mode, PlantError, Structure};
+use crate::model::zeros::ModalTerm;
 
 /// Eigenvalues come with an error of some 1e-15 of the largest: closer than this ratio of it, two are one.
 const EQUAL_RATIO: f64 = 1e-12;
@@ -45,7 +45,7 @@ pub struct ModesAt {
 
 impl ModesAt {
     fn of(structure: Structure, value: f64) -> Result<ModesAt, PlantError> {
-        let modal = Modal::of(&structure)?;
+        let modal = ModalModel::of(&structure)?;
         let unit =
             |mode: &Mode| &mode.shape / mode.shape.dot(&(&structure.mass * &mode.shape)).sqrt();
         let columns: Vec<_> = modal.modes.iter().map(unit).collect();
@@ -89,9 +89,9 @@ impl ModesAt {
 
     /// The undamped modes as seen between a force along `force` and a displacement along `sensor` (Eq. 4-15), each in its
     /// place. What is rounding of a gain is 0: a mode that does not show has no sign.
-    pub fn terms(&self, force: &DVector<f64>, sensor: &DVector<f64>) -> Vec<Term> {
+    pub fn terms(&self, force: &DVector<f64>, sensor: &DVector<f64>) -> Vec<ModalTerm> {
         let (force, sensor) = (self.gains(force), self.gains(sensor));
-        let term = |(mode, w): (usize, &f64)| Term::undamped(*w, force[mode] * sensor[mode]);
+        let term = |(mode, w): (usize, &f64)| ModalTerm::undamped(*w, force[mode] * sensor[mode]);
         self.omega_rad_s.iter().enumerate().map(term).collect()
     }
 

@@ -18,7 +18,7 @@ mod properties;
 pub mod propositions;
 
 pub use close_modes::{CloseModes, Remainder};
-pub use course::{Course, Lie, Station, as_configured, station};
+pub use course::{Sample, Trajectory, ZeroConfiguration, as_configured, station};
 pub use loci::{Loci, Meeting, ModesAt};
-pub use picture::Picture;
+pub use picture::QuadrantDiagram;
 pub use placement::{Trial, trial};

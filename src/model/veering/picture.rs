@@ -22,7 +22,7 @@
 //!   -sign(aR) cos(2 t - t_b - t_c) > |cos(t_b - t_c)|       t, t_b, t_c: angles of phi_u, b, c
 //! ```
 //!
-//! With mode R as the third axis the quadrants are octants. A probe in the quadrant that [`Picture::avoid`] names, on its side
+//! With mode R as the third axis the quadrants are octants. A probe in the quadrant that [`QuadrantDiagram::avoid`] names, on its side
 //! of the third plane, makes the signs alternate (C4-1), without which there are no CMP-CNMP zeros (P4-1).
 
 use nalgebra::DVector;
@@ -36,7 +36,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Actuator and probe among the shapes at one value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct QuadrantDiagram {
     /// The setting.
     pub value: f64,
     /// Directions of phi_u and phi_v in the frame, of unit length.
@@ -49,14 +49,14 @@ pub struct Picture {
     pub residues_per_kg: Option<[f64; 3]>,
 }
 
-impl Picture {
+impl QuadrantDiagram {
     /// At `at`, in the frame of the pair's shapes at `frame`.
     pub fn of(
         at: &ModesAt,
         frame: &ModesAt,
         pair: [usize; 2],
         [force, sensor]: &[DVector<f64>; 2],
-    ) -> Picture {
+    ) -> QuadrantDiagram {
         let [i, j] = pair;
         let ordered = if at.omega_rad_s[i] <= at.omega_rad_s[j] {
             [i, j]
@@ -84,7 +84,7 @@ impl Picture {
         } else {
             CloseModes::of(&at.terms(force, sensor), pair)
         };
-        Picture {
+        QuadrantDiagram {
             value: at.value,
             shapes: ordered.map(direction),
             actuator: components(force),
@@ -183,11 +183,11 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::{PI, TAU};
 
-    fn picture(b: f64, c: f64, remainder: f64) -> Picture {
+    fn picture(b: f64, c: f64, remainder: f64) -> QuadrantDiagram {
         let (actuator, sensor) = ([b.cos(), b.sin()], [c.cos(), c.sin()]);
         let residues = [remainder, actuator[0] * sensor[0], actuator[1] * sensor[1]];
         let shapes = [[1.0, 0.0], [0.0, 1.0]];
-        Picture {
+        QuadrantDiagram {
             value: 0.0,
             shapes,
             actuator,

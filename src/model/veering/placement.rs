@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::conditions::c4_1;
-use super::{Lie, ModesAt, Picture, station};
+use super::{ModesAt, QuadrantDiagram, ZeroConfiguration, station};
 use crate::model::plant::PlantError;
 use crate::model::zeros::cnmp_pairs;
 
@@ -70,16 +70,15 @@ pub fn trial(
             .filter_map(|station| station.modes)
             .map(|modes| c4_1(&modes))
     };
-    let count = |of: &dyn Fn(&super::Station) -> bool| {
-        stations.iter().filter(|station| of(station)).count()
-    };
+    let count =
+        |of: &dyn Fn(&super::Sample) -> bool| stations.iter().filter(|station| of(station)).count();
     let middle = stations[stations.len() / 2]
         .modes
         .map_or(0.0, |modes| modes.remainder.residue_per_kg.abs());
     Ok(Some(Trial {
         remainder_per_kg: middle,
         values: stations.len(),
-        with_cnmp: count(&|station| station.plant == Lie::Quartet),
+        with_cnmp: count(&|station| station.plant == ZeroConfiguration::Quartet),
         with_any_cnmp: count(&|station| cnmp_pairs(&station.zeros) > 0),
         alternating: signs().filter(|condition| condition.holds).count(),
         margin: signs()
@@ -97,7 +96,8 @@ fn foretold(
     closest: usize,
     pair: [usize; 2],
 ) -> bool {
-    let picture = |index: usize| Picture::of(path[index], path[closest], pair, &ports[index]);
+    let picture =
+        |index: usize| QuadrantDiagram::of(path[index], path[closest], pair, &ports[index]);
     let (first, last) = (picture(0), picture(path.len() - 1));
     let sides = if path[closest].are_equal(pair) {
         [

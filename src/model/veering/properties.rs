@@ -5,10 +5,10 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 
 use super::conditions::{c4_1, c4_2, c4_3, c4_4, c4_4y};
-use super::propositions::{Foretold, Proposition, Side, Stretch, p4_1};
-use super::{CloseModes, Course, Lie, Loci, Meeting, Station, as_configured};
+use super::propositions::{Interval, Prediction, Proposition, Side, p4_1};
+use super::{CloseModes, Loci, Meeting, Sample, Trajectory, ZeroConfiguration, as_configured};
 use crate::model::plant::{PlantError, Structure};
-use crate::model::zeros::{Kinds, Term};
+use crate::model::zeros::{ModalTerm, ZeroCounts};
 
 /// Random numbers, the same in every run.
 struct Dice(Pcg64);
@@ -80,7 +80,7 @@ impl System {
         })
     }
 
-    fn course(&self) -> Course {
+    fn course(&self) -> Trajectory {
         let mut loci = Loci::follow(&grid(), |d| self.at(d)).unwrap();
         let pair = loci.path()[0]
             .omega_rad_s
@@ -88,7 +88,7 @@ impl System {
             .enumerate()
             .filter(|(_, w)| (90.0..112.0).contains(&(*w * *w)));
         let pair: Vec<usize> = pair.map(|(mode, _)| mode).collect();
-        Course::along(&mut loci, [pair[0], pair[1]], as_configured).unwrap()
+        Trajectory::along(&mut loci, [pair[0], pair[1]], as_configured).unwrap()
     }
 }
 
@@ -110,8 +110,8 @@ struct Tally {
 impl Tally {
     fn add(&mut self, proposition: &Proposition) {
         self.asked += 1;
-        self.appear += usize::from(proposition.foretold == Foretold::Appear);
-        self.absent += usize::from(proposition.foretold == Foretold::Absent);
+        self.appear += usize::from(proposition.foretold == Prediction::Appear);
+        self.absent += usize::from(proposition.foretold == Prediction::Absent);
         self.wrong_by_equation += usize::from(
             proposition
                 .foretold
@@ -128,7 +128,8 @@ fn p4_1_is_right_in_every_random_sum_of_eq_4_1_and_c4_2_implies_c4_1() {
     for _ in 0..20_000 {
         let wu = dice.uniform(0.5, 2.0);
         let wv = wu * (1.0 + dice.uniform(1e-3, 0.5));
-        let mut mode = |omega_rad_s, low, high| Term::undamped(omega_rad_s, dice.spread(low, high));
+        let mut mode =
+            |omega_rad_s, low, high| ModalTerm::undamped(omega_rad_s, dice.spread(low, high));
         let terms = [
             mode(0.0, 0.01, 100.0),
             mode(wu, 0.1, 10.0),
@@ -136,13 +137,13 @@ fn p4_1_is_right_in_every_random_sum_of_eq_4_1_and_c4_2_implies_c4_1() {
         ];
         let modes = CloseModes::of(&terms, [1, 2]).unwrap();
         assert!((modes.remainder.residue_per_kg / terms[0].residue_per_kg - 1.0).abs() < 1e-14);
-        let quartet = Kinds::of(&modes.zeros().unwrap()).quartets == 1;
+        let quartet = ZeroCounts::of(&modes.zeros().unwrap()).quartets == 1;
         let lie = if quartet {
-            Lie::Quartet
+            ZeroConfiguration::Quartet
         } else {
-            Lie::Elsewhere
+            ZeroConfiguration::Elsewhere
         };
-        let station = Station {
+        let station = Sample {
             value: 0.0,
             modes: Some(modes),
             zeros: Vec::new(),
@@ -179,7 +180,7 @@ fn p4_2_p4_2x_and_p4_2y_are_right_on_the_stretch_in_every_random_system_of_eq_4_
         for side in [Side::Before, Side::After] {
             for (tally, proposition) in tallies
                 .iter_mut()
-                .zip(&Stretch::of(&course, side).propositions())
+                .zip(&Interval::of(&course, side).propositions())
             {
                 tally.add(proposition);
                 assert!(
@@ -203,7 +204,7 @@ fn p4_2_p4_2x_and_p4_2y_are_right_on_the_stretch_in_every_random_system_of_eq_4_
 }
 
 /// P4-2 and P4-2y with C4-1 at psi_0 alone, and P4-2x over the whole range: how often each is wrong.
-fn as_printed(course: &Course) -> [Foretold; 3] {
+fn as_printed(course: &Trajectory) -> [Prediction; 3] {
     let close = c4_3(
         course.meeting,
         course.stations[course.closest].modes.as_ref(),
@@ -221,20 +222,20 @@ fn as_printed(course: &Course) -> [Foretold; 3] {
     }
     let foretold = |premise: bool, otherwise| {
         if close && premise {
-            Foretold::Appear
+            Prediction::Appear
         } else {
             otherwise
         }
     };
     let necessary = if close {
-        Foretold::Absent
+        Prediction::Absent
     } else {
-        Foretold::Nothing
+        Prediction::Nothing
     };
     [
-        foretold(holds[0], Foretold::Nothing),
+        foretold(holds[0], Prediction::Nothing),
         foretold(holds[0], necessary),
-        foretold(holds[1], Foretold::Nothing),
+        foretold(holds[1], Prediction::Nothing),
     ]
 }
 
@@ -246,12 +247,12 @@ fn as_printed_with_signs_at_one_value_only_they_are_wrong_for_some_systems() {
         let quartet = course
             .stations
             .iter()
-            .any(|station| station.equation == Some(Lie::Quartet));
+            .any(|station| station.equation == Some(ZeroConfiguration::Quartet));
         for (which, foretold) in as_printed(&course).into_iter().enumerate() {
-            asked[which] += usize::from(foretold == Foretold::Appear);
+            asked[which] += usize::from(foretold == Prediction::Appear);
             wrong[which] += usize::from(foretold.is_contradicted_by(quartet));
             // "Only if" is right: where zeros are, P4-1 has C4-1 and C4-4 at that value.
-            assert!(foretold != Foretold::Absent || !quartet);
+            assert!(foretold != Prediction::Absent || !quartet);
         }
     }
     // Of some 700 systems that P4-2 is sure of, and 400 of P4-2y, 40: their residues turn on the way.
@@ -271,9 +272,9 @@ fn zeros_may_appear_without_veering() {
     let modes = |r: f64| {
         CloseModes::of(
             &[
-                Term::undamped(0.0, r),
-                Term::undamped(1.0, -1.0),
-                Term::undamped(2.0f64.sqrt(), 1.0),
+                ModalTerm::undamped(0.0, r),
+                ModalTerm::undamped(1.0, -1.0),
+                ModalTerm::undamped(2.0f64.sqrt(), 1.0),
             ],
             [1, 2],
         )
@@ -290,7 +291,7 @@ fn zeros_may_appear_without_veering() {
     ] {
         let modes = modes(r);
         assert_eq!(
-            Kinds::of(&modes.zeros().unwrap()).quartets == 1,
+            ZeroCounts::of(&modes.zeros().unwrap()).quartets == 1,
             quartet,
             "{r}"
         );
@@ -312,7 +313,7 @@ fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
 
 /// What P4-1 says of a plant, at the values of the grid where b2-hat is nearer to b22-hat than to b21-hat: how many are
 /// asked, how many wrong, and for the wrong ones the largest margin over A4-5's ratio.
-fn near_the_upper_limit(course: &Course) -> (usize, usize, f64) {
+fn near_the_upper_limit(course: &Trajectory) -> (usize, usize, f64) {
     let on_grid = course
         .stations
         .iter()
@@ -352,7 +353,7 @@ fn beside_held_modes_p4_1_errs_by_less_than_the_remainder_departs_from_a_double_
             let (asked, wrong, furthest) = near_the_upper_limit(&course);
             sum = (sum.0 + asked, sum.1 + wrong, sum.2.max(furthest));
             for side in [Side::Before, Side::After] {
-                let all = Stretch::of(&course, side).propositions();
+                let all = Interval::of(&course, side).propositions();
                 tallies
                     .iter_mut()
                     .zip(&all)

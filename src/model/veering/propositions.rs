@@ -23,11 +23,11 @@
 //! poles that stay side by side, with residues that keep their signs, can only leave by meeting.
 
 use super::conditions::{Condition, c4_1, c4_2, c4_3, c4_4, c4_4y};
-use super::{Course, Lie, Meeting, Station};
+use super::{Meeting, Sample, Trajectory, ZeroConfiguration};
 
 /// What premises say of CMP-CNMP zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Foretold {
+pub enum Prediction {
     /// They appear.
     Appear,
     /// They do not.
@@ -36,22 +36,22 @@ pub enum Foretold {
     Nothing,
 }
 
-impl Foretold {
+impl Prediction {
     /// In a word.
     pub fn name(self) -> &'static str {
         match self {
-            Foretold::Appear => "appear",
-            Foretold::Absent => "absent",
-            Foretold::Nothing => "nothing",
+            Prediction::Appear => "appear",
+            Prediction::Absent => "absent",
+            Prediction::Nothing => "nothing",
         }
     }
 
     /// Whether zeros that are there or not contradict.
     pub fn is_contradicted_by(self, quartet: bool) -> bool {
         match self {
-            Foretold::Appear => !quartet,
-            Foretold::Absent => quartet,
-            Foretold::Nothing => false,
+            Prediction::Appear => !quartet,
+            Prediction::Absent => quartet,
+            Prediction::Nothing => false,
         }
     }
 }
@@ -64,7 +64,7 @@ pub struct Proposition {
     /// Each with its figure.
     pub premises: Vec<Condition>,
     /// What they say.
-    pub foretold: Foretold,
+    pub foretold: Prediction,
     /// Whether Eq. (4-1) has CMP-CNMP zeros where the proposition says so: at the value, or anywhere on the stretch.
     pub equation: bool,
     /// Whether the plant has.
@@ -72,21 +72,21 @@ pub struct Proposition {
 }
 
 /// P4-1 at one value; `None` where the modes cross.
-pub fn p4_1(station: &Station) -> Option<Proposition> {
+pub fn p4_1(station: &Sample) -> Option<Proposition> {
     let modes = station.modes?;
     let premises = vec![c4_1(&modes), c4_2(&modes)];
     let foretold = if premises.iter().all(|premise| premise.holds) {
-        Foretold::Appear
+        Prediction::Appear
     } else {
-        Foretold::Absent
+        Prediction::Absent
     };
-    let equation = station.equation == Some(Lie::Quartet);
+    let equation = station.equation == Some(ZeroConfiguration::Quartet);
     Some(Proposition {
         name: "P4-1",
         premises,
         foretold,
         equation,
-        plant: station.plant == Lie::Quartet,
+        plant: station.plant == ZeroConfiguration::Quartet,
     })
 }
 
@@ -111,33 +111,32 @@ impl Side {
 
 /// One side of the veering point: the stretch of values next to it where C4-1 holds without a break.
 #[derive(Clone, Debug)]
-pub struct Stretch<'a> {
+pub struct Interval<'a> {
     /// Which side.
     pub side: Side,
     meeting: Meeting,
-    closest: &'a Station,
+    closest: &'a Sample,
     /// From the veering point outwards, without those where the modes cross. Empty where C4-1 fails at once.
-    stations: Vec<&'a Station>,
+    stations: Vec<&'a Sample>,
     /// The station next to the veering point, whether C4-1 holds or not.
-    next: Option<&'a Station>,
+    next: Option<&'a Sample>,
 }
 
-impl<'a> Stretch<'a> {
+impl<'a> Interval<'a> {
     /// Of one side of a course.
-    pub fn of(course: &'a Course, side: Side) -> Stretch<'a> {
-        let outwards: Vec<&Station> = match side {
+    pub fn of(course: &'a Trajectory, side: Side) -> Interval<'a> {
+        let outwards: Vec<&Sample> = match side {
             Side::Before => course.stations[..=course.closest].iter().rev().collect(),
             Side::After => course.stations[course.closest..].iter().collect(),
         };
-        let apart: Vec<&Station> = outwards
+        let apart: Vec<&Sample> = outwards
             .into_iter()
             .filter(|station| station.modes.is_some())
             .collect();
-        let alternates =
-            |station: &&&Station| station.modes.is_some_and(|modes| c4_1(&modes).holds);
+        let alternates = |station: &&&Sample| station.modes.is_some_and(|modes| c4_1(&modes).holds);
         let stations = apart.iter().take_while(alternates).copied().collect();
         let closest = &course.stations[course.closest];
-        Stretch {
+        Interval {
             side,
             meeting: course.meeting,
             closest,
@@ -164,16 +163,16 @@ impl<'a> Stretch<'a> {
         let holds = |premises: &[Condition]| premises.iter().all(|premise| premise.holds);
         let sufficient = |name, premises: Vec<Condition>| {
             let foretold = if holds(&premises) {
-                Foretold::Appear
+                Prediction::Appear
             } else {
-                Foretold::Nothing
+                Prediction::Nothing
             };
             self.proposition(name, premises, foretold)
         };
         let necessary = match (close.holds, holds(&[alternating, beyond])) {
-            (false, _) => Foretold::Nothing,
-            (true, true) => Foretold::Appear,
-            (true, false) => Foretold::Absent,
+            (false, _) => Prediction::Nothing,
+            (true, true) => Prediction::Appear,
+            (true, false) => Prediction::Absent,
         };
         [
             sufficient("P4-2", vec![alternating, close, beyond]),
@@ -186,16 +185,16 @@ impl<'a> Stretch<'a> {
         &self,
         name: &'static str,
         premises: Vec<Condition>,
-        foretold: Foretold,
+        foretold: Prediction,
     ) -> Proposition {
         let equation = self
             .stations
             .iter()
-            .any(|station| station.equation == Some(Lie::Quartet));
+            .any(|station| station.equation == Some(ZeroConfiguration::Quartet));
         let plant = self
             .stations
             .iter()
-            .any(|station| station.plant == Lie::Quartet);
+            .any(|station| station.plant == ZeroConfiguration::Quartet);
         Proposition {
             name,
             premises,
@@ -227,7 +226,7 @@ impl<'a> Stretch<'a> {
     /// A condition where its margin on the stretch is largest, other than at the veering point itself.
     fn best(
         &self,
-        condition: impl Fn(&Station) -> Option<Condition>,
+        condition: impl Fn(&Sample) -> Option<Condition>,
         name: &'static str,
     ) -> Condition {
         let nowhere = Condition {

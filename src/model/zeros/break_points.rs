@@ -1,6 +1,6 @@
 //! Where zeros meet, in closed form: Eqs. (3-14), (3-16), (4-5), (4-6).
 
-use super::Term;
+use super::ModalTerm;
 
 /// The two real s at which the zeros of two damped modes meet as the ratio of their residues varies, Eq. (3-14):
 ///
@@ -10,7 +10,7 @@ use super::Term;
 ///
 /// In rad/s, the smaller magnitude first; the second is infinite where zu wu = zv wv. `None` where they are complex
 /// (large and very different damping) or the frequencies are equal.
-pub fn two_mode_break_points(u: &Term, v: &Term) -> Option<[f64; 2]> {
+pub fn two_mode_break_points(u: &ModalTerm, v: &ModalTerm) -> Option<[f64; 2]> {
     let ((wu, zu), (wv, zv)) = (
         (u.omega_rad_s, u.damping_ratio),
         (v.omega_rad_s, v.damping_ratio),
@@ -34,7 +34,7 @@ pub fn two_mode_break_points(u: &Term, v: &Term) -> Option<[f64; 2]> {
 ///
 /// Eq. (4-5), where mode R is a double integrator. Elsewhere the squares of all frequencies are shifted by -wR^2: with
 /// y = s^2 + wR^2 the mode R becomes r/y, and the zeros in y meet exactly where those in s^2 do.
-pub fn critical_residues(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<[f64; 2]> {
+pub fn critical_residues(omega_r_rad_s: f64, u: &ModalTerm, v: &ModalTerm) -> Option<[f64; 2]> {
     let (xu, xv) = shifted(omega_r_rad_s, u, v)?;
     let (au, av) = (u.residue_per_kg, v.residue_per_kg);
     let middle = av * xu - au * xv;
@@ -47,7 +47,7 @@ pub fn critical_residues(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<[f64;
 
 /// The two sums of all three residues at which zeros meet, Eq. (4-6), the smaller magnitude first; shifted as in
 /// [`critical_residues`].
-pub fn critical_sums(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<[f64; 2]> {
+pub fn critical_sums(omega_r_rad_s: f64, u: &ModalTerm, v: &ModalTerm) -> Option<[f64; 2]> {
     let (xu, xv) = shifted(omega_r_rad_s, u, v)?;
     let (ru, rv) = (
         (xu * u.residue_per_kg.abs()).sqrt(),
@@ -58,7 +58,7 @@ pub fn critical_sums(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<[f64; 2]>
 }
 
 /// wu^2 - wR^2 and wv^2 - wR^2, for wR < wu < wv and residues of u and v of different sign.
-fn shifted(omega_r_rad_s: f64, u: &Term, v: &Term) -> Option<(f64, f64)> {
+fn shifted(omega_r_rad_s: f64, u: &ModalTerm, v: &ModalTerm) -> Option<(f64, f64)> {
     let square = |w: f64| (w - omega_r_rad_s) * (w + omega_r_rad_s);
     let (xu, xv) = (square(u.omega_rad_s), square(v.omega_rad_s));
     (u.residue_per_kg * v.residue_per_kg < 0.0 && 0.0 < xu && xu < xv).then_some((xu, xv))
@@ -97,7 +97,7 @@ fn applies(eta: f64, kappa: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::zeros::{Kinds, ModalSum};
+    use crate::model::zeros::{ModalSum, ZeroCounts};
     use proptest::prelude::*;
 
     /// The largest real part of a complex zero of Eq. (3-15) over all sizes of the residues (golden section about the
@@ -105,13 +105,13 @@ mod tests {
     fn furthest_right(zeta: f64, eta: f64, kappa: f64) -> f64 {
         let right = |log: f64| {
             let av = log.exp();
-            let mode = |omega_rad_s, residue_per_kg| Term {
+            let mode = |omega_rad_s, residue_per_kg| ModalTerm {
                 omega_rad_s,
                 damping_ratio: zeta,
                 residue_per_kg,
             };
             let terms = vec![
-                Term::undamped(0.0, 1.0),
+                ModalTerm::undamped(0.0, 1.0),
                 mode(eta, -kappa * av),
                 mode(1.0, av),
             ];
@@ -180,7 +180,12 @@ mod tests {
     #[test]
     fn the_break_points_of_section_3_2_4_are_1_21_and_21() {
         // aR = 1, au = -a0, av = a0: by Eq. (4-6) zeros meet where aR is a0 (wv -+ wu)/(wv +- wu), that is a0 = 1/21 and 21.
-        let modes = |a0: f64| (Term::undamped(10.0, -a0), Term::undamped(11.0, a0));
+        let modes = |a0: f64| {
+            (
+                ModalTerm::undamped(10.0, -a0),
+                ModalTerm::undamped(11.0, a0),
+            )
+        };
         for (a0, which) in [(1.0 / 21.0, 1), (21.0, 0)] {
             let (u, v) = modes(a0);
             assert!((critical_residues(0.0, &u, &v).unwrap()[which] - 1.0).abs() < 1e-14);
@@ -194,11 +199,11 @@ mod tests {
             wr in 0.0..5.0f64, above in 0.1..20.0f64, apart in 0.01..10.0f64, au in 0.01..10.0f64, av in 0.01..10.0f64, sign in 0..2usize,
         ) {
             let sign = [1.0, -1.0][sign];
-            let (u, v) = (Term::undamped(wr + above, -sign * au), Term::undamped(wr + above + apart, sign * av));
+            let (u, v) = (ModalTerm::undamped(wr + above, -sign * au), ModalTerm::undamped(wr + above + apart, sign * av));
             let [near, far] = critical_residues(wr, &u, &v).unwrap();
             let quartets = |ar: f64| {
-                let sum = ModalSum::new(vec![Term::undamped(wr, ar), u, v], 0.0).unwrap();
-                Kinds::of(&sum.undamped_zeros().unwrap()).quartets
+                let sum = ModalSum::new(vec![ModalTerm::undamped(wr, ar), u, v], 0.0).unwrap();
+                ZeroCounts::of(&sum.undamped_zeros().unwrap()).quartets
             };
             // The discriminant is quadratic in aR: 1e-6 beside its root it is far above the rounding of two equal roots.
             prop_assume!((far - near).abs() > 1e-4 * far.abs() && near.abs() > 1e-4 * far.abs());
@@ -215,13 +220,13 @@ mod tests {
         fn two_damped_modes_meet_where_eq_3_14_says(
             wu in 0.5..5.0f64, apart in 0.1..5.0f64, zu in 0.0..0.3f64, zv in 0.0..0.3f64, which in 0..2usize,
         ) {
-            let mode = |omega_rad_s, damping_ratio, residue_per_kg| Term { omega_rad_s, damping_ratio, residue_per_kg };
+            let mode = |omega_rad_s, damping_ratio, residue_per_kg| ModalTerm { omega_rad_s, damping_ratio, residue_per_kg };
             let (u, v) = (mode(wu, zu, 1.0), mode(wu + apart, zv, 1.0));
             let Some(points) = two_mode_break_points(&u, &v) else { return Ok(()) };
             let s = points[which];
             prop_assume!(s.is_finite() && s.abs() > 1e-3 && s.abs() < 1e3);
             // The ratio of residues that puts a zero at s: G(s) = 0.
-            let denominator = |t: &Term| s * s + 2.0 * t.damping_ratio * t.omega_rad_s * s + t.omega_rad_s * t.omega_rad_s;
+            let denominator = |t: &ModalTerm| s * s + 2.0 * t.damping_ratio * t.omega_rad_s * s + t.omega_rad_s * t.omega_rad_s;
             let ratio = -denominator(&u) / denominator(&v);
             prop_assume!((ratio + 1.0).abs() > 1e-6 && ratio.abs() > 1e-6);
             let sum = ModalSum::new(vec![mode(wu, zu, ratio), v], 0.0).unwrap();

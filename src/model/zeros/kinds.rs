@@ -15,7 +15,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::model::plant::linear_algebra::{complement, pencil};
 use crate::model::plant::{PlantError, Structure};
 
-/// Kinds of zeros (Fig 3-1).
+/// ZeroCounts of zeros (Fig 3-1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ZeroKind {
     /// Marginal minimum phase: on the imaginary axis but for the damping.
@@ -54,7 +54,7 @@ pub struct Zero {
 
 /// How many zeros of which kind a plant without damping has, by pairs and quartets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Kinds {
+pub struct ZeroCounts {
     /// Pairs on the imaginary axis.
     pub mmp: usize,
     /// Pairs of one RMP and one RNMP zero.
@@ -63,11 +63,11 @@ pub struct Kinds {
     pub quartets: usize,
 }
 
-impl Kinds {
+impl ZeroCounts {
     /// The kinds of the zeros of a plant without damping.
-    pub fn of(zeros: &[Zero]) -> Kinds {
+    pub fn of(zeros: &[Zero]) -> ZeroCounts {
         let count = |kind| zeros.iter().filter(|zero| zero.kind == kind).count();
-        Kinds {
+        ZeroCounts {
             mmp: count(ZeroKind::Mmp) / 2,
             real: count(ZeroKind::Rnmp),
             quartets: count(ZeroKind::Cnmp) / 2,
@@ -81,7 +81,7 @@ impl Kinds {
 }
 
 /// As the thesis's tables write it: `dual MMP`, `MMP + RMP-RNMP`, `CMP-CNMP`.
-impl std::fmt::Display for Kinds {
+impl std::fmt::Display for ZeroCounts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let named = |(count, name): (usize, &str)| match count {
             0 => None,

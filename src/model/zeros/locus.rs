@@ -9,11 +9,11 @@
 use nalgebra::Complex;
 
 use super::matching::{Point, assigned, is_clear, padded};
-use super::{Kinds, Zero, ZeroKind};
+use super::{Zero, ZeroCounts, ZeroKind};
 
 /// Which zeros are followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Plane {
+pub enum LocusPlane {
     /// Zeros of the undamped plant, by u = s^2: one track a pair, two a quartet.
     Undamped,
     /// Zeros of the damped plant, each by itself.
@@ -47,7 +47,7 @@ impl Crossing {
 
 /// A value at which the kinds of the zeros change.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Change {
+pub struct KindChange {
     /// The value, bisected to some 1e-14 of itself.
     pub value: f64,
     /// Where.
@@ -70,13 +70,13 @@ pub struct Locus {
     /// zero above the origin on the imaginary axis, of a quartet two that mirror each other.
     pub tracks: Vec<Vec<Option<Complex<f64>>>>,
     /// Where kinds change, in the order of the values.
-    pub changes: Vec<Change>,
+    pub changes: Vec<KindChange>,
 }
 
 impl Locus {
     /// Follows the zeros that `zeros` gives at a value. `values` are two at least, in one order.
     pub fn follow<E>(
-        plane: Plane,
+        plane: LocusPlane,
         values: &[f64],
         zeros: impl FnMut(f64) -> Result<Vec<Zero>, E>,
     ) -> Result<Locus, E> {
@@ -118,15 +118,15 @@ impl Locus {
 /// eigenvalue iteration apart by the square root of the rounding, 1.5e-8).
 const COMPLEX_RATIO: f64 = 1e-7;
 
-impl Plane {
+impl LocusPlane {
     fn points(self, zeros: &[Zero]) -> Vec<Complex<f64>> {
         let one_of_a_pair = |zero: &&Zero| match zero.kind {
             ZeroKind::Mmp => zero.s.im > 0.0,
             kind => matches!(kind, ZeroKind::Rnmp | ZeroKind::Cnmp),
         };
         match self {
-            Plane::Undamped => zeros.iter().filter(one_of_a_pair).map(square).collect(),
-            Plane::Damped => zeros.iter().map(|zero| zero.s).collect(),
+            LocusPlane::Undamped => zeros.iter().filter(one_of_a_pair).map(square).collect(),
+            LocusPlane::Damped => zeros.iter().map(|zero| zero.s).collect(),
         }
     }
 
@@ -135,7 +135,7 @@ impl Plane {
         let mut last: Option<Complex<f64>> = None;
         let nearer = |point: &Point| {
             let root = self.root((*point)?);
-            let turn = self == Plane::Undamped
+            let turn = self == LocusPlane::Undamped
                 && last.is_some_and(|last| (last + root).norm() < (last - root).norm());
             last = Some(if turn { -root } else { root });
             last
@@ -145,18 +145,18 @@ impl Plane {
 
     fn root(self, point: Complex<f64>) -> Complex<f64> {
         match self {
-            Plane::Damped => point,
-            Plane::Undamped if point.im == 0.0 && point.re < 0.0 => {
+            LocusPlane::Damped => point,
+            LocusPlane::Undamped if point.im == 0.0 && point.re < 0.0 => {
                 Complex::new(0.0, (-point.re).sqrt())
             }
-            Plane::Undamped => point.sqrt(),
+            LocusPlane::Undamped => point.sqrt(),
         }
     }
 
     fn census(self, zeros: &[Zero]) -> Census {
         match self {
-            Plane::Undamped => Census::Undamped(Kinds::of(zeros)),
-            Plane::Damped => {
+            LocusPlane::Undamped => Census::Undamped(ZeroCounts::of(zeros)),
+            LocusPlane::Damped => {
                 let count = |real: bool, right: bool| {
                     zeros
                         .iter()
@@ -190,7 +190,7 @@ fn is_real(s: Complex<f64>) -> bool {
 /// How many zeros there are of which kind; complex ones by conjugate pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Census {
-    Undamped(Kinds),
+    Undamped(ZeroCounts),
     Damped {
         complex_left: usize,
         complex_right: usize,
@@ -239,7 +239,7 @@ struct Sample {
 const DEPTH: u32 = 12;
 
 struct Follower<F> {
-    plane: Plane,
+    plane: LocusPlane,
     zeros: F,
     /// Samples that may still be taken beyond the grid to follow tracks.
     left: usize,
@@ -299,7 +299,12 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
     }
 
     /// All changes of kind between two samples, as far as the kinds at both differ.
-    fn changes(&mut self, from: &Sample, to: &Sample, found: &mut Vec<Change>) -> Result<(), E> {
+    fn changes(
+        &mut self,
+        from: &Sample,
+        to: &Sample,
+        found: &mut Vec<KindChange>,
+    ) -> Result<(), E> {
         let mut from = from.clone();
         // Each change alters one pair or quartet; more than there are zeros cannot stand between two samples.
         for _ in 0..=2 * to.points.len() {
@@ -338,7 +343,7 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         triple: &[Sample],
         tracks: &[Vec<Point>],
         index: usize,
-        found: &mut Vec<Change>,
+        found: &mut Vec<KindChange>,
     ) -> Result<(), E> {
         let [a, b, c] = triple else { return Ok(()) };
         if a.census != b.census || b.census != c.census {
@@ -437,7 +442,7 @@ fn may_vanish(a: f64, b: f64, c: f64) -> bool {
 }
 
 /// What changes between two samples that are next to each other.
-fn change(plane: Plane, low: &Sample, high: &Sample) -> Change {
+fn change(plane: LocusPlane, low: &Sample, high: &Sample) -> KindChange {
     let (crossing, point) = match (low.census, high.census) {
         (Census::Undamped(a), Census::Undamped(b)) if a.quartets != b.quartets => {
             let at = meeting(if a.quartets > b.quartets { low } else { high });
@@ -475,7 +480,7 @@ fn change(plane: Plane, low: &Sample, high: &Sample) -> Change {
         _ => through(low),
     };
     let s = plane.root(point);
-    Change {
+    KindChange {
         value: 0.5 * (low.value + high.value),
         crossing,
         s: Complex::new(s.re, s.im.abs()),
@@ -520,7 +525,7 @@ fn through(sample: &Sample) -> (Crossing, Complex<f64>) {
 mod tests {
     use super::*;
     use crate::model::plant::PlantError;
-    use crate::model::zeros::{ModalSum, Term};
+    use crate::model::zeros::{ModalSum, ModalTerm};
 
     fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {
         (0..count)
@@ -530,9 +535,9 @@ mod tests {
 
     fn section_3_2_4(a0: f64) -> Result<Vec<Zero>, PlantError> {
         let terms = vec![
-            Term::undamped(0.0, 1.0),
-            Term::undamped(10.0, -a0),
-            Term::undamped(11.0, a0),
+            ModalTerm::undamped(0.0, 1.0),
+            ModalTerm::undamped(10.0, -a0),
+            ModalTerm::undamped(11.0, a0),
         ];
         ModalSum::new(terms, 0.0)?.undamped_zeros()
     }
@@ -540,8 +545,12 @@ mod tests {
     #[test]
     fn the_zeros_of_section_3_2_4_meet_at_1_21_and_21() {
         for count in [4, 50, 1001] {
-            let locus =
-                Locus::follow(Plane::Undamped, &grid(1e-3, 30.0, count), section_3_2_4).unwrap();
+            let locus = Locus::follow(
+                LocusPlane::Undamped,
+                &grid(1e-3, 30.0, count),
+                section_3_2_4,
+            )
+            .unwrap();
             let [first, second] = locus.changes.as_slice() else {
                 panic!("{:?}", locus.changes)
             };
@@ -569,7 +578,7 @@ mod tests {
     fn a_band_of_complex_zeros_narrower_than_the_grid_is_found() {
         // x^2 + (221 - 21 a0) x + 12100 with a0 = 1/21 + 1e-6 - (v - 0.5137)^2: complex within 1e-3 of v = 0.5137 only.
         let bump = |v: f64| section_3_2_4(1.0 / 21.0 + 1e-6 - (v - 0.5137) * (v - 0.5137) * 0.05);
-        let locus = Locus::follow(Plane::Undamped, &grid(0.0, 1.0, 24), bump).unwrap();
+        let locus = Locus::follow(LocusPlane::Undamped, &grid(0.0, 1.0, 24), bump).unwrap();
         let half_width = (1e-6f64 / 0.05).sqrt();
         let values: Vec<f64> = locus.changes.iter().map(|change| change.value).collect();
         assert_eq!(values.len(), 2, "{:?}", locus.changes);
@@ -586,11 +595,15 @@ mod tests {
         // Fig 3-2: aR = 1, av from 0 to -3; the pair on the imaginary axis goes to infinity at av = -1 and comes back on the
         // real one. x = -wv^2/(1 + av).
         let zeros = |av: f64| {
-            ModalSum::new(vec![Term::undamped(0.0, 1.0), Term::undamped(3.0, av)], 0.0)?
-                .undamped_zeros()
+            ModalSum::new(
+                vec![ModalTerm::undamped(0.0, 1.0), ModalTerm::undamped(3.0, av)],
+                0.0,
+            )?
+            .undamped_zeros()
         };
         let locus =
-            Locus::follow::<PlantError>(Plane::Undamped, &grid(-0.01, -3.0, 60), zeros).unwrap();
+            Locus::follow::<PlantError>(LocusPlane::Undamped, &grid(-0.01, -3.0, 60), zeros)
+                .unwrap();
         let [change] = locus.changes.as_slice() else {
             panic!("{:?}", locus.changes)
         };
@@ -609,7 +622,7 @@ mod tests {
     #[test]
     fn damped_zeros_cross_the_imaginary_axis_one_by_one() {
         // Eq. (3-15) below the touching damping of wu = 0.9, wv = 1.1, ratio 2.
-        let mode = |omega_rad_s, residue_per_kg| Term {
+        let mode = |omega_rad_s, residue_per_kg| ModalTerm {
             omega_rad_s,
             damping_ratio: 0.2,
             residue_per_kg,
@@ -617,7 +630,7 @@ mod tests {
         let zeros = |av: f64| {
             ModalSum::new(
                 vec![
-                    Term::undamped(0.0, 1.0),
+                    ModalTerm::undamped(0.0, 1.0),
                     mode(0.9, -2.0 * av),
                     mode(1.1, av),
                 ],
@@ -626,7 +639,7 @@ mod tests {
             .damped_zeros()
         };
         let locus =
-            Locus::follow::<PlantError>(Plane::Damped, &grid(0.01, 0.9, 90), zeros).unwrap();
+            Locus::follow::<PlantError>(LocusPlane::Damped, &grid(0.01, 0.9, 90), zeros).unwrap();
         let crossings: Vec<Crossing> = locus.changes.iter().map(|change| change.crossing).collect();
         assert_eq!(
             crossings,

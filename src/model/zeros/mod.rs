@@ -8,7 +8,7 @@
 //!              sequence of dominant modes -> Tables 3-1 to 3-4, step responses, break points
 //! ```
 //!
-//! Kinds, signs and the sequence of dominant modes are those of the undamped system unless a name says damped.
+//! ZeroCounts, signs and the sequence of dominant modes are those of the undamped system unless a name says damped.
 
 mod bounds;
 mod break_points;
@@ -25,10 +25,12 @@ pub use bounds::{Bound, bandwidth_rad_s, guaranteed_peak, opening_angle, opening
 pub use break_points::{
     critical_damping, critical_residues, critical_sums, touching_damping, two_mode_break_points,
 };
-pub use kinds::{Kinds, Zero, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
-pub use locus::{Change, Crossing, Locus, Plane};
+pub use kinds::{
+    Zero, ZeroCounts, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros,
+};
+pub use locus::{Crossing, KindChange, Locus, LocusPlane};
 pub use map::cnmp_map;
 pub use sequence::{Dominant, Sequence, dominant_sequence, sign_sequence};
-pub use step::{InitialStep, StepResponse};
-pub use sum::{ModalSum, Term};
-pub use tables::{Place, Row, TABLES, Table, table_of};
+pub use step::{StepFeatures, StepResponse};
+pub use sum::{ModalSum, ModalTerm};
+pub use tables::{MmpLocation, TABLES, Table, TableRow, table_of};

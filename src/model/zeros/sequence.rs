@@ -10,21 +10,21 @@
 //! | (4) | the same mode twice is once |
 //! | (5) | below the first event the mode that resonates there dominates; if it is a zero of G, the modes that hold the sign before it, by (2) with frequency reversed: one of them, or `[DC]` / `[-DC]` |
 
-use super::{ModalSum, Term, ZeroKind};
-use crate::model::plant::{Modal, PlantError, Sign};
+use super::{ModalSum, ModalTerm, ZeroKind};
+use crate::model::plant::{ModalModel, PlantError, Sign};
 
 /// The signs of the modes that show, slowest first: `+-+`.
-pub fn sign_sequence(modal: &Modal) -> String {
+pub fn sign_sequence(modal: &ModalModel) -> String {
     modal
         .signs()
         .iter()
-        .filter(|sign| **sign != Sign::None)
+        .filter(|sign| **sign != Sign::Hidden)
         .map(|sign| sign.symbol())
         .collect()
 }
 
 /// The sequence of dominant modes of the undamped plant in words, `[R]-[u]-[v]`; `[]` where no mode shows.
-pub fn dominant_sequence(modal: &Modal) -> Result<String, PlantError> {
+pub fn dominant_sequence(modal: &ModalModel) -> Result<String, PlantError> {
     match ModalSum::visible(modal) {
         Err(PlantError::NoResponse) => Ok("[]".into()),
         sum => Ok(Sequence::of(&sum?)?.to_string()),
@@ -303,7 +303,7 @@ fn able(
     let mut able = Vec::new();
     for candidate in candidates {
         let parts = || rest.iter().chain([candidate]);
-        let terms: Vec<Term> = parts().filter_map(|part| term(sum, *part)).collect();
+        let terms: Vec<ModalTerm> = parts().filter_map(|part| term(sum, *part)).collect();
         let constant = if parts().any(|part| *part == Part::Constant) {
             sum.constant_m_per_n()
         } else {
@@ -320,7 +320,7 @@ fn able(
     Ok(able)
 }
 
-fn term(sum: &ModalSum, part: Part) -> Option<Term> {
+fn term(sum: &ModalSum, part: Part) -> Option<ModalTerm> {
     match part {
         Part::Mode(mode) => Some(sum.terms()[mode]),
         Part::Constant => None,
@@ -364,7 +364,10 @@ mod tests {
     use super::*;
 
     fn sequence(parts: &[(f64, f64)], constant: f64) -> String {
-        let terms = parts.iter().map(|(w, r)| Term::undamped(*w, *r)).collect();
+        let terms = parts
+            .iter()
+            .map(|(w, r)| ModalTerm::undamped(*w, *r))
+            .collect();
         Sequence::of(&ModalSum::new(terms, constant).unwrap())
             .unwrap()
             .to_string()

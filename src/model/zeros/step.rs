@@ -8,7 +8,7 @@
 //! crossings than zeros in the right half plane holds for the thesis's examples and is no law: fast modes that outweigh a
 //! slow one swing through zero many times, whatever their zeros.
 
-use super::{ModalSum, Term};
+use super::{ModalSum, ModalTerm};
 
 /// The response of a plant to a step of 1 N.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct StepResponse<'a> {
 
 /// What the beginning of a step response shows.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InitialStep {
+pub struct StepFeatures {
     /// Whether it sets out in the positive direction.
     pub starts_positive: bool,
     /// Whether it ends (or, with a double integrator, goes off) in the positive direction.
@@ -36,7 +36,7 @@ pub struct InitialStep {
     pub initial_s: f64,
 }
 
-impl InitialStep {
+impl StepFeatures {
     /// Initial undershoot: it sets out against its end.
     pub fn has_undershoot(&self) -> bool {
         self.starts_positive != self.ends_positive
@@ -90,9 +90,9 @@ impl<'a> StepResponse<'a> {
     }
 
     /// Directions, zero crossings and reversals.
-    pub fn initial(&self) -> InitialStep {
+    pub fn initial(&self) -> StepFeatures {
         let window_s = self.window_s();
-        let period = |term: &Term| 2.0 * std::f64::consts::PI / term.omega_rad_s;
+        let period = |term: &ModalTerm| 2.0 * std::f64::consts::PI / term.omega_rad_s;
         let initial_s = self
             .sum
             .terms()
@@ -107,7 +107,7 @@ impl<'a> StepResponse<'a> {
             .iter()
             .filter(|t| **t < last_s)
             .map(|t| against(self.position_m(*t)));
-        InitialStep {
+        StepFeatures {
             starts_positive: self.starts_positive(window_s),
             ends_positive,
             undershoot_m: before.fold(against(self.sum.constant_m_per_n()).max(0.0), f64::max),
@@ -225,7 +225,7 @@ fn bisected(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 }
 
 /// exp(-zeta w t) cos(wd t) and exp(-zeta w t) sin(wd t)/wd; hyperbolic above critical damping.
-fn swing(term: &Term, time_s: f64) -> (f64, f64) {
+fn swing(term: &ModalTerm, time_s: f64) -> (f64, f64) {
     let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
     let (decay, square) = (zeta * w, w * w * (1.0 - zeta) * (1.0 + zeta));
     let rate = square.abs().sqrt();
@@ -246,14 +246,14 @@ fn swing(term: &Term, time_s: f64) -> (f64, f64) {
     }
 }
 
-fn velocity(term: &Term, time_s: f64) -> f64 {
+fn velocity(term: &ModalTerm, time_s: f64) -> f64 {
     if term.omega_rad_s == 0.0 {
         return term.residue_per_kg * time_s;
     }
     term.residue_per_kg * swing(term, time_s).1
 }
 
-fn position(term: &Term, time_s: f64) -> f64 {
+fn position(term: &ModalTerm, time_s: f64) -> f64 {
     let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
     if w == 0.0 {
         return 0.5 * term.residue_per_kg * time_s * time_s;
@@ -273,10 +273,10 @@ fn position(term: &Term, time_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::zeros::Kinds;
+    use crate::model::zeros::ZeroCounts;
 
     fn sum(parts: &[(f64, f64, f64)]) -> ModalSum {
-        let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &_| Term {
+        let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &_| ModalTerm {
             omega_rad_s,
             damping_ratio,
             residue_per_kg,
@@ -310,12 +310,12 @@ mod tests {
             0.01, 0.04, 0.06, 0.5, 2.0, 5.0, 8.0, 10.0, 12.0, 15.0, 18.0, 20.9, 21.1, 25.0, 40.0,
         ] {
             let plant = eq_3_9(a0);
-            let kinds = Kinds::of(
+            let kinds = ZeroCounts::of(
                 &ModalSum::new(
                     plant
                         .terms()
                         .iter()
-                        .map(|t| Term {
+                        .map(|t| ModalTerm {
                             damping_ratio: 0.0,
                             ..*t
                         })

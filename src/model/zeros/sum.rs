@@ -7,11 +7,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::Zero;
 use super::kinds::{self, System};
-use crate::model::plant::{Modal, Mode, PlantError, Sign};
+use crate::model::plant::{ModalModel, Mode, PlantError, Sign};
 
 /// One mode, seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Term {
+pub struct ModalTerm {
     /// Undamped natural frequency in rad/s; 0 for a double integrator.
     pub omega_rad_s: f64,
     /// Damping ratio.
@@ -20,10 +20,10 @@ pub struct Term {
     pub residue_per_kg: f64,
 }
 
-impl Term {
+impl ModalTerm {
     /// A mode without damping.
-    pub fn undamped(omega_rad_s: f64, residue_per_kg: f64) -> Term {
-        Term {
+    pub fn undamped(omega_rad_s: f64, residue_per_kg: f64) -> ModalTerm {
+        ModalTerm {
             omega_rad_s,
             damping_ratio: 0.0,
             residue_per_kg,
@@ -45,13 +45,13 @@ impl Term {
 /// The sum, slowest mode first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalSum {
-    terms: Vec<Term>,
+    terms: Vec<ModalTerm>,
     constant_m_per_n: f64,
 }
 
 impl ModalSum {
     /// A sum; its modes may come in any order. One whose residues and constant are all zero is refused.
-    pub fn new(mut terms: Vec<Term>, constant_m_per_n: f64) -> Result<ModalSum, PlantError> {
+    pub fn new(mut terms: Vec<ModalTerm>, constant_m_per_n: f64) -> Result<ModalSum, PlantError> {
         terms.retain(|term| term.residue_per_kg != 0.0);
         terms.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
         if terms.is_empty() && constant_m_per_n == 0.0 {
@@ -63,14 +63,14 @@ impl ModalSum {
         })
     }
 
-    /// The modes of a structure that show between its actuator and its probe ([`Modal::signs`]).
-    pub fn visible(modal: &Modal) -> Result<ModalSum, PlantError> {
+    /// The modes of a structure that show between its actuator and its probe ([`ModalModel::signs`]).
+    pub fn visible(modal: &ModalModel) -> Result<ModalSum, PlantError> {
         let shown = modal
             .modes
             .iter()
             .zip(modal.signs())
-            .filter(|(_, sign)| *sign != Sign::None);
-        let term = |(mode, _): (&Mode, Sign)| Term {
+            .filter(|(_, sign)| *sign != Sign::Hidden);
+        let term = |(mode, _): (&Mode, Sign)| ModalTerm {
             omega_rad_s: mode.omega_rad_s,
             damping_ratio: mode.damping_ratio,
             residue_per_kg: mode.residue_per_kg(),
@@ -79,7 +79,7 @@ impl ModalSum {
     }
 
     /// The modes with a residue, slowest first.
-    pub fn terms(&self) -> &[Term] {
+    pub fn terms(&self) -> &[ModalTerm] {
         &self.terms
     }
 
@@ -97,7 +97,7 @@ impl ModalSum {
 
     /// G(s) in m/N.
     pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
-        let part = |t: &Term| t.resonance(s) * t.residue_per_kg;
+        let part = |t: &ModalTerm| t.resonance(s) * t.residue_per_kg;
         self.terms.iter().map(part).sum::<Complex<f64>>() + self.constant_m_per_n
     }
 
@@ -119,7 +119,7 @@ impl ModalSum {
         if self.terms.is_empty() {
             return Ok(Vec::new());
         }
-        let vector = |of: fn(&Term) -> f64| {
+        let vector = |of: fn(&ModalTerm) -> f64| {
             DVector::from_iterator(self.terms.len(), self.terms.iter().map(of))
         };
         zeros(&System {
@@ -141,7 +141,7 @@ mod tests {
     fn a_constant_gives_the_zeros_of_the_closed_form() {
         // r/(u + w^2) + R = 0 at u = -w^2 - r/R: on the imaginary axis for r/R > -w^2, real below.
         for (residue, constant) in [(2.0, 0.5), (-3.0, 0.5), (1.0, 1e-9), (1e-9, -1.0)] {
-            let sum = ModalSum::new(vec![Term::undamped(2.0, residue)], constant).unwrap();
+            let sum = ModalSum::new(vec![ModalTerm::undamped(2.0, residue)], constant).unwrap();
             let u = -4.0 - residue / constant;
             let zeros = sum.undamped_zeros().unwrap();
             assert_eq!(zeros.len(), 2);
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn a_sum_of_nothing_is_refused() {
         assert_eq!(
-            ModalSum::new(vec![Term::undamped(1.0, 0.0)], 0.0),
+            ModalSum::new(vec![ModalTerm::undamped(1.0, 0.0)], 0.0),
             Err(PlantError::NoResponse)
         );
     }

@@ -15,11 +15,11 @@
 //! A misprint: in Table 3-2 the places of the MMP zeros stand one row too low (cyclically). `[v]-[u]-[v]` has them below wu,
 //! `[u]-[v]` none, `[u]-[v]-[u]` above wv.
 
-use super::{Kinds, ModalSum, Sequence};
+use super::{ModalSum, Sequence, ZeroCounts};
 
 /// Between which resonances a pair of MMP zeros lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Place {
+pub enum MmpLocation {
     /// (0, wu).
     BelowU,
     /// (wu, wv).
@@ -30,19 +30,19 @@ pub enum Place {
 
 /// One row of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct TableRow {
     /// `3-1` to `3-4`.
     pub table: &'static str,
-    /// Row of the table, from 1.
+    /// TableRow of the table, from 1.
     pub number: usize,
     /// Signs of the modes by frequency.
     pub signs: &'static str,
     /// The sequence as printed.
     pub printed: &'static str,
     /// The kinds of the zeros as printed; one of these.
-    pub kinds: &'static [Kinds],
+    pub kinds: &'static [ZeroCounts],
     /// Where the MMP zeros lie.
-    pub mmp: &'static [Place],
+    pub mmp: &'static [MmpLocation],
     pattern: &'static [Piece],
 }
 
@@ -53,7 +53,7 @@ enum Piece {
     Some(&'static [&'static str]),
 }
 
-impl Row {
+impl TableRow {
     /// Whether a sequence is of this row.
     pub fn fits(&self, signs: &str, names: &[String]) -> bool {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -80,12 +80,12 @@ pub struct Table {
     /// `3-1` to `3-4`.
     pub name: &'static str,
     /// The rows as printed.
-    pub rows: &'static [Row],
+    pub rows: &'static [TableRow],
 }
 
 impl Table {
     /// The row of a plant, by its signs and its sequence; `None` where no row has that sequence.
-    pub fn row(&self, sum: &ModalSum, sequence: &Sequence) -> Option<&'static Row> {
+    pub fn row(&self, sum: &ModalSum, sequence: &Sequence) -> Option<&'static TableRow> {
         let (signs, names) = (signs(sum), turned(sum, sequence));
         self.rows.iter().find(|row| row.fits(&signs, &names))
     }
@@ -143,19 +143,19 @@ fn turned(sum: &ModalSum, sequence: &Sequence) -> Vec<String> {
     }
 }
 
-const fn kinds(mmp: usize, real: usize, quartets: usize) -> Kinds {
-    Kinds {
+const fn kinds(mmp: usize, real: usize, quartets: usize) -> ZeroCounts {
+    ZeroCounts {
         mmp,
         real,
         quartets,
     }
 }
 
-const MMP: &[Kinds] = &[kinds(1, 0, 0)];
-const REAL: &[Kinds] = &[kinds(0, 1, 0)];
-const DUAL_MMP: &[Kinds] = &[kinds(2, 0, 0)];
-const MMP_AND_REAL: &[Kinds] = &[kinds(1, 1, 0)];
-const QUARTET_OR_DUAL_REAL: &[Kinds] = &[kinds(0, 0, 1), kinds(0, 2, 0)];
+const MMP: &[ZeroCounts] = &[kinds(1, 0, 0)];
+const REAL: &[ZeroCounts] = &[kinds(0, 1, 0)];
+const DUAL_MMP: &[ZeroCounts] = &[kinds(2, 0, 0)];
+const MMP_AND_REAL: &[ZeroCounts] = &[kinds(1, 1, 0)];
+const QUARTET_OR_DUAL_REAL: &[ZeroCounts] = &[kinds(0, 0, 1), kinds(0, 2, 0)];
 
 const R: Piece = Piece::One(&["R"]);
 const U: Piece = Piece::One(&["u"]);
@@ -169,10 +169,10 @@ const fn row(
     signs: &'static str,
     printed: &'static str,
     pattern: &'static [Piece],
-    kinds: &'static [Kinds],
-    mmp: &'static [Place],
-) -> Row {
-    Row {
+    kinds: &'static [ZeroCounts],
+    mmp: &'static [MmpLocation],
+) -> TableRow {
+    TableRow {
         table,
         number,
         signs,
@@ -183,7 +183,7 @@ const fn row(
     }
 }
 
-use Place::{AboveV, BelowU, Between};
+use MmpLocation::{AboveV, BelowU, Between};
 
 /// Tables 3-1 to 3-4, in their order.
 pub const TABLES: &[Table] = &[

@@ -1,19 +1,19 @@
 //! What a person gets of a record: its pictures, and one page with all of them that needs nothing from elsewhere.
 //!
 //! ```text
-//! experiment::Analysis, config, recording ---------> AnalysedRun   --.
-//!                                                                  Analysed -> pictures (report::*) -> page (report::page)
-//! experiment::ForeignAnalysis, what was measured --> AnalysedTable --'
+//! experiment::Analysis, config, recording ---------> RunReport   --.
+//!                                                                  ReportSource -> pictures (report::*) -> page (report::page)
+//! experiment::ExternalAnalysis, what was measured --> TableReport --'
 //! ```
 
+mod bench_run;
+mod external;
 mod page;
-mod pictures;
-mod run;
-mod shown;
-mod table;
+mod plots;
+mod summary;
 
+pub use bench_run::RunReport;
+pub use external::TableReport;
 pub use page::page;
-pub use pictures::{KINDS, Picture, pictures};
-pub use run::AnalysedRun;
-pub use shown::{Analysed, Shown};
-pub use table::AnalysedTable;
+pub use plots::{PLOT_KINDS, Plot, pictures};
+pub use summary::{ReportSource, Shown};

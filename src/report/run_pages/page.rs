@@ -1,6 +1,6 @@
 //! The page of a record: the verdict and its reasons first.
 
-use super::{Analysed, Picture, Shown};
+use super::{Plot, ReportSource, Shown};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::identify::verdict::UncertainZero;
 use crate::report::number::{interval, percent};
@@ -9,7 +9,7 @@ use crate::report::page::{document, escaped, facts, picture, row, table};
 const HERTZ: f64 = 2.0 * std::f64::consts::PI;
 
 /// The page, as an HTML document.
-pub fn page(record: &dyn Analysed, pictures: &[Picture]) -> String {
+pub fn page(record: &dyn ReportSource, pictures: &[Plot]) -> String {
     let shown = record.shown();
     let (before, behind) = record.sections();
     let pictures: String = pictures
@@ -34,7 +34,7 @@ pub fn page(record: &dyn Analysed, pictures: &[Picture]) -> String {
     document(&shown.title, &body)
 }
 
-fn verdict(shown: &Shown<'_>, record: &dyn Analysed) -> String {
+fn verdict(shown: &Shown<'_>, record: &dyn ReportSource) -> String {
     let name = shown.verdict.cnmp.name();
     let all: Vec<_> = evidence(shown)
         .into_iter()
@@ -56,7 +56,7 @@ fn evidence(shown: &Shown<'_>) -> Vec<(String, String)> {
     let fall = shown.verdict.phase.map(|p| {
         format!(
             "{:.1} deg beyond what the magnitude asks for",
-            -p.beyond_deg
+            -p.excess_phase_deg
         )
     });
     let pairs = [

@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{self, CalibrationSettings, ConfigError, WhenUnfit};
+use crate::config::{self, CalibrationSettings, ConfigError, OnInvalidCalibration};
 
 /// What `bench calibrate` found, with date and devices.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -114,7 +114,7 @@ pub enum CalibrationError {
 }
 
 /// The calibration of a run, and warnings about it; nothing where none is configured.
-pub fn use_of(
+pub fn load_calibration(
     settings: &CalibrationSettings,
     amplifier: &str,
     probe: &str,
@@ -141,8 +141,10 @@ pub fn use_of(
     for (complaint, then, setting) in complaints {
         match (complaint, then) {
             (None, _) => {}
-            (Some(why), WhenUnfit::Warn) => warnings.push(format!("calibration {file}: {why}")),
-            (Some(why), WhenUnfit::Refuse) => {
+            (Some(why), OnInvalidCalibration::Warn) => {
+                warnings.push(format!("calibration {file}: {why}"))
+            }
+            (Some(why), OnInvalidCalibration::Refuse) => {
                 return Err(CalibrationError::Unfit {
                     file: file.clone(),
                     why,

@@ -18,6 +18,7 @@ mod file;
 mod rig;
 
 pub use file::{
-    AmplifierCalibration, Calibration, CalibrationError, ChainCalibration, ProbeCalibration, use_of,
+    AmplifierCalibration, Calibration, CalibrationError, ChainCalibration, ProbeCalibration,
+    load_calibration,
 };
 pub use rig::CalibratedRig;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bench_hal::can::budget::Exchange;
-use bench_hal::can::bus::{PortError, SocketPort, Threads};
+use bench_hal::can::bus::{PortError, SocketPort, SystemHost};
 use bench_hal::can::drive::{
     CanopenDrive, DriveSettings, ExpectedIdentity, OpenError, TorqueMode as Mode,
 };
@@ -12,10 +12,10 @@ use bench_hal::can::vesc::{self, Vesc};
 
 use super::Amplifier;
 use crate::config::{
-    AmplifierDevice, CanopenSettings, Config, ExchangeSettings, TargetReference, TorqueMode,
-    VescSettings, WhenUnheard,
+    AmplifierDevice, CanopenSettings, Config, ExchangeSettings, OnCommunicationLoss,
+    TargetReference, TorqueMode, VescSettings,
 };
-use crate::rt::thread::below_the_loop;
+use crate::rt::thread::device_thread_setup;
 
 /// The step of a VESC's set-point in amperes: whole milliamperes.
 const VESC_STEP_A: f64 = 1e-3;
@@ -48,14 +48,14 @@ pub fn open(config: &Config) -> Result<(Amplifier, String), AmplifierError> {
         AmplifierDevice::Simulated(_) => Err(AmplifierError::Simulated),
         AmplifierDevice::Canopen(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            let host = Threads::new(port).prepared(below_the_loop(&config.servo));
+            let host = SystemHost::new(port).prepared(device_thread_setup(&config.servo));
             let drive = CanopenDrive::open(drive_settings(device, config), Box::new(host))?;
             let identity = canopen_identity(drive.identity());
             Ok((Box::new(drive), identity))
         }
         AmplifierDevice::Vesc(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            let host = Threads::new(port).prepared(below_the_loop(&config.servo));
+            let host = SystemHost::new(port).prepared(device_thread_setup(&config.servo));
             let opened = Vesc::open(vesc_settings(device, config), Box::new(host));
             let vesc = opened.map_err(|why| AmplifierError::Vesc {
                 node: device.node,
@@ -104,10 +104,10 @@ pub fn drive_settings(device: &CanopenSettings, config: &Config) -> DriveSetting
             serial: device.identity.serial,
         },
         abort_connection: match device.when_unheard {
-            WhenUnheard::Fault => Some(1),
-            WhenUnheard::DisableVoltage => Some(2),
-            WhenUnheard::QuickStop => Some(3),
-            WhenUnheard::OwnReaction => None,
+            OnCommunicationLoss::Fault => Some(1),
+            OnCommunicationLoss::DisableVoltage => Some(2),
+            OnCommunicationLoss::QuickStop => Some(3),
+            OnCommunicationLoss::OwnReaction => None,
         },
         heartbeat_period: seconds(times.heartbeat_s),
         heartbeat_timeout: seconds(times.heartbeat_lost_s),

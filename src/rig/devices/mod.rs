@@ -13,7 +13,7 @@ pub mod probe;
 
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::Watch;
+use bench_hal::serial::StatisticsHandle;
 use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Rig, Tick, Validity};
 
 use crate::config::{AmplifierDevice, Config, ProbeDevice};
@@ -68,7 +68,7 @@ pub enum DevicesError {
 }
 
 /// An open rig.
-pub struct Opened {
+pub struct OpenRig {
     /// What the loop drives.
     pub rig: Box<dyn Rig>,
     /// Which amplifier it is, as it says itself.
@@ -78,7 +78,7 @@ pub struct Opened {
     /// What a person should know before the run: line settings not taken, and the like.
     pub notes: Vec<String>,
     /// Counts of the probe's reader, while the loop has the rig.
-    pub watch: Option<Watch>,
+    pub watch: Option<StatisticsHandle>,
 }
 
 /// Whether the configuration names no device.
@@ -95,7 +95,7 @@ pub fn check(config: &Config) -> Result<(), DevicesError> {
 }
 
 /// Opens what the configuration names. Afterwards the amplifier is off, and the probe gives valid readings.
-pub fn open(config: &Config) -> Result<Opened, DevicesError> {
+pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
     if is_simulated(config) {
         return simulate(config);
     }
@@ -114,7 +114,7 @@ pub fn open(config: &Config) -> Result<Opened, DevicesError> {
     wait_for_reading(&mut probe, &watch)?;
     let rig = Box::new(Devices { amplifier, probe });
     let (amplifier, probe) = (amplifier_identity, probe::identity(config));
-    Ok(Opened {
+    Ok(OpenRig {
         rig,
         amplifier,
         probe,
@@ -124,11 +124,11 @@ pub fn open(config: &Config) -> Result<Opened, DevicesError> {
 }
 
 /// The simulated stage with the rates, delays and steps of whatever devices the configuration names.
-pub fn simulate(config: &Config) -> Result<Opened, DevicesError> {
+pub fn simulate(config: &Config) -> Result<OpenRig, DevicesError> {
     let (rig, name) = (Box::new(SimulatedRig::new(config)?), || {
         "simulated".to_string()
     });
-    Ok(Opened {
+    Ok(OpenRig {
         rig,
         amplifier: name(),
         probe: name(),
@@ -138,7 +138,10 @@ pub fn simulate(config: &Config) -> Result<Opened, DevicesError> {
 }
 
 /// A run that began before the first reading would trip at once.
-fn wait_for_reading(probe: &mut impl DisplacementProbe, watch: &Watch) -> Result<(), DevicesError> {
+fn wait_for_reading(
+    probe: &mut impl DisplacementProbe,
+    watch: &StatisticsHandle,
+) -> Result<(), DevicesError> {
     let begin = Instant::now();
     loop {
         let reading = probe.latest(Tick::default());
@@ -152,7 +155,7 @@ fn wait_for_reading(probe: &mut impl DisplacementProbe, watch: &Watch) -> Result
     }
 }
 
-fn no_reading(validity: Validity, watch: &Watch) -> DevicesError {
+fn no_reading(validity: Validity, watch: &StatisticsHandle) -> DevicesError {
     let s = watch.statistics();
     let what = match validity {
         Validity::OutOfRange => "the target stayed outside the probe's range",

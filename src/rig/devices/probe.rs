@@ -11,7 +11,7 @@ use crate::config::{
     AsciiSettings, CapancdtSettings, Config, CounterMeaning, LineSettings, MountingSettings,
     OptoncdtSettings, Parity, PollingSettings, ProbeDevice,
 };
-use crate::rt::thread::below_the_loop;
+use crate::rt::thread::device_thread_setup;
 
 /// A probe that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -63,7 +63,7 @@ pub fn open(config: &Config) -> Result<SerialProbe, ProbeError> {
     let settings = settings(config).ok_or(ProbeError::Simulated)?;
     Ok(SerialProbe::open_with(
         settings,
-        below_the_loop(&config.servo),
+        device_thread_setup(&config.servo),
     )?)
 }
 
@@ -199,7 +199,7 @@ fn ascii(device: &AsciiSettings) -> ascii::Settings {
         over: device.over.clone(),
         under: device.under.clone(),
         error: device.error.clone(),
-        error_words: &[],
+        error_texts: &[],
         request: device.request.clone(),
         unit_m: device.unit_m,
         offset_m: device.zero_m,

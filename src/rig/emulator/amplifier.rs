@@ -4,23 +4,24 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use bench_hal::can::bus::{Claim, Condition, Host, Running, SocketPort, Threads};
+use bench_hal::can::bus::{Claim, Condition, Host, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::device::{
-    ActingAmplifier, Device, DeviceFault, DeviceSettings, DeviceTask, Follow, Passed, VescDevice,
+    AmplifierTask, Device, DeviceFault, EmulatedAmplifier, EmulatedDriveSettings, EmulatedVesc,
+    FrameCounts, Observer,
 };
 
-use super::ActingError;
+use super::EmulatorError;
 use super::fault::AmplifierFault;
-use super::journal::{CurrentWatch, Entry, Journal, Turned};
+use super::journal::{CurrentWatch, EventLog, LogEntry, Turned};
 use super::stage::{Stage, seconds};
 use crate::config::{AmplifierDevice, CanopenSettings, Config};
 use crate::rig::devices::amplifier::reference;
-use crate::rt::thread::below_the_loop;
+use crate::rt::thread::device_thread_setup;
 
 /// An amplifier at work; dropping it takes it from the bus.
 pub struct Amplifier {
-    _running: Running,
-    device: Arc<Mutex<dyn ActingAmplifier>>,
+    _running: TaskHandle,
+    device: Arc<Mutex<dyn EmulatedAmplifier>>,
     host: Arc<dyn Host>,
     tally: Arc<Tally>,
     kind: &'static str,
@@ -59,12 +60,12 @@ impl Amplifier {
     pub fn open(
         config: &Config,
         stage: Stage,
-        journal: Journal,
+        journal: EventLog,
         start: Instant,
-    ) -> Result<Amplifier, ActingError> {
+    ) -> Result<Amplifier, EmulatorError> {
         let (interface, bit_rate, node) = match &config.amplifier.device {
             AmplifierDevice::Simulated(_) => {
-                return Err(ActingError::Simulated {
+                return Err(EmulatorError::Simulated {
                     device: "amplifier",
                 });
             }
@@ -74,11 +75,12 @@ impl Amplifier {
         let port = SocketPort::open(interface, bit_rate)?;
         // Another claim than that of the driver, which may run on this computer too.
         let claim = Claim::new(&format!("{interface}/device"), node);
-        let held = |held| ActingError::Held {
+        let held = |held| EmulatorError::NodeInUse {
             interface: interface.clone(),
             held,
         };
-        let host = Arc::new(Threads::since(port, start).prepared(below_the_loop(&config.servo)));
+        let host =
+            Arc::new(SystemHost::since(port, start).prepared(device_thread_setup(&config.servo)));
         Ok(Amplifier {
             _claim: claim.map_err(held)?,
             ..Amplifier::start(config, host, stage, journal)?
@@ -90,13 +92,13 @@ impl Amplifier {
         config: &Config,
         host: Arc<dyn Host>,
         stage: Stage,
-        journal: Journal,
-    ) -> Result<Amplifier, ActingError> {
+        journal: EventLog,
+    ) -> Result<Amplifier, EmulatorError> {
         let device = device(config)?;
         let tally = Arc::<Tally>::default();
         let follow = follow(stage, journal, Arc::clone(&tally));
-        let running = DeviceTask::start_followed(&*host, Arc::clone(&device), follow);
-        let running = running.map_err(|source| ActingError::Thread {
+        let running = AmplifierTask::start_observed(&*host, Arc::clone(&device), follow);
+        let running = running.map_err(|source| EmulatorError::Thread {
             device: "amplifier",
             source,
         })?;
@@ -120,7 +122,7 @@ impl Amplifier {
     }
 
     /// Misbehaves from now on. In bus-off nothing passes: the other end is told, and the device hears and says nothing.
-    pub fn ask(&self, fault: AmplifierFault) -> Result<(), ActingError> {
+    pub fn ask(&self, fault: AmplifierFault) -> Result<(), EmulatorError> {
         match fault {
             AmplifierFault::Device(fault) => self.device().inject(fault),
             AmplifierFault::BusOff => {
@@ -156,27 +158,27 @@ impl Amplifier {
         &self.tally
     }
 
-    fn device(&self) -> MutexGuard<'_, dyn ActingAmplifier + 'static> {
+    fn device(&self) -> MutexGuard<'_, dyn EmulatedAmplifier + 'static> {
         self.device.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-fn device(config: &Config) -> Result<Arc<Mutex<dyn ActingAmplifier>>, ActingError> {
+fn device(config: &Config) -> Result<Arc<Mutex<dyn EmulatedAmplifier>>, EmulatorError> {
     match &config.amplifier.device {
-        AmplifierDevice::Simulated(_) => Err(ActingError::Simulated {
+        AmplifierDevice::Simulated(_) => Err(EmulatorError::Simulated {
             device: "amplifier",
         }),
         AmplifierDevice::Canopen(device) => Ok(Arc::new(Mutex::new(Device::new(drive(device))))),
-        AmplifierDevice::Vesc(device) => Ok(Arc::new(Mutex::new(VescDevice::new(device.node)))),
+        AmplifierDevice::Vesc(device) => Ok(Arc::new(Mutex::new(EmulatedVesc::new(device.node)))),
     }
 }
 
 /// A drive that is what the configuration expects.
-fn drive(device: &CanopenSettings) -> DeviceSettings {
-    let usual = DeviceSettings::default();
+fn drive(device: &CanopenSettings) -> EmulatedDriveSettings {
+    let usual = EmulatedDriveSettings::default();
     let [vendor, product, revision, serial] = usual.identity;
     let identity = &device.identity;
-    DeviceSettings {
+    EmulatedDriveSettings {
         node: device.node,
         identity: [
             identity.vendor.unwrap_or(vendor),
@@ -192,7 +194,7 @@ fn drive(device: &CanopenSettings) -> DeviceSettings {
 }
 
 /// Moves the stage by what the device gives, lets it measure what flows, and writes down its changes.
-fn follow(stage: Stage, journal: Journal, tally: Arc<Tally>) -> Follow {
+fn follow(stage: Stage, journal: EventLog, tally: Arc<Tally>) -> Observer {
     let (mut given_a, mut state, mut watch) = (0.0, "", CurrentWatch::default());
     Box::new(move |passed, device| {
         let (now_ns, current_a) = (passed.now_ns, device.current_a());
@@ -203,7 +205,7 @@ fn follow(stage: Stage, journal: Journal, tally: Arc<Tally>) -> Follow {
         device.set_measured_current_a(Some(stage.current_a(now_ns)));
         count(&tally, passed, device);
         let write = |what, text: &str, since_s| {
-            let entry = Entry {
+            let entry = LogEntry {
                 time_s: seconds(now_ns),
                 device: "amplifier",
                 what,
@@ -227,7 +229,7 @@ fn follow(stage: Stage, journal: Journal, tally: Arc<Tally>) -> Follow {
     })
 }
 
-fn count(tally: &Tally, passed: Passed, device: &mut dyn ActingAmplifier) {
+fn count(tally: &Tally, passed: FrameCounts, device: &mut dyn EmulatedAmplifier) {
     tally.received.store(passed.received, Relaxed);
     tally.sent.store(passed.sent, Relaxed);
     tally

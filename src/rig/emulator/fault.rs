@@ -7,7 +7,7 @@ use crate::util::quantity;
 
 /// What an acting device is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ActingFault {
+pub enum EmulatedFault {
     /// All devices are sound again.
     None,
     /// Of the amplifier.
@@ -140,9 +140,9 @@ fn words() -> String {
     KINDS.map(|(word, ..)| word).join(", ")
 }
 
-impl ActingFault {
+impl EmulatedFault {
     /// Reads the words of a fault: `KIND` or `KIND=VALUE`.
-    pub fn parse(text: &str) -> Result<ActingFault, FaultError> {
+    pub fn parse(text: &str) -> Result<EmulatedFault, FaultError> {
         let (word, said) = text
             .split_once('=')
             .map_or((text, None), |(word, value)| (word, Some(value)));
@@ -161,27 +161,27 @@ impl ActingFault {
             return Err(refused("left out: this fault has no value"));
         }
         if word == "none" {
-            return Ok(ActingFault::None);
+            return Ok(EmulatedFault::None);
         }
-        let amplifier = |fault| ActingFault::Amplifier(AmplifierFault::Device(fault));
+        let amplifier = |fault| EmulatedFault::Amplifier(AmplifierFault::Device(fault));
         match word.split_once('.') {
-            Some(("amplifier", "bus-off")) => Ok(ActingFault::Amplifier(AmplifierFault::BusOff)),
+            Some(("amplifier", "bus-off")) => Ok(EmulatedFault::Amplifier(AmplifierFault::BusOff)),
             Some(("amplifier", kind)) => of_amplifier(kind, value).map(amplifier).map_err(refused),
             Some((_, kind)) => of_probe(kind, value)
-                .map(ActingFault::Probe)
+                .map(EmulatedFault::Probe)
                 .map_err(refused),
             None => Err(unknown()),
         }
     }
 
     /// What ends this fault.
-    pub fn end(self) -> ActingFault {
+    pub fn end(self) -> EmulatedFault {
         match self {
-            ActingFault::None => ActingFault::None,
-            ActingFault::Amplifier(_) => {
-                ActingFault::Amplifier(AmplifierFault::Device(DeviceFault::None))
+            EmulatedFault::None => EmulatedFault::None,
+            EmulatedFault::Amplifier(_) => {
+                EmulatedFault::Amplifier(AmplifierFault::Device(DeviceFault::None))
             }
-            ActingFault::Probe(_) => ActingFault::Probe(Fault::None),
+            EmulatedFault::Probe(_) => EmulatedFault::Probe(Fault::None),
         }
     }
 }
@@ -191,12 +191,12 @@ fn of_amplifier(kind: &str, value: &str) -> Result<DeviceFault, &'static str> {
         "silence" => DeviceFault::Mute,
         "unplugged" => DeviceFault::Unplugged,
         "short-frames" => DeviceFault::ShortFrames,
-        "senseless-status" => DeviceFault::SenselessStatus,
+        "senseless-status" => DeviceFault::InvalidStatusword,
         "fault" => DeviceFault::Drive(code(value)?),
         "emergency" => DeviceFault::EmergencyOnly(code(value)?),
         "target-ignored" => DeviceFault::TargetIgnored,
         "set-points-ignored" => DeviceFault::SetPointsIgnored,
-        "orders-ignored" => DeviceFault::OrdersIgnored,
+        "orders-ignored" => DeviceFault::CommandsIgnored,
         "switches-off" => DeviceFault::SwitchesOff,
         "late" => DeviceFault::Late(nanoseconds(value)? / 1_000_000),
         "reset" => DeviceFault::Reset,
@@ -254,8 +254,8 @@ mod tests {
 
     #[test]
     fn every_kind_is_another_fault_and_is_in_the_help() {
-        let faults: Vec<ActingFault> = KINDS
-            .map(|(word, ..)| ActingFault::parse(word).expect(word))
+        let faults: Vec<EmulatedFault> = KINDS
+            .map(|(word, ..)| EmulatedFault::parse(word).expect(word))
             .to_vec();
         for (index, fault) in faults.iter().enumerate() {
             assert!(!faults[..index].contains(fault), "{}", KINDS[index].0);
@@ -265,25 +265,25 @@ mod tests {
 
     #[test]
     fn values_are_read_in_the_units_that_a_person_writes() {
-        let amplifier = |fault| Ok(ActingFault::Amplifier(AmplifierFault::Device(fault)));
+        let amplifier = |fault| Ok(EmulatedFault::Amplifier(AmplifierFault::Device(fault)));
         assert_eq!(
-            ActingFault::parse("amplifier.late=250ms"),
+            EmulatedFault::parse("amplifier.late=250ms"),
             amplifier(DeviceFault::Late(250))
         );
         assert_eq!(
-            ActingFault::parse("amplifier.fault=0x3220"),
+            EmulatedFault::parse("amplifier.fault=0x3220"),
             amplifier(DeviceFault::Drive(0x3220))
         );
         assert_eq!(
-            ActingFault::parse("probe.jump=-1mm"),
-            Ok(ActingFault::Probe(Fault::Jump {
+            EmulatedFault::parse("probe.jump=-1mm"),
+            Ok(EmulatedFault::Probe(Fault::Jump {
                 every: 2,
                 by_m: -1e-3
             }))
         );
         assert_eq!(
-            ActingFault::parse("probe.corrupt=97"),
-            Ok(ActingFault::Probe(Fault::Corrupt { every: 97 }))
+            EmulatedFault::parse("probe.corrupt=97"),
+            Ok(EmulatedFault::Probe(Fault::Corrupt { every: 97 }))
         );
     }
 
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn what_is_no_fault_is_refused_with_what_there_is() {
-        let refusal = |text| ActingFault::parse(text).expect_err(text).to_string();
+        let refusal = |text| EmulatedFault::parse(text).expect_err(text).to_string();
         for text in [
             "",
             "silence",

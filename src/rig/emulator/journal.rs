@@ -9,7 +9,7 @@ use super::stage::seconds;
 
 /// A change.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Entry {
+pub struct LogEntry {
     /// When, in seconds since the start.
     pub time_s: f64,
     /// `amplifier`, `probe`.
@@ -29,9 +29,9 @@ pub struct Entry {
     pub since_s: Option<f64>,
 }
 
-impl fmt::Display for Entry {
+impl fmt::Display for LogEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Entry {
+        let LogEntry {
             time_s,
             device,
             what,
@@ -52,17 +52,17 @@ impl fmt::Display for Entry {
 
 /// Where a device writes its changes; clones write to the same place.
 #[derive(Clone, Debug)]
-pub struct Journal(Sender<Entry>);
+pub struct EventLog(Sender<LogEntry>);
 
-impl Journal {
+impl EventLog {
     /// A journal and where it is read.
-    pub fn new() -> (Journal, Receiver<Entry>) {
+    pub fn new() -> (EventLog, Receiver<LogEntry>) {
         let (sender, receiver) = channel();
-        (Journal(sender), receiver)
+        (EventLog(sender), receiver)
     }
 
     /// Writes; if nobody reads any more, nobody misses it.
-    pub fn write(&self, entry: Entry) {
+    pub fn write(&self, entry: LogEntry) {
         let _ = self.0.send(entry);
     }
 }

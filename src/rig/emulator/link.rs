@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::ActingError;
+use super::EmulatorError;
 
 /// A symbolic link; dropping it removes it.
 #[derive(Debug)]
@@ -14,7 +14,7 @@ pub(super) struct Link {
 
 impl Link {
     /// Links `path` to `target`. A link that leads nowhere (of a process that was killed) is replaced, nothing else is.
-    pub(super) fn new(path: &Path, target: &Path) -> Result<Link, ActingError> {
+    pub(super) fn new(path: &Path, target: &Path) -> Result<Link, EmulatorError> {
         if path.is_symlink() && !path.exists() {
             let _ = std::fs::remove_file(path); // if it cannot go, the next call says why
         }
@@ -23,7 +23,7 @@ impl Link {
                 ErrorKind::AlreadyExists => "it exists".to_string(),
                 _ => error.to_string(),
             };
-            ActingError::Link {
+            EmulatorError::Link {
                 path: path.into(),
                 why,
             }

@@ -22,22 +22,22 @@ mod stage;
 
 use std::path::PathBuf;
 
-use bench_hal::can::bus::{BusError, Held, PortError};
+use bench_hal::can::bus::{BusError, NodeInUse, PortError};
 use bench_hal::serial::SerialError;
 
 use crate::model::plant::PlantError;
 
 pub use amplifier::Amplifier;
-pub use fault::{ActingFault, AmplifierFault};
-pub use journal::{Entry, Journal};
+pub use fault::{AmplifierFault, EmulatedFault};
+pub use journal::{EventLog, LogEntry};
 pub use probe::Probe;
-pub use rehearsal::{Rehearsal, Summary};
-pub use schedule::Schedule;
+pub use rehearsal::{Emulator, Summary};
+pub use schedule::FaultSchedule;
 pub use stage::Stage;
 
 /// A device that cannot act.
 #[derive(Debug, thiserror::Error)]
-pub enum ActingError {
+pub enum EmulatorError {
     /// The configuration names none.
     #[error(
         "{device}.device is `simulated`: there is nothing to act for; name real devices, as --config lab does"
@@ -59,11 +59,11 @@ pub enum ActingError {
     Bus(#[from] BusError),
     /// Another process acts as this device.
     #[error("on {interface}, {held}")]
-    Held {
+    NodeInUse {
         /// The interface.
         interface: String,
         /// Who.
-        held: Held,
+        held: NodeInUse,
     },
     /// The serial line.
     #[error(transparent)]

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use bench_hal::serial::device::{Carried, Fault, Line, ProbeTask, Shared, simulate};
+use bench_hal::serial::device::{Fault, Line, LineCounts, ProbeTask, SharedProbe, simulate};
 use bench_hal::serial::{Note, PortSettings};
 
-use super::ActingError;
+use super::EmulatorError;
 use super::link::Link;
 use super::stage::Stage;
 use crate::config::{Config, MountingSettings, ProbeDevice};
 use crate::rig::devices::probe::port;
 use crate::rig::simulated::Sensor;
-use crate::rt::thread::below_the_loop;
+use crate::rt::thread::device_thread_setup;
 
 /// Measurements a second of a probe that speaks by itself, if the configuration does not say.
 const STREAM_HZ: f64 = 4000.0;
@@ -22,7 +22,7 @@ const MEASUREMENTS_PER_ANSWER: f64 = 1.5;
 
 /// Where the probe's end of the line is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum ProbeEndpoint {
     /// A pseudo terminal, with a link of this name to the reader's end.
     Terminal(Option<PathBuf>),
     /// A serial port: a null-modem cable, the other end of a pair.
@@ -32,7 +32,7 @@ pub enum End {
 /// A probe at work; dropping it closes the line.
 pub struct Probe {
     task: ProbeTask,
-    device: Shared,
+    device: SharedProbe,
     place: PathBuf,
     notes: Vec<Note>,
     rate_hz: f64,
@@ -44,20 +44,20 @@ impl Probe {
     /// Serves the probe of the configuration at `end`. `now_ns` is the stage's clock.
     pub fn start(
         config: &Config,
-        end: &End,
+        end: &ProbeEndpoint,
         rate_hz: Option<f64>,
         stage: Stage,
         now_ns: impl Fn() -> u64 + Send + 'static,
-    ) -> Result<Probe, ActingError> {
+    ) -> Result<Probe, EmulatorError> {
         let device = &config.probe.device;
-        let simulated = || ActingError::Simulated { device: "probe" };
+        let simulated = || EmulatorError::Simulated { device: "probe" };
         let protocol = device.protocol().ok_or_else(simulated)?;
         let rate_hz = rate_hz.unwrap_or_else(|| measuring_rate_hz(config));
-        let acting: Shared = Arc::new(Mutex::new(simulate(&protocol, rate_hz)?));
+        let acting: SharedProbe = Arc::new(Mutex::new(simulate(&protocol, rate_hz)?));
         let (line, notes) = line(port(device.line().ok_or_else(simulated)?), end)?;
         let place = line.path().to_owned();
         let link = match end {
-            End::Terminal(Some(path)) => Some(Link::new(path, &place)?),
+            ProbeEndpoint::Terminal(Some(path)) => Some(Link::new(path, &place)?),
             _ => None,
         };
         let task = ProbeTask::start(
@@ -65,9 +65,9 @@ impl Probe {
             Arc::clone(&acting),
             now_ns,
             measure(config, stage),
-            below_the_loop(&config.servo),
+            device_thread_setup(&config.servo),
         );
-        let task = task.map_err(|source| ActingError::Thread {
+        let task = task.map_err(|source| EmulatorError::Thread {
             device: "probe",
             source,
         })?;
@@ -87,7 +87,7 @@ impl Probe {
         self.device
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .ask_fault(fault);
+            .inject_fault(fault);
     }
 
     /// The port, or the reader's end of the pseudo terminal.
@@ -116,7 +116,7 @@ impl Probe {
     }
 
     /// What has gone over the line.
-    pub fn carried(&self) -> &Carried {
+    pub fn carried(&self) -> &LineCounts {
         self.task.carried()
     }
 
@@ -141,10 +141,10 @@ pub fn measuring_rate_hz(config: &Config) -> f64 {
     }
 }
 
-fn line(settings: PortSettings, end: &End) -> Result<(Line, Vec<Note>), ActingError> {
+fn line(settings: PortSettings, end: &ProbeEndpoint) -> Result<(Line, Vec<Note>), EmulatorError> {
     Ok(match end {
-        End::Terminal(_) => (Line::terminal(settings)?, Vec::new()),
-        End::Port(path) => Line::port(PortSettings {
+        ProbeEndpoint::Terminal(_) => (Line::terminal(settings)?, Vec::new()),
+        ProbeEndpoint::Port(path) => Line::port(PortSettings {
             path: path.clone(),
             ..settings
         })?,

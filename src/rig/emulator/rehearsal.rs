@@ -6,31 +6,31 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::fault::ActingFault;
-use super::journal::{Entry, Journal};
-use super::probe::End;
+use super::fault::EmulatedFault;
+use super::journal::{EventLog, LogEntry};
+use super::probe::ProbeEndpoint;
 use super::stage::seconds;
-use super::{ActingError, Amplifier, Probe, Stage};
+use super::{Amplifier, EmulatorError, Probe, Stage};
 use crate::config::{AmplifierDevice, Config};
 
 /// Which devices act, and where.
 #[derive(Clone, Debug, Default)]
-pub struct Cast {
+pub struct EmulatedDevices {
     /// The amplifier, on the interface of the configuration.
     pub amplifier: bool,
     /// The probe, at this end.
-    pub probe: Option<End>,
+    pub probe: Option<ProbeEndpoint>,
     /// The probe's measurements a second, if not as configured.
     pub measuring_rate_hz: Option<f64>,
 }
 
 /// Acting devices at work.
-pub struct Rehearsal {
+pub struct Emulator {
     amplifier: Option<Amplifier>,
     probe: Option<Probe>,
     stage: Stage,
-    journal: Journal,
-    entries: Receiver<Entry>,
+    journal: EventLog,
+    entries: Receiver<LogEntry>,
     start: Instant,
     faults: u64,
     probe_was_lost: bool,
@@ -65,10 +65,10 @@ pub struct Summary {
     pub faults: u64,
 }
 
-impl Rehearsal {
+impl Emulator {
     /// Opens interface and line, and serves from now on.
-    pub fn start(config: &Config, cast: &Cast) -> Result<Rehearsal, ActingError> {
-        let (journal, entries) = Journal::new();
+    pub fn start(config: &Config, cast: &EmulatedDevices) -> Result<Emulator, EmulatorError> {
+        let (journal, entries) = EventLog::new();
         let (stage, start) = (Stage::new(config)?, Instant::now());
         let now_ns = move || start.elapsed().as_nanos() as u64;
         let served = |end| Probe::start(config, end, cast.measuring_rate_hz, stage.clone(), now_ns);
@@ -76,7 +76,7 @@ impl Rehearsal {
         let opened = || Amplifier::open(config, stage.clone(), journal.clone(), start);
         let amplifier = cast.amplifier.then(opened).transpose()?;
         let (faults, probe_was_lost) = (0, false);
-        let rehearsal = Rehearsal {
+        let rehearsal = Emulator {
             amplifier,
             probe,
             stage,
@@ -136,16 +136,16 @@ impl Rehearsal {
     }
 
     /// Refuses what the devices served here cannot have.
-    pub fn check(&self, word: &str, fault: ActingFault) -> Result<(), ActingError> {
-        let not_served = |device| ActingError::NotServed {
+    pub fn check(&self, word: &str, fault: EmulatedFault) -> Result<(), EmulatorError> {
+        let not_served = |device| EmulatorError::NotServed {
             word: word.into(),
             device,
         };
         match (fault, &self.amplifier, &self.probe) {
-            (ActingFault::Amplifier(_), None, _) => Err(not_served("amplifier")),
-            (ActingFault::Probe(_), _, None) => Err(not_served("probe")),
-            (ActingFault::Amplifier(fault), Some(amplifier), _) if !amplifier.knows(fault) => {
-                Err(ActingError::Fault {
+            (EmulatedFault::Amplifier(_), None, _) => Err(not_served("amplifier")),
+            (EmulatedFault::Probe(_), _, None) => Err(not_served("probe")),
+            (EmulatedFault::Amplifier(fault), Some(amplifier), _) if !amplifier.knows(fault) => {
+                Err(EmulatorError::Fault {
                     kind: amplifier.kind(),
                     word: word.into(),
                 })
@@ -155,19 +155,19 @@ impl Rehearsal {
     }
 
     /// Asks for a fault, or for its end.
-    pub fn ask(&mut self, word: &str, fault: ActingFault) -> Result<(), ActingError> {
+    pub fn ask(&mut self, word: &str, fault: EmulatedFault) -> Result<(), EmulatorError> {
         self.check(word, fault)?;
         self.faults += u64::from(fault != fault.end());
-        let device = if matches!(fault, ActingFault::Probe(_)) {
+        let device = if matches!(fault, EmulatedFault::Probe(_)) {
             "probe"
         } else {
             "amplifier"
         };
         self.write(device, "fault", word.into());
         match (fault, &self.amplifier, &self.probe) {
-            (ActingFault::Amplifier(fault), Some(amplifier), _) => amplifier.ask(fault)?,
-            (ActingFault::Probe(fault), _, Some(probe)) => probe.ask(fault),
-            (ActingFault::None, amplifier, probe) => {
+            (EmulatedFault::Amplifier(fault), Some(amplifier), _) => amplifier.ask(fault)?,
+            (EmulatedFault::Probe(fault), _, Some(probe)) => probe.ask(fault),
+            (EmulatedFault::None, amplifier, probe) => {
                 let sound =
                     super::AmplifierFault::Device(bench_hal::can::device::DeviceFault::None);
                 amplifier
@@ -183,7 +183,7 @@ impl Rehearsal {
     }
 
     /// What has changed since this was asked last.
-    pub fn news(&mut self) -> Vec<Entry> {
+    pub fn news(&mut self) -> Vec<LogEntry> {
         let is_lost = self.probe.as_ref().is_some_and(Probe::is_lost);
         if is_lost && !std::mem::replace(&mut self.probe_was_lost, true) {
             self.write(
@@ -203,7 +203,7 @@ impl Rehearsal {
             .map_or((0.0, false), |a| (a.current_a(), a.is_enabled()));
         let position_m = self.stage.position_m(now_ns);
         let (time_s, since_s) = (seconds(now_ns), None);
-        self.journal.write(Entry {
+        self.journal.write(LogEntry {
             time_s,
             device,
             what,

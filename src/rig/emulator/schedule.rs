@@ -2,23 +2,23 @@
 
 use std::collections::VecDeque;
 
-use super::fault::{ActingFault, FaultError};
+use super::fault::{EmulatedFault, FaultError};
 
 /// Longest plan: a day, in seconds.
 const LONGEST_S: f64 = 86_400.0;
 
 /// A fault and when.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Planned {
+pub struct PlannedFault {
     word: String,
-    fault: ActingFault,
+    fault: EmulatedFault,
     from_s: f64,
     to_s: Option<f64>,
 }
 
 /// Words that are no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlannedError {
+pub enum PlannedFaultError {
     /// The fault.
     #[error(transparent)]
     Fault(#[from] FaultError),
@@ -32,11 +32,11 @@ pub enum PlannedError {
     },
 }
 
-impl std::str::FromStr for Planned {
-    type Err = PlannedError;
+impl std::str::FromStr for PlannedFault {
+    type Err = PlannedFaultError;
 
-    fn from_str(text: &str) -> Result<Planned, PlannedError> {
-        let refused = || PlannedError::Time { text: text.into() };
+    fn from_str(text: &str) -> Result<PlannedFault, PlannedFaultError> {
+        let refused = || PlannedFaultError::Time { text: text.into() };
         let seconds = |text: &str| {
             text.parse()
                 .ok()
@@ -51,9 +51,9 @@ impl std::str::FromStr for Planned {
         if to_s.is_some_and(|to_s| to_s <= from_s) {
             return Err(refused());
         }
-        Ok(Planned {
+        Ok(PlannedFault {
             word: word.into(),
-            fault: ActingFault::parse(word)?,
+            fault: EmulatedFault::parse(word)?,
             from_s,
             to_s,
         })
@@ -61,17 +61,17 @@ impl std::str::FromStr for Planned {
 }
 
 /// A word and its fault: what is to be asked for next.
-pub type Step = (String, ActingFault);
+pub type Step = (String, EmulatedFault);
 
 /// What begins and ends when.
 #[derive(Clone, Debug, Default)]
-pub struct Schedule(VecDeque<(f64, Step)>);
+pub struct FaultSchedule(VecDeque<(f64, Step)>);
 
-impl Schedule {
+impl FaultSchedule {
     /// All that is planned, in the order of time.
-    pub fn new(planned: &[Planned]) -> Schedule {
+    pub fn new(planned: &[PlannedFault]) -> FaultSchedule {
         let mut steps: Vec<(f64, Step)> = Vec::new();
-        for Planned {
+        for PlannedFault {
             word,
             fault,
             from_s,
@@ -82,7 +82,7 @@ impl Schedule {
             steps.extend(to_s.map(|to_s| (to_s, (format!("end of {word}"), fault.end()))));
         }
         steps.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        Schedule(steps.into())
+        FaultSchedule(steps.into())
     }
 
     /// All faults that will be asked for.
@@ -102,13 +102,13 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    fn planned(text: &str) -> Planned {
+    fn planned(text: &str) -> PlannedFault {
         text.parse().expect(text)
     }
 
     #[test]
     fn faults_begin_and_end_when_planned() {
-        let mut schedule = Schedule::new(&[
+        let mut schedule = FaultSchedule::new(&[
             planned("probe.stuck@2.5"),
             planned("amplifier.late=20ms@1..2"),
         ]);
@@ -136,12 +136,12 @@ mod tests {
             "probe.stuck@NaN",
             "@1..x",
         ] {
-            let error = text.parse::<Planned>().expect_err(text).to_string();
+            let error = text.parse::<PlannedFault>().expect_err(text).to_string();
             assert!(error.contains("KIND@FROM..TO"), "{error}");
         }
         assert!(
             "probe.nonsense@1"
-                .parse::<Planned>()
+                .parse::<PlannedFault>()
                 .expect_err("no kind")
                 .to_string()
                 .contains("probe.stuck")

@@ -1,7 +1,9 @@
 //! The plant of a rig whose constraints are not linearised.
 
 use crate::config::Config;
-use crate::model::plant::{Load, Modal, PlantError, Quadratic, QuadraticState, build};
+use crate::model::plant::{
+    Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build,
+};
 
 /// A step turns the fastest mode by no more than this: its phase then errs by (0.02)^4/120 = 1.3e-9 of itself, its size by
 /// (0.02)^5/144 = 2e-11 a radian, against a damping ratio of 1e-3.
@@ -10,7 +12,7 @@ const LARGEST_TURN: f64 = 0.02;
 /// The mechanism and its state.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
-    mechanism: Quadratic,
+    mechanism: QuadraticSr4dof,
     state: QuadraticState,
     fastest_rad_s: f64,
     lag_rad_s: f64,
@@ -20,10 +22,10 @@ pub(super) struct Body {
 impl Body {
     /// At rest at the operating point.
     pub(super) fn new(config: &Config) -> Result<Body, PlantError> {
-        let made = super::as_made(config);
-        let linear = Modal::of(&build(&made)?)?;
+        let made = super::actual_plant(config);
+        let linear = ModalModel::of(&build(&made)?)?;
         Ok(Body {
-            mechanism: Quadratic::of(&made)?,
+            mechanism: QuadraticSr4dof::of(&made)?,
             state: QuadraticState::default(),
             fastest_rad_s: linear
                 .modes
@@ -51,7 +53,7 @@ impl Body {
     }
 
     /// One step: the current goes from `current_a` towards the set-point as the amplifier has it.
-    pub(super) fn step(&mut self, step_s: f64, current_a: f64, setpoint_a: f64, load: Load) {
+    pub(super) fn step(&mut self, step_s: f64, current_a: f64, setpoint_a: f64, load: Disturbance) {
         let after = |span_s: f64| {
             setpoint_a + (current_a - setpoint_a) * libm::exp(-self.lag_rad_s * span_s)
         };

@@ -17,7 +17,7 @@ mod stage;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
 use crate::config::{Config, Geometry, PlantSettings, UnmodelledMode};
-use crate::model::plant::{self, Modal, Mode, PlantError};
+use crate::model::plant::{self, ModalModel, Mode, PlantError};
 use body::Body;
 use course::Course;
 use probe::Probe;
@@ -112,13 +112,13 @@ fn stage(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
 
 /// The modes of the linear rig: those of the plant's model and those that it leaves out.
 pub fn modes(config: &Config) -> Result<Vec<Mode>, PlantError> {
-    let mut modes = Modal::of(&plant::build(&as_made(config))?)?.modes;
+    let mut modes = ModalModel::of(&plant::build(&actual_plant(config))?)?.modes;
     modes.extend(unmodelled_modes(config));
     Ok(modes)
 }
 
 /// The plant as the simulated stage was made: with an asymmetry that its configuration does not know of.
-pub fn as_made(config: &Config) -> PlantSettings {
+pub fn actual_plant(config: &Config) -> PlantSettings {
     let mut plant = config.plant.clone();
     if let PlantSettings::Sr4dof(settings) = &mut plant {
         settings.mass_asymmetry += config.sim.asymmetry_offset;

@@ -7,7 +7,7 @@ use super::body::Body;
 use super::floor::Line;
 use super::noise::Gaussian;
 use crate::config::Config;
-use crate::model::plant::{Load, Mode, Motion, Sampled};
+use crate::model::plant::{DiscretePlant, Disturbance, Mode, PlantState};
 
 /// Steps of at most this length resolve the contact with the stop: its frequency against the lightest effective mass,
 /// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, turns by 0.1 rad a step.
@@ -37,10 +37,10 @@ impl Place {
 /// The state of the simulated mechanics.
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
-    whole: Sampled,
-    fine: Sampled,
+    whole: DiscretePlant,
+    fine: DiscretePlant,
     fine_steps: usize,
-    motion: Motion,
+    motion: PlantState,
     body: Option<Body>,
     floor: Vec<Line>,
     floor_m_per_s2: f64,
@@ -61,7 +61,7 @@ impl Stage {
             config.amplifier.bandwidth_hz,
             config.motor.force_constant_n_per_a,
         );
-        let sampled = |period_s| Sampled::new(modes, bandwidth_hz, force_constant, period_s);
+        let sampled = |period_s| DiscretePlant::new(modes, bandwidth_hz, force_constant, period_s);
         let line = |(index, line)| {
             Line::new(
                 line,
@@ -152,7 +152,7 @@ impl Stage {
     pub(super) fn advance_finely(&mut self, setpoint_a: f64) {
         let (contact_n, floor_m_per_s2) = (self.contact_n(), self.floor_m_per_s2);
         if let Some(body) = &mut self.body {
-            let load = Load {
+            let load = Disturbance {
                 probe_n: contact_n,
                 floor_m_per_s2,
             };

@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex};
 use bench::config::{Config, Source, load};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rt::arming::State;
-use bench::rt::clock::{Moment, Virtual};
+use bench::rt::clock::{TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
-use bench::rt::outlet::Outlet;
 use bench::rt::program::{Decision, Program};
-use bench::rt::record::{Event, EventKind, Published, TickRecord};
-use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench::rt::publisher::Publisher;
+use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,
@@ -177,15 +177,15 @@ pub fn says(current_a: impl FnMut(u64) -> f64 + Send + 'static) -> Box<dyn Progr
 /// The loop, its rings, and everything that came out of them.
 pub struct Bench {
     servo: Servo,
-    orders: Producer<Order>,
-    published: Consumer<Published>,
-    spent: Consumer<Box<dyn Program>>,
+    requests: Producer<Request>,
+    published: Consumer<LoopMessage>,
+    retired: Consumer<Box<dyn Program>>,
     log: Log,
     now: Arc<AtomicU64>,
     clock: Virtual,
     next: u64,
     /// All that the loop published, in its order.
-    pub all: Vec<Published>,
+    pub all: Vec<LoopMessage>,
     /// Programs that came back.
     pub handed_back: usize,
 }
@@ -194,20 +194,20 @@ impl Bench {
     pub fn around(config: &Config, rig: impl Rig + 'static) -> Bench {
         let watched = Watched::new(rig);
         let (log, now) = (Arc::clone(&watched.log), Arc::clone(&watched.now));
-        let (outlet, published) = RingBuffer::new(256);
-        let (orders, taken) = RingBuffer::new(16);
-        let (hand_back, spent) = RingBuffer::new(16);
+        let (publisher, published) = RingBuffer::new(256);
+        let (requests, taken) = RingBuffer::new(16);
+        let (hand_back, retired) = RingBuffer::new(16);
         let connections = Connections {
-            orders: taken,
-            spent: hand_back,
-            outlet: Outlet::new(outlet),
+            requests: taken,
+            retired: hand_back,
+            publisher: Publisher::new(publisher),
             progress: Arc::new(Progress::default()),
         };
         Bench {
             servo: Servo::new(Box::new(watched), Interlocks::new(config), connections),
-            orders,
+            requests,
             published,
-            spent,
+            retired,
             log,
             now,
             clock: Virtual {
@@ -231,16 +231,16 @@ impl Bench {
         program: Box<dyn Program>,
     ) -> Bench {
         let mut bench = Bench::still(config, faults);
-        bench.order(Order::Arm);
-        bench.order(Order::Start(program));
+        bench.order(Request::Arm);
+        bench.order(Request::Start(program));
         bench
     }
 
     /// Taken at the next tick.
-    pub fn order(&mut self, order: Order) {
+    pub fn order(&mut self, order: Request) {
         assert!(
-            self.orders.push(order).is_ok(),
-            "the ring of orders is full"
+            self.requests.push(order).is_ok(),
+            "the ring of requests is full"
         );
     }
 
@@ -258,7 +258,7 @@ impl Bench {
         };
         self.now.store(number, Ordering::Relaxed);
         self.servo.tick(
-            &Moment {
+            &TickTiming {
                 tick,
                 woke_ns: scheduled_ns,
                 missed,
@@ -269,7 +269,7 @@ impl Bench {
         while let Ok(published) = self.published.pop() {
             self.all.push(published);
         }
-        while self.spent.pop().is_ok() {
+        while self.retired.pop().is_ok() {
             self.handed_back += 1;
         }
         *self
@@ -289,8 +289,8 @@ impl Bench {
     }
 
     pub fn events(&self) -> Vec<Event> {
-        let event = |p: &Published| {
-            if let Published::Event(event) = p {
+        let event = |p: &LoopMessage| {
+            if let LoopMessage::Event(event) = p {
                 Some(*event)
             } else {
                 None
@@ -384,12 +384,12 @@ impl Bench {
 }
 
 /// The records among what was published.
-pub struct Records<'a>(&'a [Published]);
+pub struct Records<'a>(&'a [LoopMessage]);
 
 impl<'a> Records<'a> {
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &'a TickRecord> + use<'a> {
         self.0.iter().filter_map(|p| {
-            if let Published::Tick(record) = p {
+            if let LoopMessage::Tick(record) = p {
                 Some(record)
             } else {
                 None

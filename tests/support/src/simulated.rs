@@ -5,10 +5,10 @@ use bench::config::Config;
 use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::thread::{Ended, Pace};
+use bench::rt::thread::{LoopOutcome, Pace};
 
 /// The recording of a run by `plan`, and how the run ended.
-pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, Ended) {
+pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, LoopOutcome) {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let ended = (run.path.clone(), run.ended.clone());

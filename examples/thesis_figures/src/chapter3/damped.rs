@@ -5,7 +5,7 @@ use super::super::model::{ModeOf, Model, even, geometric};
 use super::super::plane::{Part, changes, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Workshop};
 use bench::model::zeros::{
-    Crossing, Plane, Term, critical_damping, touching_damping, two_mode_break_points,
+    Crossing, LocusPlane, ModalTerm, critical_damping, touching_damping, two_mode_break_points,
 };
 use bench::report::Pen;
 use bench::report::Symbol;
@@ -33,7 +33,7 @@ pub(in super::super) fn fig_3_15(_: &Workshop) -> Result<Content, FigureError> {
             .into_iter()
             .map(f64::tan)
             .collect::<Vec<_>>();
-        let locus = locus(&model.varied(key)?, Plane::Damped, &values)?;
+        let locus = locus(&model.varied(key)?, LocusPlane::Damped, &values)?;
         let chart = plane(heading, re, (-im, im));
         let chart = changes(
             tracks(chart, "zeros", Pen::solid(VERMILION), &locus, Part::Damped),
@@ -53,12 +53,12 @@ pub(in super::super) fn fig_3_15(_: &Workshop) -> Result<Content, FigureError> {
             ],
         ));
         let points = two_mode_break_points(
-            &Term {
+            &ModalTerm {
                 omega_rad_s: 1.0,
                 damping_ratio: zu,
                 residue_per_kg: 1.0,
             },
-            &Term {
+            &ModalTerm {
                 omega_rad_s: 1.2,
                 damping_ratio: zv,
                 residue_per_kg: -1.0,
@@ -111,9 +111,9 @@ pub(in super::super) fn fig_3_16(_: &Workshop) -> Result<Content, FigureError> {
             ModeOf("v", 1.1, 1.0, zeta),
         ]);
         let plane_of = if zeta == 0.0 {
-            Plane::Undamped
+            LocusPlane::Undamped
         } else {
-            Plane::Damped
+            LocusPlane::Damped
         };
         let part = if zeta == 0.0 {
             Part::Upper

@@ -10,14 +10,14 @@ pub(crate) use two_modes::{fig_3_2, fig_3_3, fig_3_4, fig_3_5, fig_3_6, fig_3_8}
 
 use super::FigureError;
 use super::model::{even, geometric};
-use bench::model::zeros::{InitialStep, ModalSum, Sequence, StepResponse, Term};
+use bench::model::zeros::{ModalSum, ModalTerm, Sequence, StepFeatures, StepResponse};
 use bench::report::{Chart, Pen, Scale};
 
 const W: &str = "Frequency (rad/s)";
 
 /// A sum of modes: frequency in rad/s, damping ratio, residue in 1/kg.
 fn sum(modes: &[(f64, f64, f64)]) -> Result<ModalSum, FigureError> {
-    let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &(f64, f64, f64)| Term {
+    let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &(f64, f64, f64)| ModalTerm {
         omega_rad_s,
         damping_ratio,
         residue_per_kg,
@@ -27,7 +27,7 @@ fn sum(modes: &[(f64, f64, f64)]) -> Result<ModalSum, FigureError> {
 
 /// The size of one mode's part over frequency.
 fn part(omega_rad_s: f64, residue_per_kg: f64, over: &[f64]) -> Vec<(f64, f64)> {
-    let term = Term::undamped(omega_rad_s, residue_per_kg);
+    let term = ModalTerm::undamped(omega_rad_s, residue_per_kg);
     over.iter().map(|w| (*w, term.part(*w).abs())).collect()
 }
 
@@ -55,7 +55,7 @@ fn step(sum: &ModalSum, seconds: f64, count: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn initial(sum: &ModalSum) -> InitialStep {
+fn initial(sum: &ModalSum) -> StepFeatures {
     StepResponse::new(sum).initial()
 }
 

@@ -7,7 +7,7 @@ use super::super::plane::{Part, changes, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Workshop};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
 use bench::control::{self, ControllerText, continuous_response};
-use bench::model::zeros::{Crossing, ModalSum, Plane};
+use bench::model::zeros::{Crossing, LocusPlane, ModalSum};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale, Symbol};
 
@@ -52,7 +52,7 @@ pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
             (-1.0, "αv < 0", Pen::dashed(BLUE)),
         ] {
             let model = pair(ratio * sign, sign);
-            let locus = locus(&model.varied(KEY)?, Plane::Undamped, &ratios())?;
+            let locus = locus(&model.varied(KEY)?, LocusPlane::Undamped, &ratios())?;
             let complex = locus.changes.iter().any(|change| {
                 change.after.contains("CMP-CNMP") || change.before.contains("CMP-CNMP")
             });
@@ -124,7 +124,7 @@ pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
         for ratio in family {
             let locus = locus(
                 &pair(ratio * sign, sign).varied(KEY)?,
-                Plane::Undamped,
+                LocusPlane::Undamped,
                 &geometric(1e5, 1e-5, 321),
             )?;
             chart = tracks(
@@ -142,7 +142,7 @@ pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
     }
     let even = locus(
         &pair(-1.0, 1.0).varied(KEY)?,
-        Plane::Undamped,
+        LocusPlane::Undamped,
         &geometric(1e5, 1e-5, 321),
     )?;
     chart = tracks(
@@ -305,7 +305,7 @@ pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
     ]);
     let locus_of = locus(
         &model.varied(KEY)?,
-        Plane::Undamped,
+        LocusPlane::Undamped,
         &geometric(1e3, 1e-3, 141),
     )?;
     let places = |size: f64| {

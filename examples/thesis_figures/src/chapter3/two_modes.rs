@@ -6,7 +6,7 @@ use super::super::model::{ModeOf, Model, even, kinds, response};
 use super::super::plane::{Part, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Workshop};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
-use bench::model::zeros::{Locus, ModalSum, Plane, ZeroKind, phase_drop_deg};
+use bench::model::zeros::{Locus, LocusPlane, ModalSum, ZeroKind, phase_drop_deg};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale, Symbol};
 
@@ -49,7 +49,7 @@ fn migration(omega_u: f64, segments: &[Segment], content: Content) -> Result<Con
             width: 3.0,
             ..Pen::solid(*colour)
         };
-        let locus = locus(&varied, Plane::Undamped, &tangents(*from, *to))?;
+        let locus = locus(&varied, LocusPlane::Undamped, &tangents(*from, *to))?;
         a = tracks(a, name, pen, &locus, Part::Upper);
         b = b.line("", pen, sizes(&locus));
         let middle = if *from < -20.0 {

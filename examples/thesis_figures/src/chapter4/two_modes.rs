@@ -7,14 +7,17 @@ use super::super::plane::locus;
 use super::super::{Comparison, Content, FigureError, Workshop};
 use super::W;
 use bench::model::zeros::{
-    Crossing, ModalSum, Plane, Sequence, Term, critical_residues, critical_sums,
+    Crossing, LocusPlane, ModalSum, ModalTerm, Sequence, critical_residues, critical_sums,
 };
 use bench::report::colours::{BLUE, GREEN, GREY, INK, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale, Symbol};
 
 /// Modes u and v of the example of section 4.2.2: wu^2 = 1, wv^2 = 2, residues -1 and 1.
-fn example() -> (Term, Term) {
-    (Term::undamped(1.0, -1.0), Term::undamped(2f64.sqrt(), 1.0))
+fn example() -> (ModalTerm, ModalTerm) {
+    (
+        ModalTerm::undamped(1.0, -1.0),
+        ModalTerm::undamped(2f64.sqrt(), 1.0),
+    )
 }
 
 /// N(x) of Eq. (4-3) at x = s^2.
@@ -57,7 +60,7 @@ pub(crate) fn fig_4_2(_: &Workshop) -> Result<Content, FigureError> {
         (10.0, Pen::solid(GREEN)),
     ] {
         a = a.line(&format!("αR = {}", signed(residue, 1)), pen, curve(residue));
-        let sum = ModalSum::new(vec![Term::undamped(0.0, residue), u, v], 0.0)?;
+        let sum = ModalSum::new(vec![ModalTerm::undamped(0.0, residue), u, v], 0.0)?;
         content = content.compare(Comparison::unprinted(
             &format!("zeros, αR = {}", signed(residue, 1)),
             kinds(&sum.undamped_zeros()?),
@@ -82,7 +85,7 @@ pub(crate) fn fig_4_2(_: &Workshop) -> Result<Content, FigureError> {
     let key = "plant.modes.R.residue_per_kg";
     let locus = locus(
         &model.varied(key)?,
-        Plane::Undamped,
+        LocusPlane::Undamped,
         &geometric(0.01, 100.0, 121),
     )?;
     let met: Vec<f64> = locus
@@ -133,13 +136,13 @@ pub(crate) fn fig_4_4(_: &Workshop) -> Result<Content, FigureError> {
     ] {
         let terms = |zeta: f64| {
             vec![
-                Term::undamped(0.0, 1.0),
-                Term {
+                ModalTerm::undamped(0.0, 1.0),
+                ModalTerm {
                     omega_rad_s: 10.0,
                     damping_ratio: zeta,
                     residue_per_kg: -0.02,
                 },
-                Term {
+                ModalTerm {
                     omega_rad_s: fast,
                     damping_ratio: zeta,
                     residue_per_kg: 0.02,

@@ -6,7 +6,7 @@ use super::super::model::{Model, even, kinds, response};
 use super::super::plane::{Part, changes, locus, places, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Workshop};
 use super::{K, K23, L, W, Y, sr4dof, three_mass};
-use bench::model::zeros::{Crossing, Locus, Plane, undamped_zeros};
+use bench::model::zeros::{Crossing, Locus, LocusPlane, undamped_zeros};
 use bench::report::colours::{BLUE, Colour, GREEN, GREY, VERMILION};
 use bench::report::{Chart, Pen, Symbol};
 
@@ -48,7 +48,11 @@ impl Study<'_> {
     }
 
     fn locus(&self) -> Result<Locus, FigureError> {
-        locus(&self.model.varied(self.key)?, Plane::Undamped, &self.values)
+        locus(
+            &self.model.varied(self.key)?,
+            LocusPlane::Undamped,
+            &self.values,
+        )
     }
 
     fn map(&self, heading: &str, locus: &Locus) -> Result<Chart, FigureError> {

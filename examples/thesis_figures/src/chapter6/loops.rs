@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::super::FigureError;
 use super::super::model::Model;
 use bench::control::{ClosedLoop, ControllerText};
-use bench::model::plant::Modal;
+use bench::model::plant::ModalModel;
 
 /// The loop of a plant with a controller: a name of the program's own, or a file's name and its text.
 pub(crate) fn closed_loop(
@@ -24,7 +24,7 @@ pub(crate) fn closed_loop(
     let sections = controller.sections(config.servo.rate_hz)?;
     Ok(ClosedLoop::new(
         &config,
-        Modal::of(&bench::model::plant::build(&config.plant)?)?.modes,
+        ModalModel::of(&bench::model::plant::build(&config.plant)?)?.modes,
         sections,
     ))
 }

@@ -8,7 +8,7 @@ use super::super::measured::{Closed, Which};
 use super::super::model::{Model, kinds, response};
 use super::super::{Comparison, Content, FigureError, Workshop};
 use super::loops::{closed, closed_loop, open, sensitivity, step};
-use bench::control::{ControllerText, Margins, continuous_response, step_figures};
+use bench::control::{ControllerText, Margins, continuous_response, step_metrics};
 use bench::model::zeros::sign_sequence;
 use bench::report::colours::{BLUE, GREEN, INK, PURPLE, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
@@ -252,7 +252,7 @@ pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
         ));
         let course = step(&of, 0.4);
         let positions: Vec<f64> = course.iter().map(|point| point.1).collect();
-        let figures = step_figures(&positions, 1.0, of.chain().period_s());
+        let figures = step_metrics(&positions, 1.0, of.chain().period_s());
         let computed = figures.settling_time_s.unwrap_or(f64::NAN);
         content = content
             .compare(Comparison::number(&format!("settling time, {}", which.name()), settling, 4, computed, "s").remark("to 2 % of the step; it depends on how much of the first mode still rings, whose frequency is 183.9 rad/s here and 179 there"))

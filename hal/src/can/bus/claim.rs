@@ -15,7 +15,7 @@ use thiserror::Error;
 /// Another process drives the node.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("node {node} is driven by {} already; end that first{}, or choose another node", who(*pid), kill(*pid))]
-pub struct Held {
+pub struct NodeInUse {
     /// The node.
     pub node: u8,
     /// The process, if it can be found out.
@@ -44,13 +44,13 @@ impl Claim {
     }
 
     /// Claims `node` on `interface`, or tells the process that has it.
-    pub fn new(interface: &str, node: u8) -> Result<Claim, Held> {
+    pub fn new(interface: &str, node: u8) -> Result<Claim, NodeInUse> {
         let name = format!("bench-can/{interface}/{node}");
         let address =
-            SocketAddr::from_abstract_name(&name).map_err(|_| Held { node, pid: None })?;
+            SocketAddr::from_abstract_name(&name).map_err(|_| NodeInUse { node, pid: None })?;
         match UnixListener::bind_addr(&address) {
             Ok(listener) => Ok(Claim(Some(listener))),
-            Err(_) => Err(Held {
+            Err(_) => Err(NodeInUse {
                 node,
                 pid: holder(&name).ok().flatten(),
             }),
@@ -93,6 +93,6 @@ mod tests {
     fn a_holder_that_is_not_known_is_not_to_be_killed() {
         let text =
             "node 5 is driven by another process already; end that first, or choose another node";
-        assert_eq!(Held { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller
+        assert_eq!(NodeInUse { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller
     }
 }

@@ -23,7 +23,7 @@ pub enum KernelError {
 }
 
 /// Opens a raw CAN socket and closes it again.
-pub fn kernel_speaks_can() -> Result<(), KernelError> {
+pub fn check_can_support() -> Result<(), KernelError> {
     let opened = socket(
         AddressFamily::Can,
         SockType::Raw,

@@ -1,7 +1,7 @@
 //! Where frames go and come from, whose clock it is, and who runs the service task.
 //!
-//! A [`Host`] is all a driver needs of the world. [`Threads`] is the real one: the system's clock and threads around a
-//! [`Port`], which is a SocketCAN interface ([`SocketPort`]) or a bus in memory ([`MemoryBus`]). [`World`] is a bus in
+//! A [`Host`] is all a driver needs of the world. [`SystemHost`] is the real one: the system's clock and threads around a
+//! [`Port`], which is a SocketCAN interface ([`SocketPort`]) or a bus in memory ([`MemoryBus`]). [`SimulatedHost`] is a bus in
 //! memory with a clock of its own: tests run through it in no time and always alike.
 
 mod claim;
@@ -19,14 +19,14 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-pub use claim::{Claim, Held};
+pub use claim::{Claim, NodeInUse};
 pub use condition::Condition;
 pub use interface::{Interface, InterfaceError};
-pub use kernel::{KernelError, kernel_speaks_can};
+pub use kernel::{KernelError, check_can_support};
 pub use memory::{MemoryBus, MemoryEndpoint};
 pub use socket::{PortError, SocketPort};
-pub use threads::Threads;
-pub use world::World;
+pub use threads::SystemHost;
+pub use world::SimulatedHost;
 
 use super::frame::{CanFrame, Id};
 
@@ -85,7 +85,7 @@ pub trait Port: Send + Sync {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError>;
 
     /// Claims a node of this bus for this process, or names the process that has it.
-    fn claim(&self, node: u8) -> Result<Claim, Held> {
+    fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
         let _ = node;
         Ok(Claim::none())
     }
@@ -113,17 +113,17 @@ pub trait Host: Port {
     fn sleep(&self, time: Duration);
 
     /// Runs a task until the handle is dropped.
-    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<Running>;
+    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle>;
 }
 
 /// A task at work; dropping it ends the task and waits for its end.
 #[derive(Debug, Default)]
-pub struct Running {
+pub struct TaskHandle {
     stop: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
-impl Drop for Running {
+impl Drop for TaskHandle {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {

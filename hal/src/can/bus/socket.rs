@@ -9,7 +9,9 @@ use socketcan::{
 use thiserror::Error;
 
 use super::super::frame::{CanFrame, Id};
-use super::{BusError, BusEvent, CanBus, Claim, Condition, Held, Interface, InterfaceError, Port};
+use super::{
+    BusError, BusEvent, CanBus, Claim, Condition, Interface, InterfaceError, NodeInUse, Port,
+};
 
 /// A SocketCAN interface.
 #[derive(Clone, Debug)]
@@ -96,7 +98,7 @@ impl Port for SocketPort {
         Ok(Box::new(SocketEndpoint { socket }))
     }
 
-    fn claim(&self, node: u8) -> Result<Claim, Held> {
+    fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
         Claim::new(&self.interface, node)
     }
 

@@ -61,12 +61,12 @@ fn echoes(host: &dyn Host) {
 
 #[test]
 fn a_task_answers_on_a_thread() {
-    echoes(&Threads::new(MemoryBus::default()));
+    echoes(&SystemHost::new(MemoryBus::default()));
 }
 
 #[test]
 fn a_task_answers_in_virtual_time() {
-    let world = World::default();
+    let world = SimulatedHost::default();
     echoes(&world);
     // One step of 100 us to the answer, then 20 ms of waiting in vain.
     assert_eq!(world.now_ns(), 20_100_000);

@@ -5,27 +5,27 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::super::frame::Id;
-use super::{BusError, CanBus, Claim, Condition, Held, Host, Port, Running, Task};
+use super::{BusError, CanBus, Claim, Condition, Host, NodeInUse, Port, Task, TaskHandle};
 
 /// How long a task waits for a frame before it looks at the clock again: a tenth of the shortest time that matters.
 const WAIT: Duration = Duration::from_millis(1);
 
 /// A port in real time.
-pub struct Threads<P> {
+pub struct SystemHost<P> {
     port: P,
     start: Instant,
     prepare: Arc<dyn Fn() + Send + Sync>,
 }
 
-impl<P: Port> Threads<P> {
+impl<P: Port> SystemHost<P> {
     /// Time begins now.
-    pub fn new(port: P) -> Threads<P> {
-        Threads::since(port, Instant::now())
+    pub fn new(port: P) -> SystemHost<P> {
+        SystemHost::since(port, Instant::now())
     }
 
     /// Time began at `start`: for hosts that share a clock with others.
-    pub fn since(port: P, start: Instant) -> Threads<P> {
-        Threads {
+    pub fn since(port: P, start: Instant) -> SystemHost<P> {
+        SystemHost {
             port,
             start,
             prepare: Arc::new(|| {}),
@@ -33,8 +33,8 @@ impl<P: Port> Threads<P> {
     }
 
     /// `prepare` runs first in each thread that is started, to give it a priority or a processor.
-    pub fn prepared(self, prepare: impl Fn() + Send + Sync + 'static) -> Threads<P> {
-        Threads {
+    pub fn prepared(self, prepare: impl Fn() + Send + Sync + 'static) -> SystemHost<P> {
+        SystemHost {
             prepare: Arc::new(prepare),
             ..self
         }
@@ -45,12 +45,12 @@ fn since_ns(start: Instant) -> u64 {
     start.elapsed().as_nanos() as u64
 }
 
-impl<P: Port> Port for Threads<P> {
+impl<P: Port> Port for SystemHost<P> {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         self.port.endpoint(ids)
     }
 
-    fn claim(&self, node: u8) -> Result<Claim, Held> {
+    fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
         self.port.claim(node)
     }
 
@@ -59,7 +59,7 @@ impl<P: Port> Port for Threads<P> {
     }
 }
 
-impl<P: Port> Host for Threads<P> {
+impl<P: Port> Host for SystemHost<P> {
     fn now_ns(&self) -> u64 {
         since_ns(self.start)
     }
@@ -68,8 +68,8 @@ impl<P: Port> Host for Threads<P> {
         std::thread::sleep(time);
     }
 
-    fn start(&self, name: &str, mut task: Box<dyn Task>) -> std::io::Result<Running> {
-        let mut running = Running::default();
+    fn start(&self, name: &str, mut task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
+        let mut running = TaskHandle::default();
         let (stop, start, prepare) = (
             Arc::clone(&running.stop),
             self.start,

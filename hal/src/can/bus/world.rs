@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::super::frame::{CanFrame, Id};
 use super::{
-    BusError, BusEvent, CanBus, Condition, Host, MemoryBus, MemoryEndpoint, Port, Running, Task,
+    BusError, BusEvent, CanBus, Condition, Host, MemoryBus, MemoryEndpoint, Port, Task, TaskHandle,
 };
 
 const STEP_NS: u64 = 100_000;
@@ -19,7 +19,7 @@ type Tasks = Vec<(Arc<AtomicBool>, Box<dyn Task>)>;
 
 /// A world; clones are the same world.
 #[derive(Clone, Default)]
-pub struct World {
+pub struct SimulatedHost {
     shared: Arc<Shared>,
 }
 
@@ -30,7 +30,7 @@ struct Shared {
     tasks: Mutex<Tasks>,
 }
 
-impl World {
+impl SimulatedHost {
     /// The bus of this world.
     pub fn bus(&self) -> &MemoryBus {
         &self.shared.bus
@@ -62,7 +62,7 @@ impl World {
     }
 }
 
-impl Port for World {
+impl Port for SimulatedHost {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         Ok(Box::new(WorldEndpoint {
             world: self.clone(),
@@ -75,7 +75,7 @@ impl Port for World {
     }
 }
 
-impl Host for World {
+impl Host for SimulatedHost {
     fn now_ns(&self) -> u64 {
         self.shared.now_ns.load(Ordering::Acquire)
     }
@@ -87,15 +87,15 @@ impl Host for World {
         }
     }
 
-    fn start(&self, _name: &str, task: Box<dyn Task>) -> std::io::Result<Running> {
-        let running = Running::default();
+    fn start(&self, _name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
+        let running = TaskHandle::default();
         self.tasks().push((Arc::clone(&running.stop), task));
         Ok(running)
     }
 }
 
 struct WorldEndpoint {
-    world: World,
+    world: SimulatedHost,
     inner: MemoryEndpoint,
 }
 

@@ -5,7 +5,7 @@ use super::super::frame::CanFrame;
 use super::{Device, DeviceFault};
 
 /// The device's side of a current amplifier on a CAN bus: frames and time go in, frames come out.
-pub trait ActingAmplifier: Send {
+pub trait EmulatedAmplifier: Send {
     /// Takes a frame of the bus at time `now_ns`; frames to send are added to `out`.
     fn handle(&mut self, frame: &CanFrame, now_ns: u64, out: &mut Vec<CanFrame>);
 
@@ -31,7 +31,7 @@ pub trait ActingAmplifier: Send {
     fn inject(&mut self, fault: DeviceFault);
 }
 
-impl ActingAmplifier for Device {
+impl EmulatedAmplifier for Device {
     fn handle(&mut self, frame: &CanFrame, now_ns: u64, out: &mut Vec<CanFrame>) {
         Device::handle(self, frame, now_ns, out);
     }

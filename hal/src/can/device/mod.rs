@@ -1,6 +1,6 @@
 //! The other end: a simulated CANopen drive and a simulated VESC, for tests and for rehearsal without hardware.
 //!
-//! Both are an [`ActingAmplifier`]; [`DeviceTask`] joins one to a bus. [`Device`], the drive, is sans-I/O:
+//! Both are an [`EmulatedAmplifier`]; [`AmplifierTask`] joins one to a bus. [`Device`], the drive, is sans-I/O:
 //! [`Device::handle`] takes a frame, [`Device::poll`] the passing of time, both give frames to send. It is written from the standards, not from the driver, so the two check each
 //! other: object dictionary, SDO server, NMT, heartbeat producer and consumer, PDO with the rules of their mapping, and
 //! the state machine of CiA 402.
@@ -18,12 +18,12 @@ mod vesc;
 
 use std::collections::VecDeque;
 
-pub use acting::ActingAmplifier;
+pub use acting::EmulatedAmplifier;
 pub use dictionary::ObjectDictionary;
-pub use objects::DeviceSettings;
+pub use objects::EmulatedDriveSettings;
 pub use power::Power;
-pub use task::{DeviceTask, Follow, Passed};
-pub use vesc::VescDevice;
+pub use task::{AmplifierTask, FrameCounts, Observer};
+pub use vesc::EmulatedVesc;
 
 use super::emcy::Emergency;
 use super::frame::CanFrame;
@@ -41,7 +41,7 @@ pub enum DeviceFault {
     /// Sends status frames of a wrong length.
     ShortFrames,
     /// Sends statuswords that no state has.
-    SenselessStatus,
+    InvalidStatusword,
     /// The power stage fails: emergency message with this code, then the state Fault.
     Drive(u16),
     /// An emergency message without a change of state.
@@ -51,7 +51,7 @@ pub enum DeviceFault {
     /// Takes no set-points any more, but obeys NMT.
     SetPointsIgnored,
     /// Takes neither set-points nor NMT, but still watches the heartbeat.
-    OrdersIgnored,
+    CommandsIgnored,
     /// Switches itself off without a fault.
     SwitchesOff,
     /// Sends everything this much later, in milliseconds.
@@ -65,7 +65,7 @@ pub enum DeviceFault {
 /// A simulated drive.
 #[derive(Debug)]
 pub struct Device {
-    settings: DeviceSettings,
+    settings: EmulatedDriveSettings,
     objects: ObjectDictionary,
     server: Server,
     power: Power,
@@ -80,7 +80,7 @@ pub struct Device {
 
 impl Device {
     /// A drive that has just got power; the first [`Device::poll`] sends the boot-up message.
-    pub fn new(settings: DeviceSettings) -> Device {
+    pub fn new(settings: EmulatedDriveSettings) -> Device {
         let objects = objects::dictionary(&settings);
         Device {
             settings,
@@ -172,7 +172,7 @@ impl Device {
 
     fn dispatch(&mut self, frame: &CanFrame) {
         let (node, id) = (self.settings.node, frame.id());
-        if id == nmt::COB_ID && self.misbehaviour != DeviceFault::OrdersIgnored {
+        if id == nmt::COB_ID && self.misbehaviour != DeviceFault::CommandsIgnored {
             self.obey_nmt(frame.data());
         } else if id == sync::COB_ID {
             self.take_sync();
@@ -193,7 +193,7 @@ impl Device {
     fn ignores_set_points(&self) -> bool {
         matches!(
             self.misbehaviour,
-            DeviceFault::SetPointsIgnored | DeviceFault::OrdersIgnored
+            DeviceFault::SetPointsIgnored | DeviceFault::CommandsIgnored
         )
     }
 
@@ -278,7 +278,7 @@ impl Device {
         self.power
             .set_mode(self.objects.number(object::MODE) as u8 as i8);
         let status = match self.misbehaviour {
-            DeviceFault::SenselessStatus => 0x0048,
+            DeviceFault::InvalidStatusword => 0x0048,
             _ => self.power.statusword(),
         };
         let commanded = (self.current_a() / self.settings.reference_a() * 1000.0).round() as i16;

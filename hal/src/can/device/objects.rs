@@ -21,7 +21,7 @@ pub(super) const SHOWN: [Address; 3] = [STATUSWORD, MODE_DISPLAY, ACTUAL];
 
 /// What a simulated drive is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DeviceSettings {
+pub struct EmulatedDriveSettings {
     /// Node number, 1 to 127.
     pub node: u8,
     /// Vendor, product, revision and serial number of 0x1018.
@@ -37,12 +37,12 @@ pub struct DeviceSettings {
     /// Modes of operation it has; bits of 0x6502: mode 4 is bit 3, mode 10 bit 9.
     pub modes: u32,
     /// Objects it lacks, of those it could have.
-    pub lacks: Vec<Address>,
+    pub missing_objects: Vec<Address>,
 }
 
-impl Default for DeviceSettings {
+impl Default for EmulatedDriveSettings {
     fn default() -> Self {
-        DeviceSettings {
+        EmulatedDriveSettings {
             node: 5,
             identity: [0x0000_0402, 0x0000_0001, 0x0001_0000, 1],
             name: "simulated CANopen drive".to_owned(),
@@ -50,12 +50,12 @@ impl Default for DeviceSettings {
             maximum_per_mille: 1500,
             reference: Reference::Rated,
             modes: 1 << (CYCLIC_TORQUE - 1) | 1 << (PROFILE_TORQUE - 1),
-            lacks: Vec::new(),
+            missing_objects: Vec::new(),
         }
     }
 }
 
-impl DeviceSettings {
+impl EmulatedDriveSettings {
     /// The current of 1000 counts, in amperes.
     pub(super) fn reference_a(&self) -> f64 {
         let rated_a = f64::from(self.rated_current_ma.max(1)) * 1e-3;
@@ -67,7 +67,7 @@ impl DeviceSettings {
 }
 
 /// The objects as after power-on.
-pub(super) fn dictionary(settings: &DeviceSettings) -> ObjectDictionary {
+pub(super) fn dictionary(settings: &EmulatedDriveSettings) -> ObjectDictionary {
     let mut objects = ObjectDictionary::default();
     communication(&mut objects, settings);
     for number in 1..=4 {
@@ -76,13 +76,13 @@ pub(super) fn dictionary(settings: &DeviceSettings) -> ObjectDictionary {
     }
     drive(&mut objects, settings);
     settings
-        .lacks
+        .missing_objects
         .iter()
         .for_each(|address| objects.remove(*address));
     objects
 }
 
-fn communication(objects: &mut ObjectDictionary, settings: &DeviceSettings) {
+fn communication(objects: &mut ObjectDictionary, settings: &EmulatedDriveSettings) {
     objects.add(Address::new(0x1000, 0), 4, 0x0002_0192, Access::Read); // servo drive, profile 402
     objects.add(Address::new(0x1001, 0), 1, 0, Access::Read);
     objects.add_text(Address::new(0x1008, 0), &settings.name, Access::Read);
@@ -116,7 +116,7 @@ fn pdo(objects: &mut ObjectDictionary, direction: Direction, number: u8, node: u
     }
 }
 
-fn drive(objects: &mut ObjectDictionary, settings: &DeviceSettings) {
+fn drive(objects: &mut ObjectDictionary, settings: &EmulatedDriveSettings) {
     objects.add(ABORT_CONNECTION, 2, 0, Access::Write);
     objects.add(CONTROLWORD, 2, 0, Access::Mapped);
     objects.add(STATUSWORD, 2, 0x40, Access::Mapped);

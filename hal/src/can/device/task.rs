@@ -3,16 +3,16 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::super::bus::{BusError, BusEvent, CanBus, Host, Running, Task};
+use super::super::bus::{BusError, BusEvent, CanBus, Host, Task, TaskHandle};
 use super::super::frame::CanFrame;
-use super::ActingAmplifier;
+use super::EmulatedAmplifier;
 
 /// Frames taken in one step, so that a flooded bus cannot stop time.
 const MOST_FRAMES: usize = 256;
 
 /// The moment in which an acting device has just heard a frame, or has let time pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Passed {
+pub struct FrameCounts {
     /// The host's clock.
     pub now_ns: u64,
     /// Frames heard since the start.
@@ -22,38 +22,38 @@ pub struct Passed {
 }
 
 /// Sees the device after every frame and every step of time, in the device's thread.
-pub type Follow = Box<dyn FnMut(Passed, &mut dyn ActingAmplifier) + Send>;
+pub type Observer = Box<dyn FnMut(FrameCounts, &mut dyn EmulatedAmplifier) + Send>;
 
 /// An acting amplifier on a bus. The device is shared: a test asks it for its current and makes it misbehave.
-pub struct DeviceTask {
+pub struct AmplifierTask {
     bus: Box<dyn CanBus>,
-    device: Arc<Mutex<dyn ActingAmplifier>>,
-    follow: Follow,
-    passed: Passed,
+    device: Arc<Mutex<dyn EmulatedAmplifier>>,
+    follow: Observer,
+    passed: FrameCounts,
     out: Vec<CanFrame>,
 }
 
-impl DeviceTask {
+impl AmplifierTask {
     /// Starts `device` on the bus of `host`; it runs until the handle is dropped.
-    pub fn start<D: ActingAmplifier + 'static>(
+    pub fn start<D: EmulatedAmplifier + 'static>(
         host: &dyn Host,
         device: Arc<Mutex<D>>,
-    ) -> std::io::Result<Running> {
-        DeviceTask::start_followed(host, device, Box::new(|_, _| {}))
+    ) -> std::io::Result<TaskHandle> {
+        AmplifierTask::start_observed(host, device, Box::new(|_, _| {}))
     }
 
     /// The same; `follow` sees what the device does, so that a motor can be moved by it.
-    pub fn start_followed(
+    pub fn start_observed(
         host: &dyn Host,
-        device: Arc<Mutex<dyn ActingAmplifier>>,
-        follow: Follow,
-    ) -> std::io::Result<Running> {
+        device: Arc<Mutex<dyn EmulatedAmplifier>>,
+        follow: Observer,
+    ) -> std::io::Result<TaskHandle> {
         let bus = host.endpoint(&[]).map_err(std::io::Error::other)?;
-        let task = DeviceTask {
+        let task = AmplifierTask {
             bus,
             device,
             follow,
-            passed: Passed::default(),
+            passed: FrameCounts::default(),
             out: Vec::new(),
         };
         host.start("can-device", Box::new(task))
@@ -89,7 +89,7 @@ impl DeviceTask {
     }
 }
 
-impl Task for DeviceTask {
+impl Task for AmplifierTask {
     fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
         let taken = self.take(now_ns, wait);
         self.poll(now_ns());
@@ -103,7 +103,7 @@ impl Task for DeviceTask {
 }
 
 fn lock<'a>(
-    device: &'a Mutex<dyn ActingAmplifier + 'static>,
-) -> MutexGuard<'a, dyn ActingAmplifier + 'static> {
+    device: &'a Mutex<dyn EmulatedAmplifier + 'static>,
+) -> MutexGuard<'a, dyn EmulatedAmplifier + 'static> {
     device.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -6,7 +6,7 @@ use super::super::sdo::{AbortCode, Answer, Part, Request, Start};
 use super::*;
 
 fn booted() -> Device {
-    let mut device = Device::new(DeviceSettings::default());
+    let mut device = Device::new(EmulatedDriveSettings::default());
     let mut out = Vec::new();
     device.poll(0, &mut out);
     assert_eq!(

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 use super::super::frame::{CanFrame, Id};
 use super::super::vesc::{set_current, status_id};
-use super::{ActingAmplifier, DeviceFault};
+use super::{DeviceFault, EmulatedAmplifier};
 
 /// Time between STATUS frames: 50 Hz, as delivered.
 const STATUS_NS: u64 = 20_000_000;
@@ -15,7 +15,7 @@ const TIMEOUT_NS: u64 = 500_000_000;
 
 /// A simulated VESC in current control.
 #[derive(Debug)]
-pub struct VescDevice {
+pub struct EmulatedVesc {
     node: u8,
     target_ma: i32,
     measured_a: Option<f64>,
@@ -26,11 +26,11 @@ pub struct VescDevice {
     outbox: VecDeque<(u64, CanFrame)>,
 }
 
-impl VescDevice {
+impl EmulatedVesc {
     /// A VESC that has just got power.
-    pub fn new(node: u8) -> VescDevice {
+    pub fn new(node: u8) -> EmulatedVesc {
         let (misbehaviour, outbox) = (DeviceFault::None, VecDeque::new());
-        VescDevice {
+        EmulatedVesc {
             node,
             target_ma: 0,
             measured_a: None,
@@ -50,7 +50,7 @@ impl VescDevice {
     fn take(&mut self, frame: &CanFrame) {
         let deaf = matches!(
             self.misbehaviour,
-            DeviceFault::Unplugged | DeviceFault::SetPointsIgnored | DeviceFault::OrdersIgnored
+            DeviceFault::Unplugged | DeviceFault::SetPointsIgnored | DeviceFault::CommandsIgnored
         );
         if let (false, true, Ok(bytes)) = (
             deaf,
@@ -90,7 +90,7 @@ impl VescDevice {
     }
 }
 
-impl ActingAmplifier for VescDevice {
+impl EmulatedAmplifier for EmulatedVesc {
     fn handle(&mut self, frame: &CanFrame, now_ns: u64, _out: &mut Vec<CanFrame>) {
         self.now_ns = self.now_ns.max(now_ns);
         self.take(frame);
@@ -139,7 +139,7 @@ impl ActingAmplifier for VescDevice {
             fault,
             DeviceFault::Drive(_)
                 | DeviceFault::EmergencyOnly(_)
-                | DeviceFault::SenselessStatus
+                | DeviceFault::InvalidStatusword
                 | DeviceFault::SwitchesOff
         )
     }
@@ -150,10 +150,10 @@ impl ActingAmplifier for VescDevice {
         }
         if fault == DeviceFault::Reset {
             let now_ns = self.now_ns;
-            *self = VescDevice {
+            *self = EmulatedVesc {
                 now_ns,
                 due_ns: now_ns + STATUS_NS,
-                ..VescDevice::new(self.node)
+                ..EmulatedVesc::new(self.node)
             };
             return;
         }

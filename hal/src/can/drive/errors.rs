@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::super::budget::BudgetError;
-use super::super::bus::{BusError, Held};
+use super::super::bus::{BusError, NodeInUse};
 use super::super::sdo::{Address, SdoError};
 
 /// Why a drive could not be opened: value, limit and next step.
@@ -24,7 +24,7 @@ pub enum OpenError {
     Budget(#[from] BudgetError),
     /// Another process drives this node.
     #[error(transparent)]
-    Held(#[from] Held),
+    NodeInUse(#[from] NodeInUse),
     /// The interface failed.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -57,7 +57,7 @@ pub enum OpenError {
         /// What is configured, in amperes.
         want_a: f64,
     },
-    /// The drive lacks the mode.
+    /// The drive missing_objects the mode.
     #[error(
         "node {node} has none of the configured modes of operation (0x6502 = 0x{supported:08X}; bit 9 is cyclic synchronous torque, bit 3 profile torque)"
     )]
@@ -93,7 +93,7 @@ pub enum OpenError {
         /// What was written.
         want: u32,
     },
-    /// The drive lacks an object without which it would not stop when this program dies.
+    /// The drive missing_objects an object without which it would not stop when this program dies.
     #[error(
         "node {node} cannot be told to stop when it no longer hears us: {cause}; with abort_connection unset its own reaction is trusted: prove it by unplugging the bus"
     )]

@@ -15,7 +15,7 @@ pub struct Inspection {
     pub name: Option<String>,
     /// Vendor, product, revision and serial number of 0x1018.
     pub identity: [Option<u32>; 4],
-    /// Error register, 0x1001; [`super::super::emcy::register_words`] puts it into words.
+    /// Error register, 0x1001; [`super::super::emcy::register_names`] puts it into words.
     pub error_register: Option<u8>,
     /// Statusword, 0x6041.
     pub statusword: Option<u16>,
@@ -27,12 +27,12 @@ pub struct Inspection {
     pub maximum_current_ratio: Option<f64>,
     /// Past errors, 0x1003, the latest first: codes for [`super::super::emcy::text`].
     pub past_errors: Vec<u16>,
-    /// Objects it lacks of those without which it cannot be watched: see [`NEEDED`].
-    pub lacks: Vec<Address>,
+    /// Objects it lacks of those without which it cannot be watched: see [`REQUIRED_OBJECTS`].
+    pub missing_objects: Vec<Address>,
 }
 
 /// Heartbeat consumer and producer, and what the drive does when it hears nobody (0x6007).
-pub const NEEDED: [Address; 3] = [
+pub const REQUIRED_OBJECTS: [Address; 3] = [
     Address::new(0x1016, 1),
     Address::new(0x1017, 0),
     ABORT_CONNECTION,
@@ -81,7 +81,7 @@ pub fn inspect(host: &dyn Host, node: u8, timeout: Duration) -> Result<Inspectio
         maximum_current_ratio: present(channel.read_u16(Address::new(0x6072, 0)))?
             .map(|mille| f64::from(mille) * 1e-3),
         past_errors: past_errors(&mut channel)?,
-        lacks: lacks(&mut channel)?,
+        missing_objects: missing_objects(&mut channel)?,
     })
 }
 
@@ -99,14 +99,14 @@ fn past_errors(channel: &mut Channel<'_>) -> Result<Vec<u16>, SdoError> {
         .collect())
 }
 
-fn lacks(channel: &mut Channel<'_>) -> Result<Vec<Address>, SdoError> {
-    let mut lacks = Vec::new();
-    for address in NEEDED {
+fn missing_objects(channel: &mut Channel<'_>) -> Result<Vec<Address>, SdoError> {
+    let mut missing_objects = Vec::new();
+    for address in REQUIRED_OBJECTS {
         if present(channel.read(address))?.is_none() {
-            lacks.push(address);
+            missing_objects.push(address);
         }
     }
-    Ok(lacks)
+    Ok(missing_objects)
 }
 
 /// An object that is not there is no error.

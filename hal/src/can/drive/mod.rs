@@ -27,7 +27,7 @@ use std::time::Duration;
 
 pub use errors::OpenError;
 pub use faults::fault_text;
-pub use inspect::{ABORT_CONNECTION, Inspection, NEEDED, inspect};
+pub use inspect::{ABORT_CONNECTION, Inspection, REQUIRED_OBJECTS, inspect};
 pub use settings::{DriveSettings, ExpectedIdentity, TorqueMode};
 
 use self::monitor::{Monitor, heard_ids, set_point};
@@ -35,7 +35,7 @@ use self::service::Service;
 use self::setup::{Configured, Setup};
 use self::shared::{Intent, Shared};
 use super::budget::Exchange;
-use super::bus::{CanBus, Claim, Host, Running};
+use super::bus::{CanBus, Claim, Host, TaskHandle};
 use super::cia402::{CYCLIC_TORQUE, DISABLE_VOLTAGE, ENABLE_OPERATION, State};
 use super::scale::Scale;
 use super::sdo::{Address, Channel, answer_id};
@@ -47,7 +47,7 @@ const LOOK: Duration = Duration::from_millis(2);
 
 /// A CANopen drive in torque mode. See the module for who watches whom.
 pub struct CanopenDrive {
-    service: Running, // first, so that it ends before the claim does
+    service: TaskHandle, // first, so that it ends before the claim does
     bus: Box<dyn CanBus>,
     host: Box<dyn Host>,
     shared: Arc<Shared>,
@@ -296,7 +296,7 @@ impl CurrentAmplifier for CanopenDrive {
 impl Drop for CanopenDrive {
     fn drop(&mut self) {
         self.leave_in_order();
-        self.service = Running::default();
+        self.service = TaskHandle::default();
     }
 }
 

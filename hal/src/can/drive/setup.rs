@@ -159,7 +159,7 @@ impl Setup<'_> {
         (2..=4).try_for_each(|number| self.silence(number))
     }
 
-    /// Says which other exchange does without the times that a drive lacks.
+    /// Says which other exchange does without the times that a drive missing_objects.
     fn no_timer(&self, address: Address, error: OpenError) -> OpenError {
         let is_time = matches!((address.index, address.sub), (0x1800, 3 | 5));
         match error {

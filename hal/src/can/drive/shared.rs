@@ -13,7 +13,7 @@ pub(super) enum Intent {
     Off = 0,
     /// On the way to Operation Enabled; target zero.
     Enabling = 1,
-    /// Follow commands.
+    /// Observer commands.
     On = 2,
     /// A person acknowledges a fault: no current, and the fault is looked at anew at the end.
     Resetting = 3,

@@ -63,7 +63,7 @@ pub enum SdoError {
 }
 
 impl SdoError {
-    /// Whether the node lacks the object.
+    /// Whether the node missing_objects the object.
     pub fn means_absent(&self) -> bool {
         matches!(self, SdoError::Aborted { code, .. } if code.means_absent())
     }

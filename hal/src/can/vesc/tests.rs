@@ -2,8 +2,8 @@ use std::sync::Mutex;
 
 use proptest::prelude::*;
 
-use super::super::bus::{Port, World};
-use super::super::device::{ActingAmplifier, DeviceFault, DeviceTask, VescDevice};
+use super::super::bus::{Port, SimulatedHost};
+use super::super::device::{AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedVesc};
 use super::*;
 
 const SETTINGS: VescSettings = VescSettings {
@@ -14,9 +14,9 @@ const SETTINGS: VescSettings = VescSettings {
 
 struct Rig {
     vesc: Vesc,
-    world: World,
-    device: Arc<Mutex<VescDevice>>,
-    _running: Running,
+    world: SimulatedHost,
+    device: Arc<Mutex<EmulatedVesc>>,
+    _running: TaskHandle,
 }
 
 impl Rig {
@@ -30,8 +30,11 @@ impl Rig {
 }
 
 fn rig() -> Rig {
-    let (world, device) = (World::default(), Arc::new(Mutex::new(VescDevice::new(23))));
-    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    let (world, device) = (
+        SimulatedHost::default(),
+        Arc::new(Mutex::new(EmulatedVesc::new(23))),
+    );
+    let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     let vesc = Vesc::open(SETTINGS, Box::new(world.clone())).unwrap();
     Rig {
         vesc,
@@ -144,7 +147,7 @@ fn a_loop_that_stands_still_ends_with_no_current() {
 proptest! {
     #[test]
     fn no_frame_panics_the_watch(frames in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..9), 0..50)) {
-        let world = World::default();
+        let world = SimulatedHost::default();
         let vesc = Vesc::open(SETTINGS, Box::new(world.clone())).unwrap();
         let mut bus = world.endpoint(&[]).unwrap();
         for bytes in frames {

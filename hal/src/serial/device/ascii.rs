@@ -1,7 +1,7 @@
 //! A pretend probe that writes its values: sends a line at each measurement, or at each request.
 
 use super::fault::{Ailing, Fault};
-use super::{Sampler, SimulatedProbe};
+use super::{EmulatedProbe, Sampler};
 use crate::serial::ascii::{Statement, Writing};
 
 /// Longest request worth remembering: what is longer is not known.
@@ -75,7 +75,7 @@ impl AsciiDevice {
     }
 }
 
-impl SimulatedProbe for AsciiDevice {
+impl EmulatedProbe for AsciiDevice {
     fn handle(&mut self, bytes: &[u8], now_ns: u64, position_m: f64) -> Vec<u8> {
         let mut lines = self.measure(now_ns, position_m);
         lines.extend(self.answer(bytes));
@@ -91,7 +91,7 @@ impl SimulatedProbe for AsciiDevice {
         self.sampler.next_ns
     }
 
-    fn ask_fault(&mut self, fault: Fault) {
+    fn inject_fault(&mut self, fault: Fault) {
         if fault == Fault::Reset {
             self.heard.clear();
             self.cut = true;

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::fault::{Ailing, Fault};
-use super::{Sampler, SimulatedProbe};
+use super::{EmulatedProbe, Sampler};
 use crate::serial::capancdt::{BATCH_MAX, CounterMeaning, Settings};
 
 /// The device's side of [`crate::serial::capancdt`].
@@ -64,7 +64,7 @@ fn keep_newest<T>(queue: &mut VecDeque<T>, len: usize) {
     queue.drain(..queue.len().saturating_sub(len));
 }
 
-impl SimulatedProbe for CapancdtDevice {
+impl EmulatedProbe for CapancdtDevice {
     fn handle(&mut self, bytes: &[u8], now_ns: u64, position_m: f64) -> Vec<u8> {
         self.measure(now_ns, position_m);
         let mut answers = Vec::new();
@@ -85,7 +85,7 @@ impl SimulatedProbe for CapancdtDevice {
         self.sampler.next_ns
     }
 
-    fn ask_fault(&mut self, fault: Fault) {
+    fn inject_fault(&mut self, fault: Fault) {
         if fault == Fault::Reset {
             self.counter = 0;
             self.unsent.clear();

@@ -1,7 +1,7 @@
 //! Pretend probes: the device's side of each protocol, to rehearse without hardware and to test.
 //!
-//! The probes know no clock and no port either: whoever carries the bytes calls [`SimulatedProbe::handle`] with what the
-//! host sent and [`SimulatedProbe::poll`] often, with the time and the true position of the stage, and sends what they
+//! The probes know no clock and no port either: whoever carries the bytes calls [`EmulatedProbe::handle`] with what the
+//! host sent and [`EmulatedProbe::poll`] often, with the time and the true position of the stage, and sends what they
 //! return. [`ProbeTask`] does so in a thread, on a [`Line`]: a pseudo terminal or a port.
 //!
 //! Positions are those of the probe: metres from the start of its range (capaNCDT, optoNCDT) or from its zero (ASCII).
@@ -21,12 +21,12 @@ pub use self::capancdt::CapancdtDevice;
 pub use self::fault::Fault;
 pub use self::line::Line;
 pub use self::optoncdt::OptoncdtDevice;
-pub use self::task::{Carried, ProbeTask, Shared};
+pub use self::task::{LineCounts, ProbeTask, SharedProbe};
 
 use super::{Protocol, SerialError};
 
 /// The device's side of a probe.
-pub trait SimulatedProbe: Send {
+pub trait EmulatedProbe: Send {
     /// Takes what the host sent; returns what the probe sends at once.
     fn handle(&mut self, bytes: &[u8], now_ns: u64, position_m: f64) -> Vec<u8>;
 
@@ -37,11 +37,11 @@ pub trait SimulatedProbe: Send {
     fn due_ns(&self) -> Option<u64>;
 
     /// Makes the probe misbehave until another fault is asked for. [`Fault::Reset`] happens once.
-    fn ask_fault(&mut self, fault: Fault);
+    fn inject_fault(&mut self, fault: Fault);
 }
 
 /// The device's side of `protocol`, making `rate_hz` measurements a second.
-pub fn simulate(protocol: &Protocol, rate_hz: f64) -> Result<Box<dyn SimulatedProbe>, SerialError> {
+pub fn simulate(protocol: &Protocol, rate_hz: f64) -> Result<Box<dyn EmulatedProbe>, SerialError> {
     super::error::positive("rate_hz", rate_hz)?;
     protocol.decoder()?; // refuses settings that make no sense
     Ok(match protocol.clone() {

@@ -1,7 +1,7 @@
 //! A pretend optoNCDT: sends every measurement by itself.
 
 use super::fault::{Ailing, Fault};
-use super::{Sampler, SimulatedProbe};
+use super::{EmulatedProbe, Sampler};
 use crate::serial::optoncdt::{Settings, message};
 
 /// The device's side of [`crate::serial::optoncdt`].
@@ -47,7 +47,7 @@ impl OptoncdtDevice {
     }
 }
 
-impl SimulatedProbe for OptoncdtDevice {
+impl EmulatedProbe for OptoncdtDevice {
     fn handle(&mut self, _bytes: &[u8], now_ns: u64, position_m: f64) -> Vec<u8> {
         self.poll(now_ns, position_m)
     }
@@ -62,7 +62,7 @@ impl SimulatedProbe for OptoncdtDevice {
         self.sampler.next_ns
     }
 
-    fn ask_fault(&mut self, fault: Fault) {
+    fn inject_fault(&mut self, fault: Fault) {
         self.cut |= fault == Fault::Reset;
         self.ailing.ask(fault);
     }

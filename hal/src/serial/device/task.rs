@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::{Line, SimulatedProbe};
+use super::{EmulatedProbe, Line};
 
 /// Longest time between two looks at what is due.
 const LOOK_NS: u64 = 1_000_000;
@@ -14,18 +14,18 @@ const LOOK_NS: u64 = 1_000_000;
 const MOST_MEASUREMENTS: usize = 1000;
 
 /// A pretend probe that several may hold: one carries its bytes, another asks it for faults.
-pub type Shared = Arc<Mutex<Box<dyn SimulatedProbe>>>;
+pub type SharedProbe = Arc<Mutex<Box<dyn EmulatedProbe>>>;
 
 /// A pretend probe at work. Dropping it ends the thread and closes the line: a reader of the terminal sees it hang up.
 pub struct ProbeTask {
     stop: Arc<AtomicBool>,
-    carried: Arc<Carried>,
+    carried: Arc<LineCounts>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// What has gone over a line.
 #[derive(Debug, Default)]
-pub struct Carried {
+pub struct LineCounts {
     /// Bytes of the host.
     pub received: AtomicU64,
     /// Bytes of the probe.
@@ -41,12 +41,12 @@ impl ProbeTask {
     /// time at which a measurement falls due; `prepare` runs first in the thread, to give it a priority or a processor.
     pub fn start(
         line: Line,
-        probe: Shared,
+        probe: SharedProbe,
         now_ns: impl Fn() -> u64 + Send + 'static,
         measure_m: impl FnMut(u64) -> f64 + Send + 'static,
         prepare: impl FnOnce() + Send + 'static,
     ) -> io::Result<ProbeTask> {
-        let (stop, carried) = (Arc::<AtomicBool>::default(), Arc::<Carried>::default());
+        let (stop, carried) = (Arc::<AtomicBool>::default(), Arc::<LineCounts>::default());
         let mut carrier = Carrier {
             line,
             probe,
@@ -73,7 +73,7 @@ impl ProbeTask {
     }
 
     /// The counts.
-    pub fn carried(&self) -> &Arc<Carried> {
+    pub fn carried(&self) -> &Arc<LineCounts> {
         &self.carried
     }
 }
@@ -89,10 +89,10 @@ impl Drop for ProbeTask {
 
 struct Carrier<N, M> {
     line: Line,
-    probe: Shared,
+    probe: SharedProbe,
     now_ns: N,
     measure_m: M,
-    carried: Arc<Carried>,
+    carried: Arc<LineCounts>,
 }
 
 impl<N: Fn() -> u64, M: FnMut(u64) -> f64> Carrier<N, M> {
@@ -149,6 +149,6 @@ impl<N: Fn() -> u64, M: FnMut(u64) -> f64> Carrier<N, M> {
     }
 }
 
-fn lock(probe: &Shared) -> MutexGuard<'_, Box<dyn SimulatedProbe>> {
+fn lock(probe: &SharedProbe) -> MutexGuard<'_, Box<dyn EmulatedProbe>> {
     probe.lock().unwrap_or_else(PoisonError::into_inner)
 }

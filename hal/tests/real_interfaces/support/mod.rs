@@ -7,9 +7,9 @@ pub mod vcan;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use bench_hal::can::bus::{Host, Port, Running, SocketPort, Threads};
+use bench_hal::can::bus::{Host, Port, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::cia402::State;
-use bench_hal::can::device::{Device, DeviceFault, DeviceSettings, DeviceTask};
+use bench_hal::can::device::{AmplifierTask, Device, DeviceFault, EmulatedDriveSettings};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings, OpenError};
 use bench_hal::can::heartbeat;
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
@@ -34,8 +34,8 @@ pub fn settings() -> DriveSettings {
 }
 
 /// Interface `name`, in real time.
-pub fn host(name: &str) -> Threads<SocketPort> {
-    Threads::new(SocketPort::open(name, BIT_RATE).unwrap())
+pub fn host(name: &str) -> SystemHost<SocketPort> {
+    SystemHost::new(SocketPort::open(name, BIT_RATE).unwrap())
 }
 
 pub fn open(name: &str, settings: DriveSettings) -> Result<CanopenDrive, OpenError> {
@@ -61,7 +61,7 @@ pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
 /// A simulated drive at work on a bus.
 pub struct FarEnd {
     device: Arc<Mutex<Device>>,
-    running: Running,
+    running: TaskHandle,
 }
 
 impl FarEnd {
@@ -71,7 +71,7 @@ impl FarEnd {
         let mut bus = self::host(name).endpoint(&[heartbeat::cob_id(5)]).unwrap();
         let far_end = FarEnd::again(
             host,
-            Arc::new(Mutex::new(Device::new(DeviceSettings::default()))),
+            Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default()))),
         );
         wait_for("the drive has started", || {
             bus.receive(Duration::from_secs(1)).unwrap().is_some()
@@ -87,7 +87,7 @@ impl FarEnd {
     }
 
     fn again(host: &dyn Host, device: Arc<Mutex<Device>>) -> FarEnd {
-        let running = DeviceTask::start(host, Arc::clone(&device)).unwrap();
+        let running = AmplifierTask::start(host, Arc::clone(&device)).unwrap();
         FarEnd { device, running }
     }
 

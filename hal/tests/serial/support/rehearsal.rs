@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::device::{Fault, Line, ProbeTask, Shared, simulate};
+use bench_hal::serial::device::{Fault, Line, ProbeTask, SharedProbe, simulate};
 use bench_hal::serial::{PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics};
 use bench_hal::{DisplacementProbe, Reading, Tick};
 
@@ -22,7 +22,7 @@ pub struct Rehearsal {
     pub path: PathBuf,
     pub locks: tempfile::TempDir,
     started: Instant,
-    device: Shared,
+    device: SharedProbe,
     task: Option<ProbeTask>,
 }
 
@@ -31,7 +31,7 @@ impl Rehearsal {
     pub fn new(protocol: &Protocol, rate_hz: f64, motion: Motion) -> Self {
         let line = Line::terminal(PortSettings::new("", BAUD)).unwrap();
         let (path, started) = (line.path().to_owned(), Instant::now());
-        let device: Shared = Arc::new(Mutex::new(simulate(protocol, rate_hz).unwrap()));
+        let device: SharedProbe = Arc::new(Mutex::new(simulate(protocol, rate_hz).unwrap()));
         let now_ns = move || started.elapsed().as_nanos() as u64;
         let task =
             Some(ProbeTask::start(line, Arc::clone(&device), now_ns, motion, || {}).unwrap());
@@ -59,8 +59,8 @@ impl Rehearsal {
         SerialProbe::open(self.settings(protocol)).unwrap()
     }
 
-    pub fn ask_fault(&self, fault: Fault) {
-        self.device.lock().unwrap().ask_fault(fault);
+    pub fn inject_fault(&self, fault: Fault) {
+        self.device.lock().unwrap().inject_fault(fault);
     }
 
     pub fn now_ns(&self) -> u64 {

@@ -81,9 +81,9 @@ fn the_drive_is_told_to_watch_us_and_to_switch_off() {
 
 #[test]
 fn profile_torque_is_the_fallback() {
-    let device = DeviceSettings {
+    let device = EmulatedDriveSettings {
         modes: 1 << (PROFILE_TORQUE - 1),
-        ..DeviceSettings::default()
+        ..EmulatedDriveSettings::default()
     };
     let mut rig = open(DriveSettings::default(), device.clone()).unwrap();
     assert_eq!(rig.drive.mode(), PROFILE_TORQUE);
@@ -112,9 +112,9 @@ fn a_target_in_per_mille_of_the_maximum_is_scaled_so() {
         reference: Reference::Maximum,
         ..DriveSettings::default()
     };
-    let device = DeviceSettings {
+    let device = EmulatedDriveSettings {
         reference: Reference::Maximum,
-        ..DeviceSettings::default()
+        ..EmulatedDriveSettings::default()
     };
     let mut rig = open(settings, device).unwrap();
     rig.drive.enable().unwrap();
@@ -135,12 +135,12 @@ fn another_drive_than_configured_is_refused() {
         vendor: Some(0x402),
         ..ExpectedIdentity::default()
     };
-    assert!(open(with(vendor), DeviceSettings::default()).is_ok());
+    assert!(open(with(vendor), EmulatedDriveSettings::default()).is_ok());
     let serial = ExpectedIdentity {
         serial: Some(7),
         ..vendor
     };
-    let refused = refusal(with(serial), DeviceSettings::default());
+    let refused = refusal(with(serial), EmulatedDriveSettings::default());
     assert!(
         refused.contains(
             "the serial number of node 5 is 0x00000001, the configuration says 0x00000007"
@@ -152,7 +152,7 @@ fn another_drive_than_configured_is_refused() {
             rated_current_a: 4.5,
             ..DriveSettings::default()
         },
-        DeviceSettings::default(),
+        EmulatedDriveSettings::default(),
     );
     assert!(
         refused.contains("is 4 A, the configuration says 4.5 A"),
@@ -162,9 +162,9 @@ fn another_drive_than_configured_is_refused() {
 
 #[test]
 fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
-    let device = DeviceSettings {
-        lacks: vec![Address::new(0x6007, 0)],
-        ..DeviceSettings::default()
+    let device = EmulatedDriveSettings {
+        missing_objects: vec![Address::new(0x6007, 0)],
+        ..EmulatedDriveSettings::default()
     };
     let refused = refusal(DriveSettings::default(), device.clone());
     assert!(refused.contains("prove it by unplugging"), "{refused}");
@@ -178,9 +178,9 @@ fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
         )
         .is_ok()
     );
-    let device = DeviceSettings {
-        lacks: vec![Address::new(0x1016, 1)],
-        ..DeviceSettings::default()
+    let device = EmulatedDriveSettings {
+        missing_objects: vec![Address::new(0x1016, 1)],
+        ..EmulatedDriveSettings::default()
     };
     let trusting = DriveSettings {
         abort_connection: None,
@@ -192,9 +192,9 @@ fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
 #[test]
 fn a_drive_without_a_timer_for_its_status_is_refused_with_sync_as_the_way_out() {
     for sub in [3, 5] {
-        let device = DeviceSettings {
-            lacks: vec![Address::new(0x1800, sub)],
-            ..DeviceSettings::default()
+        let device = EmulatedDriveSettings {
+            missing_objects: vec![Address::new(0x1800, sub)],
+            ..EmulatedDriveSettings::default()
         };
         let refused = refusal(DriveSettings::default(), device.clone());
         let remedy = "choose the synchronous exchange, in which the drive answers SYNC";
@@ -217,25 +217,25 @@ fn a_drive_without_a_timer_for_its_status_is_refused_with_sync_as_the_way_out() 
 
 #[test]
 fn optional_objects_may_be_missing() {
-    let lacks = [0x1801, 0x1802, 0x1803]
+    let missing_objects = [0x1801, 0x1802, 0x1803]
         .map(|index| Address::new(index, 1))
         .to_vec();
-    let lacks = [
-        lacks,
+    let missing_objects = [
+        missing_objects,
         vec![Address::new(0x6502, 0), Address::new(0x1008, 0)],
     ]
     .concat();
-    let device = DeviceSettings {
+    let device = EmulatedDriveSettings {
         modes: 1 << 9,
-        lacks: lacks[..3].to_vec(),
-        ..DeviceSettings::default()
+        missing_objects: missing_objects[..3].to_vec(),
+        ..EmulatedDriveSettings::default()
     };
     assert!(open(DriveSettings::default(), device).is_ok());
 }
 
 #[test]
 fn silence_on_the_bus_is_told_with_what_to_check() {
-    let error = CanopenDrive::open(DriveSettings::default(), Box::new(World::default()))
+    let error = CanopenDrive::open(DriveSettings::default(), Box::new(SimulatedHost::default()))
         .err()
         .unwrap();
     assert_eq!(
@@ -246,9 +246,9 @@ fn silence_on_the_bus_is_told_with_what_to_check() {
 
 #[test]
 fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
-    let world = World::default();
-    let device = Arc::new(Mutex::new(Device::new(DeviceSettings::default())));
-    let _running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    let world = SimulatedHost::default();
+    let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default())));
+    let _running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     world.sleep(Duration::from_millis(1));
     let before = device.lock().unwrap().objects().clone();
     let seen = inspect(&world, 5, Duration::from_millis(100)).unwrap();
@@ -267,7 +267,7 @@ fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
         (Some(0x0002_0192), Some(1.5)),
         "profile 402"
     );
-    assert_eq!((seen.past_errors, seen.lacks), (vec![], vec![]));
+    assert_eq!((seen.past_errors, seen.missing_objects), (vec![], vec![]));
     assert_eq!(
         format!("{before:?}"),
         format!("{:?}", device.lock().unwrap().objects())
@@ -276,20 +276,20 @@ fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
 
 #[test]
 fn a_drive_looked_at_tells_which_objects_it_lacks() {
-    let world = World::default();
-    let lacks = vec![
+    let world = SimulatedHost::default();
+    let missing_objects = vec![
         Address::new(0x6007, 0),
         Address::new(0x6502, 0),
         Address::new(0x1008, 0),
     ];
-    let device = Arc::new(Mutex::new(Device::new(DeviceSettings {
-        lacks,
-        ..DeviceSettings::default()
+    let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings {
+        missing_objects,
+        ..EmulatedDriveSettings::default()
     })));
-    let _running = DeviceTask::start(&world, device).unwrap();
+    let _running = AmplifierTask::start(&world, device).unwrap();
     let seen = inspect(&world, 5, Duration::from_millis(100)).unwrap();
     assert_eq!(
-        (seen.lacks, seen.modes, seen.name),
+        (seen.missing_objects, seen.modes, seen.name),
         (vec![Address::new(0x6007, 0)], None, None)
     );
 }

@@ -78,7 +78,7 @@ fn faults_of_the_drive_are_found_with_the_next_status_frame() {
         (DeviceFault::TargetIgnored, faults::TARGET_IGNORED),
         (DeviceFault::SwitchesOff, faults::SWITCHED_OFF),
         (DeviceFault::ShortFrames, faults::MALFORMED),
-        (DeviceFault::SenselessStatus, faults::MALFORMED),
+        (DeviceFault::InvalidStatusword, faults::MALFORMED),
         (DeviceFault::Reset, faults::RESTARTED),
     ];
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
@@ -143,7 +143,7 @@ fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat
         own_heartbeat_timeout: Duration::from_millis(40),
         ..DriveSettings::default()
     };
-    let mut rig = open(settings, DeviceSettings::default()).unwrap();
+    let mut rig = open(settings, EmulatedDriveSettings::default()).unwrap();
     rig.drive.enable().unwrap();
     rig.run_ms(1.0, 50);
     rig.device().inject(DeviceFault::Unplugged);
@@ -221,7 +221,7 @@ fn an_adapter_that_is_pulled_out_is_gone_though_it_goes_down_first() {
 fn a_killed_process_is_missed_by_the_drive() {
     let mut rig = running(ASYNCHRONOUS);
     // SIGKILL: no thread of ours runs on, nothing is sent any more.
-    rig.drive.service = Running::default();
+    rig.drive.service = TaskHandle::default();
     rig.sleep_ms(48);
     assert_eq!(
         rig.device_current_a(),
@@ -272,7 +272,7 @@ fn a_loop_that_stops_commanding_is_switched_off() {
 fn disable_acts_at_once_and_without_the_service() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
-        rig.drive.service = Running::default(); // as if its thread hung
+        rig.drive.service = TaskHandle::default(); // as if its thread hung
         rig.drive.disable();
         rig.world.sleep(Duration::from_micros(200)); // two steps of the bus
         assert_eq!(rig.device_current_a(), 0.0, "{exchange:?}");
@@ -301,7 +301,7 @@ fn a_disable_that_was_lost_is_repeated() {
 fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
     for (misbehaviour, most_ms) in [
         (DeviceFault::SetPointsIgnored, 85),
-        (DeviceFault::OrdersIgnored, 175),
+        (DeviceFault::CommandsIgnored, 175),
     ] {
         let mut rig = running(ASYNCHRONOUS);
         rig.device().inject(misbehaviour);
@@ -364,9 +364,9 @@ fn a_fault_that_persists_is_not_cleared() {
 
 #[test]
 fn a_drive_in_fault_at_opening_is_opened_but_not_reset() {
-    let world = World::default();
-    let device = Arc::new(Mutex::new(Device::new(DeviceSettings::default())));
-    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    let world = SimulatedHost::default();
+    let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default())));
+    let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     world.sleep(Duration::from_millis(1));
     device.lock().unwrap().inject(DeviceFault::Drive(0x2310));
     world.sleep(Duration::from_millis(5));

@@ -7,22 +7,22 @@ mod failing;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use super::super::bus::{Host, World};
-use super::super::device::{Device, DeviceSettings, DeviceTask};
+use super::super::bus::{Host, SimulatedHost};
+use super::super::device::{AmplifierTask, Device, EmulatedDriveSettings};
 use super::*;
 
 /// Driver and simulated drive on one bus.
 struct Rig {
     drive: CanopenDrive,
-    world: World,
+    world: SimulatedHost,
     device: Arc<Mutex<Device>>,
-    _running: Running,
+    _running: TaskHandle,
 }
 
-fn open(settings: DriveSettings, device: DeviceSettings) -> Result<Rig, OpenError> {
-    let world = World::default();
+fn open(settings: DriveSettings, device: EmulatedDriveSettings) -> Result<Rig, OpenError> {
+    let world = SimulatedHost::default();
     let device = Arc::new(Mutex::new(Device::new(device)));
-    let running = DeviceTask::start(&world, Arc::clone(&device)).unwrap();
+    let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     let drive = CanopenDrive::open(settings, Box::new(world.clone()))?;
     Ok(Rig {
         drive,
@@ -41,13 +41,13 @@ fn rig(exchange: Exchange) -> Rig {
             exchange,
             ..DriveSettings::default()
         },
-        DeviceSettings::default(),
+        EmulatedDriveSettings::default(),
     )
     .unwrap()
 }
 
 /// Why it did not open.
-fn refusal(settings: DriveSettings, device: DeviceSettings) -> String {
+fn refusal(settings: DriveSettings, device: EmulatedDriveSettings) -> String {
     match open(settings, device) {
         Ok(_) => panic!("this must not open"),
         Err(error) => error.to_string(),

@@ -3,25 +3,25 @@
 
 use rtrb::Producer;
 
-use super::record::{Event, EventKind, Published, TickRecord};
-use super::servo::ORDERS_PER_TICK;
+use super::record::{Event, EventKind, LoopMessage, TickRecord};
+use super::servo::REQUESTS_PER_TICK;
 
 /// Publishes records and events without waiting.
-pub struct Outlet {
-    ring: Producer<Published>,
+pub struct Publisher {
+    ring: Producer<LoopMessage>,
     lost: u64,
     unreported: u64,
 }
 
-/// Free slots that a tick can need: three events an order (arm orders whose amplifier does not enable make four, but each
+/// Free slots that a tick can need: three events an order (arm requests whose amplifier does not enable make four, but each
 /// needs a clear order before the next, which makes two), a trip and its state, the program's end and its state, the record,
 /// and the count of what was lost.
-pub const SLOTS_PER_TICK: usize = 3 * ORDERS_PER_TICK + 6;
+pub const SLOTS_PER_TICK: usize = 3 * REQUESTS_PER_TICK + 6;
 
-impl Outlet {
-    /// An outlet into `ring`.
-    pub fn new(ring: Producer<Published>) -> Self {
-        Outlet {
+impl Publisher {
+    /// An publisher into `ring`.
+    pub fn new(ring: Producer<LoopMessage>) -> Self {
+        Publisher {
             ring,
             lost: 0,
             unreported: 0,
@@ -53,17 +53,17 @@ impl Outlet {
                 },
             };
             self.unreported = 0;
-            self.push(Published::Event(lost));
+            self.push(LoopMessage::Event(lost));
         }
-        self.push(Published::Tick(record));
+        self.push(LoopMessage::Tick(record));
     }
 
     /// A change. *In the tick.*
     pub fn event(&mut self, tick: u64, kind: EventKind) {
-        self.push(Published::Event(Event { tick, kind }));
+        self.push(LoopMessage::Event(Event { tick, kind }));
     }
 
-    fn push(&mut self, published: Published) {
+    fn push(&mut self, published: LoopMessage) {
         if self.ring.push(published).is_err() {
             self.lost += 1;
             self.unreported += 1;
@@ -79,28 +79,28 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_counted_and_told_when_there_is_room_again() {
         let (producer, mut consumer) = RingBuffer::new(4);
-        let mut outlet = Outlet::new(producer);
+        let mut publisher = Publisher::new(producer);
         let record = |tick| TickRecord {
             tick,
             ..TickRecord::default()
         };
-        (0..7).for_each(|tick| outlet.record(record(tick)));
-        assert_eq!(outlet.lost(), 3, "ticks 4, 5 and 6 found no room");
+        (0..7).for_each(|tick| publisher.record(record(tick)));
+        assert_eq!(publisher.lost(), 3, "ticks 4, 5 and 6 found no room");
         for expected in 0..4 {
-            assert!(matches!(consumer.pop(), Ok(Published::Tick(t)) if t.tick == expected));
+            assert!(matches!(consumer.pop(), Ok(LoopMessage::Tick(t)) if t.tick == expected));
         }
-        outlet.record(record(7));
+        publisher.record(record(7));
         let lost = consumer.pop();
         assert!(
             matches!(
                 lost,
-                Ok(Published::Event(Event {
+                Ok(LoopMessage::Event(Event {
                     tick: 7,
                     kind: EventKind::Lost { records: 3 }
                 }))
             ),
             "{lost:?}"
         );
-        assert!(matches!(consumer.pop(), Ok(Published::Tick(t)) if t.tick == 7));
+        assert!(matches!(consumer.pop(), Ok(LoopMessage::Tick(t)) if t.tick == 7));
     }
 }

@@ -12,10 +12,12 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use super::options::{BenchOptions, print_json};
 use super::{CliError, Outcome};
 use crate::config::Purpose;
-use crate::rig::emulator::probe::End;
-use crate::rig::emulator::rehearsal::Cast;
-use crate::rig::emulator::schedule::Planned;
-use crate::rig::emulator::{ActingError, ActingFault, Entry, Rehearsal, Schedule, fault};
+use crate::rig::emulator::probe::ProbeEndpoint;
+use crate::rig::emulator::rehearsal::EmulatedDevices;
+use crate::rig::emulator::schedule::PlannedFault;
+use crate::rig::emulator::{
+    EmulatedFault, Emulator, EmulatorError, FaultSchedule, LogEntry, fault,
+};
 
 /// How often orders, signals and faults are looked for.
 const BEAT: Duration = Duration::from_millis(2);
@@ -43,7 +45,7 @@ pub(super) struct Args {
     measuring_rate: Option<f64>,
     /// A fault at a time (KIND@SECONDS) or for a while (KIND@FROM..TO), repeatable; the kinds are listed below
     #[arg(long = "fault", value_name = "KIND@SECONDS")]
-    faults: Vec<Planned>,
+    faults: Vec<PlannedFault>,
     /// What the times of --fault count from: the first enable of the amplifier, or the start
     /// [default: enable; start if there is no amplifier]
     #[arg(long, value_name = "enable|start", value_parser = ["enable", "start"])]
@@ -51,7 +53,7 @@ pub(super) struct Args {
     /// Write every change to a file as well, a JSON object a line
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// End after so many seconds [default: on Ctrl-C]
+    /// ProbeEndpoint after so many seconds [default: on Ctrl-C]
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
 }
@@ -61,12 +63,12 @@ impl Args {
         self.devices.iter().any(|served| served == device)
     }
 
-    fn cast(&self) -> Cast {
-        let end = self
-            .port
-            .clone()
-            .map_or_else(|| End::Terminal(self.pty.clone()), End::Port);
-        Cast {
+    fn cast(&self) -> EmulatedDevices {
+        let end = self.port.clone().map_or_else(
+            || ProbeEndpoint::Terminal(self.pty.clone()),
+            ProbeEndpoint::Port,
+        );
+        EmulatedDevices {
             amplifier: self.serves("amplifier"),
             probe: self.serves("probe").then_some(end),
             measuring_rate_hz: self.measuring_rate,
@@ -126,8 +128,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let log = args.log.as_ref().map(Log::create).transpose()?;
     let (runtime, signals) =
         signals().map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
-    let rehearsal = Rehearsal::start(&config, &args.cast())?;
-    let schedule = Schedule::new(&args.faults);
+    let rehearsal = Emulator::start(&config, &args.cast())?;
+    let schedule = FaultSchedule::new(&args.faults);
     schedule
         .steps()
         .try_for_each(|(word, fault)| rehearsal.check(word, *fault))?;
@@ -147,8 +149,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 struct Session<'a> {
-    rehearsal: Rehearsal,
-    schedule: Schedule,
+    rehearsal: Emulator,
+    schedule: FaultSchedule,
     log: Option<Log>,
     typed: Receiver<String>,
     args: &'a Args,
@@ -199,7 +201,7 @@ impl Session<'_> {
             ["help"] => eprint!("fault KIND, quit, help; the kinds are\n{}", fault::help()),
             ["fault", word] => {
                 let word = fault::whole(word, &self.args.devices);
-                let fault = ActingFault::parse(&word).map_err(|e| e.to_string());
+                let fault = EmulatedFault::parse(&word).map_err(|e| e.to_string());
                 let asked = fault
                     .and_then(|fault| self.rehearsal.ask(&word, fault).map_err(|e| e.to_string()));
                 asked.unwrap_or_else(|why| eprintln!("bench device: {why}"));
@@ -263,7 +265,7 @@ impl Log {
         })
     }
 
-    fn write(&mut self, entry: &Entry) -> Result<(), CliError> {
+    fn write(&mut self, entry: &LogEntry) -> Result<(), CliError> {
         let written = serde_json::to_string(entry).map_err(std::io::Error::other);
         let written = written.and_then(|line| self.file.write_all((line + "\n").as_bytes()));
         written.map_err(|e| {
@@ -275,10 +277,12 @@ impl Log {
     }
 }
 
-impl From<ActingError> for CliError {
-    fn from(error: ActingError) -> Self {
+impl From<EmulatorError> for CliError {
+    fn from(error: EmulatorError) -> Self {
         match error {
-            ActingError::Bus(_) | ActingError::Thread { .. } => CliError::Failed(error.to_string()),
+            EmulatorError::Bus(_) | EmulatorError::Thread { .. } => {
+                CliError::Failed(error.to_string())
+            }
             _ => CliError::Usage(error.to_string()),
         }
     }

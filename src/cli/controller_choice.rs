@@ -3,7 +3,7 @@
 /// Which controller.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[group(multiple = false)]
-pub(super) struct Choice {
+pub(super) struct ControllerChoice {
     /// The fast controller of the thesis, Eq. (6-7)
     #[arg(long)]
     fast: bool,
@@ -15,7 +15,7 @@ pub(super) struct Choice {
     controller: Option<String>,
 }
 
-impl Choice {
+impl ControllerChoice {
     /// The setting that the choice stands for.
     pub fn sets(&self) -> Vec<String> {
         let name = match (self.fast, self.slow, &self.controller) {

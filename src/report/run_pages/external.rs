@@ -1,18 +1,18 @@
 //! A record of other hands: no model, and no loop of ours.
 
 use super::page::delay_ms;
-use super::{Analysed, Picture, Shown};
-use crate::experiment::ForeignAnalysis;
+use super::{Plot, ReportSource, Shown};
+use crate::experiment::ExternalAnalysis;
 use crate::identify::Unit;
-use crate::identify::modal::View;
+use crate::identify::modal::MeasurementChain;
 use crate::report::ReportError;
 use crate::report::page::facts;
 
 /// A table of samples that was analysed.
 #[derive(Clone, Copy, Debug)]
-pub struct AnalysedTable<'a> {
+pub struct TableReport<'a> {
     /// What it shows.
-    pub analysis: &'a ForeignAnalysis,
+    pub analysis: &'a ExternalAnalysis,
     /// Name of the file.
     pub file: &'a str,
     /// Column of the input.
@@ -25,7 +25,7 @@ pub struct AnalysedTable<'a> {
     pub samples: usize,
 }
 
-impl Analysed for AnalysedTable<'_> {
+impl ReportSource for TableReport<'_> {
     fn shown(&self) -> Shown<'_> {
         Shown {
             title: self.file.to_string(),
@@ -37,7 +37,7 @@ impl Analysed for AnalysedTable<'_> {
             residue_unit: format!("{} per {} and s^2", self.output, self.input),
             frf: &self.analysis.frf,
             model: None,
-            view: View::Bare,
+            view: MeasurementChain::Bare,
             fit: self.analysis.fit.as_ref().ok(),
             verdict: &self.analysis.verdict,
             judged_up_to_rad_s: self.analysis.judged_up_to_rad_s,
@@ -55,7 +55,7 @@ impl Analysed for AnalysedTable<'_> {
             .collect()
     }
 
-    fn more_pictures(&self) -> Result<Vec<Picture>, ReportError> {
+    fn more_pictures(&self) -> Result<Vec<Plot>, ReportError> {
         Ok(Vec::new())
     }
 

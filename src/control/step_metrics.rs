@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// What a step response shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StepFigures {
+pub struct StepMetrics {
     /// Seconds from the step until the position has entered the band of 2 % of the step around the reference for good; absent where it never does.
     pub settling_time_s: Option<f64>,
     /// Largest excursion beyond the reference, in per cent of the step.
@@ -44,8 +44,8 @@ impl StepMeter {
     }
 
     /// What the positions so far show.
-    pub fn figures(&self, period_s: f64) -> StepFigures {
-        StepFigures {
+    pub fn figures(&self, period_s: f64) -> StepMetrics {
+        StepMetrics {
             settling_time_s: (self.settled < self.seen).then_some(self.settled as f64 * period_s),
             overshoot_percent: 100.0 * self.beyond_m / self.height_m.abs(),
         }
@@ -53,7 +53,7 @@ impl StepMeter {
 }
 
 /// Figures of a step of `height_m` at the first of `positions_m`, which are relative to where it started.
-pub fn step_figures(positions_m: &[f64], height_m: f64, period_s: f64) -> StepFigures {
+pub fn step_metrics(positions_m: &[f64], height_m: f64, period_s: f64) -> StepMetrics {
     let mut meter = StepMeter::new(height_m);
     positions_m.iter().for_each(|y| meter.push(*y));
     meter.figures(period_s)
@@ -75,7 +75,7 @@ mod tests {
             let positions: Vec<f64> = (0..10_000)
                 .map(|k| height * y(f64::from(k) * period_s))
                 .collect();
-            let figures = step_figures(&positions, height, period_s);
+            let figures = step_metrics(&positions, height, period_s);
             let overshoot =
                 100.0 * (-std::f64::consts::PI * zeta / (1.0 - zeta * zeta).sqrt()).exp();
             assert!(
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn a_response_that_never_settles_has_no_settling_time() {
         assert_eq!(
-            step_figures(&[0.0, 1.0, 0.0], 1.0, 1.0).settling_time_s,
+            step_metrics(&[0.0, 1.0, 0.0], 1.0, 1.0).settling_time_s,
             None
         );
     }

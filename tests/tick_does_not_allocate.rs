@@ -9,12 +9,12 @@ use bench::config::{
 use bench::control::{Controller, ControllerText};
 use bench::excitation::{Chirp, Quiet as NoCurrent, of, reference};
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::clock::{Clock, Moment, Realtime, Virtual};
+use bench::rt::clock::{Clock, Realtime, TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
-use bench::rt::outlet::Outlet;
 use bench::rt::program::{Control, Decision, Excite, Program};
-use bench::rt::record::{EventKind, Published};
-use bench::rt::servo::{Connections, Order, Progress, Servo};
+use bench::rt::publisher::Publisher;
+use bench::rt::record::{EventKind, LoopMessage};
+use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench_hal::{Tick, Validity};
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -159,9 +159,9 @@ fn short(config: &Config, kind: ExcitationKind) -> Config {
 /// A loop with its rings, and what comes out of them.
 struct Quiet {
     servo: Servo,
-    orders: Producer<Order>,
-    records: Consumer<Published>,
-    spent: Consumer<Box<dyn Program>>,
+    requests: Producer<Request>,
+    records: Consumer<LoopMessage>,
+    retired: Consumer<Box<dyn Program>>,
     clock: Virtual,
     next: u64,
     trip: Option<&'static str>,
@@ -172,20 +172,20 @@ struct Quiet {
 impl Quiet {
     fn new(config: &Config, faults: &[(Range<u64>, Fault)]) -> Quiet {
         let rig = FaultyRig::new(SimulatedRig::new(config).expect("a rig"), faults);
-        let (outlet, records) = RingBuffer::new(1024);
-        let (orders, taken) = RingBuffer::new(16);
-        let (hand_back, spent) = RingBuffer::new(4);
+        let (publisher, records) = RingBuffer::new(1024);
+        let (requests, taken) = RingBuffer::new(16);
+        let (hand_back, retired) = RingBuffer::new(4);
         let connections = Connections {
-            orders: taken,
-            spent: hand_back,
-            outlet: Outlet::new(outlet),
+            requests: taken,
+            retired: hand_back,
+            publisher: Publisher::new(publisher),
             progress: Arc::new(Progress::default()),
         };
         Quiet {
             servo: Servo::new(Box::new(rig), Interlocks::new(config), connections),
-            orders,
+            requests,
             records,
-            spent,
+            retired,
             clock: Virtual {
                 period_s: config.servo.period_s(),
             },
@@ -202,21 +202,22 @@ impl Quiet {
         program: Box<dyn Program>,
     ) -> Quiet {
         let mut quiet = Quiet::new(config, faults);
-        quiet.order(Order::Arm);
-        quiet.order(Order::Start(program));
+        quiet.order(Request::Arm);
+        quiet.order(Request::Start(program));
         quiet
     }
 
-    fn order(&mut self, order: Order) {
-        assert!(self.orders.push(order).is_ok());
+    fn order(&mut self, order: Request) {
+        assert!(self.requests.push(order).is_ok());
     }
 
     /// What the loop does in a tick, and nothing else.
     fn bare_tick(&mut self, missed: u32) {
         let moment = self
             .clock
-            .wait(self.next + u64::from(missed), self.servo.outlet());
-        self.servo.tick(&Moment { missed, ..moment }, &self.clock);
+            .wait(self.next + u64::from(missed), self.servo.publisher());
+        self.servo
+            .tick(&TickTiming { missed, ..moment }, &self.clock);
         self.next = moment.tick.number + 1;
     }
 
@@ -224,8 +225,8 @@ impl Quiet {
     fn collect(&mut self) {
         while let Ok(published) = self.records.pop() {
             match published {
-                Published::Tick(record) => self.commands += u64::from(record.command_a != 0.0),
-                Published::Event(event) => match event.kind {
+                LoopMessage::Tick(record) => self.commands += u64::from(record.command_a != 0.0),
+                LoopMessage::Event(event) => match event.kind {
                     EventKind::Trip(trip) => self.trip = Some(trip.reason()),
                     EventKind::Completed => self.completed = true,
                     _ => {}
@@ -249,7 +250,7 @@ impl Quiet {
             assert_no_alloc(|| self.bare_tick(0));
             self.collect();
         }
-        while self.spent.pop().is_ok() {}
+        while self.retired.pop().is_ok() {}
     }
 }
 
@@ -320,11 +321,11 @@ fn no_trip_allocates_nor_what_comes_after_it() {
         quiet.run(8000);
         assert_eq!(quiet.trip, Some(reason), "{fault:?}");
         for order in [
-            Order::Arm,
-            Order::Start(Box::new(Says(0.01))),
-            Order::Stop,
-            Order::Clear,
-            Order::Stop,
+            Request::Arm,
+            Request::Start(Box::new(Says(0.01))),
+            Request::Stop,
+            Request::Clear,
+            Request::Stop,
         ] {
             quiet.order(order);
         }
@@ -344,21 +345,21 @@ fn no_order_allocates_whenever_it_comes_and_programs_are_freed_outside() {
     let mut quiet = Quiet::new(&config, &[]);
     for round in 0..20 {
         for order in [
-            Order::Start(Box::new(Says(0.01))),
-            Order::Arm,
-            Order::Arm,
-            Order::Start(Box::new(Says(0.01))),
+            Request::Start(Box::new(Says(0.01))),
+            Request::Arm,
+            Request::Arm,
+            Request::Start(Box::new(Says(0.01))),
         ] {
             quiet.order(order);
             assert_no_alloc(|| quiet.bare_tick(0));
         }
-        quiet.order(Order::Start(Box::new(Says(0.02))));
+        quiet.order(Request::Start(Box::new(Says(0.02))));
         quiet.order(if round % 2 == 0 {
-            Order::Stop
+            Request::Stop
         } else {
-            Order::Clear
+            Request::Clear
         });
-        quiet.order(Order::Stop);
+        quiet.order(Request::Stop);
         // Nobody collects the programs here: after four the ring is full, and they are kept rather than freed in the tick.
         for _ in 0..3 {
             assert_no_alloc(|| quiet.bare_tick(0));
@@ -376,7 +377,7 @@ fn a_full_ring_to_the_recorder_allocates_nothing_and_holds_nothing_up() {
             number,
             scheduled_ns: number * 200_000,
         };
-        let moment = Moment {
+        let moment = TickTiming {
             tick,
             woke_ns: tick.scheduled_ns,
             missed: 0,
@@ -384,7 +385,7 @@ fn a_full_ring_to_the_recorder_allocates_nothing_and_holds_nothing_up() {
         assert_no_alloc(|| quiet.servo.tick(&moment, &quiet.clock));
     }
     // 1024 slots: four events and 1020 records.
-    assert_eq!(quiet.servo.outlet().lost(), 5000 - 1020);
+    assert_eq!(quiet.servo.publisher().lost(), 5000 - 1020);
 }
 
 /// What became of a child.
@@ -542,10 +543,10 @@ fn trips_orders_and_late_ticks_make_no_system_call() {
         let config = weak();
         let mut quiet = Quiet::running(&config, &[(0..8000, fault)], Box::new(Says(current_a)));
         let mut others = [
-            Some(Order::Clear),
-            Some(Order::Arm),
-            Some(Order::Start(Box::new(Says(0.01)))),
-            Some(Order::Stop),
+            Some(Request::Clear),
+            Some(Request::Arm),
+            Some(Request::Start(Box::new(Says(0.01)))),
+            Some(Request::Stop),
         ];
         let ended = in_a_child(|| {
             allow_only(&[]);
@@ -555,7 +556,7 @@ fn trips_orders_and_late_ticks_make_no_system_call() {
             }
             for other in &mut others {
                 if let Some(order) = other.take() {
-                    let _ = quiet.orders.push(order);
+                    let _ = quiet.requests.push(order);
                 }
                 quiet.bare_tick(2);
                 quiet.collect();
@@ -575,9 +576,9 @@ fn in_real_time_the_clock_is_all_that_the_loop_asks_of_the_system() {
     let ended = in_a_child(|| {
         allow_only(&[libc::SYS_clock_nanosleep, libc::SYS_clock_gettime]);
         for number in 0..50 {
-            let moment = clock.wait(number, quiet.servo.outlet());
+            let moment = clock.wait(number, quiet.servo.publisher());
             quiet.servo.tick(
-                &Moment {
+                &TickTiming {
                     missed: 0,
                     ..moment
                 },

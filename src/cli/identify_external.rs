@@ -8,11 +8,11 @@ use super::analysis_output::{Drawn, Plots, drawn, free, in_folder, plots_text};
 use super::modal_output::Shown;
 use super::options::{print_json, print_text};
 use super::{CliError, Outcome};
-use crate::experiment::{ForeignAnalysis, analyse_signals};
+use crate::experiment::{ExternalAnalysis, analyse_external};
 use crate::identify::periodic::Repetition;
 use crate::identify::table::{self, Clock, Columns};
 use crate::identify::{Signals, Unit, csv};
-use crate::report::run_pages::AnalysedTable;
+use crate::report::run_pages::TableReport;
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
 const WHOLE_SAMPLES: f64 = 1e-3;
@@ -20,7 +20,7 @@ const WHOLE_SAMPLES: f64 = 1e-3;
 /// What the columns of a CSV mean.
 #[derive(Clone, Debug, clap::Args)]
 #[group(id = "table")]
-pub(super) struct TableOptions {
+pub(super) struct ExternalOptions {
     /// Column of the force, or of what stands for it, in any unit: the file is a CSV
     #[arg(long, value_name = "COLUMN", requires = "output")]
     input: Option<String>,
@@ -89,7 +89,7 @@ struct Report {
     shown: Shown,
 }
 
-impl TableOptions {
+impl ExternalOptions {
     /// Whether a file is to be read as a CSV: by the options, or by its name.
     pub(super) fn is_meant(&self, path: &Path) -> bool {
         self.input.is_some()
@@ -172,14 +172,14 @@ impl TableOptions {
 pub(super) fn run(
     path: &Path,
     out: Option<&Path>,
-    options: &TableOptions,
+    options: &ExternalOptions,
     json: bool,
 ) -> Result<Outcome, CliError> {
     let columns = options.columns(path)?;
     let signals = table::read(path, &columns)?;
     signals.check()?;
     let band_hz = options.band_hz(signals.rate_hz)?;
-    let analysis = analyse_signals(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
+    let analysis = analyse_external(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
     let report = report(
         path,
         &columns,
@@ -201,7 +201,7 @@ fn report(
     columns: &Columns,
     signals: &Signals,
     band_hz: (f64, f64),
-    analysis: &ForeignAnalysis,
+    analysis: &ExternalAnalysis,
     beside: &Path,
 ) -> Result<Report, CliError> {
     let csv_path = free(beside, "frf", "csv");
@@ -211,7 +211,7 @@ fn report(
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let (samples, rate_hz) = (signals.len(), signals.rate_hz);
     let Drawn { plots, report } = drawn(
-        &AnalysedTable {
+        &TableReport {
             analysis,
             file: &file,
             input,

@@ -1,7 +1,7 @@
 //! The pictures of a record.
 
-use super::{Analysed, Shown};
-use crate::identify::modal::{ModalFit, Order, UncertainPole};
+use super::{ReportSource, Shown};
+use crate::identify::modal::{ModalFit, ModelOrder, UncertainPole};
 use crate::identify::verdict::{self, UncertainZero};
 use crate::report::{
     Curve, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg,
@@ -9,7 +9,7 @@ use crate::report::{
 };
 
 /// The names of all pictures, as files and in JSON; two need modes, two a closed loop, the last a multisine with lines left out.
-pub const KINDS: [&str; 8] = [
+pub const PLOT_KINDS: [&str; 8] = [
     "bode",
     "coherence",
     "nyquist",
@@ -25,8 +25,8 @@ const HERTZ: f64 = 2.0 * std::f64::consts::PI;
 
 /// A picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
-    /// Its name: one of [`KINDS`].
+pub struct Plot {
+    /// Its name: one of [`PLOT_KINDS`].
     pub kind: &'static str,
     /// What it is.
     pub heading: &'static str,
@@ -40,7 +40,7 @@ pub struct Picture {
 ///
 /// # Errors
 /// When a response is not sound, or drawing fails.
-pub fn pictures(record: &dyn Analysed) -> Result<Vec<Picture>, ReportError> {
+pub fn pictures(record: &dyn ReportSource) -> Result<Vec<Plot>, ReportError> {
     let shown = record.shown();
     let map = shown.fit.map(|fit| map(&shown, fit));
     let mut all = responses(&shown, map.as_ref())?;
@@ -52,7 +52,7 @@ pub fn pictures(record: &dyn Analysed) -> Result<Vec<Picture>, ReportError> {
     Ok(all)
 }
 
-fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Picture>, ReportError> {
+fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Plot>, ReportError> {
     let Shown {
         title,
         subtitle,
@@ -89,7 +89,7 @@ fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Picture
         ((low - room).max(0.0) / HERTZ, (high + room) / HERTZ)
     };
     let part_hz = map.and_then(PoleZeroMap::close_pair).map(around);
-    let picture = |kind, heading, caption: &str, svg| Picture {
+    let picture = |kind, heading, caption: &str, svg| Plot {
         kind,
         heading,
         caption: caption.into(),
@@ -145,8 +145,8 @@ fn map(shown: &Shown<'_>, fit: &ModalFit) -> PoleZeroMap {
     }
 }
 
-fn pole_zero(shown: &Shown<'_>, map: &PoleZeroMap) -> Result<Picture, ReportError> {
-    Ok(Picture {
+fn pole_zero(shown: &Shown<'_>, map: &PoleZeroMap) -> Result<Plot, ReportError> {
+    Ok(Plot {
         kind: "pole_zero",
         heading: "Poles and zeros",
         caption: format!(
@@ -160,12 +160,12 @@ fn pole_zero(shown: &Shown<'_>, map: &PoleZeroMap) -> Result<Picture, ReportErro
     })
 }
 
-fn stability(shown: &Shown<'_>, fit: &ModalFit) -> Result<Picture, ReportError> {
-    let mode = |term: &crate::model::zeros::Term| OrderedMode {
+fn stability(shown: &Shown<'_>, fit: &ModalFit) -> Result<Plot, ReportError> {
+    let mode = |term: &crate::model::zeros::ModalTerm| OrderedMode {
         frequency_hz: term.omega_rad_s / HERTZ,
         damping_ratio: term.damping_ratio,
     };
-    let modes = |order: &Order| order.parameters.modes.iter().map(mode).collect();
+    let modes = |order: &ModelOrder| order.parameters.modes.iter().map(mode).collect();
     let orders: Vec<Vec<OrderedMode>> = fit.orders.iter().map(modes).collect();
     let fit_hz: Vec<f64> = fit
         .parameters
@@ -173,7 +173,7 @@ fn stability(shown: &Shown<'_>, fit: &ModalFit) -> Result<Picture, ReportError> 
         .iter()
         .map(|term| term.omega_rad_s / HERTZ)
         .collect();
-    Ok(Picture {
+    Ok(Plot {
         kind: "stability",
         heading: "Stability chart",
         caption: "The modes at each order that was found worth its parameters; a mode that is there stays from one order to the \

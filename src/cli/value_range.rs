@@ -9,12 +9,12 @@ const MOST: usize = 10_000;
 
 /// Values at equal distances, both ends among them.
 #[derive(Clone, Debug)]
-pub(super) struct Spaced(pub Vec<f64>);
+pub(super) struct ValueRange(pub Vec<f64>);
 
-impl FromStr for Spaced {
+impl FromStr for ValueRange {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Spaced, String> {
+    fn from_str(text: &str) -> Result<ValueRange, String> {
         let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
             return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
         };
@@ -39,6 +39,6 @@ impl FromStr for Spaced {
                 from + (to - from) * k as f64 / last
             }
         };
-        Ok(Spaced((0..count).map(value).collect()))
+        Ok(ValueRange((0..count).map(value).collect()))
     }
 }

@@ -3,13 +3,13 @@
 use nalgebra::Complex;
 
 use super::page::{delay_ms, section};
-use super::{Analysed, Picture, Shown};
+use super::{Plot, ReportSource, Shown};
 use crate::config::Config;
 use crate::excitation::{swept_words, words};
 use crate::experiment::{Analysis, ClosedResponses};
 use crate::identify::Unit;
 use crate::identify::linearity::Linearity;
-use crate::identify::modal::{Estimate, SIGMAS_95, View};
+use crate::identify::modal::{Estimate, MeasurementChain, SIGMAS_95};
 use crate::recording::Recording;
 use crate::report::number::interval;
 use crate::report::page::{escaped, facts, row};
@@ -19,7 +19,7 @@ const HERTZ: f64 = 2.0 * std::f64::consts::PI;
 
 /// A run that was analysed.
 #[derive(Clone, Copy, Debug)]
-pub struct AnalysedRun<'a> {
+pub struct RunReport<'a> {
     /// What it shows.
     pub analysis: &'a Analysis,
     /// What it was made with.
@@ -28,7 +28,7 @@ pub struct AnalysedRun<'a> {
     pub recording: &'a Recording,
 }
 
-impl AnalysedRun<'_> {
+impl RunReport<'_> {
     /// What was excited, and when, in two lines.
     fn subtitle(&self) -> String {
         format!(
@@ -59,7 +59,7 @@ impl AnalysedRun<'_> {
     }
 }
 
-impl Analysed for AnalysedRun<'_> {
+impl ReportSource for RunReport<'_> {
     fn shown(&self) -> Shown<'_> {
         Shown {
             title: self.config.title.clone(),
@@ -68,7 +68,7 @@ impl Analysed for AnalysedRun<'_> {
             residue_unit: "1/kg".into(),
             frf: &self.analysis.frf,
             model: Some(&self.analysis.model),
-            view: View::Bench(self.config),
+            view: MeasurementChain::Bench(self.config),
             fit: self.analysis.fit.as_ref().ok(),
             verdict: &self.analysis.verdict,
             judged_up_to_rad_s: self.analysis.judged_up_to_rad_s,
@@ -118,7 +118,7 @@ impl Analysed for AnalysedRun<'_> {
             .collect()
     }
 
-    fn more_pictures(&self) -> Result<Vec<Picture>, ReportError> {
+    fn more_pictures(&self) -> Result<Vec<Plot>, ReportError> {
         let mut all = Vec::new();
         if let Some(closed) = &self.analysis.closed {
             all.extend(around(self, closed)?);
@@ -135,7 +135,7 @@ impl Analysed for AnalysedRun<'_> {
 }
 
 /// The loop and its sensitivities, measured over model.
-fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2], ReportError> {
+fn around(run: &RunReport<'_>, closed: &ClosedResponses) -> Result<[Plot; 2], ReportError> {
     let frequency_hz = &closed.loop_gain.frequency_hz;
     let by_model = |of: fn(Complex<f64>) -> Complex<f64>| {
         closed.model_loop.iter().map(|l| of(*l)).collect::<Vec<_>>()
@@ -158,7 +158,7 @@ fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2
             run.occasion()
         );
         let svg = bode_svg(Unit::Bare, traces, &run.config.title, &subtitle)?;
-        Ok(Picture {
+        Ok(Plot {
             kind,
             heading,
             caption: caption.into(),
@@ -190,7 +190,7 @@ fn around(run: &AnalysedRun<'_>, closed: &ClosedResponses) -> Result<[Picture; 2
 }
 
 /// Output, noise and distortion, line by line.
-fn levels(run: &AnalysedRun<'_>, linearity: &Linearity) -> Result<Picture, ReportError> {
+fn levels(run: &RunReport<'_>, linearity: &Linearity) -> Result<Plot, ReportError> {
     let harmonics = &linearity.harmonics;
     let periods = harmonics.periods;
     let lines = LevelLines {
@@ -199,7 +199,7 @@ fn levels(run: &AnalysedRun<'_>, linearity: &Linearity) -> Result<Picture, Repor
         even: &harmonics.even,
         periods,
     };
-    Ok(Picture {
+    Ok(Plot {
         kind: "linearity",
         heading: "Distortion and noise",
         caption: format!(
@@ -212,7 +212,7 @@ fn levels(run: &AnalysedRun<'_>, linearity: &Linearity) -> Result<Picture, Repor
 }
 
 /// What the measured loop dares, beside the model.
-fn margins(run: &AnalysedRun<'_>) -> String {
+fn margins(run: &RunReport<'_>) -> String {
     let Some(closed) = &run.analysis.closed else {
         return String::new();
     };
@@ -251,7 +251,7 @@ fn margins(run: &AnalysedRun<'_>) -> String {
 }
 
 /// How the loop was scheduled and what it kept.
-fn loop_facts(run: &AnalysedRun<'_>) -> String {
+fn loop_facts(run: &RunReport<'_>) -> String {
     let recording = run.recording;
     let counted = |count: u64| count.to_string();
     let told = [
@@ -286,7 +286,7 @@ fn loop_facts(run: &AnalysedRun<'_>) -> String {
 }
 
 /// The worst over the run, where there was a clock.
-fn lateness(run: &AnalysedRun<'_>) -> Vec<(String, String)> {
+fn lateness(run: &RunReport<'_>) -> Vec<(String, String)> {
     if run.said("pace") == "virtual" {
         return Vec::new();
     }
@@ -316,7 +316,7 @@ fn capital(name: &str) -> String {
     })
 }
 
-fn configuration(run: &AnalysedRun<'_>) -> String {
+fn configuration(run: &RunReport<'_>) -> String {
     let Some(toml) = run.recording.config_toml() else {
         return String::new();
     };

@@ -2,8 +2,8 @@
 
 use nalgebra::Complex;
 
-use super::Picture;
-use crate::identify::modal::{ModalFit, View};
+use super::Plot;
+use crate::identify::modal::{MeasurementChain, ModalFit};
 use crate::identify::verdict::Verdict;
 use crate::identify::{Frf, Unit};
 use crate::report::ReportError;
@@ -24,7 +24,7 @@ pub struct Shown<'a> {
     /// By the model at the same frequencies, if there is one.
     pub model: Option<&'a [Complex<f64>]>,
     /// Through what the modes are seen.
-    pub view: View<'a>,
+    pub view: MeasurementChain<'a>,
     /// The modes, if there are any.
     pub fit: Option<&'a ModalFit>,
     /// What they say of CNMP zeros.
@@ -34,7 +34,7 @@ pub struct Shown<'a> {
 }
 
 /// A record that was analysed: of a run of the bench, or of other hands.
-pub trait Analysed {
+pub trait ReportSource {
     /// What every record has.
     fn shown(&self) -> Shown<'_>;
 
@@ -45,7 +45,7 @@ pub trait Analysed {
     fn evidence(&self) -> Vec<(String, String)>;
 
     /// Pictures beside those of every record.
-    fn more_pictures(&self) -> Result<Vec<Picture>, ReportError>;
+    fn more_pictures(&self) -> Result<Vec<Plot>, ReportError>;
 
     /// Sections of the page before the pictures, and behind them.
     fn sections(&self) -> (String, String);

@@ -1,4 +1,4 @@
-//! The record cut into blocks of neighbouring bins: what a parametric fit takes, where each datum must be independent of
+//! The record cut into frf_data of neighbouring bins: what a parametric fit takes, where each datum must be independent of
 //! the next and no curve may be smoothed.
 //!
 //! In a block, `H = sum Y conj(R) / sum U conj(R)`, with U itself for the instrument R in open loop, is the mean of H over its
@@ -14,47 +14,47 @@ use nalgebra::Complex;
 use super::bins::Bins;
 use super::noise_floor::NoiseFloor;
 use super::record::Record;
-use crate::identify::{Block, EstimatorSettings, IdentifyError, Signals, band};
+use crate::identify::{EstimatorSettings, FrfDatum, IdentifyError, Signals, band};
 
 /// Width of a block as a ratio of frequency.
 const WIDTH_RATIO: f64 = 0.0005;
 
-/// The blocks of a record that begins and ends at rest, each a twentieth of a percent of its frequency wide and one bin at least;
+/// The frf_data of a record that begins and ends at rest, each a twentieth of a percent of its frequency wide and one bin at least;
 /// those without input or without any noise are left out. Frequencies rise. Of the settings, the least half-width counts.
 ///
 /// # Errors
 /// Those of [`super::local::estimate`].
-pub fn blocks(
+pub fn frf_data(
     signals: &Signals,
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
-) -> Result<Vec<Block>, IdentifyError> {
+) -> Result<Vec<FrfDatum>, IdentifyError> {
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    let blocks = cut(&Record::new(signals), &bins, settings);
+    let frf_data = cut(&Record::new(signals), &bins, settings);
     let (low_hz, high_hz) = band_hz;
-    if blocks.is_empty() {
+    if frf_data.is_empty() {
         Err(IdentifyError::NotExcited { low_hz, high_hz })
     } else {
-        Ok(blocks)
+        Ok(frf_data)
     }
 }
 
-/// The blocks between two bins.
+/// The frf_data between two bins.
 pub(super) fn cut(
     of: &impl Bins,
     bins: &RangeInclusive<usize>,
     settings: &EstimatorSettings,
-) -> Vec<Block> {
+) -> Vec<FrfDatum> {
     let noise = noise_of(settings);
     let floor = NoiseFloor::of(of, (*bins.start() as f64, *bins.end() as f64), &noise);
-    let (mut blocks, mut low) = (Vec::new(), *bins.start());
+    let (mut frf_data, mut low) = (Vec::new(), *bins.start());
     while low <= *bins.end() {
         let next = low + (WIDTH_RATIO * low as f64).floor().max(1.0) as usize;
         let high = (next - 1).min(*bins.end());
         let middle = 0.5 * (low + high) as f64;
-        blocks.extend(block(
+        frf_data.extend(block(
             of,
             low,
             high,
@@ -62,7 +62,7 @@ pub(super) fn cut(
         ));
         low = next;
     }
-    blocks
+    frf_data
 }
 
 /// The curves whose residual is the noise.
@@ -73,7 +73,7 @@ fn noise_of(settings: &EstimatorSettings) -> EstimatorSettings {
     }
 }
 
-fn block(of: &impl Bins, low: usize, high: usize, noise: f64) -> Option<Block> {
+fn block(of: &impl Bins, low: usize, high: usize, noise: f64) -> Option<FrfDatum> {
     let sum = |term: &dyn Fn(usize) -> Complex<f64>| (low..=high).map(term).sum::<Complex<f64>>();
     let (drive, weight) = (sum(&|k| of.drive(k)), |k: usize| of.drive(k).norm());
     let all = (low..=high).map(weight).sum::<f64>();
@@ -84,7 +84,7 @@ fn block(of: &impl Bins, low: usize, high: usize, noise: f64) -> Option<Block> {
             / all
     };
     let centre = low as f64 + moment(&|k| k - low as f64);
-    let block = Block {
+    let block = FrfDatum {
         frequency_hz: centre * of.bin_hz(),
         spread_hz: moment(&|k| (k - centre) * (k - centre)).sqrt() * of.bin_hz(),
         response: sum(&|k| of.cross(k)) / drive,

@@ -1,9 +1,9 @@
-//! Any sequence of orders and faults: current flows in a run that was armed and started after the last trip, or not at all.
+//! Any sequence of requests and faults: current flows in a run that was armed and started after the last trip, or not at all.
 use std::ops::Range;
 
 use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, flag};
-use bench::rt::servo::Order;
+use bench::rt::servo::Request;
 use bench_hal::Validity;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -22,7 +22,7 @@ enum Given {
     Clear,
 }
 
-fn orders() -> impl Strategy<Value = Vec<(u64, Given)>> {
+fn requests() -> impl Strategy<Value = Vec<(u64, Given)>> {
     let current = prop_oneof![
         8 => -5.0..5.0f64,
         1 => Just(f64::NAN),
@@ -61,18 +61,18 @@ fn late() -> impl Strategy<Value = Vec<(u64, u32)>> {
     prop::collection::vec((0..TICKS, 1..60u32), 0..3)
 }
 
-fn run(orders: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, u32)]) -> Bench {
+fn run(requests: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, u32)]) -> Bench {
     let mut bench = Bench::still(&stage(), faults);
     for step in 0..TICKS {
         // No more than the ring takes.
-        for (_, given) in orders.iter().filter(|(at, _)| *at == step).take(16) {
+        for (_, given) in requests.iter().filter(|(at, _)| *at == step).take(16) {
             bench.order(match *given {
-                Given::Arm => Order::Arm,
+                Given::Arm => Request::Arm,
                 Given::Start(current_a, ticks) => {
-                    Order::Start(Box::new(Says(move |_| current_a, ticks)))
+                    Request::Start(Box::new(Says(move |_| current_a, ticks)))
                 }
-                Given::Stop => Order::Stop,
-                Given::Clear => Order::Clear,
+                Given::Stop => Request::Stop,
+                Given::Clear => Request::Clear,
             });
         }
         bench.late_tick(
@@ -160,9 +160,9 @@ proptest! {
 
     #[test]
     fn current_flows_only_in_a_run_that_was_armed_and_started_after_the_last_trip(
-        orders in orders(), faults in faults(), late in late(),
+        requests in requests(), faults in faults(), late in late(),
     ) {
-        prove(&run(&orders, &faults, &late))?;
+        prove(&run(&requests, &faults, &late))?;
     }
 }
 
@@ -176,11 +176,11 @@ fn the_property_sees_runs_trips_clears_and_completions() {
     });
     let (mut with_current, mut trips, mut second_runs, mut completed) = (0, 0, 0, 0);
     for _ in 0..500 {
-        let tree = (orders(), faults(), late())
+        let tree = (requests(), faults(), late())
             .new_tree(&mut runner)
             .expect("generators without filters");
-        let (orders, faults, late) = proptest::strategy::ValueTree::current(&tree);
-        let bench = run(&orders, &faults, &late);
+        let (requests, faults, late) = proptest::strategy::ValueTree::current(&tree);
+        let bench = run(&requests, &faults, &late);
         let events = bench.events();
         let trip = events
             .iter()
@@ -209,20 +209,20 @@ fn the_property_sees_runs_trips_clears_and_completions() {
 
 #[test]
 fn in_virtual_pace_nothing_is_lost_however_many_orders_a_tick_takes() {
-    // All that the ring of orders holds, each with every event it can cause: an amplifier that does not enable.
+    // All that the ring of requests holds, each with every event it can cause: an amplifier that does not enable.
     let mut bench = Bench::still(&stage(), &[(0..10, Fault::DoesNotEnable(1))]);
     bench.tick();
     for _ in 0..8 {
-        bench.order(Order::Arm);
-        bench.order(Order::Clear);
+        bench.order(Request::Arm);
+        bench.order(Request::Clear);
     }
     let before = bench.all.len();
     bench.tick();
     let published = bench.all.len() - before;
     assert!(
-        published <= bench::rt::outlet::SLOTS_PER_TICK,
+        published <= bench::rt::publisher::SLOTS_PER_TICK,
         "{published} in one tick"
     );
-    // Order, state, trip, state for each arm order, order and state for each clear order; then the record.
+    // Request, state, trip, state for each arm order, order and state for each clear order; then the record.
     assert_eq!(published, 8 * (4 + 2) + 1);
 }

@@ -5,10 +5,12 @@ use nalgebra::Complex;
 
 use super::AnalysisError;
 use super::analysis::judge;
-use crate::identify::modal::{self, FitError, ModalFit, View};
+use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Repetition};
 use crate::identify::verdict::{MISFIT, Verdict};
-use crate::identify::{Block, EstimatorSettings, Frf, Signals, blocks, local, with_distortion};
+use crate::identify::{
+    EstimatorSettings, Frf, FrfDatum, Signals, frf_data, local, with_distortion,
+};
 
 /// Half of the frequencies must have at least this coherence.
 const LEAST_COHERENCE: f64 = 0.5;
@@ -24,7 +26,7 @@ const SURE: f64 = 5.0;
 
 /// What signals of other hands show.
 #[derive(Clone, Debug)]
-pub struct ForeignAnalysis {
+pub struct ExternalAnalysis {
     /// The response from input to output.
     pub frf: Frf,
     /// The modes that it shows, or why none are told.
@@ -39,23 +41,29 @@ pub struct ForeignAnalysis {
 
 /// Analyses input and output between two frequencies; with a repetition as averaged periods, without one as a record that
 /// begins and ends at rest.
-pub fn analyse_signals(
+pub fn analyse_external(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
-) -> Result<ForeignAnalysis, AnalysisError> {
-    let (frf, blocks, periods) = response(signals, band_hz, repetition)?;
+) -> Result<ExternalAnalysis, AnalysisError> {
+    let (frf, frf_data, periods) = response(signals, band_hz, repetition)?;
     let fit = if repetition.is_some() {
-        fit_of_periods(&blocks)
+        fit_of_periods(&frf_data)
     } else {
-        modal::fit(&blocks, &View::Bare)
+        modal::fit(&frf_data, &MeasurementChain::Bare)
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let verdict = match doubt(signals.rate_hz, &frf, &blocks, &fit) {
+    let verdict = match doubt(signals.rate_hz, &frf, &frf_data, &fit) {
         Some(why) => Verdict::undecided(why),
-        None => judge(&fit, &blocks, &View::Bare, judged_up_to_rad_s, None)?,
+        None => judge(
+            &fit,
+            &frf_data,
+            &MeasurementChain::Bare,
+            judged_up_to_rad_s,
+            None,
+        )?,
     };
-    Ok(ForeignAnalysis {
+    Ok(ExternalAnalysis {
         frf,
         fit,
         verdict,
@@ -68,74 +76,77 @@ fn response(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
-) -> Result<(Frf, Vec<Block>, Option<usize>), AnalysisError> {
+) -> Result<(Frf, Vec<FrfDatum>, Option<usize>), AnalysisError> {
     if let Some(repetition) = repetition {
         let periods = periodic::estimate(signals, band_hz, repetition)?;
-        return Ok((periods.frf, periods.blocks, Some(periods.count)));
+        return Ok((periods.frf, periods.frf_data, Some(periods.count)));
     }
     let frf = local::estimate(signals, band_hz, &EstimatorSettings::default())?;
     Ok((
         frf,
-        blocks(signals, band_hz, &EstimatorSettings::default())?,
+        frf_data(signals, band_hz, &EstimatorSettings::default())?,
         None,
     ))
 }
 
 /// The modes that periods show. Where they leave more than the noise, distortion counts as well; without periods the noise is
 /// taken from neighbouring frequencies, and distortion is in it.
-fn fit_of_periods(blocks: &[Block]) -> Result<ModalFit, FitError> {
-    let fit = modal::fit(blocks, &View::Bare);
+fn fit_of_periods(frf_data: &[FrfDatum]) -> Result<ModalFit, FitError> {
+    let fit = modal::fit(frf_data, &MeasurementChain::Bare);
     if fit.as_ref().is_ok_and(|fit| fit.chi2_per_freedom <= MISFIT) {
         return fit;
     }
-    let mut fit = modal::fit(&with_distortion(blocks), &View::Bare)?;
-    fit.chi2_per_freedom = chi2_per_freedom(&fit, blocks);
+    let mut fit = modal::fit(&with_distortion(frf_data), &MeasurementChain::Bare)?;
+    fit.chi2_per_freedom = chi2_per_freedom(&fit, frf_data);
     Ok(fit)
 }
 
 /// What a fit leaves over the noise alone, whatever it was weighted with.
-fn chi2_per_freedom(fit: &ModalFit, blocks: &[Block]) -> f64 {
-    let frequency_hz: Vec<f64> = blocks.iter().map(|block| block.frequency_hz).collect();
-    let fitted = fit.response(&View::Bare, &frequency_hz);
-    let left = |(block, h): (&Block, &Complex<f64>)| {
+fn chi2_per_freedom(fit: &ModalFit, frf_data: &[FrfDatum]) -> f64 {
+    let frequency_hz: Vec<f64> = frf_data.iter().map(|block| block.frequency_hz).collect();
+    let fitted = fit.response(&MeasurementChain::Bare, &frequency_hz);
+    let left = |(block, h): (&FrfDatum, &Complex<f64>)| {
         2.0 * (block.response - h).norm_sqr() / block.variance
     };
-    let freedom = (2 * blocks.len())
+    let freedom = (2 * frf_data.len())
         .saturating_sub(fit.covariance.nrows())
         .max(1);
-    blocks.iter().zip(&fitted).map(left).sum::<f64>() / freedom as f64
+    frf_data.iter().zip(&fitted).map(left).sum::<f64>() / freedom as f64
 }
 
 /// Why the data carry no verdict, whatever the fit says of them.
 fn doubt(
     rate_hz: f64,
     frf: &Frf,
-    blocks: &[Block],
+    frf_data: &[FrfDatum],
     fit: &Result<ModalFit, FitError>,
 ) -> Option<String> {
-    let swapped = || grows(frf).or_else(|| explained_the_other_way(blocks, fit));
+    let swapped = || grows(frf).or_else(|| explained_the_other_way(frf_data, fit));
     incoherent(frf)
         .or_else(swapped)
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
 
 /// Modes that do not explain the response, but do explain its inverse.
-fn explained_the_other_way(blocks: &[Block], fit: &Result<ModalFit, FitError>) -> Option<String> {
+fn explained_the_other_way(
+    frf_data: &[FrfDatum],
+    fit: &Result<ModalFit, FitError>,
+) -> Option<String> {
     let explained = |fit: &ModalFit| fit.chi2_per_freedom <= MISFIT;
     if fit.as_ref().is_ok_and(explained) {
         return None;
     }
-    let inverse = |block: &Block| Block {
+    let inverse = |block: &FrfDatum| FrfDatum {
         response: block.response.inv(),
         variance: block.variance / block.response.norm_sqr().powi(2),
         ..*block
     };
-    let inverse: Vec<Block> = blocks
+    let inverse: Vec<FrfDatum> = frf_data
         .iter()
         .map(inverse)
         .filter(|b| b.variance.is_normal())
         .collect();
-    let other = modal::fit(&inverse, &View::Bare).ok()?;
+    let other = modal::fit(&inverse, &MeasurementChain::Bare).ok()?;
     explained(&other).then(|| {
         "modes explain how the input answers the output, and not how the output answers the input: they are swapped (--input, \
          --output)"

@@ -55,7 +55,7 @@ fn the_errors_are_as_large_as_they_say() {
             whole(1),
         )
         .unwrap();
-        for block in &periods.blocks {
+        for block in &periods.frf_data {
             ratio += (block.response - response(block.frequency_hz)).norm_sqr() / block.variance;
             count += 1.0;
         }
@@ -86,7 +86,7 @@ fn response_and_variance_are_those_of_numpy() {
     let Some(theirs) = python::numbers("periodic.py", &arguments, &rows) else {
         return;
     };
-    let ours = estimate(&signals, BAND_HZ, whole(2)).unwrap().blocks;
+    let ours = estimate(&signals, BAND_HZ, whole(2)).unwrap().frf_data;
     assert_eq!(theirs.len(), ours.len());
     for (row, block) in theirs.iter().zip(&ours) {
         let off =
