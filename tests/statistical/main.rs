@@ -1,0 +1,3 @@
+//! The statistical suite: claims about many seeds, such as the coverage of a 95 % confidence interval.
+//!
+//! It takes minutes of processor time: `cargo test --features statistical --test statistical`. `.ci/run` runs it.
