@@ -9,8 +9,8 @@ use bench_hal::can::budget::Exchange;
 use bench_hal::can::bus::{
     BusError, BusEvent, CanBus, Host, Port, SimulatedHost, Task, TaskHandle,
 };
-use bench_hal::can::device::{AmplifierTask, Device, DeviceFault, EmulatedDriveSettings};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
+use bench_hal::can::emulator::{AmplifierTask, DeviceFault, EmulatedDrive, EmulatedDriveSettings};
 use bench_hal::can::{CanFrame, Id};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 
@@ -82,7 +82,9 @@ fn command_status_and_disable_allocate_nothing() {
         Exchange::Synchronous { status_every: 1 },
     ] {
         let (world, swallow) = (SimulatedHost::default(), Arc::new(AtomicBool::new(false)));
-        let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default())));
+        let device = Arc::new(Mutex::new(EmulatedDrive::new(
+            EmulatedDriveSettings::default(),
+        )));
         let _running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
         let host = Quiet {
             world: world.clone(),

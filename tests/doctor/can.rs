@@ -10,16 +10,16 @@ use bench_hal::can::bus::{
     BusError, BusEvent, CanBus, Claim, Host, NodeInUse, Port, SimulatedHost, Task, TaskHandle,
 };
 use bench_hal::can::cia402::State;
-use bench_hal::can::device::{AmplifierTask, Device, DeviceFault, EmulatedDriveSettings};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
+use bench_hal::can::emulator::{AmplifierTask, DeviceFault, EmulatedDrive, EmulatedDriveSettings};
 use bench_hal::can::frame::{CanFrame, Id};
 use bench_hal::can::vesc::{VescSettings, status_id};
 use bench_hal::can::{nmt, sdo};
 
 /// A world with a drive that has just started.
-fn rig(settings: EmulatedDriveSettings) -> (SimulatedHost, Arc<Mutex<Device>>, TaskHandle) {
+fn rig(settings: EmulatedDriveSettings) -> (SimulatedHost, Arc<Mutex<EmulatedDrive>>, TaskHandle) {
     let world = SimulatedHost::default();
-    let device = Arc::new(Mutex::new(Device::new(settings)));
+    let device = Arc::new(Mutex::new(EmulatedDrive::new(settings)));
     let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     world.sleep(Duration::from_millis(5));
     (world, device, running)

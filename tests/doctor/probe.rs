@@ -2,7 +2,7 @@
 
 use bench::config::{Config, Source, load};
 use bench::rig::devices::probe::settings;
-use bench_hal::serial::device::Fault;
+use bench_hal::serial::emulator::Fault;
 use bench_hal::serial::{Protocol, SerialProbe};
 use nix::fcntl::{Flock, FlockArg};
 use serde_json::Value;

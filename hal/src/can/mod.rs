@@ -6,7 +6,7 @@
 //!  budget scale     what fits on the bus; amperes and counts
 //!  bus              where frames go: SocketCAN, or a bus in memory with real or virtual time
 //!  drive  vesc      the two drivers: bench_hal::CurrentAmplifier
-//!  device           the other end: a simulated drive, for tests and rehearsal
+//!  emulator         the other end: a simulated drive, for tests and rehearsal
 //! ```
 //!
 //! # Who stops the current when
@@ -24,9 +24,9 @@
 pub mod budget;
 pub mod bus;
 pub mod cia402;
-pub mod device;
 pub mod drive;
 pub mod emcy;
+pub mod emulator;
 pub mod frame;
 pub mod heartbeat;
 pub mod nmt;

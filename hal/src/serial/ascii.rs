@@ -16,8 +16,8 @@
 //! What the protocol cannot know: nothing protects a digit that became another digit, and where the pattern does not fix
 //! the size of the value (`{value:8.4}` does), a lost character makes a shorter number.
 
+use super::decoder::{Damage, Decoder, Event, Sample, Window};
 use super::error::{SerialError, positive};
-use super::event::{Damage, Decoder, Event, Sample, Window};
 use super::pattern::{Decimal, Pattern};
 
 /// Longest line, terminator included.

@@ -20,8 +20,8 @@
 //! burst in 256 passes it. Parity (8E1) catches most of those before they get here, except on a pseudo terminal, which
 //! has none. The counter has 16 bits: a gap is known modulo 65536.
 
+use super::decoder::{Damage, Decoder, Event, Sample, Window};
 use super::error::{SerialError, positive};
-use super::event::{Damage, Decoder, Event, Sample, Window};
 
 /// Counts at the end of the range.
 pub const FULL_SCALE: i32 = 0xF0_0000;

@@ -8,7 +8,7 @@
 //!
 //! * [`capancdt`], [`optoncdt`], [`ascii`]: what the probes say, byte by byte, for both sides of the line; no clock, no port.
 //! * [`SerialProbe`]: the driver. Its thread owns the port, asks where the protocol asks and listens where it streams.
-//! * [`device`]: pretend probes with faults on request, to rehearse and to test.
+//! * [`emulator`]: pretend probes with faults on request, to rehearse and to test.
 //!
 //! # What a reading is worth
 //!
@@ -27,21 +27,21 @@
 pub mod ascii;
 pub mod capancdt;
 mod cell;
-pub mod device;
+mod decoder;
+pub mod emulator;
 mod error;
-mod event;
-mod exchange;
 mod lock;
 mod low_latency;
 pub mod optoncdt;
 mod pattern;
+mod poller;
 mod port;
 mod probe;
 mod reader;
 mod statistics;
 
+pub use decoder::{Decoder, Event, Sample};
 pub use error::SerialError;
-pub use event::{Decoder, Event, Sample};
 pub use port::{Note, Parity, PortSettings};
 pub use probe::{Polling, ProbeSettings, Protocol, SerialProbe, StatisticsHandle};
 pub use reader::Mounting;

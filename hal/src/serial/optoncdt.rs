@@ -25,8 +25,8 @@
 //!
 //! A jump that the stage cannot make is for the interlocks to see.
 
+use super::decoder::{Damage, Decoder, Event, Sample};
 use super::error::{SerialError, positive};
-use super::event::{Damage, Decoder, Event, Sample};
 
 /// Lowest count within the range.
 pub const RANGE_START: u32 = 643;

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 use super::cell::{Measurement, Writer};
+use super::decoder::{Decoder, Event};
 use super::error::Trouble;
-use super::event::{Decoder, Event};
-use super::exchange::{Exchange, Step};
+use super::poller::{Exchange, Step};
 use super::port::{Port, PortSettings};
 use super::statistics::{Counters, Rate, add};
 use crate::Validity;

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64, Ordering::Relaxed};
 
+use super::decoder::Event;
 use super::error::Trouble;
-use super::event::Event;
 use crate::DeviceError;
 
 /// The counts since the probe was opened.

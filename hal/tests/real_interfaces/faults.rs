@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use bench_hal::CurrentAmplifier;
-use bench_hal::can::device::DeviceFault;
 use bench_hal::can::drive::{fault_text, faults};
+use bench_hal::can::emulator::DeviceFault;
 
 use crate::support::vcan::Vcan;
 use crate::support::{Rig, open, settings, wait_for};

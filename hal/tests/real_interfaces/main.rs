@@ -7,9 +7,9 @@
 mod bus_off;
 mod cable;
 mod cards;
+mod external_peers;
 mod faults;
 mod interface;
-mod other_hands;
 mod process;
 mod running;
 mod support;

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::device::{EmulatedProbe, Fault, simulate};
+use bench_hal::serial::emulator::{EmulatedProbe, Fault, simulate};
 use bench_hal::serial::{
     Parity, Polling, PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics, capancdt,
 };

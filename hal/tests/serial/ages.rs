@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bench_hal::Validity;
-use bench_hal::serial::device::Fault;
+use bench_hal::serial::emulator::Fault;
 use bench_hal::serial::{Polling, ProbeSettings, Protocol, SerialProbe, ascii};
 
 use crate::support::probes::{

@@ -1,7 +1,7 @@
 //! The driver over a pseudo terminal, against the pretend probe of each protocol, well and with every fault.
 
 use bench_hal::Validity;
-use bench_hal::serial::device::Fault;
+use bench_hal::serial::emulator::Fault;
 use bench_hal::serial::{Mounting, Parity, PortSettings, ProbeSettings, Protocol, SerialProbe};
 
 use crate::support::probes::{

@@ -2,7 +2,7 @@
 
 use std::os::fd::AsRawFd;
 
-use bench_hal::serial::device::Fault;
+use bench_hal::serial::emulator::Fault;
 use serialport::{SerialPort, TTYPort};
 
 use crate::support::probes::{all, optoncdt, ramp, still};

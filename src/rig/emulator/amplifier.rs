@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use bench_hal::can::bus::{Claim, Condition, Host, SocketPort, SystemHost, TaskHandle};
-use bench_hal::can::device::{
-    AmplifierTask, Device, DeviceFault, EmulatedAmplifier, EmulatedDriveSettings, EmulatedVesc,
-    FrameCounts, Observer,
+use bench_hal::can::emulator::{
+    AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
+    EmulatedVesc, FrameCounts, Observer,
 };
 
 use super::EmulatorError;
@@ -168,7 +168,9 @@ fn device(config: &Config) -> Result<Arc<Mutex<dyn EmulatedAmplifier>>, Emulator
         AmplifierDevice::Simulated(_) => Err(EmulatorError::Simulated {
             device: "amplifier",
         }),
-        AmplifierDevice::Canopen(device) => Ok(Arc::new(Mutex::new(Device::new(drive(device))))),
+        AmplifierDevice::Canopen(device) => {
+            Ok(Arc::new(Mutex::new(EmulatedDrive::new(drive(device)))))
+        }
         AmplifierDevice::Vesc(device) => Ok(Arc::new(Mutex::new(EmulatedVesc::new(device.node)))),
     }
 }

@@ -1,7 +1,7 @@
 //! Faults in words: `amplifier.late=50ms`, `probe.stuck`, `none`.
 
-use bench_hal::can::device::DeviceFault;
-use bench_hal::serial::device::Fault;
+use bench_hal::can::emulator::DeviceFault;
+use bench_hal::serial::emulator::Fault;
 
 use crate::util::quantity;
 

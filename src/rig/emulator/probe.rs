@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use bench_hal::serial::device::{Fault, Line, LineCounts, ProbeTask, SharedProbe, simulate};
+use bench_hal::serial::emulator::{Fault, Line, LineCounts, ProbeTask, SharedProbe, simulate};
 use bench_hal::serial::{Note, PortSettings};
 
 use super::EmulatorError;

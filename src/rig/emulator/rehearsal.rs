@@ -169,13 +169,13 @@ impl Emulator {
             (EmulatedFault::Probe(fault), _, Some(probe)) => probe.ask(fault),
             (EmulatedFault::None, amplifier, probe) => {
                 let sound =
-                    super::AmplifierFault::Device(bench_hal::can::device::DeviceFault::None);
+                    super::AmplifierFault::Device(bench_hal::can::emulator::DeviceFault::None);
                 amplifier
                     .iter()
                     .try_for_each(|amplifier| amplifier.ask(sound))?;
                 probe
                     .iter()
-                    .for_each(|probe| probe.ask(bench_hal::serial::device::Fault::None));
+                    .for_each(|probe| probe.ask(bench_hal::serial::emulator::Fault::None));
             }
             _ => {}
         }

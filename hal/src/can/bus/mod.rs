@@ -9,9 +9,9 @@ mod condition;
 mod interface;
 mod kernel;
 mod memory;
+mod simulated_host;
 mod socket;
-mod threads;
-mod world;
+mod system_host;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,9 +24,9 @@ pub use condition::Condition;
 pub use interface::{Interface, InterfaceError};
 pub use kernel::{KernelError, check_can_support};
 pub use memory::{MemoryBus, MemoryEndpoint};
+pub use simulated_host::SimulatedHost;
 pub use socket::{PortError, SocketPort};
-pub use threads::SystemHost;
-pub use world::SimulatedHost;
+pub use system_host::SystemHost;
 
 use super::frame::{CanFrame, Id};
 

@@ -3,7 +3,7 @@ use std::sync::Mutex;
 use proptest::prelude::*;
 
 use super::super::bus::{Port, SimulatedHost};
-use super::super::device::{AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedVesc};
+use super::super::emulator::{AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedVesc};
 use super::*;
 
 const SETTINGS: VescSettings = VescSettings {

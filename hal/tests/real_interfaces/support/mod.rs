@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use bench_hal::can::bus::{Host, Port, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::cia402::State;
-use bench_hal::can::device::{AmplifierTask, Device, DeviceFault, EmulatedDriveSettings};
 use bench_hal::can::drive::{CanopenDrive, DriveSettings, OpenError};
+use bench_hal::can::emulator::{AmplifierTask, DeviceFault, EmulatedDrive, EmulatedDriveSettings};
 use bench_hal::can::heartbeat;
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 
@@ -60,7 +60,7 @@ pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
 
 /// A simulated drive at work on a bus.
 pub struct FarEnd {
-    device: Arc<Mutex<Device>>,
+    device: Arc<Mutex<EmulatedDrive>>,
     running: TaskHandle,
 }
 
@@ -71,7 +71,9 @@ impl FarEnd {
         let mut bus = self::host(name).endpoint(&[heartbeat::cob_id(5)]).unwrap();
         let far_end = FarEnd::again(
             host,
-            Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default()))),
+            Arc::new(Mutex::new(EmulatedDrive::new(
+                EmulatedDriveSettings::default(),
+            ))),
         );
         wait_for("the drive has started", || {
             bus.receive(Duration::from_secs(1)).unwrap().is_some()
@@ -86,12 +88,12 @@ impl FarEnd {
         FarEnd::again(host, device)
     }
 
-    fn again(host: &dyn Host, device: Arc<Mutex<Device>>) -> FarEnd {
+    fn again(host: &dyn Host, device: Arc<Mutex<EmulatedDrive>>) -> FarEnd {
         let running = AmplifierTask::start(host, Arc::clone(&device)).unwrap();
         FarEnd { device, running }
     }
 
-    pub fn device(&self) -> MutexGuard<'_, Device> {
+    pub fn device(&self) -> MutexGuard<'_, EmulatedDrive> {
         self.device.lock().unwrap()
     }
 

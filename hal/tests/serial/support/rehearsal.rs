@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::device::{Fault, Line, ProbeTask, SharedProbe, simulate};
+use bench_hal::serial::emulator::{Fault, Line, ProbeTask, SharedProbe, simulate};
 use bench_hal::serial::{PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics};
 use bench_hal::{DisplacementProbe, Reading, Tick};
 

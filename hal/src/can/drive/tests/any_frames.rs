@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::super::super::bus::{BusEvent, Condition, Port};
-use super::super::super::device::DeviceFault;
+use super::super::super::emulator::DeviceFault;
 use super::super::super::frame::{CanFrame, Id};
 use super::super::super::pdo;
 use super::*;
@@ -64,7 +64,7 @@ proptest! {
     fn the_simulated_drive_stands_any_frames(
         frames in proptest::collection::vec((any_frame(), 0u64..30_000_000), 1..200),
     ) {
-        let mut device = Device::new(EmulatedDriveSettings::default());
+        let mut device = EmulatedDrive::new(EmulatedDriveSettings::default());
         let (mut now_ns, mut out) = (0, Vec::new());
         for (frame, later_ns) in frames {
             now_ns += later_ns;
@@ -104,7 +104,7 @@ proptest! {
 fn ten_million_random_frames_do_not_panic() {
     let shared = Arc::new(Shared::default());
     let mut monitor = Monitor::new(&DriveSettings::default(), Arc::clone(&shared), 0);
-    let mut device = Device::new(EmulatedDriveSettings::default());
+    let mut device = EmulatedDrive::new(EmulatedDriveSettings::default());
     let (mut client, _) = super::super::super::sdo::Client::upload(Address::new(0x1008, 0));
     let ids = [
         0x000u16, 0x080, 0x085, 0x185, 0x205, 0x585, 0x605, 0x705, 0x77F,

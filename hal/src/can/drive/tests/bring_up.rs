@@ -247,7 +247,9 @@ fn silence_on_the_bus_is_told_with_what_to_check() {
 #[test]
 fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
     let world = SimulatedHost::default();
-    let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default())));
+    let device = Arc::new(Mutex::new(EmulatedDrive::new(
+        EmulatedDriveSettings::default(),
+    )));
     let _running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     world.sleep(Duration::from_millis(1));
     let before = device.lock().unwrap().objects().clone();
@@ -282,7 +284,7 @@ fn a_drive_looked_at_tells_which_objects_it_lacks() {
         Address::new(0x6502, 0),
         Address::new(0x1008, 0),
     ];
-    let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings {
+    let device = Arc::new(Mutex::new(EmulatedDrive::new(EmulatedDriveSettings {
         missing_objects,
         ..EmulatedDriveSettings::default()
     })));

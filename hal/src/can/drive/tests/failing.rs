@@ -1,7 +1,7 @@
 //! Every fault: found in the time that the settings state, current zero, and usable again when a person clears it.
 
 use super::super::super::bus::{BusError, Condition};
-use super::super::super::device::DeviceFault;
+use super::super::super::emulator::DeviceFault;
 use super::*;
 
 /// Enabled, 1 A flowing for 50 ms.
@@ -365,7 +365,9 @@ fn a_fault_that_persists_is_not_cleared() {
 #[test]
 fn a_drive_in_fault_at_opening_is_opened_but_not_reset() {
     let world = SimulatedHost::default();
-    let device = Arc::new(Mutex::new(Device::new(EmulatedDriveSettings::default())));
+    let device = Arc::new(Mutex::new(EmulatedDrive::new(
+        EmulatedDriveSettings::default(),
+    )));
     let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     world.sleep(Duration::from_millis(1));
     device.lock().unwrap().inject(DeviceFault::Drive(0x2310));

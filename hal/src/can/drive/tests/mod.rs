@@ -8,20 +8,20 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use super::super::bus::{Host, SimulatedHost};
-use super::super::device::{AmplifierTask, Device, EmulatedDriveSettings};
+use super::super::emulator::{AmplifierTask, EmulatedDrive, EmulatedDriveSettings};
 use super::*;
 
 /// Driver and simulated drive on one bus.
 struct Rig {
     drive: CanopenDrive,
     world: SimulatedHost,
-    device: Arc<Mutex<Device>>,
+    device: Arc<Mutex<EmulatedDrive>>,
     _running: TaskHandle,
 }
 
 fn open(settings: DriveSettings, device: EmulatedDriveSettings) -> Result<Rig, OpenError> {
     let world = SimulatedHost::default();
-    let device = Arc::new(Mutex::new(Device::new(device)));
+    let device = Arc::new(Mutex::new(EmulatedDrive::new(device)));
     let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
     let drive = CanopenDrive::open(settings, Box::new(world.clone()))?;
     Ok(Rig {
@@ -55,7 +55,7 @@ fn refusal(settings: DriveSettings, device: EmulatedDriveSettings) -> String {
 }
 
 impl Rig {
-    fn device(&self) -> MutexGuard<'_, Device> {
+    fn device(&self) -> MutexGuard<'_, EmulatedDrive> {
         self.device.lock().unwrap()
     }
 

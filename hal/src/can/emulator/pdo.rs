@@ -4,7 +4,7 @@ use super::super::frame::{CanFrame, Id};
 use super::super::nmt;
 use super::super::pdo::{Direction, OFF, parameters};
 use super::super::sdo::{Address, Dictionary};
-use super::{Device, DeviceFault, objects as object};
+use super::{DeviceFault, EmulatedDrive, objects as object};
 
 /// What is remembered between frames.
 #[derive(Debug, Default)]
@@ -33,7 +33,7 @@ struct Parameters {
     mapping: u16,
 }
 
-impl Device {
+impl EmulatedDrive {
     fn pdo_parameters(&self, direction: Direction, number: u8) -> Parameters {
         let index = parameters(direction, number);
         let value = |sub| self.objects.number(Address::new(index, sub));

@@ -1,27 +1,27 @@
 //! The other end: a simulated CANopen drive and a simulated VESC, for tests and for rehearsal without hardware.
 //!
-//! Both are an [`EmulatedAmplifier`]; [`AmplifierTask`] joins one to a bus. [`Device`], the drive, is sans-I/O:
-//! [`Device::handle`] takes a frame, [`Device::poll`] the passing of time, both give frames to send. It is written from the standards, not from the driver, so the two check each
+//! Both are an [`EmulatedAmplifier`]; [`AmplifierTask`] joins one to a bus. [`EmulatedDrive`], the drive, is sans-I/O:
+//! [`EmulatedDrive::handle`] takes a frame, [`EmulatedDrive::poll`] the passing of time, both give frames to send. It is written from the standards, not from the driver, so the two check each
 //! other: object dictionary, SDO server, NMT, heartbeat producer and consumer, PDO with the rules of their mapping, and
 //! the state machine of CiA 402.
 //!
-//! What matters of it is [`Device::current_a`]: the current that a real drive would give. It is quantised as in the
+//! What matters of it is [`EmulatedDrive::current_a`]: the current that a real drive would give. It is quantised as in the
 //! drive, and zero unless operation is enabled, whatever the bus says.
 
-mod acting;
+mod amplifier;
 mod dictionary;
 mod objects;
 mod pdo;
-mod power;
+mod power_stage;
 mod task;
 mod vesc;
 
 use std::collections::VecDeque;
 
-pub use acting::EmulatedAmplifier;
+pub use amplifier::EmulatedAmplifier;
 pub use dictionary::ObjectDictionary;
 pub use objects::EmulatedDriveSettings;
-pub use power::Power;
+pub use power_stage::Power;
 pub use task::{AmplifierTask, FrameCounts, Observer};
 pub use vesc::EmulatedVesc;
 
@@ -64,7 +64,7 @@ pub enum DeviceFault {
 
 /// A simulated drive.
 #[derive(Debug)]
-pub struct Device {
+pub struct EmulatedDrive {
     settings: EmulatedDriveSettings,
     objects: ObjectDictionary,
     server: Server,
@@ -78,11 +78,11 @@ pub struct Device {
     now_ns: u64,
 }
 
-impl Device {
-    /// A drive that has just got power; the first [`Device::poll`] sends the boot-up message.
-    pub fn new(settings: EmulatedDriveSettings) -> Device {
+impl EmulatedDrive {
+    /// A drive that has just got power; the first [`EmulatedDrive::poll`] sends the boot-up message.
+    pub fn new(settings: EmulatedDriveSettings) -> EmulatedDrive {
         let objects = objects::dictionary(&settings);
-        Device {
+        EmulatedDrive {
             settings,
             objects,
             server: Server::default(),
@@ -214,7 +214,7 @@ impl Device {
     /// All objects, states and queues as after power-on; a requested lateness or muteness is gone with them.
     fn restart(&mut self) {
         let now_ns = self.now_ns;
-        *self = Device::new(self.settings.clone());
+        *self = EmulatedDrive::new(self.settings.clone());
         self.now_ns = now_ns;
     }
 

@@ -5,8 +5,8 @@ use super::super::pdo::{Direction, Mapped};
 use super::super::sdo::{AbortCode, Answer, Part, Request, Start};
 use super::*;
 
-fn booted() -> Device {
-    let mut device = Device::new(EmulatedDriveSettings::default());
+fn booted() -> EmulatedDrive {
+    let mut device = EmulatedDrive::new(EmulatedDriveSettings::default());
     let mut out = Vec::new();
     device.poll(0, &mut out);
     assert_eq!(
@@ -17,7 +17,7 @@ fn booted() -> Device {
     device
 }
 
-fn ask(device: &mut Device, request: Request) -> Answer {
+fn ask(device: &mut EmulatedDrive, request: Request) -> Answer {
     let mut out = Vec::new();
     device.handle(
         &CanFrame::new(sdo::request_id(5), request.encode()),
@@ -27,7 +27,7 @@ fn ask(device: &mut Device, request: Request) -> Answer {
     Answer::decode(out.last().expect("an answer").data()).expect("a known answer")
 }
 
-fn write(device: &mut Device, index: u16, sub: u8, value: &[u8]) -> Result<(), AbortCode> {
+fn write(device: &mut EmulatedDrive, index: u16, sub: u8, value: &[u8]) -> Result<(), AbortCode> {
     let address = Address::new(index, sub);
     match ask(
         device,
@@ -39,14 +39,14 @@ fn write(device: &mut Device, index: u16, sub: u8, value: &[u8]) -> Result<(), A
     }
 }
 
-fn send(device: &mut Device, frame: CanFrame) -> Vec<CanFrame> {
+fn send(device: &mut EmulatedDrive, frame: CanFrame) -> Vec<CanFrame> {
     let mut out = Vec::new();
     device.handle(&frame, device.now_ns, &mut out);
     out
 }
 
 /// Operational, controlword and target mapped asynchronously, cyclic torque.
-fn operational() -> Device {
+fn operational() -> EmulatedDrive {
     let mut device = booted();
     write(&mut device, 0x1400, 1, &0x8000_0205u32.to_le_bytes()).unwrap();
     for (sub, word) in [(1, 0x6040_0010u32), (2, 0x6071_0010)] {
@@ -59,7 +59,7 @@ fn operational() -> Device {
     device
 }
 
-fn set_point(device: &mut Device, controlword: u16, target: i16) {
+fn set_point(device: &mut EmulatedDrive, controlword: u16, target: i16) {
     let id = layout::cob_id(Direction::Receive, 1, 5);
     send(device, CanFrame::new(id, layout::pack(controlword, target)));
 }

@@ -2,7 +2,7 @@
 
 use super::super::cia402::State;
 use super::super::frame::CanFrame;
-use super::{Device, DeviceFault};
+use super::{DeviceFault, EmulatedDrive};
 
 /// The device's side of a current amplifier on a CAN bus: frames and time go in, frames come out.
 pub trait EmulatedAmplifier: Send {
@@ -31,21 +31,21 @@ pub trait EmulatedAmplifier: Send {
     fn inject(&mut self, fault: DeviceFault);
 }
 
-impl EmulatedAmplifier for Device {
+impl EmulatedAmplifier for EmulatedDrive {
     fn handle(&mut self, frame: &CanFrame, now_ns: u64, out: &mut Vec<CanFrame>) {
-        Device::handle(self, frame, now_ns, out);
+        EmulatedDrive::handle(self, frame, now_ns, out);
     }
 
     fn poll(&mut self, now_ns: u64, out: &mut Vec<CanFrame>) {
-        Device::poll(self, now_ns, out);
+        EmulatedDrive::poll(self, now_ns, out);
     }
 
     fn current_a(&self) -> f64 {
-        Device::current_a(self)
+        EmulatedDrive::current_a(self)
     }
 
     fn set_measured_current_a(&mut self, current_a: Option<f64>) {
-        Device::set_measured_current_a(self, current_a);
+        EmulatedDrive::set_measured_current_a(self, current_a);
     }
 
     fn state(&self) -> &'static str {
@@ -61,6 +61,6 @@ impl EmulatedAmplifier for Device {
     }
 
     fn inject(&mut self, fault: DeviceFault) {
-        Device::inject(self, fault);
+        EmulatedDrive::inject(self, fault);
     }
 }
