@@ -10,6 +10,7 @@ use super::arming::Trip;
 use super::clock::{Clock, Realtime, Virtual};
 use super::servo::Servo;
 use crate::config::LoopSettings;
+use crate::util::thread_priority::set_fifo;
 
 /// `virtual` or `realtime`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -180,24 +181,6 @@ pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
         cpu: bound,
         refused,
     }
-}
-
-/// For the threads that serve the loop's devices: right below it, where that is permitted. Where it is not, the loop's own
-/// thread says so.
-pub fn device_thread_setup(settings: &LoopSettings) -> impl Fn() + Send + Sync + Clone + use<> {
-    let priority = (settings.priority - 1).max(1);
-    move || {
-        let _ = set_fifo(priority);
-    }
-}
-
-fn set_fifo(priority: i32) -> nix::Result<()> {
-    let parameters = libc::sched_param {
-        sched_priority: priority,
-    };
-    // SAFETY: 0 is the calling thread, `parameters` outlives the call, and the kernel only reads it.
-    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
-    nix::errno::Errno::result(result).map(drop)
 }
 
 fn bind(cpu: usize) -> nix::Result<()> {

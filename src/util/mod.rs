@@ -2,3 +2,4 @@
 
 pub mod atomic_file;
 pub mod quantity;
+pub(crate) mod thread_priority;

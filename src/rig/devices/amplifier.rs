@@ -15,7 +15,7 @@ use crate::config::{
     AmplifierDevice, CanopenSettings, Config, ExchangeSettings, OnCommunicationLoss,
     TargetReference, TorqueMode, VescSettings,
 };
-use crate::rt::thread::device_thread_setup;
+use crate::util::thread_priority::device_thread_setup;
 
 /// The step of a VESC's set-point in amperes: whole milliamperes.
 const VESC_STEP_A: f64 = 1e-3;
@@ -48,14 +48,14 @@ pub fn open(config: &Config) -> Result<(Amplifier, String), AmplifierError> {
         AmplifierDevice::Simulated(_) => Err(AmplifierError::Simulated),
         AmplifierDevice::Canopen(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            let host = SystemHost::new(port).prepared(device_thread_setup(&config.servo));
+            let host = SystemHost::new(port).prepared(device_thread_setup(config.servo.priority));
             let drive = CanopenDrive::open(drive_settings(device, config), Box::new(host))?;
             let identity = canopen_identity(drive.identity());
             Ok((Box::new(drive), identity))
         }
         AmplifierDevice::Vesc(device) => {
             let port = SocketPort::open(&device.interface, device.bit_rate)?;
-            let host = SystemHost::new(port).prepared(device_thread_setup(&config.servo));
+            let host = SystemHost::new(port).prepared(device_thread_setup(config.servo.priority));
             let opened = Vesc::open(vesc_settings(device, config), Box::new(host));
             let vesc = opened.map_err(|why| AmplifierError::Vesc {
                 node: device.node,

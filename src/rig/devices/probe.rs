@@ -11,7 +11,7 @@ use crate::config::{
     AsciiSettings, CapancdtSettings, Config, CounterMeaning, LineSettings, MountingSettings,
     OptoncdtSettings, Parity, PollingSettings, ProbeDevice,
 };
-use crate::rt::thread::device_thread_setup;
+use crate::util::thread_priority::device_thread_setup;
 
 /// A probe that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -63,7 +63,7 @@ pub fn open(config: &Config) -> Result<SerialProbe, ProbeError> {
     let settings = settings(config).ok_or(ProbeError::Simulated)?;
     Ok(SerialProbe::open_with(
         settings,
-        device_thread_setup(&config.servo),
+        device_thread_setup(config.servo.priority),
     )?)
 }
 

@@ -16,7 +16,7 @@ use super::journal::{CurrentWatch, EventLog, LogEntry, Turned};
 use super::stage::{Stage, seconds};
 use crate::config::{AmplifierDevice, CanopenSettings, Config};
 use crate::rig::devices::amplifier::reference;
-use crate::rt::thread::device_thread_setup;
+use crate::util::thread_priority::device_thread_setup;
 
 /// An amplifier at work; dropping it takes it from the bus.
 pub struct Amplifier {
@@ -79,8 +79,9 @@ impl Amplifier {
             interface: interface.clone(),
             held,
         };
-        let host =
-            Arc::new(SystemHost::since(port, start).prepared(device_thread_setup(&config.servo)));
+        let host = Arc::new(
+            SystemHost::since(port, start).prepared(device_thread_setup(config.servo.priority)),
+        );
         Ok(Amplifier {
             _claim: claim.map_err(held)?,
             ..Amplifier::start(config, host, stage, journal)?

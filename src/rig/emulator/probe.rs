@@ -13,7 +13,7 @@ use super::stage::Stage;
 use crate::config::{Config, MountingSettings, ProbeDevice};
 use crate::rig::devices::probe::port;
 use crate::rig::simulated::Sensor;
-use crate::rt::thread::device_thread_setup;
+use crate::util::thread_priority::device_thread_setup;
 
 /// Measurements a second of a probe that speaks by itself, if the configuration does not say.
 const STREAM_HZ: f64 = 4000.0;
@@ -65,7 +65,7 @@ impl Probe {
             Arc::clone(&acting),
             now_ns,
             measure(config, stage),
-            device_thread_setup(&config.servo),
+            device_thread_setup(config.servo.priority),
         );
         let task = task.map_err(|source| EmulatorError::Thread {
             device: "probe",
