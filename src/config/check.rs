@@ -4,6 +4,7 @@
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
+use crate::util::nearest::nearest;
 use crate::util::quantity::{self, Quantity};
 
 /// Something wrong at a path.
@@ -248,15 +249,6 @@ fn unknown_key(key: &str, properties: &Map<String, Json>) -> String {
         Some(nearest) => format!("is not a setting; the nearest is `{nearest}`"),
         None => "is not a setting; this table has none".into(),
     }
-}
-
-/// The candidate most like `word`.
-pub(crate) fn nearest<'a>(
-    word: &str,
-    candidates: impl Iterator<Item = &'a str>,
-) -> Option<&'a str> {
-    candidates
-        .max_by(|a, b| strsim::jaro_winkler(word, a).total_cmp(&strsim::jaro_winkler(word, b)))
 }
 
 fn not_one_of(given: &str, words: &[&str]) -> String {

@@ -34,7 +34,6 @@ mod sim;
 
 pub use calibration::*;
 pub use campaign::*;
-pub(crate) use check::nearest;
 pub use chirp::*;
 pub use control::*;
 pub use devices::*;

@@ -1,9 +1,10 @@
 //! What no single setting of a plant can say.
 
-use super::check::{Finding, nearest};
+use super::check::Finding;
 use super::{
     Config, ConfigError, Geometry, LumpedSettings, ModalSettings, PlantSettings, SpringSettings,
 };
+use crate::util::nearest::nearest;
 
 /// The name that no node may have.
 pub(crate) const GROUND: &str = "ground";

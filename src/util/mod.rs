@@ -1,5 +1,8 @@
 //! Small helpers without a subject of their own.
 
 pub mod atomic_file;
+pub mod checkpoint;
+pub mod nearest;
+pub mod numeric;
 pub mod quantity;
 pub(crate) mod thread_priority;

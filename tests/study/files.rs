@@ -271,7 +271,7 @@ fn a_file_that_is_no_study_is_refused_and_left_as_it_is() {
         ] {
             bench
                 .run(&arguments)
-                .is_refused(&["a.study is not a study", "left as it is"]);
+                .is_refused(&["a.study is not a study", "left unchanged"]);
             assert_eq!(bench.read("a.study"), content);
         }
     }

@@ -140,7 +140,7 @@ fn two_processes_do_not_work_on_one_file() {
     ] {
         let answer = bench.run(&arguments);
         assert!(
-            answer.code == 1 && answer.err.contains("another `bench` is at work on it"),
+            answer.code == 1 && answer.err.contains("another `bench` is using it"),
             "{answer:?}"
         );
     }
@@ -177,7 +177,7 @@ fn a_full_disk_is_told_and_what_was_done_is_kept() {
     for words in [
         "cannot write a.study",
         "File too large",
-        "make room and start it again with the same arguments",
+        "free some space and start it again with the same arguments",
     ] {
         assert!(said.contains(words), "`{words}` is not in {said}");
     }

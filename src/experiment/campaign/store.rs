@@ -15,8 +15,8 @@ use serde_json::Value;
 use super::{CampaignError, Grid, Place, PutOn};
 use crate::config::Config;
 use crate::identify::verdict::Cnmp;
-use crate::model::study::differences;
 use crate::util::atomic_file::write_whole;
+use crate::util::checkpoint::differences;
 
 const FORMAT: &str = "bench campaign 1";
 /// Differences that are told one by one.

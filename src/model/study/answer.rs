@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::effects::{Cell, Effects, Share};
-use super::interval::wilson;
 use super::{Block, Failure, Results, Shard, Varied};
+use crate::util::numeric::wilson_interval;
 
 /// Failures that are told one by one; the others are counted.
 const EXAMPLES: usize = 5;
@@ -162,7 +162,7 @@ fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
 }
 
 fn probability(pairs: Option<u32>, yes: u64, all: u64) -> Probability {
-    let [low, high] = wilson(yes, all);
+    let [low, high] = wilson_interval(yes, all);
     Probability {
         pairs,
         draws: yes,

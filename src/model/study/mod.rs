@@ -5,83 +5,79 @@
 //!                                      |                                                       |
 //!                                      |            blocks of draws, on all threads <----------+
 //!                                      v                          |
-//!                        Answer <--- Results <--- StudyFile: what is done, by shards, to go on and to join
+//!                        Answer <--- Results <--- StudyFile: completed blocks, by shards, to continue and to join
 //! ```
 //!
-//! A file holds the counts alone: the settings of draw k are a function of the plan and of k. So an answer does not depend
-//! on threads, on shards, on interruptions, or on the order in which blocks were done.
+//! A file holds the counts alone: the settings of draw k are a function of the plan and of k. The answer therefore does
+//! not depend on threads, shards, interruptions, or the order in which blocks were completed.
 
 mod answer;
 mod counter;
 mod effects;
 mod file;
-mod interval;
 mod plan;
 mod results;
 mod tolerance;
 mod workers;
 
 pub use answer::{Answer, Counted, Effect, Interaction, NotAnalysed, Probability};
-pub(crate) use file::differences;
 pub use file::{Opened, StudyFile, joined};
 pub use plan::{Drawn, Plan, Shard, Varied};
 pub use results::{Block, Count, Failure, Results};
 pub use tolerance::{Deviation, Tolerance};
 pub use workers::count;
 
-/// Why there is no study.
+use crate::util::checkpoint::FileError;
+
+/// The reason why a study is refused or fails.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyError {
-    /// A tolerance that cannot be read, or means nothing for its setting.
+    /// A tolerance that cannot be read, or that does not apply to its setting.
     #[error("--vary {text}: {why}")]
     Tolerance {
         /// As typed.
         text: String,
-        /// What is wrong, with the remedy.
+        /// The reason, with the remedy.
         why: String,
     },
-    /// No setting, too many, or no draws.
+    /// A plan without or with too many settings or draws, or of a plant that cannot be analysed.
     #[error("{0}")]
     Plan(
-        /// What is wrong, with the remedy.
+        /// The reason, with the remedy.
         String,
     ),
-    /// A shard that is none.
-    #[error("`{0}` is no shard; write I/N, as in 3/8: the third of eight, I from 1 to N")]
+    /// An invalid shard.
+    #[error("invalid shard `{0}`: expected I/N with 1 <= I <= N, as in 3/8 for the third of eight")]
     Shard(
         /// As typed.
         String,
     ),
     /// A file that cannot be written or read.
-    #[error("cannot {what} {path}: {why}; {remedy}")]
+    #[error("{error}; {remedy}")]
     File {
-        /// What was tried.
-        what: &'static str,
-        /// The file.
-        path: String,
-        /// The system's words.
-        why: String,
-        /// What to do about it.
+        /// The failure.
+        error: FileError,
+        /// The remedy.
         remedy: &'static str,
     },
-    /// A file that is something else.
-    #[error("{path} is not a study ({why}); it is left as it is: name another file")]
+    /// A file of another kind.
+    #[error("{path} is not a study ({why}); it was left unchanged: name another file")]
     NotAStudy {
         /// The file.
         path: String,
-        /// What was found.
+        /// The reason.
         why: String,
     },
     /// A file of other settings.
     #[error("{path} holds a study of other settings; name another file, or give the same settings:\n{}", differences.join("\n"))]
-    Other {
+    OtherSettings {
         /// The file.
         path: String,
         /// A line for each difference.
         differences: Vec<String>,
     },
-    /// Files that do not make up a whole.
-    #[error("the shards do not make up a whole study:\n{}", .0.join("\n"))]
+    /// Files that are not a complete study together.
+    #[error("the shards are not a complete study:\n{}", .0.join("\n"))]
     Shards(
         /// A line for each finding.
         Vec<String>,

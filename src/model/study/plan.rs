@@ -10,7 +10,8 @@ use serde_json::Value;
 
 use super::counter::Counter;
 use super::{Deviation, StudyError, Tolerance};
-use crate::config::{Config, PlantSettings, nearest, validate};
+use crate::config::{Config, PlantSettings, validate};
+use crate::util::nearest::nearest;
 
 /// Settings that may vary at once: the classes of all couples of them stay below 40 MB.
 const MOST_VARIED: usize = 64;
@@ -75,13 +76,13 @@ impl FromStr for Shard {
             .and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
         let shard = parts.map(|(index, count)| Shard { index, count });
         shard
-            .filter(Shard::is_one)
+            .filter(Shard::is_valid)
             .ok_or_else(|| StudyError::Shard(text.into()))
     }
 }
 
 impl Shard {
-    pub(super) fn is_one(&self) -> bool {
+    pub(super) fn is_valid(&self) -> bool {
         (1..=self.count).contains(&self.index)
     }
 }
