@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::CliError;
+use super::error::CliError;
 use super::linearity_output::LinearityMade;
 use super::loop_output::LoopMade;
 use super::modal_output::Shown;

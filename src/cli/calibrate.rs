@@ -5,9 +5,11 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
-use super::options::{BenchOptions, print_json, print_text};
+use super::error::CliError;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use super::run_options::{RunOptions, RunReport, finish};
-use super::{CliError, Outcome};
 use crate::config::{Config, ExcitationKind, Purpose};
 use crate::excitation::{self, Extremes, Staircase};
 use crate::experiment::calibration::{Fit, fit};

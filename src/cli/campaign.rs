@@ -8,10 +8,12 @@ use std::sync::atomic::AtomicBool;
 use super::campaign_attended::OnDevices;
 use super::campaign_output::Report;
 use super::chirp::check;
-use super::options::{BenchOptions, print_json, print_text};
-use super::progress::Progress;
+use super::error::CliError;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
+use super::progress::ProgressLine;
 use super::value_range::ValueRange;
-use super::{CliError, Outcome};
 use crate::config::{Config, Purpose, profiles};
 use crate::experiment::campaign::{
     Answer, Found, Grid, Place, Point, Store, Tolerances, measured, order, picture, work,
@@ -20,6 +22,7 @@ use crate::experiment::{self, Plan, Run, stop_on_signal};
 use crate::rig::devices;
 use crate::rt::thread::Pace;
 use crate::util::atomic_file::write_whole;
+use crate::util::progress::Progress;
 
 /// Section 5.2.2 was identified at 1 kHz; the sweep has to stay below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
@@ -142,18 +145,16 @@ fn fill(
     threads: usize,
     stop: &AtomicBool,
 ) -> Result<(), CliError> {
-    let (progress, mut count) = (Progress::new("campaign"), 0);
-    progress.show(count, missing.len() as u64);
+    let progress = Progress::default();
+    progress.begin("campaign", missing.len() as u64);
+    let _line = ProgressLine::show(&progress);
     let measure = |place| bench.measure(place, &store.recordings(place));
-    let worked = work(missing, threads, stop, measure, |place, point| {
+    work(missing, threads, stop, measure, |place, point| {
         store.add(place, &point)?;
         done.push((place, point));
-        count += 1;
-        progress.show(count, missing.len() as u64);
+        progress.advance(1);
         Ok(())
-    });
-    progress.close();
-    worked
+    })
 }
 
 /// Draws the picture into the folder; where it is.

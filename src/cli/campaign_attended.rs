@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use super::CliError;
 use super::campaign::Bench;
+use super::error::CliError;
 use super::person::AtTerminal;
 use super::run_options::{RunOptions, finish};
 use crate::experiment::Plan;

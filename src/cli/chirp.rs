@@ -2,9 +2,10 @@
 
 use super::analysis_output::{AnalysisOutputs, make};
 use super::chirp_plan::{Expected, shape, show};
+use super::error::CliError;
 use super::options::BenchOptions;
+use super::outcome::Outcome;
 use super::run_options::{RunOptions, RunReport, close};
-use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::excitation::{self, Extremes};
 use crate::experiment::{Plan, abandon_on_signal};

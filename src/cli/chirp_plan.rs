@@ -6,8 +6,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::chirp::rig;
-use super::options::{print_json, print_text};
-use super::{CliError, Outcome};
+use super::error::CliError;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use crate::config::{AmplitudePoint, Config, ExcitationKind};
 use crate::excitation::{CurrentLimit, Extremes, LARGEST_SPAN, of, shaped_amplitude, words};
 use crate::identify::csv;

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::CliError;
+use super::error::CliError;
 
 /// Where a command writes its table.
 #[derive(Clone, Debug, Default, clap::Args)]

@@ -2,8 +2,10 @@
 
 use clap::Subcommand;
 
-use super::options::{BenchOptions, print_json, print_text};
-use super::{CliError, Outcome};
+use super::error::CliError;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use crate::config::Purpose;
 
 /// What to do with the configuration.

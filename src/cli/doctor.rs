@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::chirp;
+use super::error::CliError;
 use super::margins::{closed_loop, require_modulus_margin};
-use super::options::{BenchOptions, print_json, print_text};
-use super::{CliError, Outcome};
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use crate::config::{Config, Purpose};
 use crate::control::Margins;
 use crate::doctor::{RunChecks, examine};

@@ -9,8 +9,10 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::options::{BenchOptions, print_json};
-use super::{CliError, Outcome};
+use super::error::CliError;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::print_json;
 use crate::config::Purpose;
 use crate::rig::emulator::probe::ProbeEndpoint;
 use crate::rig::emulator::rehearsal::EmulatedDevices;

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::analysis_output::{AnalysisOutputs, in_folder, make};
+use super::error::CliError;
 use super::identify_external::{self, ExternalOptions};
-use super::options::{print_json, print_text};
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use super::run_options::TripReport;
-use super::{CliError, Outcome};
 use crate::config::Config;
 use crate::experiment::{Ending, Plan, RunKind};
 use crate::recording::Recording;

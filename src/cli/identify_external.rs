@@ -5,9 +5,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::analysis_output::{Drawn, Plots, drawn, free, in_folder, plots_text};
+use super::error::CliError;
 use super::modal_output::Shown;
-use super::options::{print_json, print_text};
-use super::{CliError, Outcome};
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use crate::experiment::{ExternalAnalysis, analyse_external};
 use crate::identify::periodic::Repetition;
 use crate::identify::table::{self, Clock, Columns};

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::CliError;
 use super::analysis_output::free;
+use super::error::CliError;
 use crate::experiment::ClosedResponses;
 use crate::identify::{Frf, Unit, csv};
 

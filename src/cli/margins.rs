@@ -3,8 +3,11 @@
 use serde::Serialize;
 
 use super::controller_choice::ControllerChoice;
-use super::options::{BenchOptions, print_json, print_text};
-use super::{CliError, Outcome};
+use super::error::CliError;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
+use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::model::plant::{self, ModalModel};
@@ -106,8 +109,11 @@ pub(super) fn text(config: &Config, margins: &Margins) -> String {
         false => chain_text(config),
     };
     format!(
-        "{} controller, {time}\n  {}\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {:.4} (peak of S {:.2} dB)\n  sensitivity bandwidth  {}\n",
-        config.control.controller,
+        "{}  {}\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {:.4} (peak of S {:.2} dB)\n  sensitivity bandwidth  {}\n",
+        wrap(
+            &format!("{} controller, {time}", config.control.controller),
+            0
+        ),
         if margins.stable {
             "stable"
         } else {

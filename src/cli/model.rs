@@ -18,9 +18,11 @@ mod veering;
 use clap::Subcommand;
 use serde::Serialize;
 
-use super::options::{BenchOptions, print_json, print_text};
+use super::error::CliError;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use super::table::table;
-use super::{CliError, Outcome};
 use crate::config::{Config, Purpose};
 use crate::model::plant::{self, ModalModel};
 use crate::model::zeros::{self, Zero};

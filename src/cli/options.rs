@@ -1,9 +1,8 @@
 //! The options that all commands on a bench share.
 
 use clap::Args;
-use serde::Serialize;
 
-use super::CliError;
+use super::error::CliError;
 use crate::config::{Config, PlantSettings, Purpose, Source, load};
 use crate::rig::devices;
 use crate::util::quantity::{self, Quantity};
@@ -91,22 +90,4 @@ fn has(plant: &PlantSettings, value: Option<f64>, option: &str) -> Result<f64, C
             "{option} has no meaning for the model `{model}`; {settings}"
         ))
     })
-}
-
-/// Prints the one JSON object of a command.
-pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
-    print_text(&format!("{text}\n"))
-}
-
-/// Prints to standard output; a reader that has gone is no error of ours.
-pub(super) fn print_text(text: &str) -> Result<(), CliError> {
-    use std::io::Write;
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(CliError::Failed(format!(
-            "cannot write to standard output: {e}"
-        ))),
-        _ => Ok(()),
-    }
 }

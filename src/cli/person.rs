@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-use super::CliError;
+use super::error::CliError;
 use crate::experiment::campaign::{Person, Question, Reply};
 use crate::util::quantity::{self, Quantity};
 

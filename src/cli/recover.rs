@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::options::{print_json, print_text};
-use super::{CliError, Outcome};
+use super::error::CliError;
+use super::outcome::Outcome;
+use super::output::{print_json, print_text};
 use crate::recording::recover;
 
 /// Which recording.

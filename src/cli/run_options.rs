@@ -7,9 +7,11 @@ use bench_hal::Rig;
 
 use serde::Serialize;
 
-use super::options::print_text;
-use super::progress::Progress;
-use super::{CliError, Outcome};
+use super::error::CliError;
+use super::outcome::Outcome;
+use super::output::print_text;
+use super::progress::ProgressLine;
+use super::table::labelled;
 use crate::config::Config;
 use crate::experiment::{Ending, Plan, Run, RunError};
 use crate::recording::{Quantiles, Totals};
@@ -17,6 +19,7 @@ use crate::rig::calibration::{CalibratedRig, Calibration, load_calibration};
 use crate::rig::devices;
 use crate::rt::arming::Trip;
 use crate::rt::thread::Pace;
+use crate::util::progress::Progress;
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]
@@ -127,10 +130,11 @@ impl RunOptions {
         let pace = self.pace(&plan.config)?;
         let (plan, rig) = self.open(plan, calibration)?;
         let progress = Progress::new(what);
+        let line = ProgressLine::show(&progress);
         let run = crate::experiment::run(&plan, rig, pace, &self.out, &mut |done, total| {
-            progress.show(done, total)
+            progress.set(done, total)
         });
-        progress.close();
+        drop(line);
         run.map_err(|error| match error {
             RunError::Plan(plan) => CliError::from(plan),
             other => CliError::Failed(other.to_string()),
@@ -297,13 +301,13 @@ impl RunReport {
             ),
         };
         format!(
-            "{}: {} ticks ({seconds:.2} s at {} Hz), {} overruns, {} lost records\n  {timing}{refused}{trip}\n  recording  {}\n",
+            "{}: {} ticks ({seconds:.2} s at {} Hz), {} overruns, {} lost records\n  {timing}{refused}{trip}\n{}",
             self.outcome,
             self.ticks,
             config.servo.rate_hz,
             self.overruns,
             self.lost_records,
-            self.recording
+            labelled("recording", &self.recording)
         )
     }
 }

@@ -1,27 +1,133 @@
-//! Columns of text for people.
+//! Text for a terminal: tables, wrapped sentences, labelled lines, at most 80 columns wide.
 
-/// Rows of cells, right-aligned under a header.
+/// Columns of a line at most.
+const WIDTH: usize = 80;
+/// Between two columns of a table.
+const GAP: &str = "  ";
+/// Width of the label of a labelled line.
+const LABEL: usize = 13;
+
+/// Rows of cells, right-aligned below a header. A table wider than 80 columns is split into several ones below each
+/// other, each with the first column of the whole.
 pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
-    let width = |column: usize| {
-        let cells = rows
-            .iter()
-            .filter_map(|row| row.get(column))
-            .map(|cell| cell.chars().count());
-        cells
-            .chain([header[column].chars().count()])
+    let header: Vec<String> = header.iter().map(|cell| cell.to_string()).collect();
+    let lines: Vec<&Vec<String>> = std::iter::once(&header).chain(rows).collect();
+    let widths: Vec<usize> = (0..header.len())
+        .map(|column| width(&lines, column))
+        .collect();
+    let parts = split(&widths);
+    let parts: Vec<String> = parts
+        .iter()
+        .map(|columns| part(&lines, &widths, columns))
+        .collect();
+    parts.join("\n")
+}
+
+fn width(lines: &[&Vec<String>], column: usize) -> usize {
+    let cells = lines.iter().filter_map(|line| line.get(column));
+    cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+}
+
+/// The columns of each part, the first one in all of them.
+fn split(widths: &[usize]) -> Vec<Vec<usize>> {
+    let first = widths.first().copied().unwrap_or(0);
+    let mut parts = vec![vec![0]];
+    let mut taken = first;
+    for (column, width) in widths.iter().enumerate().skip(1) {
+        let needed = GAP.len() + width;
+        let is_full = taken + needed > WIDTH && parts.last().is_some_and(|part| part.len() > 1);
+        if is_full {
+            parts.push(vec![0]);
+            taken = first;
+        }
+        taken += needed;
+        parts
+            .iter_mut()
+            .last()
+            .into_iter()
+            .for_each(|part| part.push(column));
+    }
+    parts
+}
+
+fn part(lines: &[&Vec<String>], widths: &[usize], columns: &[usize]) -> String {
+    let lines = lines.iter().map(|line| row(line, widths, columns));
+    lines.collect()
+}
+
+fn row(line: &[String], widths: &[usize], columns: &[usize]) -> String {
+    let padded = columns.iter().filter_map(|&column| {
+        let width = widths[column];
+        line.get(column).map(|cell| format!("{cell:>width$}"))
+    });
+    padded.collect::<Vec<_>>().join(GAP) + "\n"
+}
+
+/// Text in lines of at most 80 columns, each indented by `indent`. A word longer than a line keeps a line of its own.
+pub(super) fn wrap(text: &str, indent: usize) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= WIDTH => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(format!("{:indent$}{word}", "")),
+        }
+    }
+    lines.iter().map(|line| line.clone() + "\n").collect()
+}
+
+/// A line `  label      text`, wrapped below its text.
+pub(super) fn labelled(label: &str, text: &str) -> String {
+    let wrapped = wrap(text, LABEL);
+    let label = format!("  {label}");
+    let text = wrapped.get(LABEL..).unwrap_or("\n");
+    format!("{label:<LABEL$}{text}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widest(text: &str) -> usize {
+        text.lines()
+            .map(|line| line.chars().count())
             .max()
             .unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..header.len()).map(width).collect();
-    let line = |cells: Vec<&str>| {
-        let padded = cells
-            .iter()
-            .zip(&widths)
-            .map(|(cell, &width)| format!("{cell:>width$}"));
-        padded.collect::<Vec<_>>().join("  ") + "\n"
-    };
-    let body = rows
-        .iter()
-        .map(|row| line(row.iter().map(String::as_str).collect()));
-    std::iter::once(line(header.to_vec())).chain(body).collect()
+    }
+
+    #[test]
+    fn aligns_cells_to_the_right() {
+        let rows = [
+            vec!["1".to_string(), "22".to_string()],
+            vec!["333".into(), "4".into()],
+        ];
+        assert_eq!(table(&["a", "b"], &rows), "  a   b\n  1  22\n333   4\n");
+    }
+
+    #[test]
+    fn splits_a_table_wider_than_80_columns_and_repeats_the_first_column() {
+        let header: Vec<String> = (0..12).map(|k| format!("column {k:02}")).collect();
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        let rows = [(0..12).map(|k| k.to_string()).collect::<Vec<_>>()];
+        let text = table(&header, &rows);
+        assert!(widest(&text) <= 80, "{text}");
+        assert_eq!(text.matches("column 00").count(), 2, "{text}");
+        assert!(header.iter().all(|name| text.contains(name)), "{text}");
+    }
+
+    #[test]
+    fn wraps_at_80_columns_and_keeps_every_word() {
+        let text = "word ".repeat(60);
+        let wrapped = labelled("recording", &text);
+        assert!(widest(&wrapped) <= 80 && wrapped.starts_with("  recording  word word"));
+        assert_eq!(wrapped.matches("word").count(), 60);
+        let path = "/a".repeat(60);
+        assert_eq!(
+            labelled("recording", &path),
+            format!("  recording  {path}\n")
+        );
+        assert_eq!(labelled("none", ""), "  none       \n");
+    }
 }

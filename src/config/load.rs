@@ -80,6 +80,21 @@ pub enum ConfigError {
     ),
 }
 
+impl ConfigError {
+    /// The file, line or option that is wrong; of several the first.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            ConfigError::NotFound { name, .. } => Some(name.clone()),
+            ConfigError::Unreadable { path, .. } => Some(path.display().to_string()),
+            ConfigError::Syntax { place, .. } => Some(place.clone()),
+            ConfigError::Refused(findings) => {
+                let (place, _) = findings.first()?.split_once(": `")?;
+                Some(place.trim().to_string())
+            }
+        }
+    }
+}
+
 /// One layer of settings, with the text it came from.
 struct Layer {
     name: String,

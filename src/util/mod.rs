@@ -4,5 +4,6 @@ pub mod atomic_file;
 pub mod checkpoint;
 pub mod nearest;
 pub mod numeric;
+pub mod progress;
 pub mod quantity;
 pub(crate) mod thread_priority;

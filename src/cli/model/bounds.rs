@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::super::CliError;
-use super::super::options::{BenchOptions, print_json, print_text};
+use super::super::error::CliError;
+use super::super::options::BenchOptions;
+use super::super::output::{print_json, print_text};
 use super::super::table::table;
 use crate::config::Purpose;
 use crate::model::plant;

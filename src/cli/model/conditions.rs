@@ -3,8 +3,9 @@
 
 use serde::Serialize;
 
-use super::super::CliError;
-use super::super::options::{BenchOptions, print_json, print_text};
+use super::super::error::CliError;
+use super::super::options::BenchOptions;
+use super::super::output::{print_json, print_text};
 use super::conditions_text::text;
 use super::sweep::Sweep;
 use super::veering::{self, hz};

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::super::CliError;
-use super::super::options::{print_json, print_text};
+use super::super::error::CliError;
+use super::super::output::{print_json, print_text};
 use crate::model::zeros;
 
 /// Two close modes beside a double integrator (Eq. 3-15).

@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use super::super::CliError;
 use super::super::columns::{Column, TableOptions};
-use super::super::options::{BenchOptions, print_json, print_text};
+use super::super::error::CliError;
+use super::super::options::BenchOptions;
+use super::super::output::{print_json, print_text};
 use super::super::value_range::ValueRange;
 use crate::config::{PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::super::CliError;
-use super::super::options::{BenchOptions, print_json, print_text};
+use super::super::error::CliError;
+use super::super::options::BenchOptions;
+use super::super::output::{print_json, print_text};
 use super::conditions::{meeting_pair, veers};
 use super::placement_text::text;
 use super::ports::Weights;

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::super::CliError;
+use super::super::error::CliError;
 use crate::model::plant::Port;
 
 /// A sum of ports with their weights, by place.

@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use super::super::CliError;
 use super::super::columns::{Column, TableOptions};
-use super::super::options::{BenchOptions, print_json, print_text};
+use super::super::error::CliError;
+use super::super::options::BenchOptions;
+use super::super::output::{print_json, print_text};
 use crate::config::Purpose;
 use crate::model::plant::{self, ModalModel};
 use crate::model::zeros::{ModalSum, Sequence, StepFeatures, StepResponse, ZeroCounts};

@@ -4,16 +4,19 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use super::super::columns::{Column, TableOptions};
-use super::super::options::{BenchOptions, print_json, print_text};
-use super::super::progress::Progress;
+use super::super::error::CliError;
+use super::super::options::BenchOptions;
+use super::super::outcome::Outcome;
+use super::super::output::{print_json, print_text};
+use super::super::progress::ProgressLine;
 use super::super::table::table;
-use super::super::{CliError, Outcome};
 use crate::config::Purpose;
 use crate::experiment::stop_on_signal;
 use crate::model::study::{
     Answer, Block, Counted, Deviation, Effect, Interaction, Opened, Plan, Probability, Results,
     Shard, StudyError, StudyFile, Tolerance, Varied, count, joined,
 };
+use crate::util::progress::Progress;
 
 /// What varies, and how often it is drawn.
 #[derive(Clone, Debug, clap::Args)]
@@ -102,18 +105,20 @@ fn fill(
     stop: &AtomicBool,
 ) -> Result<(), CliError> {
     let (plan, ranges) = (results.plan.clone(), results.missing());
-    let (mut done, progress) = (0, Progress::new("draws"));
-    let total: u64 = ranges.iter().map(|range| range.end - range.start).sum();
+    let progress = Progress::default();
+    progress.begin(
+        "draws",
+        ranges.iter().map(|range| range.end - range.start).sum(),
+    );
+    let _line = ProgressLine::show(&progress);
     let counted = count(&plan, &ranges, threads, stop, |block| {
         if let Some(file) = file.as_mut() {
             file.append(&block)?;
         }
-        done += block.cnmp_pairs.len() as u64;
+        progress.advance(block.cnmp_pairs.len() as u64);
         results.add(block);
-        progress.show(done, total);
         Ok::<(), StudyError>(())
     });
-    progress.close();
     counted?;
     Ok(file.map_or(Ok(()), |file| file.sync())?)
 }

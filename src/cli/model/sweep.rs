@@ -1,6 +1,6 @@
 //! One setting that varies over a grid.
 
-use super::super::CliError;
+use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use crate::config::{Config, Purpose};
 use crate::model::plant::{self, Structure};

@@ -148,10 +148,15 @@ impl Answer {
         value
     }
 
-    /// Refused as usage: exit code 2, nothing on standard output, and all of `words` in the message.
+    /// Refused as usage: exit code 2 and all of `words` in the message. Standard output has nothing or, with `--json`, the
+    /// same message in an error object.
     pub fn is_refused(&self, words: &[&str]) {
         assert_eq!(self.code, 2, "{self:?}");
-        assert_eq!(self.out, "", "standard output of a refused command");
+        if !self.out.is_empty() {
+            let message = self.json()["error"]["message"].clone();
+            let message = message.as_str().expect("an error message");
+            assert!(self.err.contains(message), "{self:?}");
+        }
         for word in words {
             assert!(
                 self.err.contains(word),

@@ -1,0 +1,103 @@
+//! The commands and their dispatch.
+
+use clap::{Parser, Subcommand};
+
+use super::error::{CliError, ErrorReport};
+use super::outcome::Outcome;
+use super::output::{print_json, print_note};
+use super::{
+    calibrate, campaign, chirp, config, control, doctor, emulate, identify, linearity, margins,
+    model, recover, replay,
+};
+
+/// A controller daemon for a precision-motion test bench.
+///
+/// Without a configuration every command works on the simulated stage of the thesis. Exit codes: 0 done, 1 failed (a trip of
+/// the interlocks included), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) of a run
+/// that did not come to its end.
+#[derive(Debug, Parser)]
+#[command(name = "bench", version, max_term_width = 80)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Excite the stage, record, estimate its frequency response: recording, CSV and Bode plot
+    Chirp(chirp::Args),
+    /// A multisine at several amplitudes: distortion told apart from noise, and whether modes shift with amplitude
+    Linearity(linearity::Args),
+    /// Close the loop with a reference: recording, predicted and measured figures
+    Control(control::Args),
+    /// One chirp at each point of a grid of operating points and asymmetries: dots over the map, offset, recommendation
+    Campaign(campaign::Args),
+    /// Find scale, sign, offset and delay of amplifier and probe by small static steps
+    Calibrate(calibrate::Args),
+    /// The mechanics by the model: modes, residues, signs, zeros
+    Model(model::Args),
+    /// Crossover, phase, gain and modulus margin of a controller with the model
+    Margins(margins::Args),
+    /// The analysis of `bench chirp`, from a recording or from a CSV of other hands
+    Identify(identify::Args),
+    /// Run the recorded probe through the same loop and compare every command bit for bit
+    Replay(replay::Args),
+    /// Make a cut-off recording readable and say what was lost
+    Recover(recover::Args),
+    /// Act as the configured devices, with the simulated stage behind them: a rehearsal without hardware
+    Device(emulate::Args),
+    /// The effective settings, their validation, their schema
+    Config(config::Args),
+    /// Could a run start? System, devices, recordings, each finding with its remedy; nothing moves
+    Doctor(doctor::Args),
+}
+
+/// Parses the arguments of the process, runs the command and reports an error: as text on standard error and, with
+/// `--json`, as an object on standard output.
+pub fn main() -> Outcome {
+    let json = std::env::args_os().any(|argument| argument == "--json");
+    match Cli::try_parse() {
+        Ok(cli) => run(cli).unwrap_or_else(|error| failed(&error, json)),
+        Err(error) => not_parsed(&error, json),
+    }
+}
+
+fn failed(error: &CliError, json: bool) -> Outcome {
+    print_note(&error.to_string());
+    if json {
+        // The exit code says the rest, should standard output be closed.
+        let _ = print_json(&ErrorReport::of(error));
+    }
+    error.outcome()
+}
+
+/// Help and version are requests, everything else is wrong usage.
+fn not_parsed(error: &clap::Error, json: bool) -> Outcome {
+    let _ = error.print();
+    if error.exit_code() == 0 {
+        return Outcome::Done;
+    }
+    if json {
+        let _ = print_json(&ErrorReport::of_usage(error));
+    }
+    Outcome::Usage
+}
+
+/// Runs a parsed command line.
+pub fn run(cli: Cli) -> Result<Outcome, CliError> {
+    match cli.command {
+        Command::Chirp(args) => chirp::run(&args),
+        Command::Linearity(args) => linearity::run(&args),
+        Command::Control(args) => control::run(&args),
+        Command::Campaign(args) => campaign::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::Model(args) => model::run(&args),
+        Command::Margins(args) => margins::run(&args),
+        Command::Identify(args) => identify::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Recover(args) => recover::run(&args),
+        Command::Device(args) => emulate::run(&args),
+        Command::Config(args) => config::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+    }
+}
