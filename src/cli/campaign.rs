@@ -283,7 +283,7 @@ impl Bench<'_> {
 /// What a run says; the recording is closed with that in it.
 pub(super) fn point(mut run: Run, config: &Config) -> Result<Point, CliError> {
     let point = measured(&mut run, config)?;
-    super::run_options::finish(run, &point)?;
+    experiment::close(run, &point)?;
     Ok(point)
 }
 

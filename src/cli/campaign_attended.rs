@@ -6,9 +6,9 @@ use std::sync::atomic::AtomicBool;
 use super::campaign::Bench;
 use super::error::CliError;
 use super::person::AtTerminal;
-use super::run_options::{RunOptions, finish};
-use crate::experiment::Plan;
+use super::progress::ProgressLine;
 use crate::experiment::campaign::{Attended, CampaignError, Place, Point, Rest, Stage, Store};
+use crate::experiment::{Plan, Run, Runner, Setup, close};
 use crate::recording::Recording;
 
 /// The configured devices, and the folder of the campaign.
@@ -42,7 +42,7 @@ impl Stage for OnDevices<'_> {
     /// Recorded in the folder `rest` of the campaign; a trip is an error: nothing can be measured on such a bench.
     fn rest(&mut self) -> Result<Option<Rest>, CliError> {
         let plan = Plan::quiet(self.bench.config.clone());
-        let run = RunOptions::on_devices(self.out.join("rest")).run(&plan, "rest")?;
+        let run = on_devices(self.out.join("rest"), &plan, "rest")?;
         if let Some((trip, tick)) = run.ended.trip {
             let what = format!(
                 "the bench tripped at rest, at tick {tick}: {trip}; {}",
@@ -55,7 +55,7 @@ impl Stage for OnDevices<'_> {
         }
         let path = run.path.clone();
         // All ticks are in the file once it is closed.
-        finish(run, &serde_json::json!({ "outcome": "completed" }))?;
+        close(run, &serde_json::json!({ "outcome": "completed" }))?;
         let name = path.display().to_string();
         let opened = Recording::open(&path);
         let rest = opened.map_err(|e| CampaignError::Rest {
@@ -67,9 +67,9 @@ impl Stage for OnDevices<'_> {
 
     fn measure(&mut self, place: Place) -> Result<Option<Point>, CliError> {
         let folder = self.store.recordings(place);
-        let options = RunOptions::on_devices(folder.clone());
-        self.bench
-            .measure_by(place, &folder, |plan| options.run(plan, "chirp"))
+        self.bench.measure_by(place, &folder, |plan| {
+            on_devices(folder.clone(), plan, "chirp")
+        })
     }
 
     fn keep(&mut self, place: Place, point: &Point) -> Result<(), CliError> {
@@ -77,4 +77,17 @@ impl Stage for OnDevices<'_> {
         self.done.push((place, point.clone()));
         Ok(())
     }
+}
+
+fn on_devices(
+    folder: std::path::PathBuf,
+    plan: &Plan,
+    phase: &'static str,
+) -> Result<Run, CliError> {
+    let (setup, progress) = (
+        Setup::on_devices(folder),
+        crate::util::progress::Progress::new(phase),
+    );
+    let _line = ProgressLine::show(&progress);
+    Ok(Runner { setup, progress }.run(plan, phase)?)
 }

@@ -5,13 +5,12 @@ use super::chirp_plan::{Expected, shape, show};
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::run_options::{RunOptions, RunReport, close};
+use super::run_options::{RunOptions, close, exit, run_text};
 use crate::config::{Config, Purpose};
 use crate::excitation::{self, Extremes};
-use crate::experiment::{Plan, abandon_on_signal};
+use crate::experiment::{self, Plan, RunSummary, abandon_on_signal};
 use crate::model::plant::DiscretePlant;
 use crate::recording::Recording;
-use crate::rig::simulated;
 use serde::Serialize;
 use std::path::Path;
 
@@ -118,7 +117,7 @@ impl Args {
 #[derive(Debug, Serialize)]
 struct Report {
     #[serde(flatten)]
-    run: RunReport,
+    run: RunSummary,
     expected_travel_m: f64,
     expected: Expected,
     #[serde(flatten)]
@@ -133,11 +132,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     let plan = Plan::chirp(config.clone());
     let mut run = args.run.run(&plan, "chirp")?;
-    let totals = run.totals()?;
-    let report = RunReport::new(&run, &totals);
-    let made = match report.outcome {
-        "completed" => analysed(&run.path, &config)?,
-        _ => AnalysisOutputs::nothing("the run did not come to its end"),
+    let report = RunSummary::of(&mut run)?;
+    let made = match report.is_completed() {
+        true => analysed(&run.path, &config)?,
+        false => AnalysisOutputs::nothing("the run did not come to its end"),
     };
     let report = Report {
         run: report,
@@ -149,7 +147,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(if report.made.is_stopped() {
         Outcome::Failed
     } else {
-        report.run.exit()
+        exit(&report.run)
     })
 }
 
@@ -171,25 +169,12 @@ pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, 
 
 /// Refuses an excitation that would trip an interlock, by the model of the whole rig; returns what to expect.
 pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
-    Ok(excitation::check(
-        &excitation::of(config),
-        config,
-        &rig(config)?,
-    )?)
+    Ok(experiment::predicted_extremes(config)?)
 }
 
 /// The model of the whole rig.
 pub(super) fn rig(config: &Config) -> Result<DiscretePlant, CliError> {
-    let (bandwidth_hz, force_constant) = (
-        config.amplifier.bandwidth_hz,
-        config.motor.force_constant_n_per_a,
-    );
-    Ok(DiscretePlant::new(
-        &simulated::modes(config)?,
-        bandwidth_hz,
-        force_constant,
-        config.servo.period_s(),
-    ))
+    Ok(experiment::rig_model(config)?)
 }
 
 fn text(report: &Report, config: &Config) -> String {
@@ -197,7 +182,7 @@ fn text(report: &Report, config: &Config) -> String {
         "{}; expected travel {:.0} um\n{}{}",
         excitation::words(config),
         report.expected_travel_m * 1e6,
-        report.run.text(config),
+        run_text(&report.run, config),
         report.made.text(),
     )
 }

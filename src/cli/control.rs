@@ -10,10 +10,10 @@ use super::error::CliError;
 use super::margins::{closed_loop, require_modulus_margin, text as margins_text};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::run_options::{RunOptions, RunReport, close};
+use super::run_options::{RunOptions, close, exit, run_text};
 use crate::config::{Config, Purpose, ReferenceSettings};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
-use crate::experiment::{Measured, Plan, measure};
+use crate::experiment::{Measured, Plan, RunSummary, measure};
 use crate::recording::Recording;
 use crate::util::quantity;
 
@@ -146,7 +146,7 @@ impl Args {
 #[derive(Debug, Serialize)]
 struct Report {
     #[serde(flatten)]
-    run: RunReport,
+    run: RunSummary,
     predicted: Predicted,
     measured: Option<Measured>,
     /// What a swept reference does by the model.
@@ -177,9 +177,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let predicted = Predicted { margins, step };
     let plan = Plan::control(config.clone())?;
     let mut run = args.run.run(&plan, "control")?;
-    let totals = run.totals()?;
-    let report = RunReport::new(&run, &totals);
-    let completed = report.outcome == "completed";
+    let report = RunSummary::of(&mut run)?;
+    let completed = report.is_completed();
     let swept = matches!(config.control.reference, ReferenceSettings::Chirp { .. });
     let measured = match completed && !swept {
         true => measure(&Recording::open(&run.path)?, &config)?,
@@ -206,7 +205,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(if stopped {
         Outcome::Failed
     } else {
-        report.run.exit()
+        exit(&report.run)
     })
 }
 
@@ -236,7 +235,7 @@ fn text(report: &Report, config: &Config) -> String {
         let travel_um = report
             .expected
             .map_or(0.0, |expected| expected.travel_m * 1e6);
-        let run = report.run.text(config);
+        let run = run_text(&report.run, config);
         return format!(
             "{margins}  expected   travel of {travel_um:.1} um by the model\n{run}{}",
             made.text()
@@ -262,6 +261,6 @@ fn text(report: &Report, config: &Config) -> String {
     format!(
         "{}{predicted}{measured}{}",
         margins_text(config, &report.predicted.margins),
-        report.run.text(config)
+        run_text(&report.run, config)
     )
 }

@@ -7,8 +7,8 @@ use super::outcome::Outcome;
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::excitation::ExcitationError;
-use crate::experiment::PlanError;
 use crate::experiment::campaign::{AnswerError, CampaignError};
+use crate::experiment::{ExperimentError, PlanError};
 use crate::identify::IdentifyError;
 use crate::identify::table::ExternalCsvError;
 use crate::model::plant::PlantError;
@@ -102,6 +102,21 @@ pub enum ErrorKind {
     Campaign,
     /// Anything else, at run time.
     Failed,
+}
+
+impl From<ExperimentError> for CliError {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Plan(error) => error.into(),
+            ExperimentError::Excitation(error) => error.into(),
+            ExperimentError::Plant(error) => error.into(),
+            ExperimentError::Devices(error) => error.into(),
+            ExperimentError::Calibration(error) => error.into(),
+            ExperimentError::Recording(error) => error.into(),
+            ExperimentError::Refused(what) => CliError::Usage(what),
+            other => CliError::Failed(other.to_string()),
+        }
+    }
 }
 
 impl CliError {

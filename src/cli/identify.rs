@@ -9,9 +9,9 @@ use super::error::CliError;
 use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
-use super::run_options::TripReport;
+use super::run_options::trip_text;
 use crate::config::Config;
-use crate::experiment::{Ending, Plan, RunKind};
+use crate::experiment::{Ending, Plan, RunKind, TripSummary};
 use crate::recording::Recording;
 
 /// Which recording.
@@ -33,8 +33,8 @@ pub(super) struct Args {
 #[derive(Debug, Serialize)]
 struct Report {
     /// `completed`, `tripped`, `stopped`, or `cut_off` where the file ends before the run does.
-    outcome: &'static str,
-    trip: Option<TripReport>,
+    outcome: Ending,
+    trip: Option<TripSummary>,
     recording: String,
     ticks: u64,
     overruns: u64,
@@ -71,8 +71,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     let ending = Ending::of(&recording);
     let report = Report {
-        outcome: ending.name(),
-        trip: TripReport::of(&ending),
+        outcome: ending,
+        trip: TripSummary::of(ending),
         recording: args.recording.display().to_string(),
         ticks: recording.tick_count(),
         overruns: recording.overruns(),
@@ -110,7 +110,7 @@ impl Report {
         };
         format!(
             "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}{}\n{}",
-            self.outcome.replace('_', " "),
+            self.outcome.name().replace('_', " "),
             self.ticks,
             self.ticks as f64 * period_s,
             config.servo.rate_hz,
@@ -118,7 +118,7 @@ impl Report {
             self.lost_records,
             self.trip
                 .as_ref()
-                .map_or(String::new(), |trip| trip.text(period_s)),
+                .map_or(String::new(), |trip| trip_text(trip, period_s)),
             self.made.text()
         )
     }

@@ -10,11 +10,11 @@ use super::modal_output::{ModeJson, mode};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
-use super::run_options::{RunOptions, RunReport, finish};
+use super::run_options::{RunOptions, exit, run_text};
 use super::table::table;
 use crate::config::{Config, Purpose};
 use crate::excitation;
-use crate::experiment::{ModeOverAmplitude, Plan, modes_over_amplitude};
+use crate::experiment::{self, ModeOverAmplitude, Plan, RunSummary, modes_over_amplitude};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
 
@@ -102,7 +102,7 @@ struct RunMade {
     scale: f64,
     expected: Expected,
     #[serde(flatten)]
-    run: RunReport,
+    run: RunSummary,
     #[serde(flatten)]
     made: AnalysisOutputs,
 }
@@ -112,7 +112,7 @@ impl RunMade {
         if self.made.is_stopped() {
             Outcome::Failed
         } else {
-            self.run.exit()
+            exit(&self.run)
         }
     }
 }
@@ -171,11 +171,10 @@ fn expected(scale: f64, config: &Config) -> Result<Expected, CliError> {
 /// One amplitude: recorded, analysed, its report in its recording.
 fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<RunMade, CliError> {
     let mut run = args.run.run(&Plan::chirp(config.clone()), "linearity")?;
-    let totals = run.totals()?;
-    let told = RunReport::new(&run, &totals);
-    let made = match told.outcome {
-        "completed" => analysed(&run.path, config)?,
-        _ => AnalysisOutputs::nothing("the run did not come to its end"),
+    let told = RunSummary::of(&mut run)?;
+    let made = match told.is_completed() {
+        true => analysed(&run.path, config)?,
+        false => AnalysisOutputs::nothing("the run did not come to its end"),
     };
     let made = RunMade {
         scale,
@@ -183,7 +182,7 @@ fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<R
         run: told,
         made,
     };
-    finish(run, &made)?;
+    experiment::close(run, &made)?;
     Ok(made)
 }
 
@@ -277,7 +276,7 @@ fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude])
             run.scale,
             run.expected.travel_m * 1e6,
             run.expected.current_a,
-            run.run.text(config)
+            run_text(&run.run, config)
         )
     };
     let words = configs

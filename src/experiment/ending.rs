@@ -1,5 +1,7 @@
 //! How a run came to its end, as its loop or its recording tells it.
 
+use serde::{Serialize, Serializer};
+
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
 use crate::rt::record::EventKind;
@@ -16,6 +18,13 @@ pub enum Ending {
     Stopped,
     /// The recording ends before the run does.
     CutOff,
+}
+
+/// As its [`name`](Ending::name).
+impl Serialize for Ending {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
 }
 
 impl From<&LoopOutcome> for Ending {

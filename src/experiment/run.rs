@@ -13,7 +13,7 @@ use tokio::signal::unix::Signal;
 
 use super::name;
 use super::plan::{KIND, Plan, PlanError};
-use super::stop::signals;
+use super::signals::signals;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;

@@ -1,6 +1,7 @@
 //! How late the loop woke and how long it computed, each second and over the whole run.
 
 use hdrhistogram::Histogram;
+use serde::Serialize;
 
 use super::continuity::Continuity;
 use super::messages::Timing;
@@ -10,15 +11,19 @@ const SECOND_NS: u64 = 1_000_000_000;
 
 /// Quantiles of a duration in nanoseconds. `max_ns` is exact; the others are exact below 2048 ns and at most 0.1 %
 /// above the true quantile beyond (three significant digits); 10 s and more count as 10 s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Quantiles {
     /// Median.
+    #[serde(rename = "p50")]
     pub p50_ns: u64,
     /// 99 %.
+    #[serde(rename = "p99")]
     pub p99_ns: u64,
     /// 99.99 %.
+    #[serde(rename = "p9999")]
     pub p9999_ns: u64,
     /// Largest.
+    #[serde(rename = "max")]
     pub max_ns: u64,
 }
 

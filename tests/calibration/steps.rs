@@ -2,7 +2,7 @@
 use std::path::Path;
 
 use bench::config::{Config, ScaleBy, Source, load};
-use bench::experiment::calibration::{Fit, FitError, fit};
+use bench::experiment::calibration::{StaircaseError, StaircaseFit, fit};
 use bench::experiment::{self, Plan};
 use bench::recording::Recording;
 use bench::rig::calibration::{
@@ -31,10 +31,14 @@ fn recorded(rig: Box<dyn Rig>, config: &Config, folder: &Path) -> Recording {
     Recording::open(&path).expect("a recording")
 }
 
-fn fitted(skew: Skew, config: &Config) -> Result<Fit, FitError> {
+fn fit_of(recording: &Recording, config: &Config) -> Result<StaircaseFit, StaircaseError> {
+    fit(recording, &config.calibrate, config.servo.period_s())
+}
+
+fn fitted(skew: Skew, config: &Config) -> Result<StaircaseFit, StaircaseError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let rig = SkewedRig::new(SimulatedRig::new(config).expect("a rig"), skew);
-    fit(&recorded(Box::new(rig), config, folder.path()), config)
+    fit_of(&recorded(Box::new(rig), config, folder.path()), config)
 }
 
 #[test]
@@ -160,7 +164,7 @@ fn a_stage_that_does_not_move_gives_no_calibration() {
     assert!(
         matches!(
             fitted(Skew::default(), &config),
-            Err(FitError::Still { .. })
+            Err(StaircaseError::NoMotion { .. })
         ),
         "lost in the noise"
     );
@@ -208,7 +212,7 @@ fn through_its_calibration_a_skewed_rig_is_the_stage_again() {
     };
     let rig = SkewedRig::new(SimulatedRig::new(&config).expect("a rig"), skew);
     let rig = CalibratedRig::new(Box::new(rig), &calibration);
-    let second = fit(&recorded(Box::new(rig), &config, folder.path()), &config).expect("a fit");
+    let second = fit_of(&recorded(Box::new(rig), &config, folder.path()), &config).expect("a fit");
     assert!(
         (second.compliance_m_per_a / COMPLIANCE_M_PER_A - 1.0).abs() < 2e-4,
         "{second:?}"

@@ -1,18 +1,19 @@
-//! From the recording of a staircase to scale, sign, offset, linearity and hysteresis.
+//! Fits the recording of a staircase of static currents: compliance with its sign, rest position, linearity, hysteresis.
 
-use crate::config::{CalibrateSettings, Config, ScaleBy};
+use crate::config::{CalibrateSettings, ScaleBy};
 use crate::excitation::Staircase;
 use crate::identify::RunningStats;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
+use crate::rt::record::TickRecord;
 
-/// The stage must move by so many standard deviations of a level's mean.
-const SEEN: f64 = 20.0;
+/// The stage must move by this many standard deviations of the mean of a level.
+const MIN_SIGMAS: f64 = 20.0;
 
-/// A staircase that says nothing.
+/// A staircase without a usable fit.
 #[derive(Debug, thiserror::Error)]
-pub enum FitError {
-    /// It cannot be read.
+pub enum StaircaseError {
+    /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A level has no ticks.
@@ -24,17 +25,17 @@ pub enum FitError {
     #[error(
         "the reading moved by {travel_m:.3e} m over the whole staircase, with {noise_m:.3e} m of noise in a level's mean: the stage does not follow the current; check motor, amplifier and probe, or raise calibrate.amplitude_a"
     )]
-    Still {
+    NoMotion {
         /// From the lowest to the highest level.
         travel_m: f64,
         /// Standard deviation of a mean.
         noise_m: f64,
     },
-    /// Not a straight line.
+    /// The readings are not on a straight line.
     #[error(
         "{what} is {found:.4} of the travel, {limit} is allowed ({setting}): friction, a stop, or a probe near the end of its range; look at the recording"
     )]
-    Crooked {
+    NotStraight {
         /// What is too large.
         what: &'static str,
         /// How large.
@@ -46,12 +47,12 @@ pub enum FitError {
     },
 }
 
-/// What the staircase shows, in readings and commands as they were.
+/// The fit of a staircase, in readings and commands as recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
+pub struct StaircaseFit {
     /// Metres of reading per ampere commanded, with its sign.
     pub compliance_m_per_a: f64,
-    /// Standard deviation of that, by the scatter about the line.
+    /// Its standard deviation, from the scatter about the line.
     pub compliance_sigma_m_per_a: f64,
     /// Reading in metres at zero command, by the line.
     pub rest_m: f64,
@@ -61,47 +62,45 @@ pub struct Fit {
     pub hysteresis_ratio: f64,
     /// RMS of the reading about the means of its levels, in metres.
     pub noise_rms_m: f64,
-    /// Amperes that flow per ampere commanded and at none, where the amplifier says.
+    /// Measured current per ampere commanded, and at zero command, if the amplifier measures its current.
     pub current: Option<(f64, f64)>,
 }
 
-/// Fits the recording of a staircase.
-pub fn fit(recording: &Recording, config: &Config) -> Result<Fit, FitError> {
-    let staircase = Staircase::new(&config.calibrate, config.servo.period_s());
+/// Fits the recording of a staircase that ran with these settings and period.
+pub fn fit(
+    recording: &Recording,
+    settings: &CalibrateSettings,
+    period_s: f64,
+) -> Result<StaircaseFit, StaircaseError> {
+    let staircase = Staircase::new(settings, period_s);
     let levels = levels(recording, &staircase)?;
-    let (offset_m, slope, sigma) =
-        line(levels.iter().map(|l| (l.command_a.mean, l.position_m.mean)));
-    let noise = levels
-        .iter()
-        .filter_map(|l| l.position_m.sigma())
-        .map(|s| s * s)
-        .sum::<f64>()
-        / levels.len() as f64;
-    let span_a = 2.0 * config.calibrate.amplitude_a;
-    let travel_m = (slope * span_a).abs();
-    let ticks = levels
-        .iter()
-        .map(|l| l.position_m.count)
-        .fold(f64::INFINITY, f64::min);
-    let noise_m = (noise / ticks).sqrt();
-    if travel_m.partial_cmp(&(SEEN * noise_m)) != Some(std::cmp::Ordering::Greater) {
-        return Err(FitError::Still { travel_m, noise_m });
-    }
-    let off = |l: &Level| (l.position_m.mean - offset_m - slope * l.command_a.mean).abs();
-    let fit = Fit {
+    let (rest_m, slope, sigma) = line(levels.iter().map(Level::reading));
+    let noise = mean_variance(&levels);
+    let travel_m = (slope * 2.0 * settings.amplitude_a).abs();
+    require_motion(travel_m, (noise / shortest(&levels)).sqrt())?;
+    let fit = StaircaseFit {
         compliance_m_per_a: slope,
         compliance_sigma_m_per_a: sigma,
-        rest_m: offset_m,
-        nonlinearity_ratio: levels.iter().map(off).fold(0.0, f64::max) / travel_m,
+        rest_m,
+        nonlinearity_ratio: nonlinearity_m(&levels, rest_m, slope) / travel_m,
         hysteresis_ratio: hysteresis_m(&levels, staircase.levels_a(), slope) / travel_m,
         noise_rms_m: noise.sqrt(),
         current: current(&levels),
     };
-    straight(&fit, &config.calibrate).map(|()| fit)
+    require_straight(&fit, settings)?;
+    Ok(fit)
 }
 
-impl Fit {
-    /// Metres per metre of reading that a calibration applies: the sign, and the size where it is known otherwise.
+fn require_motion(travel_m: f64, noise_m: f64) -> Result<(), StaircaseError> {
+    if travel_m > MIN_SIGMAS * noise_m {
+        return Ok(());
+    }
+    // NaN is refused as well.
+    Err(StaircaseError::NoMotion { travel_m, noise_m })
+}
+
+impl StaircaseFit {
+    /// Metres per metre of reading that a calibration applies: the sign, and the scale if `scale_by` states a reference for it.
     pub fn probe_gain(&self, scale_by: ScaleBy, model_m_per_a: f64) -> f64 {
         let gain = self.current.map_or(1.0, |(gain, _)| gain);
         match scale_by {
@@ -111,31 +110,39 @@ impl Fit {
     }
 }
 
-/// Refuses what is not a straight line.
-fn straight(fit: &Fit, settings: &CalibrateSettings) -> Result<(), FitError> {
-    let cases = [
-        (
-            "the distance between the ways up and down",
-            fit.hysteresis_ratio,
-            settings.largest_hysteresis_ratio,
-            "calibrate.largest_hysteresis_ratio",
-        ),
-        (
-            "the distance from a straight line",
-            fit.nonlinearity_ratio,
-            settings.largest_nonlinearity_ratio,
-            "calibrate.largest_nonlinearity_ratio",
-        ),
-    ];
-    match cases.into_iter().find(|(_, found, limit, _)| found > limit) {
-        Some((what, found, limit, setting)) => Err(FitError::Crooked {
+fn require_straight(
+    fit: &StaircaseFit,
+    settings: &CalibrateSettings,
+) -> Result<(), StaircaseError> {
+    require_ratio(
+        "the distance between the ways up and down",
+        fit.hysteresis_ratio,
+        settings.largest_hysteresis_ratio,
+        "calibrate.largest_hysteresis_ratio",
+    )?;
+    require_ratio(
+        "the distance from a straight line",
+        fit.nonlinearity_ratio,
+        settings.largest_nonlinearity_ratio,
+        "calibrate.largest_nonlinearity_ratio",
+    )
+}
+
+fn require_ratio(
+    what: &'static str,
+    found: f64,
+    limit: f64,
+    setting: &'static str,
+) -> Result<(), StaircaseError> {
+    if found > limit {
+        return Err(StaircaseError::NotStraight {
             what,
             found,
             limit,
             setting,
-        }),
-        None => Ok(()),
+        });
     }
+    Ok(())
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -145,7 +152,42 @@ struct Level {
     actual_a: RunningStats,
 }
 
-fn levels(recording: &Recording, staircase: &Staircase) -> Result<Vec<Level>, FitError> {
+impl Level {
+    /// Mean command and mean reading.
+    fn reading(&self) -> (f64, f64) {
+        (self.command_a.mean, self.position_m.mean)
+    }
+
+    fn push(&mut self, record: &TickRecord) {
+        self.command_a.push(record.command_a);
+        self.position_m.push(record.position_m);
+        if let Some(actual_a) = record.actual_a {
+            self.actual_a.push(actual_a);
+        }
+    }
+}
+
+fn mean_variance(levels: &[Level]) -> f64 {
+    let sigmas = levels.iter().filter_map(|level| level.position_m.sigma());
+    sigmas.map(|sigma| sigma * sigma).sum::<f64>() / levels.len() as f64
+}
+
+/// Ticks of the shortest level.
+fn shortest(levels: &[Level]) -> f64 {
+    let counts = levels.iter().map(|level| level.position_m.count);
+    counts.fold(f64::INFINITY, f64::min)
+}
+
+/// Largest distance of a level from the line.
+fn nonlinearity_m(levels: &[Level], rest_m: f64, slope: f64) -> f64 {
+    let distances = levels.iter().map(|level| {
+        let (command_a, position_m) = level.reading();
+        (position_m - rest_m - slope * command_a).abs()
+    });
+    distances.fold(0.0, f64::max)
+}
+
+fn levels(recording: &Recording, staircase: &Staircase) -> Result<Vec<Level>, StaircaseError> {
     let mut levels = vec![Level::default(); staircase.levels_a().len()];
     let mut first = None;
     for record in recording.ticks()? {
@@ -154,24 +196,17 @@ fn levels(recording: &Recording, staircase: &Staircase) -> Result<Vec<Level>, Fi
             continue;
         }
         let first = *first.get_or_insert(record.tick);
-        let Some(level) = staircase.level(record.tick - first) else {
-            continue;
-        };
-        let level = &mut levels[level];
-        level.command_a.push(record.command_a);
-        level.position_m.push(record.position_m);
-        record
-            .actual_a
-            .into_iter()
-            .for_each(|actual_a| level.actual_a.push(actual_a));
+        if let Some(level) = staircase.level(record.tick - first) {
+            levels[level].push(&record);
+        }
     }
     match levels.iter().position(|level| level.position_m.count < 2.0) {
-        Some(short) => Err(FitError::Short(short)),
+        Some(short) => Err(StaircaseError::Short(short)),
         None => Ok(levels),
     }
 }
 
-/// Largest difference of two visits of a level from opposite sides, the difference of their commands allowed for.
+/// Largest difference between two visits of a level from opposite sides, corrected for the difference of their commands.
 fn hysteresis_m(levels: &[Level], wanted_a: &[f64], slope: f64) -> f64 {
     let rest_m = |l: &Level| l.position_m.mean - slope * l.command_a.mean;
     let pairs = (0..levels.len()).flat_map(|i| (i + 1..levels.len()).map(move |j| (i, j)));
@@ -180,7 +215,7 @@ fn hysteresis_m(levels: &[Level], wanted_a: &[f64], slope: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Gain and offset of the current that flows, where the amplifier measured it at every level.
+/// Gain and offset of the measured current, if the amplifier measured it at every level.
 fn current(levels: &[Level]) -> Option<(f64, f64)> {
     if levels.iter().any(|level| level.actual_a.count == 0.0) {
         return None;

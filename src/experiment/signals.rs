@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::RunError;
+use super::run::RunError;
 
 /// Interrupt (Ctrl-C) and terminate, from now on for the whole process.
 pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {

@@ -1,0 +1,8 @@
+//! Calibration by small static steps: scale, sign, offset and linearity of amplifier and probe, then a short chirp for the
+//! delay from a command to its reading.
+
+mod run;
+mod staircase_fit;
+
+pub use run::{CalibrationRun, check, run, settings};
+pub use staircase_fit::{StaircaseError, StaircaseFit, fit};

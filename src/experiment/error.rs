@@ -1,0 +1,54 @@
+//! Why an experiment was refused before it began, or failed on its way.
+
+use super::analysis::AnalysisError;
+use super::plan::PlanError;
+use super::run::RunError;
+use crate::excitation::ExcitationError;
+use crate::model::plant::PlantError;
+use crate::recording::RecordingError;
+use crate::rig::calibration::CalibrationError;
+use crate::rig::devices::DevicesError;
+
+/// An experiment that was refused or that failed.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// The run cannot be planned.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// By the model the excitation would trip an interlock.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
+    /// The model cannot be analysed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The devices cannot be opened, or do not match their settings.
+    #[error(transparent)]
+    Devices(#[from] DevicesError),
+    /// The calibration may not be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// The settings do not allow the experiment.
+    #[error("{0}")]
+    Refused(String),
+    /// The run or its recording failed.
+    #[error(transparent)]
+    Run(RunError),
+    /// The recording cannot be written or read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The recording does not contain a frequency response.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// Another failure on the way.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl From<RunError> for ExperimentError {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Plan(error) => error.into(),
+            other => ExperimentError::Run(other),
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! How a run ended, as every command reports it and as its recording contains it.
+
+use serde::Serialize;
+
+use super::ending::Ending;
+use super::run::Run;
+use crate::recording::{Quantiles, RecordingError};
+use crate::rt::arming::Trip;
+use crate::rt::thread::{Pace, Scheduling};
+
+/// Counts, timing and ending of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunSummary {
+    /// How the run ended.
+    pub outcome: Ending,
+    /// The trip that ended it.
+    pub trip: Option<TripSummary>,
+    /// Recorded ticks.
+    pub ticks: u64,
+    /// Scheduled ticks that were not served.
+    pub overruns: u64,
+    /// Records lost between loop and recording.
+    pub lost_records: u64,
+    /// Path of the recording.
+    pub recording: String,
+    /// Equal for two runs whose loops received and did the same, bit for bit.
+    pub loop_digest: String,
+    /// Pace, scheduling and timing of the loop.
+    pub timing: TimingSummary,
+}
+
+/// A trip of the interlocks.
+#[derive(Clone, Debug, Serialize)]
+pub struct TripSummary {
+    /// Short name of the reason.
+    pub reason: &'static str,
+    /// The tick of the trip.
+    pub tick: u64,
+    /// The reason with value and limit.
+    pub text: String,
+    /// What to do about it.
+    pub remedy: &'static str,
+}
+
+/// Timing of a loop.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimingSummary {
+    /// Pace of the loop.
+    pub pace: Pace,
+    /// How its thread was scheduled.
+    #[serde(flatten)]
+    pub scheduling: Scheduling,
+    /// Woke - due.
+    pub lateness_ns: Quantiles,
+    /// Done - woke.
+    pub compute_ns: Quantiles,
+}
+
+impl TripSummary {
+    /// The trip of a run, if it ended with one.
+    pub fn of(ending: Ending) -> Option<TripSummary> {
+        ending.trip().map(|(trip, tick)| summary(trip, tick))
+    }
+}
+
+fn summary(trip: Trip, tick: u64) -> TripSummary {
+    TripSummary {
+        reason: trip.reason(),
+        tick,
+        text: trip.to_string(),
+        remedy: trip.remedy(),
+    }
+}
+
+impl RunSummary {
+    /// Summarises a run; its recording then contains every tick.
+    pub fn of(run: &mut Run) -> Result<RunSummary, RecordingError> {
+        let totals = run.totals()?;
+        let ending = Ending::from(&run.ended);
+        Ok(RunSummary {
+            outcome: ending,
+            trip: TripSummary::of(ending),
+            ticks: totals.ticks,
+            overruns: totals.overruns,
+            // A loss at the very end leaves no gap; only the loop's own count contains it.
+            lost_records: totals.lost_records.max(run.ended.lost_records),
+            recording: run.path.display().to_string(),
+            loop_digest: format!("{:016x}", totals.loop_digest),
+            timing: TimingSummary {
+                pace: run.pace,
+                scheduling: run.scheduling.clone(),
+                lateness_ns: totals.lateness,
+                compute_ns: totals.compute,
+            },
+        })
+    }
+
+    /// Whether the run came to its end.
+    pub fn is_completed(&self) -> bool {
+        self.outcome == Ending::Completed
+    }
+
+    /// Whether ticks were not served or records were lost.
+    pub fn has_losses(&self) -> bool {
+        self.overruns + self.lost_records > 0
+    }
+}

@@ -1,0 +1,140 @@
+//! Runs plans on a bench: opens the rig, applies the calibration, runs the loop, and reports progress.
+
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+use bench_hal::Rig;
+use serde::Serialize;
+
+use super::error::ExperimentError;
+use super::plan::Plan;
+use super::run::{Run, run};
+use crate::config::Config;
+use crate::rig::calibration::{CalibratedRig, Calibration, load_calibration};
+use crate::rig::devices::{self, OpenRig};
+use crate::rt::thread::Pace;
+use crate::util::progress::Progress;
+
+/// On which rig a plan runs, at which pace, and where it is recorded.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Pace of the loop.
+    pub pace: Pace,
+    /// Whether the simulated stage replaces the configured devices.
+    pub simulate: bool,
+    /// Whether a fault that the amplifier has stored is cleared first. The operator confirms that its cause is removed.
+    pub clear_fault: bool,
+    /// Folder of the recordings.
+    pub folder: PathBuf,
+}
+
+impl Setup {
+    /// The configured devices at their own pace.
+    pub fn on_devices(folder: PathBuf) -> Setup {
+        Setup {
+            pace: Pace::Realtime,
+            simulate: false,
+            clear_fault: false,
+            folder,
+        }
+    }
+
+    /// The simulated stage as fast as possible.
+    pub fn simulated(folder: PathBuf) -> Setup {
+        Setup {
+            pace: Pace::Virtual,
+            simulate: true,
+            clear_fault: false,
+            folder,
+        }
+    }
+
+    fn open(&self, config: &Config) -> Result<OpenRig, ExperimentError> {
+        let mut opened = if self.simulate || devices::is_simulated(config) {
+            devices::simulate(config)?
+        } else {
+            devices::open(config)?
+        };
+        for note in &opened.notes {
+            tracing::warn!("{note}");
+        }
+        if self.clear_fault {
+            let failed = |e| ExperimentError::Failed(format!("amplifier: {e}; nothing was moved"));
+            opened.rig.reset_fault().map_err(failed)?;
+        }
+        Ok(opened)
+    }
+}
+
+/// Runs plans one after another.
+pub struct Runner {
+    /// On which rig, and where to.
+    pub setup: Setup,
+    /// Receives the progress of each run.
+    pub progress: Progress,
+}
+
+impl Runner {
+    /// Runs a plan with the configured calibration.
+    pub fn run(&self, plan: &Plan, phase: &'static str) -> Result<Run, ExperimentError> {
+        self.run_calibrated(plan, phase, None)
+    }
+
+    /// Runs a plan with `calibration` instead of the configured one.
+    pub fn run_calibrated(
+        &self,
+        plan: &Plan,
+        phase: &'static str,
+        calibration: Option<Calibration>,
+    ) -> Result<Run, ExperimentError> {
+        let opened = self.setup.open(&plan.config)?;
+        let (plan, rig) = calibrated(plan, opened, calibration)?;
+        self.progress.begin(phase, 0);
+        let mut update = |done, total| self.progress.set(done, total);
+        let (pace, folder) = (self.setup.pace, &self.setup.folder);
+        Ok(run(&plan, rig, pace, folder, &mut update)?)
+    }
+}
+
+/// The rig corrected by `given` or by the configured calibration, and the plan with devices and calibration stated.
+fn calibrated(
+    plan: &Plan,
+    opened: OpenRig,
+    given: Option<Calibration>,
+) -> Result<(Plan, Box<dyn Rig>), ExperimentError> {
+    let calibration = match given {
+        Some(calibration) => Some(calibration),
+        None => configured_calibration(&plan.config, &opened)?,
+    };
+    let mut plan = plan.clone();
+    plan.devices = vec![("amplifier", opened.amplifier), ("probe", opened.probe)];
+    let Some(calibration) = calibration else {
+        return Ok((plan, opened.rig));
+    };
+    plan.calibration = Some(calibration.to_toml()?);
+    let rig = CalibratedRig::new(opened.rig, &calibration);
+    Ok((plan, Box::new(rig)))
+}
+
+fn configured_calibration(
+    config: &Config,
+    opened: &OpenRig,
+) -> Result<Option<Calibration>, ExperimentError> {
+    let (settings, now) = (&config.calibration, SystemTime::now());
+    let loaded = load_calibration(settings, &opened.amplifier, &opened.probe, now)?;
+    let Some((calibration, warnings)) = loaded else {
+        return Ok(None);
+    };
+    for warning in warnings {
+        tracing::warn!("{warning}");
+    }
+    Ok(Some(calibration))
+}
+
+/// Adds the result of a run to its recording as JSON and closes the file; returns the JSON.
+pub fn close(run: Run, result: &impl Serialize) -> Result<String, ExperimentError> {
+    let json = serde_json::to_string_pretty(result)
+        .map_err(|e| ExperimentError::Failed(format!("cannot write the result as JSON: {e}")))?;
+    run.finish(&json)?;
+    Ok(json + "\n")
+}
