@@ -3,15 +3,27 @@
 use std::process::ExitCode;
 
 use bench::cli;
-use tracing_subscriber::EnvFilter;
+use tracing::level_filters::LevelFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::prelude::*;
 
 fn main() -> ExitCode {
-    let level = EnvFilter::try_from_env("BENCH_LOG").unwrap_or_else(|_| "warn".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(level)
-        .with_writer(std::io::stderr)
-        // Otherwise a full standard error ends the program in a panic.
-        .log_internal_errors(false)
-        .init();
+    start_log();
     cli::main().into()
+}
+
+/// Log lines go to standard error. `BENCH_LOG` chooses the level: `info`, or `bench::rt=debug,warn`.
+fn start_log() {
+    let chosen = std::env::var("BENCH_LOG")
+        .ok()
+        .and_then(|text| text.parse::<Targets>().ok());
+    let filter = chosen.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
+    // With internal errors logged, a full standard error would end the program in a panic.
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .log_internal_errors(false);
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(filter)
+        .init();
 }
