@@ -32,8 +32,9 @@ fn check_and_control(c: &mut Criterion) {
     let sections = ControllerText::find("fast")
         .and_then(|text| text.sections(5000.0))
         .expect("embedded");
-    let mut controller = Controller::new(&sections, 2e-4);
-    let mut interlocks = Interlocks::new(&config);
+    let controller = Controller::new(&sections, 2e-4);
+    let mut state = controller.at_rest();
+    let mut interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
     let mut number = 0;
     c.bench_function("tick: check + fast controller", |b| {
         b.iter(|| {
@@ -50,7 +51,7 @@ fn check_and_control(c: &mut Criterion) {
                 scheduled_ns: number * 200_000,
             };
             let checked = interlocks.check_reading(black_box(&reading), now);
-            let command_a = controller.update(-reading.position_m);
+            let command_a = controller.update(&mut state, -reading.position_m);
             let passed = interlocks.check_command(command_a);
             interlocks.note(command_a);
             black_box((checked.is_ok(), passed.is_ok(), command_a))
@@ -104,7 +105,8 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
         progress,
     };
     let rig = Box::new(SimulatedRig::new(config).expect("valid"));
-    let servo = Servo::new(rig, Interlocks::new(config), connections);
+    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let servo = Servo::new(rig, interlocks, connections);
     for order in [Request::Arm, Request::Start(plan.program().expect("valid"))] {
         assert!(requests.push(order).is_ok());
     }

@@ -6,12 +6,12 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bench::config::{
     AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Source, Sweep, TravelPoint, load,
 };
-use bench::control::{Controller, ControllerText};
+use bench::control::{ControlDesign, ControllerText};
 use bench::excitation::{Chirp, Quiet as NoCurrent, of, reference};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Realtime, TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Control, Decision, Excite, Program};
+use bench::rt::program::{Control, Decision, Excite, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage};
 use bench::rt::servo::{Connections, Progress, Request, Servo};
@@ -75,7 +75,7 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
             let points = "time_s,reference_m\n0.0,0.0\n0.2,1e-5\n0.4,2e-5\n";
             let reference =
                 reference(settings, &config.chirp, Some(points), period_s).expect("valid");
-            let program = Control::new(Controller::new(&sections, period_s), reference, 500, 4500);
+            let program = Control::new(sections.law(period_s), reference, 500, 4500);
             programs.push((format!("{name}, {settings:?}"), Box::new(program)));
         }
     }
@@ -181,8 +181,9 @@ impl Quiet {
             publisher: Publisher::new(publisher),
             progress: Arc::new(Progress::default()),
         };
+        let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
         Quiet {
-            servo: Servo::new(Box::new(rig), Interlocks::new(config), connections),
+            servo: Servo::new(Box::new(rig), interlocks, connections),
             requests,
             records,
             retired,
@@ -257,7 +258,7 @@ impl Quiet {
 struct Says(f64);
 
 impl Program for Says {
-    fn decide(&mut self, _tick: u64, _position_m: f64) -> Decision {
+    fn decide(&mut self, _input: &ProgramInput) -> Decision {
         Decision {
             reference_m: 0.0,
             requested_a: self.0,

@@ -167,7 +167,7 @@ struct Predicted {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.sets()?)?;
     let closed_loop = closed_loop(&config)?;
-    let margins = closed_loop.margins(false);
+    let margins = closed_loop.margins();
     require_modulus_margin(&config, &margins)?;
     let step = if margins.stable {
         predicted_step(&config, &closed_loop)

@@ -52,7 +52,7 @@ fn runs(args: &Args) -> RunChecks {
 }
 
 fn loop_margins(config: &Config) -> Result<Margins, CliError> {
-    let margins = closed_loop(config)?.margins(false);
+    let margins = closed_loop(config)?.margins();
     require_modulus_margin(config, &margins)?;
     Plan::control(config.clone())?.program()?;
     Ok(margins)

@@ -10,7 +10,7 @@ use super::output::{print_json, print_text};
 use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
-use crate::model::plant::{self, ModalModel};
+use crate::model::plant::{self, LoopPlant, ModalModel};
 
 /// Which loop.
 #[derive(Clone, Debug, clap::Args)]
@@ -36,12 +36,15 @@ struct Report<'a> {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.sets())?;
     let closed_loop = closed_loop(&config)?;
-    let margins = closed_loop.margins(args.continuous);
+    let margins = match args.continuous {
+        true => closed_loop.continuous_margins()?,
+        false => closed_loop.margins(),
+    };
     if args.bench.json {
         let delay_s = if args.continuous {
             0.0
         } else {
-            closed_loop.chain().delay_s()
+            closed_loop.plant().delay_s()
         };
         print_json(&Report {
             margins: &margins,
@@ -55,10 +58,17 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The loop of a configuration around the model of its plant.
 pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
-    let sections =
-        ControllerText::find(&config.control.controller)?.sections(config.servo.rate_hz)?;
-    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
-    Ok(ClosedLoop::new(config, modal.modes, sections))
+    let text = ControllerText::find(&config.control.controller)?;
+    let design = text.design(config.servo.rate_hz)?;
+    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
+    let plant = LoopPlant::new(config, &modes);
+    let force_constant_n_per_a = config.motor.force_constant_n_per_a;
+    Ok(ClosedLoop::new(
+        plant,
+        modes,
+        force_constant_n_per_a,
+        design,
+    )?)
 }
 
 /// Refuses a loop with less than the configured modulus margin.

@@ -1,61 +1,111 @@
-//! A controller as the loop runs it: a cascade of discrete sections, metres in, amperes out.
+//! The section controller: a cascade of discrete sections, metres in, amperes out.
 
 use nalgebra::Complex;
 
-use super::{Biquad, Section};
+use super::law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
+use super::state_space::StateSpace;
+use super::{Biquad, BiquadState, Section};
+use crate::util::units::UM_PER_M;
 
-/// Sections take micrometres, the loop has metres.
-const UM_PER_M: f64 = 1e6;
-
-/// A discrete controller u = C (r - y).
+/// Coefficients of a discrete controller u = C (r - y), a cascade of sections in amperes per micrometre. Immutable.
+///
+/// ```
+/// use bench::control::{Controller, Section};
+///
+/// // A gain of 2 A/um: 10 nm of error ask for 20 mA.
+/// let gain = Section { numerator: [2.0, 0.0, 0.0], denominator: [1.0, 0.0, 0.0], prewarp_rad_s: None };
+/// let controller = Controller::new(&[gain], 1e-3);
+/// let mut state = controller.at_rest();
+/// assert!((controller.update(&mut state, 10e-9) - 0.020).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Controller {
     sections: Vec<Biquad>,
 }
 
+/// The state of each section of a [`Controller`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ControllerState(Vec<BiquadState>);
+
 impl Controller {
-    /// Discretises continuous sections, one by one.
+    /// Discretises continuous sections for a loop of period T, one by one (Tustin).
     pub fn new(sections: &[Section], period_s: f64) -> Controller {
+        let discrete = sections.iter().map(|section| section.tustin(period_s));
         Controller {
-            sections: sections
-                .iter()
-                .map(|section| section.tustin(period_s))
-                .collect(),
+            sections: discrete.collect(),
         }
     }
 
+    /// The state at rest. A change to coefficients of as many sections may keep the state: it is then bumpless.
+    pub fn at_rest(&self) -> ControllerState {
+        ControllerState(vec![BiquadState::default(); self.sections.len()])
+    }
+
     /// The command in amperes for the error r - y in metres. *In the tick.*
-    pub fn update(&mut self, error_m: f64) -> f64 {
-        self.sections
-            .iter_mut()
-            .fold(error_m * UM_PER_M, |x, section| section.update(x))
+    pub fn update(&self, state: &mut ControllerState, error_m: f64) -> f64 {
+        let sections = self.sections.iter().zip(&mut state.0);
+        sections.fold(error_m * UM_PER_M, |x, (section, state)| {
+            section.update(state, x)
+        })
+    }
+}
+
+impl LinearLaw for Controller {
+    fn state_space(&self) -> StateSpace {
+        let gain = StateSpace::gain(UM_PER_M);
+        self.sections.iter().fold(gain, |cascade, section| {
+            cascade.then(&StateSpace::from(section))
+        })
     }
 
-    /// Forgets the past: the first command after it is that of a controller at rest.
-    pub fn reset(&mut self) {
-        self.sections.iter_mut().for_each(Biquad::reset);
+    fn response(&self, z: Complex<f64>) -> Complex<f64> {
+        let sections = self.sections.iter().map(|section| section.response(z));
+        sections.product::<Complex<f64>>() * UM_PER_M
+    }
+}
+
+/// A [`Controller`] with its state: the control law u = C (r - y).
+#[derive(Clone, Debug, PartialEq)]
+pub struct SectionController {
+    controller: Controller,
+    state: ControllerState,
+}
+
+impl SectionController {
+    /// At rest.
+    pub fn new(controller: Controller) -> SectionController {
+        let state = controller.at_rest();
+        SectionController { controller, state }
+    }
+}
+
+impl ControlLaw for SectionController {
+    fn reset(&mut self, _rest_m: f64) {
+        self.state.0.fill(BiquadState::default());
     }
 
-    /// C(z) in amperes per metre.
-    pub fn response(&self, z: Complex<f64>) -> Complex<f64> {
-        self.sections
-            .iter()
-            .map(|section| section.response(z))
-            .product::<Complex<f64>>()
-            * UM_PER_M
+    fn update(&mut self, input: &LawInput) -> f64 {
+        let error_m = input.reference_m - input.position_m;
+        self.controller.update(&mut self.state, error_m)
     }
 
-    /// The sections, first to last.
-    pub fn sections(&self) -> &[Biquad] {
-        &self.sections
+    fn linear(&self) -> Option<Box<dyn LinearLaw>> {
+        Some(Box::new(self.controller.clone()))
+    }
+}
+
+impl ControlDesign for Vec<Section> {
+    fn law(&self, period_s: f64) -> Box<dyn ControlLaw> {
+        Box::new(SectionController::new(Controller::new(self, period_s)))
+    }
+
+    fn sections(&self) -> Option<&[Section]> {
+        Some(self)
     }
 }
 
 /// C(s) in amperes per metre of continuous sections.
 pub fn continuous_response(sections: &[Section], s: Complex<f64>) -> Complex<f64> {
-    sections
-        .iter()
-        .map(|section| section.response(s))
-        .product::<Complex<f64>>()
-        * UM_PER_M
+    let responses = sections.iter().map(|section| section.response(s));
+    responses.product::<Complex<f64>>() * UM_PER_M
 }

@@ -1,25 +1,38 @@
-//! Controllers as TOML: a list of sections, micrometres in, amperes out.
+//! Controllers as TOML: a list of sections in amperes per micrometre, or a control law of another kind.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Section;
+use super::law::ControlDesign;
+use super::laws::LawSettings;
 use super::section::SectionError;
 use crate::config::{self, ConfigError, profiles};
 
-/// A controller file.
+/// A controller file with a cascade of sections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "bench controller")]
 pub struct ControllerFile {
-    /// What it is, in words.
+    /// Title of the controller.
     pub title: String,
     /// The cascade, first to last. One section at least carries the gain in amperes per micrometre.
     #[schemars(length(min = 1, max = 32))]
     pub section: Vec<SectionSettings>,
 }
 
-/// A section as a person writes it. A new kind is one variant and one arm below.
+/// A controller file with a control law of another kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "bench control law")]
+pub struct LawFile {
+    /// Title of the controller.
+    pub title: String,
+    /// The law.
+    pub law: LawSettings,
+}
+
+/// A section as written in a controller file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SectionSettings {
@@ -93,10 +106,10 @@ pub enum SectionSettings {
     },
 }
 
-/// A controller that is refused. Nothing has moved yet when it is.
+/// A controller that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ControllerError {
-    /// The file is not there, not TOML, or its keys, types and ranges are wrong.
+    /// The file is missing or not TOML, or its keys, types and ranges are wrong.
     #[error(transparent)]
     File(#[from] ConfigError),
     /// A section that no controller may have.
@@ -104,7 +117,7 @@ pub enum ControllerError {
     Section {
         /// The controller.
         name: String,
-        /// Which section, from 1.
+        /// Number of the section, from 1.
         number: usize,
         /// What is wrong.
         why: SectionError,
@@ -116,19 +129,37 @@ pub enum ControllerError {
     Prewarp {
         /// The controller.
         name: String,
-        /// Which section, from 1.
+        /// Number of the section, from 1.
         number: usize,
         /// As given.
         prewarp_rad_s: f64,
         /// Half the servo rate.
         limit_rad_s: f64,
     },
+    /// A law whose settings contradict each other or the servo rate.
+    #[error("{name}: `law` {why}")]
+    Law {
+        /// The controller.
+        name: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// A law of another kind where sections are needed.
+    #[error(
+        "the controller is not a cascade of continuous sections, which this needs; choose one with `[[section]]`"
+    )]
+    NotSections,
+    /// A law without a linear description.
+    #[error(
+        "the control law offers no linear description, so its stability and margins cannot be computed"
+    )]
+    NotLinear,
 }
 
 /// A controller as text, as it travels with a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControllerText {
-    /// `fast`, `slow` or the file.
+    /// `fast`, `slow` or the path of a file.
     pub name: String,
     /// TOML.
     pub text: String,
@@ -143,27 +174,58 @@ impl ControllerText {
         })
     }
 
-    /// The sections, checked for a servo rate.
+    /// The control law, checked for a servo rate.
+    pub fn design(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
+        if !self.names_a_law() {
+            return Ok(Box::new(self.sections(rate_hz)?));
+        }
+        let file: LawFile = config::typed(&self.name, &self.text)?;
+        let checked = file.law.check(rate_hz);
+        checked.map_err(|why| ControllerError::Law {
+            name: self.name.clone(),
+            why,
+        })?;
+        Ok(file.law.design())
+    }
+
+    /// The sections of a controller that is a cascade, checked for a servo rate.
     pub fn sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
+        if self.names_a_law() {
+            return Err(ControllerError::NotSections);
+        }
         let file: ControllerFile = config::typed(&self.name, &self.text)?;
+        let numbered = (1..).zip(&file.section);
+        numbered
+            .map(|(number, settings)| self.checked_section(number, settings, rate_hz))
+            .collect()
+    }
+
+    fn names_a_law(&self) -> bool {
+        let table = self.text.parse::<toml::Table>();
+        table.is_ok_and(|table| table.contains_key("law"))
+    }
+
+    fn checked_section(
+        &self,
+        number: usize,
+        settings: &SectionSettings,
+        rate_hz: f64,
+    ) -> Result<Section, ControllerError> {
+        let name = self.name.clone();
         let limit_rad_s = std::f64::consts::PI * rate_hz;
-        let checked = |(index, settings): (usize, &SectionSettings)| {
-            let (name, number) = (self.name.clone(), index + 1);
-            match section(settings).checked() {
-                Err(why) => Err(ControllerError::Section { name, number, why }),
-                Ok(Section {
-                    prewarp_rad_s: Some(prewarp_rad_s),
-                    ..
-                }) if prewarp_rad_s >= limit_rad_s => Err(ControllerError::Prewarp {
-                    name,
-                    number,
-                    prewarp_rad_s,
-                    limit_rad_s,
-                }),
-                Ok(section) => Ok(section),
-            }
-        };
-        file.section.iter().enumerate().map(checked).collect()
+        match section(settings).checked() {
+            Err(why) => Err(ControllerError::Section { name, number, why }),
+            Ok(Section {
+                prewarp_rad_s: Some(prewarp_rad_s),
+                ..
+            }) if prewarp_rad_s >= limit_rad_s => Err(ControllerError::Prewarp {
+                name,
+                number,
+                prewarp_rad_s,
+                limit_rad_s,
+            }),
+            Ok(section) => Ok(section),
+        }
     }
 }
 
@@ -213,7 +275,7 @@ fn section(settings: &SectionSettings) -> Section {
     }
 }
 
-/// Coefficients by falling powers, as written, to rising ones, as kept.
+/// From coefficients by falling powers to coefficients by rising powers.
 fn rising(falling: &[f64]) -> [f64; 3] {
     let mut rising = [0.0; 3];
     for (slot, c) in rising.iter_mut().zip(falling.iter().rev()) {

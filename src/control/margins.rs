@@ -48,42 +48,106 @@ pub(super) fn margins(
     stable: bool,
     continuous: bool,
 ) -> Margins {
-    let gain = |w: f64| libm::log(response(w).norm());
-    let sensitivity = |w: f64| (response(w) + 1.0).inv().norm();
-    let values: Vec<Complex<f64>> = grid_rad_s.iter().map(|&w| response(w)).collect();
-    let gains: Vec<f64> = values.iter().map(|l| l.norm().ln()).collect();
-    let crossings: Vec<Crossing> = sign_changes(&gains)
-        .map(|i| bisect(&gain, grid_rad_s[i], grid_rad_s[i + 1]))
-        .map(|rad_s| Crossing {
-            rad_s,
-            phase_margin_deg: phase_margin_deg(response(rad_s)),
-        })
-        .collect();
-    let falling = sign_changes(&gains).position(|i| gains[i] > 0.0);
-    let smallest = crossings
-        .iter()
-        .map(|c| c.phase_margin_deg)
-        .min_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let peak = sensitivity_peak(&sensitivity, grid_rad_s, &values);
-    let rise = |w: f64| libm::log(sensitivity(w)) + 0.5 * std::f64::consts::LN_2;
-    let rises: Vec<f64> = values
-        .iter()
-        .map(|l| -(l + 1.0).norm().ln() + 0.5 * std::f64::consts::LN_2)
-        .collect();
-    let bandwidth = sign_changes(&rises)
-        .find(|&i| rises[i] < 0.0)
-        .map(|i| bisect(&rise, grid_rad_s[i], grid_rad_s[i + 1]));
+    let values = grid_rad_s.iter().map(|&w| response(w)).collect();
+    let tabulated = Tabulated {
+        response,
+        grid_rad_s,
+        values,
+    };
+    let (crossings, crossover_rad_s) = tabulated.crossings();
+    let phase_margins = crossings.iter().map(|c| c.phase_margin_deg);
+    let peak = tabulated.sensitivity_peak();
     Margins {
-        crossover_rad_s: falling.map(|i| crossings[i].rad_s),
-        phase_margin_deg: smallest,
-        gain_margin_db: gain_margin_db(response, grid_rad_s, &values),
+        crossover_rad_s,
+        phase_margin_deg: smallest(phase_margins),
+        gain_margin_db: smallest(tabulated.gain_margins_db()),
         modulus_margin: 1.0 / peak,
         sensitivity_peak_db: 20.0 * libm::log10(peak),
-        sensitivity_bandwidth_rad_s: bandwidth,
+        sensitivity_bandwidth_rad_s: tabulated.sensitivity_bandwidth_rad_s(),
         stable,
         crossings,
         continuous,
     }
+}
+
+/// L and its values on the grid.
+struct Tabulated<'a> {
+    response: &'a dyn Fn(f64) -> Complex<f64>,
+    grid_rad_s: &'a [f64],
+    values: Vec<Complex<f64>>,
+}
+
+impl Tabulated<'_> {
+    /// All crossings of |L| = 1, and the lowest frequency at which |L| falls through 1.
+    fn crossings(&self) -> (Vec<Crossing>, Option<f64>) {
+        let gains: Vec<f64> = self.values.iter().map(|l| l.norm().ln()).collect();
+        let places: Vec<usize> = sign_changes(&gains).collect();
+        let crossings: Vec<Crossing> = places.iter().map(|&i| self.crossing(i)).collect();
+        let falling = places.iter().position(|&i| gains[i] > 0.0);
+        let crossover_rad_s = falling.map(|i| crossings[i].rad_s);
+        (crossings, crossover_rad_s)
+    }
+
+    /// The crossing of |L| = 1 between two points of the grid.
+    fn crossing(&self, i: usize) -> Crossing {
+        let rad_s = self.bisect(i, &|l| libm::log(l.norm()));
+        Crossing {
+            rad_s,
+            phase_margin_deg: phase_margin_deg((self.response)(rad_s)),
+        }
+    }
+
+    /// Distances in decibels of |L| from 1 where L crosses the negative real axis.
+    fn gain_margins_db(&self) -> impl Iterator<Item = f64> {
+        let imaginary: Vec<f64> = self.values.iter().map(|l| l.im).collect();
+        let places: Vec<usize> = sign_changes(&imaginary).collect();
+        let negative = |i: &usize| self.values[*i].re < 0.0 || self.values[*i + 1].re < 0.0;
+        let crossings = places.into_iter().filter(negative);
+        crossings
+            .map(|i| (self.response)(self.bisect(i, &|l| l.im)))
+            .filter(|l| l.re < 0.0)
+            .map(|l| -20.0 * libm::log10(l.norm()))
+    }
+
+    /// max |S|.
+    fn sensitivity_peak(&self) -> f64 {
+        let on_grid: Vec<f64> = self.values.iter().map(|l| (l + 1.0).inv().norm()).collect();
+        let highest = on_grid.iter().copied().fold(0.0, f64::max);
+        let sensitivity = |w: f64| ((self.response)(w) + 1.0).inv().norm();
+        let refined = local_maxima(&on_grid)
+            .filter(|i| on_grid[*i] > 0.9 * highest)
+            .map(|i| maximum(&sensitivity, self.grid_rad_s[i - 1], self.grid_rad_s[i + 1]));
+        refined.fold(highest, f64::max)
+    }
+
+    /// The lowest frequency at which |S| rises through 1/sqrt(2).
+    fn sensitivity_bandwidth_rad_s(&self) -> Option<f64> {
+        const HALF_LN_2: f64 = 0.5 * std::f64::consts::LN_2;
+        let on_grid = self.values.iter();
+        let excess: Vec<f64> = on_grid
+            .map(|l| -(l + 1.0).norm().ln() + HALF_LN_2)
+            .collect();
+        let rising = sign_changes(&excess).find(|&i| excess[i] < 0.0)?;
+        let refined = |l: Complex<f64>| libm::log((l + 1.0).inv().norm()) + HALF_LN_2;
+        Some(self.bisect(rising, &refined))
+    }
+
+    /// Where a function of L changes its sign between the points `i` and `i + 1` of the grid.
+    fn bisect(&self, i: usize, of: &dyn Fn(Complex<f64>) -> f64) -> f64 {
+        let (low, high) = (self.grid_rad_s[i], self.grid_rad_s[i + 1]);
+        bisect(&|w| of((self.response)(w)), low, high)
+    }
+}
+
+/// The value of smallest magnitude.
+fn smallest(values: impl Iterator<Item = f64>) -> Option<f64> {
+    values.min_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
+/// Where a value is not below its neighbours.
+fn local_maxima(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
+    (1..values.len().saturating_sub(1))
+        .filter(|&i| values[i] >= values[i - 1] && values[i] >= values[i + 1])
 }
 
 /// A logarithmic grid, denser where light damping makes the response turn: around each resonance or antiresonance (w,
@@ -109,42 +173,6 @@ pub fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64
 fn phase_margin_deg(l: Complex<f64>) -> f64 {
     // The argument of -L is that of L turned by 180 deg, within +-180 deg.
     libm::atan2(-l.im, -l.re).to_degrees()
-}
-
-/// Smallest distance in decibels of |L| from 1 where L crosses the negative real axis.
-fn gain_margin_db(
-    response: &dyn Fn(f64) -> Complex<f64>,
-    grid: &[f64],
-    values: &[Complex<f64>],
-) -> Option<f64> {
-    let imaginary: Vec<f64> = values.iter().map(|l| l.im).collect();
-    let negative = |i: &usize| values[*i].re < 0.0 || values[*i + 1].re < 0.0;
-    let at = |i: usize| response(bisect(&|w| response(w).im, grid[i], grid[i + 1]));
-    let margins = sign_changes(&imaginary)
-        .filter(negative)
-        .map(at)
-        .filter(|l| l.re < 0.0)
-        .map(|l| -20.0 * libm::log10(l.norm()));
-    margins.min_by(|a, b| a.abs().total_cmp(&b.abs()))
-}
-
-fn sensitivity_peak(
-    sensitivity: &dyn Fn(f64) -> f64,
-    grid: &[f64],
-    values: &[Complex<f64>],
-) -> f64 {
-    let on_grid: Vec<f64> = values.iter().map(|l| (l + 1.0).inv().norm()).collect();
-    let highest = on_grid.iter().copied().fold(0.0, f64::max);
-    let near = |i: &usize| {
-        on_grid[*i] > 0.9 * highest
-            && on_grid[*i] >= on_grid[*i - 1]
-            && on_grid[*i] >= on_grid[*i + 1]
-    };
-    let last = on_grid.len().saturating_sub(1);
-    (1..last)
-        .filter(near)
-        .map(|i| maximum(sensitivity, grid[i - 1], grid[i + 1]))
-        .fold(highest, f64::max)
 }
 
 fn sign_changes(values: &[f64]) -> impl Iterator<Item = usize> + '_ {

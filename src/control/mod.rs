@@ -1,30 +1,41 @@
-//! Controllers and their margins.
+//! Control laws and their margins.
 //!
 //! A controller is a cascade of first and second order sections from its TOML file to the loop, never a polynomial: as one
 //! 8th order polynomial at 5 kHz the fast controller cannot be discretised in double precision.
 //!
 //! ```text
-//!  file -> Section (continuous) -> Biquad (Tustin, section by section) -> Controller::update in the loop
-//!               \-> margins, continuous and sampled, and the predicted step
+//!  file -> Section (continuous) -> Biquad (Tustin, section by section) -> SectionController --+
+//!    |          \-> continuous margins                                                       |
+//!    +-> laws (another kind, `[law]`) -------------------------------------> ControlLaw <-----+
+//!                                                                             |   \-> ClosedLoop: margins, predicted step
+//!                                                                             v
+//!                                                                  rt::program::Control
 //! ```
 //!
 //! Sign convention: u = C (r - y). Positive current moves the stage in the positive direction, so C has positive gain.
+//! Coefficients are immutable and stand apart from state.
 
 mod biquad;
 mod closed_loop;
 mod controller;
 mod file;
+mod law;
+mod laws;
 mod margins;
 mod section;
+mod state_space;
 mod step_metrics;
 mod swept;
 
-pub use biquad::Biquad;
+pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::ClosedLoop;
-pub use controller::{Controller, continuous_response};
-pub use file::{ControllerError, ControllerFile, ControllerText};
+pub use controller::{Controller, ControllerState, SectionController, continuous_response};
+pub use file::{ControllerError, ControllerFile, ControllerText, LawFile, SectionSettings};
+pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
+pub use laws::{LawSettings, StateSpaceLaw};
 pub use margins::grid;
 pub use margins::{Crossing, Margins};
-pub use section::Section;
+pub use section::{Section, SectionError};
+pub use state_space::StateSpace;
 pub use step_metrics::{StepMeter, StepMetrics, step_metrics};
-pub use swept::swept_reference_amplitudes;
+pub use swept::{SweptLimits, swept_reference_amplitudes};

@@ -15,7 +15,7 @@ pub struct Section {
     pub prewarp_rad_s: Option<f64>,
 }
 
-/// What makes a section useless as a part of a controller.
+/// A section that no controller may have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SectionError {
     /// More zeros than poles: infinite gain at high frequency.
@@ -38,7 +38,7 @@ pub enum SectionError {
         /// Imaginary part.
         im_rad_s: f64,
     },
-    /// A coefficient that is not a number, or a denominator of zeros.
+    /// A coefficient that is not finite, or a denominator of zeros.
     #[error("has a denominator of zeros or a coefficient that is not finite")]
     Degenerate,
 }
@@ -50,7 +50,7 @@ impl Section {
         at(&self.numerator) / at(&self.denominator)
     }
 
-    /// Refuses what is improper or unstable.
+    /// This section, if it is proper and has no unstable pole. One pole at the origin is allowed.
     pub fn checked(self) -> Result<Section, SectionError> {
         let finite = self
             .numerator
@@ -67,18 +67,22 @@ impl Section {
                 denominator,
             });
         }
-        let poles = self.poles();
-        let at_origin = poles.iter().filter(|pole| pole.norm() == 0.0).count();
-        match poles
-            .iter()
-            .find(|pole| pole.re >= 0.0 && (pole.norm() > 0.0 || at_origin > 1))
-        {
-            Some(pole) => Err(SectionError::Unstable {
-                re_rad_s: pole.re,
-                im_rad_s: pole.im,
-            }),
+        match self.unstable_pole() {
+            Some(Complex {
+                re: re_rad_s,
+                im: im_rad_s,
+            }) => Err(SectionError::Unstable { re_rad_s, im_rad_s }),
             None => Ok(self),
         }
+    }
+
+    /// A pole in the right half plane or on the imaginary axis; a single one at the origin is none.
+    fn unstable_pole(&self) -> Option<Complex<f64>> {
+        let poles = self.poles();
+        let at_origin = poles.iter().filter(|pole| pole.norm() == 0.0).count();
+        poles
+            .into_iter()
+            .find(|pole| pole.re >= 0.0 && (pole.norm() > 0.0 || at_origin > 1))
     }
 
     /// Roots of the denominator.
@@ -97,27 +101,30 @@ impl Section {
             Some(w) => w / libm::tan(w * period_s / 2.0),
             None => 2.0 / period_s,
         };
-        // Times (z + 1)^2: s -> c (z^2 - 1), s^2 -> c^2 (z - 1)^2. Powers of z^-1 from z^2 downwards.
-        let map = |p: &[f64; 3]| {
-            let (p1, p2) = (p[1] * c, p[2] * c * c);
-            [p[0] + p1 + p2, 2.0 * (p[0] - p2), p[0] - p1 + p2]
+        // A section of lower order is mapped without the common factors (z + 1), each of which would be a mode at half the
+        // sampling rate.
+        let map = match order(&self.numerator).max(order(&self.denominator)) {
+            None | Some(0) => constant,
+            Some(1) => first_order,
+            Some(_) => second_order,
         };
-        // Of lower order: without the common factors (z + 1), each of which would be a mode at half the sampling rate.
-        let order = order(&self.numerator)
-            .max(order(&self.denominator))
-            .unwrap_or(0);
-        if order == 0 {
-            return Biquad::new(
-                [self.numerator[0], 0.0, 0.0],
-                [self.denominator[0], 0.0, 0.0],
-            );
-        }
-        if order == 1 {
-            let map = |p: &[f64; 3]| [p[0] + p[1] * c, p[0] - p[1] * c, 0.0];
-            return Biquad::new(map(&self.numerator), map(&self.denominator));
-        }
-        Biquad::new(map(&self.numerator), map(&self.denominator))
+        Biquad::new(map(&self.numerator, c), map(&self.denominator, c))
     }
+}
+
+fn constant(p: &[f64; 3], _c: f64) -> [f64; 3] {
+    [p[0], 0.0, 0.0]
+}
+
+/// Times (z + 1): s -> c (z - 1). Powers of z^-1 from z downwards.
+fn first_order(p: &[f64; 3], c: f64) -> [f64; 3] {
+    [p[0] + p[1] * c, p[0] - p[1] * c, 0.0]
+}
+
+/// Times (z + 1)^2: s -> c (z^2 - 1), s^2 -> c^2 (z - 1)^2. Powers of z^-1 from z^2 downwards.
+fn second_order(p: &[f64; 3], c: f64) -> [f64; 3] {
+    let (p1, p2) = (p[1] * c, p[2] * c * c);
+    [p[0] + p1 + p2, 2.0 * (p[0] - p2), p[0] - p1 + p2]
 }
 
 fn order(coefficients: &[f64; 3]) -> Option<usize> {
@@ -142,6 +149,7 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [Complex<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::BiquadState;
 
     fn section(numerator: [f64; 3], denominator: [f64; 3]) -> Section {
         Section {
@@ -175,14 +183,14 @@ mod tests {
     }
 
     #[test]
-    fn a_section_of_lower_order_has_no_mode_at_half_the_sampling_rate() {
+    fn section_of_lower_order_has_no_mode_at_half_the_sampling_rate() {
         // A common factor (z + 1) of numerator and denominator would ring at -1, +1, -1, ... for ever after an impulse.
         let gain = section([0.3, 0.0, 0.0], [1.5, 0.0, 0.0]);
         let pole = section([893.0, 0.0, 0.0], [893.0, 1.0, 0.0]);
         for (h, expected) in [(gain, 0.2), (pole, 1.0)] {
-            let mut biquad = h.tustin(2e-4);
+            let (biquad, mut state) = (h.tustin(2e-4), BiquadState::default());
             let response: Vec<f64> = (0..2000)
-                .map(|k| biquad.update(if k == 0 { 1.0 } else { 0.0 }))
+                .map(|k| biquad.update(&mut state, if k == 0 { 1.0 } else { 0.0 }))
                 .collect();
             // The pole's memory after 2000 ticks is exp(-893 * 0.4), 1e-155 of the first sample.
             assert!(
@@ -215,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn improper_and_unstable_sections_are_refused() {
+    fn rejects_improper_and_unstable_sections() {
         assert!(matches!(
             section([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]).checked(),
             Err(SectionError::Improper { .. })

@@ -9,7 +9,7 @@ use crate::control::{ClosedLoop, ControllerError, Margins};
 use crate::identify::joint::{self, JointEstimate, LoopSignals};
 use crate::identify::modal::Estimate;
 use crate::identify::{EstimatorSettings, Frf};
-use crate::model::plant::{self, ModalModel};
+use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::recording::Recording;
 
 /// A recording of a closed loop that shows no plant.
@@ -83,7 +83,7 @@ pub(super) fn seen(
         .map(|f| model.sampled_loop(TURN * f))
         .collect();
     let margins = margins(&loop_gain, &sensitivity);
-    let predicted = model.margins(false);
+    let predicted = model.margins();
     let closed = ClosedResponses {
         complementary,
         sensitivity,
@@ -120,10 +120,13 @@ fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, AnalysisE
     let text = plan
         .controller
         .ok_or(ClosedLoopError::Plan(PlanError::Missing("controller")))?;
-    let sections = text
-        .sections(config.servo.rate_hz)
+    let design = text
+        .design(config.servo.rate_hz)
         .map_err(ClosedLoopError::Controller)?;
-    Ok(ClosedLoop::new(config, modes, sections))
+    let plant = LoopPlant::new(config, &modes);
+    let force_constant_n_per_a = config.motor.force_constant_n_per_a;
+    let closed_loop = ClosedLoop::new(plant, modes, force_constant_n_per_a, design);
+    Ok(closed_loop.map_err(ClosedLoopError::Controller)?)
 }
 
 fn margins(loop_gain: &Frf, sensitivity: &Frf) -> MeasuredMargins {

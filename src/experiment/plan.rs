@@ -3,7 +3,7 @@
 
 use super::swept;
 use crate::config::{Config, ConfigError, ReferenceSettings, whole};
-use crate::control::{Controller, ControllerError, ControllerText};
+use crate::control::{ControllerError, ControllerText};
 use crate::excitation::{
     self, Chirp, Excitation, ExcitationError, Extremes, Quiet, ReferenceError, Staircase,
     reference, reference_text,
@@ -189,7 +189,7 @@ impl Plan {
             .controller
             .as_ref()
             .ok_or(PlanError::Missing("controller"))?;
-        let controller = Controller::new(&text.sections(config.servo.rate_hz)?, period_s);
+        let law = text.design(config.servo.rate_hz)?.law(period_s);
         let reference = reference(
             &config.control.reference,
             &config.chirp,
@@ -202,9 +202,7 @@ impl Plan {
             _ => ticks(config.control.duration_s),
         };
         let settle = ticks(config.control.settle_s);
-        Ok(Box::new(Control::new(
-            controller, reference, settle, closed,
-        )))
+        Ok(Box::new(Control::new(law, reference, settle, closed)))
     }
 
     /// The effective configuration as TOML.

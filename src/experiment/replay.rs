@@ -90,7 +90,9 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
         clears,
         status: AmplifierStatus::Disabled,
     });
-    let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
+    let config = &plan.config;
+    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let servo = Servo::new(rig, interlocks, connections);
     let program = plan.program()?;
     let mut comparison = Comparison {
         servo,

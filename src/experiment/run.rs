@@ -111,7 +111,9 @@ pub fn run(
         publisher: Publisher::new(publisher),
         progress: Arc::clone(&progress),
     };
-    let servo = Servo::new(rig, Interlocks::new(&plan.config), connections);
+    let config = &plan.config;
+    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let servo = Servo::new(rig, interlocks, connections);
     queue(&mut requests, program);
     let tail_ticks = (TAIL_S * plan.config.servo.rate_hz) as u64;
     let prepared =

@@ -2,8 +2,9 @@
 
 use super::plan::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
-use crate::control::{ClosedLoop, ControllerText, swept_reference_amplitudes};
+use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use crate::excitation::{Chirp, Excitation, Extremes, reference, within};
+use crate::model::plant::LoopPlant;
 use crate::rig::simulated;
 
 /// The configuration with amplitudes by the model of the whole rig, and what the run would do by it; as it is, and nothing,
@@ -19,18 +20,22 @@ pub(super) fn planned(
     else {
         return Ok((config, None));
     };
+    let modes = simulated::modes(&config)?;
     let closed_loop = ClosedLoop::new(
-        &config,
-        simulated::modes(&config)?,
-        controller.sections(config.servo.rate_hz)?,
-    );
+        LoopPlant::new(&config, &modes),
+        modes,
+        config.motor.force_constant_n_per_a,
+        controller.design(config.servo.rate_hz)?,
+    )?;
     let amplitude = match amplitude.is_empty() {
-        true => swept_reference_amplitudes(
-            &closed_loop,
-            &config.chirp,
-            *travel_m,
-            config.interlock.soft_limit_m,
-        ),
+        true => {
+            let limits = SweptLimits {
+                chirp: &config.chirp,
+                travel_m: *travel_m,
+                reference_m: config.interlock.soft_limit_m,
+            };
+            swept_reference_amplitudes(&closed_loop, &limits)
+        }
         false => amplitude.clone(),
     };
     config.control.reference = ReferenceSettings::Chirp {
@@ -41,7 +46,7 @@ pub(super) fn planned(
     validate(&config)?;
     // What a loop that runs away would do has no largest current to lower.
     let unstable = |error| {
-        if closed_loop.margins(false).stable {
+        if closed_loop.margins().stable {
             error
         } else {
             PlanError::Unstable
@@ -56,7 +61,7 @@ fn predicted_extremes(config: &Config, closed_loop: &ClosedLoop) -> Result<Extre
     let period_s = config.servo.period_s();
     let reference = reference(&config.control.reference, &config.chirp, None, period_s)?;
     let chirp = Chirp::new(&config.chirp, period_s);
-    let course = closed_loop.course(chirp.ticks() as usize, |tick| reference.at_m(tick as u64));
+    let course = closed_loop.signals(chirp.ticks() as usize, |tick| reference.at_m(tick as u64));
     let extremes = Extremes::over(course, config);
     let frequency_hz = chirp.frequency_at_hz(extremes.travel_tick);
     within(

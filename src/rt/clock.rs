@@ -1,4 +1,4 @@
-//! The two paces of the loop. The pace is the only difference between a study and a rig.
+//! The two paces of the loop, virtual and real time. The pace is the only difference between a study and a rig.
 
 use bench_hal::Tick;
 use nix::sys::time::TimeSpec;
@@ -6,12 +6,12 @@ use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
 use super::publisher::Publisher;
 
-/// When a tick began.
+/// When a tick was due and when it began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickTiming {
     /// The tick to serve.
     pub tick: Tick,
-    /// When it really began, in nanoseconds since the loop started.
+    /// When it began, in nanoseconds since the loop started.
     pub woke_ns: u64,
     /// Scheduled ticks before it that passed unserved.
     pub missed: u32,
@@ -19,14 +19,14 @@ pub struct TickTiming {
 
 /// Where ticks come from.
 pub trait Clock {
-    /// Waits for the tick `number`, or, where that has passed by more than a period, for none: then the moment is that of
-    /// the latest tick due, and says how many were missed.
+    /// Waits for the tick `number`. If that is late by more than a period, it returns at once with the latest tick due and
+    /// the number of missed ticks.
     fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming;
 
-    /// Nanoseconds since the loop started, asked within `tick`. *In the tick.*
+    /// Nanoseconds since the loop started, read within `tick`. *In the tick.*
     fn now_ns(&self, tick: Tick) -> u64;
 
-    /// Begins the schedule anew, so that the tick `number` is due one period from now.
+    /// Restarts the schedule: the tick `number` is due one period from now.
     fn restart(&mut self, number: u64);
 }
 
@@ -38,8 +38,8 @@ fn tick(number: u64, period_s: f64) -> Tick {
     }
 }
 
-/// Back to back, as fast as the machine goes; every tick begins and ends when it is due. Waits for room in the ring, so
-/// that nothing is lost.
+/// Ticks back to back, as fast as the machine can; every tick begins and ends when it is due. Waits for room in the ring, so
+/// that no record is lost.
 #[derive(Clone, Copy, Debug)]
 pub struct Virtual {
     /// Length of a tick in seconds.

@@ -1,17 +1,16 @@
-//! Does the current that the amplifier measures follow the commands?
+//! Following error of the current: does the current that the amplifier measures follow the commands?
 //!
-//! A drive that takes no set-points any more goes on with the last one, and says that all is well. What it measures tells:
-//! over a window it must stay within what was commanded in this window and the one before, and move where the commands
-//! moved much.
+//! A drive that takes no more set-points keeps its last current and may report no fault. The measured current shows it: over
+//! a window it must stay within the commands of this window and the one before, and move where the commands moved much.
 
 use bench_hal::Tick;
 
 use super::arming::Trip;
 
-/// The commands must have moved by so many errors before a current that stands still is one.
+/// A constant current is an error once the commands have moved by this many tolerances.
 const MOVED: f64 = 4.0;
 
-/// Lowest and highest of some currents, in amperes.
+/// Lowest and highest current in amperes.
 #[derive(Clone, Copy, Debug)]
 struct Band(f64, f64);
 
@@ -27,9 +26,9 @@ impl Band {
     }
 }
 
-/// What was commanded and measured, window by window.
+/// Bands of commanded and measured currents, window by window.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Following {
+pub(super) struct FollowingError {
     error_a: f64,
     window_ns: u64,
     began_ns: Option<u64>,
@@ -38,11 +37,11 @@ pub(super) struct Following {
     measured: Band,
 }
 
-impl Following {
+impl FollowingError {
     /// Currents may differ by `error_a` over a window.
     pub(super) fn new(error_a: f64, window_ns: u64) -> Self {
         let (before, commanded, measured) = (Band(0.0, 0.0), Band::NONE, Band::NONE);
-        Following {
+        FollowingError {
             error_a,
             window_ns,
             began_ns: None,
@@ -52,12 +51,12 @@ impl Following {
         }
     }
 
-    /// Forgets what was: the amplifier is off.
+    /// Discards all windows: the amplifier is off.
     pub(super) fn reset(&mut self) {
-        *self = Following::new(self.error_a, self.window_ns);
+        *self = FollowingError::new(self.error_a, self.window_ns);
     }
 
-    /// Takes the command that flows since the last tick and what the amplifier measured; judges at the end of a window.
+    /// Takes the command of the last tick and the current measured since; checks at the end of each window.
     pub(super) fn check(&mut self, command_a: f64, actual_a: f64, now: Tick) -> Result<(), Trip> {
         let began_ns = *self.began_ns.get_or_insert(now.scheduled_ns);
         self.commanded = self.commanded.with(command_a);
@@ -65,14 +64,14 @@ impl Following {
         if now.scheduled_ns.saturating_sub(began_ns) < self.window_ns {
             return Ok(());
         }
-        let verdict = self.judge();
+        let checked = self.check_window();
         self.before = self.commanded;
         (self.commanded, self.measured, self.began_ns) =
             (Band::NONE, Band::NONE, Some(now.scheduled_ns));
-        verdict
+        checked
     }
 
-    fn judge(&self) -> Result<(), Trip> {
+    fn check_window(&self) -> Result<(), Trip> {
         let asked = self.before.with(self.commanded.0).with(self.commanded.1);
         let not_followed = |actual_a, command_a| {
             Err(Trip::CurrentNotFollowed {
@@ -105,7 +104,7 @@ mod tests {
         command_a: impl Fn(u64) -> f64,
         actual_a: impl Fn(u64) -> f64,
     ) -> Option<u64> {
-        let mut following = Following::new(0.1, 50_000_000);
+        let mut following = FollowingError::new(0.1, 50_000_000);
         (0..ticks).find(|&number| {
             let tick = Tick {
                 number,
@@ -122,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_current_that_lags_and_is_quantised_follows() {
+    fn accepts_a_lagging_and_quantised_current() {
         for hz in [0.3, 3.0, 30.0, 150.0] {
             let late = |tick: u64| (500.0 * sine(hz, tick as f64 - 3.3)).round() / 500.0;
             assert_eq!(
@@ -139,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_keeps_its_last_current_is_found_within_two_windows() {
+    fn trips_within_two_windows_when_a_drive_keeps_its_last_current() {
         let stuck = |hz: f64| move |tick: u64| sine(hz, tick.min(1000) as f64);
         for hz in [3.0, 30.0, 150.0] {
             let found = first_trip(5_000, |tick| sine(hz, tick as f64), stuck(hz))
@@ -155,8 +154,8 @@ mod tests {
     }
 
     #[test]
-    fn after_a_reset_nothing_old_counts() {
-        let mut following = Following::new(0.1, 50_000_000);
+    fn reset_discards_earlier_windows() {
+        let mut following = FollowingError::new(0.1, 50_000_000);
         let tick = |number: u64| Tick {
             number,
             scheduled_ns: number * 1_000_000,

@@ -1,17 +1,17 @@
-//! The interlocks: below every controller, they see every reading first and every command last.
+//! The interlocks: below every controller, they check every reading first and every command last.
 //!
-//! A trip is latched by the arming machine, not here: these functions only say whether a reading, a tick or a command may
-//! pass. A command that is not finite is a trip, not a value to clamp.
+//! The arming machine latches a trip; the functions here only check a reading, a tick or a command. A command that is not
+//! finite is a trip, not a value to clamp.
 
 use std::collections::VecDeque;
 
 use bench_hal::{Reading, Tick, Validity};
 
 use super::arming::Trip;
-use super::following_error::Following;
-use crate::config::Config;
+use super::following_error::FollowingError;
+use crate::config::{InterlockSettings, LoopSettings, MotorSettings};
 
-/// Limits and what must be remembered to check them.
+/// The limits, and the state that their checks need.
 #[derive(Clone, Debug)]
 pub struct Interlocks {
     soft_limit_m: f64,
@@ -26,11 +26,11 @@ pub struct Interlocks {
     last_command_a: f64,
     fresh: Freshness,
     overruns: Overruns,
-    following: Following,
+    following: FollowingError,
 }
 
-/// When ticks were missed within the last second. Its memory is claimed once: no more entries fit into a second than it
-/// has ticks, and none are needed beyond the limit.
+/// The missed ticks within the last second. Its memory is allocated once: a second has no more entries than ticks, and
+/// none are needed beyond the limit.
 #[derive(Clone, Debug)]
 struct Overruns {
     when: VecDeque<(u64, u32)>,
@@ -38,7 +38,7 @@ struct Overruns {
     count: u64,
 }
 
-/// Since when the probe says the same.
+/// Since when the probe returns the same reading.
 #[derive(Clone, Copy, Debug, Default)]
 struct Freshness {
     sequence: Option<u64>,
@@ -50,30 +50,29 @@ struct Freshness {
 }
 
 impl Interlocks {
-    /// Interlocks as configured, the motor cold.
-    pub fn new(config: &Config) -> Self {
-        let ns = |seconds: f64| (seconds * 1e9) as u64;
+    /// Interlocks with a cold motor.
+    pub fn new(settings: &InterlockSettings, motor: &MotorSettings, servo: &LoopSettings) -> Self {
         Interlocks {
-            soft_limit_m: config.interlock.soft_limit_m,
-            peak_current_a: config.motor.peak_current_a(),
-            continuous_current_a: config.motor.continuous_current_a(),
-            cooling: config.servo.period_s() / config.motor.thermal_time_constant_s,
-            stale_ns: ns(config.interlock.probe_stale_s),
-            stuck_ns: ns(config.interlock.probe_stuck_s),
-            stuck_current_a: config.interlock.probe_stuck_current_a,
-            overruns_per_s: config.interlock.overruns_per_s,
+            soft_limit_m: settings.soft_limit_m,
+            peak_current_a: motor.peak_current_a(),
+            continuous_current_a: motor.continuous_current_a(),
+            cooling: servo.period_s() / motor.thermal_time_constant_s,
+            stale_ns: nanoseconds(settings.probe_stale_s),
+            stuck_ns: nanoseconds(settings.probe_stuck_s),
+            stuck_current_a: settings.probe_stuck_current_a,
+            overruns_per_s: settings.overruns_per_s,
             thermal_a2: 0.0,
             last_command_a: 0.0,
             fresh: Freshness::default(),
-            following: Following::new(
-                config.interlock.current_error_a,
-                ns(config.interlock.current_error_s),
+            following: FollowingError::new(
+                settings.current_error_a,
+                nanoseconds(settings.current_error_s),
             ),
-            overruns: Overruns::new(config.interlock.overruns_per_s, config.servo.rate_hz),
+            overruns: Overruns::new(settings.overruns_per_s, servo.rate_hz),
         }
     }
 
-    /// May this reading be used? *In the tick.*
+    /// Checks a reading. *In the tick.*
     pub fn check_reading(&mut self, reading: &Reading, now: Tick) -> Result<(), Trip> {
         let stuck = self.follow(reading, now);
         if reading.validity != Validity::Valid || !reading.position_m.is_finite() {
@@ -122,7 +121,7 @@ impl Interlocks {
         Ok(())
     }
 
-    /// Are too many ticks missed within the second that ends now? The last current flowed through them. *In the tick.*
+    /// Checks how many ticks were missed within the last second. The last current flowed through them. *In the tick.*
     pub fn check_timing(&mut self, missed: u32, now: Tick) -> Result<(), Trip> {
         if missed == 0 {
             return Ok(());
@@ -138,24 +137,19 @@ impl Interlocks {
         Ok(())
     }
 
-    /// Does the current that the amplifier measures follow the commands? Where it measures none, nothing is said; where it is
-    /// off, everything is forgotten. *In the tick.*
-    pub fn check_current(
-        &mut self,
-        is_on: bool,
-        actual_a: Option<f64>,
-        now: Tick,
-    ) -> Result<(), Trip> {
+    /// Checks whether the current that the amplifier measures follows the commands. `None`, where it measures none or is off,
+    /// resets the check. *In the tick.*
+    pub fn check_current(&mut self, actual_a: Option<f64>, now: Tick) -> Result<(), Trip> {
         match actual_a {
-            Some(actual_a) if is_on => self.following.check(self.last_command_a, actual_a, now),
-            _ => {
+            Some(actual_a) => self.following.check(self.last_command_a, actual_a, now),
+            None => {
                 self.following.reset();
                 Ok(())
             }
         }
     }
 
-    /// May this command go out? Integrates the motor's heat, thermal' = (i^2 - thermal)/tau. *In the tick.*
+    /// Checks a command before it goes out. Integrates the motor's heat, thermal' = (i^2 - thermal)/tau. *In the tick.*
     pub fn check_command(&mut self, command_a: f64) -> Result<(), Trip> {
         if !command_a.is_finite() {
             return Err(Trip::CommandNotFinite);
@@ -176,7 +170,7 @@ impl Interlocks {
         Ok(())
     }
 
-    /// Takes note of the current that really flows from this tick on. *In the tick.*
+    /// Takes the current that flows from this tick on. *In the tick.*
     pub fn note(&mut self, command_a: f64) {
         self.heat(command_a, 1.0);
         self.last_command_a = command_a;
@@ -198,7 +192,7 @@ impl Overruns {
         }
     }
 
-    /// How many were missed within the second before `now_ns`, with those that were missed right now.
+    /// The number missed within the second before `now_ns`, those of this tick included.
     fn add(&mut self, missed: u32, now_ns: u64) -> u32 {
         while self.when.len() == self.room
             || self
@@ -217,6 +211,10 @@ impl Overruns {
 
 fn is_past(ns: u64, now_ns: u64) -> bool {
     now_ns.saturating_sub(ns) > 1_000_000_000
+}
+
+fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9) as u64
 }
 
 fn seconds(ns: u64) -> f64 {

@@ -1,14 +1,14 @@
 //! The real-time loop.
 //!
 //! ```text
-//!            requests (ring)                       records, events (ring)
+//!            requests (ring)                     records, events (ring)
 //!  supervisor ----------->  Servo::tick  ------------------------------>  recorder
 //!             <-----------    read -> check -> decide -> write -> publish
-//!             retired programs (ring)
+//!            retired programs (ring)
 //! ```
 //!
 //! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`clock`] its two paces, [`program`] what it
-//! runs, [`record`] what it says.
+//! runs, [`record`] what it publishes.
 
 pub mod arming;
 pub mod clock;
@@ -19,3 +19,4 @@ pub mod publisher;
 pub mod record;
 pub mod servo;
 pub mod thread;
+mod trip;

@@ -1,28 +1,39 @@
-//! What the loop runs: an excitation, or a controller with a reference.
+//! What the loop runs: an excitation, or a control law with a reference.
 //!
-//! A program is made before the run and handed over whole; what it decides depends on the tick of its run and the
-//! measurements alone, so that a recording can be replayed.
+//! A program is made before the run and handed over whole. Its decisions depend on the tick of its run and the signals of
+//! [`ProgramInput`] alone, so that a recording can be replayed.
 
-use crate::control::Controller;
+use crate::control::{ControlLaw, LawInput};
 use crate::excitation::{Excitation, Reference};
+
+/// What a program may use in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ProgramInput {
+    /// Tick of the run, counted from 0.
+    pub tick: u64,
+    /// Position in metres, measured in this tick.
+    pub position_m: f64,
+    /// Current in amperes that the amplifier gave for the previous tick.
+    pub applied_a: f64,
+}
 
 /// What a program decides in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Decision {
     /// Reference in metres, 0 where there is none.
     pub reference_m: f64,
-    /// The current it asks for, in amperes.
+    /// The requested current in amperes.
     pub requested_a: f64,
-    /// Neither quiet before nor after.
+    /// Whether the excitation is on or the loop closed: neither quiet before nor after.
     pub active: bool,
 }
 
 /// Decides one command a tick.
 pub trait Program: Send {
-    /// The command at a tick of the run, counted from 0, with the position measured in it. *In the tick.*
-    fn decide(&mut self, tick: u64, position_m: f64) -> Decision;
+    /// The command of this tick. *In the tick.*
+    fn decide(&mut self, input: &ProgramInput) -> Decision;
 
-    /// Length of the run in ticks.
+    /// Length of the run in ticks. *In the tick.*
     fn ticks(&self) -> u64;
 }
 
@@ -33,11 +44,11 @@ pub struct Excite<E>(
 );
 
 impl<E: Excitation> Program for Excite<E> {
-    fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
+    fn decide(&mut self, input: &ProgramInput) -> Decision {
         Decision {
             reference_m: 0.0,
-            requested_a: self.0.current_a(tick),
-            active: self.0.active(tick),
+            requested_a: self.0.current_a(input.tick),
+            active: self.0.active(input.tick),
         }
     }
 
@@ -46,51 +57,62 @@ impl<E: Excitation> Program for Excite<E> {
     }
 }
 
-/// Rests at zero current for a while, then closes the loop where the stage rests: u = C (r - y), r = origin + reference.
+/// Rests at zero current for a while, then closes the loop where the stage rests: r = rest position + reference.
 ///
-/// The start is bumpless: the origin is the mean position over the rest, the controller starts from rest, and the
-/// reference is relative to the origin, so no old set-point and no offset of the probe can make the stage jump.
+/// The start is bumpless: the rest position is the mean over the rest, the law starts from rest, and the reference is
+/// relative to the rest position. No earlier set-point and no offset of the probe makes the stage jump.
 pub struct Control {
-    controller: Controller,
+    law: Box<dyn ControlLaw>,
     reference: Box<dyn Reference>,
     settle_ticks: u64,
     closed_ticks: u64,
-    origin_m: f64,
+    rest_m: f64,
 }
 
 impl Control {
     /// A run of `settle_ticks` at rest (one at least) and `closed_ticks` with the loop closed.
     pub fn new(
-        mut controller: Controller,
+        law: Box<dyn ControlLaw>,
         reference: Box<dyn Reference>,
         settle_ticks: u64,
         closed_ticks: u64,
     ) -> Self {
-        controller.reset();
         Control {
-            controller,
+            law,
             reference,
             settle_ticks: settle_ticks.max(1),
             closed_ticks,
-            origin_m: 0.0,
+            rest_m: 0.0,
+        }
+    }
+
+    /// Takes the position into the mean over the rest.
+    fn settle(&mut self, input: &ProgramInput) -> Decision {
+        self.rest_m += (input.position_m - self.rest_m) / (input.tick + 1) as f64;
+        Decision {
+            reference_m: self.rest_m,
+            requested_a: 0.0,
+            active: false,
         }
     }
 }
 
 impl Program for Control {
-    fn decide(&mut self, tick: u64, position_m: f64) -> Decision {
-        if tick < self.settle_ticks {
-            self.origin_m += (position_m - self.origin_m) / (tick + 1) as f64;
-            return Decision {
-                reference_m: self.origin_m,
-                requested_a: 0.0,
-                active: false,
-            };
+    fn decide(&mut self, input: &ProgramInput) -> Decision {
+        let Some(tick) = input.tick.checked_sub(self.settle_ticks) else {
+            return self.settle(input);
+        };
+        if tick == 0 {
+            self.law.reset(self.rest_m);
         }
-        let reference_m = self.origin_m + self.reference.at_m(tick - self.settle_ticks);
+        let law_input = LawInput {
+            reference_m: self.rest_m + self.reference.at_m(tick),
+            position_m: input.position_m,
+            applied_a: input.applied_a,
+        };
         Decision {
-            reference_m,
-            requested_a: self.controller.update(reference_m - position_m),
+            reference_m: law_input.reference_m,
+            requested_a: self.law.update(&law_input),
             active: true,
         }
     }

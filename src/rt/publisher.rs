@@ -1,5 +1,5 @@
-//! The loop's end of the ring to the recorder. It never blocks: what does not fit is counted, and the count is published as
-//! soon as there is room again.
+//! The loop's end of the ring to the recorder. It never blocks: messages that do not fit are counted, and the count is
+//! published as soon as there is room again.
 
 use rtrb::Producer;
 
@@ -13,13 +13,13 @@ pub struct Publisher {
     unreported: u64,
 }
 
-/// Free slots that a tick can need: three events an order (arm requests whose amplifier does not enable make four, but each
-/// needs a clear order before the next, which makes two), a trip and its state, the program's end and its state, the record,
-/// and the count of what was lost.
+/// Slots that a tick can need at most: three events a request (an arm request whose amplifier does not enable makes four, but
+/// needs a clear request before the next one, which makes two), a trip and its state, the end of the program and its state,
+/// the record, and the count of lost records.
 pub const SLOTS_PER_TICK: usize = 3 * REQUESTS_PER_TICK + 6;
 
 impl Publisher {
-    /// An publisher into `ring`.
+    /// A publisher into `ring`.
     pub fn new(ring: Producer<LoopMessage>) -> Self {
         Publisher {
             ring,
@@ -28,7 +28,7 @@ impl Publisher {
         }
     }
 
-    /// Whether all that a tick may publish fits.
+    /// Whether there is room for everything that a tick may publish.
     pub fn has_room(&self) -> bool {
         self.ring.slots() >= SLOTS_PER_TICK
     }
@@ -38,7 +38,7 @@ impl Publisher {
         self.ring.is_abandoned()
     }
 
-    /// Records that did not fit, all in all.
+    /// Number of records that did not fit.
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -77,7 +77,7 @@ mod tests {
     use rtrb::RingBuffer;
 
     #[test]
-    fn what_does_not_fit_is_counted_and_told_when_there_is_room_again() {
+    fn counts_lost_records_and_reports_them_when_there_is_room() {
         let (producer, mut consumer) = RingBuffer::new(4);
         let mut publisher = Publisher::new(producer);
         let record = |tick| TickRecord {

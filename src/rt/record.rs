@@ -1,4 +1,4 @@
-//! What the loop says of itself: one [`TickRecord`] a tick and an [`Event`] at every change. Plain copies without
+//! What the loop publishes: one [`TickRecord`] a tick and an [`Event`] at every change. Plain copies without
 //! allocation, so that they can leave the tick through a wait-free ring.
 
 use bench_hal::Validity;
@@ -20,11 +20,11 @@ pub struct TickRecord {
     pub reference_m: f64,
     /// Measurement y in metres.
     pub position_m: f64,
-    /// What the program asked for, in amperes, before the interlocks.
+    /// Request of the program in amperes, before the interlocks.
     pub requested_a: f64,
     /// Command u in amperes as the amplifier gives it: after the interlocks, quantised and limited.
     pub command_a: f64,
-    /// The current in amperes that the amplifier says it gives, where it says so: as of its last status.
+    /// The current in amperes that the amplifier measures, if it measures one: as of its last status.
     pub actual_a: Option<f64>,
     /// The probe's own count of measurements.
     pub probe_sequence: u64,
@@ -44,7 +44,7 @@ pub struct TickRecord {
 pub mod flag {
     /// The program was running and the loop closed (or the excitation on): neither quiet before nor quiet after.
     pub const ACTIVE: u32 = 1;
-    /// The amplifier gives another current than was asked for.
+    /// The amplifier gives another current than requested.
     pub const LIMITED: u32 = 2;
     /// This tick began more than one period late; `missed_ticks` says how many were lost.
     pub const OVERRUN: u32 = 4;
@@ -63,10 +63,10 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// What an [`Event`] tells.
+/// Kind of an [`Event`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
-    /// An order of the supervisor was taken.
+    /// A request of the supervisor was taken.
     Request(RequestKind),
     /// The arming machine went from one state to another.
     State {
@@ -86,16 +86,16 @@ pub enum EventKind {
     },
 }
 
-/// Orders, as they appear in a recording.
+/// Requests, as they appear in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestKind {
     /// Enable the amplifier.
     Arm,
-    /// Run the program that came with the order.
+    /// Run the program that came with the request.
     Start,
     /// Zero current, disarm.
     Stop,
-    /// A person clears a trip.
+    /// The operator clears a trip.
     Clear,
 }
 

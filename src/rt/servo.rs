@@ -9,21 +9,21 @@ use rtrb::{Consumer, Producer};
 use super::arming::{State, Transition, Trip};
 use super::clock::{Clock, TickTiming};
 use super::interlock::Interlocks;
-use super::program::{Decision, Program};
+use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
 use super::record::{EventKind, RequestKind, TickRecord, flag};
 
-/// The answer of a driver to a command was not a number.
-const NONSENSE: DeviceError = DeviceError {
+/// The driver returned a current that is not finite.
+const NOT_FINITE: DeviceError = DeviceError {
     what: "the driver does not say which current it gives",
     remedy: "this is a fault of the driver; please report it",
     code: 0,
 };
 
-/// Orders that one tick takes; more wait for the next.
+/// Requests that one tick takes; more wait for the next.
 pub const REQUESTS_PER_TICK: usize = 16;
 
-/// An order to the loop, taken at a tick boundary. What it carries is whole and immutable.
+/// A request to the loop, taken at a tick boundary. Its content is complete and immutable.
 pub enum Request {
     /// Enable the amplifier.
     Arm,
@@ -31,7 +31,7 @@ pub enum Request {
     Start(Box<dyn Program>),
     /// Zero current, disarm.
     Stop,
-    /// A person clears a trip.
+    /// The operator clears a trip.
     Clear,
 }
 
@@ -46,92 +46,84 @@ impl Request {
     }
 }
 
-/// What others see of a running loop.
+/// Progress of a running loop, for other threads.
 #[derive(Debug, Default)]
 pub struct Progress {
     /// Ticks of the program done so far.
     pub run_ticks: AtomicU64,
 }
 
-/// The loop's memory between ticks.
+/// The loop and its state between ticks.
 pub struct Servo {
     rig: Box<dyn Rig>,
     interlocks: Interlocks,
     state: State,
     program: Option<Box<dyn Program>>,
     run_tick: u64,
-    requests: Consumer<Request>,
-    retired: Producer<Box<dyn Program>>,
-    publisher: Publisher,
-    progress: Arc<Progress>,
+    /// Current in amperes that the amplifier gives since the last tick.
+    applied_a: f64,
+    connections: Connections,
     trip: Option<(Trip, u64)>,
     completed: bool,
-    slow_order: bool,
+    took_slow_request: bool,
 }
 
-/// The ends of the rings that the loop holds.
+/// The loop's ends of the rings.
 pub struct Connections {
-    /// Orders of the supervisor.
+    /// Requests of the supervisor.
     pub requests: Consumer<Request>,
-    /// Programs that are done with: freed outside.
+    /// Programs that ended, to be freed outside the loop.
     pub retired: Producer<Box<dyn Program>>,
     /// To the recorder.
     pub publisher: Publisher,
-    /// For whoever watches.
+    /// Progress for other threads.
     pub progress: Arc<Progress>,
 }
 
 impl Servo {
     /// A disarmed loop around a rig.
     pub fn new(rig: Box<dyn Rig>, interlocks: Interlocks, connections: Connections) -> Self {
-        let Connections {
-            requests,
-            retired,
-            publisher,
-            progress,
-        } = connections;
         Servo {
             rig,
             interlocks,
             state: State::Disarmed,
             program: None,
             run_tick: 0,
-            requests,
-            retired,
-            publisher,
-            progress,
+            applied_a: 0.0,
+            connections,
             trip: None,
             completed: false,
-            slow_order: false,
+            took_slow_request: false,
         }
     }
 
-    /// One tick. Allocates nothing, takes no lock, prints nothing, calls no system function but clock and devices.
-    pub fn tick(&mut self, moment: &TickTiming, clock: &impl Clock) {
-        let now = moment.tick;
-        self.take_orders(now.number);
+    /// One tick: allocates nothing, takes no lock, prints nothing, makes no system call but those of clock and devices.
+    ///
+    /// A tick that takes [`Request::Arm`] or [`Request::Clear`] calls `enable` or `reset_fault`, which may take their time:
+    /// the current is zero then, and the caller restarts the schedule (see [`Servo::took_slow_request`]).
+    pub fn tick(&mut self, timing: &TickTiming, clock: &impl Clock) {
+        let now = timing.tick;
+        self.take_requests(now.number);
         let reading = self.rig.latest(now); // read
-        let checked = self.check(&reading, moment); // check
+        let checked = self.check(&reading, timing); // check
         let decision = self.decide(&reading, checked, now.number); // decide
-        let command_a = self.write(decision.requested_a, now.number); // write
+        self.write(decision.requested_a, now.number); // write
         let done_ns = clock.now_ns(now);
-        self.publish(moment, done_ns, &reading, &decision, command_a); // publish
+        self.publish(timing, done_ns, &reading, &decision); // publish
         self.finish_run(now.number);
     }
 
-    fn check(&mut self, reading: &Reading, moment: &TickTiming) -> Result<(), Trip> {
-        let timing = self.interlocks.check_timing(moment.missed, moment.tick);
-        let reading = self.interlocks.check_reading(reading, moment.tick);
-        let is_on = matches!(self.state, State::Armed | State::Running);
-        let current =
-            self.interlocks
-                .check_current(is_on, self.rig.actual_current_a(), moment.tick);
+    fn check(&mut self, reading: &Reading, timing: &TickTiming) -> Result<(), Trip> {
+        let missed = self.interlocks.check_timing(timing.missed, timing.tick);
+        let reading = self.interlocks.check_reading(reading, timing.tick);
+        let actual_a = self.rig.actual_current_a().filter(|_| self.is_on());
+        let current = self.interlocks.check_current(actual_a, timing.tick);
         match self.rig.status() {
             AmplifierStatus::Fault(code) => Err(Trip::Amplifier {
                 code: i64::from(code),
                 words: self.rig.explain(code),
             }),
-            _ => timing.and(reading).and(current),
+            _ => missed.and(reading).and(current),
         }
     }
 
@@ -139,64 +131,81 @@ impl Servo {
         if let Err(trip) = checked {
             self.trip(trip, tick);
         }
+        let input = ProgramInput {
+            tick: self.run_tick,
+            position_m: reading.position_m,
+            applied_a: self.applied_a,
+        };
         match (self.state, &mut self.program) {
-            (State::Running, Some(program)) => program.decide(self.run_tick, reading.position_m),
+            (State::Running, Some(program)) => program.decide(&input),
             _ => Decision::default(),
         }
     }
 
-    /// The last gate: the command passes the interlocks and goes out, or everything goes off.
-    fn write(&mut self, requested_a: f64, tick: u64) -> f64 {
-        let mut command_a = 0.0;
-        if matches!(self.state, State::Armed | State::Running) {
-            let passed = self.interlocks.check_command(requested_a);
-            match passed.and_then(|()| self.rig.command(requested_a).map_err(Trip::from)) {
-                Ok(given_a) if given_a.is_finite() => command_a = given_a,
-                // No driver may say so; what really flows is then unknown.
-                Ok(_) => self.trip(Trip::from(NONSENSE), tick),
+    /// The request passes the interlocks and goes out, or everything goes off.
+    fn write(&mut self, requested_a: f64, tick: u64) {
+        self.applied_a = 0.0;
+        if self.is_on() {
+            match self.command(requested_a) {
+                Ok(given_a) => self.applied_a = given_a,
                 Err(trip) => self.trip(trip, tick),
             }
         }
-        self.interlocks.note(command_a);
-        command_a
+        self.interlocks.note(self.applied_a);
+    }
+
+    /// The current that the amplifier gives for a request.
+    fn command(&mut self, requested_a: f64) -> Result<f64, Trip> {
+        self.interlocks.check_command(requested_a)?;
+        let given_a = self.rig.command(requested_a)?;
+        // The current is unknown if the driver returns a value that is not finite.
+        if given_a.is_finite() {
+            Ok(given_a)
+        } else {
+            Err(Trip::from(NOT_FINITE))
+        }
     }
 
     fn publish(
         &mut self,
-        moment: &TickTiming,
+        timing: &TickTiming,
         done_ns: u64,
         reading: &Reading,
         decision: &Decision,
-        command_a: f64,
     ) {
-        let bit = |set: bool, bit: u32| if set { bit } else { 0 };
-        let tripped_now = self
-            .trip
-            .is_some_and(|(_, tick)| tick == moment.tick.number);
-        self.publisher.record(TickRecord {
-            tick: moment.tick.number,
-            scheduled_ns: moment.tick.scheduled_ns,
-            woke_ns: moment.woke_ns,
+        let record = TickRecord {
+            tick: timing.tick.number,
+            scheduled_ns: timing.tick.scheduled_ns,
+            woke_ns: timing.woke_ns,
             done_ns,
             reference_m: decision.reference_m,
             position_m: reading.position_m,
             requested_a: decision.requested_a,
-            command_a,
+            command_a: self.applied_a,
             actual_a: self.rig.actual_current_a(),
             probe_sequence: reading.sequence,
             probe_age_ns: reading.age_ns,
             validity: reading.validity,
             state: self.state,
-            flags: bit(decision.active, flag::ACTIVE)
-                | bit(
-                    command_a.to_bits() != decision.requested_a.to_bits(),
-                    flag::LIMITED,
-                )
-                | bit(moment.missed > 0, flag::OVERRUN)
-                | bit(reading.validity != Validity::Valid, flag::INVALID)
-                | bit(tripped_now, flag::TRIPPED),
-            missed_ticks: moment.missed,
-        });
+            flags: self.flags(timing, reading, decision),
+            missed_ticks: timing.missed,
+        };
+        self.connections.publisher.record(record);
+    }
+
+    fn flags(&self, timing: &TickTiming, reading: &Reading, decision: &Decision) -> u32 {
+        let limited = self.applied_a.to_bits() != decision.requested_a.to_bits();
+        let tick = timing.tick.number;
+        let tripped = self.trip.is_some_and(|(_, at)| at == tick);
+        let flags = [
+            (decision.active, flag::ACTIVE),
+            (limited, flag::LIMITED),
+            (timing.missed > 0, flag::OVERRUN),
+            (reading.validity != Validity::Valid, flag::INVALID),
+            (tripped, flag::TRIPPED),
+        ];
+        let set = flags.iter().filter(|(is_set, _)| *is_set);
+        set.fold(0, |flags, (_, flag)| flags | flag)
     }
 
     fn finish_run(&mut self, tick: u64) {
@@ -204,27 +213,23 @@ impl Servo {
             return;
         }
         self.run_tick += 1;
-        self.progress
-            .run_ticks
-            .store(self.run_tick, Ordering::Relaxed);
-        if self
-            .program
-            .as_ref()
-            .is_some_and(|program| self.run_tick >= program.ticks())
-        {
+        let progress = &self.connections.progress.run_ticks;
+        progress.store(self.run_tick, Ordering::Relaxed);
+        let program = self.program.as_ref();
+        if program.is_some_and(|program| self.run_tick >= program.ticks()) {
             self.completed = true;
-            self.publisher.event(tick, EventKind::Completed);
+            self.event(tick, EventKind::Completed);
             self.switch_off(Transition::Stop, tick);
         }
     }
 
-    fn take_orders(&mut self, tick: u64) {
+    fn take_requests(&mut self, tick: u64) {
         for _ in 0..REQUESTS_PER_TICK {
-            let Ok(order) = self.requests.pop() else {
+            let Ok(request) = self.connections.requests.pop() else {
                 return;
             };
-            self.publisher.event(tick, EventKind::Request(order.kind()));
-            match order {
+            self.event(tick, EventKind::Request(request.kind()));
+            match request {
                 Request::Arm => self.arm(tick),
                 Request::Start(program) => self.start(program, tick),
                 Request::Stop => self.switch_off(Transition::Stop, tick),
@@ -233,88 +238,89 @@ impl Servo {
         }
     }
 
-    /// Enabling may take its time; nothing moves yet, and the schedule begins anew after it. Where the order changes
-    /// nothing, neither does it: a schedule that begins anew in the middle of a run would hide a late tick.
+    /// Enables the amplifier, which may take its time at zero current; the schedule restarts afterwards. A request that
+    /// changes no state does not restart the schedule: in the middle of a run that would hide a late tick.
     fn arm(&mut self, tick: u64) {
         if self.state.after(Transition::Arm).is_none() {
             return;
         }
-        self.slow_order = true;
+        self.took_slow_request = true;
         self.change(Transition::Arm, tick);
         if let Err(error) = self.rig.enable() {
             self.trip(Trip::from(error), tick);
         }
     }
 
-    /// A person's acknowledgement reaches the amplifier too; as long as that keeps its fault, the trip stays.
+    /// Clears the fault of the amplifier as well; the trip stays as long as that fails.
     fn clear(&mut self, tick: u64) {
         if self.state.after(Transition::Clear).is_none() {
             return;
         }
-        self.slow_order = true;
+        self.took_slow_request = true;
         if self.rig.reset_fault().is_ok() {
             self.change(Transition::Clear, tick);
         }
     }
 
     fn start(&mut self, program: Box<dyn Program>, tick: u64) {
-        let before = self.state;
+        if self.state.after(Transition::Start).is_none() {
+            return self.retire(Some(program));
+        }
         self.change(Transition::Start, tick);
-        let old = if self.state == State::Running && before != State::Running {
-            (self.run_tick, self.completed, self.trip) = (0, false, None);
-            self.program.replace(program)
-        } else {
-            Some(program)
-        };
-        self.hand_back(old);
+        (self.run_tick, self.completed, self.trip) = (0, false, None);
+        let old = self.program.replace(program);
+        self.retire(old);
     }
 
-    /// Zero current now, amplifier disabled, the reason published.
+    /// Zero current in this tick, amplifier disabled, the reason published.
     fn trip(&mut self, trip: Trip, tick: u64) {
         if self.state.after(Transition::Trip).is_some() {
             self.trip = Some((trip, tick));
-            self.publisher.event(tick, EventKind::Trip(trip));
+            self.event(tick, EventKind::Trip(trip));
             self.switch_off(Transition::Trip, tick);
         }
     }
 
-    fn switch_off(&mut self, change: Transition, tick: u64) {
+    fn switch_off(&mut self, transition: Transition, tick: u64) {
         self.rig.disable();
-        self.change(change, tick);
+        self.change(transition, tick);
         let program = self.program.take();
-        self.hand_back(program);
+        self.retire(program);
     }
 
-    fn change(&mut self, change: Transition, tick: u64) {
-        if let Some(to) = self.state.after(change) {
-            self.publisher.event(
-                tick,
-                EventKind::State {
-                    from: self.state,
-                    to,
-                },
-            );
+    fn change(&mut self, transition: Transition, tick: u64) {
+        if let Some(to) = self.state.after(transition) {
+            let from = self.state;
+            self.event(tick, EventKind::State { from, to });
             self.state = to;
         }
     }
 
-    /// Memory is freed outside the loop; if nobody collects it, it is kept rather than freed here.
-    fn hand_back(&mut self, program: Option<Box<dyn Program>>) {
-        if let Some(rtrb::PushError::Full(program)) =
-            program.and_then(|program| self.retired.push(program).err())
-        {
+    fn event(&mut self, tick: u64, kind: EventKind) {
+        self.connections.publisher.event(tick, kind);
+    }
+
+    /// Hands a program over to be freed outside the loop. Without room in the ring its memory is leaked, not freed here.
+    fn retire(&mut self, program: Option<Box<dyn Program>>) {
+        let Some(program) = program else { return };
+        if let Err(rtrb::PushError::Full(program)) = self.connections.retired.push(program) {
             std::mem::forget(program);
         }
     }
 
-    /// Whether an order since the last call took its time, so that the schedule must begin anew.
+    /// Whether a request since the last call may have taken longer than a tick: the schedule must then restart.
     pub fn took_slow_request(&mut self) -> bool {
-        std::mem::take(&mut self.slow_order)
+        std::mem::take(&mut self.took_slow_request)
+    }
+
+    /// Armed or running: the amplifier is enabled.
+    fn is_on(&self) -> bool {
+        matches!(self.state, State::Armed | State::Running)
     }
 
     /// Neither armed nor running.
     pub fn is_off(&self) -> bool {
-        matches!(self.state, State::Disarmed | State::Tripped)
+        !self.is_on()
     }
 
     /// The trip since the last start, if there was one, and its tick.
@@ -329,12 +335,12 @@ impl Servo {
 
     /// The way to the recorder.
     pub fn publisher(&self) -> &Publisher {
-        &self.publisher
+        &self.connections.publisher
     }
 }
 
 impl Drop for Servo {
-    /// Whatever ends the loop, the motor is off.
+    /// However the loop ends, the amplifier is disabled.
     fn drop(&mut self) {
         self.rig.disable();
     }

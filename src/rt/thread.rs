@@ -1,9 +1,10 @@
-//! The loop's own thread, and what the system allows it: memory locked, a real-time scheduler, a processor of its own.
-//! Where something is refused the loop runs all the same and says so.
+//! The loop's own thread: memory locked, a real-time scheduler, a processor of its own. If the system refuses one of these,
+//! the loop runs all the same and reports it.
 
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
+use nix::sys::mman::{MlockAllFlags, mlockall};
 use serde::{Deserialize, Serialize};
 
 use super::arming::Trip;
@@ -56,10 +57,10 @@ pub struct LoopOutcome {
     pub lost_records: u64,
 }
 
-/// A loop on its own thread, scheduled but waiting for leave to begin.
+/// A loop on its own thread, scheduled but waiting for [`PreparedLoop::begin`].
 pub struct PreparedLoop {
     thread: JoinHandle<LoopOutcome>,
-    leave: Sender<()>,
+    start: Sender<()>,
     scheduling: Scheduling,
 }
 
@@ -69,10 +70,10 @@ impl PreparedLoop {
         &self.scheduling
     }
 
-    /// Lets it begin. Without this call it ends before its first tick.
+    /// Starts the loop. Without this call it ends before its first tick.
     pub fn begin(self) -> JoinHandle<LoopOutcome> {
-        // The thread waits for this; if it died, joining it tells.
-        let _ = self.leave.send(());
+        // If the thread has died, joining it returns the reason.
+        let _ = self.start.send(());
         self.thread
     }
 }
@@ -85,50 +86,53 @@ pub fn prepare(
     tail_ticks: u64,
 ) -> std::io::Result<PreparedLoop> {
     let settings = settings.clone();
-    let (leave, permitted) = channel();
-    let (tell, told) = channel();
-    let thread = std::thread::Builder::new()
-        .name("bench-loop".into())
-        .spawn(move || {
-            let scheduling = match pace {
-                Pace::Virtual => Scheduling {
-                    policy: "SCHED_OTHER".into(),
-                    ..Scheduling::default()
-                },
-                Pace::Realtime => become_realtime(&settings),
-            };
-            let _ = tell.send(scheduling);
-            if permitted.recv().is_err() {
-                return LoopOutcome::default();
-            }
-            match pace {
-                Pace::Virtual => run(
-                    servo,
-                    Virtual {
-                        period_s: settings.period_s(),
-                    },
-                    tail_ticks,
-                ),
-                Pace::Realtime => run(servo, Realtime::new(settings.period_s()), tail_ticks),
-            }
-        })?;
-    let scheduling = told
-        .recv()
-        .map_err(|_| std::io::Error::other("the loop's thread ended before it began"))?;
+    let (start, started) = channel();
+    let (report, reported) = channel();
+    let body = move || {
+        let _ = report.send(pace.schedule(&settings));
+        match started.recv() {
+            Ok(()) => pace.run(servo, settings.period_s(), tail_ticks),
+            Err(_) => LoopOutcome::default(),
+        }
+    };
+    let builder = std::thread::Builder::new().name("bench-loop".into());
+    let thread = builder.spawn(body)?;
+    let ended = |_| std::io::Error::other("the loop's thread ended before it began");
+    let scheduling = reported.recv().map_err(ended)?;
     Ok(PreparedLoop {
         thread,
-        leave,
+        start,
         scheduling,
     })
+}
+
+impl Pace {
+    /// Schedules the calling thread.
+    fn schedule(self, settings: &LoopSettings) -> Scheduling {
+        match self {
+            Pace::Virtual => Scheduling {
+                policy: "SCHED_OTHER".into(),
+                ..Scheduling::default()
+            },
+            Pace::Realtime => become_realtime(settings),
+        }
+    }
+
+    fn run(self, servo: Servo, period_s: f64, tail_ticks: u64) -> LoopOutcome {
+        match self {
+            Pace::Virtual => run(servo, Virtual { period_s }, tail_ticks),
+            Pace::Realtime => run(servo, Realtime::new(period_s), tail_ticks),
+        }
+    }
 }
 
 /// Ticks until the loop has been off for `tail_ticks`.
 pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutcome {
     let (mut number, mut off_ticks) = (0, 0);
     while off_ticks <= tail_ticks {
-        let moment = clock.wait(number, servo.publisher());
-        servo.tick(&moment, &clock);
-        number = moment.tick.number + 1;
+        let timing = clock.wait(number, servo.publisher());
+        servo.tick(&timing, &clock);
+        number = timing.tick.number + 1;
         if servo.took_slow_request() {
             clock.restart(number);
         }
@@ -141,45 +145,36 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutc
     }
 }
 
-/// Asks for everything that keeps the system from interrupting the calling thread, which is the loop's.
+/// Asks the system for everything that keeps it from interrupting the calling thread, which is the loop's.
 pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
-    let mut refused = Vec::new();
-    let mut ask = |what: &str, result: nix::Result<()>, remedy: &str| match result {
-        Ok(()) => true,
-        Err(error) => {
-            refused.push(format!("{what}: {error}; {remedy}"));
-            false
-        }
-    };
-    let all =
-        nix::sys::mman::MlockAllFlags::MCL_CURRENT | nix::sys::mman::MlockAllFlags::MCL_FUTURE;
-    let memory_locked = ask(
+    let mut scheduling = Scheduling::default();
+    scheduling.memory_locked = scheduling.ask(
         "locking memory",
-        nix::sys::mman::mlockall(all),
+        mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE),
         "raise `memlock` in /etc/security/limits.conf or give the program CAP_IPC_LOCK",
     );
-    let fifo = ask(
+    let is_fifo = scheduling.ask(
         "SCHED_FIFO",
         set_fifo(settings.priority),
         "raise `rtprio` in /etc/security/limits.conf or give the program CAP_SYS_NICE",
     );
-    let bound = settings.cpu.filter(|&cpu| {
-        ask(
-            "binding to a processor",
-            bind(cpu),
-            "choose a processor this process may use in loop.cpu",
-        )
-    });
-    let policy = if fifo {
-        format!("SCHED_FIFO {}", settings.priority)
-    } else {
-        "SCHED_OTHER".into()
+    let remedy = "choose a processor this process may use in loop.cpu";
+    let cpu = settings.cpu;
+    scheduling.cpu = cpu.filter(|&cpu| scheduling.ask("binding to a processor", bind(cpu), remedy));
+    scheduling.policy = match is_fifo {
+        true => format!("SCHED_FIFO {}", settings.priority),
+        false => "SCHED_OTHER".into(),
     };
-    Scheduling {
-        policy,
-        memory_locked,
-        cpu: bound,
-        refused,
+    scheduling
+}
+
+impl Scheduling {
+    /// Whether the system granted what was asked for; a refusal is noted with its remedy.
+    fn ask(&mut self, what: &str, result: nix::Result<()>, remedy: &str) -> bool {
+        let refused = result.map_err(|error| format!("{what}: {error}; {remedy}"));
+        let granted = refused.is_ok();
+        self.refused.extend(refused.err());
+        granted
     }
 }
 

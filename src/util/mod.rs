@@ -7,3 +7,4 @@ pub mod numeric;
 pub mod progress;
 pub mod quantity;
 pub(crate) mod thread_priority;
+pub mod units;

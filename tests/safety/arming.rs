@@ -7,8 +7,7 @@ use std::time::Duration;
 use bench::experiment::{self, Plan};
 use bench::rt::arming::{State, Transition};
 use bench::rt::clock::{Clock, TickTiming, Virtual};
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Decision, Program};
+use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage};
 use bench::rt::servo::{Connections, Progress, Request, Servo};
@@ -17,7 +16,7 @@ use bench_hal::{Rig, Tick, Validity};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::faulty_rig::Fault;
-use crate::rig::{Bench, Says, Still, Told, Watched, says, stage};
+use crate::rig::{Bench, Says, Still, Told, Watched, interlocks, says, stage};
 
 const STATES: [State; 4] = [
     State::Disarmed,
@@ -302,7 +301,7 @@ fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Request>, Consumer<L
         progress: Arc::new(Progress::default()),
     };
     (
-        Servo::new(Box::new(rig), Interlocks::new(&stage()), connections),
+        Servo::new(Box::new(rig), interlocks(&stage()), connections),
         requests,
         records,
     )
@@ -312,7 +311,8 @@ fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Request>, Consumer<L
 struct Panics;
 
 impl Program for Panics {
-    fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
+    fn decide(&mut self, input: &ProgramInput) -> Decision {
+        let tick = input.tick;
         assert!(tick < 10, "the mistake");
         Decision {
             reference_m: 0.0,

@@ -2,11 +2,11 @@
 use std::ops::Range;
 
 use bench::config::{Config, ReferenceSettings};
-use bench::control::{Controller, ControllerText};
+use bench::control::{ControlLaw, Controller, ControllerText, LawInput, SectionController};
 use bench::excitation::reference;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
-use bench::rt::program::{Control, Program};
+use bench::rt::program::{Control, Program, ProgramInput};
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::servo::Request;
 
@@ -44,17 +44,38 @@ fn program(config: &Config, settle: u64, closed: u64) -> Control {
         config.servo.period_s(),
     )
     .expect("no file");
-    Control::new(controller(config), reference, settle, closed)
+    let law = SectionController::new(controller(config));
+    Control::new(Box::new(law), reference, settle, closed)
 }
 
 /// The largest command, tick by tick, that errors of one metre at most can cause: the sum of the impulse response's
 /// magnitudes.
 fn largest_gains(config: &Config, ticks: usize) -> Vec<f64> {
-    let mut controller = controller(config);
-    let impulse = (0..ticks).map(|tick| controller.update(if tick == 0 { 1.0 } else { 0.0 }).abs());
+    let controller = controller(config);
+    let mut state = controller.at_rest();
+    let impulse = (0..ticks).map(|tick| {
+        controller
+            .update(&mut state, if tick == 0 { 1.0 } else { 0.0 })
+            .abs()
+    });
     impulse
         .scan(0.0, |sum, h| Some(*sum + h).inspect(|s| *sum = *s))
         .collect()
+}
+
+fn input(tick: u64, position_m: f64) -> ProgramInput {
+    ProgramInput {
+        tick,
+        position_m,
+        applied_a: 0.0,
+    }
+}
+
+fn error(reference_m: f64) -> LawInput {
+    LawInput {
+        reference_m,
+        ..LawInput::default()
+    }
 }
 
 fn closed(bench: &Bench, from: u64) -> Vec<TickRecord> {
@@ -180,7 +201,7 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
             .filter(|r| r.tick >= from && r.state == State::Running)
             .enumerate()
         {
-            let decision = fresh.decide(tick as u64, record.position_m);
+            let decision = fresh.decide(&input(tick as u64, record.position_m));
             let bits = [record.requested_a, record.reference_m].map(f64::to_bits);
             assert_eq!(
                 [decision.requested_a, decision.reference_m].map(f64::to_bits),
@@ -196,8 +217,8 @@ fn a_controller_that_was_used_before_starts_from_rest() {
     for name in ["fast", "slow"] {
         let mut config = config(name, 6);
         config.control.reference = ReferenceSettings::Hold;
-        let mut used = controller(&config);
-        let moved = (0..1000).map(|_| used.update(100e-6)).last();
+        let mut used = SectionController::new(controller(&config));
+        let moved = (0..1000).map(|_| used.update(&error(100e-6))).last();
         assert!(
             moved.is_some_and(|current_a| current_a.abs() > 1e-3),
             "{moved:?}"
@@ -211,13 +232,18 @@ fn a_controller_that_was_used_before_starts_from_rest() {
             )
             .expect("no file")
         };
-        let mut after = Control::new(used, hold(), 10, 100);
-        let mut fresh = Control::new(controller(&config), hold(), 10, 100);
+        let mut after = Control::new(Box::new(used), hold(), 10, 100);
+        let mut fresh = Control::new(
+            Box::new(SectionController::new(controller(&config))),
+            hold(),
+            10,
+            100,
+        );
         for tick in 0..110 {
             let position_m = 1e-6 * (tick % 3) as f64;
             assert_eq!(
-                after.decide(tick, position_m),
-                fresh.decide(tick, position_m),
+                after.decide(&input(tick, position_m)),
+                fresh.decide(&input(tick, position_m)),
                 "{name} at tick {tick}"
             );
         }

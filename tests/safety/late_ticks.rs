@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Realtime, TickTiming};
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Decision, Program};
+use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{LoopMessage, TickRecord, flag};
 use bench::rt::servo::{Connections, Progress, Request, Servo};
@@ -15,7 +14,7 @@ use bench_hal::{
 };
 use rtrb::{Consumer, RingBuffer};
 
-use crate::rig::{Says, Still, stage};
+use crate::rig::{Says, Still, interlocks, stage};
 
 /// A clock by which some ticks are late: (call, ticks missed).
 struct Jerky {
@@ -67,7 +66,7 @@ fn run(
         publisher: Publisher::new(publisher),
         progress: Arc::new(Progress::default()),
     };
-    let servo = Servo::new(Box::new(rig), Interlocks::new(&config), connections);
+    let servo = Servo::new(Box::new(rig), interlocks(&config), connections);
     let ended = thread::run(servo, clock, tail);
     let records = records.into_chunk().filter_map(|p| {
         if let LoopMessage::Tick(r) = p {
@@ -134,7 +133,8 @@ fn missed_ticks_are_counted_flagged_and_leave_a_gap_in_the_numbers() {
 struct Asked(Arc<Mutex<Vec<u64>>>, u64);
 
 impl Program for Asked {
-    fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
+    fn decide(&mut self, input: &ProgramInput) -> Decision {
+        let tick = input.tick;
         self.0.lock().expect("not poisoned").push(tick);
         Decision {
             reference_m: 0.0,

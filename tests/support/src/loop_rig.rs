@@ -8,7 +8,7 @@ use bench::recording::{Header, Recorder, Recording};
 use bench::rt::arming::State;
 use bench::rt::clock::{TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Decision, Program};
+use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench::rt::servo::{Connections, Progress, Request, Servo};
@@ -157,10 +157,10 @@ impl<R: Rig> DisplacementProbe for Watched<R> {
 pub struct Says<F>(pub F, pub u64);
 
 impl<F: FnMut(u64) -> f64 + Send> Program for Says<F> {
-    fn decide(&mut self, tick: u64, _position_m: f64) -> Decision {
+    fn decide(&mut self, input: &ProgramInput) -> Decision {
         Decision {
             reference_m: 0.0,
-            requested_a: (self.0)(tick),
+            requested_a: (self.0)(input.tick),
             active: true,
         }
     }
@@ -172,6 +172,11 @@ impl<F: FnMut(u64) -> f64 + Send> Program for Says<F> {
 /// A program without an end.
 pub fn says(current_a: impl FnMut(u64) -> f64 + Send + 'static) -> Box<dyn Program> {
     Box::new(Says(current_a, u64::MAX))
+}
+
+/// The interlocks of a configuration.
+pub fn interlocks(config: &Config) -> Interlocks {
+    Interlocks::new(&config.interlock, &config.motor, &config.servo)
 }
 
 /// The loop, its rings, and everything that came out of them.
@@ -204,7 +209,7 @@ impl Bench {
             progress: Arc::new(Progress::default()),
         };
         Bench {
-            servo: Servo::new(Box::new(watched), Interlocks::new(config), connections),
+            servo: Servo::new(Box::new(watched), interlocks(config), connections),
             requests,
             published,
             retired,

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::super::FigureError;
 use super::super::model::Model;
 use bench::control::{ClosedLoop, ControllerText};
-use bench::model::plant::ModalModel;
+use bench::model::plant::{LoopPlant, ModalModel};
 
 /// The loop of a plant with a controller: a name of the program's own, or a file's name and its text.
 pub(crate) fn closed_loop(
@@ -21,19 +21,23 @@ pub(crate) fn closed_loop(
         },
         None => ControllerText::find(name)?,
     };
-    let sections = controller.sections(config.servo.rate_hz)?;
+    let design = controller.design(config.servo.rate_hz)?;
+    let modes = ModalModel::of(&bench::model::plant::build(&config.plant)?)?.modes;
+    let plant = LoopPlant::new(&config, &modes);
+    let force_constant_n_per_a = config.motor.force_constant_n_per_a;
     Ok(ClosedLoop::new(
-        &config,
-        ModalModel::of(&bench::model::plant::build(&config.plant)?)?.modes,
-        sections,
-    ))
+        plant,
+        modes,
+        force_constant_n_per_a,
+        design,
+    )?)
 }
 
 /// L(jw) in continuous time.
 pub(crate) fn open(of: &ClosedLoop, low_rad_s: f64, high_rad_s: f64) -> Vec<(f64, Complex<f64>)> {
     of.frequencies(low_rad_s, high_rad_s)
         .into_iter()
-        .map(|w| (w, of.continuous_loop(w)))
+        .filter_map(|w| Some((w, of.continuous_loop(w)?)))
         .collect()
 }
 
@@ -49,7 +53,7 @@ pub(crate) fn sensitivity(open: &[(f64, Complex<f64>)]) -> Vec<(f64, Complex<f64
 
 /// Time in seconds and position after a step of height 1.
 pub(crate) fn step(of: &ClosedLoop, seconds: f64) -> Vec<(f64, f64)> {
-    let period_s = of.chain().period_s();
+    let period_s = of.plant().period_s();
     let positions = of.simulate((seconds / period_s).round() as usize, |_| 1.0);
     positions
         .into_iter()

@@ -138,7 +138,10 @@ pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
         Scale::linear("Position/step (1)"),
     )
     .line("ζ = 0.01", pen(1), step(&loops[1], 12.0));
-    let margins: Vec<_> = loops.iter().map(|of| of.margins(true)).collect();
+    let margins: Vec<_> = loops
+        .iter()
+        .map(ClosedLoop::continuous_margins)
+        .collect::<Result<_, _>>()?;
     let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
     let peaks: Vec<f64> = ts
         .iter()
@@ -325,7 +328,7 @@ pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
         );
         wide = wide.directed(&l.name, l.pen, l.polar());
         near = near.directed("", l.pen, l.polar());
-        margins.push(of.margins(true));
+        margins.push(of.continuous_margins()?);
     }
     let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
     Ok(Content::new("The notch between the two modes, and the open loop with the controller of Eq. (6-4): the circles grow away from -1, however light the damping.")
@@ -379,9 +382,14 @@ pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
     let near = |heading: &str, l: &Curve| {
         critical(nyquist(heading, (-2.6, 1.4), (-2.0, 2.0), "L")).directed("", l.pen, l.polar())
     };
-    let between =
-        |of: &ClosedLoop| -360.0 + of.continuous_loop(9.0).arg().to_degrees().rem_euclid(360.0);
-    let margins: Vec<_> = loops.iter().map(|(_, of)| of.margins(true)).collect();
+    let between = |of: &ClosedLoop| {
+        let l = of.continuous_loop(9.0).map_or(f64::NAN, |l| l.arg());
+        -360.0 + l.to_degrees().rem_euclid(360.0)
+    };
+    let margins: Vec<_> = loops
+        .iter()
+        .map(|(_, of)| of.continuous_margins())
+        .collect::<Result<_, _>>()?;
     Ok(content
         .row(190.0, [a.0, c.0])
         .row(170.0, [a.1, c.1])

@@ -127,7 +127,7 @@ fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
         polar("(b) Nyquist plot of L", 1.05 * size),
         polar("(b) the same near −1", 1.5),
     );
-    let margins = of.margins(true);
+    let margins = of.continuous_margins()?;
     let content = Content::new(&format!("Open loop of the {} controller, {equation}, with the model of the stage.", which.name()))
         .setting("profile stage, mass asymmetry +10 %, operating point 8 % of L; continuous time, without hold, delay and amplifier")
         .row(220.0, [gain, phase])
@@ -252,7 +252,7 @@ pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
         ));
         let course = step(&of, 0.4);
         let positions: Vec<f64> = course.iter().map(|point| point.1).collect();
-        let figures = step_metrics(&positions, 1.0, of.chain().period_s());
+        let figures = step_metrics(&positions, 1.0, of.plant().period_s());
         let computed = figures.settling_time_s.unwrap_or(f64::NAN);
         content = content
             .compare(Comparison::number(&format!("settling time, {}", which.name()), settling, 4, computed, "s").remark("to 2 % of the step; it depends on how much of the first mode still rings, whose frequency is 183.9 rad/s here and 179 there"))
@@ -359,7 +359,7 @@ pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureE
         content = with_margins(
             content,
             which,
-            &of.margins(true),
+            &of.continuous_margins()?,
             &format!(", {} controller, model", which.name()),
         )
         .compare(

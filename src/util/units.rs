@@ -1,0 +1,20 @@
+//! Conversions between SI units and those in which controllers and frequencies are written.
+
+use std::f64::consts::TAU;
+
+/// Micrometres in a metre. Controllers are written in amperes per micrometre.
+pub const UM_PER_M: f64 = 1e6;
+
+/// Angular frequency in rad/s of a frequency in hertz, w = 2 pi f.
+///
+/// ```
+/// assert_eq!(bench::util::units::rad_s(0.5), std::f64::consts::PI);
+/// ```
+pub fn rad_s(frequency_hz: f64) -> f64 {
+    TAU * frequency_hz
+}
+
+/// Frequency in hertz of an angular frequency in rad/s, f = w/(2 pi).
+pub fn hz(omega_rad_s: f64) -> f64 {
+    omega_rad_s / TAU
+}
