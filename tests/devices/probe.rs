@@ -164,7 +164,7 @@ impl Table {
             is_on: false,
         };
         let probe = devices::probe::open(&config).expect("the acting probe is there");
-        let watch = probe.watch();
+        let watch = probe.statistics_handle();
         let bench = Bench::around(&config, Devices { amplifier, probe });
         let (probe, pace, published, _folder) = (Some(acting), Pace::Readings, 0, folder);
         let mut table = Table {

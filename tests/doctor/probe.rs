@@ -1,5 +1,7 @@
 //! The probe's port: acting probes on pseudo terminals, seen by the program itself.
 
+use std::sync::Arc;
+
 use bench::config::{Config, Source, load};
 use bench::rig::devices::probe::settings;
 use bench_hal::serial::emulator::Fault;
@@ -40,7 +42,7 @@ fn config(sets: Vec<String>) -> Config {
     .unwrap()
 }
 
-fn protocol() -> Protocol {
+fn protocol() -> Arc<dyn Protocol> {
     config(vec![]).probe.device.protocol().unwrap()
 }
 

@@ -1,8 +1,8 @@
-//! One writer, one reader, the newest value: wait-free on both sides.
+//! Passes the newest measurement from one writer to one reader, wait-free on both sides.
 //!
-//! Three slots: the writer owns one, the reader owns one, the third waits between them. Publishing and taking are one
-//! atomic exchange each, so neither side ever waits for the other, even if the other was stopped in the middle. (A
-//! sequence lock would let a real-time reader spin for ever on a writer that it preempted.)
+//! There are three slots: one belongs to the writer, one to the reader, and one waits between them. Publishing and taking
+//! are one atomic exchange each. Neither side waits for the other, even if the other thread is suspended. (With a sequence
+//! lock a real-time reader would spin without end on a writer that it has preempted.)
 //!
 //! ```text
 //! writer: fill own slot, exchange own <-> waiting | NEW     (release: the words are in the slot before it is handed over)
@@ -14,13 +14,13 @@ use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 
 use crate::Validity;
 
-/// What the reader thread hands to the loop.
+/// The measurement that the reader thread passes to the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Measurement {
     pub position_m: f64,
     pub sequence: u64,
-    /// When it was made, on the probe's monotonic clock.
-    pub made_ns: u64,
+    /// Time of the measurement on the clock of the probe.
+    pub measured_ns: u64,
     pub validity: Validity,
 }
 
@@ -31,23 +31,23 @@ type Slot = [AtomicU64; 4];
 
 struct Shared {
     slots: [Slot; 3],
-    /// Number of the slot in the middle, and whether the reader has not seen it yet.
+    /// Number of the waiting slot, with the flag `NEW` if the reader has not taken it yet.
     waiting: AtomicU8,
 }
 
-/// The side that publishes.
+/// The side that publishes measurements.
 pub(super) struct Writer {
     shared: Arc<Shared>,
     own: u8,
 }
 
-/// The side that takes the newest.
+/// The side that takes the newest measurement.
 pub(super) struct Reader {
     shared: Arc<Shared>,
     own: u8,
 }
 
-/// A cell that holds a `Missing` measurement.
+/// A cell with a `Missing` measurement.
 pub(super) fn cell() -> (Writer, Reader) {
     let slots = std::array::from_fn(|_| words(Measurement::default()).map(AtomicU64::new));
     let shared = Arc::new(Shared {
@@ -89,13 +89,13 @@ fn words(measurement: Measurement) -> [u64; 4] {
     let Measurement {
         position_m,
         sequence,
-        made_ns,
+        measured_ns,
         validity,
     } = measurement;
-    [position_m.to_bits(), sequence, made_ns, validity as u64]
+    [position_m.to_bits(), sequence, measured_ns, validity as u64]
 }
 
-fn measurement([position, sequence, made_ns, validity]: [u64; 4]) -> Measurement {
+fn measurement([position, sequence, measured_ns, validity]: [u64; 4]) -> Measurement {
     let validity = match validity {
         0 => Validity::Valid,
         1 => Validity::OutOfRange,
@@ -105,7 +105,7 @@ fn measurement([position, sequence, made_ns, validity]: [u64; 4]) -> Measurement
     Measurement {
         position_m: f64::from_bits(position),
         sequence,
-        made_ns,
+        measured_ns,
         validity,
     }
 }
@@ -125,13 +125,13 @@ mod tests {
         Measurement {
             position_m: sequence as f64 * 0.5,
             sequence,
-            made_ns: !sequence,
+            measured_ns: !sequence,
             validity,
         }
     }
 
     #[test]
-    fn before_the_first_value_there_is_none() {
+    fn measurement_is_missing_before_the_first_value() {
         assert_eq!(
             cell().1.newest(),
             Measurement {
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_is_taken_and_stays_until_a_newer_one_comes() {
+    fn newest_measurement_stays_until_a_newer_one_is_published() {
         let (mut writer, mut reader) = cell();
         (1..=5).for_each(|sequence| writer.publish(consistent(sequence)));
         assert_eq!([reader.newest(), reader.newest()], [consistent(5); 2]);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn no_reading_is_torn_and_none_goes_back_while_the_writer_never_pauses() {
+    fn concurrent_readings_are_consistent_and_in_order() {
         const LAST: u64 = 2_000_000;
         let (mut writer, mut reader) = cell();
         writer.publish(consistent(0));

@@ -1,120 +1,128 @@
-//! What a decoder has to say, and what every decoder is.
+//! Decoders: bytes in, events out.
 
-/// One measurement of a probe, before it is mounted anywhere.
+/// One measurement as the probe sent it, before [`Mounting`](super::Mounting) is applied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// The number on the line: counts of a binary protocol, digits without the point of a written one.
+    /// The number on the line: counts of a binary protocol, digits without the decimal point of a text protocol.
     pub raw: i64,
-    /// Metres from the start of the probe's range (or its own zero), before mounting; the range's end when out of range.
+    /// Displacement in metres from the start of the measuring range (or from the probe's zero). If the target is out
+    /// of range this is the end of the range.
     pub position_m: f64,
 }
 
-/// What a decoder found in the bytes it was fed. In order of the bytes, and the same however they were sliced.
+/// What a decoder found in the bytes. The events have the order of the bytes and do not depend on how the bytes were
+/// divided into slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// A measurement within the probe's range.
+    /// A measurement within the measuring range.
     Value(Sample),
-    /// The target is outside the range; the position is the range's end on that side.
+    /// The target is outside the measuring range; the position is the end of the range on that side.
     OutOfRange(Sample),
-    /// The probe answers, but says that it did not measure or did not understand.
+    /// The probe answered with an error: it could not measure, or it did not accept the request.
     Fault {
-        /// The probe's own number.
+        /// Error number of the probe.
         code: i64,
-        /// What that number means.
-        words: &'static str,
+        /// Meaning of the number.
+        text: &'static str,
     },
-    /// The probe made so many measurements that never arrived.
+    /// Number of measurements that the probe made and that did not arrive.
     Gap(u32),
-    /// So many values arrived that are not known to be new (counter did not advance, or jumped back): not handed out.
+    /// Number of values that were received but may be old (the counter did not advance, or went back) and are not used.
     Withheld(u32),
-    /// The probe's counter went back: it has restarted, or an answer of the past has come up.
+    /// The probe's counter went back: the probe has restarted, or an old answer arrived late.
     Restart,
-    /// So many bytes belonged to nothing. A long run is reported in pieces.
+    /// Number of bytes that do not belong to any message. Long runs are reported in parts.
     Damaged(u32),
-    /// The line returned our own request, as two-wire RS485 adapters do.
+    /// The line returned the request, as two-wire RS485 adapters do.
     Echo,
     /// The answer to a request is complete, with or without a value.
     AnswerEnd,
 }
 
-/// Bytes in, events out; no clock, no port. Never panics, whatever the bytes.
+/// Decodes the bytes of one probe, without clock and port. A decoder must not panic on any input.
 pub trait Decoder: Send {
-    /// Takes the next bytes of the line, in slices of any size.
+    /// Decodes the next bytes of the line; slices may have any length.
     fn feed(&mut self, bytes: &[u8], out: &mut dyn FnMut(Event));
 
-    /// Forgets a message begun (its bytes count as damaged): what comes next starts a message, or is searched for one.
-    fn reset(&mut self, out: &mut dyn FnMut(Event));
+    /// Discards an incomplete message; its bytes are reported as damaged. Called before each request.
+    fn reset(&mut self, out: &mut dyn FnMut(Event)) {
+        let _ = out;
+    }
 
-    /// What to send to get an answer; `None` if the probe speaks by itself.
-    fn request(&self) -> Option<&[u8]>;
+    /// The request that asks for a measurement; `None` if the probe sends without requests.
+    fn request(&self) -> Option<&[u8]> {
+        None
+    }
 
-    /// Bytes of the latest message that carried a measurement: the line was busy with them after the measurement.
+    /// Length in bytes of the latest message with a measurement. The time that these bytes take on the line is part of
+    /// the age of the measurement.
     fn message_bytes(&self) -> u32;
 }
 
-/// Counts skipped bytes and reports them in pieces whose size depends on the bytes alone, not on the slicing.
+/// Counts damaged bytes and reports them in parts that depend on the bytes only, not on the slices.
 #[derive(Debug, Default)]
-pub(super) struct Damage {
+pub(super) struct DamageCounter {
     bytes: u32,
 }
 
-impl Damage {
-    /// A run is reported when it ends, and every so many bytes: noise without end must show in the statistics.
-    const PIECE: u32 = 64;
+impl DamageCounter {
+    /// A run of damaged bytes is reported at its end and every 64 bytes, so that continuous noise is visible in the
+    /// statistics.
+    const PART: u32 = 64;
 
     pub(super) fn add(&mut self, bytes: u32, out: &mut dyn FnMut(Event)) {
         self.bytes += bytes;
-        if self.bytes >= Self::PIECE {
-            self.end(out);
+        if self.bytes >= Self::PART {
+            self.report(out);
         }
     }
 
-    pub(super) fn end(&mut self, out: &mut dyn FnMut(Event)) {
+    pub(super) fn report(&mut self, out: &mut dyn FnMut(Event)) {
         if self.bytes > 0 {
             out(Event::Damaged(std::mem::take(&mut self.bytes)));
         }
     }
 }
 
-/// The bytes of a message not yet complete: at most `N`, oldest first.
+/// The bytes of an incomplete message, oldest first, at most `N`.
 #[derive(Debug)]
 pub(super) struct Window<const N: usize> {
     bytes: [u8; N],
-    len: usize,
+    length: usize,
 }
 
 impl<const N: usize> Default for Window<N> {
     fn default() -> Self {
         Self {
             bytes: [0; N],
-            len: 0,
+            length: 0,
         }
     }
 }
 
 impl<const N: usize> Window<N> {
-    /// Appends a byte; `false` if there was no room for it.
+    /// Appends a byte; returns `false` if the window is full.
     pub(super) fn push(&mut self, byte: u8) -> bool {
-        let Some(slot) = self.bytes.get_mut(self.len) else {
+        let Some(slot) = self.bytes.get_mut(self.length) else {
             return false;
         };
         *slot = byte;
-        self.len += 1;
+        self.length += 1;
         true
     }
 
-    pub(super) fn held(&self) -> &[u8] {
-        &self.bytes[..self.len] // len never passes N: push
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes[..self.length] // `push` keeps length <= N
     }
 
     pub(super) fn drop_front(&mut self, count: usize) {
-        let count = count.min(self.len);
-        self.bytes.copy_within(count..self.len, 0);
-        self.len -= count;
+        let count = count.min(self.length);
+        self.bytes.copy_within(count..self.length, 0);
+        self.length -= count;
     }
 
-    /// Empties the window and says how many bytes were in it.
+    /// Empties the window and returns the number of bytes that it held.
     pub(super) fn clear(&mut self) -> u32 {
-        std::mem::take(&mut self.len) as u32
+        std::mem::take(&mut self.length) as u32
     }
 }

@@ -1,48 +1,48 @@
-//! Everything that can be wrong with a serial port, with what to do about it.
+//! Errors of a serial port, each with its remedy.
 
 use std::path::PathBuf;
 
 use crate::DeviceError;
 
-/// Why a probe cannot be opened. Each text ends with the remedy.
+/// Why a probe could not be opened. Each message ends with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
-    /// A setting makes no sense.
-    #[error("setting {name} = {value}: it must be {wants}")]
+    /// A setting is invalid.
+    #[error("setting {name} = {value} is invalid: expected {expected}")]
     Setting {
-        /// Which setting.
+        /// The setting.
         name: &'static str,
         /// Its value.
         value: String,
-        /// What it must be.
-        wants: &'static str,
+        /// The valid values.
+        expected: &'static str,
     },
-    /// There is no such device.
-    #[error("{}: there is no such port; plug the adapter in, and see /dev/serial/by-id for what is there", path.display())]
+    /// The device does not exist.
+    #[error("{}: there is no such port; connect the adapter, and look in /dev/serial/by-id for the ports that exist", path.display())]
     Missing {
         /// The port as configured.
         path: PathBuf,
     },
-    /// The user may not open it.
+    /// The user may not open the device.
     #[error(
         "{}: permission denied; join the group that owns it (`ls -l` shows it, often dialout) and log in again, \
          or add a udev rule with TAG+=\"uaccess\"",
         path.display()
     )]
     Permission {
-        /// The file that was refused.
+        /// The port as configured.
         path: PathBuf,
     },
-    /// Another process holds the port.
+    /// Another process uses the port.
     #[error(
-        "{}: held by {}; stop that first, two readers would take each other's bytes",
+        "{}: held by {}; stop that first: two readers would take each other's bytes",
         path.display(),
         pid.map_or("another process".to_string(), |pid| format!("process {pid}"))
     )]
     PortInUse {
         /// The port as configured.
         path: PathBuf,
-        /// Who holds it, if it says so.
+        /// The process, if it is known.
         pid: Option<u32>,
     },
     /// The lock file cannot be written.
@@ -50,39 +50,52 @@ pub enum SerialError {
     Lock {
         /// The lock file.
         path: PathBuf,
-        /// The system's words.
+        /// The system error.
         source: std::io::Error,
     },
-    /// The port did not take a setting of the line.
-    #[error("{}: {what} {asked} was asked for, the port has {got}; {remedy}", path.display())]
+    /// The port did not accept a line setting.
+    #[error("{}: {what} {asked} was requested, the port has {got}; {remedy}", path.display())]
     NotTaken {
         /// The port as configured.
         path: PathBuf,
-        /// Which setting of the line.
+        /// The line setting.
         what: &'static str,
-        /// What was asked for.
+        /// The configured value.
         asked: String,
-        /// What the port says it has.
+        /// The value of the port.
         got: String,
         /// What to do.
         remedy: &'static str,
     },
-    /// The port cannot be set up as a serial port.
+    /// The device is not a serial port.
     #[error("{}: cannot be opened as a serial port ({source}); is it a terminal device?", path.display())]
     Open {
         /// The port as configured.
         path: PathBuf,
-        /// The library's words.
+        /// Error of the serial-port library.
         source: serialport::Error,
     },
-    /// No thread for the reader.
-    #[error(
-        "no thread for the reader of the port: {source}; raise the limit of processes (ulimit -u)"
-    )]
-    Thread {
-        /// The system's words.
+    /// The start command could not be sent.
+    #[error("{}: the start command could not be sent ({source}); check adapter and cable", path.display())]
+    Start {
+        /// The port as configured.
+        path: PathBuf,
+        /// The system error.
         source: std::io::Error,
     },
+    /// The reader thread could not be started.
+    #[error(
+        "cannot start the reader thread of the port: {source}; raise the limit of processes (ulimit -u)"
+    )]
+    Thread {
+        /// The system error.
+        source: std::io::Error,
+    },
+    /// The protocol has no emulated probe.
+    #[error(
+        "this protocol has no emulated probe; implement Protocol::responder, or use one that has"
+    )]
+    NoEmulator,
 }
 
 /// Refuses a setting that is not a finite number above zero.
@@ -93,60 +106,60 @@ pub(super) fn positive(name: &'static str, value: f64) -> Result<(), SerialError
     Err(SerialError::Setting {
         name,
         value: value.to_string(),
-        wants: "a finite number above zero",
+        expected: "a finite number above zero",
     })
 }
 
-/// What went wrong while running, as a number that fits an atomic.
+/// A failure while the probe is open, as a number that fits an atomic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub(super) enum Trouble {
-    ReadFailed = 1,
-    WriteFailed,
-    HungUp,
+pub(super) enum Failure {
+    Read = 1,
+    Write,
+    HangUp,
     Timeout,
     Restart,
 }
 
-impl Trouble {
+impl Failure {
     const ALL: [Self; 5] = [
-        Self::ReadFailed,
-        Self::WriteFailed,
-        Self::HungUp,
+        Self::Read,
+        Self::Write,
+        Self::HangUp,
         Self::Timeout,
         Self::Restart,
     ];
 
-    /// The error of this number; `None` if there was none.
+    /// The error of this number; `None` for 0, no failure.
     pub(super) fn describe(number: u32, code: i64) -> Option<DeviceError> {
-        let trouble = Self::ALL
+        let failure = Self::ALL
             .into_iter()
-            .find(|trouble| *trouble as u32 == number)?;
-        let (what, remedy) = trouble.words();
+            .find(|failure| *failure as u32 == number)?;
+        let (what, remedy) = failure.text();
         Some(DeviceError { what, remedy, code })
     }
 
-    fn words(self) -> (&'static str, &'static str) {
+    fn text(self) -> (&'static str, &'static str) {
         match self {
-            Self::ReadFailed => (
+            Self::Read => (
                 "the serial port cannot be read",
-                "see the kernel's log for the adapter; open the probe again",
+                "see the kernel log for the adapter, then open the probe again",
             ),
-            Self::WriteFailed => (
-                "the serial port takes no request",
-                "check adapter and cable; open the probe again",
+            Self::Write => (
+                "the request cannot be written to the serial port",
+                "check adapter and cable, then open the probe again",
             ),
-            Self::HungUp => (
+            Self::HangUp => (
                 "the serial port is gone",
-                "plug the cable in and open the probe again",
+                "connect the cable, then open the probe again",
             ),
             Self::Timeout => (
                 "the probe did not answer",
                 "check its power, wiring, address, baud rate and parity",
             ),
             Self::Restart => (
-                "the probe's counter went back: it restarted",
-                "check the probe's supply",
+                "the counter of the probe went back: the probe restarted",
+                "check the supply of the probe",
             ),
         }
     }

@@ -1,9 +1,9 @@
-//! One process a port.
+//! Locks a port for one process.
 //!
-//! The library's own lock (TIOCEXCL and flock on the terminal) keeps others out but cannot name the holder, and TIOCEXCL
-//! does not hold against root. So before the port is opened a lock file named after the *resolved* device (two links to
-//! one port are one port) is locked by flock and given our process id. The kernel drops the lock with the process, however
-//! it ends; the file stays, and means nothing without the lock.
+//! The lock of the serial-port library (TIOCEXCL and flock on the terminal) excludes other processes but does not identify
+//! them, and TIOCEXCL does not apply to root. Therefore a lock file is locked with flock before the port is opened. It
+//! has the name of the resolved device, because several links may lead to one port, and contains the process number. The
+//! kernel releases the lock when the process ends. The file remains; without the lock it has no meaning.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, Write};
@@ -17,11 +17,11 @@ use super::error::SerialError;
 /// Holds the port for this process until dropped.
 #[derive(Debug)]
 pub(super) struct PortLock {
-    _held: Flock<File>,
+    _file: Flock<File>,
 }
 
 impl PortLock {
-    /// Takes the lock of `device` (a resolved path, `port` as configured), or names the process that has it.
+    /// Locks `device`, the resolved path of `port`. The error names the process that holds the lock.
     pub(super) fn take(lock_dir: &Path, port: &Path, device: &Path) -> Result<Self, SerialError> {
         let path = lock_dir.join(name_of(device));
         let file = open(&path).map_err(|source| SerialError::Lock {
@@ -29,9 +29,9 @@ impl PortLock {
             source,
         })?;
         match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
-            Ok(mut held) => {
-                sign(&mut held).map_err(|source| SerialError::Lock { path, source })?;
-                Ok(Self { _held: held })
+            Ok(mut file) => {
+                write_pid(&mut file).map_err(|source| SerialError::Lock { path, source })?;
+                Ok(Self { _file: file })
             }
             Err((mut file, _)) => Err(SerialError::PortInUse {
                 path: port.to_owned(),
@@ -50,7 +50,8 @@ fn name_of(device: &Path) -> PathBuf {
     format!("bench-{name}.lock").into()
 }
 
-/// Opens the file for every user of the port: in a shared, sticky directory only its maker may create it.
+/// Opens the file, or creates it for every user. In a shared, sticky directory, opening a file of another user with O_CREAT
+/// may be refused, so the existing file is opened first.
 fn open(path: &Path) -> std::io::Result<File> {
     let existing = OpenOptions::new().read(true).write(true).open(path);
     existing.or_else(|_| {
@@ -64,7 +65,7 @@ fn open(path: &Path) -> std::io::Result<File> {
     })
 }
 
-fn sign(file: &mut File) -> std::io::Result<()> {
+fn write_pid(file: &mut File) -> std::io::Result<()> {
     file.set_len(0)?;
     file.rewind()?;
     writeln!(file, "{}", std::process::id())

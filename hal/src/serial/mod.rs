@@ -1,28 +1,34 @@
-//! Displacement probes over a serial port.
+//! Displacement probes on a serial port.
 //!
 //! ```text
-//! port --bytes--> decoder --events--> reader thread --newest, with its time--> cell --> SerialProbe::latest   (the loop)
-//!   ^                                      |                                                in the tick: no lock
-//!   +------------- request ----------------+---> statistics (atomics)
+//! port --bytes--> decoder --events--> reader thread --newest measurement--> cell --> SerialProbe::latest (in the tick)
+//!   ^                                      |
+//!   +-------------- request ---------------+---> statistics (atomics)
 //! ```
 //!
-//! * [`capancdt`], [`optoncdt`], [`ascii`]: what the probes say, byte by byte, for both sides of the line; no clock, no port.
-//! * [`SerialProbe`]: the driver. Its thread owns the port, asks where the protocol asks and listens where it streams.
-//! * [`emulator`]: pretend probes with faults on request, to rehearse and to test.
+//! * [`Protocol`] is the interface of a protocol; [`capancdt`], [`optoncdt`] and [`ascii`] implement it.
+//! * [`SerialProbe`] is the driver. Its reader thread owns the port, polls the probe or listens to its stream.
+//! * [`emulator`] contains emulated probes with faults, for tests and rehearsals.
 //!
-//! # What a reading is worth
+//! # To add a probe
 //!
-//! *Valid* means: the bytes kept every rule of the protocol, the probe did not object, and the value is in range. How much
-//! that is depends on the protocol; each module says what its protocol cannot know.
+//! Write one file in this folder with a type that implements [`Protocol`] (see the example there), and declare it below
+//! with `pub mod`.
 //!
-//! *Sequence* counts measurements, those included that a counter shows to be lost. It rises only with new ones: values
-//! that the probe repeats are withheld.
+//! # Meaning of a reading
 //!
-//! *Age* is never understated knowingly: an answer counts from its request, a message of a stream from before its first
-//! byte. Where nobody can tell (a reader that was kept from running, a backlog, an answer that may belong to an older
-//! request) the value is counted and not handed out. A damaged message is no reading; the one before it ages. When the
-//! port is lost the last reading stays, aging and `Faulty`. A probe that says it cannot measure gives a new `Faulty`
-//! reading whose position is not a number.
+//! `validity` is `Valid` if the bytes obey all rules of the protocol, the probe reports no error, and the value is in range.
+//! Each protocol module states which errors its protocol cannot detect. If the probe reports that it cannot measure, the
+//! reading is `Faulty` and its position is NaN. If the port is lost, the last reading remains, becomes `Faulty`, and its age
+//! grows.
+//!
+//! `sequence` counts measurements, including those that were lost according to the probe's counter. It increases only with
+//! new measurements; repeated values are withheld.
+//!
+//! `age_ns` is an upper bound as far as the driver can determine it: the age of an answer counts from its request, the age of
+//! a message of a stream from the time before its first byte. If the driver cannot determine the age (the reader thread was
+//! suspended, a backlog of bytes, an answer that may belong to an earlier request), the value is counted but not
+//! published. A damaged message gives no reading.
 
 pub mod ascii;
 pub mod capancdt;
@@ -30,19 +36,19 @@ mod cell;
 mod decoder;
 pub mod emulator;
 mod error;
+mod ioctl;
 mod lock;
-mod low_latency;
 pub mod optoncdt;
-mod pattern;
 mod poller;
 mod port;
 mod probe;
+mod protocol;
 mod reader;
 mod statistics;
 
 pub use decoder::{Decoder, Event, Sample};
 pub use error::SerialError;
 pub use port::{Note, Parity, PortSettings};
-pub use probe::{Polling, ProbeSettings, Protocol, SerialProbe, StatisticsHandle};
-pub use reader::Mounting;
+pub use probe::{Mounting, ProbeSettings, SerialProbe, StatisticsHandle};
+pub use protocol::{Polling, Protocol};
 pub use statistics::Statistics;

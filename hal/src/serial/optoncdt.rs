@@ -1,6 +1,6 @@
-//! Micro-Epsilon RS422 stream (optoNCDT family): the probe sends three bytes a value, unasked.
+//! Micro-Epsilon RS422 stream (optoNCDT family): the probe sends three bytes per value, without requests.
 //!
-//! Source: manual optoNCDT 1420, chapter "Digital interfaces RS422". 921600 baud, 8N1, up to 4 kHz; 33 us a value.
+//! Source: manual optoNCDT 1420, chapter "Digital interfaces RS422". 921600 baud, 8N1, up to 4 kHz; 33 us per value.
 //!
 //! ```text
 //! L  0 0 D5  D4  D3  D2  D1  D0
@@ -11,50 +11,58 @@
 //! D17 or D16 set: not a value but an error
 //! ```
 //!
-//! # What the protocol cannot know
+//! # Limits of the protocol
 //!
-//! There is no checksum, no counter and, at 8N1, no parity: two bits of eight say where a byte belongs, the other six
-//! are believed. So
+//! There is no checksum, no counter and, at 8N1, no parity: two bits of each byte give its place in the message, the
+//! other six cannot be checked. Therefore:
 //!
-//! * a flipped data bit is a wrong value, by up to half the range;
-//! * bytes lost in threes join the parts of two values: `L | M' H'` is wrong by at most 63 counts, `L M | H'` by a multiple
-//!   of 4096 counts (6 % of the range) when the signal crosses such a boundary in between;
-//! * lost values leave no trace unless a message was cut;
-//! * of random bytes one triple in 64 is a message (1/4 L, 1/4 M, 1/4 H with F = 0), one in 256 a value without error
+//! * A flipped data bit gives a wrong value; the error is up to half the range.
+//! * Bytes lost in groups of three join the parts of two values: `L | M' H'` is wrong by at most 63 counts, `L M | H'` by
+//!   a multiple of 4096 counts (6 % of the range) if the signal crosses such a boundary in between.
+//! * Lost values are not detected unless a message was cut.
+//! * Of random bytes, one triple in 64 is a message (1/4 L, 1/4 M, 1/4 H with F = 0), one in 256 a value without error
 //!   bits, and 64235/65536 of those are in range: 3.83 valid values in 1000 bytes of noise.
 //!
-//! A jump that the stage cannot make is for the interlocks to see.
+//! Jumps that the stage cannot make are left to the interlocks.
 
-use super::decoder::{Damage, Decoder, Event, Sample};
+use super::decoder::{DamageCounter, Decoder, Event, Sample};
+use super::emulator::Responder;
 use super::error::{SerialError, positive};
+use super::protocol::Protocol;
 
 /// Lowest count within the range.
 pub const RANGE_START: u32 = 643;
 /// Highest count within the range.
 pub const RANGE_END: u32 = 64877;
-/// Highest count that is a value at all.
+/// Highest 16-bit value; a larger number is an error code.
 const VALUE_MAX: u32 = 0xFFFF;
 
-/// What the probe is set to send at each measurement.
+/// The values that the probe sends at each measurement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cycle {
-    /// Values the probe is set to send a cycle, 1 to 32.
+    /// Number of values per cycle, 1 to 32.
     pub values: u8,
-    /// Which of them is the displacement, counted from 0.
+    /// Index of the displacement among them, from 0.
     pub displacement: u8,
 }
 
-/// A probe of this family on the line.
+/// Settings of the protocol.
+///
+/// ```
+/// let settings = bench_hal::serial::optoncdt::Settings::new(10e-3);
+/// assert!((settings.metres(32760) - 5e-3).abs() < 1e-15); // the middle of the range
+/// assert_eq!(settings.counts(5e-3), 32760);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Measuring range, metres.
+    /// Measuring range in metres.
     pub range_m: f64,
-    /// What a cycle of the probe's output holds.
+    /// The values per cycle.
     pub cycle: Cycle,
 }
 
 impl Settings {
-    /// A probe of this range that sends nothing but the displacement.
+    /// A probe with this measuring range that sends only the displacement.
     pub fn new(range_m: f64) -> Self {
         Self {
             range_m,
@@ -65,29 +73,27 @@ impl Settings {
         }
     }
 
-    /// Metres of `x` counts from the start of the range.
+    /// Position of `x` counts in metres from the start of the range.
     pub fn metres(&self, x: u32) -> f64 {
         (f64::from(x) * 102.0 / 65520.0 - 1.0) / 100.0 * self.range_m
     }
 
-    /// Counts at `position_m`, rounded, within what the probe can say: the device's side.
+    /// Counts at `position_m`, rounded and limited to 0..=65520.
     pub fn counts(&self, position_m: f64) -> u32 {
-        ((position_m / self.range_m * 100.0 + 1.0) / 102.0 * 65520.0)
-            .round()
-            .clamp(0.0, 65520.0) as u32
+        let counts = (position_m / self.range_m * 100.0 + 1.0) / 102.0 * 65520.0;
+        counts.round().clamp(0.0, 65520.0) as u32
     }
 
     fn event(&self, x: u32) -> Event {
         if x > VALUE_MAX {
             return Event::Fault {
                 code: i64::from(x),
-                words: words(x),
+                text: error_text(x),
             };
         }
-        let position_m = self.metres(x).clamp(0.0, self.range_m);
         let sample = Sample {
             raw: i64::from(x),
-            position_m,
+            position_m: self.metres(x).clamp(0.0, self.range_m),
         };
         if (RANGE_START..=RANGE_END).contains(&x) {
             Event::Value(sample)
@@ -97,27 +103,41 @@ impl Settings {
     }
 }
 
-/// The three bytes of the 18 bits of `x`: the device's side.
-pub fn message(x: u32, first: bool) -> [u8; 3] {
-    let six = |shift: u32| (x >> shift) as u8 & 0x3F;
-    [
-        six(0),
-        0x40 | six(6),
-        0x80 | u8::from(!first) << 6 | six(12),
-    ]
+impl Protocol for Settings {
+    fn decoder(&self) -> Result<Box<dyn Decoder>, SerialError> {
+        Ok(Box::new(Optoncdt::new(self.clone())?))
+    }
+
+    fn characters_per_reading(&self) -> Option<u32> {
+        Some(3 * u32::from(self.cycle.values))
+    }
+
+    fn responder(&self) -> Result<Box<dyn Responder>, SerialError> {
+        Ok(Box::new(OptoncdtResponder {
+            settings: self.clone(),
+            is_cut: false,
+        }))
+    }
 }
 
-/// Words for an error value. The manual at hand says only that errors have 18 bits; the list is from memory of it.
-fn words(x: u32) -> &'static str {
+/// The message with the 18 bits of `x`.
+pub fn message(x: u32, is_first: bool) -> [u8; 3] {
+    let [low, middle, high] = [0, 6, 12].map(|shift| (x >> shift) as u8 & 0x3F);
+    [low, 0x40 | middle, 0x80 | u8::from(!is_first) << 6 | high]
+}
+
+/// Text for an error value. The manual used for this module states only that errors have 18 bits. The numbers were written
+/// from memory and have not been verified.
+fn error_text(x: u32) -> &'static str {
     match x {
-        262_075 => "the probe has more data than its baud rate carries",
-        262_076 => "the probe sees no peak: no target, or too little light",
+        262_075 => "the data rate of the probe exceeds its baud rate",
+        262_076 => "the probe detects no peak: no target, or too little light",
         262_077 => "the peak lies before the measuring range",
         262_078 => "the peak lies behind the measuring range",
         262_080 => "the probe cannot compute a value",
         262_082 => "the peak is too wide",
         262_083 => "the laser is off",
-        _ => "the probe reports an error; its manual lists the number",
+        _ => "the probe reports an error; see its manual for the number",
     }
 }
 
@@ -125,32 +145,32 @@ fn words(x: u32) -> &'static str {
 #[derive(Debug)]
 pub struct Optoncdt {
     settings: Settings,
-    held: Held,
-    /// Place of the next further value in the cycle; `None` until a first value has been seen undamaged.
-    place: Option<u8>,
-    damage: Damage,
+    partial: Partial,
+    /// Index of the next further value in the cycle; `None` until a first value has been received undamaged.
+    next_index: Option<u8>,
+    damage: DamageCounter,
 }
 
-/// The part of a message that is there, without its marking bits.
+/// The received part of a message, without its marking bits.
 #[derive(Clone, Copy, Debug)]
-enum Held {
-    Nothing,
-    L(u32),
-    LM(u32),
+enum Partial {
+    Empty,
+    Low(u32),
+    LowMiddle(u32),
 }
 
-impl Held {
+impl Partial {
     fn bytes(self) -> u32 {
         match self {
-            Self::Nothing => 0,
-            Self::L(_) => 1,
-            Self::LM(_) => 2,
+            Self::Empty => 0,
+            Self::Low(_) => 1,
+            Self::LowMiddle(_) => 2,
         }
     }
 }
 
 impl Optoncdt {
-    /// A decoder that has heard nothing yet.
+    /// A decoder that has not received anything yet.
     pub fn new(settings: Settings) -> Result<Self, SerialError> {
         positive("range_m", settings.range_m)?;
         let Cycle {
@@ -158,43 +178,54 @@ impl Optoncdt {
             displacement,
         } = settings.cycle;
         if !(1..=32).contains(&values) || displacement >= values {
-            let value = format!("{displacement} of {values}");
-            let wants = "1 to 32 values a cycle, and the displacement one of them, counted from 0";
             return Err(SerialError::Setting {
                 name: "cycle",
-                value,
-                wants,
+                value: format!("{displacement} of {values}"),
+                expected: "1 to 32 values per cycle, and the index of the displacement, from 0, below that number",
             });
         }
         Ok(Self {
             settings,
-            held: Held::Nothing,
-            place: None,
-            damage: Damage::default(),
+            partial: Partial::Empty,
+            next_index: None,
+            damage: DamageCounter::default(),
         })
     }
 
-    /// The message is broken: what is held, and `more` bytes, belong to nothing.
-    fn break_off(&mut self, more: u32, out: &mut dyn FnMut(Event)) {
-        let bytes = std::mem::replace(&mut self.held, Held::Nothing).bytes() + more;
+    fn take_byte(&mut self, byte: u8, out: &mut dyn FnMut(Event)) {
+        let data = u32::from(byte & 0x3F);
+        match (byte >> 6, self.partial) {
+            (0, _) => {
+                self.discard(0, out);
+                self.partial = Partial::Low(data);
+            }
+            (1, Partial::Low(low)) => self.partial = Partial::LowMiddle(low | data << 6),
+            (2 | 3, Partial::LowMiddle(low)) => {
+                self.partial = Partial::Empty;
+                self.take_message(low | data << 12, byte & 0x40 == 0, out);
+            }
+            _ => self.discard(1, out),
+        }
+    }
+
+    /// Reports the partial message and `more` bytes as damaged.
+    fn discard(&mut self, more: u32, out: &mut dyn FnMut(Event)) {
+        let bytes = std::mem::replace(&mut self.partial, Partial::Empty).bytes() + more;
         if bytes > 0 {
-            self.place = None;
+            self.next_index = None;
             self.damage.add(bytes, out);
         }
     }
 
-    fn take_message(&mut self, x: u32, first: bool, out: &mut dyn FnMut(Event)) {
-        let Cycle {
-            values,
-            displacement,
-        } = self.settings.cycle;
-        let place = if first { Some(0) } else { self.place };
-        let Some(place) = place.filter(|place| *place < values) else {
-            return self.break_off(3, out);
+    fn take_message(&mut self, x: u32, is_first: bool, out: &mut dyn FnMut(Event)) {
+        let cycle = &self.settings.cycle;
+        let index = if is_first { Some(0) } else { self.next_index };
+        let Some(index) = index.filter(|index| *index < cycle.values) else {
+            return self.discard(3, out);
         };
-        self.damage.end(out);
-        self.place = Some(place + 1);
-        if place == displacement {
+        self.damage.report(out);
+        self.next_index = Some(index + 1);
+        if index == cycle.displacement {
             out(self.settings.event(x));
         }
     }
@@ -203,33 +234,58 @@ impl Optoncdt {
 impl Decoder for Optoncdt {
     fn feed(&mut self, bytes: &[u8], out: &mut dyn FnMut(Event)) {
         for &byte in bytes {
-            let six = u32::from(byte & 0x3F);
-            match (byte >> 6, self.held) {
-                (0, _) => {
-                    self.break_off(0, out);
-                    self.held = Held::L(six);
-                }
-                (1, Held::L(low)) => self.held = Held::LM(low | six << 6),
-                (2 | 3, Held::LM(low)) => {
-                    self.held = Held::Nothing;
-                    self.take_message(low | six << 12, byte & 0x40 == 0, out);
-                }
-                _ => self.break_off(1, out),
-            }
+            self.take_byte(byte, out);
         }
     }
 
     fn reset(&mut self, out: &mut dyn FnMut(Event)) {
-        self.break_off(0, out);
-        self.place = None;
-        self.damage.end(out);
-    }
-
-    fn request(&self) -> Option<&[u8]> {
-        None
+        self.discard(0, out);
+        self.next_index = None;
+        self.damage.report(out);
     }
 
     fn message_bytes(&self) -> u32 {
         3 * (1 + u32::from(self.settings.cycle.displacement))
+    }
+}
+
+/// An emulated probe: sends a cycle at each measurement.
+struct OptoncdtResponder {
+    settings: Settings,
+    /// The next cycle is cut off after two bytes: the probe has restarted while sending it.
+    is_cut: bool,
+}
+
+impl Responder for OptoncdtResponder {
+    /// One cycle; the values other than the displacement are zero.
+    fn measure(&mut self, position_m: f64) -> Vec<u8> {
+        let Cycle {
+            values,
+            displacement,
+        } = self.settings.cycle;
+        let mut cycle = vec![0; usize::from(values)];
+        if let Some(x) = cycle.get_mut(usize::from(displacement)) {
+            *x = self.settings.counts(position_m);
+        }
+        let mut bytes = Vec::new();
+        for (index, x) in cycle.into_iter().enumerate() {
+            bytes.extend(message(x, index == 0));
+        }
+        if std::mem::take(&mut self.is_cut) {
+            bytes.truncate(2);
+        }
+        bytes
+    }
+
+    fn receive(&mut self, _byte: u8) -> Vec<u8> {
+        Vec::new()
+    }
+
+    fn restart(&mut self) {
+        self.is_cut = true;
+    }
+
+    fn out_of_range_m(&self) -> f64 {
+        2.0 * self.settings.range_m
     }
 }

@@ -1,167 +1,211 @@
-//! Asking and being answered on a half-duplex line, without clock or port: times go in, decisions come out.
+//! Request and answer on a half-duplex line, without clock and port: the caller passes the times.
 //!
 //! ```text
 //!                    due: send
-//!   Rest -----------------------------------------> Waiting --+ `timeout` without a byte: timed out, send again
+//!   Idle -----------------------------------------> Waiting --+ `timeout` without a byte: timed out, send again
 //!    ^ ^                                             |  |  ^--+
-//!    | +- answered; or damaged: bytes, then `quiet` -+  |
-//!    |                                                  | answered after a timeout; two answers
+//!    | +- answer; or damaged answer and `quiet` -----+  |
+//!    |                                                  | answer after a timeout; two answers
 //!    +-- silent for long enough ---- OutOfStep <--------+
 //! ```
 //!
-//! An answer carries no mark of its request: it is as old as the first request that it may belong to. That is the request
-//! it follows, if all before had their answers. After a timeout it is the first of those without one, and the line must
-//! then fall silent, for the answers to the others may still come, as far from each other as their requests: twice the
-//! longest distance between two of these is long enough, if no answer is later than another by more than `timeout`. What
-//! arrives meanwhile is thrown away. So it is at the start, too: a program before us may have asked.
+//! An answer does not identify its request. It is therefore assigned to the earliest request that it may belong to:
 //!
-//! Noise on the line between a request and an answer that comes later than `quiet` after it would be taken for that answer
-//! damaged: `quiet` must be longer than a probe thinks.
+//! * If all earlier requests were answered, this is the latest request.
+//! * After timeouts it is the first request without an answer. The answers to the other requests may still arrive, at
+//!   distances like those of their requests. Before the next request the line must therefore be silent for twice the longest
+//!   of these distances; this is sufficient if the delays of the answers differ by at most `timeout`. Bytes that
+//!   arrive in this time are discarded.
+//!
+//! The same silence is required after opening, because another program may have sent requests before.
+//!
+//! Noise between a request and its answer looks like a damaged answer if the answer comes later than `quiet` after the
+//! noise. `quiet` must therefore be longer than the response time of the probe.
 
-/// Times of a polled probe, nanoseconds.
+use std::time::Duration;
+
+use super::protocol::Polling;
+
+/// [`Polling`] in nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Times {
-    pub interval_ns: u64,
-    pub timeout_ns: u64,
-    pub quiet_ns: u64,
+struct Times {
+    interval_ns: u64,
+    timeout_ns: u64,
+    quiet_ns: u64,
 }
 
-/// What to do when nothing (more) has arrived.
+/// What the reader thread has to do after it has read all bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Step {
-    /// Send the request, then call [`Exchange::sent`].
+pub(super) enum Action {
+    /// Call [`Poller::sent`] and send the request.
     Send,
-    /// Listen until then.
+    /// Listen until this time.
     Listen { until_ns: u64 },
-    /// The probe did not answer in time; ask again what to do.
+    /// Count a timeout, then ask for the next action.
     TimedOut,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    Rest { until_ns: u64 },
-    Waiting { sent_ns: u64, heard_ns: Option<u64> },
-    OutOfStep { silence_ns: u64, heard_ns: u64 },
+    Idle {
+        until_ns: u64,
+    },
+    Waiting {
+        sent_ns: u64,
+        received_ns: Option<u64>,
+    },
+    OutOfStep {
+        silence_ns: u64,
+        received_ns: u64,
+    },
 }
 
-/// The conversation with a polled probe.
+/// Decides when to send a request and which answers to use.
 #[derive(Debug)]
-pub(super) struct Exchange {
+pub(super) struct Poller {
     times: Times,
     state: State,
     /// The requests since the last answer, if one of them timed out.
     unanswered: Option<Unanswered>,
 }
 
-/// Requests that timed out, and the one after them.
+/// A series of requests of which the first timed out.
 #[derive(Clone, Copy, Debug)]
 struct Unanswered {
     first_ns: u64,
     latest_ns: u64,
-    /// From one to the next, at most.
-    apart_ns: u64,
+    /// Longest time from one request to the next.
+    longest_distance_ns: u64,
 }
 
-impl Exchange {
-    /// A conversation not begun.
-    pub(super) fn new(times: Times, now_ns: u64) -> Self {
-        let state = State::OutOfStep {
-            silence_ns: 2 * times.timeout_ns,
-            heard_ns: now_ns,
+impl Unanswered {
+    fn new(sent_ns: u64) -> Self {
+        Self {
+            first_ns: sent_ns,
+            latest_ns: sent_ns,
+            longest_distance_ns: 0,
+        }
+    }
+
+    fn add_request(&mut self, now_ns: u64) {
+        let distance_ns = now_ns - self.latest_ns;
+        self.longest_distance_ns = self.longest_distance_ns.max(distance_ns);
+        self.latest_ns = now_ns;
+    }
+}
+
+impl Poller {
+    /// A poller that waits for silence before its first request.
+    pub(super) fn new(polling: Polling, now_ns: u64) -> Self {
+        let times = Times {
+            interval_ns: nanoseconds(polling.interval),
+            timeout_ns: nanoseconds(polling.timeout),
+            quiet_ns: nanoseconds(polling.quiet),
         };
+        Self::with_times(times, now_ns)
+    }
+
+    fn with_times(times: Times, now_ns: u64) -> Self {
         Self {
             times,
-            state,
+            state: State::OutOfStep {
+                silence_ns: 2 * times.timeout_ns,
+                received_ns: now_ns,
+            },
             unanswered: None,
         }
     }
 
-    /// Until when there is nothing to do but listen.
+    /// The time of the next action if nothing is received.
     pub(super) fn listen_until_ns(&self) -> u64 {
         match self.state {
-            State::Rest { until_ns } => until_ns,
+            State::Idle { until_ns } => until_ns,
             State::OutOfStep {
                 silence_ns,
-                heard_ns,
-            } => heard_ns + silence_ns,
+                received_ns,
+            } => received_ns + silence_ns,
             State::Waiting {
-                heard_ns: Some(heard_ns),
+                received_ns: Some(received_ns),
                 ..
-            } => heard_ns + self.times.quiet_ns,
-            State::Waiting {
-                sent_ns,
-                heard_ns: None,
-            } => sent_ns + self.times.timeout_ns,
+            } => received_ns + self.times.quiet_ns,
+            State::Waiting { sent_ns, .. } => sent_ns + self.times.timeout_ns,
         }
     }
 
-    /// What to do. To be asked when all that had arrived by `now_ns` was heard.
-    pub(super) fn step(&mut self, now_ns: u64) -> Step {
+    /// The next action. To be called when all bytes that arrived up to `now_ns` have been passed to
+    /// [`received`](Self::received).
+    pub(super) fn next_action(&mut self, now_ns: u64) -> Action {
         let until_ns = self.listen_until_ns();
         match self.state {
-            _ if now_ns < until_ns => Step::Listen { until_ns },
+            _ if now_ns < until_ns => Action::Listen { until_ns },
             State::Waiting {
                 sent_ns,
-                heard_ns: None,
+                received_ns: None,
             } => {
-                self.unanswered.get_or_insert(Unanswered {
-                    first_ns: sent_ns,
-                    latest_ns: sent_ns,
-                    apart_ns: 0,
-                });
-                self.state = State::Rest { until_ns: now_ns };
-                Step::TimedOut
+                self.unanswered.get_or_insert(Unanswered::new(sent_ns));
+                self.state = State::Idle { until_ns: now_ns };
+                Action::TimedOut
             }
-            _ => Step::Send,
+            _ => Action::Send,
         }
     }
 
-    /// A request goes out; `now_ns` is before its first byte.
+    /// Notes that a request is sent; `now_ns` is before its first byte.
     pub(super) fn sent(&mut self, now_ns: u64) {
         self.state = State::Waiting {
             sent_ns: now_ns,
-            heard_ns: None,
+            received_ns: None,
         };
         if let Some(unanswered) = &mut self.unanswered {
-            unanswered.apart_ns = unanswered.apart_ns.max(now_ns - unanswered.latest_ns);
-            unanswered.latest_ns = now_ns;
+            unanswered.add_request(now_ns);
         }
     }
 
-    /// Bytes arrived: may they be part of an answer, to be decoded?
-    pub(super) fn heard(&mut self, now_ns: u64) -> bool {
+    /// Notes that bytes were received. Returns whether they may be part of an answer and have to be decoded.
+    pub(super) fn received(&mut self, now_ns: u64) -> bool {
         match &mut self.state {
-            State::Waiting { heard_ns, .. } => *heard_ns = Some(now_ns),
-            State::OutOfStep { heard_ns, .. } => *heard_ns = now_ns,
-            State::Rest { .. } => {}
+            State::Waiting { received_ns, .. } => *received_ns = Some(now_ns),
+            State::OutOfStep { received_ns, .. } => *received_ns = now_ns,
+            State::Idle { .. } => {}
         }
         matches!(self.state, State::Waiting { .. })
     }
 
-    /// So many answers, one or more, are complete: when they were asked for, if that can be told.
+    /// Notes `answers` complete answers, at least one. Returns the time of the request that the age counts from, or `None` if
+    /// it is unknown.
     ///
-    /// The probe sends what it measured before it heard the request, so its newest value is as old as the request, and
-    /// counts from there, however late the answer.
+    /// The probe sends values that it measured before it received the request. The newest of them is therefore as old as
+    /// the request, however late the answer arrives.
     pub(super) fn answered(&mut self, answers: u32, now_ns: u64) -> Option<u64> {
         let State::Waiting { sent_ns, .. } = self.state else {
             return None;
         };
-        let unanswered = self.unanswered.take();
-        if answers == 1 && unanswered.is_none() {
-            self.state = State::Rest {
-                until_ns: sent_ns + self.times.interval_ns,
-            };
-        } else {
-            let apart_ns = unanswered
-                .map_or(0, |unanswered| unanswered.apart_ns)
-                .max(self.times.timeout_ns);
-            self.state = State::OutOfStep {
-                silence_ns: 2 * apart_ns,
-                heard_ns: now_ns,
-            };
+        match (answers, self.unanswered.take()) {
+            (1, None) => {
+                let until_ns = sent_ns + self.times.interval_ns;
+                self.state = State::Idle { until_ns };
+                Some(sent_ns)
+            }
+            (_, unanswered) => {
+                self.wait_for_silence(unanswered, now_ns);
+                let first_ns = unanswered.map_or(sent_ns, |unanswered| unanswered.first_ns);
+                (answers == 1).then_some(first_ns)
+            }
         }
-        (answers == 1).then_some(unanswered.map_or(sent_ns, |unanswered| unanswered.first_ns))
     }
+
+    fn wait_for_silence(&mut self, unanswered: Option<Unanswered>, now_ns: u64) {
+        let longest_ns = unanswered.map_or(0, |unanswered| unanswered.longest_distance_ns);
+        self.state = State::OutOfStep {
+            silence_ns: 2 * longest_ns.max(self.times.timeout_ns),
+            received_ns: now_ns,
+        };
+    }
+}
+
+/// The duration in nanoseconds, limited to one hour so that sums cannot overflow.
+pub(super) fn nanoseconds(duration: Duration) -> u64 {
+    duration.min(Duration::from_secs(3600)).as_nanos() as u64
 }
 
 #[cfg(test)]
@@ -177,109 +221,108 @@ mod tests {
         quiet_ns: 100,
     };
 
-    /// An exchange after the silence at the start, with a request at 1000.
-    fn asked() -> Exchange {
-        let mut exchange = Exchange::new(TIMES, 0);
-        assert_eq!(exchange.step(999), Step::Listen { until_ns: 1000 });
-        assert_eq!(exchange.step(1000), Step::Send);
-        exchange.sent(1000);
-        exchange
+    /// An poller after the silence at the start, with a request at 1000.
+    fn asked() -> Poller {
+        let mut poller = Poller::with_times(TIMES, 0);
+        assert_eq!(poller.next_action(999), Action::Listen { until_ns: 1000 });
+        assert_eq!(poller.next_action(1000), Action::Send);
+        poller.sent(1000);
+        poller
     }
 
     #[test]
-    fn a_request_goes_out_at_every_interval_and_its_answer_is_as_old_as_the_request() {
-        let mut exchange = asked();
-        assert!(exchange.heard(1200));
-        assert_eq!(exchange.answered(1, 1200), Some(1000));
-        assert_eq!(exchange.step(1999), Step::Listen { until_ns: 2000 });
-        assert_eq!(exchange.step(2000), Step::Send);
+    fn polls_at_the_interval_and_dates_the_answer_by_its_request() {
+        let mut poller = asked();
+        assert!(poller.received(1200));
+        assert_eq!(poller.answered(1, 1200), Some(1000));
+        assert_eq!(poller.next_action(1999), Action::Listen { until_ns: 2000 });
+        assert_eq!(poller.next_action(2000), Action::Send);
     }
 
     #[test]
-    fn a_damaged_answer_is_asked_for_again_as_soon_as_the_line_is_quiet() {
-        let mut exchange = asked();
-        assert!(exchange.heard(1100) && exchange.heard(1150));
-        assert_eq!(exchange.step(1249), Step::Listen { until_ns: 1250 });
-        assert_eq!(exchange.step(1250), Step::Send);
+    fn repeats_the_request_when_the_line_is_quiet_after_a_damaged_answer() {
+        let mut poller = asked();
+        assert!(poller.received(1100) && poller.received(1150));
+        assert_eq!(poller.next_action(1249), Action::Listen { until_ns: 1250 });
+        assert_eq!(poller.next_action(1250), Action::Send);
     }
 
     #[test]
-    fn silence_times_out_and_is_asked_again() {
-        let mut exchange = asked();
-        assert_eq!(exchange.step(1499), Step::Listen { until_ns: 1500 });
-        assert_eq!(exchange.step(1500), Step::TimedOut);
-        assert_eq!(exchange.step(1500), Step::Send);
+    fn repeats_the_request_after_a_timeout() {
+        let mut poller = asked();
+        assert_eq!(poller.next_action(1499), Action::Listen { until_ns: 1500 });
+        assert_eq!(poller.next_action(1500), Action::TimedOut);
+        assert_eq!(poller.next_action(1500), Action::Send);
     }
 
     #[test]
-    fn an_answer_after_timeouts_is_as_old_as_the_first_request_without_one_and_then_the_line_must_fall_silent()
-     {
-        let mut exchange = asked();
+    fn dates_an_answer_after_timeouts_by_the_first_unanswered_request_and_waits_for_silence() {
+        let mut poller = asked();
         for now_ns in [1500, 2000] {
-            assert_eq!(exchange.step(now_ns), Step::TimedOut);
-            exchange.sent(now_ns);
+            assert_eq!(poller.next_action(now_ns), Action::TimedOut);
+            poller.sent(now_ns);
         }
         assert_eq!(
-            exchange.answered(1, 2100),
+            poller.answered(1, 2100),
             Some(1000),
             "it may be the answer to the very first"
         );
         assert!(
-            !exchange.heard(2600),
+            !poller.received(2600),
             "the answer to the second: thrown away"
         );
         assert_eq!(
-            exchange.step(3599),
-            Step::Listen { until_ns: 3600 },
+            poller.next_action(3599),
+            Action::Listen { until_ns: 3600 },
             "and it starts the silence anew"
         );
-        assert_eq!(exchange.step(3600), Step::Send);
-        exchange.sent(3600);
-        assert_eq!(exchange.answered(1, 3700), Some(3600));
+        assert_eq!(poller.next_action(3600), Action::Send);
+        poller.sent(3600);
+        assert_eq!(poller.answered(1, 3700), Some(3600));
     }
 
     #[test]
-    fn two_answers_to_one_request_are_of_unknown_age() {
-        let mut exchange = asked();
-        assert_eq!(exchange.answered(2, 1100), None);
-        assert_eq!(exchange.step(2099), Step::Listen { until_ns: 2100 });
+    fn two_answers_to_one_request_have_unknown_age() {
+        let mut poller = asked();
+        assert_eq!(poller.answered(2, 1100), None);
+        assert_eq!(poller.next_action(2099), Action::Listen { until_ns: 2100 });
     }
 
     #[test]
-    fn what_nobody_asked_for_is_not_decoded() {
-        let mut exchange = asked();
-        assert_eq!(exchange.answered(1, 1200), Some(1000));
-        assert!(!exchange.heard(1300));
-        assert_eq!(exchange.answered(1, 1300), None);
+    fn ignores_bytes_without_a_request() {
+        let mut poller = asked();
+        assert_eq!(poller.answered(1, 1200), Some(1000));
+        assert!(!poller.received(1300));
+        assert_eq!(poller.answered(1, 1300), None);
     }
 
     proptest! {
         /// However late a probe answers, and however late the reader looks: no answer counts as asked for after it was.
         #[test]
-        fn an_answer_is_never_taken_for_that_of_a_later_request(
+        fn never_assigns_an_answer_to_a_later_request(
             late_ns in 0u64..5000, jitter_ns in vec(0u64..400, 1..20), kept_ns in vec(0u64..2000, 1..20), rarely in 1usize..30,
         ) {
-            let (mut exchange, mut now_ns, mut believed) = (Exchange::new(TIMES, 0), 0, 0);
+            let (mut poller, mut now_ns, mut believed) = (Poller::with_times(TIMES, 0), 0, 0);
             let mut on_the_way: Vec<(u64, u64)> = Vec::new(); // sent, arrives
             let mut requests = 0;
             for turn in 0..2000 {
                 let (arrived, later): (Vec<_>, Vec<_>) = on_the_way.iter().partition(|(_, arrives_ns)| *arrives_ns <= now_ns);
                 if let Some((sent_ns, _)) = arrived.last() {
-                    let asked_ns = exchange.heard(now_ns).then(|| exchange.answered(arrived.len() as u32, now_ns)).flatten();
+                    let asked_ns = poller.received(now_ns).then(|| poller.answered(arrived.len() as u32, now_ns)).flatten();
                     prop_assert!(asked_ns.is_none_or(|asked_ns| asked_ns <= *sent_ns), "{:?} for {}", asked_ns, sent_ns);
                     believed += u32::from(asked_ns.is_some());
                     on_the_way = later;
                 } else {
-                    match exchange.step(now_ns) {
-                        Step::Send => {
-                            exchange.sent(now_ns);
+                    match poller.next_action(now_ns) {
+                        Action::Send => {
+                            poller.sent(now_ns);
                             let last_ns = on_the_way.last().map_or(0, |(_, arrives_ns)| *arrives_ns);
                             let arrives_ns = last_ns.max(now_ns + late_ns + jitter_ns[requests % jitter_ns.len()]);
                             on_the_way.push((now_ns, arrives_ns));
                             requests += 1;
                         }
-                        Step::TimedOut => {}
-                        Step::Listen { until_ns } => {
+                        Action::TimedOut => {}
+                        Action::Listen { until_ns } => {
                             let next_ns = on_the_way.first().map_or(until_ns, |(_, arrives_ns)| until_ns.min(*arrives_ns));
                             now_ns = next_ns.max(now_ns);
                         }

@@ -1,7 +1,6 @@
-//! Opening a serial port, and saying what it did not take.
+//! Opens a serial port and checks which settings it accepted.
 
 use std::io::{self, Read, Write};
-use std::os::fd::AsRawFd;
 use std::os::linux::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -9,8 +8,8 @@ use std::time::Duration;
 use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
 
 use super::error::SerialError;
+use super::ioctl;
 use super::lock::PortLock;
-use super::low_latency;
 
 /// Parity of a character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +22,7 @@ pub enum Parity {
 }
 
 impl Parity {
-    fn asked(self) -> serialport::Parity {
+    fn to_serialport(self) -> serialport::Parity {
         match self {
             Self::None => serialport::Parity::None,
             Self::Even => serialport::Parity::Even,
@@ -39,23 +38,23 @@ impl Parity {
     }
 }
 
-/// A port and its line. Eight data bits, one stop bit, no flow control.
+/// A port and its line settings. Eight data bits, one stop bit, no flow control.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PortSettings {
-    /// The device; a link below /dev/serial/by-id keeps its name when adapters are plugged in another order.
+    /// The device. A link in /dev/serial/by-id keeps its name when the adapters are connected in another order.
     pub path: PathBuf,
-    /// Bits a second. Any number: 230400 and 921600 need no table.
+    /// Baud rate in bit/s; any number that the port supports.
     pub baud: u32,
     /// Parity.
     pub parity: Parity,
-    /// Ask the driver to hand over bytes at once. Without it USB adapters collect them for up to 16 ms.
+    /// Request low latency from the driver. Without it USB adapters collect bytes for up to 16 ms.
     pub low_latency: bool,
-    /// Where the lock files are.
+    /// Folder of the lock files.
     pub lock_dir: PathBuf,
 }
 
 impl PortSettings {
-    /// This port at this rate, 8N1, low latency, locks in /run/lock.
+    /// A port with 8N1, low latency and lock files in /run/lock.
     pub fn new(path: impl Into<PathBuf>, baud: u32) -> Self {
         Self {
             path: path.into(),
@@ -66,76 +65,63 @@ impl PortSettings {
         }
     }
 
-    /// Nanoseconds for which `bytes` keep the line busy.
+    /// Time in nanoseconds that `bytes` take on the line.
     pub fn line_time_ns(&self, bytes: u32) -> u64 {
         u64::from(bytes) * self.parity.bits() * 1_000_000_000 / u64::from(self.baud.max(1))
     }
 }
 
-/// Something about an open port that a person should know; reading works nevertheless.
+/// A setting that an open port did not accept. The port can be read nevertheless.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// What is not as asked for.
+    /// What differs from the configuration.
     pub what: String,
-    /// What that means, or what to do.
+    /// The consequence, or what to do.
     pub remedy: &'static str,
 }
 
-/// An open port that is ours alone.
+/// An open port, locked for this process.
 pub(super) struct Port {
     terminal: TTYPort,
     _lock: PortLock,
 }
 
 impl Port {
-    /// Locks, opens and checks the port; returns it with what it did not take.
+    /// Locks, opens and checks the port. The notes name the settings that it did not accept.
     pub(super) fn open(settings: &PortSettings) -> Result<(Self, Vec<Note>), SerialError> {
         super::error::positive("baud", settings.baud.into())?;
         let path = &settings.path;
         let device = path
             .canonicalize()
-            .map_err(|source| refused(path, source.into()))?;
+            .map_err(|source| open_error(path, source.into()))?;
         let lock = PortLock::take(&settings.lock_dir, path, &device)?;
-        let builder = serialport::new(device.to_string_lossy(), settings.baud)
-            .parity(settings.parity.asked());
-        let terminal = TTYPort::open(&builder).map_err(|source| refused(path, source))?;
-        let mut notes = Vec::new();
-        let pseudo = is_pseudo_terminal(&device);
-        let got = terminal.parity().map_err(|source| refused(path, source))?;
-        notes.extend(parity_note(settings, got, pseudo)?);
-        check_baud(
-            settings,
-            terminal
-                .baud_rate()
-                .map_err(|source| refused(path, source))?,
-        )?;
-        // What arrived before we listened is of unknown age.
+        let terminal = open_terminal(settings, &device).map_err(|e| open_error(path, e))?;
+        let mut notes = check_line(settings, &terminal, &device)?;
+        // The age of bytes that arrived before is unknown.
         terminal
             .clear(ClearBuffer::Input)
-            .map_err(|source| refused(path, source))?;
+            .map_err(|source| open_error(path, source))?;
         if settings.low_latency {
-            notes.extend(low_latency::ask(terminal.as_raw_fd()).err());
+            notes.extend(ioctl::request_low_latency(&terminal).err());
         }
-        Ok((
-            Self {
-                terminal,
-                _lock: lock,
-            },
-            notes,
-        ))
+        let port = Self {
+            terminal,
+            _lock: lock,
+        };
+        Ok((port, notes))
     }
 
-    /// Bytes that arrive within `wait`, at most as many as fit; 0 if none do. An error means that the port is lost.
+    /// Reads bytes that arrive within `wait`; 0 if there are none. An error means that the port is lost.
     pub(super) fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         set_timeout(&mut self.terminal, wait)?;
         match self.terminal.read(buffer) {
             Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
-            Err(error) if is_nothing(&error) => Ok(0),
+            Err(error) if is_no_data(&error) => Ok(0),
             other => other,
         }
     }
 
-    /// Sends all `bytes` or fails.
+    /// Writes all `bytes` within `wait` per write.
     pub(super) fn write(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
         set_timeout(&mut self.terminal, wait)?;
         self.terminal.write_all(bytes)
@@ -146,15 +132,38 @@ fn set_timeout(terminal: &mut TTYPort, wait: Duration) -> io::Result<()> {
     terminal.set_timeout(wait).map_err(io::Error::from)
 }
 
-pub(super) fn is_nothing(error: &io::Error) -> bool {
+pub(super) fn is_no_data(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock
     )
 }
 
-/// The library's error in our words.
-fn refused(path: &Path, source: serialport::Error) -> SerialError {
+/// The baud rate and parity that the port accepted; notes for what differs without harm.
+fn check_line(
+    settings: &PortSettings,
+    terminal: &TTYPort,
+    device: &Path,
+) -> Result<Vec<Note>, SerialError> {
+    let path = &settings.path;
+    let parity = terminal
+        .parity()
+        .map_err(|source| open_error(path, source))?;
+    let baud = terminal
+        .baud_rate()
+        .map_err(|source| open_error(path, source))?;
+    check_baud(settings, baud)?;
+    let note = check_parity(settings, parity, is_pseudo_terminal(device))?;
+    Ok(note.into_iter().collect())
+}
+
+fn open_terminal(settings: &PortSettings, device: &Path) -> serialport::Result<TTYPort> {
+    let builder = serialport::new(device.to_string_lossy(), settings.baud);
+    TTYPort::open(&builder.parity(settings.parity.to_serialport()))
+}
+
+/// Converts an error of the serial-port library.
+fn open_error(path: &Path, source: serialport::Error) -> SerialError {
     let path = path.to_owned();
     match source.kind() {
         ErrorKind::Io(io::ErrorKind::NotFound) => SerialError::Missing { path },
@@ -170,24 +179,24 @@ fn is_pseudo_terminal(device: &Path) -> bool {
         .is_ok_and(|device| (136..=143).contains(&libc::major(device.st_rdev())))
 }
 
-/// A pseudo terminal takes even parity without a word and reads back none; elsewhere that is an error.
-fn parity_note(
+/// A pseudo terminal accepts even parity silently and reads back none: a note. On other ports this is an error.
+fn check_parity(
     settings: &PortSettings,
     got: serialport::Parity,
     pseudo_terminal: bool,
 ) -> Result<Option<Note>, SerialError> {
-    if got == settings.parity.asked() {
+    if got == settings.parity.to_serialport() {
         return Ok(None);
     }
     if pseudo_terminal {
         let what = format!(
-            "{}: a pseudo terminal has no parity: {:?} was dropped",
+            "{}: a pseudo terminal has no parity: {:?} was ignored",
             settings.path.display(),
             settings.parity
         );
         return Ok(Some(Note {
             what,
-            remedy: "damage that parity would catch goes unseen here; a real port has it",
+            remedy: "errors that parity would detect are not detected; a real port has parity",
         }));
     }
     Err(SerialError::NotTaken {
@@ -195,11 +204,11 @@ fn parity_note(
         what: "parity",
         asked: format!("{:?}", settings.parity),
         got: format!("{got:?}"),
-        remedy: "use an adapter that can do it",
+        remedy: "use an adapter that supports it",
     })
 }
 
-/// A receiver samples the last bit of a character within half a bit: 2 % of ten bits leave room for the probe's own error.
+/// A receiver must sample the last of ten bits within half a bit, 5 %. A limit of 2 % leaves room for the error of the probe.
 fn check_baud(settings: &PortSettings, got: u32) -> Result<(), SerialError> {
     if got.abs_diff(settings.baud) <= settings.baud / 50 {
         return Ok(());
@@ -209,7 +218,7 @@ fn check_baud(settings: &PortSettings, got: u32) -> Result<(), SerialError> {
         what: "baud",
         asked: settings.baud.to_string(),
         got: got.to_string(),
-        remedy: "use an adapter that can do it, or set probe and port to a rate both have",
+        remedy: "use an adapter that supports it, or set probe and port to a rate that both support",
     })
 }
 
@@ -225,28 +234,28 @@ mod tests {
     }
 
     #[test]
-    fn parity_dropped_by_a_pseudo_terminal_is_said_and_elsewhere_refused() {
-        let note = parity_note(&even(), serialport::Parity::None, true)
+    fn ignored_parity_is_a_note_on_a_pseudo_terminal_and_an_error_elsewhere() {
+        let note = check_parity(&even(), serialport::Parity::None, true)
             .unwrap()
             .unwrap();
-        assert!(note.what.contains("Even was dropped"), "{note:?}");
-        let error = parity_note(&even(), serialport::Parity::None, false)
+        assert!(note.what.contains("Even was ignored"), "{note:?}");
+        let error = check_parity(&even(), serialport::Parity::None, false)
             .unwrap_err()
             .to_string();
         assert!(
-            error.contains("parity Even was asked for, the port has None"),
+            error.contains("parity Even was requested, the port has None"),
             "{error}"
         );
         assert_eq!(
-            parity_note(&even(), serialport::Parity::Even, false).unwrap(),
+            check_parity(&even(), serialport::Parity::Even, false).unwrap(),
             None
         );
     }
 
     #[test]
-    fn what_the_system_refuses_is_told_apart() {
+    fn distinguishes_the_errors_of_the_system() {
         let of = |kind| {
-            refused(
+            open_error(
                 Path::new("/dev/ttyX"),
                 serialport::Error::new(kind, "words"),
             )
@@ -267,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_two_percent_off_is_refused_with_both_figures() {
+    fn rejects_a_baud_rate_that_differs_by_two_percent() {
         assert!(check_baud(&even(), 230_400 + 4_608).is_ok());
         let error = check_baud(&even(), 225_000).unwrap_err().to_string();
         assert!(
@@ -277,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_of_one_value_keeps_the_line_busy_for_17_characters_of_11_bits() {
+    fn line_time_counts_all_bits_of_a_character() {
         // 17 x 11 / 230400 s = 811.6 us
         assert_eq!(even().line_time_ns(17), 811_631);
         assert_eq!(PortSettings::new("", 921_600).line_time_ns(3), 32_552);

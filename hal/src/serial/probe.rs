@@ -1,4 +1,4 @@
-//! A displacement probe on a serial port, behind the boundary.
+//! The driver of a displacement probe on a serial port.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,230 +6,222 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::ascii::Ascii;
-use super::capancdt::Capancdt;
 use super::cell::{self, Reader};
-use super::decoder::Decoder;
 use super::error::SerialError;
-use super::optoncdt::Optoncdt;
-use super::poller::{Exchange, Times};
+use super::poller::{Poller, nanoseconds};
 use super::port::{Note, Port, PortSettings};
-use super::reader::{Clock, Mounting, Publisher, ReaderThread};
+use super::protocol::Protocol;
+use super::reader::{Clock, Publisher, ReaderThread};
 use super::statistics::{Counters, Statistics};
-use super::{ascii, capancdt, optoncdt};
 use crate::{DisplacementProbe, Reading, Tick};
 
-/// What the probe speaks.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Protocol {
-    /// Micro-Epsilon capaNCDT 61xx over RS485, polled.
-    Capancdt(capancdt::Settings),
-    /// Micro-Epsilon RS422 stream.
-    Optoncdt(optoncdt::Settings),
-    /// Lines of text, polled or by itself.
-    Ascii(ascii::Settings),
+/// Longest time for writing the start command.
+const START_WAIT: Duration = Duration::from_secs(1);
+
+/// How a probe is mounted: position = gain * (position of the probe) + offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mounting {
+    /// Metres of the stage per metre of the probe; negative if the probe measures against the direction of positive
+    /// force.
+    pub gain: f64,
+    /// Position of the stage at the zero of the probe, in metres.
+    pub offset_m: f64,
 }
 
-impl Protocol {
-    /// The decoder of this protocol, or the setting that makes no sense.
-    pub fn decoder(&self) -> Result<Box<dyn Decoder>, SerialError> {
-        Ok(match self.clone() {
-            Self::Capancdt(settings) => Box::new(Capancdt::new(settings)?),
-            Self::Optoncdt(settings) => Box::new(Optoncdt::new(settings)?),
-            Self::Ascii(settings) => Box::new(Ascii::new(settings)?),
+impl Default for Mounting {
+    /// The position as the probe sends it.
+    fn default() -> Self {
+        Self {
+            gain: 1.0,
+            offset_m: 0.0,
+        }
+    }
+}
+
+impl Mounting {
+    fn check(&self) -> Result<(), SerialError> {
+        let (name, value, expected) = if !self.gain.is_normal() {
+            ("gain", self.gain, "a finite number other than zero")
+        } else if !self.offset_m.is_finite() {
+            ("offset_m", self.offset_m, "a finite number of metres")
+        } else {
+            return Ok(());
+        };
+        Err(SerialError::Setting {
+            name,
+            value: value.to_string(),
+            expected,
         })
     }
 }
 
-/// Times of a probe that must be asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Polling {
-    /// From one request to the next; 0 asks again as soon as the answer is there.
-    pub interval: Duration,
-    /// How long a probe may stay silent before it is asked again. At the start, and once more after the answer that ends a
-    /// series of missing ones, nothing is believed until the line has been silent for twice as long at least.
-    pub timeout: Duration,
-    /// How long the line must be quiet before a damaged answer counts as over: longer than the probe thinks before it
-    /// answers, and than the longest pause that the adapter makes in an answer (16 ms over USB without low latency).
-    pub quiet: Duration,
-}
-
-impl Default for Polling {
-    /// As fast as the probe answers; 100 ms for an answer, 20 ms of silence after a damaged one.
-    fn default() -> Self {
-        let ms = Duration::from_millis;
-        Self {
-            interval: ms(0),
-            timeout: ms(100),
-            quiet: ms(20),
-        }
-    }
-}
-
-/// A probe, its port and how it is mounted.
-#[derive(Clone, Debug, PartialEq)]
+/// Settings of a probe: port, protocol and mounting.
+#[derive(Clone, Debug)]
 pub struct ProbeSettings {
-    /// Where it is connected.
+    /// The port and its line settings.
     pub port: PortSettings,
-    /// What it speaks.
-    pub protocol: Protocol,
-    /// When it is asked, if it must be.
-    pub polling: Polling,
-    /// How its readings become positions of the stage.
+    /// The protocol with its settings.
+    pub protocol: Arc<dyn Protocol>,
+    /// How the position of the stage follows from the measurement.
     pub mounting: Mounting,
-    /// From a measurement to the moment the probe could tell it (filters, computing); known from its manual or a
-    /// calibration, and added to the age of every reading. An hour at most.
+    /// Time from a measurement until its value is available in the probe (filters, computation), from the manual or a
+    /// calibration. It is added to the age of every reading; at most one hour.
     pub latency: Duration,
 }
 
 impl ProbeSettings {
-    /// This probe on this port, as it reads.
-    pub fn new(port: PortSettings, protocol: Protocol) -> Self {
-        let (polling, mounting) = (Polling::default(), Mounting::default());
+    /// A probe with this port and protocol, without mounting and latency.
+    pub fn new(port: PortSettings, protocol: Arc<dyn Protocol>) -> Self {
         Self {
             port,
             protocol,
-            polling,
-            mounting,
+            mounting: Mounting::default(),
             latency: Duration::ZERO,
         }
     }
-
-    fn check(&self) -> Result<(), SerialError> {
-        let Mounting { gain, offset_m } = self.mounting;
-        let refuse = |name, value: String, wants| Err(SerialError::Setting { name, value, wants });
-        if !gain.is_normal() {
-            return refuse("gain", gain.to_string(), "a finite number other than zero");
-        }
-        if !offset_m.is_finite() {
-            return refuse(
-                "offset_m",
-                offset_m.to_string(),
-                "a finite number of metres",
-            );
-        }
-        let Polling { timeout, quiet, .. } = self.polling;
-        if quiet.is_zero() || timeout < quiet {
-            let value = format!("{quiet:?}, {timeout:?}");
-            return refuse(
-                "quiet, timeout",
-                value,
-                "above zero, and the timeout no shorter than the quiet",
-            );
-        }
-        Ok(())
-    }
 }
 
-/// A displacement probe on a serial port. A thread of its own reads it; dropping it ends the thread and frees the port.
+/// A displacement probe on a serial port, read by a thread of its own. Dropping it ends the thread and closes the port.
+///
+/// ```no_run
+/// use std::sync::Arc;
+///
+/// use bench_hal::serial::{PortSettings, ProbeSettings, SerialProbe, optoncdt};
+/// use bench_hal::{DisplacementProbe, Tick, Validity};
+///
+/// let port = PortSettings::new("/dev/ttyUSB0", 921_600);
+/// let protocol = Arc::new(optoncdt::Settings::new(10e-3));
+/// let mut probe = SerialProbe::open(ProbeSettings::new(port, protocol))?;
+/// let reading = probe.latest(Tick::default());
+/// if reading.validity == Validity::Valid {
+///     println!("{} m, {} ns ago", reading.position_m, reading.age_ns);
+/// }
+/// # Ok::<(), bench_hal::serial::SerialError>(())
+/// ```
 pub struct SerialProbe {
     newest: Reader,
     clock: Clock,
-    watch: StatisticsHandle,
+    counters: Arc<Counters>,
     notes: Vec<Note>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// Sees the statistics of a probe while the loop has the probe itself.
+/// Gives access to the statistics of a probe while the loop owns the probe.
 #[derive(Clone, Debug)]
 pub struct StatisticsHandle {
     counters: Arc<Counters>,
 }
 
 impl StatisticsHandle {
-    /// The counts up to now.
+    /// The present counts.
     pub fn statistics(&self) -> Statistics {
         self.counters.snapshot()
     }
 }
 
 impl SerialProbe {
-    /// Opens the port, takes it for this process, and starts to read.
+    /// Opens and locks the port, and starts to read.
     pub fn open(settings: ProbeSettings) -> Result<Self, SerialError> {
         Self::open_with(settings, || {})
     }
 
-    /// The same; `prepare` runs first in the reader's thread, to give it a name, a priority or a processor. The thread
-    /// should run just below the loop: whatever delays it makes readings look younger than they are, up to 20 ms, by
-    /// which time they are not handed out.
+    /// As [`open`](Self::open); `prepare` runs first in the reader thread, for example to set its priority. The thread should
+    /// have a priority just below the loop: a delay of the thread makes readings of a stream appear younger than they are,
+    /// by up to 20 ms; after a longer delay they are not published.
     pub fn open_with(
         settings: ProbeSettings,
         prepare: impl FnOnce() + Send + 'static,
     ) -> Result<Self, SerialError> {
-        settings.check()?;
+        settings.mounting.check()?;
+        settings.protocol.polling().check()?;
         let decoder = settings.protocol.decoder()?;
-        let (port, notes) = Port::open(&settings.port)?;
+        let (mut port, notes) = Port::open(&settings.port)?;
+        send_start_command(&mut port, &settings)?;
         let (writer, newest) = cell::cell();
-        let (counters, stop) = (
-            Arc::new(Counters::default()),
-            Arc::new(AtomicBool::new(false)),
-        );
+        let counters = Arc::<Counters>::default();
+        let stop = Arc::<AtomicBool>::default();
         let clock = Clock::start();
+        let polling = settings.protocol.polling();
         let reader = ReaderThread {
             port,
-            exchange: decoder
-                .request()
-                .map(|_| Exchange::new(times(settings.polling), clock.now_ns())),
-            decoder,
             line: settings.port,
-            mounting: settings.mounting,
+            poller: decoder
+                .request()
+                .map(|_| Poller::new(polling, clock.now_ns())),
+            decoder,
             latency_ns: nanoseconds(settings.latency),
             clock,
-            publisher: Publisher::new(writer, counters.clone()),
-            looked_ns: clock.now_ns(),
-            stop: stop.clone(),
+            publisher: Publisher::new(writer, Arc::clone(&counters), settings.mounting),
+            last_read_ns: clock.now_ns(),
+            stop: Arc::clone(&stop),
         };
         counters.running.store(true, Relaxed);
-        let thread = thread::Builder::new()
-            .name("serial-probe".into())
-            .spawn(move || {
-                prepare();
-                reader.run();
-            });
-        let thread = Some(thread.map_err(|source| SerialError::Thread { source })?);
         Ok(Self {
+            thread: Some(spawn(reader, prepare)?),
             newest,
             clock,
-            watch: StatisticsHandle { counters },
+            counters,
             notes,
             stop,
-            thread,
         })
     }
 
-    /// What the port did not take, for a person.
+    /// Settings that the port did not accept.
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }
 
-    /// The counts up to now.
+    /// The present counts.
     pub fn statistics(&self) -> Statistics {
-        self.watch.statistics()
+        self.counters.snapshot()
     }
 
-    /// A way to the statistics that another thread may keep.
-    pub fn watch(&self) -> StatisticsHandle {
-        self.watch.clone()
-    }
-
-    fn reading_at(&mut self, now_ns: u64) -> Reading {
-        let newest = self.newest.newest();
-        let age_ns = now_ns.saturating_sub(newest.made_ns);
-        Reading {
-            position_m: newest.position_m,
-            sequence: newest.sequence,
-            age_ns,
-            validity: newest.validity,
+    /// A handle to the statistics for another thread.
+    pub fn statistics_handle(&self) -> StatisticsHandle {
+        StatisticsHandle {
+            counters: Arc::clone(&self.counters),
         }
     }
 }
 
+fn send_start_command(port: &mut Port, settings: &ProbeSettings) -> Result<(), SerialError> {
+    let command = settings.protocol.start_command();
+    if command.is_empty() {
+        return Ok(());
+    }
+    port.write(command, START_WAIT)
+        .map_err(|source| SerialError::Start {
+            path: settings.port.path.clone(),
+            source,
+        })
+}
+
+fn spawn(
+    reader: ReaderThread,
+    prepare: impl FnOnce() + Send + 'static,
+) -> Result<JoinHandle<()>, SerialError> {
+    let run = move || {
+        prepare();
+        reader.run();
+    };
+    thread::Builder::new()
+        .name("serial-probe".into())
+        .spawn(run)
+        .map_err(|source| SerialError::Thread { source })
+}
+
 impl DisplacementProbe for SerialProbe {
-    /// The newest measurement and its age now, by the monotonic clock. Wait-free; one look at the clock.
+    /// The newest measurement with its present age by the monotonic clock. Wait-free; reads the clock once.
     fn latest(&mut self, _now: Tick) -> Reading {
         let now_ns = self.clock.now_ns();
-        self.reading_at(now_ns)
+        let newest = self.newest.newest();
+        Reading {
+            position_m: newest.position_m,
+            sequence: newest.sequence,
+            age_ns: now_ns.saturating_sub(newest.measured_ns),
+            validity: newest.validity,
+        }
     }
 }
 
@@ -237,7 +229,7 @@ impl Drop for SerialProbe {
     fn drop(&mut self) {
         self.stop.store(true, Relaxed);
         if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // a panic was reported by its own thread
+            let _ = thread.join(); // a panic was reported by the thread itself
         }
     }
 }
@@ -248,18 +240,5 @@ impl fmt::Debug for SerialProbe {
             .field("notes", &self.notes)
             .field("statistics", &self.statistics())
             .finish()
-    }
-}
-
-/// An hour is for ever on this line, and far from overflowing a sum.
-fn nanoseconds(duration: Duration) -> u64 {
-    duration.min(Clock::OPENED).as_nanos() as u64
-}
-
-fn times(polling: Polling) -> Times {
-    Times {
-        interval_ns: nanoseconds(polling.interval),
-        timeout_ns: nanoseconds(polling.timeout),
-        quiet_ns: nanoseconds(polling.quiet),
     }
 }

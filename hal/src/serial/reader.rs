@@ -1,4 +1,4 @@
-//! The thread that owns the port: listens or asks, decodes, and publishes the newest measurement with its time.
+//! The reader thread: owns the port, polls or listens, decodes, and publishes the newest measurement with its time.
 
 use std::io;
 use std::sync::Arc;
@@ -7,50 +7,32 @@ use std::time::{Duration, Instant};
 
 use super::cell::{Measurement, Writer};
 use super::decoder::{Decoder, Event};
-use super::error::Trouble;
-use super::poller::{Exchange, Step};
+use super::error::Failure;
+use super::poller::{Action, Poller};
 use super::port::{Port, PortSettings};
+use super::probe::Mounting;
 use super::statistics::{Counters, Rate, add};
 use crate::Validity;
 
-/// Longest sleep in a read: how long a drop of the probe may wait for the thread.
-const SLICE: Duration = Duration::from_millis(5);
-/// A listening thread that has not looked for longer does not know when what it finds has arrived.
-const AWAY_NS: u64 = 4 * SLICE.as_nanos() as u64;
-/// A read that brings so much found a backlog (22 ms of line at 921600 baud): there is newer behind it.
+/// Longest wait in a read: how long dropping the probe may wait for the thread.
+const READ_WAIT: Duration = Duration::from_millis(5);
+/// If the thread has not read for longer than this, the arrival time of the bytes of a stream is unknown.
+const MAX_PAUSE_NS: u64 = 4 * READ_WAIT.as_nanos() as u64;
+/// A read of this many bytes (22 ms at 921600 baud) found a backlog: newer bytes follow.
 const BACKLOG: usize = 2048;
 
-/// How a probe is mounted: position = gain * (reading of the probe) + offset.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mounting {
-    /// Metres of the stage per metre of the probe; negative if the probe faces against positive force.
-    pub gain: f64,
-    /// Position of the stage at the probe's zero, metres.
-    pub offset_m: f64,
-}
-
-impl Default for Mounting {
-    /// As the probe reads.
-    fn default() -> Self {
-        Self {
-            gain: 1.0,
-            offset_m: 0.0,
-        }
-    }
-}
-
-/// All that the thread owns.
+/// The state of the thread.
 pub(super) struct ReaderThread {
     pub port: Port,
     pub line: PortSettings,
     pub decoder: Box<dyn Decoder>,
-    pub exchange: Option<Exchange>,
-    pub mounting: Mounting,
+    /// `None` for a stream.
+    pub poller: Option<Poller>,
     pub latency_ns: u64,
     pub clock: Clock,
     pub publisher: Publisher,
-    /// When the thread last knew that nothing was left to read.
-    pub looked_ns: u64,
+    /// When the thread last read all available bytes.
+    pub last_read_ns: u64,
     pub stop: Arc<AtomicBool>,
 }
 
@@ -61,8 +43,8 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// What the clock shows when a probe is opened: as old as the longest latency, so that a time before exists.
-    pub(super) const OPENED: Duration = Duration::from_secs(3600);
+    /// The reading of the clock when a probe is opened: the longest latency, so that times before the opening exist.
+    const AT_OPENING: Duration = Duration::from_secs(3600);
 
     pub(super) fn start() -> Self {
         Self {
@@ -71,82 +53,88 @@ impl Clock {
     }
 
     pub(super) fn now_ns(self) -> u64 {
-        (Self::OPENED + self.opened.elapsed()).as_nanos() as u64 // 584 years
+        (Self::AT_OPENING + self.opened.elapsed()).as_nanos() as u64 // sufficient for 584 years
     }
 }
 
-/// Numbers measurements and hands the newest over.
-pub(super) struct Publisher {
-    cell: Writer,
-    counters: Arc<Counters>,
-    newest: Measurement,
-    rate: Rate,
-}
-
-/// What one read brought.
+/// The result of one read.
 #[derive(Default)]
-struct Harvest {
-    /// The newest measurement: its position as the probe reads it, and its validity.
+struct Batch {
+    /// Position as the probe sent it, and validity, of the newest measurement.
     newest: Option<(f64, Validity)>,
+    /// Measurements in this batch.
     values: u64,
-    /// Measurements made, those that never arrived included.
+    /// Measurements that the probe made, including those that did not arrive.
     made: u64,
+    /// Complete answers.
     answers: u32,
 }
 
-impl Harvest {
-    fn take(&mut self, event: Event) {
-        let mut measured = |position_m, validity| {
-            self.newest = Some((position_m, validity));
-            self.values += 1;
-            self.made += 1;
-        };
+impl Batch {
+    fn add(&mut self, event: Event) {
         match event {
-            Event::Value(sample) => measured(sample.position_m, Validity::Valid),
-            Event::OutOfRange(sample) => measured(sample.position_m, Validity::OutOfRange),
-            Event::Fault { .. } => measured(f64::NAN, Validity::Faulty),
+            Event::Value(sample) => self.add_measurement(sample.position_m, Validity::Valid),
+            Event::OutOfRange(sample) => {
+                self.add_measurement(sample.position_m, Validity::OutOfRange);
+            }
+            Event::Fault { .. } => self.add_measurement(f64::NAN, Validity::Faulty),
             Event::Gap(missed) => self.made += u64::from(missed),
             Event::AnswerEnd => self.answers += 1,
             Event::Withheld(_) | Event::Restart | Event::Damaged(_) | Event::Echo => {}
         }
     }
+
+    fn add_measurement(&mut self, position_m: f64, validity: Validity) {
+        self.newest = Some((position_m, validity));
+        self.values += 1;
+        self.made += 1;
+    }
+}
+
+/// Numbers the measurements and passes the newest to the loop.
+pub(super) struct Publisher {
+    cell: Writer,
+    counters: Arc<Counters>,
+    mounting: Mounting,
+    newest: Measurement,
+    rate: Rate,
 }
 
 impl Publisher {
-    pub(super) fn new(cell: Writer, counters: Arc<Counters>) -> Self {
+    pub(super) fn new(cell: Writer, counters: Arc<Counters>, mounting: Mounting) -> Self {
         Self {
             cell,
             counters,
+            mounting,
             newest: Measurement::default(),
             rate: Rate::default(),
         }
     }
 
-    /// Takes note of what a read brought; with the time it was made (and only then) the newest goes to the loop.
-    fn publish(&mut self, harvest: &Harvest, made_ns: Option<u64>, mounting: Mounting) {
-        self.newest.sequence += harvest.made;
-        let Some((position_m, validity)) = harvest.newest else {
+    /// Counts a batch, and publishes its newest measurement if the time of the measurement is known.
+    fn publish(&mut self, batch: &Batch, measured_ns: Option<u64>) {
+        self.newest.sequence += batch.made;
+        let Some((position_m, validity)) = batch.newest else {
             return;
         };
-        let Some(made_ns) = made_ns else {
-            return add(&self.counters.unknown_age, harvest.values);
+        let Some(measured_ns) = measured_ns else {
+            return add(&self.counters.unknown_age, batch.values);
         };
-        add(&self.counters.superseded, harvest.values - 1);
+        add(&self.counters.superseded, batch.values - 1);
         add(&self.counters.published, 1);
-        let position_m = mounting.gain * position_m + mounting.offset_m;
         self.newest = Measurement {
-            position_m,
+            position_m: self.mounting.gain * position_m + self.mounting.offset_m,
             validity,
-            made_ns,
+            measured_ns,
             ..self.newest
         };
         self.cell.publish(self.newest);
     }
 
-    /// The port is lost: the last measurement stays what it was, but is no longer to be used.
-    fn lose(&mut self, trouble: Trouble, error: &io::Error) {
-        self.counters
-            .trouble(trouble, error.raw_os_error().unwrap_or(0).into());
+    /// Marks the last measurement as faulty, because the port is lost.
+    fn fail(&mut self, failure: Failure, error: &io::Error) {
+        let code = error.raw_os_error().unwrap_or(0);
+        self.counters.set_failure(failure, code.into());
         if self.newest.validity != Validity::Missing {
             self.newest.validity = Validity::Faulty;
             self.cell.publish(self.newest);
@@ -154,7 +142,8 @@ impl Publisher {
     }
 
     fn update_rate(&mut self, now_ns: u64) {
-        if let Some(rate_hz) = self.rate.update(now_ns, self.counters.values.load(Relaxed)) {
+        let values = self.counters.values.load(Relaxed);
+        if let Some(rate_hz) = self.rate.update(now_ns, values) {
             self.counters.rate_bits.store(rate_hz.to_bits(), Relaxed);
         }
     }
@@ -164,8 +153,8 @@ impl ReaderThread {
     /// Runs until the probe is dropped or the port is lost.
     pub(super) fn run(mut self) {
         while !self.stop.load(Relaxed) {
-            if let Err((trouble, error)) = self.turn() {
-                self.publisher.lose(trouble, &error);
+            if let Err((failure, error)) = self.step() {
+                self.publisher.fail(failure, &error);
                 break;
             }
             self.publisher.update_rate(self.clock.now_ns());
@@ -173,89 +162,100 @@ impl ReaderThread {
         self.publisher.counters.running.store(false, Relaxed);
     }
 
-    /// One look at the line; if it brought nothing, what the exchange wants done.
-    fn turn(&mut self) -> Result<(), (Trouble, io::Error)> {
-        let mut bytes = [0; 4096];
-        let wait = self.wait();
+    /// Reads once; if nothing arrived, executes the next action of the poller.
+    fn step(&mut self) -> Result<(), (Failure, io::Error)> {
+        let mut buffer = [0; 4096];
+        let wait = self.read_wait();
         let count = self
             .port
-            .read(&mut bytes, wait)
-            .map_err(|error| (trouble_of(&error), error))?;
+            .read(&mut buffer, wait)
+            .map_err(|error| (read_failure(&error), error))?;
         let now_ns = self.clock.now_ns();
-        let late = count >= BACKLOG || now_ns - self.looked_ns > AWAY_NS;
-        self.looked_ns = now_ns;
+        let is_late = count >= BACKLOG || now_ns - self.last_read_ns > MAX_PAUSE_NS;
+        self.last_read_ns = now_ns;
         if count > 0 {
-            self.receive(&bytes[..count], now_ns, late); // read never says more than fits
-            return Ok(());
-        }
-        match self.exchange.as_mut().map(|exchange| exchange.step(now_ns)) {
-            None | Some(Step::Listen { .. }) => Ok(()),
-            Some(Step::TimedOut) => {
-                add(&self.publisher.counters.timeouts, 1);
-                self.publisher.counters.trouble(Trouble::Timeout, 0);
-                Ok(())
-            }
-            Some(Step::Send) => self.ask().map_err(|error| (Trouble::WriteFailed, error)),
+            self.receive(&buffer[..count], now_ns, is_late);
+            Ok(())
+        } else {
+            self.poll(now_ns).map_err(|error| (Failure::Write, error))
         }
     }
 
-    /// How long to listen; what is due must not wait, but what has arrived comes first.
-    fn wait(&self) -> Duration {
-        let until_ns = self.exchange.as_ref().map(Exchange::listen_until_ns);
-        until_ns.map_or(SLICE, |until_ns| {
-            SLICE.min(Duration::from_nanos(
-                until_ns.saturating_sub(self.clock.now_ns()),
-            ))
-        })
+    /// How long to wait for bytes: until the next action of the poller is due.
+    fn read_wait(&self) -> Duration {
+        let Some(poller) = &self.poller else {
+            return READ_WAIT;
+        };
+        let left_ns = poller.listen_until_ns().saturating_sub(self.clock.now_ns());
+        READ_WAIT.min(Duration::from_nanos(left_ns))
     }
 
-    fn ask(&mut self) -> io::Result<()> {
-        let counters = &self.publisher.counters;
-        self.decoder.reset(&mut |event| counters.count(event));
-        let Some((request, exchange)) = self.decoder.request().zip(self.exchange.as_mut()) else {
+    fn poll(&mut self, now_ns: u64) -> io::Result<()> {
+        let Some(poller) = &mut self.poller else {
             return Ok(());
         };
-        exchange.sent(self.clock.now_ns());
-        self.port.write(request, SLICE)
+        match poller.next_action(now_ns) {
+            Action::Listen { .. } => Ok(()),
+            Action::TimedOut => {
+                let counters = &self.publisher.counters;
+                add(&counters.timeouts, 1);
+                counters.set_failure(Failure::Timeout, 0);
+                Ok(())
+            }
+            Action::Send => self.send_request(),
+        }
     }
 
-    /// Takes what the line brought. `late`: nobody knows when it arrived.
-    fn receive(&mut self, bytes: &[u8], now_ns: u64, late: bool) {
-        let counters = self.publisher.counters.clone();
+    fn send_request(&mut self) -> io::Result<()> {
+        let counters = &self.publisher.counters;
+        self.decoder.reset(&mut |event| counters.count(event));
+        if let (Some(request), Some(poller)) = (self.decoder.request(), &mut self.poller) {
+            poller.sent(self.clock.now_ns());
+            self.port.write(request, READ_WAIT)?;
+        }
+        Ok(())
+    }
+
+    /// Decodes bytes and publishes the newest measurement. `is_late`: the arrival time of the bytes is unknown.
+    fn receive(&mut self, bytes: &[u8], now_ns: u64, is_late: bool) {
+        let counters = Arc::clone(&self.publisher.counters);
         add(&counters.bytes, bytes.len() as u64);
-        if let Some(exchange) = &mut self.exchange
-            && !exchange.heard(now_ns)
-        {
+        let is_expected = self
+            .poller
+            .as_mut()
+            .is_none_or(|poller| poller.received(now_ns));
+        if !is_expected {
             return add(&counters.damaged_bytes, bytes.len() as u64);
         }
-        let mut harvest = Harvest::default();
+        let mut batch = Batch::default();
         self.decoder.feed(bytes, &mut |event| {
             counters.count(event);
-            harvest.take(event);
+            batch.add(event);
         });
-        let made_ns = self.made_ns(&harvest, now_ns, late);
-        self.publisher.publish(&harvest, made_ns, self.mounting);
+        let measured_ns = self.measured_ns(&batch, now_ns, is_late);
+        self.publisher.publish(&batch, measured_ns);
     }
 
-    /// When the newest measurement of the harvest was made: at the request that brought it, or, of a probe that speaks by
-    /// itself, before its message began to arrive. `None` if that cannot be said.
-    fn made_ns(&mut self, harvest: &Harvest, now_ns: u64, late: bool) -> Option<u64> {
-        let known_ns = match &mut self.exchange {
-            Some(_) if harvest.answers == 0 => None,
-            Some(exchange) => exchange.answered(harvest.answers, now_ns),
-            None if late => None,
+    /// Time of the newest measurement of the batch: the request that it answers, or for a stream the time before its first
+    /// byte. `None` if it is unknown.
+    fn measured_ns(&mut self, batch: &Batch, now_ns: u64, is_late: bool) -> Option<u64> {
+        let known_ns = match &mut self.poller {
+            Some(_) if batch.answers == 0 => None,
+            Some(poller) => poller.answered(batch.answers, now_ns),
+            None if is_late => None,
             None => {
-                Some(now_ns.saturating_sub(self.line.line_time_ns(self.decoder.message_bytes())))
+                let line_ns = self.line.line_time_ns(self.decoder.message_bytes());
+                Some(now_ns.saturating_sub(line_ns))
             }
         };
         known_ns.map(|known_ns| known_ns.saturating_sub(self.latency_ns))
     }
 }
 
-fn trouble_of(error: &io::Error) -> Trouble {
+fn read_failure(error: &io::Error) -> Failure {
     if error.kind() == io::ErrorKind::BrokenPipe {
-        Trouble::HungUp
+        Failure::HangUp
     } else {
-        Trouble::ReadFailed
+        Failure::Read
     }
 }

@@ -1,47 +1,47 @@
-//! What the reader thread counts, for whoever wants to know: atomics only, so asking never disturbs the reading.
+//! Statistics of the reader thread, in atomics: reading them does not disturb the thread.
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use super::decoder::Event;
-use super::error::Trouble;
+use super::error::Failure;
 use crate::DeviceError;
 
-/// The counts since the probe was opened.
+/// Counts since the probe was opened.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
     /// Bytes received.
     pub bytes: u64,
-    /// Measurements decoded, those out of range and those the probe could not make included.
+    /// Measurements decoded, including those out of range and those with an error of the probe.
     pub values: u64,
-    /// Of these: handed to the loop. The others had a newer one behind them or no known age.
+    /// Of the values: passed to the loop.
     pub published: u64,
-    /// Of these: older than another that arrived with them, so not handed out.
+    /// Of the values: not published, because a newer one arrived with them.
     pub superseded: u64,
-    /// Of these: not handed out because nobody can say when they were made.
+    /// Of the values: not published, because their age is unknown.
     pub unknown_age: u64,
-    /// Measurements that the probe's counter says were made and that never arrived.
+    /// Measurements that were made, according to the probe's counter, but did not arrive.
     pub gaps: u64,
-    /// Values received that were not known to be new (not among `values`).
+    /// Values that were received but may be old (not part of `values`).
     pub withheld: u64,
     /// Measurements out of range.
     pub out_of_range: u64,
-    /// Times the probe said that it cannot measure or did not understand.
+    /// Answers with an error of the probe.
     pub faults: u64,
-    /// Bytes that belonged to nothing.
+    /// Bytes that do not belong to any message.
     pub damaged_bytes: u64,
-    /// Requests without a complete answer in time.
+    /// Requests without a complete answer before the timeout.
     pub timeouts: u64,
-    /// Times the probe's counter went back.
+    /// How often the probe's counter went back.
     pub restarts: u64,
-    /// Measurements a second over the last half second or more; 0 before.
+    /// Measurements per second over the last half second or more; 0 before.
     pub rate_hz: f64,
-    /// Whether the reader thread still runs: it ends when the port is lost.
+    /// Whether the reader thread is running; it ends when the port is lost.
     pub running: bool,
-    /// The latest trouble with port or probe.
+    /// The latest failure of port or probe.
     pub last_error: Option<DeviceError>,
 }
 
-/// The counters themselves; written by the reader thread only.
+/// The counters, written by the reader thread only.
 #[derive(Debug, Default)]
 pub(super) struct Counters {
     pub bytes: AtomicU64,
@@ -58,17 +58,21 @@ pub(super) struct Counters {
     pub restarts: AtomicU64,
     pub rate_bits: AtomicU64,
     pub running: AtomicBool,
-    trouble: AtomicU32,
-    trouble_code: AtomicI64,
+    failure: AtomicU32,
+    failure_code: AtomicI64,
 }
 
-/// Adds to a counter that only this thread writes.
+/// Adds to a counter.
 pub(super) fn add(counter: &AtomicU64, count: u64) {
     counter.fetch_add(count, Relaxed);
 }
 
+fn read(counter: &AtomicU64) -> u64 {
+    counter.load(Relaxed)
+}
+
 impl Counters {
-    /// Counts what a decoder said.
+    /// Counts an event of the decoder.
     pub(super) fn count(&self, event: Event) {
         match event {
             Event::Value(_) => add(&self.values, 1),
@@ -84,20 +88,23 @@ impl Counters {
             Event::Withheld(values) => add(&self.withheld, values.into()),
             Event::Restart => {
                 add(&self.restarts, 1);
-                self.trouble(Trouble::Restart, 0);
+                self.set_failure(Failure::Restart, 0);
             }
             Event::Damaged(bytes) => add(&self.damaged_bytes, bytes.into()),
             Event::Echo | Event::AnswerEnd => {}
         }
     }
 
-    pub(super) fn trouble(&self, trouble: Trouble, code: i64) {
-        self.trouble_code.store(code, Relaxed);
-        self.trouble.store(trouble as u32, Relaxed);
+    pub(super) fn set_failure(&self, failure: Failure, code: i64) {
+        self.failure_code.store(code, Relaxed);
+        self.failure.store(failure as u32, Relaxed);
+    }
+
+    fn last_error(&self) -> Option<DeviceError> {
+        Failure::describe(self.failure.load(Relaxed), self.failure_code.load(Relaxed))
     }
 
     pub(super) fn snapshot(&self) -> Statistics {
-        let read = |counter: &AtomicU64| counter.load(Relaxed);
         Statistics {
             bytes: read(&self.bytes),
             values: read(&self.values),
@@ -113,15 +120,12 @@ impl Counters {
             restarts: read(&self.restarts),
             rate_hz: f64::from_bits(read(&self.rate_bits)),
             running: self.running.load(Relaxed),
-            last_error: Trouble::describe(
-                self.trouble.load(Relaxed),
-                self.trouble_code.load(Relaxed),
-            ),
+            last_error: self.last_error(),
         }
     }
 }
 
-/// Measurements a second, over windows of half a second or more.
+/// Measurements per second, over windows of at least half a second.
 #[derive(Debug, Default)]
 pub(super) struct Rate {
     since_ns: u64,
@@ -131,7 +135,7 @@ pub(super) struct Rate {
 impl Rate {
     const WINDOW_NS: u64 = 500_000_000;
 
-    /// The new rate if a window has passed; `values` is the count since the start.
+    /// The rate if a window has passed; `values` is the count since the start.
     pub(super) fn update(&mut self, now_ns: u64, values: u64) -> Option<f64> {
         let window_ns = now_ns.saturating_sub(self.since_ns);
         if window_ns < Self::WINDOW_NS {

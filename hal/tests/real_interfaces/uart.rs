@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::emulator::{EmulatedProbe, Fault, simulate};
+use bench_hal::serial::emulator::{EmulatedProbe, Fault, SharedProbe};
 use bench_hal::serial::{
     Parity, Polling, PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics, capancdt,
 };
@@ -28,13 +28,13 @@ const POSITION_M: f64 = 60e-6;
 
 /// A capaNCDT at the far end, with a stage that stands still.
 struct FarProbe {
-    probe: Arc<Mutex<Box<dyn EmulatedProbe>>>,
+    probe: SharedProbe,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl FarProbe {
-    fn new(protocol: &Protocol) -> FarProbe {
+    fn new(protocol: &Arc<dyn Protocol>) -> FarProbe {
         let line = serialport::new(THERE, BAUD)
             .parity(serialport::Parity::Even)
             .timeout(Duration::from_millis(1));
@@ -42,7 +42,7 @@ impl FarProbe {
             .open_native()
             .expect("two UARTs: use .ci/vm/run --uart-pair");
         assert_eq!(line.parity().unwrap(), serialport::Parity::Even);
-        let probe = Arc::new(Mutex::new(simulate(protocol, 200.0).unwrap()));
+        let probe = Arc::new(Mutex::new(EmulatedProbe::new(&**protocol, 200.0).unwrap()));
         let stop = Arc::new(AtomicBool::new(false));
         let serving = (Arc::clone(&probe), Arc::clone(&stop));
         let thread = Some(std::thread::spawn(move || {
@@ -70,7 +70,7 @@ impl Drop for FarProbe {
     }
 }
 
-fn serve(mut line: serialport::TTYPort, probe: &Mutex<Box<dyn EmulatedProbe>>, stop: &AtomicBool) {
+fn serve(mut line: serialport::TTYPort, probe: &SharedProbe, stop: &AtomicBool) {
     let (started, mut bytes) = (Instant::now(), [0; 64]);
     while !stop.load(Ordering::Acquire) {
         let count = line.read(&mut bytes).unwrap_or(0); // nothing in time
@@ -120,28 +120,31 @@ fn is_even(path: &str) -> bool {
     flags.contains(ControlFlags::PARENB) && !flags.contains(ControlFlags::PARODD)
 }
 
-fn settings(protocol: &Protocol, locks: &Path) -> ProbeSettings {
+fn settings(protocol: &Arc<dyn Protocol>, locks: &Path) -> ProbeSettings {
     let port = PortSettings {
         parity: Parity::Even,
         lock_dir: locks.into(),
         ..PortSettings::new(HERE, BAUD)
     };
-    // The emulated machine may stand still: an answer has a second, and is over after 200 ms of silence.
-    let polling = Polling {
-        timeout: Duration::from_secs(1),
-        quiet: Duration::from_millis(200),
-        ..Polling::default()
-    };
-    ProbeSettings {
-        polling,
-        ..ProbeSettings::new(port, protocol.clone())
-    }
+    ProbeSettings::new(port, Arc::clone(protocol))
+}
+
+/// With times for an emulated machine that may stand still: an answer has a second, and is complete after 200 ms of silence.
+fn protocol() -> Arc<dyn Protocol> {
+    Arc::new(capancdt::Settings {
+        polling: Polling {
+            timeout: Duration::from_secs(1),
+            quiet: Duration::from_millis(200),
+            ..Polling::default()
+        },
+        ..capancdt::Settings::new(RANGE_M)
+    })
 }
 
 /// One test, since there is one pair.
 #[test]
 fn a_probe_over_8e1_is_read_rightly_and_damage_silence_and_a_restart_never_give_a_false_value() {
-    let protocol = Protocol::Capancdt(capancdt::Settings::new(RANGE_M));
+    let protocol = protocol();
     let (far, locks) = (FarProbe::new(&protocol), tempfile::tempdir().unwrap());
     let mut probe = SerialProbe::open(settings(&protocol, locks.path())).unwrap();
     assert!(

@@ -1,5 +1,5 @@
-//! Any bytes, in any slicing: no panic, the same events, no valid value that an independent decoder does not find, and
-//! in step again after damage.
+//! Arbitrary bytes in arbitrary slices: no panic, the same events for all slices, the same valid values as an independent
+//! decoder, and synchronisation after damage.
 
 use bench_hal::serial::ascii::Ascii;
 use bench_hal::serial::capancdt::Capancdt;
@@ -32,7 +32,7 @@ fn answer() -> impl Strategy<Value = Vec<u8>> {
         .prop_map(move |(counter, values)| settings.answer(counter, &values))
 }
 
-/// Bytes that look like the protocols': messages, parts and damaged copies of them, their marking bytes, and noise.
+/// Bytes similar to those of the protocols: messages, parts and damaged copies of them, their marking bytes, and noise.
 fn line() -> impl Strategy<Value = Vec<u8>> {
     let keyence =
         "(\\+|-)[0-9]{2}\\.[0-9]{4}\r|ER,[A-Z]{2},[0-9]{2}\r|[+X]FFFFFFF\r|[-+.0-9 ]{0,12}\r";
@@ -79,15 +79,15 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn the_slicing_does_not_change_the_events(bytes in line(), cuts in vec(any::<Index>(), 0..30)) {
+    fn events_do_not_depend_on_the_slices(bytes in line(), cuts in vec(any::<Index>(), 0..30)) {
         prop_assert_eq!(sliced(&mut capa(), &bytes, &cuts), events(&mut capa(), &bytes));
         prop_assert_eq!(sliced(&mut opto(), &bytes, &cuts), events(&mut opto(), &bytes));
         prop_assert_eq!(sliced(&mut keyence(), &bytes, &cuts), events(&mut keyence(), &bytes));
     }
 
     #[test]
-    fn valid_values_are_those_of_an_independent_decoder(bytes in line()) {
-        // What may still be the beginning of an answer is not searched further: 93 foreign bytes settle it.
+    fn valid_values_equal_those_of_an_independent_decoder(bytes in line()) {
+        // The decoder waits for the rest of a possible answer: 93 other bytes complete or refute it.
         let settled = [&bytes[..], &[0xFF; 93]].concat();
         prop_assert_eq!(valid(&events(&mut capa(), &settled)), naive::capancdt(&settled));
         prop_assert_eq!(valid(&events(&mut opto(), &bytes)), naive::optoncdt(&bytes));
@@ -95,7 +95,7 @@ proptest! {
     }
 
     #[test]
-    fn every_byte_is_either_of_a_message_or_damaged(bytes in vec(any::<u8>(), 0..2000)) {
+    fn every_byte_belongs_to_a_message_or_is_damaged(bytes in vec(any::<u8>(), 0..2000)) {
         let mut decoder = opto();
         let mut found = events(&mut decoder, &bytes);
         decoder.reset(&mut |event| found.push(event));
@@ -104,8 +104,8 @@ proptest! {
     }
 
     #[test]
-    fn after_damage_a_capancdt_is_in_step_before_93_bytes_have_passed(bytes in line()) {
-        // The longest thing that damage can pretend to be is an answer of 93 bytes; ours have 17: six of them.
+    fn capancdt_synchronises_within_93_bytes_after_damage(bytes in line()) {
+        // Damaged bytes can look like an answer of at most 93 bytes; the answers here have 17 bytes: six of them.
         let settings = capancdt::Settings::new(1e-3);
         let mut decoder = capa();
         events(&mut decoder, &bytes);
@@ -117,14 +117,14 @@ proptest! {
     }
 
     #[test]
-    fn after_damage_an_optoncdt_loses_no_message(bytes in line()) {
+    fn optoncdt_loses_no_message_after_damage(bytes in line()) {
         let mut decoder = opto();
         events(&mut decoder, &bytes);
         prop_assert_eq!(valid(&events(&mut decoder, &[message(1000, true), message(2000, true)].concat())), [1000, 2000]);
     }
 
     #[test]
-    fn after_damage_a_keyence_loses_one_line_at_most(bytes in line()) {
+    fn keyence_loses_at_most_one_line_after_damage(bytes in line()) {
         let mut decoder = keyence();
         events(&mut decoder, &bytes);
         let found = valid(&events(&mut decoder, b"+00.0001\r+00.0002\r+00.0003\r"));
@@ -134,25 +134,25 @@ proptest! {
 
 const TEN_MILLION: usize = 10_000_000;
 
-/// Whether a count of rare events is within five standard deviations (of Poisson's law) of what is expected.
+/// Whether a count of rare events is within five standard deviations (Poisson distribution) of the expected count.
 fn is_expected(count: usize, expected: f64) -> bool {
     (count as f64 - expected).abs() < 5.0 * expected.sqrt().max(1.0)
 }
 
 #[test]
-fn of_ten_million_random_bytes_none_is_a_capancdt_value() {
+fn ten_million_random_bytes_contain_no_capancdt_value() {
     // 10 bytes of an answer are fixed by the rules: one in 256^10 / 21 places would pass.
     let noise = Noise(1).bytes(TEN_MILLION);
     let found = events(&mut capa(), &noise);
     assert_eq!((valid(&found), naive::capancdt(&noise)), (vec![], vec![]));
     assert!(
         damaged(&found) > noise.len() as u64 - 200,
-        "all of it is damage, but for what is still held"
+        "all bytes are damaged except those that may begin an answer"
     );
 }
 
 #[test]
-fn of_ten_million_random_bytes_3_83_in_1000_are_an_optoncdt_value() {
+fn ten_million_random_bytes_contain_the_expected_number_of_optoncdt_values() {
     // L, M, H with F = 0: 1/64; no error bits: 1/4; in range: 64235 of 65536.
     let expected = TEN_MILLION as f64 / 64.0 / 4.0 * 64235.0 / 65536.0;
     let noise = Noise(2).bytes(TEN_MILLION);
@@ -170,13 +170,13 @@ fn of_ten_million_random_bytes_3_83_in_1000_are_an_optoncdt_value() {
 }
 
 #[test]
-fn of_ten_million_random_bytes_none_is_a_keyence_value() {
+fn ten_million_random_bytes_contain_no_keyence_value() {
     let noise = Noise(3).bytes(TEN_MILLION);
     assert_eq!(valid(&events(&mut keyence(), &noise)), []);
 }
 
 #[test]
-fn of_ten_million_random_characters_of_its_alphabet_11_in_a_million_are_a_keyence_value() {
+fn ten_million_random_characters_contain_the_expected_number_of_keyence_values() {
     let noise: Vec<u8> = Noise(4)
         .bytes(TEN_MILLION)
         .iter()

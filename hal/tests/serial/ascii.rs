@@ -1,6 +1,6 @@
-//! Written values: Keyence LK-G by its manual's lines, and the settings of other probes.
+//! Text protocol: Keyence LK-G with the lines of its manual, and the settings of other probes.
 
-use bench_hal::serial::ascii::{Ascii, Settings, Statement, Writing};
+use bench_hal::serial::ascii::{Ascii, LineFormat, Output, Settings};
 use bench_hal::serial::{Decoder, Event, Sample};
 
 use crate::support::{damaged, events, valid};
@@ -9,7 +9,7 @@ fn keyence() -> Settings {
     Settings::keyence_lk_g(3e-3)
 }
 
-/// Events of `text` behind a first terminator, whose own bytes (damage, nothing was before it) are not counted.
+/// Events of `text` after a first terminator. The bytes of that terminator, reported as damaged, are not counted.
 fn decode(settings: Settings, text: &str) -> Vec<Event> {
     let terminator = settings
         .terminator
@@ -32,7 +32,7 @@ fn decode(settings: Settings, text: &str) -> Vec<Event> {
 }
 
 #[test]
-fn the_manuals_lines_are_what_the_manual_says() {
+fn decodes_the_lines_of_the_manual() {
     let value = |raw, position_m| Event::Value(Sample { raw, position_m });
     assert_eq!(
         decode(keyence(), "+01.2345\r"),
@@ -42,26 +42,26 @@ fn the_manuals_lines_are_what_the_manual_says() {
         decode(keyence(), "-00.0120\r"),
         [value(-120, -0.0120e-3), Event::AnswerEnd]
     );
-    let beyond = |raw, position_m| Event::OutOfRange(Sample { raw, position_m });
+    let outside = |raw, position_m| Event::OutOfRange(Sample { raw, position_m });
     assert_eq!(
         decode(keyence(), "+FFFFFFF\r-FFFFFFF\r")[0],
-        beyond(i64::MAX, 3e-3)
+        outside(i64::MAX, 3e-3)
     );
     assert_eq!(
         decode(keyence(), "+FFFFFFF\r-FFFFFFF\r")[2],
-        beyond(i64::MIN, -3e-3)
+        outside(i64::MIN, -3e-3)
     );
     assert_eq!(
         decode(keyence(), "+03.0001\r")[0],
-        beyond(30001, 3e-3),
-        "a number beyond the range is beyond the range"
+        outside(30001, 3e-3),
+        "a number outside the range"
     );
 }
 
 #[test]
-fn invalid_and_errors_have_words() {
+fn invalid_values_and_errors_have_a_text() {
     let fault = |text| match decode(keyence(), text)[0] {
-        Event::Fault { code, words } => (code, words),
+        Event::Fault { code, text } => (code, text),
         other => panic!("{text}: {other:?}"),
     };
     assert!(fault("XXXXXXXX\r").1.contains("cannot measure"));
@@ -77,7 +77,7 @@ fn invalid_and_errors_have_words() {
 }
 
 #[test]
-fn what_came_before_the_first_terminator_is_no_value() {
+fn ignores_bytes_before_the_first_terminator() {
     let mut decoder = Ascii::new(Settings {
         line: "{value}".into(),
         ..keyence()
@@ -89,7 +89,7 @@ fn what_came_before_the_first_terminator_is_no_value() {
 }
 
 #[test]
-fn a_line_that_lost_or_gained_a_character_is_no_value() {
+fn rejects_lines_with_a_missing_or_additional_character() {
     for line in [
         "+01.234\r",
         "+1.2345\r",
@@ -110,7 +110,7 @@ fn a_line_that_lost_or_gained_a_character_is_no_value() {
 }
 
 #[test]
-fn a_line_without_end_does_not_hide_the_next() {
+fn finds_the_line_after_an_endless_line() {
     let found = decode(keyence(), &format!("{}\r+00.5000\r", "9".repeat(1000)));
     assert_eq!((valid(&found), damaged(&found)), (vec![5000], 1001));
     let tail = decode(
@@ -120,11 +120,15 @@ fn a_line_without_end_does_not_hide_the_next() {
         },
         &format!("{}1.25\r", " ".repeat(1000)),
     );
-    assert_eq!(valid(&tail), [], "nor does its end pass for a line");
+    assert_eq!(
+        valid(&tail),
+        [],
+        "the end of the endless line is not a line"
+    );
 }
 
 #[test]
-fn prefix_suffix_unit_and_offset_are_settings() {
+fn applies_prefix_suffix_unit_and_offset() {
     let settings = Settings {
         line: "D={value}um;{skip}".into(),
         terminator: "\\r\\n".into(),
@@ -143,7 +147,7 @@ fn prefix_suffix_unit_and_offset_are_settings() {
 }
 
 #[test]
-fn settings_that_make_no_sense_are_refused_with_their_name() {
+fn rejects_invalid_settings_by_name() {
     let refused = |settings: Settings| Ascii::new(settings).unwrap_err().to_string();
     assert!(
         refused(Settings {
@@ -190,12 +194,12 @@ fn settings_that_make_no_sense_are_refused_with_their_name() {
 }
 
 #[test]
-fn the_devices_side_writes_the_manuals_lines() {
-    let writing = Writing::new(keyence()).unwrap();
-    let line = |statement| String::from_utf8(writing.write(statement)).unwrap();
-    assert_eq!(line(Statement::Metres(1.2345e-3)), "+01.2345\r");
-    assert_eq!(line(Statement::Metres(-0.012e-3)), "-00.0120\r");
-    assert_eq!(line(Statement::Metres(4e-3)), "+FFFFFFF\r");
-    assert_eq!(line(Statement::Metres(-4e-3)), "-FFFFFFF\r");
-    assert_eq!(line(Statement::Invalid), "XXXXXXXX\r");
+fn writes_the_lines_of_the_manual() {
+    let format = LineFormat::new(keyence()).unwrap();
+    let line = |output| String::from_utf8(format.write(output)).unwrap();
+    assert_eq!(line(Output::Position(1.2345e-3)), "+01.2345\r");
+    assert_eq!(line(Output::Position(-0.012e-3)), "-00.0120\r");
+    assert_eq!(line(Output::Position(4e-3)), "+FFFFFFF\r");
+    assert_eq!(line(Output::Position(-4e-3)), "-FFFFFFF\r");
+    assert_eq!(line(Output::Invalid), "XXXXXXXX\r");
 }

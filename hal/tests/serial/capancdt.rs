@@ -1,11 +1,11 @@
-//! capaNCDT 61xx by the manuals' bytes.
+//! capaNCDT 61xx with the examples of the manuals.
 
 use bench_hal::serial::capancdt::{Capancdt, CounterMeaning, Settings};
 use bench_hal::serial::{Decoder, Event, Sample};
 
 use crate::support::{damaged, events, valid};
 
-/// The manuals' example: counter 290, three values, the first 0x3244B1.
+/// The example of the manuals: counter 290, three values, the first 0x3244B1.
 const EXAMPLE: [u8; 25] = [
     0x68, 0x13, 0x13, 0x68, 0x01, 0x7E,
     0x08, // SD LE LE SD DA SA FC: 19 bytes from DA to the end of data
@@ -28,13 +28,13 @@ fn raws(answers: &[Vec<u8>]) -> Vec<Event> {
 }
 
 #[test]
-fn the_request_is_the_manuals() {
+fn request_equals_that_of_the_manual() {
     assert_eq!(settings().request(), [0x10, 0x7E, 0x01, 0x4C, 0xCB, 0x16]);
     assert_eq!(decoder().request(), Some(&settings().request()[..]));
 }
 
 #[test]
-fn the_manuals_answer_is_three_values_near_41_89_micrometres() {
+fn decodes_the_answer_of_the_manual() {
     let found = events(&mut decoder(), &EXAMPLE);
     assert_eq!(valid(&found), [0x3244B1, 0x3244AC, 0x3244B9]);
     assert_eq!((found.len(), found.last()), (4, Some(&Event::AnswerEnd)));
@@ -49,7 +49,7 @@ fn the_manuals_answer_is_three_values_near_41_89_micrometres() {
 }
 
 #[test]
-fn the_encoder_writes_the_manuals_answer() {
+fn writes_the_answer_of_the_manual() {
     assert_eq!(
         settings().answer(290, &[0x3244B1, 0x3244AC, 0x3244B9]),
         EXAMPLE
@@ -57,7 +57,7 @@ fn the_encoder_writes_the_manuals_answer() {
 }
 
 #[test]
-fn no_answer_with_one_wrong_byte_is_believed() {
+fn rejects_an_answer_with_one_wrong_byte() {
     for at in 0..EXAMPLE.len() {
         for flip in 1..=255 {
             let mut bytes = EXAMPLE;
@@ -72,14 +72,14 @@ fn no_answer_with_one_wrong_byte_is_believed() {
 }
 
 #[test]
-fn an_answer_whose_m_contradicts_its_length_is_not_believed() {
+fn rejects_an_answer_whose_count_does_not_match_its_length() {
     let mut bytes = EXAMPLE;
     (bytes[9], bytes[23]) = (2, 0x24); // m one less, and the sum with it
     assert_eq!(valid(&events(&mut decoder(), &bytes)), []);
 }
 
 #[test]
-fn the_answer_of_another_address_is_not_ours() {
+fn rejects_the_answer_of_another_address() {
     let other = Settings {
         probe_address: 0x7D,
         ..settings()
@@ -88,7 +88,7 @@ fn the_answer_of_another_address_is_not_ours() {
 }
 
 #[test]
-fn beyond_full_scale_and_below_zero_the_position_is_the_ranges_end() {
+fn position_outside_the_range_is_the_end_of_the_range() {
     let found = raws(&[settings().answer(4, &[0xF0_0000, 0xF0_0001, 0, -1])]);
     let end = |raw, position_m| Sample { raw, position_m };
     let expected = [
@@ -102,7 +102,7 @@ fn beyond_full_scale_and_below_zero_the_position_is_the_ranges_end() {
 }
 
 #[test]
-fn a_counter_that_advanced_further_than_the_batch_shows_the_gap() {
+fn reports_a_gap_when_the_counter_advances_more_than_the_batch() {
     let found = raws(&[
         settings().answer(65534, &[1]),
         settings().answer(3, &[2, 3]),
@@ -113,7 +113,7 @@ fn a_counter_that_advanced_further_than_the_batch_shows_the_gap() {
 }
 
 #[test]
-fn a_value_sent_twice_is_handed_out_once() {
+fn uses_a_repeated_value_once() {
     let found = raws(&[
         settings().answer(7, &[1, 2]),
         settings().answer(7, &[1, 2]),
@@ -130,7 +130,7 @@ fn a_value_sent_twice_is_handed_out_once() {
 }
 
 #[test]
-fn after_a_restart_the_first_batch_is_withheld_and_the_next_is_new() {
+fn withholds_the_first_batch_after_a_restart() {
     let found = raws(&[
         settings().answer(500, &[1]),
         settings().answer(2, &[8, 9]),
@@ -144,7 +144,7 @@ fn after_a_restart_the_first_batch_is_withheld_and_the_next_is_new() {
 }
 
 #[test]
-fn a_counter_of_the_oldest_value_is_followed_over_changing_batches() {
+fn follows_a_counter_of_the_oldest_value() {
     let oldest = Settings {
         counter: CounterMeaning::OldestValue,
         ..settings()
@@ -167,12 +167,12 @@ fn a_counter_of_the_oldest_value_is_followed_over_changing_batches() {
 }
 
 #[test]
-fn an_answer_without_values_ends_an_exchange_and_is_no_measurement() {
+fn accepts_an_answer_without_values() {
     assert_eq!(raws(&[settings().answer(1, &[])]), [Event::AnswerEnd]);
 }
 
 #[test]
-fn the_echo_of_the_request_is_not_damage() {
+fn recognises_the_echo_of_the_request() {
     let found = raws(&[settings().request().to_vec(), settings().answer(1, &[4])]);
     assert_eq!(
         (found[0], damaged(&found), valid(&found)),
@@ -181,7 +181,7 @@ fn the_echo_of_the_request_is_not_damage() {
 }
 
 #[test]
-fn an_answer_behind_a_cut_one_is_found() {
+fn finds_the_answer_after_a_cut_one() {
     let cut = settings().answer(1, &[1, 2, 3])[..20].to_vec();
     let found = raws(&[cut, settings().answer(2, &[7]), settings().answer(3, &[8])]);
     assert_eq!((valid(&found), damaged(&found)), (vec![7, 8], 20));

@@ -1,4 +1,4 @@
-//! The pretend probe's end of the line.
+//! The line of an emulated probe.
 
 use std::os::fd::AsRawFd;
 
@@ -8,13 +8,13 @@ use serialport::{SerialPort, TTYPort};
 use crate::support::probes::{all, optoncdt, ramp, still};
 use crate::support::rehearsal::{Rehearsal, more, until};
 
-/// Whether the terminal is marked for exclusive use: who is not root could not open it.
+/// Whether the terminal is in exclusive use: a user other than root could not open it.
 fn is_exclusive(terminal: &TTYPort) -> bool {
-    let mut mark: libc::c_int = 0;
-    // SAFETY: the descriptor is open, and `mark` is the int that TIOCGEXCL writes.
-    let result = unsafe { libc::ioctl(terminal.as_raw_fd(), libc::TIOCGEXCL, &mut mark) };
+    let mut exclusive: libc::c_int = 0;
+    // SAFETY: the descriptor is open, and `exclusive` is the int that TIOCGEXCL writes.
+    let result = unsafe { libc::ioctl(terminal.as_raw_fd(), libc::TIOCGEXCL, &mut exclusive) };
     assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
-    mark != 0
+    exclusive != 0
 }
 
 fn shared(rehearsal: &Rehearsal) -> TTYPort {
@@ -23,41 +23,41 @@ fn shared(rehearsal: &Rehearsal) -> TTYPort {
 }
 
 #[test]
-fn one_reader_after_the_other_is_served_by_the_same_probe() {
+fn several_readers_can_use_the_probe_one_after_the_other() {
     for protocol in all() {
         let rehearsal = Rehearsal::new(&protocol, 1000.0, ramp);
         for _ in 0..3 {
-            more(&mut rehearsal.open(&protocol), 20);
+            more(&mut rehearsal.open(), 20);
         }
     }
 }
 
 #[test]
-fn the_mark_of_exclusive_use_that_a_killed_reader_leaves_is_taken_off() {
+fn exclusive_use_ends_after_a_reader_was_killed() {
     let rehearsal = Rehearsal::new(&optoncdt(), 1000.0, still);
-    let watch = shared(&rehearsal);
+    let observer = shared(&rehearsal);
     let killed = std::fs::File::options()
         .read(true)
         .write(true)
         .open(&rehearsal.path)
         .unwrap();
-    // SAFETY: the descriptor is open; TIOCEXCL takes no argument.
+    // SAFETY: the descriptor is open; TIOCEXCL has no argument.
     assert_eq!(
         unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) },
         0
     );
     drop(killed);
-    for _ in 0..10_000 {
-        if !is_exclusive(&watch) {
+    for _ in 0..60_000 {
+        if !is_exclusive(&observer) {
             return;
         }
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    panic!("the mark stays");
+    panic!("still in exclusive use");
 }
 
 #[test]
-fn what_nobody_reads_is_lost_as_on_a_wire() {
+fn bytes_without_a_reader_are_lost() {
     let rehearsal = Rehearsal::new(&optoncdt(), 20_000.0, still);
     let nobody = shared(&rehearsal);
     while rehearsal.sent() < 20_000 {
@@ -72,8 +72,8 @@ fn what_nobody_reads_is_lost_as_on_a_wire() {
     );
     drop(nobody);
     rehearsal.inject_fault(Fault::None);
-    let mut probe = rehearsal.open(&optoncdt());
-    until(&mut probe, "young", |reading, _| {
+    let mut probe = rehearsal.open();
+    until(&mut probe, "a new reading", |reading, _| {
         reading.age_ns < 20_000_000 && reading.sequence > 0
     });
 }

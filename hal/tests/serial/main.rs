@@ -1,4 +1,5 @@
-//! The serial probes: their codecs by the manuals' bytes and by any bytes, and the driver over pseudo terminals.
+//! The serial probes: decoders with the examples of the manuals and with arbitrary bytes, and the driver over pseudo
+//! terminals.
 
 mod ages;
 mod any_bytes;

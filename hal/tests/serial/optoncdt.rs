@@ -1,4 +1,4 @@
-//! optoNCDT by its formula.
+//! optoNCDT with the formula of the manual.
 
 use bench_hal::serial::optoncdt::{Cycle, Optoncdt, Settings, message};
 use bench_hal::serial::{Decoder, Event, Sample};
@@ -12,7 +12,7 @@ fn decode(bytes: &[u8]) -> Vec<Event> {
 }
 
 #[test]
-fn the_bits_are_where_the_manual_has_them() {
+fn message_has_the_bits_of_the_manual() {
     // x = 32760 = 0b0111_111111_111000: L 00 111000, M 01 111111, H 10 00 0111; d = (32760 * 102 / 65520 - 1) / 100 = 50 %
     let bytes = [0b0011_1000, 0b0111_1111, 0b1000_0111];
     assert_eq!(message(32760, true), bytes);
@@ -28,7 +28,7 @@ fn the_bits_are_where_the_manual_has_them() {
 }
 
 #[test]
-fn the_range_ends_where_the_manual_says() {
+fn range_has_the_limits_of_the_manual() {
     let found = decode(&[642, 643, 64877, 64878].map(|x| message(x, true)).concat());
     // 643 is 0.001 % and 64877 is 99.999 % of the range: one count is 0.00156 %
     let Event::Value(Sample {
@@ -65,10 +65,10 @@ fn the_range_ends_where_the_manual_says() {
 }
 
 #[test]
-fn a_value_of_more_than_16_bits_is_an_error_with_words() {
+fn value_of_more_than_16_bits_is_an_error_with_a_text() {
     let found = decode(&message(262_076, true));
     assert!(
-        matches!(found[..], [Event::Fault { code: 262_076, words }] if words.contains("no peak")),
+        matches!(found[..], [Event::Fault { code: 262_076, text }] if text.contains("no peak")),
         "{found:?}"
     );
     assert!(matches!(
@@ -78,7 +78,7 @@ fn a_value_of_more_than_16_bits_is_an_error_with_words() {
 }
 
 #[test]
-fn counts_and_metres_belong_together() {
+fn counts_and_metres_are_inverse() {
     let settings = Settings::new(RANGE_M);
     for x in [643, 644, 20_000, 32_760, 64_877] {
         assert_eq!(settings.counts(settings.metres(x)), x);
@@ -86,7 +86,7 @@ fn counts_and_metres_belong_together() {
 }
 
 #[test]
-fn a_lost_byte_costs_its_value_and_no_other() {
+fn lost_byte_affects_one_value_only() {
     let whole = [1000, 2000, 3000].map(|x| message(x, true)).concat();
     for lost in 0..whole.len() {
         let mut bytes = whole.clone();
@@ -105,7 +105,7 @@ fn a_lost_byte_costs_its_value_and_no_other() {
 }
 
 #[test]
-fn further_values_of_a_cycle_are_counted_from_its_first() {
+fn finds_the_displacement_by_its_index_in_the_cycle() {
     let cycle = Cycle {
         values: 3,
         displacement: 1,
@@ -130,7 +130,7 @@ fn further_values_of_a_cycle_are_counted_from_its_first() {
         )),
         [1001, 2001]
     );
-    // The first value of a cycle is damaged: nobody knows which the further ones are, until the next cycle.
+    // The first value of a cycle is damaged: the index of the further ones is unknown until the next cycle.
     assert_eq!(
         valid(&events(
             &mut decoder,
@@ -141,7 +141,7 @@ fn further_values_of_a_cycle_are_counted_from_its_first() {
 }
 
 #[test]
-fn a_further_value_where_none_was_announced_is_damage() {
+fn further_value_without_a_first_one_is_damaged() {
     let found = decode(&[message(1000, false), message(2000, true)].concat());
     assert_eq!((valid(&found), damaged(&found)), (vec![2000], 3));
 }

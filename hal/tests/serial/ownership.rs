@@ -1,24 +1,26 @@
-//! Who may open a port, and what is said to whoever may not.
+//! Exclusive use of a port, and the errors when it cannot be opened.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
 
 use bench_hal::serial::{
     Polling, PortSettings, ProbeSettings, Protocol, SerialError, SerialProbe, optoncdt,
 };
-
 use nix::fcntl::{Flock, FlockArg};
 
+use crate::support::probes::{self, capancdt_with, still};
 use crate::support::rehearsal::{Rehearsal, more};
 
 const HOLD: &str = "BENCH_TEST_HOLD";
 
-fn protocol() -> Protocol {
-    Protocol::Optoncdt(optoncdt::Settings::new(200e-6))
+fn protocol() -> Arc<dyn Protocol> {
+    probes::optoncdt()
 }
 
 fn rehearsal() -> Rehearsal {
-    Rehearsal::new(&protocol(), 1000.0, |_| 60e-6)
+    Rehearsal::new(&protocol(), 1000.0, still)
 }
 
 fn refusal(settings: ProbeSettings) -> SerialError {
@@ -26,25 +28,25 @@ fn refusal(settings: ProbeSettings) -> SerialError {
 }
 
 #[test]
-fn a_second_opening_is_refused_with_the_holders_pid_until_the_first_is_dropped() {
+fn second_opening_is_refused_with_the_process_number_until_the_first_is_dropped() {
     let rehearsal = rehearsal();
-    let first = rehearsal.open(&protocol());
-    let error = refusal(rehearsal.settings(&protocol())).to_string();
+    let first = rehearsal.open();
+    let error = refusal(rehearsal.settings()).to_string();
     assert!(
         error.contains(&format!("held by process {}", std::process::id())),
         "{error}"
     );
     drop(first);
-    more(&mut rehearsal.open(&protocol()), 1);
+    more(&mut rehearsal.open(), 1);
 }
 
 #[test]
-fn another_name_of_the_same_port_is_the_same_port() {
+fn link_to_an_open_port_is_refused() {
     let rehearsal = rehearsal();
-    let _first = rehearsal.open(&protocol());
+    let _first = rehearsal.open();
     let link = rehearsal.locks.path().join("by-id");
     std::os::unix::fs::symlink(&rehearsal.path, &link).unwrap();
-    let mut settings = rehearsal.settings(&protocol());
+    let mut settings = rehearsal.settings();
     settings.port.path = link;
     assert!(matches!(
         refusal(settings),
@@ -52,7 +54,7 @@ fn another_name_of_the_same_port_is_the_same_port() {
     ));
 }
 
-/// Not a test of its own: the other process of the next one.
+/// Not a test: the other process of the next test.
 #[test]
 fn other_process() {
     let Ok(hold) = std::env::var(HOLD) else {
@@ -65,11 +67,11 @@ fn other_process() {
     };
     let _probe = SerialProbe::open(ProbeSettings::new(port, protocol())).unwrap();
     println!("holding");
-    std::thread::sleep(std::time::Duration::from_secs(600)); // killed long before
+    std::thread::sleep(Duration::from_secs(600)); // killed long before
 }
 
 #[test]
-fn another_process_is_named_and_its_port_is_free_after_its_violent_end() {
+fn port_of_another_process_is_refused_and_free_after_that_process_is_killed() {
     let rehearsal = rehearsal();
     let hold = format!(
         "{} {}",
@@ -89,18 +91,18 @@ fn another_process_is_named_and_its_port_is_free_after_its_violent_end() {
         said.into_iter().any(|line| line.contains("holding")),
         "the other process did not open the port"
     );
-    let error = refusal(rehearsal.settings(&protocol()));
+    let error = refusal(rehearsal.settings());
     assert!(
         matches!(error, SerialError::PortInUse { pid: Some(pid), .. } if pid == other.id()),
         "{error}"
     );
     other.kill().unwrap();
     other.wait().unwrap();
-    more(&mut rehearsal.open(&protocol()), 1);
+    more(&mut rehearsal.open(), 1);
 }
 
 #[test]
-fn a_terminal_that_another_program_has_locked_is_refused() {
+fn terminal_locked_by_another_program_is_refused() {
     let rehearsal = rehearsal();
     let terminal = std::fs::File::options()
         .read(true)
@@ -108,7 +110,7 @@ fn a_terminal_that_another_program_has_locked_is_refused() {
         .open(&rehearsal.path)
         .unwrap();
     let _theirs = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
-    let error = refusal(rehearsal.settings(&protocol())).to_string();
+    let error = refusal(rehearsal.settings()).to_string();
     assert!(
         error.contains("held by another process; stop that first"),
         "{error}"
@@ -116,8 +118,8 @@ fn a_terminal_that_another_program_has_locked_is_refused() {
 }
 
 #[test]
-fn a_port_that_is_not_there_is_said_to_be_missing() {
-    let mut settings = rehearsal().settings(&protocol());
+fn missing_port_is_reported() {
+    let mut settings = rehearsal().settings();
     settings.port.path = "/dev/ttyNONE9".into();
     let error = refusal(settings).to_string();
     assert!(
@@ -128,9 +130,9 @@ fn a_port_that_is_not_there_is_said_to_be_missing() {
 }
 
 #[test]
-fn a_file_that_is_no_terminal_is_refused() {
+fn file_that_is_not_a_terminal_is_refused() {
     let rehearsal = rehearsal();
-    let mut settings = rehearsal.settings(&protocol());
+    let mut settings = rehearsal.settings();
     settings.port.path = rehearsal.locks.path().join("file");
     std::fs::write(&settings.port.path, "").unwrap();
     let error = refusal(settings).to_string();
@@ -138,8 +140,8 @@ fn a_file_that_is_no_terminal_is_refused() {
 }
 
 #[test]
-fn a_lock_that_cannot_be_written_is_said_with_the_setting_to_change() {
-    let mut settings = rehearsal().settings(&protocol());
+fn lock_file_error_names_the_setting() {
+    let mut settings = rehearsal().settings();
     settings.port.path = "/dev/null".into();
     settings.port.lock_dir = "/nonexistent".into();
     let error = refusal(settings).to_string();
@@ -150,7 +152,7 @@ fn a_lock_that_cannot_be_written_is_said_with_the_setting_to_change() {
 }
 
 #[test]
-fn settings_that_make_no_sense_are_refused_before_the_port_is_touched() {
+fn invalid_settings_are_refused_before_the_port_is_opened() {
     let settings = || ProbeSettings::new(PortSettings::new("/dev/ttyNONE9", 921_600), protocol());
     let refused = |change: fn(&mut ProbeSettings)| {
         let mut settings = settings();
@@ -160,21 +162,21 @@ fn settings_that_make_no_sense_are_refused_before_the_port_is_touched() {
     assert!(refused(|settings| settings.mounting.gain = 0.0).contains("gain = 0"));
     assert!(refused(|settings| settings.mounting.offset_m = f64::NAN).contains("offset_m"));
     assert!(refused(|settings| settings.port.baud = 0).contains("baud = 0"));
-    let impatient = |settings: &mut ProbeSettings| {
-        settings.polling = Polling {
-            timeout: std::time::Duration::ZERO,
-            ..settings.polling
-        }
+    let without_timeout = |settings: &mut ProbeSettings| {
+        settings.protocol = capancdt_with(Polling {
+            timeout: Duration::ZERO,
+            ..Polling::default()
+        });
     };
-    assert!(refused(impatient).contains("quiet, timeout"));
-    let of_nothing = |settings: &mut ProbeSettings| {
-        settings.protocol = Protocol::Optoncdt(optoncdt::Settings::new(-1.0))
+    assert!(refused(without_timeout).contains("quiet, timeout"));
+    let without_range = |settings: &mut ProbeSettings| {
+        settings.protocol = Arc::new(optoncdt::Settings::new(-1.0));
     };
-    assert!(refused(of_nothing).contains("range_m = -1"));
+    assert!(refused(without_range).contains("range_m = -1"));
 }
 
 #[test]
-fn permission_denied_names_the_group_and_the_rule() {
+fn permission_error_names_group_and_udev_rule() {
     let error = SerialError::Permission {
         path: "/dev/ttyUSB0".into(),
     }

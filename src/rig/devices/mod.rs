@@ -110,7 +110,7 @@ pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
         .iter()
         .map(|note| format!("{}; {}", note.what, note.remedy))
         .collect();
-    let watch = probe.watch();
+    let watch = probe.statistics_handle();
     wait_for_reading(&mut probe, &watch)?;
     let rig = Box::new(Devices { amplifier, probe });
     let (amplifier, probe) = (amplifier_identity, probe::identity(config));

@@ -1,5 +1,6 @@
 //! Probes by their settings.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use bench_hal::serial::{
@@ -44,7 +45,7 @@ pub fn check(config: &Config) -> Result<(), ProbeError> {
         return Ok(());
     };
     settings.protocol.decoder()?;
-    let characters = config.probe.device.characters_per_reading().unwrap_or(0);
+    let characters = settings.protocol.characters_per_reading().unwrap_or(0);
     let least_s = settings.port.line_time_ns(characters) as f64 * 1e-9;
     let transport_s = config.probe.transport_s;
     if transport_s < least_s {
@@ -82,7 +83,6 @@ pub fn settings(config: &Config) -> Option<ProbeSettings> {
     let mut settings = ProbeSettings::new(port(line), protocol);
     settings.latency = Duration::from_secs_f64(config.probe.latency_s);
     settings.mounting = device.mounting().map(mounting).unwrap_or_default();
-    settings.polling = device.polling().map(polling).unwrap_or_default();
     Some(settings)
 }
 
@@ -116,13 +116,13 @@ fn polling(settings: PollingSettings) -> Polling {
 }
 
 impl ProbeDevice {
-    /// What the probe speaks; `None` for the simulated one.
-    pub fn protocol(&self) -> Option<Protocol> {
+    /// The protocol with its settings; `None` for the simulated probe.
+    pub fn protocol(&self) -> Option<Arc<dyn Protocol>> {
         match self {
             ProbeDevice::Simulated(_) => None,
-            ProbeDevice::Capancdt(device) => Some(Protocol::Capancdt(capancdt(device))),
-            ProbeDevice::Optoncdt(device) => Some(Protocol::Optoncdt(optoncdt(device))),
-            ProbeDevice::Ascii(device) => Some(Protocol::Ascii(ascii(device))),
+            ProbeDevice::Capancdt(device) => Some(Arc::new(capancdt(device))),
+            ProbeDevice::Optoncdt(device) => Some(Arc::new(optoncdt(device))),
+            ProbeDevice::Ascii(device) => Some(Arc::new(ascii(device))),
         }
     }
 
@@ -145,27 +145,6 @@ impl ProbeDevice {
             ProbeDevice::Ascii(device) => Some(device.mounting),
         }
     }
-
-    fn polling(&self) -> Option<PollingSettings> {
-        match self {
-            ProbeDevice::Capancdt(device) => Some(device.polling),
-            ProbeDevice::Ascii(device) => Some(device.polling),
-            ProbeDevice::Simulated(_) | ProbeDevice::Optoncdt(_) => None,
-        }
-    }
-
-    /// Characters on the line between the moment a probe could tell a value and the arrival of the last of them; the
-    /// request counts, for the age does from there.
-    pub fn characters_per_reading(&self) -> Option<u32> {
-        match self {
-            ProbeDevice::Simulated(_) | ProbeDevice::Ascii(_) => None,
-            ProbeDevice::Capancdt(device) => {
-                let device = capancdt(device);
-                Some((device.request().len() + device.answer(0, &[0]).len()) as u32)
-            }
-            ProbeDevice::Optoncdt(device) => Some(3 * u32::from(device.values_per_cycle)),
-        }
-    }
 }
 
 fn capancdt(device: &CapancdtSettings) -> capancdt::Settings {
@@ -177,6 +156,7 @@ fn capancdt(device: &CapancdtSettings) -> capancdt::Settings {
             CounterMeaning::NewestValue => capancdt::CounterMeaning::NewestValue,
             CounterMeaning::OldestValue => capancdt::CounterMeaning::OldestValue,
         },
+        polling: polling(device.polling),
     }
 }
 
@@ -205,5 +185,6 @@ fn ascii(device: &AsciiSettings) -> ascii::Settings {
         offset_m: device.zero_m,
         lower_m: device.lower_m,
         upper_m: device.upper_m,
+        polling: polling(device.polling),
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use bench_hal::serial::emulator::{Fault, Line, LineCounts, ProbeTask, SharedProbe, simulate};
+use bench_hal::serial::emulator::{EmulatedProbe, Fault, Line, LineCounts, ProbeTask, SharedProbe};
 use bench_hal::serial::{Note, PortSettings};
 
 use super::EmulatorError;
@@ -53,7 +53,7 @@ impl Probe {
         let simulated = || EmulatorError::Simulated { device: "probe" };
         let protocol = device.protocol().ok_or_else(simulated)?;
         let rate_hz = rate_hz.unwrap_or_else(|| measuring_rate_hz(config));
-        let acting: SharedProbe = Arc::new(Mutex::new(simulate(&protocol, rate_hz)?));
+        let acting: SharedProbe = Arc::new(Mutex::new(EmulatedProbe::new(&*protocol, rate_hz)?));
         let (line, notes) = line(port(device.line().ok_or_else(simulated)?), end)?;
         let place = line.path().to_owned();
         let link = match end {
@@ -117,7 +117,7 @@ impl Probe {
 
     /// What has gone over the line.
     pub fn carried(&self) -> &LineCounts {
-        self.task.carried()
+        self.task.counts()
     }
 
     /// Whether the line is lost: the port is gone.

@@ -1,104 +1,105 @@
-//! Faults that a pretend probe can be asked for.
+//! Faults of an emulated probe.
 
 use std::collections::VecDeque;
 
-/// How a pretend probe misbehaves.
+/// A fault of an emulated probe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Fault {
-    /// Not at all.
+    /// No fault.
     #[default]
     None,
-    /// It sends nothing.
+    /// Nothing is sent.
     Silence,
-    /// One byte in so many is another byte.
+    /// Bytes are corrupted at regular intervals.
     Corrupt {
-        /// Bytes from one damaged one to the next.
+        /// Distance of the corrupted bytes: 1 corrupts every byte.
         every: u32,
     },
-    /// Its measurements stay where the stage is now, and are sent as new.
+    /// The measured value no longer changes, but is sent as new.
     Stuck,
-    /// One measurement in so many lies elsewhere.
+    /// Measurements jump at regular intervals.
     Jump {
-        /// Measurements from one jump to the next.
+        /// Distance of the jumps: 2 makes every second measurement jump.
         every: u32,
-        /// How far, metres.
+        /// Size of the jump in metres.
         by_m: f64,
     },
-    /// The target is twice the range beyond its end.
+    /// The target is far outside the measuring range.
     OutOfRange,
-    /// All it sends leaves it later.
+    /// Everything is sent with a delay.
     Late {
-        /// By how much, nanoseconds.
+        /// The delay in nanoseconds.
         by_ns: u64,
     },
-    /// It restarts at once: its counter begins again, what it had to send is cut off.
+    /// The probe restarts now: its counter starts again, and an unfinished message is cut off.
     Reset,
 }
 
-/// Carries out a fault on what a probe measures and on what it sends.
+/// Applies a fault to the measurements and to the bytes of an emulated probe.
 #[derive(Debug, Default)]
-pub(super) struct Ailing {
+pub(super) struct FaultInjector {
     fault: Fault,
     stuck_m: Option<f64>,
     measurements: u32,
     bytes: u32,
-    noise: u32,
-    held_back: VecDeque<(u64, Vec<u8>)>,
+    random: u32,
+    delayed: VecDeque<(u64, Vec<u8>)>,
 }
 
-impl Ailing {
-    /// A new fault; what a former one held back is lost.
-    pub(super) fn ask(&mut self, fault: Fault) {
+impl FaultInjector {
+    /// Sets a new fault; bytes that the previous fault delayed are lost.
+    pub(super) fn set(&mut self, fault: Fault) {
         *self = Self {
             fault,
-            noise: self.noise,
+            random: self.random,
             ..Self::default()
         };
     }
 
-    /// What is measured at `position_m` with `beyond_m` a place out of range.
-    pub(super) fn measure(&mut self, position_m: f64, beyond_m: f64) -> f64 {
+    /// The position that is measured at `position_m`.
+    pub(super) fn measure(&mut self, position_m: f64, out_of_range_m: f64) -> f64 {
         self.measurements = self.measurements.wrapping_add(1);
         match self.fault {
             Fault::Stuck => *self.stuck_m.get_or_insert(position_m),
             Fault::Jump { every, by_m } if self.measurements.is_multiple_of(every.max(1)) => {
                 position_m + by_m
             }
-            Fault::OutOfRange => beyond_m,
+            Fault::OutOfRange => out_of_range_m,
             _ => position_m,
         }
     }
 
-    /// What goes out on the line now of `bytes` and of what was held back before.
+    /// The bytes that go out now: `bytes` with the fault applied, and delayed bytes that are due.
     pub(super) fn send(&mut self, mut bytes: Vec<u8>, now_ns: u64) -> Vec<u8> {
         match self.fault {
             Fault::Silence => bytes.clear(),
-            Fault::Corrupt { every } => bytes
-                .iter_mut()
-                .for_each(|byte| self.corrupt(byte, every.max(1))),
-            Fault::Late { by_ns } => return self.hold_back(bytes, now_ns, by_ns),
+            Fault::Corrupt { every } => self.corrupt(&mut bytes, every.max(1)),
+            Fault::Late { by_ns } => return self.delay(bytes, now_ns, by_ns),
             _ => {}
         }
         bytes
     }
 
-    fn corrupt(&mut self, byte: &mut u8, every: u32) {
-        self.bytes = self.bytes.wrapping_add(1);
-        if self.bytes.is_multiple_of(every) {
-            self.noise = self
-                .noise
-                .wrapping_mul(1_664_525)
-                .wrapping_add(1_013_904_223); // Numerical Recipes
-            *byte ^= (self.noise >> 24) as u8 | 1; // never the same byte
+    fn corrupt(&mut self, bytes: &mut [u8], every: u32) {
+        for byte in bytes {
+            self.bytes = self.bytes.wrapping_add(1);
+            if self.bytes.is_multiple_of(every) {
+                // Linear congruential generator of Numerical Recipes.
+                self.random = self
+                    .random
+                    .wrapping_mul(1_664_525)
+                    .wrapping_add(1_013_904_223);
+                *byte ^= (self.random >> 24) as u8 | 1; // bit 0 set: the byte always changes
+            }
         }
     }
 
-    fn hold_back(&mut self, bytes: Vec<u8>, now_ns: u64, by_ns: u64) -> Vec<u8> {
+    fn delay(&mut self, bytes: Vec<u8>, now_ns: u64, by_ns: u64) -> Vec<u8> {
         if !bytes.is_empty() {
-            self.held_back.push_back((now_ns + by_ns, bytes));
+            self.delayed.push_back((now_ns + by_ns, bytes));
         }
         let mut due = Vec::new();
-        while let Some((_, bytes)) = self.held_back.pop_front_if(|(due_ns, _)| *due_ns <= now_ns) {
+        while let Some((_, bytes)) = self.delayed.pop_front_if(|(due_ns, _)| *due_ns <= now_ns) {
             due.extend(bytes);
         }
         due

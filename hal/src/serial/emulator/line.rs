@@ -1,40 +1,40 @@
-//! The probe's end of a serial line: a port, or the master of a pseudo terminal as slow as the line it stands for.
+//! The probe's end of a serial line: a port, or the master of a pseudo terminal with the speed of the emulated line.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
-use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serialport::{ClearBuffer, SerialPort, TTYPort};
 
 use crate::serial::error::SerialError;
-use crate::serial::port::{Note, Port, PortSettings, is_nothing};
+use crate::serial::ioctl;
+use crate::serial::port::{Note, Port, PortSettings, is_no_data};
 
-/// More bytes than this wait for a reader: nobody reads.
-const UNREAD: u32 = 2048;
-/// How long a write may wait for room.
+/// If more bytes than this are waiting in the terminal, nobody reads it.
+const UNREAD_MAX: u32 = 2048;
+/// How long a write may wait for space.
 const WRITE_WAIT: Duration = Duration::from_millis(5);
-/// A line that is so far behind takes no more: a probe that says more than the line carries loses the rest.
-const FULL_NS: u64 = 1_000_000_000;
-/// How often the slave of a pseudo terminal is freed of the mark of a reader that was killed.
-const FREE_NS: u64 = 50_000_000;
+/// If the line is this far behind, further bytes are lost: the probe sends more than the line can transmit.
+const BACKLOG_MAX_NS: u64 = 1_000_000_000;
+/// How often the exclusive use of the pseudo terminal is ended.
+const RELEASE_PERIOD_NS: u64 = 50_000_000;
 
-/// Where a pretend probe is connected.
+/// The line of an emulated probe.
 pub struct Line {
     end: End,
     path: PathBuf,
     settings: PortSettings,
-    /// What is on its way, with the time at which its last bit arrives.
-    sending: VecDeque<(u64, Vec<u8>)>,
-    /// Until when the line carries what was given to it.
-    busy_ns: u64,
-    freed_ns: u64,
+    /// Bytes in transmission, with the arrival time of the last of them.
+    in_transit: VecDeque<(u64, Vec<u8>)>,
+    /// When the line will have transmitted all bytes.
+    busy_until_ns: u64,
+    next_release_ns: u64,
 }
 
 enum End {
     Port(Port),
-    /// The slave stays open here, so that the line outlives whoever reads it.
+    /// The slave is kept open, so that the line remains when a reader closes it.
     Terminal {
         master: TTYPort,
         slave: TTYPort,
@@ -42,19 +42,16 @@ enum End {
 }
 
 impl Line {
-    /// Opens the port of `settings` and takes it for this process; with what it did not take.
+    /// Opens and locks the port of `settings`. The notes name the settings that it did not accept.
     pub fn port(settings: PortSettings) -> Result<(Line, Vec<Note>), SerialError> {
         let (port, notes) = Port::open(&settings)?;
-        Ok((
-            Line::new(End::Port(port), settings.path.clone(), settings),
-            notes,
-        ))
+        let line = Line::new(End::Port(port), settings.path.clone(), settings);
+        Ok((line, notes))
     }
 
-    /// Makes a pseudo terminal that carries bytes as fast as the line of `settings`; its slave is for the reader.
+    /// Creates a pseudo terminal with the speed of the line of `settings`. The reader opens its slave, [`path`](Line::path).
     pub fn terminal(settings: PortSettings) -> Result<Line, SerialError> {
-        let made = TTYPort::pair();
-        let (master, slave) = made.map_err(|source| SerialError::Open {
+        let (master, slave) = TTYPort::pair().map_err(|source| SerialError::Open {
             path: "/dev/ptmx".into(),
             source,
         })?;
@@ -67,98 +64,90 @@ impl Line {
             end,
             path,
             settings,
-            sending: VecDeque::new(),
-            busy_ns: 0,
-            freed_ns: 0,
+            in_transit: VecDeque::new(),
+            busy_until_ns: 0,
+            next_release_ns: 0,
         }
     }
 
-    /// The port, or the slave of the pseudo terminal.
+    /// Path of the port, or of the slave of the pseudo terminal.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Bytes from the host, waiting up to `wait` for them; 0 if there are none. An error: the line is lost.
+    /// Reads bytes of the host that arrive within `wait`; 0 if there are none. An error means that the line is lost.
     pub(super) fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         match &mut self.end {
             End::Port(port) => port.read(buffer, wait),
             End::Terminal { master, .. } => {
                 master.set_timeout(wait).map_err(io::Error::from)?;
-                master.read(buffer).or_else(|error| {
-                    if is_nothing(&error) {
-                        Ok(0)
-                    } else {
-                        Err(error)
-                    }
-                })
+                match master.read(buffer) {
+                    Err(error) if is_no_data(&error) => Ok(0),
+                    other => other,
+                }
             }
         }
     }
 
-    /// Gives `bytes` to the line, after `asked` bytes of the host that took their time, too.
-    pub(super) fn give(&mut self, bytes: Vec<u8>, asked: usize, now_ns: u64) {
-        if bytes.is_empty() || self.busy_ns > now_ns + FULL_NS {
+    /// Starts the transmission of `bytes` after a request of `request` bytes, which takes its time on the line, too.
+    pub(super) fn transmit(&mut self, bytes: Vec<u8>, request: usize, now_ns: u64) {
+        if bytes.is_empty() || self.busy_until_ns > now_ns + BACKLOG_MAX_NS {
             return;
         }
-        let is_port = matches!(self.end, End::Port(_));
-        let line_ns = if is_port {
-            0
-        } else {
-            self.settings.line_time_ns((asked + bytes.len()) as u32)
+        let line_ns = match self.end {
+            End::Port(_) => 0, // the port itself has the speed of the line
+            End::Terminal { .. } => self.settings.line_time_ns((request + bytes.len()) as u32),
         };
-        self.busy_ns = self.busy_ns.max(now_ns) + line_ns;
-        self.sending.push_back((self.busy_ns, bytes));
+        self.busy_until_ns = self.busy_until_ns.max(now_ns) + line_ns;
+        self.in_transit.push_back((self.busy_until_ns, bytes));
     }
 
     /// When the next bytes arrive.
     pub(super) fn due_ns(&self) -> Option<u64> {
-        self.sending.front().map(|(due_ns, _)| *due_ns)
+        self.in_transit.front().map(|(due_ns, _)| *due_ns)
     }
 
-    /// Hands over what has arrived by `now_ns`; returns how many bytes.
+    /// Delivers the bytes that have arrived by `now_ns`; returns their number.
     pub(super) fn deliver(&mut self, now_ns: u64) -> io::Result<u64> {
-        self.free_slave(now_ns);
+        self.release_terminal(now_ns);
         let mut count = 0;
-        while let Some((_, bytes)) = self.sending.pop_front_if(|(due_ns, _)| *due_ns <= now_ns) {
+        while let Some((_, bytes)) = self
+            .in_transit
+            .pop_front_if(|(due_ns, _)| *due_ns <= now_ns)
+        {
             self.write(&bytes)?;
             count += bytes.len() as u64;
         }
         Ok(count)
     }
 
-    /// What nobody reads is lost, as on a wire without a reader.
+    /// Bytes that nobody reads are lost, as on a wire.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let written = match &mut self.end {
             End::Port(port) => port.write(bytes, WRITE_WAIT),
             End::Terminal { master, slave } => {
-                if slave.bytes_to_read().unwrap_or(0) > UNREAD {
+                if slave.bytes_to_read().unwrap_or(0) > UNREAD_MAX {
                     slave.clear(ClearBuffer::Input).map_err(io::Error::from)?;
                 }
                 master.set_timeout(WRITE_WAIT).map_err(io::Error::from)?;
                 master.write_all(bytes)
             }
         };
-        written.or_else(|error| {
-            if is_nothing(&error) {
-                Ok(())
-            } else {
-                Err(error)
-            }
-        })
+        match written {
+            Err(error) if is_no_data(&error) => Ok(()),
+            other => other,
+        }
     }
 
-    /// Takes off the mark of exclusive use that a reader leaves on the slave when it is killed: on a port it goes with the
-    /// last closing, but here the slave stays open, and the next reader would be refused. Readers keep each other out by
-    /// their locks.
-    fn free_slave(&mut self, now_ns: u64) {
+    /// Ends the exclusive use of the slave that a killed reader leaves behind. On a port it ends with the last close, but
+    /// here the slave stays open, and only root could open it again. Readers exclude each other by their lock files.
+    fn release_terminal(&mut self, now_ns: u64) {
         let End::Terminal { slave, .. } = &self.end else {
             return;
         };
-        if now_ns < self.freed_ns {
-            return;
+        if now_ns >= self.next_release_ns {
+            self.next_release_ns = now_ns + RELEASE_PERIOD_NS;
+            ioctl::end_exclusive_use(slave);
         }
-        self.freed_ns = now_ns + FREE_NS;
-        // SAFETY: the descriptor is open as long as `slave` lives; TIOCNXCL takes no argument.
-        let _ = unsafe { libc::ioctl(slave.as_raw_fd(), libc::TIOCNXCL) }; // else only root can open it next
     }
 }

@@ -1,4 +1,4 @@
-//! Carries bytes between a line and a pretend probe, in a thread of its own.
+//! The thread that connects an emulated probe to a line.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -8,37 +8,38 @@ use std::time::Duration;
 
 use super::{EmulatedProbe, Line};
 
-/// Longest time between two looks at what is due.
-const LOOK_NS: u64 = 1_000_000;
-/// Measurements made one by one if the thread was kept away; more are made at once, of one position.
-const MOST_MEASUREMENTS: usize = 1000;
+/// Longest wait for bytes of the host.
+const WAIT_MAX_NS: u64 = 1_000_000;
+/// Largest number of measurements that are taken one by one after the thread was suspended. The remaining ones are taken
+/// together, at one position.
+const CATCH_UP_MAX: usize = 1000;
 
-/// A pretend probe that several may hold: one carries its bytes, another asks it for faults.
-pub type SharedProbe = Arc<Mutex<Box<dyn EmulatedProbe>>>;
+/// An emulated probe that is shared: the thread runs it, another thread injects faults.
+pub type SharedProbe = Arc<Mutex<EmulatedProbe>>;
 
-/// A pretend probe at work. Dropping it ends the thread and closes the line: a reader of the terminal sees it hang up.
+/// A running emulated probe. Dropping it ends the thread and closes the line; the reader of the terminal sees a hang-up.
 pub struct ProbeTask {
     stop: Arc<AtomicBool>,
-    carried: Arc<LineCounts>,
+    counts: Arc<LineCounts>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// What has gone over a line.
+/// Counts of a line.
 #[derive(Debug, Default)]
 pub struct LineCounts {
-    /// Bytes of the host.
+    /// Bytes received from the host.
     pub received: AtomicU64,
-    /// Bytes of the probe.
+    /// Bytes sent by the probe.
     pub sent: AtomicU64,
-    /// Measurements made.
+    /// Measurements taken.
     pub measurements: AtomicU64,
-    /// The line is lost.
+    /// Whether the line is lost.
     pub is_lost: AtomicBool,
 }
 
 impl ProbeTask {
-    /// Starts `probe` on `line`. `now_ns` is the clock; `measure_m` tells the stage's position, in metres of the probe, at a
-    /// time at which a measurement falls due; `prepare` runs first in the thread, to give it a priority or a processor.
+    /// Starts `probe` on `line`. `now_ns` is the clock. `measure_m` returns the position of the stage, in metres of the
+    /// probe, at the time of a measurement. `prepare` runs first in the thread, for example to set its priority.
     pub fn start(
         line: Line,
         probe: SharedProbe,
@@ -46,35 +47,33 @@ impl ProbeTask {
         measure_m: impl FnMut(u64) -> f64 + Send + 'static,
         prepare: impl FnOnce() + Send + 'static,
     ) -> io::Result<ProbeTask> {
-        let (stop, carried) = (Arc::<AtomicBool>::default(), Arc::<LineCounts>::default());
-        let mut carrier = Carrier {
+        let stop = Arc::<AtomicBool>::default();
+        let counts = Arc::<LineCounts>::default();
+        let worker = Worker {
             line,
             probe,
             now_ns,
             measure_m,
-            carried: Arc::clone(&carried),
+            counts: Arc::clone(&counts),
+            stop: Arc::clone(&stop),
         };
-        let stopped = Arc::clone(&stop);
-        let work = move || {
+        let run = move || {
             prepare();
-            while !stopped.load(Relaxed) && carrier.turn().is_ok() {}
-            carrier.carried.is_lost.store(true, Relaxed);
+            worker.run();
         };
-        let thread = Some(
-            thread::Builder::new()
-                .name("probe-device".into())
-                .spawn(work)?,
-        );
+        let thread = thread::Builder::new()
+            .name("probe-emulator".into())
+            .spawn(run)?;
         Ok(ProbeTask {
             stop,
-            carried,
-            thread,
+            counts,
+            thread: Some(thread),
         })
     }
 
-    /// The counts.
-    pub fn carried(&self) -> &Arc<LineCounts> {
-        &self.carried
+    /// The counts of the line.
+    pub fn counts(&self) -> &Arc<LineCounts> {
+        &self.counts
     }
 }
 
@@ -82,73 +81,78 @@ impl Drop for ProbeTask {
     fn drop(&mut self) {
         self.stop.store(true, Relaxed);
         if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // a panic was reported by its own thread
+            let _ = thread.join(); // a panic was reported by the thread itself
         }
     }
 }
 
-struct Carrier<N, M> {
+struct Worker<N, M> {
     line: Line,
     probe: SharedProbe,
     now_ns: N,
     measure_m: M,
-    carried: Arc<LineCounts>,
+    counts: Arc<LineCounts>,
+    stop: Arc<AtomicBool>,
 }
 
-impl<N: Fn() -> u64, M: FnMut(u64) -> f64> Carrier<N, M> {
-    /// Measures and sends what is due, then listens until something is.
-    fn turn(&mut self) -> io::Result<()> {
+impl<N: Fn() -> u64, M: FnMut(u64) -> f64> Worker<N, M> {
+    fn run(mut self) {
+        while !self.stop.load(Relaxed) && self.step().is_ok() {}
+        self.counts.is_lost.store(true, Relaxed);
+    }
+
+    /// Takes and sends what is due, then waits for a request.
+    fn step(&mut self) -> io::Result<()> {
         self.measure();
         let sent = self.line.deliver((self.now_ns)())?;
-        self.carried.sent.fetch_add(sent, Relaxed);
-        let (mut bytes, wait) = ([0; 256], self.wait());
-        let count = self.line.read(&mut bytes, wait)?;
+        self.counts.sent.fetch_add(sent, Relaxed);
+        let wait = self.wait();
+        let mut buffer = [0; 256];
+        let count = self.line.read(&mut buffer, wait)?;
         if count > 0 {
-            self.carried.received.fetch_add(count as u64, Relaxed);
-            self.answer(&bytes[..count]); // read never says more than fits
+            self.counts.received.fetch_add(count as u64, Relaxed);
+            self.answer(&buffer[..count]);
         }
         Ok(())
     }
 
-    /// Each measurement is made of the position at its own time.
+    /// Takes the measurements that are due, each at the position of its own time.
     fn measure(&mut self) {
         let now_ns = (self.now_ns)();
         let mut probe = lock(&self.probe);
-        for turn in 0..=MOST_MEASUREMENTS {
+        for number in 0..=CATCH_UP_MAX {
             let due_ns = probe.due_ns().unwrap_or(now_ns);
             if due_ns > now_ns {
                 break;
             }
-            let at_ns = if turn < MOST_MEASUREMENTS {
+            let time_ns = if number < CATCH_UP_MAX {
                 due_ns
             } else {
                 now_ns
             };
-            let bytes = probe.poll(at_ns, (self.measure_m)(at_ns));
-            self.line.give(bytes, 0, at_ns);
-            self.carried.measurements.fetch_add(1, Relaxed);
+            let bytes = probe.poll(time_ns, (self.measure_m)(time_ns));
+            self.line.transmit(bytes, 0, time_ns);
+            self.counts.measurements.fetch_add(1, Relaxed);
         }
     }
 
     fn answer(&mut self, request: &[u8]) {
         self.measure();
         let now_ns = (self.now_ns)();
-        let mut probe = lock(&self.probe);
         let position_m = (self.measure_m)(now_ns);
-        let answer = probe.handle(request, now_ns, position_m);
-        self.line.give(answer, request.len(), now_ns);
+        let answer = lock(&self.probe).handle(request, now_ns, position_m);
+        self.line.transmit(answer, request.len(), now_ns);
     }
 
     fn wait(&self) -> Duration {
         let now_ns = (self.now_ns)();
-        let due_ns = [lock(&self.probe).due_ns(), self.line.due_ns()]
-            .into_iter()
-            .flatten()
-            .min();
-        Duration::from_nanos(due_ns.unwrap_or(now_ns).saturating_sub(now_ns).min(LOOK_NS))
+        let measurement_ns = lock(&self.probe).due_ns();
+        let times_ns = [measurement_ns, self.line.due_ns()];
+        let due_ns = times_ns.into_iter().flatten().min().unwrap_or(now_ns);
+        Duration::from_nanos(due_ns.saturating_sub(now_ns).min(WAIT_MAX_NS))
     }
 }
 
-fn lock(probe: &SharedProbe) -> MutexGuard<'_, Box<dyn EmulatedProbe>> {
+fn lock(probe: &SharedProbe) -> MutexGuard<'_, EmulatedProbe> {
     probe.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! What the tests of the serial probes share.
+//! Shared code of the tests of the serial probes.
 
 pub mod naive;
 pub mod probes;
@@ -27,7 +27,7 @@ pub fn valid(events: &[Event]) -> Vec<i64> {
         .collect()
 }
 
-/// Bytes that were said to be damaged.
+/// Number of bytes that were reported as damaged.
 pub fn damaged(events: &[Event]) -> u64 {
     events
         .iter()

@@ -1,5 +1,5 @@
-//! Decoders that look at all bytes at once, written from the protocol's description alone: they say which values of some
-//! bytes are valid.
+//! Reference decoders that process all bytes at once, written from the description of the protocols alone. They return the
+//! valid values.
 
 /// capaNCDT answers: raw counts of valid values, leftmost answer first.
 pub fn capancdt(bytes: &[u8]) -> Vec<i64> {

@@ -1,66 +1,78 @@
-//! A pretend probe behind a pseudo terminal, in a thread of its own, and the driver in front of it.
+//! An emulated probe behind a pseudo terminal, and the driver in front of it.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::emulator::{Fault, Line, ProbeTask, SharedProbe, simulate};
+use bench_hal::serial::emulator::{EmulatedProbe, Fault, Line, ProbeTask, SharedProbe};
 use bench_hal::serial::{PortSettings, ProbeSettings, Protocol, SerialProbe, Statistics};
 use bench_hal::{DisplacementProbe, Reading, Tick};
 
-/// Nothing here may take so long; only a test that hangs meets it.
-const HANGS: Duration = Duration::from_secs(60);
-/// Bits a second.
+/// A test that waits longer than this has failed.
+const LIMIT: Duration = Duration::from_secs(60);
+/// Baud rate in bit/s.
 const BAUD: u32 = 921_600;
 
-/// Where the stage is at a time (nanoseconds of the rehearsal's clock), in metres of the probe.
+/// Position of the stage, in metres of the probe, at a time in nanoseconds of the rehearsal's clock.
 pub type Motion = fn(u64) -> f64;
 
-/// A probe on a pseudo terminal. The clock starts with it.
+/// A probe on a pseudo terminal, with a clock that starts with it.
 pub struct Rehearsal {
     pub path: PathBuf,
     pub locks: tempfile::TempDir,
+    protocol: Arc<dyn Protocol>,
     started: Instant,
-    device: SharedProbe,
+    probe: SharedProbe,
     task: Option<ProbeTask>,
 }
 
 impl Rehearsal {
-    /// A probe that makes `rate_hz` measurements a second of a stage that moves so.
-    pub fn new(protocol: &Protocol, rate_hz: f64, motion: Motion) -> Self {
+    /// A probe that takes `rate_hz` measurements per second of a stage with this motion.
+    pub fn new(protocol: &Arc<dyn Protocol>, rate_hz: f64, motion: Motion) -> Self {
+        Self::with_fault(protocol, rate_hz, motion, Fault::None)
+    }
+
+    /// The same with a fault from the start.
+    pub fn with_fault(
+        protocol: &Arc<dyn Protocol>,
+        rate_hz: f64,
+        motion: Motion,
+        fault: Fault,
+    ) -> Self {
         let line = Line::terminal(PortSettings::new("", BAUD)).unwrap();
         let (path, started) = (line.path().to_owned(), Instant::now());
-        let device: SharedProbe = Arc::new(Mutex::new(simulate(protocol, rate_hz).unwrap()));
+        let mut probe = EmulatedProbe::new(&**protocol, rate_hz).unwrap();
+        probe.inject_fault(fault);
+        let probe: SharedProbe = Arc::new(Mutex::new(probe));
         let now_ns = move || started.elapsed().as_nanos() as u64;
-        let task =
-            Some(ProbeTask::start(line, Arc::clone(&device), now_ns, motion, || {}).unwrap());
-        let locks = tempfile::tempdir().unwrap();
+        let task = ProbeTask::start(line, Arc::clone(&probe), now_ns, motion, || {});
         Self {
             path,
-            locks,
+            locks: tempfile::tempdir().unwrap(),
+            protocol: Arc::clone(protocol),
             started,
-            device,
-            task,
+            probe,
+            task: Some(task.unwrap()),
         }
     }
 
     /// Settings of the driver for this probe.
-    pub fn settings(&self, protocol: &Protocol) -> ProbeSettings {
+    pub fn settings(&self) -> ProbeSettings {
         let port = PortSettings {
             lock_dir: self.locks.path().into(),
             ..PortSettings::new(&self.path, BAUD)
         };
-        ProbeSettings::new(port, protocol.clone())
+        ProbeSettings::new(port, Arc::clone(&self.protocol))
     }
 
-    /// The driver in front of this probe.
-    pub fn open(&self, protocol: &Protocol) -> SerialProbe {
-        SerialProbe::open(self.settings(protocol)).unwrap()
+    /// The driver for this probe.
+    pub fn open(&self) -> SerialProbe {
+        SerialProbe::open(self.settings()).unwrap()
     }
 
     pub fn inject_fault(&self, fault: Fault) {
-        self.device.lock().unwrap().inject_fault(fault);
+        self.probe.lock().unwrap().inject_fault(fault);
     }
 
     pub fn now_ns(&self) -> u64 {
@@ -71,43 +83,47 @@ impl Rehearsal {
     pub fn sent(&self) -> u64 {
         self.task
             .as_ref()
-            .map_or(0, |task| task.carried().sent.load(Relaxed))
+            .map_or(0, |task| task.counts().sent.load(Relaxed))
     }
 
-    /// Pulls the cable: the terminal hangs up.
+    /// Disconnects the cable: the terminal hangs up.
     pub fn unplug(&mut self) {
         self.task = None;
     }
 }
 
-/// The reading now.
+/// The present reading.
 pub fn latest(probe: &mut SerialProbe) -> Reading {
     probe.latest(Tick::default())
 }
 
-/// Watches the probe until a reading pleases, checking that its sequence never falls; panics if none ever does.
+/// Reads until `condition` holds, and checks that the sequence never decreases. Panics after the time limit.
 pub fn until(
     probe: &mut SerialProbe,
     what: &str,
-    mut pleases: impl FnMut(&Reading, &Statistics) -> bool,
+    mut condition: impl FnMut(&Reading, &Statistics) -> bool,
 ) -> Reading {
-    let (begun, mut before) = (Instant::now(), latest(probe));
-    while begun.elapsed() < HANGS {
+    let (start, mut previous) = (Instant::now(), latest(probe));
+    while start.elapsed() < LIMIT {
         let (reading, statistics) = (latest(probe), probe.statistics());
         assert!(
-            reading.sequence >= before.sequence,
-            "{before:?} before {reading:?}"
+            reading.sequence >= previous.sequence,
+            "{previous:?} before {reading:?}"
         );
-        if pleases(&reading, &statistics) {
+        if condition(&reading, &statistics) {
             return reading;
         }
-        before = reading;
+        previous = reading;
         std::thread::sleep(Duration::from_micros(200));
     }
-    panic!("never {what}: {:?} {:?}", latest(probe), probe.statistics());
+    panic!(
+        "not reached: {what}: {:?} {:?}",
+        latest(probe),
+        probe.statistics()
+    );
 }
 
-/// Waits until so many more measurements have been handed out than at the call.
+/// Waits until `count` more measurements have been published than at the call.
 pub fn more(probe: &mut SerialProbe, count: u64) -> Reading {
     let before = probe.statistics().published;
     until(probe, "more readings", |_, statistics| {

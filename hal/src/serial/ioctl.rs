@@ -1,8 +1,8 @@
-//! Asking a serial driver for low latency: the flag `ASYNC_LOW_LATENCY` by TIOCGSERIAL and TIOCSSERIAL [Linux,
-//! tty_ioctl(4), include/uapi/linux/serial.h]. Best effort: who may not, or has no such driver, is told.
+//! System calls on a terminal that have no safe wrapper.
+#![allow(unsafe_code, reason = "ioctl calls")]
 
 use std::io;
-use std::os::fd::RawFd;
+use std::os::fd::AsRawFd;
 
 use super::port::Note;
 
@@ -33,17 +33,19 @@ struct SerialStruct {
     iomap_base: libc::c_ulong,
 }
 
-/// Sets the flag, or says why not.
-pub(super) fn ask(terminal: RawFd) -> Result<(), Note> {
-    // SAFETY: all fields are integers or a pointer nobody follows; zero is a value of each.
+/// Requests low latency from a serial driver: the flag `ASYNC_LOW_LATENCY` by TIOCGSERIAL and TIOCSSERIAL [Linux,
+/// tty_ioctl(4), include/uapi/linux/serial.h]. The note gives the reason if driver or permissions do not allow it.
+pub(super) fn request_low_latency(terminal: &impl AsRawFd) -> Result<(), Note> {
+    let terminal = terminal.as_raw_fd();
+    // SAFETY: all fields are integers or a pointer that is not dereferenced; zero is valid for each.
     let mut serial: SerialStruct = unsafe { std::mem::zeroed() };
-    // SAFETY: `serial` has the layout the kernel writes, and lives through the call.
+    // SAFETY: `serial` has the layout that the kernel writes, and outlives the call.
     check(unsafe { libc::ioctl(terminal, TIOCGSERIAL, &mut serial) })?;
     if serial.flags & ASYNC_LOW_LATENCY != 0 {
         return Ok(());
     }
     serial.flags |= ASYNC_LOW_LATENCY;
-    // SAFETY: as above; the kernel reads.
+    // SAFETY: as above; the kernel reads `serial`.
     check(unsafe { libc::ioctl(terminal, TIOCSSERIAL, &serial) })
 }
 
@@ -56,10 +58,16 @@ fn check(result: libc::c_int) -> Result<(), Note> {
         Some(libc::EPERM | libc::EACCES) => {
             "let root run `setserial PORT low_latency`, or grant CAP_SYS_ADMIN"
         }
-        _ => "this driver has no such switch; readings may be older than on a port that has it",
+        _ => "this driver does not support it; readings may be older than on a port that does",
     };
     Err(Note {
         what: format!("no low latency: {error}"),
         remedy,
     })
+}
+
+/// Ends the exclusive use of a terminal (TIOCNXCL). Best effort.
+pub(super) fn end_exclusive_use(terminal: &impl AsRawFd) {
+    // SAFETY: the descriptor is open as long as `terminal` is borrowed; TIOCNXCL has no argument.
+    let _ = unsafe { libc::ioctl(terminal.as_raw_fd(), libc::TIOCNXCL) };
 }

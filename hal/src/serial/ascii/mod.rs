@@ -1,0 +1,259 @@
+//! Probes that send each measurement as a line of text.
+//!
+//! The form of the lines is a setting: [`Settings::line`] is a pattern with the fields `{value}`, `{value:WIDTH.DECIMALS}`
+//! and `{skip}`. [`Settings::keyence_lk_g`] is the Keyence LK-G over RS-232 [manual LK-G, chapter 5, pages 5-5 and 5-6]:
+//!
+//! ```text
+//! +01.2345 CR     sign and seven characters, in the unit of the display (mm)
+//! XXXXXXXX CR     invalid
+//! +FFFFFFF CR     over range;  -FFFFFFF under range
+//! ER,MA,01 CR     error: the command that it answers, and a number
+//! ```
+//!
+//! Bytes before the first terminator are never used as a value: the beginning of that line may be missing, and a cut
+//! number is still a number.
+//!
+//! Limits of the protocol: a digit that was changed into another digit is not detected. A lost character gives a shorter
+//! number unless the pattern fixes the size of the value, as `{value:8.4}` does.
+
+mod format;
+mod pattern;
+
+pub use self::format::{LineFormat, Output};
+use super::decoder::{DamageCounter, Decoder, Event, Window};
+use super::emulator::Responder;
+use super::error::SerialError;
+use super::protocol::{Polling, Protocol};
+
+/// Longest line, including the terminator.
+const LINE_MAX: usize = 128;
+/// Longest request that the emulated probe compares; longer input is an unknown command.
+const REQUEST_MAX: usize = 64;
+
+/// Settings of the protocol. Texts may contain the escapes `\r`, `\n`, `\t`, `\xNN`, `\\`, `\{`.
+///
+/// ```
+/// use bench_hal::serial::ascii::{LineFormat, Output, Settings};
+///
+/// let format = LineFormat::new(Settings::keyence_lk_g(3e-3)).unwrap();
+/// assert_eq!(format.write(Output::Position(1.2345e-3)), b"+01.2345\r");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Pattern of a line with a measurement: plain text and the fields `{value}`, `{value:WIDTH.DECIMALS}`, `{skip}`, with
+    /// `{value}` exactly once.
+    pub line: String,
+    /// End of a line.
+    pub terminator: String,
+    /// Texts in place of the value that mean: not measured.
+    pub invalid: Vec<String>,
+    /// Texts in place of the value that mean: above the range.
+    pub over: Vec<String>,
+    /// Texts in place of the value that mean: below the range.
+    pub under: Vec<String>,
+    /// Pattern of a line with an error: plain text, `{skip}`, and `{code}` exactly once.
+    pub error: Option<String>,
+    /// Meaning of the error numbers.
+    pub error_texts: &'static [(i64, &'static str)],
+    /// Request for a line; `None` if the probe sends without requests.
+    pub request: Option<String>,
+    /// Metres per unit of the number: 1e-3 for millimetres.
+    pub unit_m: f64,
+    /// Position at the number 0, in metres.
+    pub offset_m: f64,
+    /// Start of the measuring range in metres.
+    pub lower_m: f64,
+    /// End of the measuring range in metres.
+    pub upper_m: f64,
+    /// Timing of the requests.
+    pub polling: Polling,
+}
+
+impl Settings {
+    /// Keyence LK-G with a display in millimetres with four decimals, sending without requests, with a measuring range of
+    /// +-`half_range_m`.
+    pub fn keyence_lk_g(half_range_m: f64) -> Self {
+        Self {
+            line: "{value:8.4}".into(),
+            terminator: "\\r".into(),
+            invalid: vec!["XXXXXXXX".into()],
+            over: vec!["+FFFFFFF".into()],
+            under: vec!["-FFFFFFF".into()],
+            error: Some("ER,{skip},{code}".into()),
+            error_texts: KEYENCE_ERRORS,
+            request: None,
+            unit_m: 1e-3,
+            offset_m: 0.0,
+            lower_m: -half_range_m,
+            upper_m: half_range_m,
+            polling: Polling::default(),
+        }
+    }
+}
+
+/// Error numbers of the Keyence LK-G [manual, page 5-5].
+pub const KEYENCE_ERRORS: &[(i64, &str)] = &[
+    (0, "the probe does not know the command"),
+    (
+        1,
+        "the probe cannot execute the command in its present state",
+    ),
+    (20, "the command has the wrong length"),
+    (21, "the command has the wrong number of parameters"),
+    (22, "a parameter of the command is invalid"),
+    (88, "the controller of the probe timed out"),
+];
+
+impl Protocol for Settings {
+    fn decoder(&self) -> Result<Box<dyn Decoder>, SerialError> {
+        Ok(Box::new(Ascii::new(self.clone())?))
+    }
+
+    fn polling(&self) -> Polling {
+        self.polling
+    }
+
+    fn responder(&self) -> Result<Box<dyn Responder>, SerialError> {
+        let format = LineFormat::new(self.clone())?;
+        Ok(Box::new(AsciiResponder::new(format)))
+    }
+}
+
+/// Decodes the lines of one probe.
+#[derive(Debug)]
+pub struct Ascii {
+    format: LineFormat,
+    window: Window<LINE_MAX>,
+    damage: DamageCounter,
+    /// Whether the beginning of the present line has been received.
+    is_complete: bool,
+    message_bytes: u32,
+}
+
+impl Ascii {
+    /// A decoder that has not received anything yet.
+    pub fn new(settings: Settings) -> Result<Self, SerialError> {
+        Ok(Self {
+            format: LineFormat::new(settings)?,
+            window: Window::default(),
+            damage: DamageCounter::default(),
+            is_complete: false,
+            message_bytes: 0,
+        })
+    }
+
+    fn take_byte(&mut self, byte: u8, out: &mut dyn FnMut(Event)) {
+        if !self.window.push(byte) {
+            // Too long for a line: drop its beginning, so that it is not used as a value, and search for its end.
+            self.window.drop_front(1);
+            self.window.push(byte);
+            self.damage.add(1, out);
+            self.is_complete = false;
+        }
+        if let Some(line) = self.window.bytes().strip_suffix(self.format.terminator()) {
+            let event = self.format.read(line).filter(|_| self.is_complete);
+            self.end_line(event, out);
+        }
+    }
+
+    fn end_line(&mut self, event: Option<Event>, out: &mut dyn FnMut(Event)) {
+        let bytes = self.window.clear();
+        self.is_complete = true;
+        let Some(event) = event else {
+            return self.damage.add(bytes, out);
+        };
+        self.damage.report(out);
+        self.message_bytes = bytes;
+        out(event);
+        out(Event::AnswerEnd);
+    }
+}
+
+impl Decoder for Ascii {
+    fn feed(&mut self, bytes: &[u8], out: &mut dyn FnMut(Event)) {
+        for &byte in bytes {
+            self.take_byte(byte, out);
+        }
+    }
+
+    fn reset(&mut self, out: &mut dyn FnMut(Event)) {
+        let discarded = self.window.clear();
+        self.damage.add(discarded, out);
+        self.damage.report(out);
+        // A line begins after a request on a silent line, but anywhere in a stream.
+        self.is_complete = self.request().is_some();
+    }
+
+    fn request(&self) -> Option<&[u8]> {
+        self.format.request()
+    }
+
+    fn message_bytes(&self) -> u32 {
+        self.message_bytes
+    }
+}
+
+/// An emulated probe: sends a line at each measurement, or at each request.
+struct AsciiResponder {
+    format: LineFormat,
+    newest_m: f64,
+    received: Vec<u8>,
+    /// The next line loses its first half: the probe has restarted while sending it.
+    is_cut: bool,
+}
+
+impl AsciiResponder {
+    fn new(format: LineFormat) -> Self {
+        Self {
+            format,
+            newest_m: 0.0,
+            received: Vec::new(),
+            is_cut: false,
+        }
+    }
+
+    fn line(&mut self) -> Vec<u8> {
+        let line = self.format.write(Output::Position(self.newest_m));
+        let lost = if std::mem::take(&mut self.is_cut) {
+            line.len() / 2
+        } else {
+            0
+        };
+        line[lost..].to_vec()
+    }
+}
+
+impl Responder for AsciiResponder {
+    fn measure(&mut self, position_m: f64) -> Vec<u8> {
+        self.newest_m = position_m;
+        if self.format.request().is_none() {
+            self.line()
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// A line for a request, the error of an unknown command for any other line.
+    fn receive(&mut self, byte: u8) -> Vec<u8> {
+        self.received.push(byte);
+        let is_line_end = byte == b'\r' || byte == b'\n';
+        let answer = if self.format.request() == Some(&self.received) {
+            self.line()
+        } else if is_line_end || self.received.len() >= REQUEST_MAX {
+            self.format.write(Output::Error(0))
+        } else {
+            return Vec::new();
+        };
+        self.received.clear();
+        answer
+    }
+
+    fn restart(&mut self) {
+        self.received.clear();
+        self.is_cut = true;
+    }
+
+    fn out_of_range_m(&self) -> f64 {
+        self.format.out_of_range_m()
+    }
+}
