@@ -29,11 +29,11 @@ fn config() -> Config {
 
 fn judged(signals: &Signals, config: &Config) -> Verdict {
     let frf_data = frf_data(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
-    let view = MeasurementChain::Bench(config);
-    let fit = fit(&frf_data, &view).expect("modes");
+    let chain = MeasurementChain::bench(config);
+    let fit = fit(&frf_data, &chain).expect("modes");
     verdict(&VerdictInput {
         fit: &fit,
-        view: &view,
+        chain: &chain,
         frf_data: &frf_data,
         up_to_rad_s: 650.0,
         expected_modes: Some(3),

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::linearity_output::LinearityMade;
+use super::linearity_output;
 use super::loop_output::LoopMade;
-use super::modal_output::Shown;
+use super::modal_output::ModalSummary;
 use crate::config::Config;
 use crate::experiment::{AnalysisError, analyse};
+use crate::identify::frf_csv::{self, METRES_PER_AMPERE};
+use crate::identify::linearity::Linearity;
 use crate::identify::modal::{FittedMode, ModalFit};
-use crate::identify::{Unit, csv};
 use crate::recording::Recording;
 use crate::report::run_pages::{PLOT_KINDS, ReportSource, RunReport, page, pictures};
 
@@ -39,13 +40,13 @@ pub(super) struct AnalysisOutputs {
     delay_beyond_model_s: Option<f64>,
     delay_beyond_model_sigma_s: Option<f64>,
     #[serde(flatten)]
-    shown: Shown,
+    summary: ModalSummary,
     /// The loop around the plant, where it was closed.
     #[serde(rename = "loop", skip_serializing_if = "Option::is_none")]
     closed: Option<LoopMade>,
     /// Distortion and noise, where a multisine left lines out.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub linearity: Option<LinearityMade>,
+    pub linearity: Option<Linearity>,
     /// The modes as fitted, to be compared with those of other runs.
     #[serde(skip)]
     pub fitted: Vec<FittedMode>,
@@ -69,11 +70,11 @@ pub(super) fn make(
 ) -> Result<AnalysisOutputs, CliError> {
     let analysis = &analyse(recording, config)?;
     let csv_path = free(beside, "frf", "csv");
-    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere)
+    frf_csv::write_new(&csv_path, &analysis.frf, METRES_PER_AMPERE)
         .map_err(|e| CliError::Failed(e.to_string()))?;
     let plain_path = free(beside, "frf_without_delay", "csv");
-    let plain = analysis.frf.earlier(analysis.measured_delay_s());
-    csv::write_new(&plain_path, &plain, Unit::MetresPerAmpere)
+    let plain = analysis.frf.without_delay(analysis.measured_delay_s());
+    frf_csv::write_new(&plain_path, &plain, METRES_PER_AMPERE)
         .map_err(|e| CliError::Failed(e.to_string()))?;
     let run = RunReport {
         analysis,
@@ -91,15 +92,15 @@ pub(super) fn make(
         coherence_median: analysis.frf.median_coherence(),
         filled_ticks: analysis.filled_ticks,
         delay_s: Some(analysis.delay_s),
-        delay_beyond_model_s: analysis.beyond.map(|delay| delay.seconds),
-        delay_beyond_model_sigma_s: analysis.beyond.map(|delay| delay.sigma_s),
-        shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
+        delay_beyond_model_s: analysis.excess_delay.map(|delay| delay.value),
+        delay_beyond_model_sigma_s: analysis.excess_delay.map(|delay| delay.sigma),
+        summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
         closed: analysis
             .closed
             .as_ref()
             .map(|closed| LoopMade::of(closed, beside))
             .transpose()?,
-        linearity: analysis.linearity.as_ref().map(LinearityMade::of),
+        linearity: analysis.linearity.clone(),
         fitted: analysis.fit.as_ref().map_or(Vec::new(), ModalFit::modes),
     })
 }
@@ -119,7 +120,7 @@ impl AnalysisOutputs {
             delay_s: None,
             delay_beyond_model_s: None,
             delay_beyond_model_sigma_s: None,
-            shown: Shown::nothing(why),
+            summary: ModalSummary::none(why),
             closed: None,
             linearity: None,
             fitted: Vec::new(),
@@ -132,14 +133,14 @@ impl AnalysisOutputs {
     }
 
     pub fn is_stopped(&self) -> bool {
-        self.shown.why() == STOPPED
+        self.summary.why() == STOPPED
     }
 
     pub fn text(&self) -> String {
         let (Some(frf_csv), Some(report), Some(coherence)) =
             (&self.frf_csv, &self.report, self.coherence_median)
         else {
-            return format!("  no frequency response: {}\n", self.shown.why());
+            return format!("  no frequency response: {}\n", self.summary.why());
         };
         let filled = if self.filled_ticks > 0 {
             format!(", {} missing ticks filled in", self.filled_ticks)
@@ -169,9 +170,9 @@ impl AnalysisOutputs {
             self.frf_without_delay_csv.as_deref().unwrap_or_default(),
             self.linearity
                 .as_ref()
-                .map_or(String::new(), LinearityMade::line),
+                .map_or(String::new(), linearity_output::line),
             plots_text(&self.plots),
-            self.shown.text()
+            self.summary.text()
         )
     }
 }

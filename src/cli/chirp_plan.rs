@@ -11,7 +11,7 @@ use super::outcome::Outcome;
 use super::output::{print_json, print_text};
 use crate::config::{AmplitudePoint, Config, ExcitationKind};
 use crate::excitation::{CurrentLimit, Extremes, LARGEST_SPAN, of, shaped_amplitude, words};
-use crate::identify::csv;
+use crate::identify::frf_csv;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 
 /// Frequencies at which the model is looked at, beside those of its modes: 0.2 % apart over four decades.
@@ -185,7 +185,7 @@ fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
 
 /// The same of an FRF that was measured before.
 fn by_file(config: &Config, path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
-    let frf = csv::read(path).map_err(|e| {
+    let frf = frf_csv::read(path).map_err(|e| {
         CliError::Usage(format!("--shape {}: {e}; or give `model`", path.display()))
     })?;
     let (low_hz, high_hz) = config.chirp.band_hz();

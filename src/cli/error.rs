@@ -10,7 +10,7 @@ use crate::excitation::ExcitationError;
 use crate::experiment::campaign::{AnswerError, CampaignError};
 use crate::experiment::{ExperimentError, PlanError};
 use crate::identify::IdentifyError;
-use crate::identify::table::ExternalCsvError;
+use crate::identify::external_csv::ExternalCsvError;
 use crate::model::plant::PlantError;
 use crate::model::study::StudyError;
 use crate::recording::RecordingError;
@@ -124,11 +124,7 @@ impl CliError {
     pub fn outcome(&self) -> Outcome {
         match self {
             CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
-            CliError::Table(
-                ExternalCsvError::NoColumn { .. }
-                | ExternalCsvError::Ambiguous { .. }
-                | ExternalCsvError::Same { .. },
-            ) => Outcome::Usage,
+            CliError::Table(ExternalCsvError::Columns(_)) => Outcome::Usage,
             CliError::Table(_) => Outcome::Failed,
             CliError::Campaign(CampaignError::File { .. } | CampaignError::Rest { .. }) => {
                 Outcome::Failed

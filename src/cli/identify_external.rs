@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use super::analysis_output::{Drawn, Plots, drawn, free, in_folder, plots_text};
 use super::error::CliError;
-use super::modal_output::Shown;
+use super::modal_output::ModalSummary;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
 use crate::experiment::{ExternalAnalysis, analyse_external};
+use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::periodic::Repetition;
-use crate::identify::table::{self, Clock, Columns};
-use crate::identify::{Signals, Unit, csv};
+use crate::identify::{Signals, frf_csv};
 use crate::report::run_pages::TableReport;
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
@@ -87,7 +87,7 @@ struct Report {
     /// Median coherence over the band.
     coherence_median: Option<f64>,
     #[serde(flatten)]
-    shown: Shown,
+    summary: ModalSummary,
 }
 
 impl ExternalOptions {
@@ -100,7 +100,7 @@ impl ExternalOptions {
     }
 
     fn columns(&self, path: &Path) -> Result<Columns, CliError> {
-        let there = || Ok::<_, CliError>(table::names(path)?.join(", "));
+        let there = || Ok::<_, CliError>(external_csv::names(path)?.join(", "));
         let (Some(input), Some(output)) = (self.input.clone(), self.output.clone()) else {
             let text = format!(
                 "which columns of {}? --input COLUMN --output COLUMN of {}",
@@ -109,9 +109,9 @@ impl ExternalOptions {
             );
             return Err(CliError::Usage(text));
         };
-        let clock = match (&self.time, self.rate) {
-            (Some(time), _) => Clock::Column(time.clone()),
-            (None, Some(rate_hz)) => Clock::RateHz(rate_hz),
+        let sampling = match (&self.time, self.rate) {
+            (Some(time), _) => Sampling::TimeColumn(time.clone()),
+            (None, Some(rate_hz)) => Sampling::RateHz(rate_hz),
             (None, None) => {
                 let text = format!(
                     "when were the lines sampled? --time COLUMN (of {}) or --rate HZ",
@@ -123,7 +123,7 @@ impl ExternalOptions {
         Ok(Columns {
             input,
             output,
-            clock,
+            sampling,
         })
     }
 
@@ -177,7 +177,7 @@ pub(super) fn run(
     json: bool,
 ) -> Result<Outcome, CliError> {
     let columns = options.columns(path)?;
-    let signals = table::read(path, &columns)?;
+    let signals = external_csv::read(path, &columns)?;
     signals.check()?;
     let band_hz = options.band_hz(signals.rate_hz)?;
     let analysis = analyse_external(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
@@ -206,7 +206,8 @@ fn report(
     beside: &Path,
 ) -> Result<Report, CliError> {
     let csv_path = free(beside, "frf", "csv");
-    csv::write_new(&csv_path, &analysis.frf, Unit::MetresPerAmpere)
+    let magnitude = frf_csv::external_magnitude(&columns.input, &columns.output);
+    frf_csv::write_new(&csv_path, &analysis.frf, &magnitude)
         .map_err(|e| CliError::Failed(e.to_string()))?;
     let Columns { input, output, .. } = columns;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
@@ -241,7 +242,7 @@ fn report(
         report,
         frequencies: analysis.frf.len(),
         coherence_median: analysis.frf.median_coherence(),
-        shown: Shown::of(analysis.fit.as_ref().ok(), &analysis.verdict),
+        summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
     })
 }
 
@@ -266,8 +267,8 @@ impl Report {
             self.report,
             self.output,
             self.input,
-            self.shown.chi2().unwrap_or(0.0),
-            self.shown.text()
+            self.summary.chi2_per_freedom().unwrap_or(0.0),
+            self.summary.text()
         )
     }
 }

@@ -6,7 +6,7 @@ use super::analysis_output::AnalysisOutputs;
 use super::chirp::{ExcitationOptions, analysed, check};
 use super::chirp_plan::Expected;
 use super::error::CliError;
-use super::modal_output::{ModeJson, mode};
+use super::linearity_output;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
@@ -120,7 +120,7 @@ impl RunMade {
 #[derive(Debug, Serialize)]
 struct ModeMade {
     /// In the order of the runs; null where it is not seen.
-    by_run: Vec<Option<ModeJson>>,
+    by_run: Vec<Option<FittedMode>>,
     frequency_shifts: bool,
     damping_shifts: bool,
     residue_shifts: bool,
@@ -204,11 +204,7 @@ fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
         Some(true) => format!("with amplitude shift beyond what their errors explain: {}", shifting(modes)),
     };
     let mode = |over: &ModeOverAmplitude| ModeMade {
-        by_run: over
-            .by_run
-            .iter()
-            .map(|seen| seen.as_ref().map(mode))
-            .collect(),
+        by_run: over.by_run.clone(),
         frequency_shifts: over.frequency_shifts,
         damping_shifts: over.damping_shifts,
         residue_shifts: over.residue_shifts,
@@ -265,7 +261,7 @@ fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude])
             .made
             .linearity
             .as_ref()
-            .map_or_else(|| run.made.text(), |linearity| linearity.text());
+            .map_or_else(|| run.made.text(), linearity_output::text);
         let page = run
             .made
             .report

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::analysis_output::free;
 use super::error::CliError;
 use crate::experiment::ClosedResponses;
-use crate::identify::{Frf, Unit, csv};
+use crate::identify::{Frf, frf_csv};
 
 /// The part of the report that a closed loop makes.
 #[derive(Clone, Debug, Serialize)]
@@ -32,7 +32,8 @@ impl LoopMade {
     pub(super) fn of(closed: &ClosedResponses, recording: &Path) -> Result<LoopMade, CliError> {
         let write = |frf: &Frf, what| {
             let path = free(recording, what, "csv");
-            csv::write_new(&path, frf, Unit::Bare).map_err(|e| CliError::Failed(e.to_string()))?;
+            frf_csv::write_new(&path, frf, frf_csv::RATIO)
+                .map_err(|e| CliError::Failed(e.to_string()))?;
             Ok::<_, CliError>(path.display().to_string())
         };
         let margins = &closed.margins;

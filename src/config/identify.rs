@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum IdentifySettings {
     /// By smooth curves through neighbouring frequencies of the transform of the whole record: no leakage where it begins and
     /// ends at rest.
-    Local(LocalSettings),
+    Local(EstimatorSettings),
     /// Over segments in time (Welch): Hann windows, half overlapped.
     Welch {
         /// Length of a segment in seconds.
@@ -24,7 +24,7 @@ pub enum IdentifySettings {
 /// The local estimator: resolution, grid, and shape of the curves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LocalSettings {
+pub struct EstimatorSettings {
     /// Half-width of the neighbourhood of a frequency, as a ratio of the frequency.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub resolution_ratio: f64,
@@ -48,6 +48,30 @@ pub struct LocalSettings {
     /// Whether the record begins or ends in motion: what that leaves in the transform is then estimated with the response.
     #[serde(default)]
     pub transient: bool,
+}
+
+impl Default for EstimatorSettings {
+    fn default() -> Self {
+        Self {
+            resolution_ratio: 0.0025,
+            min_half_width_bins: 16,
+            resolution: Vec::new(),
+            frequencies: None,
+            curve: LocalModel::default(),
+            estimator: Estimator::default(),
+            transient: false,
+        }
+    }
+}
+
+impl IdentifySettings {
+    /// The settings of the local estimator; its defaults if another one is selected.
+    pub fn local(&self) -> EstimatorSettings {
+        match self {
+            IdentifySettings::Local(settings) => settings.clone(),
+            IdentifySettings::Welch { .. } => EstimatorSettings::default(),
+        }
+    }
 }
 
 /// The resolution of an estimate at a frequency.

@@ -9,13 +9,11 @@ use super::patterns::{Taken, taken};
 use super::plan::{KIND, RunKind};
 use crate::config::Config;
 use crate::excitation::{self, Excitation};
-use crate::identify::delay::{self, ExcessDelay};
+use crate::identify::delay::excess_delay;
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::verdict::{Verdict, VerdictInput, verdict};
-use crate::identify::{
-    EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, frf_data, response,
-};
+use crate::identify::{Estimate, Frf, FrfDatum, IdentifyError, Signals, frf_data, response};
 use crate::model::plant::{self, LoopPlant, ModalModel, Mode, PlantError, Sign};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
@@ -68,7 +66,7 @@ pub struct Analysis {
     /// Mean time in seconds from a command to the position that its reading shows, by the model.
     pub delay_s: f64,
     /// How much later than the model the chain answers, by its phases up to the last mode of the model.
-    pub beyond: Option<ExcessDelay>,
+    pub excess_delay: Option<Estimate>,
     /// Missing ticks that were filled in: the current held, the position on a straight line.
     pub filled_ticks: u64,
     /// The modes that the response shows, or why none are told.
@@ -133,11 +131,7 @@ fn open_loop(
                 let frf = response(&signals, band_hz, &config.identify)?;
                 (
                     frf,
-                    frf_data(
-                        &signals,
-                        band_hz,
-                        &EstimatorSettings::from(&config.identify),
-                    )?,
+                    frf_data(&signals, band_hz, &config.identify.local())?,
                     None,
                 )
             }
@@ -166,26 +160,21 @@ fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, Ana
             .iter()
             .map(|mode| mode.omega_rad_s)
             .fold(0.0, f64::max);
-    let chain = LoopPlant::with_mean_age(config, &modal.modes);
+    let plant = LoopPlant::with_mean_age(config, &modal.modes);
     let model: Vec<_> = frf
         .frequency_hz
         .iter()
-        .map(|f| chain.response(2.0 * std::f64::consts::PI * f))
+        .map(|f| plant.response(2.0 * std::f64::consts::PI * f))
         .collect();
-    let beyond = delay::beyond(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
-    let fit = modal::fit(&frf_data, &MeasurementChain::Bench(config));
-    let verdict = judge(
-        &fit,
-        &frf_data,
-        &MeasurementChain::Bench(config),
-        last_rad_s,
-        Some(&modal),
-    )?;
+    let chain = MeasurementChain::bench(config);
+    let excess_delay = excess_delay(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
+    let fit = modal::fit(&frf_data, &chain);
+    let verdict = judge(&fit, &frf_data, &chain, last_rad_s, Some(&modal))?;
     Ok(Analysis {
         frf,
         model,
-        delay_s: chain.delay_s(),
-        beyond,
+        delay_s: plant.delay_s(),
+        excess_delay,
         filled_ticks,
         fit,
         verdict,
@@ -198,7 +187,7 @@ fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, Ana
 impl Analysis {
     /// From a command to the position that its reading shows, in seconds: by the configuration, and what the phases show beyond.
     pub fn measured_delay_s(&self) -> f64 {
-        self.delay_s + self.beyond.map_or(0.0, |beyond| beyond.seconds)
+        self.delay_s + self.excess_delay.map_or(0.0, |delay| delay.value)
     }
 }
 
@@ -206,7 +195,7 @@ impl Analysis {
 pub(super) fn judge(
     fit: &Result<ModalFit, FitError>,
     frf_data: &[FrfDatum],
-    view: &MeasurementChain<'_>,
+    chain: &MeasurementChain,
     up_to_rad_s: f64,
     model: Option<&ModalModel>,
 ) -> Result<Verdict, AnalysisError> {
@@ -220,7 +209,7 @@ pub(super) fn judge(
         model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
     Ok(verdict(&VerdictInput {
         fit,
-        view,
+        chain,
         frf_data,
         up_to_rad_s,
         expected_modes,

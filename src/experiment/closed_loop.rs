@@ -6,9 +6,9 @@ use super::analysis::{AnalysisError, Seen};
 use super::plan::{Plan, PlanError};
 use crate::config::{Config, ReferenceSettings};
 use crate::control::{ClosedLoop, ControllerError, Margins};
+use crate::identify::Frf;
 use crate::identify::joint::{self, JointEstimate, LoopSignals};
 use crate::identify::modal::Estimate;
-use crate::identify::{EstimatorSettings, Frf};
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::recording::Recording;
 
@@ -75,7 +75,7 @@ pub(super) fn seen(
         complementary,
         sensitivity,
         loop_gain,
-    } = joint::estimate(signals, band_hz, &EstimatorSettings::from(&config.identify))?;
+    } = joint::estimate(signals, band_hz, &config.identify.local())?;
     let model = model(recording, config)?;
     let model_loop = loop_gain
         .frequency_hz

@@ -7,7 +7,7 @@ use super::AnalysisError;
 use super::analysis::judge;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Repetition};
-use crate::identify::verdict::{MISFIT, Verdict};
+use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::identify::{
     EstimatorSettings, Frf, FrfDatum, Signals, frf_data, local, with_distortion,
 };
@@ -50,7 +50,7 @@ pub fn analyse_external(
     let fit = if repetition.is_some() {
         fit_of_periods(&frf_data)
     } else {
-        modal::fit(&frf_data, &MeasurementChain::Bare)
+        modal::fit(&frf_data, &MeasurementChain::Direct)
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
     let verdict = match doubt(signals.rate_hz, &frf, &frf_data, &fit) {
@@ -58,7 +58,7 @@ pub fn analyse_external(
         None => judge(
             &fit,
             &frf_data,
-            &MeasurementChain::Bare,
+            &MeasurementChain::Direct,
             judged_up_to_rad_s,
             None,
         )?,
@@ -92,11 +92,14 @@ fn response(
 /// The modes that periods show. Where they leave more than the noise, distortion counts as well; without periods the noise is
 /// taken from neighbouring frequencies, and distortion is in it.
 fn fit_of_periods(frf_data: &[FrfDatum]) -> Result<ModalFit, FitError> {
-    let fit = modal::fit(frf_data, &MeasurementChain::Bare);
-    if fit.as_ref().is_ok_and(|fit| fit.chi2_per_freedom <= MISFIT) {
+    let fit = modal::fit(frf_data, &MeasurementChain::Direct);
+    if fit
+        .as_ref()
+        .is_ok_and(|fit| fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM)
+    {
         return fit;
     }
-    let mut fit = modal::fit(&with_distortion(frf_data), &MeasurementChain::Bare)?;
+    let mut fit = modal::fit(&with_distortion(frf_data), &MeasurementChain::Direct)?;
     fit.chi2_per_freedom = chi2_per_freedom(&fit, frf_data);
     Ok(fit)
 }
@@ -104,7 +107,7 @@ fn fit_of_periods(frf_data: &[FrfDatum]) -> Result<ModalFit, FitError> {
 /// What a fit leaves over the noise alone, whatever it was weighted with.
 fn chi2_per_freedom(fit: &ModalFit, frf_data: &[FrfDatum]) -> f64 {
     let frequency_hz: Vec<f64> = frf_data.iter().map(|block| block.frequency_hz).collect();
-    let fitted = fit.response(&MeasurementChain::Bare, &frequency_hz);
+    let fitted = fit.response(&MeasurementChain::Direct, &frequency_hz);
     let left = |(block, h): (&FrfDatum, &Complex<f64>)| {
         2.0 * (block.response - h).norm_sqr() / block.variance
     };
@@ -132,7 +135,7 @@ fn explained_the_other_way(
     frf_data: &[FrfDatum],
     fit: &Result<ModalFit, FitError>,
 ) -> Option<String> {
-    let explained = |fit: &ModalFit| fit.chi2_per_freedom <= MISFIT;
+    let explained = |fit: &ModalFit| fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
     if fit.as_ref().is_ok_and(explained) {
         return None;
     }
@@ -146,7 +149,7 @@ fn explained_the_other_way(
         .map(inverse)
         .filter(|b| b.variance.is_normal())
         .collect();
-    let other = modal::fit(&inverse, &MeasurementChain::Bare).ok()?;
+    let other = modal::fit(&inverse, &MeasurementChain::Direct).ok()?;
     explained(&other).then(|| {
         "modes explain how the input answers the output, and not how the output answers the input: they are swapped (--input, \
          --output)"

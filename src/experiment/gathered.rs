@@ -1,11 +1,12 @@
 //! The ticks of a recorded run as signals on the loop's regular times.
 
 use super::AnalysisError;
-use crate::identify::align::Readings;
 use crate::identify::joint::LoopSignals;
-use crate::identify::{RunningStats, Signals, edges};
+use crate::identify::resampling::Readings;
+use crate::identify::{Signals, setpoint_timing};
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
+use crate::util::running_stats::RunningStats;
 
 /// Ticks that may be filled in, as a ratio of all: each adds an error of its own.
 const FILLED_RATIO: f64 = 1e-3;
@@ -189,7 +190,7 @@ fn currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
         .into_iter()
         .map(|late| if late.is_nan() { 0.0 } else { late - median })
         .collect();
-    edges::at_regular_times(&input_a, &later)
+    setpoint_timing::at_regular_times(&input_a, &later)
 }
 
 fn seconds(ns: u64) -> f64 {

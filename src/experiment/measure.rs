@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use crate::config::{Config, ReferenceSettings};
 use crate::control::{StepMeter, StepMetrics};
-use crate::identify::RunningStats;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::flag;
+use crate::util::running_stats::RunningStats;
 
 /// What the recording of a closed loop shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -47,8 +47,8 @@ pub(super) fn taken(
                 skip: *skip,
             };
             let Periods { frf, frf_data, .. } = periodic::estimate(&whole, band_hz, repetition)?;
-            let linearity =
-                harmonics(&whole, band_hz, repetition)?.map(|lines| Box::new(Linearity::of(lines)));
+            let linearity = harmonics(&whole, band_hz, repetition)?
+                .map(|lines| Box::new(Linearity::new(lines)));
             let frf_data = linearity
                 .as_ref()
                 .map_or_else(|| frf_data.clone(), |l| l.with_odd_distortion(&frf_data));

@@ -1,12 +1,11 @@
-//! From a band in hertz to bins of an FFT.
+//! Conversion of a band in hertz to bins of an FFT.
 
 use core::ops::RangeInclusive;
 
 use super::IdentifyError;
 
 /// The bins k = 1 ..= (samples - 1)/2 of an FFT over `samples` whose frequency k rate/samples lies within the band,
-/// limits included. Bin 0 carries the offset of the probe, and the bin at the Nyquist frequency has no phase: both stay
-/// out.
+/// limits included. Bin 0 (offset of the probe) and the bin at the Nyquist frequency (no phase) are excluded.
 pub(super) fn bins(
     band_hz: (f64, f64),
     rate_hz: f64,
@@ -15,20 +14,17 @@ pub(super) fn bins(
     let (low_hz, high_hz) = band_hz;
     check(band_hz, rate_hz)?;
     let bin_hz = rate_hz / samples as f64;
-    // A limit that is a bin up to rounding counts as that bin.
+    // A limit that equals a bin except for rounding includes that bin.
     let low = (low_hz / bin_hz - 1e-6).ceil().max(1.0) as usize;
     let high = (high_hz / bin_hz + 1e-6)
         .floor()
         .min(last_bin(samples) as f64) as usize;
     if low > high {
-        Err(IdentifyError::BandEmpty {
-            low_hz,
-            high_hz,
-            bin_hz,
-        })
-    } else {
-        Ok(low..=high)
+        return Err(IdentifyError::Band(format!(
+            "no frequency of this record lies between {low_hz} and {high_hz} Hz, its bins are {bin_hz} Hz apart and begin at {bin_hz} Hz: widen the band or use a longer record or segment"
+        )));
     }
+    Ok(low..=high)
 }
 
 /// The highest bin below the Nyquist frequency.
@@ -37,13 +33,16 @@ pub(super) fn last_bin(samples: usize) -> usize {
 }
 
 fn check((low_hz, high_hz): (f64, f64), rate_hz: f64) -> Result<(), IdentifyError> {
-    let limit_hz = rate_hz / 2.0;
     if !(low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite()) {
-        return Err(IdentifyError::BandOrder { low_hz, high_hz });
+        return Err(IdentifyError::Band(format!(
+            "a band from {low_hz} to {high_hz} Hz: both limits must be finite with 0 <= lower < upper"
+        )));
     }
+    let limit_hz = rate_hz / 2.0;
     if high_hz > limit_hz {
-        Err(IdentifyError::BandBeyondNyquist { high_hz, limit_hz })
-    } else {
-        Ok(())
+        return Err(IdentifyError::Band(format!(
+            "the band reaches {high_hz} Hz, beyond the Nyquist frequency of {limit_hz} Hz: lower its upper limit or record at a higher rate"
+        )));
     }
+    Ok(())
 }

@@ -1,135 +1,131 @@
-//! How much later than the model a measured response answers: F = M exp(-j w tau).
+//! The excess delay of a measured response F over its model M: F = M exp(-j w tau).
 //!
-//! The phase of F/M falls by w tau. A coarse search over tau finds the turn, then the phases are fitted by weighted least
-//! squares, without those that lie far off: a mode that the model has elsewhere, or not at all, turns the phase around it by
-//! half a turn, and is no delay.
+//! The phase of F/M falls by w tau. A coarse search over tau resolves the turns; then tau is fitted to the phases by
+//! weighted least squares. Outliers are excluded: a mode at another frequency than the model's, or one that the model does
+//! not have, changes the phase around it by half a turn without being a delay.
 
 use nalgebra::Complex;
 
-use super::Frf;
+use super::{Estimate, Frf};
 
-/// Delays up to this size in seconds, of either sign, are looked for.
-const LARGEST_S: f64 = 0.05;
-/// No phase counts as better known than this: the model is not.
-const BEST_PHASE_RAD: f64 = 0.005;
-/// Phases further off than so many median deviations are left out.
-const FAR_OFF: f64 = 4.0;
-/// Frequencies without which there is no fit.
-const FEWEST: usize = 10;
+/// Delays up to this size in seconds, of either sign, are considered.
+const MAX_DELAY_S: f64 = 0.05;
+/// Smallest standard deviation of a phase, as the model is not more accurate.
+const MIN_PHASE_SIGMA_RAD: f64 = 0.005;
+/// Phases with a larger standard deviation are not used.
+const MAX_PHASE_SIGMA_RAD: f64 = 0.5;
+/// Phases that deviate by more than this multiple of the median deviation are outliers.
+const OUTLIER_RATIO: f64 = 4.0;
+/// A fit needs this many frequencies.
+const MIN_FREQUENCIES: usize = 10;
+/// Fits, each followed by a new selection of the outliers.
+const FITS: usize = 4;
 
-/// A delay beyond the model's.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ExcessDelay {
-    /// tau in seconds: positive where the measurement lags the model.
-    pub seconds: f64,
-    /// Standard deviation of tau in seconds, by the scatter of the phases about the fit.
-    pub sigma_s: f64,
-}
-
-/// The delay of `measured` beyond `model`, both at the frequencies of `measured` up to `highest_hz`; `None` where too few
-/// of them say anything.
-pub fn beyond(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Option<ExcessDelay> {
-    let points: Vec<Point> = points(measured, model, highest_hz);
-    if points.len() < FEWEST {
+/// The delay tau in seconds of `measured` beyond `model`, both at the frequencies of `measured` up to `max_hz`; positive
+/// where the measurement lags the model. `None` where too few phases are known well enough.
+///
+/// The standard deviation follows from the scatter of the phases about the fit.
+pub fn excess_delay(measured: &Frf, model: &[Complex<f64>], max_hz: f64) -> Option<Estimate> {
+    let all = phases(measured, model, max_hz);
+    if all.len() < MIN_FREQUENCIES {
         return None;
     }
-    let mut tau_s = coarse(&points)?;
-    let mut kept = points.clone();
-    for _ in 0..4 {
-        tau_s += fit(&kept, tau_s)?;
-        kept = near(&points, tau_s);
+    let mut tau_s = coarse(&all)?;
+    let mut used = all.clone();
+    for _ in 0..FITS {
+        tau_s += correction(&used, tau_s)?;
+        used = without_outliers(&all, tau_s);
     }
-    let (weight, square) = kept.iter().fold((0.0, 0.0), |(weight, square), p| {
-        (
-            weight + p.weight * p.omega_rad_s * p.omega_rad_s,
-            square + p.weight * p.off(tau_s) * p.off(tau_s),
-        )
-    });
-    let scatter = square / (kept.len().saturating_sub(1).max(1)) as f64;
-    (kept.len() >= FEWEST).then(|| ExcessDelay {
-        seconds: tau_s,
-        sigma_s: (scatter / weight).sqrt(),
+    (used.len() >= MIN_FREQUENCIES).then(|| Estimate {
+        value: tau_s,
+        sigma: sigma(&used, tau_s),
     })
 }
 
+/// The ratio F/M at one frequency.
 #[derive(Clone, Copy, Debug)]
-struct Point {
+struct Phase {
     omega_rad_s: f64,
-    /// F/M, of size 1.
-    turn: Complex<f64>,
+    /// F/M, of magnitude 1.
+    ratio: Complex<f64>,
     weight: f64,
 }
 
-impl Point {
-    /// The phase that a delay of `tau_s` leaves, in radians.
-    fn off(&self, tau_s: f64) -> f64 {
-        (self.turn * Complex::from_polar(1.0, self.omega_rad_s * tau_s)).arg()
+impl Phase {
+    /// The phase in radians that remains after a delay of `tau_s`.
+    fn residual(&self, tau_s: f64) -> f64 {
+        (self.ratio * Complex::from_polar(1.0, self.omega_rad_s * tau_s)).arg()
     }
 }
 
-fn points(measured: &Frf, model: &[Complex<f64>], highest_hz: f64) -> Vec<Point> {
-    let of = |(index, model): (usize, &Complex<f64>)| {
-        let ratio = measured.response[index] / model;
-        let sigma_rad = measured.phase_sigma_rad[index].max(BEST_PHASE_RAD);
-        let omega_rad_s = 2.0 * std::f64::consts::PI * measured.frequency_hz[index];
-        let good = ratio.norm().is_normal()
-            && sigma_rad < 0.5
-            && measured.frequency_hz[index] <= highest_hz;
-        good.then(|| Point {
-            omega_rad_s,
-            turn: ratio / ratio.norm(),
-            weight: 1.0 / (sigma_rad * sigma_rad),
-        })
-    };
-    model
-        .iter()
-        .enumerate()
-        .take(measured.len())
-        .filter_map(of)
+fn phases(measured: &Frf, model: &[Complex<f64>], max_hz: f64) -> Vec<Phase> {
+    let usable = |k: &usize| measured.frequency_hz[*k] <= max_hz;
+    let count = model.len().min(measured.len());
+    (0..count)
+        .filter(usable)
+        .filter_map(|k| phase(measured, k, model[k]))
         .collect()
 }
 
-/// The delay that leaves the phases most in line, on a grid of an eighth of the fastest turn.
-fn coarse(points: &[Point]) -> Option<f64> {
-    let fastest = points.iter().map(|p| p.omega_rad_s).fold(0.0, f64::max);
-    let step_s = std::f64::consts::PI / (4.0 * fastest);
-    let steps = (LARGEST_S / step_s).ceil() as i64;
-    let in_line = |tau_s: f64| {
-        points
+fn phase(measured: &Frf, k: usize, model: Complex<f64>) -> Option<Phase> {
+    let ratio = measured.response[k] / model;
+    let sigma_rad = measured.phase_sigma_rad[k].max(MIN_PHASE_SIGMA_RAD);
+    let omega_rad_s = 2.0 * std::f64::consts::PI * measured.frequency_hz[k];
+    let known = ratio.norm().is_normal() && sigma_rad < MAX_PHASE_SIGMA_RAD;
+    known.then(|| Phase {
+        omega_rad_s,
+        ratio: ratio / ratio.norm(),
+        weight: 1.0 / (sigma_rad * sigma_rad),
+    })
+}
+
+/// The delay with the smallest residuals, on a grid of an eighth of the period of the highest frequency.
+fn coarse(phases: &[Phase]) -> Option<f64> {
+    let max_rad_s = phases.iter().map(|p| p.omega_rad_s).fold(0.0, f64::max);
+    let step_s = std::f64::consts::PI / (4.0 * max_rad_s);
+    let steps = (MAX_DELAY_S / step_s).ceil() as i64;
+    let alignment = |tau_s: f64| {
+        phases
             .iter()
-            .map(|p| p.weight * p.off(tau_s).cos())
+            .map(|p| p.weight * p.residual(tau_s).cos())
             .sum::<f64>()
     };
     let candidates = (-steps..=steps).map(|step| step as f64 * step_s);
-    candidates.max_by(|a, b| in_line(*a).total_cmp(&in_line(*b)))
+    candidates.max_by(|a, b| alignment(*a).total_cmp(&alignment(*b)))
 }
 
-/// The change of tau that fits best.
-fn fit(points: &[Point], tau_s: f64) -> Option<f64> {
-    let (top, bottom) = points.iter().fold((0.0, 0.0), |(top, bottom), p| {
-        let weighted = p.weight * p.omega_rad_s;
-        (
-            top - weighted * p.off(tau_s),
-            bottom + weighted * p.omega_rad_s,
-        )
-    });
-    (bottom > 0.0).then(|| top / bottom)
+/// The change of tau by weighted least squares.
+fn correction(phases: &[Phase], tau_s: f64) -> Option<f64> {
+    let (mut numerator, mut denominator) = (0.0, 0.0);
+    for phase in phases {
+        let weighted = phase.weight * phase.omega_rad_s;
+        numerator -= weighted * phase.residual(tau_s);
+        denominator += weighted * phase.omega_rad_s;
+    }
+    (denominator > 0.0).then(|| numerator / denominator)
 }
 
-fn near(points: &[Point], tau_s: f64) -> Vec<Point> {
-    let mut sizes: Vec<f64> = points.iter().map(|p| p.off(tau_s).abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let limit = FAR_OFF
-        * sizes
-            .get(sizes.len() / 2)
-            .copied()
-            .unwrap_or(0.0)
-            .max(BEST_PHASE_RAD);
-    points
+fn without_outliers(phases: &[Phase], tau_s: f64) -> Vec<Phase> {
+    let mut deviations: Vec<f64> = phases.iter().map(|p| p.residual(tau_s).abs()).collect();
+    deviations.sort_by(f64::total_cmp);
+    let median = deviations.get(deviations.len() / 2).copied().unwrap_or(0.0);
+    let limit = OUTLIER_RATIO * median.max(MIN_PHASE_SIGMA_RAD);
+    phases
         .iter()
         .copied()
-        .filter(|p| p.off(tau_s).abs() <= limit)
+        .filter(|p| p.residual(tau_s).abs() <= limit)
         .collect()
+}
+
+/// Standard deviation of tau by the scatter of the phases.
+fn sigma(phases: &[Phase], tau_s: f64) -> f64 {
+    let (mut weight, mut square) = (0.0, 0.0);
+    for phase in phases {
+        weight += phase.weight * phase.omega_rad_s * phase.omega_rad_s;
+        square += phase.weight * phase.residual(tau_s) * phase.residual(tau_s);
+    }
+    let scatter = square / phases.len().saturating_sub(1).max(1) as f64;
+    (scatter / weight).sqrt()
 }
 
 #[cfg(test)]
@@ -142,7 +138,8 @@ mod tests {
         (s * s + s * 0.02 * at_rad_s + at_rad_s * at_rad_s).inv()
     }
 
-    /// A measured response that lags its model by `tau_s`, with noise and a mode at 900 rad/s that the model has at 920.
+    /// A measured response that lags its model by `tau_s`, with noise, and with a mode at 900 rad/s that the model has at
+    /// 920 rad/s.
     fn case(tau_s: f64, noise: f64) -> (Frf, Vec<Complex<f64>>) {
         let (mut frf, mut model, mut seed) = (Frf::default(), Vec::new(), 1u64);
         let mut random = || {
@@ -171,24 +168,24 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_is_found_whatever_its_sign_and_in_spite_of_a_mode_that_lies_elsewhere() {
+    fn finds_delay_of_either_sign_despite_displaced_mode() {
         for tau_s in [0.0, 1.37e-4, -2.5e-4, 3.1e-3, 0.021] {
             let (frf, model) = case(tau_s, 0.02);
-            let delay = beyond(&frf, &model, 200.0).unwrap();
-            // 300 phases of 0.006 rad at 600 rad/s in the mean: 0.6 us; the mode that lies elsewhere pulls by a few more.
+            let delay = excess_delay(&frf, &model, 200.0).unwrap();
+            // 300 phases of 0.006 rad at 600 rad/s on average: 0.6 us. The displaced mode adds a few us.
             assert!(
-                (delay.seconds - tau_s).abs() < 1e-5,
+                (delay.value - tau_s).abs() < 1e-5,
                 "{} for {tau_s}",
-                delay.seconds
+                delay.value
             );
-            assert!((1e-7..1e-5).contains(&delay.sigma_s), "{}", delay.sigma_s);
+            assert!((1e-7..1e-5).contains(&delay.sigma), "{}", delay.sigma);
         }
     }
 
     #[test]
-    fn too_few_frequencies_say_nothing() {
+    fn too_few_frequencies_give_no_delay() {
         let (frf, model) = case(1e-3, 0.01);
-        assert_eq!(beyond(&frf, &model, 3.0), None);
-        assert_eq!(beyond(&Frf::default(), &[], 100.0), None);
+        assert_eq!(excess_delay(&frf, &model, 3.0), None);
+        assert_eq!(excess_delay(&Frf::default(), &[], 100.0), None);
     }
 }

@@ -1,42 +1,58 @@
-//! The frequency response function as measured: value, coherence and confidence at each frequency.
+//! Frequency response functions as measured: value, coherence and standard deviations at each frequency.
 
 use core::f64::consts::PI;
 
 use nalgebra::Complex;
 
-/// Standard deviation of a phase of which nothing is known: uniform over one turn, pi/sqrt(3) rad = 103.9 deg.
+/// Largest standard deviation of a phase, that of a uniform distribution over one turn: pi/sqrt(3) rad = 103.9 deg.
 pub const PHASE_SIGMA_LIMIT_RAD: f64 = PI / 1.732_050_807_568_877_2;
 
-/// What the magnitude of a response counts in.
+/// Unit of the magnitude of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// From current to displacement.
     MetresPerAmpere,
-    /// A ratio, or in units that a person knows.
+    /// A ratio, or the units of the columns of an external record.
     Bare,
 }
 
-/// A measured frequency response. All columns have one entry a frequency, frequencies rise, every entry is finite.
+/// A measured frequency response. All columns have one entry a frequency; frequencies rise; every entry is finite.
 ///
-/// A frequency at which the input had no energy is left out rather than filled in.
+/// A frequency at which the input had no energy is omitted.
+///
+/// ```
+/// use bench::identify::{Frf, FrfPoint};
+///
+/// let mut frf = Frf::default();
+/// let added = frf.push(FrfPoint {
+///     frequency_hz: 29.3,
+///     response: nalgebra::Complex::new(0.0, -3.4e-4),
+///     coherence: 0.999,
+///     variance: 2e-12,
+///     resolution_hz: 0.1,
+/// });
+/// assert!(added && (frf.phase_rad(0).to_degrees() + 90.0).abs() < 1e-12);
+/// // sigma(|H|) = sqrt(variance/2)
+/// assert!((frf.magnitude_sigma[0] - 1e-6).abs() < 1e-18);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frf {
     /// Frequencies in hertz.
     pub frequency_hz: Vec<f64>,
-    /// H = output / input in metres per ampere; a lag is a negative phase.
+    /// H = output/input in metres per ampere; a lag is a negative phase.
     pub response: Vec<Complex<f64>>,
-    /// Magnitude-squared coherence, 0 to 1: the share of the output's power that the input explains.
+    /// Magnitude-squared coherence, 0 to 1: the ratio of the output's power that the input explains.
     pub coherence: Vec<f64>,
     /// Standard deviation of |H| in metres per ampere.
     pub magnitude_sigma: Vec<f64>,
     /// Standard deviation of arg H in radians, at most [`PHASE_SIGMA_LIMIT_RAD`].
     pub phase_sigma_rad: Vec<f64>,
-    /// Equivalent noise bandwidth in hertz of the weights whose mean the estimate is: the width of the rectangle over
-    /// which averaging would lessen noise as much. Anything narrower in the plant is smeared.
+    /// Equivalent noise bandwidth of the estimator in hertz: the width of the rectangular average with the same noise
+    /// reduction. Features of the plant that are narrower are smeared.
     pub resolution_hz: Vec<f64>,
 }
 
-/// One frequency of an [`Frf`], before it is split into columns.
+/// One frequency of an [`Frf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrfPoint {
     /// Frequency in hertz.
@@ -51,33 +67,54 @@ pub struct FrfPoint {
     pub resolution_hz: f64,
 }
 
+/// One datum of a parametric fit: the mean response over a few neighbouring bins. The errors of different data are
+/// independent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrfDatum {
+    /// Mean frequency of the bins in hertz, weighted with the power of the input.
+    pub frequency_hz: f64,
+    /// Standard deviation of the bins' frequencies about their mean, with the same weights, in hertz.
+    pub spread_hz: f64,
+    /// Mean of H in metres per ampere.
+    pub response: Complex<f64>,
+    /// E|error of the response|^2 in (m/A)^2.
+    pub variance: f64,
+}
+
+impl FrfDatum {
+    /// Angular frequency in rad/s.
+    pub fn omega_rad_s(&self) -> f64 {
+        2.0 * PI * self.frequency_hz
+    }
+}
+
 impl Frf {
     /// Number of frequencies.
     pub fn len(&self) -> usize {
         self.frequency_hz.len()
     }
 
-    /// Whether there is no frequency at all.
+    /// Whether there are no frequencies.
     pub fn is_empty(&self) -> bool {
         self.frequency_hz.is_empty()
     }
 
-    /// Half of the frequencies have at least this coherence.
+    /// Median of the coherence over the frequencies.
     pub fn median_coherence(&self) -> Option<f64> {
         let mut sorted = self.coherence.clone();
         sorted.sort_by(f64::total_cmp);
         sorted.get(sorted.len() / 2).copied()
     }
 
-    /// The response as it would be `delay_s` earlier: H exp(j w delay).
-    pub fn earlier(&self, delay_s: f64) -> Frf {
-        let turned =
+    /// The response with a delay removed from its phases: H exp(j w delay).
+    pub fn without_delay(&self, delay_s: f64) -> Frf {
+        let advance =
             |(f, h): (&f64, &Complex<f64>)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s);
         let response = self
             .frequency_hz
             .iter()
             .zip(&self.response)
-            .map(turned)
+            .map(advance)
             .collect();
         Frf {
             response,
@@ -90,10 +127,10 @@ impl Frf {
         wrapped_phase_rad(self.response[index])
     }
 
-    /// Appends a frequency; says no to one whose numbers are not finite.
+    /// Appends a frequency; returns false and appends nothing if a number is not finite.
     ///
-    /// The error of H is circular, half its power lies along H and half across: sigma(|H|) = sqrt(E|error|^2 / 2) and
-    /// sigma(arg H) = sigma(|H|) / |H|, as long as that is small. It cannot exceed that of a phase that is anywhere.
+    /// The error of H is circular, half its power lies along H and half across it: sigma(|H|) = sqrt(E|error|^2 / 2) and
+    /// sigma(arg H) = sigma(|H|) / |H| as long as that is small; it is limited to [`PHASE_SIGMA_LIMIT_RAD`].
     pub fn push(&mut self, point: FrfPoint) -> bool {
         let sigma = (point.variance / 2.0).sqrt();
         let magnitude = point.response.norm();
@@ -108,15 +145,31 @@ impl Frf {
         self.resolution_hz.push(point.resolution_hz);
         true
     }
+
+    /// Appends points; those with a number that is not finite are omitted.
+    pub(super) fn extend(&mut self, points: impl IntoIterator<Item = FrfPoint>) {
+        for point in points {
+            self.push(point);
+        }
+    }
+
+    /// The response, or an error if it has no frequencies.
+    pub(super) fn excited(self, band_hz: (f64, f64)) -> Result<Frf, super::IdentifyError> {
+        if self.is_empty() {
+            Err(super::IdentifyError::not_excited(band_hz))
+        } else {
+            Ok(self)
+        }
+    }
 }
 
-/// arg H in (-pi, pi]: the one value that atan2 gives beyond that, -pi (of a negative zero), is pi.
+/// arg H in (-pi, pi]: -pi, which atan2 returns for a negative zero, becomes pi.
 pub fn wrapped_phase_rad(response: Complex<f64>) -> f64 {
     let phase = response.arg();
     if phase <= -PI { PI } else { phase }
 }
 
-/// sigma/|H|, up to what can be said of a phase at all (0/0, neither response nor noise, included).
+/// sigma/|H|, limited; the limit also applies to 0/0 (neither response nor noise).
 fn phase_sigma_rad(sigma: f64, magnitude: f64) -> f64 {
     if sigma < PHASE_SIGMA_LIMIT_RAD * magnitude {
         sigma / magnitude

@@ -1,55 +1,73 @@
-//! From recorded signals to a frequency response function (FRF) that says how far it can be trusted.
+//! From recorded signals to a frequency response function (FRF) with standard deviations, its modes, and a verdict.
 //!
 //! ```text
-//! Signals -> drift removed -> FFT of the whole record -> a curve through each neighbourhood of bins -> Frf -> CSV, plot
+//! Signals -> drift removed -> FFT of the whole record -> local models of neighbouring bins -> Frf -> CSV, plots
+//!                                                                                    '--> FrfDatum -> modal -> verdict
 //! ```
 //!
-//! - [`local::estimate`]: the default. For records that begin and end at rest, as every run of the bench does.
-//! - [`frf_data()`]: the same record without smoothing, for a fit.
-//! - [`joint::estimate`]: plant, loop and sensitivities of a stage under control.
-//! - [`response`]: as the configuration chooses.
-//! - [`repeated::mean`]: repetitions of one excitation, each at rest at its ends, averaged.
-//! - [`periodic::estimate`]: periods of one excitation, averaged.
-//! - [`harmonics`], [`linearity`]: what stands between the lines of a multisine: distortion, odd and even, beside noise.
-//! - [`with_distortion`]: what is alike in every period and yet no response.
-//! - [`welch::estimate`]: averaged segments, for records that do not, and for comparison with other programs.
-//! - [`align::Readings`] and [`edges`]: readings and set-points of irregular times on the regular ones of a loop.
-//! - [`delay::beyond`]: how much later than a model a response answers.
-//! - [`table`]: records of other hands, a CSV with named columns.
-//! - [`csv`]: the file in which an FRF leaves the bench, and comes back.
+//! | to find | look in |
+//! |---|---|
+//! | the default estimator, for records that begin and end at rest | [`local`] |
+//! | the same without smoothing, for a fit | [`frf_data()`] |
+//! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
+//! | the estimator that the configuration selects | [`response`] |
+//! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
+//! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
+//! | readings and set-points of irregular times | [`resampling`], [`setpoint_timing`] |
+//! | the excess delay of a response over its model | [`delay`] |
+//! | modes with confidence intervals | [`modal`] |
+//! | whether there are CNMP zeros | [`verdict`] |
+//! | external records as CSV, FRFs as CSV | [`external_csv`], [`frf_csv`] |
 //!
 //! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
 
 mod band;
-mod block;
-mod configured;
-pub mod csv;
-mod curves;
 pub mod delay;
 mod error;
+mod estimate;
 mod estimator;
+pub mod external_csv;
+mod fft;
 mod frf;
-mod lines;
+pub mod frf_csv;
+mod local_model;
 pub mod modal;
-mod moments;
+mod multisine_lines;
 pub mod repeated;
 mod signals;
-mod spectrum;
-pub mod table;
-mod times;
+mod timing;
 pub mod verdict;
 pub mod welch;
 
-pub use crate::config::{Estimator, LocalModel, ResolutionPoint};
-pub use block::FrfDatum;
-pub use configured::response;
-pub use curves::frf_data::frf_data;
-pub use curves::settings::EstimatorSettings;
-pub use curves::{joint, local};
+use crate::config::IdentifySettings;
+pub use crate::config::{Estimator, EstimatorSettings, LocalModel, ResolutionPoint};
 pub use error::IdentifyError;
-pub use frf::{Frf, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
-pub use lines::distortion::with_distortion;
-pub use lines::{harmonics, linearity, periodic};
-pub use moments::RunningStats;
+pub use estimate::{Estimate, SIGMAS_95};
+pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
+pub use local_model::frf_data::frf_data;
+pub use local_model::{joint, local};
+pub use multisine_lines::distortion::with_distortion;
+pub use multisine_lines::{harmonics, linearity, periodic};
 pub use signals::Signals;
-pub use times::{align, edges};
+pub use timing::{resampling, setpoint_timing};
+
+/// The frequency response by the estimator that the configuration selects.
+///
+/// # Errors
+/// Those of the estimator.
+pub fn response(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &IdentifySettings,
+) -> Result<Frf, IdentifyError> {
+    match settings {
+        IdentifySettings::Local(local) => local::estimate(signals, band_hz, local),
+        IdentifySettings::Welch {
+            segment_s,
+            estimator,
+        } => {
+            let segment = libm::round(segment_s * signals.rate_hz) as usize;
+            welch::estimate(signals, band_hz, segment, *estimator)
+        }
+    }
+}

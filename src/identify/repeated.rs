@@ -1,27 +1,27 @@
-//! Repetitions of one excitation, each of which begins and ends at rest: their mean, tick by tick, is one record of the same
-//! signal with less noise.
+//! The mean of repetitions of one excitation, each of which begins and ends at rest.
 //!
-//! The mean loses nothing, as all have the same input; and unlike their scatter, which takes five of them to say anything, the
-//! noise of the mean is seen among its neighbouring bins from two on. A periodic excitation without rest between is for
-//! [`super::periodic`].
+//! The mean, tick by tick, is one record of the same signal with less noise. No information is lost, as all repetitions have
+//! the same input. The noise of the mean is estimated from neighbouring bins, which needs two repetitions; the scatter of the
+//! repetitions would need at least five. See [`super::periodic`] for a periodic excitation without rest.
 
 use super::Signals;
 
-/// The mean of `count` repetitions of so many samples, or of as many as there are whole; a last one that was cut off does not
-/// count. Without a whole one the record is left as it is.
+/// The mean of `count` repetitions of `length` samples, or of as many whole ones as the record has. A record without a whole
+/// repetition is returned unchanged.
 pub fn mean(signals: &Signals, length: usize, count: usize) -> Signals {
-    let count = count.min(signals.len().checked_div(length).unwrap_or(0));
-    let of = |samples: &[f64]| -> Vec<f64> {
-        let at = |n: usize| (0..count).map(|r| samples[r * length + n]).sum::<f64>() / count as f64;
-        if count == 0 {
-            samples.to_vec()
-        } else {
-            (0..length).map(at).collect()
-        }
-    };
+    let whole = signals.len().checked_div(length).unwrap_or(0);
+    let count = count.min(whole);
+    if count == 0 {
+        return signals.clone();
+    }
     Signals {
         rate_hz: signals.rate_hz,
-        input_a: of(&signals.input_a),
-        output_m: of(&signals.output_m),
+        input_a: mean_of(&signals.input_a, length, count),
+        output_m: mean_of(&signals.output_m, length, count),
     }
+}
+
+fn mean_of(samples: &[f64], length: usize, count: usize) -> Vec<f64> {
+    let sum = |n: usize| (0..count).map(|r| samples[r * length + n]).sum::<f64>();
+    (0..length).map(|n| sum(n) / count as f64).collect()
 }

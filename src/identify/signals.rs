@@ -1,24 +1,24 @@
-//! What an estimator is given: input and output of one run, tick by tick.
+//! Input and output of one run: the data of every estimator.
 
 use core::ops::Range;
 
 use super::IdentifyError;
 
-/// Fewer samples than this have too few neighbouring bins to tell a response from noise.
-const LEAST_SAMPLES: usize = 64;
-/// Squares and sums of anything below this stay finite.
-const LARGEST_SAMPLE: f64 = 1e100;
-/// The input counts as quiet below this part of its peak.
+/// A shorter record has too few neighbouring bins to separate a response from noise.
+const MIN_SAMPLES: usize = 64;
+/// Squares and sums of samples up to this magnitude stay finite.
+const MAX_SAMPLE: f64 = 1e100;
+/// The input is quiet while it stays below this ratio of its peak.
 const QUIET_RATIO: f64 = 1e-6;
-/// A quiet stretch shorter than this says too little about where the output rests.
-const LEAST_QUIET_S: f64 = 0.25;
+/// A shorter quiet interval does not give the rest position well enough.
+const MIN_QUIET_S: f64 = 0.25;
 
 /// Input and output of one run: one sample a tick, the same tick at the same index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signals {
     /// Ticks per second.
     pub rate_hz: f64,
-    /// Current in amperes, as the amplifier gave it.
+    /// Current in amperes, as applied by the amplifier.
     pub input_a: Vec<f64>,
     /// Displacement in metres.
     pub output_m: Vec<f64>,
@@ -30,27 +30,35 @@ impl Signals {
         self.input_a.len()
     }
 
-    /// Whether there is no tick at all.
+    /// Whether there are no ticks.
     pub fn is_empty(&self) -> bool {
         self.input_a.is_empty()
     }
 
-    /// Whether the signals are fit for any estimator.
+    /// The samples of both signals in a range of ticks.
+    ///
+    /// # Panics
+    /// When the range reaches beyond the end of a signal.
+    pub fn slice(&self, ticks: Range<usize>) -> Signals {
+        Signals {
+            rate_hz: self.rate_hz,
+            input_a: self.input_a[ticks.clone()].to_vec(),
+            output_m: self.output_m[ticks].to_vec(),
+        }
+    }
+
+    /// Checks that any estimator can process the signals.
+    ///
+    /// # Errors
+    /// When the signals differ in length, are too short, hold samples that are not finite, or do not change.
     pub fn check(&self) -> Result<(), IdentifyError> {
-        let (input, output) = (self.input_a.len(), self.output_m.len());
-        if input != output {
-            return Err(IdentifyError::Lengths { input, output });
-        }
-        if input < LEAST_SAMPLES {
-            return Err(IdentifyError::TooShort {
-                samples: input,
-                least: LEAST_SAMPLES,
-            });
-        }
+        check_lengths(self.input_a.len(), self.output_m.len())?;
+        check_min_samples(self.len(), MIN_SAMPLES)?;
         if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
-            return Err(IdentifyError::Rate {
-                rate_hz: self.rate_hz,
-            });
+            return Err(IdentifyError::Signals(format!(
+                "a sampling rate of {} Hz: it must be finite and greater than 0 Hz",
+                self.rate_hz
+            )));
         }
         check_samples("input_a", &self.input_a)?;
         check_samples("output_m", &self.output_m)?;
@@ -59,42 +67,48 @@ impl Signals {
 
     fn check_motion(&self) -> Result<(), IdentifyError> {
         let samples = self.len();
-        if let Some(value) = only_value(&self.input_a) {
-            return Err(IdentifyError::InputStill { value, samples });
+        if let Some(value) = constant_value(&self.input_a) {
+            return Err(IdentifyError::Signals(format!(
+                "the input is {value} A at every one of {samples} samples: nothing was excited; check that the amplifier was enabled and that the excitation is not zero"
+            )));
         }
-        match only_value(&self.output_m) {
-            Some(value) => Err(IdentifyError::OutputStill { value, samples }),
-            None => Ok(()),
+        if let Some(value) = constant_value(&self.output_m) {
+            return Err(IdentifyError::Signals(format!(
+                "the output is {value} m at every one of {samples} samples: the probe did not see the stage; check its range, its cable and its validity flag"
+            )));
         }
+        Ok(())
     }
 
-    /// The output less the straight line through where it rests before and after the excitation, in metres.
+    /// The output minus the straight line through its rest positions before and after the excitation, in metres.
     ///
-    /// An FFT takes the record for one turn of something periodic. A constant offset c of the probe then stays in bin
-    /// 0, which no estimate uses. A drift does not: over the record it makes a step of d metres from the last sample to
-    /// the first, that is d/(2 pi f) in metre seconds at every frequency, all along the band. The quiet before and the
-    /// last half of the quiet after (when the stage has rung out) show d; without both, only the mean is taken off.
+    /// An FFT treats the record as one period of a periodic signal. A constant offset of the probe stays in bin 0, which
+    /// no estimate uses. A drift of d metres over the record is a step from the last sample to the first; it adds
+    /// d/(2 pi f) metre seconds at every frequency. The quiet interval before the excitation and the second half of the
+    /// one after it (when the stage has rung out) give d. Without both intervals only the mean is subtracted.
     pub(super) fn output_without_drift_m(&self) -> Vec<f64> {
-        let (before, after) = self.quiet();
-        let least = (LEAST_QUIET_S * self.rate_hz).max(8.0);
-        let enough = before.len().min(after.len()) as f64 >= least;
-        let (offset, slope) = if enough {
-            line(
+        let (offset, slope) = self.drift();
+        let subtract = |(k, y): (usize, &f64)| y - offset - slope * k as f64;
+        self.output_m.iter().enumerate().map(subtract).collect()
+    }
+
+    /// Offset in metres and slope in metres per sample of the drift.
+    fn drift(&self) -> (f64, f64) {
+        let (before, after) = self.quiet_intervals();
+        let min_samples = (MIN_QUIET_S * self.rate_hz).max(8.0);
+        if before.len().min(after.len()) as f64 >= min_samples {
+            let (start, end) = (
                 centre(&self.output_m, before),
                 centre(&self.output_m, after),
-            )
+            );
+            line_through(start, end)
         } else {
             (mean(&self.output_m), 0.0)
-        };
-        self.output_m
-            .iter()
-            .enumerate()
-            .map(|(k, y)| y - offset - slope * k as f64)
-            .collect()
+        }
     }
 
-    /// The quiet stretch before the excitation and the last half of the one after it.
-    fn quiet(&self) -> (Range<usize>, Range<usize>) {
+    /// The quiet interval before the excitation and the second half of the one after it.
+    fn quiet_intervals(&self) -> (Range<usize>, Range<usize>) {
         let peak = self
             .input_a
             .iter()
@@ -106,22 +120,40 @@ impl Signals {
     }
 }
 
-fn check_samples(column: &'static str, samples: &[f64]) -> Result<(), IdentifyError> {
-    // A NaN compares as false, and so fails.
-    let fit = |sample: &f64| sample.abs() <= LARGEST_SAMPLE;
-    match samples.iter().position(|sample| !fit(sample)) {
-        Some(index) => Err(IdentifyError::Sample {
-            column,
-            index,
-            value: samples[index],
-            limit: LARGEST_SAMPLE,
-        }),
-        None => Ok(()),
+/// Checks that input and output have the same number of samples.
+pub(super) fn check_lengths(input: usize, output: usize) -> Result<(), IdentifyError> {
+    if input == output {
+        return Ok(());
     }
+    Err(IdentifyError::Signals(format!(
+        "{input} samples of the input but {output} of the output: both need one sample a tick, with the same tick at the same index"
+    )))
 }
 
-/// The value of all samples, if they are all the same.
-fn only_value(samples: &[f64]) -> Option<f64> {
+/// Checks that there are enough samples.
+pub(super) fn check_min_samples(samples: usize, min: usize) -> Result<(), IdentifyError> {
+    if samples >= min {
+        return Ok(());
+    }
+    Err(IdentifyError::Signals(format!(
+        "{samples} samples are too few: at least {min} are needed, so record for longer"
+    )))
+}
+
+fn check_samples(column: &str, samples: &[f64]) -> Result<(), IdentifyError> {
+    // A comparison with NaN is false, so NaN is rejected.
+    let valid = |sample: &f64| sample.abs() <= MAX_SAMPLE;
+    let Some(index) = samples.iter().position(|sample| !valid(sample)) else {
+        return Ok(());
+    };
+    Err(IdentifyError::Signals(format!(
+        "{column} is {} at sample {index}: every sample must be finite and below {MAX_SAMPLE:e} in magnitude; cut the record before it or repair the sample",
+        samples[index]
+    )))
+}
+
+/// The value of all samples, if they are all equal.
+fn constant_value(samples: &[f64]) -> Option<f64> {
     let first = *samples.first()?;
     samples.iter().all(|s| *s == first).then_some(first)
 }
@@ -130,7 +162,7 @@ fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
 }
 
-/// Middle index and mean of a stretch.
+/// Middle index and mean of a range of samples.
 fn centre(samples: &[f64], range: Range<usize>) -> (f64, f64) {
     (
         (range.start + range.end - 1) as f64 / 2.0,
@@ -139,7 +171,7 @@ fn centre(samples: &[f64], range: Range<usize>) -> (f64, f64) {
 }
 
 /// Offset at index 0 and slope per sample of the line through two points.
-fn line((k0, y0): (f64, f64), (k1, y1): (f64, f64)) -> (f64, f64) {
+fn line_through((k0, y0): (f64, f64), (k1, y1): (f64, f64)) -> (f64, f64) {
     let slope = (y1 - y0) / (k1 - k0);
     (y0 - slope * k0, slope)
 }

@@ -121,7 +121,7 @@ mod tests {
             input_a2: 1.0,
             power_m2,
             noise_m2: 1.0,
-            surprise: 0.0,
+            surprisal: 0.0,
         };
         let power = |level: &LineLevel| level.power_m2;
         // 1 to 1000 Hz: a column is exp(ln(1000)/120) = 5.9 % wide; 1 Hz begins the first, 100 and 101 Hz share the 80th.

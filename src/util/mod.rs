@@ -6,5 +6,6 @@ pub mod nearest;
 pub mod numeric;
 pub mod progress;
 pub mod quantity;
+pub mod running_stats;
 pub(crate) mod thread_priority;
 pub mod units;

@@ -42,14 +42,19 @@ fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_not
             .linearity
             .expect("lines were left out");
         let whole = &linearity.whole;
-        assert_eq!(whole.cause(), cause, "{}", whole.words());
-        for kind in [whole.odd, whole.even].map(|kind| kind.expect("looked for")) {
-            assert!(!kind.is_found() && kind.missing == 0.0, "{seed}: {kind:?}");
+        assert_eq!(whole.cause, cause, "{}", linearity.why);
+        assert!(
+            !whole.is_odd_detected() && !whole.is_even_detected(),
+            "{seed}: {whole:?}"
+        );
+        assert_eq!(whole.missing_by_distortion, 0.0);
+        for ratio in [whole.odd_distortion_ratio, whole.even_distortion_ratio] {
+            let ratio = ratio.expect("omitted lines");
             // The scatter of an estimate of 0 is the noise of the mean of 8 periods over the root of the lines. Those that hold most of
             // the noise, at the floor's 8 Hz and at mode R, are ten and more: a third, and three of these.
             assert!(
-                kind.ratio.abs() < whole.noise_ratio / 8.0,
-                "{seed}: {kind:?} {}",
+                ratio.abs() < whole.noise_ratio / 8.0,
+                "{seed}: {ratio} {}",
                 whole.noise_ratio
             );
         }
@@ -60,28 +65,23 @@ fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_not
 fn constraints_as_they_are_make_even_and_odd_distortion_which_is_put_down_to_geometry() {
     let analysis = shown(&["sim.geometry=quadratic"]);
     let linearity = analysis.linearity.as_ref().expect("lines were left out");
-    let (odd, even) = (
-        linearity.whole.odd.expect("looked for"),
-        linearity.whole.even.expect("looked for"),
+    let whole = &linearity.whole;
+    assert!(
+        whole.is_even_detected() && whole.is_odd_detected(),
+        "{whole:?}"
     );
-    assert!(even.is_found() && odd.is_found(), "{even:?} {odd:?}");
     // x_i - x_j has a term in the square of y_i - y_j: even first, at most of the lines.
     assert!(
-        even.missing > odd.missing && odd.missing > 0.0,
-        "{even:?} {odd:?}"
+        whole.missing_by_even > whole.missing_by_odd && whole.missing_by_odd > 0.0,
+        "{whole:?}"
     );
-    assert_eq!(
-        linearity.whole.cause(),
-        Cause::Nonlinearity,
-        "{}",
-        linearity.whole.words()
-    );
+    assert_eq!(whole.cause, Cause::Nonlinearity, "{}", linearity.why);
     // It stays inside of the stops, which are at 1 mm: geometry is all there is.
     assert!(
         linearity
             .bands
             .iter()
-            .any(|band| band.cause() == Cause::Nonlinearity && band.band_hz.0 > 20.0)
+            .any(|band| band.cause == Cause::Nonlinearity && band.low_hz > 20.0)
     );
 }
 
@@ -130,7 +130,7 @@ fn a_multisine_of_all_lines_and_a_chirp_say_nothing_of_it() {
     let odd = shown(&["multisine.lines=odd"])
         .linearity
         .expect("even lines were left out");
-    assert!(odd.whole.odd.is_none() && odd.whole.even.is_some());
+    assert!(odd.whole.odd_by_noise_alone.is_none() && odd.whole.even_by_noise_alone.is_some());
 }
 
 const HERE: &str = "--set loop.rate_hz=1000 --start 5 --stop 200 --set multisine.period_s=8 --set multisine.periods=9 --operating-point 8%";
@@ -151,7 +151,7 @@ fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
     for run in 0..3 {
         let made = &answer["runs"][run];
         assert_ne!(
-            made["linearity"]["cause"], "geometry",
+            made["linearity"]["cause"], "nonlinearity",
             "{}",
             made["linearity"]
         );
@@ -207,7 +207,7 @@ fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift
         );
     }
     assert_eq!(
-        answer["runs"][2]["linearity"]["cause"], "geometry",
+        answer["runs"][2]["linearity"]["cause"], "nonlinearity",
         "{}",
         answer["runs"][2]["linearity"]["why"]
     );

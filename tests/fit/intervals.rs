@@ -17,7 +17,7 @@ fn of_modes_at_any_noise() {
         for seed in 0..SEEDS {
             let modes = fit(
                 &frf_data(&truth, 2e-4, sigma_m_per_n, seed),
-                &MeasurementChain::Bare,
+                &MeasurementChain::Direct,
             )
             .unwrap()
             .modes();
@@ -54,7 +54,11 @@ fn of_the_complex_zeros_as_ellipses() {
         .s;
     let mut held = 0;
     for seed in 0..SEEDS {
-        let fit = fit(&frf_data(&truth, 2e-4, 1e-9, seed), &MeasurementChain::Bare).unwrap();
+        let fit = fit(
+            &frf_data(&truth, 2e-4, 1e-9, seed),
+            &MeasurementChain::Direct,
+        )
+        .unwrap();
         let zeros = zeros(&fit).unwrap();
         let near = zeros
             .iter()

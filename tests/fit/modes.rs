@@ -18,7 +18,7 @@ fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
         let truth = [term(29.0, 0.009, 0.47), low, high];
         let fit = fit(
             &frf_data(&truth, 0.0, QUIET_M_PER_N, 3),
-            &MeasurementChain::Bare,
+            &MeasurementChain::Direct,
         )
         .unwrap();
         let modes = fit.modes();
@@ -55,7 +55,7 @@ fn a_delay_of_many_milliseconds_is_told_apart_from_the_modes() {
     for delay_s in [0.0, 1e-4, 1.7e-3, 6e-3, -2e-3] {
         let fit = fit(
             &frf_data(&stage(), delay_s, QUIET_M_PER_N, 5),
-            &MeasurementChain::Bare,
+            &MeasurementChain::Direct,
         )
         .unwrap();
         let delay = fit.delay_s();
@@ -75,7 +75,7 @@ fn a_mode_below_the_noise_is_not_claimed() {
     for seed in 0..20 {
         let modes = fit(
             &frf_data(&truth, 0.0, QUIET_M_PER_N, seed),
-            &MeasurementChain::Bare,
+            &MeasurementChain::Direct,
         )
         .unwrap()
         .modes();
@@ -88,7 +88,7 @@ fn a_free_body_with_a_flexible_mode_is_one_double_integrator_and_one_mode() {
     let truth = [term(0.0, 0.0, 2.0), term(48.0, 0.01, -1.2)];
     let fit = fit(
         &frf_data(&truth, 0.0, QUIET_M_PER_N, 8),
-        &MeasurementChain::Bare,
+        &MeasurementChain::Direct,
     )
     .unwrap();
     let modes = fit.modes();
@@ -108,19 +108,19 @@ fn noise_alone_and_too_few_frequencies_are_refused() {
     let noise: Vec<FrfDatum> = frf_data(&[], 0.0, 1e-6, 4);
     assert!(
         matches!(
-            fit(&noise, &MeasurementChain::Bare),
+            fit(&noise, &MeasurementChain::Direct),
             Err(FitError::NoMode { .. })
         ),
         "{:?}",
-        fit(&noise, &MeasurementChain::Bare)
+        fit(&noise, &MeasurementChain::Direct)
     );
     assert!(matches!(
-        fit(&noise[..1], &MeasurementChain::Bare),
-        Err(FitError::TooFew { frf_data: 1 })
+        fit(&noise[..1], &MeasurementChain::Direct),
+        Err(FitError::TooFew { frequencies: 1 })
     ));
     assert!(matches!(
-        fit(&[], &MeasurementChain::Bare),
-        Err(FitError::TooFew { frf_data: 0 })
+        fit(&[], &MeasurementChain::Direct),
+        Err(FitError::TooFew { frequencies: 0 })
     ));
     let dead: Vec<FrfDatum> = noise
         .iter()
@@ -129,5 +129,5 @@ fn noise_alone_and_too_few_frequencies_are_refused() {
             ..*b
         })
         .collect();
-    assert!(fit(&dead, &MeasurementChain::Bare).is_err());
+    assert!(fit(&dead, &MeasurementChain::Direct).is_err());
 }

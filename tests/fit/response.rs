@@ -1,6 +1,6 @@
 //! The response and the poles of a fit whose parameters are known: closed form.
 
-use bench::identify::modal::{MeasurementChain, ModalFit, Parameters};
+use bench::identify::modal::{MeasurementChain, ModalFit, ModalParameters};
 use bench::model::zeros::ModalTerm;
 use nalgebra::{Complex, DMatrix};
 
@@ -8,7 +8,7 @@ const DELAY_S: f64 = 3e-4;
 const REMAINDER_M_PER_N: f64 = 2e-6;
 
 fn fit(modes: Vec<ModalTerm>, covariance: DMatrix<f64>) -> ModalFit {
-    let parameters = Parameters {
+    let parameters = ModalParameters {
         modes,
         remainder_m_per_n: REMAINDER_M_PER_N,
         delay_s: DELAY_S,
@@ -39,7 +39,7 @@ fn the_response_is_the_sum_of_modes_and_remainder_late() {
     ];
     let frequency_hz = [1.0, 29.3, 82.0, 84.4, 300.0];
     let response =
-        fit(modes.clone(), DMatrix::zeros(9, 9)).response(&MeasurementChain::Bare, &frequency_hz);
+        fit(modes.clone(), DMatrix::zeros(9, 9)).response(&MeasurementChain::Direct, &frequency_hz);
     for (f, h) in frequency_hz.iter().zip(response) {
         let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * f);
         let of = |t: &ModalTerm| {

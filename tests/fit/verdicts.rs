@@ -67,7 +67,7 @@ fn modes_are_true(config: &Config, analysis: &Analysis) {
         .fold(0.0, f64::max);
     for [omega, damping, residue] in model(config) {
         let Some(mode) = stands_for(&modes, omega) else {
-            let told = analysis.verdict.why.contains("are seen") || residue.abs() < 5.0 * sigma;
+            let told = analysis.verdict.why.contains("are found") || residue.abs() < 5.0 * sigma;
             assert!(
                 told,
                 "{omega} rad/s, {residue} 1/kg: {:?}",
@@ -154,7 +154,7 @@ fn judged(
 ) -> Verdict {
     let frf_data = frf_data(modes, 0.0, sigma_m_per_n, 12);
     judged_by(
-        &fit(&frf_data, &MeasurementChain::Bare).expect("modes"),
+        &fit(&frf_data, &MeasurementChain::Direct).expect("modes"),
         &frf_data,
         expected,
     )
@@ -164,7 +164,7 @@ fn judged_by(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict 
     let up_to_rad_s = std::f64::consts::TAU * 110.0;
     verdict(&VerdictInput {
         fit,
-        view: &MeasurementChain::Bare,
+        chain: &MeasurementChain::Direct,
         frf_data,
         up_to_rad_s,
         expected_modes: Some(expected),
@@ -175,7 +175,7 @@ fn judged_by(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict 
 #[test]
 fn what_is_not_a_number_is_never_sure() {
     let frf_data = frf_data(&stage(), 0.0, 1e-9, 12);
-    let good = fit(&frf_data, &MeasurementChain::Bare).expect("modes");
+    let good = fit(&frf_data, &MeasurementChain::Direct).expect("modes");
     assert_eq!(judged_by(&good, &frf_data, 3).cnmp, Cnmp::Detected);
     let mut unknown = good.clone();
     unknown.covariance.fill(f64::NAN);
@@ -195,7 +195,7 @@ fn what_is_not_a_number_is_never_sure() {
     // The same of a stage without CNMP zeros, which half a turn of nothing must not exclude.
     let calm = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
     let mut frf_data = crate::synthetic::frf_data(&calm, 0.0, 1e-9, 12);
-    let fit = fit(&frf_data, &MeasurementChain::Bare).expect("modes");
+    let fit = fit(&frf_data, &MeasurementChain::Direct).expect("modes");
     assert_eq!(judged_by(&fit, &frf_data, 2).cnmp, Cnmp::Excluded);
     frf_data[valley].response = Complex::new(0.0, 0.0);
     assert_eq!(judged_by(&fit, &frf_data, 2).cnmp, Cnmp::Undecided);
@@ -212,7 +212,7 @@ fn the_words_of_an_undecided_verdict_name_what_is_missing() {
     );
     let alone = judged(&[term(29.0, 0.009, 0.47)], 1e-9, 1);
     assert!(
-        alone.cnmp == Cnmp::Undecided && alone.why.contains("fewer than two modes"),
+        alone.cnmp == Cnmp::Undecided && alone.why.contains("needs two modes"),
         "{}",
         alone.why
     );

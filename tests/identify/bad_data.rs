@@ -165,7 +165,7 @@ fn settings_out_of_bounds_are_refused_with_name_value_and_bounds() {
         &["resolution_ratio is 0.2", "0 to 0.1"],
     );
     let one = EstimatorSettings {
-        min_half_width_bins: 1.0,
+        min_half_width_bins: 1,
         ..EstimatorSettings::default()
     };
     assert_says(
@@ -246,7 +246,7 @@ proptest! {
         lengths_agree in prop::bool::weighted(0.95),
         rate_hz in prop_oneof![10 => Just(100.0), 1 => any::<f64>()],
         band_hz in (limit(), limit()),
-        half_width in 1.5..40.0,
+        half_width in 1_usize..40,
         ratio in 0.0..0.11,
         segment in 0_usize..310,
     ) {

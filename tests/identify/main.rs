@@ -2,8 +2,8 @@
 
 mod accuracy;
 mod bad_data;
-mod csv;
 mod curves;
+mod frf_csv;
 mod joint;
 mod noise;
 use bench_test_support::python;

@@ -98,7 +98,7 @@ fn sigma_is_below_one_percent_from_1_to_200_hz_and_is_not_zero() {
 }
 
 /// A chirp of two seconds and 1.2 mA, 185 nm of motion, in 50 nm of noise: the errors of so many runs of 8.5 seconds.
-fn short_runs(seeds: u64, min_half_width_bins: f64) -> Vec<(f64, f64, f64)> {
+fn short_runs(seeds: u64, min_half_width_bins: usize) -> Vec<(f64, f64, f64)> {
     let plant = SampledPlant::stage();
     let input_a: Vec<f64> = stage::chirp_of(2.0, 0.5, 6.0)
         .iter()
@@ -125,14 +125,14 @@ fn short_runs(seeds: u64, min_half_width_bins: f64) -> Vec<(f64, f64, f64)> {
 
 #[test]
 fn a_short_noisy_record_has_large_sigmas_that_are_as_honest() {
-    assert_honest(&short_runs(8, 16.0), "short records");
+    assert_honest(&short_runs(8, 16), "short records");
 }
 
 /// The floor's peak at 5 Hz is four bins wide to either side here, and the noise is taken from sixteen: sigma is too
 /// small by a quarter, no more. Of the default half-width of 16 bins it would be from 32: record longer, or ask for less.
 #[test]
 fn where_the_floor_peaks_in_a_short_record_eight_errors_in_ten_are_within_two_sigma() {
-    let mut peak = short_runs(100, 8.0);
+    let mut peak = short_runs(100, 8);
     peak.retain(|(f, _, _)| (4.5..5.5).contains(f));
     let (magnitude, phase) = (share(&peak, |e| e.1), share(&peak, |e| e.2));
     println!(

@@ -179,9 +179,9 @@ fn measure_delay(
 }
 
 fn set_delay(chain: &mut ChainCalibration, analysis: Option<Analysis>) {
-    let delay = analysis.and_then(|analysis| Some((analysis.delay_s, analysis.beyond?)));
-    chain.delay_s = delay.map(|(delay_s, excess)| delay_s + excess.seconds);
-    chain.delay_sigma_s = delay.map(|(_, excess)| excess.sigma_s);
+    let delay = analysis.and_then(|analysis| Some((analysis.delay_s, analysis.excess_delay?)));
+    chain.delay_s = delay.map(|(delay_s, excess)| delay_s + excess.value);
+    chain.delay_sigma_s = delay.map(|(_, excess)| excess.sigma);
 }
 
 /// The static compliance of the model, from current to displacement.

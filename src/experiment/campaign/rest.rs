@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::CampaignError;
-use crate::identify::RunningStats;
 use crate::recording::Recording;
 use crate::rt::record::flag;
+use crate::util::running_stats::RunningStats;
 use bench_hal::Validity;
 
 /// Stretches whose means are compared.

@@ -1,43 +1,43 @@
-//! Has this stage complex non-minimum phase zeros? "detected", "excluded" or "undecided", and why.
+//! Has this stage complex non-minimum phase (CNMP) zeros? "detected", "excluded" or "undecided", with the reasons.
 //!
-//! Three witnesses are heard, and none of them may contradict:
+//! Three criteria must agree:
 //!
 //! 1. the zeros of the fit, each with its probability of lying in the right half plane;
 //! 2. the signs of the residues: two close modes of opposite signs beside a remainder are necessary for CNMP zeros between
 //!    them (sections 3.2.2 and 3.2.4);
-//! 3. the phase, which falls by a turn more than the magnitude asks for at each CNMP pair, whatever the modes ([`phase_drop`]).
+//! 3. the excess phase over Bode's relation, independent of the modes: each CNMP pair adds one turn of lag ([`phase_drop`]).
 //!
-//! A verdict needs data that carry it: as many modes seen as the model has there, and errors that noise explains. Beyond
-//! the band of the verdict nothing is said. Every comparison asks what must hold, not what must not, so that a figure that
-//! is not a number (a covariance that broke down, a bin of nothing) ends as undecided.
+//! A verdict needs sufficient data: as many modes as the model has, and residuals that are noise. It covers the band up to a
+//! given frequency. All comparisons state what must hold, so that a number that is not finite (a singular covariance, a bin
+//! without response) makes the verdict undecided.
 
-mod phase;
+mod phase_drop;
 mod zeros;
 
-pub use phase::{PhaseDrop, phase_drop};
+pub use phase_drop::{PhaseDrop, phase_drop};
 pub use zeros::{UncertainZero, zeros};
 
 use serde::{Deserialize, Serialize};
 
 use crate::identify::FrfDatum;
-use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit, SIGMAS_95};
+use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit};
 use crate::model::plant::PlantError;
 use crate::model::zeros::ZeroKind;
 
-/// A zero is on a side if it is on the other with a probability below this.
-const SURE: f64 = 1e-3;
-/// No fit of a bench is truer than this ratio: a zero closer to the imaginary axis is on neither side.
-const TRUEST: f64 = 1e-4;
-/// A fit that leaves so many times the power of the noise does not describe the stage.
-pub(crate) const MISFIT: f64 = 4.0;
-/// The phase must be so close to a number of half turns, in degrees.
-const CLEAR_DEG: f64 = 60.0;
-/// A response stands out of the noise with so many times its power.
-const CLEAR_POWER: f64 = 20.0;
-/// A residue of the other sign with a probability above this is of no known sign.
-const UNKNOWN_SIGN: f64 = 1e-3;
+/// A zero is certain to lie on one side if the probability of the other side is below this.
+const WRONG_SIDE_PROBABILITY: f64 = 1e-3;
+/// Relative accuracy of a fit: a zero closer to the imaginary axis is on neither side.
+const FIT_ACCURACY: f64 = 1e-4;
+/// With a larger reduced chi-square the fit does not describe the stage.
+pub(crate) const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
+/// Largest deviation of the excess phase from a number of half turns, in degrees.
+const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
+/// A response is significant above this multiple of the power of its noise.
+const SIGNIFICANT_POWER: f64 = 20.0;
+/// A residue with a larger probability of the opposite sign has no certain sign.
+const WRONG_SIGN_PROBABILITY: f64 = 1e-3;
 
-/// What can be said of CNMP zeros.
+/// Whether there are CNMP zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cnmp {
@@ -45,7 +45,7 @@ pub enum Cnmp {
     Detected,
     /// There are none.
     Excluded,
-    /// The data do not tell.
+    /// The data are insufficient.
     Undecided,
 }
 
@@ -60,21 +60,21 @@ impl Cnmp {
     }
 }
 
-/// A verdict, and its reasons in words.
+/// A verdict with its reasons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// What is said.
+    /// The verdict.
     pub cnmp: Cnmp,
-    /// Why; where undecided, what to change.
+    /// The reasons; if undecided, what to change.
     pub why: String,
     /// The zeros in the band of the verdict.
     pub zeros: Vec<UncertainZero>,
-    /// The phase over the modes of the band, where there are two or more.
+    /// The phase drop over the modes of the band, if there are two or more.
     pub phase: Option<PhaseDrop>,
 }
 
 impl Verdict {
-    /// Nothing can be said, and why.
+    /// An undecided verdict without any zeros.
     pub fn undecided(why: String) -> Verdict {
         Verdict {
             cnmp: Cnmp::Undecided,
@@ -84,48 +84,46 @@ impl Verdict {
         }
     }
 
-    /// The same with something told beside its reasons.
-    pub fn with(self, caution: Option<String>) -> Verdict {
-        let why = std::iter::once(self.why)
-            .chain(caution)
-            .collect::<Vec<_>>()
-            .join("; ");
-        Verdict { why, ..self }
+    /// The verdict with a caution added to its reasons.
+    pub fn with(mut self, caution: Option<String>) -> Verdict {
+        if let Some(caution) = caution {
+            self.why = format!("{}; {caution}", self.why);
+        }
+        self
     }
 }
 
-/// What the verdict is about.
+/// What a verdict is based on.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictInput<'a> {
-    /// The modes that were fitted.
+    /// The fitted modes.
     pub fit: &'a ModalFit,
-    /// Through what the mechanics were seen.
-    pub view: &'a MeasurementChain<'a>,
-    /// What they were fitted to, frequencies rising.
+    /// The chain through which the mechanics were observed.
+    pub chain: &'a MeasurementChain,
+    /// The fitted data, frequencies rising.
     pub frf_data: &'a [FrfDatum],
-    /// Zeros and modes up to here count, in rad/s.
+    /// The verdict covers zeros and modes up to here, in rad/s.
     pub up_to_rad_s: f64,
-    /// Modes that the model has there, of those that show between its actuator and its probe.
+    /// Number of modes of the model in that band with a residue between its actuator and its probe.
     pub expected_modes: Option<usize>,
 }
 
-/// Weighs the witnesses. Fails where the zeros of the fit cannot be computed.
-pub fn verdict(case: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
-    let within = |w: f64| w <= case.up_to_rad_s && w >= case.frf_data.first().map_or(0.0, omega);
-    let zeros: Vec<UncertainZero> = zeros(case.fit)?
-        .into_iter()
-        .filter(|zero| within(zero.s.norm()))
-        .collect();
-    let modes: Vec<FittedMode> = case
-        .fit
-        .modes()
-        .into_iter()
-        .filter(|mode| within(mode.omega_rad_s.value))
-        .collect();
-    let phase = fall(case, &modes);
-    let (cnmp, why) = match doubt(case, &modes).or_else(|| unclear(&zeros)) {
-        Some(doubt) => (Cnmp::Undecided, doubt),
-        None => weigh(&zeros, &modes, phase),
+/// Evaluates the criteria.
+///
+/// # Errors
+/// When the zeros of the fit cannot be computed.
+pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
+    let low_rad_s = input.frf_data.first().map_or(0.0, FrfDatum::omega_rad_s);
+    let in_band = |w: f64| w <= input.up_to_rad_s && w >= low_rad_s;
+    let mut zeros = zeros(input.fit)?;
+    zeros.retain(|zero| in_band(zero.s.norm()));
+    let mut modes = input.fit.modes();
+    modes.retain(|mode| in_band(mode.omega_rad_s.value));
+    let phase = phase_drop_over(input, &modes);
+    let insufficient = insufficient_data(input, &modes).or_else(|| uncertain_side(&zeros));
+    let (cnmp, why) = match insufficient {
+        Some(why) => (Cnmp::Undecided, why),
+        None => evaluate(&zeros, &modes, phase),
     };
     Ok(Verdict {
         cnmp,
@@ -135,133 +133,133 @@ pub fn verdict(case: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
     })
 }
 
-/// Why the data carry no verdict.
-fn doubt(case: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<String> {
-    let misfit = case.fit.chi2_per_freedom;
-    let described = misfit <= MISFIT;
-    if !described {
-        return Some(format!(
-            "the modes leave {misfit:.1} times the power of the noise: the stage is not the sum of modes that was fitted; \
-             excite less, so that its geometry stays linear, or look at the plot where they differ"
-        ));
-    }
-    let expected = case.expected_modes.unwrap_or(0);
-    if modes.len() < expected {
-        return Some(format!(
-            "{} of the {expected} modes that the model has up to {:.0} Hz are seen; excite more there, or for longer",
-            modes.len(),
-            case.up_to_rad_s / (2.0 * std::f64::consts::PI)
-        ));
-    }
-    let signed = |mode: &FittedMode| mode.sign_error_probability() <= UNKNOWN_SIGN;
-    let unsigned = modes.iter().find(|mode| !signed(mode))?;
+/// Why the data are insufficient for a verdict.
+fn insufficient_data(input: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<String> {
+    poor_fit(input.fit.chi2_per_freedom)
+        .or_else(|| missing_modes(input, modes.len()))
+        .or_else(|| uncertain_sign(modes))
+}
+
+fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
+    let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
+    (!good).then(|| {
+        format!(
+            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the stage is not the sum of modes that was fitted; excite less, so that it stays linear, or look at the plot where they differ"
+        )
+    })
+}
+
+fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
+    let expected = input.expected_modes.unwrap_or(0);
+    (found < expected).then(|| {
+        format!(
+            "only {found} of the {expected} modes that the model has up to {:.0} Hz are found; excite more there, or for longer",
+            hertz(input.up_to_rad_s)
+        )
+    })
+}
+
+fn uncertain_sign(modes: &[FittedMode]) -> Option<String> {
+    let certain = |mode: &FittedMode| mode.sign_error_probability() <= WRONG_SIGN_PROBABILITY;
+    let uncertain = modes.iter().find(|mode| !certain(mode))?;
     Some(format!(
-        "the sign of the residue at {:.2} Hz is not known; excite more there, or for longer",
-        unsigned.frequency_hz().value
+        "the sign of the residue at {:.2} Hz is uncertain; excite more there, or for longer",
+        uncertain.frequency_hz().value
     ))
 }
 
-/// A zero of which nobody can say on which side of the imaginary axis it is.
-fn unclear(zeros: &[UncertainZero]) -> Option<String> {
-    let near = |zero: &&UncertainZero| zero.s.re.abs() < TRUEST * zero.s.norm();
-    let sure =
-        |zero: &&UncertainZero| zero.rhp_probability <= SURE || zero.rhp_probability >= 1.0 - SURE;
-    let zero = zeros.iter().find(|zero| near(zero) || !sure(zero))?;
+/// A zero that may lie on either side of the imaginary axis.
+fn uncertain_side(zeros: &[UncertainZero]) -> Option<String> {
+    let zero = zeros.iter().find(|zero| !has_certain_side(zero))?;
+    let real_part = zero.real_part();
     Some(format!(
-        "the zero {:.3} +- {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, \
-         or for longer",
-        zero.s.re,
-        SIGMAS_95 * zero.covariance[0][0].sqrt(),
-        zero.s.norm() / (2.0 * std::f64::consts::PI),
+        "the zero {:.3} +- {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, or for longer",
+        real_part.value,
+        real_part.half_width_95(),
+        hertz(zero.s.norm()),
         100.0 * zero.rhp_probability
     ))
 }
 
-/// The verdict of zeros that are all on a known side: the other two witnesses must agree.
-fn weigh(
+fn has_certain_side(zero: &UncertainZero) -> bool {
+    let off_axis = zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm();
+    let right = zero.rhp_probability;
+    off_axis && (right <= WRONG_SIDE_PROBABILITY || right >= 1.0 - WRONG_SIDE_PROBABILITY)
+}
+
+/// The verdict from zeros that all have a certain side: the other two criteria must agree.
+fn evaluate(
     zeros: &[UncertainZero],
     modes: &[FittedMode],
     phase: Option<PhaseDrop>,
 ) -> (Cnmp, String) {
-    let right = |zero: &&UncertainZero| zero.s.re > 0.0;
-    let pairs = zeros
-        .iter()
-        .filter(right)
-        .filter(|zero| zero.kind == ZeroKind::Cnmp)
-        .count();
-    let real = zeros.iter().filter(right).count() - pairs;
+    let right = || zeros.iter().filter(|zero| zero.s.re > 0.0);
+    let pairs = right().filter(|zero| zero.kind == ZeroKind::Cnmp).count();
+    let real = right().count() - pairs;
+    let half_turns = (2 * pairs + real) as i32;
     let Some(phase) = phase else {
-        return (
-            Cnmp::Undecided,
-            "fewer than two modes are seen: there is no valley to look at".into(),
-        );
+        let why = "fewer than two modes are found, and the phase check needs two modes";
+        return (Cnmp::Undecided, why.into());
     };
-    let turns = (2 * pairs + real) as i32;
-    let agree = phase.off_deg <= CLEAR_DEG && phase.half_turns == turns;
-    if !agree {
-        return (Cnmp::Undecided, contradiction(turns, phase));
+    let agrees = phase.deviation_deg <= MAX_PHASE_DEVIATION_DEG && phase.half_turns == half_turns;
+    if !agrees {
+        (Cnmp::Undecided, phase_disagrees(half_turns, phase))
+    } else if pairs == 0 {
+        let why = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
+        (Cnmp::Excluded, why.into())
+    } else if !has_opposite_neighbours(modes) {
+        let why = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; look at the plot, and excite more";
+        (Cnmp::Undecided, why.into())
+    } else {
+        (Cnmp::Detected, detected(pairs, modes, phase))
     }
-    if pairs == 0 {
-        let words = "all zeros of the fit lie left of the imaginary axis, and the phase falls by no more than the magnitude asks for";
-        return (Cnmp::Excluded, words.into());
-    }
-    if !alternate(modes) {
-        let words = "the fit has CNMP zeros, but no two neighbouring modes of opposite residues, without which there are none; \
-                     look at the plot, and excite more";
-        return (Cnmp::Undecided, words.into());
-    }
-    (
-        Cnmp::Detected,
-        format!(
-            "{pairs} pair{} of CNMP zeros, residues of opposite signs ({}), and the phase falls by {:.0} degrees more than the \
-             magnitude asks for",
-            if pairs == 1 { "" } else { "s" },
-            signs(modes),
-            -phase.excess_phase_deg
-        ),
-    )
 }
 
-fn contradiction(turns: i32, phase: PhaseDrop) -> String {
+fn detected(pairs: usize, modes: &[FittedMode], phase: PhaseDrop) -> String {
+    let plural = if pairs == 1 { "" } else { "s" };
+    let signs: String = modes.iter().map(FittedMode::sign).collect();
     format!(
-        "by the fit's zeros the phase falls by {} degrees beyond what the magnitude asks for, as measured by {:.0}; excite more \
-         in the valley, or for longer",
-        180 * turns,
+        "{pairs} pair{plural} of CNMP zeros, residues of opposite signs ({signs}), and {:.0} degrees more phase lag than a minimum-phase system of this magnitude",
         -phase.excess_phase_deg
     )
 }
 
-fn alternate(modes: &[FittedMode]) -> bool {
-    modes
-        .windows(2)
-        .any(|pair| pair[0].residue_per_kg.value * pair[1].residue_per_kg.value < 0.0)
+fn phase_disagrees(half_turns: i32, phase: PhaseDrop) -> String {
+    format!(
+        "the zeros of the fit give {} degrees more phase lag than a minimum-phase system, the measured response {:.0}; excite more between the modes, or for longer",
+        180 * half_turns,
+        -phase.excess_phase_deg
+    )
 }
 
-/// Signs of the residues, slowest mode first.
-fn signs(modes: &[FittedMode]) -> String {
-    modes.iter().map(FittedMode::sign).collect()
+fn has_opposite_neighbours(modes: &[FittedMode]) -> bool {
+    let product = |pair: &[FittedMode]| pair[0].residue_per_kg.value * pair[1].residue_per_kg.value;
+    modes.windows(2).any(|pair| product(pair) < 0.0)
 }
 
-/// The phase from well below the first of the band's modes to its end.
-///
-/// Beyond the end the magnitude is believed for as long as it stands out of the noise.
-fn fall(case: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<PhaseDrop> {
-    let [first, .., _] = modes else { return None };
-    let low = 0.5 * first.omega_rad_s.value;
-    let from = case.frf_data.iter().position(|block| omega(block) >= low)?;
-    let to = case
-        .frf_data
+/// The phase drop from well below the first mode of the band to its end. Beyond the end the magnitude is used as far as it is
+/// significant.
+fn phase_drop_over(input: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<PhaseDrop> {
+    let [first, .., _] = modes else {
+        return None;
+    };
+    let low_rad_s = 0.5 * first.omega_rad_s.value;
+    let data = input.frf_data;
+    let from = data
         .iter()
-        .rposition(|block| omega(block) <= case.up_to_rad_s)?;
-    let clear = |block: &&FrfDatum| block.response.norm_sqr() > CLEAR_POWER * block.variance;
-    let reach = to + 1 + case.frf_data[to + 1..].iter().take_while(clear).count();
-    let omega_rad_s: Vec<f64> = case.frf_data[..reach].iter().map(omega).collect();
-    let mechanics = case
-        .view
-        .mechanics(&case.frf_data[..reach], case.fit.parameters.delay_s);
+        .position(|datum| datum.omega_rad_s() >= low_rad_s)?;
+    let to = data
+        .iter()
+        .rposition(|datum| datum.omega_rad_s() <= input.up_to_rad_s)?;
+    let significant =
+        |datum: &&FrfDatum| datum.response.norm_sqr() > SIGNIFICANT_POWER * datum.variance;
+    let beyond = data[to + 1..].iter().take_while(significant).count();
+    let used = &data[..to + 1 + beyond];
+    let omega_rad_s: Vec<f64> = used.iter().map(FrfDatum::omega_rad_s).collect();
+    let mechanics = input.chain.mechanics(used, input.fit.parameters.delay_s);
     (from < to).then(|| phase_drop(&omega_rad_s, &mechanics, from, to))
 }
 
-fn omega(block: &FrfDatum) -> f64 {
-    2.0 * std::f64::consts::PI * block.frequency_hz
+fn hertz(omega_rad_s: f64) -> f64 {
+    omega_rad_s / (2.0 * std::f64::consts::PI)
 }

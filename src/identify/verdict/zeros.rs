@@ -1,32 +1,59 @@
-//! Zeros of a fit, each with its covariance.
+//! The zeros of a fit, each with its covariance.
 //!
 //! ```text
 //! G(z) = R + sum of r q,   q = 1/(z^2 + 2 zeta w z + w^2)           dz = - (dG/dtheta . dtheta) / (dG/dz)
 //! ```
 //!
-//! so that with the rows Re and Im of -(dG/dtheta)/(dG/dz) the covariance of (Re z, Im z) is J cov(theta) J^T. Where two zeros
-//! meet, dG/dz is zero and the covariance grows without bound: then nothing is said of them.
+//! With the rows Re and Im of -(dG/dtheta)/(dG/dz) as J, the covariance of (Re z, Im z) is J cov(theta) J^T. Where two zeros
+//! coincide, dG/dz is zero and the covariance is unbounded: the zeros are then undetermined.
 
 use nalgebra::{Complex, DMatrix};
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
-use crate::identify::modal::{Entry, Estimate, ModalFit};
+use crate::identify::Estimate;
+use crate::identify::modal::{ModalFit, Parameter};
 use crate::model::plant::PlantError;
 use crate::model::zeros::{ModalSum, ModalTerm, ZeroKind};
 
-/// A zero with its errors.
+/// A zero with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncertainZero {
-    /// Where it is, in rad/s; of a conjugate pair the one above the real axis.
+    /// The zero in rad/s; of a conjugate pair the one above the real axis.
     pub s: Complex<f64>,
-    /// Covariance of its real and imaginary part in (rad/s)^2.
+    /// Covariance of real and imaginary part in (rad/s)^2.
     pub covariance: [[f64; 2]; 2],
-    /// Probability that it lies in the right half plane, for errors of a normal distribution.
+    /// Probability that it lies in the right half plane, for normally distributed errors.
     pub rhp_probability: f64,
-    /// Its kind, where it is.
+    /// Its kind at its estimated location.
     pub kind: ZeroKind,
 }
 
+impl UncertainZero {
+    /// The real part with its standard deviation.
+    pub fn real_part(&self) -> Estimate {
+        Estimate {
+            value: self.s.re,
+            sigma: self.covariance[0][0].sqrt(),
+        }
+    }
+}
+
+impl Serialize for UncertainZero {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut zero = serializer.serialize_struct("UncertainZero", 5)?;
+        zero.serialize_field("re_rad_s", &self.s.re)?;
+        zero.serialize_field("im_rad_s", &self.s.im)?;
+        zero.serialize_field("covariance", &self.covariance)?;
+        zero.serialize_field("rhp_probability", &self.rhp_probability)?;
+        zero.serialize_field("kind", self.kind.name())?;
+        zero.end()
+    }
+}
+
 /// The zeros of a fit with damping, slowest first.
+///
+/// # Errors
+/// When the zeros cannot be computed.
 pub fn zeros(fit: &ModalFit) -> Result<Vec<UncertainZero>, PlantError> {
     let sum = ModalSum::new(
         fit.parameters.modes.clone(),
@@ -37,55 +64,43 @@ pub fn zeros(fit: &ModalFit) -> Result<Vec<UncertainZero>, PlantError> {
         .into_iter()
         .filter(|zero| zero.s.im >= 0.0);
     Ok(above
-        .map(|zero| uncertain(fit, zero.s, zero.kind))
+        .map(|zero| uncertain_zero(fit, zero.s, zero.kind))
         .collect())
 }
 
-fn uncertain(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZero {
-    let rows = rows(fit, s);
+fn uncertain_zero(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZero {
+    let rows = derivatives(fit, s);
     let product =
         |i: usize, j: usize| (rows.row(i) * &fit.covariance * rows.row(j).transpose())[(0, 0)];
-    let real = s.im == 0.0;
-    let covariance = if real {
+    let covariance = if s.im == 0.0 {
         [[product(0, 0), 0.0], [0.0, 0.0]]
     } else {
         [0, 1].map(|i| [0, 1].map(|j| product(i, j)))
     };
-    let rhp_probability = Estimate {
+    let mirrored = Estimate {
         value: -s.re,
         sigma: covariance[0][0].sqrt(),
-    }
-    .below_zero_probability();
+    };
     UncertainZero {
         s,
         covariance,
-        rhp_probability,
+        rhp_probability: mirrored.below_zero_probability(),
         kind,
     }
 }
 
 /// d(Re z)/d theta and d(Im z)/d theta, 2 x parameters.
-fn rows(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
-    let modes = &fit.parameters.modes;
-    let by_square = |t: &ModalTerm| -t.resonance(z) * t.resonance(z) * t.residue_per_kg;
-    let by_z: Complex<f64> = modes
-        .iter()
-        .map(|t| by_square(t) * (z * 2.0 + 2.0 * t.damping_ratio * t.omega_rad_s))
-        .sum();
-    let by = |entry: &Entry| match *entry {
-        Entry::Omega(k) => {
-            by_square(&modes[k]) * (z * (2.0 * modes[k].damping_ratio) + 2.0 * modes[k].omega_rad_s)
-        }
-        Entry::Damping(k) => by_square(&modes[k]) * z * (2.0 * modes[k].omega_rad_s),
-        Entry::Residue(k) => modes[k].resonance(z),
-        Entry::Remainder => Complex::new(1.0, 0.0),
-        Entry::Delay => Complex::new(0.0, 0.0),
-    };
-    let moves: Vec<Complex<f64>> = fit
+fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
+    let by_z: Complex<f64> = fit
         .parameters
-        .entries()
+        .modes
         .iter()
-        .map(|entry| -by(entry) / by_z)
+        .map(|mode| derivative_by_z(mode, z))
+        .sum();
+    let free = fit.parameters.free();
+    let moves: Vec<Complex<f64>> = free
+        .iter()
+        .map(|parameter| -derivative(&fit.parameters.modes, *parameter, z) / by_z)
         .collect();
     DMatrix::from_fn(2, moves.len(), |row, column| {
         if row == 0 {
@@ -94,4 +109,27 @@ fn rows(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
             moves[column].im
         }
     })
+}
+
+/// Derivative of a mode's response by the denominator of q.
+fn by_denominator(mode: &ModalTerm, z: Complex<f64>) -> Complex<f64> {
+    -mode.resonance(z) * mode.resonance(z) * mode.residue_per_kg
+}
+
+fn derivative_by_z(mode: &ModalTerm, z: Complex<f64>) -> Complex<f64> {
+    by_denominator(mode, z) * (z * 2.0 + 2.0 * mode.damping_ratio * mode.omega_rad_s)
+}
+
+/// dG/dtheta of one parameter.
+fn derivative(modes: &[ModalTerm], parameter: Parameter, z: Complex<f64>) -> Complex<f64> {
+    match parameter {
+        Parameter::Frequency(k) => {
+            let by_frequency = z * (2.0 * modes[k].damping_ratio) + 2.0 * modes[k].omega_rad_s;
+            by_denominator(&modes[k], z) * by_frequency
+        }
+        Parameter::Damping(k) => by_denominator(&modes[k], z) * z * (2.0 * modes[k].omega_rad_s),
+        Parameter::Residue(k) => modes[k].resonance(z),
+        Parameter::Remainder => Complex::new(1.0, 0.0),
+        Parameter::Delay => Complex::new(0.0, 0.0),
+    }
 }

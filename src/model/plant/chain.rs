@@ -43,26 +43,58 @@ struct Tap {
     setpoint: f64,
 }
 
-impl LoopPlant {
-    /// The chain of a configuration around `modes`, as the loop sees it.
-    pub fn new(config: &Config, modes: &[Mode]) -> LoopPlant {
-        LoopPlant::over(config, modes, delays(config))
+/// Settings of the chain between command and reading, without the mechanics.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainSettings {
+    /// Period of the loop in seconds.
+    pub period_s: f64,
+    /// Bandwidth of the amplifier in hertz.
+    pub amplifier_bandwidth_hz: f64,
+    /// Force constant of the motor in newtons per ampere.
+    pub force_constant_n_per_a: f64,
+    /// Delays from command to reading in seconds; the chain is the mean over them.
+    pub delays_s: Vec<f64>,
+}
+
+impl ChainSettings {
+    /// The chain of a configuration.
+    pub fn of(config: &Config) -> ChainSettings {
+        ChainSettings {
+            period_s: config.servo.period_s(),
+            amplifier_bandwidth_hz: config.amplifier.bandwidth_hz,
+            force_constant_n_per_a: config.motor.force_constant_n_per_a,
+            delays_s: delays(config),
+        }
     }
 
     /// The same with readings that all have the mean age: without the roll-off of a free-running probe.
-    pub fn with_mean_age(config: &Config, modes: &[Mode]) -> LoopPlant {
-        let delays = delays(config);
-        let mean_s = delays.iter().sum::<f64>() / delays.len() as f64;
-        LoopPlant::over(config, modes, vec![mean_s])
+    pub fn with_mean_age(self) -> ChainSettings {
+        let mean_s = self.delays_s.iter().sum::<f64>() / self.delays_s.len() as f64;
+        ChainSettings {
+            delays_s: vec![mean_s],
+            ..self
+        }
+    }
+}
+
+impl LoopPlant {
+    /// The chain of a configuration around `modes`, as the loop sees it.
+    pub fn new(config: &Config, modes: &[Mode]) -> LoopPlant {
+        LoopPlant::of(&ChainSettings::of(config), modes)
     }
 
-    /// The mean over `delays`.
-    fn over(config: &Config, modes: &[Mode], delays: Vec<f64>) -> LoopPlant {
+    /// The same with readings that all have the mean age.
+    pub fn with_mean_age(config: &Config, modes: &[Mode]) -> LoopPlant {
+        LoopPlant::of(&ChainSettings::of(config).with_mean_age(), modes)
+    }
+
+    /// A chain around `modes`.
+    pub fn of(settings: &ChainSettings, modes: &[Mode]) -> LoopPlant {
         let (bandwidth_hz, force_constant) = (
-            config.amplifier.bandwidth_hz,
-            config.motor.force_constant_n_per_a,
+            settings.amplifier_bandwidth_hz,
+            settings.force_constant_n_per_a,
         );
-        let period_s = config.servo.period_s();
+        let (period_s, delays) = (settings.period_s, &settings.delays_s);
         let over = |span_s: f64| DiscretePlant::new(modes, bandwidth_hz, force_constant, span_s);
         let held = over(period_s);
         let share = 1.0 / delays.len() as f64;

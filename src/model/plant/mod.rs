@@ -36,7 +36,7 @@ mod structure;
 mod xy;
 
 pub(crate) use beam::Beam;
-pub use chain::LoopPlant;
+pub use chain::{ChainSettings, LoopPlant};
 pub(crate) use exponential::exponential;
 pub use modal::{ModalModel, Mode, Sign};
 pub use port::Port;

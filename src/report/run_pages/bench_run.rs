@@ -68,7 +68,7 @@ impl ReportSource for RunReport<'_> {
             residue_unit: "1/kg".into(),
             frf: &self.analysis.frf,
             model: Some(&self.analysis.model),
-            view: MeasurementChain::Bench(self.config),
+            chain: MeasurementChain::bench(self.config),
             fit: self.analysis.fit.as_ref().ok(),
             verdict: &self.analysis.verdict,
             judged_up_to_rad_s: self.analysis.judged_up_to_rad_s,
@@ -93,12 +93,7 @@ impl ReportSource for RunReport<'_> {
             .as_ref()
             .ok()
             .map(|fit| delay_ms(fit.delay_s()));
-        let by_phase = analysis.beyond.map(|d| {
-            delay_ms(Estimate {
-                value: d.seconds,
-                sigma: d.sigma_s,
-            })
-        });
+        let by_phase = analysis.excess_delay.map(delay_ms);
         let linearity = analysis.linearity.as_ref();
         let pairs = [
             (
@@ -109,7 +104,7 @@ impl ReportSource for RunReport<'_> {
             ("Delay beyond it, by the phases", by_phase),
             (
                 "Coherence",
-                linearity.map(|linearity| linearity.whole.words()),
+                linearity.map(|linearity| linearity.why.clone()),
             ),
         ];
         pairs
@@ -205,7 +200,7 @@ fn levels(run: &RunReport<'_>, linearity: &Linearity) -> Result<Plot, ReportErro
         caption: format!(
             "RMS of the displacement a line, of the mean of {periods} periods: at the lines that were excited, and at the odd and even \
              ones that were left out, averaged over neighbours. Without distortion these lie on the noise of the mean. {}.",
-            linearity.whole.words()
+            linearity.why.clone()
         ),
         svg: levels_svg(&lines, &run.config.title, &run.subtitle())?,
     })

@@ -37,7 +37,7 @@ impl ReportSource for TableReport<'_> {
             residue_unit: format!("{} per {} and s^2", self.output, self.input),
             frf: &self.analysis.frf,
             model: None,
-            view: MeasurementChain::Bare,
+            chain: MeasurementChain::Direct,
             fit: self.analysis.fit.as_ref().ok(),
             verdict: &self.analysis.verdict,
             judged_up_to_rad_s: self.analysis.judged_up_to_rad_s,

@@ -62,7 +62,7 @@ fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Plot>, 
         ..
     } = shown;
     let frequency_hz = &frf.frequency_hz;
-    let fitted = fit.map(|fit| fit.response(&shown.view, frequency_hz));
+    let fitted = fit.map(|fit| fit.response(&shown.chain, frequency_hz));
     let name = fit.map_or(String::new(), |fit| {
         format!("fit of {} modes", fit.parameters.modes.len())
     });

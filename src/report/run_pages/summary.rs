@@ -23,8 +23,8 @@ pub struct Shown<'a> {
     pub frf: &'a Frf,
     /// By the model at the same frequencies, if there is one.
     pub model: Option<&'a [Complex<f64>]>,
-    /// Through what the modes are seen.
-    pub view: MeasurementChain<'a>,
+    /// The chain through which the modes were measured.
+    pub chain: MeasurementChain,
     /// The modes, if there are any.
     pub fit: Option<&'a ModalFit>,
     /// What they say of CNMP zeros.

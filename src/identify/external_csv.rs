@@ -1,0 +1,255 @@
+//! External records: CSV files with a header that names the columns, one sample a line.
+//!
+//! Columns are separated by commas, semicolons or tabs, whichever is most frequent in the first line. Input and output may have
+//! any units: these replace the amperes and metres of [`Signals`], and a residue is output per input per second squared.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::Signals;
+
+/// Largest deviation of a time step from the median step, as a ratio: that of times rounded to a few digits.
+const MAX_IRREGULARITY: f64 = 0.1;
+
+/// The columns of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    /// Name of the input column.
+    pub input: String,
+    /// Name of the output column.
+    pub output: String,
+    /// Times of the samples.
+    pub sampling: Sampling,
+}
+
+/// Times of the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sampling {
+    /// Name of a column of regular times in seconds.
+    TimeColumn(String),
+    /// Samples per second.
+    RateHz(f64),
+}
+
+/// Why a file cannot be read as a record. Messages state file, line, value and remedy.
+#[derive(Debug, Error)]
+pub enum ExternalCsvError {
+    /// The file cannot be read.
+    #[error("{0}: {1}")]
+    File(PathBuf, std::io::Error),
+    /// The selected columns are missing, ambiguous or identical.
+    #[error("{0}")]
+    Columns(String),
+    /// The file is not a table of numbers with regular times.
+    #[error("{0}")]
+    Data(String),
+}
+
+/// Reads two columns as a record.
+///
+/// # Errors
+/// When the file is not a table, lacks a column, holds something else than numbers, or its times are irregular: see
+/// [`ExternalCsvError`]. Use [`Signals::check`] to check that an estimator can process the signals.
+pub fn read(path: &Path, columns: &Columns) -> Result<Signals, ExternalCsvError> {
+    let table = Table::open(path)?;
+    let mut names = vec![columns.input.as_str(), columns.output.as_str()];
+    if let Sampling::TimeColumn(time) = &columns.sampling {
+        names.push(time);
+    }
+    let Numbers { lines, mut values } = table.numbers(&names)?;
+    let rate_hz = match &columns.sampling {
+        Sampling::RateHz(rate_hz) => *rate_hz,
+        Sampling::TimeColumn(time) => table.rate_hz(time, &values[2], &lines)?,
+    };
+    let output_m = values.swap_remove(1);
+    let input_a = values.swap_remove(0);
+    Ok(Signals {
+        rate_hz,
+        input_a,
+        output_m,
+    })
+}
+
+/// The names of the columns of a file.
+///
+/// # Errors
+/// When the file cannot be read, or its first line is not a header.
+pub fn names(path: &Path) -> Result<Vec<String>, ExternalCsvError> {
+    let table = Table::open(path)?;
+    let header = table.header(&mut table.reader())?;
+    Ok(header.iter().map(String::from).collect())
+}
+
+/// The most frequent separator in the first line: comma, semicolon or tab.
+fn separator(text: &[u8]) -> u8 {
+    let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let count = |separator: &u8| first.iter().filter(|byte| *byte == separator).count();
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(count)
+        .unwrap_or(b',')
+}
+
+struct Table<'a> {
+    path: &'a Path,
+    text: Vec<u8>,
+}
+
+/// Columns of numbers, with the line of each row in the file.
+struct Numbers {
+    lines: Vec<u64>,
+    values: Vec<Vec<f64>>,
+}
+
+impl Table<'_> {
+    fn open(path: &Path) -> Result<Table<'_>, ExternalCsvError> {
+        let text = std::fs::read(path)
+            .map_err(|source| ExternalCsvError::File(path.to_owned(), source))?;
+        Ok(Table { path, text })
+    }
+
+    fn reader(&self) -> csv::Reader<&[u8]> {
+        csv::ReaderBuilder::new()
+            .delimiter(separator(&self.text))
+            .trim(csv::Trim::All)
+            .from_reader(&self.text)
+    }
+
+    fn header(
+        &self,
+        reader: &mut csv::Reader<&[u8]>,
+    ) -> Result<csv::StringRecord, ExternalCsvError> {
+        reader
+            .headers()
+            .cloned()
+            .map_err(|error| self.not_a_table(&error))
+    }
+
+    fn not_a_table(&self, error: &csv::Error) -> ExternalCsvError {
+        let path = self.path.display();
+        ExternalCsvError::Data(format!(
+            "{path} is not a table with one sample a line: {error}"
+        ))
+    }
+
+    /// An error at a line of the file.
+    fn invalid_line(&self, line: u64, what: &str) -> ExternalCsvError {
+        ExternalCsvError::Data(format!("{}, line {line}: {what}", self.path.display()))
+    }
+
+    fn numbers(&self, names: &[&str]) -> Result<Numbers, ExternalCsvError> {
+        let mut reader = self.reader();
+        let header = self.header(&mut reader)?;
+        let indices = self.column_indices(&header, names)?;
+        let mut numbers = Numbers {
+            lines: Vec::new(),
+            values: vec![Vec::new(); names.len()],
+        };
+        for record in reader.records() {
+            let record = record.map_err(|error| self.not_a_table(&error))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            numbers.lines.push(line);
+            for ((values, index), name) in numbers.values.iter_mut().zip(&indices).zip(names) {
+                let text = record.get(*index).unwrap_or_default();
+                values.push(self.number(text, line, name)?);
+            }
+        }
+        Ok(numbers)
+    }
+
+    fn column_indices(
+        &self,
+        header: &csv::StringRecord,
+        names: &[&str],
+    ) -> Result<Vec<usize>, ExternalCsvError> {
+        let duplicate = |(k, name): &(usize, &&str)| names[..*k].contains(*name);
+        if let Some((_, name)) = names.iter().enumerate().find(duplicate) {
+            return Err(ExternalCsvError::Columns(format!(
+                "`{name}` is selected twice; input, output and time must be different columns"
+            )));
+        }
+        names
+            .iter()
+            .map(|name| self.column_index(header, name))
+            .collect()
+    }
+
+    fn column_index(
+        &self,
+        header: &csv::StringRecord,
+        name: &str,
+    ) -> Result<usize, ExternalCsvError> {
+        let path = self.path.display();
+        let mut matches = (0..header.len()).filter(|index| &header[*index] == name);
+        match (matches.next(), matches.next()) {
+            (Some(index), None) => Ok(index),
+            (Some(_), Some(_)) => Err(ExternalCsvError::Columns(format!(
+                "{path} has more than one column `{name}`; give each a name of its own"
+            ))),
+            (None, _) => {
+                let available = header.iter().collect::<Vec<_>>().join(", ");
+                Err(ExternalCsvError::Columns(format!(
+                    "{path} has no column `{name}`; its columns are {available}"
+                )))
+            }
+        }
+    }
+
+    fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, ExternalCsvError> {
+        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| {
+            let what = format!(
+                "{text:?} in column `{column}` is not a finite number; repair the cell, or cut the file there"
+            );
+            self.invalid_line(line, &what)
+        })
+    }
+
+    /// Samples per second, from the first to the last.
+    fn rate_hz(
+        &self,
+        column: &str,
+        time_s: &[f64],
+        lines: &[u64],
+    ) -> Result<f64, ExternalCsvError> {
+        let [first_s, .., last_s] = time_s else {
+            return Err(ExternalCsvError::Data(format!(
+                "{} has {} lines of samples; a rate needs at least 2, and an estimate 64",
+                self.path.display(),
+                time_s.len()
+            )));
+        };
+        let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if let Some(k) = steps_s.iter().position(|step_s| *step_s <= 0.0) {
+            let what = format!(
+                "the time {} s in column `{column}` is not after the previous time of {} s; sort the lines, or cut the file there",
+                time_s[k + 1],
+                time_s[k]
+            );
+            return Err(self.invalid_line(lines[k + 1], &what));
+        }
+        self.check_regular(&steps_s, lines)?;
+        Ok(steps_s.len() as f64 / (last_s - first_s))
+    }
+
+    fn check_regular(&self, steps_s: &[f64], lines: &[u64]) -> Result<(), ExternalCsvError> {
+        let median_s = median(steps_s);
+        let irregular = |step_s: &f64| (step_s - median_s).abs() > MAX_IRREGULARITY * median_s;
+        let Some(k) = steps_s.iter().position(irregular) else {
+            return Ok(());
+        };
+        let what = format!(
+            "{:.9} s after the line before, where the median step is {median_s:.9} s; fill the gap, cut the file there, or give --rate in place of --time if only the times are inaccurate",
+            steps_s[k]
+        );
+        Err(self.invalid_line(lines[k + 1], &what))
+    }
+}
+
+/// The median of at least one value.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}

@@ -1,0 +1,161 @@
+//! Frequency response functions as CSV files.
+//!
+//! One row a frequency. Phases are wrapped to (-180, 180] degrees; a lag is negative. Numbers are written with as many
+//! digits as reading back the same number needs.
+
+use std::fs::OpenOptions;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use nalgebra::Complex;
+use thiserror::Error;
+
+use super::Frf;
+
+/// Name of the magnitude column of a response from current to displacement.
+pub const METRES_PER_AMPERE: &str = "magnitude_m_per_a";
+/// Name of the magnitude column of a ratio, such as a sensitivity.
+pub const RATIO: &str = "magnitude";
+
+/// The columns of a response from current to displacement, in this order.
+pub const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
+
+const COLUMNS: usize = 7;
+
+/// Why an FRF cannot be written or read.
+#[derive(Debug, Error)]
+pub enum FrfCsvError {
+    /// Results are never overwritten.
+    #[error("{0} exists already and is not overwritten: move it away or give another name")]
+    Exists(PathBuf),
+    /// The file cannot be read or written.
+    #[error("{0}: {1}")]
+    File(PathBuf, io::Error),
+    /// The text is not an FRF.
+    #[error("{0}")]
+    Format(String),
+}
+
+/// Name of the magnitude column of an external record, with the names of its columns in place of units.
+pub fn external_magnitude(input: &str, output: &str) -> String {
+    format!("magnitude_{output}_per_{input}")
+}
+
+/// The FRF as text; `magnitude` names the magnitude column.
+pub fn to_string(frf: &Frf, magnitude: &str) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let header = HEADER.split(',').map(|name| {
+        if name == METRES_PER_AMPERE {
+            magnitude
+        } else {
+            name
+        }
+    });
+    // Writing to memory cannot fail, and all rows have the length of the header.
+    let _ = writer.write_record(header);
+    for k in 0..frf.len() {
+        let _ = writer.write_record(row(frf, k));
+    }
+    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+}
+
+fn row(frf: &Frf, k: usize) -> [String; COLUMNS] {
+    [
+        frf.frequency_hz[k].to_string(),
+        format!("{:e}", frf.response[k].norm()),
+        frf.phase_rad(k).to_degrees().to_string(),
+        frf.coherence[k].to_string(),
+        format!("{:e}", frf.magnitude_sigma[k]),
+        frf.phase_sigma_rad[k].to_degrees().to_string(),
+        frf.resolution_hz[k].to_string(),
+    ]
+}
+
+/// Writes the FRF into a new file; `magnitude` names the magnitude column.
+///
+/// # Errors
+/// When the file exists already, or cannot be written.
+pub fn write_new(path: &Path, frf: &Frf, magnitude: &str) -> Result<(), FrfCsvError> {
+    let failed = |source: io::Error| match source.kind() {
+        io::ErrorKind::AlreadyExists => FrfCsvError::Exists(path.to_owned()),
+        _ => FrfCsvError::File(path.to_owned(), source),
+    };
+    let mut file = OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(path)
+        .map_err(failed)?;
+    file.write_all(to_string(frf, magnitude).as_bytes())
+        .and_then(|()| file.sync_all())
+        .map_err(failed)
+}
+
+/// Reads an FRF in metres per ampere from a file.
+///
+/// # Errors
+/// When the file cannot be read, or is not such an FRF.
+pub fn read(path: &Path) -> Result<Frf, FrfCsvError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| FrfCsvError::File(path.to_owned(), source))?;
+    from_str(&text)
+}
+
+/// Reads an FRF in metres per ampere from text.
+///
+/// # Errors
+/// When the header differs from [`HEADER`], or a row is not seven finite numbers with rising frequencies.
+pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
+    let found = text.lines().next().unwrap_or_default().trim();
+    if found != HEADER {
+        return Err(FrfCsvError::Format(format!(
+            "the first line is {found:?}, that of an FRF is {HEADER:?}"
+        )));
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let mut frf = Frf::default();
+    for record in reader.records() {
+        let record = record.map_err(|error| FrfCsvError::Format(error.to_string()))?;
+        push_row(&record, &mut frf).ok_or_else(|| invalid_row(&record))?;
+    }
+    Ok(frf)
+}
+
+fn invalid_row(record: &csv::StringRecord) -> FrfCsvError {
+    let line = record.position().map_or(0, csv::Position::line);
+    let text = record.iter().collect::<Vec<_>>().join(",");
+    FrfCsvError::Format(format!(
+        "line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before"
+    ))
+}
+
+fn push_row(record: &csv::StringRecord, frf: &mut Frf) -> Option<()> {
+    let numbers: Vec<f64> = record
+        .iter()
+        .map(|field| field.parse().ok())
+        .collect::<Option<_>>()?;
+    let numbers: [f64; COLUMNS] = numbers.try_into().ok()?;
+    let [
+        frequency,
+        magnitude,
+        phase_deg,
+        coherence,
+        magnitude_sigma,
+        phase_sigma_deg,
+        resolution,
+    ] = numbers;
+    let rising = frf.frequency_hz.last().is_none_or(|last| frequency > *last);
+    if !rising || numbers.iter().any(|number| !number.is_finite()) {
+        return None;
+    }
+    frf.frequency_hz.push(frequency);
+    frf.response
+        .push(Complex::from_polar(magnitude, phase_deg.to_radians()));
+    frf.coherence.push(coherence);
+    frf.magnitude_sigma.push(magnitude_sigma);
+    frf.phase_sigma_rad.push(phase_sigma_deg.to_radians());
+    frf.resolution_hz.push(resolution);
+    Some(())
+}

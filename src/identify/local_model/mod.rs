@@ -1,0 +1,19 @@
+//! Local polynomial and local rational models (LPM, LRM) of the response, fitted to neighbouring bins of the FFT of a whole
+//! record.
+//!
+//! ```text
+//! RecordSpectra (bins of U, Y) --Window--> model (least squares) --NoiseFloor--> local: response with standard deviations
+//!                                                                           '--> frf_data: the same without smoothing
+//! joint: the same for a stage in closed loop, by ratios of two models
+//! ```
+
+pub mod frf_data;
+pub mod joint;
+mod least_squares;
+pub mod local;
+mod model;
+mod noise_floor;
+mod record_spectra;
+mod settings;
+mod spectra;
+mod window;

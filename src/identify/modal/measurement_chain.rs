@@ -1,0 +1,141 @@
+//! The measurement chain through which the mechanics are observed.
+
+use nalgebra::{Complex, DVector};
+
+use crate::config::Config;
+use crate::identify::FrfDatum;
+use crate::model::plant::{ChainSettings, LoopPlant, Mode};
+use crate::model::zeros::ModalTerm;
+
+/// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
+const FAR_RAD_S: f64 = 1e6;
+
+/// What lies between set-point and reading beside the mechanics.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeasurementChain {
+    /// Hold, motor, amplifier and delays of a bench; input in amperes. Exact, aliasing included.
+    Bench(ChainSettings),
+    /// Nothing: input in newtons, or in a unit that takes its place.
+    Direct,
+}
+
+/// The frequencies at which the model of each datum is evaluated: two that have the datum's first three moments, or one.
+pub(super) struct Nodes(Vec<(Node, Option<Node>)>);
+
+struct Node {
+    s: Complex<f64>,
+    /// exp(s T) of a bench.
+    z: Complex<f64>,
+    /// exp(-s tau).
+    delay: Complex<f64>,
+}
+
+impl Node {
+    fn new(frequency_hz: f64, period_s: f64, delay_s: f64) -> Node {
+        let omega_rad_s = 2.0 * std::f64::consts::PI * frequency_hz;
+        Node {
+            s: Complex::new(0.0, omega_rad_s),
+            z: unit_phasor(omega_rad_s * period_s),
+            delay: unit_phasor(-omega_rad_s * delay_s),
+        }
+    }
+}
+
+/// exp(j angle).
+fn unit_phasor(angle: f64) -> Complex<f64> {
+    let (sine, cosine) = libm::sincos(angle);
+    Complex::new(cosine, sine)
+}
+
+impl Nodes {
+    /// The mean of a response over each datum, with the delay.
+    fn mean(&self, response: impl Fn(&Node) -> Complex<f64>) -> Vec<Complex<f64>> {
+        let delayed = |node: &Node| response(node) * node.delay;
+        let mean = |(one, other): &(Node, Option<Node>)| match other {
+            Some(other) => (delayed(one) + delayed(other)) * 0.5,
+            None => delayed(one),
+        };
+        self.0.iter().map(mean).collect()
+    }
+}
+
+impl MeasurementChain {
+    /// The chain of a bench, with readings that all have the mean age.
+    pub fn bench(config: &Config) -> MeasurementChain {
+        MeasurementChain::Bench(ChainSettings::of(config).with_mean_age())
+    }
+
+    /// The nodes of `data` for a model with the delay `delay_s`.
+    pub(super) fn nodes(&self, delay_s: f64, data: &[FrfDatum]) -> Nodes {
+        let period_s = match self {
+            MeasurementChain::Bench(settings) => settings.period_s,
+            MeasurementChain::Direct => 0.0,
+        };
+        let node = |frequency_hz: f64| Node::new(frequency_hz, period_s, delay_s);
+        let nodes = |datum: &FrfDatum| match datum.spread_hz {
+            0.0 => (node(datum.frequency_hz), None),
+            spread_hz => (
+                node(datum.frequency_hz - spread_hz),
+                Some(node(datum.frequency_hz + spread_hz)),
+            ),
+        };
+        Nodes(data.iter().map(nodes).collect())
+    }
+
+    /// The response of a mode of residue 1 for each datum.
+    pub(super) fn mode(
+        &self,
+        omega_rad_s: f64,
+        damping_ratio: f64,
+        nodes: &Nodes,
+    ) -> Vec<Complex<f64>> {
+        let mode = Mode {
+            omega_rad_s,
+            damping_ratio,
+            shape: DVector::zeros(0),
+            force_gain: 1.0,
+            sensor_gain: 1.0,
+            floor_gain: 0.0,
+        };
+        match self {
+            MeasurementChain::Bench(settings) => {
+                let plant = LoopPlant::of(settings, &[mode]);
+                nodes.mean(|node| plant.response_at(node.z))
+            }
+            MeasurementChain::Direct => nodes.mean(|node| mode.resonance(node.s)),
+        }
+    }
+
+    /// The response of the mechanics alone in m/N: the data without hold, motor, amplifier and delays, and without another
+    /// delay of `delay_s`. Aliases are not removed.
+    pub(crate) fn mechanics(&self, data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
+        let chain = self.constant(&self.nodes(delay_s, data));
+        data.iter()
+            .zip(chain)
+            .map(|(datum, chain)| datum.response / chain)
+            .collect()
+    }
+
+    /// The response of a constant compliance of 1 m/N for each datum.
+    pub(super) fn constant(&self, nodes: &Nodes) -> Vec<Complex<f64>> {
+        let far = self.mode(FAR_RAD_S, 1.0, nodes);
+        far.into_iter()
+            .map(|h| h * (FAR_RAD_S * FAR_RAD_S))
+            .collect()
+    }
+}
+
+/// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, from which sampling deviates by a
+/// thousandth.
+pub(super) fn log_derivatives(term: &ModalTerm, omega_rad_s: f64) -> [Complex<f64>; 2] {
+    let (s, w, zeta) = (
+        Complex::new(0.0, omega_rad_s),
+        term.omega_rad_s,
+        term.damping_ratio,
+    );
+    let resonance = term.resonance(s);
+    [
+        -resonance * (s * (2.0 * zeta) + 2.0 * w),
+        -resonance * s * (2.0 * w),
+    ]
+}

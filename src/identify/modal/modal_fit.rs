@@ -1,0 +1,201 @@
+//! The result of a modal fit: modes, delay, poles and response.
+
+use nalgebra::{Complex, DMatrix};
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
+use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
+use crate::identify::FrfDatum;
+use crate::model::plant::Sign;
+use crate::model::zeros::ModalTerm;
+
+/// The modes that fit a response.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalFit {
+    /// The parameters, slowest mode first.
+    pub parameters: ModalParameters,
+    /// Covariance of w (rad/s), zeta, r (1/kg) of each mode (of a free body r alone), of R (m/N) and tau (s), in that order.
+    pub covariance: DMatrix<f64>,
+    /// All significant model orders, for the stability chart.
+    pub orders: Vec<ModelOrder>,
+    /// Reduced chi-square with the noise of the estimator: 1 if the residual is noise.
+    pub chi2_per_freedom: f64,
+    /// Lowest and highest fitted frequency in hertz.
+    pub band_hz: (f64, f64),
+}
+
+/// A fitted mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedMode {
+    /// Undamped natural frequency in rad/s; exactly 0 for a free body.
+    pub omega_rad_s: Estimate,
+    /// Damping ratio.
+    pub damping_ratio: Estimate,
+    /// Residue in 1/kg.
+    pub residue_per_kg: Estimate,
+}
+
+impl FittedMode {
+    /// Probability that the residue has the opposite sign, for normally distributed errors.
+    pub fn sign_error_probability(&self) -> f64 {
+        let magnitude = self.residue_per_kg.value.abs();
+        Estimate {
+            value: magnitude,
+            ..self.residue_per_kg
+        }
+        .below_zero_probability()
+    }
+
+    /// The sign of the residue.
+    pub fn sign(&self) -> char {
+        Sign::of(self.residue_per_kg.value).symbol()
+    }
+
+    /// Undamped natural frequency in hertz.
+    pub fn frequency_hz(&self) -> Estimate {
+        self.omega_rad_s.scaled(0.5 * std::f64::consts::FRAC_1_PI)
+    }
+}
+
+impl Serialize for FittedMode {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut mode = serializer.serialize_struct("FittedMode", 8)?;
+        mode.serialize_field("frequency_hz", &self.frequency_hz().value)?;
+        mode.serialize_field("frequency_hz_sigma", &self.frequency_hz().sigma)?;
+        mode.serialize_field("damping_ratio", &self.damping_ratio.value)?;
+        mode.serialize_field("damping_ratio_sigma", &self.damping_ratio.sigma)?;
+        mode.serialize_field("residue", &self.residue_per_kg.value)?;
+        mode.serialize_field("residue_sigma", &self.residue_per_kg.sigma)?;
+        mode.serialize_field("sign", &self.sign())?;
+        mode.serialize_field("sign_error_probability", &self.sign_error_probability())?;
+        mode.end()
+    }
+}
+
+/// A pole with its covariance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UncertainPole {
+    /// The pole in rad/s; of a conjugate pair the one above the real axis.
+    pub s: Complex<f64>,
+    /// Covariance of real and imaginary part in (rad/s)^2.
+    pub covariance: [[f64; 2]; 2],
+}
+
+impl ModalFit {
+    /// The modes with their standard deviations, slowest first.
+    pub fn modes(&self) -> Vec<FittedMode> {
+        let fitted = |(k, term): (usize, &ModalTerm)| FittedMode {
+            omega_rad_s: self.estimate(term.omega_rad_s, Parameter::Frequency(k)),
+            damping_ratio: self.estimate(term.damping_ratio, Parameter::Damping(k)),
+            residue_per_kg: self.estimate(term.residue_per_kg, Parameter::Residue(k)),
+        };
+        self.parameters
+            .modes
+            .iter()
+            .enumerate()
+            .map(fitted)
+            .collect()
+    }
+
+    /// The delay beyond that of the measurement chain, in seconds.
+    pub fn delay_s(&self) -> Estimate {
+        self.estimate(self.parameters.delay_s, Parameter::Delay)
+    }
+
+    /// A parameter's value with its standard deviation, 0 if it is not free.
+    fn estimate(&self, value: f64, parameter: Parameter) -> Estimate {
+        let sigma = self
+            .index(parameter)
+            .map_or(0.0, |i| self.covariance[(i, i)].sqrt());
+        Estimate { value, sigma }
+    }
+
+    /// Index of a parameter in the covariance.
+    fn index(&self, parameter: Parameter) -> Option<usize> {
+        self.parameters
+            .free()
+            .iter()
+            .position(|free| *free == parameter)
+    }
+
+    /// The response of the fit through `chain`, its delay included, at frequencies in hertz, in the unit of the fitted data
+    /// (m/A through a bench, m/N directly).
+    pub fn response(&self, chain: &MeasurementChain, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
+        let datum = |frequency_hz: &f64| FrfDatum {
+            frequency_hz: *frequency_hz,
+            spread_hz: 0.0,
+            response: Complex::new(0.0, 0.0),
+            variance: 1.0,
+        };
+        let points: Vec<FrfDatum> = frequency_hz.iter().map(datum).collect();
+        let nodes = chain.nodes(self.parameters.delay_s, &points);
+        let mut sum = chain.constant(&nodes);
+        sum.iter_mut()
+            .for_each(|h| *h *= self.parameters.remainder_m_per_n);
+        for term in &self.parameters.modes {
+            let mode = chain.mode(term.omega_rad_s, term.damping_ratio, &nodes);
+            sum.iter_mut()
+                .zip(mode)
+                .for_each(|(h, mode)| *h += mode * term.residue_per_kg);
+        }
+        sum
+    }
+
+    /// The poles, slowest mode first: one of a mode below critical damping, both of one above, which are real.
+    ///
+    /// ```text
+    /// s = -zeta w + j w sqrt(1 - zeta^2)             covariance J cov(w, zeta) J^T, J the derivatives of (Re s, Im s)
+    /// ```
+    pub fn poles(&self) -> Vec<UncertainPole> {
+        let modes = self.parameters.modes.iter().enumerate();
+        modes
+            .flat_map(|(k, term)| self.mode_poles(k, term))
+            .collect()
+    }
+
+    fn mode_poles(&self, k: usize, term: &ModalTerm) -> Vec<UncertainPole> {
+        let indices = self
+            .index(Parameter::Frequency(k))
+            .zip(self.index(Parameter::Damping(k)));
+        let pole = |(s, derivatives)| UncertainPole {
+            s,
+            covariance: self.pole_covariance(indices, derivatives),
+        };
+        poles_with_derivatives(term).into_iter().map(pole).collect()
+    }
+
+    /// J cov J^T of a pair of parameters; zero if they are not free.
+    fn pole_covariance(
+        &self,
+        indices: Option<(usize, usize)>,
+        derivatives: [[f64; 2]; 2],
+    ) -> [[f64; 2]; 2] {
+        let Some((omega, damping)) = indices else {
+            return [[0.0; 2]; 2];
+        };
+        let at = [omega, damping];
+        let product = |a: usize, b: usize| -> f64 {
+            let term = |i: usize, j: usize| {
+                derivatives[a][i] * self.covariance[(at[i], at[j])] * derivatives[b][j]
+            };
+            term(0, 0) + term(0, 1) + term(1, 0) + term(1, 1)
+        };
+        [0, 1].map(|a| [0, 1].map(|b| product(a, b)))
+    }
+}
+
+/// Each pole of a mode with d(Re s, Im s)/d(w, zeta).
+fn poles_with_derivatives(term: &ModalTerm) -> Vec<(Complex<f64>, [[f64; 2]; 2])> {
+    let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
+    if zeta < 1.0 {
+        let root = (1.0 - zeta * zeta).sqrt();
+        let derivatives = [[-zeta, -w], [root, -w * zeta / root]];
+        return vec![(Complex::new(-zeta * w, w * root), derivatives)];
+    }
+    let root = (zeta * zeta - 1.0).sqrt();
+    let real = |sign: f64| {
+        let re_per_w = -zeta + sign * root;
+        let derivatives = [[re_per_w, w * (-1.0 + sign * zeta / root)], [0.0, 0.0]];
+        (Complex::new(w * re_per_w, 0.0), derivatives)
+    };
+    vec![real(1.0), real(-1.0)]
+}

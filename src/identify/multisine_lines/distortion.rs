@@ -1,0 +1,119 @@
+//! Distortion that repeats in every period, from the roughness of the response over frequency.
+//!
+//! Friction and backlash act in the same way in every period, so that the scatter between the periods does not show them. Their
+//! effect changes from line to line with the phases of the input, while a response is smooth, or has a mode:
+//!
+//! ```text
+//! H(x) = (a + b x + c x^2)/(1 + d x)            over the 8 lines to either side, x the distance
+//! ```
+//!
+//! by least squares (local rational method: McKelvey, Guerin, IFAC SYSID 2012). The residual over its degrees of freedom is the
+//! power of noise and distortion, averaged over as many lines again as a ratio of |H|^2.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::identify::FrfDatum;
+
+/// Lines to either side.
+const REACH: usize = 8;
+/// Lines of a local model.
+const LINES: usize = 2 * REACH + 1;
+/// Parameters of a local model.
+const PARAMETERS: usize = 4;
+/// Fits, each weighted with the denominator of the one before.
+const FITS: usize = 3;
+/// Smallest magnitude of a denominator.
+const MIN_DENOMINATOR: f64 = 1e-3;
+/// Singular values below this belong to linearly dependent parameters.
+const DEPENDENT: f64 = 1e-10;
+
+/// The data with the power of distortion in their variances. With too few lines the data are returned unchanged. Where modes are
+/// closer than the lines of one local model, their deviation from it counts as distortion.
+pub fn with_distortion(data: &[FrfDatum]) -> Vec<FrfDatum> {
+    if data.len() < LINES {
+        return data.to_vec();
+    }
+    let relative_power: Vec<f64> = (0..data.len())
+        .map(|k| roughness(data, k) / data[k].response.norm_sqr())
+        .collect();
+    let with_distortion = |(k, datum): (usize, &FrfDatum)| {
+        let near = &relative_power[k.saturating_sub(REACH)..(k + REACH + 1).min(data.len())];
+        let mean = near.iter().sum::<f64>() / near.len() as f64;
+        // A response of zero makes 0/0, for which max() returns the noise.
+        let variance = datum.variance.max(mean * datum.response.norm_sqr());
+        FrfDatum { variance, ..*datum }
+    };
+    data.iter().enumerate().map(with_distortion).collect()
+}
+
+/// The residual power of the local model around a line, per degree of freedom.
+fn roughness(data: &[FrfDatum], line: usize) -> f64 {
+    let low = line.saturating_sub(REACH).min(data.len() - LINES);
+    let near = &data[low..low + LINES];
+    let span_hz = near[LINES - 1].frequency_hz - near[0].frequency_hz;
+    let distance = |datum: &FrfDatum| {
+        2.0 * REACH as f64 * (datum.frequency_hz - data[line].frequency_hz) / span_hz
+    };
+    let x: Vec<f64> = near.iter().map(distance).collect();
+    let mut denominator = vec![Complex::new(1.0, 0.0); LINES];
+    let mut residual_power = f64::INFINITY;
+    for _ in 0..FITS {
+        let Some(model) = local_model(&x, near, &denominator) else {
+            break;
+        };
+        denominator = x.iter().map(|x| limited(model[3] * *x + 1.0)).collect();
+        let value =
+            |k: usize| (model[0] + model[1] * x[k] + model[2] * (x[k] * x[k])) / denominator[k];
+        residual_power = (0..LINES)
+            .map(|k| (near[k].response - value(k)).norm_sqr())
+            .sum();
+    }
+    residual_power / (LINES - PARAMETERS) as f64
+}
+
+/// a, b, c, d of the local model, with 1/`denominator` as the weight of each line.
+fn local_model(
+    x: &[f64],
+    near: &[FrfDatum],
+    denominator: &[Complex<f64>],
+) -> Option<DVector<Complex<f64>>> {
+    let matrix = DMatrix::from_fn(x.len(), PARAMETERS, |k, column| {
+        let entry = match column {
+            3 => -near[k].response * x[k],
+            power => Complex::new(x[k].powi(power as i32), 0.0),
+        };
+        entry / denominator[k]
+    });
+    let right = DVector::from_fn(x.len(), |k, _| near[k].response / denominator[k]);
+    solve_scaled(&matrix, &right)
+}
+
+/// Least squares with columns scaled to the same size, as the last one has other units.
+fn solve_scaled(
+    matrix: &DMatrix<Complex<f64>>,
+    right: &DVector<Complex<f64>>,
+) -> Option<DVector<Complex<f64>>> {
+    let size: Vec<f64> = matrix
+        .column_iter()
+        .map(|column| column.norm().max(f64::MIN_POSITIVE))
+        .collect();
+    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |k, column| {
+        matrix[(k, column)] / size[column]
+    });
+    let finite = scaled
+        .iter()
+        .chain(right.iter())
+        .all(|entry| entry.re.is_finite() && entry.im.is_finite());
+    let solved = finite.then(|| scaled.svd(true, true).solve(right, DEPENDENT).ok())??;
+    Some(DVector::from_fn(size.len(), |column, _| {
+        solved[column] / size[column]
+    }))
+}
+
+fn limited(denominator: Complex<f64>) -> Complex<f64> {
+    if denominator.norm() < MIN_DENOMINATOR {
+        Complex::new(MIN_DENOMINATOR, 0.0)
+    } else {
+        denominator
+    }
+}

@@ -1,0 +1,175 @@
+//! Distortion separated from noise, by the lines that a periodic excitation omits.
+//!
+//! A plant with an excitation of odd lines, some of which are omitted, responds
+//!
+//! ```text
+//!  at excited lines            the linear response, odd distortion, noise
+//!  at omitted odd lines                             odd distortion, noise      sums of an odd number of odd lines
+//!  at even lines                                    even distortion, noise     sums of an even number of odd lines
+//! ```
+//!
+//! Distortion repeats in every period and noise does not. With Y_p the spectrum of period p of P, m their mean and s^2 their
+//! scatter,
+//!
+//! ```text
+//!  m = mean of Y_p     s^2 = sum |Y_p - m|^2 / (P - 1)     E |m|^2 = |distortion|^2 + s^2/P
+//! ```
+//!
+//! so |m|^2 - s^2/P estimates the power of distortion without bias. For noise alone, F = P |m|^2 / s^2 has Fisher's
+//! distribution of 2 and 2 (P - 1) degrees of freedom, whose tail is exact and independent of the power of the noise:
+//!
+//! ```text
+//!  P(F exceeded) = (1 + F/(P - 1))^-(P - 1)       - sum of ln P over M lines: Gamma distributed, shape M
+//! ```
+//!
+//! (Fisher's method; the noise may differ from line to line.) Levels are squares of RMS values in m^2: 2 |Y|^2/N^2 with N samples
+//! in a period. Pintelon, Schoukens, System Identification, 2nd ed., section 4.3: the fast method, with one realization of the
+//! phases.
+//!
+//! A disturbance at exactly a line (mains, with periods of whole seconds) also repeats in every period and counts as distortion;
+//! in the probability, one line weighs no more than ln(level).
+
+use super::periodic::{Line, ROUNDING, Repetition, excited, lines, mean, variance_of_mean};
+use crate::identify::{IdentifyError, Signals};
+
+/// A line is omitted if its input is below this ratio of the largest. With an excited line of a hundredth, a linear plant then
+/// responds with a thousandth of its amplitude.
+const OMITTED_RATIO: f64 = 1e-5;
+/// Number of lines of a kind that are averaged around a frequency.
+const NEIGHBOURS: usize = 4;
+
+/// One line of the output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineLevel {
+    /// Frequency in hertz.
+    pub frequency_hz: f64,
+    /// Square of the RMS of the mean input in A^2.
+    pub input_a2: f64,
+    /// Square of the RMS of the mean of all periods in m^2.
+    pub power_m2: f64,
+    /// Square of the RMS of the noise of one period in m^2.
+    pub noise_m2: f64,
+    /// -ln of the probability that noise alone gives a mean as large.
+    pub surprisal: f64,
+}
+
+/// The lines of a band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Harmonics {
+    /// The excited lines, all of them odd.
+    pub excited: Vec<LineLevel>,
+    /// The omitted odd lines.
+    pub odd: Vec<LineLevel>,
+    /// The even lines.
+    pub even: Vec<LineLevel>,
+    /// Number of averaged periods.
+    pub periods: usize,
+}
+
+/// The lines of `band_hz`; `None` if no line shows distortion: none is omitted, or even lines are excited.
+///
+/// # Errors
+/// When the signals, the band or the periods allow no estimate: see [`IdentifyError`].
+pub fn harmonics(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    repetition: Repetition,
+) -> Result<Option<Harmonics>, IdentifyError> {
+    let lines = lines(signals, band_hz, repetition)?;
+    let scale = Scale::new(&lines, signals.rate_hz, repetition.period);
+    let harmonics = Harmonics {
+        excited: excited(&lines).map(|line| scale.level(line)).collect(),
+        odd: scale.omitted(&lines, 1),
+        even: scale.omitted(&lines, 0),
+        periods: scale.periods,
+    };
+    let only_odd = excited(&lines).all(|line| line.number % 2 == 1);
+    let omitted = harmonics.odd.len() + harmonics.even.len();
+    Ok((only_odd && !harmonics.excited.is_empty() && omitted > 0).then_some(harmonics))
+}
+
+/// Conversion of sums over a period to levels.
+struct Scale {
+    line_hz: f64,
+    /// (sqrt(2)/N)^2.
+    square: f64,
+    periods: usize,
+    max_input: f64,
+    /// Power below which a scatter is rounding.
+    rounding: f64,
+}
+
+impl Scale {
+    fn new(lines: &[Line], rate_hz: f64, period: usize) -> Scale {
+        let max = |of: fn(&Line) -> f64| lines.iter().map(of).fold(0.0, f64::max);
+        let max_output = max(|line| mean(&line.output).norm());
+        Scale {
+            line_hz: rate_hz / period as f64,
+            square: 2.0 / (period as f64 * period as f64),
+            periods: lines.first().map_or(0, |line| line.output.len()),
+            max_input: max(|line| mean(&line.input).norm()),
+            rounding: (ROUNDING * max_output).powi(2).max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// The levels of the omitted lines that are odd (1) or even (0).
+    fn omitted(&self, lines: &[Line], parity: usize) -> Vec<LineLevel> {
+        let omitted = |line: &&Line| {
+            line.number % 2 == parity && mean(&line.input).norm() <= OMITTED_RATIO * self.max_input
+        };
+        lines
+            .iter()
+            .filter(omitted)
+            .map(|line| self.level(line))
+            .collect()
+    }
+
+    fn level(&self, line: &Line) -> LineLevel {
+        let (power, of_mean) = (
+            mean(&line.output).norm_sqr(),
+            variance_of_mean(&line.output),
+        );
+        let freedom = self.periods as f64 - 1.0;
+        LineLevel {
+            frequency_hz: line.number as f64 * self.line_hz,
+            input_a2: self.square * mean(&line.input).norm_sqr(),
+            power_m2: self.square * power,
+            noise_m2: self.square * self.periods as f64 * of_mean,
+            surprisal: freedom * libm::log1p(power / (freedom * (of_mean + self.rounding))),
+        }
+    }
+}
+
+impl Harmonics {
+    /// The power of a line without its noise, in m^2; without bias, and therefore sometimes negative.
+    pub fn without_noise_m2(&self, level: &LineLevel) -> f64 {
+        level.power_m2 - level.noise_m2 / self.periods as f64
+    }
+
+    /// The mean of [`Self::without_noise_m2`] of the lines nearest to a frequency, of lines with rising frequency; 0 without lines.
+    pub(super) fn around_m2(&self, lines: &[LineLevel], frequency_hz: f64) -> f64 {
+        let above = lines.partition_point(|line| line.frequency_hz < frequency_hz);
+        let first = above
+            .saturating_sub(NEIGHBOURS / 2)
+            .min(lines.len().saturating_sub(NEIGHBOURS));
+        let near = &lines[first..(first + NEIGHBOURS).min(lines.len())];
+        near.iter()
+            .map(|line| self.without_noise_m2(line))
+            .sum::<f64>()
+            / near.len().max(1) as f64
+    }
+}
+
+/// The probability that noise alone gives lines as large: exp(-x) sum of x^j/j! for j below their number, x the sum of their
+/// surprisals. 1 without lines.
+pub fn noise_probability(lines: &[LineLevel]) -> f64 {
+    let x: f64 = lines.iter().map(|line| line.surprisal).sum();
+    if lines.is_empty() || x <= 0.0 {
+        return 1.0;
+    }
+    if !x.is_finite() {
+        return 0.0;
+    }
+    let term = |j: usize| libm::exp(j as f64 * libm::log(x) - x - libm::lgamma(j as f64 + 1.0));
+    (0..lines.len()).map(term).sum::<f64>().min(1.0)
+}

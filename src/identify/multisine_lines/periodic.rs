@@ -1,0 +1,252 @@
+//! Averages over the periods of an excitation: no leakage, no smoothing; the noise is what differs between the periods.
+//!
+//! ```text
+//! H = mean Y / mean U                      at each line k rate/period that is excited
+//! E|error of H|^2 = sum over periods of |Y_p - H U_p|^2 / ((P - 1) P |mean U|^2)
+//! ```
+//!
+//! so that noise on the measured input counts as well as that on the output (Pintelon, Schoukens, System Identification, 2nd
+//! ed., section 2.5). What the plant repeats in every period, distortion included, is not noise here: a model that does not
+//! describe it has a reduced chi-square above 1. With P periods, chi-square is (P - 1)/(P - 2) times too high.
+//!
+//! **Drift.** A free body wanders. A step of d from the end of a period to its begin adds d/(2 pi f) times the rate to every
+//! line. A straight line by least squares does not remove it: it also fits the excitation, and leaves a saw-tooth that repeats
+//! in every period. The difference of samples one period apart does not contain the excitation: its mean around the begin of a
+//! period is d, and d n/N is subtracted. Therefore the last period only serves to measure the drift of the one before it.
+
+use nalgebra::Complex;
+
+use crate::identify::error::check_setting;
+use crate::identify::fft::RealFft;
+use crate::identify::{Frf, FrfDatum, FrfPoint, IdentifyError, Signals, band};
+
+/// With fewer averaged periods the scatter is not known well enough.
+const MIN_PERIODS: usize = 4;
+/// Smallest number of samples in a period.
+const MIN_PERIOD: usize = 8;
+/// The drift is averaged over this part of a period to either side of its begin.
+const DRIFT_PART: usize = 100;
+/// A line below this ratio of the largest amplitude in the band is not excited.
+const EXCITED_RATIO: f64 = 0.01;
+/// The amplitude of an excited line exceeds this multiple of its standard deviation.
+const EXCITED_SIGMAS: f64 = 5.0;
+/// Relative error of a response by rounding: 10^4 sums of doubles.
+pub(super) const ROUNDING: f64 = 1e-12;
+
+/// How a record repeats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Repetition {
+    /// Samples in a period.
+    pub period: usize,
+    /// Periods at the begin of the record to omit, in which the plant settles.
+    pub skip: usize,
+}
+
+/// The response by averages over periods.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Periods {
+    /// The response at the excited lines; the resolution is the distance of the lines.
+    pub frf: Frf,
+    /// The same for a fit, one datum a line.
+    pub frf_data: Vec<FrfDatum>,
+    /// Number of averaged periods.
+    pub count: usize,
+}
+
+/// The response at the excited lines of `band_hz`.
+///
+/// # Errors
+/// When the signals, the band or the periods allow no estimate: see [`IdentifyError`].
+pub fn estimate(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    repetition: Repetition,
+) -> Result<Periods, IdentifyError> {
+    let lines = lines(signals, band_hz, repetition)?;
+    let line_hz = signals.rate_hz / repetition.period as f64;
+    let count = lines.first().map_or(0, |line| line.input.len());
+    let mut periods = Periods {
+        frf: Frf::default(),
+        frf_data: Vec::new(),
+        count,
+    };
+    for line in excited(&lines) {
+        periods.push(line, line_hz);
+    }
+    if periods.frf_data.is_empty() {
+        Err(IdentifyError::not_excited(band_hz))
+    } else {
+        Ok(periods)
+    }
+}
+
+/// Every line of a band, with one value per period.
+pub(super) fn lines(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    repetition: Repetition,
+) -> Result<Vec<Line>, IdentifyError> {
+    signals.check()?;
+    let count = averaged_periods(signals.len(), repetition)?;
+    let bins = band::bins(band_hz, signals.rate_hz, repetition.period)?;
+    let input = spectra(&signals.input_a, repetition, count);
+    let output = spectra(&signals.output_m, repetition, count);
+    Ok(bins.map(|k| Line::new(k, &input, &output)).collect())
+}
+
+impl Periods {
+    fn push(&mut self, line: &Line, line_hz: f64) {
+        let (frequency_hz, response) = (line.number as f64 * line_hz, line.response());
+        let variance = line
+            .variance()
+            .max(ROUNDING * ROUNDING * response.norm_sqr());
+        let coherence = line.coherence();
+        let point = FrfPoint {
+            frequency_hz,
+            response,
+            coherence,
+            variance,
+            resolution_hz: line_hz,
+        };
+        if self.frf.push(point) && variance > 0.0 {
+            self.frf_data.push(FrfDatum {
+                frequency_hz,
+                spread_hz: 0.0,
+                response,
+                variance,
+            });
+        }
+    }
+}
+
+/// Number of periods that are averaged: those after the first `skip`, without the last whole one, which measures the drift.
+fn averaged_periods(
+    samples: usize,
+    Repetition { period, skip }: Repetition,
+) -> Result<usize, IdentifyError> {
+    check_setting("period", period as f64, MIN_PERIOD as f64, samples as f64)?;
+    let periods = samples / period;
+    let count = periods.saturating_sub(skip).saturating_sub(1);
+    if count >= MIN_PERIODS {
+        return Ok(count);
+    }
+    Err(IdentifyError::Periods(format!(
+        "{periods} whole periods, of which {skip} are omitted: {} must remain, the last of which only shows the drift; record more periods, omit fewer, or check the length of the period",
+        MIN_PERIODS + 1
+    )))
+}
+
+/// The spectra of the averaged periods, without drift.
+fn spectra(
+    samples: &[f64],
+    Repetition { period, skip }: Repetition,
+    count: usize,
+) -> Vec<Vec<Complex<f64>>> {
+    let fft = RealFft::new(period);
+    let starts = (0..count).map(|p| (skip + p) * period);
+    starts
+        .map(|start| fft.transform(&mut without_drift(samples, start, period)))
+        .collect()
+}
+
+fn without_drift(samples: &[f64], start: usize, period: usize) -> Vec<f64> {
+    let slope = drift(samples, start, period) / period as f64;
+    let subtract = |(n, x): (usize, &f64)| x - slope * n as f64;
+    samples[start..start + period]
+        .iter()
+        .enumerate()
+        .map(subtract)
+        .collect()
+}
+
+/// The drift of a signal over the period from `start` on: the mean of `x[n + period] - x[n]` for n around `start`, as far to
+/// both sides as there are samples.
+fn drift(samples: &[f64], start: usize, period: usize) -> f64 {
+    let available = samples.len().saturating_sub(start + period + 1);
+    let reach = (period / DRIFT_PART).min(start).min(available);
+    let around = start - reach..=start + reach;
+    let size = around.clone().count() as f64;
+    around
+        .map(|n| samples[n + period] - samples[n])
+        .sum::<f64>()
+        / size
+}
+
+/// One line of the spectrum, with one value per period.
+pub(super) struct Line {
+    /// Cycles in a period.
+    pub(super) number: usize,
+    pub(super) input: Vec<Complex<f64>>,
+    pub(super) output: Vec<Complex<f64>>,
+}
+
+impl Line {
+    fn new(number: usize, input: &[Vec<Complex<f64>>], output: &[Vec<Complex<f64>>]) -> Line {
+        let line = |spectra: &[Vec<Complex<f64>>]| {
+            spectra.iter().map(|spectrum| spectrum[number]).collect()
+        };
+        Line {
+            number,
+            input: line(input),
+            output: line(output),
+        }
+    }
+
+    fn response(&self) -> Complex<f64> {
+        mean(&self.output) / mean(&self.input)
+    }
+
+    /// E|error of H|^2.
+    fn variance(&self) -> f64 {
+        let response = self.response();
+        let residuals: Vec<_> = self
+            .output
+            .iter()
+            .zip(&self.input)
+            .map(|(y, u)| y - response * u)
+            .collect();
+        variance_of_mean(&residuals) / mean(&self.input).norm_sqr()
+    }
+
+    /// |sum Y conj(U)|^2 / (sum |U|^2 sum |Y|^2) over the periods.
+    fn coherence(&self) -> f64 {
+        let power = |line: &[Complex<f64>]| line.iter().map(|x| x.norm_sqr()).sum::<f64>();
+        let cross: Complex<f64> = self
+            .output
+            .iter()
+            .zip(&self.input)
+            .map(|(y, u)| y * u.conj())
+            .sum();
+        let output = power(&self.output);
+        if output > 0.0 {
+            (cross.norm() / power(&self.input)) * (cross.norm() / output)
+        } else {
+            0.0
+        }
+    }
+}
+
+pub(super) fn mean(values: &[Complex<f64>]) -> Complex<f64> {
+    values.iter().sum::<Complex<f64>>() / values.len() as f64
+}
+
+/// E|error of the mean|^2, from the scatter of the values.
+pub(super) fn variance_of_mean(values: &[Complex<f64>]) -> f64 {
+    let (count, mean) = (values.len() as f64, mean(values));
+    values.iter().map(|x| (x - mean).norm_sqr()).sum::<f64>() / ((count - 1.0) * count)
+}
+
+/// The lines whose input exceeds its own noise and [`EXCITED_RATIO`] of the largest.
+pub(super) fn excited(lines: &[Line]) -> impl Iterator<Item = &Line> {
+    let largest = lines
+        .iter()
+        .map(|line| mean(&line.input).norm())
+        .fold(0.0, f64::max);
+    lines.iter().filter(move |line| {
+        let amplitude = mean(&line.input).norm();
+        let sigma = variance_of_mean(&line.input).sqrt();
+        amplitude > 0.0
+            && amplitude >= EXCITED_RATIO * largest
+            && amplitude > EXCITED_SIGMAS * sigma
+    })
+}

@@ -1,0 +1,5 @@
+//! Readings and set-points of irregular times, resampled to the regular ticks of a loop.
+
+mod kernel;
+pub mod resampling;
+pub mod setpoint_timing;

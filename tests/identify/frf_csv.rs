@@ -1,0 +1,132 @@
+use bench::identify::frf_csv::{self, FrfCsvError, METRES_PER_AMPERE};
+use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
+use nalgebra::Complex;
+
+use crate::stage;
+
+fn frf(responses: &[(f64, f64)]) -> Frf {
+    let mut frf = Frf::default();
+    for (k, (re, im)) in responses.iter().enumerate() {
+        frf.push(FrfPoint {
+            frequency_hz: (k + 1) as f64 / 3.0,
+            response: Complex::new(*re, *im),
+            coherence: 0.75,
+            variance: 2e-14,
+            resolution_hz: 0.1,
+        });
+    }
+    frf
+}
+
+#[test]
+fn the_file_has_the_header_of_the_contract_and_one_row_a_frequency() {
+    let text = frf_csv::to_string(&frf(&[(0.0, -2e-4), (1e-4, 0.0)]), METRES_PER_AMPERE);
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(
+        lines[0],
+        "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz"
+    );
+    // sigma(|H|) = sqrt(2e-14 / 2) = 1e-7, over |H| = 2e-4: 0.0005 rad.
+    let row: Vec<f64> = lines[1]
+        .split(',')
+        .map(|field| field.parse().unwrap())
+        .collect();
+    assert_eq!(row[..4], [1.0 / 3.0, 2e-4, -90.0, 0.75]);
+    assert!(
+        (row[4] / 1e-7 - 1.0).abs() < 1e-12
+            && (row[5] / 0.0005_f64.to_degrees() - 1.0).abs() < 1e-12
+    );
+    assert_eq!((row[6], lines.len()), (0.1, 3));
+}
+
+#[test]
+fn phases_are_wrapped_to_180_degrees_of_which_only_the_positive_one_is_written() {
+    let text = frf_csv::to_string(
+        &frf(&[(-1e-4, -0.0), (-1e-4, 0.0), (-1e-4, -1e-9), (1e-4, 0.0)]),
+        METRES_PER_AMPERE,
+    );
+    let phases: Vec<f64> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(2).unwrap().parse().unwrap())
+        .collect();
+    assert_eq!((phases[0], phases[1], phases[3]), (180.0, 180.0, 0.0));
+    assert!((-180.0..-179.9).contains(&phases[2]));
+}
+
+#[test]
+fn a_measured_response_comes_back_from_its_file_as_it_was() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("frf.csv");
+    let signals = stage::with_noise(&stage::clean_run(), 1);
+    let frf = local::estimate(&signals, (0.5, 450.0), &EstimatorSettings::default()).unwrap();
+    frf_csv::write_new(&path, &frf, METRES_PER_AMPERE).unwrap();
+    let back = frf_csv::read(&path).unwrap();
+    let exact = |frf: &Frf| {
+        (
+            frf.frequency_hz.clone(),
+            frf.coherence.clone(),
+            frf.magnitude_sigma.clone(),
+            frf.resolution_hz.clone(),
+        )
+    };
+    assert_eq!(exact(&back), exact(&frf));
+    for k in 0..frf.len() {
+        // Through magnitude and degrees: a few roundings of 1.1e-16, at up to pi rad.
+        assert!((back.response[k] / frf.response[k] - 1.0).norm() < 2e-15);
+        assert!((back.phase_sigma_rad[k] / frf.phase_sigma_rad[k] - 1.0).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn a_file_that_exists_is_never_overwritten() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("frf.csv");
+    frf_csv::write_new(&path, &frf(&[(1e-4, 0.0)]), METRES_PER_AMPERE).unwrap();
+    let before = std::fs::read(&path).unwrap();
+    let error = frf_csv::write_new(&path, &frf(&[(2e-4, 0.0)]), METRES_PER_AMPERE).unwrap_err();
+    assert!(matches!(error, FrfCsvError::Exists(_)));
+    assert!(
+        error
+            .to_string()
+            .contains("frf.csv exists already and is not overwritten"),
+        "{error}"
+    );
+    assert_eq!(std::fs::read(&path).unwrap(), before);
+}
+
+#[test]
+fn a_file_of_other_columns_or_with_a_broken_row_is_refused_with_its_line() {
+    let error = frf_csv::from_str("frequency_hz,magnitude\n1,2\n").unwrap_err();
+    assert!(
+        error.to_string().contains("frequency_hz,magnitude_m_per_a"),
+        "{error}"
+    );
+    for row in [
+        "1,2,3",
+        "1,NaN,3,4,5,6,7",
+        "0.1,2,3,4,5,6,7",
+        "1,2,3,4,5,6,seven",
+        "1,2,3,4,5,6,7,8",
+    ] {
+        let text = format!("{}\n0.5,1e-4,0,1,0,0,0.1\n{row}\n", frf_csv::HEADER);
+        let error = frf_csv::from_str(&text).unwrap_err().to_string();
+        assert!(error.contains("line 3") && error.contains(row), "{error}");
+    }
+}
+
+/// A quarter of a turn at the first frequency.
+#[test]
+fn a_delay_taken_out_turns_phases_and_nothing_else() {
+    let late = frf(&[(0.0, -2e-4), (1e-4, 0.0)]);
+    let delay_s = 0.25 / late.frequency_hz[0];
+    let earlier = late.without_delay(delay_s);
+    assert!((earlier.response[0] - Complex::new(2e-4, 0.0)).norm() < 1e-18);
+    let turns = late.frequency_hz[1] * delay_s;
+    let expected = late.response[1] * Complex::from_polar(1.0, std::f64::consts::TAU * turns);
+    assert!((earlier.response[1] - expected).norm() < 1e-18);
+    assert_eq!(
+        (earlier.magnitude_sigma, earlier.coherence),
+        (late.magnitude_sigma, late.coherence)
+    );
+}
