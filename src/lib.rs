@@ -1,70 +1,51 @@
-//! `bench`: a controller daemon for a precision-motion test bench.
+//! `bench`: a controller for a precision-motion test bench.
 //!
-//! A real-time loop drives a voice coil motor through a current amplifier and reads a displacement probe, behind a hardware
-//! boundary ([`bench_hal`]) with a simulated or a real stage behind it.
-//!
-//! ```text
-//!  bench-config/*.toml
-//!        |
-//!                  zeros, veering, study (what the thesis asks of a model)
-//!                    ^
-//!     config ----> plant ----> sim (a rig that obeys the model)
-//!        |           |            |  implements
-//!        v           v            v
-//!  excitation, control ----> rt (one loop) <---- tick ----> hal (amplifier + probe) <== wires ==> acting (sim at the other end)
-//!                             |                               ^  opens what the configuration names
-//!                             v  wait-free ring            devices <---- calibration
-//!                         recording (MCAP) ----> identify ----> fit ----> verdict ----> report
-//!                                   \______ session (one run, its analysis, its replay) ___ run_report, figures, campaign ___ cli
-//! ```
-//!
-//! Imports point towards what stands earlier in this picture. [`cli`] sees all, nobody sees it.
+//! A real-time loop drives a voice-coil motor through a current amplifier and reads a displacement probe, behind the traits
+//! of [`bench_hal`] with a simulated stage or real devices. ARCHITECTURE.md has the picture: the direction of imports, the
+//! path of a tick and of a record, and where to add a probe, an excitation, a control law or a plant.
 //!
 //! | to find | look in |
 //! |---|---|
 //! | the loop on one screen | [`rt::servo`] |
-//! | the interlocks and the arming machine | [`rt::interlock`], [`rt::arming`] |
-//! | the fast and the slow controller | `bench-config/controllers/`, run by [`control::Controller`] |
+//! | the interlocks and the arming state machine | [`rt::interlock`], [`rt::arming`] |
+//! | the fast and the slow controller | `bench-config/controllers/`, built by [`control`] |
 //! | margins of a loop | [`control::ClosedLoop`] |
-//! | zeros and their kinds, sequence of dominant modes, maps | [`zeros`] |
-//! | how Tables 3-1 to 3-4 are read | `zeros/tables.rs`, `zeros/sequence.rs` |
-//! | tolerances: how likely CNMP zeros are, and what decides it | [`study`] |
-//! | two close modes, veering, conditions and propositions of Chapter 4, placement of actuator and probe | [`veering`] |
-//! | a figure or table of the thesis | [`figures`]: one line a figure in `figures/registry.rs` |
-//! | what excites the stage, and what that would do to it | [`excitation`] |
-//! | what the simulated stage does | [`sim`] |
-//! | the devices that act for a rehearsal, and their faults | [`acting`] |
-//! | a grid of chirps, and what all verdicts together say of the stage | [`campaign`] |
-//! | what a person puts on for a point, and how that is checked | `campaign/load.rs`, `campaign/check.rs`, asked for in `campaign/attended.rs` |
-//! | how a frequency response is estimated | [`identify`] |
-//! | noise told from geometry, and modes over amplitude | [`identify::linearity`], `session/amplitudes.rs`, `cli/linearity.rs` |
-//! | a plant identified under control | [`identify::joint`], `session/closed_loop.rs` |
-//! | how modes are fitted, and their number found | [`fit`] |
-//! | whether there are CNMP zeros | [`verdict`] |
-//! | the pictures and the page of a run | [`run_report`] |
-//! | what `bench doctor` looks at | [`doctor`]: one file a subject, facts apart from verdicts |
-//! | which devices there are, and how they are opened | [`devices`] |
-//! | what static steps say of amplifier and probe | [`calibration`] |
-//! | what stands in a recording | [`recording`] and `recordings/README.md` |
+//! | modes, residues and zeros of a model | [`model::plant`], [`model::zeros`] |
+//! | Tables 3-1 to 3-4 of the thesis | `model/zeros/tables.rs`, `model/zeros/sequence.rs` |
+//! | two close modes: veering, conditions and propositions of Chapter 4 | [`model::veering`] |
+//! | tolerances: the probability of CNMP zeros | [`model::study`] |
+//! | excitations, references, and their prediction | [`excitation`] |
+//! | the simulated stage | [`rig::simulated`] |
+//! | real devices, their emulators, calibration | [`rig::devices`], [`rig::emulator`], [`rig::calibration`] |
+//! | estimation of a frequency response | [`identify`] |
+//! | modal fit and model order | [`identify::modal`] |
+//! | the decision about CNMP zeros | [`identify::verdict`] |
+//! | one run: plan, run, analyse, replay | [`experiment`] |
+//! | a grid of chirps | [`experiment::campaign`] |
+//! | plots and pages | [`report`] |
+//! | figures and tables of the thesis | `examples/thesis_figures/` |
 //!
-//! # To add one
+//! # Example
 //!
-//! | a new | one file | one line |
-//! |---|---|---|
-//! | profile | `bench-config/NAME.toml`: what differs from `stage.toml` | in [`config::profiles::PROFILES`] |
-//! | controller | `bench-config/controllers/NAME.toml`, or any file with `--controller` | in [`config::profiles::CONTROLLERS`] |
-//! | kind of section | none | a variant and its arm in `control/file.rs` |
-//! | plant | `plant/NAME.rs`: settings to [`plant::Structure`] | a variant of [`config::PlantSettings`] and its arm in [`plant::build`] |
-//! | excitation | `excitation/NAME.rs` with [`excitation::Excitation`], its table in `config/excitation.rs` | a variant of [`config::ExcitationKind`] and its arm in [`excitation::of`] |
-//! | reference | a struct in `excitation/reference.rs` | a variant of [`config::ReferenceSettings`] and its arm |
-//! | device | below `hal/src/`, with the traits of [`bench_hal`] | a variant in `config/devices.rs` and its arm in [`devices`] |
-//! | fault of an acting device | below `hal/src/`, where the device acts | in `acting/fault.rs` |
+//! The modes of the default stage: frequency in hertz and residue in 1/kg.
+//!
+//! ```
+//! use bench::config::{Source, load};
+//! use bench::model::plant::{ModalModel, build};
+//!
+//! let config = load(&Source::default())?;
+//! let model = ModalModel::of(&build(&config.plant)?)?;
+//! for mode in &model.modes {
+//!     println!("{:8.3} Hz  {:+.4e} 1/kg", mode.frequency_hz(), mode.residue_per_kg());
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Conventions
 //!
-//! SI units inside, and in names: `_m _a _n _hz _rad_s _s _ns`, ratios bare. Positive current gives positive force, positive
-//! force positive displacement; u = C (r - y). Micrometres appear in controllers' gains, which are printed in amperes per
-//! micrometre, and in what a person reads.
+//! SI units inside, with the unit in the name: `_m _a _n _hz _rad_s _s _ns`; ratios have no suffix. Positive current gives
+//! positive force, positive force gives positive displacement at low frequency; u = C (r - y). The gains of controllers are
+//! printed in amperes per micrometre, as in the thesis.
 
 pub mod cli;
 pub mod config;
