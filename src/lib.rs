@@ -36,7 +36,8 @@
 //! let config = load(&Source::default())?;
 //! let model = ModalModel::of(&build(&config.plant)?)?;
 //! for mode in &model.modes {
-//!     println!("{:8.3} Hz  {:+.4e} 1/kg", mode.frequency_hz(), mode.residue_per_kg());
+//!     let frequency_hz = mode.omega_rad_s / std::f64::consts::TAU;
+//!     println!("{frequency_hz:8.3} Hz  {:+.4e} 1/kg", mode.residue_per_kg());
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
