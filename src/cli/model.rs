@@ -8,7 +8,6 @@ mod locus;
 mod map;
 mod placement;
 mod placement_text;
-mod ports;
 mod sequence;
 mod step;
 mod study;

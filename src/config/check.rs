@@ -4,29 +4,9 @@
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
+use crate::util::finding::Finding;
 use crate::util::nearest::nearest;
 use crate::util::quantity::{self, Quantity};
-
-/// Something wrong at a path.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Finding {
-    /// Dotted path of the key.
-    pub path: String,
-    /// What is wrong, with value, limit and remedy.
-    pub what: String,
-    /// The key is not there: what is wrong is the table around it.
-    pub missing: bool,
-}
-
-impl Finding {
-    /// The path to look at: of the key, or of the table that lacks it.
-    pub fn at(&self) -> &str {
-        match self.path.rsplit_once('.') {
-            Some((table, _)) if self.missing => table,
-            _ => &self.path,
-        }
-    }
-}
 
 /// All that is wrong with `value`.
 pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {

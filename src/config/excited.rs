@@ -1,7 +1,7 @@
 //! What no single setting of an excitation can say.
 
-use super::check::Finding;
 use super::{BLOCKS_PER_SINE, Config, ExcitationKind, MultisineSettings, PrbsSettings};
+use crate::util::finding::Finding;
 
 /// All that is wrong between the settings of the excitation in use, its length apart.
 pub(super) fn excitation(config: &Config) -> Vec<Finding> {

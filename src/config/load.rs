@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::check::{self, Finding};
+use super::check;
 use super::place::line_of;
 use super::profiles::{self, EmbeddedFile};
 use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, excited, relations, schema};
+use crate::util::finding::Finding;
 
 /// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
 const CHIRP_TICKS: f64 = 2e7;

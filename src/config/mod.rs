@@ -24,12 +24,12 @@ mod identify;
 mod interlock;
 mod load;
 mod place;
-mod plant;
 pub mod profiles;
 mod relations;
 mod rig;
 mod servo;
 mod settings;
+mod signal_path;
 mod sim;
 
 pub use calibration::*;
@@ -42,12 +42,15 @@ pub use identify::*;
 pub use interlock::*;
 pub use load::{ConfigError, Purpose, Source, load, whole};
 pub(crate) use load::{text_of, text_of_file, typed, validate};
-pub use plant::*;
-pub(crate) use relations::check_plant_relations;
 pub use rig::*;
 pub use servo::*;
 pub use settings::*;
 pub use sim::*;
+
+pub use crate::model::plant::{
+    DampingPoint, DampingSettings, LumpedSettings, ModalSettings, ModeSettings, NodeSettings,
+    PlantSettings, SecondaryMassDeviation, SpringSettings, Sr4dofSettings, XyLayout, XySettings,
+};
 
 /// The JSON schema of a configuration, made from the types.
 pub fn schema() -> serde_json::Value {

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::PlantSettings;
 use super::calibration::{CalibrateSettings, CalibrationSettings};
 use super::campaign::CampaignSettings;
 use super::chirp::ChirpSettings;
@@ -12,7 +13,6 @@ use super::excitation::{
 };
 use super::identify::IdentifySettings;
 use super::interlock::InterlockSettings;
-use super::plant::PlantSettings;
 use super::rig::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::servo::LoopSettings;
 use super::sim::SimSettings;

@@ -509,7 +509,7 @@ fn a_plant_that_is_none_is_refused_with_its_place_and_the_remedy() {
                 "ground = { mass_kg = 1.0, sensor = 1.0, actuator = 1.0 }",
                 "",
             ),
-            &["call the node something else"],
+            &["give the node another name"],
         ),
         (
             lumped(&format!("{node}\n{node}"), held),

@@ -5,7 +5,7 @@ use super::content::signed;
 use super::model::{Model, even, response};
 use super::{Comparison, Content, FigureError, Workshop};
 use bench::config::{PlantSettings, Sr4dofSettings};
-use bench::model::plant::{self, ModalModel, Mode, sr4dof};
+use bench::model::plant::{self, ModalModel, Mode};
 use bench::model::veering::{Loci, ModesAt};
 use bench::model::zeros::{LocusPlane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
 use bench::report::colours::{BLUE, Colour, GREEN, GREY, INK, VERMILION};
@@ -119,7 +119,7 @@ fn shape_chart(heading: &str, mode: &Mode, rows: &[[[f64; 4]; 2]; 5]) -> Chart {
 
 pub(crate) fn fig_2_3(_: &Workshop) -> Result<Content, FigureError> {
     let model = chapter2(0.05, 0.0);
-    let (modal, rows) = (model.modal()?, sr4dof::stages(&settings(&model)?));
+    let (modal, rows) = (model.modal()?, settings(&model)?.stage_rows());
     let chart = |k: usize, letter: char| {
         let mode = &modal.modes[k];
         shape_chart(

@@ -10,9 +10,8 @@ use super::super::options::BenchOptions;
 use super::super::output::{print_json, print_text};
 use super::conditions::{meeting_pair, veers};
 use super::placement_text::text;
-use super::ports::Weights;
 use super::sweep::Sweep;
-use crate::model::plant::{PlantError, Port, Structure};
+use crate::model::plant::{PlantError, Port, PortWeights, Structure};
 use crate::model::veering::{Loci, ModesAt, QuadrantDiagram, Trial, trial};
 use crate::report::{QuadrantPanel, quadrants_svg};
 
@@ -140,7 +139,9 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         [("--actuator", &args.actuator), ("--sensor", &args.sensor)].map(|(option, text)| {
             text.as_ref()
                 .map(|text| {
-                    Weights::parse(option, text, &places).map(|weights| (text.clone(), weights))
+                    PortWeights::parse(text, &places)
+                        .map_err(|why| CliError::Usage(format!("{option} {why}")))
+                        .map(|weights| (text.clone(), weights))
                 })
                 .transpose()
         });
@@ -207,7 +208,7 @@ fn places_at(sweep: &Sweep, value: f64) -> Result<Vec<Port>, CliError> {
 }
 
 /// What was typed, and what it means.
-type Chosen = Option<(String, Weights)>;
+type Chosen = Option<(String, PortWeights)>;
 
 /// What came of the placements.
 #[derive(Default)]

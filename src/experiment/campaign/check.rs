@@ -1,6 +1,6 @@
 //! Whether what should be on the stage is on it: by where it rests, by what a person reads, and by its modes.
 //!
-//! What the X probe can see (see [`crate::model::plant::holding_force_n`]): the stage rests at the same X whatever hangs in Y, so a rest
+//! What the X probe can see (see [`crate::config::Sr4dofSettings::holding_force_n`]): the stage rests at the same X whatever hangs in Y, so a rest
 //! elsewhere tells of a cable that pulls askew, and never that the weight is there. The displacement in Y is seen by a person
 //! with a gauge, or by the modes of the chirp: u and v appear and fall with the operating point, and move with the masses.
 

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::CampaignError;
 use super::grid::{MASS_STEP_KG, settings};
 use crate::config::{CampaignSettings, Config, PlantSettings, Sr4dofSettings};
-use crate::model::plant::holding_force_n;
 
 /// Standard gravity in m/s^2.
 const GRAVITY_M_PER_S2: f64 = 9.80665;
@@ -27,7 +26,7 @@ pub struct Load {
 impl Load {
     /// What makes the operating point and the asymmetry of a configuration.
     ///
-    /// The weight is F/(g p) with the force F that holds the operating point ([`holding_force_n`]) and p of `pulley_ratio`. The
+    /// The weight is F/(g p) with the force F that holds the operating point ([`Sr4dofSettings::holding_force_n`]) and p of `pulley_ratio`. The
     /// masses turn the asymmetry B of the stage as it was built, m2 = m3 (1 + B), into D: m3 (D - B) on stage 2, or, for D < B,
     /// m3 ((1 + B)/(1 + D) - 1) on stage 3, to the nearest step of 0.5 g (section 5.2.1).
     pub fn of(config: &Config) -> Result<Load, CampaignError> {
@@ -39,7 +38,7 @@ impl Load {
                 * libm::round(share.max(0.0) * stage.secondary_stage_mass_kg / MASS_STEP_KG)
         };
         Ok(Load {
-            hung_kg: holding_force_n(stage) / (GRAVITY_M_PER_S2 * with.pulley_ratio),
+            hung_kg: stage.holding_force_n() / (GRAVITY_M_PER_S2 * with.pulley_ratio),
             on_m2_kg: stepped(m2),
             on_m3_kg: stepped(m3),
         })
@@ -65,7 +64,7 @@ impl Load {
         Ok(PlantSettings::Sr4dof(Sr4dofSettings {
             secondary_stage_mass_kg: m3_kg,
             mass_asymmetry: m2_kg / m3_kg - 1.0,
-            operating_point_m: self.force_n(with) / holding_force_n(&soft),
+            operating_point_m: self.force_n(with) / soft.holding_force_n(),
             ..stage.clone()
         }))
     }

@@ -4,7 +4,7 @@ use nalgebra::{Complex, DVector};
 
 use crate::config::Config;
 use crate::identify::FrfDatum;
-use crate::model::plant::{ChainSettings, LoopPlant, Mode};
+use crate::model::plant::{LoopPlant, Mode, SignalPath};
 use crate::model::zeros::ModalTerm;
 
 /// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
@@ -14,7 +14,7 @@ const FAR_RAD_S: f64 = 1e6;
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeasurementChain {
     /// Hold, motor, amplifier and delays of a bench; input in amperes. Exact, aliasing included.
-    Bench(ChainSettings),
+    Bench(SignalPath),
     /// Nothing: input in newtons, or in a unit that takes its place.
     Direct,
 }
@@ -62,7 +62,7 @@ impl Nodes {
 impl MeasurementChain {
     /// The chain of a bench, with readings that all have the mean age.
     pub fn bench(config: &Config) -> MeasurementChain {
-        MeasurementChain::Bench(ChainSettings::of(config).with_mean_age())
+        MeasurementChain::Bench(SignalPath::from(config).with_mean_age())
     }
 
     /// The nodes of `data` for a model with the delay `delay_s`.

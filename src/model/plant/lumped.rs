@@ -2,53 +2,245 @@
 //!
 //! Coordinates in the order of the nodes' names. The floor moves along the same line.
 
-use super::structure::Assembly;
-use super::{PlantError, Port, Structure, damping};
-use crate::config::LumpedSettings;
+use std::collections::BTreeMap;
 
-pub(super) fn structure(s: &LumpedSettings) -> Result<Structure, PlantError> {
-    let mut structure = undamped(s);
-    structure.damping = damping::matrix(&structure, &s.damping)?;
-    Ok(structure)
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::damping::{DampingSettings, damping_matrix};
+use super::structure::Assembly;
+use super::{PlantError, PlantModel, Port, Structure};
+use crate::util::finding::Finding;
+use crate::util::nearest::nearest;
+
+/// The name of the fixed end of a spring, which no node may have.
+const GROUND: &str = "ground";
+
+/// Masses that move along one line, and springs between them or to ground. Coordinates in the order of the names.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LumpedSettings {
+    /// The masses by name, each with its part in force and displacement.
+    pub nodes: BTreeMap<String, NodeSettings>,
+    /// The springs by name.
+    pub springs: BTreeMap<String, SpringSettings>,
+    /// How many bodies hang on no spring to ground; each moves freely, at a frequency of zero.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 64))]
+    pub free_bodies: usize,
+    /// Damping of the modes.
+    pub damping: DampingSettings,
 }
 
-/// The same with C = 0, whatever the damping of the settings.
-pub(super) fn undamped(s: &LumpedSettings) -> Structure {
-    let n = s.nodes.len();
-    let place = |name: &str| s.nodes.keys().position(|node| node == name);
-    let mut parts = Assembly::new(n);
-    for (index, node) in s.nodes.values().enumerate() {
-        let mut row = vec![0.0; n];
-        row[index] = 1.0;
-        parts.mass(node.mass_kg, &row, &vec![0.0; n]);
+/// A mass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NodeSettings {
+    /// Mass in kilograms, above zero.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub mass_kg: f64,
+    /// Force on it per newton of the actuator.
+    #[serde(default)]
+    #[schemars(range(min = -1e6, max = 1e6))]
+    pub actuator: f64,
+    /// Displacement at the probe per metre of its own.
+    #[serde(default)]
+    #[schemars(range(min = -1e6, max = 1e6))]
+    pub sensor: f64,
+}
+
+/// A spring.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpringSettings {
+    /// The two ends, each a node or `ground`.
+    pub between: [String; 2],
+    /// Stiffness in newtons per metre; 0 joins nothing.
+    #[schemars(range(min = 0.0, max = 1e12))]
+    pub stiffness_n_per_m: f64,
+}
+
+impl LumpedSettings {
+    fn node_index(&self, name: &str) -> Option<usize> {
+        self.nodes.keys().position(|node| node == name)
     }
-    for spring in s.springs.values() {
-        let mut along = vec![0.0; n];
-        // A name that is no node is ground: any other was refused with the configuration.
+
+    fn weights(&self, weight: fn(&NodeSettings) -> f64) -> Vec<f64> {
+        self.nodes.values().map(weight).collect()
+    }
+
+    /// e_i of a node.
+    fn unit(&self, index: usize) -> Vec<f64> {
+        let mut row = vec![0.0; self.nodes.len()];
+        row[index] = 1.0;
+        row
+    }
+
+    /// d of a spring. A name that is no node is ground: any other was refused with the configuration.
+    fn elongation(&self, spring: &SpringSettings) -> Vec<f64> {
+        let mut along = vec![0.0; self.nodes.len()];
         for (end, sign) in spring.between.iter().zip([1.0, -1.0]) {
-            if let Some(index) = place(end) {
+            if let Some(index) = self.node_index(end) {
                 along[index] += sign;
             }
         }
-        parts.spring(spring.stiffness_n_per_m, &along);
+        along
     }
-    let weights =
-        |of: fn(&crate::config::NodeSettings) -> f64| s.nodes.values().map(of).collect::<Vec<_>>();
-    let mut structure = parts.finish(&weights(|node| node.actuator), &weights(|node| node.sensor));
-    structure.free_bodies = s.free().len();
-    structure
+
+    /// The bodies that no spring holds to ground, each as the names of its nodes. A spring of 0 N/m joins nothing.
+    fn free(&self) -> Vec<Vec<&str>> {
+        let mut left: Vec<&str> = self.nodes.keys().map(String::as_str).collect();
+        let mut free = Vec::new();
+        while let Some(first) = left.first().copied() {
+            let body = self.joined_to(first);
+            left.retain(|node| !body.contains(node));
+            if !body.contains(&GROUND) {
+                free.push(body);
+            }
+        }
+        free
+    }
+
+    /// All nodes that springs join to `start`, itself included. The search ends at ground.
+    fn joined_to<'a>(&'a self, start: &'a str) -> Vec<&'a str> {
+        let mut body = vec![start];
+        let mut next = 0;
+        while next < body.len() {
+            for end in self.neighbours(body[next]) {
+                if !body.contains(&end) {
+                    body.push(end);
+                }
+            }
+            next += 1;
+        }
+        body
+    }
+
+    /// The other ends of all springs at a node; none of ground.
+    fn neighbours<'a>(&'a self, node: &'a str) -> impl Iterator<Item = &'a str> {
+        let springs = self.springs.values();
+        let joining = springs.filter(move |s| s.stiffness_n_per_m > 0.0 && node != GROUND);
+        joining.filter_map(move |spring| match &spring.between {
+            [one, other] if one == node => Some(other.as_str()),
+            [one, other] if other == node => Some(one.as_str()),
+            _ => None,
+        })
+    }
+
+    fn check_nodes(&self) -> Vec<Finding> {
+        let nodes = self.nodes.iter();
+        let mut findings: Vec<Finding> = nodes
+            .filter_map(|(name, node)| check_node(name, node.mass_kg))
+            .collect();
+        let weights = [
+            ("actuator", "force", self.weights(|node| node.actuator)),
+            ("sensor", "displacement", self.weights(|node| node.sensor)),
+        ];
+        for (key, quantity, weights) in weights {
+            if weights.iter().all(|weight| *weight == 0.0) {
+                findings.push(Finding::new(
+                    "plant.nodes",
+                    format!(
+                        "give no node a part in the {quantity}; set `{key}` of at least one node"
+                    ),
+                ));
+            }
+        }
+        findings
+    }
+
+    fn check_spring(&self, name: &str, spring: &SpringSettings) -> Vec<Finding> {
+        let path = format!("plant.springs.{name}.between");
+        let known = || self.nodes.keys().map(String::as_str).chain([GROUND]);
+        let [one, other] = &spring.between;
+        let unknown = spring
+            .between
+            .iter()
+            .filter(|end| !known().any(|node| node == *end));
+        let unknown = unknown.map(|end| {
+            let hint = nearest(end, known()).unwrap_or(GROUND);
+            format!("names the node `{end}`, which is not there; the nearest is `{hint}`")
+        });
+        let looped = (one == other).then(|| format!("joins `{one}` to itself"));
+        unknown
+            .chain(looped)
+            .map(|what| Finding::new(&path, what))
+            .collect()
+    }
+
+    fn check_free_bodies(&self) -> Option<Finding> {
+        let free = self.free();
+        let bodies: Vec<String> = free
+            .iter()
+            .map(|body| format!("[{}]", body.join(" ")))
+            .collect();
+        let found = match bodies.is_empty() {
+            true => "every node is held by ground".into(),
+            false => format!("free are {}", bodies.join(", ")),
+        };
+        let remedy = "join them to ground by a spring, or state how many are meant to be free";
+        let (stated, count) = (self.free_bodies, free.len());
+        (count != stated).then(|| {
+            let what =
+                format!("is {stated}, but {count} hang on no spring to ground: {found}; {remedy}");
+            Finding::new("plant.free_bodies", what)
+        })
+    }
 }
 
-/// The displacement of each node.
-pub(super) fn ports(s: &LumpedSettings) -> Vec<Port> {
-    let row = |index: usize| {
-        (0..s.nodes.len())
-            .map(|other| f64::from(u8::from(other == index)))
-            .collect::<Vec<_>>()
-    };
-    s.nodes
-        .keys()
-        .enumerate()
-        .map(|(index, name)| Port::new(name, &row(index)))
-        .collect()
+fn check_node(name: &str, mass_kg: f64) -> Option<Finding> {
+    let path = format!("plant.nodes.{name}");
+    if name == GROUND {
+        let what = "has the name of the fixed end of a spring; give the node another name";
+        return Some(Finding::new(&path, what.into()));
+    }
+    let what = "is 0, which leaves the motion of the node undefined; give it a mass, or join the springs that meet there";
+    (mass_kg == 0.0).then(|| Finding::new(&format!("{path}.mass_kg"), what.into()))
+}
+
+impl PlantModel for LumpedSettings {
+    fn coordinates(&self) -> Vec<&str> {
+        self.nodes.keys().map(String::as_str).collect()
+    }
+
+    fn check(&self) -> Vec<Finding> {
+        let mut findings = self.check_nodes();
+        for (name, spring) in &self.springs {
+            findings.extend(self.check_spring(name, spring));
+        }
+        if findings.is_empty() {
+            findings.extend(self.check_free_bodies());
+        }
+        findings
+    }
+
+    fn undamped(&self) -> Structure {
+        let mut parts = Assembly::new(self.nodes.len());
+        let still = vec![0.0; self.nodes.len()];
+        for (index, node) in self.nodes.values().enumerate() {
+            parts.add_mass(node.mass_kg, &self.unit(index), &still);
+        }
+        for spring in self.springs.values() {
+            parts.add_spring(spring.stiffness_n_per_m, &self.elongation(spring));
+        }
+        let force = self.weights(|node| node.actuator);
+        let sensor = self.weights(|node| node.sensor);
+        Structure {
+            free_bodies: self.free().len(),
+            ..parts.into_structure(&force, &sensor)
+        }
+    }
+
+    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError> {
+        damping_matrix(undamped, &self.damping)
+    }
+
+    /// The displacement of each node.
+    fn ports(&self) -> Vec<Port> {
+        let names = self.nodes.keys().enumerate();
+        names
+            .map(|(index, name)| Port::new(name, &self.unit(index)))
+            .collect()
+    }
 }

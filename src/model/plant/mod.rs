@@ -1,133 +1,248 @@
-//! Models of the mechanics.
+//! Models of the mechanics, with their settings.
 //!
 //! ```text
 //!  settings -> Structure (M, C, K, vectors) -> modes (ModalModel) -> simulation, FRF, margins
 //!                          |                            |
 //!                          v                            v
-//!                       zeros (crate::model::zeros)         loci that veer or cross (crate::model::veering)
+//!                       zeros (model::zeros)         loci that veer or cross (model::veering)
 //! ```
 //!
-//! | `plant.model` | made in | from |
+//! | `plant.model` | file | source |
 //! |---|---|---|
 //! | `sr4dof` | `sr4dof.rs` | its four parallelograms, Eq. (2-5) |
 //! | `xy` | `xy.rs` | its sixteen parallelograms, section 2.2.4 |
-//! | `lumped` | `lumped.rs` | named masses and springs: sections 4.4.1 and 4.4.3, Fig 4-3, or a stage of yours |
-//! | `modal` | `by_modes.rs` | residues, frequencies and damping ratios: Eqs. (3-3) to (3-15), (6-1), (6-3) |
+//! | `lumped` | `lumped.rs` | named masses and springs: sections 4.4.1 and 4.4.3, Fig 4-3, or a stage of your own |
+//! | `modal` | `modal.rs` | residues, frequencies and damping ratios: Eqs. (3-3) to (3-15), (6-1), (6-3) |
 //!
-//! All four are one [`Structure`] to the rest of the program. How to describe a stage of your own as masses and springs
-//! stands, with an example, in `bench-config/README.md`.
+//! A new model is one file with its settings and their [`PlantModel`], and one line in `plant_models!` below. To the rest of
+//! the program it is a [`Structure`]. `bench-config/README.md` shows how to describe a stage as masses and springs without
+//! any code.
 //!
 //! Signs: positive current gives positive force, positive force gives positive displacement at low frequency.
 
 mod beam;
-mod by_modes;
-mod chain;
+mod coordinate;
 mod damping;
-mod exponential;
-mod kinematics;
-pub(crate) mod linear_algebra;
+mod discrete;
+mod error;
+pub(super) mod linear_algebra;
+mod loop_plant;
 mod lumped;
+mod matrix_exponential;
 mod modal;
+mod modes;
 mod port;
 mod quadratic;
-mod sampled;
-pub mod sr4dof;
+mod sr4dof;
 mod structure;
 mod xy;
 
-pub(crate) use beam::Beam;
-pub use chain::{ChainSettings, LoopPlant};
-pub(crate) use exponential::exponential;
-pub use modal::{ModalModel, Mode, Sign};
-pub use port::Port;
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use damping::{DampingPoint, DampingSettings};
+pub use discrete::{DiscreteMode, DiscretePlant, PlantState};
+pub use error::PlantError;
+pub use loop_plant::{LoopPlant, LoopPlantState, SignalPath};
+pub use lumped::{LumpedSettings, NodeSettings, SpringSettings};
+pub(crate) use matrix_exponential::matrix_exponential;
+pub use modal::{ModalSettings, ModeSettings};
+pub use modes::{ModalModel, Mode, Sign};
+pub use port::{Port, PortWeights};
 pub(crate) use quadratic::{Disturbance, QuadraticSr4dof, QuadraticState};
-pub use sampled::{Block, DiscretePlant, PlantState};
-pub use sr4dof::holding_force_n;
+pub use sr4dof::Sr4dofSettings;
 pub use structure::Structure;
+pub use xy::{SecondaryMassDeviation, XyLayout, XySettings};
 
-use crate::config::PlantSettings;
+use crate::util::finding::Finding;
 
-/// A model that cannot be analysed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlantError {
-    /// The mass matrix is not positive definite.
-    #[error(
-        "the mass matrix is not positive definite: some coordinate carries no mass; give every moving stage a mass above zero"
-    )]
-    SingularMass,
-    /// An eigenvalue iteration did not end.
-    #[error(
-        "the eigenvalues of {what} did not converge; scale the model's masses and stiffnesses to similar sizes"
-    )]
-    NoConvergence {
-        /// Which matrix.
-        what: &'static str,
-    },
-    /// A rigid body mode, or one that buckles, where a held stage is meant.
-    #[error(
-        "mode {number} has the eigenvalue {eigenvalue_rad2_s2:.3e} rad^2/s^2, which beside the fastest mode's cannot be told from zero, or is negative: no spring holds the stage in that direction, or another mass is too light, or another spring too stiff, to be computed with"
-    )]
-    Free {
-        /// Which mode, from 1.
-        number: usize,
-        /// Its eigenvalue.
-        eigenvalue_rad2_s2: f64,
-    },
-    /// No force of the actuator reaches the probe.
-    #[error(
-        "the residues of all modes are zero: what the actuator moves, the probe does not see; join the two by springs, or change where they act"
-    )]
-    NoResponse,
-    /// Damping in proportion to mass holds a body to ground.
-    #[error(
-        "{mass_per_s} 1/s of damping in proportion to mass would hold a free body to ground; give damping of kind \"uniform\", or \"rayleigh\" with mass_per_s = 0"
-    )]
-    DampedFreeBody {
-        /// The coefficient of the mass matrix.
-        mass_per_s: f64,
-    },
-    /// A model that is only known linearised.
-    #[error(
-        "the model `{model}` has no geometry beyond the linear one; set sim.geometry = \"linear\""
-    )]
-    NotQuadratic {
-        /// Which model.
-        model: &'static str,
-    },
-    /// A free body has no static compliance.
-    #[error("{0} is not defined for a free body, which no spring holds in place")]
-    FreeBody(
-        /// What is asked for.
-        &'static str,
-    ),
+/// The functions that the settings of each model provide.
+trait PlantModel {
+    /// Names of the coordinates of a mode's shape, in their order.
+    fn coordinates(&self) -> Vec<&str>;
+
+    /// Length of the beams in metres, of a model with beams.
+    fn beam_length_m(&self) -> Option<f64> {
+        None
+    }
+
+    /// Static Y displacement of the motion stage in metres, of a model with an operating point.
+    fn operating_point_m(&self) -> Option<f64> {
+        None
+    }
+
+    /// Mass asymmetry D = m2/m3 - 1, of a model that has it.
+    fn mass_asymmetry(&self) -> Option<f64> {
+        None
+    }
+
+    /// Errors in the relations between settings, each of which is within its range.
+    fn check(&self) -> Vec<Finding> {
+        Vec::new()
+    }
+
+    /// The structure with C = 0.
+    fn undamped(&self) -> Structure;
+
+    /// C of that structure.
+    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError>;
+
+    /// Places where a force may act and a probe may measure, in the model's order.
+    fn ports(&self) -> Vec<Port> {
+        Vec::new()
+    }
+}
+
+/// Registers the models: the variant of [`PlantSettings`], its settings, and its name in `plant.model`.
+macro_rules! plant_models {
+    ($($(#[$doc:meta])* $variant:ident($settings:ident) = $name:literal,)*) => {
+        /// The settings of a model of the mechanics.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(tag = "model", rename_all = "snake_case")]
+        pub enum PlantSettings {
+            $($(#[$doc])* $variant($settings),)*
+        }
+
+        impl PlantSettings {
+            /// The name of the model, as in `plant.model`.
+            pub fn model(&self) -> &'static str {
+                match self {
+                    $(PlantSettings::$variant(_) => $name,)*
+                }
+            }
+
+            fn as_model(&self) -> &dyn PlantModel {
+                match self {
+                    $(PlantSettings::$variant(settings) => settings,)*
+                }
+            }
+
+            /// Settings of the same model from a table without its name. The general way, by the name, copies the whole
+            /// table and takes six times as long.
+            pub(crate) fn with_table(
+                &self,
+                table: &serde_json::Value,
+            ) -> serde_json::Result<PlantSettings> {
+                match self {
+                    $(PlantSettings::$variant(_) => {
+                        $settings::deserialize(table).map(PlantSettings::$variant)
+                    })*
+                }
+            }
+        }
+    };
+}
+
+plant_models! {
+    /// The simple representative 4-DoF mechanism of Eq. (2-5).
+    Sr4dof(Sr4dofSettings) = "sr4dof",
+    /// The XY stage of section 2.2.4, 10 degrees of freedom.
+    Xy(XySettings) = "xy",
+    /// Masses and springs along one line.
+    Lumped(LumpedSettings) = "lumped",
+    /// A sum of modes, given one by one.
+    Modal(ModalSettings) = "modal",
+}
+
+impl PlantSettings {
+    /// Names of the coordinates of a mode's shape, in their order.
+    pub fn coordinates(&self) -> Vec<&str> {
+        self.as_model().coordinates()
+    }
+
+    /// Length of the beams in metres, of a model with beams.
+    pub fn beam_length_m(&self) -> Option<f64> {
+        self.as_model().beam_length_m()
+    }
+
+    /// Static Y displacement of the motion stage in metres, of a model with an operating point.
+    pub fn operating_point_m(&self) -> Option<f64> {
+        self.as_model().operating_point_m()
+    }
+
+    /// Mass asymmetry D = m2/m3 - 1, of a model that has it.
+    pub fn mass_asymmetry(&self) -> Option<f64> {
+        self.as_model().mass_asymmetry()
+    }
+
+    /// Errors in the relations between settings, each of which is within its range.
+    pub(crate) fn check(&self) -> Vec<Finding> {
+        let mut findings: Vec<Finding> = self.check_operating_point().into_iter().collect();
+        findings.extend(self.as_model().check());
+        findings
+    }
+
+    fn check_operating_point(&self) -> Option<Finding> {
+        let (point_m, length_m) = (self.operating_point_m()?, self.beam_length_m()?);
+        let what = format!("is {point_m} m, beyond the length of the beams, {length_m} m");
+        (point_m.abs() > length_m).then(|| Finding::new("plant.operating_point_m", what))
+    }
 }
 
 /// The structure that the settings describe.
 pub fn build(settings: &PlantSettings) -> Result<Structure, PlantError> {
-    match settings {
-        PlantSettings::Sr4dof(settings) => sr4dof::structure(settings),
-        PlantSettings::Xy(settings) => xy::structure(settings),
-        PlantSettings::Lumped(settings) => lumped::structure(settings),
-        PlantSettings::Modal(settings) => Ok(by_modes::structure(settings)),
-    }
+    let undamped = undamped(settings);
+    let damping = settings.as_model().damping(&undamped)?;
+    Ok(Structure {
+        damping,
+        ..undamped
+    })
 }
 
 /// The same with C = 0, whatever the damping of the settings.
 pub fn undamped(settings: &PlantSettings) -> Structure {
-    match settings {
-        PlantSettings::Sr4dof(settings) => sr4dof::undamped(settings),
-        PlantSettings::Xy(settings) => xy::undamped(settings),
-        PlantSettings::Lumped(settings) => lumped::undamped(settings),
-        PlantSettings::Modal(settings) => by_modes::undamped(settings),
-    }
+    settings.as_model().undamped()
 }
 
-/// Where a force may act on the model and a probe may look, in the model's order; none for a plant given by its modes.
+/// Places where a force may act on the model and a probe may measure, in the model's order; none for a plant given by its
+/// modes.
 pub fn ports(settings: &PlantSettings) -> Vec<Port> {
-    match settings {
-        PlantSettings::Sr4dof(settings) => sr4dof::ports(settings),
-        PlantSettings::Xy(settings) => xy::ports(settings),
-        PlantSettings::Lumped(settings) => lumped::ports(settings),
-        PlantSettings::Modal(_) => Vec::new(),
+    settings.as_model().ports()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{build, ports};
+    use crate::config::{Source, load};
+    use nalgebra::DMatrix;
+
+    /// Each stage's mass moves along its ports: together they are the mass matrix.
+    #[test]
+    fn masses_along_the_ports_sum_to_the_mass_matrix() {
+        for (profile, stages) in [
+            ("chapter2", ["1", "2", "3", "4", "5"]),
+            ("xy", ["ms", "X", "Y", "s", "g"]),
+        ] {
+            let config = load(&Source {
+                config: Some(profile.into()),
+                ..Source::default()
+            })
+            .unwrap();
+            let plant = serde_json::to_value(&config.plant).unwrap();
+            let key = |key: &str| plant[key].as_f64().unwrap();
+            let mass_kg = |name: &str| {
+                let stage = name.trim_start_matches(['x', 'y']).trim_start_matches('_');
+                match *stages
+                    .iter()
+                    .find(|start| stage.starts_with(**start))
+                    .unwrap()
+                {
+                    "1" | "ms" => key("motion_stage_mass_kg"),
+                    "2" => key("secondary_stage_mass_kg") * (1.0 + key("mass_asymmetry")),
+                    "3" | "s" | "g" => key("secondary_stage_mass_kg"),
+                    _ => key("intermediate_stage_mass_kg"),
+                }
+            };
+            let structure = build(&config.plant).unwrap();
+            let n = structure.mass.nrows();
+            let sum = ports(&config.plant)
+                .iter()
+                .fold(DMatrix::zeros(n, n), |sum, port| {
+                    sum + mass_kg(&port.name) * &port.row * port.row.transpose()
+                });
+            let error = (&sum - &structure.mass).amax();
+            assert!(error < 1e-14 * structure.mass.amax(), "{profile}: {sum}");
+        }
     }
 }

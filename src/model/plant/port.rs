@@ -1,13 +1,15 @@
-//! Where a force may act and a probe may look.
+//! Places where a force may act and a probe may measure.
 
 use nalgebra::DVector;
 
-/// A displacement of some stage: row^T z. A force along it is the generalised force row.
+use crate::util::nearest::nearest;
+
+/// The displacement row^T z of a stage. A force along it is the generalised force row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Port {
-    /// Of the stage or node, with the axis where it has two: `x4`, `y_ms`, `m2`.
+    /// Stage or node, with the axis where it has two: `x4`, `y_ms`, `m2`.
     pub name: String,
-    /// Over the degrees of freedom; of all zeros where it cannot move.
+    /// Coefficients of the degrees of freedom; all zero where the stage cannot move.
     pub row: DVector<f64>,
 }
 
@@ -20,50 +22,53 @@ impl Port {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::{build, ports};
-    use crate::config::{Source, load};
-    use nalgebra::DMatrix;
+/// A weighted sum of ports, as in `x4` or `u=0.117,b=0.5606`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PortWeights(Vec<(usize, f64)>);
 
-    /// Each stage's mass moves along its ports: together they are the mass matrix.
-    #[test]
-    fn the_stages_along_their_ports_make_the_mass_matrix() {
-        for (profile, stages) in [
-            ("chapter2", ["1", "2", "3", "4", "5"]),
-            ("xy", ["ms", "X", "Y", "s", "g"]),
-        ] {
-            let config = load(&Source {
-                config: Some(profile.into()),
-                ..Source::default()
-            })
-            .unwrap();
-            let plant = serde_json::to_value(&config.plant).unwrap();
-            let key = |key: &str| plant[key].as_f64().unwrap();
-            let mass_kg = |name: &str| {
-                let stage = name.trim_start_matches(['x', 'y']).trim_start_matches('_');
-                match *stages
-                    .iter()
-                    .find(|start| stage.starts_with(**start))
-                    .unwrap()
-                {
-                    "1" | "ms" => key("motion_stage_mass_kg"),
-                    "2" => key("secondary_stage_mass_kg") * (1.0 + key("mass_asymmetry")),
-                    "3" | "s" | "g" => key("secondary_stage_mass_kg"),
-                    _ => key("intermediate_stage_mass_kg"),
-                }
-            };
-            let structure = build(&config.plant).unwrap();
-            let n = structure.mass.nrows();
-            let sum = ports(&config.plant)
-                .iter()
-                .fold(DMatrix::zeros(n, n), |sum, port| {
-                    sum + mass_kg(&port.name) * &port.row * port.row.transpose()
-                });
-            assert!(
-                (&sum - &structure.mass).amax() < 1e-14 * structure.mass.amax(),
-                "{profile}: {sum}"
-            );
+impl PortWeights {
+    /// Reads `NAME` or `NAME=WEIGHT`, separated by commas. The error states the reason and the remedy.
+    pub fn parse(text: &str, ports: &[Port]) -> Result<PortWeights, String> {
+        let weights = text
+            .split(',')
+            .map(|part| parse_weight(part.trim(), ports))
+            .collect::<Result<Vec<_>, _>>()?;
+        if weights.iter().all(|(_, weight)| *weight == 0.0) {
+            return Err(format!(
+                "{text}: all weights are 0; give at least one weight other than 0"
+            ));
         }
+        Ok(PortWeights(weights))
     }
+
+    /// The row over the degrees of freedom.
+    pub fn row(&self, ports: &[Port]) -> DVector<f64> {
+        let zero = DVector::zeros(ports.first().map_or(0, |port| port.row.len()));
+        let add = |sum, (place, weight): &(usize, f64)| sum + *weight * &ports[*place].row;
+        self.0.iter().fold(zero, add)
+    }
+}
+
+fn parse_weight(part: &str, ports: &[Port]) -> Result<(usize, f64), String> {
+    let (name, weight) = part.split_once('=').unwrap_or((part, "1"));
+    let place = ports.iter().position(|port| port.name == name);
+    let place = place.ok_or_else(|| unknown_port(name, ports))?;
+    let weight = weight
+        .parse()
+        .ok()
+        .filter(|weight: &f64| weight.is_finite());
+    let weight = weight.ok_or_else(|| format!("{part}: a weight is a number, as in {name}=0.5"))?;
+    Ok((place, weight))
+}
+
+fn unknown_port(name: &str, ports: &[Port]) -> String {
+    let names: Vec<&str> = ports.iter().map(|port| port.name.as_str()).collect();
+    let nearest = nearest(name, names.iter().copied());
+    let hint = nearest.map_or(String::new(), |nearest| {
+        format!("; did you mean {nearest}?")
+    });
+    format!(
+        "{name}: no such place; this plant has {}{hint}",
+        names.join(" ")
+    )
 }

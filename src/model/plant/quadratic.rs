@@ -1,4 +1,4 @@
-//! The SR4DoF mechanism with its constraints as they are, not linearised.
+//! The SR4DoF mechanism with its exact constraints, not linearised.
 //!
 //! With z = [x1, y1, y2, y3] about the operating point, c = 0.6/L and a = c Y1o (Eqs. 2-1 to 2-3), the four parallelograms
 //! give
@@ -14,15 +14,13 @@
 //!  M(z) z'' = J_4 P + e_1 F - K_y z - C z' - sum of k_i x_i J_i - sum of m_i J_i (J_i' z' + g)      M(z) = sum of m_i J_i J_i^T + M_y
 //! ```
 //!
-//! with P the actuator, F a force at the probe, g the floor's acceleration, J_i' z' = z'^T (d^2 x_i/dz^2) z'. The constant
-//! force that holds Y1o has no part in X, and none is stored there at rest. C is the linear structure's, so that small
-//! motions have the damping of the modes. At z = 0 this is Eq. (2-5).
+//! with P the actuator's force, F a force at the probe, g the floor's acceleration, J_i' z' = z'^T (d^2 x_i/dz^2) z'. The
+//! constant force that holds Y1o has no component in X. C is that of the linear structure, so that small motions have the
+//! damping of the modes. At z = 0 this is Eq. (2-5).
 
-use nalgebra::{DMatrix, Matrix4, Vector4};
+use nalgebra::{Matrix4, Vector4};
 
-use super::beam::Beam;
-use super::{PlantError, Structure, sr4dof};
-use crate::config::{PlantSettings, Sr4dofSettings};
+use super::{PlantError, PlantSettings, Sr4dofSettings, Structure, build};
 
 /// The mechanism.
 #[derive(Clone, Debug)]
@@ -38,7 +36,7 @@ pub(crate) struct QuadraticSr4dof {
     spring_n_per_m: f64,
 }
 
-/// Where it is and how it moves.
+/// Position and velocity of the mechanism.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct QuadraticState {
     /// z in metres.
@@ -47,7 +45,17 @@ pub(crate) struct QuadraticState {
     pub rate: Vector4<f64>,
 }
 
-/// What acts on it besides the actuator, held over a step.
+impl QuadraticState {
+    /// This state after a time span with a constant slope.
+    fn advanced(&self, slope: &QuadraticState, span_s: f64) -> QuadraticState {
+        QuadraticState {
+            place: self.place + slope.place * span_s,
+            rate: self.rate + slope.rate * span_s,
+        }
+    }
+}
+
+/// Loads beside the actuator's force, held over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Disturbance {
     /// Force on stage 1 in X, at the probe, in newtons.
@@ -56,8 +64,8 @@ pub(crate) struct Disturbance {
     pub floor_m_per_s2: f64,
 }
 
-/// x_i of stages 2 to 5, its gradient, and the part of its acceleration that z' makes.
-struct Motion {
+/// x_i of a stage, its gradient, and the part of its acceleration that z' causes.
+struct StageMotion {
     along_m: f64,
     gradient: Vector4<f64>,
     bend_m_per_s2: f64,
@@ -67,7 +75,7 @@ impl QuadraticSr4dof {
     /// The mechanism of the settings.
     pub fn of(settings: &PlantSettings) -> Result<QuadraticSr4dof, PlantError> {
         match settings {
-            PlantSettings::Sr4dof(s) => Ok(QuadraticSr4dof::new(s, &sr4dof::structure(s)?)),
+            PlantSettings::Sr4dof(s) => Ok(QuadraticSr4dof::new(s, &build(settings)?)),
             other => Err(PlantError::NotQuadratic {
                 model: other.model(),
             }),
@@ -75,16 +83,10 @@ impl QuadraticSr4dof {
     }
 
     fn new(s: &Sr4dofSettings, linear: &Structure) -> QuadraticSr4dof {
-        let beam = Beam::from(s);
-        let (m1, m3, m4) = (
-            s.motion_stage_mass_kg,
-            s.secondary_stage_mass_kg,
-            s.intermediate_stage_mass_kg,
-        );
-        let m2 = m3 * (1.0 + s.mass_asymmetry);
-        let k = beam.parallelogram_n_per_m();
+        let beam = s.beam();
+        let [m1, m2, m3, m4, m5] = s.masses_kg();
         #[rustfmt::skip]
-        let bending = k * Matrix4::new(
+        let bending = beam.parallelogram_n_per_m() * Matrix4::new(
             0.0, 0.0, 0.0, 0.0,
             0.0, 2.0, -1.0, -1.0,
             0.0, -1.0, 2.0, 0.0,
@@ -93,40 +95,46 @@ impl QuadraticSr4dof {
         QuadraticSr4dof {
             slope: beam.shortening_per_m() * s.operating_point_m,
             shortening_per_m: beam.shortening_per_m(),
-            masses_kg: [m2, m3, m4, m4],
+            masses_kg: [m2, m3, m4, m5],
             straight: Matrix4::from_diagonal(&Vector4::new(m1, m1, m2, m3)),
             bending,
-            damping: square(&linear.damping),
+            damping: Matrix4::from_fn(|row, column| linear.damping[(row, column)]),
             spring_n_per_m: s.spring_stiffness_n_per_m,
         }
     }
 
-    /// One step of `step_s` by the classical Runge and Kutta rule of fourth order, with the actuator's force in newtons at
-    /// its start, middle and end. Of a mode w the step h changes the phase by (w h)^5/120 and the size by (w h)^6/144.
+    /// Advances the state by `step_s` with the classical Runge-Kutta method of fourth order. `force_n` is the actuator's
+    /// force in newtons at start, middle and end. The phase of a mode w errs by (w h)^5/120 a step h, its amplitude by
+    /// (w h)^6/144.
     pub fn step(
         &self,
         state: &mut QuadraticState,
         step_s: f64,
         force_n: [f64; 3],
-        load: Disturbance,
+        disturbance: Disturbance,
     ) {
-        let slope = |state: QuadraticState, force_n: f64| QuadraticState {
-            place: state.rate,
-            rate: self.acceleration(&state, force_n, load),
-        };
         let start = *state;
-        let beyond = |slope: QuadraticState, span_s: f64| QuadraticState {
-            place: start.place + slope.place * span_s,
-            rate: start.rate + slope.rate * span_s,
-        };
         let half_s = 0.5 * step_s;
-        let k1 = slope(start, force_n[0]);
-        let k2 = slope(beyond(k1, half_s), force_n[1]);
-        let k3 = slope(beyond(k2, half_s), force_n[1]);
-        let k4 = slope(beyond(k3, step_s), force_n[2]);
+        let k1 = self.slope_at(start, force_n[0], disturbance);
+        let k2 = self.slope_at(start.advanced(&k1, half_s), force_n[1], disturbance);
+        let k3 = self.slope_at(start.advanced(&k2, half_s), force_n[1], disturbance);
+        let k4 = self.slope_at(start.advanced(&k3, step_s), force_n[2], disturbance);
         let sixth_s = step_s / 6.0;
         state.place += (k1.place + (k2.place + k3.place) * 2.0 + k4.place) * sixth_s;
         state.rate += (k1.rate + (k2.rate + k3.rate) * 2.0 + k4.rate) * sixth_s;
+    }
+
+    /// The time derivative of a state.
+    fn slope_at(
+        &self,
+        state: QuadraticState,
+        force_n: f64,
+        disturbance: Disturbance,
+    ) -> QuadraticState {
+        QuadraticState {
+            place: state.rate,
+            rate: self.acceleration(&state, force_n, disturbance),
+        }
     }
 
     /// z''.
@@ -134,69 +142,84 @@ impl QuadraticSr4dof {
         &self,
         state: &QuadraticState,
         force_n: f64,
-        load: Disturbance,
+        disturbance: Disturbance,
     ) -> Vector4<f64> {
         let motions = self.motions(state);
         let mut mass = self.straight;
         let mut force =
             motions[2].gradient * force_n - self.bending * state.place - self.damping * state.rate;
         // Stage 1 moves along x1 itself.
-        force[0] += load.probe_n - self.straight[(0, 0)] * load.floor_m_per_s2;
+        force[0] += disturbance.probe_n - self.straight[(0, 0)] * disturbance.floor_m_per_s2;
         for (motion, m) in motions.iter().zip(self.masses_kg) {
             mass += motion.gradient * motion.gradient.transpose() * m;
-            force -= motion.gradient * (m * (motion.bend_m_per_s2 + load.floor_m_per_s2));
+            force -= motion.gradient * (m * (motion.bend_m_per_s2 + disturbance.floor_m_per_s2));
         }
         for motion in &motions[2..] {
             force -= motion.gradient * (self.spring_n_per_m * motion.along_m);
         }
-        // Positive definite for any finite z, as `straight` is; a state beyond numbers stays so, and the probe says so.
+        // Positive definite for any finite z, as `straight` is. A state that is not finite stays so and shows at the probe.
         mass.cholesky()
             .map_or(Vector4::from_element(f64::NAN), |factor| {
                 factor.solve(&force)
             })
     }
 
+    /// p(d).
+    fn shortening_m(&self, d: f64) -> f64 {
+        (self.slope + self.shortening_per_m * d) * d
+    }
+
+    /// dp/dd.
+    fn slope_of(&self, d: f64) -> f64 {
+        self.slope + 2.0 * self.shortening_per_m * d
+    }
+
+    /// The part of p'' that the rate of d causes.
+    fn bend_of(&self, rate: f64) -> f64 {
+        2.0 * self.shortening_per_m * rate * rate
+    }
+
     /// Stages 2, 3, 4, 5.
-    fn motions(&self, state: &QuadraticState) -> [Motion; 4] {
-        let (z, v) = (&state.place, &state.rate);
-        let (x1, [y1, y2, y3], [v1, v2, v3]) = (z[0], [z[1], z[2], z[3]], [v[1], v[2], v[3]]);
-        let c = self.shortening_per_m;
-        let shortened = |d: f64| (self.slope + c * d) * d;
-        let slope = |d: f64| self.slope + 2.0 * c * d;
-        let bend = |rate: f64| 2.0 * c * rate * rate;
-        let (s12, s2, s13, s3) = (slope(y1 - y2), slope(y2), slope(y1 - y3), slope(y3));
-        let (x2, x3) = (x1 + shortened(y1 - y2), x1 - shortened(y1 - y3));
-        let (b2, b3) = (bend(v1 - v2), -bend(v1 - v3));
-        let motion = |along_m, gradient, bend_m_per_s2| Motion {
-            along_m,
-            gradient,
-            bend_m_per_s2,
-        };
+    fn motions(&self, state: &QuadraticState) -> [StageMotion; 4] {
+        let [x1, y1, y2, y3] = state.place.into();
+        let [_, v1, v2, v3] = state.rate.into();
+        let (s12, s2) = (self.slope_of(y1 - y2), self.slope_of(y2));
+        let (s13, s3) = (self.slope_of(y1 - y3), self.slope_of(y3));
+        let (x2, x3) = (
+            x1 + self.shortening_m(y1 - y2),
+            x1 - self.shortening_m(y1 - y3),
+        );
+        let (b2, b3) = (self.bend_of(v1 - v2), -self.bend_of(v1 - v3));
         [
-            motion(x2, Vector4::new(1.0, s12, -s12, 0.0), b2),
-            motion(x3, Vector4::new(1.0, -s13, 0.0, s13), b3),
-            motion(
-                x2 - shortened(y2),
-                Vector4::new(1.0, s12, -s12 - s2, 0.0),
-                b2 - bend(v2),
-            ),
-            motion(
-                x3 + shortened(y3),
-                Vector4::new(1.0, -s13, 0.0, s13 + s3),
-                b3 + bend(v3),
-            ),
+            StageMotion {
+                along_m: x2,
+                gradient: Vector4::new(1.0, s12, -s12, 0.0),
+                bend_m_per_s2: b2,
+            },
+            StageMotion {
+                along_m: x3,
+                gradient: Vector4::new(1.0, -s13, 0.0, s13),
+                bend_m_per_s2: b3,
+            },
+            StageMotion {
+                along_m: x2 - self.shortening_m(y2),
+                gradient: Vector4::new(1.0, s12, -s12 - s2, 0.0),
+                bend_m_per_s2: b2 - self.bend_of(v2),
+            },
+            StageMotion {
+                along_m: x3 + self.shortening_m(y3),
+                gradient: Vector4::new(1.0, -s13, 0.0, s13 + s3),
+                bend_m_per_s2: b3 + self.bend_of(v3),
+            },
         ]
     }
-}
-
-fn square(matrix: &DMatrix<f64>) -> Matrix4<f64> {
-    Matrix4::from_fn(|row, column| matrix[(row, column)])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::{Source, load};
+    use crate::model::plant::build;
     use nalgebra::DVector;
 
     fn settings(sets: &[&str]) -> Sr4dofSettings {
@@ -214,14 +237,14 @@ mod tests {
     }
 
     fn mechanism(s: &Sr4dofSettings) -> (QuadraticSr4dof, Structure) {
-        let linear = sr4dof::structure(s).unwrap();
+        let linear = build(&PlantSettings::Sr4dof(s.clone())).unwrap();
         (QuadraticSr4dof::new(s, &linear), linear)
     }
 
     /// T + V of a state, by the definition: masses times velocities, springs times elongations.
     fn energy(s: &Sr4dofSettings, q: &QuadraticSr4dof, state: &QuadraticState) -> f64 {
         let motions = q.motions(state);
-        let x_speed = |motion: &Motion| motion.gradient.dot(&state.rate);
+        let x_speed = |motion: &StageMotion| motion.gradient.dot(&state.rate);
         let moving: f64 = motions
             .iter()
             .zip(q.masses_kg)
@@ -229,7 +252,7 @@ mod tests {
             .sum();
         let straight = state.rate.dot(&(q.straight * state.rate));
         let [y1, y2, y3] = [state.place[1], state.place[2], state.place[3]];
-        let k = Beam::from(s).parallelogram_n_per_m();
+        let k = s.beam().parallelogram_n_per_m();
         let bent = k * ((y1 - y2).powi(2) + y2 * y2 + (y1 - y3).powi(2) + y3 * y3);
         let springs: f64 = motions[2..]
             .iter()
@@ -239,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn small_motions_are_those_of_the_linear_structure() {
+    fn small_motions_match_the_linear_structure() {
         let s = settings(&[]);
         let (q, linear) = mechanism(&s);
         let inverse = linear.mass.clone().try_inverse().unwrap();
@@ -268,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn large_motions_without_damping_keep_their_energy() {
+    fn large_undamped_motions_conserve_energy() {
         let s = settings(&["plant.damping={kind=\"uniform\",ratio=0.0}"]);
         let (q, _) = mechanism(&s);
         let mut state = QuadraticState {
@@ -292,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn halving_the_step_changes_the_error_by_the_fourth_power() {
+    fn error_falls_with_the_fourth_power_of_the_step() {
         let s = settings(&[]);
         let (q, _) = mechanism(&s);
         let after = |steps: usize| {

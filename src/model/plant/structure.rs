@@ -13,16 +13,15 @@ pub struct Structure {
     pub stiffness: DMatrix<f64>,
     /// q: generalised force per newton of the actuator.
     pub force: DVector<f64>,
-    /// c: displacement that the probe sees per unit of each coordinate.
+    /// c: displacement at the probe per unit of each coordinate.
     pub sensor: DVector<f64>,
-    /// g: generalised force per m/s^2 of the floor, against its acceleration; coordinates are relative to the floor.
+    /// g: generalised force per m/s^2 of floor acceleration, against it; coordinates are relative to the floor.
     pub floor: DVector<f64>,
-    /// Bodies that no spring holds to ground: as many of the slowest modes have the frequency zero, not just nearly so.
+    /// Number of bodies that no spring holds to ground: as many of the slowest modes have exactly the frequency zero.
     pub free_bodies: usize,
 }
 
-/// Collects masses and springs on coordinates that follow from the degrees of freedom, x_i = row_i z:
-/// M = sum of m row^T row, K = sum of k row^T row (that is J^T M J with diagonal M).
+/// Sums up masses and springs on coordinates x_i = row_i z: M = sum of m row^T row, K = sum of k row^T row.
 #[derive(Clone, Debug)]
 pub(super) struct Assembly {
     mass: DMatrix<f64>,
@@ -31,7 +30,7 @@ pub(super) struct Assembly {
 }
 
 impl Assembly {
-    pub(super) fn new(degrees_of_freedom: usize) -> Self {
+    pub fn new(degrees_of_freedom: usize) -> Self {
         let square = DMatrix::zeros(degrees_of_freedom, degrees_of_freedom);
         Assembly {
             mass: square.clone(),
@@ -40,20 +39,21 @@ impl Assembly {
         }
     }
 
-    /// A mass that moves along `x` (in the direction of the floor's acceleration) and along `y` (across it).
-    pub(super) fn mass(&mut self, kilograms: f64, x: &[f64], y: &[f64]) {
+    /// Adds a mass that moves along `x`, the direction of the floor's acceleration, and along `y` across it.
+    pub fn add_mass(&mut self, kilograms: f64, x: &[f64], y: &[f64]) {
         let (x, y) = (DVector::from_row_slice(x), DVector::from_row_slice(y));
         self.mass += kilograms * (&x * x.transpose() + &y * y.transpose());
         self.floor += kilograms * x;
     }
 
-    /// A spring that lengthens by `along` times z.
-    pub(super) fn spring(&mut self, newtons_per_metre: f64, along: &[f64]) {
+    /// Adds a spring whose elongation is `along` times z.
+    pub fn add_spring(&mut self, newtons_per_metre: f64, along: &[f64]) {
         let along = DVector::from_row_slice(along);
         self.stiffness += newtons_per_metre * &along * along.transpose();
     }
 
-    pub(super) fn finish(self, force: &[f64], sensor: &[f64]) -> Structure {
+    /// The structure without damping, with the rows of force and displacement.
+    pub fn into_structure(self, force: &[f64], sensor: &[f64]) -> Structure {
         let n = self.mass.nrows();
         Structure {
             mass: self.mass,

@@ -7,40 +7,128 @@
 //!          gL                      gR
 //!  ground     XL  sL  ms  sR  XR     ground    at X = 0, Y = Y0: y_sL = y_sR = y_gT = y_gB = Y0/2
 //!                         sB
-//!                         YB  gB               the motor pushes XL in X, the probe sees x_ms
+//!                         YB  gB               the motor pushes XL in X, the probe measures x_ms
 //!                         ground
 //! ```
 //!
-//! On which side of their stages the ground modules sit is not known, as Fig 1-2a is missing. With s = +-1 the side of the
-//! secondary stage beside its anchor, in X for gT and gB, in Y for gL and gR: the layout chooses s_T and s_B; s_L = +1 and
-//! s_R = -1 always, which with s_T = +1, s_B = -1 is the pinwheel, the same after a quarter turn. s_L and s_R decide
-//! about the geometric stiffness alone.
+//! The sides of the ground modules are unknown, as Fig 1-2a is missing. s = +-1 is the side of a secondary stage beside its
+//! anchor, in X for gT and gB, in Y for gL and gR. The layout chooses s_T and s_B; s_L = +1 and s_R = -1 always. With
+//! s_T = +1, s_B = -1 the mechanism is the same after a quarter turn (pinwheel). s_L and s_R affect the geometric stiffness
+//! alone.
 //!
-//! Geometric stiffness: a force on YB, opposite to where a Y motor pushes as XL is to X, holds Y0. It loads sB, gL, gR, sT
-//! along their beams, and what moves across those gives way by the static force times the constraint's curvature. The
-//! static solution is that of equal stiffness in all parallelograms; no force acts in X.
+//! Geometric stiffness: a force on YB, opposite to where a Y motor would push, holds Y0. It loads sB, gL, gR, sT along
+//! their beams. The static force times the curvature of the constraint adds to the stiffness across these beams. The static
+//! solution is that of equal stiffness in all parallelograms; no force acts in X.
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::beam::Beam;
-use super::kinematics::Coordinate;
+use super::coordinate::Coordinate;
+use super::damping::{DampingSettings, damping_matrix};
 use super::structure::Assembly;
-use super::{PlantError, Port, Structure, damping};
-use crate::config::{XyLayout, XySettings};
+use super::{PlantError, PlantModel, Port, Structure};
 
 /// Degrees of freedom.
 const N: usize = 10;
-/// The place of y_ms among them.
+/// Index of y_ms among them.
 const Y_MS: usize = 1;
 
-/// A stage: where it is in X and Y.
+/// The XY stage (Fig 1-2a, section 2.2.4): motion stage, four intermediate stages (XL, where the force acts, XR, YT, YB) and
+/// eight secondary stages, joined by 16 equal parallelograms.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct XySettings {
+    /// Beam length L in metres.
+    #[schemars(range(min = 0.001, max = 1.0))]
+    pub beam_length_m: f64,
+    /// Beam height H (out of plane) in metres.
+    #[schemars(range(min = 0.0001, max = 1.0))]
+    pub beam_height_m: f64,
+    /// Beam thickness T (in plane) in metres.
+    #[schemars(range(min = 0.00001, max = 0.1))]
+    pub beam_thickness_m: f64,
+    /// Young's modulus E in pascals.
+    #[schemars(range(min = 1e6, max = 1e13))]
+    pub youngs_modulus_pa: f64,
+    /// Poisson ratio nu; the beams' bending stiffness takes the plate modulus E/(1 - nu^2).
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub poisson_ratio: f64,
+    /// Mass of the motion stage in kilograms.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub motion_stage_mass_kg: f64,
+    /// Mass of an intermediate stage in kilograms.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub intermediate_stage_mass_kg: f64,
+    /// Nominal mass of a secondary stage in kilograms.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub secondary_stage_mass_kg: f64,
+    /// What each secondary stage has beyond the nominal mass, as a ratio of it.
+    pub secondary_mass_deviation: SecondaryMassDeviation,
+    /// On which side of their anchors the secondary stages gT and gB sit.
+    pub layout: XyLayout,
+    /// Static Y displacement of the motion stage in metres, at X = 0.
+    #[schemars(range(min = -0.5, max = 0.5))]
+    pub operating_point_m: f64,
+    /// Whether the static load of the beams changes the stiffness: a force on YB holds the operating point.
+    pub geometric_stiffness: bool,
+    /// Damping of the modes.
+    pub damping: DampingSettings,
+}
+
+/// Deviations of the eight secondary masses by place: s between the motion stage and an intermediate stage, g between ground
+/// and an intermediate stage; left, right, top, bottom.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case, reason = "the names of the drawing")]
+pub struct SecondaryMassDeviation {
+    /// Motion stage to XL.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub sL: f64,
+    /// Motion stage to XR.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub sR: f64,
+    /// Motion stage to YT.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub sT: f64,
+    /// Motion stage to YB.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub sB: f64,
+    /// Ground to XL.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub gL: f64,
+    /// Ground to XR.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub gR: f64,
+    /// Ground to YT.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub gT: f64,
+    /// Ground to YB.
+    #[schemars(range(min = -0.9, max = 9.0))]
+    pub gB: f64,
+}
+
+/// Where the secondary stages gT and gB sit in X beside their anchors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum XyLayout {
+    /// gT on the far side of the motor, gB on the near side (s_T = +1, s_B = -1): the same after a quarter turn.
+    Pinwheel,
+    /// Both away from the motor (s_T = s_B = +1).
+    MirrorAway,
+    /// Both towards the motor (s_T = s_B = -1).
+    MirrorToward,
+}
+
+/// The place of a stage in X and Y.
 #[derive(Clone, Debug)]
 struct Stage {
     x: Coordinate,
     y: Coordinate,
 }
 
-/// The thirteen stages; secondary stages in the order L, R, T, B, and intermediate ones XL, XR, YT, YB.
+/// The thirteen stages: secondary stages in the order L, R, T, B, intermediate ones XL, XR, YT, YB.
 struct Stages {
     motion: Stage,
     intermediate: [Stage; 4],
@@ -48,50 +136,85 @@ struct Stages {
     outer: [Stage; 4],
 }
 
-pub(super) fn structure(s: &XySettings) -> Result<Structure, PlantError> {
-    let mut structure = undamped(s);
-    structure.damping = damping::matrix(&structure, &s.damping)?;
-    Ok(structure)
+impl XySettings {
+    fn beam(&self) -> Beam {
+        Beam {
+            length_m: self.beam_length_m,
+            height_m: self.beam_height_m,
+            thickness_m: self.beam_thickness_m,
+            youngs_modulus_pa: self.youngs_modulus_pa,
+            poisson_ratio: self.poisson_ratio,
+        }
+    }
+
+    /// s_T and s_B.
+    fn sides(&self) -> (f64, f64) {
+        match self.layout {
+            XyLayout::Pinwheel => (1.0, -1.0),
+            XyLayout::MirrorAway => (1.0, 1.0),
+            XyLayout::MirrorToward => (-1.0, -1.0),
+        }
+    }
 }
 
-/// The same with C = 0, whatever the damping of the settings.
-pub(super) fn undamped(s: &XySettings) -> Structure {
-    let beam = Beam::from(s);
-    let stages = Stages::of(s, beam.shortening_per_m());
-    let mut parts = Assembly::new(N);
-    for (kilograms, stage) in stages.masses(s) {
-        parts.mass(kilograms, stage.x.row.as_slice(), stage.y.row.as_slice());
+impl PlantModel for XySettings {
+    fn coordinates(&self) -> Vec<&str> {
+        vec![
+            "x_ms", "y_ms", "y_sL", "y_sR", "x_sT", "x_sB", "x_gL", "x_gR", "y_gT", "y_gB",
+        ]
     }
-    let springs = stages.springs();
-    let k = beam.parallelogram_n_per_m();
-    for spring in &springs {
-        parts.spring(k, spring.row.as_slice());
+
+    fn beam_length_m(&self) -> Option<f64> {
+        Some(self.beam_length_m)
     }
-    let [pushed, .., loaded] = &stages.intermediate;
-    let mut structure = parts.finish(pushed.x.row.as_slice(), stages.motion.x.row.as_slice());
-    if s.geometric_stiffness {
-        structure.stiffness += geometric_stiffness(&springs, k, &loaded.y);
+
+    fn operating_point_m(&self) -> Option<f64> {
+        Some(self.operating_point_m)
     }
-    structure
+
+    fn undamped(&self) -> Structure {
+        let (stages, k) = (Stages::new(self), self.beam().parallelogram_n_per_m());
+        let mut parts = Assembly::new(N);
+        for (kilograms, stage) in stages.masses(self) {
+            parts.add_mass(kilograms, stage.x.row.as_slice(), stage.y.row.as_slice());
+        }
+        let springs = stages.elongations();
+        for spring in &springs {
+            parts.add_spring(k, spring.row.as_slice());
+        }
+        let [pushed, .., loaded] = &stages.intermediate;
+        let (force, sensor) = (&pushed.x.row, &stages.motion.x.row);
+        let mut structure = parts.into_structure(force.as_slice(), sensor.as_slice());
+        if self.geometric_stiffness {
+            structure.stiffness += geometric_stiffness(&springs, k, &loaded.y);
+        }
+        structure
+    }
+
+    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError> {
+        damping_matrix(undamped, &self.damping)
+    }
+
+    /// Displacements of the thirteen stages in X and in Y; the row of one that cannot move is zero.
+    fn ports(&self) -> Vec<Port> {
+        let stages = Stages::new(self);
+        let names = [
+            "ms", "XL", "XR", "YT", "YB", "sL", "sR", "sT", "sB", "gL", "gR", "gT", "gB",
+        ];
+        let all = std::iter::once(stages.motion)
+            .chain(stages.intermediate)
+            .chain(stages.inner)
+            .chain(stages.outer);
+        names.into_iter().zip(all).flat_map(both_ports).collect()
+    }
 }
 
-/// The displacements of the thirteen stages in X and in Y; the row of one that cannot move is zero.
-pub(super) fn ports(s: &XySettings) -> Vec<Port> {
-    let stages = Stages::of(s, Beam::from(s).shortening_per_m());
-    let named = |names: [&'static str; 4], four: [Stage; 4]| names.into_iter().zip(four);
-    let motion = std::iter::once(("ms", stages.motion));
-    let all = motion
-        .chain(named(["XL", "XR", "YT", "YB"], stages.intermediate))
-        .chain(named(["sL", "sR", "sT", "sB"], stages.inner))
-        .chain(named(["gL", "gR", "gT", "gB"], stages.outer));
-    let both = |(name, stage): (&str, Stage)| {
-        [("x", stage.x.row), ("y", stage.y.row)]
-            .map(|(axis, row)| Port::new(&format!("{axis}_{name}"), row.as_slice()))
-    };
-    all.flat_map(both).collect()
+fn both_ports((name, stage): (&str, Stage)) -> [Port; 2] {
+    [("x", stage.x.row), ("y", stage.y.row)]
+        .map(|(axis, row)| Port::new(&format!("{axis}_{name}"), row.as_slice()))
 }
 
-/// The sum of static forces times curves: k d curve of each parallelogram bent by d, less F curve of the holding force F,
+/// The sum of static forces times curves: k d curve of each parallelogram bent by d, minus F curve of the holding force F,
 /// which follows from the equilibrium in y_ms.
 fn geometric_stiffness(springs: &[Coordinate], k: f64, held: &Coordinate) -> DMatrix<f64> {
     let pull_n: f64 = springs
@@ -99,94 +222,92 @@ fn geometric_stiffness(springs: &[Coordinate], k: f64, held: &Coordinate) -> DMa
         .map(|spring| k * spring.at_m * spring.row[Y_MS])
         .sum();
     let holding_n = pull_n / held.row[Y_MS];
-    let add = |sum: DMatrix<f64>, (force_n, along): (f64, &Coordinate)| match &along.curve {
-        Some(curve) => sum + force_n * curve,
-        None => sum,
-    };
-    let bent = springs.iter().map(|d| (k * d.at_m, d));
-    bent.chain([(-holding_n, held)])
-        .fold(DMatrix::zeros(N, N), add)
+    let bent = springs.iter().map(|spring| (k * spring.at_m, spring));
+    let forces = bent.chain([(-holding_n, held)]);
+    let curves = forces.filter_map(|(force_n, along)| Some((force_n, along.curve.as_ref()?)));
+    curves.fold(DMatrix::zeros(N, N), |sum, (force_n, curve)| {
+        sum + force_n * curve
+    })
 }
 
 impl Stages {
-    fn of(s: &XySettings, c: f64) -> Stages {
+    fn new(s: &XySettings) -> Stages {
+        let c = s.beam().shortening_per_m();
         let (y0, half) = (s.operating_point_m, s.operating_point_m / 2.0);
         let free = |index, at_m| Coordinate::free(N, s.geometric_stiffness, index, at_m);
-        let (side_top, side_bottom) = match s.layout {
-            XyLayout::Pinwheel => (1.0, -1.0),
-            XyLayout::MirrorAway => (1.0, 1.0),
-            XyLayout::MirrorToward => (-1.0, -1.0),
-        };
+        let (side_top, side_bottom) = s.sides();
         let motion = Stage {
             x: free(0, 0.0),
             y: free(Y_MS, y0),
         };
-        let [(s_l, xl, g_l), (s_r, xr, g_r)] =
-            [(2, 6, -1.0, 1.0), (3, 7, 1.0, -1.0)].map(|(inner, outer, at, side)| {
-                across_y(&motion, free(inner, half), free(outer, 0.0), at, side, c)
-            });
-        let [(s_t, yt, g_t), (s_b, yb, g_b)] = [(4, 8, 1.0, side_top), (5, 9, -1.0, side_bottom)]
-            .map(|(inner, outer, at, side)| {
-                across_x(&motion, free(inner, 0.0), free(outer, half), at, side, c)
-            });
+        let left = across_y(&motion, free(2, half), free(6, 0.0), -1.0, 1.0, c);
+        let right = across_y(&motion, free(3, half), free(7, 0.0), 1.0, -1.0, c);
+        let top = across_x(&motion, free(4, 0.0), free(8, half), 1.0, side_top, c);
+        let bottom = across_x(&motion, free(5, 0.0), free(9, half), -1.0, side_bottom, c);
         Stages {
             motion,
-            intermediate: [xl, xr, yt, yb],
-            inner: [s_l, s_r, s_t, s_b],
-            outer: [g_l, g_r, g_t, g_b],
+            intermediate: [left.1, right.1, top.1, bottom.1],
+            inner: [left.0, right.0, top.0, bottom.0],
+            outer: [left.2, right.2, top.2, bottom.2],
         }
     }
 
+    /// Each stage with its mass in kilograms.
     fn masses(&self, s: &XySettings) -> Vec<(f64, &Stage)> {
         let d = &s.secondary_mass_deviation;
         let secondary = |deviation: f64| s.secondary_stage_mass_kg * (1.0 + deviation);
-        let inner = [d.sL, d.sR, d.sT, d.sB]
-            .map(secondary)
-            .into_iter()
-            .zip(&self.inner);
-        let outer = [d.gL, d.gR, d.gT, d.gB]
-            .map(secondary)
-            .into_iter()
-            .zip(&self.outer);
-        let intermediate = self
-            .intermediate
-            .iter()
-            .map(|stage| (s.intermediate_stage_mass_kg, stage));
-        std::iter::once((s.motion_stage_mass_kg, &self.motion))
-            .chain(intermediate)
-            .chain(inner)
-            .chain(outer)
+        let mut masses = vec![(s.motion_stage_mass_kg, &self.motion)];
+        masses.extend(
+            [s.intermediate_stage_mass_kg; 4]
+                .into_iter()
+                .zip(&self.intermediate),
+        );
+        masses.extend(
+            [d.sL, d.sR, d.sT, d.sB]
+                .map(secondary)
+                .into_iter()
+                .zip(&self.inner),
+        );
+        masses.extend(
+            [d.gL, d.gR, d.gT, d.gB]
+                .map(secondary)
+                .into_iter()
+                .zip(&self.outer),
+        );
+        masses
+    }
+
+    /// The transverse elongation of each of the sixteen parallelograms.
+    fn elongations(&self) -> Vec<Coordinate> {
+        (0..4)
+            .flat_map(|place| self.module_elongations(place))
             .collect()
     }
 
-    /// How far each of the sixteen parallelograms is bent.
-    fn springs(&self) -> Vec<Coordinate> {
-        let module = |place: usize| {
-            let (inner, outer, intermediate) = (
-                &self.inner[place],
-                &self.outer[place],
-                &self.intermediate[place],
-            );
-            let in_y = [
-                self.motion.y.from(&inner.y),
+    /// Those of the four parallelograms of one side: 0 left, 1 right, 2 top, 3 bottom.
+    fn module_elongations(&self, place: usize) -> [Coordinate; 4] {
+        let (inner, outer) = (&self.inner[place], &self.outer[place]);
+        let (motion, intermediate) = (&self.motion, &self.intermediate[place]);
+        if place < 2 {
+            [
+                motion.y.from(&inner.y),
                 inner.y.from(&intermediate.y),
                 outer.x.clone(),
                 intermediate.x.from(&outer.x),
-            ];
-            let in_x = [
-                self.motion.x.from(&inner.x),
+            ]
+        } else {
+            [
+                motion.x.from(&inner.x),
                 inner.x.from(&intermediate.x),
                 outer.y.clone(),
                 intermediate.y.from(&outer.y),
-            ];
-            if place < 2 { in_y } else { in_x }
-        };
-        (0..4).flat_map(module).collect()
+            ]
+        }
     }
 }
 
-/// Left or right (`at` = -1 or 1): the inner module has its beams along X and gives way in Y, the outer one the other way
-/// round, its secondary stage on `side` of ground in Y. Returns inner, intermediate and outer stage.
+/// Left or right (`at` = -1 or 1). The inner module has its beams along X and deflects in Y. The outer one has them along Y,
+/// its secondary stage on `side` of ground in Y. Returns inner, intermediate and outer stage.
 fn across_y(
     motion: &Stage,
     inner_y: Coordinate,
@@ -200,8 +321,8 @@ fn across_y(
         x: motion.x.joined(&inner_y.from(&motion.y), at, c),
         y: inner_y,
     };
-    // In Y the intermediate stage is held: its row is zero, as the outer module is not bent at rest. Its curve, which the
-    // line after the next finds, would change only the curve of its x, along which no static force acts.
+    // The intermediate stage does not move in Y: its row is zero, as the outer module is not bent at rest. The curve of its
+    // y would change only the curve of its x, along which no static force acts.
     let x = inner.x.joined(&ground.from(&inner.y), -at, c);
     let outer = Stage {
         y: ground.joined(&outer_x, side, c),

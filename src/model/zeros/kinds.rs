@@ -1,7 +1,7 @@
-//! Transmission zeros by pencils, never by summed polynomials.
+//! Transmission zeros from pencils, not from summed polynomials.
 //!
-//! A zero is an s for which some motion z != 0 has no displacement at the probe, c^T z = 0, and is kept up by the
-//! actuator alone, (s^2 M + s C + K) z = q F. With N_c and N_q orthonormal bases of what is orthogonal to c and q:
+//! A zero is an s for which some motion z != 0 has no displacement at the probe, c^T z = 0, and needs no force but the
+//! actuator's, (s^2 M + s C + K) z = q F. With N_c and N_q orthonormal bases of the vectors orthogonal to c and q:
 //!
 //! ```text
 //!   N_q^T (s^2 M + s C + K) N_c v = 0
@@ -11,14 +11,16 @@
 //! zeros. With damping it is linearised to twice that size.
 
 use nalgebra::{Complex, DMatrix, DVector};
+use serde::{Serialize, Serializer};
 
-use crate::model::plant::linear_algebra::{complement, pencil};
+use crate::model::plant::linear_algebra::{orthogonal_complement, pencil_roots};
 use crate::model::plant::{PlantError, Structure};
 
-/// ZeroCounts of zeros (Fig 3-1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Kinds of zeros (Fig 3-1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "UPPERCASE")]
 pub enum ZeroKind {
-    /// Marginal minimum phase: on the imaginary axis but for the damping.
+    /// Marginally minimum phase: on the imaginary axis but for the damping.
     Mmp,
     /// Real, left half plane.
     Rmp,
@@ -41,18 +43,35 @@ impl ZeroKind {
             ZeroKind::Cnmp => "CNMP",
         }
     }
+
+    /// Whether the zero lies in the right half plane.
+    pub fn is_non_minimum_phase(self) -> bool {
+        matches!(self, ZeroKind::Rnmp | ZeroKind::Cnmp)
+    }
 }
 
-/// A zero with its kind.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A zero with its kind. It is serialised as `re_rad_s`, `im_rad_s`, `kind`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Zero {
-    /// Where it is, in rad/s.
+    /// Position in rad/s.
+    #[serde(flatten, serialize_with = "rectangular")]
     pub s: Complex<f64>,
-    /// What it is.
+    /// Kind.
     pub kind: ZeroKind,
 }
 
-/// How many zeros of which kind a plant without damping has, by pairs and quartets.
+/// Serialises a complex number as the entries `re_rad_s` and `im_rad_s`, `null` at infinity.
+pub(super) fn rectangular<S: Serializer>(s: &Complex<f64>, to: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Rectangular {
+        re_rad_s: f64,
+        im_rad_s: f64,
+    }
+    let (re_rad_s, im_rad_s) = (s.re, s.im);
+    Rectangular { re_rad_s, im_rad_s }.serialize(to)
+}
+
+/// Numbers of zeros by kind of a plant without damping, in pairs and quartets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ZeroCounts {
     /// Pairs on the imaginary axis.
@@ -64,13 +83,12 @@ pub struct ZeroCounts {
 }
 
 impl ZeroCounts {
-    /// The kinds of the zeros of a plant without damping.
+    /// Counts the zeros of a plant without damping.
     pub fn of(zeros: &[Zero]) -> ZeroCounts {
-        let count = |kind| zeros.iter().filter(|zero| zero.kind == kind).count();
         ZeroCounts {
-            mmp: count(ZeroKind::Mmp) / 2,
-            real: count(ZeroKind::Rnmp),
-            quartets: count(ZeroKind::Cnmp) / 2,
+            mmp: count(zeros, ZeroKind::Mmp) / 2,
+            real: count(zeros, ZeroKind::Rnmp),
+            quartets: cnmp_pairs(zeros),
         }
     }
 
@@ -83,42 +101,75 @@ impl ZeroCounts {
 /// As the thesis's tables write it: `dual MMP`, `MMP + RMP-RNMP`, `CMP-CNMP`.
 impl std::fmt::Display for ZeroCounts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let named = |(count, name): (usize, &str)| match count {
-            0 => None,
-            1 => Some(name.to_string()),
-            2 => Some(format!("dual {name}")),
-            _ => Some(format!("{count} x {name}")),
-        };
         let parts = [
-            (self.mmp, "MMP"),
-            (self.real, "RMP-RNMP"),
-            (self.quartets, "CMP-CNMP"),
+            named(self.mmp, "MMP"),
+            named(self.real, "RMP-RNMP"),
+            named(self.quartets, "CMP-CNMP"),
         ];
-        let text = parts
-            .into_iter()
-            .filter_map(named)
-            .collect::<Vec<_>>()
-            .join(" + ");
-        f.write_str(if text.is_empty() { "none" } else { &text })
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        match parts.is_empty() {
+            true => f.write_str("none"),
+            false => f.write_str(&parts.join(" + ")),
+        }
     }
 }
 
-/// A pair in u counts as complex above this ratio of imaginary part to magnitude: two equal real values come out of the
-/// eigenvalue iteration apart by the square root of the rounding (1.5e-8).
-const COMPLEX_RATIO: f64 = 1e-7;
+fn named(count: usize, name: &str) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some(name.to_string()),
+        2 => Some(format!("dual {name}")),
+        _ => Some(format!("{count} x {name}")),
+    }
+}
+
+impl Serialize for ZeroCounts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+fn count(zeros: &[Zero], kind: ZeroKind) -> usize {
+    zeros.iter().filter(|zero| zero.kind == kind).count()
+}
+
+/// Number of CNMP pairs among zeros.
+pub fn cnmp_pairs(zeros: &[Zero]) -> usize {
+    count(zeros, ZeroKind::Cnmp) / 2
+}
+
+/// Phase lag in degrees beyond that of the minimum-phase plant of the same magnitude: 180 for each zero in the right half
+/// plane.
+pub fn phase_drop_deg(zeros: &[Zero]) -> f64 {
+    let right = zeros
+        .iter()
+        .filter(|zero| zero.kind.is_non_minimum_phase())
+        .count();
+    180.0 * right as f64
+}
 
 /// Zeros of the structure without its damping, slowest first.
+///
+/// ```
+/// use bench::config::{Source, load};
+/// use bench::model::{plant, zeros};
+///
+/// let config = load(&Source::default())?;
+/// let structure = plant::build(&config.plant)?;
+/// assert_eq!(zeros::cnmp_pairs(&zeros::undamped_zeros(&structure)?), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn undamped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {
     undamped(&System::from(structure))
 }
 
-/// Zeros of the structure with its damping, slowest first. A zero in the left half plane has the kind of the undamped
-/// zero it comes from.
+/// Zeros of the structure with its damping, slowest first. A zero in the left half plane has the kind of the nearest
+/// undamped zero.
 pub fn damped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {
     damped(&System::from(structure))
 }
 
-/// What the zeros of R + c^T (s^2 M + s C + K)^-1 q depend on.
+/// The matrices, vectors and constant that determine the zeros of R + c^T (s^2 M + s C + K)^-1 q.
 pub(super) struct System<'a> {
     pub mass: &'a DMatrix<f64>,
     pub damping: &'a DMatrix<f64>,
@@ -130,41 +181,32 @@ pub(super) struct System<'a> {
 
 impl<'a> From<&'a Structure> for System<'a> {
     fn from(structure: &'a Structure) -> Self {
-        let Structure {
-            mass,
-            damping,
-            stiffness,
-            force,
-            sensor,
-            ..
-        } = structure;
         System {
-            mass,
-            damping,
-            stiffness,
-            force,
-            sensor,
+            mass: &structure.mass,
+            damping: &structure.damping,
+            stiffness: &structure.stiffness,
+            force: &structure.force,
+            sensor: &structure.sensor,
             constant_m_per_n: 0.0,
         }
     }
 }
 
-/// The same with a constant beside the structure: zeros of R + c^T (s^2 M + K)^-1 q.
+/// Zeros of R + c^T (s^2 M + K)^-1 q.
 pub(super) fn undamped(system: &System) -> Result<Vec<Zero>, PlantError> {
-    let scale = time_scale(system);
-    let [mass, _, stiffness] = reduced(system, scale);
-    let squares = pencil(&stiffness, &mass)?;
+    let scale = system.frequency_scale();
+    let [mass, _, stiffness] = system.reduced(scale);
+    let squares = pencil_roots(&stiffness, &mass)?;
     let zeros = squares
         .iter()
-        .flat_map(|u| of_square(u * (scale * scale)))
-        .collect();
-    Ok(sorted(zeros))
+        .flat_map(|u| zeros_of_square(u * (scale * scale)));
+    Ok(sorted(zeros.collect()))
 }
 
-/// The same with damping: zeros of R + c^T (s^2 M + s C + K)^-1 q.
+/// Zeros of R + c^T (s^2 M + s C + K)^-1 q.
 pub(super) fn damped(system: &System) -> Result<Vec<Zero>, PlantError> {
-    let scale = time_scale(system);
-    let [mass, damping, stiffness] = reduced(system, scale);
+    let scale = system.frequency_scale();
+    let [mass, damping, stiffness] = system.reduced(scale);
     let n = mass.nrows();
     let mut constant = DMatrix::identity(2 * n, 2 * n);
     let mut linear = DMatrix::zeros(2 * n, 2 * n);
@@ -173,100 +215,96 @@ pub(super) fn damped(system: &System) -> Result<Vec<Zero>, PlantError> {
     linear.view_mut((n, 0), (n, n)).copy_from(&mass);
     linear.view_mut((n, n), (n, n)).copy_from(&damping);
     let undamped = undamped(system)?;
-    let zeros = pencil(&constant, &linear)?
-        .iter()
-        .map(|s| kind_of_damped(s * scale, &undamped))
-        .collect();
-    Ok(sorted(zeros))
+    let roots = pencil_roots(&constant, &linear)?;
+    let zeros = roots.iter().map(|s| damped_zero(s * scale, &undamped));
+    Ok(sorted(zeros.collect()))
 }
 
-/// Number of CNMP pairs among zeros.
-pub fn cnmp_pairs(zeros: &[Zero]) -> usize {
-    zeros
-        .iter()
-        .filter(|zero| zero.kind == ZeroKind::Cnmp)
-        .count()
-        / 2
-}
-
-/// Phase in degrees by which the plant falls below the minimum-phase plant of the same magnitude: 180 a zero in the right
-/// half plane.
-pub fn phase_drop_deg(zeros: &[Zero]) -> f64 {
-    180.0
-        * zeros
-            .iter()
-            .filter(|zero| matches!(zero.kind, ZeroKind::Cnmp | ZeroKind::Rnmp))
-            .count() as f64
-}
-
-/// Mass, damping and stiffness of the pencil, with time in units of 1/`scale`: projected, by motions alone or, where there
-/// is a constant beside the structure, by motions and force.
-fn reduced(system: &System, scale: f64) -> [DMatrix<f64>; 3] {
-    if system.constant_m_per_n != 0.0 {
-        return with_constant(system, scale);
+impl System<'_> {
+    /// Mass, damping and stiffness of the pencil, with time in units of 1/`scale`: projected by motions alone or, where
+    /// there is a constant, by motions and force.
+    fn reduced(&self, scale: f64) -> [DMatrix<f64>; 3] {
+        if self.constant_m_per_n != 0.0 {
+            return self.with_constant(scale);
+        }
+        let [mass, damping, stiffness] = self.projected();
+        [mass, damping / scale, stiffness / (scale * scale)]
     }
-    let [mass, damping, stiffness] = projected(system);
-    [mass, damping / scale, stiffness / (scale * scale)]
+
+    /// M N, C N and K N - q m, with [N; m] an orthonormal basis of the motions z and forces f for which R f + c^T z = 0.
+    /// Force and probe are scaled to the size of the masses.
+    fn with_constant(&self, scale: f64) -> [DMatrix<f64>; 3] {
+        let n = self.mass.nrows();
+        let size = self.mass.norm();
+        let (force, sensor) = (size / self.force.norm(), size / self.sensor.norm());
+        let through = self.constant_m_per_n * scale * scale * force * sensor;
+        let measured = self.sensor.clone() * sensor;
+        let basis = orthogonal_complement(&measured.push(through));
+        let (motions, forces) = (basis.rows(0, n), basis.row(n));
+        let stiffness = self.stiffness * motions / (scale * scale) - force * self.force * forces;
+        [
+            self.mass * motions,
+            self.damping * motions / scale,
+            stiffness,
+        ]
+    }
+
+    /// N_q^T (.) N_c of mass, damping and stiffness.
+    fn projected(&self) -> [DMatrix<f64>; 3] {
+        let output = orthogonal_complement(self.sensor);
+        let input = orthogonal_complement(self.force);
+        [self.mass, self.damping, self.stiffness].map(|matrix| input.transpose() * matrix * &output)
+    }
+
+    /// A frequency amid those of the structure, by which scaled masses and stiffnesses have one size.
+    fn frequency_scale(&self) -> f64 {
+        let squared = self.stiffness.norm() / self.mass.norm();
+        if squared > 0.0 { squared.sqrt() } else { 1.0 }
+    }
 }
 
-/// With [N; m] an orthonormal basis of the motions z and forces f for which R f + c^T z = 0, and K N - q m for the
-/// stiffness: M N, C N and that. Force and probe are brought to the size of the masses.
-fn with_constant(system: &System, scale: f64) -> [DMatrix<f64>; 3] {
-    let n = system.mass.nrows();
-    let size = system.mass.norm();
-    let (force, sensor) = (size / system.force.norm(), size / system.sensor.norm());
-    let through = system.constant_m_per_n * scale * scale * force * sensor;
-    let seen = system.sensor.clone() * sensor;
-    let basis = complement(&seen.push(through));
-    let (motions, forces) = (basis.rows(0, n), basis.row(n));
-    let stiffness = system.stiffness * motions / (scale * scale) - force * system.force * forces;
-    [
-        system.mass * motions,
-        system.damping * motions / scale,
-        stiffness,
-    ]
+/// Above this ratio of imaginary part to magnitude a root is off the real axis: the eigenvalue iteration separates two
+/// equal real ones by the square root of the rounding (1.5e-8).
+const COMPLEX_RATIO: f64 = 1e-7;
+
+/// Whether a root is real to rounding.
+pub(super) fn is_real(root: Complex<f64>) -> bool {
+    root.im.abs() <= COMPLEX_RATIO * root.norm()
 }
 
-/// N_q^T (.) N_c of mass, damping and stiffness.
-fn projected(system: &System) -> [DMatrix<f64>; 3] {
-    let (output, input) = (complement(system.sensor), complement(system.force));
-    [system.mass, system.damping, system.stiffness]
-        .map(|matrix| input.transpose() * matrix * &output)
-}
-
-/// A frequency in the middle of the structure's own, so that scaled masses and stiffnesses are of one size.
-fn time_scale(system: &System) -> f64 {
-    let squared = system.stiffness.norm() / system.mass.norm();
-    if squared > 0.0 { squared.sqrt() } else { 1.0 }
-}
-
-fn of_square(u: Complex<f64>) -> Vec<Zero> {
-    let at = |re: f64, im: f64, kind| Zero {
+/// The two zeros s = +-sqrt(u).
+fn zeros_of_square(u: Complex<f64>) -> [Zero; 2] {
+    let zero = |re: f64, im: f64, kind| Zero {
         s: Complex::new(re, im),
         kind,
     };
-    if u.im.abs() > COMPLEX_RATIO * u.norm() {
-        // Both u and its conjugate come by here: each gives a right half plane zero and its mirror image.
-        let s = u.sqrt();
-        return vec![
-            at(s.re, s.im, ZeroKind::Cnmp),
-            at(-s.re, -s.im, ZeroKind::Cmp),
-        ];
-    }
     let size = u.re.abs().sqrt();
-    if u.re < 0.0 {
-        vec![at(0.0, size, ZeroKind::Mmp), at(0.0, -size, ZeroKind::Mmp)]
-    } else {
-        vec![at(-size, 0.0, ZeroKind::Rmp), at(size, 0.0, ZeroKind::Rnmp)]
+    match is_real(u) {
+        // Both u and its conjugate come by here: each gives a right half plane zero and its mirror image.
+        false => {
+            let s = u.sqrt();
+            [
+                zero(s.re, s.im, ZeroKind::Cnmp),
+                zero(-s.re, -s.im, ZeroKind::Cmp),
+            ]
+        }
+        true if u.re < 0.0 => [
+            zero(0.0, size, ZeroKind::Mmp),
+            zero(0.0, -size, ZeroKind::Mmp),
+        ],
+        true => [
+            zero(-size, 0.0, ZeroKind::Rmp),
+            zero(size, 0.0, ZeroKind::Rnmp),
+        ],
     }
 }
 
-fn kind_of_damped(s: Complex<f64>, undamped: &[Zero]) -> Zero {
-    let real = s.im.abs() <= COMPLEX_RATIO * s.norm();
+fn damped_zero(s: Complex<f64>, undamped: &[Zero]) -> Zero {
+    let distance = |zero: &Zero| (zero.s - s).norm();
     let nearest = undamped
         .iter()
-        .min_by(|a, b| (a.s - s).norm().total_cmp(&(b.s - s).norm()));
-    let kind = match (real, s.re > 0.0) {
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let kind = match (is_real(s), s.re > 0.0) {
         (true, true) => ZeroKind::Rnmp,
         (true, false) => ZeroKind::Rmp,
         (false, true) => ZeroKind::Cnmp,

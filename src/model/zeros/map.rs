@@ -13,8 +13,7 @@
 //! the three are complex, which is one CNMP pair. Where rounding could turn that sign, the pencil itself decides.
 
 use super::{cnmp_pairs, undamped_zeros};
-use crate::config::Sr4dofSettings;
-use crate::model::plant::{Beam, PlantError, sr4dof};
+use crate::model::plant::{PlantError, PlantSettings, Sr4dofSettings, undamped};
 
 /// The discriminant's sign counts beyond this ratio to the sum of its terms' sizes, each term taken with all of its sums
 /// without cancellation (`Sized`).
@@ -81,7 +80,7 @@ fn by_pencil(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8
     };
     // Three values of u hold one complex pair at most.
     Ok(u8::from(
-        cnmp_pairs(&undamped_zeros(&sr4dof::undamped(&there))?) > 0,
+        cnmp_pairs(&undamped_zeros(&undamped(&PlantSettings::Sr4dof(there)))?) > 0,
     ))
 }
 
@@ -156,7 +155,7 @@ fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Sized; 4] {
         1.0 + asymmetry,
         settings.intermediate_stage_mass_kg / m3,
     );
-    let bk = b * settings.spring_stiffness_n_per_m / Beam::from(settings).parallelogram_n_per_m();
+    let bk = b * settings.spring_stiffness_n_per_m / settings.beam().parallelogram_n_per_m();
     let entry = |constant: f64, linear: Sized| [Sized::of(constant), linear];
     let (near, far) = (Sized::of(b * (1.0 + m4)), Sized::of(b * (2.0 + 4.0 * m4)));
     let none = Sized::of(0.0);

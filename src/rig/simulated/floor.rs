@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::noise::Gaussian;
 use crate::config::FloorLine;
-use crate::model::plant::exponential;
+use crate::model::plant::matrix_exponential;
 
 /// One line of the floor's acceleration.
 #[derive(Clone, Debug)]
@@ -22,8 +22,9 @@ pub(super) struct Line {
 impl Line {
     pub(super) fn new(line: &FloorLine, period_s: f64, mut noise: Gaussian) -> Self {
         let w = 2.0 * std::f64::consts::PI * line.frequency_hz;
-        let over_period =
-            exponential(&(Matrix2::new(0.0, w, -w, -2.0 * line.damping_ratio * w) * period_s));
+        let over_period = matrix_exponential(
+            &(Matrix2::new(0.0, w, -w, -2.0 * line.damping_ratio * w) * period_s),
+        );
         let rms = line.acceleration_rms_m_per_s2;
         let missing = Matrix2::identity() - over_period * over_period.transpose();
         // Cholesky of a 2 x 2 matrix that is positive but for rounding.

@@ -1,30 +1,69 @@
-//! The plant between a command and the reading that answers it, as a loop sees it once a period.
+//! The plant between a command and the reading of its effect, as a control loop sees it once a period.
 //!
 //! ```text
 //!  command of tick k --delay--> hold --> amplifier --> modes --> probe measures --age--> reading of tick k
 //! ```
 //!
-//! *Delay* is the computing delay in whole periods and the latency of bus and drive. *Age* is how old the reading is: what
-//! the probe and its line take, and, for a probe with a clock of its own, any time up to its period since its last reading
-//! arrived. Between hold and sampler only the sum of both counts, d = n T + r with 0 <= r < T, and
+//! *Delay* is the computing delay in whole periods plus the latency of bus and drive. *Age* is the time from measurement to
+//! use: latency and transport of the probe, and, for a probe with a clock of its own, up to its own period. Between hold and
+//! sampler only the sum of both matters, d = n T + r with 0 <= r < T, and
 //!
 //! ```text
 //!  y(k T - d) = C x((k - n - 1) T + (T - r)) = C (A x + B_i i + B_u u) at tick k - n - 1,   A, B over T - r        (r > 0)
 //! ```
 //!
-//! which is exact. A free-running probe is the mean over its ages (nodes evenly over its period): its first harmonic, with
-//! the delay and the roll-off of a hold. The side bands that such a probe also makes are left out.
+//! which is exact. A free-running probe is represented by the mean over its ages (nodes evenly over its period): its first
+//! harmonic, with the delay and the roll-off of a hold. The side bands of such a probe are left out.
 
 use nalgebra::{Complex, DMatrix};
 
-use super::{DiscretePlant, Mode, PlantState};
-use crate::config::Config;
+use super::{DiscreteMode, DiscretePlant, Mode, PlantState};
 
 /// Nodes of the mean over a probe's period. The midpoint rule with n nodes errs by (w Tp)^2/(24 n^2): 1e-5 at w Tp = 1.
 const NODES: usize = 64;
 
-/// Ratios of a period below which a rest of a delay is rounding.
+/// A remainder of a delay below this ratio of a period is rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Timing and gains between command and reading, beside the modes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SignalPath {
+    /// Period of the loop in seconds.
+    pub period_s: f64,
+    /// Bandwidth of the amplifier's current loop in hertz.
+    pub amplifier_bandwidth_hz: f64,
+    /// Force constant of the motor in newtons per ampere.
+    pub force_constant_n_per_a: f64,
+    /// Delays in seconds from a command to the position of its reading, hold and amplifier lag excluded. The response is
+    /// the mean over them.
+    pub delays_s: Vec<f64>,
+}
+
+impl SignalPath {
+    /// Evenly spread delays of a probe with a clock of its own, from the least delay on; the least delay alone without one.
+    pub fn delays_of_probe_s(least_s: f64, probe_period_s: Option<f64>) -> Vec<f64> {
+        let Some(period_s) = probe_period_s else {
+            return vec![least_s];
+        };
+        let age_s = |i| period_s * (i as f64 + 0.5) / NODES as f64;
+        (0..NODES).map(|i| least_s + age_s(i)).collect()
+    }
+
+    /// The same path with the mean delay alone: without the roll-off of a free-running probe.
+    pub fn with_mean_age(&self) -> SignalPath {
+        let mean_s = self.delays_s.iter().sum::<f64>() / self.delays_s.len() as f64;
+        SignalPath {
+            delays_s: vec![mean_s],
+            ..self.clone()
+        }
+    }
+
+    fn discrete(&self, modes: &[Mode], span_s: f64) -> DiscretePlant {
+        let (bandwidth_hz, force_constant) =
+            (self.amplifier_bandwidth_hz, self.force_constant_n_per_a);
+        DiscretePlant::new(modes, bandwidth_hz, force_constant, span_s)
+    }
+}
 
 /// Hold, amplifier, modes, delays and the probe's own rate.
 #[derive(Clone, Debug)]
@@ -34,7 +73,7 @@ pub struct LoopPlant {
     delay_s: f64,
 }
 
-/// What arrives `periods` after the tick it comes from: rows . x + current i + setpoint u.
+/// The part of a reading that arrives `periods` after its tick: rows . x + current i + setpoint u.
 #[derive(Clone, Debug, PartialEq)]
 struct Tap {
     periods: usize,
@@ -43,68 +82,37 @@ struct Tap {
     setpoint: f64,
 }
 
-/// Settings of the chain between command and reading, without the mechanics.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ChainSettings {
-    /// Period of the loop in seconds.
-    pub period_s: f64,
-    /// Bandwidth of the amplifier in hertz.
-    pub amplifier_bandwidth_hz: f64,
-    /// Force constant of the motor in newtons per ampere.
-    pub force_constant_n_per_a: f64,
-    /// Delays from command to reading in seconds; the chain is the mean over them.
-    pub delays_s: Vec<f64>,
-}
-
-impl ChainSettings {
-    /// The chain of a configuration.
-    pub fn of(config: &Config) -> ChainSettings {
-        ChainSettings {
-            period_s: config.servo.period_s(),
-            amplifier_bandwidth_hz: config.amplifier.bandwidth_hz,
-            force_constant_n_per_a: config.motor.force_constant_n_per_a,
-            delays_s: delays(config),
-        }
-    }
-
-    /// The same with readings that all have the mean age: without the roll-off of a free-running probe.
-    pub fn with_mean_age(self) -> ChainSettings {
-        let mean_s = self.delays_s.iter().sum::<f64>() / self.delays_s.len() as f64;
-        ChainSettings {
-            delays_s: vec![mean_s],
-            ..self
-        }
-    }
+/// State of a [`LoopPlant`]: that of the plant, and the readings under way by the tick of their arrival.
+#[derive(Clone, Debug)]
+pub struct LoopPlantState {
+    plant: PlantState,
+    coming_m: Vec<f64>,
 }
 
 impl LoopPlant {
-    /// The chain of a configuration around `modes`, as the loop sees it.
-    pub fn new(config: &Config, modes: &[Mode]) -> LoopPlant {
-        LoopPlant::of(&ChainSettings::of(config), modes)
+    /// The plant with these modes at the end of a signal path, for example that of a configuration.
+    pub fn new(path: impl Into<SignalPath>, modes: &[Mode]) -> LoopPlant {
+        LoopPlant::of(&path.into(), modes)
     }
 
-    /// The same with readings that all have the mean age.
-    pub fn with_mean_age(config: &Config, modes: &[Mode]) -> LoopPlant {
-        LoopPlant::of(&ChainSettings::of(config).with_mean_age(), modes)
+    /// The same with the mean age of all readings: without the roll-off of a free-running probe.
+    pub fn with_mean_age(path: impl Into<SignalPath>, modes: &[Mode]) -> LoopPlant {
+        LoopPlant::of(&path.into().with_mean_age(), modes)
     }
 
-    /// A chain around `modes`.
-    pub fn of(settings: &ChainSettings, modes: &[Mode]) -> LoopPlant {
-        let (bandwidth_hz, force_constant) = (
-            settings.amplifier_bandwidth_hz,
-            settings.force_constant_n_per_a,
-        );
-        let (period_s, delays) = (settings.period_s, &settings.delays_s);
-        let over = |span_s: f64| DiscretePlant::new(modes, bandwidth_hz, force_constant, span_s);
-        let held = over(period_s);
-        let share = 1.0 / delays.len() as f64;
-        let taps = delays.iter().fold(Vec::new(), |taps, d| {
-            add(taps, tap(&held, &over, *d), share)
-        });
+    /// The same from a path that is kept.
+    pub fn of(path: &SignalPath, modes: &[Mode]) -> LoopPlant {
+        let held = path.discrete(modes, path.period_s);
+        let share = 1.0 / path.delays_s.len() as f64;
+        let mut taps = Vec::new();
+        for delay_s in &path.delays_s {
+            let tap = Tap::new(&held, path, modes, *delay_s).scaled(share);
+            join(&mut taps, tap);
+        }
         LoopPlant {
             held,
             taps,
-            delay_s: delays.iter().sum::<f64>() * share,
+            delay_s: path.delays_s.iter().sum::<f64>() * share,
         }
     }
 
@@ -113,7 +121,7 @@ impl LoopPlant {
         self.held.period_s
     }
 
-    /// Mean time in seconds from a command to the position that its reading shows, without hold and lag.
+    /// Mean time in seconds from a command to the position of its reading, without hold and lag.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
     }
@@ -127,18 +135,13 @@ impl LoopPlant {
     /// The same at z = exp(j w T).
     pub fn response_at(&self, z: Complex<f64>) -> Complex<f64> {
         let current = self.held.current_response(z);
-        let of = |tap: &Tap| {
-            let moved: Complex<f64> = (tap.rows.iter().zip(&self.held.blocks))
-                .map(|(row, block)| DiscretePlant::state_response(block, *row, z, current))
-                .sum();
-            (moved + current * tap.current + tap.setpoint) * z.powi(-(tap.periods as i32))
-        };
-        self.taps.iter().map(of).sum()
+        let taps = self.taps.iter();
+        taps.map(|tap| tap.response(&self.held, z, current)).sum()
     }
 
-    /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ..., what arrives next, what after that, ...].
+    /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ..., next reading, the one after it, ...].
     pub fn state_space(&self) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-        let (moving, register) = (1 + 2 * self.held.blocks.len(), self.longest());
+        let (moving, register) = (1 + 2 * self.held.modes.len(), self.longest());
         let n = moving + register;
         let (a0, b0, _) = self.held.state_space();
         let (mut a, mut b, mut c) = (
@@ -166,28 +169,28 @@ impl LoopPlant {
         (a, b, c)
     }
 
-    /// The chain at rest.
-    pub fn at_rest(&self) -> ChainState {
-        ChainState {
-            motion: self.held.at_rest(),
+    /// The state at rest.
+    pub fn at_rest(&self) -> LoopPlantState {
+        LoopPlantState {
+            plant: self.held.at_rest(),
             coming_m: vec![0.0; self.longest() + 1],
         }
     }
 
     /// The reading of this tick in metres.
-    pub fn reading_m(&self, state: &ChainState) -> f64 {
+    pub fn reading_m(&self, state: &LoopPlantState) -> f64 {
         let now = self.taps.iter().filter(|tap| tap.periods == 0);
-        state.coming_m[0] + now.map(|tap| tap.of(&state.motion, 0.0)).sum::<f64>()
+        state.coming_m[0] + now.map(|tap| tap.output_m(&state.plant, 0.0)).sum::<f64>()
     }
 
-    /// One period on, with the command of this tick.
-    pub fn step(&self, state: &mut ChainState, command_a: f64) {
+    /// Advances the state by one period, with the command of this tick.
+    pub fn step(&self, state: &mut LoopPlantState, command_a: f64) {
         for tap in self.taps.iter().filter(|tap| tap.periods > 0) {
-            state.coming_m[tap.periods] += tap.of(&state.motion, command_a);
+            state.coming_m[tap.periods] += tap.output_m(&state.plant, command_a);
         }
         state.coming_m.rotate_left(1);
         state.coming_m[self.longest()] = 0.0;
-        self.held.step(&mut state.motion, command_a, |_| 0.0);
+        self.held.step(&mut state.plant, command_a, |_| 0.0);
     }
 
     /// Periods of the longest tap.
@@ -196,100 +199,68 @@ impl LoopPlant {
     }
 }
 
-/// Where a chain is: its motion, and the readings on their way, by the tick at which they arrive.
-#[derive(Clone, Debug)]
-pub struct ChainState {
-    motion: PlantState,
-    coming_m: Vec<f64>,
-}
-
-/// The delays whose mean the chain is.
-fn delays(config: &Config) -> Vec<f64> {
-    let computing_s = f64::from(config.servo.computing_delay_periods) * config.servo.period_s();
-    let youngest_s = computing_s + config.amplifier.latency_s + config.probe.age_at_arrival_s();
-    match config.probe.rate_hz.map(|rate_hz| 1.0 / rate_hz) {
-        None => vec![youngest_s],
-        Some(period_s) => (0..NODES)
-            .map(|i| youngest_s + period_s * (i as f64 + 0.5) / NODES as f64)
-            .collect(),
-    }
-}
-
-fn tap(held: &DiscretePlant, over: &impl Fn(f64) -> DiscretePlant, delay_s: f64) -> Tap {
-    let ratio = delay_s / held.period_s;
-    let whole = libm::floor(ratio + ROUNDING);
-    let rest = ratio - whole;
-    if rest <= ROUNDING {
-        let rows = held
-            .blocks
-            .iter()
-            .map(|block| [block.output, 0.0])
-            .collect();
-        return Tap {
+impl Tap {
+    fn new(held: &DiscretePlant, path: &SignalPath, modes: &[Mode], delay_s: f64) -> Tap {
+        let ratio = delay_s / held.period_s;
+        let whole = libm::floor(ratio + ROUNDING);
+        let rest = ratio - whole;
+        if rest > ROUNDING {
+            let within = path.discrete(modes, held.period_s * (1.0 - rest));
+            return Tap::within_period(&within, whole as usize + 1);
+        }
+        let rows = held.modes.iter().map(|mode| [mode.output, 0.0]);
+        Tap {
             periods: whole as usize,
-            rows,
+            rows: rows.collect(),
             current: 0.0,
             setpoint: 0.0,
-        };
-    }
-    let within = over(held.period_s * (1.0 - rest));
-    let sum = |of: fn(&super::Block) -> f64| {
-        within
-            .blocks
-            .iter()
-            .map(|block| block.output * of(block))
-            .sum()
-    };
-    Tap {
-        periods: whole as usize + 1,
-        rows: within
-            .blocks
-            .iter()
-            .map(|block| block.a[0].map(|a| block.output * a))
-            .collect(),
-        current: sum(|block| block.current[0]),
-        setpoint: sum(|block| block.setpoint[0]),
-    }
-}
-
-/// `taps` with `share` of `tap`, which joins one that arrives at the same time.
-fn add(mut taps: Vec<Tap>, tap: Tap, share: f64) -> Vec<Tap> {
-    let rows = tap.rows.iter().map(|row| row.map(|c| c * share)).collect();
-    let tap = Tap {
-        rows,
-        current: tap.current * share,
-        setpoint: tap.setpoint * share,
-        ..tap
-    };
-    match taps.iter_mut().find(|other| other.periods == tap.periods) {
-        Some(other) => other.join(&tap),
-        None => taps.push(tap),
-    }
-    taps
-}
-
-impl Tap {
-    fn join(&mut self, other: &Tap) {
-        for (mine, theirs) in self
-            .rows
-            .iter_mut()
-            .flatten()
-            .zip(other.rows.iter().flatten())
-        {
-            *mine += theirs;
         }
-        self.current += other.current;
-        self.setpoint += other.setpoint;
     }
 
-    fn of(&self, motion: &PlantState, setpoint_a: f64) -> f64 {
-        let moved: f64 = self
-            .rows
-            .iter()
-            .zip(&motion.states)
-            .map(|(c, x)| c[0] * x[0] + c[1] * x[1])
+    /// The reading within a period, after the time span of `within`.
+    fn within_period(within: &DiscretePlant, periods: usize) -> Tap {
+        let sum = |of: fn(&DiscreteMode) -> f64| {
+            let modes = within.modes.iter();
+            modes.map(|mode| mode.output * of(mode)).sum()
+        };
+        let rows = within.modes.iter();
+        Tap {
+            periods,
+            rows: rows
+                .map(|mode| mode.a[0].map(|a| mode.output * a))
+                .collect(),
+            current: sum(|mode| mode.current[0]),
+            setpoint: sum(|mode| mode.setpoint[0]),
+        }
+    }
+
+    fn scaled(self, share: f64) -> Tap {
+        let rows = self.rows.iter().map(|row| row.map(|c| c * share));
+        Tap {
+            rows: rows.collect(),
+            current: self.current * share,
+            setpoint: self.setpoint * share,
+            ..self
+        }
+    }
+
+    fn response(
+        &self,
+        held: &DiscretePlant,
+        z: Complex<f64>,
+        current: Complex<f64>,
+    ) -> Complex<f64> {
+        let rows = self.rows.iter().zip(&held.modes);
+        let moved: Complex<f64> = rows
+            .map(|(row, mode)| mode.state_response(*row, z, current))
             .sum();
-        moved + self.current * motion.current_a + self.setpoint * setpoint_a
+        (moved + current * self.current + self.setpoint) * z.powi(-(self.periods as i32))
+    }
+
+    fn output_m(&self, state: &PlantState, setpoint_a: f64) -> f64 {
+        let rows = self.rows.iter().zip(&state.states);
+        let moved: f64 = rows.map(|(c, x)| c[0] * x[0] + c[1] * x[1]).sum();
+        moved + self.current * state.current_a + self.setpoint * setpoint_a
     }
 
     fn add_row(&self, matrix: &mut DMatrix<f64>, row: usize) {
@@ -299,12 +270,29 @@ impl Tap {
             matrix[(row, 2 + 2 * index)] += rate;
         }
     }
+
+    fn add(&mut self, other: &Tap) {
+        let rows = self.rows.iter_mut().flatten();
+        for (row, other) in rows.zip(other.rows.iter().flatten()) {
+            *row += other;
+        }
+        self.current += other.current;
+        self.setpoint += other.setpoint;
+    }
+}
+
+/// Adds a tap to the one that arrives at the same time, or as a new one.
+fn join(taps: &mut Vec<Tap>, tap: Tap) {
+    match taps.iter_mut().find(|other| other.periods == tap.periods) {
+        Some(other) => other.add(&tap),
+        None => taps.push(tap),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use crate::config::{Config, Source, load};
 
     fn config(sets: &[&str]) -> Config {
         let sets = sets.iter().map(|set| set.to_string()).collect();
@@ -383,7 +371,7 @@ mod tests {
     ];
 
     #[test]
-    fn the_response_is_the_sum_of_its_aliases() {
+    fn response_is_the_sum_of_its_aliases() {
         for sets in CASES {
             let config = config(sets);
             let chain = LoopPlant::new(&config, &[mode()]);
@@ -403,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn response_state_space_and_simulation_are_one_chain() {
+    fn response_state_space_and_simulation_agree() {
         for sets in CASES {
             let chain = LoopPlant::new(&config(sets), &[mode()]);
             let (a, b, c) = chain.state_space();
@@ -431,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn the_delay_is_the_sum_of_its_parts() {
+    fn delay_is_the_sum_of_its_parts() {
         let chain = LoopPlant::new(&config(CASES[3]), &[mode()]);
         // A period of computing, 1.2 ms of transport, half the probe's period.
         assert!((chain.delay_s() - (0.001 + 0.0012 + 0.5 / 430.0)).abs() < 1e-12);

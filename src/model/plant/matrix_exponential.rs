@@ -5,9 +5,12 @@ use nalgebra::SMatrix;
 /// Terms of the series: with a norm of 1/16 at most the next one is below 16^-14/14!, 2e-28.
 const TERMS: u32 = 13;
 
-/// exp(A) by scaling and squaring: the Taylor series of A/2^s, squared s times. (nalgebra has one with its `std` feature
-/// alone, whose products are rounded differently on different processors.)
-pub(crate) fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+/// exp(A) by scaling and squaring: the Taylor series of A/2^s, squared s times.
+///
+/// nalgebra's own exponential needs its `std` feature, whose products are rounded differently on different processors.
+pub(crate) fn matrix_exponential<const N: usize>(
+    matrix: &SMatrix<f64, N, N>,
+) -> SMatrix<f64, N, N> {
     let norm = matrix
         .column_iter()
         .map(|column| column.iter().map(|x| x.abs()).sum::<f64>())
@@ -32,9 +35,9 @@ mod tests {
     use nalgebra::Matrix2;
 
     #[test]
-    fn rotations_decays_and_shears_have_their_closed_forms() {
+    fn matches_closed_forms_of_rotation_decay_and_shear() {
         for angle in [1e-9, 0.3, 2.0, 50.0] {
-            let rotation = exponential(&Matrix2::new(0.0, angle, -angle, 0.0));
+            let rotation = matrix_exponential(&Matrix2::new(0.0, angle, -angle, 0.0));
             let exact = Matrix2::new(angle.cos(), angle.sin(), -angle.sin(), angle.cos());
             // Each of log2(16 angle) squarings doubles the rounding: 16 angle times 1e-16, times a few sums.
             assert!(
@@ -42,12 +45,12 @@ mod tests {
                 "{angle}"
             );
         }
-        let decay = exponential(&Matrix2::new(-3.0, 0.0, 0.0, -700.0));
+        let decay = matrix_exponential(&Matrix2::new(-3.0, 0.0, 0.0, -700.0));
         // Scaled for the 700 by 2^14: as many roundings of 1e-16 in the slow element.
         assert!(
             (decay[(0, 0)] / f64::exp(-3.0) - 1.0).abs() < 4e-12 && decay[(1, 1)].abs() < 1e-300
         );
-        let shear = exponential(&Matrix2::new(0.0, 5.0, 0.0, 0.0));
+        let shear = matrix_exponential(&Matrix2::new(0.0, 5.0, 0.0, 0.0));
         assert!((shear - Matrix2::new(1.0, 5.0, 0.0, 1.0)).amax() < 1e-14);
     }
 }
