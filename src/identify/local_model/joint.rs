@@ -32,10 +32,10 @@ use nalgebra::Complex;
 
 use super::frf_data::{non_empty, of_spectra};
 use super::local::{collect, h1};
-use super::model::{self, FittedModel, LocalFit};
+use super::model::{self, FittedModel};
 use super::record_spectra::RecordSpectra;
 use super::spectra::Spectra;
-use super::window::Window;
+use super::window::{LocalFit, Window};
 use crate::identify::fft::RealFft;
 use crate::identify::signals::check_lengths;
 use crate::identify::{EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, band};

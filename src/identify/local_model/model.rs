@@ -21,7 +21,7 @@
 use nalgebra::Complex;
 
 use super::least_squares::{self, LeastSquares};
-use super::window::Window;
+use super::window::{LocalFit, Window};
 use crate::identify::{EstimatorSettings, LocalModel};
 
 /// Linear fits, each weighted with the denominator of the one before.
@@ -37,24 +37,6 @@ const MIN_POLE_DISTANCE: f64 = 1e-3;
 const SIGNIFICANT_F: f64 = 10.0;
 /// F statistic of the first linear fit with a pole below which no others are made.
 const PROMISING_F: f64 = 5.0;
-
-/// The response in the middle of a window.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LocalFit {
-    pub(super) response: Complex<f64>,
-    /// E|error of H|^2 for noise of power 1 in a bin.
-    pub(super) noise_gain: f64,
-    /// sum w |Y - H U|^2
-    pub(super) residual_power: f64,
-    /// Expected residual power for noise of power 1 in a bin.
-    pub(super) freedom: f64,
-    /// Equivalent noise bandwidth, in bins, of the weights that combine the ratios Y/U to H.
-    pub(super) bandwidth_bins: f64,
-    /// The ratio of the output's power that the model explains.
-    pub(super) coherence: f64,
-    /// Whether there is input in the middle, or on both sides of it.
-    pub(super) encloses_input: bool,
-}
 
 /// A local model with the linear solution that it was found by.
 pub(super) struct FittedModel {

@@ -2,9 +2,9 @@
 
 use nalgebra::Complex;
 
-use super::model::{self, LocalFit};
+use super::model;
 use super::spectra::Spectra;
-use super::window::Window;
+use super::window::{LocalFit, Window};
 use crate::identify::fft::RealFft;
 use crate::identify::{EstimatorSettings, Signals};
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::model::LocalFit;
+use super::window::LocalFit;
 use crate::identify::EstimatorSettings;
 
 /// Spectra of an input U, an output Y and an instrument R, which is independent of the noise; in open loop R is U.

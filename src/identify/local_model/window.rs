@@ -3,7 +3,6 @@
 use nalgebra::Complex;
 
 use super::least_squares::LeastSquares;
-use super::model::LocalFit;
 use crate::identify::LocalModel;
 
 /// The bins around a position. Their weights are cos^2(pi x/2).
@@ -14,6 +13,24 @@ pub(super) struct Window {
     pub(super) root_weight: Vec<f64>,
     pub(super) input: Vec<Complex<f64>>,
     pub(super) output: Vec<Complex<f64>>,
+}
+
+/// The response in the middle of a window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LocalFit {
+    pub(super) response: Complex<f64>,
+    /// E|error of H|^2 for noise of power 1 in a bin.
+    pub(super) noise_gain: f64,
+    /// sum w |Y - H U|^2
+    pub(super) residual_power: f64,
+    /// Expected residual power for noise of power 1 in a bin.
+    pub(super) freedom: f64,
+    /// Equivalent noise bandwidth, in bins, of the weights that combine the ratios Y/U to H.
+    pub(super) bandwidth_bins: f64,
+    /// The ratio of the output's power that the model explains.
+    pub(super) coherence: f64,
+    /// Whether there is input in the middle, or on both sides of it.
+    pub(super) encloses_input: bool,
 }
 
 impl Window {

@@ -12,6 +12,7 @@
 //! describe the data, the standard deviations grow accordingly.
 
 mod candidates;
+mod error;
 mod measurement_chain;
 mod merge;
 mod modal_fit;
@@ -24,6 +25,8 @@ mod solution;
 
 use core::ops::ControlFlow;
 
+use error::report;
+pub use error::{FitError, Progress};
 pub use measurement_chain::MeasurementChain;
 pub use modal_fit::{FittedMode, ModalFit, UncertainPole};
 pub use parameters::ModalParameters;
@@ -35,50 +38,12 @@ pub use crate::identify::{Estimate, SIGMAS_95};
 use merge::merged;
 use prune::pruned;
 use refine::refine;
-use search::report;
 use solution::{Problem, Solution};
 
 /// Data to either side over which the noise is averaged: 64 degrees of freedom a side.
 const NOISE_REACH: usize = 32;
 /// Progress at the end of the search; the rest is the final fit.
 const SEARCH_PROGRESS: f64 = 0.8;
-
-/// Receives the progress of a fit, 0 to 1; `Break` cancels it.
-pub type Progress<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
-
-/// Why no modes can be fitted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// No mode is significant.
-    #[error(
-        "no mode exceeds the noise between {low_hz:.3} and {high_hz:.3} Hz; excite more, or for longer, or check that the probe sees the stage"
-    )]
-    NoMode {
-        /// Lowest frequency.
-        low_hz: f64,
-        /// Highest frequency.
-        high_hz: f64,
-    },
-    /// Fewer data than parameters.
-    #[error(
-        "{frequencies} frequencies do not determine a mode; record for longer or widen the band"
-    )]
-    TooFew {
-        /// Number of frequencies.
-        frequencies: usize,
-    },
-    /// The covariance is singular.
-    #[error(
-        "the response does not determine the parameters of {modes} modes; record for longer or excite more"
-    )]
-    Undetermined {
-        /// Number of modes found.
-        modes: usize,
-    },
-    /// The receiver of the progress cancelled the fit.
-    #[error("the fit was cancelled")]
-    Cancelled,
-}
 
 /// Fits as many modes to a response as are significant.
 ///

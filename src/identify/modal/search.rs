@@ -1,16 +1,14 @@
 //! The number of modes: modes are added one at a time, each where the residual exceeds the noise most, as long as the decrease
 //! of chi^2 is significant.
 
-use core::ops::ControlFlow;
-
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
+use super::error::{FitError, Progress, report};
 use super::merge::merged;
 use super::parameters::ModalParameters;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
-use super::{FitError, Progress};
 use crate::identify::FrfDatum;
 
 /// Largest number of modes.
@@ -109,14 +107,6 @@ pub(super) fn orders(
         done = stage.progress;
     }
     Ok(orders)
-}
-
-/// Reports progress; an error if the receiver cancels.
-pub(super) fn report(progress: &mut Progress<'_>, fraction: f64) -> Result<(), FitError> {
-    match progress(fraction) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(FitError::Cancelled),
-    }
 }
 
 /// Progress of a stage, 0 to 1, by how far the misfit has fallen towards 1 on a logarithmic scale.

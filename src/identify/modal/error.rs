@@ -1,0 +1,48 @@
+//! Errors and progress of a fit.
+
+use core::ops::ControlFlow;
+
+/// Receives the progress of a fit, 0 to 1; `Break` cancels it.
+pub type Progress<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
+
+/// Why no modes can be fitted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// No mode is significant.
+    #[error(
+        "no mode exceeds the noise between {low_hz:.3} and {high_hz:.3} Hz; excite more, or for longer, or check that the probe sees the stage"
+    )]
+    NoMode {
+        /// Lowest frequency.
+        low_hz: f64,
+        /// Highest frequency.
+        high_hz: f64,
+    },
+    /// Fewer data than parameters.
+    #[error(
+        "{frequencies} frequencies do not determine a mode; record for longer or widen the band"
+    )]
+    TooFew {
+        /// Number of frequencies.
+        frequencies: usize,
+    },
+    /// The covariance is singular.
+    #[error(
+        "the response does not determine the parameters of {modes} modes; record for longer or excite more"
+    )]
+    Undetermined {
+        /// Number of modes found.
+        modes: usize,
+    },
+    /// The receiver of the progress cancelled the fit.
+    #[error("the fit was cancelled")]
+    Cancelled,
+}
+
+/// Reports progress; an error if the receiver cancels.
+pub(super) fn report(progress: &mut Progress<'_>, fraction: f64) -> Result<(), FitError> {
+    match progress(fraction) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(FitError::Cancelled),
+    }
+}
