@@ -1,6 +1,6 @@
 //! `bench chirp`: excite, record, estimate the frequency response.
 
-use super::analysis_output::{AnalysisOutputs, make};
+use super::analysis_output::{self, analyse_and_write};
 use super::chirp_plan::{Expected, shape, show};
 use super::error::CliError;
 use super::options::BenchOptions;
@@ -11,6 +11,7 @@ use crate::excitation::{self, Extremes};
 use crate::experiment::{self, Plan, RunSummary, abandon_on_signal};
 use crate::model::plant::DiscretePlant;
 use crate::recording::Recording;
+use crate::report::run_pages::AnalysisOutputs;
 use serde::Serialize;
 use std::path::Path;
 
@@ -135,7 +136,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let report = RunSummary::of(&mut run)?;
     let made = match report.is_completed() {
         true => analysed(&run.path, &config)?,
-        false => AnalysisOutputs::nothing("the run did not come to its end"),
+        false => AnalysisOutputs::run_incomplete(),
     };
     let report = Report {
         run: report,
@@ -144,7 +145,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         made,
     };
     close(run, &report, args.bench.json, &text(&report, &config))?;
-    Ok(if report.made.is_stopped() {
+    Ok(if report.made.is_cancelled() {
         Outcome::Failed
     } else {
         exit(&report.run)
@@ -154,10 +155,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 /// The analysis, which a person may stop: the recording is whole all the same.
 pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
     let (of, config) = (path.to_path_buf(), config.clone());
-    let made = abandon_on_signal(move || make(&Recording::open(&of)?, &config, &of));
+    let made = abandon_on_signal(move || analyse_and_write(&Recording::open(&of)?, &config, &of));
     let made = made
         .map_err(|error| CliError::Failed(error.to_string()))?
-        .unwrap_or(Ok(AnalysisOutputs::stopped()));
+        .unwrap_or(Ok(AnalysisOutputs::cancelled()));
     let kept = |error| {
         CliError::Failed(format!(
             "{error}; the run itself is whole, in {}",
@@ -183,6 +184,6 @@ fn text(report: &Report, config: &Config) -> String {
         excitation::words(config),
         report.expected_travel_m * 1e6,
         run_text(&report.run, config),
-        report.made.text(),
+        analysis_output::text(&report.made),
     )
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::analysis_output::AnalysisOutputs;
+use super::analysis_output;
 use super::chirp::analysed;
 use super::chirp_plan::Expected;
 use super::controller_choice::ControllerChoice;
@@ -15,6 +15,7 @@ use crate::config::{Config, Purpose, ReferenceSettings};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
 use crate::experiment::{Measured, Plan, RunSummary, measure};
 use crate::recording::Recording;
+use crate::report::run_pages::AnalysisOutputs;
 use crate::util::quantity;
 
 /// A step is predicted over as many ticks at most: 200 s at 5 kHz, however long the run.
@@ -186,7 +187,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     let made = match (swept, completed) {
         (true, true) => Some(analysed(&run.path, &plan.config)?),
-        (true, false) => Some(AnalysisOutputs::nothing("the run did not come to its end")),
+        (true, false) => Some(AnalysisOutputs::run_incomplete()),
         (false, _) => None,
     };
     let expected = plan.predicted_extremes.as_ref().map(Expected::of);
@@ -201,7 +202,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let stopped = report
         .made
         .as_ref()
-        .is_some_and(AnalysisOutputs::is_stopped);
+        .is_some_and(AnalysisOutputs::is_cancelled);
     Ok(if stopped {
         Outcome::Failed
     } else {
@@ -238,7 +239,7 @@ fn text(report: &Report, config: &Config) -> String {
         let run = run_text(&report.run, config);
         return format!(
             "{margins}  expected   travel of {travel_um:.1} um by the model\n{run}{}",
-            made.text()
+            analysis_output::text(made)
         );
     }
     let measured = report.measured.as_ref().map_or(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::analysis_output::{AnalysisOutputs, in_folder, make};
+use super::analysis_output::{self, analyse_and_write, in_folder};
 use super::error::CliError;
 use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
@@ -13,11 +13,12 @@ use super::run_options::trip_text;
 use crate::config::Config;
 use crate::experiment::{Ending, Plan, RunKind, TripSummary};
 use crate::recording::Recording;
+use crate::report::run_pages::AnalysisOutputs;
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
-    /// The recording (MCAP) of a chirp, or a CSV of other hands with --input and --output
+    /// The recording (MCAP) of a chirp, or an external CSV with --input and --output
     recording: PathBuf,
     #[command(flatten)]
     table: ExternalOptions,
@@ -78,7 +79,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         overruns: recording.overruns(),
         lost_records: recording.lost_records(),
         truncated: recording.truncated(),
-        made: make(
+        made: analyse_and_write(
             &recording,
             &plan.config,
             &in_folder(args.out.as_deref(), &args.recording)?,
@@ -119,7 +120,7 @@ impl Report {
             self.trip
                 .as_ref()
                 .map_or(String::new(), |trip| trip_text(trip, period_s)),
-            self.made.text()
+            analysis_output::text(&self.made)
         )
     }
 }

@@ -1,19 +1,19 @@
-//! `bench identify` on a CSV of other hands: any input, any output, no model beside them.
+//! `bench identify` of an external CSV: any input, any output, without a model.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output::{Drawn, Plots, drawn, free, in_folder, plots_text};
+use super::analysis_output::{in_folder, pages_text, response_text};
 use super::error::CliError;
-use super::modal_output::ModalSummary;
+use super::modal_output;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
 use crate::experiment::{ExternalAnalysis, analyse_external};
 use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::periodic::Repetition;
 use crate::identify::{Signals, frf_csv};
-use crate::report::run_pages::TableReport;
+use crate::report::run_pages::{ModalSummary, PageFiles, TableReport, write_frf};
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
 const WHOLE_SAMPLES: f64 = 1e-3;
@@ -78,11 +78,8 @@ struct Report {
     /// Periods that were averaged; `null` of a record that does not repeat.
     periods: Option<usize>,
     frf_csv: String,
-    /// The Bode plot.
-    plot: Option<String>,
-    plots: Plots,
-    /// The page of the record.
-    report: String,
+    #[serde(flatten)]
+    pages: PageFiles,
     frequencies: usize,
     /// Median coherence over the band.
     coherence_median: Option<f64>,
@@ -205,30 +202,22 @@ fn report(
     analysis: &ExternalAnalysis,
     beside: &Path,
 ) -> Result<Report, CliError> {
-    let csv_path = free(beside, "frf", "csv");
-    let magnitude = frf_csv::external_magnitude(&columns.input, &columns.output);
-    frf_csv::write_new(&csv_path, &analysis.frf, &magnitude)
-        .map_err(|e| CliError::Failed(e.to_string()))?;
     let Columns { input, output, .. } = columns;
-    let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let (samples, rate_hz) = (signals.len(), signals.rate_hz);
-    let Drawn { plots, report } = drawn(
-        &TableReport {
-            analysis,
-            file: &file,
-            input,
-            output,
-            rate_hz,
-            samples,
-        },
-        beside,
-    )?;
+    let magnitude = frf_csv::external_magnitude(input, output);
+    let table = TableReport {
+        analysis,
+        file: &path.file_name().unwrap_or_default().to_string_lossy(),
+        input,
+        output,
+        rate_hz: signals.rate_hz,
+        samples: signals.len(),
+    };
     Ok(Report {
         outcome: None,
         trip: None,
         recording: path.display().to_string(),
-        input: columns.input.clone(),
-        output: columns.output.clone(),
+        input: input.clone(),
+        output: output.clone(),
         ticks: signals.len(),
         overruns: 0,
         lost_records: 0,
@@ -236,10 +225,8 @@ fn report(
         rate_hz: signals.rate_hz,
         band_hz,
         periods: analysis.periods,
-        frf_csv: csv_path.display().to_string(),
-        plot: plots.get("bode").cloned().flatten(),
-        plots,
-        report,
+        frf_csv: write_frf(beside, "frf", &analysis.frf, &magnitude)?,
+        pages: PageFiles::write(&table, beside)?,
         frequencies: analysis.frf.len(),
         coherence_median: analysis.frf.median_coherence(),
         summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
@@ -248,27 +235,42 @@ fn report(
 
 impl Report {
     fn text(&self) -> String {
-        let periods = self
-            .periods
-            .map_or(String::new(), |count| format!(", {count} periods averaged"));
+        let Report {
+            recording,
+            ticks,
+            input,
+            output,
+            ..
+        } = self;
+        let periods = match self.periods {
+            Some(count) => format!("             {count} periods averaged\n"),
+            None => String::new(),
+        };
+        let coherence = self.coherence_median.unwrap_or(0.0);
+        let response = response_text(&self.frf_csv, self.frequencies, coherence);
+        let pages = pages_text(&self.pages);
+        let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         format!(
-            "  record     {}: {} samples at {} Hz from `{}` to `{}`{periods}\n  response   {} ({} frequencies, median coherence \
-             {:.4})\n{}  report     {}\n  residues   in `{}` per `{}` and s^2, where the table says 1/kg\n  misfit     {:.1} times the power \
-             of the noise\n{}",
-            self.recording,
-            self.ticks,
-            self.rate_hz,
-            self.input,
-            self.output,
-            self.frf_csv,
-            self.frequencies,
-            self.coherence_median.unwrap_or(0.0),
-            plots_text(&self.plots),
-            self.report,
-            self.output,
-            self.input,
-            self.summary.chi2_per_freedom().unwrap_or(0.0),
-            self.summary.text()
+            "  record     {recording}\n             {ticks} samples at {} from `{input}` to `{output}`\n{periods}{response}\n{pages}  residues   in `{output}` per `{input}` and s^2, in place of 1/kg below\n  fit        reduced chi-square {chi2:.3}\n{}",
+            hertz(self.rate_hz),
+            modal_output::text(&self.summary)
         )
+    }
+}
+
+/// A rate in nine significant digits: times in a file are decimal, and their quotient is not.
+fn hertz(rate_hz: f64) -> String {
+    let rounded: f64 = format!("{rate_hz:.8e}").parse().unwrap_or(rate_hz);
+    format!("{rounded} Hz")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rate_is_shown_without_rounding_errors() {
+        assert_eq!(hertz(2000.0000000000002), "2000 Hz");
+        assert_eq!(hertz(1234.5678), "1234.5678 Hz");
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::analysis_output::AnalysisOutputs;
+use super::analysis_output;
 use super::chirp::{ExcitationOptions, analysed, check};
 use super::chirp_plan::Expected;
 use super::error::CliError;
@@ -17,6 +17,7 @@ use crate::excitation;
 use crate::experiment::{self, ModeOverAmplitude, Plan, RunSummary, modes_over_amplitude};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
+use crate::report::run_pages::AnalysisOutputs;
 
 /// Odd lines, one in four left out.
 const LINES: [&str; 2] = [
@@ -109,7 +110,7 @@ struct RunMade {
 
 impl RunMade {
     fn ended(&self) -> Outcome {
-        if self.made.is_stopped() {
+        if self.made.is_cancelled() {
             Outcome::Failed
         } else {
             exit(&self.run)
@@ -147,7 +148,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             break;
         }
     }
-    let fitted: Vec<Vec<FittedMode>> = runs.iter().map(|run| run.made.fitted.clone()).collect();
+    let fitted: Vec<Vec<FittedMode>> = runs
+        .iter()
+        .map(|run| run.made.summary.modes.clone())
+        .collect();
     let modes = modes_over_amplitude(&fitted);
     let report = report(runs, &modes);
     if args.bench.json {
@@ -174,7 +178,7 @@ fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<R
     let told = RunSummary::of(&mut run)?;
     let made = match told.is_completed() {
         true => analysed(&run.path, config)?,
-        false => AnalysisOutputs::nothing("the run did not come to its end"),
+        false => AnalysisOutputs::run_incomplete(),
     };
     let made = RunMade {
         scale,
@@ -261,9 +265,10 @@ fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude])
             .made
             .linearity
             .as_ref()
-            .map_or_else(|| run.made.text(), linearity_output::text);
+            .map_or_else(|| analysis_output::text(&run.made), linearity_output::text);
         let page = run
             .made
+            .pages
             .report
             .as_ref()
             .map_or(String::new(), |path| format!("  report     {path}\n"));

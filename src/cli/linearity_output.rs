@@ -1,11 +1,11 @@
 //! Noise and nonlinear distortion of a multisine, as text.
 
-use super::table::table;
+use super::table::{labelled, table};
 use crate::identify::linearity::{BandLinearity, Linearity};
 
 /// The line of `bench chirp`.
 pub(super) fn line(linearity: &Linearity) -> String {
-    format!("  linearity  {}\n", linearity.why)
+    labelled("linearity", &linearity.why)
 }
 
 /// The line, and a table of the amplitudes in each band.

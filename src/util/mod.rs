@@ -4,6 +4,7 @@ pub mod atomic_file;
 pub mod checkpoint;
 pub(crate) mod finding;
 pub mod nearest;
+pub mod new_file;
 pub mod numeric;
 pub mod progress;
 pub mod quantity;

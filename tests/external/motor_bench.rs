@@ -180,7 +180,7 @@ fn the_residues_agree_at_the_motor_and_differ_at_the_load() {
         assert!(
             side.answer["why"]
                 .as_str()
-                .is_some_and(|why| why.contains("times the power of the noise"))
+                .is_some_and(|why| why.contains("reduced chi-square"))
         );
     }
     compare(&path, "motor_angle_rad", &motor, "+");

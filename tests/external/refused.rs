@@ -46,7 +46,7 @@ fn options_that_do_not_go_with_the_file_are_refused() {
             "--time t",
             &["no column `t`", "time_s, force_n, position_m"],
         ),
-        ("--time force_n", &["`force_n` is asked for twice"]),
+        ("--time force_n", &["`force_n` is selected twice"]),
         ("--time time_s --rate 1000", &["--rate"]),
         ("--rate 1000 --skip-periods 1", &["--period"]),
         (

@@ -1,0 +1,312 @@
+//! The files and the numbers of an analysed record: FRFs as CSV, plots, the page, modes, zeros and verdict.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::bench_run::RunReport;
+use super::page::page;
+use super::plots::{PLOT_KINDS, pictures};
+use super::summary::ReportSource;
+use crate::experiment::{Analysis, ClosedResponses};
+use crate::identify::Frf;
+use crate::identify::frf_csv::{self, FrfCsvError, METRES_PER_AMPERE, RATIO};
+use crate::identify::linearity::Linearity;
+use crate::identify::modal::{FittedMode, ModalFit, ModelOrder};
+use crate::identify::verdict::{Cnmp, UncertainZero, Verdict};
+use crate::report::ReportError;
+use crate::util::new_file::{free_path, write_new};
+
+/// Why the files of an analysis cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// A plot cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] ReportError),
+    /// An FRF cannot be written.
+    #[error(transparent)]
+    Frf(#[from] FrfCsvError),
+    /// Another file cannot be written.
+    #[error("cannot write {0}: {1}; free some space or choose another folder")]
+    File(PathBuf, std::io::Error),
+}
+
+/// Plots by kind; `None` where the data give none.
+pub type Plots = BTreeMap<&'static str, Option<String>>;
+
+/// The plots and the page of a record.
+#[derive(Clone, Debug, Serialize)]
+pub struct PageFiles {
+    /// The Bode plot.
+    pub plot: Option<String>,
+    /// All plots.
+    pub plots: Plots,
+    /// The page.
+    pub report: Option<String>,
+}
+
+impl Default for PageFiles {
+    fn default() -> Self {
+        let plots = PLOT_KINDS.into_iter().map(|kind| (kind, None)).collect();
+        PageFiles {
+            plot: None,
+            plots,
+            report: None,
+        }
+    }
+}
+
+impl PageFiles {
+    /// Draws a record and writes its plots and its page beside a path, under its name.
+    ///
+    /// # Errors
+    /// When a plot cannot be drawn, or a file cannot be written.
+    pub fn write(source: &dyn ReportSource, beside: &Path) -> Result<PageFiles, OutputError> {
+        let pictures = pictures(source)?;
+        let mut files = PageFiles::default();
+        for picture in &pictures {
+            let path = write_text(beside, picture.kind, "svg", &picture.svg)?;
+            files.plots.insert(picture.kind, Some(path));
+        }
+        files.plot = files.plots.get("bode").cloned().flatten();
+        files.report = Some(write_text(
+            beside,
+            "report",
+            "html",
+            &page(source, &pictures),
+        )?);
+        Ok(files)
+    }
+}
+
+fn write_text(
+    beside: &Path,
+    what: &str,
+    extension: &str,
+    text: &str,
+) -> Result<String, OutputError> {
+    let path = free_path(beside, what, extension);
+    write_new(&path, text).map_err(|error| OutputError::File(path.clone(), error))?;
+    Ok(path.display().to_string())
+}
+
+/// Writes an FRF beside a path, under its name; `magnitude` names its magnitude column.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_frf(
+    beside: &Path,
+    what: &str,
+    frf: &Frf,
+    magnitude: &str,
+) -> Result<String, OutputError> {
+    let path = free_path(beside, what, "csv");
+    frf_csv::write_new(&path, frf, magnitude)?;
+    Ok(path.display().to_string())
+}
+
+/// Modes, zeros and verdict; the names are a contract.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModalSummary {
+    /// The modes, slowest first.
+    pub modes: Vec<FittedMode>,
+    /// Zeros of the fit, with damping, in the band of the verdict; of a conjugate pair the one above the real axis.
+    pub zeros: Vec<UncertainZero>,
+    /// The verdict.
+    pub cnmp: Cnmp,
+    /// Its reasons.
+    pub why: String,
+    /// Reduced chi-square: 1 if the residual of the fit is noise.
+    pub fit_chi2_per_freedom: Option<f64>,
+    /// Delay beyond that of the configuration, by the fit.
+    pub fit_delay_s: Option<f64>,
+    /// Its standard deviation.
+    pub fit_delay_sigma_s: Option<f64>,
+    /// Phase lag over the modes beyond that of a minimum-phase system of the same magnitude: 360 for each pair of CNMP zeros.
+    pub phase_fall_deg: Option<f64>,
+    /// The modes of each significant model order: the stability chart.
+    pub orders: Vec<ModelOrder>,
+}
+
+impl ModalSummary {
+    /// The summary of a fit and its verdict.
+    pub fn new(fit: Option<&ModalFit>, verdict: &Verdict) -> ModalSummary {
+        ModalSummary {
+            modes: fit.map_or(Vec::new(), ModalFit::modes),
+            zeros: verdict.zeros.clone(),
+            cnmp: verdict.cnmp,
+            why: verdict.why.clone(),
+            fit_chi2_per_freedom: fit.map(|fit| fit.chi2_per_freedom),
+            fit_delay_s: fit.map(|fit| fit.delay_s().value),
+            fit_delay_sigma_s: fit.map(|fit| fit.delay_s().sigma),
+            phase_fall_deg: verdict.phase.map(|phase| -phase.excess_phase_deg),
+            orders: fit.map_or(Vec::new(), |fit| fit.orders.clone()),
+        }
+    }
+}
+
+/// Responses and margins of a closed loop; the names are a contract.
+#[derive(Clone, Debug, Serialize)]
+pub struct LoopOutputs {
+    /// L = P C, from error to reading.
+    pub loop_csv: String,
+    /// S, from reference to error.
+    pub sensitivity_csv: String,
+    /// T, from reference to reading.
+    pub complementary_csv: String,
+    /// Lowest frequency at which the measured |L| falls through 1.
+    pub crossover_rad_s: Option<f64>,
+    /// 180 degrees + arg L there.
+    pub phase_margin_deg: Option<f64>,
+    /// Its standard deviation.
+    pub phase_margin_sigma_deg: Option<f64>,
+    /// 1/max |S| in the swept band.
+    pub modulus_margin: f64,
+    /// Its standard deviation.
+    pub modulus_margin_sigma: f64,
+    /// That of the model.
+    pub predicted_modulus_margin: f64,
+}
+
+impl LoopOutputs {
+    fn write(closed: &ClosedResponses, beside: &Path) -> Result<LoopOutputs, OutputError> {
+        let margins = &closed.margins;
+        Ok(LoopOutputs {
+            loop_csv: write_frf(beside, "loop", &closed.loop_gain, RATIO)?,
+            sensitivity_csv: write_frf(beside, "sensitivity", &closed.sensitivity, RATIO)?,
+            complementary_csv: write_frf(beside, "complementary", &closed.complementary, RATIO)?,
+            crossover_rad_s: margins.crossover_rad_s,
+            phase_margin_deg: margins.phase_margin_deg.map(|margin| margin.value),
+            phase_margin_sigma_deg: margins.phase_margin_deg.map(|margin| margin.sigma),
+            modulus_margin: margins.modulus_margin.value,
+            modulus_margin_sigma: margins.modulus_margin.sigma,
+            predicted_modulus_margin: closed.predicted.modulus_margin,
+        })
+    }
+}
+
+/// Whether a run was analysed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnalysisStatus {
+    /// It was.
+    Analysed,
+    /// The run did not come to its end.
+    RunIncomplete,
+    /// The operator cancelled the analysis.
+    Cancelled,
+}
+
+/// The files and the numbers of an analysed run; `None` where there is no response. The names are a contract.
+#[derive(Clone, Debug, Serialize)]
+pub struct AnalysisOutputs {
+    /// Whether the run was analysed.
+    #[serde(skip)]
+    pub status: AnalysisStatus,
+    /// The FRF.
+    pub frf_csv: Option<String>,
+    /// The FRF with the measured delay removed from its phases.
+    pub frf_without_delay_csv: Option<String>,
+    /// Plots and page.
+    #[serde(flatten)]
+    pub pages: PageFiles,
+    /// Number of frequencies.
+    pub frequencies: usize,
+    /// Median coherence over the band.
+    pub coherence_median: Option<f64>,
+    /// Missing ticks that were interpolated.
+    pub filled_ticks: u64,
+    /// Mean time from a command to the position that its reading shows, by the model.
+    pub delay_s: Option<f64>,
+    /// Excess delay of the measured response over the model.
+    pub delay_beyond_model_s: Option<f64>,
+    /// Its standard deviation.
+    pub delay_beyond_model_sigma_s: Option<f64>,
+    /// Modes, zeros and verdict.
+    #[serde(flatten)]
+    pub summary: ModalSummary,
+    /// The loop, if it was closed.
+    #[serde(rename = "loop", skip_serializing_if = "Option::is_none")]
+    pub closed: Option<LoopOutputs>,
+    /// Distortion and noise, if a multisine omitted lines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linearity: Option<Linearity>,
+}
+
+impl AnalysisOutputs {
+    /// Writes the files of an analysed run beside a path, under its name.
+    ///
+    /// # Errors
+    /// When a plot cannot be drawn, or a file cannot be written.
+    pub fn write(run: &RunReport<'_>, beside: &Path) -> Result<AnalysisOutputs, OutputError> {
+        let analysis = run.analysis;
+        let without_delay = analysis.frf.without_delay(analysis.measured_delay_s());
+        let frf_csv = write_frf(beside, "frf", &analysis.frf, METRES_PER_AMPERE)?;
+        let frf_without_delay_csv = write_frf(
+            beside,
+            "frf_without_delay",
+            &without_delay,
+            METRES_PER_AMPERE,
+        )?;
+        let pages = PageFiles::write(run, beside)?;
+        let closed = analysis.closed.as_ref();
+        Ok(AnalysisOutputs {
+            frf_csv: Some(frf_csv),
+            frf_without_delay_csv: Some(frf_without_delay_csv),
+            pages,
+            closed: closed
+                .map(|closed| LoopOutputs::write(closed, beside))
+                .transpose()?,
+            ..AnalysisOutputs::numbers(analysis)
+        })
+    }
+
+    fn numbers(analysis: &Analysis) -> AnalysisOutputs {
+        AnalysisOutputs {
+            frequencies: analysis.frf.len(),
+            coherence_median: analysis.frf.median_coherence(),
+            filled_ticks: analysis.filled_ticks,
+            delay_s: Some(analysis.delay_s),
+            delay_beyond_model_s: analysis.excess_delay.map(|delay| delay.value),
+            delay_beyond_model_sigma_s: analysis.excess_delay.map(|delay| delay.sigma),
+            summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
+            linearity: analysis.linearity.clone(),
+            ..AnalysisOutputs::without_analysis(AnalysisStatus::Analysed, "")
+        }
+    }
+
+    fn without_analysis(status: AnalysisStatus, why: &str) -> AnalysisOutputs {
+        AnalysisOutputs {
+            status,
+            frf_csv: None,
+            frf_without_delay_csv: None,
+            pages: PageFiles::default(),
+            frequencies: 0,
+            coherence_median: None,
+            filled_ticks: 0,
+            delay_s: None,
+            delay_beyond_model_s: None,
+            delay_beyond_model_sigma_s: None,
+            summary: ModalSummary::new(None, &Verdict::undecided(why.into())),
+            closed: None,
+            linearity: None,
+        }
+    }
+
+    /// The outputs of a run that did not come to its end.
+    pub fn run_incomplete() -> AnalysisOutputs {
+        let why = "the run did not come to its end";
+        AnalysisOutputs::without_analysis(AnalysisStatus::RunIncomplete, why)
+    }
+
+    /// The outputs of a run whose analysis was cancelled.
+    pub fn cancelled() -> AnalysisOutputs {
+        let why = "stopped before the analysis was done; the recording is complete: `bench identify` analyses it";
+        AnalysisOutputs::without_analysis(AnalysisStatus::Cancelled, why)
+    }
+
+    /// Whether the operator cancelled the analysis.
+    pub fn is_cancelled(&self) -> bool {
+        self.status == AnalysisStatus::Cancelled
+    }
+}
