@@ -1,0 +1,436 @@
+//! The structure of the sources, read from their imports: every import points in the direction of ARCHITECTURE.md, and no
+//! files import each other, directly or through others.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use syn::visit::{self, Visit};
+use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
+
+/// The modules of the library; a module imports only from those that stand before it. The settings of plants and excitations
+/// live with what they set, and `config` composes them: so `model::plant` stands before `config`, the rest of `model` after it.
+const ORDER: [&str; 15] = [
+    "util",
+    "model::plant",
+    "excitation",
+    "config",
+    "model",
+    "control",
+    "rig",
+    "rt",
+    "recording",
+    "identify",
+    "experiment",
+    "report",
+    "doctor",
+    "daemon",
+    "cli",
+];
+
+/// A path as it is written, from the root of the crate.
+type ItemPath = Vec<String>;
+
+/// One file of the library.
+#[derive(Default)]
+struct Module {
+    file: PathBuf,
+    /// Names that are defined here.
+    defined: BTreeSet<String>,
+    /// Names that are re-exported, and what they stand for.
+    exported: BTreeMap<String, ItemPath>,
+    /// Modules all of whose names are re-exported.
+    globs: Vec<ItemPath>,
+    /// All that its code refers to.
+    uses: Vec<ItemPath>,
+}
+
+/// Reads one file: definitions, re-exports and references outside tests.
+struct Reader {
+    path: ItemPath,
+    is_facade: bool,
+    aliases: BTreeMap<String, ItemPath>,
+    module: Module,
+}
+
+impl Reader {
+    fn absolute(&self, segments: &[String]) -> Option<ItemPath> {
+        let mut base = match segments.first()?.as_str() {
+            "crate" => Vec::new(),
+            "self" => self.path.clone(),
+            "super" => self.path[..self.path.len().checked_sub(1)?].to_vec(),
+            name => self.aliases.get(name)?.clone(),
+        };
+        for segment in &segments[1..] {
+            match segment.as_str() {
+                "super" => drop(base.pop()),
+                "self" => {}
+                name => base.push(name.to_string()),
+            }
+        }
+        Some(base)
+    }
+
+    fn import(&mut self, tree: &UseTree, prefix: &[String], is_export: bool) {
+        match tree {
+            UseTree::Path(path) => {
+                let mut longer = prefix.to_vec();
+                longer.push(path.ident.to_string());
+                self.import(&path.tree, &longer, is_export);
+            }
+            UseTree::Group(group) => {
+                for tree in &group.items {
+                    self.import(tree, prefix, is_export);
+                }
+            }
+            UseTree::Name(name) => {
+                let name = name.ident.to_string();
+                self.name(prefix, &name, &name, is_export);
+            }
+            UseTree::Rename(rename) => {
+                let (from, to) = (rename.ident.to_string(), rename.rename.to_string());
+                self.name(prefix, &from, &to, is_export);
+            }
+            UseTree::Glob(_) => {
+                if let Some(path) = self.local(prefix) {
+                    if is_export {
+                        self.module.globs.push(path);
+                    } else {
+                        self.module.uses.push(path);
+                    }
+                }
+            }
+        }
+    }
+
+    fn name(&mut self, prefix: &[String], from: &str, to: &str, is_export: bool) {
+        let mut written = prefix.to_vec();
+        if from != "self" {
+            written.push(from.to_string());
+        }
+        let Some(path) = self.local(&written) else {
+            return;
+        };
+        let to = if from == "self" {
+            path.last().cloned().unwrap_or_default()
+        } else {
+            to.to_string()
+        };
+        if is_export {
+            self.module.exported.insert(to.clone(), path.clone());
+        } else {
+            self.module.uses.push(path.clone());
+        }
+        self.aliases.insert(to, path);
+    }
+
+    /// A path that begins in this crate; `child::Item` of a re-export begins with a module of its own.
+    fn local(&self, written: &[String]) -> Option<ItemPath> {
+        match written.first()?.as_str() {
+            "crate" | "self" | "super" => self.absolute(written),
+            first if self.module.defined.contains(first) => {
+                let mut path = self.path.clone();
+                path.extend_from_slice(written);
+                Some(path)
+            }
+            _ => None,
+        }
+    }
+}
+
+fn is_test(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("cfg")
+            && attribute
+                .parse_args::<syn::Ident>()
+                .is_ok_and(|word| word == "test")
+    })
+}
+
+impl<'ast> Visit<'ast> for Reader {
+    fn visit_item_use(&mut self, item: &'ast ItemUse) {
+        if !is_test(&item.attrs) {
+            let is_export = self.is_facade && !matches!(item.vis, Visibility::Inherited);
+            self.import(&item.tree, &[], is_export);
+        }
+    }
+
+    fn visit_item_mod(&mut self, item: &'ast ItemMod) {
+        if !is_test(&item.attrs) {
+            visit::visit_item_mod(self, item);
+        }
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        let segments: Vec<String> = path.segments.iter().map(|s| s.ident.to_string()).collect();
+        if segments.len() > 1
+            && let Some(path) = self.absolute(&segments)
+        {
+            self.module.uses.push(path);
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+fn names_of(item: &Item) -> Option<String> {
+    let ident = match item {
+        Item::Const(item) => &item.ident,
+        Item::Enum(item) => &item.ident,
+        Item::Fn(item) => &item.sig.ident,
+        Item::Mod(item) => &item.ident,
+        Item::Static(item) => &item.ident,
+        Item::Struct(item) => &item.ident,
+        Item::Trait(item) => &item.ident,
+        Item::Type(item) => &item.ident,
+        _ => return None,
+    };
+    Some(ident.to_string())
+}
+
+fn read(root: &Path, file: &Path) -> (ItemPath, Module) {
+    let relative = file.strip_prefix(root).expect("below src");
+    let mut path: ItemPath = relative
+        .with_extension("")
+        .iter()
+        .map(|part| part.to_string_lossy().into_owned())
+        .collect();
+    let is_facade = matches!(path.last().map(String::as_str), Some("mod" | "lib"))
+        || file.with_extension("").is_dir();
+    if matches!(path.last().map(String::as_str), Some("mod" | "lib")) {
+        path.pop();
+    }
+    let text = std::fs::read_to_string(file).expect("readable");
+    let syntax = syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    let mut reader = Reader {
+        path: path.clone(),
+        is_facade,
+        aliases: BTreeMap::new(),
+        module: Module {
+            file: relative.to_path_buf(),
+            defined: syntax.items.iter().filter_map(names_of).collect(),
+            ..Module::default()
+        },
+    };
+    // Imports first: a path may use a name that is imported further down.
+    for item in &syntax.items {
+        if let Item::Use(item) = item {
+            reader.visit_item_use(item);
+        }
+    }
+    for item in &syntax.items {
+        if !matches!(item, Item::Use(_)) {
+            reader.visit_item(item);
+        }
+    }
+    (path, reader.module)
+}
+
+fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            rust_files(&path, files);
+        } else if path.extension().is_some_and(|e| e == "rs")
+            && !path.ends_with("main.rs")
+            && !path.ends_with("tests.rs")
+            && !path.components().any(|part| part.as_os_str() == "tests")
+        {
+            files.push(path);
+        }
+    }
+}
+
+/// The library as files and what each of them imports.
+struct Library {
+    modules: BTreeMap<ItemPath, Module>,
+}
+
+impl Library {
+    fn read(sources: &str) -> Library {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(sources);
+        let mut files = Vec::new();
+        rust_files(&root, &mut files);
+        let modules = files.iter().map(|file| read(&root, file)).collect();
+        Library { modules }
+    }
+
+    /// The module whose file defines what `path` stands for, through re-exports.
+    fn definition(&self, path: &[String]) -> Option<ItemPath> {
+        let mut module: ItemPath = Vec::new();
+        for (index, segment) in path.iter().enumerate() {
+            let mut child = module.clone();
+            child.push(segment.clone());
+            if self.modules.contains_key(&child) {
+                module = child;
+                continue;
+            }
+            let here = self.modules.get(&module)?;
+            if let Some(target) = here.exported.get(segment) {
+                let mut longer = target.clone();
+                longer.extend_from_slice(&path[index + 1..]);
+                return self.definition(&longer);
+            }
+            if !here.defined.contains(segment) {
+                return here
+                    .globs
+                    .iter()
+                    .find_map(|glob| self.defines(glob, segment))
+                    .or(Some(module));
+            }
+            return Some(module);
+        }
+        Some(module)
+    }
+
+    fn defines(&self, module: &[String], name: &str) -> Option<ItemPath> {
+        self.modules
+            .get(module)?
+            .defined
+            .contains(name)
+            .then(|| module.to_vec())
+    }
+
+    /// What each module imports, itself left out.
+    fn imports(&self) -> BTreeMap<&ItemPath, BTreeSet<ItemPath>> {
+        self.modules
+            .iter()
+            .map(|(path, module)| {
+                let mut targets: BTreeSet<ItemPath> = module
+                    .uses
+                    .iter()
+                    .filter_map(|used| self.definition(used))
+                    .collect();
+                targets.remove(path);
+                (path, targets)
+            })
+            .collect()
+    }
+
+    fn file(&self, module: &ItemPath) -> String {
+        self.modules[module].file.display().to_string()
+    }
+}
+
+/// The place of a module in [`ORDER`]: that of its own path, or of the folder that it is in.
+fn rank(module: &ItemPath) -> Option<usize> {
+    let place = |length: usize| {
+        let path = module[..length].join("::");
+        ORDER.iter().position(|entry| *entry == path)
+    };
+    let found = (1..=module.len()).rev().find_map(place);
+    assert!(
+        found.is_some() || module.is_empty(),
+        "{module:?} has no place in ORDER"
+    );
+    found
+}
+
+#[test]
+fn imports_point_in_the_direction_of_the_architecture() {
+    let library = Library::read("src");
+    let mut wrong = Vec::new();
+    for (from, targets) in library.imports() {
+        let Some(own) = rank(from) else { continue };
+        for to in &targets {
+            if rank(to).is_some_and(|other| other > own) {
+                wrong.push(format!(
+                    "{} imports {}",
+                    library.file(from),
+                    library.file(to)
+                ));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "against the direction:\n{}",
+        wrong.join("\n")
+    );
+}
+
+type Graph = BTreeMap<ItemPath, BTreeSet<ItemPath>>;
+
+/// All that is imported by `start`, directly or through others.
+fn reachable(graph: &Graph, start: &ItemPath) -> BTreeSet<ItemPath> {
+    let mut found = BTreeSet::new();
+    let mut waiting = vec![start];
+    while let Some(module) = waiting.pop() {
+        for target in graph.get(module).into_iter().flatten() {
+            if found.insert(target.clone()) {
+                waiting.push(target);
+            }
+        }
+    }
+    found
+}
+
+/// Sets of modules each of which imports all others of its set, directly or through others.
+fn circles(graph: &Graph) -> BTreeSet<BTreeSet<ItemPath>> {
+    let reached: Graph = graph
+        .keys()
+        .map(|module| (module.clone(), reachable(graph, module)))
+        .collect();
+    let in_circle = reached
+        .iter()
+        .filter(|(module, targets)| targets.contains(*module));
+    in_circle
+        .map(|(module, targets)| {
+            let back = |target: &&ItemPath| reached[*target].contains(module);
+            targets.iter().filter(back).cloned().collect()
+        })
+        .collect()
+}
+
+fn circles_of_files(sources: &str) -> Vec<String> {
+    let library = Library::read(sources);
+    let imports = library.imports();
+    let graph: Graph = imports
+        .into_iter()
+        .map(|(path, targets)| (path.clone(), targets))
+        .collect();
+    circles(&graph)
+        .iter()
+        .map(|circle| {
+            let files: Vec<String> = circle.iter().map(|path| library.file(path)).collect();
+            files.join(", ")
+        })
+        .collect()
+}
+
+#[test]
+fn no_files_of_the_program_import_each_other() {
+    let found = circles_of_files("src");
+    assert!(found.is_empty(), "circles of files:\n{}", found.join("\n"));
+}
+
+#[test]
+fn no_files_of_the_drivers_import_each_other() {
+    let found = circles_of_files("hal/src");
+    assert!(found.is_empty(), "circles of files:\n{}", found.join("\n"));
+}
+
+/// The two tests above have to be able to fail.
+#[test]
+fn a_circle_of_three_files_is_found() {
+    let name = |text: &str| vec![text.to_string()];
+    let edges = [("a", "b"), ("b", "c"), ("c", "a"), ("d", "a"), ("c", "e")];
+    let mut graph = Graph::new();
+    for (from, to) in edges {
+        graph.entry(name(from)).or_default().insert(name(to));
+        graph.entry(name(to)).or_default();
+    }
+    let circle = BTreeSet::from([name("a"), name("b"), name("c")]);
+    assert_eq!(circles(&graph), BTreeSet::from([circle]));
+}
+
+#[test]
+fn the_imports_of_a_known_file_are_found() {
+    let library = Library::read("src");
+    let servo: ItemPath = ["rt", "servo"].map(String::from).into();
+    let imports = library.imports();
+    let files: Vec<String> = imports[&servo].iter().map(|to| library.file(to)).collect();
+    assert!(files.contains(&"rt/interlock.rs".to_string()), "{files:?}");
+    assert!(
+        !files.iter().any(|file| file.starts_with("cli")),
+        "{files:?}"
+    );
+}
