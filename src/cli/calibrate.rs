@@ -5,16 +5,18 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::error::CliError;
+use super::help::with_setting;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
-use crate::config::{Config, Purpose};
+use crate::config::{Config, OptionSetting, Purpose};
 use crate::experiment::calibration;
 use crate::experiment::{RunSummary, Runner};
 use crate::rig::calibration::{AmplifierCalibration, Calibration, ChainCalibration};
 use crate::util::progress::Progress;
+use crate::util::quantity::Current;
 
 /// Arguments of the command.
 #[derive(Clone, Debug, clap::Args)]
@@ -23,9 +25,10 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     run: RunOptions,
-    /// Largest current in amperes, to both sides
-    #[arg(long, value_name = "A", allow_hyphen_values = true)]
-    amplitude: Option<f64>,
+    /// Largest current, to both sides
+    #[arg(long, value_name = "CURRENT", allow_hyphen_values = true,
+        help = with_setting("Largest current, to both sides", "calibrate.amplitude_a"))]
+    amplitude: Option<Current>,
     /// The calibration's file [default: beside the recording, under its name]
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
@@ -67,8 +70,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 fn config(args: &Args) -> Result<Config, CliError> {
-    let set = |a| format!("calibrate.amplitude_a={}", toml::Value::from(a));
-    let amplitude = args.amplitude.map(set);
+    let amplitude = args.amplitude.as_ref().map(|amplitude| {
+        let option = format!("--amplitude {amplitude}");
+        OptionSetting::new("calibrate.amplitude_a", amplitude.si(), option)
+    });
     let config = args.bench.load(Purpose::Chirp, amplitude.as_slice())?;
     Ok(calibration::settings(config))
 }

@@ -23,6 +23,7 @@ use crate::rig::devices;
 use crate::rt::thread::Pace;
 use crate::util::atomic_file::write_whole;
 use crate::util::progress::Progress;
+use crate::util::quantity::{OfRatio, si};
 
 /// Section 5.2.2 was identified at 1 kHz; the sweep has to stay below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
@@ -58,10 +59,10 @@ pub(super) struct Args {
     #[arg(long)]
     keep_recordings: bool,
     /// How exactly an asymmetry can be put on, for the recommendation [default: half a step of 0.5 g]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = si::<OfRatio>)]
     asymmetry_tolerance: Option<f64>,
     /// How exactly an operating point can be set, as a ratio of the beam length
-    #[arg(long, value_name = "RATIO", default_value_t = 0.002)]
+    #[arg(long, value_name = "RATIO", default_value_t = 0.002, value_parser = si::<OfRatio>)]
     operating_point_tolerance: f64,
     /// Points at a time [default: one a processor]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

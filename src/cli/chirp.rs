@@ -1,19 +1,29 @@
 //! `bench chirp`: excite, record, estimate the frequency response.
 
+use std::path::Path;
+
+use clap::ValueEnum;
+use serde::Serialize;
+
 use super::analysis_output::{self, analyse_and_write};
-use super::chirp_plan::{Expected, shape, show};
+use super::chirp_plan::{Expected, show};
 use super::error::CliError;
+use super::excitation_options::ExcitationOptions;
+use super::help::with_setting;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
+use super::output::print_text;
+use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, exit, run_text};
-use crate::config::{Config, Purpose};
+use super::table::{labelled, wrap};
+use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
 use crate::excitation::{self, Extremes};
 use crate::experiment::{self, Plan, RunSummary, abandon_on_signal};
-use crate::model::plant::DiscretePlant;
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
-use serde::Serialize;
-use std::path::Path;
+use crate::rig::devices;
+use crate::util::progress::Progress;
+use crate::util::quantity::Time;
 
 /// Which bench, and how to excite it.
 #[derive(Clone, Debug, clap::Args)]
@@ -22,96 +32,56 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     run: RunOptions,
-    /// What to excite with: chirp, multisine, stepped_sine or prbs
-    #[arg(long, value_name = "KIND")]
-    excitation: Option<String>,
+    /// What to excite with
+    #[arg(long, value_name = "KIND", help = with_setting("What to excite with", "excitation.kind"))]
+    excitation: Option<ExcitationKind>,
     #[command(flatten)]
     band: ExcitationOptions,
-    /// Length of the sweep in seconds
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    duration: Option<f64>,
-    /// How the frequency runs over time: linear or logarithmic
-    #[arg(long, value_name = "KIND")]
-    sweep: Option<String>,
-    /// Only say what the run would do: travel, current, heat, duration; nothing moves
+    /// Length of the sweep
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true,
+        help = with_setting("Length of the sweep", "chirp.duration_s"))]
+    duration: Option<Time>,
+    /// Frequency over time
+    #[arg(long, value_name = "KIND", help = with_setting("Frequency over time", "chirp.sweep"))]
+    sweep: Option<Sweep>,
+    /// Only print what the run would do: travel, current, heat, duration; no motion
     #[arg(long)]
     plan: bool,
 }
 
-/// Which frequencies, and with how much.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct ExcitationOptions {
-    /// First frequency in hertz
-    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
-    start: Option<f64>,
-    /// Last frequency in hertz
-    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
-    stop: Option<f64>,
-    /// The same amplitude in amperes at all frequencies
-    #[arg(long, value_name = "A", allow_hyphen_values = true)]
-    amplitude: Option<f64>,
-    /// Amplitude over frequency for the same displacement everywhere, by the model or by an FRF measured before; a stepped sine
-    /// takes the model if neither this nor --amplitude is given
-    #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
-    shape: Option<String>,
-}
-
-impl ExcitationOptions {
-    pub(super) fn sets(&self) -> Vec<String> {
-        let number = |(key, value): (&str, Option<f64>)| {
-            value.map(|v| format!("chirp.{key}={}", toml::Value::from(v)))
-        };
-        let point = |a: f64| {
-            format!(
-                "chirp.amplitude=[{{ frequency_hz = 1.0, current_a = {} }}]",
-                toml::Value::from(a)
-            )
-        };
-        let binary = |a: f64| format!("prbs.amplitude_a={}", toml::Value::from(a));
-        let flat = self
-            .amplitude
-            .map(point)
-            .into_iter()
-            .chain(self.amplitude.map(binary));
-        [("start_hz", self.start), ("stop_hz", self.stop)]
-            .into_iter()
-            .filter_map(number)
-            .chain(flat)
-            .collect()
-    }
-
-    /// The settings with the amplitude shaped as asked for.
-    pub(super) fn shaped(&self, config: Config) -> Result<Config, CliError> {
-        shape(config, self.shape.as_deref(), self.amplitude.is_some())
-    }
-}
-
 impl Args {
-    fn sets(&self) -> Vec<String> {
-        let text = |key: &str, value: &Option<String>| {
-            value
-                .as_ref()
-                .map(|value| format!("{key}={}", toml::Value::from(value.as_str())))
-        };
-        let words = text("chirp.sweep", &self.sweep)
-            .into_iter()
-            .chain(text("excitation.kind", &self.excitation));
-        let duration = self
-            .duration
-            .map(|s| format!("chirp.duration_s={}", toml::Value::from(s)));
-        self.band
-            .sets()
-            .into_iter()
-            .chain(duration)
-            .chain(words)
-            .collect()
+    fn settings(&self) -> Vec<OptionSetting> {
+        let mut settings = self.band.settings();
+        if let Some(duration) = &self.duration {
+            let option = format!("--duration {duration}");
+            settings.push(OptionSetting::new(
+                "chirp.duration_s",
+                duration.si(),
+                option,
+            ));
+        }
+        if let Some(sweep) = self.sweep {
+            let option = format!("--sweep {}", word(sweep));
+            settings.push(OptionSetting::new("chirp.sweep", word(sweep), option));
+        }
+        if let Some(kind) = self.excitation {
+            let option = format!("--excitation {}", word(kind));
+            settings.push(OptionSetting::new("excitation.kind", word(kind), option));
+        }
+        settings
     }
 
-    /// The settings, with the amplitude shaped as asked for.
+    /// The configuration with the requested amplitude over frequency.
     fn config(&self) -> Result<Config, CliError> {
-        self.band
-            .shaped(self.bench.load(Purpose::Chirp, &self.sets())?)
+        let config = self.bench.load(Purpose::Chirp, &self.settings())?;
+        self.band.shaped(config)
     }
+}
+
+/// The word of a value in help and settings.
+fn word(value: impl ValueEnum) -> String {
+    let value = value.to_possible_value();
+    value.map_or(String::new(), |value| value.get_name().to_string())
 }
 
 /// The JSON object of the command.
@@ -131,6 +101,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     if args.plan {
         return show(&config, &expected, args.bench.json);
     }
+    if !args.bench.json {
+        print_text(&plan_text(&config, &expected))?;
+    }
     let plan = Plan::chirp(config.clone());
     let mut run = args.run.run(&plan, "chirp")?;
     let report = RunSummary::of(&mut run)?;
@@ -144,7 +117,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         expected,
         made,
     };
-    close(run, &report, args.bench.json, &text(&report, &config))?;
+    let text = run_text(&report.run, &config) + &analysis_output::text(&report.made);
+    close(run, &report, args.bench.json, &text)?;
     Ok(if report.made.is_cancelled() {
         Outcome::Failed
     } else {
@@ -152,20 +126,19 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     })
 }
 
-/// The analysis, which a person may stop: the recording is whole all the same.
+/// The analysis, which can be cancelled: the recording is complete all the same.
 pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
-    let (of, config) = (path.to_path_buf(), config.clone());
-    let made = abandon_on_signal(move || analyse_and_write(&Recording::open(&of)?, &config, &of));
-    let made = made
-        .map_err(|error| CliError::Failed(error.to_string()))?
-        .unwrap_or(Ok(AnalysisOutputs::cancelled()));
-    let kept = |error| {
+    let _line = ProgressLine::show(&Progress::new("analysing"));
+    let (recording, config) = (path.to_path_buf(), config.clone());
+    let work = move || analyse_and_write(&Recording::open(&recording)?, &config, &recording);
+    let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
+    let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));
+    outputs.map_err(|error| {
+        let path = path.display();
         CliError::Failed(format!(
-            "{error}; the run itself is whole, in {}",
-            path.display()
+            "{error}; the recording of the run is complete: {path}"
         ))
-    };
-    made.map_err(kept)
+    })
 }
 
 /// Refuses an excitation that would trip an interlock, by the model of the whole rig; returns what to expect.
@@ -173,17 +146,30 @@ pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
     Ok(experiment::predicted_extremes(config)?)
 }
 
-/// The model of the whole rig.
-pub(super) fn rig(config: &Config) -> Result<DiscretePlant, CliError> {
-    Ok(experiment::rig_model(config)?)
+/// What the run will do, printed before it starts.
+fn plan_text(config: &Config, expected: &Expected) -> String {
+    let (words, travel_um) = (excitation::words(config), expected.travel_m * 1e6);
+    let plan = wrap(&format!("{words}; expected travel {travel_um:.0} um"), 0);
+    plan + &unmodelled_text(config)
 }
 
-fn text(report: &Report, config: &Config) -> String {
-    format!(
-        "{}; expected travel {:.0} um\n{}{}",
-        excitation::words(config),
-        report.expected_travel_m * 1e6,
-        run_text(&report.run, config),
-        analysis_output::text(&report.made),
-    )
+/// Modes of the simulated stage that the model of the plant does not have.
+fn unmodelled_text(config: &Config) -> String {
+    let frequencies = config.sim.unmodelled.iter().map(|mode| mode.frequency_hz);
+    let (low_hz, high_hz) = config.chirp.band_hz();
+    let inside: Vec<f64> = frequencies
+        .filter(|hz| (low_hz..=high_hz).contains(hz))
+        .collect();
+    if inside.is_empty() || !devices::is_simulated(config) {
+        return String::new();
+    }
+    let (count, lowest) = (
+        inside.len(),
+        inside.iter().copied().fold(f64::INFINITY, f64::min),
+    );
+    let highest = inside.iter().copied().fold(0.0, f64::max);
+    let text = format!(
+        "the simulated stage has {count} modes from {lowest} to {highest} Hz that are not part of the model (sim.unmodelled); the analysis finds them as well"
+    );
+    labelled("note", &text)
 }

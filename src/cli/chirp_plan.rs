@@ -5,12 +5,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::chirp::rig;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
 use crate::config::{AmplitudePoint, Config, ExcitationKind};
 use crate::excitation::{CurrentLimit, Extremes, LARGEST_SPAN, of, shaped_amplitude, words};
+use crate::experiment::rig_model;
 use crate::identify::frf_csv;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 
@@ -156,7 +156,8 @@ pub(super) fn shape(
 
 /// The lines of a multisine add up: all of them smaller, until the sum moves the stage no farther.
 fn lower_to(config: &mut Config, travel_m: f64) -> Result<(), CliError> {
-    let share = (travel_m / Extremes::of(&of(config), config, &rig(config)?).travel_m).min(1.0);
+    let share =
+        (travel_m / Extremes::of(&of(config), config, &rig_model(config)?).travel_m).min(1.0);
     config
         .chirp
         .amplitude

@@ -5,143 +5,22 @@ use serde::Serialize;
 use super::analysis_output;
 use super::chirp::analysed;
 use super::chirp_plan::Expected;
-use super::controller_choice::ControllerChoice;
+pub(super) use super::control_options::Args;
 use super::error::CliError;
 use super::margins::{closed_loop, require_modulus_margin, text as margins_text};
-use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::run_options::{RunOptions, close, exit, run_text};
+use super::output::print_text;
+use super::run_options::{close, exit, run_text};
+use super::table::labelled;
 use crate::config::{Config, Purpose, ReferenceSettings};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
+use crate::excitation;
 use crate::experiment::{Measured, Plan, RunSummary, measure};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
-use crate::util::quantity;
 
 /// A step is predicted over as many ticks at most: 200 s at 5 kHz, however long the run.
 const PREDICTED_TICKS: usize = 1_000_000;
-
-/// Which loop, and what it follows.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct Args {
-    #[command(flatten)]
-    bench: BenchOptions,
-    #[command(flatten)]
-    choice: ControllerChoice,
-    #[command(flatten)]
-    run: RunOptions,
-    /// What to follow: step, hold, ramp, sine, chirp (identification in closed loop), or a CSV file with time_s,reference_m
-    #[arg(long, value_name = "KIND|FILE")]
-    reference: Option<String>,
-    /// Height of step and ramp, amplitude of the sine: 50um or metres [default: 50um]; of a chirp the largest travel, by
-    /// the model [default: 20um]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
-    amplitude: Option<String>,
-    /// Frequency of the sine in hertz [default: 1]
-    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
-    frequency: Option<f64>,
-    /// Speed of the ramp in metres per second [default: 1e-4]
-    #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
-    speed: Option<f64>,
-    /// Seconds with the loop closed; of a chirp the length of its sweep
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    duration: Option<f64>,
-}
-
-impl Args {
-    /// The settings that the options stand for.
-    fn sets(&self) -> Result<Vec<String>, CliError> {
-        self.refuse_idle()?;
-        let number = |x: f64| toml::Value::from(x).to_string();
-        let mut sets = self.choice.sets();
-        let amplitude = self
-            .amplitude
-            .as_deref()
-            .map(quantity::metres)
-            .transpose()
-            .map_err(|e| CliError::Usage(e.to_string()))?;
-        let mut set = |key: &str, value: String| sets.push(format!("control.{key}={value}"));
-        let swept = self.reference.as_deref() == Some("chirp");
-        if let Some(duration) = self.duration.filter(|_| !swept) {
-            set("duration_s", number(duration));
-        }
-        let height = number(amplitude.unwrap_or(50e-6));
-        match self.reference.as_deref() {
-            None if self.amplitude.is_some() => set("reference.amplitude_m", height),
-            None => {}
-            Some("hold") => set("reference", "{ kind = \"hold\" }".into()),
-            Some("step") => set(
-                "reference",
-                format!("{{ kind = \"step\", amplitude_m = {height}, at_s = 0.2 }}"),
-            ),
-            Some("ramp") => {
-                let speed = number(self.speed.unwrap_or(1e-4));
-                set(
-                    "reference",
-                    format!(
-                        "{{ kind = \"ramp\", amplitude_m = {height}, speed_m_per_s = {speed}, at_s = 0.2 }}"
-                    ),
-                );
-            }
-            Some("sine") => {
-                let frequency = number(self.frequency.unwrap_or(1.0));
-                set(
-                    "reference",
-                    format!(
-                        "{{ kind = \"sine\", amplitude_m = {height}, frequency_hz = {frequency} }}"
-                    ),
-                );
-            }
-            Some("chirp") => {
-                let travel = number(amplitude.unwrap_or(20e-6));
-                set(
-                    "reference",
-                    format!("{{ kind = \"chirp\", travel_m = {travel} }}"),
-                );
-            }
-            Some(path) => set(
-                "reference",
-                format!("{{ kind = \"file\", path = {} }}", toml::Value::from(path)),
-            ),
-        }
-        sets.extend(
-            self.duration
-                .filter(|_| swept)
-                .map(|duration| format!("chirp.duration_s={}", number(duration))),
-        );
-        Ok(sets)
-    }
-
-    /// Refuses an option that the reference has no use for.
-    fn refuse_idle(&self) -> Result<(), CliError> {
-        let kind = self.reference.as_deref();
-        let high =
-            !matches!(kind, Some(kind) if !["step", "ramp", "sine", "chirp"].contains(&kind));
-        let idle = [
-            (
-                self.amplitude.is_some() && !high,
-                "--amplitude",
-                "step, ramp, sine or chirp",
-            ),
-            (
-                self.frequency.is_some() && kind != Some("sine"),
-                "--frequency",
-                "sine",
-            ),
-            (
-                self.speed.is_some() && kind != Some("ramp"),
-                "--speed",
-                "ramp",
-            ),
-        ];
-        match idle.iter().find(|(idle, ..)| *idle) {
-            Some((_, option, kinds)) => Err(CliError::Usage(format!(
-                "{option} goes with --reference {kinds} only"
-            ))),
-            None => Ok(()),
-        }
-    }
-}
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
@@ -166,7 +45,7 @@ struct Predicted {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = args.bench.load(Purpose::Control, &args.sets()?)?;
+    let config = args.bench.load(Purpose::Control, &args.settings()?)?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins();
     require_modulus_margin(&config, &margins)?;
@@ -177,6 +56,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     let predicted = Predicted { margins, step };
     let plan = Plan::control(config.clone())?;
+    let expected = plan.predicted_extremes.as_ref().map(Expected::of);
+    if !args.bench.json {
+        print_text(&plan_text(&config, &predicted, expected.as_ref()))?;
+    }
     let mut run = args.run.run(&plan, "control")?;
     let report = RunSummary::of(&mut run)?;
     let completed = report.is_completed();
@@ -190,7 +73,6 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         (true, false) => Some(AnalysisOutputs::run_incomplete()),
         (false, _) => None,
     };
-    let expected = plan.predicted_extremes.as_ref().map(Expected::of);
     let report = Report {
         run: report,
         predicted,
@@ -222,46 +104,78 @@ fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetri
         .then(|| step_metrics(&positions, amplitude_m, config.servo.period_s()))
 }
 
-fn text(report: &Report, config: &Config) -> String {
-    let milliseconds = |s: Option<f64>| s.map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
-    let predicted = report.predicted.step.map_or(String::new(), |step| {
-        format!(
-            "  predicted  settling {}, overshoot {:.1} %\n",
-            milliseconds(step.settling_time_s),
-            step.overshoot_percent
+/// Margins, reference and predicted step, printed before the run.
+fn plan_text(config: &Config, predicted: &Predicted, expected: Option<&Expected>) -> String {
+    let margins = margins_text(config, &predicted.margins);
+    let reference = labelled("reference", &reference_text(config));
+    let step = predicted.step.as_ref().map_or(String::new(), |step| {
+        labelled("predicted", &step_text(step))
+    });
+    let travel = expected.map_or(String::new(), |expected| {
+        let travel_um = expected.travel_m * 1e6;
+        labelled(
+            "expected",
+            &format!("travel of {travel_um:.1} um by the model"),
         )
     });
-    if let Some(made) = &report.made {
-        let margins = margins_text(config, &report.predicted.margins);
-        let travel_um = report
-            .expected
-            .map_or(0.0, |expected| expected.travel_m * 1e6);
-        let run = run_text(&report.run, config);
-        return format!(
-            "{margins}  expected   travel of {travel_um:.1} um by the model\n{run}{}",
-            analysis_output::text(made)
-        );
+    margins + &reference + &step + &travel
+}
+
+/// The reference, and how long the loop is closed.
+fn reference_text(config: &Config) -> String {
+    let um = |metres: f64| format!("{} um", (metres * 1e9).round() / 1e3);
+    let duration_s = config.control.duration_s;
+    let reference = match &config.control.reference {
+        ReferenceSettings::Hold => "the position at rest".to_string(),
+        ReferenceSettings::Step { amplitude_m, at_s } => {
+            format!("step of {} at {at_s} s", um(*amplitude_m))
+        }
+        ReferenceSettings::Ramp {
+            amplitude_m,
+            speed_m_per_s,
+            at_s,
+        } => format!(
+            "ramp to {} at {}/s from {at_s} s",
+            um(*amplitude_m),
+            um(*speed_m_per_s)
+        ),
+        ReferenceSettings::Sine {
+            amplitude_m,
+            frequency_hz,
+        } => format!("sine of {} at {frequency_hz} Hz", um(*amplitude_m)),
+        ReferenceSettings::Chirp { .. } => return excitation::swept_words(config),
+        ReferenceSettings::File { path } => format!("the file {path}"),
+    };
+    format!("{reference}; the loop is closed for {duration_s} s")
+}
+
+fn step_text(step: &StepMetrics) -> String {
+    let settling = step
+        .settling_time_s
+        .map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
+    let overshoot = step.overshoot_percent;
+    format!("settling to 2 % in {settling}, overshoot {overshoot:.1} %")
+}
+
+/// How the run went and what it shows.
+fn text(report: &Report, config: &Config) -> String {
+    let run = run_text(&report.run, config);
+    match &report.made {
+        Some(made) => run + &analysis_output::text(made),
+        None => measured_text(report.measured.as_ref()) + &run,
     }
-    let measured = report.measured.as_ref().map_or(
-        "  measured   nothing: the run did not reach a steady state\n".to_string(),
-        |m| {
-            let step = m.step.map_or(String::new(), |step| {
-                format!(
-                    "settling {}, overshoot {:.1} %; ",
-                    milliseconds(step.settling_time_s),
-                    step.overshoot_percent
-                )
-            });
-            format!(
-                "  measured   {step}steady state: mean error {:+.4} um, sigma {:.4} um\n",
-                m.steady_state_mean_error_m * 1e6,
-                m.steady_state_sigma_m * 1e6
-            )
-        },
+}
+
+fn measured_text(measured: Option<&Measured>) -> String {
+    let Some(measured) = measured else {
+        return labelled("measured", "nothing: the run did not reach a steady state");
+    };
+    let step = measured.step.as_ref().map(step_text);
+    let steady = format!(
+        "steady state: mean error {:+.4} um, sigma {:.4} um",
+        measured.steady_state_mean_error_m * 1e6,
+        measured.steady_state_sigma_m * 1e6
     );
-    format!(
-        "{}{predicted}{measured}{}",
-        margins_text(config, &report.predicted.margins),
-        run_text(&report.run, config)
-    )
+    let parts: Vec<String> = step.into_iter().chain([steady]).collect();
+    labelled("measured", &parts.join("; "))
 }

@@ -1,5 +1,8 @@
 //! Which controller: an option of `bench control` and `bench margins`.
 
+use super::help::with_setting;
+use crate::config::{OptionSetting, profiles};
+
 /// Which controller.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[group(multiple = false)]
@@ -10,22 +13,28 @@ pub(super) struct ControllerChoice {
     /// The slow controller of the thesis, Eq. (6-6)
     #[arg(long)]
     slow: bool,
-    /// A TOML file with sections
-    #[arg(long, value_name = "FILE")]
+    /// A controller by name, or a TOML file with sections
+    #[arg(long, value_name = "NAME|FILE", help = controller_help())]
     controller: Option<String>,
 }
 
 impl ControllerChoice {
     /// The setting that the choice stands for.
-    pub fn sets(&self) -> Vec<String> {
-        let name = match (self.fast, self.slow, &self.controller) {
-            (true, _, _) => Some("fast"),
-            (_, true, _) => Some("slow"),
-            (_, _, Some(file)) => Some(file.as_str()),
-            _ => None,
+    pub fn settings(&self) -> Vec<OptionSetting> {
+        let (name, option) = match (self.fast, self.slow, &self.controller) {
+            (true, _, _) => ("fast", "--fast".to_string()),
+            (_, true, _) => ("slow", "--slow".to_string()),
+            (_, _, Some(file)) => (file.as_str(), format!("--controller {file}")),
+            _ => return Vec::new(),
         };
-        name.map(|name| format!("control.controller={}", toml::Value::from(name)))
-            .into_iter()
-            .collect()
+        vec![OptionSetting::new("control.controller", name, option)]
     }
+}
+
+fn controller_help() -> String {
+    let names = profiles::names(profiles::CONTROLLERS);
+    let text = format!(
+        "A controller by name ({names}), or a TOML file with a `title` and one [[section]] for each factor of C(s). Kinds of section: gain, integrator, zero_pole, pole, pole_pair, biquad, and coefficients with `numerator` and `denominator` by falling powers of s"
+    );
+    with_setting(&text, "control.controller")
 }

@@ -82,12 +82,16 @@ fn again(args: &Args) -> String {
     [
         one("--config", config),
         sets,
-        one("--operating-point", operating_point),
-        one("--asymmetry", asymmetry),
-        one("--seed", &seed.map(|seed| seed.to_string())),
+        one("--operating-point", &text(operating_point)),
+        one("--asymmetry", &text(asymmetry)),
+        one("--seed", &text(seed)),
         one("--out", &out),
     ]
     .concat()
+}
+
+fn text(value: &Option<impl ToString>) -> Option<String> {
+    value.as_ref().map(ToString::to_string)
 }
 
 /// As a shell takes it.
@@ -109,7 +113,7 @@ mod tests {
         let bench = BenchOptions {
             config: Some("my bench.toml".into()),
             sets: vec!["loop.rate_hz=1000".into(), "title=it's".into()],
-            asymmetry: Some("-10%".into()),
+            asymmetry: Some("-10%".parse().expect("a ratio")),
             ..BenchOptions::default()
         };
         let args = Args {

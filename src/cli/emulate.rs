@@ -13,13 +13,14 @@ use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_json;
-use crate::config::Purpose;
+use crate::config::{OptionSetting, Purpose};
 use crate::rig::emulator::probe::ProbeEndpoint;
 use crate::rig::emulator::rehearsal::EmulatedDevices;
 use crate::rig::emulator::schedule::PlannedFault;
 use crate::rig::emulator::{
     EmulatedFault, Emulator, EmulatorError, FaultSchedule, LogEntry, fault,
 };
+use crate::util::quantity::{OfFrequency, OfTime, si};
 
 /// How often orders, signals and faults are looked for.
 const BEAT: Duration = Duration::from_millis(2);
@@ -43,7 +44,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "LINK")]
     pty: Option<PathBuf>,
     /// Measurements of the probe a second [default: as configured]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "FREQUENCY", value_parser = si::<OfFrequency>)]
     measuring_rate: Option<f64>,
     /// A fault at a time (KIND@SECONDS) or for a while (KIND@FROM..TO), repeatable; the kinds are listed below
     #[arg(long = "fault", value_name = "KIND@SECONDS")]
@@ -55,8 +56,8 @@ pub(super) struct Args {
     /// Write every change to a file as well, a JSON object a line
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// ProbeEndpoint after so many seconds [default: on Ctrl-C]
-    #[arg(long, value_name = "S")]
+    /// End after this time [default: on Ctrl-C]
+    #[arg(long, value_name = "TIME", value_parser = si::<OfTime>)]
     duration: Option<f64>,
 }
 
@@ -78,12 +79,10 @@ impl Args {
     }
 
     /// The settings that the options stand for.
-    fn sets(&self) -> Vec<String> {
+    fn settings(&self) -> Vec<OptionSetting> {
         let set = |name: &String| {
-            format!(
-                "amplifier.device.interface={}",
-                toml::Value::from(name.as_str())
-            )
+            let option = format!("--interface {name}");
+            OptionSetting::new("amplifier.device.interface", name.as_str(), option)
         };
         self.interface.iter().map(set).collect()
     }
@@ -91,8 +90,7 @@ impl Args {
     /// Options that the devices have no use for, and values that cannot be.
     fn check(&self) -> Result<(), CliError> {
         let of_probe = self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
-        let positive =
-            |value: Option<f64>| value.is_none_or(|value| value.is_finite() && value > 0.0);
+        let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0);
         let wrong = [
             (
                 of_probe && !self.serves("probe"),
@@ -104,12 +102,9 @@ impl Args {
             ),
             (
                 !positive(self.measuring_rate),
-                "--measuring-rate must be above zero, in hertz",
+                "--measuring-rate must be above zero",
             ),
-            (
-                !positive(self.duration),
-                "--duration must be above zero, in seconds",
-            ),
+            (!positive(self.duration), "--duration must be above zero"),
         ];
         wrong
             .iter()
@@ -126,7 +121,7 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     args.check()?;
-    let config = args.bench.load(Purpose::Model, &args.sets())?;
+    let config = args.bench.load(Purpose::Model, &args.settings())?;
     let log = args.log.as_ref().map(Log::create).transpose()?;
     let (runtime, signals) =
         signals().map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;

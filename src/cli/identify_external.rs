@@ -14,6 +14,7 @@ use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::periodic::Repetition;
 use crate::identify::{Signals, frf_csv};
 use crate::report::run_pages::{ModalSummary, PageFiles, TableReport, write_frf};
+use crate::util::quantity::{Frequency, OfFrequency, Time, si};
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
 const WHOLE_SAMPLES: f64 = 1e-3;
@@ -41,8 +42,7 @@ pub(super) struct ExternalOptions {
         long,
         value_name = "HZ",
         requires = "input",
-        allow_hyphen_values = true
-    )]
+        allow_hyphen_values = true, value_parser = si::<OfFrequency>)]
     rate: Option<f64>,
     /// The record repeats: samples a period (2500) or seconds (1s). Without it the record begins and ends at rest
     #[arg(long, value_name = "SAMPLES|S", requires = "input")]
@@ -128,12 +128,13 @@ impl ExternalOptions {
         let Some(text) = &self.band else {
             return Ok((0.0, rate_hz / 2.0));
         };
-        let limits = text
-            .split_once(':')
-            .and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)));
+        let limits = text.split_once(':').and_then(|(low, high)| {
+            let [low, high]: [Frequency; 2] = [low.parse().ok()?, high.parse().ok()?];
+            Some((low.si(), high.si()))
+        });
         limits.ok_or_else(|| {
             CliError::Usage(format!(
-                "--band {text}: it must be two frequencies in hertz, as in 11:250"
+                "--band {text}: it must be two frequencies, as in 11Hz:250Hz"
             ))
         })
     }
@@ -147,9 +148,10 @@ impl ExternalOptions {
                 "--period {text}: it must be a whole number of samples, or seconds that make one at {rate_hz} Hz, as in 2500 or 1s"
             ))
         };
-        let samples: f64 = match text.strip_suffix('s') {
-            Some(seconds) => seconds.parse::<f64>().map_err(|_| wrong())? * rate_hz,
-            None => text.parse().map_err(|_| wrong())?,
+        // A bare number is one of samples.
+        let samples: f64 = match text.parse() {
+            Ok(samples) => samples,
+            Err(_) => text.parse::<Time>().map_err(|_| wrong())?.si() * rate_hz,
         };
         // A NaN compares as false, and so fails.
         let whole =

@@ -3,26 +3,28 @@
 use serde::Serialize;
 
 use super::analysis_output;
-use super::chirp::{ExcitationOptions, analysed, check};
+use super::chirp::{analysed, check};
 use super::chirp_plan::Expected;
 use super::error::CliError;
+use super::excitation_options::ExcitationOptions;
 use super::linearity_output;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::table;
-use crate::config::{Config, Purpose};
+use crate::config::{Config, OptionSetting, Purpose};
 use crate::excitation;
 use crate::experiment::{self, ModeOverAmplitude, Plan, RunSummary, modes_over_amplitude};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
 use crate::report::run_pages::AnalysisOutputs;
+use crate::util::quantity::Ratio;
 
 /// Odd lines, one in four left out.
-const LINES: [&str; 2] = [
-    "excitation.kind=\"multisine\"",
-    "multisine.lines=\"odd_random\"",
+const LINES: [(&str, &str); 2] = [
+    ("excitation.kind", "multisine"),
+    ("multisine.lines", "odd_random"),
 ];
 /// Amplitudes at most.
 const MOST: usize = 10;
@@ -44,13 +46,13 @@ pub(super) struct Args {
         default_value = "0.25,0.5,1",
         allow_hyphen_values = true
     )]
-    scales: Vec<f64>,
+    scales: Vec<Ratio>,
 }
 
 impl Args {
     /// The ratios, rising.
     fn scales(&self) -> Result<Vec<f64>, CliError> {
-        let mut scales = self.scales.clone();
+        let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
         scales.sort_by(f64::total_cmp);
         let sound = scales.iter().all(|scale| scale.is_finite() && *scale > 0.0);
         let different = scales.windows(2).all(|pair| pair[0] < pair[1]);
@@ -58,19 +60,16 @@ impl Args {
             return Ok(scales);
         }
         Err(CliError::Usage(format!(
-            "--scales {:?}: two to {MOST} different ratios above 0 are needed, such as 0.5,1,2",
-            self.scales
+            "--scales {scales:?}: two to {MOST} different ratios above 0 are needed, such as 0.5,1,2"
         )))
     }
 
     /// The settings of each run.
     fn configs(&self) -> Result<Vec<(f64, Config)>, CliError> {
-        let sets: Vec<String> = LINES
-            .map(String::from)
-            .into_iter()
-            .chain(self.band.sets())
-            .collect();
-        let planned = self.band.shaped(self.bench.load(Purpose::Chirp, &sets)?)?;
+        let lines = LINES.map(|(key, value)| OptionSetting::new(key, value, "bench linearity"));
+        let settings = [&lines[..], &self.band.settings()].concat();
+        let planned = self.bench.load(Purpose::Chirp, &settings)?;
+        let planned = self.band.shaped(planned)?;
         let scaled = |scale: f64| {
             let mut config = planned.clone();
             config

@@ -34,7 +34,7 @@ struct Report<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = args.bench.load(Purpose::Model, &args.choice.sets())?;
+    let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
     let closed_loop = closed_loop(&config)?;
     let margins = match args.continuous {
         true => closed_loop.continuous_margins()?,

@@ -3,9 +3,9 @@
 use clap::Args;
 
 use super::error::CliError;
-use crate::config::{Config, PlantSettings, Purpose, Source, load};
+use crate::config::{Config, OptionSetting, PlantSettings, Purpose, Source, load};
 use crate::rig::devices;
-use crate::util::quantity::{self, Quantity};
+use crate::util::quantity::{OperatingPoint, Ratio};
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]
@@ -17,11 +17,11 @@ pub(super) struct BenchOptions {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
     /// Static Y displacement of the motion stage: 8% of the beam length, 3.8mm, or metres
-    #[arg(long, value_name = "Y", allow_hyphen_values = true)]
-    pub operating_point: Option<String>,
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub operating_point: Option<OperatingPoint>,
     /// Mass asymmetry m2/m3 - 1: 10% or 0.1
-    #[arg(long, value_name = "D", allow_hyphen_values = true)]
-    pub asymmetry: Option<String>,
+    #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
+    pub asymmetry: Option<Ratio>,
     /// Seed of noise and disturbance
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
@@ -39,53 +39,61 @@ impl BenchOptions {
     }
 
     /// The effective configuration; `more` are settings that the command's own options stand for.
-    pub fn load(&self, purpose: Purpose, more: &[String]) -> Result<Config, CliError> {
+    pub fn load(&self, purpose: Purpose, more: &[OptionSetting]) -> Result<Config, CliError> {
         let mut source = Source {
             config: self.config.clone(),
             sets: self.sets.clone(),
+            options: self.seed.map(seed).into_iter().collect(),
             purpose,
         };
-        let usage = |e: quantity::QuantityError| CliError::Usage(e.to_string());
-        if let Some(seed) = self.seed {
-            source.sets.push(format!("sim.seed={seed}"));
-        }
-        source.sets.extend_from_slice(more);
-        let model = (self.asymmetry.is_some() || self.operating_point.is_some())
-            .then(|| load(&source))
-            .transpose()?;
-        let plant = model.map(|config| config.plant);
-        if let (Some(text), Some(plant)) = (&self.asymmetry, &plant) {
-            has(plant, plant.mass_asymmetry(), "--asymmetry")?;
-            source.sets.push(format!(
-                "plant.mass_asymmetry={:?}",
-                quantity::ratio(text).map_err(usage)?
-            ));
-        }
-        if let (Some(text), Some(plant)) = (&self.operating_point, &plant) {
-            let length_m = has(
-                plant,
-                plant.operating_point_m().and(plant.beam_length_m()),
-                "--operating-point",
-            )?;
-            let metres = match quantity::parse(text).map_err(usage)? {
-                Quantity::Bare(metres) | Quantity::Metres(metres) => metres,
-                Quantity::Ratio(ratio) => ratio * length_m,
-            };
-            source
-                .sets
-                .push(format!("plant.operating_point_m={metres:?}"));
+        source.options.extend_from_slice(more);
+        if self.asymmetry.is_some() || self.operating_point.is_some() {
+            let plant = load(&source)?.plant;
+            source.options.extend(self.asymmetry_setting(&plant)?);
+            source.options.extend(self.operating_point_setting(&plant)?);
         }
         let config = load(&source)?;
         devices::check(&config)?;
         Ok(config)
     }
+
+    fn asymmetry_setting(&self, plant: &PlantSettings) -> Result<Option<OptionSetting>, CliError> {
+        let Some(asymmetry) = &self.asymmetry else {
+            return Ok(None);
+        };
+        require(plant, plant.mass_asymmetry(), "--asymmetry")?;
+        let option = format!("--asymmetry {asymmetry}");
+        let setting = OptionSetting::new("plant.mass_asymmetry", asymmetry.si(), option);
+        Ok(Some(setting))
+    }
+
+    fn operating_point_setting(
+        &self,
+        plant: &PlantSettings,
+    ) -> Result<Option<OptionSetting>, CliError> {
+        let Some(point) = &self.operating_point else {
+            return Ok(None);
+        };
+        let beam_length_m = plant.operating_point_m().and(plant.beam_length_m());
+        require(plant, beam_length_m, "--operating-point")?;
+        let point_m = point.metres(beam_length_m);
+        let point_m = point_m.map_err(|error| CliError::Usage(error.to_string()))?;
+        let option = format!("--operating-point {point}");
+        let setting = OptionSetting::new("plant.operating_point_m", point_m, option);
+        Ok(Some(setting))
+    }
 }
 
-/// What an option is about, if the model has it.
-fn has(plant: &PlantSettings, value: Option<f64>, option: &str) -> Result<f64, CliError> {
+fn seed(seed: u64) -> OptionSetting {
+    // The parser of the option allows no larger one.
+    OptionSetting::new("sim.seed", seed as i64, format!("--seed {seed}"))
+}
+
+/// Refuses an option for a setting that the model does not have.
+fn require(plant: &PlantSettings, value: Option<f64>, option: &str) -> Result<(), CliError> {
     let model = plant.model();
     let settings = "`bench config show` lists its settings, --set KEY=VALUE changes one";
-    value.ok_or_else(|| {
+    value.map(drop).ok_or_else(|| {
         CliError::Usage(format!(
             "{option} has no meaning for the model `{model}`; {settings}"
         ))

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::error::CliError;
 use crate::experiment::campaign::{Person, Question, Reply};
-use crate::util::quantity::{self, Quantity};
+use crate::util::quantity::Quantity;
 
 /// Ctrl-C is looked for so often while an answer is waited for.
 const LOOK: Duration = Duration::from_millis(100);
@@ -117,13 +117,10 @@ fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<
         "right" if question.may_confirm => return Ok(Reply::Right),
         _ => {}
     }
-    let read = quantity::parse(line).ok().filter(|_| question.may_read);
-    let length_m = match read {
-        Some(Quantity::Metres(metres)) => Some(metres),
-        Some(Quantity::Ratio(ratio)) => beam_length_m.map(|length_m| ratio * length_m),
-        _ => None,
-    };
-    let read_m = length_m.filter(|metres| metres.is_finite());
+    // A bare number may be millimetres or metres.
+    let read: Option<Quantity> = line.parse().ok();
+    let read = read.filter(|read| question.may_read && !read.is_bare());
+    let read_m = read.and_then(|read| read.operating_point_m(beam_length_m).ok());
     read_m
         .map(|m| Reply::Done(Some(m)))
         .ok_or_else(|| format!("`{line}` is no answer here; {}", choices(question)))

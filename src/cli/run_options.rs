@@ -19,7 +19,7 @@ use crate::util::progress::Progress;
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct RunOptions {
     /// Pace of the loop [default: virtual on the simulated stage, realtime on devices]
-    #[arg(long, value_name = "virtual|realtime", value_parser = pace)]
+    #[arg(long, value_name = "PACE")]
     pace: Option<Pace>,
     /// Run on the simulated stage, with the rates, delays and steps of the configured devices
     #[arg(long)]
@@ -30,13 +30,6 @@ pub(super) struct RunOptions {
     /// Folder for the recording and what is made from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
-}
-
-fn pace(text: &str) -> Result<Pace, String> {
-    [Pace::Virtual, Pace::Realtime]
-        .into_iter()
-        .find(|p| p.name() == text)
-        .ok_or("allowed is virtual, realtime".into())
 }
 
 impl RunOptions {

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::util::quantity;
+use crate::util::quantity::{OfRatio, si};
 
 /// Values of a grid, at most.
 const MOST: usize = 10_000;
@@ -18,7 +18,7 @@ impl FromStr for ValueRange {
         let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
             return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
         };
-        let ratio = |text: &str| quantity::ratio(text).map_err(|e| e.to_string());
+        let ratio = |text: &str| si::<OfRatio>(text).map_err(|e| e.to_string());
         let (from, to) = (ratio(from)?, ratio(to)?);
         let count = count
             .trim()

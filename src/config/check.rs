@@ -1,12 +1,14 @@
 //! Checks a merged TOML tree against the schema made from the types: unknown keys with the nearest valid one, missing
 //! keys, types and ranges, each with its path.
 
+use std::ops::RangeInclusive;
+
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
 use crate::util::finding::Finding;
 use crate::util::nearest::nearest;
-use crate::util::quantity::{self, Quantity};
+use crate::util::quantity::{Dimension, Quantity};
 
 /// All that is wrong with `value`.
 pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
@@ -15,15 +17,44 @@ pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
     findings.0
 }
 
+/// Whether a number belongs at `path` of `value`.
+pub(super) fn wants_number(schema: &Json, value: &Value, path: &str) -> bool {
+    keywords_at(schema, value, path).is_some_and(|keywords| is(&keywords, "number"))
+}
+
+/// The range of a number at `path` of `value`.
+pub(super) fn range_at(schema: &Json, value: &Value, path: &str) -> Option<RangeInclusive<f64>> {
+    let keywords = keywords_at(schema, value, path)?;
+    let limit = |key: &str| keywords.get(key).and_then(Json::as_f64);
+    Some(limit("minimum")?..=limit("maximum")?)
+}
+
+/// The keywords of the schema for what is at `path` of `value`.
+fn keywords_at(schema: &Json, value: &Value, path: &str) -> Option<Map<String, Json>> {
+    let mut keywords = flatten(schema, schema);
+    let mut value = value;
+    for part in path.split('.') {
+        if let Some(variants) = keywords.get("oneOf").and_then(Json::as_array) {
+            let tag = variants.iter().find_map(tag_of)?;
+            keywords = flatten(schema, chosen(variants, &tag, value)?);
+        }
+        let index = part.parse::<usize>().ok();
+        let property = keywords.get("properties").and_then(|all| all.get(part));
+        let named = keywords.get("additionalProperties");
+        let item = index.and_then(|_| keywords.get("items"));
+        let inner = property.or(item).or(named)?.clone();
+        keywords = flatten(schema, &inner);
+        let entry = value.get(part);
+        value = entry.or_else(|| value.get(index?))?;
+    }
+    Some(keywords)
+}
+
 struct Findings(Vec<Finding>);
 
 impl Findings {
     fn add(&mut self, path: &str, what: String) {
-        self.0.push(Finding {
-            path: path.to_string(),
-            what,
-            missing: false,
-        });
+        self.0.push(Finding::new(path, what));
     }
 
     fn lacks(&mut self, path: &str, what: String) {
@@ -51,7 +82,7 @@ fn node(root: &Json, schema: &Json, value: &Value, path: &str, out: &mut Finding
         Value::Float(x) if is(&keywords, "number") => range(&keywords, *x, path, out),
         Value::String(word) if is(&keywords, "string") => text(&keywords, word, path, out),
         Value::Boolean(_) if is(&keywords, "boolean") => {}
-        other => out.add(path, wrong_type(&keywords, other)),
+        other => out.add(path, wrong_type(&keywords, other, path)),
     }
 }
 
@@ -87,11 +118,7 @@ fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut 
         }
         return;
     };
-    let word = value.get(&tag).and_then(Value::as_str);
-    let chosen = variants
-        .iter()
-        .find(|v| word.is_some() && constant(&v["properties"][&tag]) == word);
-    match chosen {
+    match chosen(variants, &tag, value) {
         Some(chosen) => node(root, chosen, value, path, out),
         None => {
             let words: Vec<&str> = variants
@@ -104,6 +131,13 @@ fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut 
             }
         }
     }
+}
+
+/// The variant that the tag of a table names.
+fn chosen<'a>(variants: &'a [Json], tag: &str, value: &Value) -> Option<&'a Json> {
+    let word = value.get(tag)?.as_str()?;
+    let named = |variant: &&Json| constant(&variant["properties"][tag]) == Some(word);
+    variants.iter().find(named)
 }
 
 fn table(
@@ -174,10 +208,10 @@ fn range(keywords: &Map<String, Json>, x: f64, path: &str, out: &mut Findings) {
     let (low, high) = (limit("minimum"), limit("maximum"));
     if !x.is_finite() || low.is_some_and(|low| x < low) || high.is_some_and(|high| x > high) {
         let bound = |b: Option<f64>| b.map_or("any".to_string(), |b| format!("{b}"));
-        out.add(
-            path,
-            format!("is {x}; allowed is {} to {}", bound(low), bound(high)),
-        );
+        let dimension = Dimension::of_key(path);
+        let (is, unit) = (dimension.display(x), dimension.si_unit());
+        let allowed = format!("{} to {} {unit}", bound(low), bound(high));
+        out.add(path, format!("is {is}; allowed is {}", allowed.trim_end()));
     }
 }
 
@@ -194,7 +228,7 @@ fn text(keywords: &Map<String, Json>, word: &str, path: &str, out: &mut Findings
     }
 }
 
-fn join(path: &str, key: &str) -> String {
+pub(super) fn join(path: &str, key: &str) -> String {
     if path.is_empty() {
         key.to_string()
     } else {
@@ -235,7 +269,7 @@ fn not_one_of(given: &str, words: &[&str]) -> String {
     format!("is {given}; allowed is {}", words.join(", "))
 }
 
-fn wrong_type(keywords: &Map<String, Json>, given: &Value) -> String {
+fn wrong_type(keywords: &Map<String, Json>, given: &Value, path: &str) -> String {
     let wanted = ["number", "integer", "string", "boolean", "array", "object"]
         .into_iter()
         .find(|t| is(keywords, t));
@@ -243,13 +277,12 @@ fn wrong_type(keywords: &Map<String, Json>, given: &Value) -> String {
         "something else",
         |t| if t == "object" { "table" } else { t },
     );
-    let si = given
-        .as_str()
-        .filter(|_| wanted == "number")
-        .and_then(|text| quantity::parse(text).ok());
-    match si {
-        Some(Quantity::Bare(x) | Quantity::Metres(x) | Quantity::Ratio(x)) => {
-            format!("is the text {given}, not a number; settings are in SI units: write {x}")
+    let quantity: Option<Quantity> = given.as_str().and_then(|text| text.parse().ok());
+    match quantity.filter(|_| wanted == "number") {
+        Some(quantity) => {
+            let si = quantity.si(Dimension::of_key(path));
+            let remedy = si.map_or_else(|error| error.to_string(), |x| format!("write {x}"));
+            format!("is the text {given}, not a number; settings are in SI units: {remedy}")
         }
         None => {
             let article = if wanted.starts_with(['a', 'i']) {

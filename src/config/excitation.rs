@@ -13,8 +13,11 @@ pub struct ExcitationSettings {
 }
 
 /// The kinds of excitation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum,
+)]
 #[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum ExcitationKind {
     /// A sine of rising or falling frequency, `[chirp]`.
     Chirp,

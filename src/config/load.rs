@@ -2,9 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::Value as Json;
 use toml::{Table, Value};
 
 use super::check;
+use super::layer::{Layer, lay, same_kind};
+use super::overrides::{
+    OptionSetting, convert_quantities, in_terms_of_option, options_table, sets,
+};
 use super::place::line_of;
 use super::profiles::{self, EmbeddedFile};
 use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, excited, relations, schema};
@@ -20,6 +25,8 @@ pub struct Source {
     pub config: Option<String>,
     /// `KEY=VALUE`, the later one wins.
     pub sets: Vec<String>,
+    /// Settings that command-line options stand for, over all of `sets`.
+    pub options: Vec<OptionSetting>,
     /// What it is for.
     pub purpose: Purpose,
 }
@@ -96,16 +103,9 @@ impl ConfigError {
     }
 }
 
-/// One layer of settings, with the text it came from.
-struct Layer {
-    name: String,
-    text: String,
-    table: Table,
-}
-
 /// Loads, merges and checks a configuration.
 pub fn load(source: &Source) -> Result<Config, ConfigError> {
-    checked(&layers(source)?, source.purpose)
+    checked(&layers(source)?, &source.options, source.purpose)
 }
 
 /// Tables that recordings of earlier versions lack, which ran a chirp: they are those of the default profile.
@@ -122,25 +122,34 @@ const LATER: [&str; 6] = [
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
     if let Some(base) = profiles::find(profiles::PROFILES, profiles::DEFAULT) {
-        let mut base = parse(format!("profile {}", base.name), base.text.to_string())?;
+        let mut base = Layer::parse(format!("profile {}", base.name), base.text.to_string())?;
         base.table.retain(|key, _| LATER.contains(&key));
         layers.push(base);
     }
-    layers.push(parse(name.to_string(), text.to_string())?);
-    checked(&layers, Purpose::Model)
+    layers.push(Layer::parse(name.to_string(), text.to_string())?);
+    checked(&layers, &[], Purpose::Model)
 }
 
-fn checked(layers: &[Layer], purpose: Purpose) -> Result<Config, ConfigError> {
+fn checked(
+    layers: &[Layer],
+    options: &[OptionSetting],
+    purpose: Purpose,
+) -> Result<Config, ConfigError> {
+    let schema = schema();
     let mut merged = Table::new();
     for layer in layers {
         lay(&mut merged, &layer.table, same_kind);
     }
-    let findings = check::check(&schema(), &Value::Table(merged.clone()));
-    refuse(layers, findings)?;
-    let config: Config = merged
-        .try_into()
-        .map_err(|e: toml::de::Error| ConfigError::Refused(vec![e.to_string()]))?;
-    refuse(layers, cross_checks(&config, purpose))?;
+    lay(&mut merged, &options_table(options), same_kind);
+    let sets = layers.last().filter(|layer| layer.name == Layer::SETS);
+    let findings = sets.map(|sets| convert_quantities(&schema, &sets.table, &mut merged));
+    let merged = Value::Table(merged);
+    let refuse = |findings| refuse(layers, options, findings, &schema, &merged);
+    refuse(findings.unwrap_or_default())?;
+    refuse(check::check(&schema, &merged))?;
+    let typed: Result<Config, toml::de::Error> = merged.clone().try_into();
+    let config = typed.map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
+    refuse(cross_checks(&config, purpose))?;
     Ok(config)
 }
 
@@ -160,16 +169,26 @@ pub(crate) fn validate(config: &Config) -> Result<(), ConfigError> {
     }
 }
 
-fn refuse(layers: &[Layer], findings: Vec<Finding>) -> Result<(), ConfigError> {
-    if findings.is_empty() {
-        return Ok(());
+fn refuse(
+    layers: &[Layer],
+    options: &[OptionSetting],
+    findings: Vec<Finding>,
+    schema: &Json,
+    merged: &Value,
+) -> Result<(), ConfigError> {
+    let line = |finding: &Finding| {
+        in_terms_of_option(options, finding, schema, merged).unwrap_or_else(|| {
+            let place = place(layers, finding.at());
+            format!("  {place}: `{}` {}", finding.path, finding.what)
+        })
+    };
+    let mut lines: Vec<String> = findings.iter().map(line).collect();
+    // One option may stand for several settings.
+    lines.dedup();
+    match lines.is_empty() {
+        true => Ok(()),
+        false => Err(ConfigError::Refused(lines)),
     }
-    Err(ConfigError::Refused(
-        findings
-            .iter()
-            .map(|f| format!("  {}: `{}` {}", place(layers, f.at()), f.path, f.what))
-            .collect(),
-    ))
 }
 
 /// The last layer that sets `path`, with the line; or the last layer that sets something around it.
@@ -178,7 +197,7 @@ fn place(layers: &[Layer], path: &str) -> String {
     loop {
         for layer in layers.iter().rev() {
             if let Some(line) = line_of(&layer.text, path) {
-                return if layer.name == "--set" {
+                return if layer.name == Layer::SETS {
                     layer.name.clone()
                 } else {
                     format!("{} line {line}", layer.name)
@@ -200,7 +219,7 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
     let embedded = |name: &str| profiles::find(profiles::PROFILES, name);
     let mut layers = Vec::new();
     if let Some(base) = embedded(profiles::DEFAULT) {
-        layers.push(parse(
+        layers.push(Layer::parse(
             format!("profile {}", base.name),
             base.text.to_string(),
         )?);
@@ -208,10 +227,11 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
     match source.config.as_deref() {
         None | Some(profiles::DEFAULT) => {}
         Some(name) => match embedded(name) {
-            Some(profile) => {
-                layers.push(parse(format!("profile {name}"), profile.text.to_string())?)
-            }
-            None => layers.push(parse(
+            Some(profile) => layers.push(Layer::parse(
+                format!("profile {name}"),
+                profile.text.to_string(),
+            )?),
+            None => layers.push(Layer::parse(
                 name.to_string(),
                 read(name, profiles::PROFILES, "profile")?,
             )?),
@@ -260,83 +280,13 @@ pub(crate) fn typed<T>(name: &str, text: &str) -> Result<T, ConfigError>
 where
     T: serde::de::DeserializeOwned + schemars::JsonSchema,
 {
-    let layer = parse(name.to_string(), text.to_string())?;
+    let layer = Layer::parse(name.to_string(), text.to_string())?;
     let schema = schemars::schema_for!(T).to_value();
-    let findings = check::check(&schema, &Value::Table(layer.table.clone()));
-    refuse(std::slice::from_ref(&layer), findings)?;
-    layer
-        .table
-        .try_into()
-        .map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
-}
-
-fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
-    match text.parse::<Table>() {
-        Ok(table) => Ok(Layer { name, text, table }),
-        Err(e) => Err(ConfigError::Syntax {
-            place: name,
-            why: e.to_string(),
-        }),
-    }
-}
-
-/// All `--set KEY=VALUE` as one layer. A value that is not TOML is text: `control.controller=slow`.
-fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
-    let mut table = Table::new();
-    for set in sets {
-        let wrong = |why: &str| ConfigError::Syntax {
-            place: format!("--set {set}"),
-            why: why.into(),
-        };
-        let (key, text) = set
-            .split_once('=')
-            .ok_or_else(|| wrong("write KEY=VALUE, as in plant.mass_asymmetry=0.05"))?;
-        let (key, text) = (key.trim(), text.trim());
-        let parsed = format!("value = {text}")
-            .parse::<Table>()
-            .ok()
-            .and_then(|mut t| t.remove("value"));
-        let value = parsed.unwrap_or_else(|| Value::String(text.trim_matches('"').into()));
-        let nested = key.rsplit('.').fold(value, |inner, part| {
-            let mut outer = Table::new();
-            outer.insert(part.to_string(), inner);
-            Value::Table(outer)
-        });
-        match nested {
-            Value::Table(layer) if !key.split('.').any(str::is_empty) => {
-                lay(&mut table, &layer, |_, _| true)
-            }
-            _ => return Err(wrong("the key has an empty part")),
-        }
-    }
-    let text = toml::to_string(&table).unwrap_or_default();
-    Ok(Layer {
-        name: "--set".into(),
-        text,
-        table,
-    })
-}
-
-/// Lays `over` upon `base`: tables that `joins` accepts are merged key by key, all else takes the old value's place.
-fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
-    for (key, value) in over {
-        match (base.get_mut(key), value) {
-            (Some(Value::Table(old)), Value::Table(new)) if joins(old, new) => lay(old, new, joins),
-            _ => {
-                base.insert(key.clone(), value.clone());
-            }
-        }
-    }
-}
-
-/// Tables of another `kind` or `model` have other keys: the new one replaces the old one.
-fn same_kind(old: &Table, new: &Table) -> bool {
-    ["kind", "model"]
-        .iter()
-        .all(|tag| match (old.get(*tag), new.get(*tag)) {
-            (Some(old), Some(new)) => old == new,
-            _ => true,
-        })
+    let value = Value::Table(layer.table.clone());
+    let findings = check::check(&schema, &value);
+    refuse(std::slice::from_ref(&layer), &[], findings, &schema, &value)?;
+    let typed: Result<T, toml::de::Error> = value.try_into();
+    typed.map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
 }
 
 /// What no single setting can say: relations between settings.

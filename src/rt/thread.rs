@@ -14,7 +14,7 @@ use crate::config::LoopSettings;
 use crate::util::thread_priority::set_fifo;
 
 /// `virtual` or `realtime`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {
     /// Ticks back to back: studies, tests.

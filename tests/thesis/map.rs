@@ -85,8 +85,8 @@ fn what_is_no_map_is_refused_with_the_remedy() {
         ("--operating-points 1mm:2mm:5", "a ratio"),
         ("--asymmetries 0:0.1:1", "from 2 to"),
         ("--asymmetries 0.1:10%:5", "empty sweep"),
-        ("--operating-points 0:2:5", "plant.operating_point_m"),
-        ("--asymmetries -2:0:5", "plant.mass_asymmetry"),
+        ("--operating-points 0:2:5", "--operating-points is 0.095 m"),
+        ("--asymmetries -2:0:5", "--asymmetries is -2"),
         ("--asymmetry 5%", "leave them out"),
     ] {
         let answer = bench.run(&format!("model map {arguments}"));

@@ -9,6 +9,7 @@ use super::super::table::table;
 use crate::config::Purpose;
 use crate::model::plant;
 use crate::model::zeros::{self, Bound, Zero};
+use crate::util::quantity::{OfAngularFrequency, OfRatio, si};
 
 /// |S| in the band, if nothing else is asked for.
 const ALPHA: f64 = 0.5;
@@ -21,13 +22,13 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     /// |S| stays below this up to the bandwidth (Eq. 1-1), between 0 and 1
-    #[arg(long, value_name = "RATIO", default_value_t = ALPHA)]
+    #[arg(long, value_name = "RATIO", default_value_t = ALPHA, value_parser = si::<OfRatio>)]
     alpha: f64,
     /// |S| stays below this everywhere, above 1; 2 is a modulus margin of 0.5
-    #[arg(long, value_name = "RATIO", default_value_t = PEAK)]
+    #[arg(long, value_name = "RATIO", default_value_t = PEAK, value_parser = si::<OfRatio>)]
     peak: f64,
     /// Instead of the bandwidth that a peak allows: the peak that a bandwidth costs
-    #[arg(long, value_name = "RAD_PER_S")]
+    #[arg(long, value_name = "RAD_PER_S", value_parser = si::<OfAngularFrequency>)]
     bandwidth: Option<f64>,
 }
 

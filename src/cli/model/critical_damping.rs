@@ -5,18 +5,19 @@ use serde::Serialize;
 use super::super::error::CliError;
 use super::super::output::{print_json, print_text};
 use crate::model::zeros;
+use crate::util::quantity::{OfAngularFrequency, OfRatio, si};
 
 /// Two close modes beside a double integrator (Eq. 3-15).
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     /// Frequency of mode u
-    #[arg(long, value_name = "RAD_PER_S", default_value_t = 0.9)]
+    #[arg(long, value_name = "RAD_PER_S", default_value_t = 0.9, value_parser = si::<OfAngularFrequency>)]
     omega_u: f64,
     /// Frequency of mode v, above that of u
-    #[arg(long, value_name = "RAD_PER_S", default_value_t = 1.1)]
+    #[arg(long, value_name = "RAD_PER_S", default_value_t = 1.1, value_parser = si::<OfAngularFrequency>)]
     omega_v: f64,
     /// |residue of u / residue of v|, above (omega_v/omega_u)^2
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, default_value_t = 2.0, value_parser = si::<OfRatio>)]
     ratio: f64,
     /// One JSON object on standard output, nothing else there
     #[arg(long)]

@@ -7,7 +7,7 @@ use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::output::{print_json, print_text};
 use super::super::value_range::ValueRange;
-use crate::config::{PlantSettings, Purpose, Sr4dofSettings};
+use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
 
 /// The largest picture for people: lines and characters.
@@ -78,17 +78,17 @@ fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
         .zip(ends(&args.asymmetries))
     {
         let point_m = point * settings.beam_length_m;
-        let sets = [
-            format!("plant.operating_point_m={point_m:?}"),
-            format!("plant.mass_asymmetry={asymmetry:?}"),
+        let settings = [
+            OptionSetting::new("plant.operating_point_m", point_m, "--operating-points"),
+            OptionSetting::new("plant.mass_asymmetry", asymmetry, "--asymmetries"),
         ];
-        sr4dof(args, &sets)?;
+        sr4dof(args, &settings)?;
     }
     Ok(settings)
 }
 
-fn sr4dof(args: &Args, sets: &[String]) -> Result<Sr4dofSettings, CliError> {
-    match args.bench.load(Purpose::Model, sets)?.plant {
+fn sr4dof(args: &Args, settings: &[OptionSetting]) -> Result<Sr4dofSettings, CliError> {
+    match args.bench.load(Purpose::Model, settings)?.plant {
         PlantSettings::Sr4dof(settings) => Ok(settings),
         other => Err(CliError::Usage(format!(
             "a map is over operating point and mass asymmetry, which the model `{}` does not have both; take one of `sr4dof` (--config stage, --config chapter2), or `bench model locus --vary KEY`",

@@ -9,6 +9,7 @@ use super::super::output::{print_json, print_text};
 use crate::config::Purpose;
 use crate::model::plant::{self, ModalModel};
 use crate::model::zeros::{ModalSum, Sequence, StepFeatures, StepResponse, ZeroCounts};
+use crate::util::quantity::{OfTime, si};
 
 /// Which step response.
 #[derive(Clone, Debug, clap::Args)]
@@ -18,7 +19,7 @@ pub(super) struct Args {
     #[command(flatten)]
     table: TableOptions,
     /// Length of the response in the file; until the window of the zero crossings ends if absent
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = si::<OfTime>)]
     duration: Option<f64>,
     /// Rows of the file
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]

@@ -2,9 +2,9 @@
 
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use crate::config::{Config, Purpose};
+use crate::config::{Config, OptionSetting, Purpose};
 use crate::model::plant::{self, Structure};
-use crate::util::quantity::{self, Quantity};
+use crate::util::quantity::{Quantity, QuantityError};
 
 /// `count` values of the setting `vary`, two or more.
 #[derive(Clone, Copy, Debug)]
@@ -17,13 +17,13 @@ pub(super) struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// The grid. A value in per cent is one of the beam length where the setting is a length.
+    /// The grid.
     pub fn values(&self) -> Result<Vec<f64>, CliError> {
         self.refuse_options()?;
         let config = self.bench.load(Purpose::Model, &[])?;
         let (from, to) = (
-            self.number(&config, self.from)?,
-            self.number(&config, self.to)?,
+            self.number(&config, "--from", self.from)?,
+            self.number(&config, "--to", self.to)?,
         );
         if from == to {
             return Err(CliError::Usage(format!(
@@ -43,7 +43,7 @@ impl Sweep<'_> {
 
     /// A value as typed, read as those of the range are.
     pub fn value(&self, text: &str) -> Result<f64, CliError> {
-        self.number(&self.bench.load(Purpose::Model, &[])?, text)
+        self.number(&self.bench.load(Purpose::Model, &[])?, "--at", text)
     }
 
     /// The plant at a value.
@@ -53,8 +53,9 @@ impl Sweep<'_> {
 
     /// The configuration at a value.
     pub fn config(&self, value: f64) -> Result<Config, CliError> {
-        self.bench
-            .load(Purpose::Model, &[format!("{}={value:?}", self.vary)])
+        let option = format!("--vary {}", self.vary);
+        let setting = OptionSetting::new(self.vary, value, option);
+        self.bench.load(Purpose::Model, &[setting])
     }
 
     fn refuse_options(&self) -> Result<(), CliError> {
@@ -70,24 +71,10 @@ impl Sweep<'_> {
         }
     }
 
-    fn number(&self, config: &Config, text: &str) -> Result<f64, CliError> {
-        match quantity::parse(text).map_err(|e| CliError::Usage(e.to_string()))? {
-            Quantity::Ratio(ratio) if self.vary.ends_with("_m") => {
-                Ok(ratio * beam_length_m(config, self.vary)?)
-            }
-            Quantity::Bare(value) | Quantity::Metres(value) | Quantity::Ratio(value) => Ok(value),
-        }
+    fn number(&self, config: &Config, option: &str, text: &str) -> Result<f64, CliError> {
+        let beam_length_m = config.plant.beam_length_m();
+        let quantity: Result<Quantity, QuantityError> = text.parse();
+        let value = quantity.and_then(|value| value.for_setting(self.vary, beam_length_m));
+        value.map_err(|error| CliError::Usage(format!("{option} {text}: {error}")))
     }
-}
-
-fn beam_length_m(config: &Config, key: &str) -> Result<f64, CliError> {
-    let plant = serde_json::to_value(&config.plant).unwrap_or_default();
-    let length_m = plant
-        .get("beam_length_m")
-        .and_then(serde_json::Value::as_f64);
-    length_m.ok_or_else(|| {
-        CliError::Usage(format!(
-            "this plant has no beams: give {key} in metres, not in per cent"
-        ))
-    })
 }

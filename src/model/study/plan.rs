@@ -209,7 +209,7 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
             varied.push(Varied {
                 key: key.clone(),
                 nominal,
-                deviation: tolerance.deviation(key, nominal)?,
+                deviation: tolerance.deviation(key, nominal, plant.beam_length_m())?,
             });
         }
     }

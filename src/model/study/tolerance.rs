@@ -5,7 +5,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::StudyError;
-use crate::util::quantity::{self, Quantity};
+use crate::util::quantity::{Dimension, Quantity, QuantityError};
 
 /// Where a normal deviation ends, in standard deviations: two values in 10^9 lie beyond, and are put there.
 const NORMAL_END: f64 = 6.0;
@@ -58,8 +58,8 @@ impl Deviation {
 
 /// Which settings deviate, and by how much: `KEY=uniform:LOW:HIGH`, `KEY=normal:SIGMA`, or `KEY=+-LIMIT` for a uniform one.
 ///
-/// A bare number or a length is added to the nominal value; a percentage is of the nominal value. `*` in the key stands for
-/// any part of a name between dots.
+/// The deviation is added to the nominal value. A percentage of an operating point is of the beam length, of a ratio of 1,
+/// and of any other setting of its nominal value. `*` in the key stands for any part of a name between dots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
     text: String,
@@ -67,8 +67,9 @@ pub struct Tolerance {
     amounts: Amounts,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Amounts {
+    Symmetric(Quantity),
     Uniform(Quantity, Quantity),
     Normal(Quantity),
 }
@@ -83,16 +84,16 @@ impl FromStr for Tolerance {
         };
         let usage = "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
         let (pattern, amounts) = text.split_once('=').ok_or_else(|| wrong(usage.into()))?;
-        let number = |text: &str| quantity::parse(text).map_err(|e| wrong(e.to_string()));
+        let number = |text: &str| {
+            text.parse()
+                .map_err(|e: QuantityError| wrong(e.to_string()))
+        };
         let limit = ["+-", "±"]
             .iter()
             .find_map(|sign| amounts.trim().strip_prefix(sign));
         let parts: Vec<&str> = amounts.split(':').map(str::trim).collect();
         let amounts = match (limit, parts.as_slice()) {
-            (Some(limit), _) => {
-                let limit = number(limit)?;
-                Amounts::Uniform(scaled(limit, -1.0), limit)
-            }
+            (Some(limit), _) => Amounts::Symmetric(number(limit)?),
             (None, ["uniform", low, high]) => Amounts::Uniform(number(low)?, number(high)?),
             (None, ["normal", sigma]) => Amounts::Normal(number(sigma)?),
             _ => return Err(wrong(usage.into())),
@@ -102,14 +103,6 @@ impl FromStr for Tolerance {
             pattern: pattern.trim().into(),
             amounts,
         })
-    }
-}
-
-fn scaled(quantity: Quantity, factor: f64) -> Quantity {
-    match quantity {
-        Quantity::Bare(x) => Quantity::Bare(x * factor),
-        Quantity::Metres(x) => Quantity::Metres(x * factor),
-        Quantity::Ratio(x) => Quantity::Ratio(x * factor),
     }
 }
 
@@ -126,44 +119,62 @@ impl Tolerance {
             && patterns.zip(parts).all(|(p, part)| glob(p, part))
     }
 
-    /// The deviation of one of its settings from a nominal value. Refuses one that is empty, that is a length where there is
-    /// none, or that is a ratio of zero.
-    pub fn deviation(&self, key: &str, nominal: f64) -> Result<Deviation, StudyError> {
-        let amount = |quantity| self.amount(key, nominal, quantity);
-        match self.amounts {
-            Amounts::Uniform(low, high) => {
-                let (low, high) = (amount(low)?, amount(high)?);
-                let why = format!(
-                    "an empty tolerance of `{key}`: from {low} to {high}; give a lower and a higher limit"
-                );
-                if low < high {
-                    Ok(Deviation::Uniform { low, high })
-                } else {
-                    Err(self.wrong(why))
-                }
+    /// The deviation of one of its settings from a nominal value, on a plant with beams of this length.
+    ///
+    /// # Errors
+    /// If it is empty, if its unit does not belong to the setting, or if it is in percent of zero.
+    pub fn deviation(
+        &self,
+        key: &str,
+        nominal: f64,
+        beam_length_m: Option<f64>,
+    ) -> Result<Deviation, StudyError> {
+        let amount = |quantity| self.amount(key, nominal, beam_length_m, quantity);
+        match &self.amounts {
+            Amounts::Symmetric(limit) => {
+                let limit = amount(limit)?;
+                self.uniform(key, -limit, limit)
             }
-            Amounts::Normal(sigma) => {
-                let sigma = amount(sigma)?;
-                let why =
-                    format!("the standard deviation of `{key}` is {sigma}; give one above zero");
-                if sigma > 0.0 {
-                    Ok(Deviation::Normal { sigma })
-                } else {
-                    Err(self.wrong(why))
-                }
-            }
+            Amounts::Uniform(low, high) => self.uniform(key, amount(low)?, amount(high)?),
+            Amounts::Normal(sigma) => self.normal(key, amount(sigma)?),
         }
     }
 
-    fn amount(&self, key: &str, nominal: f64, quantity: Quantity) -> Result<f64, StudyError> {
-        match quantity {
-            Quantity::Bare(x) => Ok(x),
-            Quantity::Metres(x) if key.ends_with("_m") => Ok(x),
-            Quantity::Metres(_) => Err(self.wrong(format!("`{key}` is no length; give a bare number in its unit"))),
-            Quantity::Ratio(_) if nominal == 0.0 => Err(self.wrong(format!(
-                "a percentage is of the nominal value, and that of `{key}` is 0; give a bare number in its unit, as in 0.15"
+    fn uniform(&self, key: &str, low: f64, high: f64) -> Result<Deviation, StudyError> {
+        if low < high {
+            return Ok(Deviation::Uniform { low, high });
+        }
+        Err(self.wrong(format!(
+            "an empty tolerance of `{key}`: from {low} to {high}; give a lower and a higher limit"
+        )))
+    }
+
+    fn normal(&self, key: &str, sigma: f64) -> Result<Deviation, StudyError> {
+        if sigma > 0.0 {
+            return Ok(Deviation::Normal { sigma });
+        }
+        Err(self.wrong(format!(
+            "the standard deviation of `{key}` is {sigma}; give one above zero"
+        )))
+    }
+
+    fn amount(
+        &self,
+        key: &str,
+        nominal: f64,
+        beam_length_m: Option<f64>,
+        quantity: &Quantity,
+    ) -> Result<f64, StudyError> {
+        let has_reference =
+            key == Quantity::OPERATING_POINT || Dimension::of_key(key) == Dimension::Ratio;
+        match quantity.percentage().filter(|_| !has_reference) {
+            Some(_) if nominal == 0.0 => Err(self.wrong(format!(
+                "a percentage of `{key}` is of its nominal value, which is 0; give the deviation in the unit of the setting"
             ))),
-            Quantity::Ratio(x) => Ok(x * nominal.abs()),
+            Some(share) => Ok(share * nominal.abs()),
+            None => quantity
+                .for_setting(key, beam_length_m)
+                .map_err(|error| self.wrong(error.to_string())),
         }
     }
 
@@ -192,23 +203,26 @@ mod tests {
     use super::*;
 
     fn deviation(text: &str, key: &str, nominal: f64) -> Result<Deviation, StudyError> {
-        text.parse::<Tolerance>().unwrap().deviation(key, nominal)
+        text.parse::<Tolerance>()
+            .unwrap()
+            .deviation(key, nominal, Some(0.05))
     }
 
     #[test]
-    fn limits_are_added_and_percentages_are_of_the_nominal_value() {
+    fn percentages_are_of_beam_length_one_or_nominal_value() {
         let uniform = |low, high| Ok(Deviation::Uniform { low, high });
         assert_eq!(deviation("k=uniform:-0.5:2", "k", 7.0), uniform(-0.5, 2.0));
-        assert_eq!(deviation("k=+-50%", "k", -3.0), uniform(-1.5, 1.5));
+        assert_eq!(deviation("k=+-50%", "k", -3.0), uniform(-0.5, 0.5));
         assert_eq!(deviation("k = ±2", "k", 0.0), uniform(-2.0, 2.0));
         assert_eq!(
             deviation("y_m=uniform:-1mm:0.5", "y_m", 0.0),
             uniform(-1e-3, 0.5)
         );
-        assert_eq!(
-            deviation("k=normal:25%", "k", 4.0),
-            Ok(Deviation::Normal { sigma: 1.0 })
-        );
+        let point = deviation("*=+-5%", "plant.operating_point_m", 0.004);
+        assert_eq!(point, uniform(-0.05 * 0.05, 0.05 * 0.05));
+        assert_eq!(deviation("m_kg=+-50%", "m_kg", -3.0), uniform(-1.5, 1.5));
+        let quarter = Ok(Deviation::Normal { sigma: 1.0 });
+        assert_eq!(deviation("m_kg=normal:25%", "m_kg", 4.0), quarter);
     }
 
     #[test]
@@ -249,8 +263,8 @@ mod tests {
             ("k=+-0", "empty"),
             ("k=normal:0", "above zero"),
             ("k=normal:-1", "above zero"),
-            ("k=+-1mm", "no length"),
-            ("k=+-5%", "nominal value"),
+            ("k=+-1mm", "a length in m"),
+            ("m_kg=+-5%", "nominal value"),
         ] {
             let error = deviation(text, "k", 0.0).unwrap_err().to_string();
             assert!(error.contains(word) && error.contains(text), "{error}");

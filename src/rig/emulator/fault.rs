@@ -3,7 +3,7 @@
 use bench_hal::can::emulator::DeviceFault;
 use bench_hal::serial::emulator::Fault;
 
-use crate::util::quantity;
+use crate::util::quantity::Length;
 
 /// What an acting device is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -215,8 +215,11 @@ fn of_probe(kind: &str, value: &str) -> Result<Fault, &'static str> {
         }
         "stuck" => Fault::Stuck,
         "jump" => {
-            let by_m = quantity::metres(value).map_err(|_| "a length (50um, 0.5mm, or metres)")?;
-            Fault::Jump { every: 2, by_m }
+            let by: Length = (value.parse()).map_err(|_| "a length (50um, 0.5mm, or metres)")?;
+            Fault::Jump {
+                every: 2,
+                by_m: by.si(),
+            }
         }
         "out-of-range" => Fault::OutOfRange,
         "late" => Fault::Late {

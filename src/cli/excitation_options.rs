@@ -1,0 +1,66 @@
+//! Options of the excitation, for every command that makes one.
+
+use toml::{Table, Value};
+
+use super::chirp_plan::shape;
+use super::error::CliError;
+use super::help::with_setting;
+use crate::config::{Config, OptionSetting};
+use crate::util::quantity::{Current, Frequency};
+
+/// Which frequencies, and with how much.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct ExcitationOptions {
+    /// First frequency
+    #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true,
+        help = with_setting("First frequency", "chirp.start_hz"))]
+    start: Option<Frequency>,
+    /// Last frequency
+    #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true,
+        help = with_setting("Last frequency", "chirp.stop_hz"))]
+    stop: Option<Frequency>,
+    /// The same amplitude at all frequencies: 0.1A or 100mA [default: chirp.amplitude of the profile, which depends on
+    /// the frequency; of a binary sequence prbs.amplitude_a]
+    #[arg(long, value_name = "CURRENT", allow_hyphen_values = true)]
+    amplitude: Option<Current>,
+    /// Amplitude over frequency for the same displacement at all frequencies, by the model or by an FRF measured before
+    /// [default of a stepped sine without --amplitude: model]
+    #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
+    shape: Option<String>,
+}
+
+impl ExcitationOptions {
+    pub(super) fn settings(&self) -> Vec<OptionSetting> {
+        let mut settings = Vec::new();
+        if let Some(start) = &self.start {
+            let option = format!("--start {start}");
+            settings.push(OptionSetting::new("chirp.start_hz", start.si(), option));
+        }
+        if let Some(stop) = &self.stop {
+            let option = format!("--stop {stop}");
+            settings.push(OptionSetting::new("chirp.stop_hz", stop.si(), option));
+        }
+        if let Some(amplitude) = &self.amplitude {
+            settings.extend(flat(amplitude));
+        }
+        settings
+    }
+
+    /// The configuration with the requested amplitude over frequency.
+    pub(super) fn shaped(&self, config: Config) -> Result<Config, CliError> {
+        shape(config, self.shape.as_deref(), self.amplitude.is_some())
+    }
+}
+
+/// One point is the same amplitude at all frequencies.
+fn flat(amplitude: &Current) -> [OptionSetting; 2] {
+    let option = format!("--amplitude {amplitude}");
+    let point = Table::from_iter([
+        ("frequency_hz".to_string(), Value::Float(1.0)),
+        ("current_a".to_string(), Value::Float(amplitude.si())),
+    ]);
+    [
+        OptionSetting::new("chirp.amplitude", vec![point], option.clone()),
+        OptionSetting::new("prbs.amplitude_a", amplitude.si(), option),
+    ]
+}

@@ -1,0 +1,49 @@
+//! Layers of TOML, the later one over the earlier ones.
+
+use toml::{Table, Value};
+
+use super::ConfigError;
+
+/// One layer of settings, with the text it came from.
+pub(super) struct Layer {
+    pub name: String,
+    pub text: String,
+    pub table: Table,
+}
+
+impl Layer {
+    /// The name of the layer of all `--set`.
+    pub const SETS: &str = "--set";
+
+    pub fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
+        match text.parse::<Table>() {
+            Ok(table) => Ok(Layer { name, text, table }),
+            Err(e) => Err(ConfigError::Syntax {
+                place: name,
+                why: e.to_string(),
+            }),
+        }
+    }
+}
+
+/// Lays `over` upon `base`: tables that `joins` accepts are merged key by key, everything else replaces the old value.
+pub(super) fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
+    for (key, value) in over {
+        match (base.get_mut(key), value) {
+            (Some(Value::Table(old)), Value::Table(new)) if joins(old, new) => lay(old, new, joins),
+            _ => {
+                base.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+/// Tables of another `kind` or `model` have other keys: the new one replaces the old one.
+pub(super) fn same_kind(old: &Table, new: &Table) -> bool {
+    ["kind", "model"]
+        .iter()
+        .all(|tag| match (old.get(*tag), new.get(*tag)) {
+            (Some(old), Some(new)) => old == new,
+            _ => true,
+        })
+}

@@ -1,0 +1,161 @@
+//! Settings made on the command line: `--set KEY=VALUE`, and options that stand for settings.
+
+use serde_json::Value as Json;
+use toml::{Table, Value};
+
+use super::ConfigError;
+use super::check;
+use super::layer::{Layer, lay};
+use crate::util::finding::Finding;
+use crate::util::quantity::{Dimension, Quantity};
+
+/// A setting that a command-line option stands for. Errors name the option as typed, not the setting.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OptionSetting {
+    key: String,
+    value: Value,
+    option: String,
+}
+
+impl OptionSetting {
+    /// The setting `key` made by `option`, which is its text on the command line: `--amplitude 0.1A`.
+    pub fn new(
+        key: impl Into<String>,
+        value: impl Into<Value>,
+        option: impl Into<String>,
+    ) -> OptionSetting {
+        OptionSetting {
+            key: key.into(),
+            value: value.into(),
+            option: option.into(),
+        }
+    }
+
+    /// Whether `path` is the setting or something within it.
+    fn contains(&self, path: &str) -> bool {
+        let rest = path.strip_prefix(&self.key);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    }
+
+    /// `; did you mean 8mm?` for a number typed without a unit that is allowed with one.
+    fn hint(&self, path: &str, schema: &Json, merged: &Value) -> String {
+        let typed = self.option.rsplit(' ').next();
+        let number = typed.and_then(|text| text.parse::<f64>().ok());
+        let allowed = check::range_at(schema, merged, path);
+        let (Some(number), Some(allowed)) = (number, allowed) else {
+            return String::new();
+        };
+        if allowed.contains(&number) {
+            return String::new();
+        }
+        let mut readings = Dimension::of_key(path).other_readings(number, &allowed);
+        if path == Quantity::OPERATING_POINT && number.abs() <= 100.0 {
+            readings.insert(0, format!("{number}%"));
+        }
+        readings.truncate(2);
+        match readings.is_empty() {
+            true => String::new(),
+            false => format!("; did you mean {}?", readings.join(" or ")),
+        }
+    }
+}
+
+/// The settings of the options as a layer.
+pub(super) fn options_table(options: &[OptionSetting]) -> Table {
+    let mut table = Table::new();
+    for option in options {
+        lay_at(&mut table, &option.key, option.value.clone());
+    }
+    table
+}
+
+/// What is wrong with a setting in terms of the option that made it, if one did.
+pub(super) fn in_terms_of_option(
+    options: &[OptionSetting],
+    finding: &Finding,
+    schema: &Json,
+    merged: &Value,
+) -> Option<String> {
+    let around = options
+        .iter()
+        .filter(|option| option.contains(&finding.path));
+    let option = around.max_by_key(|option| option.key.len())?;
+    let hint = option.hint(&finding.path, schema, merged);
+    Some(format!("  {} {}{hint}", option.option, finding.what))
+}
+
+/// All `--set KEY=VALUE` as one layer. A value that is not TOML is text: `control.controller=slow`.
+pub(super) fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
+    let mut table = Table::new();
+    for set in sets {
+        let (key, value) = key_and_value(set).map_err(|why| ConfigError::Syntax {
+            place: format!("--set {set}"),
+            why: why.into(),
+        })?;
+        lay_at(&mut table, key, value);
+    }
+    let text = toml::to_string(&table).unwrap_or_default();
+    Ok(Layer {
+        name: Layer::SETS.into(),
+        text,
+        table,
+    })
+}
+
+fn key_and_value(set: &str) -> Result<(&str, Value), &'static str> {
+    let split = set.split_once('=');
+    let (key, text) = split.ok_or("write KEY=VALUE, as in plant.mass_asymmetry=0.05")?;
+    let (key, text) = (key.trim(), text.trim());
+    if key.split('.').any(str::is_empty) {
+        return Err("the key has an empty part");
+    }
+    let parsed = format!("value = {text}").parse::<Table>().ok();
+    let parsed = parsed.and_then(|mut table| table.remove("value"));
+    Ok((
+        key,
+        parsed.unwrap_or_else(|| Value::String(text.trim_matches('"').into())),
+    ))
+}
+
+fn lay_at(table: &mut Table, key: &str, value: Value) {
+    let nested = key.rsplit('.').fold(value, |inner, part| {
+        Value::Table(Table::from_iter([(part.to_string(), inner)]))
+    });
+    if let Value::Table(nested) = nested {
+        lay(table, &nested, |_, _| true);
+    }
+}
+
+/// Turns the quantities with units among the values of `--set` into numbers, where a number belongs.
+pub(super) fn convert_quantities(schema: &Json, sets: &Table, merged: &mut Table) -> Vec<Finding> {
+    let mut texts = Vec::new();
+    collect_texts(sets, "", &mut texts);
+    let mut findings = Vec::new();
+    for (path, text) in texts {
+        let is_number = check::wants_number(schema, &Value::Table(merged.clone()), &path);
+        let quantity: Option<Quantity> = text.parse().ok();
+        let Some(quantity) = quantity.filter(|_| is_number) else {
+            continue;
+        };
+        match quantity.for_setting(&path, beam_length_m(merged)) {
+            Ok(si) => lay_at(merged, &path, Value::Float(si)),
+            Err(error) => findings.push(Finding::new(&path, format!("cannot be set: {error}"))),
+        }
+    }
+    findings
+}
+
+fn collect_texts(table: &Table, around: &str, texts: &mut Vec<(String, String)>) {
+    for (key, value) in table {
+        let path = check::join(around, key);
+        match value {
+            Value::Table(inner) => collect_texts(inner, &path, texts),
+            Value::String(text) => texts.push((path, text.clone())),
+            _ => {}
+        }
+    }
+}
+
+fn beam_length_m(merged: &Table) -> Option<f64> {
+    merged.get("plant")?.get("beam_length_m")?.as_float()
+}
