@@ -9,7 +9,7 @@ use bench::recording::Recording;
 use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
 
-use crate::rig::analysed;
+use crate::identified::analysed;
 use crate::simulated;
 
 /// The default stage at its 5 kHz.

@@ -8,8 +8,6 @@ mod joint;
 mod noise;
 use bench_test_support::python;
 mod repeated;
-mod seeds;
 mod sides;
 use bench_test_support::stage;
-use bench_test_support::unrecorded;
 mod welch;

@@ -1,3 +1,9 @@
 //! The statistical suite: claims about many seeds, such as the coverage of a 95 % confidence interval.
 //!
 //! It takes minutes of processor time: `cargo test --features statistical --test statistical`. `.ci/run` runs it.
+
+mod fit_intervals;
+mod frf_bias_and_coverage;
+mod frf_noise;
+mod modes;
+mod verdicts;

@@ -1,11 +1,13 @@
 //! What the integration tests share: running the program, external references in python, rigs, records.
 
 pub mod faulty_rig;
+pub mod identified;
 pub mod loop_rig;
 pub mod program;
 pub mod python;
 pub mod simulated;
 pub mod stage;
 pub mod svg;
+pub mod synthetic;
 pub mod truth;
 pub mod unrecorded;

@@ -2,7 +2,7 @@
 use bench::identify::modal::{Estimate, MeasurementChain, fit};
 use bench::identify::verdict::zeros;
 
-use crate::synthetic::{frf_data, stage};
+use bench_test_support::synthetic::{frf_data, stage};
 
 const SEEDS: u64 = 200;
 

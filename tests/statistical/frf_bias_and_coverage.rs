@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bench::config::{Config, Source, load};
 use bench::identify::{Frf, response};
 
-use crate::stage::SampledPlant;
-use crate::unrecorded;
+use bench_test_support::stage::SampledPlant;
+use bench_test_support::unrecorded;
 
 const BAND_HZ: (f64, f64) = (0.5, 450.0);
 /// Three of the stage's runs a second on a core: 200 are 30 to 60 seconds on two.

@@ -2,35 +2,10 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench::config::{Config, Source, UnmodelledMode, load};
+use bench::config::{Source, UnmodelledMode, load};
 use bench::experiment::Analysis;
-use bench::identify::modal::{Estimate, FittedMode};
-use bench::model::plant::{self, ModalModel};
-
-use crate::rig::{analysed, config};
-
-/// w (rad/s), zeta and residue (1/kg) of a mode.
-pub type Truth = [f64; 3];
-
-/// The modes of the model, slowest first.
-pub fn model(config: &Config) -> Vec<Truth> {
-    let modal = ModalModel::of(&plant::build(&config.plant).expect("a model")).expect("modes");
-    modal
-        .modes
-        .iter()
-        .map(|m| [m.omega_rad_s, m.damping_ratio, m.residue_per_kg()])
-        .collect()
-}
-
-/// The fitted mode that stands for one of the model, within half a percent of its frequency.
-pub fn stands_for(modes: &[FittedMode], omega_rad_s: f64) -> Option<FittedMode> {
-    let off = |mode: &&FittedMode| (mode.omega_rad_s.value / omega_rad_s - 1.0).abs();
-    modes
-        .iter()
-        .min_by(|a, b| off(a).total_cmp(&off(b)))
-        .filter(|mode| off(mode) < 5e-3)
-        .copied()
-}
+use bench::identify::modal::Estimate;
+use bench_test_support::identified::{Truth, analysed, config, model, stands_for};
 
 /// On both cores.
 fn both(count: u64, of: impl Fn(u64) -> Analysis + Sync) -> Vec<Analysis> {

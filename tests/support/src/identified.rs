@@ -1,0 +1,53 @@
+//! A chirp of the simulated stage with its analysis, and the true modes and zeros of the model.
+use bench::config::{Config, Source, load};
+use bench::experiment::{Analysis, Plan};
+use bench::identify::modal::FittedMode;
+use bench::model::plant::{self, ModalModel};
+use bench::model::zeros::{cnmp_pairs, damped_zeros};
+
+use crate::simulated;
+
+/// The default stage, identified at 1 kHz as in section 5.2.2.
+pub fn config(sets: &[String]) -> Config {
+    let sets = std::iter::once("loop.rate_hz=1000".to_string())
+        .chain(sets.iter().cloned())
+        .collect();
+    load(&Source {
+        sets,
+        ..Source::default()
+    })
+    .expect("the profile is valid")
+}
+
+/// The analysis of a run with `config`, believing `believed`.
+pub fn analysed(config: &Config, believed: &Config) -> Analysis {
+    simulated::analysed(&Plan::chirp(config.clone()), believed).expect("an analysis")
+}
+
+/// CNMP pairs of the model with damping.
+pub fn truth(config: &Config) -> usize {
+    cnmp_pairs(&damped_zeros(&plant::build(&config.plant).expect("a model")).expect("zeros"))
+}
+
+/// w (rad/s), zeta and residue (1/kg) of a mode.
+pub type Truth = [f64; 3];
+
+/// The modes of the model, slowest first.
+pub fn model(config: &Config) -> Vec<Truth> {
+    let modal = ModalModel::of(&plant::build(&config.plant).expect("a model")).expect("modes");
+    modal
+        .modes
+        .iter()
+        .map(|m| [m.omega_rad_s, m.damping_ratio, m.residue_per_kg()])
+        .collect()
+}
+
+/// The fitted mode that stands for one of the model, within half a percent of its frequency.
+pub fn stands_for(modes: &[FittedMode], omega_rad_s: f64) -> Option<FittedMode> {
+    let off = |mode: &&FittedMode| (mode.omega_rad_s.value / omega_rad_s - 1.0).abs();
+    modes
+        .iter()
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .filter(|mode| off(mode) < 5e-3)
+        .copied()
+}
