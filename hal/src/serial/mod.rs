@@ -38,6 +38,7 @@ pub mod emulator;
 mod error;
 mod ioctl;
 mod lock;
+mod mounting;
 pub mod optoncdt;
 mod poller;
 mod port;
@@ -48,7 +49,8 @@ mod statistics;
 
 pub use decoder::{Decoder, Event, Sample};
 pub use error::SerialError;
+pub use mounting::Mounting;
 pub use port::{Note, Parity, PortSettings};
-pub use probe::{Mounting, ProbeSettings, SerialProbe, StatisticsHandle};
+pub use probe::{ProbeSettings, SerialProbe, StatisticsHandle};
 pub use protocol::{Polling, Protocol};
 pub use statistics::Statistics;

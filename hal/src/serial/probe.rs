@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::cell::{self, Reader};
 use super::error::SerialError;
+use super::mounting::Mounting;
 use super::poller::{Poller, nanoseconds};
 use super::port::{Note, Port, PortSettings};
 use super::protocol::Protocol;
@@ -17,43 +18,6 @@ use crate::{DisplacementProbe, Reading, Tick};
 
 /// Longest time for writing the start command.
 const START_WAIT: Duration = Duration::from_secs(1);
-
-/// How a probe is mounted: position = gain * (position of the probe) + offset.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mounting {
-    /// Metres of the stage per metre of the probe; negative if the probe measures against the direction of positive
-    /// force.
-    pub gain: f64,
-    /// Position of the stage at the zero of the probe, in metres.
-    pub offset_m: f64,
-}
-
-impl Default for Mounting {
-    /// The position as the probe sends it.
-    fn default() -> Self {
-        Self {
-            gain: 1.0,
-            offset_m: 0.0,
-        }
-    }
-}
-
-impl Mounting {
-    fn check(&self) -> Result<(), SerialError> {
-        let (name, value, expected) = if !self.gain.is_normal() {
-            ("gain", self.gain, "a finite number other than zero")
-        } else if !self.offset_m.is_finite() {
-            ("offset_m", self.offset_m, "a finite number of metres")
-        } else {
-            return Ok(());
-        };
-        Err(SerialError::Setting {
-            name,
-            value: value.to_string(),
-            expected,
-        })
-    }
-}
 
 /// Settings of a probe: port, protocol and mounting.
 #[derive(Clone, Debug)]

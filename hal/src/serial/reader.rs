@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use super::cell::{Measurement, Writer};
 use super::decoder::{Decoder, Event};
 use super::error::Failure;
+use super::mounting::Mounting;
 use super::poller::{Action, Poller};
 use super::port::{Port, PortSettings};
-use super::probe::Mounting;
 use super::statistics::{Counters, Rate, add};
 use crate::Validity;
 

@@ -71,7 +71,7 @@ fn invalid_values_and_errors_have_a_text() {
     );
     assert_eq!(
         fault("ER,M1,88\r"),
-        (88, "the probe's controller timed out")
+        (88, "the controller of the probe timed out")
     );
     assert!(fault("ER,M1,77\r").1.contains("its manual"));
 }

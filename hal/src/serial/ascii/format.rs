@@ -2,8 +2,8 @@
 
 use super::super::decoder::{Event, Sample};
 use super::super::error::{SerialError, positive};
-use super::Settings;
 use super::pattern::{Decimal, Pattern};
+use super::settings::Settings;
 
 /// The compiled settings, for both sides of the line.
 #[derive(Clone, Debug)]

@@ -13,9 +13,11 @@
 mod fault;
 mod line;
 mod probe;
+mod responder;
 mod task;
 
 pub use self::fault::Fault;
 pub use self::line::Line;
-pub use self::probe::{EmulatedProbe, Responder};
+pub use self::probe::EmulatedProbe;
+pub use self::responder::Responder;
 pub use self::task::{LineCounts, ProbeTask, SharedProbe};

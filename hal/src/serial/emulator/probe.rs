@@ -1,24 +1,9 @@
 //! A probe that measures at a fixed rate and answers by its protocol.
 
 use super::fault::{Fault, FaultInjector};
+use super::responder::Responder;
 use crate::serial::error::{SerialError, positive};
 use crate::serial::protocol::Protocol;
-
-/// The probe's side of a protocol.
-pub trait Responder: Send {
-    /// Takes a measurement at `position_m`, in metres of the probe. Returns the bytes that the probe sends without a
-    /// request; empty for a polled probe.
-    fn measure(&mut self, position_m: f64) -> Vec<u8>;
-
-    /// Receives one byte from the host. Returns the answer if the byte completes a request.
-    fn receive(&mut self, byte: u8) -> Vec<u8>;
-
-    /// Restarts the probe: its counter starts again and an unfinished message is cut off.
-    fn restart(&mut self);
-
-    /// A position outside the measuring range, in metres of the probe, for [`Fault::OutOfRange`].
-    fn out_of_range_m(&self) -> f64;
-}
 
 /// An emulated probe: measures at a fixed rate, answers by its protocol, and misbehaves on request.
 ///

@@ -1,0 +1,40 @@
+//! How a probe is mounted.
+
+use super::error::SerialError;
+
+/// How a probe is mounted: position = gain * (position of the probe) + offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mounting {
+    /// Metres of the stage per metre of the probe; negative if the probe measures against the direction of positive
+    /// force.
+    pub gain: f64,
+    /// Position of the stage at the zero of the probe, in metres.
+    pub offset_m: f64,
+}
+
+impl Default for Mounting {
+    /// The position as the probe sends it.
+    fn default() -> Self {
+        Self {
+            gain: 1.0,
+            offset_m: 0.0,
+        }
+    }
+}
+
+impl Mounting {
+    pub(super) fn check(&self) -> Result<(), SerialError> {
+        let (name, value, expected) = if !self.gain.is_normal() {
+            ("gain", self.gain, "a finite number other than zero")
+        } else if !self.offset_m.is_finite() {
+            ("offset_m", self.offset_m, "a finite number of metres")
+        } else {
+            return Ok(());
+        };
+        Err(SerialError::Setting {
+            name,
+            value: value.to_string(),
+            expected,
+        })
+    }
+}
