@@ -10,7 +10,9 @@ use bench_hal::can::bus::{
     BusError, BusEvent, CanBus, Host, Port, SimulatedHost, Task, TaskHandle,
 };
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
-use bench_hal::can::emulator::{AmplifierTask, DeviceFault, EmulatedDrive, EmulatedDriveSettings};
+use bench_hal::can::emulator::{
+    AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
+};
 use bench_hal::can::{CanFrame, Id};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 

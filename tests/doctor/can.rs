@@ -11,7 +11,9 @@ use bench_hal::can::bus::{
 };
 use bench_hal::can::cia402::State;
 use bench_hal::can::drive::{CanopenDrive, DriveSettings};
-use bench_hal::can::emulator::{AmplifierTask, DeviceFault, EmulatedDrive, EmulatedDriveSettings};
+use bench_hal::can::emulator::{
+    AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
+};
 use bench_hal::can::frame::{CanFrame, Id};
 use bench_hal::can::vesc::{VescSettings, status_id};
 use bench_hal::can::{nmt, sdo};

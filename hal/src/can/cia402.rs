@@ -148,7 +148,7 @@ impl State {
 
 /// What a controlword orders (CiA 402-2, table 5). Fault reset is an edge and stands apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
+pub enum Command {
     /// 0xxx x110
     Shutdown,
     /// 0xxx 0111, also `disable operation`
@@ -161,16 +161,16 @@ pub enum Order {
     QuickStop,
 }
 
-impl Order {
+impl Command {
     /// Reads a controlword; `None` while bit 7 is set.
-    pub const fn decode(controlword: u16) -> Option<Order> {
+    pub const fn decode(controlword: u16) -> Option<Command> {
         match controlword & 0x8F {
             word if word & 0x80 != 0 => None,
-            word if word & 0x02 == 0 => Some(Order::DisableVoltage),
-            word if word & 0x04 == 0 => Some(Order::QuickStop),
-            word if word & 0x01 == 0 => Some(Order::Shutdown),
-            0x07 => Some(Order::SwitchOn),
-            _ => Some(Order::EnableOperation),
+            word if word & 0x02 == 0 => Some(Command::DisableVoltage),
+            word if word & 0x04 == 0 => Some(Command::QuickStop),
+            word if word & 0x01 == 0 => Some(Command::Shutdown),
+            0x07 => Some(Command::SwitchOn),
+            _ => Some(Command::EnableOperation),
         }
     }
 }
@@ -230,8 +230,8 @@ mod tests {
             DISABLE_VOLTAGE,
             QUICK_STOP,
         ]
-        .map(Order::decode);
-        use Order::*;
+        .map(Command::decode);
+        use Command::*;
         assert_eq!(
             words,
             [
@@ -243,9 +243,9 @@ mod tests {
             ]
             .map(Some)
         );
-        assert_eq!(Order::decode(FAULT_RESET | ENABLE_OPERATION), None);
+        assert_eq!(Command::decode(FAULT_RESET | ENABLE_OPERATION), None);
         assert_eq!(
-            Order::decode(0x0D),
+            Command::decode(0x0D),
             Some(DisableVoltage),
             "without bit 1 there is no voltage"
         );

@@ -33,7 +33,7 @@ pub const fn consumer_entry(node: u8, timeout_ms: u16) -> u32 {
 }
 
 /// The watched node and its time in milliseconds; `None` for an unused entry.
-pub fn watched(entry: u32) -> Option<(u8, u16)> {
+pub fn monitored(entry: u32) -> Option<(u8, u16)> {
     let (node, timeout_ms) = ((entry >> 16) as u8, entry as u16);
     ((1..=127).contains(&node) && timeout_ms > 0).then_some((node, timeout_ms))
 }
@@ -60,8 +60,8 @@ mod tests {
     #[test]
     fn consumer_entries_carry_node_and_time() {
         assert_eq!(consumer_entry(0x7F, 100), 0x007F_0064);
-        assert_eq!(watched(0x007F_0064), Some((0x7F, 100)));
-        assert_eq!(watched(0), None);
-        assert_eq!(watched(0x0080_0064), None, "node numbers end at 127");
+        assert_eq!(monitored(0x007F_0064), Some((0x7F, 100)));
+        assert_eq!(monitored(0), None);
+        assert_eq!(monitored(0x0080_0064), None, "node numbers end at 127");
     }
 }

@@ -30,6 +30,7 @@ pub mod emulator;
 pub mod frame;
 pub mod heartbeat;
 pub mod nmt;
+mod objects;
 pub mod pdo;
 pub mod scale;
 pub mod sdo;

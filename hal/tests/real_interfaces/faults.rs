@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bench_hal::CurrentAmplifier;
 use bench_hal::can::drive::{fault_text, faults};
-use bench_hal::can::emulator::DeviceFault;
+use bench_hal::can::emulator::{DeviceFault, EmulatedAmplifier};
 
 use crate::support::vcan::Vcan;
 use crate::support::{Rig, open, settings, wait_for};

@@ -117,7 +117,7 @@ impl Amplifier {
     /// Whether the device can have this fault.
     pub fn knows(&self, fault: AmplifierFault) -> bool {
         match fault {
-            AmplifierFault::Device(fault) => self.device().knows(fault),
+            AmplifierFault::Device(fault) => self.device().supports(fault),
             AmplifierFault::BusOff => true,
         }
     }

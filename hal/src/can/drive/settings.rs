@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::super::budget::{Exchange, Traffic};
 use super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
 use super::super::scale::Reference;
-use super::OpenError;
+use super::errors::OpenError;
 
 /// Which mode of operation the drive shall run in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,57 +1,48 @@
-//! Tells a drive how to work, and checks that it listens: everything that goes by SDO.
+//! Configures a drive by SDO and verifies what it accepted.
 
 use std::time::Duration;
 
 use super::super::budget::Exchange;
 use super::super::cia402::PROFILE_TORQUE;
+use super::super::objects::{
+    ABORT_CONNECTION, ACTUAL, CONTROLWORD, HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, MAXIMUM, MODE,
+    MODE_DISPLAY, RATED_CURRENT, SLOPE, STATUSWORD, SUPPORTED_MODES, TARGET, identity,
+};
 use super::super::pdo::{ASYNCHRONOUS, Direction, Mapped, OFF, Pdo, Value, parameters};
 use super::super::scale::{Reference, Scale};
 use super::super::sdo::{Address, Channel, SdoError};
 use super::super::{heartbeat, nmt};
-use super::OpenError;
+use super::errors::OpenError;
 use super::settings::{DriveSettings, milliseconds};
 
-const IDENTITY: u16 = 0x1018;
-const HEARTBEAT_CONSUMER: Address = Address::new(0x1016, 1);
-const HEARTBEAT_PRODUCER: Address = Address::new(0x1017, 0);
-const ABORT_CONNECTION: Address = Address::new(0x6007, 0);
-const CONTROLWORD: Address = Address::new(0x6040, 0);
-const STATUSWORD: Address = Address::new(0x6041, 0);
-const MODE: Address = Address::new(0x6060, 0);
-const MODE_DISPLAY: Address = Address::new(0x6061, 0);
-const TARGET: Address = Address::new(0x6071, 0);
-const MAXIMUM: Address = Address::new(0x6072, 0);
-const RATED_CURRENT: Address = Address::new(0x6075, 0);
-const ACTUAL: Address = Address::new(0x6077, 0);
-const SLOPE: Address = Address::new(0x6087, 0);
-const SUPPORTED_MODES: Address = Address::new(0x6502, 0);
+/// Time between reads of the active mode.
+const MODE_POLL: Duration = Duration::from_millis(5);
 
-/// What the drive turned out to be.
+/// Properties of a configured drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Configured {
     pub(super) scale: Scale,
     pub(super) mode: i8,
-    /// Vendor, product, revision and serial number, as far as the drive says.
+    /// Vendor, product, revision and serial number, as far as the drive has them.
     pub(super) identity: [Option<u32>; 4],
 }
 
-/// A drive to be set up.
+/// The configuration of one drive.
 pub(super) struct Setup<'a> {
     pub(super) channel: Channel<'a>,
     pub(super) settings: &'a DriveSettings,
 }
 
 impl Setup<'_> {
-    /// All of it, in pre-operational: nothing moves and no process data flow.
+    /// Configures the drive in the state pre-operational, in which no process data are exchanged.
     pub(super) fn run(&mut self) -> Result<Configured, OpenError> {
-        self.channel
-            .bus
-            .send(&nmt::Command::EnterPreOperational.frame(self.settings.node))?;
+        let stop = nmt::Command::EnterPreOperational.frame(self.settings.node);
+        self.channel.bus.send(&stop)?;
         let identity = self.check_identity()?;
         self.switch_off()?;
         let scale = self.scale()?;
-        self.watch_each_other()?;
-        self.map()?;
+        self.configure_heartbeats()?;
+        self.configure_pdos()?;
         let mode = self.choose_mode()?;
         Ok(Configured {
             scale,
@@ -61,40 +52,44 @@ impl Setup<'_> {
     }
 
     fn check_identity(&mut self) -> Result<[Option<u32>; 4], OpenError> {
-        let identity = self.settings.identity;
-        let fields = [
-            (1, "the vendor", identity.vendor),
-            (2, "the product code", identity.product),
-            (3, "the revision", identity.revision),
-            (4, "the serial number", identity.serial),
-        ];
-        self.channel.read_u32(Address::new(IDENTITY, 1))?; // every CANopen node has it: a node that answers is there
-        let mut identity = [None; 4];
-        for ((sub, field, want), said) in fields.into_iter().zip(&mut identity) {
-            let have = match (self.channel.read_u32(Address::new(IDENTITY, sub)), want) {
-                (Err(error), None) if error.means_absent() => continue,
-                (have, _) => have?,
-            };
-            if let Some(want) = want.filter(|want| *want != have) {
-                return Err(OpenError::Identity {
-                    node: self.settings.node,
-                    field,
-                    have,
-                    want,
-                });
-            }
-            *said = Some(have);
-        }
-        Ok(identity)
+        let expected = self.settings.identity;
+        self.channel.read_u32(identity(1))?; // every CANopen node has it: this shows that the node answers
+        Ok([
+            self.check_identity_field(1, "the vendor", expected.vendor)?,
+            self.check_identity_field(2, "the product code", expected.product)?,
+            self.check_identity_field(3, "the revision", expected.revision)?,
+            self.check_identity_field(4, "the serial number", expected.serial)?,
+        ])
     }
 
-    /// No voltage, no target: whatever came before.
+    fn check_identity_field(
+        &mut self,
+        sub: u8,
+        field: &'static str,
+        want: Option<u32>,
+    ) -> Result<Option<u32>, OpenError> {
+        let have = match self.channel.read_u32(identity(sub)) {
+            Err(error) if want.is_none() && error.means_absent() => return Ok(None),
+            have => have?,
+        };
+        match want {
+            Some(want) if want != have => Err(OpenError::Identity {
+                node: self.settings.node,
+                field,
+                have,
+                want,
+            }),
+            _ => Ok(Some(have)),
+        }
+    }
+
+    /// Disables the voltage and sets the target to zero.
     fn switch_off(&mut self) -> Result<(), OpenError> {
         self.put(CONTROLWORD, 0, 2)?;
         self.put(TARGET, 0, 2)
     }
 
-    /// Rated current as configured, to the milliampere of 0x6075; and what 1000 counts are.
+    /// Checks the rated current, to the resolution of 0x6075, and returns the scale of the target.
     fn scale(&mut self) -> Result<Scale, OpenError> {
         let (node, want_a) = (self.settings.node, self.settings.rated_current_a);
         let have_a = f64::from(self.channel.read_u32(RATED_CURRENT)?) * 1e-3;
@@ -110,60 +105,56 @@ impl Setup<'_> {
             Reference::Rated => have_a,
             Reference::Maximum => have_a * f64::from(self.channel.read_u16(MAXIMUM)?) * 1e-3,
         };
-        Scale::new(reference_a, self.settings.current_limit_a).ok_or(OpenError::Setting {
+        let limit_a = self.settings.current_limit_a;
+        Scale::new(reference_a, limit_a).ok_or_else(|| OpenError::Setting {
             name: "current_limit_a",
-            value: format!(
-                "{} A with 1000 counts = {reference_a} A",
-                self.settings.current_limit_a
-            ),
+            value: format!("{limit_a} A with 1000 counts = {reference_a} A"),
             limit: "both positive, the limit at least one count",
         })
     }
 
-    /// Heartbeats both ways, and what the drive does when it hears none.
-    fn watch_each_other(&mut self) -> Result<(), OpenError> {
+    /// Heartbeats in both directions, and the reaction of the drive to a lost heartbeat.
+    fn configure_heartbeats(&mut self) -> Result<(), OpenError> {
         let (settings, node) = (self.settings, self.settings.node);
-        let own_timeout_ms = milliseconds(settings.own_heartbeat_timeout);
-        let entry = heartbeat::consumer_entry(settings.own_node, own_timeout_ms);
-        self.put(
-            HEARTBEAT_PRODUCER,
-            u32::from(milliseconds(settings.heartbeat_period)),
-            2,
-        )?;
-        let no_stop = |error| match error {
-            OpenError::Sdo(cause) if cause.means_absent() => OpenError::NoStop { node, cause },
-            other => other,
-        };
-        self.put(HEARTBEAT_CONSUMER, entry, 4).map_err(no_stop)?;
+        let producer_ms = milliseconds(settings.heartbeat_period);
+        let timeout_ms = milliseconds(settings.own_heartbeat_timeout);
+        let consumer = heartbeat::consumer_entry(settings.own_node, timeout_ms);
+        self.put(HEARTBEAT_PRODUCER, u32::from(producer_ms), 2)?;
+        self.put(HEARTBEAT_CONSUMER, consumer, 4)
+            .map_err(|error| no_stop(node, error))?;
         match settings.abort_connection {
             Some(option) => self
                 .put(ABORT_CONNECTION, u32::from(option as u16), 2)
-                .map_err(no_stop),
+                .map_err(|error| no_stop(node, error)),
             None => Ok(()),
         }
     }
 
-    fn map(&mut self) -> Result<(), OpenError> {
+    fn configure_pdos(&mut self) -> Result<(), OpenError> {
         for pdo in self.pdos() {
-            let cob_id_now = self.channel.read_u32(pdo.cob_id_address())?;
-            for value in pdo.sequence(cob_id_now) {
-                self.write(value)
-                    .map_err(|error| self.no_timer(value.address, error))?;
-            }
-            for value in pdo.layout() {
-                self.verify(value)?;
-            }
-            let on = pdo.sequence(cob_id_now).last().copied();
-            on.map_or(Ok(()), |value| self.verify(value))?;
+            self.configure_pdo(&pdo)?;
         }
-        (2..=4).try_for_each(|number| self.silence(number))
+        (2..=4).try_for_each(|number| self.switch_off_status_pdo(number))
     }
 
-    /// Says which other exchange does without the times that a drive missing_objects.
+    fn configure_pdo(&mut self, pdo: &Pdo) -> Result<(), OpenError> {
+        let present_cob_id = self.channel.read_u32(pdo.cob_id_address())?;
+        let sequence = pdo.sequence(present_cob_id);
+        for value in &sequence {
+            self.write(*value)
+                .map_err(|error| self.no_timer(value.address, error))?;
+        }
+        for value in pdo.layout() {
+            self.verify(value)?;
+        }
+        sequence.last().map_or(Ok(()), |on| self.verify(*on))
+    }
+
+    /// If the drive lacks the timer of the status PDO, the error names the exchange that needs none.
     fn no_timer(&self, address: Address, error: OpenError) -> OpenError {
-        let is_time = matches!((address.index, address.sub), (0x1800, 3 | 5));
+        let is_timer = matches!((address.index, address.sub), (0x1800, 3 | 5));
         match error {
-            OpenError::Sdo(cause) if is_time && cause.means_absent() => OpenError::NoTimer {
+            OpenError::Sdo(cause) if is_timer && cause.means_absent() => OpenError::NoTimer {
                 node: self.settings.node,
                 cause,
             },
@@ -171,31 +162,48 @@ impl Setup<'_> {
         }
     }
 
-    /// Set-point: controlword and target. Status: statusword and actual value.
+    /// The set-point with controlword and target, and the status with statusword and actual value.
     fn pdos(&self) -> [Pdo; 2] {
-        let node = self.settings.node;
         let period_ms = milliseconds(self.settings.status_period());
-        let (set_point, status, timer_ms) = match self.settings.exchange {
-            Exchange::Asynchronous { .. } => (ASYNCHRONOUS, ASYNCHRONOUS, Some(period_ms)),
-            Exchange::Synchronous { status_every } => (1, status_every, None),
-        };
-        let pdo = |direction, entries: [Address; 2], transmission, timer_ms: Option<u16>| Pdo {
-            direction,
-            number: 1,
-            node,
-            entries: entries.map(|address| Mapped::new(address, 16)).to_vec(),
-            transmission,
-            inhibit_100us: timer_ms.map(|timer_ms| timer_ms.saturating_mul(10)),
-            event_timer_ms: timer_ms,
-        };
-        [
-            pdo(Direction::Receive, [CONTROLWORD, TARGET], set_point, None),
-            pdo(Direction::Transmit, [STATUSWORD, ACTUAL], status, timer_ms),
-        ]
+        let set_point = self.pdo(Direction::Receive, [CONTROLWORD, TARGET]);
+        let status = self.pdo(Direction::Transmit, [STATUSWORD, ACTUAL]);
+        match self.settings.exchange {
+            Exchange::Asynchronous { .. } => [
+                set_point,
+                Pdo {
+                    inhibit_100us: Some(period_ms.saturating_mul(10)),
+                    event_timer_ms: Some(period_ms),
+                    ..status
+                },
+            ],
+            Exchange::Synchronous { status_every } => [
+                Pdo {
+                    transmission: 1,
+                    ..set_point
+                },
+                Pdo {
+                    transmission: status_every,
+                    ..status
+                },
+            ],
+        }
     }
 
-    /// Switches a status PDO off that is not in the budget, if the drive has it.
-    fn silence(&mut self, number: u8) -> Result<(), OpenError> {
+    /// PDO 1, asynchronous, with two objects of 16 bits.
+    fn pdo(&self, direction: Direction, objects: [Address; 2]) -> Pdo {
+        Pdo {
+            direction,
+            number: 1,
+            node: self.settings.node,
+            entries: objects.map(|address| Mapped::new(address, 16)).to_vec(),
+            transmission: ASYNCHRONOUS,
+            inhibit_100us: None,
+            event_timer_ms: None,
+        }
+    }
+
+    /// Switches off a status PDO that is not part of the bus load, if the drive has it.
+    fn switch_off_status_pdo(&mut self, number: u8) -> Result<(), OpenError> {
         let address = Address::new(parameters(Direction::Transmit, number), 1);
         match self.channel.read_u32(address) {
             Ok(cob_id) if cob_id & OFF == 0 => self.put(address, cob_id | OFF, 4),
@@ -207,14 +215,11 @@ impl Setup<'_> {
     fn choose_mode(&mut self) -> Result<i8, OpenError> {
         let node = self.settings.node;
         let supported = match self.channel.read_u32(SUPPORTED_MODES) {
-            Err(error) if error.means_absent() => u32::MAX, // optional: then 0x6061 tells
+            Err(error) if error.means_absent() => u32::MAX, // an optional object: 0x6061 shows the active mode
             other => other?,
         };
-        let mode = self
-            .settings
-            .mode
-            .choose(supported)
-            .ok_or(OpenError::Modes { node, supported })?;
+        let mode = self.settings.mode.choose(supported);
+        let mode = mode.ok_or(OpenError::Modes { node, supported })?;
         if mode == PROFILE_TORQUE {
             self.put(SLOPE, self.settings.torque_slope, 4)?;
         }
@@ -226,23 +231,20 @@ impl Setup<'_> {
         self.wait_for_mode(mode)
     }
 
-    /// Some drives need a moment to change their mode.
+    /// Waits until the mode is active; some drives need some time to change it.
     fn wait_for_mode(&mut self, want: i8) -> Result<i8, OpenError> {
-        let deadline_ns =
-            self.channel.host.now_ns() + self.settings.state_timeout.as_nanos() as u64;
+        let host = self.channel.host;
+        let deadline_ns = host.now_ns() + self.settings.state_timeout.as_nanos() as u64;
         loop {
             let have = self.channel.read_u8(MODE_DISPLAY)? as i8;
             if have == want {
                 return Ok(want);
             }
-            if self.channel.host.now_ns() >= deadline_ns {
-                return Err(OpenError::ModeDisplay {
-                    node: self.settings.node,
-                    have,
-                    want,
-                });
+            if host.now_ns() >= deadline_ns {
+                let node = self.settings.node;
+                return Err(OpenError::ModeDisplay { node, have, want });
             }
-            self.channel.host.sleep(Duration::from_millis(5));
+            host.sleep(MODE_POLL);
         }
     }
 
@@ -259,37 +261,39 @@ impl Setup<'_> {
 
     fn write(&mut self, value: Value) -> Result<(), OpenError> {
         let bytes = value.number.to_le_bytes();
-        Ok(self
-            .channel
-            .write(value.address, bytes.get(..value.bytes).unwrap_or(&bytes))?)
+        let bytes = bytes.get(..value.bytes).unwrap_or(&bytes);
+        Ok(self.channel.write(value.address, bytes)?)
     }
 
     fn verify(&mut self, value: Value) -> Result<(), OpenError> {
-        let bytes = self.channel.read(value.address)?;
-        let (node, address, have) = (self.settings.node, value.address, bytes.len());
-        if have != value.bytes {
-            return Err(SdoError::Length {
+        let (node, address, want) = (self.settings.node, value.address, value.number);
+        let bytes = self.channel.read(address)?;
+        if bytes.len() != value.bytes {
+            return Err(OpenError::Sdo(SdoError::Length {
                 node,
                 address,
-                have,
+                have: bytes.len(),
                 want: value.bytes,
-            }
-            .into());
+            }));
         }
-        let have = bytes
-            .iter()
-            .rev()
-            .fold(0, |number, byte| number << 8 | u32::from(*byte));
-        let want = value.number;
+        let number = |number, byte: &u8| number << 8 | u32::from(*byte);
+        let have = bytes.iter().rev().fold(0, number);
         if have == want {
-            Ok(())
-        } else {
-            Err(OpenError::Verification {
-                node,
-                address,
-                have,
-                want,
-            })
+            return Ok(());
         }
+        Err(OpenError::Verification {
+            node,
+            address,
+            have,
+            want,
+        })
+    }
+}
+
+/// If the drive lacks the object, it would not stop when the heartbeat is lost.
+fn no_stop(node: u8, error: OpenError) -> OpenError {
+    match error {
+        OpenError::Sdo(cause) if cause.means_absent() => OpenError::NoStop { node, cause },
+        other => other,
     }
 }

@@ -1,66 +1,31 @@
-//! What all acting amplifiers have in common, so that one task carries each of them.
+//! The interface of all emulated amplifiers.
 
-use super::super::cia402::State;
 use super::super::frame::CanFrame;
-use super::{DeviceFault, EmulatedDrive};
+use super::fault::DeviceFault;
 
-/// The device's side of a current amplifier on a CAN bus: frames and time go in, frames come out.
+/// The device's side of a current amplifier on a CAN bus, without bus and clock.
 pub trait EmulatedAmplifier: Send {
-    /// Takes a frame of the bus at time `now_ns`; frames to send are added to `out`.
+    /// Receives a frame at time `now_ns`; frames to send are appended to `out`.
     fn handle(&mut self, frame: &CanFrame, now_ns: u64, out: &mut Vec<CanFrame>);
 
-    /// Lets time pass until `now_ns`; frames to send are added to `out`.
+    /// Advances the time to `now_ns`; frames to send are appended to `out`.
     fn poll(&mut self, now_ns: u64, out: &mut Vec<CanFrame>);
 
     /// The current that a real device would give, in amperes.
     fn current_a(&self) -> f64;
 
-    /// What the device measures as its current, in amperes; `None`: what it commands.
+    /// Sets the current that the device measures, in amperes; `None`: the commanded current.
     fn set_measured_current_a(&mut self, current_a: Option<f64>);
 
-    /// State of the power stage in words.
+    /// Name of the state of the power stage.
     fn state(&self) -> &'static str;
 
     /// Whether current may flow.
     fn is_enabled(&self) -> bool;
 
-    /// Whether this device can misbehave so.
-    fn knows(&self, fault: DeviceFault) -> bool;
+    /// Whether the device can have this fault.
+    fn supports(&self, fault: DeviceFault) -> bool;
 
-    /// Misbehaves from now on. What the device does not know changes nothing.
+    /// Injects a fault. A fault that is not supported has no effect.
     fn inject(&mut self, fault: DeviceFault);
-}
-
-impl EmulatedAmplifier for EmulatedDrive {
-    fn handle(&mut self, frame: &CanFrame, now_ns: u64, out: &mut Vec<CanFrame>) {
-        EmulatedDrive::handle(self, frame, now_ns, out);
-    }
-
-    fn poll(&mut self, now_ns: u64, out: &mut Vec<CanFrame>) {
-        EmulatedDrive::poll(self, now_ns, out);
-    }
-
-    fn current_a(&self) -> f64 {
-        EmulatedDrive::current_a(self)
-    }
-
-    fn set_measured_current_a(&mut self, current_a: Option<f64>) {
-        EmulatedDrive::set_measured_current_a(self, current_a);
-    }
-
-    fn state(&self) -> &'static str {
-        self.power_state().name()
-    }
-
-    fn is_enabled(&self) -> bool {
-        self.power_state() == State::OperationEnabled
-    }
-
-    fn knows(&self, _fault: DeviceFault) -> bool {
-        true
-    }
-
-    fn inject(&mut self, fault: DeviceFault) {
-        EmulatedDrive::inject(self, fault);
-    }
 }

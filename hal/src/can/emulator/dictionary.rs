@@ -1,18 +1,20 @@
-//! The object dictionary of the simulated drive, with the rules of CiA 301 for PDO parameters.
+//! The object dictionary of the emulated drive, with the rules of CiA 301 for PDO parameters.
 
 use std::collections::BTreeMap;
 
+use super::super::objects as object;
 use super::super::pdo::{Mapped, OFF};
 use super::super::sdo::{AbortCode, Address, Dictionary};
-use super::objects as object;
 
-/// What may be done with an object.
+/// Access to an object by SDO and PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Access {
     Read,
     Write,
-    /// Also in a PDO, `Read` from the node, `Write` to it.
-    Mapped,
+    /// Read-only, and can be mapped to a PDO.
+    MappedRead,
+    /// Writable, and can be mapped to a PDO.
+    MappedWrite,
 }
 
 #[derive(Clone, Debug)]
@@ -43,7 +45,7 @@ impl ObjectDictionary {
         );
     }
 
-    /// Adds a text, whose length may change.
+    /// Adds a text of variable length.
     pub(super) fn add_text(&mut self, address: Address, text: &str, access: Access) {
         self.objects.insert(
             address,
@@ -55,12 +57,12 @@ impl ObjectDictionary {
         );
     }
 
-    /// Removes an object: a drive without that feature.
+    /// Removes an object.
     pub(super) fn remove(&mut self, address: Address) {
         self.objects.remove(&address);
     }
 
-    /// The unsigned number at `address`, 0 if there is none.
+    /// The unsigned number at `address`, 0 if it does not exist.
     pub fn number(&self, address: Address) -> u32 {
         let value = self
             .objects
@@ -73,7 +75,7 @@ impl ObjectDictionary {
             .fold(0, |number, byte| number << 8 | u32::from(*byte))
     }
 
-    /// Sets a number from inside the drive.
+    /// Sets a number, without the checks of an SDO.
     pub(super) fn set(&mut self, address: Address, number: u32) {
         if let Some(object) = self.objects.get_mut(&address) {
             let bytes = object.value.len().min(4);
@@ -81,21 +83,21 @@ impl ObjectDictionary {
         }
     }
 
-    /// Bits of the object, 0 if there is none.
+    /// Size of the object in bits, 0 if it does not exist.
     fn bits(&self, address: Address) -> u32 {
         self.objects
             .get(&address)
             .map_or(0, |object| 8 * object.value.len() as u32)
     }
 
-    /// Whether `address` was written since this was asked last.
+    /// Whether `address` was written since the last call.
     pub(super) fn take_written(&mut self, address: Address) -> bool {
         let was = self.written.contains(&address);
         self.written.retain(|other| *other != address);
         was
     }
 
-    /// The entries of the mapping at `index` that are in force.
+    /// The active entries of the mapping at `index`.
     pub(super) fn mapping(&self, index: u16) -> Vec<Mapped> {
         let count = self.number(Address::new(index, 0)).min(8) as u8;
         (1..=count)
@@ -127,7 +129,7 @@ impl ObjectDictionary {
         }
     }
 
-    /// The identifier of a PDO that is on does not change while it is on.
+    /// The identifier of a PDO cannot be changed while the PDO is on.
     fn check_cob_id(&self, address: Address, number: u32) -> Result<(), AbortCode> {
         let now = self.number(address);
         let both_on = now & OFF == 0 && number & OFF == 0;
@@ -164,8 +166,8 @@ impl ObjectDictionary {
         let Some(object) = self.objects.get(&word.address()) else {
             return Err(AbortCode::NO_OBJECT);
         };
-        let fits =
-            object.access == Access::Mapped && self.bits(word.address()) == u32::from(word.bits());
+        let fits = matches!(object.access, Access::MappedRead | Access::MappedWrite)
+            && self.bits(word.address()) == u32::from(word.bits());
         if fits {
             Ok(())
         } else {
@@ -197,7 +199,7 @@ impl Dictionary for ObjectDictionary {
             return Err(AbortCode::NO_OBJECT);
         };
         let is_text = object.is_text;
-        if object.access == Access::Read || object::SHOWN.contains(&address) {
+        if matches!(object.access, Access::Read | Access::MappedRead) {
             return Err(AbortCode::READ_ONLY);
         }
         if !is_text {

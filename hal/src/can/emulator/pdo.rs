@@ -1,159 +1,177 @@
-//! Process data of the simulated drive: set-points taken, status sent, by the mapping and the transmission types in force.
+//! Process data of the emulated drive, by the mapping and the transmission types in the object dictionary.
 
 use super::super::frame::{CanFrame, Id};
-use super::super::nmt;
 use super::super::pdo::{Direction, OFF, parameters};
 use super::super::sdo::{Address, Dictionary};
-use super::{DeviceFault, EmulatedDrive, objects as object};
+use super::dictionary::ObjectDictionary;
 
-/// What is remembered between frames.
+/// Emergency code: PDO not processed because of its length.
+const WRONG_LENGTH: u16 = 0x8210;
+
+/// State of the four receive and four transmit PDOs.
 #[derive(Debug, Default)]
 pub(super) struct Pdos {
-    /// A current from outside, in counts.
-    pub(super) measured: Option<i16>,
     /// Synchronous set-points that wait for SYNC.
     waiting: [Option<CanFrame>; 4],
     sent: [Sent; 4],
 }
 
+/// What was sent of a transmit PDO.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sent {
+    /// SYNCs since the last frame.
     syncs: u32,
-    at_ns: Option<u64>,
-    content: Option<CanFrame>,
+    time_ns: Option<u64>,
+    frame: Option<CanFrame>,
 }
 
-/// Parameters of one PDO, as they stand in the dictionary.
+impl Pdos {
+    /// Takes a frame if it is a set-point: immediately, or with the next SYNC. The error is an emergency code.
+    pub(super) fn receive(
+        &mut self,
+        frame: &CanFrame,
+        objects: &mut ObjectDictionary,
+    ) -> Result<(), u16> {
+        let mut result = Ok(());
+        for (number, waiting) in (1..).zip(&mut self.waiting) {
+            let pdo = Parameters::read(objects, Direction::Receive, number);
+            if !pdo.is_on || pdo.id != frame.id() {
+                continue;
+            }
+            if pdo.is_synchronous() {
+                *waiting = Some(*frame);
+            } else {
+                result = result.and(unpack(&pdo, frame, objects));
+            }
+        }
+        result
+    }
+
+    /// Takes the set-points that wait for SYNC. The error is an emergency code.
+    pub(super) fn apply_waiting(&mut self, objects: &mut ObjectDictionary) -> Result<(), u16> {
+        let mut result = Ok(());
+        for (number, waiting) in (1..).zip(&mut self.waiting) {
+            if let Some(frame) = waiting.take() {
+                let pdo = Parameters::read(objects, Direction::Receive, number);
+                result = result.and(unpack(&pdo, &frame, objects));
+            }
+        }
+        result
+    }
+
+    /// Status frames at a SYNC: of transmission type n every n-th.
+    pub(super) fn synchronous_status(
+        &mut self,
+        objects: &ObjectDictionary,
+        now_ns: u64,
+    ) -> Vec<CanFrame> {
+        let mut frames = Vec::new();
+        for (number, sent) in (1..).zip(&mut self.sent) {
+            let pdo = Parameters::read(objects, Direction::Transmit, number);
+            sent.syncs = sent.syncs.saturating_add(1);
+            let is_cyclic = pdo.is_on && pdo.is_synchronous() && pdo.transmission > 0;
+            if is_cyclic && sent.syncs >= u32::from(pdo.transmission) {
+                sent.syncs = 0;
+                frames.extend(sent.note(pack(&pdo, objects), now_ns));
+            }
+        }
+        frames
+    }
+
+    /// Asynchronous status frames: on a change, but not before the inhibit time, and not later than the event timer.
+    pub(super) fn due_status(&mut self, objects: &ObjectDictionary, now_ns: u64) -> Vec<CanFrame> {
+        let mut frames = Vec::new();
+        for (number, sent) in (1..).zip(&mut self.sent) {
+            let pdo = Parameters::read(objects, Direction::Transmit, number);
+            if !pdo.is_on || pdo.transmission < 254 {
+                continue;
+            }
+            let frame = pack(&pdo, objects);
+            if sent.is_due(&pdo, frame, now_ns) {
+                frames.extend(sent.note(frame, now_ns));
+            }
+        }
+        frames
+    }
+}
+
+impl Sent {
+    fn is_due(&self, pdo: &Parameters, frame: Option<CanFrame>, now_ns: u64) -> bool {
+        let elapsed_ns = self
+            .time_ns
+            .map_or(u64::MAX, |time_ns| now_ns.saturating_sub(time_ns));
+        let is_changed = self.frame != frame && elapsed_ns >= pdo.inhibit_ns;
+        let is_timed = pdo.timer_ns > 0 && elapsed_ns >= pdo.timer_ns;
+        is_changed || is_timed
+    }
+
+    /// Notes that `frame` is sent now; without a mapping there is no frame.
+    fn note(&mut self, frame: Option<CanFrame>, now_ns: u64) -> Option<CanFrame> {
+        if frame.is_some() {
+            self.time_ns = Some(now_ns);
+            self.frame = frame;
+        }
+        frame
+    }
+}
+
+/// Parameters of a PDO in the object dictionary.
 struct Parameters {
     id: Id,
     is_on: bool,
     transmission: u8,
     inhibit_ns: u64,
     timer_ns: u64,
+    /// Index of the mapping.
     mapping: u16,
 }
 
-impl EmulatedDrive {
-    fn pdo_parameters(&self, direction: Direction, number: u8) -> Parameters {
+impl Parameters {
+    fn read(objects: &ObjectDictionary, direction: Direction, number: u8) -> Parameters {
         let index = parameters(direction, number);
-        let value = |sub| self.objects.number(Address::new(index, sub));
+        let [cob_id, transmission, inhibit, timer] =
+            [1, 2, 3, 5].map(|sub| objects.number(Address::new(index, sub)));
         Parameters {
-            id: Id::standard(value(1) as u16),
-            is_on: value(1) & OFF == 0,
-            transmission: value(2) as u8,
-            inhibit_ns: u64::from(value(3)) * 100_000,
-            timer_ns: u64::from(value(5)) * 1_000_000,
+            id: Id::standard(cob_id as u16),
+            is_on: cob_id & OFF == 0,
+            transmission: transmission as u8,
+            inhibit_ns: u64::from(inhibit) * 100_000,
+            timer_ns: u64::from(timer) * 1_000_000,
             mapping: index + 0x200,
         }
     }
 
-    /// Takes a frame if it is a set-point: now, or with the next SYNC.
-    pub(super) fn take_set_point(&mut self, frame: &CanFrame) {
-        for number in 1..=4 {
-            let pdo = self.pdo_parameters(Direction::Receive, number);
-            if !pdo.is_on || pdo.id != frame.id() {
-                continue;
-            }
-            if pdo.transmission <= 240 {
-                self.pdos.waiting[usize::from(number - 1)] = Some(*frame);
-            } else {
-                self.unpack(pdo.mapping, frame);
-            }
-        }
+    fn is_synchronous(&self) -> bool {
+        self.transmission <= 240
     }
+}
 
-    /// SYNC: waiting set-points take effect, then status is sampled.
-    pub(super) fn take_sync(&mut self) {
-        if self.state != nmt::State::Operational {
-            return;
-        }
-        for number in 1..=4 {
-            if let Some(frame) = self.pdos.waiting[usize::from(number - 1)].take() {
-                let mapping = self.pdo_parameters(Direction::Receive, number).mapping;
-                self.unpack(mapping, &frame);
-            }
-        }
-        self.reflect();
-        for number in 1..=4 {
-            let pdo = self.pdo_parameters(Direction::Transmit, number);
-            let sent = &mut self.pdos.sent[usize::from(number - 1)];
-            sent.syncs = sent.syncs.saturating_add(1);
-            if pdo.is_on
-                && (1..=240).contains(&pdo.transmission)
-                && sent.syncs >= u32::from(pdo.transmission)
-            {
-                sent.syncs = 0;
-                self.send_status(number, &pdo);
-            }
-        }
+/// A frame with the mapped objects in order; `None` if nothing is mapped.
+fn pack(pdo: &Parameters, objects: &ObjectDictionary) -> Option<CanFrame> {
+    let mapping = objects.mapping(pdo.mapping);
+    let values = mapping
+        .iter()
+        .filter_map(|mapped| objects.read(mapped.address()).ok());
+    let bytes: Vec<u8> = values.flatten().collect();
+    if bytes.is_empty() {
+        None
+    } else {
+        CanFrame::from_slice(pdo.id, &bytes)
     }
+}
 
-    /// Asynchronous status: on change, not before the inhibit time, and not later than the event timer.
-    pub(super) fn send_due_status(&mut self) {
-        if self.state != nmt::State::Operational {
-            return;
-        }
-        for number in 1..=4 {
-            let pdo = self.pdo_parameters(Direction::Transmit, number);
-            if !pdo.is_on || pdo.transmission < 254 {
-                continue;
-            }
-            let sent = self.pdos.sent[usize::from(number - 1)];
-            let since_ns = sent
-                .at_ns
-                .map_or(u64::MAX, |at_ns| self.now_ns.saturating_sub(at_ns));
-            let changed = sent.content != self.pack(&pdo);
-            let timed = pdo.timer_ns > 0 && since_ns >= pdo.timer_ns;
-            if (changed && since_ns >= pdo.inhibit_ns) || timed {
-                self.send_status(number, &pdo);
-            }
-        }
+/// Writes the mapped objects. A frame that is shorter than the mapping is refused.
+fn unpack(pdo: &Parameters, frame: &CanFrame, objects: &mut ObjectDictionary) -> Result<(), u16> {
+    let mapping = objects.mapping(pdo.mapping);
+    let lengths = mapping.iter().map(|mapped| usize::from(mapped.bits() / 8));
+    if frame.data().len() < lengths.clone().sum() {
+        return Err(WRONG_LENGTH);
     }
-
-    fn send_status(&mut self, number: u8, pdo: &Parameters) {
-        let Some(frame) = self.pack(pdo) else { return };
-        let sent = &mut self.pdos.sent[usize::from(number - 1)];
-        (sent.at_ns, sent.content) = (Some(self.now_ns), Some(frame));
-        let cut = match self.misbehaviour {
-            DeviceFault::ShortFrames => frame.data().len().saturating_sub(1),
-            _ => frame.data().len(),
-        };
-        if let Some(frame) = CanFrame::from_slice(pdo.id, &frame.data()[..cut]) {
-            self.send(frame);
-        }
+    let mut rest = frame.data();
+    for (mapped, length) in mapping.iter().zip(lengths) {
+        let (value, after) = rest.split_at(length.min(rest.len()));
+        rest = after;
+        let _ = objects.write(mapped.address(), value); // a value out of range is ignored
     }
-
-    /// The mapped objects in order; nothing is mapped, nothing is sent.
-    fn pack(&self, pdo: &Parameters) -> Option<CanFrame> {
-        let words = self.objects.mapping(pdo.mapping);
-        let bytes: Vec<u8> = words
-            .iter()
-            .filter_map(|word| self.objects.read(word.address()).ok())
-            .flatten()
-            .collect();
-        if bytes.is_empty() {
-            None
-        } else {
-            CanFrame::from_slice(pdo.id, &bytes)
-        }
-    }
-
-    /// Writes the mapped objects; a frame shorter than its mapping is not taken (emergency 0x8210).
-    fn unpack(&mut self, mapping: u16, frame: &CanFrame) {
-        let words = self.objects.mapping(mapping);
-        let wanted: usize = words.iter().map(|word| usize::from(word.bits() / 8)).sum();
-        if frame.data().len() < wanted {
-            return self.emergency(0x8210);
-        }
-        let mut rest = frame.data();
-        for word in words {
-            let (value, after) = rest.split_at(usize::from(word.bits() / 8).min(rest.len()));
-            rest = after;
-            let _ = self.objects.write(word.address(), value); // a value out of range is left out
-        }
-        if self.objects.take_written(object::CONTROLWORD) {
-            self.power
-                .obey(self.objects.number(object::CONTROLWORD) as u16);
-        }
-    }
+    Ok(())
 }

@@ -1,22 +1,24 @@
-//! The power stage of the simulated drive: the state machine of CiA 402 from the drive's side.
+//! The power stage of the emulated drive: the state machine of CiA 402 from the side of the drive.
+//!
+//! The numbers are those of the transitions in CiA 402.
 
 use super::super::cia402::{
-    CYCLIC_TORQUE, FAULT_RESET, FOLLOWS_TARGET, Order, PROFILE_TORQUE, REMOTE, State,
+    CYCLIC_TORQUE, Command, FAULT_RESET, FOLLOWS_TARGET, PROFILE_TORQUE, REMOTE, State,
 };
 
 /// State, controlword and mode.
 #[derive(Clone, Copy, Debug)]
-pub struct Power {
+pub(super) struct PowerStage {
     state: State,
     controlword: u16,
     mode: i8,
     /// Operation stays enabled, but no current flows.
-    pub ignores_target: bool,
+    pub(super) ignores_target: bool,
 }
 
-impl Default for Power {
+impl Default for PowerStage {
     fn default() -> Self {
-        Power {
+        PowerStage {
             state: State::NotReadyToSwitchOn,
             controlword: 0,
             mode: 0,
@@ -25,41 +27,36 @@ impl Default for Power {
     }
 }
 
-impl Power {
+impl PowerStage {
     /// The state.
-    pub fn state(&self) -> State {
+    pub(super) fn state(&self) -> State {
         self.state
     }
 
-    /// Mode of operation in force.
-    pub fn mode(&self) -> i8 {
-        self.mode
-    }
-
     /// Sets the mode of operation.
-    pub fn set_mode(&mut self, mode: i8) {
+    pub(super) fn set_mode(&mut self, mode: i8) {
         self.mode = mode;
     }
 
-    /// Whether the target becomes current.
-    pub fn follows(&self) -> bool {
+    /// Whether the current follows the target.
+    pub(super) fn follows(&self) -> bool {
         let is_torque = matches!(self.mode, CYCLIC_TORQUE | PROFILE_TORQUE);
         self.state == State::OperationEnabled && is_torque && !self.ignores_target
     }
 
-    /// Takes a controlword: arrows 2 to 12, 15 and 16 of CiA 402.
-    pub fn obey(&mut self, controlword: u16) {
+    /// Takes a controlword: transitions 2 to 12, 15 and 16.
+    pub(super) fn take_controlword(&mut self, controlword: u16) {
         let reset = controlword & !self.controlword & FAULT_RESET != 0;
         self.controlword = controlword;
-        match Order::decode(controlword) {
+        match Command::decode(controlword) {
             None if reset && self.state == State::Fault => self.state = State::SwitchOnDisabled, // 15
             None => {}
-            Some(order) => self.state = next(self.state, order),
+            Some(command) => self.state = next(self.state, command),
         }
     }
 
-    /// Arrows that need no order: 0, 1, 14.
-    pub fn settle(&mut self) {
+    /// Automatic transitions: 0, 1, 14.
+    pub(super) fn advance(&mut self) {
         self.state = match self.state {
             State::NotReadyToSwitchOn => State::SwitchOnDisabled,
             State::FaultReactionActive => State::Fault,
@@ -67,25 +64,25 @@ impl Power {
         };
     }
 
-    /// Arrow 13: a fault.
-    pub fn fail(&mut self) {
+    /// A fault: transition 13.
+    pub(super) fn fail(&mut self) {
         if self.state != State::Fault {
             self.state = State::FaultReactionActive;
         }
     }
 
-    /// Arrows 7, 9, 10, 12 from inside.
-    pub fn switch_off(&mut self) {
-        self.state = next(self.state, Order::DisableVoltage);
+    /// Switches off without a command: transitions 7, 9, 10, 12.
+    pub(super) fn switch_off(&mut self) {
+        self.state = next(self.state, Command::DisableVoltage);
     }
 
-    /// Arrow 11 from inside.
-    pub fn quick_stop(&mut self) {
-        self.state = next(self.state, Order::QuickStop);
+    /// Quick stop without a command: transition 11.
+    pub(super) fn quick_stop(&mut self) {
+        self.state = next(self.state, Command::QuickStop);
     }
 
-    /// The statusword: state, voltage, remote, and whether the target is followed.
-    pub fn statusword(&self) -> u16 {
+    /// The statusword: state, voltage, remote, target followed.
+    pub(super) fn statusword(&self) -> u16 {
         const VOLTAGE: u16 = 1 << 4;
         let follows = if self.follows() && self.mode == CYCLIC_TORQUE {
             FOLLOWS_TARGET
@@ -96,23 +93,25 @@ impl Power {
     }
 }
 
-/// The state after an order; what has no arrow changes nothing.
-const fn next(state: State, order: Order) -> State {
-    match (state, order) {
-        (State::SwitchOnDisabled, Order::Shutdown) => State::ReadyToSwitchOn, // 2
-        (State::ReadyToSwitchOn, Order::SwitchOn) => State::SwitchedOn,       // 3
-        (State::SwitchedOn, Order::EnableOperation) => State::OperationEnabled, // 4
-        (State::ReadyToSwitchOn, Order::EnableOperation) => State::OperationEnabled, // 3 and 4
-        (State::OperationEnabled, Order::SwitchOn) => State::SwitchedOn,      // 5
-        (State::SwitchedOn, Order::Shutdown) => State::ReadyToSwitchOn,       // 6
-        (State::ReadyToSwitchOn, Order::DisableVoltage | Order::QuickStop) => {
+/// The state after a command; a command without a transition is ignored.
+const fn next(state: State, command: Command) -> State {
+    match (state, command) {
+        (State::SwitchOnDisabled, Command::Shutdown) => State::ReadyToSwitchOn, // 2
+        (State::ReadyToSwitchOn, Command::SwitchOn) => State::SwitchedOn,       // 3
+        (State::SwitchedOn, Command::EnableOperation) => State::OperationEnabled, // 4
+        (State::ReadyToSwitchOn, Command::EnableOperation) => State::OperationEnabled, // 3 and 4
+        (State::OperationEnabled, Command::SwitchOn) => State::SwitchedOn,      // 5
+        (State::SwitchedOn, Command::Shutdown) => State::ReadyToSwitchOn,       // 6
+        (State::ReadyToSwitchOn, Command::DisableVoltage | Command::QuickStop) => {
             State::SwitchOnDisabled
         } // 7
-        (State::OperationEnabled, Order::Shutdown) => State::ReadyToSwitchOn, // 8
-        (State::OperationEnabled, Order::DisableVoltage) => State::SwitchOnDisabled, // 9
-        (State::SwitchedOn, Order::DisableVoltage | Order::QuickStop) => State::SwitchOnDisabled, // 10
-        (State::OperationEnabled, Order::QuickStop) => State::QuickStopActive, // 11
-        (State::QuickStopActive, Order::DisableVoltage) => State::SwitchOnDisabled, // 12
+        (State::OperationEnabled, Command::Shutdown) => State::ReadyToSwitchOn, // 8
+        (State::OperationEnabled, Command::DisableVoltage) => State::SwitchOnDisabled, // 9
+        (State::SwitchedOn, Command::DisableVoltage | Command::QuickStop) => {
+            State::SwitchOnDisabled
+        } // 10
+        (State::OperationEnabled, Command::QuickStop) => State::QuickStopActive, // 11
+        (State::QuickStopActive, Command::DisableVoltage) => State::SwitchOnDisabled, // 12
         (state, _) => state,
     }
 }
@@ -122,8 +121,8 @@ mod tests {
     use super::super::super::cia402::*;
     use super::*;
 
-    fn at(state: State) -> Power {
-        Power {
+    fn at(state: State) -> PowerStage {
+        PowerStage {
             state,
             controlword: 0,
             mode: CYCLIC_TORQUE,
@@ -132,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn each_arrow_of_the_standard_is_taken_and_no_other() {
+    fn has_exactly_the_transitions_of_the_standard() {
         use State::*;
         let states = [
             NotReadyToSwitchOn,
@@ -144,7 +143,7 @@ mod tests {
             FaultReactionActive,
             Fault,
         ];
-        let arrows = [
+        let transitions = [
             (SwitchOnDisabled, SHUTDOWN, ReadyToSwitchOn), // 2
             (ReadyToSwitchOn, SWITCH_ON, SwitchedOn),      // 3
             (ReadyToSwitchOn, ENABLE_OPERATION, OperationEnabled), // 3, 4
@@ -170,14 +169,14 @@ mod tests {
                 QUICK_STOP,
                 FAULT_RESET,
             ] {
-                let arrow = arrows
+                let transition = transitions
                     .iter()
                     .find(|(from, with, _)| (*from, *with) == (state, word));
                 let mut power = at(state);
-                power.obey(word);
+                power.take_controlword(word);
                 assert_eq!(
                     power.state(),
-                    arrow.map_or(state, |(_, _, to)| *to),
+                    transition.map_or(state, |(_, _, to)| *to),
                     "{state:?} with {word:#06x}"
                 );
             }
@@ -185,13 +184,13 @@ mod tests {
     }
 
     #[test]
-    fn the_drivers_words_lead_up_in_three_steps_and_back_in_three() {
-        let mut power = Power::default();
-        power.settle(); // 1
+    fn controlwords_of_the_driver_enable_and_disable_in_three_steps() {
+        let mut power = PowerStage::default();
+        power.advance(); // 1
         power.set_mode(CYCLIC_TORQUE);
         let mut up = vec![power.state()];
         while power.state() != State::OperationEnabled {
-            power.obey(power.state().towards_enabled().unwrap());
+            power.take_controlword(power.state().towards_enabled().unwrap());
             up.push(power.state());
         }
         use State::*;
@@ -206,31 +205,31 @@ mod tests {
         ); // 2, 3, 4
         let mut down = Vec::new();
         while let Some(word) = power.state().towards_disabled() {
-            power.obey(word);
+            power.take_controlword(word);
             down.push(power.state());
         }
         assert_eq!(down, [SwitchedOn, ReadyToSwitchOn, SwitchOnDisabled]); // 5, 6, 7
     }
 
     #[test]
-    fn quick_stop_and_fault_are_left_only_as_the_standard_says() {
+    fn leaves_quick_stop_and_fault_only_by_the_transitions_of_the_standard() {
         let mut power = at(State::QuickStopActive);
-        power.obey(power.state().towards_enabled().unwrap());
+        power.take_controlword(power.state().towards_enabled().unwrap());
         assert_eq!(power.state(), State::SwitchOnDisabled); // 12
         power.fail(); // 13
         assert_eq!(power.state(), State::FaultReactionActive);
-        power.settle(); // 14
+        power.advance(); // 14
         assert_eq!(power.state(), State::Fault);
         power.controlword = FAULT_RESET;
-        power.obey(FAULT_RESET);
-        assert_eq!(power.state(), State::Fault, "a standing bit is no edge");
-        power.obey(0);
-        power.obey(FAULT_RESET); // 15
+        power.take_controlword(FAULT_RESET);
+        assert_eq!(power.state(), State::Fault, "a constant bit is not an edge");
+        power.take_controlword(0);
+        power.take_controlword(FAULT_RESET); // 15
         assert_eq!(power.state(), State::SwitchOnDisabled);
     }
 
     #[test]
-    fn bit_12_says_that_the_target_is_followed_in_cyclic_torque_only() {
+    fn bit_12_reports_a_followed_target_in_cyclic_torque_only() {
         let mut power = at(State::OperationEnabled);
         assert_eq!(
             power.statusword() & (0x6F | FOLLOWS_TARGET | REMOTE),

@@ -1,35 +1,35 @@
-//! Joins an acting amplifier to a bus.
+//! Connects an emulated amplifier to a bus.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::super::bus::{BusError, BusEvent, CanBus, Host, Task, TaskHandle};
 use super::super::frame::CanFrame;
-use super::EmulatedAmplifier;
+use super::amplifier::EmulatedAmplifier;
 
-/// Frames taken in one step, so that a flooded bus cannot stop time.
-const MOST_FRAMES: usize = 256;
+/// Largest number of frames per step, so that the time also advances on a flooded bus.
+const FRAMES_MAX: usize = 256;
 
-/// The moment in which an acting device has just heard a frame, or has let time pass.
+/// Time and counts after a frame was received or the time was advanced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameCounts {
-    /// The host's clock.
+    /// Time of the host's clock.
     pub now_ns: u64,
-    /// Frames heard since the start.
+    /// Frames received since the start.
     pub received: u64,
     /// Frames sent since the start.
     pub sent: u64,
 }
 
-/// Sees the device after every frame and every step of time, in the device's thread.
+/// Called after every frame and every step of the time, in the thread of the device.
 pub type Observer = Box<dyn FnMut(FrameCounts, &mut dyn EmulatedAmplifier) + Send>;
 
-/// An acting amplifier on a bus. The device is shared: a test asks it for its current and makes it misbehave.
+/// An emulated amplifier on a bus. The device is shared, so that a test can read its current and inject faults.
 pub struct AmplifierTask {
     bus: Box<dyn CanBus>,
     device: Arc<Mutex<dyn EmulatedAmplifier>>,
-    follow: Observer,
-    passed: FrameCounts,
+    observer: Observer,
+    counts: FrameCounts,
     out: Vec<CanFrame>,
 }
 
@@ -42,29 +42,29 @@ impl AmplifierTask {
         AmplifierTask::start_observed(host, device, Box::new(|_, _| {}))
     }
 
-    /// The same; `follow` sees what the device does, so that a motor can be moved by it.
+    /// As [`start`](AmplifierTask::start), with an observer, for example a simulated motor that is driven by the device.
     pub fn start_observed(
         host: &dyn Host,
         device: Arc<Mutex<dyn EmulatedAmplifier>>,
-        follow: Observer,
+        observer: Observer,
     ) -> std::io::Result<TaskHandle> {
         let bus = host.endpoint(&[]).map_err(std::io::Error::other)?;
         let task = AmplifierTask {
             bus,
             device,
-            follow,
-            passed: FrameCounts::default(),
+            observer,
+            counts: FrameCounts::default(),
             out: Vec::new(),
         };
-        host.start("can-device", Box::new(task))
+        host.start("can-emulator", Box::new(task))
     }
 
-    /// Takes what has come, the first within `wait`.
-    fn take(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
+    /// Receives all frames, waiting up to `wait` for the first.
+    fn receive(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
         let mut event = self.bus.receive(wait)?;
-        for _ in 0..MOST_FRAMES {
+        for _ in 0..FRAMES_MAX {
             match event {
-                Some(BusEvent::Frame(frame)) => self.hear(&frame, now_ns()),
+                Some(BusEvent::Frame(frame)) => self.handle(&frame, now_ns()),
                 Some(BusEvent::Condition(_)) => {}
                 None => break,
             }
@@ -73,32 +73,36 @@ impl AmplifierTask {
         Ok(())
     }
 
-    fn hear(&mut self, frame: &CanFrame, now_ns: u64) {
+    fn handle(&mut self, frame: &CanFrame, now_ns: u64) {
         let mut device = lock(&self.device);
         device.handle(frame, now_ns, &mut self.out);
-        self.passed.received += 1;
-        self.passed.now_ns = now_ns;
-        (self.follow)(self.passed, &mut *device);
+        self.counts.received += 1;
+        self.counts.now_ns = now_ns;
+        (self.observer)(self.counts, &mut *device);
     }
 
     fn poll(&mut self, now_ns: u64) {
         let mut device = lock(&self.device);
         device.poll(now_ns, &mut self.out);
-        self.passed.now_ns = now_ns;
-        (self.follow)(self.passed, &mut *device);
+        self.counts.now_ns = now_ns;
+        (self.observer)(self.counts, &mut *device);
+    }
+
+    fn send(&mut self) -> Result<(), BusError> {
+        for frame in self.out.drain(..) {
+            self.bus.send(&frame)?;
+            self.counts.sent += 1;
+        }
+        Ok(())
     }
 }
 
 impl Task for AmplifierTask {
     fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
-        let taken = self.take(now_ns, wait);
+        let received = self.receive(now_ns, wait);
         self.poll(now_ns());
-        let (bus, passed) = (&mut self.bus, &mut self.passed);
-        let sent = self
-            .out
-            .drain(..)
-            .try_for_each(|frame| bus.send(&frame).map(|()| passed.sent += 1));
-        taken.and(sent)
+        let sent = self.send();
+        received.and(sent)
     }
 }
 

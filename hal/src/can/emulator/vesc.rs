@@ -1,44 +1,44 @@
-//! A simulated VESC: takes SET_CURRENT, sends STATUS, lets go after half a second without a command.
+//! An emulated VESC: takes SET_CURRENT, sends STATUS, and releases the motor after 0.5 s without a command.
 //!
-//! Written from vedderb/bldc, documentation/comm_can.md, like the driver [`crate::can::vesc`]: frames as there.
+//! Source: vedderb/bldc, documentation/comm_can.md; frames as in [`crate::can::vesc`].
 
 use std::collections::VecDeque;
 
 use super::super::frame::{CanFrame, Id};
 use super::super::vesc::{set_current, status_id};
-use super::{DeviceFault, EmulatedAmplifier};
+use super::amplifier::EmulatedAmplifier;
+use super::fault::DeviceFault;
 
-/// Time between STATUS frames: 50 Hz, as delivered.
-const STATUS_NS: u64 = 20_000_000;
-/// Without a command for so long it lets go.
-const TIMEOUT_NS: u64 = 500_000_000;
+/// Time between STATUS frames: 50 Hz, the factory setting.
+const STATUS_PERIOD_NS: u64 = 20_000_000;
+/// Time without a command after which the motor is released.
+const COMMAND_TIMEOUT_NS: u64 = 500_000_000;
 
-/// A simulated VESC in current control.
+/// An emulated VESC in current control.
 #[derive(Debug)]
 pub struct EmulatedVesc {
     node: u8,
     target_ma: i32,
     measured_a: Option<f64>,
-    commanded_ns: Option<u64>,
-    due_ns: u64,
+    last_command_ns: Option<u64>,
+    next_status_ns: u64,
     now_ns: u64,
-    misbehaviour: DeviceFault,
+    fault: DeviceFault,
     outbox: VecDeque<(u64, CanFrame)>,
 }
 
 impl EmulatedVesc {
-    /// A VESC that has just got power.
+    /// A VESC after power-on.
     pub fn new(node: u8) -> EmulatedVesc {
-        let (misbehaviour, outbox) = (DeviceFault::None, VecDeque::new());
         EmulatedVesc {
             node,
             target_ma: 0,
             measured_a: None,
-            commanded_ns: None,
-            due_ns: 0,
+            last_command_ns: None,
+            next_status_ns: 0,
             now_ns: 0,
-            misbehaviour,
-            outbox,
+            fault: DeviceFault::None,
+            outbox: VecDeque::new(),
         }
     }
 
@@ -47,69 +47,73 @@ impl EmulatedVesc {
         set_current(self.node, 0).id()
     }
 
-    fn take(&mut self, frame: &CanFrame) {
-        let deaf = matches!(
-            self.misbehaviour,
+    fn ignores_commands(&self) -> bool {
+        matches!(
+            self.fault,
             DeviceFault::Unplugged | DeviceFault::SetPointsIgnored | DeviceFault::CommandsIgnored
-        );
-        if let (false, true, Ok(bytes)) = (
-            deaf,
-            frame.id() == self.command_id(),
-            frame.data().try_into(),
-        ) {
-            (self.target_ma, self.commanded_ns) = (i32::from_be_bytes(bytes), Some(self.now_ns));
+        )
+    }
+
+    fn release_without_command(&mut self) {
+        let last_ns = self.last_command_ns;
+        if last_ns.is_some_and(|last_ns| self.now_ns.saturating_sub(last_ns) > COMMAND_TIMEOUT_NS) {
+            self.target_ma = 0;
+            self.last_command_ns = None;
         }
     }
 
-    fn let_go_in_time(&mut self) {
-        if self
-            .commanded_ns
-            .is_some_and(|at_ns| self.now_ns.saturating_sub(at_ns) > TIMEOUT_NS)
-        {
-            (self.target_ma, self.commanded_ns) = (0, None);
+    fn send_due_status(&mut self) {
+        if self.now_ns >= self.next_status_ns {
+            self.next_status_ns = self.now_ns + STATUS_PERIOD_NS;
+            self.send(self.status());
         }
     }
 
-    fn tell_status(&mut self) {
-        if self.now_ns < self.due_ns {
-            return;
-        }
-        self.due_ns = self.now_ns + STATUS_NS;
-        let tenths = (self.measured_a.unwrap_or(self.current_a()) * 10.0) as i16;
-        let [high, low] = tenths.to_be_bytes();
-        let bytes = [0, 0, 0, 0, high, low, 0, 0];
-        let (bytes, late_ns) = match self.misbehaviour {
+    /// STATUS with the current in units of 0.1 A.
+    fn status(&self) -> [u8; 8] {
+        let current_a = self.measured_a.unwrap_or(self.current_a());
+        let [high, low] = ((current_a * 10.0) as i16).to_be_bytes();
+        [0, 0, 0, 0, high, low, 0, 0]
+    }
+
+    fn send(&mut self, status: [u8; 8]) {
+        let (length, delay_ms) = match self.fault {
             DeviceFault::Mute | DeviceFault::Unplugged => return,
-            DeviceFault::ShortFrames => (&bytes[..7], 0),
-            DeviceFault::Late(late_ms) => (&bytes[..], late_ms.saturating_mul(1_000_000)),
-            _ => (&bytes[..], 0),
+            DeviceFault::ShortFrames => (7, 0),
+            DeviceFault::Late(delay_ms) => (8, delay_ms),
+            _ => (8, 0),
         };
-        let frame = CanFrame::from_slice(status_id(self.node), bytes);
-        self.outbox
-            .extend(frame.map(|frame| (self.now_ns.saturating_add(late_ns), frame)));
+        let delay_ns = delay_ms.saturating_mul(1_000_000);
+        let due_ns = self.now_ns.saturating_add(delay_ns);
+        let frame = CanFrame::from_slice(status_id(self.node), &status[..length]);
+        self.outbox.extend(frame.map(|frame| (due_ns, frame)));
     }
 }
 
 impl EmulatedAmplifier for EmulatedVesc {
     fn handle(&mut self, frame: &CanFrame, now_ns: u64, _out: &mut Vec<CanFrame>) {
         self.now_ns = self.now_ns.max(now_ns);
-        self.take(frame);
+        if frame.id() != self.command_id() || self.ignores_commands() {
+            return;
+        }
+        if let Ok(bytes) = frame.data().try_into() {
+            self.target_ma = i32::from_be_bytes(bytes);
+            self.last_command_ns = Some(self.now_ns);
+        }
     }
 
     fn poll(&mut self, now_ns: u64, out: &mut Vec<CanFrame>) {
         self.now_ns = self.now_ns.max(now_ns);
-        self.let_go_in_time();
-        self.tell_status();
-        while let Some((_, frame)) = self
-            .outbox
-            .pop_front_if(|(due_ns, _)| *due_ns <= self.now_ns)
-        {
+        self.release_without_command();
+        self.send_due_status();
+        let now_ns = self.now_ns;
+        while let Some((_, frame)) = self.outbox.pop_front_if(|(due_ns, _)| *due_ns <= now_ns) {
             out.push(frame);
         }
     }
 
     fn current_a(&self) -> f64 {
-        if self.misbehaviour == DeviceFault::TargetIgnored {
+        if self.fault == DeviceFault::TargetIgnored {
             0.0
         } else {
             f64::from(self.target_ma) * 1e-3
@@ -128,13 +132,13 @@ impl EmulatedAmplifier for EmulatedVesc {
         }
     }
 
-    /// A VESC holds the motor as long as somebody commands, be it zero.
+    /// A VESC drives the motor as long as it receives commands, even of zero current.
     fn is_enabled(&self) -> bool {
-        self.commanded_ns.is_some()
+        self.last_command_ns.is_some()
     }
 
-    /// It has no power states and no emergency messages.
-    fn knows(&self, fault: DeviceFault) -> bool {
+    /// A VESC has neither power states nor emergency messages.
+    fn supports(&self, fault: DeviceFault) -> bool {
         !matches!(
             fault,
             DeviceFault::Drive(_)
@@ -145,18 +149,14 @@ impl EmulatedAmplifier for EmulatedVesc {
     }
 
     fn inject(&mut self, fault: DeviceFault) {
-        if !self.knows(fault) {
-            return;
-        }
         if fault == DeviceFault::Reset {
-            let now_ns = self.now_ns;
             *self = EmulatedVesc {
-                now_ns,
-                due_ns: now_ns + STATUS_NS,
+                now_ns: self.now_ns,
+                next_status_ns: self.now_ns + STATUS_PERIOD_NS,
                 ..EmulatedVesc::new(self.node)
             };
-            return;
+        } else if self.supports(fault) {
+            self.fault = fault;
         }
-        self.misbehaviour = fault;
     }
 }

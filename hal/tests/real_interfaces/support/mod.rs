@@ -10,7 +10,9 @@ use std::time::{Duration, Instant};
 use bench_hal::can::bus::{Host, Port, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::cia402::State;
 use bench_hal::can::drive::{CanopenDrive, DriveSettings, OpenError};
-use bench_hal::can::emulator::{AmplifierTask, DeviceFault, EmulatedDrive, EmulatedDriveSettings};
+use bench_hal::can::emulator::{
+    AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
+};
 use bench_hal::can::heartbeat;
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
 

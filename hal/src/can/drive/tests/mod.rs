@@ -8,7 +8,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use super::super::bus::{Host, SimulatedHost};
-use super::super::emulator::{AmplifierTask, EmulatedDrive, EmulatedDriveSettings};
+use super::super::emulator::{
+    AmplifierTask, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
+};
 use super::*;
 
 /// Driver and simulated drive on one bus.

@@ -1,9 +1,9 @@
-use super::super::cia402::*;
-use super::super::heartbeat;
-use super::super::pdo as layout;
-use super::super::pdo::{Direction, Mapped};
-use super::super::sdo::{AbortCode, Answer, Part, Request, Start};
 use super::*;
+use crate::can::cia402::*;
+use crate::can::heartbeat;
+use crate::can::pdo as layout;
+use crate::can::pdo::{Direction, Mapped};
+use crate::can::sdo::{AbortCode, Answer, Part, Request, Start};
 
 fn booted() -> EmulatedDrive {
     let mut device = EmulatedDrive::new(EmulatedDriveSettings::default());

@@ -1,25 +1,13 @@
-//! What the simulated drive is, and the objects it has.
+//! Settings and objects of the emulated drive.
 
 use super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
-use super::super::pdo::{Direction, OFF, cob_id};
+use super::super::objects::*;
+use super::super::pdo::{Direction, OFF, cob_id, parameters};
 use super::super::scale::Reference;
 use super::super::sdo::Address;
 use super::dictionary::{Access, ObjectDictionary};
 
-pub(super) const HEARTBEAT_CONSUMER: Address = Address::new(0x1016, 1);
-pub(super) const HEARTBEAT_PRODUCER: Address = Address::new(0x1017, 0);
-pub(super) const ABORT_CONNECTION: Address = Address::new(0x6007, 0);
-pub(super) const CONTROLWORD: Address = Address::new(0x6040, 0);
-pub(super) const STATUSWORD: Address = Address::new(0x6041, 0);
-pub(super) const MODE: Address = Address::new(0x6060, 0);
-pub(super) const MODE_DISPLAY: Address = Address::new(0x6061, 0);
-pub(super) const TARGET: Address = Address::new(0x6071, 0);
-pub(super) const ACTUAL: Address = Address::new(0x6077, 0);
-pub(super) const SUPPORTED_MODES: Address = Address::new(0x6502, 0);
-/// Objects that a PDO may carry but nobody may write.
-pub(super) const SHOWN: [Address; 3] = [STATUSWORD, MODE_DISPLAY, ACTUAL];
-
-/// What a simulated drive is.
+/// Settings of an emulated drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmulatedDriveSettings {
     /// Node number, 1 to 127.
@@ -34,9 +22,9 @@ pub struct EmulatedDriveSettings {
     pub maximum_per_mille: u16,
     /// What 1000 counts of the target are.
     pub reference: Reference,
-    /// Modes of operation it has; bits of 0x6502: mode 4 is bit 3, mode 10 bit 9.
+    /// Supported modes of operation, 0x6502: mode 4 is bit 3, mode 10 is bit 9.
     pub modes: u32,
-    /// Objects it lacks, of those it could have.
+    /// Objects that this drive does not have.
     pub missing_objects: Vec<Address>,
 }
 
@@ -66,7 +54,7 @@ impl EmulatedDriveSettings {
     }
 }
 
-/// The objects as after power-on.
+/// The object dictionary after power-on.
 pub(super) fn dictionary(settings: &EmulatedDriveSettings) -> ObjectDictionary {
     let mut objects = ObjectDictionary::default();
     communication(&mut objects, settings);
@@ -75,30 +63,29 @@ pub(super) fn dictionary(settings: &EmulatedDriveSettings) -> ObjectDictionary {
         pdo(&mut objects, Direction::Transmit, number, settings.node);
     }
     drive(&mut objects, settings);
-    settings
-        .missing_objects
-        .iter()
-        .for_each(|address| objects.remove(*address));
+    for address in &settings.missing_objects {
+        objects.remove(*address);
+    }
     objects
 }
 
 fn communication(objects: &mut ObjectDictionary, settings: &EmulatedDriveSettings) {
-    objects.add(Address::new(0x1000, 0), 4, 0x0002_0192, Access::Read); // servo drive, profile 402
-    objects.add(Address::new(0x1001, 0), 1, 0, Access::Read);
-    objects.add_text(Address::new(0x1008, 0), &settings.name, Access::Read);
+    objects.add(DEVICE_TYPE, 4, 0x0002_0192, Access::Read); // servo drive, profile 402
+    objects.add(ERROR_REGISTER, 1, 0, Access::Read);
+    objects.add_text(DEVICE_NAME, &settings.name, Access::Read);
     objects.add(Address::new(0x1016, 0), 1, 1, Access::Read);
     objects.add(HEARTBEAT_CONSUMER, 4, 0, Access::Write);
     objects.add(HEARTBEAT_PRODUCER, 2, 0, Access::Write);
-    objects.add(Address::new(0x1018, 0), 1, 4, Access::Read);
+    objects.add(identity(0), 1, 4, Access::Read);
     for (sub, number) in (1..).zip(settings.identity) {
-        objects.add(Address::new(0x1018, sub), 4, number, Access::Read);
+        objects.add(identity(sub), 4, number, Access::Read);
     }
-    objects.add_text(Address::new(0x2000, 0), "", Access::Write); // a note of the owner, any length
+    objects.add_text(Address::new(0x2000, 0), "", Access::Write); // a text of the user, of any length
 }
 
-/// PDO 1 is on from the start, as is usual; the others are off.
+/// PDO 1 is on after power-on, the others are off.
 fn pdo(objects: &mut ObjectDictionary, direction: Direction, number: u8, node: u8) {
-    let index = super::super::pdo::parameters(direction, number);
+    let index = parameters(direction, number);
     let off = if number == 1 { 0 } else { OFF };
     objects.add(Address::new(index, 0), 1, 5, Access::Read);
     objects.add(
@@ -118,24 +105,19 @@ fn pdo(objects: &mut ObjectDictionary, direction: Direction, number: u8, node: u
 
 fn drive(objects: &mut ObjectDictionary, settings: &EmulatedDriveSettings) {
     objects.add(ABORT_CONNECTION, 2, 0, Access::Write);
-    objects.add(CONTROLWORD, 2, 0, Access::Mapped);
-    objects.add(STATUSWORD, 2, 0x40, Access::Mapped);
-    objects.add(MODE, 1, 0, Access::Mapped);
-    objects.add(MODE_DISPLAY, 1, 0, Access::Mapped);
-    objects.add(TARGET, 2, 0, Access::Mapped);
+    objects.add(CONTROLWORD, 2, 0, Access::MappedWrite);
+    objects.add(STATUSWORD, 2, 0x40, Access::MappedRead);
+    objects.add(MODE, 1, 0, Access::MappedWrite);
+    objects.add(MODE_DISPLAY, 1, 0, Access::MappedRead);
+    objects.add(TARGET, 2, 0, Access::MappedWrite);
     objects.add(
-        Address::new(0x6072, 0),
+        MAXIMUM,
         2,
         u32::from(settings.maximum_per_mille),
         Access::Write,
     );
-    objects.add(
-        Address::new(0x6075, 0),
-        4,
-        settings.rated_current_ma,
-        Access::Read,
-    );
-    objects.add(ACTUAL, 2, 0, Access::Mapped);
-    objects.add(Address::new(0x6087, 0), 4, 1000, Access::Write);
+    objects.add(RATED_CURRENT, 4, settings.rated_current_ma, Access::Read);
+    objects.add(ACTUAL, 2, 0, Access::MappedRead);
+    objects.add(SLOPE, 4, 1000, Access::Write);
     objects.add(SUPPORTED_MODES, 4, settings.modes, Access::Read);
 }
