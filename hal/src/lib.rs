@@ -1,47 +1,60 @@
-//! The hardware boundary of `bench`: one page for the author of a driver.
+//! The hardware interface of `bench`: the traits of a current amplifier and of a displacement probe, and their drivers.
 //!
-//! A device is a [`CurrentAmplifier`], a [`DisplacementProbe`], or both (a [`Rig`]). The loop calls them from its
-//! real-time thread, once a tick, in this order:
+//! A device implements [`CurrentAmplifier`], [`DisplacementProbe`], or both (a [`Rig`]). The loop calls the methods in its
+//! real-time thread. No method is called from another thread while the loop owns the device.
 //!
-//! ```text
-//! probe.latest(now)   ->  ...interlocks, controller...  ->  amplifier.command(current_a)
-//! ```
+//! | method | when the loop calls it | may allocate | may block |
+//! |---|---|---|---|
+//! | [`latest`](DisplacementProbe::latest) | every tick, first | no | no |
+//! | [`status`](CurrentAmplifier::status) | every tick | no | no |
+//! | [`actual_current_a`](CurrentAmplifier::actual_current_a) | every tick, twice | no | no |
+//! | [`explain`](CurrentAmplifier::explain) | every tick in which `status` is a fault | no | no |
+//! | [`command`](CurrentAmplifier::command) | every tick while armed, after the interlocks and the control law | no | no |
+//! | [`disable`](CurrentAmplifier::disable) | in the tick at a stop or a trip, and when the loop ends | no | no |
+//! | [`enable`](CurrentAmplifier::enable) | in the tick that takes the request to arm | yes | yes |
+//! | [`reset_fault`](CurrentAmplifier::reset_fault) | in the tick that takes the request to clear a trip | yes | yes |
+//!
+//! "May block: no" excludes locks, sleeping, printing, and waiting for a device. A system call that returns at once, such as a
+//! write to a non-blocking socket, is permitted. A slow device is read by a thread of its own; `latest` returns the newest
+//! value with its age.
+//!
+//! `enable` and `reset_fault` may block until the time limit of the driver. The amplifier gives no current meanwhile, no tick
+//! is executed, and the loop restarts its schedule afterwards, so that the delay does not count as missed ticks.
 //!
 //! # Rules for a driver
 //!
-//! * None of the calls marked *in the tick* may allocate, lock, print, sleep or wait for a device. A slow device is read
-//!   by a thread of its own, and [`DisplacementProbe::latest`] hands out the newest value with its age.
-//! * A value that cannot be trusted is never handed out as [`Validity::Valid`]; an old value never gets a new sequence
+//! * A value that cannot be trusted is never returned as [`Validity::Valid`]. A value that is returned again keeps its sequence
 //!   number.
-//! * After [`CurrentAmplifier::disable`] the current is zero, whatever came before.
-//! * Errors say what to do about them: a person reads [`DeviceError`] with the motor in front of him.
+//! * After [`CurrentAmplifier::disable`] the current is zero, whatever happened before.
+//! * Each error states the remedy: the operator reads the [`DeviceError`] in front of the machine.
 //!
-//! `hal/README.md` shows step by step how a driver is added, with the VESC driver ([`can::vesc`]) as the worked example.
+//! `hal/README.md` describes step by step how to add a driver, with the VESC driver ([`can::vesc`]) as the example.
 #![warn(missing_docs)]
+#![deny(unsafe_code)]
 
 pub mod can;
 pub mod serial;
 
 use std::fmt;
 
-/// The moment a tick was scheduled for. Time enters the bench only like this, so simulation, hardware and replay run
-/// the same code.
+/// The scheduled time of a tick. The loop gets the time only in this form, so that simulation, hardware and replay run the
+/// same code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tick {
-    /// Number of the tick since the loop started; counts scheduled ticks, so a missed tick leaves a gap.
+    /// Number of the tick since the loop started. Missed ticks are counted, too.
     pub number: u64,
-    /// Scheduled time since the loop started, in nanoseconds: `number` times the period.
+    /// Scheduled time since the loop started, in nanoseconds: `number` times the sampling period.
     pub scheduled_ns: u64,
 }
 
-/// Whether a reading may be used.
+/// Validity of a reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Validity {
-    /// A measurement within the range of the probe.
+    /// A measurement within the measuring range.
     Valid,
-    /// The target is outside the probe's range; the position is the range's end.
+    /// The target is outside the measuring range; the position is the end of the range.
     OutOfRange,
-    /// The probe answers, but says that it cannot measure, or the answer was damaged.
+    /// The probe reports that it cannot measure, or the connection to it is lost.
     Faulty,
     /// No reading has arrived yet.
     #[default]
@@ -53,15 +66,15 @@ pub enum Validity {
 pub struct Reading {
     /// Displacement in metres, positive in the direction of positive force.
     pub position_m: f64,
-    /// Counts measurements: unchanged when `latest` returns the same measurement again.
+    /// Number of the measurement; unchanged when the same measurement is returned again.
     pub sequence: u64,
-    /// Age of the measurement at the tick, in nanoseconds.
+    /// Age of the measurement in nanoseconds.
     pub age_ns: u64,
     /// Whether `position_m` may be used.
     pub validity: Validity,
 }
 
-/// What an amplifier says of itself.
+/// State of an amplifier.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AmplifierStatus {
     /// No current flows.
@@ -69,11 +82,11 @@ pub enum AmplifierStatus {
     Disabled,
     /// The amplifier follows commands.
     Enabled,
-    /// The amplifier has switched itself off; the code is the device's own.
+    /// The amplifier has switched off because of a fault, with the code of the driver.
     Fault(u32),
 }
 
-/// A fault in words, for a person.
+/// Description of a fault for the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultText {
     /// What happened.
@@ -82,14 +95,19 @@ pub struct FaultText {
     pub remedy: &'static str,
 }
 
-/// A device did not do as told. Static text only: it is made inside the tick.
+/// Error of a device. It contains static text only, because it is created in the tick.
+///
+/// ```
+/// let error = bench_hal::DeviceError { what: "the drive is not enabled", remedy: "arm first", code: 3 };
+/// assert_eq!(error.to_string(), "the drive is not enabled (code 3); arm first");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceError {
     /// What went wrong, where.
     pub what: &'static str,
     /// What to do about it.
     pub remedy: &'static str,
-    /// The device's or the system's own number, 0 if there is none.
+    /// Error number of the device or of the system; 0 if there is none.
     pub code: i64,
 }
 
@@ -101,32 +119,46 @@ impl fmt::Display for DeviceError {
 
 impl std::error::Error for DeviceError {}
 
-/// A current amplifier: amperes in, force out.
+/// A current amplifier.
 pub trait CurrentAmplifier: Send {
-    /// Prepares the amplifier to follow commands; the current stays zero. Not in the tick: may take its time.
+    /// Prepares the amplifier to follow commands; the current stays zero.
+    ///
+    /// Called in the thread of the loop when it is armed. May allocate, and may block until the time limit of the driver: for a
+    /// CANopen drive `state_timeout` (2 s by default), for a VESC `status_timeout`.
     fn enable(&mut self) -> Result<(), DeviceError>;
 
-    /// Commands `current_a` amperes and returns what the amplifier will really give (quantised, limited). *In the tick.*
-    /// `current_a` is finite: the loop's interlocks stand above this call.
+    /// Commands a current in amperes and returns the current that the amplifier will give after quantisation and limits.
+    ///
+    /// Called in every tick while armed. Must not allocate or block. `current_a` is finite, because the interlocks are checked
+    /// first.
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError>;
 
-    /// Zero current, at once, and no more commands followed. *In the tick*, may be called at any time, repeatedly.
+    /// Sets the current to zero immediately; further commands are refused.
+    ///
+    /// Called in the tick at a stop or a trip, and when the loop ends; in any state, and repeatedly. Must not allocate or
+    /// block.
     fn disable(&mut self);
 
-    /// The latest known state. *In the tick.*
+    /// The latest known state. Called in every tick; must not allocate or block.
     fn status(&self) -> AmplifierStatus;
 
-    /// The current that the amplifier says it gives, in amperes, if it says so. *In the tick.*
+    /// The current that the amplifier measures, in amperes; `None` if it does not report it. Called in every tick; must not
+    /// allocate or block.
     fn actual_current_a(&self) -> Option<f64> {
         None
     }
 
-    /// Acknowledges a fault, on a person's command only. Nothing is enabled by it. Not in the tick: may take its time.
+    /// Acknowledges a fault. The amplifier stays disabled.
+    ///
+    /// Called in the thread of the loop, only on a command of the operator. May allocate, and may block until the time limits of
+    /// the driver: a CANopen drive that has restarted is configured again, which may take several times `state_timeout`.
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }
 
-    /// What a code of [`AmplifierStatus::Fault`] means and what to do about it, in words.
+    /// Meaning and remedy of a code of [`AmplifierStatus::Fault`].
+    ///
+    /// Called in every tick in which the amplifier has a fault. Must not allocate or block: the text is static.
     fn explain(&self, code: u32) -> Option<FaultText> {
         let _ = code;
         None
@@ -135,7 +167,7 @@ pub trait CurrentAmplifier: Send {
 
 /// A displacement probe.
 pub trait DisplacementProbe: Send {
-    /// The newest measurement as of the tick `now`. *In the tick.*
+    /// The newest measurement at the tick `now`. Called first in every tick; must not allocate or block.
     fn latest(&mut self, now: Tick) -> Reading;
 }
 
@@ -163,16 +195,16 @@ impl<A: CurrentAmplifier + ?Sized> CurrentAmplifier for Box<A> {
     }
 }
 
-/// What the loop drives: an amplifier and a probe.
+/// An amplifier and a probe.
 pub trait Rig: CurrentAmplifier + DisplacementProbe {}
 impl<T: CurrentAmplifier + DisplacementProbe> Rig for T {}
 
-/// Joins two devices into a [`Rig`].
+/// An amplifier and a probe as one [`Rig`].
 #[derive(Debug)]
 pub struct Devices<A, P> {
-    /// Drives the motor.
+    /// The amplifier of the motor.
     pub amplifier: A,
-    /// Reads the stage.
+    /// The probe at the stage.
     pub probe: P,
 }
 
