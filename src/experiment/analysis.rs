@@ -1,5 +1,7 @@
 //! The analysis of an excitation: one function, whether it runs after a chirp, on an old recording or elsewhere.
 
+use core::ops::ControlFlow;
+
 use nalgebra::Complex;
 
 use super::closed_loop::{self, ClosedLoopError, ClosedResponses};
@@ -19,17 +21,18 @@ use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
 use crate::rt::record::flag;
 
-/// The model's phase is believed, and a verdict given, up to so many times its last mode: beyond are modes that it leaves
-/// out.
+/// The model's phase is used, and a verdict given, up to this multiple of its last mode: the model has no modes beyond.
 const LAST_MODE: f64 = 1.2;
+/// Progress is reported after this many ticks.
+const TICKS_PER_REPORT: usize = 1 << 15;
 
-/// A recording that carries no frequency response.
+/// Why a recording gives no frequency response.
 #[derive(Debug, thiserror::Error)]
 pub enum AnalysisError {
-    /// It cannot be read.
+    /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The signals carry no estimate.
+    /// The signals allow no estimate.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     /// The model cannot be analysed.
@@ -39,8 +42,11 @@ pub enum AnalysisError {
     #[error(transparent)]
     Loop(#[from] ClosedLoopError),
     /// No program ran.
-    #[error("in this recording no program ran: there is no excitation to analyse")]
+    #[error("no program ran in this recording: there is no excitation to analyse")]
     NothingRan,
+    /// The receiver of the progress cancelled the analysis.
+    #[error("the analysis was cancelled")]
+    Cancelled,
     /// Too many ticks are missing.
     #[error(
         "{missing} ticks or more are missing beside the {ticks} that were recorded, {allowed} may be filled in; repeat the run at a rate the machine keeps, or in real-time scheduling"
@@ -55,43 +61,83 @@ pub enum AnalysisError {
     },
 }
 
-/// What a recorded excitation shows.
+/// The analysis of a recorded excitation.
 #[derive(Clone, Debug)]
 pub struct Analysis {
     /// The frequency response from the amplifier's set-point (A) to the probe (m): hold, amplifier, plant, delays, and the
-    /// mean age of the readings; what their ages differ is undone.
+    /// mean age of the readings; differences of their ages are corrected.
     pub frf: Frf,
     /// The same by the model, at the same frequencies, for readings of the mean age.
     pub model: Vec<Complex<f64>>,
     /// Mean time in seconds from a command to the position that its reading shows, by the model.
     pub delay_s: f64,
-    /// How much later than the model the chain answers, by its phases up to the last mode of the model.
+    /// Excess delay over the model in seconds, from the phases up to the last mode of the model.
     pub excess_delay: Option<Estimate>,
-    /// Missing ticks that were filled in: the current held, the position on a straight line.
+    /// Missing ticks that were interpolated: the current held, the position linear.
     pub filled_ticks: u64,
-    /// The modes that the response shows, or why none are told.
+    /// The fitted modes, or why none can be fitted.
     pub fit: Result<ModalFit, FitError>,
-    /// What that says of CNMP zeros.
+    /// The verdict on CNMP zeros.
     pub verdict: Verdict,
-    /// Modes and zeros up to here count for the verdict, in rad/s.
+    /// The verdict covers modes and zeros up to here, in rad/s.
     pub judged_up_to_rad_s: f64,
-    /// The loop around the plant, of a recording under control.
+    /// The loop, of a closed-loop recording.
     pub closed: Option<ClosedResponses>,
-    /// How linear the stage answered, of a multisine with lines left out.
+    /// Noise and distortion, of a multisine that omits lines.
     pub linearity: Option<Linearity>,
 }
 
-/// Analyses a recording made with `config`: of an excitation, or of a closed loop whose reference was swept. Of a run that did
-/// not come to its end the verdict's reasons say so.
+/// A part of the analysis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnalysisPhase {
+    /// The ticks are read.
+    Reading,
+    /// The frequency response is estimated.
+    Response,
+    /// The modes are fitted.
+    Modes,
+}
+
+impl AnalysisPhase {
+    /// Progress of the whole analysis, 0 to 1, at a progress of the phase.
+    pub fn overall(self, fraction: f64) -> f64 {
+        let (begin, end) = match self {
+            AnalysisPhase::Reading => (0.0, 0.1),
+            AnalysisPhase::Response => (0.1, 0.3),
+            AnalysisPhase::Modes => (0.3, 1.0),
+        };
+        begin + (end - begin) * fraction
+    }
+}
+
+/// Receives the progress of each phase, 0 to 1; `Break` cancels the analysis.
+pub type AnalysisProgress<'a> = dyn FnMut(AnalysisPhase, f64) -> ControlFlow<()> + 'a;
+
+/// Analyses a recording made with `config`: of an excitation, or of a closed loop with a swept reference. The reasons of the
+/// verdict mention a run that did not come to its end.
+///
+/// # Errors
+/// When the recording cannot be read, or contains no frequency response: see [`AnalysisError`].
 pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
-    let closed = recording
-        .metadata()
-        .get(KIND)
-        .is_some_and(|kind| kind == RunKind::Control.name());
+    analyse_with_progress(recording, config, &mut |_, _| ControlFlow::Continue(()))
+}
+
+/// As [`analyse`], with a receiver of its progress, which can cancel it.
+///
+/// # Errors
+/// Those of [`analyse`], and [`AnalysisError::Cancelled`].
+pub fn analyse_with_progress(
+    recording: &Recording,
+    config: &Config,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Analysis, AnalysisError> {
+    let kind = recording.metadata().get(KIND);
+    let closed = kind.is_some_and(|kind| kind == RunKind::Control.name());
     let Ran {
         loop_signals,
         filled_ticks,
-    } = ran(recording, config.servo.rate_hz, closed)?;
+    } = ran(recording, config.servo.rate_hz, closed, progress)?;
+    report(progress, AnalysisPhase::Response, 0.0)?;
     let band_hz = config.chirp.band_hz();
     let (seen, linearity) = if closed {
         (
@@ -101,13 +147,25 @@ pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, Analy
     } else {
         open_loop(loop_signals.signals, band_hz, config)?
     };
-    let shown = shown(seen, config, filled_ticks)?;
-    let verdict = shown.verdict.with(Ending::of(recording).caution());
+    let analysis = with_modes(seen, config, filled_ticks, progress)?;
+    let verdict = analysis.verdict.with(Ending::of(recording).caution());
     Ok(Analysis {
         linearity,
         verdict,
-        ..shown
+        ..analysis
     })
+}
+
+/// Reports progress; an error if the receiver cancels.
+fn report(
+    progress: &mut AnalysisProgress<'_>,
+    phase: AnalysisPhase,
+    fraction: f64,
+) -> Result<(), AnalysisError> {
+    match progress(phase, fraction) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(AnalysisError::Cancelled),
+    }
 }
 
 /// A response in both its forms.
@@ -122,20 +180,18 @@ fn open_loop(
     band_hz: (f64, f64),
     config: &Config,
 ) -> Result<(Seen, Option<Linearity>), AnalysisError> {
-    let (frf, frf_data, linearity) =
-        match taken(signals, &excitation::of(config).pattern(), band_hz)? {
-            Taken::Lines(frf, frf_data, linearity) => {
-                (frf, frf_data, linearity.map(|boxed| *boxed))
-            }
-            Taken::Record(signals) => {
-                let frf = response(&signals, band_hz, &config.identify)?;
-                (
-                    frf,
-                    frf_data(&signals, band_hz, &config.identify.local())?,
-                    None,
-                )
-            }
-        };
+    let pattern = excitation::of(config).pattern();
+    let (frf, frf_data, linearity) = match taken(signals, &pattern, band_hz)? {
+        Taken::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
+        Taken::Record(signals) => {
+            let frf = response(&signals, band_hz, &config.identify)?;
+            (
+                frf,
+                frf_data(&signals, band_hz, &config.identify.local())?,
+                None,
+            )
+        }
+    };
     Ok((
         Seen {
             frf,
@@ -146,52 +202,54 @@ fn open_loop(
     ))
 }
 
-/// What a response shows beside the model.
-fn shown(seen: Seen, config: &Config, filled_ticks: u64) -> Result<Analysis, AnalysisError> {
+/// The modes of a response, compared with the model.
+fn with_modes(
+    seen: Seen,
+    config: &Config,
+    filled_ticks: u64,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Analysis, AnalysisError> {
     let Seen {
         frf,
         frf_data,
         closed,
     } = seen;
     let modal = ModalModel::of(&plant::build(&config.plant)?)?;
-    let last_rad_s = LAST_MODE
-        * modal
-            .modes
-            .iter()
-            .map(|mode| mode.omega_rad_s)
-            .fold(0.0, f64::max);
+    let frequencies_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s);
+    let judged_up_to_rad_s = LAST_MODE * frequencies_rad_s.fold(0.0, f64::max);
     let plant = LoopPlant::with_mean_age(config, &modal.modes);
-    let model: Vec<_> = frf
-        .frequency_hz
-        .iter()
-        .map(|f| plant.response(2.0 * std::f64::consts::PI * f))
-        .collect();
+    let at = |f: &f64| plant.response(2.0 * std::f64::consts::PI * f);
+    let model: Vec<Complex<f64>> = frf.frequency_hz.iter().map(at).collect();
+    let up_to_hz = judged_up_to_rad_s / (2.0 * std::f64::consts::PI);
     let chain = MeasurementChain::bench(config);
-    let excess_delay = excess_delay(&frf, &model, last_rad_s / (2.0 * std::f64::consts::PI));
-    let fit = modal::fit(&frf_data, &chain);
-    let verdict = judge(&fit, &frf_data, &chain, last_rad_s, Some(&modal))?;
+    let fit = modal::fit_with_progress(&frf_data, &chain, &mut |fraction| {
+        progress(AnalysisPhase::Modes, fraction)
+    });
+    if fit == Err(FitError::Cancelled) {
+        return Err(AnalysisError::Cancelled);
+    }
     Ok(Analysis {
+        excess_delay: excess_delay(&frf, &model, up_to_hz),
+        verdict: judge(&fit, &frf_data, &chain, judged_up_to_rad_s, Some(&modal))?,
+        delay_s: plant.delay_s(),
         frf,
         model,
-        delay_s: plant.delay_s(),
-        excess_delay,
         filled_ticks,
         fit,
-        verdict,
-        judged_up_to_rad_s: last_rad_s,
+        judged_up_to_rad_s,
         closed,
         linearity: None,
     })
 }
 
 impl Analysis {
-    /// From a command to the position that its reading shows, in seconds: by the configuration, and what the phases show beyond.
+    /// Time from a command to the position that its reading shows, in seconds: by the configuration, plus the excess delay.
     pub fn measured_delay_s(&self) -> f64 {
         self.delay_s + self.excess_delay.map_or(0.0, |delay| delay.value)
     }
 }
 
-/// What the fit says of CNMP zeros up to `up_to_rad_s`, beside the modes that the model has there.
+/// The verdict on CNMP zeros up to `up_to_rad_s`; with a model, as many modes are required as it has there.
 pub(super) fn judge(
     fit: &Result<ModalFit, FitError>,
     frf_data: &[FrfDatum],
@@ -217,12 +275,21 @@ pub(super) fn judge(
 }
 
 /// Every tick of the run, or those with the loop closed.
-fn ran(recording: &Recording, rate_hz: f64, closed: bool) -> Result<Ran, AnalysisError> {
+fn ran(
+    recording: &Recording,
+    rate_hz: f64,
+    closed: bool,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Ran, AnalysisError> {
     let mut gathered = Gathered::new(recording, rate_hz);
-    for record in recording.ticks()? {
+    let total = recording.tick_count().max(1) as f64;
+    for (index, record) in recording.ticks()?.enumerate() {
         let record = record?;
         if record.state == State::Running && (!closed || record.flags & flag::ACTIVE != 0) {
             gathered.push(&record)?;
+        }
+        if index % TICKS_PER_REPORT == 0 {
+            report(progress, AnalysisPhase::Reading, index as f64 / total)?;
         }
     }
     gathered.finish()

@@ -1,5 +1,4 @@
-//! The analysis of signals that no bench of ours recorded: from force to displacement, or what stands in their place, and
-//! without a model to compare with.
+//! The analysis of external signals: from force to displacement, or what takes their place, and without a model.
 
 use nalgebra::Complex;
 
@@ -13,55 +12,54 @@ use crate::identify::{
 };
 
 /// Half of the frequencies must have at least this coherence.
-const LEAST_COHERENCE: f64 = 0.5;
-/// No mechanics answer with a magnitude that still grows with this power of frequency at the end of the band, unless the next
-/// mode is right above it.
-const STEEPEST: f64 = 1.0;
-/// The slope at the end is taken over this part of ln f.
-const END: f64 = 0.25;
-/// An answer earlier than this part of a sample, and than five of its sigma, comes before its cause.
+const MIN_COHERENCE: f64 = 0.5;
+/// A mechanical response does not grow with a higher power of frequency at the end of the band, unless the next mode is right
+/// above it.
+const MAX_SLOPE: f64 = 1.0;
+/// The slope is measured over this part of ln f at the end of the band.
+const SLOPE_PART: f64 = 0.25;
+/// An output is early if it precedes its input by more than this part of a sample and by [`CERTAIN_SIGMAS`].
 const EARLY_SAMPLES: f64 = 0.5;
-/// Sigma that count as sure.
-const SURE: f64 = 5.0;
+/// A deviation by this many standard deviations is certain.
+const CERTAIN_SIGMAS: f64 = 5.0;
 
-/// What signals of other hands show.
+/// The chain of external signals: none.
+const CHAIN: MeasurementChain = MeasurementChain::Direct;
+
+/// The analysis of external signals.
 #[derive(Clone, Debug)]
 pub struct ExternalAnalysis {
     /// The response from input to output.
     pub frf: Frf,
-    /// The modes that it shows, or why none are told.
+    /// Its modes, or why none can be fitted.
     pub fit: Result<ModalFit, FitError>,
-    /// What that says of CNMP zeros.
+    /// The verdict on CNMP zeros.
     pub verdict: Verdict,
-    /// Modes and zeros up to here count for the verdict, in rad/s: the end of the band.
+    /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
     pub judged_up_to_rad_s: f64,
-    /// Periods that were averaged, of a periodic record.
+    /// Number of averaged periods of a periodic record.
     pub periods: Option<usize>,
 }
 
-/// Analyses input and output between two frequencies; with a repetition as averaged periods, without one as a record that
+/// Analyses input and output between two frequencies: with a repetition as averaged periods, without one as a record that
 /// begins and ends at rest.
+///
+/// # Errors
+/// When the signals allow no estimate, or the zeros cannot be computed.
 pub fn analyse_external(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
 ) -> Result<ExternalAnalysis, AnalysisError> {
-    let (frf, frf_data, periods) = response(signals, band_hz, repetition)?;
-    let fit = if repetition.is_some() {
-        fit_of_periods(&frf_data)
-    } else {
-        modal::fit(&frf_data, &MeasurementChain::Direct)
+    let (frf, data, periods) = response(signals, band_hz, repetition)?;
+    let fit = match repetition {
+        Some(_) => fit_of_periods(&data),
+        None => modal::fit(&data, &CHAIN),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let verdict = match doubt(signals.rate_hz, &frf, &frf_data, &fit) {
+    let verdict = match implausible(signals.rate_hz, &frf, &data, &fit) {
         Some(why) => Verdict::undecided(why),
-        None => judge(
-            &fit,
-            &frf_data,
-            &MeasurementChain::Direct,
-            judged_up_to_rad_s,
-            None,
-        )?,
+        None => judge(&fit, &data, &CHAIN, judged_up_to_rad_s, None)?,
     };
     Ok(ExternalAnalysis {
         frf,
@@ -81,131 +79,114 @@ fn response(
         let periods = periodic::estimate(signals, band_hz, repetition)?;
         return Ok((periods.frf, periods.frf_data, Some(periods.count)));
     }
-    let frf = local::estimate(signals, band_hz, &EstimatorSettings::default())?;
-    Ok((
-        frf,
-        frf_data(signals, band_hz, &EstimatorSettings::default())?,
-        None,
-    ))
+    let settings = EstimatorSettings::default();
+    let frf = local::estimate(signals, band_hz, &settings)?;
+    Ok((frf, frf_data(signals, band_hz, &settings)?, None))
 }
 
-/// The modes that periods show. Where they leave more than the noise, distortion counts as well; without periods the noise is
-/// taken from neighbouring frequencies, and distortion is in it.
-fn fit_of_periods(frf_data: &[FrfDatum]) -> Result<ModalFit, FitError> {
-    let fit = modal::fit(frf_data, &MeasurementChain::Direct);
-    if fit
-        .as_ref()
-        .is_ok_and(|fit| fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM)
-    {
+/// Whether the fit describes the data.
+fn describes(fit: &ModalFit) -> bool {
+    fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
+}
+
+/// The modes of averaged periods. If they do not describe the data, distortion is added to the noise. (Without periods the noise
+/// is estimated from neighbouring frequencies and includes distortion.)
+fn fit_of_periods(data: &[FrfDatum]) -> Result<ModalFit, FitError> {
+    let fit = modal::fit(data, &CHAIN);
+    if fit.as_ref().is_ok_and(describes) {
         return fit;
     }
-    let mut fit = modal::fit(&with_distortion(frf_data), &MeasurementChain::Direct)?;
-    fit.chi2_per_freedom = chi2_per_freedom(&fit, frf_data);
+    let mut fit = modal::fit(&with_distortion(data), &CHAIN)?;
+    fit.chi2_per_freedom = chi2_per_freedom(&fit, data);
     Ok(fit)
 }
 
-/// What a fit leaves over the noise alone, whatever it was weighted with.
-fn chi2_per_freedom(fit: &ModalFit, frf_data: &[FrfDatum]) -> f64 {
-    let frequency_hz: Vec<f64> = frf_data.iter().map(|block| block.frequency_hz).collect();
-    let fitted = fit.response(&MeasurementChain::Direct, &frequency_hz);
-    let left = |(block, h): (&FrfDatum, &Complex<f64>)| {
-        2.0 * (block.response - h).norm_sqr() / block.variance
+/// Reduced chi-square with the noise alone.
+fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum]) -> f64 {
+    let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
+    let fitted = fit.response(&CHAIN, &frequency_hz);
+    let square = |(datum, h): (&FrfDatum, &Complex<f64>)| {
+        2.0 * (datum.response - h).norm_sqr() / datum.variance
     };
-    let freedom = (2 * frf_data.len())
+    let freedom = (2 * data.len())
         .saturating_sub(fit.covariance.nrows())
         .max(1);
-    frf_data.iter().zip(&fitted).map(left).sum::<f64>() / freedom as f64
+    data.iter().zip(&fitted).map(square).sum::<f64>() / freedom as f64
 }
 
-/// Why the data carry no verdict, whatever the fit says of them.
-fn doubt(
+/// Why the signals are not input and output of a mechanical system.
+fn implausible(
     rate_hz: f64,
     frf: &Frf,
-    frf_data: &[FrfDatum],
+    data: &[FrfDatum],
     fit: &Result<ModalFit, FitError>,
 ) -> Option<String> {
-    let swapped = || grows(frf).or_else(|| explained_the_other_way(frf_data, fit));
     incoherent(frf)
-        .or_else(swapped)
+        .or_else(|| growing(frf))
+        .or_else(|| inverse_fits(data, fit))
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
 
-/// Modes that do not explain the response, but do explain its inverse.
-fn explained_the_other_way(
-    frf_data: &[FrfDatum],
-    fit: &Result<ModalFit, FitError>,
-) -> Option<String> {
-    let explained = |fit: &ModalFit| fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
-    if fit.as_ref().is_ok_and(explained) {
+/// Modes that describe the inverse of the response, but not the response.
+fn inverse_fits(data: &[FrfDatum], fit: &Result<ModalFit, FitError>) -> Option<String> {
+    if fit.as_ref().is_ok_and(describes) {
         return None;
     }
-    let inverse = |block: &FrfDatum| FrfDatum {
-        response: block.response.inv(),
-        variance: block.variance / block.response.norm_sqr().powi(2),
-        ..*block
+    let inverse = |datum: &FrfDatum| FrfDatum {
+        response: datum.response.inv(),
+        variance: datum.variance / datum.response.norm_sqr().powi(2),
+        ..*datum
     };
-    let inverse: Vec<FrfDatum> = frf_data
-        .iter()
-        .map(inverse)
-        .filter(|b| b.variance.is_normal())
-        .collect();
-    let other = modal::fit(&inverse, &MeasurementChain::Direct).ok()?;
-    explained(&other).then(|| {
-        "modes explain how the input answers the output, and not how the output answers the input: they are swapped (--input, \
-         --output)"
-            .into()
+    let mut inverse: Vec<FrfDatum> = data.iter().map(inverse).collect();
+    inverse.retain(|datum| datum.variance.is_normal());
+    let inverse_fit = modal::fit(&inverse, &CHAIN).ok()?;
+    describes(&inverse_fit).then(|| {
+        "modes describe the response from output to input, but not that from input to output: input and output are swapped (--input, --output)".into()
     })
 }
 
 fn incoherent(frf: &Frf) -> Option<String> {
     let median = frf.median_coherence()?;
-    (median < LEAST_COHERENCE).then(|| {
+    (median < MIN_COHERENCE).then(|| {
         format!(
-            "the input explains {:.0} % of the output's power at half of the frequencies or less: these are not cause and \
-             answer, or most of the band was not excited; name the columns that belong together, or the band that was \
-             excited (--band)",
+            "the input explains {:.0} % of the output's power, or less, at half of the frequencies: the columns are not input and output of one system, or most of the band was not excited; select columns that belong together, or the band that was excited (--band)",
             100.0 * median
         )
     })
 }
 
-/// A displacement falls with frequency above its modes; the force as its answer would grow.
-fn grows(frf: &Frf) -> Option<String> {
+/// A displacement falls with frequency above its modes; a force as output would grow.
+fn growing(frf: &Frf) -> Option<String> {
     let (first_hz, last_hz) = (frf.frequency_hz.first()?, frf.frequency_hz.last()?);
-    let from_hz = last_hz * (first_hz / last_hz).powf(END);
-    let end = frf
-        .frequency_hz
-        .iter()
-        .zip(&frf.response)
-        .filter(|(f, _)| **f >= from_hz);
-    let slope = slope(
-        end.map(|(f, h)| (f.ln(), h.norm().ln()))
-            .filter(|(_, y)| y.is_finite()),
-    )?;
-    (slope > STEEPEST).then(|| {
+    let from_hz = last_hz * (first_hz / last_hz).powf(SLOPE_PART);
+    let points = frf.frequency_hz.iter().zip(&frf.response);
+    let end = points
+        .filter(|(f, _)| **f >= from_hz)
+        .map(|(f, h)| (f.ln(), h.norm().ln()));
+    let slope = slope(end.filter(|(_, y)| y.is_finite()).collect())?;
+    (slope > MAX_SLOPE).then(|| {
         format!(
-            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}: input and output \
-             are swapped (--input, --output), or a mode stands right above the band (--band)"
+            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}: input and output are swapped (--input, --output), or a mode lies right above the band (--band)"
         )
     })
 }
 
-/// The slope of the line of least squares.
-fn slope(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
-    let points: Vec<_> = points.collect();
+/// The slope of the least-squares line.
+fn slope(points: Vec<(f64, f64)>) -> Option<f64> {
     let count = points.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
     let (x0, y0) = (mean(|p| p.0), mean(|p| p.1));
     let square: f64 = points.iter().map(|(x, _)| (x - x0) * (x - x0)).sum();
-    (square > 0.0).then(|| points.iter().map(|(x, y)| (x - x0) * (y - y0)).sum::<f64>() / square)
+    let product: f64 = points.iter().map(|(x, y)| (x - x0) * (y - y0)).sum();
+    (square > 0.0).then(|| product / square)
 }
 
 fn early(rate_hz: f64, fit: &ModalFit) -> Option<String> {
     let delay = fit.delay_s();
-    (-delay.value > (EARLY_SAMPLES / rate_hz).max(SURE * delay.sigma)).then(|| {
+    let limit_s = (EARLY_SAMPLES / rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
+    (-delay.value > limit_s).then(|| {
         format!(
-            "the output comes {:.3} ms before its cause: input and output are swapped (--input, --output), or they were not \
-             sampled at the same times",
+            "the output precedes the input by {:.3} ms: input and output are swapped (--input, --output), or they were not sampled at the same times",
             -delay.value * 1e3
         )
     })

@@ -30,7 +30,9 @@ mod signals;
 mod swept;
 
 pub use amplitudes::{ModeOverAmplitude, modes_over_amplitude};
-pub use analysis::{Analysis, AnalysisError, analyse};
+pub use analysis::{
+    Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress,
+};
 pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};
 pub use ending::Ending;
 pub use error::ExperimentError;
