@@ -6,9 +6,11 @@ use super::error::CliError;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
+use crate::excitation::{swept_words, words};
 use crate::experiment::{AnalysisError, analyse};
+use crate::identify::modal::MeasurementChain;
 use crate::recording::Recording;
-use crate::report::run_pages::{AnalysisOutputs, OutputError, PageFiles, RunReport};
+use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles};
 
 impl From<AnalysisError> for CliError {
     fn from(error: AnalysisError) -> Self {
@@ -29,10 +31,16 @@ pub(super) fn analyse_and_write(
     beside: &Path,
 ) -> Result<AnalysisOutputs, CliError> {
     let analysis = &analyse(recording, config)?;
-    let run = RunReport {
+    let run = BenchRun {
         analysis,
-        config,
         recording,
+        chain: MeasurementChain::bench(config),
+        title: config.title.clone(),
+        excitation: match analysis.closed {
+            Some(_) => swept_words(config),
+            None => words(config),
+        },
+        rate_hz: config.servo.rate_hz,
     };
     Ok(AnalysisOutputs::write(&run, beside)?)
 }
@@ -80,7 +88,7 @@ fn delay_text(outputs: &AnalysisOutputs) -> String {
         return without;
     };
     format!(
-        "  delay      {:.3} ms from command to reading: {:.3} ms by the configuration,\n             {:+.4} +- {:.4} ms beyond it by the phases\n{without}",
+        "  delay      {:.3} ms from command to reading: {:.3} ms by the configuration,\n             {:+.4} ± {:.4} ms beyond it by the phases\n{without}",
         (delay_s + excess_s) * 1e3,
         delay_s * 1e3,
         excess_s * 1e3,

@@ -13,7 +13,7 @@ use crate::experiment::{ExternalAnalysis, analyse_external};
 use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::periodic::Repetition;
 use crate::identify::{Signals, frf_csv};
-use crate::report::run_pages::{ModalSummary, PageFiles, TableReport, write_frf};
+use crate::report::run_pages::{ExternalRecord, ModalSummary, PageFiles, write_frf};
 use crate::util::quantity::{Frequency, OfFrequency, Time, si};
 
 /// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
@@ -206,7 +206,7 @@ fn report(
 ) -> Result<Report, CliError> {
     let Columns { input, output, .. } = columns;
     let magnitude = frf_csv::external_magnitude(input, output);
-    let table = TableReport {
+    let record = ExternalRecord {
         analysis,
         file: &path.file_name().unwrap_or_default().to_string_lossy(),
         input,
@@ -228,7 +228,7 @@ fn report(
         band_hz,
         periods: analysis.periods,
         frf_csv: write_frf(beside, "frf", &analysis.frf, &magnitude)?,
-        pages: PageFiles::write(&table, beside)?,
+        pages: PageFiles::write(&record.report(), beside)?,
         frequencies: analysis.frf.len(),
         coherence_median: analysis.frf.median_coherence(),
         summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),

@@ -1,36 +1,38 @@
 //! The Bode plot: magnitude, phase and coherence over one logarithmic frequency axis.
 
-use plotters::style::text_anchor::{HPos, VPos};
-
 use super::ReportError;
-use super::axis::{Axis, Tick};
-use super::canvas::{self, Canvas, TextForm};
-use super::header::Header;
-use super::panel::{INK, Panel, Ticks};
-use super::trace::{self, Line, Shown, Trace};
+use super::chart::{Chart, Mark, Row, Scale, SeriesPoint, sheet_svg};
+use super::trace::{self, Line, Trace};
 use crate::identify::Unit;
 
-/// Size of the page in pixels.
-const SIZE: (f64, f64) = (1000.0, 880.0);
-const LEFT: f64 = 84.0;
-const RIGHT: f64 = 974.0;
-const GAP: f64 = 16.0;
-/// Room for the frequencies and their unit below the lowest panel.
-const FOOT: f64 = 52.0;
-/// Heights of the panels for magnitude, phase and coherence, relative to each other.
-const HEIGHTS: [f64; 3] = [0.46, 0.35, 0.19];
+/// Heights of the panels for magnitude, phase and coherence in pixels.
+const HEIGHTS: [f64; 3] = [320.0, 243.0, 132.0];
 /// Part of an axis left free above and below the curves.
 const MARGIN: f64 = 0.06;
+/// Least height of the magnitude axis in decades, and of the phase axis in degrees.
+const LEAST_DECADES: f64 = 1.0;
+const LEAST_DEGREES: f64 = 180.0;
 
 /// The Bode plot of some responses, as an SVG document.
 ///
-/// Magnitude in `unit` on a logarithmic axis, phase in degrees, unwrapped from the lowest frequency on, where it is within
-/// +-180, and the coherence of measured traces, if there are any. Around measured curves lies their band of +-2 sigma;
-/// where that reaches zero magnitude the curve is drawn faint and has no say in the axes. Models are drawn on top,
-/// dashed where there is something measured below.
+/// Magnitude in `unit` on a logarithmic axis, phase in degrees, unwrapped from the lowest frequency on, and the coherence of
+/// measured traces, if there are any. Measured curves have a band of two sigma; where it reaches zero magnitude the curve
+/// is drawn faint and does not widen the axes. Models are drawn on top, dashed over measured curves.
+///
+/// ```
+/// use bench::identify::Unit;
+/// use bench::report::{Trace, bode_svg};
+/// use nalgebra::Complex;
+///
+/// let frequency_hz = [1.0, 10.0, 100.0];
+/// let response = frequency_hz.map(|f| Complex::new(1e-3, 0.0) / Complex::new(1.0, f / 10.0));
+/// let svg = bode_svg(Unit::MetresPerAmpere, &[Trace::model("low pass", &frequency_hz, &response)], "Title", "")?;
+/// assert!(svg.contains("Phase (deg)"));
+/// # Ok::<(), bench::report::ReportError>(())
+/// ```
 ///
 /// # Errors
-/// When there is nothing to draw, or a trace is not sound: see [`ReportError`].
+/// When there is nothing to draw, or a trace is invalid: see [`ReportError`].
 pub fn bode_svg(
     unit: Unit,
     traces: &[Trace],
@@ -38,162 +40,95 @@ pub fn bode_svg(
     subtitle: &str,
 ) -> Result<String, ReportError> {
     let mut lines = trace::lines(traces)?;
-    // Stable: measured traces first, so that models come to lie on top.
+    // Stable: measured traces first, so that models lie on top.
     lines.sort_by_key(|line| line.measured.is_none());
-    let header = Header::new(title, subtitle, &lines, (LEFT, RIGHT));
-    let magnitudes = magnitude_range(&lines).ok_or(ReportError::NoMagnitude)?;
-    let plot = Plot {
-        frequencies: frequency_range(&lines),
-        magnitudes,
-        phases: phase_range(&lines),
-        lines,
-        header,
-        unit,
+    let frequencies = frequency_range(&lines);
+    let mut charts = vec![magnitude(unit, &lines)?, phase(&lines)];
+    charts.extend(coherence(&lines));
+    let last = charts.len() - 1;
+    let row = |(k, chart): (usize, Chart)| {
+        let x = Scale::logarithmic("Frequency (Hz)").within(frequencies.0, frequencies.1);
+        let x = if k == last { x } else { x.unnumbered() };
+        Row::new(HEIGHTS[k], vec![Chart { x, ..chart }])
     };
-    canvas::page(SIZE, |canvas| plot.draw(canvas))
+    let rows: Vec<Row> = charts.into_iter().enumerate().map(row).collect();
+    sheet_svg(title, subtitle, &rows)
 }
 
-struct Plot<'a> {
-    lines: Vec<Line<'a>>,
-    header: Header,
-    unit: Unit,
-    frequencies: (f64, f64),
-    magnitudes: (f64, f64),
-    phases: (f64, f64),
+fn panel(y: Scale) -> Chart {
+    Chart::new("", Scale::logarithmic(""), y)
 }
 
-impl Plot<'_> {
-    fn draw(&self, canvas: &Canvas) -> Result<(), ReportError> {
-        self.header.draw(canvas, &self.lines)?;
-        let coherent = self.lines.iter().any(|line| line.measured.is_some());
-        let panels = if coherent { 3 } else { 2 };
-        self.magnitude(canvas, self.rows(0, panels))?;
-        self.phase(canvas, self.rows(1, panels), !coherent)?;
-        if coherent {
-            self.coherence(canvas, self.rows(2, panels))?;
-        }
-        let anchor = (HPos::Center, VPos::Bottom);
-        let form = TextForm {
-            size: 13.0,
-            colour: INK,
-            bold: false,
-            anchor,
-            upward: false,
-        };
-        canvas.text(
-            "Frequency (Hz)",
-            ((LEFT + RIGHT) / 2.0, SIZE.1 - 12.0),
-            form,
-        )
-    }
+fn magnitude(unit: Unit, lines: &[Line]) -> Result<Chart, ReportError> {
+    let label = match unit {
+        Unit::MetresPerAmpere => "Magnitude (m/A)",
+        Unit::Bare => "Magnitude",
+    };
+    let (low, high) = magnitude_range(lines).ok_or(ReportError::NoMagnitude)?;
+    let chart = panel(Scale::logarithmic(label).within(low, high));
+    Ok(lines.iter().fold(chart, |chart, line| {
+        chart.mark(series(legend_name(line), line, line.magnitude_points()))
+    }))
+}
 
-    /// Top and bottom of a panel.
-    fn rows(&self, index: usize, panels: usize) -> (f64, f64) {
-        let room = SIZE.1 - FOOT - self.header.bottom - GAP * (panels - 1) as f64;
-        let total: f64 = HEIGHTS[..panels].iter().sum();
-        let above: f64 = HEIGHTS[..index].iter().sum();
-        let top = self.header.bottom + room * above / total + GAP * index as f64;
-        (top, top + room * HEIGHTS[index] / total)
-    }
+fn phase(lines: &[Line]) -> Chart {
+    let (low, high) = phase_range(lines);
+    let chart = panel(Scale::degrees("Phase (deg)").within(low, high));
+    lines.iter().fold(chart, |chart, line| {
+        chart.mark(series(String::new(), line, line.phase_points()))
+    })
+}
 
-    fn panel(&self, (top, bottom): (f64, f64), y: Axis) -> (Panel, Vec<Tick>) {
-        let x = Axis::logarithmic(self.frequencies, (LEFT, RIGHT));
-        (
-            Panel {
-                left: LEFT,
-                right: RIGHT,
-                top,
-                bottom,
-                x,
-                y,
-            },
-            x.frequency_ticks(),
-        )
-    }
+/// The coherence of measured responses, if there are any.
+fn coherence(lines: &[Line]) -> Option<Chart> {
+    lines.iter().find(|line| line.measured.is_some())?;
+    let chart = panel(Scale::linear("Coherence").within(0.0, 1.05));
+    Some(lines.iter().fold(chart, |chart, line| match line.measured {
+        Some(frf) => chart.mark(series(
+            String::new(),
+            line,
+            coherence_points(line, &frf.coherence),
+        )),
+        None => chart,
+    }))
+}
 
-    fn magnitude(&self, canvas: &Canvas, (top, bottom): (f64, f64)) -> Result<(), ReportError> {
-        let (panel, x) = self.panel(
-            (top, bottom),
-            Axis::logarithmic(self.magnitudes, (bottom, top)),
-        );
-        let label = match self.unit {
-            Unit::MetresPerAmpere => "Magnitude (m/A)",
-            Unit::Bare => "Magnitude",
-        };
-        let y = panel.y.magnitude_ticks();
-        panel.frame(
-            canvas,
-            &Ticks {
-                x: &x,
-                y: &y,
-                label,
-                frequencies: false,
-            },
-        )?;
-        self.lines
-            .iter()
-            .try_for_each(|line| panel.curve(canvas, line, |k| line.magnitude(k)))
-    }
+fn coherence_points(line: &Line, coherence: &[f64]) -> Vec<SeriesPoint> {
+    let point = |(point, y): (SeriesPoint, &f64)| SeriesPoint {
+        y: *y,
+        band: (*y, *y),
+        faint: false,
+        ..point
+    };
+    line.magnitude_points()
+        .into_iter()
+        .zip(coherence)
+        .map(point)
+        .collect()
+}
 
-    fn phase(
-        &self,
-        canvas: &Canvas,
-        (top, bottom): (f64, f64),
-        frequencies: bool,
-    ) -> Result<(), ReportError> {
-        let (panel, x) = self.panel((top, bottom), Axis::linear(self.phases, (bottom, top)));
-        let y = panel.y.phase_ticks();
-        panel.frame(
-            canvas,
-            &Ticks {
-                x: &x,
-                y: &y,
-                label: "Phase (deg)",
-                frequencies,
-            },
-        )?;
-        self.lines
-            .iter()
-            .try_for_each(|line| panel.curve(canvas, line, |k| line.phase(k)))
+fn series(name: String, line: &Line, points: Vec<SeriesPoint>) -> Mark {
+    Mark::Series {
+        name,
+        pen: line.pen,
+        points,
+        dots: line.measured.is_some(),
     }
+}
 
-    fn coherence(&self, canvas: &Canvas, (top, bottom): (f64, f64)) -> Result<(), ReportError> {
-        let (panel, x) = self.panel((top, bottom), Axis::linear((0.0, 1.05), (bottom, top)));
-        let y = panel.y.linear_ticks(0.5, |value| value.to_string());
-        panel.frame(
-            canvas,
-            &Ticks {
-                x: &x,
-                y: &y,
-                label: "Coherence",
-                frequencies: true,
-            },
-        )?;
-        let measured = self
-            .lines
-            .iter()
-            .filter_map(|line| Some((line, line.measured?)));
-        for (line, frf) in measured {
-            let shown = |value| Shown {
-                value,
-                low: value,
-                high: value,
-                faint: false,
-            };
-            panel.curve(canvas, line, |k| shown(frf.coherence[k]))?;
-        }
-        Ok(())
+fn legend_name(line: &Line) -> String {
+    match line.measured {
+        Some(_) => format!("{} (band: ±{}σ)", line.name, trace::BAND_SIGMAS),
+        None => line.name.to_owned(),
     }
 }
 
 /// Of all lines; a single frequency gets a third of an octave to either side.
 fn frequency_range(lines: &[Line]) -> (f64, f64) {
-    let frequencies = || {
-        lines
-            .iter()
-            .flat_map(|line| line.frequency_hz.iter().copied())
-    };
-    let (low, high) = range(frequencies()).unwrap_or((1.0, 1.0));
+    let frequencies = lines
+        .iter()
+        .flat_map(|line| line.frequency_hz.iter().copied());
+    let (low, high) = range(frequencies).unwrap_or((1.0, 1.0));
     if low < high {
         (low, high)
     } else {
@@ -201,37 +136,41 @@ fn frequency_range(lines: &[Line]) -> (f64, f64) {
     }
 }
 
-/// Of the magnitudes drawn in full, or of all where none is, with a margin, and a decade at least.
+/// Of the magnitudes that are certain, or of all where none is, with a margin, and a decade at least.
 fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
     let logs = |all: bool| {
-        let shown =
-            move |line: &'_ Line, k: usize| (all || line.firm[k]) && line.magnitude[k] > 0.0;
-        let log =
-            move |line: &Line, k: usize| shown(line, k).then(|| libm::log10(line.magnitude[k]));
+        let visible = lines
+            .iter()
+            .flat_map(move |line| visible(line, &line.magnitude, all));
         range(
-            lines
-                .iter()
-                .flat_map(|line| (0..line.magnitude.len()).filter_map(move |k| log(line, k))),
+            visible
+                .filter(|magnitude| *magnitude > 0.0)
+                .map(libm::log10),
         )
     };
-    let (low, high) = with_margin(logs(false).or_else(|| logs(true))?, 1.0);
+    let (low, high) = with_margin(logs(false).or_else(|| logs(true))?, LEAST_DECADES);
     Some((libm::pow(10.0, low), libm::pow(10.0, high)))
 }
 
-/// Of the phases drawn in full, likewise, and half a turn at least.
+/// Of the phases that are certain, likewise, and half a turn at least.
 fn phase_range(lines: &[Line]) -> (f64, f64) {
     let phases = |all: bool| {
-        let shown = move |line: &Line, k: usize| (all || line.firm[k]).then_some(line.phase_deg[k]);
         range(
             lines
                 .iter()
-                .flat_map(|line| (0..line.phase_deg.len()).filter_map(move |k| shown(line, k))),
+                .flat_map(|line| visible(line, &line.phase_deg, all)),
         )
     };
-    with_margin(
-        phases(false).or_else(|| phases(true)).unwrap_or((0.0, 0.0)),
-        180.0,
-    )
+    let phases = phases(false).or_else(|| phases(true));
+    with_margin(phases.unwrap_or((0.0, 0.0)), LEAST_DEGREES)
+}
+
+/// The values that widen an axis: those that are certain, or all.
+fn visible<'a>(line: &'a Line, values: &'a [f64], all: bool) -> impl Iterator<Item = f64> + 'a {
+    let certain = values.iter().zip(&line.certain);
+    certain
+        .filter(move |(_, certain)| all || **certain)
+        .map(|(value, _)| *value)
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
@@ -241,7 +180,7 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// Widened to both sides by the margin, and about its middle to the least width.
+/// Widened by the margin, and about its middle to the least width.
 fn with_margin((low, high): (f64, f64), least: f64) -> (f64, f64) {
     let half = (high - low).max(least) * (0.5 + MARGIN);
     let middle = (low + high) / 2.0;

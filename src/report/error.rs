@@ -1,21 +1,21 @@
-//! Why there is no plot.
+//! Errors of plots.
 
 use thiserror::Error;
 
-/// What keeps a plot from being drawn.
+/// Why a plot cannot be drawn.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ReportError {
-    /// There is nothing to draw.
-    #[error("a plot without a trace: give at least one")]
+    /// No trace or chart was given.
+    #[error("there is nothing to plot: give at least one trace")]
     NoTrace,
     /// A trace without points.
-    #[error("the trace {name:?} has no point: leave it out")]
+    #[error("trace {name:?} has no points: leave it out")]
     Empty {
         /// Name of the trace.
         name: String,
     },
     /// Columns of different lengths.
-    #[error("the trace {name:?} has {frequencies} frequencies, but a column of {values} values")]
+    #[error("trace {name:?} has {frequencies} frequencies, but a column of {values} values")]
     Lengths {
         /// Name of the trace.
         name: String,
@@ -24,9 +24,9 @@ pub enum ReportError {
         /// Number of values.
         values: usize,
     },
-    /// A frequency that a logarithmic axis cannot show, or that does not rise.
+    /// A frequency that is not positive or not rising.
     #[error(
-        "the trace {name:?} has the frequency {value} Hz at index {index}: they must be finite, above 0 Hz and rise"
+        "trace {name:?} has the frequency {value} Hz at index {index}: frequencies must be finite, above 0 Hz and rising"
     )]
     Frequency {
         /// Name of the trace.
@@ -36,18 +36,18 @@ pub enum ReportError {
         /// Its value.
         value: f64,
     },
-    /// A value that is not a number.
+    /// A value that is not finite.
     #[error(
-        "the trace {name:?} has a value that is not finite at {frequency_hz} Hz: leave that frequency out"
+        "trace {name:?} has a value that is not finite at {frequency_hz} Hz: leave that frequency out"
     )]
     NotFinite {
         /// Name of the trace.
         name: String,
-        /// Where.
+        /// Its frequency in hertz.
         frequency_hz: f64,
     },
-    /// No magnitude that a logarithmic axis can show.
-    #[error("no trace has a magnitude above 0: there is no response to draw")]
+    /// No magnitude is above 0.
+    #[error("no trace has a magnitude above 0, which a logarithmic axis needs")]
     NoMagnitude,
     /// The drawing library failed.
     #[error("drawing failed: {0}")]

@@ -1,45 +1,36 @@
-//! What a person looks at: plots as self-contained SVG, pages as self-contained HTML.
+//! Plots as self-contained SVG, pages as self-contained HTML.
 //!
 //! ```text
-//! sheet -> chart (axes, marks, in values) -> clip -> panel -> canvas
-//! bode -> trace (checked, unwrapped by phase) -> panel (axis: scales and ticks, curve: thinned out) -> canvas (SVG)
-//! pole_zero (ellipse: intervals), stability, levels, responses (Nyquist, coherence) -> sheet
-//! page (HTML) <- pictures, tables, number (digits by the error)
-//! quadrants (actuator and probe in the plane of two shapes) -> canvas
+//! trace (checked responses, unwrapped phase) -> bode, nyquist, coherence --.
+//! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
+//! run_pages (plots and page of one record) -> html, number
 //! ```
-//!
-//! Text stays text in the SVG, in the viewer's own sans-serif: no font is needed to make a plot.
 
-mod axis;
 pub mod bode;
-mod canvas;
 mod chart;
-mod clip;
-pub mod colours;
-mod curve;
+mod coherence;
+mod distortion;
 pub mod ellipse;
 mod error;
-mod header;
-mod levels;
+pub mod html;
 pub mod number;
-pub mod page;
-mod panel;
+mod nyquist;
 pub mod phase;
 mod pole_zero;
 mod quadrants;
-mod responses;
 pub mod run_pages;
-mod sheet;
 mod stability;
 mod trace;
 
 pub use bode::bode_svg;
-pub use chart::{Chart, Mark, Pen, Scale, ScaleKind, Stroke, Symbol};
+pub use chart::{
+    Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
+};
+pub use coherence::coherence_svg;
+pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
-pub use levels::{LevelLines, levels_svg};
-pub use pole_zero::{Place, PoleZeroMap, pole_zero_svg};
+pub use nyquist::nyquist_svg;
+pub use pole_zero::{PoleZeroMap, UncertainPoint, pole_zero_svg};
 pub use quadrants::{QuadrantPanel, quadrants_svg};
-pub use responses::{coherence_svg, nyquist_svg};
-pub use sheet::{Row, sheet_svg};
-pub use stability::{OrderedMode, Stays, stability_svg, stays};
+pub use stability::{OrderedMode, stability_svg};
 pub use trace::{Curve, Trace};

@@ -1,6 +1,8 @@
-//! Numbers for people: as many digits as their error leaves them.
+//! Numbers for people: as many digits as their error allows.
 
-/// Digits behind the point with which an error of this size shows two of its own.
+use std::f64::consts::TAU;
+
+/// Decimals that show two digits of an error.
 pub fn decimals(error: f64) -> usize {
     if !(error.is_finite() && error > 0.0) {
         return 6;
@@ -8,7 +10,7 @@ pub fn decimals(error: f64) -> usize {
     (1.0 - libm::log10(error).floor()).clamp(0.0, 12.0) as usize
 }
 
-/// A number with so many digits and a true minus sign.
+/// A number with a true minus sign.
 pub fn plain(value: f64, digits: usize) -> String {
     format!("{value:.digits$}").replace('-', "\u{2212}")
 }
@@ -16,13 +18,19 @@ pub fn plain(value: f64, digits: usize) -> String {
 /// A number and half the width of its interval: `29.274373 ± 0.000062`.
 pub fn interval(value: f64, half: f64) -> String {
     let digits = decimals(half);
+    let value = plain(value, digits);
     match half.is_finite() {
-        true => format!("{} ± {half:.digits$}", plain(value, digits)),
-        false => format!("{} ± without bound", plain(value, digits)),
+        true => format!("{value} ± {half:.digits$}"),
+        false => format!("{value} ± without bound"),
     }
 }
 
-/// A probability in percent; its ends as bounds, as nobody knows a normal distribution's tails better.
+/// An angular frequency: `18.02 rad/s (2.868 Hz)`.
+pub fn angular_frequency(omega_rad_s: f64) -> String {
+    format!("{omega_rad_s:.2} rad/s ({:.3} Hz)", omega_rad_s / TAU)
+}
+
+/// A probability in percent. Close to 0 and 1 it is given as a bound, as the tails of the distribution are not known better.
 pub fn percent(probability: f64) -> String {
     match probability {
         p if p < 1e-4 => "below 0.01 %".into(),
@@ -36,14 +44,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_interval_has_two_digits_of_its_error() {
+    fn an_interval_shows_two_digits_of_its_error() {
         assert_eq!(interval(29.274_373_12, 0.000_061_6), "29.274373 ± 0.000062");
         assert_eq!(interval(-1234.5, 67.0), "\u{2212}1234 ± 67");
         assert_eq!(interval(-0.5, 0.0), "\u{2212}0.500000 ± 0.000000");
         assert_eq!(interval(0.5, f64::INFINITY), "0.500000 ± without bound");
+    }
+
+    #[test]
+    fn probabilities_close_to_0_and_1_are_bounds() {
         assert_eq!(
             [1e-9, 0.5, 0.99999].map(percent),
             ["below 0.01 %", "50.00 %", "above 99.99 %"]
         );
+    }
+
+    #[test]
+    fn an_angular_frequency_has_hertz_in_brackets() {
+        assert_eq!(angular_frequency(287.0), "287.00 rad/s (45.677 Hz)");
     }
 }

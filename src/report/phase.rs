@@ -1,13 +1,13 @@
-//! Phases that run on past +-180 degrees.
+//! Phases that continue beyond ±180 degrees.
 
-/// Degrees of one turn.
-const TURN: f64 = 360.0;
+const TURN_DEG: f64 = 360.0;
+/// Offsets are determined within this ratio of the lowest common frequency.
+const COMPARED_RATIO: f64 = 10.0;
 
-/// Unwrapped phases in degrees: each the value closest to the trusted one before it, give or take whole turns.
+/// Unwrapped phases in degrees: each the value closest to the trusted one before it, plus whole turns.
 ///
-/// A phase that is not trusted is drawn near its neighbours but leads nobody on: noise in a deep anti-resonance does
-/// not add turns to everything after it. The first trusted phase stays in (-180, 180]: a plant with a positive DC gain
-/// starts near 0.
+/// A phase that is not trusted is placed near its neighbours, but those after it do not follow it: noise in a deep
+/// anti-resonance adds no turns. The first trusted phase stays in (-180, 180]: a plant with a positive DC gain starts near 0.
 pub fn unwrapped_deg(wrapped_deg: &[f64], trusted: &[bool]) -> Vec<f64> {
     let first = trusted.iter().position(|trusted| *trusted).unwrap_or(0);
     let mut last = wrapped_deg.get(first).copied().unwrap_or(0.0);
@@ -21,33 +21,35 @@ pub fn unwrapped_deg(wrapped_deg: &[f64], trusted: &[bool]) -> Vec<f64> {
     wrapped_deg.iter().zip(trusted).map(follow).collect()
 }
 
-/// The phase, give or take whole turns, that is closest to another.
+/// The phase plus the whole turns that bring it closest to another.
 pub fn closest(phase_deg: f64, to_deg: f64) -> f64 {
-    phase_deg + TURN * ((to_deg - phase_deg) / TURN).round()
+    phase_deg + TURN_DEG * ((to_deg - phase_deg) / TURN_DEG).round()
 }
 
-/// Whole turns in degrees that bring one curve closest to another at most of the frequencies at which both are known.
+/// Whole turns in degrees that bring a curve closest to another at most of their lowest common decade.
 ///
-/// Both are (frequency, phase) with rising frequencies. 0 if they have no frequency in common.
+/// Both are (frequency, phase) with rising frequencies. 0 if they have no frequency in common. Only the lowest decade
+/// decides, since two different responses, such as S and T, may differ by turns above it.
 pub fn offset_deg(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> f64 {
-    let mut turns: Vec<f64> = curve
+    let common = curve
         .iter()
-        .filter_map(|(frequency, phase)| {
-            Some(((at(reference, *frequency)? - phase) / TURN).round())
-        })
+        .filter_map(|(frequency, phase)| Some((*frequency, at(reference, *frequency)? - phase)));
+    let common: Vec<(f64, f64)> = common.collect();
+    let highest = common.first().map_or(0.0, |first| COMPARED_RATIO * first.0);
+    let compared = common.iter().filter(|(frequency, _)| *frequency <= highest);
+    let mut turns: Vec<f64> = compared
+        .map(|(_, difference)| (difference / TURN_DEG).round())
         .collect();
     turns.sort_by(f64::total_cmp);
     turns
         .get(turns.len() / 2)
-        .map_or(0.0, |median| median * TURN)
+        .map_or(0.0, |median| median * TURN_DEG)
 }
 
-/// A curve at a frequency: the last point that is not above it, if any is and it is not past the end.
+/// A curve at a frequency within its range: the last point at or below it.
 fn at(curve: &[(f64, f64)], frequency: f64) -> Option<f64> {
     let after = curve.partition_point(|point| point.0 <= frequency);
     let within = curve.last().is_some_and(|last| frequency <= last.0);
-    curve
-        .get(after.checked_sub(1)?)
-        .filter(|_| within)
-        .map(|point| point.1)
+    let point = curve.get(after.checked_sub(1)?);
+    point.filter(|_| within).map(|point| point.1)
 }

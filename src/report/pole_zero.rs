@@ -1,44 +1,51 @@
-//! The map of poles and zeros: the whole, the two closest modes enlarged, and zeros enlarged until their ellipses are seen.
+//! The map of poles and zeros: all of them, the two closest modes enlarged, and zeros enlarged until their confidence
+//! regions are visible.
+
+use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use super::chart::{Chart, Pen, Scale, Symbol};
-use super::colours::{BLUE, Colour, GREY, INK, VERMILION};
+use super::chart::colours::{BLUE, Colour, GREY, INK, VERMILION};
+use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use super::ellipse::{Ellipse, SIGMAS_95_PLANE};
-use super::sheet::{Row, sheet_svg};
 use super::{ReportError, number};
 use crate::identify::modal::SIGMAS_95;
 
-/// Zeros enlarged at most: those nearest to the imaginary axis, in their sigmas.
+/// Largest number of enlarged zeros: those nearest to the imaginary axis in sigmas.
 const ENLARGED: usize = 3;
 /// Beyond every frame, in rad/s.
 const FAR: f64 = 1e9;
-/// Part of an enlarged ellipse's half-width left free beside it.
+/// Part of the half-width of an enlarged ellipse left free beside it.
 const ROOM: f64 = 0.45;
-/// The axis is within the frame of an enlarged zero that is closer to it than so many half-widths of its ellipse.
+/// An enlarged zero is shown with the imaginary axis if it is closer to it than so many half-widths of its ellipse.
 const AXIS_WITHIN: f64 = 6.0;
-/// Poles more damped than this, as ratio of |s|, have no say in the frame.
-const OSCILLATES: f64 = 0.2;
+/// Poles of a larger damping ratio do not widen the frame.
+const OSCILLATING: f64 = 0.2;
+/// Opacity of an ellipse.
+const STRENGTH: f64 = 0.22;
 
-/// A pole or a zero in the plane of s: of a conjugate pair the one above the real axis.
+/// Ranges of real and imaginary part in rad/s.
+type Window = ((f64, f64), (f64, f64));
+
+/// A pole or zero with its covariance; of a conjugate pair the one above the real axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// Where, in rad/s.
+pub struct UncertainPoint {
+    /// Its place in rad/s.
     pub s: Complex<f64>,
-    /// Covariance of its real and imaginary part in (rad/s)^2.
+    /// Covariance of real and imaginary part in (rad/s)^2.
     pub covariance: [[f64; 2]; 2],
 }
 
-/// What is on the map.
+/// Poles and zeros of a fit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PoleZeroMap {
     /// All poles.
-    pub poles: Vec<Place>,
-    /// Zeros that a verdict is about.
-    pub zeros: Vec<Place>,
-    /// Others, of which nothing is said.
-    pub others: Vec<Place>,
-    /// Up to here poles and zeros count, in rad/s.
+    pub poles: Vec<UncertainPoint>,
+    /// Zeros that count for the verdict.
+    pub zeros: Vec<UncertainPoint>,
+    /// Other zeros.
+    pub others: Vec<UncertainPoint>,
+    /// Poles and zeros up to here count, in rad/s.
     pub up_to_rad_s: f64,
 }
 
@@ -51,18 +58,36 @@ pub fn pole_zero_svg(
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
-    let first = std::iter::once(map.whole())
-        .chain(map.close_modes())
-        .collect();
-    let rows = [Row::new(400.0, first), Row::new(250.0, map.enlarged())];
+    let mut upper = vec![map.whole()];
+    upper.extend(map.close_modes());
+    let rows = [Row::new(400.0, upper), Row::new(250.0, map.enlarged())];
     sheet_svg(title, subtitle, &rows)
+}
+
+impl UncertainPoint {
+    fn sigma(&self, part: usize) -> f64 {
+        self.covariance[part][part].sqrt()
+    }
+
+    /// Distance from the imaginary axis in sigmas.
+    fn sigmas_from_axis(&self) -> f64 {
+        (self.s.re / self.sigma(0)).abs()
+    }
+
+    fn is_within(&self, (re, im): Window) -> bool {
+        (re.0..=re.1).contains(&self.s.re) && (im.0..=im.1).contains(&self.s.im)
+    }
+
+    fn colour(&self) -> Colour {
+        if self.s.re > 0.0 { VERMILION } else { BLUE }
+    }
 }
 
 impl PoleZeroMap {
     /// The two neighbouring poles that are closest to each other for their frequency, among those that count: their
     /// imaginary parts in rad/s.
     pub fn close_pair(&self) -> Option<(f64, f64)> {
-        let counts = |place: &&Place| place.s.im > 0.0 && place.s.norm() <= self.up_to_rad_s;
+        let counts = |pole: &&UncertainPoint| pole.s.im > 0.0 && pole.s.norm() <= self.up_to_rad_s;
         let mut im: Vec<f64> = self
             .poles
             .iter()
@@ -75,214 +100,167 @@ impl PoleZeroMap {
     }
 
     fn whole(&self) -> Chart {
-        let swings = |place: &&Place| -place.s.re <= OSCILLATES * place.s.norm();
-        let seen: Vec<&Place> = self
+        let oscillates = |pole: &&UncertainPoint| -pole.s.re <= OSCILLATING * pole.s.norm();
+        let visible: Vec<_> = self
             .poles
             .iter()
-            .filter(swings)
+            .filter(oscillates)
             .chain(&self.zeros)
             .collect();
-        let re = span(seen.iter().map(|place| place.s.re), 0.15);
-        let highest = seen.iter().map(|place| place.s.im).fold(0.0, f64::max);
-        let frame = (re, (0.0, 1.08 * highest.max(1.0)));
-        let beyond = self
-            .poles
-            .iter()
-            .chain(&self.zeros)
-            .chain(&self.others)
-            .filter(|place| !holds(frame, place))
-            .count();
-        let heading = match beyond {
-            0 => "Upper half of the plane of s".into(),
-            n => format!("Upper half of the plane of s; {n} more beyond"),
+        let highest = visible.iter().map(|point| point.s.im).fold(0.0, f64::max);
+        let window = (span(&visible, 0.15), (0.0, 1.08 * highest.max(1.0)));
+        let all = self.poles.iter().chain(&self.zeros).chain(&self.others);
+        let heading = match all.filter(|point| !point.is_within(window)).count() {
+            0 => "Upper half of the s-plane".into(),
+            n => format!("Upper half of the s-plane; {n} more outside"),
         };
-        self.marked(plane(&heading, frame), true, false)
+        self.with_points(plane(&heading, window), true)
     }
 
-    /// The surroundings of the closest pair.
+    /// The surroundings of the closest pair, with the intervals of the poles.
     fn close_modes(&self) -> Option<Chart> {
         let (low, high) = self.close_pair()?;
         let room = 0.7 * (high - low).max(1e-3 * high);
         let im = (low - room, high + room);
-        let within = |place: &&Place| place.s.im >= im.0 && place.s.im <= im.1;
-        let seen: Vec<&Place> = self
-            .poles
-            .iter()
-            .chain(&self.zeros)
-            .filter(within)
+        let all = self.poles.iter().chain(&self.zeros);
+        let visible: Vec<_> = all
+            .filter(|point| (im.0..=im.1).contains(&point.s.im))
             .collect();
-        let re = span(seen.iter().map(|place| place.s.re), 0.3);
-        let hertz = 2.0 * std::f64::consts::PI;
         let heading = format!(
             "The closest modes, {:.2} and {:.2} Hz, enlarged",
-            low / hertz,
-            high / hertz
+            low / TAU,
+            high / TAU
         );
-        Some(self.marked(plane(&heading, (re, im)), false, true))
+        let chart = plane(&heading, (span(&visible, 0.3), im));
+        let chart = self.poles.iter().fold(chart, with_intervals);
+        Some(self.with_points(chart, false))
     }
 
-    /// Poles, zeros with their ellipses, and the poles' intervals if wanted.
-    fn marked(&self, mut chart: Chart, named: bool, intervals: bool) -> Chart {
+    /// Poles, and zeros with their ellipses.
+    fn with_points(&self, mut chart: Chart, named: bool) -> Chart {
         let name = |text: &'static str| if named { text } else { "" };
-        for pole in self.poles.iter().filter(|_| intervals) {
-            chart = crossed(chart, pole);
-        }
-        chart = chart.points(name("pole"), INK, Symbol::Cross, points(&self.poles));
+        chart = chart.points(name("pole"), INK, Symbol::Cross, places(&self.poles));
         if !self.others.is_empty() {
+            let others = places(&self.others);
             chart = chart.points(
-                name("zero that is not judged"),
+                name("zero, not part of the verdict"),
                 GREY,
                 Symbol::Ring,
-                points(&self.others),
+                others,
             );
         }
-        for (right, text) in [(false, "zero left"), (true, "zero right of the axis")] {
-            let side: Vec<Place> = self
-                .zeros
-                .iter()
-                .filter(|zero| (zero.s.re > 0.0) == right)
-                .copied()
-                .collect();
-            if side.is_empty() {
-                continue;
-            }
-            chart = side.iter().fold(chart, |chart, zero| {
-                ellipse(chart, "", zero, Complex::new(0.0, 0.0))
-            });
-            chart = chart.points(name(text), colour(&side[0]), Symbol::Ring, points(&side));
-        }
-        chart
+        let (right, left): (Vec<UncertainPoint>, _) =
+            self.zeros.iter().partition(|zero| zero.s.re > 0.0);
+        chart = with_zeros(chart, name("zero left of the axis"), &left);
+        with_zeros(chart, name("zero right of the axis"), &right)
     }
 
-    /// Zeros whose ellipses can be drawn, nearest to the axis first.
+    /// Zeros that have an ellipse, nearest to the axis first.
     fn enlarged(&self) -> Vec<Chart> {
-        let drawn = |zero: &&Place| {
-            sigma(zero, 0) > 0.0 && Ellipse::of_95_percent(zero.covariance).is_some()
+        let has_ellipse = |zero: &&UncertainPoint| {
+            zero.sigma(0) > 0.0 && Ellipse::of_95_percent(zero.covariance).is_some()
         };
-        let mut zeros: Vec<&Place> = self.zeros.iter().filter(drawn).collect();
-        zeros.sort_by(|a, b| {
-            (a.s.re / sigma(a, 0))
-                .abs()
-                .total_cmp(&(b.s.re / sigma(b, 0)).abs())
-        });
-        zeros.into_iter().take(ENLARGED).map(zero_alone).collect()
+        let mut zeros: Vec<&UncertainPoint> = self.zeros.iter().filter(has_ellipse).collect();
+        zeros.sort_by(|a, b| a.sigmas_from_axis().total_cmp(&b.sigmas_from_axis()));
+        zeros
+            .into_iter()
+            .take(ENLARGED)
+            .map(enlarged_zero)
+            .collect()
     }
 }
 
-/// One zero: real and imaginary part less where it is, so that the numbers along the axes stay short.
-fn zero_alone(zero: &Place) -> Chart {
-    let half = |part: usize| SIGMAS_95_PLANE * sigma(zero, part);
-    let (re, im) = (half(0), if half(1) > 0.0 { half(1) } else { half(0) });
-    let axis = if zero.s.re.abs() <= AXIS_WITHIN * re {
-        -zero.s.re
-    } else {
-        0.0
+fn with_zeros(mut chart: Chart, name: &str, zeros: &[UncertainPoint]) -> Chart {
+    let Some(first) = zeros.first() else {
+        return chart;
     };
-    let free = ROOM * re;
-    let x = ((-re).min(axis) - free, re.max(axis) + free);
-    let less = |value: f64, half: f64| number::plain(value, number::decimals(half));
-    let chart = Chart::new(
-        &heading(zero),
-        Scale::linear(&format!("Real part less {} (rad/s)", less(zero.s.re, re))).within(x.0, x.1),
-        Scale::linear(&format!("Im. part less {} (rad/s)", less(zero.s.im, im)))
-            .within(-(1.0 + ROOM) * im, (1.0 + ROOM) * im),
-    );
-    let chart = if axis == 0.0 {
-        chart
-    } else {
-        upright(chart, "imaginary axis", axis)
-    };
-    ellipse(chart, "95 %", zero, zero.s).points("", colour(zero), Symbol::Dot, vec![(0.0, 0.0)])
+    for zero in zeros {
+        chart = with_ellipse(chart, "", zero, Complex::new(0.0, 0.0));
+    }
+    chart.points(name, first.colour(), Symbol::Ring, places(zeros))
 }
 
-fn heading(zero: &Place) -> String {
-    let sigmas = (zero.s.re / sigma(zero, 0)).abs();
-    let sigmas = if sigmas > 1000.0 {
-        "over 1000".into()
-    } else {
-        format!("{sigmas:.1}")
+/// One zero. The axes show real and imaginary part minus the zero itself, so that their numbers stay short.
+fn enlarged_zero(zero: &UncertainPoint) -> Chart {
+    let half = |part: usize| SIGMAS_95_PLANE * zero.sigma(part);
+    let re = half(0);
+    let im = if half(1) > 0.0 { half(1) } else { re };
+    let with_axis = zero.s.re.abs() <= AXIS_WITHIN * re;
+    let axis = if with_axis { -zero.s.re } else { 0.0 };
+    let x = ((-re).min(axis) - ROOM * re, re.max(axis) + ROOM * re);
+    let y = ((1.0 + ROOM) * -im, (1.0 + ROOM) * im);
+    let mut chart = Chart::new(
+        &enlarged_heading(zero),
+        offset_scale("Real", zero.s.re, re, x),
+        offset_scale("Im.", zero.s.im, im, y),
+    );
+    if with_axis {
+        chart = with_vertical(chart, "imaginary axis", axis);
+    }
+    chart = with_ellipse(chart, "95 %", zero, zero.s);
+    chart.points("", zero.colour(), Symbol::Dot, vec![(0.0, 0.0)])
+}
+
+fn offset_scale(part: &str, value: f64, half: f64, range: (f64, f64)) -> Scale {
+    let value = number::plain(value, number::decimals(half));
+    Scale::linear(&format!("{part} part − ({value}) (rad/s)")).within(range.0, range.1)
+}
+
+fn enlarged_heading(zero: &UncertainPoint) -> String {
+    let sigmas = match zero.sigmas_from_axis() {
+        s if s > 1000.0 => "over 1000".into(),
+        s => format!("{s:.1}"),
     };
     let side = if zero.s.re > 0.0 { "right" } else { "left" };
-    let hz = zero.s.norm() / (2.0 * std::f64::consts::PI);
+    let hz = zero.s.norm() / TAU;
     format!("Zero at {hz:.2} Hz, {sigmas} σ {side} of the axis")
 }
 
-/// A chart of the plane of s with its imaginary and real axis.
-fn plane(heading: &str, (re, im): ((f64, f64), (f64, f64))) -> Chart {
-    let chart = Chart::new(
-        heading,
-        Scale::linear("Real part of s (rad/s)").within(re.0, re.1),
-        Scale::linear("Imaginary part of s (rad/s)").within(im.0, im.1),
-    );
-    upright(chart, "imaginary axis", 0.0)
+/// A chart of the s-plane with its imaginary axis.
+fn plane(heading: &str, (re, im): Window) -> Chart {
+    let x = Scale::linear("Real part of s (rad/s)").within(re.0, re.1);
+    let y = Scale::linear("Imaginary part of s (rad/s)").within(im.0, im.1);
+    with_vertical(Chart::new(heading, x, y), "imaginary axis", 0.0)
 }
 
-fn upright(chart: Chart, name: &str, x: f64) -> Chart {
-    chart.line(
-        name,
-        Pen {
-            width: 1.1,
-            ..Pen::solid(INK)
-        },
-        vec![(x, -FAR), (x, FAR)],
-    )
+fn with_vertical(chart: Chart, name: &str, x: f64) -> Chart {
+    chart.line(name, Pen::solid(INK).width(1.1), vec![(x, -FAR), (x, FAR)])
 }
 
-/// The ellipse of a zero, less an origin.
-fn ellipse(chart: Chart, name: &str, zero: &Place, origin: Complex<f64>) -> Chart {
+/// The ellipse of a zero, relative to an origin.
+fn with_ellipse(chart: Chart, name: &str, zero: &UncertainPoint, origin: Complex<f64>) -> Chart {
     let Some(ellipse) = Ellipse::of_95_percent(zero.covariance) else {
         return chart;
     };
-    let outline = ellipse.outline((zero.s.re - origin.re, zero.s.im - origin.im));
-    let pen = Pen {
-        width: 1.0,
-        ..Pen::solid(colour(zero))
-    };
-    let area = super::Mark::Area {
-        name: name.into(),
-        colour: colour(zero),
-        strength: 0.22,
-        outline: outline.clone(),
-    };
-    chart.mark(area).line("", pen, outline)
-}
-
-/// The 95 % intervals of a pole's two parts.
-fn crossed(chart: Chart, pole: &Place) -> Chart {
-    let Complex { re, im } = pole.s;
-    let half = |part: usize| SIGMAS_95 * sigma(pole, part);
-    let pen = Pen {
-        width: 0.9,
-        ..Pen::solid(INK)
-    };
+    let centre = zero.s - origin;
+    let outline = ellipse.outline((centre.re, centre.im));
+    let pen = Pen::solid(zero.colour()).width(1.0);
     chart
-        .line("", pen, vec![(re - half(0), im), (re + half(0), im)])
-        .line("", pen, vec![(re, im - half(1)), (re, im + half(1))])
+        .area(name, zero.colour(), STRENGTH, outline.clone())
+        .line("", pen, outline)
 }
 
-fn colour(zero: &Place) -> Colour {
-    if zero.s.re > 0.0 { VERMILION } else { BLUE }
+/// The 95 % intervals of both parts of a pole.
+fn with_intervals(chart: Chart, pole: &UncertainPoint) -> Chart {
+    let Complex { re, im } = pole.s;
+    let (half_re, half_im) = (SIGMAS_95 * pole.sigma(0), SIGMAS_95 * pole.sigma(1));
+    let pen = Pen::solid(INK).width(0.9);
+    chart
+        .line("", pen, vec![(re - half_re, im), (re + half_re, im)])
+        .line("", pen, vec![(re, im - half_im), (re, im + half_im)])
 }
 
-fn points(places: &[Place]) -> Vec<(f64, f64)> {
-    places
+fn places(points: &[UncertainPoint]) -> Vec<(f64, f64)> {
+    points
         .iter()
-        .map(|place| (place.s.re, place.s.im))
+        .map(|point| (point.s.re, point.s.im))
         .collect()
 }
 
-fn sigma(place: &Place, part: usize) -> f64 {
-    place.covariance[part][part].sqrt()
-}
-
-fn holds((re, im): ((f64, f64), (f64, f64)), place: &Place) -> bool {
-    let within = |value: f64, (low, high): (f64, f64)| value >= low && value <= high;
-    within(place.s.re, re) && within(place.s.im, im)
-}
-
-/// From the least to the greatest, 0 among them, with a margin.
-fn span(values: impl Iterator<Item = f64>, margin: f64) -> (f64, f64) {
-    let (low, high) = values.fold((0.0, 0.0), |(low, high): (f64, f64), x| {
+/// The range of the real parts, 0 included, with a margin.
+fn span(points: &[&UncertainPoint], margin: f64) -> (f64, f64) {
+    let re = points.iter().map(|point| point.s.re);
+    let (low, high) = re.fold((0.0, 0.0), |(low, high): (f64, f64), x| {
         (low.min(x), high.max(x))
     });
     let room = margin * (high - low).max(1e-3);

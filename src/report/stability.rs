@@ -1,12 +1,12 @@
-//! The stability chart: the modes at each order, and which of them stay from one order to the next.
+//! The stability chart: the modes at each model order, and which of them persist from one order to the next.
 
-use super::chart::{Chart, Pen, Scale, Symbol};
-use super::colours::{BLUE, GREY, ORANGE, VERMILION};
-use super::sheet::{Row, sheet_svg};
-use super::{Mark, ReportError};
+use super::ReportError;
+use super::chart::colours::{BLUE, Colour, GREY, ORANGE, VERMILION};
+use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 
-/// A mode stays whose frequency and damping change by less than these ratios.
-const STAYS: (f64, f64) = (0.01, 0.05);
+/// Largest relative changes of the frequency and of the damping of a mode that persists.
+const FREQUENCY_CHANGE: f64 = 0.01;
+const DAMPING_CHANGE: f64 = 0.05;
 
 /// A mode of an order.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,31 +17,50 @@ pub struct OrderedMode {
     pub damping_ratio: f64,
 }
 
-/// How far a mode is what it was at the order before.
+/// What of a mode was present at the order before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stays {
-    /// Frequency and damping.
-    Whole,
-    /// The frequency alone.
+enum Persistence {
+    FrequencyAndDamping,
     Frequency,
-    /// It was not there.
     New,
 }
 
-/// What became of a mode since the order before.
-pub fn stays(mode: &OrderedMode, before: &[OrderedMode]) -> Stays {
+const KINDS: [(Persistence, &str, Colour, Symbol); 3] = [
+    (
+        Persistence::New,
+        "new, or moved by more than 1 %",
+        ORANGE,
+        Symbol::Cross,
+    ),
+    (
+        Persistence::Frequency,
+        "frequency stable within 1 %",
+        VERMILION,
+        Symbol::Ring,
+    ),
+    (
+        Persistence::FrequencyAndDamping,
+        "frequency and damping (5 %) stable",
+        BLUE,
+        Symbol::Dot,
+    ),
+];
+
+fn persistence(mode: &OrderedMode, before: &[OrderedMode]) -> Persistence {
     let close = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * b.abs();
-    let same = |old: &&OrderedMode| close(mode.frequency_hz, old.frequency_hz, STAYS.0);
-    let damped = |old: &OrderedMode| close(mode.damping_ratio, old.damping_ratio, STAYS.1);
-    let mut old = before.iter().filter(same).peekable();
-    match (old.peek().is_some(), old.any(damped)) {
-        (false, _) => Stays::New,
-        (true, false) => Stays::Frequency,
-        (true, true) => Stays::Whole,
+    let same = |old: &&OrderedMode| close(mode.frequency_hz, old.frequency_hz, FREQUENCY_CHANGE);
+    let damped = |old: &OrderedMode| close(mode.damping_ratio, old.damping_ratio, DAMPING_CHANGE);
+    let mut matches = before.iter().filter(same).peekable();
+    if matches.peek().is_none() {
+        Persistence::New
+    } else if matches.any(damped) {
+        Persistence::FrequencyAndDamping
+    } else {
+        Persistence::Frequency
     }
 }
 
-/// The chart as an SVG document: each order's modes over frequency, lines where the modes of the fit are.
+/// The chart as an SVG document: the modes of each order over frequency, and vertical lines at the modes of the fit.
 ///
 /// # Errors
 /// When there is no order.
@@ -55,77 +74,53 @@ pub fn stability_svg(
     if orders.is_empty() {
         return Err(ReportError::NoTrace);
     }
-    sheet_svg(
-        title,
-        subtitle,
-        &[Row::new(420.0, vec![chart(orders, fit_hz, band_hz)])],
-    )
+    let chart = chart(orders, fit_hz, band_hz);
+    sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart])])
 }
 
 fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Chart {
     let highest = orders.len().max(9) as f64 + 1.0;
-    let mut chart = Chart::new(
-        "",
-        Scale::logarithmic("Frequency (Hz)").within(from_hz(orders, band_hz), band_hz.1),
-        Scale::linear("Order (number of modes)").within(0.0, highest),
-    );
-    let mut name = format!("the {} modes of the fit", fit_hz.len());
-    for f in fit_hz {
-        let pen = Pen::dashed(GREY).thin();
-        chart = chart.mark(Mark::Line {
-            name: std::mem::take(&mut name),
-            pen,
-            points: vec![(*f, 0.0), (*f, highest)],
-            directed: false,
-        });
+    let x = Scale::logarithmic("Frequency (Hz)").within(low_end_hz(orders, band_hz), band_hz.1);
+    let y = Scale::linear("Order (number of modes)").within(0.0, highest);
+    let mut chart = Chart::new("", x, y);
+    for (k, f) in fit_hz.iter().enumerate() {
+        let name = if k == 0 {
+            format!("the {} modes of the fit", fit_hz.len())
+        } else {
+            String::new()
+        };
+        chart = chart.line(
+            &name,
+            Pen::dashed(GREY).thin(),
+            vec![(*f, 0.0), (*f, highest)],
+        );
     }
-    let kinds = [
-        (
-            Stays::New,
-            "new, or moved by more than 1 %",
-            ORANGE,
-            Symbol::Cross,
-        ),
-        (
-            Stays::Frequency,
-            "frequency stays within 1 %",
-            VERMILION,
-            Symbol::Ring,
-        ),
-        (
-            Stays::Whole,
-            "frequency and damping (5 %) stay",
-            BLUE,
-            Symbol::Dot,
-        ),
-    ];
-    kinds
+    KINDS
         .into_iter()
         .fold(chart, |chart, (kind, name, colour, symbol)| {
             chart.points(name, colour, symbol, places(orders, kind))
         })
 }
 
-/// Half of the lowest mode that swings, or the band's lower end where that is higher: below is nothing to see.
-fn from_hz(orders: &[Vec<OrderedMode>], band_hz: (f64, f64)) -> f64 {
-    let swinging = orders
-        .iter()
-        .flatten()
-        .map(|mode| mode.frequency_hz)
-        .filter(|f| *f > 0.0);
-    let lowest = swinging.fold(band_hz.1, f64::min);
+/// Half of the lowest oscillating mode, or the lower end of the band where that is higher.
+fn low_end_hz(orders: &[Vec<OrderedMode>], band_hz: (f64, f64)) -> f64 {
+    let frequencies = orders.iter().flatten().map(|mode| mode.frequency_hz);
+    let lowest = frequencies.filter(|f| *f > 0.0).fold(band_hz.1, f64::min);
     band_hz.0.max(0.5 * lowest)
 }
 
 /// The modes of a kind: frequency in hertz, and order.
-fn places(orders: &[Vec<OrderedMode>], kind: Stays) -> Vec<(f64, f64)> {
-    let before = |k: usize| if k == 0 { &[][..] } else { &orders[k - 1][..] };
-    let of = |(k, modes): (usize, &Vec<OrderedMode>)| {
-        let kept = modes.iter().filter(|mode| stays(mode, before(k)) == kind);
-        kept.map(|mode| (mode.frequency_hz, (k + 1) as f64))
-            .collect::<Vec<_>>()
-    };
-    orders.iter().enumerate().flat_map(of).collect()
+fn places(orders: &[Vec<OrderedMode>], kind: Persistence) -> Vec<(f64, f64)> {
+    let mut places = Vec::new();
+    let mut before: &[OrderedMode] = &[];
+    for (order, modes) in (1..).zip(orders) {
+        let of_kind = modes
+            .iter()
+            .filter(|mode| persistence(mode, before) == kind);
+        places.extend(of_kind.map(|mode| (mode.frequency_hz, f64::from(order))));
+        before = modes;
+    }
+    places
 }
 
 #[cfg(test)]
@@ -133,20 +128,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mode_stays_whole_by_frequency_alone_or_not_at_all() {
+    fn classifies_modes_by_their_change_of_frequency_and_damping() {
         let mode = |frequency_hz, damping_ratio| OrderedMode {
             frequency_hz,
             damping_ratio,
         };
         let before = [mode(100.0, 0.01), mode(50.0, 0.02)];
         for (now, expected) in [
-            (mode(100.9, 0.0104), Stays::Whole),
-            (mode(100.9, 0.0106), Stays::Frequency),
-            (mode(101.1, 0.01), Stays::New),
-            (mode(50.0, 0.02), Stays::Whole),
+            (mode(100.9, 0.0104), Persistence::FrequencyAndDamping),
+            (mode(100.9, 0.0106), Persistence::Frequency),
+            (mode(101.1, 0.01), Persistence::New),
+            (mode(50.0, 0.02), Persistence::FrequencyAndDamping),
         ] {
-            assert_eq!(stays(&now, &before), expected, "{now:?}");
+            assert_eq!(persistence(&now, &before), expected, "{now:?}");
         }
-        assert_eq!(stays(&before[0], &[]), Stays::New);
+        assert_eq!(persistence(&before[0], &[]), Persistence::New);
     }
 }

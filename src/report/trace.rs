@@ -1,93 +1,92 @@
-//! What goes into a plot, and what is drawn of it.
+//! Frequency responses to be plotted: checked, with their phases unwrapped.
 
 use nalgebra::Complex;
-use plotters::style::RGBColor;
 
-use super::colours::{BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION};
-use super::{ReportError, phase};
+use super::chart::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION};
+use super::{Pen, ReportError, SeriesPoint, Stroke, phase};
 use crate::identify::{Frf, wrapped_phase_rad};
 
-/// Half-width of the band, and what a magnitude must be to be drawn in full, in sigmas.
-const BAND_SIGMAS: f64 = 2.0;
-/// What a magnitude must be for its phase to lead those after it, in sigmas: known to 0.25 rad then.
-const LEADING_SIGMAS: f64 = 4.0;
-/// Measured frequencies further apart than this many resolutions leave a gap between them.
+/// Half-width of the band in sigmas; smaller magnitudes are drawn faint.
+pub(super) const BAND_SIGMAS: f64 = 2.0;
+/// Smallest magnitude in sigmas whose phase decides about turns: it is known to 0.25 rad.
+const TRUSTED_SIGMAS: f64 = 4.0;
+/// Measured frequencies further apart than this many resolutions have a gap between them.
 const GAP_RESOLUTIONS: f64 = 2.0;
-/// Colours of measured curves, and of models.
-const MEASURED: [RGBColor; 4] = [BLUE, GREEN, PURPLE, SKY];
-const MODEL: [RGBColor; 3] = [VERMILION, INK, ORANGE];
-/// Dashes of one model after the other, and the spaces between: of two that coincide both are seen.
-const DASHES: [(f64, f64); 2] = [(6.0, 5.0), (2.5, 3.0)];
+/// Colours of measured responses, and of models.
+const MEASURED: [Colour; 4] = [BLUE, GREEN, PURPLE, SKY];
+const MODEL: [Colour; 3] = [VERMILION, INK, ORANGE];
+/// Strokes of models over measured responses.
+const STROKES: [Stroke; 2] = [Stroke::Dashed, Stroke::Dotted];
+const LINE_WIDTH: f64 = 1.4;
 
-/// A curve with a name for the legend.
+/// A response with its name in the legend.
 #[derive(Clone, Debug)]
 pub struct Trace<'a> {
-    /// What the legend calls it.
+    /// Name in the legend.
     pub name: &'a str,
-    /// What it shows.
+    /// The response.
     pub curve: Curve<'a>,
 }
 
-/// What a trace shows; it is drawn accordingly.
+impl<'a> Trace<'a> {
+    /// A measured response.
+    pub fn measured(name: &'a str, frf: &'a Frf) -> Self {
+        let curve = Curve::Measured(frf);
+        Self { name, curve }
+    }
+
+    /// The response of a model.
+    pub fn model(name: &'a str, frequency_hz: &'a [f64], response: &'a [Complex<f64>]) -> Self {
+        let curve = Curve::Model {
+            frequency_hz,
+            response,
+        };
+        Self { name, curve }
+    }
+
+    pub(super) fn is_measured(&self) -> bool {
+        matches!(self.curve, Curve::Measured(_))
+    }
+}
+
+/// A response, measured or of a model.
 #[derive(Clone, Debug)]
 pub enum Curve<'a> {
-    /// A measured response: line with its band of two sigma, and coherence.
+    /// Measured: a line with its band of two sigma, and its coherence.
     Measured(&'a Frf),
-    /// The response of a model: a line on top.
+    /// Of a model: a line.
     Model {
         /// Frequencies in hertz.
         frequency_hz: &'a [f64],
-        /// Response in metres per ampere.
+        /// Response in the unit of the plot.
         response: &'a [Complex<f64>],
     },
 }
 
-/// A trace made ready: one entry a frequency in every column.
+/// A response ready to be plotted, with one entry a frequency in every column.
 pub(super) struct Line<'a> {
     pub name: &'a str,
-    pub colour: RGBColor,
-    /// Lengths in pixels of its dashes and of the space after them, so that what lies below is seen.
-    pub dashes: Option<(f64, f64)>,
+    pub pen: Pen,
     pub frequency_hz: &'a [f64],
+    pub response: &'a [Complex<f64>],
     pub magnitude: Vec<f64>,
     /// Unwrapped.
     pub phase_deg: Vec<f64>,
-    /// Whether the band leaves out zero.
-    pub firm: Vec<bool>,
-    /// Whether the phase is known well enough to tell turns.
-    leading: Vec<bool>,
-    /// Whether a gap lies before the frequency.
-    pub begins: Vec<bool>,
+    /// Whether the band of the magnitude excludes 0.
+    pub certain: Vec<bool>,
+    /// Whether the phase is known well enough to decide about turns.
+    trusted: Vec<bool>,
     pub measured: Option<&'a Frf>,
 }
 
-/// A value, the ends of its band, and whether it is known too badly to be drawn in full.
-pub(super) struct Shown {
-    pub value: f64,
-    pub low: f64,
-    pub high: f64,
-    pub faint: bool,
-}
-
-/// The lines of a plot, their phases on the same turn as far as they overlap.
+/// The responses with their pens, phases on the same turn where they overlap.
 pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportError> {
-    let (mut measured, mut models) = (MEASURED.iter().cycle(), MODEL.iter().cycle());
-    let mut lines = Vec::new();
-    for trace in traces {
-        let colour = match trace.curve {
-            Curve::Measured(_) => measured.next(),
-            Curve::Model { .. } => models.next(),
-        };
-        lines.push(Line::new(trace, colour.copied().unwrap_or_default())?);
-    }
+    let pens = pens(traces);
+    let with_pens = traces.iter().zip(pens);
+    let mut lines = with_pens
+        .map(|(trace, pen)| Line::new(trace, pen))
+        .collect::<Result<Vec<_>, _>>()?;
     align_phases(&mut lines);
-    let any_measured = lines.iter().any(|line| line.measured.is_some());
-    let models = lines
-        .iter_mut()
-        .filter(|line| any_measured && line.measured.is_none());
-    models
-        .zip(DASHES.iter().cycle())
-        .for_each(|(line, dashes)| line.dashes = Some(*dashes));
     if lines.is_empty() {
         Err(ReportError::NoTrace)
     } else {
@@ -95,8 +94,42 @@ pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportErr
     }
 }
 
+/// A pen for each trace. Models are dashed where something measured lies below them.
+fn pens(traces: &[Trace]) -> Vec<Pen> {
+    let any_measured = traces.iter().any(Trace::is_measured);
+    let (mut measured, mut models) = (0, 0);
+    let mut pen = |trace: &Trace| {
+        let count = if trace.is_measured() {
+            &mut measured
+        } else {
+            &mut models
+        };
+        *count += 1;
+        numbered_pen(trace.is_measured(), *count - 1, any_measured)
+    };
+    traces.iter().map(&mut pen).collect()
+}
+
+fn numbered_pen(measured: bool, index: usize, any_measured: bool) -> Pen {
+    let colour = if measured {
+        MEASURED[index % MEASURED.len()]
+    } else {
+        MODEL[index % MODEL.len()]
+    };
+    let over_measured = any_measured && !measured;
+    let stroke = if over_measured {
+        STROKES[index % STROKES.len()]
+    } else {
+        Stroke::Solid
+    };
+    Pen {
+        stroke,
+        ..Pen::solid(colour).width(LINE_WIDTH)
+    }
+}
+
 impl<'a> Line<'a> {
-    fn new(trace: &Trace<'a>, colour: RGBColor) -> Result<Self, ReportError> {
+    fn new(trace: &Trace<'a>, pen: Pen) -> Result<Self, ReportError> {
         check(trace)?;
         let (frequency_hz, response, measured) = match trace.curve {
             Curve::Measured(frf) => (&frf.frequency_hz[..], &frf.response[..], Some(frf)),
@@ -106,111 +139,98 @@ impl<'a> Line<'a> {
             } => (frequency_hz, response, None),
         };
         let magnitude: Vec<f64> = response.iter().map(|h| h.norm()).collect();
-        let sigma = |k: usize| measured.map_or(0.0, |frf| frf.magnitude_sigma[k]);
-        let beyond = |sigmas: f64| {
-            magnitude
-                .iter()
-                .enumerate()
-                .map(|(k, h)| *h > sigmas * sigma(k))
-                .collect()
-        };
-        let (firm, leading): (Vec<bool>, Vec<bool>) = (beyond(BAND_SIGMAS), beyond(LEADING_SIGMAS));
+        let trusted = above_sigmas(&magnitude, measured, TRUSTED_SIGMAS);
         let wrapped: Vec<f64> = response
             .iter()
             .map(|h| wrapped_phase_rad(*h).to_degrees())
             .collect();
-        let phase_deg = phase::unwrapped_deg(&wrapped, &leading);
-        let begins = (0..response.len())
-            .map(|k| k == 0 || measured.is_some_and(|frf| gap(frf, k)))
-            .collect();
-        let name = trace.name;
         Ok(Self {
-            name,
-            colour,
-            dashes: None,
+            name: trace.name,
+            pen,
             frequency_hz,
+            response,
+            certain: above_sigmas(&magnitude, measured, BAND_SIGMAS),
+            phase_deg: phase::unwrapped_deg(&wrapped, &trusted),
             magnitude,
-            phase_deg,
-            firm,
-            leading,
-            begins,
+            trusted,
             measured,
         })
     }
 
-    /// Magnitude with its band.
-    pub fn magnitude(&self, k: usize) -> Shown {
-        self.shown(
-            k,
-            self.magnitude[k],
-            self.measured.map_or(0.0, |frf| frf.magnitude_sigma[k]),
-        )
+    /// The magnitude with its band.
+    pub fn magnitude_points(&self) -> Vec<SeriesPoint> {
+        let sigma = |frf: &Frf, k: usize| frf.magnitude_sigma[k];
+        self.points(&self.magnitude, sigma)
     }
 
-    /// Phase in degrees with its band.
-    pub fn phase(&self, k: usize) -> Shown {
-        self.shown(
-            k,
-            self.phase_deg[k],
-            self.measured
-                .map_or(0.0, |frf| frf.phase_sigma_rad[k].to_degrees()),
-        )
+    /// The phase in degrees with its band.
+    pub fn phase_points(&self) -> Vec<SeriesPoint> {
+        let sigma = |frf: &Frf, k: usize| frf.phase_sigma_rad[k].to_degrees();
+        self.points(&self.phase_deg, sigma)
     }
 
-    fn shown(&self, k: usize, value: f64, sigma: f64) -> Shown {
-        Shown {
-            value,
-            low: value - BAND_SIGMAS * sigma,
-            high: value + BAND_SIGMAS * sigma,
-            faint: !self.firm[k],
-        }
+    fn points(&self, values: &[f64], sigma: impl Fn(&Frf, usize) -> f64) -> Vec<SeriesPoint> {
+        let point = |(k, y): (usize, &f64)| {
+            let half = BAND_SIGMAS * self.measured.map_or(0.0, |frf| sigma(frf, k));
+            SeriesPoint {
+                x: self.frequency_hz[k],
+                y: *y,
+                band: (y - half, y + half),
+                faint: !self.certain[k],
+                starts: k == 0 || self.measured.is_some_and(|frf| has_gap_before(frf, k)),
+            }
+        };
+        values.iter().enumerate().map(point).collect()
     }
 
     /// The points (frequency, phase) that are known well.
-    fn leading_phases(&self) -> Vec<(f64, f64)> {
-        (0..self.leading.len())
-            .filter(|k| self.leading[*k])
-            .map(|k| (self.frequency_hz[k], self.phase_deg[k]))
-            .collect()
+    fn trusted_phases(&self) -> Vec<(f64, f64)> {
+        let points = self
+            .frequency_hz
+            .iter()
+            .copied()
+            .zip(self.phase_deg.iter().copied());
+        let trusted = points.zip(&self.trusted).filter(|(_, trusted)| **trusted);
+        trusted.map(|(point, _)| point).collect()
     }
 }
 
-/// Whether a gap lies between a measured frequency and the one before it.
-pub(super) fn gap(frf: &Frf, k: usize) -> bool {
-    frf.frequency_hz[k] - frf.frequency_hz[k - 1]
-        > GAP_RESOLUTIONS * frf.resolution_hz[k].max(frf.resolution_hz[k - 1])
+/// Which magnitudes are above so many of their sigmas; all of a model.
+fn above_sigmas(magnitude: &[f64], measured: Option<&Frf>, sigmas: f64) -> Vec<bool> {
+    let sigma = |k: usize| measured.map_or(0.0, |frf| frf.magnitude_sigma[k]);
+    let above = |(k, magnitude): (usize, &f64)| *magnitude > sigmas * sigma(k);
+    magnitude.iter().enumerate().map(above).collect()
 }
 
-/// Puts every line on the turn of the one that begins at the lowest frequency, which knows best where the phase starts.
+/// Whether a gap lies between a measured frequency and the one before it.
+pub(super) fn has_gap_before(frf: &Frf, k: usize) -> bool {
+    if k == 0 {
+        return false;
+    }
+    let step = frf.frequency_hz[k] - frf.frequency_hz[k - 1];
+    step > GAP_RESOLUTIONS * frf.resolution_hz[k].max(frf.resolution_hz[k - 1])
+}
+
+/// Moves every line to the turn of the one that starts at the lowest frequency.
 fn align_phases(lines: &mut [Line]) {
-    let first = |a: &&Line, b: &&Line| a.frequency_hz[0].total_cmp(&b.frequency_hz[0]);
-    let Some(reference) = lines.iter().min_by(first).map(Line::leading_phases) else {
+    let by_start = |a: &&Line, b: &&Line| a.frequency_hz[0].total_cmp(&b.frequency_hz[0]);
+    let Some(reference) = lines.iter().min_by(by_start).map(Line::trusted_phases) else {
         return;
     };
     for line in lines {
-        let offset = phase::offset_deg(&line.leading_phases(), &reference);
+        let offset = phase::offset_deg(&line.trusted_phases(), &reference);
         line.phase_deg.iter_mut().for_each(|phase| *phase += offset);
     }
 }
 
 fn check(trace: &Trace) -> Result<(), ReportError> {
-    let name = || trace.name.to_owned();
     match trace.curve {
         Curve::Model {
             frequency_hz,
             response,
         } => {
-            check_lengths(trace.name, frequency_hz.len(), &[response.len()])?;
-            check_frequencies(trace.name, frequency_hz)?;
-            let bad = response
-                .iter()
-                .position(|h| !(h.re.is_finite() && h.im.is_finite()));
-            bad.map_or(Ok(()), |k| {
-                Err(ReportError::NotFinite {
-                    name: name(),
-                    frequency_hz: frequency_hz[k],
-                })
-            })
+            check_columns(trace.name, frequency_hz, &[response.len()])?;
+            check_finite(trace.name, frequency_hz, |k| response[k].norm().is_finite())
         }
         Curve::Measured(frf) => {
             let columns = [
@@ -220,50 +240,62 @@ fn check(trace: &Trace) -> Result<(), ReportError> {
                 &frf.resolution_hz,
             ];
             let lengths = columns.map(Vec::len);
-            check_lengths(
+            check_columns(
                 trace.name,
-                frf.len(),
+                &frf.frequency_hz,
                 &[&lengths[..], &[frf.response.len()]].concat(),
             )?;
-            check_frequencies(trace.name, &frf.frequency_hz)?;
-            let finite = |k: &usize| {
-                frf.response[*k].norm().is_finite() && columns.iter().all(|c| c[*k].is_finite())
-            };
-            let bad = (0..frf.len()).find(|k| !finite(k));
-            bad.map_or(Ok(()), |k| {
-                Err(ReportError::NotFinite {
-                    name: name(),
-                    frequency_hz: frf.frequency_hz[k],
-                })
+            let finite = |k: usize| columns.iter().all(|column| column[k].is_finite());
+            check_finite(trace.name, &frf.frequency_hz, |k| {
+                frf.response[k].norm().is_finite() && finite(k)
             })
         }
     }
 }
 
-fn check_lengths(name: &str, frequencies: usize, columns: &[usize]) -> Result<(), ReportError> {
-    let name = name.to_owned();
+fn check_columns(name: &str, frequency_hz: &[f64], columns: &[usize]) -> Result<(), ReportError> {
+    let (name, frequencies) = (name.to_owned(), frequency_hz.len());
     match columns.iter().find(|values| **values != frequencies) {
-        Some(values) => Err(ReportError::Lengths {
+        Some(&values) => Err(ReportError::Lengths {
             name,
             frequencies,
-            values: *values,
+            values,
         }),
         None if frequencies == 0 => Err(ReportError::Empty { name }),
+        None => check_rising(name, frequency_hz),
+    }
+}
+
+fn check_rising(name: String, frequency_hz: &[f64]) -> Result<(), ReportError> {
+    let before = |index: usize| {
+        if index == 0 {
+            0.0
+        } else {
+            frequency_hz[index - 1]
+        }
+    };
+    let rises =
+        |index: usize| frequency_hz[index].is_finite() && frequency_hz[index] > before(index);
+    match (0..frequency_hz.len()).find(|index| !rises(*index)) {
+        Some(index) => Err(ReportError::Frequency {
+            name,
+            index,
+            value: frequency_hz[index],
+        }),
         None => Ok(()),
     }
 }
 
-fn check_frequencies(name: &str, frequency_hz: &[f64]) -> Result<(), ReportError> {
-    let mut last = 0.0;
-    for (index, value) in frequency_hz.iter().copied().enumerate() {
-        if !(value.is_finite() && value > last) {
-            return Err(ReportError::Frequency {
-                name: name.to_owned(),
-                index,
-                value,
-            });
-        }
-        last = value;
+fn check_finite(
+    name: &str,
+    frequency_hz: &[f64],
+    finite: impl Fn(usize) -> bool,
+) -> Result<(), ReportError> {
+    match (0..frequency_hz.len()).find(|k| !finite(*k)) {
+        Some(k) => Err(ReportError::NotFinite {
+            name: name.to_owned(),
+            frequency_hz: frequency_hz[k],
+        }),
+        None => Ok(()),
     }
-    Ok(())
 }

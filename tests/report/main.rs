@@ -1,10 +1,10 @@
-//! What the report room promises. The pictures that these tests draw are left in `target/tmp`, to look at.
+//! Plots and pages of a record. The plots that these tests draw are left in `target/tmp`, for inspection.
 
 mod bode;
-mod map;
 mod nyquist;
 mod phase;
 mod pictures;
+mod pole_zero;
 mod run;
 use bench_test_support::stage;
 use bench_test_support::svg;

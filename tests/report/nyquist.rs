@@ -1,4 +1,4 @@
-//! The response in the plane.
+//! The Nyquist plot.
 
 use std::f64::consts::TAU;
 
@@ -25,7 +25,7 @@ fn circles(frf: &Frf) -> usize {
 }
 
 #[test]
-fn circles_of_confidence_upon_each_other_are_drawn_once_and_those_side_by_side_all() {
+fn draws_overlapping_confidence_circles_once() {
     let still = Frf {
         magnitude_sigma: vec![1.5e-5; 100],
         ..flat()

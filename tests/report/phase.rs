@@ -1,7 +1,7 @@
 use bench::report::phase::{offset_deg, unwrapped_deg};
 
 #[test]
-fn a_falling_phase_runs_on_past_minus_180_degrees() {
+fn unwraps_a_falling_phase() {
     let wrapped = [0.0, -90.0, -170.0, 170.0, 90.0, 0.0, -90.0, -179.0, 179.0];
     let unwrapped = [
         0.0, -90.0, -170.0, -190.0, -270.0, -360.0, -450.0, -539.0, -541.0,
@@ -10,7 +10,7 @@ fn a_falling_phase_runs_on_past_minus_180_degrees() {
 }
 
 #[test]
-fn a_rising_phase_runs_on_past_180_degrees() {
+fn unwraps_a_rising_phase() {
     assert_eq!(
         unwrapped_deg(&[90.0, 170.0, -170.0, -90.0], &[true; 4]),
         [90.0, 170.0, 190.0, 270.0]
@@ -18,7 +18,7 @@ fn a_rising_phase_runs_on_past_180_degrees() {
 }
 
 #[test]
-fn noise_in_a_deep_notch_adds_no_turn_to_what_follows() {
+fn noise_in_a_deep_notch_adds_no_turn() {
     // Followed point by point, 120, -120 and 0 would go round once.
     let wrapped = [-10.0, -10.0, 120.0, -120.0, -15.0, -15.0];
     let trusted = [true, true, false, false, true, true];
@@ -27,7 +27,7 @@ fn noise_in_a_deep_notch_adds_no_turn_to_what_follows() {
 }
 
 #[test]
-fn the_first_trusted_phase_stays_where_it_is_and_those_before_follow_it() {
+fn keeps_the_first_trusted_phase() {
     assert_eq!(
         unwrapped_deg(&[-160.0, 30.0, 5.0], &[false, true, true]),
         [200.0, 30.0, 5.0]
@@ -36,7 +36,7 @@ fn the_first_trusted_phase_stays_where_it_is_and_those_before_follow_it() {
 }
 
 #[test]
-fn a_curve_that_begins_later_is_put_on_the_turn_of_the_one_that_began_lower() {
+fn moves_a_curve_to_the_turn_of_another() {
     let reference = [(1.0, 0.0), (10.0, -200.0), (20.0, -340.0)];
     assert_eq!(
         offset_deg(&[(10.0, 160.0), (15.0, 100.0), (20.0, 20.0)], &reference),
@@ -48,4 +48,16 @@ fn a_curve_that_begins_later_is_put_on_the_turn_of_the_one_that_began_lower() {
         0.0
     );
     assert_eq!(offset_deg(&[(30.0, 160.0)], &reference), 0.0);
+}
+
+#[test]
+fn responses_that_differ_by_a_turn_above_the_lowest_decade_keep_their_start() {
+    // S rises from 90 degrees to 0, T falls from 0 below -540: at most frequencies a turn apart, not where both begin.
+    let s: Vec<(f64, f64)> = (0..40)
+        .map(|k| (f64::from(1 + k), 90.0 / f64::from(1 + k)))
+        .collect();
+    let t: Vec<(f64, f64)> = (0..40)
+        .map(|k| (f64::from(1 + k), -18.0 * f64::from(k)))
+        .collect();
+    assert_eq!(offset_deg(&t, &s), 0.0);
 }

@@ -1,4 +1,4 @@
-//! Pictures of what the bench measures, for the other tests and for the eye.
+//! Plots of measured responses, for the other tests and for inspection.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The pictures and the page of a run, by the program itself.
+//! Plots and page of a run, made by the program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::{svg, truth};
 
-/// A title that would break a page, and a picture, that did not escape it.
+/// A title that breaks a page or plot that does not escape it.
 const TITLE: &str = "a <b> & \"c\"";
 const PLOT_KINDS: [&str; 5] = ["bode", "coherence", "nyquist", "pole_zero", "stability"];
 
@@ -72,7 +72,7 @@ fn run() -> &'static Run {
 }
 
 #[test]
-fn every_picture_and_the_page_stand_beside_the_recording_under_its_name() {
+fn writes_plots_and_page_beside_the_recording_under_its_name() {
     let answer = &run().answer;
     let recording = Path::new(answer["recording"].as_str().unwrap());
     let stem = recording.file_stem().unwrap().to_string_lossy();
@@ -90,7 +90,7 @@ fn every_picture_and_the_page_stand_beside_the_recording_under_its_name() {
 }
 
 #[test]
-fn identify_overwrites_neither_pictures_nor_page() {
+fn identify_overwrites_neither_plots_nor_page() {
     let again = Run::of(&[
         "identify",
         "--json",
@@ -104,7 +104,7 @@ fn identify_overwrites_neither_pictures_nor_page() {
 }
 
 #[test]
-fn pictures_say_what_is_along_their_axes_and_in_which_unit() {
+fn labels_axes_with_quantity_and_unit() {
     let labels: [(&str, &[&str]); 5] = [
         (
             "bode",
@@ -119,13 +119,13 @@ fn pictures_say_what_is_along_their_axes_and_in_which_unit() {
             "coherence",
             &[
                 "Coherence (ratio)",
-                "1 less coherence (ratio)",
+                "1 − coherence (ratio)",
                 "Frequency (Hz)",
             ],
         ),
         (
             "nyquist",
-            &["Real part of H (um/A)", "Imaginary part of H (um/A)"],
+            &["Real part of H (µm/A)", "Imaginary part of H (µm/A)"],
         ),
         (
             "pole_zero",
@@ -146,13 +146,13 @@ fn pictures_say_what_is_along_their_axes_and_in_which_unit() {
 }
 
 #[test]
-fn nothing_is_no_number_or_outside_of_its_picture() {
+fn draws_finite_coordinates_within_the_page() {
     for (kind, picture) in run().pictures() {
         for nothing in ["NaN", "inf"] {
             assert!(!picture.contains(nothing), "{kind}: {nothing}");
         }
         // In tenths of a pixel.
-        let (width, height) = size(&picture);
+        let (width, height) = svg::page_size(&picture);
         let inside = |(x, y): &(f64, f64)| (0.0..=width).contains(x) && (0.0..=height).contains(y);
         for element in ["polyline", "polygon"] {
             assert!(
@@ -174,9 +174,10 @@ fn nothing_is_no_number_or_outside_of_its_picture() {
 }
 
 #[test]
-fn every_picture_has_paper_below_its_ink_so_that_it_is_read_on_a_dark_ground_as_well() {
+fn every_plot_has_an_opaque_background_and_a_dark_style() {
     for (kind, picture) in run().pictures() {
-        let (width, height) = size(&picture);
+        assert!(picture.contains("prefers-color-scheme:dark"), "{kind}");
+        let (width, height) = svg::page_size(&picture);
         let first = picture
             .lines()
             .find(|line| !line.starts_with("<svg "))
@@ -196,20 +197,8 @@ fn every_picture_has_paper_below_its_ink_so_that_it_is_read_on_a_dark_ground_as_
     }
 }
 
-fn size(picture: &str) -> (f64, f64) {
-    let view = picture
-        .split("viewBox=\"0 0 ")
-        .nth(1)
-        .unwrap()
-        .split('"')
-        .next()
-        .unwrap();
-    let (width, height) = view.split_once(' ').unwrap();
-    (width.parse().unwrap(), height.parse().unwrap())
-}
-
 #[test]
-fn pictures_and_page_are_well_formed_by_other_programs() {
+fn plots_and_page_are_well_formed_by_other_programs() {
     let answer = &run().answer;
     let mut files: Vec<Value> = PLOT_KINDS
         .iter()
@@ -233,7 +222,7 @@ fn pictures_and_page_are_well_formed_by_other_programs() {
 }
 
 #[test]
-fn the_page_says_the_verdict_and_why_before_anything_else_and_holds_all_of_the_run() {
+fn page_starts_with_verdict_and_reason_and_contains_all_sections() {
     let (page, answer) = (run().page(), &run().answer);
     let at = |text: &str| {
         page.find(text)
@@ -265,7 +254,7 @@ fn the_page_says_the_verdict_and_why_before_anything_else_and_holds_all_of_the_r
 }
 
 #[test]
-fn the_page_needs_nothing_from_elsewhere_and_escapes_the_title() {
+fn page_is_self_contained_and_escapes_the_title() {
     let page = run().page();
     for load in ["src=", "<link", "<script", "@import", "url(", "href="] {
         assert!(!page.contains(load), "{load}");
@@ -281,7 +270,7 @@ fn the_page_needs_nothing_from_elsewhere_and_escapes_the_title() {
 }
 
 #[test]
-fn where_no_mode_is_told_the_page_says_so_and_has_no_map() {
+fn page_without_modes_says_undecided_and_has_no_pole_zero_map() {
     // A millionth of an ampere moves the stage by less than the probe's noise.
     let run = Run::of(&[
         "chirp",

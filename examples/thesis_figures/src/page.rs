@@ -1,7 +1,7 @@
 //! All figures on one page of HTML that needs nothing from elsewhere.
 
 use super::{Comparison, Content, Made, Verdict};
-use bench::report::page::{document, escaped, picture, table};
+use bench::report::html::{document, escaped, picture, table};
 
 /// The page, as an HTML document.
 pub fn page(all: &[Made]) -> String {

@@ -1,323 +1,285 @@
-//! A run of the bench: its model, its loop, its scheduling.
+//! The report of a run of the bench: with its model, its loop, its scheduling and its configuration.
 
 use nalgebra::Complex;
 
-use super::page::{delay_ms, section};
-use super::{Plot, ReportSource, Shown};
-use crate::config::Config;
-use crate::excitation::{swept_words, words};
+use super::page::{delay_ms, named, table_section, with_interval};
+use super::{Plot, PlotKind, RecordReport};
 use crate::experiment::{Analysis, ClosedResponses};
-use crate::identify::Unit;
 use crate::identify::linearity::Linearity;
-use crate::identify::modal::{Estimate, MeasurementChain, SIGMAS_95};
+use crate::identify::modal::MeasurementChain;
+use crate::identify::{Frf, Unit};
 use crate::recording::Recording;
-use crate::report::number::interval;
-use crate::report::page::{escaped, facts, row};
-use crate::report::{Curve, LevelLines, ReportError, Trace, bode_svg, levels_svg};
+use crate::recording::messages::Timing;
+use crate::report::html::{escaped, facts, row, section};
+use crate::report::number::angular_frequency;
+use crate::report::{DistortionLevels, ReportError, Trace, bode_svg, distortion_svg};
 
-const HERTZ: f64 = 2.0 * std::f64::consts::PI;
+/// Entries of the recording's metadata that the page shows.
+const METADATA: [&str; 10] = [
+    "program",
+    "host",
+    "kernel",
+    "pace",
+    "policy",
+    "memory_locked",
+    "cpu",
+    "refused",
+    "amplifier",
+    "probe",
+];
 
-/// A run that was analysed.
-#[derive(Clone, Copy, Debug)]
-pub struct RunReport<'a> {
-    /// What it shows.
+/// An analysed run.
+#[derive(Clone, Debug)]
+pub struct BenchRun<'a> {
+    /// Its analysis.
     pub analysis: &'a Analysis,
-    /// What it was made with.
-    pub config: &'a Config,
-    /// Where it was recorded.
+    /// Its recording.
     pub recording: &'a Recording,
+    /// What lies between set-point and reading beside the mechanics.
+    pub chain: MeasurementChain,
+    /// Title of the configuration.
+    pub title: String,
+    /// How the stage was excited.
+    pub excitation: String,
+    /// Ticks per second.
+    pub rate_hz: f64,
 }
 
-impl RunReport<'_> {
-    /// What was excited, and when, in two lines.
-    fn subtitle(&self) -> String {
+impl<'a> BenchRun<'a> {
+    /// The report of the run.
+    ///
+    /// # Errors
+    /// When a response is invalid, or drawing fails.
+    pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
+        let analysis = self.analysis;
+        let file = self.recording.path().file_name().unwrap_or_default();
+        Ok(RecordReport {
+            title: self.title.clone(),
+            subtitle: self
+                .subtitle("current set-point to displacement, with hold, amplifier and delay"),
+            record: format!("Recording {}", file.to_string_lossy()),
+            unit: Unit::MetresPerAmpere,
+            residue_unit: "1/kg".into(),
+            frf: &analysis.frf,
+            model: Some(&analysis.model),
+            chain: self.chain.clone(),
+            fit: analysis.fit.as_ref().ok(),
+            verdict: &analysis.verdict,
+            judged_up_to_rad_s: analysis.judged_up_to_rad_s,
+            evidence: evidence(analysis),
+            further_plots: self.further_plots()?,
+            before_plots: analysis.closed.as_ref().map_or_else(String::new, margins),
+            after_plots: self.scheduling() + &self.configuration(),
+        })
+    }
+
+    /// What is shown, excitation and time, in two lines.
+    fn subtitle(&self, shown: &str) -> String {
+        let (excitation, rate_hz) = (&self.excitation, self.rate_hz);
         format!(
-            "current set-point to displacement, with hold, amplifier and delay;\n{}",
-            self.occasion()
+            "{shown};\n{excitation} at {rate_hz} Hz; {}",
+            self.metadata("started")
         )
     }
 
-    /// How the stage was excited, and when.
-    fn occasion(&self) -> String {
-        let how = match self.analysis.closed {
-            Some(_) => swept_words(self.config),
-            None => words(self.config),
-        };
-        format!(
-            "{how} at {} Hz; {}",
-            self.config.servo.rate_hz,
-            self.said("started")
-        )
-    }
-
-    /// What the recording says of itself under a name.
-    fn said(&self, name: &str) -> &str {
+    /// An entry of the recording's metadata; empty if it is missing.
+    fn metadata(&self, name: &str) -> &str {
         self.recording
             .metadata()
             .get(name)
             .map_or("", String::as_str)
     }
-}
 
-impl ReportSource for RunReport<'_> {
-    fn shown(&self) -> Shown<'_> {
-        Shown {
-            title: self.config.title.clone(),
-            subtitle: self.subtitle(),
-            unit: Unit::MetresPerAmpere,
-            residue_unit: "1/kg".into(),
-            frf: &self.analysis.frf,
-            model: Some(&self.analysis.model),
-            chain: MeasurementChain::bench(self.config),
-            fit: self.analysis.fit.as_ref().ok(),
-            verdict: &self.analysis.verdict,
-            judged_up_to_rad_s: self.analysis.judged_up_to_rad_s,
-        }
-    }
-
-    fn record(&self) -> String {
-        format!(
-            "Recording {}",
-            self.recording
-                .path()
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-        )
-    }
-
-    fn evidence(&self) -> Vec<(String, String)> {
-        let analysis = self.analysis;
-        let fitted = analysis
-            .fit
-            .as_ref()
-            .ok()
-            .map(|fit| delay_ms(fit.delay_s()));
-        let by_phase = analysis.excess_delay.map(delay_ms);
-        let linearity = analysis.linearity.as_ref();
-        let pairs = [
-            (
-                "Delay by the configuration",
-                Some(format!("{:.4} ms", 1e3 * analysis.delay_s)),
-            ),
-            ("Delay beyond it, by the fit", fitted),
-            ("Delay beyond it, by the phases", by_phase),
-            (
-                "Coherence",
-                linearity.map(|linearity| linearity.why.clone()),
-            ),
-        ];
-        pairs
-            .into_iter()
-            .filter_map(|(name, text)| Some((name.to_string(), text?)))
-            .collect()
-    }
-
-    fn more_pictures(&self) -> Result<Vec<Plot>, ReportError> {
-        let mut all = Vec::new();
+    fn further_plots(&self) -> Result<Vec<Plot>, ReportError> {
+        let mut plots = Vec::new();
         if let Some(closed) = &self.analysis.closed {
-            all.extend(around(self, closed)?);
+            plots.push(self.loop_plot(closed)?);
+            plots.push(self.sensitivity_plot(closed)?);
         }
         if let Some(linearity) = &self.analysis.linearity {
-            all.push(levels(self, linearity)?);
+            plots.push(self.distortion_plot(linearity)?);
         }
-        Ok(all)
+        Ok(plots)
     }
 
-    fn sections(&self) -> (String, String) {
-        (margins(self), loop_facts(self) + &configuration(self))
+    fn loop_plot(&self, closed: &ClosedResponses) -> Result<Plot, ReportError> {
+        let measured = Trace::measured("L measured", &closed.loop_gain);
+        let model = model_trace("L by the model", &closed.loop_gain, &closed.model_loop);
+        Ok(Plot {
+            kind: PlotKind::Loop,
+            heading: "Loop",
+            caption: "L = P C from error to displacement: measured, with a band of two sigma, and by the model.".into(),
+            svg: self.loop_bode(&[measured, model])?,
+        })
+    }
+
+    fn sensitivity_plot(&self, closed: &ClosedResponses) -> Result<Plot, ReportError> {
+        let by_model = |of: fn(Complex<f64>) -> Complex<f64>| {
+            closed.model_loop.iter().map(|l| of(*l)).collect()
+        };
+        let sensitivity: Vec<_> = by_model(|l| (l + 1.0).inv());
+        let complementary: Vec<_> = by_model(|l| l / (l + 1.0));
+        let traces = [
+            Trace::measured("S measured", &closed.sensitivity),
+            Trace::measured("T measured", &closed.complementary),
+            model_trace("S by the model", &closed.loop_gain, &sensitivity),
+            model_trace("T by the model", &closed.loop_gain, &complementary),
+        ];
+        Ok(Plot {
+            kind: PlotKind::Sensitivity,
+            heading: "Sensitivities",
+            caption: "S from reference to error and T from reference to displacement. The peak of S is the inverse of the \
+                      modulus margin."
+                .into(),
+            svg: self.loop_bode(&traces)?,
+        })
+    }
+
+    fn loop_bode(&self, traces: &[Trace]) -> Result<String, ReportError> {
+        let subtitle = self.subtitle("the sampled loop, with hold, amplifier and delay");
+        bode_svg(Unit::Bare, traces, &self.title, &subtitle)
+    }
+
+    fn distortion_plot(&self, linearity: &Linearity) -> Result<Plot, ReportError> {
+        let harmonics = &linearity.harmonics;
+        let periods = harmonics.periods;
+        let levels = DistortionLevels {
+            output: &harmonics.excited,
+            odd: &harmonics.odd,
+            even: &harmonics.even,
+            periods,
+        };
+        let caption = format!(
+            "RMS of the displacement at each line, mean of {periods} periods: excited lines, and odd and even lines that are not \
+             excited, averaged over neighbours. Without distortion the latter lie on the noise of the mean. {}.",
+            linearity.why
+        );
+        let subtitle = self.subtitle("displacement by frequency");
+        Ok(Plot {
+            kind: PlotKind::Linearity,
+            heading: "Distortion and noise",
+            caption,
+            svg: distortion_svg(&levels, &self.title, &subtitle)?,
+        })
+    }
+
+    /// How the loop was scheduled, and what it recorded.
+    fn scheduling(&self) -> String {
+        let recording = self.recording;
+        let metadata = METADATA.map(|name| (label(name), self.metadata(name).to_string()));
+        let counts = [
+            ("Ticks", recording.tick_count()),
+            ("Overruns", recording.overruns()),
+            ("Lost records", recording.lost_records()),
+            ("Missing ticks filled in", self.analysis.filled_ticks),
+        ];
+        let counts = counts.map(|(name, count)| (name.to_string(), count.to_string()));
+        let mut pairs: Vec<_> = metadata
+            .into_iter()
+            .filter(|(_, text)| !text.is_empty())
+            .collect();
+        pairs.extend(counts);
+        pairs.extend(self.lateness());
+        section("The loop", &facts(&pairs))
+    }
+
+    /// The largest wake-up latency and computation time; none at virtual pace, which has no clock.
+    fn lateness(&self) -> Vec<(String, String)> {
+        if self.metadata("pace") == "virtual" {
+            return Vec::new();
+        }
+        let timings = self.recording.timings();
+        let largest = |of: fn(&Timing) -> u64| timings.iter().map(of).max().unwrap_or(0);
+        let us = |ns: u64| Some(format!("{:.1} µs", ns as f64 / 1e3));
+        named([
+            (
+                "Largest wake-up latency",
+                us(largest(|timing| timing.lateness_max_ns)),
+            ),
+            (
+                "Longest computation",
+                us(largest(|timing| timing.compute_max_ns)),
+            ),
+        ])
+    }
+
+    fn configuration(&self) -> String {
+        let Some(toml) = self.recording.config_toml() else {
+            return String::new();
+        };
+        let (title, toml) = (escaped(&self.title), escaped(toml));
+        let details = format!(
+            "<details><summary>{title}</summary>\n<pre><code>{toml}</code></pre>\n</details>\n"
+        );
+        section("Configuration", &details)
     }
 }
 
-/// The loop and its sensitivities, measured over model.
-fn around(run: &RunReport<'_>, closed: &ClosedResponses) -> Result<[Plot; 2], ReportError> {
-    let frequency_hz = &closed.loop_gain.frequency_hz;
-    let by_model = |of: fn(Complex<f64>) -> Complex<f64>| {
-        closed.model_loop.iter().map(|l| of(*l)).collect::<Vec<_>>()
-    };
-    let (sensitivity, complementary) = (by_model(|l| (l + 1.0).inv()), by_model(|l| l / (l + 1.0)));
-    let measured = |name, frf| Trace {
-        name,
-        curve: Curve::Measured(frf),
-    };
-    let model = |name, response| Trace {
-        name,
-        curve: Curve::Model {
-            frequency_hz,
-            response,
-        },
-    };
-    let picture = |kind, heading, caption: &str, traces: &[Trace]| {
-        let subtitle = format!(
-            "the loop as sampled, with hold, amplifier and delay;\n{}",
-            run.occasion()
-        );
-        let svg = bode_svg(Unit::Bare, traces, &run.config.title, &subtitle)?;
-        Ok(Plot {
-            kind,
-            heading,
-            caption: caption.into(),
-            svg,
-        })
-    };
-    Ok([
-        picture(
-            "loop",
-            "Loop",
-            "L = P C from error to displacement, measured with its band of two sigma, and by the model.",
-            &[
-                measured("L measured", &closed.loop_gain),
-                model("L by the model", &closed.model_loop),
-            ],
-        )?,
-        picture(
-            "sensitivity",
-            "Sensitivities",
-            "S from reference to error and T from reference to displacement. The peak of S is the inverse of the modulus margin.",
-            &[
-                measured("S measured", &closed.sensitivity),
-                measured("T measured", &closed.complementary),
-                model("S by the model", &sensitivity),
-                model("T by the model", &complementary),
-            ],
-        )?,
+fn model_trace<'a>(name: &'a str, frf: &'a Frf, response: &'a [Complex<f64>]) -> Trace<'a> {
+    Trace::model(name, &frf.frequency_hz, response)
+}
+
+fn evidence(analysis: &Analysis) -> Vec<(String, String)> {
+    let configured = format!("{:.4} ms", 1e3 * analysis.delay_s);
+    let fitted = analysis
+        .fit
+        .as_ref()
+        .ok()
+        .map(|fit| delay_ms(fit.delay_s()));
+    let by_phase = analysis.excess_delay.map(delay_ms);
+    let linearity = analysis.linearity.as_ref();
+    let coherence = linearity.map(|linearity| linearity.why.clone());
+    named([
+        ("Delay of the configuration", Some(configured)),
+        ("Excess delay by the fit", fitted),
+        ("Excess delay by the phases", by_phase),
+        ("Coherence", coherence),
     ])
 }
 
-/// Output, noise and distortion, line by line.
-fn levels(run: &RunReport<'_>, linearity: &Linearity) -> Result<Plot, ReportError> {
-    let harmonics = &linearity.harmonics;
-    let periods = harmonics.periods;
-    let lines = LevelLines {
-        output: &harmonics.excited,
-        odd: &harmonics.odd,
-        even: &harmonics.even,
-        periods,
-    };
-    Ok(Plot {
-        kind: "linearity",
-        heading: "Distortion and noise",
-        caption: format!(
-            "RMS of the displacement a line, of the mean of {periods} periods: at the lines that were excited, and at the odd and even \
-             ones that were left out, averaged over neighbours. Without distortion these lie on the noise of the mean. {}.",
-            linearity.why.clone()
-        ),
-        svg: levels_svg(&lines, &run.config.title, &run.subtitle())?,
-    })
-}
-
-/// What the measured loop dares, beside the model.
-fn margins(run: &RunReport<'_>) -> String {
-    let Some(closed) = &run.analysis.closed else {
-        return String::new();
-    };
+/// Measured and predicted margins of the closed loop.
+fn margins(closed: &ClosedResponses) -> String {
     let (measured, predicted) = (&closed.margins, &closed.predicted);
-    let hz = |w: Option<f64>| {
-        w.map_or("none in the band".into(), |w| {
-            format!("{:.2} Hz", w / HERTZ)
-        })
-    };
-    let deg =
-        |text: Option<String>| text.map_or("none in the band".into(), |text| format!("{text} deg"));
-    let known = |e: Estimate| interval(e.value, SIGMAS_95 * e.sigma);
-    let header = ["", "Measured", "By the model"];
+    let or_none = |text: Option<String>| text.unwrap_or_else(|| "none in the band".into());
+    let crossover = |omega: Option<f64>| or_none(omega.map(angular_frequency));
+    let degrees = |text: Option<String>| or_none(text.map(|text| format!("{text} deg")));
     let rows = [
         row(&[
             "Crossover".into(),
-            hz(measured.crossover_rad_s),
-            hz(predicted.crossover_rad_s),
+            crossover(measured.crossover_rad_s),
+            crossover(predicted.crossover_rad_s),
         ]),
         row(&[
             "Phase margin".into(),
-            deg(measured.phase_margin_deg.map(known)),
-            deg(predicted
-                .phase_margin_deg
-                .map(|margin| format!("{margin:.2}"))),
+            degrees(
+                measured
+                    .phase_margin_deg
+                    .map(|margin| with_interval(margin, 1.0)),
+            ),
+            degrees(
+                predicted
+                    .phase_margin_deg
+                    .map(|margin| format!("{margin:.2}")),
+            ),
         ]),
         row(&[
             "Modulus margin".into(),
-            known(measured.modulus_margin),
+            with_interval(measured.modulus_margin, 1.0),
             format!("{:.4}", predicted.modulus_margin),
         ]),
     ];
-    let words = "The phase margin measured is that at the crossover, the one by the model the smallest of all. Intervals hold the truth \
-                 with 95 %.";
-    section("The closed loop", words, &header, &rows.concat())
-}
-
-/// How the loop was scheduled and what it kept.
-fn loop_facts(run: &RunReport<'_>) -> String {
-    let recording = run.recording;
-    let counted = |count: u64| count.to_string();
-    let told = [
-        "program",
-        "host",
-        "kernel",
-        "pace",
-        "policy",
-        "memory_locked",
-        "cpu",
-        "refused",
-        "amplifier",
-        "probe",
-    ];
-    let told = told.map(|name| (capital(name), run.said(name).to_string()));
-    let kept = [
-        ("Ticks".into(), counted(recording.tick_count())),
-        ("Overruns".into(), counted(recording.overruns())),
-        ("Lost records".into(), counted(recording.lost_records())),
-        ("Ticks filled in".into(), counted(run.analysis.filled_ticks)),
-    ];
-    let pairs: Vec<_> = told
-        .into_iter()
-        .filter(|(_, text)| !text.is_empty())
-        .chain(kept)
-        .chain(lateness(run))
-        .collect();
-    format!(
-        "<section>\n<h2>The loop</h2>\n{}</section>\n",
-        facts(&pairs)
+    let text = "The measured phase margin is that at the crossover, the predicted one the smallest of all crossings. ± is the \
+                95 % confidence interval.";
+    table_section(
+        "The closed loop",
+        text,
+        &["", "Measured", "By the model"],
+        &rows.concat(),
     )
-}
-
-/// The worst over the run, where there was a clock.
-fn lateness(run: &RunReport<'_>) -> Vec<(String, String)> {
-    if run.said("pace") == "virtual" {
-        return Vec::new();
-    }
-    let timings = run.recording.timings();
-    let worst = |of: fn(&crate::recording::messages::Timing) -> u64| {
-        timings.iter().map(of).max().unwrap_or(0)
-    };
-    let us = |ns: u64| format!("{:.1} us", ns as f64 / 1e3);
-    vec![
-        ("Latest wake".into(), us(worst(|t| t.lateness_max_ns))),
-        (
-            "Longest computation".into(),
-            us(worst(|t| t.compute_max_ns)),
-        ),
-    ]
 }
 
 /// `memory_locked` as `Memory locked`.
-fn capital(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or(String::new(), |first| {
-        first
-            .to_uppercase()
-            .chain(letters)
-            .collect::<String>()
-            .replace('_', " ")
-    })
-}
-
-fn configuration(run: &RunReport<'_>) -> String {
-    let Some(toml) = run.recording.config_toml() else {
-        return String::new();
-    };
-    format!(
-        "<section>\n<h2>Configuration</h2>\n<details><summary>{}</summary>\n<pre><code>{}</code></pre>\n</details>\n</section>\n",
-        escaped(&run.config.title),
-        escaped(toml)
-    )
+fn label(name: &str) -> String {
+    let (first, rest) = name.split_at(1);
+    first.to_uppercase() + &rest.replace('_', " ")
 }

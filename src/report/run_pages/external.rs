@@ -1,17 +1,16 @@
-//! A record of other hands: no model, and no loop of ours.
+//! The report of an external record: without model and loop.
 
-use super::page::delay_ms;
-use super::{Plot, ReportSource, Shown};
+use super::RecordReport;
+use super::page::{delay_ms, named};
 use crate::experiment::ExternalAnalysis;
 use crate::identify::Unit;
 use crate::identify::modal::MeasurementChain;
-use crate::report::ReportError;
-use crate::report::page::facts;
+use crate::report::html::{facts, section};
 
-/// A table of samples that was analysed.
+/// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]
-pub struct TableReport<'a> {
-    /// What it shows.
+pub struct ExternalRecord<'a> {
+    /// Its analysis.
     pub analysis: &'a ExternalAnalysis,
     /// Name of the file.
     pub file: &'a str,
@@ -19,64 +18,47 @@ pub struct TableReport<'a> {
     pub input: &'a str,
     /// Column of the output.
     pub output: &'a str,
-    /// Samples a second.
+    /// Samples per second.
     pub rate_hz: f64,
-    /// How many there are.
+    /// Number of samples.
     pub samples: usize,
 }
 
-impl ReportSource for TableReport<'_> {
-    fn shown(&self) -> Shown<'_> {
-        Shown {
+impl<'a> ExternalRecord<'a> {
+    /// The report of the record.
+    pub fn report(&self) -> RecordReport<'a> {
+        let (analysis, input, output) = (self.analysis, self.input, self.output);
+        let fit = analysis.fit.as_ref().ok();
+        RecordReport {
             title: self.file.to_string(),
-            subtitle: format!(
-                "{} to {}; units are those of the columns",
-                self.input, self.output
-            ),
+            subtitle: format!("{input} to {output}, in the units of the columns"),
+            record: format!("{} samples at {} Hz", self.samples, self.rate_hz),
             unit: Unit::Bare,
-            residue_unit: format!("{} per {} and s^2", self.output, self.input),
-            frf: &self.analysis.frf,
+            residue_unit: format!("{output} per {input} and s^2"),
+            frf: &analysis.frf,
             model: None,
             chain: MeasurementChain::Direct,
-            fit: self.analysis.fit.as_ref().ok(),
-            verdict: &self.analysis.verdict,
-            judged_up_to_rad_s: self.analysis.judged_up_to_rad_s,
+            fit,
+            verdict: &analysis.verdict,
+            judged_up_to_rad_s: analysis.judged_up_to_rad_s,
+            evidence: named([("Delay by the fit", fit.map(|fit| delay_ms(fit.delay_s())))]),
+            further_plots: Vec::new(),
+            before_plots: String::new(),
+            after_plots: self.description(),
         }
     }
 
-    fn record(&self) -> String {
-        format!("{} samples at {} Hz", self.samples, self.rate_hz)
-    }
-
-    fn evidence(&self) -> Vec<(String, String)> {
-        let fit = self.analysis.fit.as_ref().ok();
-        fit.map(|fit| ("Delay by the fit".into(), delay_ms(fit.delay_s())))
-            .into_iter()
-            .collect()
-    }
-
-    fn more_pictures(&self) -> Result<Vec<Plot>, ReportError> {
-        Ok(Vec::new())
-    }
-
-    fn sections(&self) -> (String, String) {
-        let periods = self
-            .analysis
-            .periods
-            .map(|count| ("Periods averaged".to_string(), count.to_string()));
-        let pairs = [
-            ("Input".to_string(), self.input.to_string()),
-            ("Output".to_string(), self.output.to_string()),
-            ("Samples".to_string(), self.samples.to_string()),
-            ("Rate".to_string(), format!("{} Hz", self.rate_hz)),
-        ];
-        let pairs: Vec<_> = pairs.into_iter().chain(periods).collect();
-        (
-            String::new(),
-            format!(
-                "<section>\n<h2>The record</h2>\n{}</section>\n",
-                facts(&pairs)
+    fn description(&self) -> String {
+        let pairs = named([
+            ("Input", Some(self.input.to_string())),
+            ("Output", Some(self.output.to_string())),
+            ("Samples", Some(self.samples.to_string())),
+            ("Rate", Some(format!("{} Hz", self.rate_hz))),
+            (
+                "Periods averaged",
+                self.analysis.periods.map(|count| count.to_string()),
             ),
-        )
+        ]);
+        section("The record", &facts(&pairs))
     }
 }

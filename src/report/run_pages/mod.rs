@@ -1,9 +1,9 @@
-//! What a person gets of a record: its pictures, and one page with all of them that needs nothing from elsewhere.
+//! Plots and HTML page of one analysed record.
 //!
 //! ```text
-//! experiment::Analysis, config, recording ---------> RunReport   --.
-//!                                                                  ReportSource -> pictures (report::*) -> page (report::page)
-//! experiment::ExternalAnalysis, what was measured --> TableReport --'
+//! BenchRun (a run of the bench) -------.
+//!                                       > RecordReport -> plots (SVG) -> page (HTML)
+//! ExternalRecord (a CSV) --------------'
 //! ```
 
 mod bench_run;
@@ -11,13 +11,52 @@ mod external;
 mod outputs;
 mod page;
 mod plots;
-mod summary;
 
-pub use bench_run::RunReport;
-pub use external::TableReport;
+use nalgebra::Complex;
+
+use crate::identify::modal::{MeasurementChain, ModalFit};
+use crate::identify::verdict::Verdict;
+use crate::identify::{Frf, Unit};
+
+pub use bench_run::BenchRun;
+pub use external::ExternalRecord;
 pub use outputs::{
     AnalysisOutputs, AnalysisStatus, LoopOutputs, ModalSummary, OutputError, PageFiles, write_frf,
 };
 pub use page::page;
-pub use plots::{PLOT_KINDS, Plot, pictures};
-pub use summary::{ReportSource, Shown};
+pub use plots::{Plot, PlotKind, plots};
+
+/// What a report shows of an analysed record.
+#[derive(Clone, Debug)]
+pub struct RecordReport<'a> {
+    /// Title of the page and of the plots.
+    pub title: String,
+    /// Input and output, excitation and time.
+    pub subtitle: String,
+    /// Name or extent of the record.
+    pub record: String,
+    /// Unit of the response.
+    pub unit: Unit,
+    /// Unit of a residue.
+    pub residue_unit: String,
+    /// The measured response.
+    pub frf: &'a Frf,
+    /// The response of the model at the same frequencies, if there is a model.
+    pub model: Option<&'a [Complex<f64>]>,
+    /// What lies between set-point and reading beside the mechanics.
+    pub chain: MeasurementChain,
+    /// The fitted modes, if the fit succeeded.
+    pub fit: Option<&'a ModalFit>,
+    /// The verdict about CNMP zeros.
+    pub verdict: &'a Verdict,
+    /// Modes and zeros up to here count for the verdict, in rad/s.
+    pub judged_up_to_rad_s: f64,
+    /// Further figures that support the verdict, by name.
+    pub evidence: Vec<(String, String)>,
+    /// Plots after those that every record has.
+    pub further_plots: Vec<Plot>,
+    /// HTML sections before the plots.
+    pub before_plots: String,
+    /// HTML sections after the plots.
+    pub after_plots: String,
+}

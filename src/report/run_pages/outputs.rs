@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::bench_run::RunReport;
+use super::RecordReport;
+use super::bench_run::BenchRun;
 use super::page::page;
-use super::plots::{PLOT_KINDS, pictures};
-use super::summary::ReportSource;
+use super::plots::{PlotKind, plots};
 use crate::experiment::{Analysis, ClosedResponses};
 use crate::identify::Frf;
 use crate::identify::frf_csv::{self, FrfCsvError, METRES_PER_AMPERE, RATIO};
@@ -48,10 +48,9 @@ pub struct PageFiles {
 
 impl Default for PageFiles {
     fn default() -> Self {
-        let plots = PLOT_KINDS.into_iter().map(|kind| (kind, None)).collect();
         PageFiles {
             plot: None,
-            plots,
+            plots: PlotKind::ALL.map(|kind| (kind.name(), None)).into(),
             report: None,
         }
     }
@@ -62,20 +61,16 @@ impl PageFiles {
     ///
     /// # Errors
     /// When a plot cannot be drawn, or a file cannot be written.
-    pub fn write(source: &dyn ReportSource, beside: &Path) -> Result<PageFiles, OutputError> {
-        let pictures = pictures(source)?;
+    pub fn write(report: &RecordReport<'_>, beside: &Path) -> Result<PageFiles, OutputError> {
+        let plots = plots(report)?;
         let mut files = PageFiles::default();
-        for picture in &pictures {
-            let path = write_text(beside, picture.kind, "svg", &picture.svg)?;
-            files.plots.insert(picture.kind, Some(path));
+        for plot in &plots {
+            let path = write_text(beside, plot.kind.name(), "svg", &plot.svg)?;
+            files.plots.insert(plot.kind.name(), Some(path));
         }
         files.plot = files.plots.get("bode").cloned().flatten();
-        files.report = Some(write_text(
-            beside,
-            "report",
-            "html",
-            &page(source, &pictures),
-        )?);
+        let page = page(report, &plots);
+        files.report = Some(write_text(beside, "report", "html", &page)?);
         Ok(files)
     }
 }
@@ -238,7 +233,7 @@ impl AnalysisOutputs {
     ///
     /// # Errors
     /// When a plot cannot be drawn, or a file cannot be written.
-    pub fn write(run: &RunReport<'_>, beside: &Path) -> Result<AnalysisOutputs, OutputError> {
+    pub fn write(run: &BenchRun<'_>, beside: &Path) -> Result<AnalysisOutputs, OutputError> {
         let analysis = run.analysis;
         let without_delay = analysis.frf.without_delay(analysis.measured_delay_s());
         let frf_csv = write_frf(beside, "frf", &analysis.frf, METRES_PER_AMPERE)?;
@@ -248,7 +243,7 @@ impl AnalysisOutputs {
             &without_delay,
             METRES_PER_AMPERE,
         )?;
-        let pages = PageFiles::write(run, beside)?;
+        let pages = PageFiles::write(&run.report()?, beside)?;
         let closed = analysis.closed.as_ref();
         Ok(AnalysisOutputs {
             frf_csv: Some(frf_csv),

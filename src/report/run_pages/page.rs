@@ -1,122 +1,125 @@
 //! The page of a record: the verdict and its reasons first.
 
-use super::{Plot, ReportSource, Shown};
+use std::f64::consts::TAU;
+
+use super::{Plot, RecordReport};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::identify::verdict::UncertainZero;
+use crate::report::html::{document, escaped, facts, note, picture, row, section, table};
 use crate::report::number::{interval, percent};
-use crate::report::page::{document, escaped, facts, picture, row, table};
 
-const HERTZ: f64 = 2.0 * std::f64::consts::PI;
-
-/// The page, as an HTML document.
-pub fn page(record: &dyn ReportSource, pictures: &[Plot]) -> String {
-    let shown = record.shown();
-    let (before, behind) = record.sections();
-    let pictures: String = pictures
-        .iter()
-        .map(|p| {
-            format!(
-                "<section>\n<h2>{}</h2>\n{}</section>\n",
-                escaped(p.heading),
-                picture(&p.svg, p.heading, &p.caption)
-            )
-        })
-        .collect();
-    let body = format!(
-        "<h1>{}</h1>\n<p class=\"quiet\">{}<br>{}</p>\n{}{}{}{before}{pictures}{behind}",
-        escaped(&shown.title),
-        escaped(&shown.subtitle),
-        escaped(&record.record()),
-        verdict(&shown, record),
-        modes(&shown),
-        zeros(&shown),
-    );
-    document(&shown.title, &body)
-}
-
-fn verdict(shown: &Shown<'_>, record: &dyn ReportSource) -> String {
-    let name = shown.verdict.cnmp.name();
-    let all: Vec<_> = evidence(shown)
-        .into_iter()
-        .chain(record.evidence())
-        .collect();
-    format!(
-        "<section>\n<h2>Complex non-minimum phase zeros</h2>\n<p class=\"verdict {name}\"><strong>{name}</strong><br>{}</p>\n{}</section>\n",
-        escaped(&shown.verdict.why),
-        facts(&all)
-    )
-}
-
-/// The numbers that a verdict rests on.
-fn evidence(shown: &Shown<'_>) -> Vec<(String, String)> {
-    let judged = format!("{:.1} Hz", shown.judged_up_to_rad_s / HERTZ);
-    let power = shown
-        .fit
-        .map(|fit| format!("{:.3} times that of the noise", fit.chi2_per_freedom));
-    let fall = shown.verdict.phase.map(|p| {
-        format!(
-            "{:.1} deg beyond what the magnitude asks for",
-            -p.excess_phase_deg
-        )
-    });
-    let pairs = [
-        ("Judged up to", Some(judged)),
-        ("Power that the fit leaves", power),
-        ("Fall of the phase", fall),
+/// The page as an HTML document.
+pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
+    let plots: String = plots.iter().map(plot).collect();
+    let body = [
+        heading(report),
+        verdict(report),
+        modes(report),
+        zeros(report),
+        report.before_plots.clone(),
+        plots,
+        report.after_plots.clone(),
     ];
-    pairs
-        .into_iter()
-        .filter_map(|(name, text)| Some((name.to_string(), text?)))
-        .collect()
+    document(&report.title, &body.concat())
 }
 
-/// A delay in milliseconds with its interval.
-pub(super) fn delay_ms(delay_s: Estimate) -> String {
-    format!(
-        "{} ms",
-        interval(1e3 * delay_s.value, 1e3 * SIGMAS_95 * delay_s.sigma)
+fn heading(report: &RecordReport<'_>) -> String {
+    let (title, subtitle) = (escaped(&report.title), escaped(&report.subtitle));
+    let record = escaped(&report.record);
+    format!("<h1>{title}</h1>\n<p class=\"quiet\">{subtitle}<br>{record}</p>\n")
+}
+
+fn plot(plot: &Plot) -> String {
+    section(
+        plot.heading,
+        &picture(&plot.svg, plot.heading, &plot.caption),
     )
 }
 
-fn modes(shown: &Shown<'_>) -> String {
-    let Some(fit) = shown.fit else {
+fn verdict(report: &RecordReport<'_>) -> String {
+    let name = report.verdict.cnmp.name();
+    let why = escaped(&report.verdict.why);
+    let evidence = [evidence(report), report.evidence.clone()].concat();
+    let text = format!("<p class=\"verdict {name}\"><strong>{name}</strong><br>{why}</p>\n");
+    section(
+        "Complex non-minimum phase zeros",
+        &(text + &facts(&evidence)),
+    )
+}
+
+/// The figures that every verdict rests on.
+fn evidence(report: &RecordReport<'_>) -> Vec<(String, String)> {
+    let limit = format!("{:.1} Hz", report.judged_up_to_rad_s / TAU);
+    let chi2 = report.fit.map(|fit| format!("{:.3}", fit.chi2_per_freedom));
+    let lag = report
+        .verdict
+        .phase
+        .map(|phase| format!("{:.1} deg", -phase.excess_phase_deg));
+    named([
+        ("Upper limit of the verdict", Some(limit)),
+        ("Reduced chi-square of the fit", chi2),
+        (
+            "Phase lag beyond that of a minimum-phase system of this magnitude",
+            lag,
+        ),
+    ])
+}
+
+/// The pairs that have a value.
+pub(super) fn named<const N: usize>(pairs: [(&str, Option<String>); N]) -> Vec<(String, String)> {
+    let with_value = |(name, value): (&str, Option<String>)| Some((name.to_string(), value?));
+    pairs.into_iter().filter_map(with_value).collect()
+}
+
+/// An estimate with its 95 % interval.
+pub(super) fn with_interval(estimate: Estimate, factor: f64) -> String {
+    interval(estimate.value * factor, SIGMAS_95 * estimate.sigma * factor)
+}
+
+/// A delay in milliseconds with its 95 % interval.
+pub(super) fn delay_ms(delay_s: Estimate) -> String {
+    format!("{} ms", with_interval(delay_s, 1e3))
+}
+
+/// A section with a note and a table.
+pub(super) fn table_section(heading: &str, text: &str, header: &[&str], rows: &str) -> String {
+    section(heading, &(note(text) + &table(header, rows)))
+}
+
+fn modes(report: &RecordReport<'_>) -> String {
+    let Some(fit) = report.fit else {
         return String::new();
     };
-    let residue = escaped(&format!("Residue ({})", shown.residue_unit));
+    let residue = format!("Residue ({})", report.residue_unit);
     let header = [
         "Frequency (Hz)",
-        "Damping (%)",
+        "Damping ratio",
         &residue,
         "Sign",
-        "Other sign",
+        "Probability of the other sign",
     ];
-    let rows: String = fit.modes().iter().map(mode).collect();
-    section(
+    let rows: String = fit.modes().iter().map(mode_row).collect();
+    table_section(
         "Modes",
-        "Intervals hold the truth with 95 %; beside the sign the probability that it is the other one.",
+        "± is the 95 % confidence interval.",
         &header,
         &rows,
     )
 }
 
-fn mode(mode: &FittedMode) -> String {
-    let scaled =
-        |e: Estimate, factor: f64| interval(e.value * factor, SIGMAS_95 * e.sigma * factor);
+fn mode_row(mode: &FittedMode) -> String {
+    let sign = if mode.sign() == '+' { "+" } else { "\u{2212}" };
     row(&[
-        scaled(mode.omega_rad_s, 1.0 / HERTZ),
-        scaled(mode.damping_ratio, 100.0),
-        scaled(mode.residue_per_kg, 1.0),
-        if mode.sign() == '+' {
-            "+".into()
-        } else {
-            "\u{2212}".into()
-        },
+        with_interval(mode.omega_rad_s, 1.0 / TAU),
+        with_interval(mode.damping_ratio, 1.0),
+        with_interval(mode.residue_per_kg, 1.0),
+        sign.into(),
         percent(mode.sign_error_probability()),
     ])
 }
 
-fn zeros(shown: &Shown<'_>) -> String {
-    let zeros = &shown.verdict.zeros;
+fn zeros(report: &RecordReport<'_>) -> String {
+    let zeros = &report.verdict.zeros;
     if zeros.is_empty() {
         return String::new();
     }
@@ -125,21 +128,18 @@ fn zeros(shown: &Shown<'_>) -> String {
         "Real part (rad/s)",
         "Imaginary part (rad/s)",
         "Kind",
-        "Right of the axis",
+        "Probability right of the imaginary axis",
     ];
-    let words = "Of the fit, up to where it is judged; of a conjugate pair the one above the real axis. Intervals hold each part with 95 %.";
-    section(
-        "Zeros",
-        words,
-        &header,
-        &zeros.iter().map(zero).collect::<String>(),
-    )
+    let text = "Zeros of the fit up to the limit of the verdict; of a conjugate pair the one above the real axis. ± is the \
+                95 % confidence interval.";
+    let rows: String = zeros.iter().map(zero_row).collect();
+    table_section("Zeros", text, &header, &rows)
 }
 
-fn zero(zero: &UncertainZero) -> String {
+fn zero_row(zero: &UncertainZero) -> String {
     let part = |value: f64, k: usize| interval(value, SIGMAS_95 * zero.covariance[k][k].sqrt());
     row(&[
-        format!("{:.3}", zero.s.norm() / HERTZ),
+        format!("{:.3}", zero.s.norm() / TAU),
         part(zero.s.re, 0),
         if zero.s.im == 0.0 {
             "0".into()
@@ -149,11 +149,4 @@ fn zero(zero: &UncertainZero) -> String {
         zero.kind.name().into(),
         percent(zero.rhp_probability),
     ])
-}
-
-pub(super) fn section(heading: &str, words: &str, header: &[&str], rows: &str) -> String {
-    format!(
-        "<section>\n<h2>{heading}</h2>\n<p class=\"quiet\">{words}</p>\n<div class=\"wide\">{}</div>\n</section>\n",
-        table(header, rows)
-    )
 }

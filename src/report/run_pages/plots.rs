@@ -1,184 +1,241 @@
-//! The pictures of a record.
+//! The plots of a record.
 
-use super::{ReportSource, Shown};
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use super::RecordReport;
 use crate::identify::modal::{ModalFit, ModelOrder, UncertainPole};
 use crate::identify::verdict::{self, UncertainZero};
+use crate::model::zeros::ModalTerm;
 use crate::report::{
-    Curve, OrderedMode, Place, PoleZeroMap, ReportError, Trace, bode_svg, coherence_svg,
+    OrderedMode, PoleZeroMap, ReportError, Trace, UncertainPoint, bode_svg, coherence_svg,
     nyquist_svg, pole_zero_svg, stability_svg,
 };
 
-/// The names of all pictures, as files and in JSON; two need modes, two a closed loop, the last a multisine with lines left out.
-pub const PLOT_KINDS: [&str; 8] = [
-    "bode",
-    "coherence",
-    "nyquist",
-    "pole_zero",
-    "stability",
-    "loop",
-    "sensitivity",
-    "linearity",
-];
-/// The part of a Nyquist plot around two close modes reaches so many of their distances to either side.
+/// The part of a Nyquist plot around two close modes extends by so many of their distances to either side.
 const AROUND: f64 = 1.5;
-const HERTZ: f64 = 2.0 * std::f64::consts::PI;
 
-/// A picture.
+/// The kinds of plots. Pole-zero map and stability chart need modes, loop and sensitivity a closed loop, and the
+/// distortion needs a multisine with lines that are not excited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlotKind {
+    /// Bode plot.
+    Bode,
+    /// Coherence.
+    Coherence,
+    /// Nyquist plot.
+    Nyquist,
+    /// Map of poles and zeros.
+    PoleZero,
+    /// Stability chart.
+    Stability,
+    /// Bode plot of L.
+    Loop,
+    /// Bode plot of S and T.
+    Sensitivity,
+    /// Output, noise and distortion of a multisine.
+    Linearity,
+}
+
+impl PlotKind {
+    /// All kinds.
+    pub const ALL: [PlotKind; 8] = [
+        PlotKind::Bode,
+        PlotKind::Coherence,
+        PlotKind::Nyquist,
+        PlotKind::PoleZero,
+        PlotKind::Stability,
+        PlotKind::Loop,
+        PlotKind::Sensitivity,
+        PlotKind::Linearity,
+    ];
+
+    /// The name in files and JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            PlotKind::Bode => "bode",
+            PlotKind::Coherence => "coherence",
+            PlotKind::Nyquist => "nyquist",
+            PlotKind::PoleZero => "pole_zero",
+            PlotKind::Stability => "stability",
+            PlotKind::Loop => "loop",
+            PlotKind::Sensitivity => "sensitivity",
+            PlotKind::Linearity => "linearity",
+        }
+    }
+}
+
+/// A plot of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// Its name: one of [`PLOT_KINDS`].
-    pub kind: &'static str,
-    /// What it is.
+    /// Its kind.
+    pub kind: PlotKind,
+    /// Its heading on the page.
     pub heading: &'static str,
-    /// How it is read.
+    /// Its caption.
     pub caption: String,
     /// The SVG document.
     pub svg: String,
 }
 
-/// All pictures that a record has data for.
+/// All plots that a record has data for.
 ///
 /// # Errors
-/// When a response is not sound, or drawing fails.
-pub fn pictures(record: &dyn ReportSource) -> Result<Vec<Plot>, ReportError> {
-    let shown = record.shown();
-    let map = shown.fit.map(|fit| map(&shown, fit));
-    let mut all = responses(&shown, map.as_ref())?;
-    if let (Some(fit), Some(map)) = (shown.fit, &map) {
-        all.push(pole_zero(&shown, map)?);
-        all.push(stability(&shown, fit)?);
+/// When a response is invalid, or drawing fails.
+pub fn plots(report: &RecordReport<'_>) -> Result<Vec<Plot>, ReportError> {
+    let map = report.fit.map(|fit| pole_zero_map(report, fit));
+    let traces = Responses::of(report);
+    let mut plots = vec![
+        bode(report, &traces)?,
+        coherence(report)?,
+        nyquist(report, &traces, map.as_ref())?,
+    ];
+    if let (Some(fit), Some(map)) = (report.fit, &map) {
+        plots.push(pole_zero(report, map)?);
+        plots.push(stability(report, fit)?);
     }
-    all.extend(record.more_pictures()?);
-    Ok(all)
+    plots.extend(report.further_plots.iter().cloned());
+    Ok(plots)
 }
 
-fn responses(shown: &Shown<'_>, map: Option<&PoleZeroMap>) -> Result<Vec<Plot>, ReportError> {
-    let Shown {
-        title,
-        subtitle,
-        unit,
-        frf,
-        fit,
-        ..
-    } = shown;
-    let frequency_hz = &frf.frequency_hz;
-    let fitted = fit.map(|fit| fit.response(&shown.chain, frequency_hz));
-    let name = fit.map_or(String::new(), |fit| {
-        format!("fit of {} modes", fit.parameters.modes.len())
-    });
-    let mut traces = vec![Trace {
-        name: "measured",
-        curve: Curve::Measured(frf),
-    }];
-    traces.extend(shown.model.map(|response| Trace {
-        name: "model",
-        curve: Curve::Model {
-            frequency_hz,
-            response,
-        },
-    }));
-    traces.extend(fitted.as_ref().map(|response| Trace {
-        name: &name,
-        curve: Curve::Model {
-            frequency_hz,
-            response,
-        },
-    }));
-    let around = |(low, high): (f64, f64)| {
-        let room = AROUND * (high - low);
-        ((low - room).max(0.0) / HERTZ, (high + room) / HERTZ)
-    };
-    let part_hz = map.and_then(PoleZeroMap::close_pair).map(around);
-    let picture = |kind, heading, caption: &str, svg| Plot {
-        kind,
-        heading,
-        caption: caption.into(),
-        svg,
-    };
-    Ok(vec![
-        picture(
-            "bode",
-            "Frequency response",
-            "Magnitude, phase and coherence: measured with its band of two sigma, and, where there are such, the model of the \
-             configuration and the fit of modes to the measurement. Where the band reaches zero the line is faint.",
-            bode_svg(*unit, &traces, title, subtitle)?,
-        ),
-        picture(
-            "coherence",
-            "Coherence",
-            "The share of the output's power that the input explains. Below, what is missing to 1, which noise, \
-             leakage and geometry that is not linear leave over.",
-            coherence_svg(frf, title, subtitle)?,
-        ),
-        picture(
-            "nyquist",
-            "Nyquist plot",
-            "The response in the plane, as far as its magnitude is known to two sigma; to the right the closest modes, where \
-             circles hold the truth with 95 %. Delay, hold and amplifier turn the curve clockwise with frequency.",
-            nyquist_svg(*unit, &traces, part_hz, title, subtitle)?,
-        ),
-    ])
+/// The measured response, that of the model, and that of the fit.
+struct Responses<'a> {
+    report: &'a RecordReport<'a>,
+    fitted: Option<(String, Vec<nalgebra::Complex<f64>>)>,
+}
+
+impl<'a> Responses<'a> {
+    fn of(report: &'a RecordReport<'a>) -> Self {
+        let fitted = report.fit.map(|fit| {
+            let name = format!("fit of {} modes", fit.parameters.modes.len());
+            (name, fit.response(&report.chain, &report.frf.frequency_hz))
+        });
+        Self { report, fitted }
+    }
+
+    fn traces(&self) -> Vec<Trace<'_>> {
+        let frequency_hz = &self.report.frf.frequency_hz;
+        let mut traces = vec![Trace::measured("measured", self.report.frf)];
+        if let Some(response) = self.report.model {
+            traces.push(Trace::model("model", frequency_hz, response));
+        }
+        if let Some((name, response)) = &self.fitted {
+            traces.push(Trace::model(name, frequency_hz, response));
+        }
+        traces
+    }
+}
+
+fn bode(report: &RecordReport<'_>, responses: &Responses<'_>) -> Result<Plot, ReportError> {
+    Ok(Plot {
+        kind: PlotKind::Bode,
+        heading: "Frequency response",
+        caption: "Magnitude, phase and coherence: measured with a band of two sigma, the model of the configuration and the \
+                  fit of modes, where they exist. The line is faint where the band reaches zero magnitude."
+            .into(),
+        svg: bode_svg(report.unit, &responses.traces(), &report.title, &report.subtitle)?,
+    })
+}
+
+fn coherence(report: &RecordReport<'_>) -> Result<Plot, ReportError> {
+    Ok(Plot {
+        kind: PlotKind::Coherence,
+        heading: "Coherence",
+        caption: "The part of the output power that the input explains. Below: 1 − coherence, which is due to noise, leakage \
+                  and nonlinearity."
+            .into(),
+        svg: coherence_svg(report.frf, &report.title, &report.subtitle)?,
+    })
+}
+
+fn nyquist(
+    report: &RecordReport<'_>,
+    responses: &Responses<'_>,
+    map: Option<&PoleZeroMap>,
+) -> Result<Plot, ReportError> {
+    let part_hz = map.and_then(PoleZeroMap::close_pair).map(surroundings_hz);
+    let (traces, title, subtitle) = (responses.traces(), &report.title, &report.subtitle);
+    Ok(Plot {
+        kind: PlotKind::Nyquist,
+        heading: "Nyquist plot",
+        caption: "The response in the complex plane, where its magnitude exceeds two sigma; on the right the closest modes. \
+                  Circles are 95 % confidence regions. Delay, hold and amplifier turn the curve clockwise with frequency."
+            .into(),
+        svg: nyquist_svg(report.unit, &traces, part_hz, title, subtitle)?,
+    })
+}
+
+/// The frequencies around two close modes, in hertz.
+fn surroundings_hz((low, high): (f64, f64)) -> (f64, f64) {
+    let room = AROUND * (high - low);
+    ((low - room).max(0.0) / TAU, (high + room) / TAU)
 }
 
 /// Poles and zeros of the fit.
-fn map(shown: &Shown<'_>, fit: &ModalFit) -> PoleZeroMap {
-    let judged = &shown.verdict.zeros;
-    let pole = |pole: UncertainPole| Place {
-        s: pole.s,
-        covariance: pole.covariance,
-    };
-    let zero = |zero: &UncertainZero| Place {
-        s: zero.s,
-        covariance: zero.covariance,
-    };
-    // A sum whose zeros cannot be found has no verdict either.
-    let all = verdict::zeros(fit).unwrap_or_default();
+fn pole_zero_map(report: &RecordReport<'_>, fit: &ModalFit) -> PoleZeroMap {
+    let judged = &report.verdict.zeros;
+    // Without zeros of the fit the verdict has none either.
+    let zeros = verdict::zeros(fit).unwrap_or_default();
+    let others = zeros.iter().filter(|other| !judged.contains(other));
     PoleZeroMap {
-        poles: fit.poles().into_iter().map(pole).collect(),
+        poles: fit.poles().iter().map(pole).collect(),
         zeros: judged.iter().map(zero).collect(),
-        others: all
-            .iter()
-            .filter(|other| !judged.contains(other))
-            .map(zero)
-            .collect(),
-        up_to_rad_s: shown.judged_up_to_rad_s,
+        others: others.map(zero).collect(),
+        up_to_rad_s: report.judged_up_to_rad_s,
     }
 }
 
-fn pole_zero(shown: &Shown<'_>, map: &PoleZeroMap) -> Result<Plot, ReportError> {
+fn pole(pole: &UncertainPole) -> UncertainPoint {
+    UncertainPoint {
+        s: pole.s,
+        covariance: pole.covariance,
+    }
+}
+
+fn zero(zero: &UncertainZero) -> UncertainPoint {
+    UncertainPoint {
+        s: zero.s,
+        covariance: zero.covariance,
+    }
+}
+
+fn pole_zero(report: &RecordReport<'_>, map: &PoleZeroMap) -> Result<Plot, ReportError> {
+    let limit = map.up_to_rad_s;
+    let caption = format!(
+        "Poles and zeros of the fit, with damping, above the real axis; hold, amplifier and delays are not included. Ellipses \
+         are 95 % confidence regions of zeros, bars 95 % confidence intervals of poles. The verdict uses those below {limit:.0} \
+         rad/s ({:.1} Hz). Zeros of the verdict are enlarged below, those nearest to the axis first.",
+        limit / TAU
+    );
     Ok(Plot {
-        kind: "pole_zero",
+        kind: PlotKind::PoleZero,
         heading: "Poles and zeros",
-        caption: format!(
-            "Of the fit, with damping, above the real axis; hold, amplifier and delays are no part of it. Ellipses hold a zero with \
-             95 %, bars through a pole each of its parts. The verdict counts what lies below {:.0} rad/s ({:.1} Hz). Each zero \
-             of the verdict is drawn again, enlarged until its ellipse is seen, those nearest to the axis first.",
-            map.up_to_rad_s,
-            map.up_to_rad_s / HERTZ
-        ),
-        svg: pole_zero_svg(map, &shown.title, &shown.subtitle)?,
+        caption,
+        svg: pole_zero_svg(map, &report.title, &report.subtitle)?,
     })
 }
 
-fn stability(shown: &Shown<'_>, fit: &ModalFit) -> Result<Plot, ReportError> {
-    let mode = |term: &crate::model::zeros::ModalTerm| OrderedMode {
-        frequency_hz: term.omega_rad_s / HERTZ,
-        damping_ratio: term.damping_ratio,
-    };
-    let modes = |order: &ModelOrder| order.parameters.modes.iter().map(mode).collect();
+fn stability(report: &RecordReport<'_>, fit: &ModalFit) -> Result<Plot, ReportError> {
+    let modes = |order: &ModelOrder| order.parameters.modes.iter().map(ordered_mode).collect();
     let orders: Vec<Vec<OrderedMode>> = fit.orders.iter().map(modes).collect();
-    let fit_hz: Vec<f64> = fit
-        .parameters
-        .modes
-        .iter()
-        .map(|term| term.omega_rad_s / HERTZ)
-        .collect();
+    let fit_modes = fit.parameters.modes.iter();
+    let fit_hz: Vec<f64> = fit_modes.map(|term| term.omega_rad_s / TAU).collect();
+    let (title, subtitle) = (&report.title, &report.subtitle);
     Ok(Plot {
-        kind: "stability",
+        kind: PlotKind::Stability,
         heading: "Stability chart",
-        caption: "The modes at each order that was found worth its parameters; a mode that is there stays from one order to the \
-                  next, one of noise or of the search moves. Rough orders come first: the errors they may leave shrink on the way."
+        caption: "The modes at each model order that the fit visited. A mode of the stage persists from one order to the next; \
+                  a mode of noise or of the search moves. The first orders are fitted with larger tolerances."
             .into(),
-        svg: stability_svg(&orders, &fit_hz, fit.band_hz, &shown.title, &shown.subtitle)?,
+        svg: stability_svg(&orders, &fit_hz, fit.band_hz, title, subtitle)?,
     })
+}
+
+fn ordered_mode(term: &ModalTerm) -> OrderedMode {
+    OrderedMode {
+        frequency_hz: term.omega_rad_s / TAU,
+        damping_ratio: term.damping_ratio,
+    }
 }

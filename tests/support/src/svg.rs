@@ -76,6 +76,13 @@ fn boxed(tag: &str, text: &str) -> Words {
     }
 }
 
+/// Width and height of a page.
+pub fn page_size(svg: &str) -> (f64, f64) {
+    let view = svg.split("viewBox=\"0 0 ").nth(1);
+    let size = view.and_then(|rest| rest.split('"').next());
+    pair(&size.expect("a view box").replace(' ', ","))
+}
+
 /// The value of an attribute of a tag.
 pub fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     let from = tag.find(&format!(" {name}=\""))? + name.len() + 3;

@@ -1,6 +1,6 @@
-//! The map of poles and zeros of places that are known.
+//! The map of poles and zeros at known places.
 
-use bench::report::{Place, PoleZeroMap, ReportError, pole_zero_svg, stability_svg};
+use bench::report::{PoleZeroMap, ReportError, UncertainPoint, pole_zero_svg, stability_svg};
 use nalgebra::Complex;
 
 use crate::pictures::keep;
@@ -9,8 +9,8 @@ use crate::svg;
 const BLUE: &str = "#0072B2";
 const VERMILION: &str = "#D55E00";
 
-fn place(re: f64, im: f64, covariance: [[f64; 2]; 2]) -> Place {
-    Place {
+fn place(re: f64, im: f64, covariance: [[f64; 2]; 2]) -> UncertainPoint {
+    UncertainPoint {
         s: Complex::new(re, im),
         covariance,
     }
@@ -38,7 +38,7 @@ fn map(covariance: [[f64; 2]; 2]) -> PoleZeroMap {
 }
 
 #[test]
-fn the_closest_pair_is_that_of_the_poles_that_count() {
+fn closest_pair_ignores_poles_above_the_limit_and_on_the_real_axis() {
     let mut map = map([[1.0, 0.0], [0.0, 1.0]]);
     map.poles.extend([
         place(-5.0, 1700.0, none()),
@@ -50,7 +50,7 @@ fn the_closest_pair_is_that_of_the_poles_that_count() {
 }
 
 #[test]
-fn an_ellipse_has_on_the_page_the_extent_that_its_covariance_has_on_the_axes() {
+fn draws_an_ellipse_to_the_scale_of_its_covariance() {
     let svg = pole_zero_svg(&map([[4.0, 0.0], [0.0, 1.0]]), "map", "").unwrap();
     keep("pole-zero.svg", &svg);
     // Twice in the upper row, and alone: the last two polygons of each colour are the enlarged ones' legends and areas.
@@ -82,7 +82,7 @@ fn an_ellipse_has_on_the_page_the_extent_that_its_covariance_has_on_the_axes() {
 }
 
 #[test]
-fn zeros_known_exactly_or_not_at_all_are_drawn_without_ellipses() {
+fn draws_zeros_of_singular_covariance_without_ellipse() {
     for covariance in [
         none(),
         [[f64::INFINITY, 0.0], [0.0, f64::INFINITY]],
@@ -99,14 +99,14 @@ fn zeros_known_exactly_or_not_at_all_are_drawn_without_ellipses() {
 }
 
 #[test]
-fn a_zero_with_an_ellipse_far_larger_than_the_map_stays_in_its_frame() {
+fn clips_an_ellipse_larger_than_the_map() {
     let svg = pole_zero_svg(&map([[1e8, 9e7], [9e7, 1e8]]), "map", "").unwrap();
     let inside = |(x, y): &(f64, f64)| (0.0..=10_000.0).contains(x) && *y >= 0.0;
     assert!(svg::points(&svg, "polygon", "").concat().iter().all(inside));
 }
 
 #[test]
-fn a_map_of_nothing_is_an_empty_frame_and_a_chart_of_no_order_an_error() {
+fn draws_an_empty_map_and_rejects_a_chart_without_orders() {
     assert!(
         pole_zero_svg(&PoleZeroMap::default(), "", "")
             .unwrap()

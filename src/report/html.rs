@@ -1,4 +1,4 @@
-//! Pages of HTML that need nothing from elsewhere, in light and in dark.
+//! Self-contained HTML pages, in light and dark mode, for wide and narrow screens.
 
 const STYLE: &str = "\
 :root{color-scheme:light dark;--ink:#222;--quiet:#5f5f5f;--paper:#fff;--line:#d0d0d0;--code:#f3f3f1;--link:#00588a;--bad:#b04a00;--good:#1f7a4d}
@@ -13,7 +13,7 @@ nav ul{columns:2;padding-left:1.2rem;margin:.3rem 0 1rem}
 nav li{break-inside:avoid;font-size:.92rem}
 nav p{margin:.6rem 0 0;font-weight:600}
 figure{margin:1rem 0}
-figure svg{display:block;width:100%;height:auto;background:#fff;border-radius:4px}
+figure svg{display:block;width:100%;height:auto;background:var(--paper);border-radius:4px}
 figcaption,.quiet{color:var(--quiet);font-size:.95rem}
 table{border-collapse:collapse;width:100%;font-size:.92rem;margin:1rem 0}
 th,td{border-bottom:1px solid var(--line);padding:.3rem .6rem;text-align:left;vertical-align:top}
@@ -29,58 +29,75 @@ ul.facts{padding-left:1.2rem;font-size:.95rem}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem;font-size:.95rem}
 dt{color:var(--quiet)}
 dd{margin:0;overflow-wrap:anywhere}
-@media (max-width:700px){nav ul{columns:1}}
+@media (max-width:700px){
+body{padding:.8rem}
+nav ul{columns:1}
+dl{grid-template-columns:1fr;gap:0}
+dd{margin-bottom:.5rem}
+figure{overflow-x:auto}
+figure svg{min-width:640px}
+}
+@media print{section{break-inside:avoid-page}}
 ";
 
-/// A page: its title, and what stands on it, as HTML.
+/// A page with a title and a body of HTML.
 pub fn document(title: &str, body: &str) -> String {
     let title = escaped(title);
     format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
 }
 
-/// An SVG within the page, with words for those who do not see it and words below it.
-pub fn picture(svg: &str, label: &str, caption: &str) -> String {
-    let labelled = format!("<svg role=\"img\" aria-label=\"{}\" ", escaped(label));
+/// A section with a heading; `body` is HTML.
+pub fn section(heading: &str, body: &str) -> String {
+    let heading = escaped(heading);
+    format!("<section>\n<h2>{heading}</h2>\n{body}</section>\n")
+}
+
+/// A paragraph of secondary importance.
+pub fn note(text: &str) -> String {
+    format!("<p class=\"quiet\">{}</p>\n", escaped(text))
+}
+
+/// An SVG with a description for readers who do not see it, and a caption.
+pub fn picture(svg: &str, description: &str, caption: &str) -> String {
+    let labelled = format!("<svg role=\"img\" aria-label=\"{}\" ", escaped(description));
     let svg = svg.replacen("<svg ", &labelled, 1);
+    let caption = escaped(caption);
     format!(
-        "<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n",
-        svg.trim_end(),
-        escaped(caption)
+        "<figure>\n{}\n<figcaption>{caption}</figcaption>\n</figure>\n",
+        svg.trim_end()
     )
 }
 
-/// A table of rows that are HTML already: see [`row`].
+/// A table. The rows are HTML: see [`row`].
 pub fn table(header: &[&str], rows: &str) -> String {
-    let header: String = header
-        .iter()
-        .map(|cell| format!("<th>{}</th>", escaped(cell)))
-        .collect();
-    format!("<table>\n<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n")
+    let cell = |cell: &&str| format!("<th>{}</th>", escaped(cell));
+    let header: String = header.iter().map(cell).collect();
+    format!(
+        "<div class=\"wide\"><table>\n<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n"
+    )
 }
 
 /// A row of a table.
 pub fn row(cells: &[String]) -> String {
-    let cells: String = cells
-        .iter()
-        .map(|cell| format!("<td class=\"n\">{}</td>", escaped(cell)))
-        .collect();
+    let cell = |cell: &String| format!("<td class=\"n\">{}</td>", escaped(cell));
+    let cells: String = cells.iter().map(cell).collect();
     format!("<tr>{cells}</tr>\n")
 }
 
-/// Names and what they stand for.
+/// A list of names and values.
 pub fn facts(pairs: &[(String, String)]) -> String {
-    let pair = |(name, text): &(String, String)| {
-        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(text))
+    let pair = |(name, value): &(String, String)| {
+        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value))
     };
-    format!(
-        "<dl>\n{}</dl>\n",
-        pairs.iter().map(pair).collect::<String>()
-    )
+    let pairs: String = pairs.iter().map(pair).collect();
+    format!("<dl>\n{pairs}</dl>\n")
 }
 
-/// Text that means nothing to HTML.
+/// Text with the special characters of HTML escaped.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -94,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_means_something_to_html_is_escaped() {
+    fn escapes_the_special_characters_of_html() {
         assert_eq!(
             escaped("<a href=\"x\">'&'"),
             "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#39;"

@@ -1,0 +1,165 @@
+//! A page to draw on, in pixels with fractions.
+//!
+//! plotters rounds to whole units; a page ten times as large, shown at a tenth, rounds to tenths of a pixel.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::Points;
+use super::colours::{Colour, INK, PAPER, dark_style};
+use crate::report::ReportError;
+
+const UNITS: f64 = 10.0;
+/// plotters divides by this before it writes a font size.
+const FONT_SCALE: f64 = 1.24;
+
+/// A drawing of given size.
+pub(super) struct Canvas<'a>(DrawingArea<SVGBackend<'a>, Shift>);
+
+/// Size, colour and position of a text relative to its anchor point.
+#[derive(Clone, Copy)]
+pub(super) struct TextStyle {
+    pub size: f64,
+    pub colour: Colour,
+    pub bold: bool,
+    anchor: (HPos, VPos),
+    upward: bool,
+}
+
+impl TextStyle {
+    pub const fn new(size: f64, horizontal: HPos, vertical: VPos) -> Self {
+        Self {
+            size,
+            colour: INK,
+            bold: false,
+            anchor: (horizontal, vertical),
+            upward: false,
+        }
+    }
+
+    pub const fn bold(self) -> Self {
+        Self { bold: true, ..self }
+    }
+
+    pub const fn colour(self, colour: Colour) -> Self {
+        Self { colour, ..self }
+    }
+
+    pub const fn upward(self) -> Self {
+        Self {
+            upward: true,
+            ..self
+        }
+    }
+}
+
+/// Draws a page of `size` pixels on white and returns it as SVG.
+pub(super) fn page(
+    size: (f64, f64),
+    draw: impl FnOnce(&Canvas) -> Result<(), ReportError>,
+) -> Result<String, ReportError> {
+    let (width, height) = (units(size.0) as u32, units(size.1) as u32);
+    let mut svg = String::new();
+    {
+        let backend = SVGBackend::with_string(&mut svg, (width, height));
+        let canvas = Canvas(backend.into_drawing_area());
+        canvas.0.fill(&PAPER).map_err(failed)?;
+        draw(&canvas)?;
+        canvas.0.present().map_err(failed)?;
+    }
+    let from = format!("<svg width=\"{width}\" height=\"{height}\"");
+    let to = format!(
+        "<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"",
+        size.0, size.1
+    );
+    let svg = svg.replacen(&from, &to, 1);
+    Ok(svg.replace("</svg>", &(dark_style() + "\n</svg>")))
+}
+
+impl Canvas<'_> {
+    pub fn line(
+        &self,
+        points: &[(f64, f64)],
+        colour: RGBAColor,
+        width: f64,
+    ) -> Result<(), ReportError> {
+        let style = colour.stroke_width(units(width) as u32);
+        let path = PathElement::new(in_units(points), style);
+        self.0.draw(&path).map_err(failed)
+    }
+
+    pub fn area(&self, points: &[(f64, f64)], colour: RGBAColor) -> Result<(), ReportError> {
+        let polygon = Polygon::new(in_units(points), colour.filled());
+        self.0.draw(&polygon).map_err(failed)
+    }
+
+    pub fn dot(
+        &self,
+        centre: (f64, f64),
+        radius: f64,
+        colour: RGBAColor,
+    ) -> Result<(), ReportError> {
+        let circle = Circle::new(at(centre), units(radius), colour.filled());
+        self.0.draw(&circle).map_err(failed)
+    }
+
+    pub fn ring(
+        &self,
+        centre: (f64, f64),
+        radius: f64,
+        colour: Colour,
+        width: f64,
+    ) -> Result<(), ReportError> {
+        let style = colour.stroke_width(units(width) as u32);
+        let circle = Circle::new(at(centre), units(radius), style);
+        self.0.draw(&circle).map_err(failed)
+    }
+
+    pub fn text(
+        &self,
+        text: &str,
+        position: (f64, f64),
+        style: TextStyle,
+    ) -> Result<(), ReportError> {
+        if text.is_empty() {
+            return Ok(());
+        }
+        let weight = if style.bold {
+            FontStyle::Bold
+        } else {
+            FontStyle::Normal
+        };
+        let turn = if style.upward {
+            FontTransform::Rotate270
+        } else {
+            FontTransform::None
+        };
+        let size = style.size * UNITS * FONT_SCALE;
+        let font = FontDesc::new(FontFamily::SansSerif, size, weight).transform(turn);
+        let anchor = Pos::new(style.anchor.0, style.anchor.1);
+        let text = Text::new(text, at(position), font.color(&style.colour).pos(anchor));
+        self.0.draw(&text).map_err(failed)
+    }
+}
+
+fn units(pixels: f64) -> i32 {
+    (pixels * UNITS).round() as i32
+}
+
+fn at((x, y): (f64, f64)) -> (i32, i32) {
+    (units(x), units(y))
+}
+
+fn in_units(points: &[(f64, f64)]) -> Vec<(i32, i32)> {
+    points.iter().map(|point| at(*point)).collect()
+}
+
+fn failed(error: impl core::fmt::Display) -> ReportError {
+    ReportError::Drawing(error.to_string())
+}
+
+/// The corners of a rectangle.
+pub(super) fn rectangle((left, top): (f64, f64), (right, bottom): (f64, f64)) -> Points {
+    vec![(left, top), (right, top), (right, bottom), (left, bottom)]
+}

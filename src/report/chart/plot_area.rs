@@ -1,0 +1,418 @@
+//! Drawing of one chart: frame, grid, numbers and marks.
+
+use plotters::style::Color;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::Points;
+use super::axis::{Axis, Direction, Tick};
+use super::canvas::{Canvas, TextStyle, rectangle};
+use super::colours::{Colour, FINE_GRID, FRAME, GRID};
+use super::frame::Frame;
+use super::header::{CHARACTER, TEXT_SIZE};
+use super::mark::{Mark, Pen, SeriesPoint, Symbol};
+use super::scale::Scale;
+use super::series::{self, Sample, dashes};
+use crate::report::ReportError;
+
+/// Pixels from the frame to the middle of the label of the vertical axis.
+const LABEL_LEFT: f64 = 66.0;
+const LABEL: TextStyle = TextStyle::new(13.0, HPos::Center, VPos::Center).upward();
+const NUMBER_BELOW: TextStyle = TextStyle::new(12.0, HPos::Center, VPos::Top);
+const NUMBER_LEFT: TextStyle = TextStyle::new(12.0, HPos::Right, VPos::Center);
+const TEXT: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Center, VPos::Center);
+
+/// Opacity of a band, and of the faint part of a series.
+pub(super) const BAND: f64 = 0.22;
+const FAINT: f64 = 0.3;
+/// A series with dots and fewer points than this has a dot at each.
+const FEW_POINTS: usize = 150;
+/// Radius of these dots, and of a symbol.
+const DOT: f64 = 2.0;
+const SYMBOL: f64 = 4.5;
+/// Pixels between the arrow heads of a directed line, and their length.
+const ARROW_SPACING: f64 = 170.0;
+const ARROW_LENGTH: f64 = 7.0;
+
+/// A frame with two axes.
+pub(super) struct PlotArea {
+    pub frame: Frame,
+    pub x: Axis,
+    pub y: Axis,
+}
+
+impl PlotArea {
+    /// Grid, frame, numbers, and the label of the vertical axis.
+    pub fn draw_axes(&self, canvas: &Canvas, x: &Scale, y: &Scale) -> Result<(), ReportError> {
+        let x_ticks = self.x.ticks(x, Direction::Horizontal);
+        let y_ticks = self.y.ticks(y, Direction::Vertical);
+        self.draw_grid(canvas, &x_ticks, &y_ticks, false)?;
+        self.draw_grid(canvas, &x_ticks, &y_ticks, true)?;
+        self.draw_frame(canvas)?;
+        let Frame {
+            left, top, bottom, ..
+        } = self.frame;
+        for tick in &y_ticks {
+            draw_number(
+                canvas,
+                tick,
+                (left - 6.0, self.y.pixel(tick.value)),
+                NUMBER_LEFT,
+            )?;
+        }
+        for tick in &x_ticks {
+            draw_number(
+                canvas,
+                tick,
+                (self.x.pixel(tick.value), bottom + 6.0),
+                NUMBER_BELOW,
+            )?;
+        }
+        canvas.text(&y.label, (left - LABEL_LEFT, (top + bottom) / 2.0), LABEL)
+    }
+
+    fn draw_grid(
+        &self,
+        canvas: &Canvas,
+        x: &[Tick],
+        y: &[Tick],
+        labelled: bool,
+    ) -> Result<(), ReportError> {
+        let (colour, width) = if labelled {
+            (GRID, 0.8)
+        } else {
+            (FINE_GRID, 0.6)
+        };
+        let Frame {
+            left,
+            right,
+            top,
+            bottom,
+        } = self.frame;
+        for tick in x.iter().filter(|tick| tick.label.is_some() == labelled) {
+            let x = self.x.pixel(tick.value);
+            canvas.line(&[(x, top), (x, bottom)], colour.into(), width)?;
+        }
+        for tick in y.iter().filter(|tick| tick.label.is_some() == labelled) {
+            let y = self.y.pixel(tick.value);
+            canvas.line(&[(left, y), (right, y)], colour.into(), width)?;
+        }
+        Ok(())
+    }
+
+    fn draw_frame(&self, canvas: &Canvas) -> Result<(), ReportError> {
+        let Frame {
+            left,
+            right,
+            top,
+            bottom,
+        } = self.frame;
+        let mut outline = rectangle((left, top), (right, bottom));
+        outline.extend([(left, top), (right, top)]);
+        canvas.line(&outline, FRAME.into(), 0.8)
+    }
+
+    pub fn draw_mark(&self, canvas: &Canvas, mark: &Mark) -> Result<(), ReportError> {
+        match mark {
+            Mark::Line {
+                pen,
+                points,
+                directed,
+                ..
+            } => self.draw_line(canvas, *pen, points, *directed),
+            Mark::Series {
+                pen, points, dots, ..
+            } => self.draw_series(canvas, *pen, points, *dots),
+            Mark::Arrow { pen, from, to, .. } => {
+                draw_arrow(canvas, *pen, self.place(from), self.place(to))
+            }
+            Mark::Points {
+                colour,
+                symbol,
+                points,
+                ..
+            } => self.draw_points(canvas, *colour, *symbol, points),
+            Mark::Area {
+                colour,
+                strength,
+                outline,
+                ..
+            } => self.draw_area(canvas, *colour, *strength, outline),
+            Mark::Cells {
+                x,
+                y,
+                rows,
+                colours,
+            } => self.draw_cells(canvas, (x, y), rows, colours),
+            Mark::Text {
+                at,
+                offset,
+                text,
+                colour,
+            } => self.draw_text(canvas, self.place(at), *offset, text, *colour),
+        }
+    }
+
+    fn place(&self, (x, y): &(f64, f64)) -> (f64, f64) {
+        (self.x.place(*x), self.y.place(*y))
+    }
+
+    fn places(&self, points: &[(f64, f64)]) -> Points {
+        points.iter().map(|point| self.place(point)).collect()
+    }
+
+    fn draw_line(
+        &self,
+        canvas: &Canvas,
+        pen: Pen,
+        points: &[(f64, f64)],
+        directed: bool,
+    ) -> Result<(), ReportError> {
+        for part in self.frame.clipped(&self.places(points)) {
+            draw_stroke(canvas, pen, 1.0, &part)?;
+            let heads = if directed {
+                arrow_heads(&part)
+            } else {
+                Vec::new()
+            };
+            let inside = |head: &&Points| head.iter().all(|corner| self.frame.contains(*corner));
+            for head in heads.iter().filter(inside) {
+                canvas.area(head, pen.colour.into())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_series(
+        &self,
+        canvas: &Canvas,
+        pen: Pen,
+        points: &[SeriesPoint],
+        dots: bool,
+    ) -> Result<(), ReportError> {
+        let samples: Vec<Sample> = points.iter().map(|point| self.sample(point)).collect();
+        let columns = series::columns(&samples);
+        let banded = samples.iter().any(|sample| sample.band.0 < sample.band.1);
+        for outline in series::bands(&columns).iter().filter(|_| banded) {
+            canvas.area(outline, pen.colour.mix(BAND))?;
+        }
+        for piece in series::pieces(&columns) {
+            draw_stroke(canvas, pen, opacity(piece.faint), &piece.points)?;
+        }
+        draw_dots(
+            canvas,
+            pen.colour,
+            &samples,
+            dots && samples.len() < FEW_POINTS,
+        )
+    }
+
+    fn sample(&self, point: &SeriesPoint) -> Sample {
+        Sample {
+            at: (self.x.pixel(point.x), self.y.pixel(point.y)),
+            band: (self.y.pixel(point.band.1), self.y.pixel(point.band.0)),
+            faint: point.faint,
+            starts: point.starts,
+        }
+    }
+
+    fn draw_points(
+        &self,
+        canvas: &Canvas,
+        colour: Colour,
+        symbol: Symbol,
+        points: &[(f64, f64)],
+    ) -> Result<(), ReportError> {
+        let places = self.places(points).into_iter();
+        let mut inside = places.filter(|place| self.frame.contains(*place));
+        inside.try_for_each(|place| draw_symbol(canvas, colour, symbol, place))
+    }
+
+    fn draw_area(
+        &self,
+        canvas: &Canvas,
+        colour: Colour,
+        strength: f64,
+        outline: &[(f64, f64)],
+    ) -> Result<(), ReportError> {
+        // A logarithmic axis has no place for values of 0 and below.
+        let places = self
+            .places(outline)
+            .into_iter()
+            .filter(|(x, y)| !(x.is_nan() || y.is_nan()));
+        let corners: Points = places.map(|place| self.frame.nearest(place)).collect();
+        if corners.len() < 3 {
+            return Ok(());
+        }
+        canvas.area(&corners, colour.mix(strength))
+    }
+
+    /// Neighbouring cells of one colour in a row become one rectangle.
+    fn draw_cells(
+        &self,
+        canvas: &Canvas,
+        (x, y): (&[f64], &[f64]),
+        rows: &[Vec<usize>],
+        colours: &[(String, Colour)],
+    ) -> Result<(), ReportError> {
+        for (row, edges) in rows.iter().zip(y.windows(2)) {
+            let mut from = 0;
+            for run in row.chunk_by(|a, b| a == b) {
+                let to = (from + run.len()).min(x.len() - 1);
+                if let Some((_, colour)) = colours.get(run[0]) {
+                    let cell = self.cell((x[from], edges[0]), (x[to], edges[1]));
+                    canvas.area(&cell, (*colour).into())?;
+                }
+                from = to;
+            }
+        }
+        Ok(())
+    }
+
+    /// A rectangle between two corners, half a pixel higher: the next row covers that part, and no seam is left.
+    fn cell(&self, lower_left: (f64, f64), upper_right: (f64, f64)) -> Points {
+        let start = self.frame.nearest(self.place(&lower_left));
+        let end = self.frame.nearest(self.place(&upper_right));
+        let end = self.frame.nearest((end.0, end.1 - 0.5));
+        rectangle(start, end)
+    }
+
+    /// Text, moved into the frame.
+    fn draw_text(
+        &self,
+        canvas: &Canvas,
+        at: (f64, f64),
+        offset: (f64, f64),
+        text: &str,
+        colour: Colour,
+    ) -> Result<(), ReportError> {
+        if at.0.is_nan() || at.1.is_nan() {
+            return Ok(());
+        }
+        let Frame {
+            left,
+            right,
+            top,
+            bottom,
+        } = self.frame;
+        let half_width = 0.5 * CHARACTER * TEXT_SIZE * text.chars().count() as f64 + 3.0;
+        let half_height = 0.6 * TEXT_SIZE + 2.0;
+        let x = moved_between(at.0 + offset.0, left + half_width, right - half_width);
+        let y = moved_between(at.1 + offset.1, top + half_height, bottom - half_height);
+        canvas.text(text, (x, y), TEXT.colour(colour))
+    }
+}
+
+/// The nearest value between two limits; the middle where they exclude each other.
+fn moved_between(value: f64, low: f64, high: f64) -> f64 {
+    if low < high {
+        value.clamp(low, high)
+    } else {
+        0.5 * (low + high)
+    }
+}
+
+fn draw_number(
+    canvas: &Canvas,
+    tick: &Tick,
+    at: (f64, f64),
+    style: TextStyle,
+) -> Result<(), ReportError> {
+    match &tick.label {
+        Some(label) if !label.is_empty() => canvas.text(label, at, style),
+        _ => Ok(()),
+    }
+}
+
+fn opacity(faint: bool) -> f64 {
+    if faint { FAINT } else { 1.0 }
+}
+
+fn draw_stroke(
+    canvas: &Canvas,
+    pen: Pen,
+    opacity: f64,
+    points: &[(f64, f64)],
+) -> Result<(), ReportError> {
+    let dashes = dashes(pen.stroke, points);
+    dashes
+        .iter()
+        .try_for_each(|dash| canvas.line(dash, pen.colour.mix(opacity), pen.width))
+}
+
+/// Dots at all points, or at those that stand alone between gaps.
+fn draw_dots(
+    canvas: &Canvas,
+    colour: Colour,
+    samples: &[Sample],
+    all: bool,
+) -> Result<(), ReportError> {
+    let next_starts = |k: usize| samples.get(k + 1).is_none_or(|next| next.starts);
+    let alone = |k: usize| samples[k].starts && next_starts(k);
+    for (_, sample) in samples.iter().enumerate().filter(|(k, _)| all || alone(*k)) {
+        canvas.dot(sample.at, DOT, colour.mix(opacity(sample.faint)))?;
+    }
+    Ok(())
+}
+
+/// A line with a head; a dot where it is shorter than its head.
+pub(super) fn draw_arrow(
+    canvas: &Canvas,
+    pen: Pen,
+    from: (f64, f64),
+    to: (f64, f64),
+) -> Result<(), ReportError> {
+    draw_stroke(canvas, pen, 1.0, &[from, to])?;
+    let length = 5.0 + 1.5 * pen.width;
+    match arrow_head(from, to, length, 0.4) {
+        Some(head) => canvas.area(&head, pen.colour.into()),
+        None => canvas.dot(to, pen.width, pen.colour.into()),
+    }
+}
+
+/// A triangle with its tip at the end of a segment; `slope` is half its width over its length.
+fn arrow_head(from: (f64, f64), to: (f64, f64), length: f64, slope: f64) -> Option<Points> {
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let distance = libm::hypot(dx, dy);
+    if !distance.is_finite() || distance < length {
+        return None;
+    }
+    let (ux, uy) = (length * dx / distance, length * dy / distance);
+    let corner = |side: f64| (to.0 - ux - side * slope * uy, to.1 - uy + side * slope * ux);
+    Some(vec![to, corner(1.0), corner(-1.0)])
+}
+
+/// Arrow heads along a line.
+fn arrow_heads(points: &[(f64, f64)]) -> Vec<Points> {
+    let (mut since_last, mut heads) = (0.55 * ARROW_SPACING, Vec::new());
+    for pair in points.windows(2) {
+        let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        let length = libm::hypot(dx, dy);
+        since_last += length;
+        if since_last > ARROW_SPACING && length > 0.0 {
+            let (ux, uy) = (dx / length * ARROW_LENGTH, dy / length * ARROW_LENGTH);
+            let middle = (pair[0].0 + 0.5 * dx, pair[0].1 + 0.5 * dy);
+            let start = (middle.0 - ux, middle.1 - uy);
+            let tip = (middle.0 + 0.5 * ux, middle.1 + 0.5 * uy);
+            heads.extend(arrow_head(start, tip, ARROW_LENGTH, 0.5));
+            since_last = 0.0;
+        }
+    }
+    heads
+}
+
+pub(super) fn draw_symbol(
+    canvas: &Canvas,
+    colour: Colour,
+    symbol: Symbol,
+    (x, y): (f64, f64),
+) -> Result<(), ReportError> {
+    match symbol {
+        Symbol::Dot => canvas.dot((x, y), 3.2, colour.into()),
+        Symbol::Ring => canvas.ring((x, y), SYMBOL, colour, 1.6),
+        Symbol::Cross => {
+            let (left, right, top, bottom) = (x - SYMBOL, x + SYMBOL, y - SYMBOL, y + SYMBOL);
+            canvas.line(&[(left, top), (right, bottom)], colour.into(), 1.8)?;
+            canvas.line(&[(left, bottom), (right, top)], colour.into(), 1.8)
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The Nyquist plot: responses in the complex plane, measured ones with circles of confidence.
+
+use nalgebra::Complex;
+
+use super::ReportError;
+use super::chart::colours::INK;
+use super::chart::{Chart, Row, Scale, Symbol, sheet_svg};
+use super::ellipse::{self, SIGMAS_95_PLANE};
+use super::trace::{self, BAND_SIGMAS, Line, Trace, has_gap_before};
+use crate::identify::{Frf, Unit};
+
+/// Largest number of circles.
+const CIRCLES: usize = 90;
+/// Circles smaller than this part of the largest magnitude are invisible and not drawn.
+const VISIBLE: f64 = 0.004;
+/// Opacity of a circle.
+const STRENGTH: f64 = 0.13;
+const MICRO: f64 = 1e6;
+
+/// The Nyquist plot as an SVG document: all frequencies, in µm/A or as they are in another unit, and beside them a part of
+/// the frequencies in hertz. Circles are 95 % confidence regions. Magnitudes below two sigma are left out, as their
+/// direction is unknown.
+///
+/// # Errors
+/// When there is nothing to draw, or a trace is invalid: see [`ReportError`].
+pub fn nyquist_svg(
+    unit: Unit,
+    traces: &[Trace],
+    part_hz: Option<(f64, f64)>,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    let lines = trace::lines(traces)?;
+    let mut charts = vec![nyquist(
+        unit,
+        "All frequencies",
+        &lines,
+        (0.0, f64::INFINITY),
+    )];
+    if let Some((low, high)) = part_hz {
+        let heading = format!("{low:.1} to {high:.1} Hz");
+        charts.push(nyquist(unit, &heading, &lines, (low, high)));
+    }
+    sheet_svg(title, subtitle, &[Row::new(400.0, charts)])
+}
+
+fn nyquist(unit: Unit, heading: &str, lines: &[Line], band_hz: (f64, f64)) -> Chart {
+    let (name, factor) = match unit {
+        Unit::MetresPerAmpere => (" (µm/A)", MICRO),
+        Unit::Bare => ("", 1.0),
+    };
+    let scale = |part: &str| Scale::linear(&format!("{part} part of H{name}"));
+    let mut chart = Chart::new(heading, scale("Real"), scale("Imaginary")).equal();
+    for line in lines {
+        let indices = within(line, band_hz);
+        if let Some(frf) = line.measured {
+            chart = circles(chart, line, frf, &indices, factor);
+        }
+        chart = chart.line(line.name, line.pen, points(line, &indices, factor));
+    }
+    chart.points("origin", INK, Symbol::Cross, vec![(0.0, 0.0)])
+}
+
+/// Indices of the frequencies of a band.
+fn within(line: &Line, (low, high): (f64, f64)) -> Vec<usize> {
+    let frequencies = line.frequency_hz.iter().enumerate();
+    let inside = frequencies.filter(|(_, f)| (low..=high).contains(*f));
+    inside.map(|(k, _)| k).collect()
+}
+
+/// Circles of confidence that are visible and do not hide each other.
+fn circles(mut chart: Chart, line: &Line, frf: &Frf, indices: &[usize], factor: f64) -> Chart {
+    let largest = indices
+        .iter()
+        .map(|k| line.magnitude[*k])
+        .fold(0.0, f64::max);
+    let mut centres: Vec<Complex<f64>> = Vec::new();
+    for &k in indices
+        .iter()
+        .step_by(indices.len().div_ceil(CIRCLES).max(1))
+    {
+        let (centre, radius) = (frf.response[k], SIGMAS_95_PLANE * frf.magnitude_sigma[k]);
+        let free = centres
+            .iter()
+            .all(|other| (centre - other).norm() >= radius);
+        if radius > VISIBLE * largest && is_known(frf, k) && free {
+            let name = if centres.is_empty() {
+                "95 % circles"
+            } else {
+                ""
+            };
+            let outline =
+                ellipse::circle((centre.re * factor, centre.im * factor), factor * radius);
+            chart = chart.area(name, line.pen.colour, STRENGTH, outline);
+            centres.push(centre);
+        }
+    }
+    chart
+}
+
+/// The curve, with gaps where frequencies, or magnitudes above the noise, are missing.
+fn points(line: &Line, indices: &[usize], factor: f64) -> Vec<(f64, f64)> {
+    const GAP: (f64, f64) = (f64::NAN, f64::NAN);
+    let mut points = Vec::new();
+    for &k in indices {
+        if line.measured.is_some_and(|frf| has_gap_before(frf, k)) {
+            points.push(GAP);
+        }
+        let known = line.measured.is_none_or(|frf| is_known(frf, k));
+        let h = line.response[k] * factor;
+        points.push(if known { (h.re, h.im) } else { GAP });
+    }
+    points
+}
+
+fn is_known(frf: &Frf, k: usize) -> bool {
+    frf.response[k].norm() > BAND_SIGMAS * frf.magnitude_sigma[k]
+}
