@@ -29,9 +29,9 @@ fn share(counted: &Value, key: &str) -> f64 {
     number(&effect.unwrap_or_else(|| panic!("{key} is not there: {counted}"))["share"])
 }
 
-/// What a couple explains beyond its settings; 0 where it does not stand out.
-fn couple(counted: &Value, keys: [&str; 2]) -> f64 {
-    let found = list(counted, "couples").iter().find(|one| {
+/// What an interaction explains beyond its settings; 0 where it does not stand out.
+fn interaction(counted: &Value, keys: [&str; 2]) -> f64 {
+    let found = list(counted, "interactions").iter().find(|one| {
         keys.iter()
             .all(|key| list(one, "keys").contains(&json!(key)))
     });
@@ -39,7 +39,7 @@ fn couple(counted: &Value, keys: [&str; 2]) -> f64 {
 }
 
 #[test]
-fn the_xy_stage_within_15_per_cent_has_0_1_2_3_pairs_in_60_2_38_8_1_0_0_per_cent_of_20_000_draws() {
+fn xy_stage_has_the_probabilities_of_20_000_draws() {
     for seed in [1, 2, 3] {
         let answer = Bench::new().json(&format!("{XY} --draws 20000 --seed {seed}"));
         assert_eq!(
@@ -106,7 +106,7 @@ fn none_of_100_000_draws_is_miscounted() {
 }
 
 #[test]
-fn the_shares_of_the_xy_stage_are_those_of_pick_and_freeze() {
+fn shares_of_the_xy_stage_agree_with_pick_and_freeze() {
     let bench = Bench::new();
     let answer = bench.json(&format!("{XY} --draws 40000"));
     let groups = [
@@ -134,7 +134,7 @@ fn the_shares_of_the_xy_stage_are_those_of_pick_and_freeze() {
     for (group, truth) in groups.iter().zip(list(&answers[0], "shares")) {
         let alone: f64 = group.iter().map(|place| share(counted, &key(place))).sum();
         let together = match group {
-            [one, other] => alone + couple(counted, [&key(one), &key(other)]),
+            [one, other] => alone + interaction(counted, [&key(one), &key(other)]),
             _ => alone,
         };
         // Both are estimates, with a sigma of 0.004 each. A couple loses up to 1/28 of the variance within its classes.
@@ -156,7 +156,7 @@ fn the_shares_of_the_xy_stage_are_those_of_pick_and_freeze() {
         (&json!(key("sL")), &json!("+"))
     );
     assert!(
-        list(&list(counted, "couples")[0], "keys").contains(&json!(key("sR"))),
+        list(&list(counted, "interactions")[0], "keys").contains(&json!(key("sR"))),
         "{counted}"
     );
 }
@@ -168,7 +168,7 @@ fn complex(u: f64, v: f64) -> bool {
 }
 
 #[test]
-fn two_residues_within_tolerances_have_the_probabilities_and_shares_of_the_closed_form() {
+fn two_residues_match_the_closed_form() {
     let bench = Bench::new();
     bench.write(
         "modes.toml",
@@ -211,10 +211,10 @@ fn two_residues_within_tolerances_have_the_probabilities_and_shares_of_the_close
         near("the share of u", share(counted, &u), of_u, 0.03);
         near("the share of v", share(counted, &v), of_v, 0.03);
         // There is nothing else: the couple has the rest, less the 1/28 that its classes lose on one border, or two.
-        let rest = 1.0 - of_u - of_v - couple(counted, [&u, &v]);
+        let rest = 1.0 - of_u - of_v - interaction(counted, [&u, &v]);
         assert!((-0.03..2.0 / 28.0 + 0.03).contains(&rest), "{rest}");
         let unexplained =
-            1.0 - number(&counted["share_alone"]) - number(&counted["share_of_couples"]);
+            1.0 - number(&counted["share_alone"]) - number(&counted["share_of_interactions"]);
         assert!(
             (-0.03..2.0 / 28.0 + 0.03).contains(&unexplained),
             "{unexplained}"
@@ -223,7 +223,7 @@ fn two_residues_within_tolerances_have_the_probabilities_and_shares_of_the_close
 }
 
 #[test]
-fn a_normal_tolerance_has_the_tails_of_a_normal_distribution() {
+fn normal_tolerance_has_normal_tails() {
     let bench = Bench::new();
     // SR4DoF has CNMP zeros between two asymmetries, which `bench model locus` finds by bisection.
     let stage = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018 --operating-point 5%";
@@ -262,7 +262,7 @@ fn a_normal_tolerance_has_the_tails_of_a_normal_distribution() {
 }
 
 #[test]
-fn damping_delays_the_zeros_and_both_are_counted() {
+fn zeros_with_damping_are_counted_as_well() {
     let bench = Bench::new();
     // Heavily damped, the XY stage keeps its zeros in the left half plane.
     let answer = bench.json(&format!(
@@ -285,7 +285,7 @@ fn damping_delays_the_zeros_and_both_are_counted() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_draws_and_another_one_others() {
+fn draws_depend_on_the_seed_alone() {
     let bench = Bench::new();
     let table = |options: &str| {
         assert_eq!(
@@ -304,7 +304,7 @@ fn the_same_seed_gives_the_same_draws_and_another_one_others() {
 }
 
 #[test]
-fn the_text_says_what_was_drawn_how_likely_pairs_are_and_why() {
+fn text_reports_tolerances_probabilities_and_shares() {
     let answer = Bench::new().run(&format!("{XY} --draws 2000 --damped"));
     assert_eq!(answer.code, 0, "{}", answer.err);
     for words in [
@@ -313,7 +313,7 @@ fn the_text_says_what_was_drawn_how_likely_pairs_are_and_why() {
         "95 % by Wilson",
         "share %",
         "with damping",
-        "couples of them",
+        "interactions of two",
     ] {
         assert!(
             answer.out.contains(words),

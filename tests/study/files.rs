@@ -16,7 +16,7 @@ fn shard(bench: &Bench, shard: &str, file: &str) -> crate::program::Answer {
 }
 
 #[test]
-fn shards_in_any_order_on_any_number_of_threads_join_into_the_answer_of_the_whole_bit_for_bit() {
+fn joined_shards_equal_the_whole_study_bit_for_bit() {
     let bench = Bench::new();
     let whole = whole(&bench);
     for (count, threads) in [(1, 1), (3, 2), (7, 3)] {
@@ -56,7 +56,7 @@ fn shards_in_any_order_on_any_number_of_threads_join_into_the_answer_of_the_whol
 }
 
 #[test]
-fn shards_that_make_up_no_whole_are_refused_with_what_is_wrong() {
+fn rejects_incomplete_sets_of_shards() {
     let bench = Bench::new();
     for index in 1..=3 {
         assert_eq!(
@@ -116,7 +116,7 @@ fn shards_that_make_up_no_whole_are_refused_with_what_is_wrong() {
 }
 
 #[test]
-fn a_file_cut_anywhere_goes_on_to_the_same_answer() {
+fn truncated_file_continues_to_the_same_answer() {
     let bench = Bench::new();
     let whole = whole(&bench);
     assert_eq!(bench.run(&format!("{XY} {DRAWS} --file a.study")).code, 0);
@@ -174,7 +174,7 @@ fn a_file_cut_anywhere_goes_on_to_the_same_answer() {
 }
 
 #[test]
-fn a_changed_block_is_not_believed() {
+fn ignores_a_changed_block() {
     let bench = Bench::new();
     let whole = whole(&bench);
     assert_eq!(bench.run(&format!("{XY} {DRAWS} --file a.study")).code, 0);
@@ -215,7 +215,7 @@ fn a_changed_block_is_not_believed() {
         );
         let answer = bench.run(&format!("{XY} {DRAWS} --file a.study --json"));
         assert!(
-            answer.err.contains("1 damaged lines do not count"),
+            answer.err.contains("1 damaged lines are ignored"),
             "{wrong}: {}",
             answer.err
         );
@@ -224,7 +224,7 @@ fn a_changed_block_is_not_believed() {
 }
 
 #[test]
-fn a_file_of_other_settings_is_refused_with_what_differs_and_left_as_it_is() {
+fn rejects_and_keeps_a_file_of_other_settings() {
     let bench = Bench::new();
     assert_eq!(shard(&bench, "1/2", "a.study").code, 0);
     let before = bench.read("a.study");
@@ -254,7 +254,7 @@ fn a_file_of_other_settings_is_refused_with_what_differs_and_left_as_it_is() {
 }
 
 #[test]
-fn a_file_that_is_no_study_is_refused_and_left_as_it_is() {
+fn rejects_and_keeps_a_file_of_another_kind() {
     let bench = Bench::new();
     for content in [
         "hello",

@@ -66,7 +66,7 @@ fn lines(text: &str) -> (u64, usize) {
 }
 
 #[test]
-fn ctrl_c_and_sigterm_leave_a_whole_file_and_say_how_to_go_on() {
+fn signals_leave_a_complete_file_and_report_how_to_continue() {
     for number in [libc::SIGINT, libc::SIGTERM] {
         let bench = Bench::new();
         let mut child = start(&bench, &format!("{XY} {LONG} --file a.study --json"));
@@ -86,7 +86,7 @@ fn ctrl_c_and_sigterm_leave_a_whole_file_and_say_how_to_go_on() {
             "{said}"
         );
         assert!(
-            said.contains("started again with the same arguments it goes on from a.study"),
+            said.contains("started again with the same arguments it continues from a.study"),
             "{said}"
         );
     }
@@ -102,14 +102,14 @@ fn ctrl_c_and_sigterm_leave_a_whole_file_and_say_how_to_go_on() {
         output
             .status
             .code()
-            .is_none_or(|code| code == 1 && said.contains("nothing is kept")),
+            .is_none_or(|code| code == 1 && said.contains("nothing was stored")),
         "{said}"
     );
     assert_eq!(bench.files(), [""; 0]);
 }
 
 #[test]
-fn what_a_killed_process_has_done_is_kept_and_gone_on_from() {
+fn continues_after_a_killed_process() {
     let bench = Bench::new();
     let arguments = format!("{XY} --draws 40000 --threads 2 --json");
     let mut child = start(&bench, &format!("{arguments} --file a.study"));
@@ -130,7 +130,7 @@ fn what_a_killed_process_has_done_is_kept_and_gone_on_from() {
 }
 
 #[test]
-fn two_processes_do_not_work_on_one_file() {
+fn rejects_a_file_that_another_process_uses() {
     let bench = Bench::new();
     let mut child = start(&bench, &format!("{XY} {LONG} --file a.study"));
     until_written(&mut child, &bench.path("a.study"));
@@ -155,7 +155,7 @@ fn two_processes_do_not_work_on_one_file() {
 }
 
 #[test]
-fn a_full_disk_is_told_and_what_was_done_is_kept() {
+fn reports_a_full_disk_and_keeps_completed_draws() {
     let bench = Bench::new();
     let arguments = format!("{XY} --draws 30000 --file a.study --json");
     // 32 blocks of 512 bytes (1024 in some shells): 16 or 32 kB of some 70 kB.

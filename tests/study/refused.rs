@@ -6,7 +6,7 @@ use crate::figures::{XY, list};
 use crate::program::{Bench, number};
 
 #[test]
-fn a_tolerance_that_is_none_is_refused() {
+fn rejects_invalid_tolerances() {
     let bench = Bench::new();
     for (tolerance, words) in [
         (
@@ -64,7 +64,7 @@ fn a_tolerance_that_is_none_is_refused() {
 }
 
 #[test]
-fn a_call_that_is_none_is_refused() {
+fn rejects_invalid_arguments() {
     let bench = Bench::new();
     for (arguments, words) in [
         (format!("{XY} --draws 0"), &["0 draws", "from 1 to"][..]),
@@ -96,7 +96,7 @@ fn a_call_that_is_none_is_refused() {
 const APART: &str = "[plant]\nmodel = \"lumped\"\n[plant.nodes]\na = { mass_kg = 1.0, actuator = 1.0 }\nb = { mass_kg = 1.0, sensor = 1.0 }\n[plant.springs]\nka = { between = [\"a\", \"ground\"], stiffness_n_per_m = 1.0 }\nkb = { between = [\"b\", \"ground\"], stiffness_n_per_m = 2.0 }\n[plant.damping]\nkind = \"uniform\"\nratio = 0.01\n";
 
 #[test]
-fn a_plant_without_a_response_is_refused() {
+fn rejects_a_plant_without_response() {
     let bench = Bench::new();
     bench.write("apart.toml", APART);
     bench
@@ -116,7 +116,7 @@ fn a_plant_without_a_response_is_refused() {
 }
 
 #[test]
-fn draws_that_cannot_be_analysed_are_counted_told_and_in_no_probability() {
+fn failed_draws_are_reported_separately() {
     let bench = Bench::new();
     // Beams of 10 to 30 mm, and an operating point of 0 to 25 mm: each end is allowed with the other's nominal value, but
     // beyond the length of the beams there is none. Of u < v, u uniform on 10..30 and v on 0..25: (15 x 15/2)/(20 x 25).

@@ -4,7 +4,7 @@ use crate::figures::XY;
 use crate::program::Bench;
 
 #[test]
-fn the_csv_has_a_row_a_draw_with_settings_and_pairs() {
+fn csv_has_one_row_per_draw() {
     let bench = Bench::new();
     assert_eq!(
         bench
@@ -41,7 +41,7 @@ fn the_csv_has_a_row_a_draw_with_settings_and_pairs() {
 
 #[test]
 #[cfg(not(feature = "parquet"))]
-fn without_the_feature_parquet_is_refused_before_anything_is_computed() {
+fn rejects_parquet_without_the_feature() {
     let bench = Bench::new();
     for command in [
         XY,
@@ -63,7 +63,7 @@ mod parquet {
     use serde_json::json;
 
     #[test]
-    fn the_parquet_file_holds_what_the_csv_file_holds() {
+    fn parquet_equals_csv() {
         let bench = Bench::new();
         // In the second one some draws cannot be analysed: null in the table.
         let beams = "model study --config chapter2 --set plant.beam_length_m=0.02 --set plant.operating_point_m=0.01 --vary plant.beam_length_m=+-10mm --vary plant.operating_point_m=+-9.9mm --draws 300";

@@ -27,8 +27,7 @@ fn propositions<'a>(answer: &'a Value, side: &str) -> [&'a Value; 3] {
 }
 
 #[test]
-fn one_per_cent_of_asymmetry_has_cnmp_zeros_from_3_40_to_6_75_per_cent_of_l_and_the_propositions_say_so()
- {
+fn propositions_predict_the_cnmp_band_at_1_percent_asymmetry() {
     let answer = Bench::new().json(&format!(
         "model conditions {PRINTED} --asymmetry 1% --count 61"
     ));
@@ -44,7 +43,7 @@ fn one_per_cent_of_asymmetry_has_cnmp_zeros_from_3_40_to_6_75_per_cent_of_l_and_
     // The band by Eq. (4-1) ends within A4-5's ratio, 1e-4 of it, of the plant's: between two values of the grid.
     assert_eq!(tally["wrong_by_plant"], 0, "{tally}");
     for proposition in propositions(&answer, "before") {
-        assert_eq!(proposition["foretold"], "appear", "{proposition}");
+        assert_eq!(proposition["predicted"], "appear", "{proposition}");
         assert_eq!(
             (&proposition["equation"], &proposition["plant"]),
             (&json!(true), &json!(true)),
@@ -54,7 +53,7 @@ fn one_per_cent_of_asymmetry_has_cnmp_zeros_from_3_40_to_6_75_per_cent_of_l_and_
 }
 
 #[test]
-fn without_positive_asymmetry_c4_1_fails_at_every_operating_point_and_there_are_no_cnmp_zeros() {
+fn c4_1_fails_without_positive_asymmetry() {
     let bench = Bench::new();
     for asymmetry in ["0", "-1%", "-5%"] {
         let answer = bench.json(&format!(
@@ -76,7 +75,7 @@ fn without_positive_asymmetry_c4_1_fails_at_every_operating_point_and_there_are_
         for side in ["before", "after"] {
             let [_, p4_2x, _] = propositions(&answer, side);
             assert_eq!(
-                (&p4_2x["foretold"], &p4_2x["plant"]),
+                (&p4_2x["predicted"], &p4_2x["plant"]),
                 (&json!("absent"), &json!(false)),
                 "D = {asymmetry}"
             );
@@ -100,7 +99,7 @@ fn without_positive_asymmetry_c4_1_fails_at_every_operating_point_and_there_are_
 }
 
 #[test]
-fn section_4_4_1_has_dual_mmp_zeros_at_k_0_and_cnmp_zeros_at_0_02_as_p4_2y_foretells() {
+fn p4_2y_predicts_the_zeros_of_section_4_4_1() {
     let bench = Bench::new();
     let answer = bench.json(&format!(
         "model conditions --config three-mass --vary {K} --from 0 --to 0.3 --count 31"
@@ -113,14 +112,14 @@ fn section_4_4_1_has_dual_mmp_zeros_at_k_0_and_cnmp_zeros_at_0_02_as_p4_2y_foret
     assert_eq!(
         (
             &answer["here"]["value"],
-            &answer["here"]["proposition"]["foretold"]
+            &answer["here"]["proposition"]["predicted"]
         ),
         (&json!(0.02), &json!("appear"))
     );
     assert_eq!(answer["here"]["proposition"]["plant"], true);
     let [.., p4_2y] = propositions(&answer, "before");
     assert_eq!(
-        (&p4_2y["foretold"], &p4_2y["plant"]),
+        (&p4_2y["predicted"], &p4_2y["plant"]),
         (&json!("appear"), &json!(true)),
         "{p4_2y}"
     );
@@ -150,7 +149,7 @@ fn section_4_4_1_has_dual_mmp_zeros_at_k_0_and_cnmp_zeros_at_0_02_as_p4_2y_foret
 }
 
 #[test]
-fn section_4_4_3_leaves_the_axis_at_50_and_comes_back_at_200_though_its_assumptions_fail() {
+fn zeros_of_section_4_4_3_are_complex_from_50_to_200() {
     let answer = Bench::new().json(&format!(
         "model conditions --config four-mass --vary {K23} --from 0 --to 300 --count 61"
     ));
@@ -171,7 +170,7 @@ fn section_4_4_3_leaves_the_axis_at_50_and_comes_back_at_200_though_its_assumpti
     // P4-2y needs neither.
     let [.., p4_2y] = propositions(&answer, "after");
     assert_eq!(
-        (&p4_2y["foretold"], &p4_2y["plant"]),
+        (&p4_2y["predicted"], &p4_2y["plant"]),
         (&json!("appear"), &json!(true)),
         "{p4_2y}"
     );
@@ -218,7 +217,7 @@ fn examples() -> Vec<(String, &'static str, &'static str)> {
 }
 
 #[test]
-fn python_finds_the_same_residues_signs_and_zeros() {
+fn residues_signs_and_zeros_agree_with_python() {
     let bench = Bench::new();
     let ask = |(options, vary, range): &(String, &str, &str)| {
         let answer = bench.json(&format!(
@@ -276,7 +275,7 @@ fn python_finds_the_same_residues_signs_and_zeros() {
 }
 
 #[test]
-fn placements_have_the_zeros_that_python_finds() {
+fn zeros_of_placements_agree_with_python() {
     let bench = Bench::new();
     let answer = bench.json(&format!(
         "model placement --config four-mass --vary {K23} --from 1 --to 271 --count 10"
@@ -316,7 +315,7 @@ fn placements_have_the_zeros_that_python_finds() {
 }
 
 #[test]
-fn a_recommended_placement_has_no_cnmp_zeros_and_a_collocated_one_never_has() {
+fn recommended_and_collocated_placements_have_no_cnmp_zeros() {
     let bench = Bench::new();
     for options in [
         "".to_string(),
@@ -348,7 +347,7 @@ fn a_recommended_placement_has_no_cnmp_zeros_and_a_collocated_one_never_has() {
 }
 
 #[test]
-fn the_stage_has_actuator_and_probe_where_the_picture_warns_and_is_drawn() {
+fn probe_of_the_stage_is_in_the_quadrant_to_avoid() {
     let bench = Bench::new();
     let answer = bench.json("model placement --svg quadrants.svg");
     let here = &answer["here"];
@@ -390,7 +389,7 @@ fn the_stage_has_actuator_and_probe_where_the_picture_warns_and_is_drawn() {
 }
 
 #[test]
-fn what_has_no_two_modes_no_places_or_no_ground_is_refused_with_a_remedy() {
+fn rejects_plants_without_two_modes_places_or_ground() {
     let bench = Bench::new();
     let damping = "[plant.damping]\nkind = \"uniform\"\nratio = 0.01\n";
     let one = format!(

@@ -22,7 +22,7 @@ fn over_operating_point(bench: &Bench, count: u32) -> Value {
 }
 
 #[test]
-fn over_the_operating_point_the_zeros_leave_the_axis_at_3_40_and_come_back_at_6_75_per_cent_of_l() {
+fn zeros_are_complex_from_3_40_to_6_75_percent_of_l() {
     let bench = Bench::new();
     for count in [5, 8, 101] {
         let answer = over_operating_point(&bench, count);
@@ -59,7 +59,7 @@ fn over_the_operating_point_the_zeros_leave_the_axis_at_3_40_and_come_back_at_6_
 }
 
 #[test]
-fn python_finds_the_same_ends_of_the_band() {
+fn ends_of_the_band_agree_with_python() {
     let bench = Bench::new();
     let config = bench.json(&format!("config show {ONE_PER_CENT}"));
     let points: Vec<f64> = (4..=60).map(|i| 0.0025 * f64::from(i)).collect();
@@ -83,7 +83,7 @@ fn python_finds_the_same_ends_of_the_band() {
 }
 
 #[test]
-fn where_zeros_meet_the_residue_of_mode_r_is_the_critical_one() {
+fn residue_of_mode_r_is_critical_where_zeros_meet() {
     // Eq. (4-5) with frequencies shifted holds exactly for three modes. The Y mode, which it leaves out, shows by less than
     // a thousandth of a peak at 0.1 % damping: a millionth of a residue, and ten times that of their differences.
     for change in list(&over_operating_point(&Bench::new(), 30), "changes") {
@@ -112,7 +112,7 @@ fn where_zeros_meet_the_residue_of_mode_r_is_the_critical_one() {
 }
 
 #[test]
-fn the_tracks_are_the_zeros_of_model_modes_and_do_not_jump() {
+fn tracks_are_continuous_and_equal_the_zeros_of_modes() {
     let bench = Bench::new();
     let answer = over_operating_point(&bench, 101);
     let (values, tracks) = (list(&answer, "values"), list(&answer, "tracks"));
@@ -183,7 +183,7 @@ fn damping_delays_the_change_to_cnmp_zeros() {
 }
 
 #[test]
-fn the_critical_damping_is_printed_as_0_2240() {
+fn critical_damping_is_0_2240() {
     let answer = Bench::new().json("model critical-damping");
     near("Eq. (3-16)", number(&answer["eq_3_16"]), 0.2240, 5e-5);
     // The double root of the crossing condition, solved with scipy: 0.22438943.
@@ -196,7 +196,7 @@ fn the_critical_damping_is_printed_as_0_2240() {
 }
 
 #[test]
-fn the_opening_angle_is_the_integral_of_eq_1_2() {
+fn opening_angle_is_the_integral_of_eq_1_2() {
     let bench = Bench::new();
     let bands = [10.0, 300.0, 520.0, 530.2, 545.0, 3000.0];
     let bound = |band: f64| {
@@ -235,7 +235,7 @@ fn the_opening_angle_is_the_integral_of_eq_1_2() {
 }
 
 #[test]
-fn the_fast_loop_keeps_to_the_bound_of_its_zeros() {
+fn fast_loop_respects_the_bound_of_its_zeros() {
     // Eq. (1-3) is a theorem for a loop that is stable with and without feedback, as the fast one is; |S| < 1/sqrt(2) up to
     // the sensitivity's bandwidth, by its definition.
     let bench = Bench::new();
@@ -264,7 +264,7 @@ fn the_fast_loop_keeps_to_the_bound_of_its_zeros() {
 }
 
 #[test]
-fn model_modes_tells_the_bound_beside_the_zeros() {
+fn modes_reports_the_bound_beside_the_zeros() {
     let bench = Bench::new();
     let (modes, bounds) = (bench.json("model modes"), bench.json("model bounds"));
     assert_eq!(modes["bounds"], bounds["zeros"]);
@@ -272,12 +272,12 @@ fn model_modes_tells_the_bound_beside_the_zeros() {
         bench
             .run("model modes")
             .out
-            .contains("|S| < 0.5 with a peak below 2: up to 530.4 rad/s")
+            .contains("at most 530.4 rad/s for |S| < 0.5 with a peak below 2")
     );
 }
 
 #[test]
-fn a_setting_that_moves_no_zero_is_said_to_move_none() {
+fn locus_reports_a_setting_without_effect() {
     let answer =
         Bench::new().run("model locus --vary sim.probe_noise_rms_m --from 0 --to 1e-9 --count 3");
     assert!(
@@ -289,7 +289,7 @@ fn a_setting_that_moves_no_zero_is_said_to_move_none() {
 }
 
 #[test]
-fn a_stage_without_zeros_in_the_right_half_plane_has_no_bound() {
+fn minimum_phase_stage_has_no_bound() {
     let answer = Bench::new().json("model bounds --asymmetry -10%");
     assert!(
         list(&answer, "zeros").is_empty() && list(&answer, "damped_zeros").is_empty(),
@@ -298,7 +298,7 @@ fn a_stage_without_zeros_in_the_right_half_plane_has_no_bound() {
 }
 
 #[test]
-fn the_stage_as_built_is_read_from_table_3_3() {
+fn stage_as_built_is_in_table_3_3() {
     let bench = Bench::new();
     for (asymmetry, signs, row) in [("10%", "+-+", 1), ("-10%", "++-", 7)] {
         let answer = bench.json(&format!("model sequence --asymmetry {asymmetry}"));
@@ -316,13 +316,13 @@ fn the_stage_as_built_is_read_from_table_3_3() {
 }
 
 #[test]
-fn the_step_of_the_stage_is_as_its_zeros_foretell() {
+fn step_of_the_stage_agrees_with_the_prediction_of_its_zeros() {
     let bench = Bench::new();
     for asymmetry in ["10%", "2%", "-10%"] {
         let answer = bench.json(&format!(
             "model step --asymmetry {asymmetry} --csv step.csv --count 500"
         ));
-        assert_eq!(answer["foretold"]["agrees"], true, "{answer}");
+        assert_eq!(answer["predicted"]["agrees"], true, "{answer}");
         assert_eq!(answer["initial_undershoot"], false);
         // k4 + k5 = 72 kN/m holds the motor at rest.
         near("the end", number(&answer["end_m_per_n"]) * 72e3, 1.0, 1e-2);

@@ -23,7 +23,7 @@ fn band(answer: &Value, column: usize) -> Vec<f64> {
 }
 
 #[test]
-fn at_one_per_cent_the_band_reaches_from_3_399_to_6_765_per_cent_of_l() {
+fn map_at_1_percent_has_the_band_of_the_locus() {
     // Points 0.002 % apart: the first and the last with zeros stand at most so far inside of the printed ends.
     let answer = Bench::new().json(&format!(
         "model map {PRINTED} --operating-points 0%:15%:7501 --asymmetries 0%:1%:2"
@@ -36,7 +36,7 @@ fn at_one_per_cent_the_band_reaches_from_3_399_to_6_765_per_cent_of_l() {
 }
 
 #[test]
-fn without_excess_mass_there_are_none_up_to_15_per_cent_of_l() {
+fn map_has_no_cnmp_zeros_without_excess_mass() {
     for profile in ["stage", "chapter2"] {
         let answer = Bench::new().json(&format!(
             "model map --config {profile} --operating-points -15%:15%:301 --asymmetries -20%:0%:81"
@@ -54,7 +54,7 @@ fn without_excess_mass_there_are_none_up_to_15_per_cent_of_l() {
 }
 
 #[test]
-fn the_csv_holds_every_point_and_the_text_draws_it() {
+fn csv_has_every_point_and_text_draws_the_map() {
     let bench = Bench::new();
     let answer = bench.run(&format!(
         "model map {PRINTED} --operating-points 3%:7%:5 --asymmetries -0.01:0.01:3 --csv map.csv"
@@ -76,7 +76,7 @@ fn the_csv_holds_every_point_and_the_text_draws_it() {
 }
 
 #[test]
-fn what_is_no_map_is_refused_with_the_remedy() {
+fn rejects_plants_and_options_without_a_map() {
     let bench = Bench::new();
     for (arguments, remedy) in [
         ("--config xy", "sr4dof"),

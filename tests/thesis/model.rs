@@ -34,7 +34,7 @@ fn at(bench: &Bench, profile: &str, point: f64, asymmetry: f64) -> Value {
 }
 
 #[test]
-fn the_eight_frequencies_are_those_of_table_2_2() {
+fn frequencies_match_table_2_2() {
     for (asymmetry, expected) in [
         ("0", [18.164, 27.580, 153.240, 154.301]),
         ("5%", [18.151, 27.569, 150.126, 153.859]),
@@ -59,7 +59,7 @@ fn the_eight_frequencies_are_those_of_table_2_2() {
 }
 
 #[test]
-fn the_eigenvectors_are_those_of_table_2_2() {
+fn eigenvectors_match_table_2_2() {
     // As printed, columns [x1, y1, y2, y3]; in mode 1 at 5 % the printed signs of y2 and y3 are flipped. Four digits are
     // printed: half a digit is 5e-5, and the table's own masses are rounded to 0.1 %; 5e-4 covers both.
     let symmetric = [
@@ -98,7 +98,7 @@ fn the_eigenvectors_are_those_of_table_2_2() {
 }
 
 #[test]
-fn the_signs_alternate_where_stage_2_is_the_heavier_and_do_not_where_it_is_the_lighter() {
+fn signs_alternate_only_where_stage_2_is_heavier() {
     let bench = Bench::new();
     for (asymmetry, sequence) in [("10%", "+-+"), ("-10%", "++-")] {
         let answer = bench.json(&format!("model modes --asymmetry {asymmetry}"));
@@ -132,7 +132,7 @@ fn a_symmetric_stage_hides_its_fourth_mode() {
 }
 
 #[test]
-fn at_rest_in_y_only_the_rigid_body_mode_shows() {
+fn only_the_rigid_body_mode_is_observed_at_rest_in_y() {
     // At Y1o = 0 the X and Y motions are not coupled: one mode of compliance 1/(k4 + k5) carries everything.
     for profile in ["stage", "chapter2"] {
         for asymmetry in [-0.1, 0.0, 0.1] {
@@ -160,7 +160,7 @@ fn at_rest_in_y_only_the_rigid_body_mode_shows() {
 }
 
 #[test]
-fn the_stage_as_built_has_its_zeros_at_12_8_and_530_3_rad_s() {
+fn stage_as_built_has_zeros_at_12_8_and_530_3_rad_s() {
     let answer = Bench::new().json("model modes --operating-point 8% --asymmetry 10%");
     assert_eq!(answer["cnmp_pairs"], 1);
     assert_eq!(answer["phase_drop_deg"], 360.0);
@@ -180,7 +180,7 @@ fn the_stage_as_built_has_its_zeros_at_12_8_and_530_3_rad_s() {
 }
 
 #[test]
-fn without_excess_mass_on_stage_2_there_are_no_cnmp_zeros_at_any_operating_point() {
+fn no_cnmp_zeros_without_excess_mass_on_stage_2() {
     let bench = Bench::new();
     for profile in ["stage", "chapter2"] {
         for asymmetry in [-0.2, -0.05, -0.01, -0.001, 0.0] {
@@ -202,7 +202,7 @@ fn without_excess_mass_on_stage_2_there_are_no_cnmp_zeros_at_any_operating_point
 }
 
 #[test]
-fn one_per_cent_of_excess_mass_gives_cnmp_zeros_between_3_40_and_6_75_per_cent_of_l() {
+fn one_percent_excess_mass_gives_cnmp_zeros_from_3_40_to_6_75_percent() {
     // Figures as printed, in steps of 0.05 %: the first and the last with zeros are inside, the next ones outside.
     let bench = Bench::new();
     let pairs = |per_cent: f64| {
@@ -230,7 +230,7 @@ fn one_per_cent_of_excess_mass_gives_cnmp_zeros_between_3_40_and_6_75_per_cent_o
 }
 
 #[test]
-fn the_close_modes_of_a_symmetric_stage_cross_at_6_580_per_cent_of_l_and_152_42_hz() {
+fn close_modes_of_a_symmetric_stage_cross_at_6_580_percent() {
     // Modes are sorted by frequency: where they cross, the hidden one changes its place from fourth to third.
     let bench = Bench::new();
     let below = at(&bench, "chapter2", 0.06575, 0.0);
@@ -248,7 +248,7 @@ fn the_close_modes_of_a_symmetric_stage_cross_at_6_580_per_cent_of_l_and_152_42_
 }
 
 #[test]
-fn moving_to_the_other_side_changes_nothing_of_the_transfer_function() {
+fn transfer_function_is_even_in_the_operating_point() {
     // Y1o to -Y1o is y to -y in Eq. (2-5).
     let bench = Bench::new();
     for (point, asymmetry) in [(0.08, 0.1), (0.034, -0.03)] {
@@ -275,7 +275,7 @@ fn moving_to_the_other_side_changes_nothing_of_the_transfer_function() {
 }
 
 #[test]
-fn python_finds_the_same_band_of_cnmp_zeros_and_the_same_crossing() {
+fn cnmp_band_and_crossing_agree_with_python() {
     let bench = Bench::new();
     let one = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018 --asymmetry 1%";
     let points: Vec<f64> = (0..=60).map(|i| 0.0025 * f64::from(i)).collect();
@@ -371,7 +371,7 @@ fn settings(draw: &mut Draw) -> String {
 }
 
 #[test]
-fn modes_residues_and_zeros_of_random_stages_equal_those_of_python() {
+fn random_stages_agree_with_python() {
     let (bench, mut draw) = (Bench::new(), Draw(2_718));
     let drawn: Vec<String> = (0..48).map(|_| settings(&mut draw)).collect();
     let question =

@@ -124,7 +124,7 @@ fn modal(bench: &Bench, draw: &mut Draw) -> String {
 }
 
 #[test]
-fn modes_residues_and_zeros_of_random_plants_equal_those_of_python() {
+fn random_plants_agree_with_python() {
     let (bench, mut draw) = (Bench::new(), Draw(31_415));
     let (mut ours, mut questions) = (Vec::new(), Vec::new());
     for i in 0..60 {
@@ -216,8 +216,7 @@ fn same_zeros(ours: &[Value], truth: &[Value], what: &str) {
 }
 
 #[test]
-fn the_nominal_xy_stage_has_no_cnmp_zeros_in_the_pinwheel_and_as_many_as_python_finds_when_mirrored()
- {
+fn cnmp_pairs_of_the_xy_layouts_agree_with_python() {
     let bench = Bench::new();
     let points: Vec<f64> = (0..=30).map(|i| 0.005 * f64::from(i)).collect();
     let pairs = |layout: &str, point: f64| {
@@ -259,7 +258,7 @@ fn the_nominal_xy_stage_has_no_cnmp_zeros_in_the_pinwheel_and_as_many_as_python_
 }
 
 #[test]
-fn the_static_load_of_the_xy_stage_shifts_its_frequencies_by_0_42_hz_at_the_most() {
+fn static_load_shifts_xy_frequencies_by_at_most_0_42_hz() {
     let bench = Bench::new();
     let options = |geometric: bool| {
         format!("--config xy --operating-point 9.5% --set plant.geometric_stiffness={geometric}")
@@ -296,7 +295,7 @@ fn the_static_load_of_the_xy_stage_shifts_its_frequencies_by_0_42_hz_at_the_most
 }
 
 #[test]
-fn the_zeros_of_three_masses_leave_the_axis_and_come_back_as_in_section_4_4_1() {
+fn zeros_of_three_masses_match_section_4_4_1() {
     let bench = Bench::new();
     let at = |k: f64| {
         bench.json(&format!(
@@ -326,7 +325,7 @@ fn the_zeros_of_three_masses_leave_the_axis_and_come_back_as_in_section_4_4_1() 
 }
 
 #[test]
-fn the_zeros_of_four_floating_masses_leave_the_axis_at_50_and_come_back_at_200_n_per_m() {
+fn zeros_of_four_masses_are_complex_from_50_to_200_n_per_m() {
     let bench = Bench::new();
     let at = |k: f64| {
         bench.json(&format!(
@@ -360,7 +359,7 @@ fn the_zeros_of_four_floating_masses_leave_the_axis_at_50_and_come_back_at_200_n
 }
 
 #[test]
-fn a_double_integrator_and_a_mode_have_the_zeros_of_eq_3_3() {
+fn double_integrator_and_mode_have_the_zeros_of_eq_3_3() {
     let bench = Bench::new();
     for residue in [-4.0, -1.5, -0.5, 0.25, 2.0] {
         let text = format!(
@@ -392,7 +391,7 @@ fn a_double_integrator_and_a_mode_have_the_zeros_of_eq_3_3() {
 }
 
 #[test]
-fn the_plants_of_section_6_1_have_their_zeros() {
+fn plants_of_section_6_1_have_their_zeros() {
     let bench = Bench::new();
     let plant = |name: &str, modes: &str| {
         bench.write(
@@ -440,7 +439,7 @@ fn the_plants_of_section_6_1_have_their_zeros() {
 }
 
 #[test]
-fn a_plant_that_is_none_is_refused_with_its_place_and_the_remedy() {
+fn rejects_invalid_plants_with_place_and_remedy() {
     let lumped = |nodes: &str, springs: &str| {
         format!(
             "[plant]\nmodel = \"lumped\"\n[plant.nodes]\n{nodes}\n[plant.springs]\n{springs}\n[plant.damping]\nkind = \"uniform\"\nratio = 0.01\n"
@@ -541,7 +540,7 @@ fn a_plant_that_is_none_is_refused_with_its_place_and_the_remedy() {
 }
 
 #[test]
-fn what_only_the_matrices_show_is_refused_by_what_needs_them() {
+fn rejects_invalid_matrices_where_they_are_needed() {
     let bench = Bench::new();
     let two = "[plant]\nmodel = \"lumped\"\n[plant.nodes]\na = { mass_kg = 1.0, actuator = 1.0 }\nb = { mass_kg = 1.0, sensor = 1.0 }\n[plant.springs]\nka = { between = [\"a\", \"ground\"], stiffness_n_per_m = 1.0 }\nkb = { between = [\"b\", \"ground\"], stiffness_n_per_m = 2.0 }\n[plant.damping]\nkind = \"uniform\"\nratio = 0.01\n";
     bench.write("apart.toml", two);
@@ -561,7 +560,7 @@ fn what_only_the_matrices_show_is_refused_by_what_needs_them() {
 }
 
 #[test]
-fn an_option_without_a_meaning_for_the_model_is_refused() {
+fn rejects_options_that_do_not_apply_to_the_model() {
     let bench = Bench::new();
     for command in ["model modes", "margins", "chirp", "control"] {
         let refused = |options: &str, words: &[&str]| {
@@ -626,7 +625,7 @@ fn share_that_is_true(profile: &str, (low_hz, high_hz): (f64, f64)) -> Option<f6
 }
 
 #[test]
-fn a_chirp_measures_each_of_the_plants() {
+fn chirp_measures_each_plant() {
     for (profile, band_hz) in [
         ("xy", (2.0, 350.0)),
         ("three-mass", (0.025, 0.28)),
@@ -644,7 +643,7 @@ fn a_chirp_measures_each_of_the_plants() {
 }
 
 #[test]
-fn each_of_the_plants_has_a_controller_and_refuses_the_fast_one() {
+fn each_plant_has_a_controller_and_rejects_the_fast_one() {
     let bench = Bench::new();
     for profile in ["xy", "three-mass", "four-mass"] {
         let answer = bench.json(&format!("control --config {profile}"));

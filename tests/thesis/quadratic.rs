@@ -27,7 +27,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[test]
-fn the_motion_is_that_of_all_coordinates_under_their_constraints() {
+fn quadratic_motion_agrees_with_lagrange_multipliers() {
     let bench = Bench::new();
     let options = format!("{CLEAN} {SHORT} --amplitude 0.7 --set sim.geometry=quadratic");
     let (commands, positions) = course(&bench, &options);
@@ -69,7 +69,7 @@ fn the_motion_is_that_of_all_coordinates_under_their_constraints() {
 }
 
 #[test]
-fn the_difference_to_the_linear_rig_falls_with_the_square_of_the_amplitude() {
+fn nonlinearity_is_quadratic_in_the_amplitude() {
     let bench = Bench::new();
     let difference = |amplitude: f64| {
         let at = |geometry: &str| {
@@ -140,7 +140,7 @@ const SLOWLY: &str = "--set chirp.quiet_after_s=20 --set chirp.fade_in_s=1 --set
 const CLOSE_MODES_HZ: (f64, f64) = (79.0, 90.0);
 
 #[test]
-fn around_modes_u_and_v_0_114_a_or_17_um_change_the_response_by_one_degree() {
+fn response_changes_by_1_degree_at_17_um_around_modes_u_and_v() {
     let at = |amplitude_a: f64| {
         change(
             &format!("{SLOWLY} --start 74 --stop 95 --amplitude {amplitude_a}"),
@@ -160,7 +160,7 @@ fn around_modes_u_and_v_0_114_a_or_17_um_change_the_response_by_one_degree() {
 }
 
 #[test]
-fn around_mode_r_no_travel_inside_the_soft_limit_changes_the_response() {
+fn response_around_mode_r_is_linear_within_the_soft_limit() {
     let (change, travel_m) = change(
         &format!("{SLOWLY} --start 24 --stop 35 --amplitude 0.1"),
         (27.5, 31.0),
@@ -171,8 +171,7 @@ fn around_mode_r_no_travel_inside_the_soft_limit_changes_the_response() {
 }
 
 #[test]
-fn the_chirp_of_the_profile_is_six_times_larger_there_than_what_changes_the_response_by_one_per_cent()
- {
+fn profile_chirp_is_six_times_the_amplitude_of_1_percent_change() {
     let points = [
         (0.1, 0.4),
         (8.0, 0.4),

@@ -174,7 +174,7 @@ fn literal(printed: &[&str], names: &[&str]) -> bool {
 }
 
 #[test]
-fn the_tables_foretell_the_kinds_of_zeros_of_random_plants_in_every_row() {
+fn tables_predict_the_kinds_of_zeros_of_random_plants() {
     let mut draw = Draw(1_618);
     let mut visits: BTreeMap<(&str, usize), [u32; 2]> = BTreeMap::new();
     let mut skipped = 0;
@@ -235,7 +235,7 @@ fn the_tables_foretell_the_kinds_of_zeros_of_random_plants_in_every_row() {
 }
 
 #[test]
-fn a_slow_mode_in_place_of_the_double_integrator_is_read_by_the_same_table() {
+fn slow_mode_is_read_as_a_double_integrator() {
     // Assumption A3-7 asks for a mode R well apart; by the sequence alone the kinds are right wherever a row has it.
     let (mut draw, mut read, mut unread) = (Draw(2_236), 0, 0);
     for _ in 0..20_000 {
@@ -267,7 +267,7 @@ fn a_slow_mode_in_place_of_the_double_integrator_is_read_by_the_same_table() {
 }
 
 #[test]
-fn python_finds_the_same_kinds_with_60_digits_in_every_row() {
+fn kinds_in_every_row_agree_with_60_digits() {
     let mut draw = Draw(577);
     let mut plants: Vec<(&TableRow, ModalSum)> = Vec::new();
     let mut visits: BTreeMap<(&str, usize), u32> = BTreeMap::new();
@@ -325,7 +325,7 @@ fn many_modes(draw: &mut Draw) -> ModalSum {
 }
 
 #[test]
-fn zeros_of_random_modal_plants_are_those_of_60_digit_polynomials_with_and_without_damping() {
+fn zeros_of_modal_plants_agree_with_60_digits() {
     let mut draw = Draw(141);
     let plants: Vec<ModalSum> = (0..150).map(|_| many_modes(&mut draw)).collect();
     let Some(answers) = truth::ask(&plants.iter().map(question).collect::<Vec<_>>()) else {
@@ -360,8 +360,7 @@ fn zeros_of_random_modal_plants_are_those_of_60_digit_polynomials_with_and_witho
 }
 
 #[test]
-fn a_step_begins_against_its_end_exactly_with_an_odd_number_of_real_zeros_in_the_right_half_plane()
-{
+fn undershoot_needs_an_odd_number_of_rnmp_zeros() {
     let mut draw = Draw(299);
     let (mut with, mut more) = ([0; 2], 0);
     for index in 0..8000 {

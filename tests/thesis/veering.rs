@@ -8,7 +8,7 @@ use crate::truth;
 const L_M: f64 = 0.0475;
 
 #[test]
-fn without_asymmetry_the_close_modes_cross_at_6_58_per_cent_of_l_and_keep_their_shapes() {
+fn close_modes_cross_at_6_58_percent_without_asymmetry() {
     let bench = Bench::new();
     let config = bench.json("config show --config chapter2 --asymmetry 0");
     let truth = truth::ask(&[json!({"what": "crossing", "config": config})]);
@@ -56,7 +56,7 @@ fn without_asymmetry_the_close_modes_cross_at_6_58_per_cent_of_l_and_keep_their_
 }
 
 #[test]
-fn with_asymmetry_they_veer_as_scipy_finds_and_each_is_localised_in_one_secondary_stage() {
+fn close_modes_veer_and_localise_with_asymmetry() {
     let bench = Bench::new();
     for asymmetry in ["5%", "-5%", "0.5%"] {
         let config = bench.json(&format!(
@@ -141,7 +141,7 @@ fn localised(answer: &Value, asymmetry: &str) {
 }
 
 #[test]
-fn a_setting_of_any_plant_may_vary_and_the_file_has_loci_and_shapes() {
+fn csv_has_loci_and_shapes_over_any_setting() {
     let bench = Bench::new();
     let vary = "--vary plant.springs.k23.stiffness_n_per_m --from 1 --to 300";
     let answer = bench.json(&format!(

@@ -1,158 +1,176 @@
-//! What `bench model conditions` says to a person.
+//! The text of `bench model conditions`.
 
-use super::super::table::table;
-use super::conditions::{Assumptions, ConditionJson, Here, PropositionJson, Report, SideJson};
+use super::super::table::{table, wrap};
+use super::screenful;
+use crate::model::veering::conditions::Condition;
+use crate::model::veering::propositions::Proposition;
+use crate::model::veering::report::{
+    Assumptions, ConditionRow, ConditionsReport, Explanation, PredictionTally, SideReport,
+};
 
-pub(super) fn text(report: &Report) -> String {
-    let [u, v] = report.modes;
-    let verb = if report.meeting == "crossing" {
-        "cross"
-    } else {
-        "veer"
+pub(super) fn text(profile: &str, vary: &str, conditions: &ConditionsReport) -> String {
+    let here = match &conditions.here {
+        Some(here) => explanation_text(here),
+        None => wrap(
+            "the modes cross at this value, where the conditions do not apply; give another --at",
+            0,
+        ),
     };
-    let bands = match report.cnmp_bands.as_slice() {
-        [] => "none".into(),
-        bands => bands
-            .iter()
-            .map(|[from, to]| format!("{from:.9} to {to:.9}"))
-            .collect::<Vec<_>>()
-            .join(", "),
-    };
-    let here = report.here.as_ref().map_or_else(
-        || {
-            format!(
-                "at {} the modes cross: there is nothing to explain there, give another --at\n",
-                report.value
-            )
-        },
-        here_text,
-    );
-    let sides: String = report.sides.iter().map(side_text).collect();
-    let tally = &report.p4_1;
+    let sides: String = conditions.sides.iter().map(side_text).collect();
     format!(
-        "{}: modes {u} and {v} over {}\nthey {verb} at {:.9}: {:.4} Hz, {:.3e} Hz apart\nCNMP zeros of these modes: {bands}\n\n{here}{}\nP4-1 at {} values: CNMP zeros foretold at {}; contradicted by the zeros of Eq. (4-1) at {}, by those of the plant at {}\n{sides}\n{}",
-        report.profile,
-        report.vary,
-        report.value,
-        report.frequency_hz,
-        report.gap_hz,
-        assumptions_text(&report.assumptions),
-        tally.values,
-        tally.appear,
-        tally.wrong_by_equation,
-        tally.wrong_by_plant,
-        rows_text(report),
+        "{}\n{here}{}\n{}\n{sides}\n{}",
+        head_text(profile, vary, conditions),
+        assumptions_text(&conditions.assumptions),
+        wrap(&tally_text(&conditions.p4_1), 0),
+        rows_text(&conditions.rows),
     )
 }
 
-fn here_text(here: &Here) -> String {
-    let proposition = &here.proposition;
-    let zeros = if proposition.plant {
-        "CNMP zeros"
-    } else {
-        "no CNMP zeros"
-    };
-    let remedies: String = here
-        .remedies
+fn head_text(profile: &str, vary: &str, conditions: &ConditionsReport) -> String {
+    let point = &conditions.point;
+    let [u, v] = point.modes;
+    let bands: Vec<String> = conditions
+        .cnmp_bands
         .iter()
-        .map(|remedy| format!("  {remedy}\n"))
+        .map(|[from, to]| format!("{from:.9} to {to:.9}"))
         .collect();
+    let bands = match bands.is_empty() {
+        true => "none".into(),
+        false => bands.join(", "),
+    };
+    let title = format!("{profile}: modes {u} and {v} over {vary}");
+    let meeting = format!(
+        "they {} at {:.9}: {:.4} Hz, {:.3e} Hz apart",
+        point.meeting.verb(),
+        point.value,
+        point.frequency_hz,
+        point.gap_hz
+    );
+    let bands = format!("CNMP zeros of these modes: {bands}");
+    [title, meeting, bands]
+        .iter()
+        .map(|line| wrap(line, 0))
+        .collect()
+}
+
+fn explanation_text(here: &Explanation) -> String {
+    let proposition = &here.proposition;
+    let zeros = match proposition.plant {
+        true => "CNMP zeros",
+        false => "no CNMP zeros",
+    };
+    let remedies: String = here.remedies.iter().map(|remedy| wrap(remedy, 2)).collect();
+    let prediction = proposition.predicted.name();
     format!(
-        "at {:.9}: {zeros} (P4-1: {})\n{remedies}",
-        here.value, proposition.foretold
+        "at {:.9}: {zeros} (P4-1: {prediction})\n{remedies}",
+        here.value
     )
 }
 
-fn assumptions_text(a: &Assumptions) -> String {
+fn assumptions_text(assumptions: &Assumptions) -> String {
     let number = |ratio: Option<f64>| ratio.map_or("-".into(), |ratio| format!("{ratio:.4}"));
+    let mode_r = assumptions
+        .mode_r
+        .map_or("-".into(), |mode| mode.to_string());
+    let sentences = [
+        format!(
+            "A4-2: damping ratio {:.4}, {} of half the gap",
+            assumptions.damping_ratio,
+            number(assumptions.damping_over_half_gap)
+        ),
+        format!(
+            "A4-4: mode R is mode {mode_r}; frequency ratio to the nearer mode {}; all other modes are {} of it",
+            number(assumptions.nearness_ratio),
+            number(assumptions.others_ratio)
+        ),
+        format!(
+            "A4-5: deviation from a double integrator between the two modes {}",
+            number(assumptions.integrator_ratio)
+        ),
+    ];
+    sentences.iter().map(|sentence| wrap(sentence, 2)).collect()
+}
+
+fn tally_text(tally: &PredictionTally) -> String {
     format!(
-        "  A4-2 damping ratio {:.4}, {} of half the gap\n  A4-4 mode R is mode {}, at {} of the frequency of the nearer; all others give {} of what it gives\n  A4-5 between the two modes the others depart from a double integrator by {}\n",
-        a.damping_ratio,
-        number(a.damping_over_half_gap),
-        a.mode_r.map_or("-".into(), |mode| mode.to_string()),
-        number(a.nearness_ratio),
-        number(a.others_ratio),
-        number(a.integrator_ratio),
+        "P4-1 at {} values: CNMP zeros predicted at {}; wrong by the zeros of Eq. (4-1) at {}, by those of the plant at {}",
+        tally.values, tally.appear, tally.wrong_by_equation, tally.wrong_by_plant
     )
 }
 
-fn side_text(side: &SideJson) -> String {
-    let place = match side.stretch {
-        None => "C4-1 fails at the veering point".into(),
+fn side_text(side: &SideReport) -> String {
+    let interval = match side.interval {
+        None => "C4-1 fails there".into(),
         Some([from, to]) => format!("C4-1 holds from {from:.6} to {to:.6}"),
     };
     let propositions: String = side.propositions.iter().map(proposition_text).collect();
-    format!("{} the veering point: {place}\n{propositions}", side.side)
+    let name = side.side.name();
+    format!("{name} the veering point: {interval}\n{propositions}")
 }
 
-fn proposition_text(p: &PropositionJson) -> String {
-    let premises: Vec<String> = p.premises.iter().map(premise_text).collect();
-    let there = |quartet: bool| if quartet { "appear" } else { "absent" };
-    let differs = if p.agrees_with_equation && p.agrees_with_plant {
-        ""
-    } else {
-        " DIFFERS"
-    };
-    format!(
-        "  {:5} {}: foretold {}; Eq. (4-1) {}, plant {}{differs}\n",
-        p.name,
+fn proposition_text(proposition: &Proposition) -> String {
+    let premises: Vec<String> = proposition.premises.iter().map(premise_text).collect();
+    let found = |quartet: bool| if quartet { "appear" } else { "absent" };
+    let agrees = proposition.agrees_with_equation && proposition.agrees_with_plant;
+    let sentence = format!(
+        "{}: {}; predicted: {}; Eq. (4-1): {}, plant: {}{}",
+        proposition.name,
         premises.join(", "),
-        p.foretold,
-        there(p.equation),
-        there(p.plant)
+        proposition.predicted.name(),
+        found(proposition.equation),
+        found(proposition.plant),
+        if agrees { "" } else { " (DISAGREES)" }
+    );
+    wrap(&sentence, 2)
+}
+
+fn premise_text(condition: &Condition) -> String {
+    let holds = if condition.holds { "holds" } else { "fails" };
+    format!("{} {holds} ({:+.3})", condition.name, condition.margin)
+}
+
+fn rows_text(rows: &[ConditionRow]) -> String {
+    let margins: Vec<Vec<String>> = screenful(rows).map(margin_row).collect();
+    let residues: Vec<Vec<String>> = screenful(rows).map(residue_row).collect();
+    format!(
+        "margins of C4-1 and C4-2, and the zeros\n{}\nresidues in 1/kg, and b2 between its limits (in the direction of av)\n{}",
+        table(
+            &[
+                "value",
+                "u Hz",
+                "v Hz",
+                "C4-1",
+                "C4-2",
+                "Eq. (4-1)",
+                "plant"
+            ],
+            &margins
+        ),
+        table(&["value", "aR", "au", "av", "b21", "b2", "b22"], &residues),
     )
 }
 
-fn premise_text(c: &ConditionJson) -> String {
-    format!(
-        "{} {} ({:+.3})",
-        c.name,
-        if c.holds { "holds" } else { "fails" },
-        c.margin
-    )
+fn margin_row(row: &ConditionRow) -> Vec<String> {
+    vec![
+        format!("{:.6}", row.value),
+        format!("{:.4}", row.u_hz),
+        format!("{:.4}", row.v_hz),
+        format!("{:+.3}", row.c4_1.margin),
+        format!("{:+.3}", row.c4_2.margin),
+        row.equation.name().into(),
+        row.plant.name().into(),
+    ]
 }
 
-/// A screen of rows; the JSON has all.
-fn rows_text(report: &Report) -> String {
-    let header = [
-        &report.vary,
-        "u Hz",
-        "v Hz",
-        "aR 1/kg",
-        "au 1/kg",
-        "av 1/kg",
-        "C4-1",
-        "b21",
-        "b2",
-        "b22",
-        "C4-2",
-        "Eq. (4-1)",
-        "plant",
-    ];
-    let step = report.rows.len().div_ceil(25).max(1);
-    let rows = report.rows.iter().step_by(step).map(|row| {
-        let small = |x: f64| format!("{x:+.4e}");
-        let limit =
-            |which: usize| row.c4_2.limits[which].map_or("-".into(), |x| format!("{x:.4e}"));
-        vec![
-            format!("{:.6}", row.value),
-            format!("{:.4}", row.u_hz),
-            format!("{:.4}", row.v_hz),
-            small(row.residue_r_per_kg),
-            small(row.residue_u_per_kg),
-            small(row.residue_v_per_kg),
-            format!("{:+.3}", row.c4_1.margin),
-            limit(0),
-            format!("{:.4e}", row.c4_2.figure),
-            limit(1),
-            format!("{:+.3}", row.c4_2.margin),
-            row.equation.into(),
-            row.plant.into(),
-        ]
-    });
-    let header: Vec<&str> = header.iter().map(|name| name as &str).collect();
-    format!(
-        "margins of C4-1 and C4-2, b-hat in the direction of av, and the zeros\n{}",
-        table(&header, &rows.collect::<Vec<_>>())
-    )
+fn residue_row(row: &ConditionRow) -> Vec<String> {
+    let [b21, b22] = row.c4_2.limits;
+    vec![
+        format!("{:.6}", row.value),
+        format!("{:+.3e}", row.residue_r_per_kg),
+        format!("{:+.3e}", row.residue_u_per_kg),
+        format!("{:+.3e}", row.residue_v_per_kg),
+        format!("{b21:.3e}"),
+        format!("{:.3e}", row.c4_2.figure),
+        format!("{b22:.3e}"),
+    ]
 }

@@ -6,14 +6,15 @@ use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::output::{print_json, print_text};
+use super::super::table::wrap;
 use super::super::value_range::ValueRange;
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
 
-/// The largest picture for people: lines and characters.
-const PICTURE: (usize, usize) = (60, 120);
+/// The largest picture in lines and characters, which fits 80 columns.
+const PICTURE: (usize, usize) = (60, 67);
 
-/// Over which grid.
+/// The grid.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -135,10 +136,11 @@ fn text(report: &Report, profile: &str) -> String {
     } else {
         format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1)
     };
-    format!(
-        "{profile}: CNMP zeros without damping at {}\n{rest}",
+    let summary = format!(
+        "{profile}: CNMP zeros without damping at {}",
         summary(report)
-    )
+    );
+    wrap(&summary, 0) + &rest
 }
 
 fn summary(report: &Report) -> String {

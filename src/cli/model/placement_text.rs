@@ -1,71 +1,63 @@
-//! What `bench model placement` says to a person.
+//! The text of `bench model placement`.
 
-use super::super::table::table;
-use super::placement::{LEAST_REMAINDER, PictureJson, Report, TrialJson};
+use super::super::table::{table, wrap};
+use crate::model::veering::QuadrantSummary;
+use crate::model::veering::placement::{LEAST_REMAINDER_RATIO, Placement, PlacementReport, Trial};
 
 /// Placements that are listed; the JSON has all.
 const LISTED: usize = 16;
 const NUMERALS: [&str; 4] = ["I", "II", "III", "IV"];
 
-pub(super) fn text(report: &Report) -> String {
+pub(super) fn text(profile: &str, vary: &str, report: &PlacementReport) -> String {
     let [u, v] = report.modes;
-    let verb = if report.meeting == "crossing" {
-        "cross"
-    } else {
-        "veer"
-    };
-    let names = report.here.as_ref().map_or(String::new(), |here| {
-        format!("actuator {}, probe {}\n", here.actuator, here.sensor)
-    });
-    let here = report.here.as_ref().map_or_else(
-        || "no response at some value\n".into(),
-        |here| judged(here) + "\n",
-    );
-    let advice = [
-        ("of all", &report.recommended),
-        ("with this actuator", &report.best_sensor),
-        ("with this probe", &report.best_actuator),
-    ];
-    let advice: String = advice
-        .into_iter()
-        .map(|(which, trial)| advice_text(which, trial.as_ref()))
-        .collect();
-    let file = report
-        .svg
-        .as_ref()
-        .map_or(String::new(), |path| format!("picture in {path}\n"));
+    let (verb, value) = (report.meeting.verb(), report.value);
+    let head = format!("{profile}: modes {u} and {v} over {vary}; they {verb} at {value:.9}");
     format!(
-        "{}: modes {u} and {v} over {}; they {verb} at {:.9}\n{names}\n{}\n{here}\nrecommended, of places where aR is {:.0} % of what it is now or more\n{advice}\n{}{file}",
-        report.profile,
-        report.vary,
-        report.value,
-        pictures_text(&report.pictures),
-        LEAST_REMAINDER * 100.0,
+        "{}{}\n{}\n{}\n{}",
+        wrap(&head, 0),
+        present_text(report),
+        diagrams_text(&report.pictures),
+        advice_text(report),
         trials_text(report),
     )
 }
 
-fn pictures_text(pictures: &[PictureJson]) -> String {
-    let numeral = |quadrant: Option<usize>| {
-        quadrant
-            .map_or("line", |quadrant| NUMERALS[quadrant - 1])
-            .to_string()
+fn present_text(report: &PlacementReport) -> String {
+    match &report.here {
+        None => "no response at some value\n".into(),
+        Some(here) => format!(
+            "actuator {}, probe {}\n{}",
+            here.actuator,
+            here.sensor,
+            wrap(&judgement(&here.trial), 0)
+        ),
+    }
+}
+
+fn judgement(trial: &Trial) -> String {
+    let diagram = match trial.picture_alternates {
+        true => "signs alternate somewhere",
+        false => "signs alternate nowhere",
     };
-    let pair = |[a, b]: [f64; 2]| format!("{a:+.4} {b:+.4}");
-    let row = |(when, p): (&str, &PictureJson)| {
-        vec![
-            when.to_string(),
-            format!("{:.6}", p.value),
-            format!("{:+.2}", (p.turn_deg * 100.0).round() / 100.0 + 0.0),
-            pair(p.actuator),
-            numeral(p.actuator_quadrant),
-            pair(p.sensor),
-            numeral(p.sensor_quadrant),
-            p.avoid_quadrant
-                .map_or("-".into(), |quadrant| numeral(Some(quadrant))),
-            p.signs.clone().unwrap_or("crossing".into()),
-        ]
+    let remark = if trial.differs {
+        "; the two differ: the plane of the shapes or aR changes over the range, or other modes contribute"
+    } else if trial.picture_alternates && trial.with_cnmp == 0 {
+        "; the gap is outside of the band of C4-2 (`bench model conditions`)"
+    } else {
+        ""
     };
+    format!(
+        "diagram: {diagram}; model: CNMP zeros of these modes at {} of {} values, of any modes at {}{remark}",
+        trial.with_cnmp, trial.values, trial.with_any_cnmp
+    )
+}
+
+fn diagrams_text(diagrams: &[QuadrantSummary]) -> String {
+    let rows: Vec<Vec<String>> = ["before", "at", "after"]
+        .into_iter()
+        .zip(diagrams)
+        .map(|(when, diagram)| diagram_row(when, diagram))
+        .collect();
     let header = [
         "",
         "value",
@@ -74,108 +66,108 @@ fn pictures_text(pictures: &[PictureJson]) -> String {
         "in",
         "probe u v",
         "in",
-        "probe not in",
-        "signs R u v",
+        "avoid",
+        "signs",
     ];
-    table(
-        &header,
-        &["before", "at", "after"]
-            .into_iter()
-            .zip(pictures)
-            .map(row)
-            .collect::<Vec<_>>(),
-    )
+    table(&header, &rows)
 }
 
-fn judged(trial: &TrialJson) -> String {
-    let picture = if trial.picture_alternates {
-        "signs alternate somewhere"
-    } else {
-        "signs alternate nowhere"
-    };
-    let differs = match (trial.differs, trial.picture_alternates) {
-        (true, _) => {
-            "; the two differ: the plane of the shapes or aR changes over the range, or other modes take part"
-        }
-        (_, true) if trial.with_cnmp == 0 => {
-            "; signs are not enough, the gap is not in the band of C4-2 (`bench model conditions`)"
-        }
-        _ => "",
-    };
-    format!(
-        "picture: {picture}; model: CNMP zeros of these modes at {} of {} values, of any modes at {}{differs}",
-        trial.with_cnmp, trial.values, trial.with_any_cnmp
-    )
+fn diagram_row(when: &str, diagram: &QuadrantSummary) -> Vec<String> {
+    let pair = |[a, b]: [f64; 2]| format!("{a:+.3} {b:+.3}");
+    let turn_deg = (diagram.turn_deg * 100.0).round() / 100.0 + 0.0;
+    vec![
+        when.to_string(),
+        format!("{:.6}", diagram.value),
+        format!("{turn_deg:+.2}"),
+        pair(diagram.actuator),
+        numeral(diagram.actuator_quadrant, "line"),
+        pair(diagram.sensor),
+        numeral(diagram.sensor_quadrant, "line"),
+        numeral(diagram.avoid_quadrant, "-"),
+        diagram.signs.clone().unwrap_or("cross".into()),
+    ]
 }
 
-fn advice_text(which: &str, trial: Option<&TrialJson>) -> String {
-    trial.map_or_else(
-        || format!("  {which}: none\n"),
-        |trial| {
-            let verdict = match trial.with_any_cnmp {
-                0 => format!("no CNMP zeros at {} values", trial.values),
-                some => format!(
-                    "CNMP zeros at {some} of {} values all the same",
-                    trial.values
-                ),
-            };
-            format!(
-                "  {which}: actuator {}, probe {}: {verdict}, C4-1 {:+.3}\n",
-                trial.actuator, trial.sensor, trial.c4_1_margin
-            )
-        },
-    )
+fn numeral(quadrant: Option<usize>, none: &str) -> String {
+    quadrant
+        .map_or(none, |quadrant| NUMERALS[quadrant - 1])
+        .to_string()
 }
 
-fn trials_text(report: &Report) -> String {
-    let row = |trial: &TrialJson| {
-        vec![
-            trial.actuator.clone(),
-            trial.sensor.clone(),
-            trial.with_any_cnmp.to_string(),
-            trial.with_cnmp.to_string(),
-            format!("{:+.3}", trial.c4_1_margin),
-            if trial.picture_alternates {
-                "alternates"
-            } else {
-                "does not"
-            }
-            .into(),
-            if trial.differs { "differs" } else { "" }.into(),
-            format!("{:.4e}", trial.remainder_per_kg),
-        ]
+fn advice_text(report: &PlacementReport) -> String {
+    let head = format!(
+        "recommended, of places where aR is at least {:.0} % of its present value",
+        LEAST_REMAINDER_RATIO * 100.0
+    );
+    let advice = [
+        ("of all", &report.recommended),
+        ("with this actuator", &report.best_sensor),
+        ("with this probe", &report.best_actuator),
+    ];
+    let lines = advice.map(|(which, best)| best_text(which, best.as_ref()));
+    wrap(&head, 0) + &lines.concat()
+}
+
+fn best_text(which: &str, best: Option<&Placement>) -> String {
+    let Some(best) = best else {
+        return format!("  {which}: none\n");
     };
-    let names = report
-        .here
-        .as_ref()
-        .map(|here| (here.actuator.as_str(), here.sensor.as_str()));
-    let kin = |trial: &&TrialJson| {
-        names.is_none_or(|(actuator, sensor)| trial.actuator == actuator || trial.sensor == sensor)
+    let values = best.trial.values;
+    let verdict = match best.trial.with_any_cnmp {
+        0 => format!("no CNMP zeros at {values} values"),
+        some => format!("CNMP zeros at {some} of {values} values nevertheless"),
     };
-    let rows: Vec<Vec<String>> = report
-        .trials
-        .iter()
-        .filter(kin)
-        .take(LISTED)
-        .map(row)
-        .collect();
+    let sentence = format!(
+        "{which}: actuator {}, probe {}: {verdict}, C4-1 {:+.3}",
+        best.actuator, best.sensor, best.trial.c4_1_margin
+    );
+    wrap(&sentence, 2)
+}
+
+fn trials_text(report: &PlacementReport) -> String {
+    let is_related = |placement: &&Placement| {
+        report.here.as_ref().is_none_or(|here| {
+            placement.actuator == here.actuator || placement.sensor == here.sensor
+        })
+    };
+    let related = report.trials.iter().filter(is_related);
+    let rows: Vec<Vec<String>> = related.take(LISTED).map(trial_row).collect();
     let header = [
         "actuator",
         "probe",
         "any CNMP",
         "of these",
-        "C4-1 at most",
-        "picture",
+        "C4-1 max",
+        "diagram",
         "",
         "|aR| 1/kg",
     ];
-    let differ = report.trials.iter().filter(|trial| trial.differs).count();
-    format!(
-        "{}{} of {} placements listed, those with this actuator or this probe, best first; {} more have no response, {} no zeros that can be computed; picture and model differ for {differ}\n",
-        table(&header, &rows),
+    let differing = report.trials.iter().filter(|one| one.trial.differs).count();
+    let summary = format!(
+        "{} of {} placements listed, those with this actuator or this probe, best first; {} more have no response, {} no zeros that can be computed; diagram and model differ for {differing}",
         rows.len(),
         report.trials.len(),
-        report.silent,
+        report.without_response,
         report.not_computed,
-    )
+    );
+    table(&header, &rows) + &wrap(&summary, 0)
+}
+
+fn trial_row(placement: &Placement) -> Vec<String> {
+    let trial = &placement.trial;
+    let diagram = match trial.picture_alternates {
+        true => "alternates",
+        false => "does not",
+    };
+    let differs = if trial.differs { "differs" } else { "" };
+    vec![
+        placement.actuator.clone(),
+        placement.sensor.clone(),
+        trial.with_any_cnmp.to_string(),
+        trial.with_cnmp.to_string(),
+        format!("{:+.3}", trial.c4_1_margin),
+        diagram.into(),
+        differs.into(),
+        format!("{:.3e}", trial.remainder_per_kg),
+    ]
 }

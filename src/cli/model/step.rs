@@ -1,4 +1,4 @@
-//! `bench model step`: how the response to a step begins, and what the zeros foretell of it (Chapter 3).
+//! `bench model step`: the beginning of the response to a step, beside the prediction from the zeros (Chapter 3).
 
 use serde::Serialize;
 
@@ -6,19 +6,23 @@ use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::output::{print_json, print_text};
+use super::super::table::wrap;
 use crate::config::Purpose;
 use crate::model::plant::{self, ModalModel};
-use crate::model::zeros::{ModalSum, Sequence, StepFeatures, StepResponse, ZeroCounts};
+use crate::model::zeros::{
+    ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
+};
+use crate::util::numeric::linspace;
 use crate::util::quantity::{OfTime, si};
 
-/// Which step response.
+/// The table of the response.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     #[command(flatten)]
     table: TableOptions,
-    /// Length of the response in the file; until the window of the zero crossings ends if absent
+    /// Length of the response in the file [default: until the window of the zero crossings ends]
     #[arg(long, value_name = "SECONDS", value_parser = si::<OfTime>)]
     duration: Option<f64>,
     /// Rows of the file
@@ -27,11 +31,11 @@ pub(super) struct Args {
 }
 
 #[derive(Debug, Serialize)]
-struct Report {
-    profile: String,
+struct Report<'a> {
+    profile: &'a str,
     dominant_sequence: String,
-    /// ZeroCounts of the zeros without damping, of the modes that show.
-    zeros: String,
+    /// Kinds of the zeros without damping, of the modes that can be observed.
+    zeros: ZeroCounts,
     end_m_per_n: Option<f64>,
     initial_undershoot: bool,
     undershoot_m_per_n: f64,
@@ -41,27 +45,13 @@ struct Report {
     reversals_s: Vec<f64>,
     window_s: f64,
     initial_s: f64,
-    foretold: Prediction,
+    predicted: StepPrediction,
     csv: Option<String>,
 }
 
-/// What the number of zeros in the right half plane says.
-#[derive(Debug, Serialize)]
-struct Prediction {
-    /// An odd number of RNMP zeros.
-    initial_undershoot: bool,
-    /// One a RNMP zero.
-    least_zero_crossings: usize,
-    /// One a zero in the right half plane: so in the thesis's examples, no law.
-    usual_zero_crossings: usize,
-    /// Whether undershoot and least number of crossings are as foretold.
-    agrees: bool,
-}
-
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
-    if let Some(seconds) = args
-        .duration
-        .filter(|seconds| !(*seconds > 0.0 && seconds.is_finite()))
+    if let Some(seconds) = args.duration
+        && !(seconds > 0.0 && seconds.is_finite())
     {
         return Err(CliError::Usage(format!(
             "--duration is {seconds}; it is in seconds and above 0"
@@ -71,16 +61,13 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
     let sum = ModalSum::visible(&ModalModel::of(&plant::build(&config.plant)?)?)?;
     let response = StepResponse::new(&sum);
-    let initial = response.initial();
-    let seconds = args.duration.unwrap_or(initial.window_s);
-    let rows = (0..args.count).map(|k| {
-        row(
-            &response,
-            seconds * f64::from(k) / f64::from(args.count - 1),
-        )
-    });
-    args.table.write(|| Column::of_rows(names(&sum), rows))?;
-    let report = report(args, &sum, &response, initial)?;
+    let features = response.initial();
+    let end_s = args.duration.unwrap_or(features.window_s);
+    args.table.write(|| {
+        let times_s = linspace(0.0, end_s, args.count as usize);
+        Column::of_rows(names(&sum), times_s.map(|t| row(&response, t)))
+    })?;
+    let report = report(args, &sum, &response, features)?;
     if args.bench.json {
         print_json(&report)
     } else {
@@ -89,90 +76,76 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 }
 
 fn names(sum: &ModalSum) -> Vec<String> {
-    let modes = (1..=sum.terms().len()).map(|number| format!("mode_{number}_m_per_n"));
-    ["time_s", "displacement_m_per_n"]
-        .into_iter()
-        .map(String::from)
-        .chain(modes)
-        .collect()
+    let mut names = vec!["time_s".to_string(), "displacement_m_per_n".to_string()];
+    names.extend((1..=sum.terms().len()).map(|number| format!("mode_{number}_m_per_n")));
+    names
 }
 
 fn row(response: &StepResponse, time_s: f64) -> Vec<f64> {
-    [time_s, response.position_m(time_s)]
-        .into_iter()
-        .chain(response.parts_m(time_s))
-        .collect()
+    let mut row = vec![time_s, response.position_m(time_s)];
+    row.extend(response.parts_m(time_s));
+    row
 }
 
-fn report(
-    args: &Args,
+fn report<'a>(
+    args: &'a Args,
     sum: &ModalSum,
     response: &StepResponse,
-    initial: StepFeatures,
-) -> Result<Report, CliError> {
-    let kinds = ZeroCounts::of(&sum.undamped_zeros()?);
-    let crossings = initial.zero_crossings_s.len();
-    let (undershoot, least, most) = (kinds.real % 2 == 1, kinds.real, kinds.in_right_half_plane());
+    features: StepFeatures,
+) -> Result<Report<'a>, CliError> {
+    let zeros = ZeroCounts::of(&sum.undamped_zeros()?);
     Ok(Report {
-        profile: args.bench.profile().into(),
+        profile: args.bench.profile(),
         dominant_sequence: Sequence::of(sum)?.to_string(),
-        zeros: kinds.to_string(),
+        zeros,
         end_m_per_n: Some(response.end_m()).filter(|end| end.is_finite()),
-        initial_undershoot: initial.has_undershoot(),
-        undershoot_m_per_n: initial.undershoot_m,
-        zero_crossings: crossings,
-        reversals: initial.reversals_s.len(),
-        window_s: initial.window_s,
-        initial_s: initial.initial_s,
-        foretold: Prediction {
-            initial_undershoot: undershoot,
-            least_zero_crossings: least,
-            usual_zero_crossings: most,
-            agrees: undershoot == initial.has_undershoot() && crossings >= least,
-        },
-        zero_crossings_s: initial.zero_crossings_s,
-        reversals_s: initial.reversals_s,
+        initial_undershoot: features.has_undershoot(),
+        undershoot_m_per_n: features.undershoot_m,
+        zero_crossings: features.zero_crossings_s.len(),
+        reversals: features.reversals_s.len(),
+        window_s: features.window_s,
+        initial_s: features.initial_s,
+        predicted: StepPrediction::of(&zeros, &features),
+        zero_crossings_s: features.zero_crossings_s,
+        reversals_s: features.reversals_s,
         csv: args.table.csv(),
     })
 }
 
 fn text(report: &Report) -> String {
-    let times = |times: &[f64]| match times {
-        [] => String::new(),
-        _ => format!(
-            " (at {} ms)",
-            times
-                .iter()
-                .map(|t| format!("{:.3}", t * 1e3))
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
-    };
     let yes = |yes: bool| if yes { "yes" } else { "no" };
-    let foretold = &report.foretold;
-    let end = report.end_m_per_n.map_or("goes on for ever".into(), |end| {
-        format!("{:.4} um/N", end * 1e6)
-    });
+    let predicted = &report.predicted;
+    let end = report
+        .end_m_per_n
+        .map_or("unlimited".into(), |end| format!("{:.4} um/N", end * 1e6));
+    let disagreement = match predicted.agrees {
+        true => "",
+        false => "  the features DISAGREE with the prediction\n",
+    };
     format!(
-        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N   foretold: {}\n  zero crossings      {}{} in the first {:.3} ms   foretold: at least {}, {} where each zero in the right half plane shows\n  reversals           {}{} in the first {:.3} ms\n{}",
+        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N (predicted: {})\n  zero crossings      {} in the first {:.3} ms (predicted: at least {}, at most {} as a rule)\n{}  reversals           {} in the first {:.3} ms\n{}{disagreement}",
         report.profile,
         report.dominant_sequence,
         report.zeros,
         yes(report.initial_undershoot),
         report.undershoot_m_per_n * 1e6,
-        yes(foretold.initial_undershoot),
+        yes(predicted.initial_undershoot),
         report.zero_crossings,
-        times(&report.zero_crossings_s),
         report.window_s * 1e3,
-        foretold.least_zero_crossings,
-        foretold.usual_zero_crossings,
+        predicted.least_zero_crossings,
+        predicted.usual_zero_crossings,
+        times_text(&report.zero_crossings_s),
         report.reversals,
-        times(&report.reversals_s),
         report.initial_s * 1e3,
-        if foretold.agrees {
-            ""
-        } else {
-            "  NOT as foretold\n"
-        },
+        times_text(&report.reversals_s),
     )
+}
+
+/// A line with the times in milliseconds.
+fn times_text(times_s: &[f64]) -> String {
+    if times_s.is_empty() {
+        return String::new();
+    }
+    let times: Vec<String> = times_s.iter().map(|t| format!("{:.3}", t * 1e3)).collect();
+    wrap(&format!("at {} ms", times.join(", ")), 22)
 }

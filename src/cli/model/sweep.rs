@@ -4,77 +4,106 @@ use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::model::plant::{self, Structure};
+use crate::model::veering::PairError;
+use crate::util::numeric::linspace;
 use crate::util::quantity::{Quantity, QuantityError};
 
-/// `count` values of the setting `vary`, two or more.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sweep<'a> {
-    pub bench: &'a BenchOptions,
-    pub vary: &'a str,
-    pub from: &'a str,
-    pub to: &'a str,
-    pub count: u32,
+/// The setting that varies, and its values. Defaults and limits differ between the commands: see `mut_arg` there.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct SweepArgs {
+    #[command(flatten)]
+    pub bench: BenchOptions,
+    /// The setting that varies: plant.operating_point_m, plant.mass_asymmetry, any number
+    #[arg(long, value_name = "KEY")]
+    pub vary: String,
+    /// First value: 3.8mm, 0.0038, 8% of the beam length for an operating point, 8% for a ratio
+    #[arg(long, value_name = "A", allow_hyphen_values = true)]
+    from: String,
+    /// Last value, likewise
+    #[arg(long, value_name = "B", allow_hyphen_values = true)]
+    to: String,
+    /// Values of the grid, refined where needed
+    #[arg(long, value_name = "N", default_value_t = 101, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    count: u32,
 }
 
-impl Sweep<'_> {
+impl SweepArgs {
     /// The grid.
     pub fn values(&self) -> Result<Vec<f64>, CliError> {
-        self.refuse_options()?;
+        self.check_fixed()?;
         let config = self.bench.load(Purpose::Model, &[])?;
-        let (from, to) = (
-            self.number(&config, "--from", self.from)?,
-            self.number(&config, "--to", self.to)?,
-        );
+        let from = self.number(&config, "--from", &self.from)?;
+        let to = self.number(&config, "--to", &self.to)?;
         if from == to {
             return Err(CliError::Usage(format!(
                 "an empty sweep: --from and --to are both {from}; give two values"
             )));
         }
-        let last = f64::from(self.count - 1);
-        let value = |k: u32| {
-            if k + 1 == self.count {
-                to
-            } else {
-                from + (to - from) * f64::from(k) / last
-            }
-        };
-        Ok((0..self.count).map(value).collect())
+        Ok(linspace(from, to, self.count as usize).collect())
     }
 
-    /// A value as typed, read as those of the range are.
-    pub fn value(&self, text: &str) -> Result<f64, CliError> {
-        self.number(&self.bench.load(Purpose::Model, &[])?, "--at", text)
+    /// A value as typed in `option`, read as those of the range are.
+    pub fn value(&self, option: &str, text: &str) -> Result<f64, CliError> {
+        self.number(&self.bench.load(Purpose::Model, &[])?, option, text)
+    }
+
+    /// The value of the setting in the configuration.
+    pub fn configured(&self) -> Result<Option<f64>, CliError> {
+        let config = self.bench.load(Purpose::Model, &[])?;
+        let config = serde_json::to_value(config).unwrap_or_default();
+        let pointer = format!("/{}", self.vary.replace('.', "/"));
+        Ok(config.pointer(&pointer).and_then(serde_json::Value::as_f64))
     }
 
     /// The plant at a value.
-    pub fn at(&self, value: f64) -> Result<Structure, CliError> {
+    pub fn structure(&self, value: f64) -> Result<Structure, CliError> {
         Ok(plant::build(&self.config(value)?.plant)?)
     }
 
     /// The configuration at a value.
     pub fn config(&self, value: f64) -> Result<Config, CliError> {
         let option = format!("--vary {}", self.vary);
-        let setting = OptionSetting::new(self.vary, value, option);
+        let setting = OptionSetting::new(&self.vary, value, option);
         self.bench.load(Purpose::Model, &[setting])
     }
 
-    fn refuse_options(&self) -> Result<(), CliError> {
-        let option = (self.vary == "plant.operating_point_m"
-            && self.bench.operating_point.is_some())
-            || (self.vary == "plant.mass_asymmetry" && self.bench.asymmetry.is_some());
-        match option {
-            true => Err(CliError::Usage(format!(
-                "--vary {} and an option that fixes it: leave out the option",
-                self.vary
-            ))),
-            false => Ok(()),
-        }
+    fn check_fixed(&self) -> Result<(), CliError> {
+        let option = match self.vary.as_str() {
+            "plant.operating_point_m" if self.bench.operating_point.is_some() => {
+                "--operating-point"
+            }
+            "plant.mass_asymmetry" if self.bench.asymmetry.is_some() => "--asymmetry",
+            _ => return Ok(()),
+        };
+        let vary = &self.vary;
+        Err(CliError::Usage(format!(
+            "--vary {vary} and {option}, an option that fixes it: leave out the option"
+        )))
     }
 
     fn number(&self, config: &Config, option: &str, text: &str) -> Result<f64, CliError> {
         let beam_length_m = config.plant.beam_length_m();
         let quantity: Result<Quantity, QuantityError> = text.parse();
-        let value = quantity.and_then(|value| value.for_setting(self.vary, beam_length_m));
+        let value = quantity.and_then(|value| value.for_setting(&self.vary, beam_length_m));
         value.map_err(|error| CliError::Usage(format!("{option} {text}: {error}")))
+    }
+}
+
+/// A sweep and two close modes.
+#[derive(Clone, Debug, clap::Args)]
+#[command(mut_arg("vary", |arg| arg.required(false).default_value("plant.operating_point_m").requires_all(["from", "to"])))]
+#[command(mut_arg("from", |arg| arg.required(false)))]
+#[command(mut_arg("to", |arg| arg.required(false).default_value("15%")))]
+pub(super) struct CloseModesArgs {
+    #[command(flatten)]
+    pub sweep: SweepArgs,
+    /// The two modes, slowest first at the first value [default: the pair that comes closest]
+    #[arg(long, value_name = "I,J", value_delimiter = ',')]
+    pub modes: Vec<usize>,
+}
+
+impl From<PairError> for CliError {
+    fn from(error: PairError) -> CliError {
+        CliError::Usage(error.to_string())
     }
 }

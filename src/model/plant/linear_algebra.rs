@@ -44,7 +44,7 @@ fn ascending(values: &DVector<f64>) -> Vec<usize> {
 /// The finite numbers u for which `constant` + u `linear` is singular.
 ///
 /// They are computed as 1/mu from the eigenvalues mu of -constant^-1 linear, or directly where `constant` is singular.
-pub(in crate::model) fn pencil_roots(
+pub(crate) fn pencil_roots(
     constant: &DMatrix<f64>,
     linear: &DMatrix<f64>,
 ) -> Result<Vec<Complex<f64>>, PlantError> {
@@ -80,7 +80,7 @@ fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
 
 /// An orthonormal basis of the vectors orthogonal to `vector`, n x (n - 1): the last columns of the Householder reflection
 /// that turns `vector` into the first axis.
-pub(in crate::model) fn orthogonal_complement(vector: &DVector<f64>) -> DMatrix<f64> {
+pub(crate) fn orthogonal_complement(vector: &DVector<f64>) -> DMatrix<f64> {
     let n = vector.len();
     let norm = vector.norm();
     let mut v = vector.clone();

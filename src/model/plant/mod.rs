@@ -25,7 +25,7 @@ mod coordinate;
 mod damping;
 mod discrete;
 mod error;
-pub(super) mod linear_algebra;
+pub(crate) mod linear_algebra;
 mod loop_plant;
 mod lumped;
 mod matrix_exponential;

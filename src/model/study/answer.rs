@@ -1,4 +1,4 @@
-//! What a study says.
+//! The answer of a study.
 
 use serde::Serialize;
 
@@ -6,11 +6,11 @@ use super::effects::{Cell, Effects, Share};
 use super::{Block, Failure, Results, Shard, Varied};
 use crate::util::numeric::wilson_interval;
 
-/// Failures that are told one by one; the others are counted.
+/// Failures that are reported one by one; the others are counted.
 const EXAMPLES: usize = 5;
-/// Couples that are told, the strongest first.
-const COUPLES: usize = 10;
-/// A difference counts above so many of its standard deviations, a couple above so many of its noise.
+/// Interactions that are reported, the strongest first.
+const INTERACTIONS: usize = 10;
+/// A difference counts above so many of its standard deviations, an interaction above so many of its noise.
 const SIGNIFICANT: f64 = 4.0;
 
 /// The answer of a study, or of one shard of it.
@@ -24,9 +24,9 @@ pub struct Answer {
     pub seed: u64,
     /// How many draws were done.
     pub draws: u64,
-    /// `I/N` of a part, nothing of the whole.
+    /// `I/N` of a part, `null` of the whole.
     pub shard: Option<String>,
-    /// What varied.
+    /// The varied settings.
     pub varied: Vec<Varied>,
     /// The draws that are not in the probabilities.
     pub not_analysed: NotAnalysed,
@@ -52,14 +52,14 @@ pub struct Counted {
     pub probabilities: Vec<Probability>,
     /// One pair or more.
     pub any: Probability,
-    /// The sum of what the settings explain alone; nothing of too few draws.
+    /// The sum of what the settings explain alone; `null` of too few draws.
     pub share_alone: Option<f64>,
-    /// The sum of what couples explain beyond that. The rest takes three settings or more together.
-    pub share_of_couples: Option<f64>,
+    /// The sum of what interactions explain beyond that. The rest takes three settings or more together.
+    pub share_of_interactions: Option<f64>,
     /// Each setting, the strongest first.
     pub settings: Vec<Effect>,
-    /// The strongest couples of settings that stand out.
-    pub couples: Vec<Interaction>,
+    /// The strongest significant interactions.
+    pub interactions: Vec<Interaction>,
 }
 
 /// The probability of a number of pairs among the draws that were analysed.
@@ -78,12 +78,12 @@ pub struct Probability {
     pub high: f64,
 }
 
-/// What a setting has to do with there being pairs.
+/// The effect of a setting on whether there are pairs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
     /// The setting.
     pub key: String,
-    /// The share of the variance of "has pairs" that it explains alone; nothing of too few draws.
+    /// The share of the variance of "has pairs" that it explains alone; `null` of too few draws.
     pub share: Option<f64>,
     /// The share's standard deviation if there were no effect.
     pub share_noise: Option<f64>,
@@ -94,7 +94,7 @@ pub struct Effect {
     pub probability_by_third: [Option<f64>; 3],
 }
 
-/// What two settings explain beyond what each explains alone.
+/// The share that two settings explain beyond their own: second-order Sobol index.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Interaction {
     /// The two settings.
@@ -110,7 +110,7 @@ pub struct Interaction {
 }
 
 impl Answer {
-    /// What the draws that are done say.
+    /// The answer of the draws that are done.
     pub fn of(results: &Results) -> Answer {
         let plan = &results.plan;
         let failures: Vec<&Failure> = results.blocks().flat_map(|block| &block.failures).collect();
@@ -135,7 +135,7 @@ impl Answer {
 
 fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
     let mut effects = Effects::new(results.plan.varied.len(), results.done());
-    // 0, 1, 2 and 3 pairs are always told.
+    // 0, 1, 2 and 3 pairs are always reported.
     let mut counts = vec![0; 4];
     for block in results.blocks() {
         for (pairs, drawn) in of(block).iter().zip(results.plan.from_draw(block.first)) {
@@ -155,9 +155,12 @@ fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
         share_alone: (0..results.plan.varied.len())
             .map(|index| Some(effects.single(index)?.value))
             .sum(),
-        share_of_couples: effects.couples().map(|(_, share)| Some(share?.value)).sum(),
+        share_of_interactions: effects
+            .interactions()
+            .map(|(_, share)| Some(share?.value))
+            .sum(),
         settings: singles(&results.plan.varied, &effects),
-        couples: couples(&results.plan.varied, &effects),
+        interactions: interactions(&results.plan.varied, &effects),
     }
 }
 
@@ -204,25 +207,26 @@ fn direction([low, _, high]: &[Cell; 3]) -> char {
     }
 }
 
-fn couples(varied: &[Varied], effects: &Effects) -> Vec<Interaction> {
-    let strong = |(couple, share): ([usize; 2], Option<Share>)| {
+fn interactions(varied: &[Varied], effects: &Effects) -> Vec<Interaction> {
+    let strong = |(pair, share): ([usize; 2], Option<Share>)| {
         share
             .filter(|share| share.value > SIGNIFICANT * share.noise)
-            .map(|share| (couple, share))
+            .map(|share| (pair, share))
     };
-    let mut strongest: Vec<([usize; 2], Share)> = effects.couples().filter_map(strong).collect();
+    let mut strongest: Vec<([usize; 2], Share)> =
+        effects.interactions().filter_map(strong).collect();
     strongest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
-    let couple = |(couple, share): &([usize; 2], Share)| {
-        let [same, opposite] = effects.halves(*couple).map(finite);
+    let pair = |(pair, share): &([usize; 2], Share)| {
+        let [same, opposite] = effects.halves(*pair).map(finite);
         Interaction {
-            keys: couple.map(|index| varied[index].key.clone()),
+            keys: pair.map(|index| varied[index].key.clone()),
             share: share.value,
             share_noise: share.noise,
             probability_same_side: same,
             probability_opposite_sides: opposite,
         }
     };
-    strongest.iter().take(COUPLES).map(couple).collect()
+    strongest.iter().take(INTERACTIONS).map(pair).collect()
 }
 
 fn finite(cell: Cell) -> Option<f64> {

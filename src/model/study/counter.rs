@@ -2,28 +2,43 @@
 
 use serde_json::Value;
 
-use super::{Count, Plan};
 use crate::model::plant::{self, ModalModel, PlantError, PlantSettings, Structure};
 use crate::model::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
 
+/// CNMP pairs of one draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Count {
+    /// Of the zeros without damping.
+    pub pairs: u32,
+    /// Of those with damping, if they are counted.
+    pub damped_pairs: Option<u32>,
+}
+
 /// A plant with settings that are replaced by their paths.
 pub(super) struct Counter<'a> {
-    plan: &'a Plan,
+    nominal: &'a PlantSettings,
+    damped: bool,
     settings: Value,
     pointers: Vec<String>,
 }
 
 impl<'a> Counter<'a> {
-    pub fn new(plan: &'a Plan) -> Counter<'a> {
+    /// A counter for values of the settings `keys`.
+    pub fn new<'k>(
+        nominal: &'a PlantSettings,
+        keys: impl Iterator<Item = &'k str>,
+        damped: bool,
+    ) -> Counter<'a> {
         // A table of plain numbers and words is always JSON.
-        let mut settings = serde_json::to_value(&plan.plant).unwrap_or_default();
+        let mut settings = serde_json::to_value(nominal).unwrap_or_default();
         if let Some(table) = settings.as_object_mut() {
             table.shift_remove("model");
         }
         Counter {
-            plan,
+            nominal,
+            damped,
             settings,
-            pointers: plan.varied.iter().map(|one| pointer(&one.key)).collect(),
+            pointers: keys.map(pointer).collect(),
         }
     }
 
@@ -35,7 +50,7 @@ impl<'a> Counter<'a> {
     }
 
     fn pairs(&self, plant: &PlantSettings) -> Result<Count, PlantError> {
-        if !self.plan.damped {
+        if !self.damped {
             return undamped_count(&plant::undamped(plant));
         }
         let structure = plant::build(plant)?;
@@ -53,7 +68,7 @@ impl<'a> Counter<'a> {
             *place.ok_or_else(|| format!("there is no setting at {pointer}"))? =
                 Value::from(*value);
         }
-        let plant = self.plan.plant.with_table(&self.settings);
+        let plant = self.nominal.with_table(&self.settings);
         plant.map_err(|error| error.to_string())
     }
 }

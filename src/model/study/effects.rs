@@ -1,14 +1,14 @@
-//! Which settings decide whether there are CNMP pairs: shares of the variance of that yes or no.
+//! The settings that decide whether there are CNMP pairs: shares of the variance of that yes or no.
 //!
 //! With Y = 1 for a draw with pairs and 0 for one without, Var Y = p (1 - p). The share of a setting X (Sobol's first-order
-//! index) and that of a couple beyond its two settings alone (second-order) are
+//! index) and that of the interaction of two settings beyond their own (second-order) are
 //!
 //! ```text
 //!  S_i = Var E[Y|X_i]/Var Y      S_ij = Var E[Y|X_i, X_j]/Var Y - S_i - S_j
 //! ```
 //!
-//! As all settings are independent, the shares of all orders add up to 1. They are taken from the draws that are there
-//! anyway (Plischke, Borgonovo and Smith, Eur. J. Oper. Res. 226, 536, 2013): X is cut into C classes of equal probability,
+//! As all settings are independent, the shares of all orders add up to 1. They are estimated from the draws of the study
+//! (Plischke, Borgonovo and Smith, Eur. J. Oper. Res. 226, 536, 2013): X is cut into C classes of equal probability,
 //! and with n_c draws and k_c of them with pairs in class c, of N and K in all,
 //!
 //! ```text
@@ -16,17 +16,17 @@
 //!  S = (between - (C - 1) noise)/total
 //! ```
 //!
-//! The term in `noise` takes away what C means of few draws differ by chance (Kelley's epsilon squared, Proc. Natl. Acad. Sci.
+//! The term in `noise` removes the difference of C means of few draws by chance (Kelley's epsilon squared, Proc. Natl. Acad. Sci.
 //! 21, 554, 1935): without an effect S is 0 on average, with a standard deviation of sqrt(2 (C - 1))/N. Within a class the
 //! effect is averaged, so that S is a lower bound: a straight line loses 1/C^2 of its share; a step within a class up to 1/C of the
-//! variance, and so does a border between pairs and none that runs through C of a couple's C x C classes.
+//! variance, and so does a border between pairs and none that runs through C of an interaction's C x C classes.
 
 /// Classes of one setting: a multiple of two and of three.
 const CLASSES: usize = 18;
-/// Classes of each setting of a couple, even numbers: as many as leave this many draws in each.
-const COUPLE_CLASSES: std::ops::RangeInclusive<usize> = 4..=32;
-const DRAWS_IN_COUPLE_CLASS: f64 = 50.0;
-/// Fewer draws than this in a class tell nothing.
+/// Classes of each setting of an interaction, even numbers: as many as leave this many draws in each.
+const PAIR_CLASSES: std::ops::RangeInclusive<usize> = 4..=32;
+const DRAWS_IN_PAIR_CLASS: f64 = 50.0;
+/// With fewer draws than this in a class there is no estimate.
 const LEAST_IN_CLASS: u64 = 10;
 
 /// Draws of a class, and those of them with pairs.
@@ -71,26 +71,26 @@ pub(super) struct Share {
     pub noise: f64,
 }
 
-/// The draws by classes of each setting and of each couple.
+/// The draws by classes of each setting and of each interaction.
 #[derive(Clone, Debug)]
 pub(super) struct Effects {
     settings: usize,
-    couple_classes: usize,
+    pair_classes: usize,
     single: Vec<[Cell; CLASSES]>,
-    couples: Vec<Vec<Cell>>,
+    interactions: Vec<Vec<Cell>>,
 }
 
 impl Effects {
     /// For so many settings and draws.
     pub fn new(settings: usize, draws: u64) -> Effects {
-        let classes = 2 * ((draws as f64 / DRAWS_IN_COUPLE_CLASS).sqrt() / 2.0) as usize;
-        let couple_classes = classes.clamp(*COUPLE_CLASSES.start(), *COUPLE_CLASSES.end());
+        let classes = 2 * ((draws as f64 / DRAWS_IN_PAIR_CLASS).sqrt() / 2.0) as usize;
+        let pair_classes = classes.clamp(*PAIR_CLASSES.start(), *PAIR_CLASSES.end());
         Effects {
             settings,
             single: vec![[Cell::default(); CLASSES]; settings],
-            couple_classes,
-            couples: couples(settings)
-                .map(|_| vec![Cell::default(); couple_classes * couple_classes])
+            pair_classes,
+            interactions: setting_pairs(settings)
+                .map(|_| vec![Cell::default(); pair_classes * pair_classes])
                 .collect(),
         }
     }
@@ -102,14 +102,18 @@ impl Effects {
         }
         let classes: Vec<usize> = ranks
             .iter()
-            .map(|&rank| class(rank, self.couple_classes))
+            .map(|&rank| class(rank, self.pair_classes))
             .collect();
-        for (cells, (i, j)) in self.couples.iter_mut().zip(couples(self.settings)) {
-            cells[classes[i] * self.couple_classes + classes[j]].add(yes);
+        for (cells, (i, j)) in self
+            .interactions
+            .iter_mut()
+            .zip(setting_pairs(self.settings))
+        {
+            cells[classes[i] * self.pair_classes + classes[j]].add(yes);
         }
     }
 
-    /// What a setting explains alone; `None` of too few draws, or where all are alike.
+    /// The share that a setting explains alone; `None` of too few draws, or where all are equal.
     pub fn single(&self, index: usize) -> Option<Share> {
         let cells = &self.single[index];
         let spread = Spread::of(cells)?;
@@ -123,18 +127,18 @@ impl Effects {
         [0, 1, 2].map(|part| Cell::sum(&self.single[index][part * third..(part + 1) * third]))
     }
 
-    /// What each couple explains beyond its two settings alone.
-    pub fn couples(&self) -> impl Iterator<Item = ([usize; 2], Option<Share>)> + '_ {
-        couples(self.settings)
-            .zip(&self.couples)
-            .map(|((i, j), cells)| ([i, j], couple(cells, self.couple_classes)))
+    /// The share that each interaction explains beyond its two settings alone.
+    pub fn interactions(&self) -> impl Iterator<Item = ([usize; 2], Option<Share>)> + '_ {
+        setting_pairs(self.settings)
+            .zip(&self.interactions)
+            .map(|((i, j), cells)| ([i, j], interaction(cells, self.pair_classes)))
     }
 
-    /// The draws in which both settings of a couple lie in the same half, and in which they lie in different ones.
+    /// The draws in which both settings of an interaction lie in the same half, and in which they lie in different ones.
     pub fn halves(&self, [i, j]: [usize; 2]) -> [Cell; 2] {
-        let place = couples(self.settings).position(|couple| couple == (i, j));
-        let cells = place.map_or(&[][..], |place| &self.couples[place]);
-        let (classes, half) = (self.couple_classes, self.couple_classes / 2);
+        let place = setting_pairs(self.settings).position(|pair| pair == (i, j));
+        let cells = place.map_or(&[][..], |place| &self.interactions[place]);
+        let (classes, half) = (self.pair_classes, self.pair_classes / 2);
         let same = |place: usize| (place / classes < half) == (place % classes < half);
         [true, false].map(|wanted| {
             Cell::sum(
@@ -152,11 +156,11 @@ fn class(rank: f64, classes: usize) -> usize {
     ((rank * classes as f64) as usize).min(classes - 1)
 }
 
-fn couples(settings: usize) -> impl Iterator<Item = (usize, usize)> {
+fn setting_pairs(settings: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..settings).flat_map(move |i| (i + 1..settings).map(move |j| (i, j)))
 }
 
-fn couple(cells: &[Cell], n: usize) -> Option<Share> {
+fn interaction(cells: &[Cell], n: usize) -> Option<Share> {
     let spread = Spread::of(cells)?;
     let line = |cells: Vec<&Cell>| Cell::sum(cells);
     let rows: Vec<Cell> = (0..n)
@@ -226,13 +230,13 @@ mod tests {
         effects
     }
 
-    /// Shares of three settings and of the couples 01, 02, 12, over some seeds, each within `tolerance`.
+    /// Shares of three settings and of the interactions 01, 02, 12, over some seeds, each within `tolerance`.
     fn are(yes: impl Fn(&[f64]) -> bool, singles: [f64; 3], beyond: [f64; 3], tolerance: f64) {
         for seed in 1..=5 {
             let effects = effects(seed, 3, &yes);
             let found = (0..3)
                 .map(|i| effects.single(i))
-                .chain(effects.couples().map(|(_, share)| share));
+                .chain(effects.interactions().map(|(_, share)| share));
             for (share, expected) in found.zip(singles.into_iter().chain(beyond)) {
                 let share = share.unwrap();
                 let allowed = tolerance + 5.0 * share.noise;
@@ -245,9 +249,9 @@ mod tests {
     }
 
     #[test]
-    fn the_shares_are_those_of_closed_forms() {
+    fn shares_match_closed_forms() {
         // The sigma of a share S of N draws is some 2 sqrt(S)/sqrt(N) (S is a squared correlation): 0.01 and below. With 40,000
-        // draws there are 28 classes: a border through the couple's cells takes 1/28 of the variance.
+        // draws there are 28 classes: a border through the interaction's cells takes 1/28 of the variance.
         //
         // x > 1/2 decides alone.
         are(|x| x[0] > 0.5, [1.0, 0.0, 0.0], [0.0; 3], 0.005);
@@ -258,7 +262,7 @@ mod tests {
             [1.0, 0.0, 0.0],
             0.005,
         );
-        // x + y > 1: E[Y|x] = x, of variance 1/12, of 1/4; the couple takes the rest.
+        // x + y > 1: E[Y|x] = x, of variance 1/12, of 1/4; the interaction takes the rest.
         are(
             |x| x[0] + x[1] > 1.0,
             [1.0 / 3.0, 1.0 / 3.0, 0.0],
@@ -287,14 +291,17 @@ mod tests {
     }
 
     #[test]
-    fn without_an_effect_the_shares_are_zero_within_their_noise() {
+    fn shares_without_an_effect_are_zero_within_their_noise() {
         let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
         for seed in 1..=20 {
             // The last number decides, and is not among the ones looked at.
             let effects = effects(seed, 5, |x| x[4] > 0.7);
-            let found = (0..4)
-                .map(|i| effects.single(i))
-                .chain(effects.couples().filter(|(c, _)| c[1] < 4).map(|(_, s)| s));
+            let found = (0..4).map(|i| effects.single(i)).chain(
+                effects
+                    .interactions()
+                    .filter(|(c, _)| c[1] < 4)
+                    .map(|(_, s)| s),
+            );
             for share in found.map(Option::unwrap) {
                 let unit = share.value / share.noise;
                 (sum, squares, count) = (sum + unit, squares + unit * unit, count + 1.0);
@@ -319,11 +326,11 @@ mod tests {
     }
 
     #[test]
-    fn too_few_draws_or_all_alike_tell_nothing() {
+    fn too_few_or_equal_draws_give_no_estimate() {
         let mut few = Effects::new(2, 159);
         (0..159).for_each(|k| few.add(&[0.5, 0.5], k % 2 == 0));
         assert_eq!(few.single(0), None);
-        assert!(few.couples().all(|(_, share)| share.is_none()));
+        assert!(few.interactions().all(|(_, share)| share.is_none()));
         assert_eq!(effects(1, 1, |_| true).single(0), None);
     }
 }

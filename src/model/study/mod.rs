@@ -21,11 +21,12 @@ mod tolerance;
 mod workers;
 
 pub use answer::{Answer, Counted, Effect, Interaction, NotAnalysed, Probability};
+pub use counter::Count;
 pub use file::{Opened, StudyFile, joined};
 pub use plan::{Drawn, Plan, Shard, Varied};
-pub use results::{Block, Count, Failure, Results};
+pub use results::{Block, Failure, Results};
 pub use tolerance::{Deviation, Tolerance};
-pub use workers::count;
+pub use workers::complete;
 
 use crate::util::checkpoint::FileError;
 

@@ -128,8 +128,14 @@ impl Plan {
         Ok(plan)
     }
 
+    /// A counter for the values of the varied settings.
+    pub(super) fn counter(&self) -> Counter<'_> {
+        let keys = self.varied.iter().map(|one| one.key.as_str());
+        Counter::new(&self.plant, keys, self.damped)
+    }
+
     fn check(&self, config: &Config) -> Result<(), StudyError> {
-        let mut counter = Counter::new(self);
+        let mut counter = self.counter();
         let nominal: Vec<f64> = self.varied.iter().map(|one| one.nominal).collect();
         let wrong =
             |why: String| StudyError::Plan(format!("the nominal plant cannot be analysed: {why}"));
@@ -288,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_draw_is_the_same_wherever_one_begins() {
+    fn draws_do_not_depend_on_the_first_draw() {
         let plan = plan(100, 7);
         assert_eq!(plan.varied.len(), 8 + 3);
         let whole: Vec<Drawn> = plan.from_draw(0).take(100).collect();
@@ -299,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_spread_as_asked_for_and_independent_of_each_other_and_of_the_seed() {
+    fn draws_have_the_distribution_and_are_independent() {
         const N: usize = 100_000;
         let (plan, other) = (plan(N as u64, 1), plan(N as u64, 2));
         let columns = |plan: &Plan| {

@@ -1,23 +1,15 @@
-//! What the draws gave.
+//! Counts of the draws.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::counter::Count;
 use super::{Plan, Shard};
 
-/// Draws of a block: what a worker takes at a time, and what at most is lost on a thread that is killed.
+/// Draws of a block: the work that a thread takes at a time, and at most loses when it is killed.
 pub(super) const BLOCK: u64 = 500;
-
-/// CNMP pairs of one draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Count {
-    /// Of the zeros without damping.
-    pub pairs: u32,
-    /// Of those with damping, if they are counted.
-    pub damped_pairs: Option<u32>,
-}
 
 /// A draw that could not be analysed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,7 +20,7 @@ pub struct Failure {
     pub why: String,
 }
 
-/// The counts of some draws in a row; `None` where a draw could not be analysed.
+/// The counts of consecutive draws; `None` where a draw could not be analysed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Block {
     /// The number of its first draw.
@@ -37,7 +29,7 @@ pub struct Block {
     pub cnmp_pairs: Vec<Option<u32>>,
     /// The same with damping; empty if not counted.
     pub damped_cnmp_pairs: Vec<Option<u32>>,
-    /// Why some are missing.
+    /// The reasons for missing counts.
     pub failures: Vec<Failure>,
 }
 
@@ -51,7 +43,7 @@ impl Block {
         }
     }
 
-    /// Adds what the next draw gave.
+    /// Adds the count of the next draw.
     pub(super) fn push(&mut self, counted: Result<Count, String>, damped: bool) {
         if damped {
             self.damped_cnmp_pairs
@@ -64,7 +56,7 @@ impl Block {
             .extend(counted.err().map(|why| Failure { draw, why }));
     }
 
-    /// Whether it is one of a shard's blocks, and whole.
+    /// Whether it is complete, as one of a shard's blocks.
     fn fits(&self, plan: &Plan, wanted: &Range<u64>) -> bool {
         let length = (wanted.end - wanted.start) as usize;
         let damped = if plan.damped { length } else { 0 };
@@ -72,18 +64,18 @@ impl Block {
     }
 }
 
-/// What is done of a shard, by its blocks.
+/// The completed blocks of a shard.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Results {
-    /// Of which study.
+    /// The study.
     pub plan: Plan,
-    /// Which part of it.
+    /// The part of it.
     pub shard: Shard,
     blocks: BTreeMap<u64, Block>,
 }
 
 impl Results {
-    /// Nothing yet.
+    /// No block completed.
     pub fn none(plan: Plan, shard: Shard) -> Results {
         Results {
             plan,
@@ -107,17 +99,17 @@ impl Results {
             .collect()
     }
 
-    /// Adds a block; says whether it is one.
+    /// Adds a block; `false` if it is not one of the shard's.
     pub fn add(&mut self, block: Block) -> bool {
         let draws = self.shard.draws(&self.plan);
         let aligned =
             draws.contains(&block.first) && (block.first - draws.start).is_multiple_of(BLOCK);
         let range = block.first..draws.end.min(block.first.saturating_add(BLOCK));
-        let good = aligned && block.fits(&self.plan, &range);
-        if good {
+        let is_valid = aligned && block.fits(&self.plan, &range);
+        if is_valid {
             self.blocks.insert(block.first, block);
         }
-        good
+        is_valid
     }
 
     /// Adds the blocks of another shard of the same study, which begin where they do there.
@@ -125,20 +117,30 @@ impl Results {
         self.blocks.extend(other.blocks);
     }
 
-    /// Whether all draws are done.
-    pub fn is_done(&self) -> bool {
+    /// Number of draws of the shard.
+    pub fn total(&self) -> u64 {
         let draws = self.shard.draws(&self.plan);
-        self.done() == draws.end - draws.start
+        draws.end - draws.start
     }
 
-    /// How many draws are done.
+    /// Number of draws that are still to do.
+    pub fn left(&self) -> u64 {
+        self.total() - self.done()
+    }
+
+    /// Whether all draws are done.
+    pub fn is_done(&self) -> bool {
+        self.left() == 0
+    }
+
+    /// Number of completed draws.
     pub fn done(&self) -> u64 {
         self.blocks()
             .map(|block| block.cnmp_pairs.len() as u64)
             .sum()
     }
 
-    /// What is done, in the order of the draws.
+    /// The completed blocks, in the order of the draws.
     pub fn blocks(&self) -> impl Iterator<Item = &Block> {
         self.blocks.values()
     }

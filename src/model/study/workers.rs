@@ -1,15 +1,36 @@
-//! All draws, on all threads.
+//! Counting of all draws, on all threads.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 
 use super::counter::Counter;
-use super::{Block, Plan};
+use super::{Block, Plan, Results, StudyError, StudyFile};
 
-/// Counts the CNMP pairs of the draws in `ranges` on up to `threads` threads (at least one), and gives each block to `take` as
-/// it is done, in any order. Ends early when `stop` is set, without the blocks under way, or with the first error of `take`.
-pub fn count<E>(
+/// Does the draws that are missing in `results`, on up to `threads` threads, and stores each completed block in the file.
+/// `progress` is called with the number of draws of each block. Ends early when `stop` is set.
+pub fn complete(
+    results: &mut Results,
+    mut file: Option<&mut StudyFile>,
+    threads: usize,
+    stop: &AtomicBool,
+    mut progress: impl FnMut(u64),
+) -> Result<(), StudyError> {
+    let (plan, ranges) = (results.plan.clone(), results.missing());
+    count(&plan, &ranges, threads, stop, |block| {
+        if let Some(file) = file.as_mut() {
+            file.append(&block)?;
+        }
+        progress(block.cnmp_pairs.len() as u64);
+        results.add(block);
+        Ok::<(), StudyError>(())
+    })?;
+    file.map_or(Ok(()), |file| file.sync())
+}
+
+/// Counts the CNMP pairs of the draws in `ranges` on up to `threads` threads (at least one), and passes each block to `take` as
+/// it is completed, in any order. Ends early when `stop` is set, without the unfinished blocks, or with the first error of `take`.
+fn count<E>(
     plan: &Plan,
     ranges: &[Range<u64>],
     threads: usize,
@@ -28,7 +49,7 @@ pub fn count<E>(
         drop(done);
         let taken = blocks.iter().try_for_each(&mut take);
         failed.store(taken.is_err(), Ordering::Relaxed);
-        // Whoever still has a block to give finds nobody to take it, and ends.
+        // A thread that still has a block to send finds the channel closed, and ends.
         drop(blocks);
         taken
     })
@@ -41,7 +62,7 @@ fn work(
     stopped: &impl Fn() -> bool,
     done: &SyncSender<Block>,
 ) {
-    let mut counter = Counter::new(plan);
+    let mut counter = plan.counter();
     while let Some(range) = ranges.get(next.fetch_add(1, Ordering::Relaxed)) {
         let Some(block) = block(plan, &mut counter, range, stopped) else {
             return;
@@ -52,7 +73,7 @@ fn work(
     }
 }
 
-/// The block of a range; none when stopped on the way.
+/// The block of a range; `None` when stopped.
 fn block(
     plan: &Plan,
     counter: &mut Counter,

@@ -1,19 +1,19 @@
-//! Two close modes and what all others leave beside them, as the sum of Eq. (4-1):
+//! Two close modes and the remainder of all others, as the sum of Eq. (4-1):
 //!
 //! ```text
 //!   G(s) = aR/s^2 + au/(s^2 + wu^2) + av/(s^2 + wv^2),   wv > wu > 0
 //! ```
 //!
-//! The thesis takes one mode R for all others (Assumption A4-4) and that mode as a double integrator (A4-5). No stage obeys
+//! The thesis assumes one mode R for all others (A4-4), and that mode to be a double integrator (A4-5). No stage fulfils
 //! either exactly. Here aR is the residue of the double integrator that equals all other modes together at w0 = sqrt(wu wv),
 //!
 //! ```text
 //!   aR = -w0^2 (sum over the others of ri/(wi^2 - w0^2))
 //! ```
 //!
-//! which is the residue of mode R where the two assumptions hold, and of the modes' sum to first order in the gap where they
-//! do not: a band as narrow as that between two close modes sees of the others little more than one number. How far they
-//! hold is a number each of [`Remainder`].
+//! which is the residue of mode R where both assumptions hold, and that of the modes' sum to first order in the gap where
+//! they do not: within a band as narrow as that between two close modes the others are little more than one number.
+//! [`Remainder`] quantifies how far each assumption holds.
 
 use crate::model::plant::PlantError;
 use crate::model::zeros::{ModalSum, ModalTerm, Zero};
@@ -29,23 +29,23 @@ pub struct CloseModes {
     pub remainder: Remainder,
 }
 
-/// All other modes, seen from the middle of the two.
+/// All other modes, evaluated amid the two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Remainder {
     /// aR in 1/kg.
     pub residue_per_kg: f64,
-    /// Mode R: that with the largest part at w0, by its place; `None` where no other mode has any.
+    /// Mode R: the mode with the largest part at w0, by its index; `None` where no other mode has any.
     pub mode: Option<usize>,
-    /// Assumption A4-4: what the others beside mode R give there, over what mode R gives; 0 where it is alone.
+    /// Assumption A4-4: the sum of the other modes there over the part of mode R; 0 where it is alone.
     pub others_ratio: f64,
-    /// Assumption A4-4: wR/wu of a mode R below the two, wv/wR of one above; 0 is as far away as can be.
+    /// Assumption A4-4: wR/wu of a mode R below the two, wv/wR of one above; 0 is the best separation.
     pub nearness_ratio: f64,
-    /// Assumption A4-5: by how much the others' sum departs from the double integrator's at wu or wv, as a ratio of it.
+    /// Assumption A4-5: deviation of the others' sum from the double integrator at wu or wv, as a ratio of it.
     pub integrator_ratio: f64,
 }
 
 impl CloseModes {
-    /// Of all modes the two of `pair`, in either order; `None` where their frequencies are the same or one is 0.
+    /// The two modes of `pair`, in either order; `None` where their frequencies are equal or one is 0.
     pub fn of(terms: &[ModalTerm], pair: [usize; 2]) -> Option<CloseModes> {
         let [i, j] = pair.map(|mode| terms[mode]);
         let (u, v) = if i.omega_rad_s < j.omega_rad_s {
@@ -100,7 +100,7 @@ impl CloseModes {
         self.u.residue_per_kg * self.v.residue_per_kg < 0.0
     }
 
-    /// Zeros of Eq. (4-1), as eigenvalues of a pencil: no formula of this chapter is in them.
+    /// Zeros of Eq. (4-1), as eigenvalues of a pencil, independent of the formulae of this chapter.
     pub fn zeros(&self) -> Result<Vec<Zero>, PlantError> {
         let remainder = ModalTerm::undamped(0.0, self.remainder.residue_per_kg);
         ModalSum::new(vec![remainder, self.u, self.v], 0.0)?.undamped_zeros()
@@ -109,32 +109,37 @@ impl CloseModes {
 
 impl Remainder {
     fn of(terms: &[ModalTerm], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
+        let middle = (wu * wv).sqrt();
         let others = || {
-            terms
-                .iter()
-                .enumerate()
-                .filter(|(mode, _)| !pair.contains(mode))
+            let terms = terms.iter().enumerate();
+            terms.filter(|(mode, _)| !pair.contains(mode))
         };
         let all = |w: f64| others().map(|(_, term)| term.part(w)).sum::<f64>();
-        let middle = (wu * wv).sqrt();
         let residue_per_kg = -middle * middle * all(middle);
-        let largest =
-            others().max_by(|a, b| a.1.part(middle).abs().total_cmp(&b.1.part(middle).abs()));
-        let largest = largest.filter(|(_, term)| term.part(middle) != 0.0);
+        let size = |term: &ModalTerm| term.part(middle).abs();
+        let largest = others()
+            .max_by(|a, b| size(a.1).total_cmp(&size(b.1)))
+            .filter(|(_, term)| term.part(middle) != 0.0);
         let departure = |w: f64| (-w * w * all(w) / residue_per_kg - 1.0).abs();
-        let near = |w: f64| if w < wu { w / wu } else { wv / w };
+        let others_ratio = |term: &ModalTerm| {
+            let part = term.part(middle);
+            ((all(middle) - part) / part).abs()
+        };
         Remainder {
             residue_per_kg,
             mode: largest.map(|(mode, _)| mode),
-            others_ratio: largest.map_or(0.0, |(_, term)| {
-                ((all(middle) - term.part(middle)) / term.part(middle)).abs()
-            }),
-            nearness_ratio: largest.map_or(0.0, |(_, term)| near(term.omega_rad_s)),
-            integrator_ratio: if residue_per_kg == 0.0 {
-                0.0
-            } else {
-                departure(wu).max(departure(wv))
+            others_ratio: largest.map_or(0.0, |(_, term)| others_ratio(term)),
+            nearness_ratio: largest.map_or(0.0, |(_, term)| nearness(term, [wu, wv])),
+            integrator_ratio: match residue_per_kg == 0.0 {
+                true => 0.0,
+                false => departure(wu).max(departure(wv)),
             },
         }
     }
+}
+
+/// wR/wu of a mode R below the two, wv/wR of one above.
+fn nearness(term: &ModalTerm, [wu, wv]: [f64; 2]) -> f64 {
+    let w = term.omega_rad_s;
+    if w < wu { w / wu } else { wv / w }
 }

@@ -1,38 +1,40 @@
-//! The conditions of section 4.2.3, each with the quantity that decides and its margin.
+//! The conditions of section 4.2.3, each with its decisive quantity and margin.
 //!
 //! | condition | quantity | holds | margin |
 //! |---|---|---|---|
-//! | C4-1 | aR, au, av in a pattern of alternating signs | all three have the signs + - + or - + - | of the better of the two patterns, the residue that fits worst over the largest of the three: above 0 the least that would have to turn, below 0 what is on the wrong side |
+//! | C4-1 | aR, au, av in a pattern of alternating signs | all three have the signs + - + or - + - | of the better of the two patterns, the worst fitting residue over the largest of the three: above 0 the least residue that would have to change its sign, below 0 the one with the wrong sign |
 //! | C4-2 | b2-hat in the direction of av, Eqs. (4-11), (4-12) | between the sizes of b21-hat and b22-hat | distance to the nearer of the two over the larger: it fails at -1 where wv^2 - wu^2 is twice too large |
 //! | C4-3 | size of b2-hat over that of b22-hat where the modes are closest | below 1, and they veer or cross in the range | 1 less that |
 //! | C4-4 | b2-hat in the direction of av, Eqs. (4-13), (4-14) | above the size of b21-hat | distance over the size of b22-hat |
 //! | C4-4y | pairs of MMP zeros between wu and wv | two | the least distance among the two zeros and the two modes, over wv - wu |
 //!
-//! Where au av >= 0, b21-hat and b22-hat do not exist; the margin of C4-2 and C4-4 is then minus the smaller residue of the two over
-//! the larger: what would have to turn.
+//! Where au av >= 0, b21-hat and b22-hat do not exist. The margin of C4-2 and C4-4 is then minus the smaller residue of the
+//! two over the larger: the residue that would have to change its sign.
 //!
-//! How they are read where the thesis leaves room:
+//! Interpretation where the thesis leaves room:
 //!
 //! * *C4-2 implies C4-1.* With au av < 0 both critical residues of Eq. (4-5) have the sign of av, and so has any aR between
-//!   them. Both are stated all the same: C4-1 says which sign is wrong.
+//!   them. Both are stated nevertheless: C4-1 names the wrong sign.
 //! * *"Sufficiently close" in C4-3* is |b2-hat| < |b22-hat| where the modes are closest: with finite residues b2-hat goes
 //!   to 0 with wv - wu (Eq. 4-9), and this is how near to 0 it has to come for the proof of Proposition P4-2. Mode crossing is the
-//!   case of a gap 0. b22-hat is taken of the residues' sizes, so that C4-3 is a statement on the gap whatever the signs.
-//! * *C4-4y* is of the plant's own zeros, with all its modes: that is what a measurement shows.
+//!   case of a gap 0. b22-hat is computed from the residues' sizes, so that C4-3 is a statement on the gap for any signs.
+//! * *C4-4y* refers to the plant's own zeros, with all its modes, as a measurement shows them.
+
+use serde::Serialize;
 
 use super::{CloseModes, Meeting};
 use crate::model::zeros::{Zero, ZeroKind};
 
 /// A condition at some value of the setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Condition {
     /// `C4-1` and so on.
     pub name: &'static str,
     /// Whether it holds.
     pub holds: bool,
-    /// The quantity that decides; see the module.
+    /// The decisive quantity; see the module.
     pub figure: f64,
-    /// Between which values it has to be; an infinite one is no limit.
+    /// The limits of the quantity; an infinite one is no limit (`null` in JSON).
     pub limits: [f64; 2],
     /// Above 0 where it holds, below 0 where it fails; see the module.
     pub margin: f64,
@@ -66,7 +68,8 @@ fn fit([r, u, v]: [f64; 3], sign: f64) -> [f64; 3] {
     [r * sign, -u * sign, v * sign].map(|residue| residue / largest)
 }
 
-/// Which of R, u, v (0 to 2) decides on Condition C4-1: the one that would have to turn, or that turns first.
+/// Which of R, u, v (0 to 2) is decisive for Condition C4-1: the one that would have to change its sign, or whose sign
+/// changes first.
 pub fn deciding_residue(residues_per_kg: [f64; 3]) -> usize {
     let fit = fit(residues_per_kg, pattern(residues_per_kg));
     (1..3).fold(0, |least, which| {
@@ -96,7 +99,7 @@ pub fn c4_2(modes: &CloseModes) -> Condition {
     Condition::by_margin("C4-2", figure, [low, high], margin)
 }
 
-/// C4-4 at one value: b2-hat beyond b21-hat. Figure and limit in 1/kg.
+/// C4-4 at one value: b2-hat above b21-hat. Figure and limit in 1/kg.
 pub fn c4_4(modes: &CloseModes) -> Condition {
     let (figure, [low, high]) = (modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
     let margin = if modes.are_opposed() {
@@ -107,13 +110,14 @@ pub fn c4_4(modes: &CloseModes) -> Condition {
     Condition::by_margin("C4-4", figure, [low, f64::INFINITY], margin)
 }
 
-/// What of au or av would have to turn for au av < 0.
+/// Minus the smaller of au and av over the larger: the one that would have to change its sign for au av < 0.
 fn to_oppose(modes: &CloseModes) -> f64 {
     let (u, v) = (modes.u.residue_per_kg.abs(), modes.v.residue_per_kg.abs());
     -u.min(v) / u.max(v).max(f64::MIN_POSITIVE)
 }
 
-/// C4-3, of the two modes where they are closest (`None` at a crossing, where the gap is 0) and what their loci do there.
+/// C4-3, from the two modes where they are closest (`None` at a crossing, where the gap is 0) and the behaviour of their
+/// loci there.
 pub fn c4_3(meeting: Meeting, closest: Option<&CloseModes>) -> Condition {
     let ratio = |modes: &CloseModes| {
         modes.b2_per_kg().abs() / modes.critical_b2_per_kg()[1].max(f64::MIN_POSITIVE)

@@ -4,21 +4,28 @@
 //!  Structure -> loci, veering point -> close modes (Eq. 4-1) -> conditions C4-1 to C4-4y -> propositions P4-1 to P4-2y
 //!                        |
 //!                        v
-//!                  quadrants and octants (picture) -> where to put actuator and probe (placement)
+//!                  quadrants and octants -> places for actuator and probe (placement)
 //! ```
+//!
+//! The terms are defined in `docs/glossary.md`.
 
 mod close_modes;
 pub mod conditions;
-mod course;
 mod loci;
-mod picture;
-mod placement;
+mod modes_at;
+mod pair;
+pub mod placement;
 #[cfg(test)]
 mod properties;
 pub mod propositions;
+mod quadrants;
+mod remedies;
+pub mod report;
+mod trajectory;
 
 pub use close_modes::{CloseModes, Remainder};
-pub use course::{Sample, Trajectory, ZeroConfiguration, as_configured, station};
-pub use loci::{Loci, Meeting, ModesAt};
-pub use picture::QuadrantDiagram;
-pub use placement::{Trial, trial};
+pub use loci::{Loci, Meeting};
+pub use modes_at::ModesAt;
+pub use pair::{PairError, close_pair, meeting_pair, require_meeting};
+pub use quadrants::{QuadrantDiagram, QuadrantSummary};
+pub use trajectory::{Ports, Sample, Trajectory, ZeroConfiguration, as_configured};

@@ -1,4 +1,4 @@
-//! The propositions held against zeros on random systems: how often the premises hold, and whether the conclusion does.
+//! The propositions compared with the zeros of random systems: how often the premises hold, and whether the conclusion does.
 
 use nalgebra::{DMatrix, DVector};
 use rand_core::Rng;
@@ -80,7 +80,7 @@ impl System {
         })
     }
 
-    fn course(&self) -> Trajectory {
+    fn trajectory(&self) -> Trajectory {
         let mut loci = Loci::follow(&grid(), |d| self.at(d)).unwrap();
         let pair = loci.path()[0]
             .omega_rad_s
@@ -97,7 +97,7 @@ fn grid() -> Vec<f64> {
     (0..25).map(|k| -5.0 + 11.0 * f64::from(k) / 24.0).collect()
 }
 
-/// How often a proposition foretold something, and was right by Eq. (4-1) and by the plant.
+/// Number of predictions of a proposition, and of wrong ones by Eq. (4-1) and by the plant.
 #[derive(Debug, Default)]
 struct Tally {
     asked: usize,
@@ -110,20 +110,20 @@ struct Tally {
 impl Tally {
     fn add(&mut self, proposition: &Proposition) {
         self.asked += 1;
-        self.appear += usize::from(proposition.foretold == Prediction::Appear);
-        self.absent += usize::from(proposition.foretold == Prediction::Absent);
+        self.appear += usize::from(proposition.predicted == Prediction::Appear);
+        self.absent += usize::from(proposition.predicted == Prediction::Absent);
         self.wrong_by_equation += usize::from(
             proposition
-                .foretold
+                .predicted
                 .is_contradicted_by(proposition.equation),
         );
         self.wrong_by_plant +=
-            usize::from(proposition.foretold.is_contradicted_by(proposition.plant));
+            usize::from(proposition.predicted.is_contradicted_by(proposition.plant));
     }
 }
 
 #[test]
-fn p4_1_is_right_in_every_random_sum_of_eq_4_1_and_c4_2_implies_c4_1() {
+fn p4_1_holds_for_random_sums_and_c4_2_implies_c4_1() {
     let (mut dice, mut tally) = (Dice::new(1), Tally::default());
     for _ in 0..20_000 {
         let wu = dice.uniform(0.5, 2.0);
@@ -143,14 +143,14 @@ fn p4_1_is_right_in_every_random_sum_of_eq_4_1_and_c4_2_implies_c4_1() {
         } else {
             ZeroConfiguration::Elsewhere
         };
-        let station = Sample {
+        let sample = Sample {
             value: 0.0,
             modes: Some(modes),
             zeros: Vec::new(),
             equation: Some(lie),
             plant: lie,
         };
-        let proposition = p4_1(&station).unwrap();
+        let proposition = p4_1(&sample).unwrap();
         let [alternating, between] = [proposition.premises[0], proposition.premises[1]];
         assert!(
             alternating.holds || !between.holds,
@@ -169,23 +169,26 @@ fn p4_1_is_right_in_every_random_sum_of_eq_4_1_and_c4_2_implies_c4_1() {
 }
 
 #[test]
-fn p4_2_p4_2x_and_p4_2y_are_right_on_the_stretch_in_every_random_system_of_eq_4_1() {
+fn p4_2_p4_2x_and_p4_2y_hold_for_random_systems_of_eq_4_1() {
     let (mut dice, mut tallies) = (Dice::new(2), <[Tally; 3]>::default());
     for index in 0..2000 {
         let mut system = System::with_double_integrator(&mut dice);
         // Every tenth crosses.
         system.coupling *= f64::from(u8::from(index % 10 != 0));
-        let course = system.course();
-        assert_eq!(course.meeting == Meeting::Crossing, system.coupling == 0.0);
+        let trajectory = system.trajectory();
+        assert_eq!(
+            trajectory.meeting == Meeting::Crossing,
+            system.coupling == 0.0
+        );
         for side in [Side::Before, Side::After] {
             for (tally, proposition) in tallies
                 .iter_mut()
-                .zip(&Interval::of(&course, side).propositions())
+                .zip(&Interval::of(&trajectory, side).propositions())
             {
                 tally.add(proposition);
                 assert!(
                     !proposition
-                        .foretold
+                        .predicted
                         .is_contradicted_by(proposition.equation),
                     "{system:?} {proposition:#?}"
                 );
@@ -204,23 +207,23 @@ fn p4_2_p4_2x_and_p4_2y_are_right_on_the_stretch_in_every_random_system_of_eq_4_
 }
 
 /// P4-2 and P4-2y with C4-1 at psi_0 alone, and P4-2x over the whole range: how often each is wrong.
-fn as_printed(course: &Trajectory) -> [Prediction; 3] {
+fn as_printed(trajectory: &Trajectory) -> [Prediction; 3] {
     let close = c4_3(
-        course.meeting,
-        course.stations[course.closest].modes.as_ref(),
+        trajectory.meeting,
+        trajectory.samples[trajectory.closest].modes.as_ref(),
     )
     .holds;
-    let away = course
-        .stations
+    let away = trajectory
+        .samples
         .iter()
         .enumerate()
-        .filter(|(index, _)| *index != course.closest);
+        .filter(|(index, _)| *index != trajectory.closest);
     let mut holds = [false; 2];
-    for (modes, station) in away.filter_map(|(_, station)| Some((station.modes?, station))) {
+    for (modes, sample) in away.filter_map(|(_, sample)| Some((sample.modes?, sample))) {
         holds[0] |= c4_1(&modes).holds && c4_4(&modes).holds;
-        holds[1] |= c4_4y(&modes, &station.zeros).holds;
+        holds[1] |= c4_4y(&modes, &sample.zeros).holds;
     }
-    let foretold = |premise: bool, otherwise| {
+    let predicted = |premise: bool, otherwise| {
         if close && premise {
             Prediction::Appear
         } else {
@@ -233,26 +236,26 @@ fn as_printed(course: &Trajectory) -> [Prediction; 3] {
         Prediction::Nothing
     };
     [
-        foretold(holds[0], Prediction::Nothing),
-        foretold(holds[0], necessary),
-        foretold(holds[1], Prediction::Nothing),
+        predicted(holds[0], Prediction::Nothing),
+        predicted(holds[0], necessary),
+        predicted(holds[1], Prediction::Nothing),
     ]
 }
 
 #[test]
-fn as_printed_with_signs_at_one_value_only_they_are_wrong_for_some_systems() {
+fn premises_as_printed_are_wrong_for_some_systems() {
     let (mut dice, mut asked, mut wrong) = (Dice::new(3), [0; 3], [0; 3]);
     for _ in 0..2000 {
-        let course = System::with_double_integrator(&mut dice).course();
-        let quartet = course
-            .stations
+        let trajectory = System::with_double_integrator(&mut dice).trajectory();
+        let quartet = trajectory
+            .samples
             .iter()
-            .any(|station| station.equation == Some(ZeroConfiguration::Quartet));
-        for (which, foretold) in as_printed(&course).into_iter().enumerate() {
-            asked[which] += usize::from(foretold == Prediction::Appear);
-            wrong[which] += usize::from(foretold.is_contradicted_by(quartet));
+            .any(|sample| sample.equation == Some(ZeroConfiguration::Quartet));
+        for (which, predicted) in as_printed(&trajectory).into_iter().enumerate() {
+            asked[which] += usize::from(predicted == Prediction::Appear);
+            wrong[which] += usize::from(predicted.is_contradicted_by(quartet));
             // "Only if" is right: where zeros are, P4-1 has C4-1 and C4-4 at that value.
-            assert!(foretold != Prediction::Absent || !quartet);
+            assert!(predicted != Prediction::Absent || !quartet);
         }
     }
     // Of some 700 systems that P4-2 is sure of, and 400 of P4-2y, 40: their residues turn on the way.
@@ -313,12 +316,12 @@ fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
 
 /// What P4-1 says of a plant, at the values of the grid where b2-hat is nearer to b22-hat than to b21-hat: how many are
 /// asked, how many wrong, and for the wrong ones the largest margin over A4-5's ratio.
-fn near_the_upper_limit(course: &Trajectory) -> (usize, usize, f64) {
-    let on_grid = course
-        .stations
+fn near_the_upper_limit(trajectory: &Trajectory) -> (usize, usize, f64) {
+    let on_grid = trajectory
+        .samples
         .iter()
-        .filter(|station| grid().contains(&station.value));
-    let apart = on_grid.filter_map(|station| Some((station.modes?, p4_1(station)?)));
+        .filter(|sample| grid().contains(&sample.value));
+    let apart = on_grid.filter_map(|sample| Some((sample.modes?, p4_1(sample)?)));
     apart.fold(
         (0, 0, 0.0),
         |(asked, wrong, furthest): (usize, usize, f64), (modes, p)| {
@@ -327,7 +330,7 @@ fn near_the_upper_limit(course: &Trajectory) -> (usize, usize, f64) {
                 return (asked, wrong, furthest);
             }
             let over = c.margin.abs() / modes.remainder.integrator_ratio;
-            let is_wrong = p.foretold.is_contradicted_by(p.plant);
+            let is_wrong = p.predicted.is_contradicted_by(p.plant);
             (
                 asked + 1,
                 wrong + usize::from(is_wrong),
@@ -342,18 +345,18 @@ fn near_the_upper_limit(course: &Trajectory) -> (usize, usize, f64) {
 }
 
 #[test]
-fn beside_held_modes_p4_1_errs_by_less_than_the_remainder_departs_from_a_double_integrator() {
+fn p4_1_errs_by_less_than_the_integrator_ratio() {
     // Dual MMP zeros and their meeting lie between the modes, where the remainder is known to that ratio, and b22-hat is
     // where they meet. Of b21-hat this says nothing: zeros meet there outside, where the remainder may be anything.
     for (below, above) in [(0.5, 300.0), (2.0, 50.0), (4.0, 25.0), (6.0, 16.0)] {
         let (mut dice, mut sum, mut tallies) =
             (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
         for _ in 0..300 {
-            let course = with_held_modes(&mut dice, below, above).course();
-            let (asked, wrong, furthest) = near_the_upper_limit(&course);
+            let trajectory = with_held_modes(&mut dice, below, above).trajectory();
+            let (asked, wrong, furthest) = near_the_upper_limit(&trajectory);
             sum = (sum.0 + asked, sum.1 + wrong, sum.2.max(furthest));
             for side in [Side::Before, Side::After] {
-                let all = Interval::of(&course, side).propositions();
+                let all = Interval::of(&trajectory, side).propositions();
                 tallies
                     .iter_mut()
                     .zip(&all)

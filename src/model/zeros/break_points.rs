@@ -1,6 +1,8 @@
-//! Where zeros meet, in closed form: Eqs. (3-14), (3-16), (4-5), (4-6).
+//! Values at which zeros meet, in closed form: Eqs. (3-14), (3-16), (4-5), (4-6).
 
-use super::ModalTerm;
+use serde::Serialize;
+
+use super::{ModalSum, ModalTerm};
 
 /// The two real s at which the zeros of two damped modes meet as the ratio of their residues varies, Eq. (3-14):
 ///
@@ -67,8 +69,8 @@ fn shifted(omega_r_rad_s: f64, u: &ModalTerm, v: &ModalTerm) -> Option<(f64, f64
 /// Eq. (3-16): the damping ratio, the same in modes u and v, at which the locus of the zeros of Eq. (3-15) passes through
 /// the imaginary axis at w^2 = (kappa wv^2 - wu^2)/(kappa - 1); eta = wu/wv, kappa = |au/av|.
 ///
-/// At that point both real parts of the condition vanish together, which makes the formula; it is not where the locus
-/// leaves the right half plane for good: see [`touching_damping`]. `None` unless eta < 1 and kappa > 1/eta^2.
+/// There both real parts of the condition vanish together. The locus still reaches into the right half plane at this
+/// damping: see [`touching_damping`]. `None` unless eta < 1 and kappa > 1/eta^2.
 pub fn critical_damping(eta: f64, kappa: f64) -> Option<f64> {
     let q = (kappa - 1.0) / (kappa / eta - eta);
     applies(eta, kappa).then(|| 0.5 * (q + 1.0 / q - eta - 1.0 / eta).max(0.0).sqrt())
@@ -92,6 +94,93 @@ pub fn touching_damping(eta: f64, kappa: f64) -> Option<f64> {
 
 fn applies(eta: f64, kappa: f64) -> bool {
     0.0 < eta && eta < 1.0 && kappa * eta * eta > 1.0 && kappa.is_finite()
+}
+
+/// The two dampings of Eq. (3-15) for modes of two frequencies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CriticalDamping {
+    /// Frequency of mode u in rad/s.
+    pub omega_u_rad_s: f64,
+    /// Frequency of mode v in rad/s, above that of u.
+    pub omega_v_rad_s: f64,
+    /// kappa = |au/av|, above (wv/wu)^2.
+    pub ratio: f64,
+    /// The damping ratio of Eq. (3-16), [`critical_damping`].
+    pub eq_3_16: f64,
+    /// The damping ratio above which no zero is in the right half plane, [`touching_damping`].
+    pub touching: f64,
+}
+
+impl CriticalDamping {
+    /// `None` unless 0 < wu < wv and kappa > (wv/wu)^2.
+    pub fn new(omega_u_rad_s: f64, omega_v_rad_s: f64, ratio: f64) -> Option<CriticalDamping> {
+        let eta = omega_u_rad_s / omega_v_rad_s;
+        Some(CriticalDamping {
+            omega_u_rad_s,
+            omega_v_rad_s,
+            ratio,
+            eq_3_16: critical_damping(eta, ratio)?,
+            touching: touching_damping(eta, ratio)?,
+        })
+    }
+}
+
+/// Closed forms of the thesis, evaluated for the modes at one value of a setting.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ClosedForm {
+    /// Three undamped modes R, u, v.
+    ThreeModes {
+        /// The residue of mode R, in 1/kg.
+        residue_r: f64,
+        /// Eq. (4-5) with mode R as a double integrator: the nearer of the two critical residues.
+        eq_4_5: f64,
+        /// The same with the squares of all frequencies shifted by -wR^2.
+        eq_4_5_shifted: f64,
+        /// The sum of all residues.
+        b2: f64,
+        /// Eq. (4-6), shifted: the nearer of the two critical sums.
+        eq_4_6_shifted: f64,
+    },
+    /// Two damped modes.
+    TwoModes {
+        /// The break points of Eq. (3-14) in rad/s.
+        eq_3_14_rad_s: [f64; 2],
+    },
+}
+
+impl ClosedForm {
+    /// The closed form that applies to the observable modes, with or without damping; `None` where there is none.
+    pub fn of(sum: &ModalSum, damped: bool) -> Option<ClosedForm> {
+        match (sum.terms(), damped) {
+            ([r, u, v], false) => ClosedForm::of_three(r, u, v),
+            ([u, v], true) => {
+                let eq_3_14_rad_s = two_mode_break_points(u, v)?;
+                Some(ClosedForm::TwoModes { eq_3_14_rad_s })
+            }
+            _ => None,
+        }
+    }
+
+    fn of_three(r: &ModalTerm, u: &ModalTerm, v: &ModalTerm) -> Option<ClosedForm> {
+        let residue_r = r.residue_per_kg;
+        let b2 = residue_r + u.residue_per_kg + v.residue_per_kg;
+        Some(ClosedForm::ThreeModes {
+            residue_r,
+            eq_4_5: nearer(residue_r, critical_residues(0.0, u, v)?),
+            eq_4_5_shifted: nearer(residue_r, critical_residues(r.omega_rad_s, u, v)?),
+            b2,
+            eq_4_6_shifted: nearer(b2, critical_sums(r.omega_rad_s, u, v)?),
+        })
+    }
+}
+
+fn nearer(to: f64, [a, b]: [f64; 2]) -> f64 {
+    if (a - to).abs() < (b - to).abs() {
+        a
+    } else {
+        b
+    }
 }
 
 #[cfg(test)]
@@ -137,20 +226,20 @@ mod tests {
     }
 
     #[test]
-    fn eq_3_16_is_0_2240_and_there_the_locus_all_but_touches_the_axis() {
+    fn eq_3_16_gives_0_2240_where_the_locus_passes_the_axis() {
         let (eta, kappa) = (0.9 / 1.1, 2.0);
         let printed = critical_damping(eta, kappa).unwrap();
         assert!((printed - 0.2240).abs() < 5e-5, "{printed}");
-        // It passes through the axis there and comes back: beyond it by 5e-4 of its frequency, no more, no less.
+        // The locus passes through the axis there and returns: it reaches 5e-4 of its frequency beyond the axis.
         let beyond = furthest_right(printed, eta, kappa);
         assert!((3e-4..7e-4).contains(&beyond), "{beyond}");
     }
 
     #[test]
-    fn at_the_touching_damping_the_locus_just_touches_the_axis() {
+    fn locus_touches_the_axis_at_the_touching_damping() {
         for (eta, kappa) in [(0.9 / 1.1, 2.0), (0.9 / 1.1, 5.0), (0.5, 6.0), (0.95, 1.2)] {
             let zeta = touching_damping(eta, kappa).unwrap();
-            // Rounding of a pencil whose zero sits at 1: some 1e-15; a thousandth of damping more or less decides.
+            // Rounding of a pencil whose zero sits at 1: some 1e-15; a thousandth of damping more or less is decisive.
             assert!(
                 furthest_right(zeta, eta, kappa).abs() < 1e-10,
                 "{eta} {kappa}: {zeta}"
@@ -162,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn without_their_condition_the_dampings_do_not_exist() {
+    fn critical_dampings_need_their_condition() {
         for (eta, kappa) in [
             (1.0, 2.0),
             (0.5, 3.9),
@@ -178,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn the_break_points_of_section_3_2_4_are_1_21_and_21() {
+    fn break_points_of_section_3_2_4_are_1_21_and_21() {
         // aR = 1, au = -a0, av = a0: by Eq. (4-6) zeros meet where aR is a0 (wv -+ wu)/(wv +- wu), that is a0 = 1/21 and 21.
         let modes = |a0: f64| {
             (
@@ -195,7 +284,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn zeros_are_complex_between_the_critical_residues_only(
+        fn zeros_are_complex_only_between_the_critical_residues(
             wr in 0.0..5.0f64, above in 0.1..20.0f64, apart in 0.01..10.0f64, au in 0.01..10.0f64, av in 0.01..10.0f64, sign in 0..2usize,
         ) {
             let sign = [1.0, -1.0][sign];
@@ -217,7 +306,7 @@ mod tests {
         }
 
         #[test]
-        fn two_damped_modes_meet_where_eq_3_14_says(
+        fn zeros_of_two_damped_modes_meet_at_eq_3_14(
             wu in 0.5..5.0f64, apart in 0.1..5.0f64, zu in 0.0..0.3f64, zv in 0.0..0.3f64, which in 0..2usize,
         ) {
             let mode = |omega_rad_s, damping_ratio, residue_per_kg| ModalTerm { omega_rad_s, damping_ratio, residue_per_kg };
@@ -230,7 +319,7 @@ mod tests {
             let ratio = -denominator(&u) / denominator(&v);
             prop_assume!((ratio + 1.0).abs() > 1e-6 && ratio.abs() > 1e-6);
             let sum = ModalSum::new(vec![mode(wu, zu, ratio), v], 0.0).unwrap();
-            // A double zero: known to the root of the rounding.
+            // A double zero: computed to the root of the rounding.
             let zeros = ModalSum::new(vec![mode(wu, zu, ratio), v], 0.0).unwrap().damped_zeros().unwrap();
             prop_assert_eq!(sum.terms().len(), 2);
             for zero in zeros {

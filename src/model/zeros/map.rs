@@ -1,6 +1,6 @@
-//! The CNMP map: how many pairs of CNMP zeros SR4DoF has over operating point and mass asymmetry.
+//! The CNMP map: number of pairs of CNMP zeros of SR4DoF over operating point and mass asymmetry.
 //!
-//! With x1 = 0 at the probe and x4 = 0 in the virtual motions (q of Eq. 2-5 is the row of x4), the pencil of `zeros.rs` has
+//! With x1 = 0 at the probe and x4 = 0 in the virtual motions (q of Eq. 2-5 is the row of x4), the pencil of `kinds.rs` has
 //! the unknowns y1, y2, y3 and, with b = a^2, masses in m3, springs in k, kappa = k4/k, the form A + u B:
 //!
 //! ```text
@@ -9,27 +9,29 @@
 //!      [-1 - 2 b kappa    0   2 + 4 b kappa ]       [-b m3 - 2 b m4                 0   m3 (1 + b) + 4 b m4        ]
 //! ```
 //!
-//! Its determinant is a cubic in u = s^2, and no root of it is computed: the sign of the discriminant says whether two of
-//! the three are complex, which is one CNMP pair. Where rounding could turn that sign, the pencil itself decides.
+//! Its determinant is a cubic in u = s^2. No root of it is computed: the sign of the discriminant decides whether two of the
+//! three are complex, which is one CNMP pair. Where rounding could change that sign, the pencil itself decides.
+
+use std::ops::{Add, Mul, Sub};
+use std::thread::ScopedJoinHandle;
 
 use super::{cnmp_pairs, undamped_zeros};
 use crate::model::plant::{PlantError, PlantSettings, Sr4dofSettings, undamped};
 
-/// The discriminant's sign counts beyond this ratio to the sum of its terms' sizes, each term taken with all of its sums
-/// without cancellation (`Sized`).
+/// The sign of the discriminant is decisive above this ratio to the sum of the sizes of its terms ([`Bounded`]).
 ///
 /// Rounding: an entry of A or B is exact to 8 roundings of its size, a coefficient, a sum of up to 12 products of three,
 /// to 3 x 8 + 2 + 11, the discriminant, of degree 4, to 4 x 37 + 8 = 156: 2e-14. The pencil calls a pair real up to a ratio
-/// of imaginary part to size of 1e-7, and its own rounding parts two equal values by that much: the square of their
-/// distance, 4e-14 of the terms, must be decided there too. 1e-9 stands well above both, and leaves to the pencil pairs
-/// closer than some 3e-5 of their size.
-const DECIDED: f64 = 1e-9;
+/// of imaginary part to size of 1e-7, and its own rounding separates two equal values by that much: the square of their
+/// distance, 4e-14 of the terms, must be decided there too. 1e-9 is well above both, and leaves to the pencil pairs closer
+/// than some 3e-5 of their size.
+const DECISIVE_RATIO: f64 = 1e-9;
 
 /// CNMP pairs of the zeros without damping, one row for each operating point (ratios Y1o/L), in it one for each mass
 /// asymmetry D = m2/m3 - 1, on up to `threads` threads (at least one).
 ///
-/// Equals [`cnmp_pairs`] of [`undamped_zeros`] at each point (Fig 2-2, Eq. 2-5). `settings` give all but the two. Fails as
-/// these do.
+/// Equals [`cnmp_pairs`] of [`undamped_zeros`] at each point (Fig 2-2, Eq. 2-5), and fails as these do. `settings` give all
+/// but the two.
 pub fn cnmp_map(
     settings: &Sr4dofSettings,
     operating_points: &[f64],
@@ -37,28 +39,30 @@ pub fn cnmp_map(
     threads: usize,
 ) -> Result<Vec<Vec<u8>>, PlantError> {
     let rows = operating_points.len().div_ceil(threads.max(1)).max(1);
-    let row = |&point: &f64| {
-        asymmetries
-            .iter()
-            .map(|&d| count(settings, point, d))
-            .collect::<Result<Vec<u8>, _>>()
-    };
-    let part = |points: &[f64]| points.iter().map(row).collect::<Result<Vec<_>, _>>();
     let parts = std::thread::scope(|scope| {
-        let running: Vec<_> = operating_points
-            .chunks(rows)
-            .map(|points| scope.spawn(move || part(points)))
-            .collect();
-        running
-            .into_iter()
-            .map(joined)
-            .collect::<Result<Vec<_>, _>>()
+        let spawn = |points| scope.spawn(move || map_rows(settings, points, asymmetries));
+        let running: Vec<_> = operating_points.chunks(rows).map(spawn).collect();
+        running.into_iter().map(join).collect::<Result<Vec<_>, _>>()
     })?;
     Ok(parts.into_iter().flatten().collect())
 }
 
-/// What a thread returned; its panic goes on in this one.
-fn joined<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
+fn map_rows(
+    settings: &Sr4dofSettings,
+    points: &[f64],
+    asymmetries: &[f64],
+) -> Result<Vec<Vec<u8>>, PlantError> {
+    let row = |point: &f64| {
+        asymmetries
+            .iter()
+            .map(|d| count(settings, *point, *d))
+            .collect()
+    };
+    points.iter().map(row).collect()
+}
+
+/// The result of a thread; its panic continues in this one.
+fn join<T>(thread: ScopedJoinHandle<'_, T>) -> T {
     thread
         .join()
         .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
@@ -72,65 +76,63 @@ fn count(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, Pl
 }
 
 fn by_pencil(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8, PlantError> {
-    let operating_point_m = point * settings.beam_length_m;
-    let there = Sr4dofSettings {
-        operating_point_m,
+    let plant = PlantSettings::Sr4dof(Sr4dofSettings {
+        operating_point_m: point * settings.beam_length_m,
         mass_asymmetry: asymmetry,
         ..settings.clone()
-    };
+    });
+    let zeros = undamped_zeros(&undamped(&plant))?;
     // Three values of u hold one complex pair at most.
-    Ok(u8::from(
-        cnmp_pairs(&undamped_zeros(&undamped(&PlantSettings::Sr4dof(there)))?) > 0,
-    ))
+    Ok(u8::from(cnmp_pairs(&zeros) > 0))
 }
 
-/// Whether two of the three u are complex; none where that cannot be told.
+/// Whether two of the three u are complex; `None` where rounding leaves it open.
 fn by_discriminant(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Option<bool> {
     let discriminant = discriminant(cubic(settings, point, asymmetry));
-    let decided = discriminant.value.abs() > DECIDED * discriminant.size;
-    decided.then_some(discriminant.value < 0.0)
+    let is_decisive = discriminant.value.abs() > DECISIVE_RATIO * discriminant.size;
+    is_decisive.then_some(discriminant.value < 0.0)
 }
 
-/// A number with the size of what it was summed from.
+/// A number with the sum of the sizes of its terms, each term with all of its sums taken without cancellation.
 #[derive(Clone, Copy)]
-struct Sized {
+struct Bounded {
     value: f64,
     size: f64,
 }
 
-impl Sized {
-    fn of(value: f64) -> Sized {
-        Sized {
+impl Bounded {
+    fn of(value: f64) -> Bounded {
+        Bounded {
             value,
             size: value.abs(),
         }
     }
 }
 
-impl std::ops::Add for Sized {
-    type Output = Sized;
-    fn add(self, other: Sized) -> Sized {
-        Sized {
+impl Add for Bounded {
+    type Output = Bounded;
+    fn add(self, other: Bounded) -> Bounded {
+        Bounded {
             value: self.value + other.value,
             size: self.size + other.size,
         }
     }
 }
 
-impl std::ops::Sub for Sized {
-    type Output = Sized;
-    fn sub(self, other: Sized) -> Sized {
-        Sized {
+impl Sub for Bounded {
+    type Output = Bounded;
+    fn sub(self, other: Bounded) -> Bounded {
+        Bounded {
             value: self.value - other.value,
             size: self.size + other.size,
         }
     }
 }
 
-impl std::ops::Mul for Sized {
-    type Output = Sized;
-    fn mul(self, other: Sized) -> Sized {
-        Sized {
+impl Mul for Bounded {
+    type Output = Bounded;
+    fn mul(self, other: Bounded) -> Bounded {
+        Bounded {
             value: self.value * other.value,
             size: self.size * other.size,
         }
@@ -138,34 +140,33 @@ impl std::ops::Mul for Sized {
 }
 
 /// Coefficients of 1 and u.
-type Linear = [Sized; 2];
+type Linear = [Bounded; 2];
 
 /// p q - r s, by powers of u.
-fn minor([p, q]: [Linear; 2], [r, s]: [Linear; 2]) -> [Sized; 3] {
+fn minor([p, q]: [Linear; 2], [r, s]: [Linear; 2]) -> [Bounded; 3] {
     let middle = (p[0] * q[1] + p[1] * q[0]) - (r[0] * s[1] + r[1] * s[0]);
     [p[0] * q[0] - r[0] * s[0], middle, p[1] * q[1] - r[1] * s[1]]
 }
 
-/// det(A + u B) by powers of u, developed by the second column.
-fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Sized; 4] {
+/// det(A + u B) by powers of u, expanded along the second column.
+fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Bounded; 4] {
     let b = (0.6 * point) * (0.6 * point);
     let m3 = settings.secondary_stage_mass_kg;
-    let (m1, m2, m4) = (
-        settings.motion_stage_mass_kg / m3,
-        1.0 + asymmetry,
-        settings.intermediate_stage_mass_kg / m3,
-    );
+    let m1 = settings.motion_stage_mass_kg / m3;
+    let m2 = 1.0 + asymmetry;
+    let m4 = settings.intermediate_stage_mass_kg / m3;
     let bk = b * settings.spring_stiffness_n_per_m / settings.beam().parallelogram_n_per_m();
-    let entry = |constant: f64, linear: Sized| [Sized::of(constant), linear];
-    let (near, far) = (Sized::of(b * (1.0 + m4)), Sized::of(b * (2.0 + 4.0 * m4)));
-    let none = Sized::of(0.0);
-    let r11 = entry(2.0 + 2.0 * bk, Sized::of(m1) + near + near);
+    let entry = |constant: f64, linear: Bounded| [Bounded::of(constant), linear];
+    let near = Bounded::of(b * (1.0 + m4));
+    let far = Bounded::of(b * (2.0 + 4.0 * m4));
+    let none = Bounded::of(0.0);
+    let r11 = entry(2.0 + 2.0 * bk, Bounded::of(m1) + near + near);
     let r13 = entry(-1.0 - 4.0 * bk, none - far);
-    let r21 = entry(-1.0 - 2.0 * bk, Sized::of(b * m2) - near - near);
-    let r22 = entry(2.0, Sized::of(m2) - Sized::of(b * m2));
+    let r21 = entry(-1.0 - 2.0 * bk, Bounded::of(b * m2) - near - near);
+    let r22 = entry(2.0, Bounded::of(m2) - Bounded::of(b * m2));
     let r23 = entry(4.0 * bk, far);
-    let r31 = entry(-1.0 - 2.0 * bk, Sized::of(-b * (1.0 + 2.0 * m4)));
-    let r33 = entry(2.0 + 4.0 * bk, Sized::of(1.0 + b * (1.0 + 4.0 * m4)));
+    let r31 = entry(-1.0 - 2.0 * bk, Bounded::of(-b * (1.0 + 2.0 * m4)));
+    let r33 = entry(2.0 + 4.0 * bk, Bounded::of(1.0 + b * (1.0 + 4.0 * m4)));
     let first = minor([r21, r33], [r23, r31]);
     let second = minor([r11, r33], [r13, r31]);
     [
@@ -177,8 +178,8 @@ fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Sized; 4] {
 }
 
 /// Of d + c u + b u^2 + a u^3: below zero for one real and two complex roots.
-fn discriminant([d, c, b, a]: [Sized; 4]) -> Sized {
-    let times = |factor: f64, x: Sized| Sized::of(factor) * x;
+fn discriminant([d, c, b, a]: [Bounded; 4]) -> Bounded {
+    let times = |factor: f64, x: Bounded| Bounded::of(factor) * x;
     let (bb, cc, ad) = (b * b, c * c, a * d);
     times(18.0, ad * b * c) + bb * cc
         - times(4.0, bb * b * d)
@@ -190,6 +191,7 @@ fn discriminant([d, c, b, a]: [Sized; 4]) -> Sized {
 mod tests {
     use super::*;
     use crate::config::{PlantSettings, Source, load};
+    use crate::util::numeric::linspace;
     use rand_core::Rng;
 
     fn chapter2(sets: &[&str]) -> Sr4dofSettings {
@@ -205,10 +207,8 @@ mod tests {
         settings
     }
 
-    fn grid(from: f64, to: f64, count: u32) -> Vec<f64> {
-        (0..count)
-            .map(|k| from + (to - from) * f64::from(k) / f64::from(count - 1))
-            .collect()
+    fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {
+        linspace(from, to, count).collect()
     }
 
     /// Uniform in [0, 1), by the generator that the simulation takes.
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn the_count_is_the_pencils_on_random_stages() {
+    fn discriminant_agrees_with_the_pencil_on_random_stages() {
         let mut draw = draws(4);
         let mut settings = chapter2(&[]);
         let (mut complex, mut undecided) = (0, 0);
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn the_count_is_the_pencils_all_over_a_map() {
+    fn map_agrees_with_the_pencil_everywhere() {
         let settings = chapter2(&["plant.secondary_stage_mass_kg=0.018"]);
         let (points, asymmetries) = (grid(-0.15, 0.15, 200), grid(-0.05, 0.15, 200));
         let map = cnmp_map(&settings, &points, &asymmetries, 2).unwrap();
@@ -265,13 +265,13 @@ mod tests {
         assert_eq!(
             map,
             cnmp_map(&settings, &points, &asymmetries, 1).unwrap(),
-            "whatever the number of threads"
+            "for any number of threads"
         );
     }
 
     #[test]
-    fn where_two_zeros_meet_the_pencil_decides() {
-        // At D = 1 %, m3 = 18 g they leave the imaginary axis at 3.399 % of L: there no count may hang on the last bit.
+    fn pencil_decides_where_two_zeros_meet() {
+        // At D = 1 %, m3 = 18 g they leave the imaginary axis at 3.399 % of L: there no count may depend on the last bit.
         let settings = chapter2(&["plant.secondary_stage_mass_kg=0.018"]);
         for point in grid(0.03398, 0.03400, 201) {
             assert_eq!(
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_grid_is_an_empty_map() {
+    fn empty_grid_gives_an_empty_map() {
         assert_eq!(cnmp_map(&chapter2(&[]), &[], &[0.1], 2), Ok(vec![]));
         assert_eq!(cnmp_map(&chapter2(&[]), &[0.1], &[], 0), Ok(vec![vec![]]));
     }

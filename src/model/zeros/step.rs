@@ -1,14 +1,24 @@
-//! The response to a step of 1 N in closed form, and what its beginning shows (sections 3.2.2 to 3.2.4).
+//! The response to a step of 1 N in closed form, and the features of its beginning (sections 3.2.2 to 3.2.4).
 //!
 //! y(t) = R + sum of r/w^2 (1 - exp(-zeta w t) (cos wd t + zeta w sin(wd t)/wd)), r t^2/2 for a double integrator.
 //!
-//! What zeros in the right half plane foretell: the response begins against its end exactly where the number of real ones
-//! is odd, and it passes through zero at least as often as there are real ones (each makes the Laplace transform of y
-//! vanish, so y must change its sign once more). A complex pair may or may not add two (Fig 3-12d). That there are not more
-//! crossings than zeros in the right half plane holds for the thesis's examples and is no law: fast modes that outweigh a
-//! slow one swing through zero many times, whatever their zeros.
+//! Predictions from the zeros in the right half plane: the response begins against its final direction exactly where the
+//! number of real ones is odd. It crosses zero at least once for each real one, as each makes the Laplace transform of y
+//! vanish. A complex pair may or may not add two crossings (Fig 3-12d). That there are not more crossings than zeros in the
+//! right half plane holds for the thesis's examples, but not in general: fast modes that outweigh a slow one cross zero many
+//! times, whatever their zeros.
 
-use super::{ModalSum, ModalTerm};
+use std::f64::consts::{PI, TAU};
+
+use serde::Serialize;
+
+use super::{ModalSum, ModalTerm, ZeroCounts};
+use crate::util::numeric::bisect;
+
+/// Samples of the shortest period that are looked at.
+const SAMPLES_PER_PERIOD: f64 = 64.0;
+/// Halvings of the first sampling step, for features that last shortly.
+const EARLY_HALVINGS: i32 = 24;
 
 /// The response of a plant to a step of 1 N.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,30 +26,57 @@ pub struct StepResponse<'a> {
     sum: &'a ModalSum,
 }
 
-/// What the beginning of a step response shows.
+/// Features of the beginning of a step response.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepFeatures {
-    /// Whether it sets out in the positive direction.
+    /// Whether it starts in the positive direction.
     pub starts_positive: bool,
-    /// Whether it ends (or, with a double integrator, goes off) in the positive direction.
+    /// Whether it ends (or, with a double integrator, continues) in the positive direction.
     pub ends_positive: bool,
-    /// Its largest excursion against its end up to the last zero crossing, in m/N.
+    /// Its largest excursion against its final direction up to the last zero crossing, in m/N.
     pub undershoot_m: f64,
-    /// When it passes through zero, in seconds, within `window_s`.
+    /// Times of its zero crossings in seconds, within `window_s`.
     pub zero_crossings_s: Vec<f64>,
-    /// When it reverses its direction, in seconds, within `initial_s`.
+    /// Times of its reversals of direction in seconds, within `initial_s`.
     pub reversals_s: Vec<f64>,
-    /// Zero crossings are looked for up to here: half a period of the slowest mode, or with a double integrator until it
-    /// outweighs all others for good.
+    /// End of the search for zero crossings: half a period of the slowest mode, or with a double integrator until it
+    /// outweighs all other modes.
     pub window_s: f64,
-    /// Reversals are looked for up to here: one period of the second mode.
+    /// End of the search for reversals: one period of the second mode.
     pub initial_s: f64,
 }
 
 impl StepFeatures {
-    /// Initial undershoot: it sets out against its end.
+    /// Initial undershoot: it starts against its final direction.
     pub fn has_undershoot(&self) -> bool {
         self.starts_positive != self.ends_positive
+    }
+}
+
+/// Prediction of the features from the number of zeros in the right half plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct StepPrediction {
+    /// An odd number of RNMP zeros.
+    pub initial_undershoot: bool,
+    /// One for each RNMP zero.
+    pub least_zero_crossings: usize,
+    /// One for each zero in the right half plane: true of the thesis's examples, not in general.
+    pub usual_zero_crossings: usize,
+    /// Whether the features have the predicted undershoot and at least the predicted number of crossings.
+    pub agrees: bool,
+}
+
+impl StepPrediction {
+    /// The prediction from the zeros without damping, compared with the features.
+    pub fn of(counts: &ZeroCounts, features: &StepFeatures) -> StepPrediction {
+        let (initial_undershoot, least) = (counts.real % 2 == 1, counts.real);
+        StepPrediction {
+            initial_undershoot,
+            least_zero_crossings: least,
+            usual_zero_crossings: counts.in_right_half_plane(),
+            agrees: initial_undershoot == features.has_undershoot()
+                && features.zero_crossings_s.len() >= least,
+        }
     }
 }
 
@@ -51,89 +88,70 @@ impl<'a> StepResponse<'a> {
 
     /// y in m/N, `time_s` after the step.
     pub fn position_m(&self, time_s: f64) -> f64 {
-        self.sum.constant_m_per_n()
-            + self
-                .sum
-                .terms()
-                .iter()
-                .map(|term| position(term, time_s))
-                .sum::<f64>()
+        let parts = self.sum.terms().iter().map(|term| position(term, time_s));
+        self.sum.constant_m_per_n() + parts.sum::<f64>()
     }
 
-    /// What each mode adds to it, in m/N.
+    /// The contribution of each mode to it, in m/N.
     pub fn parts_m(&self, time_s: f64) -> Vec<f64> {
-        self.sum
-            .terms()
-            .iter()
-            .map(|term| position(term, time_s))
-            .collect()
+        let terms = self.sum.terms().iter();
+        terms.map(|term| position(term, time_s)).collect()
     }
 
     /// dy/dt in m/s per newton.
     pub fn velocity_m_per_s(&self, time_s: f64) -> f64 {
-        self.sum
-            .terms()
-            .iter()
-            .map(|term| velocity(term, time_s))
-            .sum()
+        let terms = self.sum.terms().iter();
+        terms.map(|term| velocity(term, time_s)).sum()
     }
 
-    /// y at the end in m/N: G(0); infinite with a double integrator.
+    /// The final y in m/N: G(0); infinite with a double integrator.
     pub fn end_m(&self) -> f64 {
-        self.sum.constant_m_per_n()
-            + self
-                .sum
-                .terms()
-                .iter()
-                .map(|term| term.part(0.0))
-                .sum::<f64>()
+        let terms = self.sum.terms().iter();
+        self.sum.constant_m_per_n() + terms.map(|term| term.part(0.0)).sum::<f64>()
     }
 
     /// Directions, zero crossings and reversals.
     pub fn initial(&self) -> StepFeatures {
         let window_s = self.window_s();
-        let period = |term: &ModalTerm| 2.0 * std::f64::consts::PI / term.omega_rad_s;
-        let initial_s = self
-            .sum
-            .terms()
-            .get(1)
-            .map_or(window_s, |second| period(second).min(window_s));
+        let second_s = self.sum.terms().get(1).map(period_s);
+        let initial_s = second_s.map_or(window_s, |period_s| period_s.min(window_s));
         let extrema_s = self.extrema_s(window_s);
         let zero_crossings_s = self.zero_crossings_s(&extrema_s, window_s);
-        let ends_positive = self.ends_positive();
         let last_s = zero_crossings_s.last().copied().unwrap_or(0.0);
-        let against = |y: f64| if ends_positive { -y } else { y };
-        let before = extrema_s
-            .iter()
-            .filter(|t| **t < last_s)
-            .map(|t| against(self.position_m(*t)));
+        let early = extrema_s.iter().copied().filter(|t| *t <= initial_s);
         StepFeatures {
             starts_positive: self.starts_positive(window_s),
-            ends_positive,
-            undershoot_m: before.fold(against(self.sum.constant_m_per_n()).max(0.0), f64::max),
+            ends_positive: self.ends_positive(),
+            undershoot_m: self.undershoot_m(&extrema_s, last_s),
+            reversals_s: early.collect(),
             zero_crossings_s,
-            reversals_s: extrema_s
-                .iter()
-                .copied()
-                .filter(|t| *t <= initial_s)
-                .collect(),
             window_s,
             initial_s,
         }
     }
 
-    /// The sign of y at first: that of the constant, of the sum of residues (y = sum r t^2/2 + ...), or, where the two are
-    /// nothing, that of y early on.
+    /// The largest excursion against the final direction, at the start or at an extremum before `last_s`.
+    fn undershoot_m(&self, extrema_s: &[f64], last_s: f64) -> f64 {
+        let sign = if self.ends_positive() { -1.0 } else { 1.0 };
+        let start_m = (sign * self.sum.constant_m_per_n()).max(0.0);
+        let before = extrema_s.iter().filter(|t| **t < last_s);
+        before
+            .map(|t| sign * self.position_m(*t))
+            .fold(start_m, f64::max)
+    }
+
+    /// The sign of y at first: that of the constant, or of the sum of residues (y = sum r t^2/2 + ...), or, where both
+    /// vanish, that of y early on.
     fn starts_positive(&self, window_s: f64) -> bool {
         let residues = || self.sum.terms().iter().map(|term| term.residue_per_kg);
-        let (total, size) = (
-            residues().sum::<f64>(),
-            residues().map(f64::abs).sum::<f64>(),
-        );
-        match self.sum.constant_m_per_n() {
-            constant if constant != 0.0 => constant > 0.0,
-            _ if total.abs() > 1e-12 * size => total > 0.0,
-            _ => self.position_m(1e-4 * self.shortest_s().min(window_s)) > 0.0,
+        let total: f64 = residues().sum();
+        let size: f64 = residues().map(f64::abs).sum();
+        if self.sum.has_constant() {
+            self.sum.constant_m_per_n() > 0.0
+        } else if total.abs() > 1e-12 * size {
+            total > 0.0
+        } else {
+            self.position_m(1e-4 * self.shortest_s().min(window_s)) > 0.0
         }
     }
 
@@ -146,86 +164,68 @@ impl<'a> StepResponse<'a> {
 
     /// Period of the fastest mode.
     fn shortest_s(&self) -> f64 {
-        self.sum
-            .terms()
-            .last()
-            .map_or(1.0, |term| 2.0 * std::f64::consts::PI / term.omega_rad_s)
+        self.sum.terms().last().map_or(1.0, period_s)
     }
 
     fn window_s(&self) -> f64 {
-        match self.sum.terms().split_first() {
-            None => 1.0,
-            Some((slowest, _)) if slowest.omega_rad_s > 0.0 => {
-                std::f64::consts::PI / slowest.omega_rad_s
-            }
-            Some((free, others)) => {
-                // The part of a mode is never beyond 2 |r|/w^2.
-                let most = others.iter().map(|t| 2.0 * t.part(0.0).abs()).sum::<f64>()
-                    + self.sum.constant_m_per_n().abs();
-                let longest = others
-                    .first()
-                    .map_or(1.0, |t| 2.0 * std::f64::consts::PI / t.omega_rad_s);
-                (2.0 * most / free.residue_per_kg.abs()).sqrt().max(longest)
+        match self.sum.terms() {
+            [] => 1.0,
+            [slowest, ..] if slowest.omega_rad_s > 0.0 => PI / slowest.omega_rad_s,
+            [free, others @ ..] => {
+                // The contribution of a mode is at most 2 |r|/w^2.
+                let parts: f64 = others.iter().map(|t| 2.0 * t.part(0.0).abs()).sum();
+                let most = parts + self.sum.constant_m_per_n().abs();
+                let longest_s = others.first().map_or(1.0, period_s);
+                (2.0 * most / free.residue_per_kg.abs())
+                    .sqrt()
+                    .max(longest_s)
             }
         }
     }
 
-    /// Instants to look at: fractions of the shortest period, and below the first of them smaller ones, for what lasts
-    /// shortly only.
+    /// Sampling instants: fractions of the shortest period, and shorter ones below the first of them.
     fn instants_s(&self, window_s: f64) -> Vec<f64> {
-        let step_s = (self.shortest_s() / 64.0)
-            .min(window_s / 64.0)
+        let fraction_s = self.shortest_s() / SAMPLES_PER_PERIOD;
+        let step_s = fraction_s
+            .min(window_s / SAMPLES_PER_PERIOD)
             .max(window_s / 1e6);
-        let early = (0..24).rev().map(|k| step_s * 0.5f64.powi(k + 1));
+        let early = (0..EARLY_HALVINGS).rev();
         let count = (window_s / step_s).ceil() as usize;
         early
+            .map(|k| step_s * 0.5f64.powi(k + 1))
             .chain((1..=count).map(|k| (k as f64 * step_s).min(window_s)))
             .collect()
     }
 
-    /// Where dy/dt changes its sign.
+    /// Zeros of dy/dt.
     fn extrema_s(&self, window_s: f64) -> Vec<f64> {
-        let instants = self.instants_s(window_s);
-        let velocities: Vec<f64> = instants.iter().map(|t| self.velocity_m_per_s(*t)).collect();
-        let changes = (1..instants.len()).filter(|k| velocities[k - 1] * velocities[*k] < 0.0);
-        changes
-            .map(|k| bisected(|t| self.velocity_m_per_s(t), instants[k - 1], instants[k]))
-            .collect()
+        sign_changes(&self.instants_s(window_s), |t| self.velocity_m_per_s(t))
     }
 
-    /// Where y changes its sign: between two extrema at most once.
+    /// Zeros of y: one at most between two extrema.
     fn zero_crossings_s(&self, extrema_s: &[f64], window_s: f64) -> Vec<f64> {
-        let first = self.instants_s(window_s)[0];
-        let knots: Vec<f64> = [first]
-            .into_iter()
-            .chain(extrema_s.iter().copied())
-            .chain([window_s])
-            .collect();
-        let pairs = knots
-            .windows(2)
-            .filter(|pair| self.position_m(pair[0]) * self.position_m(pair[1]) < 0.0);
-        pairs
-            .map(|pair| bisected(|t| self.position_m(t), pair[0], pair[1]))
-            .collect()
+        let mut knots = vec![self.instants_s(window_s)[0]];
+        knots.extend(extrema_s);
+        knots.push(window_s);
+        sign_changes(&knots, |t| self.position_m(t))
     }
 }
 
-/// Where a function changes its sign between two places with different signs.
-fn bisected(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    let negative = of(low) < 0.0;
-    for _ in 0..64 {
-        let middle = 0.5 * (low + high);
-        if (of(middle) < 0.0) == negative {
-            low = middle
-        } else {
-            high = middle
-        }
-    }
-    0.5 * (low + high)
+fn period_s(term: &ModalTerm) -> f64 {
+    TAU / term.omega_rad_s
+}
+
+/// The places where a function changes its sign between neighbouring knots.
+fn sign_changes(knots: &[f64], function: impl Fn(f64) -> f64) -> Vec<f64> {
+    let values: Vec<f64> = knots.iter().map(|t| function(*t)).collect();
+    let changes = (1..knots.len()).filter(|k| values[k - 1] * values[*k] < 0.0);
+    changes
+        .map(|k| bisect(&function, knots[k - 1], knots[k]))
+        .collect()
 }
 
 /// exp(-zeta w t) cos(wd t) and exp(-zeta w t) sin(wd t)/wd; hyperbolic above critical damping.
-fn swing(term: &ModalTerm, time_s: f64) -> (f64, f64) {
+fn oscillation(term: &ModalTerm, time_s: f64) -> (f64, f64) {
     let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
     let (decay, square) = (zeta * w, w * w * (1.0 - zeta) * (1.0 + zeta));
     let rate = square.abs().sqrt();
@@ -237,7 +237,7 @@ fn swing(term: &ModalTerm, time_s: f64) -> (f64, f64) {
     } else if angle < 1.0 {
         (envelope * angle.cosh(), envelope * angle.sinh() / rate)
     } else {
-        // Apart, as one of the two exponentials alone may be beyond all numbers.
+        // Separately, as one of the two exponentials alone may overflow.
         let (slow, fast) = (
             ((rate - decay) * time_s).exp(),
             (-(rate + decay) * time_s).exp(),
@@ -250,7 +250,7 @@ fn velocity(term: &ModalTerm, time_s: f64) -> f64 {
     if term.omega_rad_s == 0.0 {
         return term.residue_per_kg * time_s;
     }
-    term.residue_per_kg * swing(term, time_s).1
+    term.residue_per_kg * oscillation(term, time_s).1
 }
 
 fn position(term: &ModalTerm, time_s: f64) -> f64 {
@@ -258,7 +258,7 @@ fn position(term: &ModalTerm, time_s: f64) -> f64 {
     if w == 0.0 {
         return 0.5 * term.residue_per_kg * time_s * time_s;
     }
-    let (cosine, sine) = swing(term, time_s);
+    let (cosine, sine) = oscillation(term, time_s);
     let risen = if zeta < 1.0 {
         // 1 - exp(-a)(cos + ...) without cancellation at small times: 1 - cos x = 2 sin^2(x/2).
         let half = (0.5 * w * ((1.0 - zeta) * (1.0 + zeta)).sqrt() * time_s).sin();
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn eq_3_4_undershoots_with_real_zeros_and_not_with_mmp_zeros() {
+    fn eq_3_4_undershoots_with_real_zeros_only() {
         // Fig 3-5: av = -0.5 and -5.
         for (av, undershoot, crossings) in [(-0.5, false, 0), (-5.0, true, 1)] {
             let plant = sum(&[(1.0, 0.001, 1.0), (10.0, 0.001, av)]);
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn eq_3_9_crosses_zero_as_often_as_it_has_real_zeros_and_its_complex_ones_are_a_transition() {
+    fn eq_3_9_crosses_zero_once_for_each_real_zero() {
         // Section 3.2.4: none for dual MMP, two for dual RMP-RNMP, from none to two on the way (Fig 3-12d).
         let (mut with, mut without, mut reversing_only) = (0, 0, 0);
         for a0 in [
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damped_mode_steps_as_in_closed_form_above_and_below_critical_damping() {
+    fn step_of_a_damped_mode_solves_its_equation_of_motion() {
         for zeta in [0.0, 0.2, 0.999_999_999, 1.0, 1.000_000_001, 3.0] {
             let plant = sum(&[(2.0, zeta, 4.0)]);
             let response = StepResponse::new(&plant);

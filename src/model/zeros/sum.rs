@@ -1,7 +1,7 @@
 //! A transfer function as the sum of its modes and, perhaps, a constant:
 //! G(s) = R + sum of r_i/(s^2 + 2 zeta_i w_i s + w_i^2) (Eqs. 3-2, 3-6, 3-10, 3-11 with beta = 0).
 //!
-//! A mode of w = 0 is a double integrator r/s^2, the constant is what a mode far above all others leaves of itself.
+//! A mode of w = 0 is a double integrator r/s^2. The constant stands for a mode far above all others.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -9,7 +9,7 @@ use super::Zero;
 use super::kinds::{self, System};
 use crate::model::plant::{ModalModel, Mode, PlantError, Sign};
 
-/// One mode, seen from outside.
+/// One mode by frequency, damping and residue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModalTerm {
     /// Undamped natural frequency in rad/s; 0 for a double integrator.
@@ -36,13 +36,35 @@ impl ModalTerm {
         (s * s + s * (2.0 * zeta * w) + w * w).inv()
     }
 
-    /// Its part of the undamped G at s = j `omega_rad_s`, in m/N.
+    /// Its contribution to the undamped G at s = j `omega_rad_s`, in m/N.
     pub fn part(&self, omega_rad_s: f64) -> f64 {
-        self.residue_per_kg / ((self.omega_rad_s - omega_rad_s) * (self.omega_rad_s + omega_rad_s))
+        let (w, omega) = (self.omega_rad_s, omega_rad_s);
+        self.residue_per_kg / ((w - omega) * (w + omega))
+    }
+}
+
+impl From<&Mode> for ModalTerm {
+    fn from(mode: &Mode) -> ModalTerm {
+        ModalTerm {
+            omega_rad_s: mode.omega_rad_s,
+            damping_ratio: mode.damping_ratio,
+            residue_per_kg: mode.residue_per_kg(),
+        }
     }
 }
 
 /// The sum, slowest mode first.
+///
+/// ```
+/// use bench::model::zeros::{ModalSum, ModalTerm, ZeroCounts};
+///
+/// // Eq. (3-9) with a0 = 5: two close modes of opposite signs beside a double integrator.
+/// let terms = [(0.0, 1.0), (10.0, -5.0), (11.0, 5.0)];
+/// let terms = terms.map(|(omega, residue)| ModalTerm::undamped(omega, residue));
+/// let sum = ModalSum::new(terms.to_vec(), 0.0)?;
+/// assert_eq!(ZeroCounts::of(&sum.undamped_zeros()?).to_string(), "CMP-CNMP");
+/// # Ok::<(), bench::model::plant::PlantError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalSum {
     terms: Vec<ModalTerm>,
@@ -50,7 +72,7 @@ pub struct ModalSum {
 }
 
 impl ModalSum {
-    /// A sum; its modes may come in any order. One whose residues and constant are all zero is refused.
+    /// A sum of modes in any order. Refuses one whose residues and constant are all zero.
     pub fn new(mut terms: Vec<ModalTerm>, constant_m_per_n: f64) -> Result<ModalSum, PlantError> {
         terms.retain(|term| term.residue_per_kg != 0.0);
         terms.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
@@ -63,19 +85,12 @@ impl ModalSum {
         })
     }
 
-    /// The modes of a structure that show between its actuator and its probe ([`ModalModel::signs`]).
+    /// The modes of a structure that can be observed between its actuator and its probe ([`ModalModel::signs`]).
     pub fn visible(modal: &ModalModel) -> Result<ModalSum, PlantError> {
-        let shown = modal
-            .modes
-            .iter()
-            .zip(modal.signs())
-            .filter(|(_, sign)| *sign != Sign::Hidden);
-        let term = |(mode, _): (&Mode, Sign)| ModalTerm {
-            omega_rad_s: mode.omega_rad_s,
-            damping_ratio: mode.damping_ratio,
-            residue_per_kg: mode.residue_per_kg(),
-        };
-        ModalSum::new(shown.map(term).collect(), 0.0)
+        let modes = modal.modes.iter().zip(modal.signs());
+        let visible = modes.filter(|(_, sign)| *sign != Sign::Hidden);
+        let terms = visible.map(|(mode, _)| ModalTerm::from(mode));
+        ModalSum::new(terms.collect(), 0.0)
     }
 
     /// The modes with a residue, slowest first.
@@ -88,6 +103,11 @@ impl ModalSum {
         self.constant_m_per_n
     }
 
+    /// Whether there is a constant R.
+    pub fn has_constant(&self) -> bool {
+        self.constant_m_per_n != 0.0
+    }
+
     /// Whether the slowest mode is a double integrator.
     pub fn is_free(&self) -> bool {
         self.terms
@@ -97,37 +117,47 @@ impl ModalSum {
 
     /// G(s) in m/N.
     pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
-        let part = |t: &ModalTerm| t.resonance(s) * t.residue_per_kg;
-        self.terms.iter().map(part).sum::<Complex<f64>>() + self.constant_m_per_n
+        let parts = self
+            .terms
+            .iter()
+            .map(|term| term.resonance(s) * term.residue_per_kg);
+        parts.sum::<Complex<f64>>() + self.constant_m_per_n
     }
 
     /// Zeros without damping, slowest first.
     pub fn undamped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
-        self.by(kinds::undamped)
+        self.zeros_by(kinds::undamped)
     }
 
     /// Zeros with damping, slowest first.
     pub fn damped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
-        self.by(kinds::damped)
+        self.zeros_by(kinds::damped)
     }
 
-    /// Unit masses on springs, one a mode, each pushed and seen by the root of its residue, and the constant beside them.
-    fn by(
+    /// The zeros of unit masses on springs, one a mode, with the root of its residue as force and sensor gain, beside the
+    /// constant.
+    fn zeros_by(
         &self,
         zeros: fn(&System) -> Result<Vec<Zero>, PlantError>,
     ) -> Result<Vec<Zero>, PlantError> {
-        if self.terms.is_empty() {
+        let n = self.terms.len();
+        if n == 0 {
             return Ok(Vec::new());
         }
-        let vector = |of: fn(&ModalTerm) -> f64| {
-            DVector::from_iterator(self.terms.len(), self.terms.iter().map(of))
-        };
+        let vector =
+            |of: fn(&ModalTerm) -> f64| DVector::from_iterator(n, self.terms.iter().map(of));
+        let root = |term: &ModalTerm| term.residue_per_kg.abs().sqrt();
         zeros(&System {
-            mass: &DMatrix::identity(self.terms.len(), self.terms.len()),
+            mass: &DMatrix::identity(n, n),
             damping: &DMatrix::from_diagonal(&vector(|t| 2.0 * t.damping_ratio * t.omega_rad_s)),
             stiffness: &DMatrix::from_diagonal(&vector(|t| t.omega_rad_s * t.omega_rad_s)),
-            force: &vector(|t| t.residue_per_kg.abs().sqrt().copysign(t.residue_per_kg)),
-            sensor: &vector(|t| t.residue_per_kg.abs().sqrt()),
+            force: &DVector::from_iterator(
+                n,
+                self.terms
+                    .iter()
+                    .map(|t| root(t).copysign(t.residue_per_kg)),
+            ),
+            sensor: &DVector::from_iterator(n, self.terms.iter().map(root)),
             constant_m_per_n: self.constant_m_per_n,
         })
     }
@@ -138,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_constant_gives_the_zeros_of_the_closed_form() {
+    fn zeros_beside_a_constant_match_the_closed_form() {
         // r/(u + w^2) + R = 0 at u = -w^2 - r/R: on the imaginary axis for r/R > -w^2, real below.
         for (residue, constant) in [(2.0, 0.5), (-3.0, 0.5), (1.0, 1e-9), (1e-9, -1.0)] {
             let sum = ModalSum::new(vec![ModalTerm::undamped(2.0, residue)], constant).unwrap();
@@ -154,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sum_of_nothing_is_refused() {
+    fn rejects_a_sum_without_residues() {
         assert_eq!(
             ModalSum::new(vec![ModalTerm::undamped(1.0, 0.0)], 0.0),
             Err(PlantError::NoResponse)

@@ -1,10 +1,10 @@
 //! Tables 3-1 to 3-4: from the signs and the sequence of dominant modes to the kinds of the zeros, without computing one.
 //!
-//! Signs are those of the modes in their order along frequency (Assumption A3-6: the slowest is positive; a plant whose
-//! slowest mode is negative is read with all signs turned). A pattern is what the printed sequence means in every case; it
-//! is wider than the printed words in these rows, and the kinds are the printed ones in all of them:
+//! Signs are those of the modes along frequency (Assumption A3-6: the slowest is positive; a plant whose slowest mode is
+//! negative is read with all signs reversed). A pattern is the meaning of the printed sequence in all cases. In these rows it
+//! is wider than the printed words, and the kinds are the printed ones in all of them:
 //!
-//! | row | printed | also there | why |
+//! | row | printed | also | reason |
 //! |---|---|---|---|
 //! | 3-3, 5 | `[R]-[u]-[v]-[u]-[DI]` | `[R]` at the end | where aR > \|au\| mode R takes over alone: it is a double integrator |
 //! | 3-3, 7 | `[Ru]-[v]-[DI]` | `[R]`, `[u]` at the end | where one of them outweighs v alone, definition (2b) names it |
@@ -12,12 +12,15 @@
 //! | 3-4, 4 | `[DC]-[v]-[u]-[v]-[R]` | `[R]` at the start | where R > \|av\|/wv^2 the constant alone holds the sign |
 //! | 3-4, 7 | `[-DC]-[u]-[v]-[R]` | `[R]`, `[v]` at the start | where one of them outweighs u at low frequency |
 //!
-//! A misprint: in Table 3-2 the places of the MMP zeros stand one row too low (cyclically). `[v]-[u]-[v]` has them below wu,
+//! A misprint: in Table 3-2 the places of the MMP zeros are one row too low (cyclically). `[v]-[u]-[v]` has them below wu,
 //! `[u]-[v]` none, `[u]-[v]-[u]` above wv.
 
-use super::{ModalSum, Sequence, ZeroCounts};
+use serde::Serialize;
 
-/// Between which resonances a pair of MMP zeros lies.
+use super::{ModalSum, Sequence, ZeroCounts, sign_sequence};
+use crate::model::plant::{ModalModel, PlantError};
+
+/// The resonances between which a pair of MMP zeros lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MmpLocation {
     /// (0, wu).
@@ -29,24 +32,28 @@ pub enum MmpLocation {
 }
 
 /// One row of a table.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TableRow {
     /// `3-1` to `3-4`.
     pub table: &'static str,
-    /// TableRow of the table, from 1.
+    /// Row of the table, from 1.
+    #[serde(rename = "row")]
     pub number: usize,
     /// Signs of the modes by frequency.
+    #[serde(skip)]
     pub signs: &'static str,
     /// The sequence as printed.
     pub printed: &'static str,
     /// The kinds of the zeros as printed; one of these.
     pub kinds: &'static [ZeroCounts],
-    /// Where the MMP zeros lie.
+    /// The places of the MMP zeros.
+    #[serde(skip)]
     pub mmp: &'static [MmpLocation],
+    #[serde(skip)]
     pattern: &'static [Piece],
 }
 
-/// A piece of a pattern: one name of these, or one or more names of these.
+/// A piece of a pattern: exactly one of these names, or one or more of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Piece {
     One(&'static [&'static str]),
@@ -54,7 +61,7 @@ enum Piece {
 }
 
 impl TableRow {
-    /// Whether a sequence is of this row.
+    /// Whether a sequence belongs to this row.
     pub fn fits(&self, signs: &str, names: &[String]) -> bool {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         self.signs == signs && fits(self.pattern, &names)
@@ -62,12 +69,10 @@ impl TableRow {
 }
 
 fn fits(pattern: &[Piece], names: &[&str]) -> bool {
-    match (pattern.split_first(), names.split_first()) {
-        (None, None) => true,
-        (Some((Piece::One(of), rest)), Some((name, names))) => {
-            of.contains(name) && fits(rest, names)
-        }
-        (Some((Piece::Some(of), rest)), Some((name, names))) => {
+    match (pattern, names) {
+        ([], []) => true,
+        ([Piece::One(of), rest @ ..], [name, names @ ..]) => of.contains(name) && fits(rest, names),
+        ([Piece::Some(of), rest @ ..], [name, names @ ..]) => {
             of.contains(name) && (fits(rest, names) || fits(pattern, names))
         }
         _ => false,
@@ -86,19 +91,15 @@ pub struct Table {
 impl Table {
     /// The row of a plant, by its signs and its sequence; `None` where no row has that sequence.
     pub fn row(&self, sum: &ModalSum, sequence: &Sequence) -> Option<&'static TableRow> {
-        let (signs, names) = (signs(sum), turned(sum, sequence));
+        let (signs, names) = (signs(sum), reversed_names(sum, sequence));
         self.rows.iter().find(|row| row.fits(&signs, &names))
     }
 }
 
-/// The table for a plant's class: a double integrator and a mode, two modes, a slow mode (or double integrator) and two
+/// The table of a plant's class: a double integrator and a mode, two modes, a slow mode (or double integrator) and two
 /// modes, two modes and a constant. `None` for any other.
 pub fn table_of(sum: &ModalSum) -> Option<&'static Table> {
-    let index = match (
-        sum.terms().len(),
-        sum.constant_m_per_n() != 0.0,
-        sum.is_free(),
-    ) {
+    let index = match (sum.terms().len(), sum.has_constant(), sum.is_free()) {
         (2, false, true) => 0,
         (2, false, false) => 1,
         (3, false, _) => 2,
@@ -109,41 +110,72 @@ pub fn table_of(sum: &ModalSum) -> Option<&'static Table> {
 }
 
 fn slowest_is_negative(sum: &ModalSum) -> bool {
-    sum.terms()
-        .first()
-        .is_some_and(|term| term.residue_per_kg < 0.0)
+    let slowest = sum.terms().first();
+    slowest.is_some_and(|term| term.residue_per_kg < 0.0)
 }
 
-/// The signs along frequency, turned so that the first is positive.
+/// The signs along frequency, reversed where the first is negative.
 fn signs(sum: &ModalSum) -> String {
-    let turn = if slowest_is_negative(sum) { -1.0 } else { 1.0 };
-    let constant = Some(sum.constant_m_per_n()).filter(|constant| *constant != 0.0);
-    let parts = sum
-        .terms()
-        .iter()
-        .map(|term| term.residue_per_kg)
-        .chain(constant);
+    let reversed = slowest_is_negative(sum);
+    let constant = sum.has_constant().then_some(sum.constant_m_per_n());
+    let residues = sum.terms().iter().map(|term| term.residue_per_kg);
+    let is_positive = |part: f64| part != 0.0 && (part > 0.0) != reversed;
+    let parts = residues.chain(constant);
     parts
-        .map(|part| if part * turn > 0.0 { '+' } else { '-' })
+        .map(|part| if is_positive(part) { '+' } else { '-' })
         .collect()
 }
 
-/// The names of a sequence, turned with the signs.
-fn turned(sum: &ModalSum, sequence: &Sequence) -> Vec<String> {
-    let turn = |name: String| match name.as_str() {
-        "DC" | "DI" => format!("-{name}"),
-        "-DC" | "-DI" => name[1..].to_string(),
-        _ => name,
-    };
-    let names = sequence.names().into_iter();
-    if slowest_is_negative(sum) {
-        names.map(turn).collect()
-    } else {
-        names.collect()
+/// The names of a sequence, reversed with the signs.
+fn reversed_names(sum: &ModalSum, sequence: &Sequence) -> Vec<String> {
+    let names = sequence.names();
+    match slowest_is_negative(sum) {
+        true => names.into_iter().map(reversed_name).collect(),
+        false => names,
     }
 }
 
-const fn kinds(mmp: usize, real: usize, quartets: usize) -> ZeroCounts {
+fn reversed_name(name: String) -> String {
+    match name.as_str() {
+        "DC" | "DI" => format!("-{name}"),
+        "-DC" | "-DI" => name[1..].to_string(),
+        _ => name,
+    }
+}
+
+/// The kinds that the tables read from the sequence of dominant modes, beside the computed ones.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SequenceReport {
+    /// The signs of the modes that can be observed.
+    pub sign_sequence: String,
+    /// The dominant modes along frequency.
+    pub dominant_sequence: String,
+    /// The row with these signs and this sequence; `None` for other numbers of modes or where no row has the sequence.
+    pub table: Option<&'static TableRow>,
+    /// The kinds of the zeros of these modes.
+    pub computed: ZeroCounts,
+    /// Whether the row has the computed kinds.
+    pub agree: Option<bool>,
+}
+
+impl SequenceReport {
+    /// The report of a plant's modes.
+    pub fn of(modal: &ModalModel) -> Result<SequenceReport, PlantError> {
+        let sum = ModalSum::visible(modal)?;
+        let sequence = Sequence::of(&sum)?;
+        let table = table_of(&sum).and_then(|table| table.row(&sum, &sequence));
+        let computed = ZeroCounts::of(&sum.undamped_zeros()?);
+        Ok(SequenceReport {
+            sign_sequence: sign_sequence(modal),
+            dominant_sequence: sequence.to_string(),
+            table,
+            computed,
+            agree: table.map(|row| row.kinds.contains(&computed)),
+        })
+    }
+}
+
+const fn counts(mmp: usize, real: usize, quartets: usize) -> ZeroCounts {
     ZeroCounts {
         mmp,
         real,
@@ -151,11 +183,11 @@ const fn kinds(mmp: usize, real: usize, quartets: usize) -> ZeroCounts {
     }
 }
 
-const MMP: &[ZeroCounts] = &[kinds(1, 0, 0)];
-const REAL: &[ZeroCounts] = &[kinds(0, 1, 0)];
-const DUAL_MMP: &[ZeroCounts] = &[kinds(2, 0, 0)];
-const MMP_AND_REAL: &[ZeroCounts] = &[kinds(1, 1, 0)];
-const QUARTET_OR_DUAL_REAL: &[ZeroCounts] = &[kinds(0, 0, 1), kinds(0, 2, 0)];
+const MMP: &[ZeroCounts] = &[counts(1, 0, 0)];
+const REAL: &[ZeroCounts] = &[counts(0, 1, 0)];
+const DUAL_MMP: &[ZeroCounts] = &[counts(2, 0, 0)];
+const MMP_AND_REAL: &[ZeroCounts] = &[counts(1, 1, 0)];
+const QUARTET_OR_DUAL_REAL: &[ZeroCounts] = &[counts(0, 0, 1), counts(0, 2, 0)];
 
 const R: Piece = Piece::One(&["R"]);
 const U: Piece = Piece::One(&["u"]);

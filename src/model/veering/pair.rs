@@ -1,0 +1,58 @@
+//! The choice of two modes.
+
+use super::{Loci, Meeting};
+use crate::model::plant::{PlantError, Structure};
+
+/// The reason why there is no pair of close modes, or no veering point, with the remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct PairError(String);
+
+/// The two modes from 0: those `asked` for by their numbers from 1, or the closest.
+pub fn close_pair<E, F>(asked: &[usize], loci: &Loci<F>) -> Result<[usize; 2], PairError>
+where
+    E: From<PlantError>,
+    F: FnMut(f64) -> Result<Structure, E>,
+{
+    let count = loci.path()[0].omega_rad_s.len();
+    let is_mode = |mode: &usize| (1..=count).contains(mode);
+    match asked {
+        [] => loci.closest_pair().ok_or_else(|| {
+            PairError("fewer than two modes of this plant are held by a spring: there is no pair to follow".into())
+        }),
+        [i, j] if i != j && is_mode(i) && is_mode(j) => Ok([i.min(j) - 1, i.max(j) - 1]),
+        _ => Err(PairError(format!(
+            "--modes {asked:?}: give two different modes, I,J, of 1 to {count}"
+        ))),
+    }
+}
+
+/// The two modes asked for, or the first that meet inside the range.
+pub fn meeting_pair<E, F>(asked: &[usize], loci: &Loci<F>) -> Result<[usize; 2], PairError>
+where
+    E: From<PlantError>,
+    F: FnMut(f64) -> Result<Structure, E>,
+{
+    if !asked.is_empty() || loci.path()[0].omega_rad_s.len() < 2 {
+        return close_pair(asked, loci);
+    }
+    let pairs = loci.meeting_pairs();
+    pairs.first().copied().ok_or_else(|| {
+        PairError(
+            "no two modes veer or cross inside the range; move --from or --to, or vary another setting"
+                .into(),
+        )
+    })
+}
+
+/// Refuses a range without a veering point.
+pub fn require_meeting(meeting: Meeting, value: f64, [i, j]: [usize; 2]) -> Result<(), PairError> {
+    if meeting != Meeting::AtTheEnd {
+        return Ok(());
+    }
+    Err(PairError(format!(
+        "modes {} and {} neither veer nor cross in the range: they are closest at its end, {value}; move --from or --to beyond it, or name two others with --modes",
+        i + 1,
+        j + 1
+    )))
+}
