@@ -146,21 +146,19 @@ fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
         }
     }
     let all: u64 = counts.iter().sum();
+    let varied = &results.plan.varied;
+    let probabilities = (0..).zip(&counts);
+    let alone = (0..varied.len()).map(|index| Some(effects.single(index)?.value));
+    let together = effects.interactions().map(|(_, share)| Some(share?.value));
     Counted {
-        probabilities: (0..)
-            .zip(&counts)
+        probabilities: probabilities
             .map(|(pairs, &yes)| probability(Some(pairs), yes, all))
             .collect(),
         any: probability(None, all - counts[0], all),
-        share_alone: (0..results.plan.varied.len())
-            .map(|index| Some(effects.single(index)?.value))
-            .sum(),
-        share_of_interactions: effects
-            .interactions()
-            .map(|(_, share)| Some(share?.value))
-            .sum(),
-        settings: singles(&results.plan.varied, &effects),
-        interactions: interactions(&results.plan.varied, &effects),
+        share_alone: alone.sum(),
+        share_of_interactions: together.sum(),
+        settings: settings(varied, &effects),
+        interactions: interactions(varied, &effects),
     }
 }
 
@@ -169,37 +167,41 @@ fn probability(pairs: Option<u32>, yes: u64, all: u64) -> Probability {
     Probability {
         pairs,
         draws: yes,
-        probability: if all == 0 {
-            0.0
-        } else {
-            yes as f64 / all as f64
+        probability: match all {
+            0 => 0.0,
+            _ => yes as f64 / all as f64,
         },
         low,
         high,
     }
 }
 
-fn singles(varied: &[Varied], effects: &Effects) -> Vec<Effect> {
-    let effect = |(index, one): (usize, &Varied)| {
-        let (share, thirds) = (effects.single(index), effects.thirds(index));
-        Effect {
-            key: one.key.clone(),
-            share: share.map(|share| share.value),
-            share_noise: share.map(|share| share.noise),
-            direction: share.map_or('0', |_| direction(&thirds)),
-            probability_by_third: thirds.map(finite),
-        }
-    };
-    let mut settings: Vec<Effect> = varied.iter().enumerate().map(effect).collect();
-    settings.sort_by(|a, b| b.share.unwrap_or(0.0).total_cmp(&a.share.unwrap_or(0.0)));
+/// The effect of each setting, the strongest first.
+fn settings(varied: &[Varied], effects: &Effects) -> Vec<Effect> {
+    let mut settings: Vec<Effect> = varied
+        .iter()
+        .enumerate()
+        .map(|(index, one)| effect(&one.key, index, effects))
+        .collect();
+    let share = |effect: &Effect| effect.share.unwrap_or(0.0);
+    settings.sort_by(|a, b| share(b).total_cmp(&share(a)));
     settings
 }
 
+fn effect(key: &str, index: usize, effects: &Effects) -> Effect {
+    let (share, thirds) = (effects.single(index), effects.thirds(index));
+    Effect {
+        key: key.into(),
+        share: share.map(|share| share.value),
+        share_noise: share.map(|share| share.noise),
+        direction: share.map_or('0', |_| direction(&thirds)),
+        probability_by_third: thirds.map(finite),
+    }
+}
+
 fn direction([low, _, high]: &[Cell; 3]) -> char {
-    let (difference, sigma) = (
-        high.probability() - low.probability(),
-        high.sigma().hypot(low.sigma()),
-    );
+    let difference = high.probability() - low.probability();
+    let sigma = high.sigma().hypot(low.sigma());
     match difference.abs() > SIGNIFICANT * sigma {
         true if difference > 0.0 => '+',
         true => '-',
@@ -207,26 +209,35 @@ fn direction([low, _, high]: &[Cell; 3]) -> char {
     }
 }
 
+/// The significant interactions, the strongest first.
 fn interactions(varied: &[Varied], effects: &Effects) -> Vec<Interaction> {
-    let strong = |(pair, share): ([usize; 2], Option<Share>)| {
-        share
-            .filter(|share| share.value > SIGNIFICANT * share.noise)
-            .map(|share| (pair, share))
-    };
-    let mut strongest: Vec<([usize; 2], Share)> =
-        effects.interactions().filter_map(strong).collect();
+    let shares = effects.interactions();
+    let known = shares.filter_map(|(pair, share)| Some((pair, share?)));
+    let mut strongest: Vec<([usize; 2], Share)> = known
+        .filter(|(_, share)| share.value > SIGNIFICANT * share.noise)
+        .collect();
     strongest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
-    let pair = |(pair, share): &([usize; 2], Share)| {
-        let [same, opposite] = effects.halves(*pair).map(finite);
-        Interaction {
-            keys: pair.map(|index| varied[index].key.clone()),
-            share: share.value,
-            share_noise: share.noise,
-            probability_same_side: same,
-            probability_opposite_sides: opposite,
-        }
-    };
-    strongest.iter().take(INTERACTIONS).map(pair).collect()
+    strongest.truncate(INTERACTIONS);
+    strongest
+        .into_iter()
+        .map(|(pair, share)| interaction(varied, pair, share, effects))
+        .collect()
+}
+
+fn interaction(
+    varied: &[Varied],
+    pair: [usize; 2],
+    share: Share,
+    effects: &Effects,
+) -> Interaction {
+    let [same, opposite] = effects.halves(pair).map(finite);
+    Interaction {
+        keys: pair.map(|index| varied[index].key.clone()),
+        share: share.value,
+        share_noise: share.noise,
+        probability_same_side: same,
+        probability_opposite_sides: opposite,
+    }
 }
 
 fn finite(cell: Cell) -> Option<f64> {

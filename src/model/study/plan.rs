@@ -1,4 +1,4 @@
-//! What is studied: a plant, what varies of it, and how often it is drawn.
+//! The plan of a study: a plant, the settings that vary, and the number of draws.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -13,9 +13,9 @@ use super::{Deviation, StudyError, Tolerance};
 use crate::config::{Config, PlantSettings, validate};
 use crate::util::nearest::nearest;
 
-/// Settings that may vary at once: the classes of all couples of them stay below 40 MB.
+/// Settings that may vary at once: the classes of all pairs of them take less than 40 MB.
 const MOST_VARIED: usize = 64;
-/// Draws, at most: their counts stay below 1 GB.
+/// Largest number of draws: their counts take less than 1 GB.
 const MOST_DRAWS: u64 = 100_000_000;
 
 /// A setting that varies.
@@ -25,27 +25,27 @@ pub struct Varied {
     pub key: String,
     /// Its value in the configuration.
     pub nominal: f64,
-    /// What is added to that.
+    /// The deviation that is added.
     #[serde(flatten)]
     pub deviation: Deviation,
 }
 
-/// All that decides the counts of a study.
+/// All settings that determine the counts of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// The nominal plant.
     pub plant: PlantSettings,
-    /// What varies, in the order of the tolerances and, within one, of the configuration.
+    /// The settings that vary, in the order of the tolerances and, within one, of the configuration.
     pub varied: Vec<Varied>,
-    /// Of the random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// How many draws.
+    /// Number of draws.
     pub draws: u64,
     /// Whether the zeros with damping are counted as well.
     pub damped: bool,
 }
 
-/// The part of a study that one process does: `index` of `count`, from 1.
+/// The part of a study that one process computes: `index` of `count`, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Which one.
@@ -93,7 +93,7 @@ impl std::fmt::Display for Shard {
     }
 }
 
-/// What one draw gave each varied setting.
+/// The varied settings of one draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// The values.
@@ -103,8 +103,8 @@ pub struct Drawn {
 }
 
 impl Plan {
-    /// A plan over a configuration. Refuses a nominal plant that cannot be analysed, and a tolerance one end of which leaves
-    /// what is allowed: a draw left out for that would bend the probabilities.
+    /// A plan for a configuration. Refuses a nominal plant that cannot be analysed, and a tolerance one end of which is out
+    /// of range: draws left out for that reason would bias the probabilities.
     pub fn new(
         config: &Config,
         tolerances: &[Tolerance],
@@ -137,48 +137,54 @@ impl Plan {
     fn check(&self, config: &Config) -> Result<(), StudyError> {
         let mut counter = self.counter();
         let nominal: Vec<f64> = self.varied.iter().map(|one| one.nominal).collect();
-        let wrong =
-            |why: String| StudyError::Plan(format!("the nominal plant cannot be analysed: {why}"));
-        counter.count(&nominal).map_err(wrong)?;
+        counter.count(&nominal).map_err(|why| {
+            StudyError::Plan(format!("the nominal plant cannot be analysed: {why}"))
+        })?;
         for (index, one) in self.varied.iter().enumerate() {
             for end in one.deviation.ends() {
                 let mut values = nominal.clone();
                 values[index] += end;
-                let reaches = |why: String| {
-                    StudyError::Plan(format!(
-                        "the tolerance of `{}` reaches {}: narrow it, or move the nominal value; {why}",
-                        one.key, values[index]
-                    ))
-                };
-                let plant = counter.plant(&values).map_err(reaches)?;
-                validate(&Config {
-                    plant,
-                    ..config.clone()
-                })
-                .map_err(|error| reaches(error.to_string()))?;
+                let plant = counter.plant(&values);
+                let checked = plant.and_then(|plant| check_plant(config, plant));
+                checked.map_err(|why| reaches_too_far(&one.key, values[index], &why))?;
             }
         }
         Ok(())
     }
 
-    /// What the draws from `first` on give the varied settings.
+    /// The values of the varied settings, from draw `first` on.
     ///
-    /// One sequence of PCG (XSL RR 128/64) for the whole study: draw k takes the 2 n numbers from 2 n k on, n settings vary,
-    /// and the generator jumps there.
+    /// One sequence of PCG (XSL RR 128/64) serves the whole study: with n settings, draw k takes the 2 n numbers from 2 n k
+    /// on, and the generator jumps there.
     pub fn from_draw(&self, first: u64) -> impl Iterator<Item = Drawn> + '_ {
         let mut bits = Pcg64::seed_from_u64(self.seed);
         bits.advance(2 * self.varied.len() as u128 * u128::from(first));
-        std::iter::repeat_with(move || {
-            let drawn = self.varied.iter().map(|one| {
-                let (deviation, rank) = one
-                    .deviation
-                    .drawn([uniform(&mut bits), uniform(&mut bits)]);
-                (one.nominal + deviation, rank)
-            });
-            let (values, ranks) = drawn.unzip();
-            Drawn { values, ranks }
-        })
+        std::iter::repeat_with(move || self.drawn(&mut bits))
     }
+
+    fn drawn(&self, bits: &mut Pcg64) -> Drawn {
+        let drawn = self.varied.iter().map(|one| {
+            let numbers = [uniform(bits), uniform(bits)];
+            let (deviation, rank) = one.deviation.drawn(numbers);
+            (one.nominal + deviation, rank)
+        });
+        let (values, ranks) = drawn.unzip();
+        Drawn { values, ranks }
+    }
+}
+
+fn check_plant(config: &Config, plant: PlantSettings) -> Result<(), String> {
+    let config = Config {
+        plant,
+        ..config.clone()
+    };
+    validate(&config).map_err(|error| error.to_string())
+}
+
+fn reaches_too_far(key: &str, value: f64, why: &str) -> StudyError {
+    StudyError::Plan(format!(
+        "the tolerance of `{key}` reaches {value}: narrow it, or move the nominal value; {why}"
+    ))
 }
 
 /// Uniform in [0, 1), in steps of 2^-53.
@@ -190,27 +196,10 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
     let settings = settings(plant);
     let mut varied: Vec<Varied> = Vec::new();
     for tolerance in tolerances {
-        let matched: Vec<&(String, Value)> = settings
-            .iter()
-            .filter(|(key, _)| tolerance.matches(key))
-            .collect();
-        let numbers: Vec<(&String, f64)> = matched
-            .iter()
-            .filter(|(_, value)| value.is_f64())
-            .filter_map(|(k, v)| Some((k, v.as_f64()?)))
-            .collect();
-        if numbers.is_empty() {
-            return Err(nothing(
-                tolerance,
-                &settings,
-                matched.first().map(|(key, _)| key.as_str()),
-            ));
-        }
-        for (key, nominal) in numbers {
+        for (key, nominal) in numbers(tolerance, &settings)? {
             if varied.iter().any(|one| one.key == *key) {
-                return Err(
-                    tolerance.wrong(format!("`{key}` varies already; name each setting once"))
-                );
+                let why = format!("`{key}` varies already; name each setting once");
+                return Err(tolerance.wrong(why));
             }
             varied.push(Varied {
                 key: key.clone(),
@@ -224,31 +213,39 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
             "nothing varies; give --vary KEY=TOLERANCE, as in plant.mass_asymmetry=+-0.02".into(),
         )),
         count if count > MOST_VARIED => Err(StudyError::Plan(format!(
-            "{count} settings would vary; {MOST_VARIED} may: name fewer"
+            "{count} settings would vary; at most {MOST_VARIED} may: name fewer"
         ))),
         _ => Ok(varied),
     }
 }
 
-fn nothing(
+/// The numeric settings that a tolerance applies to, with their values.
+fn numbers<'a>(
     tolerance: &Tolerance,
-    settings: &[(String, Value)],
-    no_number: Option<&str>,
-) -> StudyError {
+    settings: &'a [(String, Value)],
+) -> Result<Vec<(&'a String, f64)>, StudyError> {
+    let matched = || settings.iter().filter(|(key, _)| tolerance.matches(key));
+    let numbers: Vec<(&String, f64)> = matched()
+        .filter(|(_, value)| value.is_f64())
+        .filter_map(|(key, value)| Some((key, value.as_f64()?)))
+        .collect();
+    if !numbers.is_empty() {
+        return Ok(numbers);
+    }
     let pattern = tolerance.pattern();
-    tolerance.wrong(match no_number {
-        Some(key) => format!("`{key}` is no quantity: only those can deviate"),
+    Err(tolerance.wrong(match matched().next() {
+        Some((key, _)) => format!("`{key}` is no quantity: only quantities can deviate"),
         None if !pattern.starts_with("plant.") => {
             format!(
                 "`{pattern}` is not of the plant; a study varies settings that begin with `plant.`"
             )
         }
         None => {
-            let hint =
-                nearest(pattern, settings.iter().map(|(key, _)| key.as_str())).unwrap_or("plant");
+            let keys = settings.iter().map(|(key, _)| key.as_str());
+            let hint = nearest(pattern, keys).unwrap_or("plant");
             format!("`{pattern}` is not a setting of this plant; the nearest is `{hint}`")
         }
-    })
+    }))
 }
 
 /// All settings of a plant, with their dotted paths.
