@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::conditions::c4_1;
+use super::conditions::{Condition, c4_1};
 use super::trajectory::Ports;
 use super::{Meeting, ModesAt, QuadrantDiagram, QuadrantSummary, Sample, ZeroConfiguration};
 use crate::model::plant::{PlantError, Port, PortWeights};
@@ -36,6 +36,24 @@ pub struct Trial {
 }
 
 impl Trial {
+    fn of(samples: &[Sample], picture_alternates: bool) -> Trial {
+        let close = samples.iter().filter_map(|sample| sample.modes);
+        let conditions: Vec<Condition> = close.map(|modes| c4_1(&modes)).collect();
+        let margins = conditions.iter().map(|condition| condition.margin);
+        let with_cnmp = count(samples, |s| s.plant == ZeroConfiguration::Quartet);
+        let middle = samples[samples.len() / 2].modes;
+        Trial {
+            values: samples.len(),
+            with_cnmp,
+            with_any_cnmp: count(samples, |sample| cnmp_pairs(&sample.zeros) > 0),
+            alternating: conditions.iter().filter(|one| one.holds).count(),
+            c4_1_margin: margins.fold(f64::NEG_INFINITY, f64::max),
+            picture_alternates,
+            differs: !picture_alternates && with_cnmp > 0,
+            remainder_per_kg: middle.map_or(0.0, |modes| modes.remainder.residue_per_kg.abs()),
+        }
+    }
+
     /// Order of preference: no CNMP zeros, then none of the close modes, then signs that are far from alternating.
     fn preference(&self, other: &Trial) -> Ordering {
         let key = |trial: &Trial| {
@@ -95,29 +113,15 @@ impl<'a> Path<'a> {
 
     /// Tries actuator and probe at each value. `None` where some value has no response at all.
     fn trial(&self, ports: &[Ports]) -> Result<Option<Trial>, PlantError> {
-        let modes = || self.modes.iter().zip(ports);
-        if modes().any(|(at, ports)| is_silent(at, ports)) {
+        let mut values = self.modes.iter().zip(ports);
+        if values.any(|(at, ports)| is_silent(at, ports)) {
             return Ok(None);
         }
-        let samples = modes()
+        let values = self.modes.iter().zip(ports);
+        let samples = values
             .map(|(at, ports)| Sample::of(at, self.pair, ports.clone()))
             .collect::<Result<Vec<_>, _>>()?;
-        let close = samples.iter().filter_map(|sample| sample.modes);
-        let conditions: Vec<_> = close.map(|modes| c4_1(&modes)).collect();
-        let margins = conditions.iter().map(|condition| condition.margin);
-        let with_cnmp = count(&samples, |s| s.plant == ZeroConfiguration::Quartet);
-        let picture_alternates = self.diagram_alternates(ports);
-        let middle = samples[samples.len() / 2].modes;
-        Ok(Some(Trial {
-            values: samples.len(),
-            with_cnmp,
-            with_any_cnmp: count(&samples, |sample| cnmp_pairs(&sample.zeros) > 0),
-            alternating: conditions.iter().filter(|one| one.holds).count(),
-            c4_1_margin: margins.fold(f64::NEG_INFINITY, f64::max),
-            picture_alternates,
-            differs: !picture_alternates && with_cnmp > 0,
-            remainder_per_kg: middle.map_or(0.0, |modes| modes.remainder.residue_per_kg.abs()),
-        }))
+        Ok(Some(Trial::of(&samples, self.diagram_alternates(ports))))
     }
 
     /// The diagram at one value, in the frame of the veering point.
