@@ -44,8 +44,9 @@ enum Command {
     Replay(replay::Args),
     /// Make a cut-off recording readable and say what was lost
     Recover(recover::Args),
-    /// Act as the configured devices, with the simulated stage behind them: a rehearsal without hardware
-    Device(emulate::Args),
+    /// Emulate the configured devices with the simulated stage behind them, for a rehearsal without hardware
+    #[command(alias = "device")]
+    Emulate(emulate::Args),
     /// The effective settings, their validation, their schema
     Config(config::Args),
     /// Could a run start? System, devices, recordings, each finding with its remedy; nothing moves
@@ -96,7 +97,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Identify(args) => identify::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
-        Command::Device(args) => emulate::run(&args),
+        Command::Emulate(args) => emulate::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Doctor(args) => doctor::run(&args),
     }

@@ -1,8 +1,8 @@
-//! `bench device`: the other end of the bench, for a rehearsal without hardware.
+//! `bench emulate`: emulated devices, for a rehearsal without hardware.
 
 use std::fs::File;
 use std::io::{BufRead, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -14,26 +14,24 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_json;
 use crate::config::{OptionSetting, Purpose};
-use crate::rig::emulator::probe::ProbeEndpoint;
-use crate::rig::emulator::rehearsal::EmulatedDevices;
-use crate::rig::emulator::schedule::PlannedFault;
 use crate::rig::emulator::{
-    EmulatedFault, Emulator, EmulatorError, FaultSchedule, LogEntry, fault,
+    EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
+    LogEntry, PlannedFault, ProbeEndpoint, fault,
 };
 use crate::util::quantity::{OfFrequency, OfTime, si};
 
-/// How often orders, signals and faults are looked for.
-const BEAT: Duration = Duration::from_millis(2);
+/// Period at which commands, signals and planned faults are handled.
+const PERIOD: Duration = Duration::from_millis(2);
 
-/// Which devices act, and where.
+/// Which devices are emulated, and where
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = format!("Faults, for --fault KIND@SECONDS and on standard input:\n{}", fault::help()))]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// The devices that act: amplifier, probe, or both with one stage
-    #[arg(required = true, value_name = "amplifier|probe", value_parser = ["amplifier", "probe"])]
-    devices: Vec<String>,
+    /// The emulated devices: amplifier, probe, or both with one stage
+    #[arg(required = true, value_name = "amplifier|probe")]
+    devices: Vec<EmulatedDevice>,
     /// CAN interface instead of the configured one
     #[arg(long, value_name = "NAME")]
     interface: Option<String>,
@@ -43,17 +41,17 @@ pub(super) struct Args {
     /// Make a pseudo terminal for the probe, with a link of this name for the reader
     #[arg(long, value_name = "LINK")]
     pty: Option<PathBuf>,
-    /// Measurements of the probe a second [default: as configured]
+    /// Measurements of the probe per second [default: as configured]
     #[arg(long, value_name = "FREQUENCY", value_parser = si::<OfFrequency>)]
     measuring_rate: Option<f64>,
-    /// A fault at a time (KIND@SECONDS) or for a while (KIND@FROM..TO), repeatable; the kinds are listed below
+    /// Inject a fault at a time (KIND@SECONDS) or for an interval (KIND@FROM..TO), repeatable; the kinds are listed below
     #[arg(long = "fault", value_name = "KIND@SECONDS")]
     faults: Vec<PlannedFault>,
-    /// What the times of --fault count from: the first enable of the amplifier, or the start
-    /// [default: enable; start if there is no amplifier]
-    #[arg(long, value_name = "enable|start", value_parser = ["enable", "start"])]
-    faults_from: Option<String>,
-    /// Write every change to a file as well, a JSON object a line
+    /// Origin of the times of --fault: the first enable of the amplifier, or the start
+    /// [default: enable; start if no amplifier is emulated]
+    #[arg(long, value_name = "enable|start")]
+    faults_from: Option<Origin>,
+    /// Write every change to a file as well, one JSON object per line
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
     /// End after this time [default: on Ctrl-C]
@@ -61,216 +59,238 @@ pub(super) struct Args {
     duration: Option<f64>,
 }
 
+/// Origin of the times of planned faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Origin {
+    /// The first enable of the amplifier
+    Enable,
+    /// The start of the emulator
+    Start,
+}
+
 impl Args {
-    fn serves(&self, device: &str) -> bool {
-        self.devices.iter().any(|served| served == device)
+    fn emulates(&self, device: EmulatedDevice) -> bool {
+        self.devices.contains(&device)
     }
 
-    fn cast(&self) -> EmulatedDevices {
-        let end = self.port.clone().map_or_else(
-            || ProbeEndpoint::Terminal(self.pty.clone()),
-            ProbeEndpoint::Port,
-        );
+    fn emulated_devices(&self) -> EmulatedDevices {
+        let endpoint = match &self.port {
+            Some(port) => ProbeEndpoint::Port(port.clone()),
+            None => ProbeEndpoint::Terminal(self.pty.clone()),
+        };
         EmulatedDevices {
-            amplifier: self.serves("amplifier"),
-            probe: self.serves("probe").then_some(end),
+            amplifier: self.emulates(EmulatedDevice::Amplifier),
+            probe: self.emulates(EmulatedDevice::Probe).then_some(endpoint),
             measuring_rate_hz: self.measuring_rate,
         }
     }
 
-    /// The settings that the options stand for.
+    /// The settings that the options replace.
     fn settings(&self) -> Vec<OptionSetting> {
-        let set = |name: &String| {
-            let option = format!("--interface {name}");
-            OptionSetting::new("amplifier.device.interface", name.as_str(), option)
+        let Some(name) = &self.interface else {
+            return Vec::new();
         };
-        self.interface.iter().map(set).collect()
+        let option = format!("--interface {name}");
+        let key = "amplifier.device.interface";
+        vec![OptionSetting::new(key, name.as_str(), option)]
     }
 
-    /// Options that the devices have no use for, and values that cannot be.
+    /// Refuses options of a device that is not emulated, and invalid values.
     fn check(&self) -> Result<(), CliError> {
-        let of_probe = self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
-        let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0);
-        let wrong = [
-            (
-                of_probe && !self.serves("probe"),
-                "--port, --pty and --measuring-rate go with the device `probe` only",
-            ),
-            (
-                self.interface.is_some() && !self.serves("amplifier"),
-                "--interface goes with the device `amplifier` only",
-            ),
-            (
-                !positive(self.measuring_rate),
-                "--measuring-rate must be above zero",
-            ),
-            (!positive(self.duration), "--duration must be above zero"),
-        ];
-        wrong
-            .iter()
-            .find(|(wrong, _)| *wrong)
-            .map_or(Ok(()), |(_, why)| Err(CliError::Usage((*why).into())))
+        let has_probe_options =
+            self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
+        let refusal = if has_probe_options && !self.emulates(EmulatedDevice::Probe) {
+            "--port, --pty and --measuring-rate need the device `probe`"
+        } else if self.interface.is_some() && !self.emulates(EmulatedDevice::Amplifier) {
+            "--interface needs the device `amplifier`"
+        } else if !is_positive(self.measuring_rate) {
+            "--measuring-rate must be above zero"
+        } else if !is_positive(self.duration) {
+            "--duration must be above zero"
+        } else {
+            return Ok(());
+        };
+        Err(CliError::Usage(refusal.into()))
     }
 
-    fn counts_from_start(&self) -> bool {
-        self.faults_from
-            .as_ref()
-            .map_or(!self.serves("amplifier"), |from| from == "start")
+    fn origin(&self) -> Origin {
+        match self.faults_from {
+            Some(origin) => origin,
+            None if self.emulates(EmulatedDevice::Amplifier) => Origin::Enable,
+            None => Origin::Start,
+        }
     }
+}
+
+fn is_positive(value: Option<f64>) -> bool {
+    value.is_none_or(|value| value > 0.0)
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     args.check()?;
     let config = args.bench.load(Purpose::Model, &args.settings())?;
-    let log = args.log.as_ref().map(Log::create).transpose()?;
+    let log = args.log.as_deref().map(LogFile::create).transpose()?;
+    let signals = watch_signals();
     let (runtime, signals) =
-        signals().map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
-    let rehearsal = Emulator::start(&config, &args.cast())?;
+        signals.map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
+    let emulator = Emulator::start(&config, &args.emulated_devices())?;
     let schedule = FaultSchedule::new(&args.faults);
-    schedule
-        .steps()
-        .try_for_each(|(word, fault)| rehearsal.check(word, *fault))?;
-    let mut session = Session {
-        rehearsal,
+    for step in schedule.steps() {
+        emulator.check(step)?;
+    }
+    let mut server = Server {
+        emulator,
         schedule,
         log,
-        typed: listen(),
+        input: read_lines(),
         args,
         is_over: false,
     };
-    runtime.block_on(session.serve(signals))?;
+    runtime.block_on(server.serve(signals))?;
     if args.bench.json {
-        print_json(&session.rehearsal.summary())?;
+        print_json(&server.emulator.summary())?;
     }
     Ok(Outcome::Done)
 }
 
-struct Session<'a> {
-    rehearsal: Emulator,
+struct Server<'a> {
+    emulator: Emulator,
     schedule: FaultSchedule,
-    log: Option<Log>,
-    typed: Receiver<String>,
+    log: Option<LogFile>,
+    input: Receiver<String>,
     args: &'a Args,
     is_over: bool,
 }
 
-impl Session<'_> {
-    /// Serves until a signal, `quit`, or the end of the time.
+impl Server<'_> {
+    /// Serves until a signal, `quit`, or the end of the duration.
     async fn serve(&mut self, [mut interrupt, mut terminate]: [Signal; 2]) -> Result<(), CliError> {
-        let mut beat = tokio::time::interval(BEAT);
+        let mut period = tokio::time::interval(PERIOD);
         while !self.is_over {
             tokio::select! {
-                _ = beat.tick() => self.look()?,
+                _ = period.tick() => self.step()?,
                 _ = interrupt.recv() => self.is_over = true,
                 _ = terminate.recv() => self.is_over = true,
             }
         }
-        self.tell()
+        self.report()
     }
 
-    fn look(&mut self) -> Result<(), CliError> {
-        let time_s = self.rehearsal.time_s();
-        let origin_s = if self.args.counts_from_start() {
-            Some(0.0)
-        } else {
-            self.rehearsal.enabled_s()
+    fn step(&mut self) -> Result<(), CliError> {
+        let time_s = self.emulator.time_s();
+        let origin_s = match self.args.origin() {
+            Origin::Start => Some(0.0),
+            Origin::Enable => self.emulator.enabled_s(),
         };
-        for (word, fault) in
-            origin_s.map_or(Vec::new(), |origin_s| self.schedule.due(time_s - origin_s))
-        {
-            self.rehearsal.ask(&word, fault)?;
+        if let Some(origin_s) = origin_s {
+            for step in self.schedule.take_due(time_s - origin_s) {
+                self.emulator.inject(&step)?;
+            }
         }
-        while let Ok(line) = self.typed.try_recv() {
-            self.obey(line.trim());
+        while let Ok(line) = self.input.try_recv() {
+            self.execute(line.trim());
         }
-        self.is_over |= self
+        if self
             .args
             .duration
-            .is_some_and(|duration_s| time_s >= duration_s);
-        self.tell()
+            .is_some_and(|duration_s| time_s >= duration_s)
+        {
+            self.is_over = true;
+        }
+        self.report()
     }
 
-    /// An order of the person at the keyboard; what is wrong with it is said, and all goes on.
-    fn obey(&mut self, line: &str) {
-        match line.split_whitespace().collect::<Vec<_>>()[..] {
+    /// Executes a command of the operator. An error is reported, and the emulator continues.
+    fn execute(&mut self, line: &str) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
             [] => {}
             ["quit"] => self.is_over = true,
             ["help"] => eprint!("fault KIND, quit, help; the kinds are\n{}", fault::help()),
-            ["fault", word] => {
-                let word = fault::whole(word, &self.args.devices);
-                let fault = EmulatedFault::parse(&word).map_err(|e| e.to_string());
-                let asked = fault
-                    .and_then(|fault| self.rehearsal.ask(&word, fault).map_err(|e| e.to_string()));
-                asked.unwrap_or_else(|why| eprintln!("bench device: {why}"));
+            ["fault", fault] => {
+                if let Err(why) = self.inject(fault) {
+                    eprintln!("bench emulate: {why}");
+                }
             }
-            _ => eprintln!("bench device: `{line}` is no order; there are fault KIND, quit, help"),
+            _ => eprintln!(
+                "bench emulate: `{line}` is not a command; the commands are fault KIND, quit, help"
+            ),
         }
     }
 
-    /// Tells what has changed, to people and to the log.
-    fn tell(&mut self) -> Result<(), CliError> {
-        for entry in self.rehearsal.news() {
+    fn inject(&mut self, fault: &str) -> Result<(), String> {
+        let request = FaultRequest::parse_for(fault, &self.args.devices);
+        let request = request.map_err(|error| error.to_string())?;
+        let injected = self.emulator.inject(&request);
+        injected.map_err(|error| error.to_string())
+    }
+
+    /// Prints new log entries, and writes them to the file.
+    fn report(&mut self) -> Result<(), CliError> {
+        for entry in self.emulator.new_entries() {
             eprintln!("{entry}");
-            self.log.as_mut().map_or(Ok(()), |log| log.write(&entry))?;
+            if let Some(log) = &mut self.log {
+                log.write(&entry)?;
+            }
         }
         Ok(())
     }
 }
 
-/// From here on Ctrl-C and SIGTERM end a rehearsal in order: before anything is served that must be taken away again.
-fn signals() -> std::io::Result<(Runtime, [Signal; 2])> {
+/// Receives Ctrl-C and SIGTERM from now on, so that everything that is served is removed in order.
+fn watch_signals() -> std::io::Result<(Runtime, [Signal; 2])> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
-    let watched = {
-        let _inside = runtime.enter();
+    let signals = {
+        let _context = runtime.enter();
         [
             signal(SignalKind::interrupt())?,
             signal(SignalKind::terminate())?,
         ]
     };
-    Ok((runtime, watched))
+    Ok((runtime, signals))
 }
 
-/// Lines of standard input, read by a thread that ends with the program; its end is no order.
-fn listen() -> Receiver<String> {
+/// Lines of standard input, read by a thread that ends with the program. The end of the input is not a command.
+fn read_lines() -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
-        let lines = std::io::stdin().lock().lines().map_while(Result::ok);
-        lines.into_iter().all(|line| sender.send(line).is_ok())
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
     });
     receiver
 }
 
-/// A file with a JSON object a line, each of which is there when it is written.
-struct Log {
+/// A file with one JSON object per line, each written at once.
+struct LogFile {
     file: File,
     path: PathBuf,
 }
 
-impl Log {
-    fn create(path: &PathBuf) -> Result<Log, CliError> {
-        let failed = |e| {
-            CliError::Usage(format!(
-                "cannot write {}: {e}; choose another --log",
-                path.display()
-            ))
-        };
-        Ok(Log {
-            file: File::create(path).map_err(failed)?,
-            path: path.clone(),
-        })
+impl LogFile {
+    fn create(path: &Path) -> Result<LogFile, CliError> {
+        let file = File::create(path).map_err(|e| {
+            let path = path.display();
+            CliError::Usage(format!("cannot write {path}: {e}; choose another --log"))
+        })?;
+        let path = path.to_owned();
+        Ok(LogFile { file, path })
     }
 
     fn write(&mut self, entry: &LogEntry) -> Result<(), CliError> {
-        let written = serde_json::to_string(entry).map_err(std::io::Error::other);
-        let written = written.and_then(|line| self.file.write_all((line + "\n").as_bytes()));
-        written.map_err(|e| {
-            CliError::Failed(format!(
-                "cannot write {}: {e}; free some space",
-                self.path.display()
-            ))
+        self.append(entry).map_err(|e| {
+            let path = self.path.display();
+            CliError::Failed(format!("cannot write {path}: {e}; free some space"))
         })
+    }
+
+    fn append(&mut self, entry: &LogEntry) -> std::io::Result<()> {
+        let line = serde_json::to_string(entry)? + "\n";
+        self.file.write_all(line.as_bytes())
     }
 }
 

@@ -1,20 +1,18 @@
-//! The CANopen driver against the acting drive and its stage, on a bus in memory, in virtual time: always alike.
+//! The CANopen driver with the emulated drive and its stage, on a bus in memory and in virtual time: every run is identical.
 use std::sync::Arc;
 use std::time::Duration;
 
-use bench::config::{AmplifierDevice, Config, Source, load};
+use bench::config::{Config, Source, load};
 use bench::experiment::Plan;
-use bench::rig::devices::amplifier::{drive_settings, vesc_settings};
-use bench::rig::emulator::{Amplifier, EmulatedFault, EventLog, Stage};
+use bench::rig::devices::Requirements;
+use bench::rig::emulator::{AmplifierServer, EmulatedFault, EventLog, FaultRequest, Stage};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
 use bench::rt::record::{EventKind, LoopMessage};
 use bench::rt::servo::Request;
 use bench_hal::can::bus::{Host, SimulatedHost};
-use bench_hal::can::drive::CanopenDrive;
 use bench_hal::can::drive::faults::*;
-use bench_hal::can::vesc::Vesc;
-use bench_hal::{Devices, DisplacementProbe, Reading, Tick, Validity};
+use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Reading, Tick, Validity};
 
 use crate::rig::Bench;
 
@@ -180,24 +178,18 @@ impl DisplacementProbe for Look {
 /// The loop with the driver on one end of a bus, drive and stage on the other.
 struct Lab {
     bench: Bench,
-    drive: Amplifier,
+    drive: AmplifierServer,
     stage: Stage,
     world: SimulatedHost,
     config: Config,
 }
 
 /// The driver, opened on the bus.
-fn driver(config: &Config, world: &SimulatedHost) -> bench::rig::devices::Amplifier {
-    let host = Box::new(world.clone());
-    match &config.amplifier.device {
-        AmplifierDevice::Canopen(device) => {
-            Box::new(CanopenDrive::open(drive_settings(device, config), host).expect("it opens"))
-        }
-        AmplifierDevice::Vesc(device) => {
-            Box::new(Vesc::open(vesc_settings(device, config), host).expect("it opens"))
-        }
-        AmplifierDevice::Simulated(_) => unreachable!("the settings name a device"),
-    }
+fn driver(config: &Config, world: &SimulatedHost) -> Box<dyn CurrentAmplifier> {
+    let device = config.amplifier.device.can().expect("a real device");
+    let requirements = Requirements::new(&config.amplifier, &config.servo);
+    let opened = device.open(requirements, Box::new(world.clone()));
+    opened.expect("it opens").0
 }
 
 /// The driver in a loop that is disarmed.
@@ -220,9 +212,14 @@ impl Lab {
     fn of(config: Config) -> Lab {
         let world = SimulatedHost::default();
         let stage = Stage::new(&config).expect("a stage");
-        let (journal, _) = EventLog::new();
-        let drive = Amplifier::start(&config, Arc::new(world.clone()), stage.clone(), journal)
-            .expect("a drive");
+        let (log, _) = EventLog::new();
+        let drive = AmplifierServer::start(
+            &config.amplifier.device,
+            Arc::new(world.clone()),
+            stage.clone(),
+            log,
+        )
+        .expect("a drive");
         let bench = open(&config, &world, &stage);
         Lab {
             bench,
@@ -278,10 +275,11 @@ impl Lab {
     }
 
     fn ask(&self, word: &str) {
-        let Ok(EmulatedFault::Amplifier(fault)) = EmulatedFault::parse(word) else {
-            panic!("{word} is a fault")
+        let request: FaultRequest = word.parse().expect("a fault");
+        let EmulatedFault::Amplifier(fault) = request.fault else {
+            panic!("{word} is not a fault of the amplifier")
         };
-        self.drive.ask(fault).expect("a bus in memory takes it");
+        self.drive.inject(fault).expect("a bus in memory takes it");
     }
 
     fn trip(&self) -> Option<(Trip, u64)> {

@@ -1,5 +1,5 @@
-//! `bench device` as a program: what it serves, what it says, what it refuses. (What needs a CAN interface is tested in a
-//! machine that has one.)
+//! `bench emulate` as a program: what it serves, reports and refuses. (The amplifier needs a CAN interface; it is tested in the
+//! emulated machine of `.ci/vm`.)
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -36,7 +36,7 @@ fn refusal(arguments: &[&str]) -> String {
     said
 }
 
-/// `bench device probe` with a link, a log, and orders on its standard input; killed if a test ends early.
+/// `bench emulate probe` with a link, a log, and commands on its standard input; killed if a test ends early.
 struct Device {
     child: Option<Child>,
     folder: tempfile::TempDir,
@@ -45,7 +45,7 @@ struct Device {
 impl Device {
     fn start(more: &[&str]) -> Device {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut command = bench(&["device", "probe", "--config", "lab", "--json"]);
+        let mut command = bench(&["emulate", "probe", "--config", "lab", "--json"]);
         command.args(more).stdin(Stdio::piped());
         command
             .arg("--pty")
@@ -113,8 +113,7 @@ impl Device {
 
     /// A reader of the served probe, as `bench control` would open it.
     fn reader(&self) -> SerialProbe {
-        bench::rig::devices::probe::open(&config(&self.link(), self.folder.path()))
-            .expect("the probe is served")
+        open(&config(&self.link(), self.folder.path()))
     }
 }
 
@@ -156,13 +155,18 @@ fn until(probe: &mut SerialProbe, what: &str, pleases: impl Fn(&Reading) -> bool
     }
 }
 
+fn open(config: &Config) -> SerialProbe {
+    bench::rig::devices::probe::open(&config.probe, config.servo.priority)
+        .expect("the probe is served")
+}
+
 fn is_at_rest(reading: &Reading) -> bool {
     // The floor moves the stage by a tenth of a micrometre, the sensor by as much.
     reading.validity == Validity::Valid && reading.position_m.abs() < 3e-6
 }
 
 #[test]
-fn one_reader_after_the_other_reads_the_stage_where_it_is() {
+fn successive_readers_read_the_position_of_the_stage() {
     let device = Device::start(&[]);
     for _ in 0..3 {
         until(&mut device.reader(), "at rest", is_at_rest);
@@ -170,7 +174,7 @@ fn one_reader_after_the_other_reads_the_stage_where_it_is() {
 }
 
 #[test]
-fn every_protocol_is_served_and_read_in_the_stages_metres() {
+fn every_protocol_is_served_and_read_in_metres_of_the_stage() {
     let optoncdt = "{ kind = \"optoncdt\", sensor_range_m = 0.002, mounting = { gain = -1.0, offset_m = 0.001 }, line = { port = \"\", baud = 921600 } }";
     let ascii = "{ kind = \"ascii\", mounting = { gain = 1.0, offset_m = 0.0 }, pattern = \"{value:8.5}\", unit_m = 1e-3, lower_m = -1e-3, upper_m = 1e-3, line = { port = \"\", baud = 230400 } }";
     for probe in [optoncdt, ascii] {
@@ -187,14 +191,13 @@ fn every_protocol_is_served_and_read_in_the_stages_metres() {
             sets: sets.to_vec(),
             ..Source::default()
         });
-        let mut reader =
-            bench::rig::devices::probe::open(&config.expect("valid")).expect("the probe is served");
+        let mut reader = open(&config.expect("valid"));
         until(&mut reader, "at rest", is_at_rest);
     }
 }
 
 #[test]
-fn faults_come_by_the_plan_and_by_hand_and_every_one_is_in_the_log() {
+fn planned_and_typed_faults_take_effect_and_are_logged() {
     let mut device = Device::start(&["--fault", "probe.out-of-range@0..0.2"]);
     let mut reader = device.reader();
     until(&mut reader, "at rest", is_at_rest);
@@ -247,7 +250,7 @@ fn faults_come_by_the_plan_and_by_hand_and_every_one_is_in_the_log() {
 }
 
 #[test]
-fn it_ends_in_order_by_signal_and_by_time_and_takes_its_link_away() {
+fn a_signal_or_the_duration_ends_it_and_removes_the_link() {
     for signal in [Some(libc::SIGTERM), Some(libc::SIGINT), None] {
         let mut device = Device::start(if signal.is_some() {
             &[]
@@ -262,8 +265,8 @@ fn it_ends_in_order_by_signal_and_by_time_and_takes_its_link_away() {
 }
 
 #[test]
-fn its_path_is_printed_where_no_link_is_wanted() {
-    let mut child = bench(&["device", "probe", "--config", "lab", "--duration", "60"])
+fn prints_the_path_of_the_terminal_without_a_link() {
+    let mut child = bench(&["emulate", "probe", "--config", "lab", "--duration", "60"])
         .spawn()
         .expect("it starts");
     let line = BufReader::new(child.stderr.take().expect("piped"))
@@ -277,9 +280,9 @@ fn its_path_is_printed_where_no_link_is_wanted() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_before_anything_is_served() {
+fn rejects_invalid_options_before_serving() {
     let missing = refusal(&[
-        "device",
+        "emulate",
         "amplifier",
         "--config",
         "lab",
@@ -290,12 +293,12 @@ fn what_cannot_be_is_refused_before_anything_is_served() {
         missing.contains("no-such-can") && missing.contains("vcan0"),
         "{missing}"
     );
-    assert!(refusal(&["device", "probe"]).contains("--config lab"));
-    assert!(refusal(&["device"]).contains("amplifier|probe"));
-    assert!(refusal(&["device", "stage", "--config", "lab"]).contains("amplifier"));
+    assert!(refusal(&["emulate", "probe"]).contains("--config lab"));
+    assert!(refusal(&["emulate"]).contains("amplifier|probe"));
+    assert!(refusal(&["emulate", "stage", "--config", "lab"]).contains("amplifier"));
     assert!(
         refusal(&[
-            "device",
+            "emulate",
             "probe",
             "--config",
             "lab",
@@ -305,12 +308,19 @@ fn what_cannot_be_is_refused_before_anything_is_served() {
         .contains("no such port")
     );
     assert!(
-        refusal(&["device", "probe", "--config", "lab", "--interface", "vcan0"])
-            .contains("amplifier")
+        refusal(&[
+            "emulate",
+            "probe",
+            "--config",
+            "lab",
+            "--interface",
+            "vcan0"
+        ])
+        .contains("amplifier")
     );
     assert!(
         refusal(&[
-            "device",
+            "emulate",
             "probe",
             "--config",
             "lab",
@@ -321,7 +331,7 @@ fn what_cannot_be_is_refused_before_anything_is_served() {
     );
     assert!(
         refusal(&[
-            "device",
+            "emulate",
             "probe",
             "--config",
             "lab",
@@ -331,12 +341,19 @@ fn what_cannot_be_is_refused_before_anything_is_served() {
         .contains("KIND@FROM..TO")
     );
     assert!(
-        refusal(&["device", "probe", "--config", "lab", "--fault", "probe.x@1"])
-            .contains("there is no fault")
+        refusal(&[
+            "emulate",
+            "probe",
+            "--config",
+            "lab",
+            "--fault",
+            "probe.x@1"
+        ])
+        .contains("there is no fault")
     );
     assert!(
         refusal(&[
-            "device",
+            "emulate",
             "probe",
             "--config",
             "lab",
@@ -349,10 +366,12 @@ fn what_cannot_be_is_refused_before_anything_is_served() {
     let taken = folder.path().join("taken");
     std::fs::write(&taken, "").expect("a file");
     let taken = taken.to_str().expect("text");
-    assert!(refusal(&["device", "probe", "--config", "lab", "--pty", taken]).contains("it exists"));
+    assert!(
+        refusal(&["emulate", "probe", "--config", "lab", "--pty", taken]).contains("it exists")
+    );
     assert!(
         refusal(&[
-            "device",
+            "emulate",
             "probe",
             "--config",
             "lab",

@@ -1,6 +1,6 @@
-//! The serial driver against the acting probe and its stage over a pseudo terminal, in real time, at about 200 Hz: while
-//! readings come the loop ticks with them, so that a machine that does other things as well makes the test slow and not
-//! fail; what is tested here is what trips, not when.
+//! The serial driver with the emulated probe and its stage over a pseudo terminal, in real time, at about 200 Hz. While
+//! readings arrive, each one starts a tick, so that a loaded machine slows the test down and does not fail it. The tests check
+//! which interlock trips, not when.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -8,8 +8,7 @@ use std::time::{Duration, Instant};
 use bench::config::{Config, Source, load};
 use bench::experiment::Plan;
 use bench::rig::devices;
-use bench::rig::emulator::probe::{Probe, ProbeEndpoint};
-use bench::rig::emulator::{EmulatedFault, Stage};
+use bench::rig::emulator::{EmulatedFault, FaultRequest, ProbeEndpoint, ProbeServer, Stage};
 use bench::rt::arming::State;
 use bench::rt::program::Program;
 use bench::rt::record::EventKind;
@@ -128,7 +127,7 @@ enum Pace {
 struct Table {
     bench: Bench,
     watch: StatisticsHandle,
-    probe: Option<Probe>,
+    probe: Option<ProbeServer>,
     stage: Stage,
     start: Instant,
     pace: Pace,
@@ -154,8 +153,8 @@ impl Table {
     ) -> Table {
         let end = ProbeEndpoint::Terminal(Some(folder.path().join("probe")));
         let now_ns = move || start.elapsed().as_nanos() as u64;
-        let acting =
-            Probe::start(&config, &end, None, stage.clone(), now_ns).expect("a pseudo terminal");
+        let acting = ProbeServer::start(&config, &end, None, stage.clone(), now_ns)
+            .expect("a pseudo terminal");
         let given_a = Arc::<AtomicU64>::default();
         let amplifier = Straight {
             stage: stage.clone(),
@@ -163,7 +162,8 @@ impl Table {
             given_a: Arc::clone(&given_a),
             is_on: false,
         };
-        let probe = devices::probe::open(&config).expect("the acting probe is there");
+        let probe =
+            devices::probe::open(&config.probe, config.servo.priority).expect("the emulated probe");
         let watch = probe.statistics_handle();
         let bench = Bench::around(&config, Devices { amplifier, probe });
         let (probe, pace, published, _folder) = (Some(acting), Pace::Readings, 0, folder);
@@ -210,10 +210,12 @@ impl Table {
     }
 
     fn ask(&self, word: &str) {
-        let Ok(EmulatedFault::Probe(fault)) = EmulatedFault::parse(word) else {
-            panic!("{word} is a fault")
+        let request: FaultRequest = word.parse().expect("a fault");
+        let EmulatedFault::Probe(fault) = request.fault else {
+            panic!("{word} is not a fault of the probe")
         };
-        self.probe.as_ref().expect("the probe is there").ask(fault);
+        let probe = self.probe.as_ref().expect("the probe is connected");
+        probe.inject(fault);
     }
 
     /// The fault begins; whether readings go on coming decides who sets the pace.

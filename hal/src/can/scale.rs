@@ -5,8 +5,12 @@
 //! itself per mille of rated. One count of a 4 A drive is 4 mA: what is asked for and what flows differ, and the second
 //! is what a recording must hold.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// What 1000 counts of the target are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Reference {
     /// The rated current, 0x6075.
     #[default]

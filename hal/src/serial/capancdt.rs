@@ -23,6 +23,9 @@
 
 use std::collections::VecDeque;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::decoder::{DamageCounter, Decoder, Event, Sample, Window};
 use super::emulator::Responder;
 use super::error::{SerialError, positive};
@@ -46,7 +49,8 @@ const ANSWER_MAX: usize = FRAMING + LE_EMPTY as usize + 4 * BATCH_MAX;
 
 /// Which value of a batch the counter refers to. The single example in the manuals leaves it open. A wrong choice
 /// miscounts gaps by the change of the batch size; it never makes an old value appear as new.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum CounterMeaning {
     /// The counter is the number of the newest value.
     #[default]
@@ -62,18 +66,34 @@ pub enum CounterMeaning {
 /// assert_eq!(settings.request(), [0x10, 0x7E, 0x01, 0x4C, 0xCB, 0x16]);
 /// assert_eq!(settings.metres(0x780000), 100e-6); // half of full scale
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Settings {
     /// Measuring range in metres; it corresponds to [`FULL_SCALE`] counts.
+    #[serde(rename = "sensor_range_m")]
+    #[schemars(range(min = 1e-9, max = 1.0))]
     pub range_m: f64,
     /// Address of the probe.
+    #[serde(rename = "address", default = "probe_address")]
+    #[schemars(range(min = 0, max = 255))]
     pub probe_address: u8,
     /// Address of this computer.
+    #[serde(rename = "own_address", default = "master_address")]
+    #[schemars(range(min = 0, max = 255))]
     pub master_address: u8,
     /// Which value the counter refers to.
+    #[serde(default)]
     pub counter: CounterMeaning,
     /// Timing of the requests.
+    #[serde(default)]
     pub polling: Polling,
+}
+
+fn probe_address() -> u8 {
+    0x7E
+}
+
+fn master_address() -> u8 {
+    0x01
 }
 
 impl Settings {
@@ -81,8 +101,8 @@ impl Settings {
     pub fn new(range_m: f64) -> Self {
         Self {
             range_m,
-            probe_address: 0x7E,
-            master_address: 0x01,
+            probe_address: probe_address(),
+            master_address: master_address(),
             counter: CounterMeaning::default(),
             polling: Polling::default(),
         }

@@ -1,14 +1,20 @@
 //! How a probe is mounted.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::error::SerialError;
 
 /// How a probe is mounted: position = gain * (position of the probe) + offset.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Mounting {
     /// Metres of the stage per metre of the probe; negative if the probe measures against the direction of positive
     /// force.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub gain: f64,
     /// Position of the stage at the zero of the probe, in metres.
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub offset_m: f64,
 }
 

@@ -25,6 +25,9 @@
 //!
 //! Jumps that the stage cannot make are left to the interlocks.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::decoder::{DamageCounter, Decoder, Event, Sample};
 use super::emulator::Responder;
 use super::error::{SerialError, positive};
@@ -38,12 +41,20 @@ pub const RANGE_END: u32 = 64877;
 const VALUE_MAX: u32 = 0xFFFF;
 
 /// The values that the probe sends at each measurement.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Cycle {
     /// Number of values per cycle, 1 to 32.
+    #[serde(rename = "values_per_cycle", default = "one_value")]
+    #[schemars(range(min = 1, max = 32))]
     pub values: u8,
     /// Index of the displacement among them, from 0.
+    #[serde(rename = "displacement_value", default)]
+    #[schemars(range(min = 0, max = 31))]
     pub displacement: u8,
+}
+
+fn one_value() -> u8 {
+    1
 }
 
 /// Settings of the protocol.
@@ -53,11 +64,14 @@ pub struct Cycle {
 /// assert!((settings.metres(32760) - 5e-3).abs() < 1e-15); // the middle of the range
 /// assert_eq!(settings.counts(5e-3), 32760);
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Settings {
     /// Measuring range in metres.
+    #[serde(rename = "sensor_range_m")]
+    #[schemars(range(min = 1e-9, max = 1.0))]
     pub range_m: f64,
     /// The values per cycle.
+    #[serde(flatten)]
     pub cycle: Cycle,
 }
 

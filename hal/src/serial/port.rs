@@ -7,12 +7,16 @@ use std::time::Duration;
 
 use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::error::SerialError;
 use super::ioctl;
 use super::lock::PortLock;
 
 /// Parity of a character.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Parity {
     /// 8N1: ten bits a character.
     #[default]
@@ -39,18 +43,32 @@ impl Parity {
 }
 
 /// A port and its line settings. Eight data bits, one stop bit, no flow control.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct PortSettings {
     /// The device. A link in /dev/serial/by-id keeps its name when the adapters are connected in another order.
+    #[serde(rename = "port")]
     pub path: PathBuf,
     /// Baud rate in bit/s; any number that the port supports.
+    #[schemars(range(min = 300, max = 12000000))]
     pub baud: u32,
     /// Parity.
+    #[serde(default)]
     pub parity: Parity,
     /// Request low latency from the driver. Without it USB adapters collect bytes for up to 16 ms.
+    #[serde(default = "low_latency")]
     pub low_latency: bool,
     /// Folder of the lock files.
+    #[serde(rename = "lock_folder", default = "lock_dir")]
     pub lock_dir: PathBuf,
+}
+
+fn low_latency() -> bool {
+    true
+}
+
+fn lock_dir() -> PathBuf {
+    "/run/lock".into()
 }
 
 impl PortSettings {
@@ -60,8 +78,8 @@ impl PortSettings {
             path: path.into(),
             baud,
             parity: Parity::None,
-            low_latency: true,
-            lock_dir: "/run/lock".into(),
+            low_latency: low_latency(),
+            lock_dir: lock_dir(),
         }
     }
 

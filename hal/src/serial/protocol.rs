@@ -3,6 +3,9 @@
 use std::fmt::Debug;
 use std::time::Duration;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::decoder::Decoder;
 use super::emulator::Responder;
 use super::error::SerialError;
@@ -92,16 +95,40 @@ pub trait Protocol: Debug + Send + Sync {
 }
 
 /// Timing of a polled probe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct Polling {
     /// Time from one request to the next; 0 sends the next request as soon as the answer is complete.
+    #[serde(rename = "interval_s", with = "seconds")]
+    #[schemars(with = "f64", range(min = 0.0, max = 60.0))]
     pub interval: Duration,
     /// Time without an answer after which the request is repeated. After opening, and after the first answer that
     /// follows a timeout, the line must be silent for at least twice this time before answers are used.
+    #[serde(rename = "timeout_s", with = "seconds")]
+    #[schemars(with = "f64", range(min = 0.001, max = 60.0))]
     pub timeout: Duration,
     /// Silence after which a damaged answer is considered complete. It must be longer than the response time of the
     /// probe and than the longest gap that the adapter inserts into an answer (16 ms over USB without low latency).
+    #[serde(rename = "quiet_s", with = "seconds")]
+    #[schemars(with = "f64", range(min = 0.0001, max = 60.0))]
     pub quiet: Duration,
+}
+
+/// A duration as a number of seconds.
+mod seconds {
+    use std::time::Duration;
+
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(time: &Duration, to: S) -> Result<S::Ok, S::Error> {
+        time.as_secs_f64().serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Duration, D::Error> {
+        let seconds = f64::deserialize(from)?;
+        Duration::try_from_secs_f64(seconds).map_err(Error::custom)
+    }
 }
 
 impl Default for Polling {

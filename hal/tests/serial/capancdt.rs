@@ -64,7 +64,7 @@ fn rejects_an_answer_with_one_wrong_byte() {
             bytes[at] ^= flip;
             assert_eq!(
                 valid(&events(&mut decoder(), &bytes)),
-                [],
+                [0i64; 0],
                 "byte {at} ^ {flip:#x}"
             );
         }
@@ -75,7 +75,7 @@ fn rejects_an_answer_with_one_wrong_byte() {
 fn rejects_an_answer_whose_count_does_not_match_its_length() {
     let mut bytes = EXAMPLE;
     (bytes[9], bytes[23]) = (2, 0x24); // m one less, and the sum with it
-    assert_eq!(valid(&events(&mut decoder(), &bytes)), []);
+    assert_eq!(valid(&events(&mut decoder(), &bytes)), [0i64; 0]);
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn rejects_the_answer_of_another_address() {
         probe_address: 0x7D,
         ..settings()
     };
-    assert_eq!(valid(&raws(&[other.answer(1, &[5])])), []);
+    assert_eq!(valid(&raws(&[other.answer(1, &[5])])), [0i64; 0]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The file of a calibration, and whether it may be used.
+//! The file of a calibration, and the check whether it may be used.
 
 use std::path::Path;
 use std::time::{Duration, SystemTime};
@@ -8,49 +8,49 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{self, CalibrationSettings, ConfigError, OnInvalidCalibration};
 
-/// What `bench calibrate` found, with date and devices.
+/// The result of `bench calibrate`, with the date and the devices.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "bench calibration")]
 pub struct Calibration {
     /// When it was made (RFC 3339).
     pub made: String,
-    /// The recording that it was made from.
+    /// The recording of the staircase.
     pub recording: String,
     /// The amplifier.
     pub amplifier: AmplifierCalibration,
     /// The probe.
     pub probe: ProbeCalibration,
-    /// Both together, with motor and springs.
+    /// The whole chain, with motor and springs.
     pub chain: ChainCalibration,
 }
 
-/// The amplifier: it gives gain (command) + offset.
+/// The amplifier: current = gain * command + offset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AmplifierCalibration {
-    /// Which device, as it says itself.
+    /// Identity, as the device reports it.
     pub device: String,
-    /// Amperes that flow per ampere commanded, by the amplifier's own measurement; 1 where it makes none.
+    /// Measured current per commanded current; 1 if the amplifier does not measure its current.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub current_gain: f64,
-    /// Amperes that flow at the command zero, by the amplifier's own measurement; 0 where it makes none.
+    /// Measured current in amperes at command zero; 0 if the amplifier does not measure its current.
     #[schemars(range(min = -100.0, max = 100.0))]
     pub current_offset_a: f64,
     /// Whether the amplifier measures its current.
     pub measures_current: bool,
 }
 
-/// The probe: position = gain (reading) + offset.
+/// The probe: position = gain * reading + offset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeCalibration {
-    /// Which device, as far as it can be told.
+    /// Identity, as far as it is known.
     pub device: String,
-    /// Metres per metre of reading, with the sign that makes positive current move the stage positively.
+    /// Metres per metre of reading; its sign makes the displacement by a positive current positive.
     #[schemars(range(min = -1000.0, max = 1000.0))]
     pub gain: f64,
-    /// Metres to add: the stage rests at zero where no current flows.
+    /// Offset in metres, for zero displacement without current.
     #[schemars(range(min = -1.0, max = 1.0))]
     pub offset_m: f64,
     /// RMS of the reading at rest in metres.
@@ -58,7 +58,7 @@ pub struct ProbeCalibration {
     pub noise_rms_m: f64,
 }
 
-/// Amplifier, motor, springs and probe together, before the correction.
+/// Amplifier, motor, springs and probe, before the correction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChainCalibration {
@@ -66,13 +66,13 @@ pub struct ChainCalibration {
     pub compliance_m_per_a: f64,
     /// Its standard deviation.
     pub compliance_sigma_m_per_a: f64,
-    /// The same by the model.
+    /// The compliance of the model.
     pub model_m_per_a: f64,
-    /// Largest distance of a level from the straight line, as a ratio of the whole travel.
+    /// Largest deviation from the straight line, as a ratio of the travel.
     pub nonlinearity_ratio: f64,
-    /// Largest distance between the way up and the way down, as a ratio of the whole travel.
+    /// Largest difference between the way up and the way down, as a ratio of the travel.
     pub hysteresis_ratio: f64,
-    /// From a command to the position that its reading shows, in seconds, by the phases of a chirp.
+    /// Delay from a command to its reading in seconds, from the phase of a chirp.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
     /// Its standard deviation in seconds.
@@ -80,40 +80,40 @@ pub struct ChainCalibration {
     pub delay_sigma_s: Option<f64>,
 }
 
-/// A calibration that may not be used.
+/// A calibration that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
     /// The file is not a calibration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Its date is none.
+    /// The date cannot be read.
     #[error(
-        "calibration {file}: made = {made:?} is not a date; make it anew with `bench calibrate`"
+        "calibration {file}: made = {made:?} is not a date (RFC 3339); repeat `bench calibrate`"
     )]
     Date {
         /// The file.
         file: String,
-        /// What stands there.
+        /// The text in place of the date.
         made: String,
     },
-    /// It cannot be written down.
+    /// The calibration cannot be written.
     #[error("the calibration cannot be written as TOML: {0}")]
     Text(String),
     /// Too old, or of other devices.
     #[error(
-        "calibration {file}: {why}; make it anew with `bench calibrate`, or {setting} = \"warn\"; nothing moved"
+        "calibration {file}: {why}; repeat `bench calibrate`, or set {setting} = \"warn\"; nothing moved"
     )]
     Unfit {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The reason.
         why: String,
         /// The setting that decides.
         setting: &'static str,
     },
 }
 
-/// The calibration of a run, and warnings about it; nothing where none is configured.
+/// The calibration of a run, with warnings; `None` if none is configured.
 pub fn load_calibration(
     settings: &CalibrationSettings,
     amplifier: &str,
@@ -125,33 +125,26 @@ pub fn load_calibration(
     };
     let text = config::text_of_file(file, "calibration")?;
     let calibration: Calibration = config::typed(file, &text)?;
-    let complaints = [
+    let defects = [
         (
             expired(file, &calibration, settings.valid_days, now)?,
             settings.when_expired,
             "calibration.when_expired",
         ),
         (
-            foreign(&calibration, amplifier, probe),
+            other_device(&calibration, amplifier, probe),
             settings.when_foreign,
             "calibration.when_foreign",
         ),
     ];
     let mut warnings = Vec::new();
-    for (complaint, then, setting) in complaints {
-        match (complaint, then) {
-            (None, _) => {}
-            (Some(why), OnInvalidCalibration::Warn) => {
-                warnings.push(format!("calibration {file}: {why}"))
-            }
-            (Some(why), OnInvalidCalibration::Refuse) => {
-                return Err(CalibrationError::Unfit {
-                    file: file.clone(),
-                    why,
-                    setting,
-                });
-            }
+    for (defect, reaction, setting) in defects {
+        let Some(why) = defect else { continue };
+        if reaction == OnInvalidCalibration::Refuse {
+            let file = file.clone();
+            return Err(CalibrationError::Unfit { file, why, setting });
         }
+        warnings.push(format!("calibration {file}: {why}"));
     }
     Ok(Some((calibration, warnings)))
 }
@@ -162,26 +155,29 @@ fn expired(
     valid_days: f64,
     now: SystemTime,
 ) -> Result<Option<String>, CalibrationError> {
-    let wrong = || CalibrationError::Date {
+    let made = humantime::parse_rfc3339(&calibration.made).map_err(|_| CalibrationError::Date {
         file: file.to_string(),
         made: calibration.made.clone(),
-    };
-    let made = humantime::parse_rfc3339(&calibration.made).map_err(|_| wrong())?;
+    })?;
     let age = now.duration_since(made).unwrap_or(Duration::ZERO);
     let days = age.as_secs_f64() / 86_400.0;
-    Ok((days > valid_days)
-        .then(|| format!("it was made {days:.0} days ago, calibration.valid_days is {valid_days}")))
+    if days <= valid_days {
+        return Ok(None);
+    }
+    let limit = format!("calibration.valid_days is {valid_days}");
+    Ok(Some(format!("it was made {days:.0} days ago, {limit}")))
 }
 
-fn foreign(calibration: &Calibration, amplifier: &str, probe: &str) -> Option<String> {
+fn other_device(calibration: &Calibration, amplifier: &str, probe: &str) -> Option<String> {
     let pairs = [
         ("amplifier", &calibration.amplifier.device, amplifier),
         ("probe", &calibration.probe.device, probe),
     ];
-    let other = pairs.into_iter().find(|(_, theirs, ours)| theirs != ours);
-    other.map(|(what, theirs, ours)| {
-        format!("it is of another {what}: {theirs:?}, this one is {ours:?}")
-    })
+    let mut pairs = pairs.into_iter();
+    let (kind, calibrated, connected) = pairs.find(|(_, theirs, ours)| theirs != ours)?;
+    Some(format!(
+        "it belongs to another {kind}: {calibrated:?}, the connected one is {connected:?}"
+    ))
 }
 
 impl Calibration {
@@ -190,11 +186,11 @@ impl Calibration {
         toml::to_string(self).map_err(|e| CalibrationError::Text(e.to_string()))
     }
 
-    /// Writes the file; one that exists is never overwritten.
+    /// Writes a new file; an existing file is not overwritten.
     pub fn write_new(&self, path: &Path) -> std::io::Result<()> {
         use std::io::Write;
         let text = self.to_toml().map_err(std::io::Error::other)?;
-        let head = "# Made by `bench calibrate`. Name it in a configuration: [calibration] file = \"this file\".\n";
+        let head = "# Written by `bench calibrate`. To use it, name it in a configuration: [calibration] file = \"this file\".\n";
         std::fs::File::create_new(path)?.write_all(format!("{head}{text}").as_bytes())
     }
 }

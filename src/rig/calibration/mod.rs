@@ -1,18 +1,18 @@
-//! What small static steps say of amplifier and probe, and how a run takes it into account.
+//! The calibration of amplifier and probe: its file, and the correction of commands and readings.
 //!
 //! ```text
-//!  bench calibrate: Staircase -> recording -> fit -> Calibration (a file of its own)
-//!                                                        |
-//!  [calibration] file = ... ----> valid? this device's? --> CalibratedRig: position = gain (reading) + offset,
-//!                                                                          command / current gain to the amplifier
+//!  bench calibrate: staircase -> recording -> fit -> Calibration (a file)
+//!                                                         |
+//!  [calibration] file = ... -----> valid? of these devices? --> CalibratedRig: position = gain * reading + offset,
+//!                                                               command to the amplifier = (current - offset) / gain
 //! ```
 //!
-//! # What steps can tell, and what not
+//! # What small static steps can determine
 //!
-//! The slope of the reading over the command is the compliance of the whole chain: amplifier, motor, springs, probe. Its sign
-//! is that of the chain, and a calibration turns the probe's reading so that positive current moves the stage positively.
-//! The amplifier's own scale follows where it says which current flows. The probe's scale follows only from a
-//! displacement that is known otherwise: the model's compliance, if the springs are known better than the probe.
+//! The slope of the reading over the command is the compliance of the whole chain: amplifier, motor, springs and probe. From its
+//! sign the calibration corrects the sign of the probe, so that positive current gives positive displacement. The scale of the
+//! amplifier follows if it measures its current. The scale of the probe follows only from an independently known
+//! displacement: the compliance of the model, if the stiffness of the springs is known better than the scale of the probe.
 
 mod file;
 mod rig;

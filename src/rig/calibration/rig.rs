@@ -7,7 +7,7 @@ use bench_hal::{
 
 use super::Calibration;
 
-/// Corrects what goes in and what comes out: the loop sees amperes that flow, and metres from where the stage rests.
+/// Corrects commands and readings: the loop commands true amperes, and reads metres from the rest position.
 pub struct CalibratedRig {
     rig: Box<dyn Rig>,
     current_gain: f64,
@@ -34,12 +34,12 @@ impl CurrentAmplifier for CalibratedRig {
         self.rig.enable()
     }
 
-    /// Commands what makes `current_a` flow, and says which current that will be.
+    /// Commands the set-point that gives `current_a`, and returns the resulting current.
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
-        let given_a = self
+        let accepted_a = self
             .rig
             .command((current_a - self.current_offset_a) / self.current_gain)?;
-        Ok(given_a * self.current_gain + self.current_offset_a)
+        Ok(accepted_a * self.current_gain + self.current_offset_a)
     }
 
     fn disable(&mut self) {

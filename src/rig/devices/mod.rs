@@ -1,4 +1,4 @@
-//! From a configuration to the rig that it names: the simulated stage, or real devices behind the same boundary.
+//! From a configuration to the rig that it describes: the simulated stage, or real devices behind the same traits.
 //!
 //! ```text
 //!  [amplifier.device] --> amplifier.rs --> CanopenDrive | Vesc  --\
@@ -6,27 +6,31 @@
 //!  [probe.device]     --> probe.rs     --> SerialProbe          --/
 //! ```
 //!
-//! To add a device: a variant in `config/devices.rs`, and its arm in [`amplifier`] or [`probe`].
+//! `docs/adding-a-probe.md` and `docs/adding-an-amplifier.md` describe how a device is added.
 
 pub mod amplifier;
+pub mod canopen;
 pub mod probe;
+pub mod vesc;
 
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::StatisticsHandle;
-use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Rig, Tick, Validity};
+use bench_hal::serial::{SerialProbe, StatisticsHandle};
+use bench_hal::{Devices, DisplacementProbe, Rig, Tick, Validity};
 
 use crate::config::{AmplifierDevice, Config, ProbeDevice};
 use crate::model::plant::PlantError;
 use crate::rig::simulated::SimulatedRig;
 
-pub use amplifier::AmplifierError;
+pub use amplifier::{AmplifierError, CanAmplifier, Requirements};
 pub use probe::ProbeError;
 
-/// How long a probe may take to its first reading.
-const FIRST_READING: Duration = Duration::from_secs(2);
+/// How long a probe may take to give its first valid reading.
+pub(crate) const FIRST_READING: Duration = Duration::from_secs(2);
+/// Pause between two attempts to read it.
+const RETRY: Duration = Duration::from_millis(1);
 
-/// A rig that cannot be opened. Nothing moved.
+/// A rig that cannot be opened. Nothing was moved.
 #[derive(Debug, thiserror::Error)]
 pub enum DevicesError {
     /// The model of the simulated stage cannot be analysed.
@@ -38,9 +42,9 @@ pub enum DevicesError {
     /// The probe.
     #[error("probe: {0}; nothing moved")]
     Probe(#[from] ProbeError),
-    /// One is simulated, the other is not.
+    /// Only one of both is simulated.
     #[error(
-        "amplifier.device is {amplifier}, probe.device is {probe}: a current that flows and a reading of another stage make no loop; set both to devices or both to `simulated`"
+        "amplifier.device is {amplifier}, probe.device is {probe}: a real current and a simulated reading (or the reverse) make no control loop; set both to devices or both to `simulated`"
     )]
     Mixed {
         /// Kind of the amplifier.
@@ -48,9 +52,9 @@ pub enum DevicesError {
         /// Kind of the probe.
         probe: &'static str,
     },
-    /// The probe is open, but says nothing of use.
+    /// The probe is open, but gives no valid reading.
     #[error(
-        "probe: {what} within {} s of opening: {bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers came; `bench doctor` looks closer; nothing moved",
+        "probe: {what} within {} s of opening ({bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers received); `bench doctor` examines it; nothing moved",
         FIRST_READING.as_secs()
     )]
     NoReading {
@@ -71,129 +75,107 @@ pub enum DevicesError {
 pub struct OpenRig {
     /// What the loop drives.
     pub rig: Box<dyn Rig>,
-    /// Which amplifier it is, as it says itself.
+    /// Identity of the amplifier, as it reports it.
     pub amplifier: String,
-    /// Which probe it is, as far as it can be told.
+    /// Identity of the probe, as far as it is known.
     pub probe: String,
-    /// What a person should know before the run: line settings not taken, and the like.
+    /// Notes for the operator, for example line settings that the port did not accept.
     pub notes: Vec<String>,
-    /// Counts of the probe's reader, while the loop has the rig.
+    /// Statistics of the probe, while the loop owns the rig.
     pub watch: Option<StatisticsHandle>,
 }
 
-/// Whether the configuration names no device.
+/// Whether amplifier and probe are simulated.
 pub fn is_simulated(config: &Config) -> bool {
     matches!(config.amplifier.device, AmplifierDevice::Simulated(_))
         && matches!(config.probe.device, ProbeDevice::Simulated(_))
 }
 
-/// Refuses what the named devices cannot do, before anything is opened: what the bus does not carry, settings that make no
-/// sense, a line slower than `probe.transport_s` says.
-pub fn check(config: &Config) -> Result<(), DevicesError> {
-    amplifier::check(config)?;
-    Ok(probe::check(config)?)
+/// Refuses a configuration in which only one of amplifier and probe is simulated.
+pub fn check_kinds(config: &Config) -> Result<(), DevicesError> {
+    let amplifier_is_simulated = matches!(config.amplifier.device, AmplifierDevice::Simulated(_));
+    let probe_is_simulated = matches!(config.probe.device, ProbeDevice::Simulated(_));
+    if amplifier_is_simulated == probe_is_simulated {
+        return Ok(());
+    }
+    Err(DevicesError::Mixed {
+        amplifier: config.amplifier.device.kind(),
+        probe: config.probe.device.kind(),
+    })
 }
 
-/// Opens what the configuration names. Afterwards the amplifier is off, and the probe gives valid readings.
+/// Refuses what the configured devices cannot do, before anything is opened: a bus load above the limit, invalid settings, a
+/// serial line slower than `probe.transport_s`.
+pub fn check(config: &Config) -> Result<(), DevicesError> {
+    amplifier::check(&config.amplifier, &config.servo)?;
+    Ok(probe::check(&config.probe)?)
+}
+
+/// Opens the configured rig. Afterwards the amplifier is off, and the probe gives valid readings.
 pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
     if is_simulated(config) {
         return simulate(config);
     }
-    let (amplifier, probe) = (config.amplifier.device.kind(), config.probe.device.kind());
-    if "simulated" == amplifier || "simulated" == probe {
-        return Err(DevicesError::Mixed { amplifier, probe });
-    }
-    let mut probe = probe::open(config)?;
-    let (amplifier, amplifier_identity) = amplifier::open(config)?;
-    let notes = probe
-        .notes()
-        .iter()
-        .map(|note| format!("{}; {}", note.what, note.remedy))
-        .collect();
+    check_kinds(config)?;
+    let mut probe = probe::open(&config.probe, config.servo.priority)?;
+    let (amplifier, amplifier_identity) = amplifier::open(&config.amplifier, &config.servo)?;
+    let notes = probe.notes().iter();
+    let notes = notes.map(|note| format!("{}; {}", note.what, note.remedy));
+    let notes = notes.collect();
     let watch = probe.statistics_handle();
-    wait_for_reading(&mut probe, &watch)?;
-    let rig = Box::new(Devices { amplifier, probe });
-    let (amplifier, probe) = (amplifier_identity, probe::identity(config));
+    wait_for_reading(&mut probe)?;
     Ok(OpenRig {
-        rig,
-        amplifier,
-        probe,
+        rig: Box::new(Devices { amplifier, probe }),
+        amplifier: amplifier_identity,
+        probe: probe::identity(&config.probe.device),
         notes,
         watch: Some(watch),
     })
 }
 
-/// The simulated stage with the rates, delays and steps of whatever devices the configuration names.
+/// The simulated stage with the rates, delays and resolutions of the configured devices.
 pub fn simulate(config: &Config) -> Result<OpenRig, DevicesError> {
-    let (rig, name) = (Box::new(SimulatedRig::new(config)?), || {
-        "simulated".to_string()
-    });
     Ok(OpenRig {
-        rig,
-        amplifier: name(),
-        probe: name(),
+        rig: Box::new(SimulatedRig::new(config)?),
+        amplifier: "simulated".into(),
+        probe: "simulated".into(),
         notes: Vec::new(),
         watch: None,
     })
 }
 
-/// A run that began before the first reading would trip at once.
-fn wait_for_reading(
-    probe: &mut impl DisplacementProbe,
-    watch: &StatisticsHandle,
-) -> Result<(), DevicesError> {
+/// Waits for the first valid reading, because a run without one would trip at once.
+fn wait_for_reading(probe: &mut SerialProbe) -> Result<(), DevicesError> {
+    match first_reading(probe) {
+        Validity::Valid => Ok(()),
+        validity => Err(no_reading(validity, probe)),
+    }
+}
+
+/// Waits for a valid reading, at most [`FIRST_READING`]; returns the validity of the last reading.
+pub(crate) fn first_reading(probe: &mut SerialProbe) -> Validity {
     let begin = Instant::now();
     loop {
-        let reading = probe.latest(Tick::default());
-        if reading.validity == Validity::Valid {
-            return Ok(());
+        let validity = probe.latest(Tick::default()).validity;
+        if validity == Validity::Valid || begin.elapsed() > FIRST_READING {
+            return validity;
         }
-        if begin.elapsed() > FIRST_READING {
-            return Err(no_reading(reading.validity, watch));
-        }
-        std::thread::sleep(Duration::from_millis(1));
+        std::thread::sleep(RETRY);
     }
 }
 
-fn no_reading(validity: Validity, watch: &StatisticsHandle) -> DevicesError {
-    let s = watch.statistics();
+fn no_reading(validity: Validity, probe: &SerialProbe) -> DevicesError {
+    let statistics = probe.statistics();
     let what = match validity {
         Validity::OutOfRange => "the target stayed outside the probe's range",
-        Validity::Faulty => "the probe said that it cannot measure",
-        _ => "no reading came",
+        Validity::Faulty => "the probe reported that it cannot measure",
+        _ => "no reading was received",
     };
-    let (bytes, values, damaged, timeouts) = (s.bytes, s.values, s.damaged_bytes, s.timeouts);
     DevicesError::NoReading {
         what,
-        bytes,
-        values,
-        damaged,
-        timeouts,
+        bytes: statistics.bytes,
+        values: statistics.values,
+        damaged: statistics.damaged_bytes,
+        timeouts: statistics.timeouts,
     }
 }
-
-impl AmplifierDevice {
-    /// The name of the kind, as in a configuration.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            AmplifierDevice::Simulated(_) => "simulated",
-            AmplifierDevice::Canopen(_) => "canopen",
-            AmplifierDevice::Vesc(_) => "vesc",
-        }
-    }
-}
-
-impl ProbeDevice {
-    /// The name of the kind, as in a configuration.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            ProbeDevice::Simulated(_) => "simulated",
-            ProbeDevice::Capancdt(_) => "capancdt",
-            ProbeDevice::Optoncdt(_) => "optoncdt",
-            ProbeDevice::Ascii(_) => "ascii",
-        }
-    }
-}
-
-/// Any amplifier.
-pub type Amplifier = Box<dyn CurrentAmplifier>;

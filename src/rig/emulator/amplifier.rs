@@ -1,4 +1,4 @@
-//! An amplifier that acts as the configured one, and moves the stage.
+//! An emulated amplifier on a CAN bus, whose current moves the stage.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -6,124 +6,129 @@ use std::time::Instant;
 
 use bench_hal::can::bus::{Claim, Condition, Host, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::emulator::{
-    AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
-    EmulatedVesc, FrameCounts, Observer,
+    AmplifierTask, DeviceFault, EmulatedAmplifier, FrameCounts, Observer,
 };
 
-use super::EmulatorError;
+use super::event_log::{CurrentChange, CurrentMonitor, EventLog, LogEntry, LogEvent};
 use super::fault::AmplifierFault;
-use super::journal::{CurrentWatch, EventLog, LogEntry, Turned};
 use super::stage::{Stage, seconds};
-use crate::config::{AmplifierDevice, CanopenSettings, Config};
-use crate::rig::devices::amplifier::reference;
+use super::{EmulatedDevice, EmulatorError};
+use crate::config::AmplifierDevice;
 use crate::util::thread_priority::device_thread_setup;
 
-/// An amplifier at work; dropping it takes it from the bus.
-pub struct Amplifier {
-    _running: TaskHandle,
+/// Serves an emulated amplifier; dropping it takes the amplifier from the bus.
+pub struct AmplifierServer {
+    _task: TaskHandle,
     device: Arc<Mutex<dyn EmulatedAmplifier>>,
     host: Arc<dyn Host>,
-    tally: Arc<Tally>,
+    counters: Arc<AmplifierCounters>,
     kind: &'static str,
     _claim: Claim,
 }
 
-/// What an amplifier has seen and given.
+/// What an amplifier has received and given so far.
 #[derive(Debug, Default)]
-pub struct Tally {
-    /// Frames heard.
+pub struct AmplifierCounters {
+    /// Frames received.
     pub received: AtomicU64,
     /// Frames sent.
     pub sent: AtomicU64,
-    /// Bits of the largest |current| in amperes: those of numbers that are not negative have the same order.
-    largest_a: AtomicU64,
-    /// When it was enabled first, in nanoseconds; 0: never.
+    /// The bits of the largest |current| in amperes. Non-negative numbers and their bits have the same order.
+    largest_a_bits: AtomicU64,
+    /// When it was first enabled, in nanoseconds; 0 for never.
     enabled_ns: AtomicU64,
 }
 
-impl Tally {
-    /// The largest |current| given so far, in amperes.
+impl AmplifierCounters {
+    /// The largest |current| so far, in amperes.
     pub fn largest_a(&self) -> f64 {
-        f64::from_bits(self.largest_a.load(Relaxed))
+        f64::from_bits(self.largest_a_bits.load(Relaxed))
     }
 
-    /// When the amplifier was enabled first, in seconds.
+    /// When the amplifier was first enabled, in seconds.
     pub fn enabled_s(&self) -> Option<f64> {
-        Some(self.enabled_ns.load(Relaxed))
-            .filter(|ns| *ns > 0)
-            .map(seconds)
+        match self.enabled_ns.load(Relaxed) {
+            0 => None,
+            enabled_ns => Some(seconds(enabled_ns)),
+        }
+    }
+
+    fn update(&self, frames: FrameCounts, device: &dyn EmulatedAmplifier) {
+        self.received.store(frames.received, Relaxed);
+        self.sent.store(frames.sent, Relaxed);
+        let magnitude_bits = device.current_a().abs().to_bits();
+        self.largest_a_bits.fetch_max(magnitude_bits, Relaxed);
+        if device.is_enabled() {
+            let now_ns = frames.now_ns.max(1);
+            // Only the first time is stored.
+            let _ = self
+                .enabled_ns
+                .compare_exchange(0, now_ns, Relaxed, Relaxed);
+        }
     }
 }
 
-impl Amplifier {
-    /// On the CAN interface of the configuration, with a clock that began at `start`.
+impl AmplifierServer {
+    /// Serves `device` on its CAN interface, with a clock that began at `start`.
     pub fn open(
-        config: &Config,
+        device: &AmplifierDevice,
+        loop_priority: i32,
         stage: Stage,
-        journal: EventLog,
+        log: EventLog,
         start: Instant,
-    ) -> Result<Amplifier, EmulatorError> {
-        let (interface, bit_rate, node) = match &config.amplifier.device {
-            AmplifierDevice::Simulated(_) => {
-                return Err(EmulatorError::Simulated {
-                    device: "amplifier",
-                });
-            }
-            AmplifierDevice::Canopen(device) => (&device.interface, device.bit_rate, device.node),
-            AmplifierDevice::Vesc(device) => (&device.interface, device.bit_rate, device.node),
-        };
-        let port = SocketPort::open(interface, bit_rate)?;
-        // Another claim than that of the driver, which may run on this computer too.
-        let claim = Claim::new(&format!("{interface}/device"), node);
-        let held = |held| EmulatorError::NodeInUse {
-            interface: interface.clone(),
-            held,
-        };
-        let host = Arc::new(
-            SystemHost::since(port, start).prepared(device_thread_setup(config.servo.priority)),
-        );
-        Ok(Amplifier {
-            _claim: claim.map_err(held)?,
-            ..Amplifier::start(config, host, stage, journal)?
+    ) -> Result<AmplifierServer, EmulatorError> {
+        let can = device.can().ok_or_else(simulated)?.address();
+        let interface = can.interface;
+        let port = SocketPort::open(interface, can.bit_rate)?;
+        // The driver, which may run on the same computer, has another claim.
+        let claim = Claim::new(&format!("{interface}/device"), can.node);
+        let claim = claim.map_err(|holder| EmulatorError::NodeInUse {
+            interface: interface.into(),
+            holder,
+        })?;
+        let host = SystemHost::since(port, start).prepared(device_thread_setup(loop_priority));
+        let server = AmplifierServer::start(device, Arc::new(host), stage, log)?;
+        Ok(AmplifierServer {
+            _claim: claim,
+            ..server
         })
     }
 
-    /// On any bus.
+    /// Serves `device` on any bus.
     pub fn start(
-        config: &Config,
+        device: &AmplifierDevice,
         host: Arc<dyn Host>,
         stage: Stage,
-        journal: EventLog,
-    ) -> Result<Amplifier, EmulatorError> {
-        let device = device(config)?;
-        let tally = Arc::<Tally>::default();
-        let follow = follow(stage, journal, Arc::clone(&tally));
-        let running = AmplifierTask::start_observed(&*host, Arc::clone(&device), follow);
-        let running = running.map_err(|source| EmulatorError::Thread {
-            device: "amplifier",
+        log: EventLog,
+    ) -> Result<AmplifierServer, EmulatorError> {
+        let emulated = device.can().ok_or_else(simulated)?.emulate();
+        let counters = Arc::<AmplifierCounters>::default();
+        let observer = observer(stage, log, Arc::clone(&counters));
+        let task = AmplifierTask::start_observed(&*host, Arc::clone(&emulated), observer);
+        let task = task.map_err(|source| EmulatorError::Thread {
+            device: EmulatedDevice::Amplifier,
             source,
         })?;
-        let kind = config.amplifier.device.kind();
-        Ok(Amplifier {
-            _running: running,
-            device,
+        Ok(AmplifierServer {
+            _task: task,
+            device: emulated,
             host,
-            tally,
-            kind,
+            counters,
+            kind: device.kind(),
             _claim: Claim::none(),
         })
     }
 
     /// Whether the device can have this fault.
-    pub fn knows(&self, fault: AmplifierFault) -> bool {
+    pub fn supports(&self, fault: AmplifierFault) -> bool {
         match fault {
             AmplifierFault::Device(fault) => self.device().supports(fault),
             AmplifierFault::BusOff => true,
         }
     }
 
-    /// Misbehaves from now on. In bus-off nothing passes: the other end is told, and the device hears and says nothing.
-    pub fn ask(&self, fault: AmplifierFault) -> Result<(), EmulatorError> {
+    /// Begins a fault, or ends one. In bus-off no frame passes, and the host reports the condition.
+    pub fn inject(&self, fault: AmplifierFault) -> Result<(), EmulatorError> {
         match fault {
             AmplifierFault::Device(fault) => self.device().inject(fault),
             AmplifierFault::BusOff => {
@@ -139,12 +144,12 @@ impl Amplifier {
         self.device().current_a()
     }
 
-    /// Whether current may flow.
+    /// Whether the power stage is enabled.
     pub fn is_enabled(&self) -> bool {
         self.device().is_enabled()
     }
 
-    /// State of its power stage, in words.
+    /// State of the power stage, in words.
     pub fn state(&self) -> &'static str {
         self.device().state()
     }
@@ -154,9 +159,9 @@ impl Amplifier {
         self.kind
     }
 
-    /// What it has seen and given.
-    pub fn tally(&self) -> &Tally {
-        &self.tally
+    /// What it has received and given so far.
+    pub fn counters(&self) -> &AmplifierCounters {
+        &self.counters
     }
 
     fn device(&self) -> MutexGuard<'_, dyn EmulatedAmplifier + 'static> {
@@ -164,83 +169,75 @@ impl Amplifier {
     }
 }
 
-fn device(config: &Config) -> Result<Arc<Mutex<dyn EmulatedAmplifier>>, EmulatorError> {
-    match &config.amplifier.device {
-        AmplifierDevice::Simulated(_) => Err(EmulatorError::Simulated {
-            device: "amplifier",
-        }),
-        AmplifierDevice::Canopen(device) => {
-            Ok(Arc::new(Mutex::new(EmulatedDrive::new(drive(device)))))
-        }
-        AmplifierDevice::Vesc(device) => Ok(Arc::new(Mutex::new(EmulatedVesc::new(device.node)))),
-    }
+fn simulated() -> EmulatorError {
+    let device = EmulatedDevice::Amplifier;
+    EmulatorError::Simulated { device }
 }
 
-/// A drive that is what the configuration expects.
-fn drive(device: &CanopenSettings) -> EmulatedDriveSettings {
-    let usual = EmulatedDriveSettings::default();
-    let [vendor, product, revision, serial] = usual.identity;
-    let identity = &device.identity;
-    EmulatedDriveSettings {
-        node: device.node,
-        identity: [
-            identity.vendor.unwrap_or(vendor),
-            identity.product.unwrap_or(product),
-            identity.revision.unwrap_or(revision),
-            identity.serial.unwrap_or(serial),
-        ],
-        rated_current_ma: (device.rated_current_a * 1e3).round() as u32,
-        maximum_per_mille: (device.maximum_current_ratio * 1e3).round() as u16,
-        reference: reference(device.target_reference),
-        ..usual
-    }
-}
-
-/// Moves the stage by what the device gives, lets it measure what flows, and writes down its changes.
-fn follow(stage: Stage, journal: EventLog, tally: Arc<Tally>) -> Observer {
-    let (mut given_a, mut state, mut watch) = (0.0, "", CurrentWatch::default());
-    Box::new(move |passed, device| {
-        let (now_ns, current_a) = (passed.now_ns, device.current_a());
-        if current_a != given_a {
-            given_a = current_a;
-            stage.command(now_ns, current_a);
+/// Connects the device to the stage: its current moves the stage, the current that flows is what it measures, and its changes
+/// go to the log.
+fn observer(stage: Stage, log: EventLog, counters: Arc<AmplifierCounters>) -> Observer {
+    let mut given_a = 0.0;
+    let mut reporter = ChangeReporter {
+        stage: stage.clone(),
+        log,
+        state: "",
+        monitor: CurrentMonitor::default(),
+    };
+    Box::new(move |frames, device| {
+        let now_ns = frames.now_ns;
+        if device.current_a() != given_a {
+            given_a = device.current_a();
+            stage.command(now_ns, given_a);
         }
         device.set_measured_current_a(Some(stage.current_a(now_ns)));
-        count(&tally, passed, device);
-        let write = |what, text: &str, since_s| {
-            let entry = LogEntry {
-                time_s: seconds(now_ns),
-                device: "amplifier",
-                what,
-                text: text.into(),
-                enabled: device.is_enabled(),
-                current_a,
-                position_m: stage.position_m(now_ns),
-                since_s,
-            };
-            journal.write(entry);
-        };
-        if device.state() != state {
-            state = device.state();
-            write("state", state, None);
-        }
-        match watch.see(now_ns, current_a, device.is_enabled()) {
-            Some(Turned::On) => write("current on", state, None),
-            Some(Turned::Off { since_s }) => write("current off", state, Some(since_s)),
-            None => {}
-        }
+        counters.update(frames, device);
+        reporter.report(now_ns, device);
     })
 }
 
-fn count(tally: &Tally, passed: FrameCounts, device: &mut dyn EmulatedAmplifier) {
-    tally.received.store(passed.received, Relaxed);
-    tally.sent.store(passed.sent, Relaxed);
-    tally
-        .largest_a
-        .fetch_max(device.current_a().abs().to_bits(), Relaxed);
-    if device.is_enabled() {
-        let _ = tally
-            .enabled_ns
-            .compare_exchange(0, passed.now_ns.max(1), Relaxed, Relaxed); // the first time counts
+/// Writes changes of state and of current to the log.
+struct ChangeReporter {
+    stage: Stage,
+    log: EventLog,
+    state: &'static str,
+    monitor: CurrentMonitor,
+}
+
+impl ChangeReporter {
+    fn report(&mut self, now_ns: u64, device: &dyn EmulatedAmplifier) {
+        if device.state() != self.state {
+            self.state = device.state();
+            self.write(now_ns, device, LogEvent::State, None);
+        }
+        let change = self
+            .monitor
+            .update(now_ns, device.current_a(), device.is_enabled());
+        match change {
+            Some(CurrentChange::On) => self.write(now_ns, device, LogEvent::CurrentOn, None),
+            Some(CurrentChange::Off { since_s }) => {
+                self.write(now_ns, device, LogEvent::CurrentOff, Some(since_s));
+            }
+            None => {}
+        }
+    }
+
+    fn write(
+        &self,
+        now_ns: u64,
+        device: &dyn EmulatedAmplifier,
+        what: LogEvent,
+        since_s: Option<f64>,
+    ) {
+        self.log.write(LogEntry {
+            time_s: seconds(now_ns),
+            device: EmulatedDevice::Amplifier,
+            what,
+            text: self.state.into(),
+            enabled: device.is_enabled(),
+            current_a: device.current_a(),
+            position_m: self.stage.position_m(now_ns),
+            since_s,
+        });
     }
 }

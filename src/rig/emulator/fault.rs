@@ -1,14 +1,17 @@
-//! Faults in words: `amplifier.late=50ms`, `probe.stuck`, `none`.
+//! Faults that an emulated device can have, and their names: `amplifier.late=50ms`, `probe.stuck`, `none`.
+
+use std::fmt;
 
 use bench_hal::can::emulator::DeviceFault;
 use bench_hal::serial::emulator::Fault;
 
+use super::EmulatedDevice;
 use crate::util::quantity::Length;
 
-/// What an acting device is asked for.
+/// A fault, or the end of all faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmulatedFault {
-    /// All devices are sound again.
+    /// All emulated devices work correctly again.
     None,
     /// Of the amplifier.
     Amplifier(AmplifierFault),
@@ -16,238 +19,254 @@ pub enum EmulatedFault {
     Probe(Fault),
 }
 
-/// A fault of the amplifier, or of the bus that it is on.
+/// A fault of the amplifier, or of its bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AmplifierFault {
     /// Of the device.
     Device(DeviceFault),
-    /// The other end's controller is in bus-off: it is told so, and the device hears and says nothing.
+    /// The CAN controller of the host reports bus-off, and the device neither receives nor sends.
     BusOff,
 }
 
-/// Words that are no fault.
+/// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
     /// No such kind.
-    #[error("there is no fault `{word}`; there are {}", words())]
+    #[error("there is no fault `{kind}`; the faults are {}", names())]
     Unknown {
-        /// What was said.
-        word: String,
+        /// The text before `=`.
+        kind: String,
     },
-    /// A value that makes no sense.
-    #[error("{word}={value}: it must be {wants}")]
+    /// A value that the kind does not accept.
+    #[error("{kind}={value}: it must be {expected}")]
     Value {
         /// The kind.
-        word: String,
+        kind: String,
         /// The value.
         value: String,
-        /// What it must be.
-        wants: &'static str,
+        /// What the kind accepts.
+        expected: &'static str,
     },
 }
 
-/// Word, the value if none is said (empty: it has none), and what happens.
-const KINDS: [(&str, &str, &str); 23] = [
-    ("none", "", "both devices are sound again"),
-    ("amplifier.none", "", "sound again"),
-    ("amplifier.silence", "", "sends nothing, but hears"),
-    ("amplifier.unplugged", "", "neither sends nor hears"),
-    (
-        "amplifier.short-frames",
-        "",
-        "status frames of a wrong length",
-    ),
-    (
-        "amplifier.senseless-status",
-        "",
-        "statuswords that no state has",
-    ),
-    (
-        "amplifier.fault",
-        "0x2310",
-        "the power stage fails: emergency message, then the state Fault",
-    ),
-    (
-        "amplifier.emergency",
-        "0x4210",
-        "an emergency message without a change of state",
-    ),
-    (
-        "amplifier.target-ignored",
-        "",
-        "enabled, but the target is not followed (bit 12)",
-    ),
-    (
-        "amplifier.set-points-ignored",
-        "",
-        "takes no set-points, but obeys NMT",
-    ),
-    (
-        "amplifier.orders-ignored",
-        "",
-        "takes neither set-points nor NMT",
-    ),
-    (
-        "amplifier.switches-off",
-        "",
-        "switches itself off without a fault",
-    ),
-    ("amplifier.late", "50ms", "sends everything so much later"),
-    ("amplifier.reset", "", "restarts as after a loss of power"),
-    (
-        "amplifier.bus-off",
-        "",
-        "the other end is told that it is in bus-off, nothing passes (virtual interfaces only)",
-    ),
-    ("probe.none", "", "sound again"),
-    ("probe.silence", "", "sends nothing"),
-    ("probe.corrupt", "1", "one byte in so many is another byte"),
-    ("probe.stuck", "", "sends one value for ever, as new"),
-    ("probe.jump", "50um", "every second value lies so far away"),
-    ("probe.out-of-range", "", "the target is out of range"),
-    ("probe.late", "50ms", "sends everything so much later"),
-    ("probe.reset", "", "restarts: its counter begins again"),
-];
-
-/// The list of all kinds, a line each.
-pub fn help() -> String {
-    let line = |(word, value, what): &(&str, &str, &str)| {
-        let value = if value.is_empty() {
-            String::new()
-        } else {
-            format!("[={value}]")
-        };
-        format!("  {:<30} {what}\n", format!("{word}{value}"))
-    };
-    KINDS.iter().map(line).collect()
+/// A kind of fault: its name, the fault, and what happens.
+struct FaultKind {
+    name: &'static str,
+    form: Form,
+    effect: &'static str,
 }
 
-/// The whole word of a fault whose device was left out, where only one of the devices `served` can have it.
-pub fn whole(word: &str, served: &[String]) -> String {
-    let kind = word.split('=').next().unwrap_or(word);
-    let known = |device: &&String| {
-        KINDS
-            .iter()
-            .any(|(whole, ..)| *whole == format!("{device}.{kind}"))
+/// Whether a kind of fault has a value.
+enum Form {
+    Fixed(EmulatedFault),
+    WithValue {
+        default: &'static str,
+        read: fn(&str) -> Result<EmulatedFault, &'static str>,
+    },
+}
+
+const fn kind(name: &'static str, form: Form, effect: &'static str) -> FaultKind {
+    FaultKind { name, form, effect }
+}
+
+const fn drive(fault: DeviceFault) -> EmulatedFault {
+    EmulatedFault::Amplifier(AmplifierFault::Device(fault))
+}
+
+const fn fixed_drive(fault: DeviceFault) -> Form {
+    Form::Fixed(drive(fault))
+}
+
+const fn fixed_probe(fault: Fault) -> Form {
+    Form::Fixed(EmulatedFault::Probe(fault))
+}
+
+const fn with_value(
+    default: &'static str,
+    read: fn(&str) -> Result<EmulatedFault, &'static str>,
+) -> Form {
+    Form::WithValue { default, read }
+}
+
+/// All kinds of faults. A new fault is one line here.
+#[rustfmt::skip]
+const KINDS: [FaultKind; 23] = [
+    kind("none", Form::Fixed(EmulatedFault::None), "ends all faults"),
+    kind("amplifier.none", fixed_drive(DeviceFault::None), "ends the fault of the amplifier"),
+    kind("amplifier.silence", fixed_drive(DeviceFault::Mute), "sends nothing, but receives"),
+    kind("amplifier.unplugged", fixed_drive(DeviceFault::Unplugged), "neither sends nor receives"),
+    kind("amplifier.short-frames", fixed_drive(DeviceFault::ShortFrames), "sends status frames of a wrong length"),
+    kind("amplifier.senseless-status", fixed_drive(DeviceFault::InvalidStatusword), "sends statuswords of undefined states"),
+    kind("amplifier.fault", with_value("0x2310", drive_fault), "enters the state Fault and sends an emergency message"),
+    kind("amplifier.emergency", with_value("0x4210", emergency_only), "sends an emergency message, without change of state"),
+    kind("amplifier.target-ignored", fixed_drive(DeviceFault::TargetIgnored), "is enabled, but does not follow its target (bit 12)"),
+    kind("amplifier.set-points-ignored", fixed_drive(DeviceFault::SetPointsIgnored), "ignores set-points, obeys NMT"),
+    kind("amplifier.orders-ignored", fixed_drive(DeviceFault::CommandsIgnored), "ignores set-points and NMT"),
+    kind("amplifier.switches-off", fixed_drive(DeviceFault::SwitchesOff), "switches itself off without a fault"),
+    kind("amplifier.late", with_value("50ms", late_drive), "sends everything later by this time"),
+    kind("amplifier.reset", fixed_drive(DeviceFault::Reset), "restarts, as after a loss of power"),
+    kind("amplifier.bus-off", Form::Fixed(EmulatedFault::Amplifier(AmplifierFault::BusOff)), "makes the host report bus-off; no frame passes (virtual interfaces only)"),
+    kind("probe.none", fixed_probe(Fault::None), "ends the fault of the probe"),
+    kind("probe.silence", fixed_probe(Fault::Silence), "sends nothing"),
+    kind("probe.corrupt", with_value("1", corrupt), "changes one byte in so many"),
+    kind("probe.stuck", fixed_probe(Fault::Stuck), "repeats one value as if it were new"),
+    kind("probe.jump", with_value("50um", jump), "shifts every second value by this length"),
+    kind("probe.out-of-range", fixed_probe(Fault::OutOfRange), "reports a target out of range"),
+    kind("probe.late", with_value("50ms", late_probe), "sends everything later by this time"),
+    kind("probe.reset", fixed_probe(Fault::Reset), "restarts, and its counter starts again"),
+];
+
+/// The list of all kinds, one line each.
+pub fn help() -> String {
+    KINDS.iter().map(help_line).collect()
+}
+
+fn help_line(kind: &FaultKind) -> String {
+    let usage = match kind.form {
+        Form::Fixed(_) => kind.name.to_string(),
+        Form::WithValue { default, .. } => format!("{}[={default}]", kind.name),
     };
-    match served.iter().filter(known).collect::<Vec<_>>()[..] {
-        [device] if kind != "none" => format!("{device}.{word}"),
-        _ => word.into(),
+    format!("  {usage:<30} {}\n", kind.effect)
+}
+
+fn names() -> String {
+    KINDS.map(|kind| kind.name).join(", ")
+}
+
+/// A fault with its text, as given on the command line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaultRequest {
+    /// `KIND` or `KIND=VALUE`.
+    pub text: String,
+    /// The fault.
+    pub fault: EmulatedFault,
+}
+
+impl fmt::Display for FaultRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
     }
 }
 
-fn words() -> String {
-    KINDS.map(|(word, ..)| word).join(", ")
+impl std::str::FromStr for FaultRequest {
+    type Err = FaultError;
+
+    fn from_str(text: &str) -> Result<FaultRequest, FaultError> {
+        let (name, given) = match text.split_once('=') {
+            Some((name, value)) => (name, Some(value)),
+            None => (text, None),
+        };
+        let kind = KINDS.iter().find(|kind| kind.name == name);
+        let kind = kind.ok_or_else(|| FaultError::Unknown { kind: name.into() })?;
+        let fault = kind.fault(given).map_err(|expected| FaultError::Value {
+            kind: name.into(),
+            value: given.unwrap_or_default().into(),
+            expected,
+        })?;
+        let text = text.into();
+        Ok(FaultRequest { text, fault })
+    }
+}
+
+impl FaultRequest {
+    /// Reads a fault whose device may be omitted, if only one of the emulated `devices` can have it.
+    pub fn parse_for(text: &str, devices: &[EmulatedDevice]) -> Result<FaultRequest, FaultError> {
+        qualified(text, devices).parse()
+    }
+
+    /// What ends this fault.
+    pub fn end(&self) -> FaultRequest {
+        FaultRequest {
+            text: format!("end of {}", self.text),
+            fault: self.fault.end(),
+        }
+    }
+}
+
+/// `text` with the name of its device in front, if exactly one of `devices` can have this fault.
+fn qualified(text: &str, devices: &[EmulatedDevice]) -> String {
+    let name = text.split('=').next().unwrap_or(text);
+    let is_kind_of = |device: &&EmulatedDevice| {
+        let full = format!("{device}.{name}");
+        name != "none" && KINDS.iter().any(|kind| kind.name == full)
+    };
+    match devices.iter().filter(is_kind_of).collect::<Vec<_>>()[..] {
+        [device] => format!("{device}.{text}"),
+        _ => text.into(),
+    }
+}
+
+impl FaultKind {
+    fn fault(&self, value: Option<&str>) -> Result<EmulatedFault, &'static str> {
+        match (&self.form, value) {
+            (Form::Fixed(fault), None) => Ok(*fault),
+            (Form::Fixed(_), Some(_)) => Err("left out: this fault has no value"),
+            (Form::WithValue { default, read }, value) => read(value.unwrap_or(default)),
+        }
+    }
 }
 
 impl EmulatedFault {
-    /// Reads the words of a fault: `KIND` or `KIND=VALUE`.
-    pub fn parse(text: &str) -> Result<EmulatedFault, FaultError> {
-        let (word, said) = text
-            .split_once('=')
-            .map_or((text, None), |(word, value)| (word, Some(value)));
-        let unknown = || FaultError::Unknown { word: word.into() };
-        let (_, usual, _) = KINDS
-            .iter()
-            .find(|(kind, ..)| *kind == word)
-            .ok_or_else(unknown)?;
-        let value = said.unwrap_or(usual);
-        let refused = |wants| FaultError::Value {
-            word: word.into(),
-            value: value.into(),
-            wants,
-        };
-        if said.is_some() && usual.is_empty() {
-            return Err(refused("left out: this fault has no value"));
-        }
-        if word == "none" {
-            return Ok(EmulatedFault::None);
-        }
-        let amplifier = |fault| EmulatedFault::Amplifier(AmplifierFault::Device(fault));
-        match word.split_once('.') {
-            Some(("amplifier", "bus-off")) => Ok(EmulatedFault::Amplifier(AmplifierFault::BusOff)),
-            Some(("amplifier", kind)) => of_amplifier(kind, value).map(amplifier).map_err(refused),
-            Some((_, kind)) => of_probe(kind, value)
-                .map(EmulatedFault::Probe)
-                .map_err(refused),
-            None => Err(unknown()),
-        }
-    }
-
     /// What ends this fault.
     pub fn end(self) -> EmulatedFault {
         match self {
             EmulatedFault::None => EmulatedFault::None,
-            EmulatedFault::Amplifier(_) => {
-                EmulatedFault::Amplifier(AmplifierFault::Device(DeviceFault::None))
-            }
+            EmulatedFault::Amplifier(_) => drive(DeviceFault::None),
             EmulatedFault::Probe(_) => EmulatedFault::Probe(Fault::None),
         }
     }
 }
 
-fn of_amplifier(kind: &str, value: &str) -> Result<DeviceFault, &'static str> {
-    Ok(match kind {
-        "silence" => DeviceFault::Mute,
-        "unplugged" => DeviceFault::Unplugged,
-        "short-frames" => DeviceFault::ShortFrames,
-        "senseless-status" => DeviceFault::InvalidStatusword,
-        "fault" => DeviceFault::Drive(code(value)?),
-        "emergency" => DeviceFault::EmergencyOnly(code(value)?),
-        "target-ignored" => DeviceFault::TargetIgnored,
-        "set-points-ignored" => DeviceFault::SetPointsIgnored,
-        "orders-ignored" => DeviceFault::CommandsIgnored,
-        "switches-off" => DeviceFault::SwitchesOff,
-        "late" => DeviceFault::Late(nanoseconds(value)? / 1_000_000),
-        "reset" => DeviceFault::Reset,
-        _ => DeviceFault::None,
-    })
+fn drive_fault(value: &str) -> Result<EmulatedFault, &'static str> {
+    Ok(drive(DeviceFault::Drive(emergency_code(value)?)))
 }
 
-fn of_probe(kind: &str, value: &str) -> Result<Fault, &'static str> {
-    Ok(match kind {
-        "silence" => Fault::Silence,
-        "corrupt" => {
-            let every = value.parse().ok().filter(|every| *every > 0);
-            Fault::Corrupt {
-                every: every.ok_or("a whole number of bytes, above zero")?,
-            }
-        }
-        "stuck" => Fault::Stuck,
-        "jump" => {
-            let by: Length = (value.parse()).map_err(|_| "a length (50um, 0.5mm, or metres)")?;
-            Fault::Jump {
-                every: 2,
-                by_m: by.si(),
-            }
-        }
-        "out-of-range" => Fault::OutOfRange,
-        "late" => Fault::Late {
-            by_ns: nanoseconds(value)?,
-        },
-        "reset" => Fault::Reset,
-        _ => Fault::None,
-    })
+fn emergency_only(value: &str) -> Result<EmulatedFault, &'static str> {
+    Ok(drive(DeviceFault::EmergencyOnly(emergency_code(value)?)))
+}
+
+fn late_drive(value: &str) -> Result<EmulatedFault, &'static str> {
+    let milliseconds = nanoseconds(value)? / 1_000_000;
+    Ok(drive(DeviceFault::Late(milliseconds)))
+}
+
+fn late_probe(value: &str) -> Result<EmulatedFault, &'static str> {
+    let by_ns = nanoseconds(value)?;
+    Ok(EmulatedFault::Probe(Fault::Late { by_ns }))
+}
+
+fn corrupt(value: &str) -> Result<EmulatedFault, &'static str> {
+    match value.parse() {
+        Ok(every) if every > 0 => Ok(EmulatedFault::Probe(Fault::Corrupt { every })),
+        _ => Err("a whole number of bytes, above zero"),
+    }
+}
+
+fn jump(value: &str) -> Result<EmulatedFault, &'static str> {
+    let length: Result<Length, _> = value.parse();
+    let by_m = length
+        .map_err(|_| "a length (50um, 0.5mm, or metres)")?
+        .si();
+    Ok(EmulatedFault::Probe(Fault::Jump { every: 2, by_m }))
 }
 
 /// An emergency code: hexadecimal with 0x, or decimal.
-fn code(text: &str) -> Result<u16, &'static str> {
+fn emergency_code(text: &str) -> Result<u16, &'static str> {
     let hexadecimal = text.strip_prefix("0x").or(text.strip_prefix("0X"));
-    let number = hexadecimal.map_or_else(|| text.parse(), |digits| u16::from_str_radix(digits, 16));
-    number
-        .ok()
+    let code = match hexadecimal {
+        Some(digits) => u16::from_str_radix(digits, 16),
+        None => text.parse(),
+    };
+    code.ok()
         .filter(|code| *code > 0)
         .ok_or("an emergency code from 0x0001 to 0xFFFF")
 }
 
-/// A time like `50ms`, an hour at most.
+/// A time of at most one hour, with its unit.
 fn nanoseconds(text: &str) -> Result<u64, &'static str> {
-    const WANTS: &str = "a time with its unit (50ms, 200us, 1s), an hour at most";
-    let time = humantime::parse_duration(text).map_err(|_| WANTS)?;
-    if time.as_secs() <= 3600 {
-        Ok(time.as_nanos() as u64)
-    } else {
-        Err(WANTS)
+    match humantime::parse_duration(text) {
+        Ok(time) if time.as_secs() <= 3600 => Ok(time.as_nanos() as u64),
+        _ => Err("a time with its unit (50ms, 200us, 1s), an hour at most"),
     }
 }
 
@@ -255,44 +274,41 @@ fn nanoseconds(text: &str) -> Result<u64, &'static str> {
 mod tests {
     use super::*;
 
+    fn parse(text: &str) -> Result<EmulatedFault, FaultError> {
+        text.parse().map(|request: FaultRequest| request.fault)
+    }
+
     #[test]
-    fn every_kind_is_another_fault_and_is_in_the_help() {
-        let faults: Vec<EmulatedFault> = KINDS
-            .map(|(word, ..)| EmulatedFault::parse(word).expect(word))
-            .to_vec();
+    fn every_kind_is_a_different_fault_and_stands_in_the_help() {
+        let faults: Vec<EmulatedFault> = KINDS.map(|k| parse(k.name).expect(k.name)).to_vec();
         for (index, fault) in faults.iter().enumerate() {
-            assert!(!faults[..index].contains(fault), "{}", KINDS[index].0);
-            assert!(help().contains(KINDS[index].0));
+            assert!(!faults[..index].contains(fault), "{}", KINDS[index].name);
+            assert!(help().contains(KINDS[index].name));
         }
     }
 
     #[test]
-    fn values_are_read_in_the_units_that_a_person_writes() {
-        let amplifier = |fault| Ok(EmulatedFault::Amplifier(AmplifierFault::Device(fault)));
+    fn reads_values_with_their_units() {
         assert_eq!(
-            EmulatedFault::parse("amplifier.late=250ms"),
-            amplifier(DeviceFault::Late(250))
+            parse("amplifier.late=250ms"),
+            Ok(drive(DeviceFault::Late(250)))
         );
         assert_eq!(
-            EmulatedFault::parse("amplifier.fault=0x3220"),
-            amplifier(DeviceFault::Drive(0x3220))
+            parse("amplifier.fault=0x3220"),
+            Ok(drive(DeviceFault::Drive(0x3220)))
         );
-        assert_eq!(
-            EmulatedFault::parse("probe.jump=-1mm"),
-            Ok(EmulatedFault::Probe(Fault::Jump {
-                every: 2,
-                by_m: -1e-3
-            }))
-        );
-        assert_eq!(
-            EmulatedFault::parse("probe.corrupt=97"),
-            Ok(EmulatedFault::Probe(Fault::Corrupt { every: 97 }))
-        );
+        let jump = Fault::Jump {
+            every: 2,
+            by_m: -1e-3,
+        };
+        assert_eq!(parse("probe.jump=-1mm"), Ok(EmulatedFault::Probe(jump)));
+        let corrupt = Fault::Corrupt { every: 97 };
+        assert_eq!(parse("probe.corrupt=97"), Ok(EmulatedFault::Probe(corrupt)));
     }
 
     #[test]
-    fn the_device_may_be_left_out_where_only_one_can_have_the_fault() {
-        let both = ["amplifier".to_string(), "probe".to_string()];
+    fn completes_the_device_if_only_one_can_have_the_fault() {
+        let both = [EmulatedDevice::Amplifier, EmulatedDevice::Probe];
         let cases = [
             ("stuck", "probe.stuck"),
             ("fault=0x3220", "amplifier.fault=0x3220"),
@@ -301,15 +317,15 @@ mod tests {
             ("probe.late", "probe.late"),
             ("nonsense", "nonsense"),
         ];
-        for (word, expected) in cases {
-            assert_eq!(whole(word, &both), expected);
+        for (text, expected) in cases {
+            assert_eq!(qualified(text, &both), expected);
         }
-        assert_eq!(whole("late=1s", &both[1..]), "probe.late=1s");
+        assert_eq!(qualified("late=1s", &both[1..]), "probe.late=1s");
     }
 
     #[test]
-    fn what_is_no_fault_is_refused_with_what_there_is() {
-        let refusal = |text| EmulatedFault::parse(text).expect_err(text).to_string();
+    fn rejects_unknown_faults_and_values_and_lists_what_is_accepted() {
+        let refusal = |text| parse(text).expect_err(text).to_string();
         for text in [
             "",
             "silence",
@@ -320,7 +336,7 @@ mod tests {
             "nonsense=1",
         ] {
             assert!(
-                refusal(text).contains("there are none, amplifier.none, amplifier.silence"),
+                refusal(text).contains("the faults are none, amplifier.none, amplifier.silence"),
                 "{}",
                 refusal(text)
             );

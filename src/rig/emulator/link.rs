@@ -1,11 +1,11 @@
-//! A name for the slave of a pseudo terminal, as long as it is served.
+//! A name for a pseudo terminal, as long as the terminal is served.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::EmulatorError;
 
-/// A symbolic link; dropping it removes it.
+/// A symbolic link, removed when dropped.
 #[derive(Debug)]
 pub(super) struct Link {
     path: PathBuf,
@@ -13,25 +13,20 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Links `path` to `target`. A link that leads nowhere (of a process that was killed) is replaced, nothing else is.
+    /// Links `path` to `target`. Only a dangling link, left by a process that was killed, is replaced.
     pub(super) fn new(path: &Path, target: &Path) -> Result<Link, EmulatorError> {
         if path.is_symlink() && !path.exists() {
-            let _ = std::fs::remove_file(path); // if it cannot go, the next call says why
+            let _ = std::fs::remove_file(path); // a failure is reported by the next call
         }
-        std::os::unix::fs::symlink(target, path).map_err(|error| {
-            let why = match error.kind() {
+        std::os::unix::fs::symlink(target, path).map_err(|error| EmulatorError::Link {
+            path: path.into(),
+            why: match error.kind() {
                 ErrorKind::AlreadyExists => "it exists".to_string(),
                 _ => error.to_string(),
-            };
-            EmulatorError::Link {
-                path: path.into(),
-                why,
-            }
+            },
         })?;
-        Ok(Link {
-            path: path.into(),
-            target: target.into(),
-        })
+        let (path, target) = (path.into(), target.into());
+        Ok(Link { path, target })
     }
 
     /// The link's own name.
@@ -42,8 +37,9 @@ impl Link {
 
 impl Drop for Link {
     fn drop(&mut self) {
-        if std::fs::read_link(&self.path).is_ok_and(|target| target == self.target) {
-            let _ = std::fs::remove_file(&self.path); // whoever took it away meanwhile has done it
+        let is_ours = std::fs::read_link(&self.path).is_ok_and(|target| target == self.target);
+        if is_ours {
+            let _ = std::fs::remove_file(&self.path); // somebody else may have removed it
         }
     }
 }
@@ -53,15 +49,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_link_replaces_one_that_leads_nowhere_and_nothing_else_and_goes_when_dropped() {
+    fn a_link_replaces_only_a_dangling_link_and_is_removed_when_dropped() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let (path, target) = (folder.path().join("probe"), folder.path().join("terminal"));
         std::os::unix::fs::symlink("/nowhere", &path).expect("a link");
         std::fs::write(&target, "").expect("a file");
-        let link = Link::new(&path, &target).expect("a dead link is replaced");
-        let error = Link::new(&path, &target)
-            .expect_err("it is in use")
-            .to_string();
+        let link = Link::new(&path, &target).expect("a dangling link is replaced");
+        let error = Link::new(&path, &target).expect_err("the link is in use");
+        let error = error.to_string();
         assert!(
             error.contains("it exists") && error.contains("--pty"),
             "{error}"

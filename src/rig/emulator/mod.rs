@@ -1,50 +1,78 @@
-//! The other end: devices that act as the configured ones, on a real bus and a real line, with the simulated stage behind
-//! them in real time. `bench device` serves them.
+//! Emulated devices: they behave as the configured ones, on a real bus and a real line, with the simulated stage behind them in
+//! real time. `bench emulate` serves them.
 //!
 //! ```text
-//!  bench control                                       bench device
-//!    CanopenDrive | Vesc  <==== CAN interface ====>  amplifier.rs --set-points--> stage.rs (sim::LiveStage)
+//!  bench control                                       bench emulate
+//!    CanopenDrive | Vesc  <==== CAN interface ====>  amplifier.rs --current----> stage.rs (LiveStage)
 //!    SerialProbe          <==== serial line ======>  probe.rs     <--position----    |
-//!                                                     fault.rs, schedule.rs: what goes wrong, when
-//!                                                     journal.rs: every change, with its time
+//!                                                     fault.rs, fault_schedule.rs: faults and their times
+//!                                                     event_log.rs: every change, with its time
 //! ```
 //!
-//! The devices themselves are those of [`bench_hal`]: this room gives them their settings, a stage, and faults on request.
+//! The devices themselves are those of [`bench_hal`]. This module gives them their settings, the stage, and faults.
 
 pub mod amplifier;
+mod emulator;
+pub mod event_log;
 pub mod fault;
-pub mod journal;
+pub mod fault_schedule;
 mod link;
 pub mod probe;
-pub mod rehearsal;
-pub mod schedule;
 mod stage;
 
+use std::fmt;
 use std::path::PathBuf;
 
 use bench_hal::can::bus::{BusError, NodeInUse, PortError};
 use bench_hal::serial::SerialError;
+use serde::Serialize;
 
 use crate::model::plant::PlantError;
 
-pub use amplifier::Amplifier;
-pub use fault::{AmplifierFault, EmulatedFault};
-pub use journal::{EventLog, LogEntry};
-pub use probe::Probe;
-pub use rehearsal::{Emulator, Summary};
-pub use schedule::FaultSchedule;
+pub use amplifier::AmplifierServer;
+pub use emulator::{EmulatedDevices, Emulator, Summary};
+pub use event_log::{EventLog, LogEntry, LogEvent};
+pub use fault::{AmplifierFault, EmulatedFault, FaultRequest};
+pub use fault_schedule::{FaultSchedule, PlannedFault};
+pub use probe::{ProbeEndpoint, ProbeServer};
 pub use stage::Stage;
 
-/// A device that cannot act.
+/// A device that can be emulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum EmulatedDevice {
+    /// The amplifier, on a CAN interface
+    Amplifier,
+    /// The probe, on a serial line
+    Probe,
+}
+
+impl EmulatedDevice {
+    /// The name in the log and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            EmulatedDevice::Amplifier => "amplifier",
+            EmulatedDevice::Probe => "probe",
+        }
+    }
+}
+
+impl fmt::Display for EmulatedDevice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A device that cannot be emulated, or a fault that it cannot have.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
-    /// The configuration names none.
+    /// The configuration names no device.
     #[error(
-        "{device}.device is `simulated`: there is nothing to act for; name real devices, as --config lab does"
+        "{device}.device is `simulated`: there is no device to emulate; name real devices, as --config lab does"
     )]
     Simulated {
-        /// `amplifier` or `probe`.
-        device: &'static str,
+        /// Which one.
+        device: EmulatedDevice,
     },
     /// The model of the stage cannot be analysed.
     #[error(transparent)]
@@ -57,13 +85,13 @@ pub enum EmulatorError {
     /// The CAN interface failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// Another process acts as this device.
-    #[error("on {interface}, {held}")]
+    /// Another process emulates this device.
+    #[error("on {interface}, {holder}")]
     NodeInUse {
         /// The interface.
         interface: String,
-        /// Who.
-        held: NodeInUse,
+        /// Node and process.
+        holder: NodeInUse,
     },
     /// The serial line.
     #[error(transparent)]
@@ -73,24 +101,24 @@ pub enum EmulatorError {
     Link {
         /// The link.
         path: PathBuf,
-        /// What is in the way.
+        /// The reason.
         why: String,
     },
     /// A fault that this device cannot have.
-    #[error("a {kind} cannot have the fault {word}; `bench device --help` lists them")]
+    #[error("a {kind} cannot have the fault {fault}; `bench emulate --help` lists the faults")]
     Fault {
         /// Kind of the device, as in a configuration.
         kind: &'static str,
         /// The fault.
-        word: String,
+        fault: String,
     },
-    /// A fault of a device that is not served.
-    #[error("{word}: no {device} is served here; name it on the command line")]
-    NotServed {
+    /// A fault of a device that is not emulated.
+    #[error("{fault}: no {device} is emulated; name it on the command line")]
+    NotEmulated {
         /// The fault.
-        word: String,
-        /// `amplifier` or `probe`.
-        device: &'static str,
+        fault: String,
+        /// The device that could have it.
+        device: EmulatedDevice,
     },
     /// The system refused a thread.
     #[error(
@@ -98,8 +126,8 @@ pub enum EmulatorError {
     )]
     Thread {
         /// Which device.
-        device: &'static str,
-        /// The system's words.
+        device: EmulatedDevice,
+        /// The error of the system.
         source: std::io::Error,
     },
 }

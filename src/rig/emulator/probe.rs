@@ -1,36 +1,35 @@
-//! A probe that acts as the configured one, and looks at the stage.
+//! An emulated probe on a serial line, which measures the simulated stage.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bench_hal::serial::emulator::{EmulatedProbe, Fault, Line, LineCounts, ProbeTask, SharedProbe};
-use bench_hal::serial::{Note, PortSettings};
+use bench_hal::serial::{Mounting, Note, PortSettings, SerialError};
 
-use super::EmulatorError;
 use super::link::Link;
 use super::stage::Stage;
-use crate::config::{Config, MountingSettings, ProbeDevice};
-use crate::rig::devices::probe::port;
+use super::{EmulatedDevice, EmulatorError};
+use crate::config::{Config, ProbeSettings};
 use crate::rig::simulated::Sensor;
 use crate::util::thread_priority::device_thread_setup;
 
-/// Measurements a second of a probe that speaks by itself, if the configuration does not say.
+/// Measurements per second of a streaming probe, if the configuration does not state its rate.
 const STREAM_HZ: f64 = 4000.0;
-/// A probe that is asked measures faster than it is asked, so that each answer carries a value or two.
+/// A polled probe measures more often than it is polled, so that each answer holds one or two values.
 const MEASUREMENTS_PER_ANSWER: f64 = 1.5;
 
-/// Where the probe's end of the line is.
+/// Where the emulated probe is connected.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProbeEndpoint {
-    /// A pseudo terminal, with a link of this name to the reader's end.
+    /// A pseudo terminal, with an optional link to the reader's side.
     Terminal(Option<PathBuf>),
-    /// A serial port: a null-modem cable, the other end of a pair.
+    /// A serial port: the other end of a null-modem cable.
     Port(PathBuf),
 }
 
-/// A probe at work; dropping it closes the line.
-pub struct Probe {
+/// Serves an emulated probe; dropping it closes the line.
+pub struct ProbeServer {
     task: ProbeTask,
     device: SharedProbe,
     place: PathBuf,
@@ -40,57 +39,53 @@ pub struct Probe {
     link: Option<Link>,
 }
 
-impl Probe {
-    /// Serves the probe of the configuration at `end`. `now_ns` is the stage's clock.
+impl ProbeServer {
+    /// Serves the configured probe at `endpoint`. `now_ns` is the clock of the stage.
     pub fn start(
         config: &Config,
-        end: &ProbeEndpoint,
+        endpoint: &ProbeEndpoint,
         rate_hz: Option<f64>,
         stage: Stage,
         now_ns: impl Fn() -> u64 + Send + 'static,
-    ) -> Result<Probe, EmulatorError> {
-        let device = &config.probe.device;
-        let simulated = || EmulatorError::Simulated { device: "probe" };
-        let protocol = device.protocol().ok_or_else(simulated)?;
-        let rate_hz = rate_hz.unwrap_or_else(|| measuring_rate_hz(config));
-        let acting: SharedProbe = Arc::new(Mutex::new(EmulatedProbe::new(&*protocol, rate_hz)?));
-        let (line, notes) = line(port(device.line().ok_or_else(simulated)?), end)?;
+    ) -> Result<ProbeServer, EmulatorError> {
+        let serial = config.probe.device.serial().ok_or_else(simulated)?;
+        let rate_hz = match rate_hz {
+            Some(rate_hz) => rate_hz,
+            None => measuring_rate_hz(&config.probe)?,
+        };
+        let device: SharedProbe =
+            Arc::new(Mutex::new(EmulatedProbe::new(&*serial.protocol, rate_hz)?));
+        let (line, notes) = open_line(serial.line, endpoint)?;
         let place = line.path().to_owned();
-        let link = match end {
+        let link = match endpoint {
             ProbeEndpoint::Terminal(Some(path)) => Some(Link::new(path, &place)?),
             _ => None,
         };
-        let task = ProbeTask::start(
-            line,
-            Arc::clone(&acting),
-            now_ns,
-            measure(config, stage),
-            device_thread_setup(config.servo.priority),
-        );
+        let measure = measurement(Sensor::new(&config.sim), serial.mounting, stage);
+        let setup = device_thread_setup(config.servo.priority);
+        let task = ProbeTask::start(line, Arc::clone(&device), now_ns, measure, setup);
         let task = task.map_err(|source| EmulatorError::Thread {
-            device: "probe",
+            device: EmulatedDevice::Probe,
             source,
         })?;
-        Ok(Probe {
+        Ok(ProbeServer {
             task,
-            device: acting,
+            device,
             place,
             notes,
             rate_hz,
-            kind: device.kind(),
+            kind: config.probe.device.kind(),
             link,
         })
     }
 
-    /// Misbehaves from now on.
-    pub fn ask(&self, fault: Fault) {
-        self.device
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .inject_fault(fault);
+    /// Begins a fault, or ends one.
+    pub fn inject(&self, fault: Fault) {
+        let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        device.inject_fault(fault);
     }
 
-    /// The port, or the reader's end of the pseudo terminal.
+    /// The port, or the reader's side of the pseudo terminal.
     pub fn place(&self) -> &Path {
         &self.place
     }
@@ -100,12 +95,12 @@ impl Probe {
         self.link.as_ref().map(Link::path)
     }
 
-    /// What the port did not take.
+    /// Settings that the port did not accept.
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }
 
-    /// Measurements a second.
+    /// Measurements per second.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
@@ -115,49 +110,58 @@ impl Probe {
         self.kind
     }
 
-    /// What has gone over the line.
-    pub fn carried(&self) -> &LineCounts {
+    /// Bytes and measurements so far.
+    pub fn counts(&self) -> &LineCounts {
         self.task.counts()
     }
 
-    /// Whether the line is lost: the port is gone.
+    /// Whether the serial port is gone.
     pub fn is_lost(&self) -> bool {
-        self.carried().is_lost.load(Relaxed)
+        self.counts().is_lost.load(Relaxed)
     }
 }
 
-/// As fast as the configured readings come, a probe that is asked somewhat faster.
-pub fn measuring_rate_hz(config: &Config) -> f64 {
-    let is_asked = match &config.probe.device {
-        ProbeDevice::Capancdt(_) => true,
-        ProbeDevice::Ascii(device) => device.request.is_some(),
-        ProbeDevice::Optoncdt(_) | ProbeDevice::Simulated(_) => false,
+fn simulated() -> EmulatorError {
+    let device = EmulatedDevice::Probe;
+    EmulatorError::Simulated { device }
+}
+
+/// The rate of the configured readings; a polled probe measures somewhat faster.
+fn measuring_rate_hz(probe: &ProbeSettings) -> Result<f64, SerialError> {
+    let readings_hz = probe.rate_hz.unwrap_or(STREAM_HZ);
+    let serial = probe.device.serial();
+    let is_polled = match serial {
+        Some(serial) => serial.protocol.decoder()?.request().is_some(),
+        None => false,
     };
-    let answers_hz = config.probe.rate_hz.unwrap_or(STREAM_HZ);
-    if is_asked {
-        MEASUREMENTS_PER_ANSWER * answers_hz
+    Ok(if is_polled {
+        MEASUREMENTS_PER_ANSWER * readings_hz
     } else {
-        answers_hz
-    }
-}
-
-fn line(settings: PortSettings, end: &ProbeEndpoint) -> Result<(Line, Vec<Note>), EmulatorError> {
-    Ok(match end {
-        ProbeEndpoint::Terminal(_) => (Line::terminal(settings)?, Vec::new()),
-        ProbeEndpoint::Port(path) => Line::port(PortSettings {
-            path: path.clone(),
-            ..settings
-        })?,
+        readings_hz
     })
 }
 
-/// What the probe measures at a time, in its own metres: position = gain (reading) + offset, the other way round.
-fn measure(config: &Config, stage: Stage) -> impl FnMut(u64) -> f64 + Send + use<> {
-    let MountingSettings { gain, offset_m } =
-        config.probe.device.mounting().unwrap_or(MountingSettings {
-            gain: 1.0,
-            offset_m: 0.0,
-        });
-    let mut sensor = Sensor::new(config);
-    move |at_ns| (sensor.sense(stage.position_m(at_ns)) - offset_m) / gain
+fn open_line(
+    settings: PortSettings,
+    endpoint: &ProbeEndpoint,
+) -> Result<(Line, Vec<Note>), SerialError> {
+    match endpoint {
+        ProbeEndpoint::Terminal(_) => Ok((Line::terminal(settings)?, Vec::new())),
+        ProbeEndpoint::Port(path) => {
+            let path = path.clone();
+            Line::port(PortSettings { path, ..settings })
+        }
+    }
+}
+
+/// What the probe measures at a time, in its own metres: the inverse of position = gain * reading + offset.
+fn measurement(
+    mut sensor: Sensor,
+    mounting: Mounting,
+    stage: Stage,
+) -> impl FnMut(u64) -> f64 + Send {
+    move |at_ns| {
+        let sensed_m = sensor.sense(stage.position_m(at_ns));
+        (sensed_m - mounting.offset_m) / mounting.gain
+    }
 }

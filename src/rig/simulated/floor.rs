@@ -1,4 +1,4 @@
-//! The floor's acceleration: a sum of lines, each a band-passed white noise of stated RMS.
+//! The acceleration of the floor: a sum of lines, each of which is band-passed white noise with a given RMS.
 //!
 //! p'' + 2 zeta w p' + w^2 p = white noise; the line is v = p', whose spectrum is a band-pass about w. In the steady
 //! state the covariance of (w p, v) is rms^2 I, so the process is sampled exactly by x+ = F x + L n with F the exponential
@@ -10,7 +10,7 @@ use super::noise::Gaussian;
 use crate::config::FloorLine;
 use crate::model::plant::matrix_exponential;
 
-/// One line of the floor's acceleration.
+/// One line of the acceleration.
 #[derive(Clone, Debug)]
 pub(super) struct Line {
     over_period: Matrix2<f64>,
@@ -44,7 +44,7 @@ impl Line {
         }
     }
 
-    /// The acceleration in m/s^2, held over the next period.
+    /// The acceleration in m/s^2 during the next period.
     pub(super) fn next(&mut self) -> f64 {
         let acceleration = self.state[1];
         let fresh = Vector2::new(self.noise.next(), self.noise.next());
@@ -64,7 +64,7 @@ mod tests {
     };
 
     #[test]
-    fn the_rms_is_as_stated_at_any_tick() {
+    fn the_rms_does_not_depend_on_the_tick() {
         for rate_hz in [500.0, 1000.0, 5000.0] {
             let mut line = Line::new(&LINE, 1.0 / rate_hz, Gaussian::new(3, 1));
             let n = (400.0 * rate_hz) as usize;

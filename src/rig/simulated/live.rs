@@ -1,70 +1,71 @@
-//! The stage in real time: set-points act when they come, and the position is told for any moment up to now.
+//! The stage in real time: set-points take effect at any time, and the displacement is available for any time up to now.
 
 use std::collections::VecDeque;
 
-use super::course::{Course, Passed};
+use super::trajectory::{Interval, Trajectory};
 use crate::config::Config;
 use crate::model::plant::PlantError;
 
-/// Length of a step: the fastest mode, at 284 Hz, turns by a third of a radian, and a cubic between two steps misses its
-/// amplitude by 4e-5. Where the stop may be touched, the stage takes finer steps by itself.
+/// Length of a step. It is a third of a radian of the fastest mode at 284 Hz; the cubic between two steps then has a relative
+/// error of 4e-5. Near the stop the stage uses finer steps.
 const STEP_S: f64 = 200e-6;
-/// Steps of the past that are kept, for who asks a little late: 0.1 s.
-const KEPT: usize = 500;
+/// Number of past steps that are stored: 0.1 s.
+const STORED: usize = 500;
 
-/// A stage that is carried on to whatever moment is asked for. Times are in seconds since it was made.
+/// A stage that is advanced to the requested time. Times are in seconds since its creation.
 #[derive(Clone, Debug)]
 pub struct LiveStage {
-    course: Course,
-    /// Steps done.
+    trajectory: Trajectory,
+    /// Number of steps so far.
     done: u64,
-    /// The latest of them.
-    past: VecDeque<Passed>,
+    /// The latest steps.
+    past: VecDeque<Interval>,
 }
 
 impl LiveStage {
-    /// The stage of a configuration, at rest, with its floor and its stop.
+    /// The configured stage, at rest.
     pub fn new(config: &Config) -> Result<Self, PlantError> {
         Ok(LiveStage {
-            course: Course::new(config, STEP_S, 0.0)?,
+            trajectory: Trajectory::new(config, STEP_S, 0.0)?,
             done: 0,
-            past: VecDeque::with_capacity(KEPT + 1),
+            past: VecDeque::with_capacity(STORED + 1),
         })
     }
 
-    /// Takes a set-point that acts from `time_s` on; in what has passed already nothing changes.
+    /// Adds a set-point that takes effect at `time_s`. The past does not change.
     pub fn command(&mut self, time_s: f64, current_a: f64) {
-        self.course.push(time_s / STEP_S, current_a);
+        self.trajectory.push(time_s / STEP_S, current_a);
     }
 
-    /// Where the stage is at `time_s`, in metres. What is older than is kept is where it was when the record begins.
+    /// Displacement at `time_s`, in metres; before the oldest stored step that of its beginning.
     pub fn position_m(&mut self, time_s: f64) -> f64 {
         let time = self.advance(time_s);
         self.step_at(time)
             .map_or(0.0, |step| step.position_m(time.max(step.from)))
     }
 
-    /// The current at the end of the step in which `time_s` lies, in amperes.
+    /// Current at the end of the step that contains `time_s`, in amperes.
     pub fn current_a(&mut self, time_s: f64) -> f64 {
         let time = self.advance(time_s);
         self.step_at(time).map_or(0.0, |step| step.current_a)
     }
 
-    /// Carries the stage on until `time_s`; returns that time in steps.
+    /// Advances the stage to `time_s`; returns that time in steps.
     fn advance(&mut self, time_s: f64) -> f64 {
         let time = time_s / STEP_S;
         while self.past.back().is_none_or(|step| step.to < time) {
-            self.past.push_back(self.course.pass(self.done));
+            self.past
+                .push_back(self.trajectory.advance_interval(self.done));
             self.done += 1;
-            if self.past.len() > KEPT {
+            if self.past.len() > STORED {
                 self.past.pop_front();
             }
         }
         time
     }
 
-    /// The step in which `time` lies, or the oldest that is kept.
-    fn step_at(&self, time: f64) -> Option<&Passed> {
+    /// The step that contains `time`, or the oldest stored one.
+    fn step_at(&self, time: f64) -> Option<&Interval> {
         let after = self.past.partition_point(|step| step.to < time);
         self.past.get(after)
     }
@@ -99,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn the_past_is_told_as_it_was_whoever_asked_for_the_present_first() {
+    fn the_past_does_not_depend_on_earlier_requests() {
         let (mut in_order, mut out_of_order) = (quiet(), quiet());
         for stage in [&mut in_order, &mut out_of_order] {
             stage.command(0.01, 1.0);
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn between_two_steps_the_position_has_no_jump() {
+    fn the_displacement_is_smooth_between_steps() {
         let mut stage = quiet();
         stage.command(0.0, 1.0);
         let x: Vec<f64> = (0..10_000)
@@ -127,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_long_ago_is_told_by_the_oldest_that_is_kept() {
+    fn times_before_the_stored_steps_give_the_oldest_position() {
         let mut stage = quiet();
         stage.command(0.0, 1.0);
         stage.position_m(1.0);

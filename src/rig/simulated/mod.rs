@@ -1,91 +1,102 @@
-//! A rig that obeys the model: amplifier with limits, steps and latency, stage with unmodelled modes and stop, probe with
-//! noise, quantisation, range, age and a rate of its own, a moving floor. Behind the hardware boundary, so that the loop
-//! cannot tell.
+//! The simulated rig: an amplifier with limits, resolution and latency, a stage with unmodelled modes, mechanical stop and
+//! floor motion, and a probe with noise, quantisation, range, delay and a clock of its own. It implements the traits of
+//! [`bench_hal`], so the loop drives it as it drives real devices.
 //!
-//! The same seed and settings give the same readings, bit for bit, on any x86-64 or ARM machine: sums are in a fixed
-//! order, every transcendental function comes from the `libm` crate, and no library picks its kernel by the processor.
+//! The same seed and settings give bit-identical readings on every x86-64 and ARM machine: the order of sums is fixed, every
+//! transcendental function comes from the `libm` crate, and no library selects code by the processor.
 
-mod body;
-mod course;
 mod floor;
 mod live;
 mod noise;
+mod nonlinear_plant;
 mod probe;
 mod setpoints;
 mod stage;
+mod trajectory;
 
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
 use crate::config::{Config, Geometry, PlantSettings, UnmodelledMode};
 use crate::model::plant::{self, ModalModel, Mode, PlantError};
-use body::Body;
-use course::Course;
+use nonlinear_plant::NonlinearPlant;
 use probe::Probe;
 use stage::Stage;
+use trajectory::Trajectory;
 
 pub use live::LiveStage;
 pub use probe::Sensor;
 
 /// The simulated amplifier, stage and probe.
+///
+/// ```
+/// use bench::config::{Source, load};
+/// use bench::rig::simulated::SimulatedRig;
+/// use bench_hal::{DisplacementProbe, Tick, Validity};
+///
+/// let config = load(&Source::default()).unwrap();
+/// let mut rig = SimulatedRig::new(&config).unwrap();
+/// assert_eq!(rig.latest(Tick::default()).validity, Validity::Valid);
+/// ```
 #[derive(Clone, Debug)]
 pub struct SimulatedRig {
-    course: Course,
+    trajectory: Trajectory,
     status: AmplifierStatus,
-    /// From a command to its action, in ticks.
+    /// Time from a command to its effect, in ticks.
     delay: f64,
     accepted_a: f64,
     current_limit_a: f64,
-    largest_change_a: f64,
+    max_change_a: f64,
     current_step_a: f64,
     probe: Probe,
-    /// All that happens, happens at ticks: no fraction of a period needs to be resolved.
-    in_step: bool,
+    /// Whether commands and measurements occur at ticks only, so that no fraction of a period needs to be resolved.
+    is_synchronous: bool,
     tick: Option<u64>,
 }
 
 impl SimulatedRig {
-    /// A rig at rest, as configured.
+    /// The configured rig, at rest.
     pub fn new(config: &Config) -> Result<Self, PlantError> {
         let latency = config.amplifier.latency_s * config.servo.rate_hz;
         let delay = f64::from(config.servo.computing_delay_periods) + latency;
         Ok(SimulatedRig {
-            course: Course::new(config, config.servo.period_s(), delay)?,
+            trajectory: Trajectory::new(config, config.servo.period_s(), delay)?,
             status: AmplifierStatus::Disabled,
             delay,
             accepted_a: 0.0,
             current_limit_a: config.amplifier.current_limit_a,
-            largest_change_a: config.amplifier.slew_limit_a_per_s * config.servo.period_s(),
+            max_change_a: config.amplifier.slew_limit_a_per_s * config.servo.period_s(),
             current_step_a: config.amplifier.device.current_step_a(),
-            probe: Probe::new(config),
-            in_step: latency == 0.0 && probe::is_immediate(config),
+            probe: Probe::new(&config.probe, &config.sim, &config.servo),
+            is_synchronous: latency == 0.0 && probe::is_immediate(&config.probe),
             tick: None,
         })
     }
 
-    /// Where the stage really is, in metres: for tests and studies, nothing behind the boundary can see it.
+    /// The true displacement of the stage in metres, for tests and studies. The loop does not see it.
     pub fn true_position_m(&self) -> f64 {
-        self.course.position_m()
+        self.trajectory.position_m()
     }
 
-    /// The period after `tick`.
+    /// Advances by the period after `tick`.
     fn advance(&mut self, tick: u64) {
-        if self.in_step {
-            return self.course.advance(tick);
+        if self.is_synchronous {
+            return self.trajectory.advance(tick);
         }
-        for step in 0..self.course.fine_steps() {
-            let passed = self.course.pass_finely(tick, step);
-            self.probe.watch(passed.to, |time| passed.position_m(time));
+        for step in 0..self.trajectory.fine_steps() {
+            let interval = self.trajectory.advance_interval_finely(tick, step);
+            self.probe
+                .measure_until(interval.to, |time| interval.position_m(time));
         }
     }
 
-    /// The nearest step, limited in slope and size.
+    /// The set-point that the amplifier accepts: limited in slope, rounded to its resolution, limited in size.
     fn accept(&self, current_a: f64) -> f64 {
         let change_a = current_a - self.accepted_a;
-        let within = change_a.abs() <= self.largest_change_a;
+        let within = change_a.abs() <= self.max_change_a;
         let reached_a = if within {
             current_a
         } else {
-            self.accepted_a + self.largest_change_a.copysign(change_a)
+            self.accepted_a + self.max_change_a.copysign(change_a)
         };
         let step_a = self.current_step_a;
         let stepped_a = if step_a > 0.0 {
@@ -97,27 +108,27 @@ impl SimulatedRig {
     }
 }
 
-/// The moving stage, its plant linear or not, to be carried by periods of `period_s`.
+/// The stage, with a linear or a nonlinear plant, for periods of `period_s`.
 fn stage(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
     match config.sim.geometry {
         Geometry::Linear => Ok(Stage::new(config, &modes(config)?, None, period_s)),
         Geometry::Quadratic => Ok(Stage::new(
             config,
             &unmodelled_modes(config),
-            Some(Body::new(config)?),
+            Some(NonlinearPlant::new(config)?),
             period_s,
         )),
     }
 }
 
-/// The modes of the linear rig: those of the plant's model and those that it leaves out.
+/// The modes of the linear rig: those of the plant's model, and the unmodelled ones.
 pub fn modes(config: &Config) -> Result<Vec<Mode>, PlantError> {
     let mut modes = ModalModel::of(&plant::build(&actual_plant(config))?)?.modes;
     modes.extend(unmodelled_modes(config));
     Ok(modes)
 }
 
-/// The plant as the simulated stage was made: with an asymmetry that its configuration does not know of.
+/// The plant of the simulated stage. Its mass asymmetry differs from the configured one by `sim.asymmetry_offset`.
 pub fn actual_plant(config: &Config) -> PlantSettings {
     let mut plant = config.plant.clone();
     if let PlantSettings::Sr4dof(settings) = &mut plant {
@@ -127,11 +138,11 @@ pub fn actual_plant(config: &Config) -> PlantSettings {
 }
 
 fn unmodelled_modes(config: &Config) -> Vec<Mode> {
-    config.sim.unmodelled.iter().map(unmodelled).collect()
+    config.sim.unmodelled.iter().map(unmodelled_mode).collect()
 }
 
-/// An unmodelled mode has a residue, but neither a shape nor a part in the floor's motion.
-fn unmodelled(mode: &UnmodelledMode) -> Mode {
+/// An unmodelled mode has a residue, but no shape, and the floor does not excite it.
+fn unmodelled_mode(mode: &UnmodelledMode) -> Mode {
     let size = mode.residue_per_kg.abs().sqrt();
     Mode {
         omega_rad_s: 2.0 * std::f64::consts::PI * mode.frequency_hz,
@@ -159,7 +170,7 @@ impl CurrentAmplifier for SimulatedRig {
             });
         }
         self.accepted_a = self.accept(current_a);
-        self.course.push(
+        self.trajectory.push(
             self.tick.unwrap_or_default() as f64 + self.delay,
             self.accepted_a,
         );
@@ -168,7 +179,7 @@ impl CurrentAmplifier for SimulatedRig {
 
     fn disable(&mut self) {
         self.status = AmplifierStatus::Disabled;
-        self.course.clear();
+        self.trajectory.clear();
         self.accepted_a = 0.0;
     }
 
@@ -183,8 +194,8 @@ impl DisplacementProbe for SimulatedRig {
             self.advance(tick);
         }
         self.tick = Some(now.number);
-        if self.in_step {
-            self.probe.measure(self.course.position_m())
+        if self.is_synchronous {
+            self.probe.measure(self.trajectory.position_m())
         } else {
             self.probe.latest(now.number as f64)
         }

@@ -1,5 +1,5 @@
-//! Random numbers that are the same on every machine: PCG for the bits, Box and Muller with a portable libm for the
-//! Gaussian.
+//! Random numbers that are identical on every machine: PCG for the bits, and the Box-Muller transform with a portable libm
+//! for the normal distribution.
 
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -12,7 +12,7 @@ pub(super) struct Gaussian {
 }
 
 impl Gaussian {
-    /// The stream `number` of `seed`; streams are independent of one another.
+    /// The stream `number` of `seed`; different streams are independent.
     pub(super) fn new(seed: u64, number: u64) -> Self {
         // SplitMix64's finaliser: seeds that differ in one bit give states that differ in half of them.
         let mixed = [seed, !seed].map(|x| {

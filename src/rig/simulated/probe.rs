@@ -1,17 +1,17 @@
-//! The simulated probe: noise, quantisation, range, a clock of its own, and readings that arrive later.
+//! The simulated probe: noise, quantisation, range, a clock of its own, and delayed readings.
 
 use std::collections::VecDeque;
 
 use bench_hal::{Reading, Validity};
 
 use super::noise::Gaussian;
-use crate::config::Config;
+use crate::config::{LoopSettings, ProbeSettings, SimSettings};
 
-/// The clock of a free-running probe differs from the loop's by as much, so that readings of all ages occur, as they do
-/// where two oscillators drift past each other; no simple ratio, so that they fill the period evenly.
+/// Relative difference between the clock of a free-running probe and that of the loop. The readings then take all ages, as with
+/// two real oscillators; the ratio is irrational, so that the ages are uniformly distributed.
 const CLOCK_ERROR: f64 = 0.618_034e-3;
 
-/// What lies between a position and the number that a probe makes of it: noise and quantisation.
+/// Noise and quantisation of a probe.
 #[derive(Clone, Debug)]
 pub struct Sensor {
     noise: Gaussian,
@@ -20,16 +20,16 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// The sensor of a configuration.
-    pub fn new(config: &Config) -> Self {
+    /// The configured sensor.
+    pub fn new(sim: &SimSettings) -> Self {
         Sensor {
-            noise: Gaussian::new(config.sim.seed, 0),
-            noise_rms_m: config.sim.probe_noise_rms_m,
-            quantum_m: config.sim.probe_quantisation_m,
+            noise: Gaussian::new(sim.seed, 0),
+            noise_rms_m: sim.probe_noise_rms_m,
+            quantum_m: sim.probe_quantisation_m,
         }
     }
 
-    /// What is measured at `position_m`, in metres.
+    /// The measurement at `position_m`, in metres.
     pub fn sense(&mut self, position_m: f64) -> f64 {
         let noisy_m = position_m + self.noise_rms_m * self.noise.next();
         if self.quantum_m > 0.0 {
@@ -40,52 +40,51 @@ impl Sensor {
     }
 }
 
-/// The probe, with what it has measured and not yet told. Times are in ticks since the start.
+/// The probe and its measurements that have not arrived yet. Times are in ticks since the start.
 #[derive(Clone, Debug)]
 pub(super) struct Probe {
     sensor: Sensor,
     half_range_m: f64,
     sequence: u64,
-    /// From one measurement to the next.
+    /// Time between two measurements.
     period: f64,
-    /// From a measurement to its arrival.
+    /// Time from a measurement to its arrival.
     age: f64,
-    /// When the next measurement is due.
+    /// Time of the next measurement.
     due: f64,
-    /// Measured, not yet arrived, with the time of the measurement.
-    coming: VecDeque<(f64, Reading)>,
+    /// Measurements that have not arrived yet, with their times.
+    pending: VecDeque<(f64, Reading)>,
     newest: (f64, Reading),
     tick_s: f64,
 }
 
 impl Probe {
-    /// The probe of a configuration, which has already seen the stage at rest once.
-    pub(super) fn new(config: &Config) -> Self {
-        let rate_hz = config.servo.rate_hz;
-        let period = config
-            .probe
+    /// The configured probe, with one measurement of the stage at rest.
+    pub(super) fn new(settings: &ProbeSettings, sim: &SimSettings, servo: &LoopSettings) -> Self {
+        let rate_hz = servo.rate_hz;
+        let period = settings
             .rate_hz
             .map_or(1.0, |probe_hz| rate_hz / probe_hz * (1.0 + CLOCK_ERROR));
-        let age = config.probe.age_at_arrival_s() * rate_hz;
+        let age = settings.age_at_arrival_s() * rate_hz;
         let mut probe = Probe {
-            sensor: Sensor::new(config),
-            half_range_m: config.probe.range_m / 2.0,
+            sensor: Sensor::new(sim),
+            half_range_m: settings.range_m / 2.0,
             sequence: 0,
             period,
             age,
             due: -age,
-            coming: VecDeque::with_capacity((age / period) as usize + 2),
+            pending: VecDeque::with_capacity((age / period) as usize + 2),
             newest: (-age, Reading::default()),
-            tick_s: config.servo.period_s(),
+            tick_s: servo.period_s(),
         };
-        if !is_immediate(config) {
+        if !is_immediate(settings) {
             probe.newest.1 = probe.measure(0.0);
             probe.due += period;
         }
         probe
     }
 
-    /// A measurement of `position_m`, of no age.
+    /// A measurement of `position_m` with age zero.
     pub(super) fn measure(&mut self, position_m: f64) -> Reading {
         let sensed_m = self.sensor.sense(position_m);
         let validity = if sensed_m.abs() <= self.half_range_m {
@@ -103,21 +102,21 @@ impl Probe {
         }
     }
 
-    /// Measures what falls due up to `to`; `position_m` tells where the stage is at a time.
-    pub(super) fn watch(&mut self, to: f64, position_m: impl Fn(f64) -> f64) {
+    /// Takes all measurements that are due up to `to`; `position_m` gives the displacement at a time.
+    pub(super) fn measure_until(&mut self, to: f64, position_m: impl Fn(f64) -> f64) {
         while self.due <= to + 1e-9 {
             let reading = self.measure(position_m(self.due));
-            self.coming.push_back((self.due, reading));
+            self.pending.push_back((self.due, reading));
             self.due += self.period;
             self.receive(to);
         }
     }
 
-    /// Takes what has arrived by `now`.
+    /// Updates the newest reading to the measurements that have arrived by `now`.
     fn receive(&mut self, now: f64) {
         let age = self.age;
         while let Some(arrived) = self
-            .coming
+            .pending
             .pop_front_if(|(taken, _)| *taken + age <= now + 1e-9)
         {
             self.newest = arrived;
@@ -135,7 +134,7 @@ impl Probe {
     }
 }
 
-/// Whether each tick has a reading of its very moment.
-pub(super) fn is_immediate(config: &Config) -> bool {
-    config.probe.rate_hz.is_none() && config.probe.age_at_arrival_s() == 0.0
+/// Whether each tick has a reading of the same time.
+pub(super) fn is_immediate(probe: &ProbeSettings) -> bool {
+    probe.rate_hz.is_none() && probe.age_at_arrival_s() == 0.0
 }

@@ -1,52 +1,52 @@
-//! Commands on their way to the current: accepted in a tick, acting later.
+//! Set-points that have been accepted and take effect later.
 
 use std::collections::VecDeque;
 
-/// Set-points in order, each with the time from which it acts. Times are in ticks since the start.
+/// Set-points in order, each with the time at which it takes effect. Times are in ticks since the start.
 #[derive(Clone, Debug)]
 pub(super) struct Setpoints {
-    coming_a: VecDeque<(f64, f64)>,
-    acting_a: f64,
+    pending_a: VecDeque<(f64, f64)>,
+    active_a: f64,
 }
 
 impl Setpoints {
-    /// Room for what `delay_ticks` hold back.
+    /// Capacity for the set-points of `delay_ticks`.
     pub(super) fn new(delay_ticks: f64) -> Self {
         Setpoints {
-            coming_a: VecDeque::with_capacity(delay_ticks as usize + 3),
-            acting_a: 0.0,
+            pending_a: VecDeque::with_capacity(delay_ticks as usize + 3),
+            active_a: 0.0,
         }
     }
 
-    /// Takes a set-point that acts from `due`; the last word for a moment counts.
+    /// Adds a set-point that takes effect at `due`. It replaces an earlier one for the same time.
     pub(super) fn push(&mut self, due: f64, current_a: f64) {
-        self.coming_a.pop_back_if(|(other, _)| *other == due);
-        self.coming_a.push_back((due, current_a));
+        self.pending_a.pop_back_if(|(other, _)| *other == due);
+        self.pending_a.push_back((due, current_a));
     }
 
-    /// Zero, and nothing to come.
+    /// Removes all set-points; the active one is zero.
     pub(super) fn clear(&mut self) {
-        self.coming_a.clear();
-        self.acting_a = 0.0;
+        self.pending_a.clear();
+        self.active_a = 0.0;
     }
 
-    /// What acts from `time` on, if nothing comes in between.
+    /// The set-point that is active at `time`.
     pub(super) fn at(&mut self, time: f64) -> f64 {
-        while let Some((_, current_a)) = self.coming_a.pop_front_if(|(due, _)| *due <= time) {
-            self.acting_a = current_a;
+        while let Some((_, current_a)) = self.pending_a.pop_front_if(|(due, _)| *due <= time) {
+            self.active_a = current_a;
         }
-        self.acting_a
+        self.active_a
     }
 
-    /// The mean from `from` to `to`: over a step much shorter than anything that answers, its impulse is all that counts.
+    /// The mean from `from` to `to`. For a step much shorter than the time constants of the stage only the impulse matters.
     pub(super) fn mean(&mut self, from: f64, to: f64) -> f64 {
         let (mut sum, mut since) = (0.0, from);
-        while let Some((due, current_a)) = self.coming_a.pop_front_if(|(due, _)| *due < to) {
+        while let Some((due, current_a)) = self.pending_a.pop_front_if(|(due, _)| *due < to) {
             let due = due.max(since);
-            sum += self.acting_a * (due - since);
-            (since, self.acting_a) = (due, current_a);
+            sum += self.active_a * (due - since);
+            (since, self.active_a) = (due, current_a);
         }
-        (sum + self.acting_a * (to - since)) / (to - from)
+        (sum + self.active_a * (to - since)) / (to - from)
     }
 }
 
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_set_point_acts_from_its_time_and_the_last_word_for_a_moment_counts() {
+    fn a_set_point_takes_effect_at_its_time_and_the_last_one_counts() {
         let mut setpoints = Setpoints::new(1.0);
         setpoints.push(1.0, 5.0);
         setpoints.push(1.0, 2.0);

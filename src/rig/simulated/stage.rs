@@ -1,28 +1,28 @@
-//! The moving stage: amplifier current, modes, floor and mechanical stop, carried from tick to tick.
+//! The mechanics: amplifier current, modes, floor and mechanical stop, from tick to tick.
 //!
-//! With linear geometry the modes are those of the plant and those that it leaves out, exactly carried over whole periods.
-//! With quadratic geometry the plant is a [`Body`] of its own, carried in fine steps, and the modes are the others.
+//! With linear geometry the modes are those of the plant and the unmodelled ones; the solution over a period is exact. With
+//! quadratic geometry the plant is a [`NonlinearPlant`], solved in fine steps, and only the unmodelled modes are linear.
 
-use super::body::Body;
 use super::floor::Line;
 use super::noise::Gaussian;
+use super::nonlinear_plant::NonlinearPlant;
 use crate::config::Config;
 use crate::model::plant::{DiscretePlant, Disturbance, Mode, PlantState};
 
-/// Steps of at most this length resolve the contact with the stop: its frequency against the lightest effective mass,
-/// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, turns by 0.1 rad a step.
+/// Largest step during contact with the stop. The contact frequency with the smallest effective mass is
+/// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, so a step is 0.1 rad.
 const CONTACT_STEP_S: f64 = 20e-6;
 
-/// Position and velocity at a moment.
+/// Position and velocity at one time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct MotionState {
     position_m: f64,
     velocity_m_per_s: f64,
 }
 
-impl Place {
-    /// The position at a share of the way to `after`, `length_s` later: the cubic through both places (Hermite).
-    pub(super) fn towards(&self, after: &Place, length_s: f64, share: f64) -> f64 {
+impl MotionState {
+    /// The position at the fraction `share` of the time to `after`, which is `length_s` later: cubic Hermite interpolation.
+    pub(super) fn interpolate(&self, after: &MotionState, length_s: f64, share: f64) -> f64 {
         let rise_m = after.position_m - self.position_m;
         let (start_m, end_m) = (
             self.velocity_m_per_s * length_s,
@@ -41,7 +41,7 @@ pub(super) struct Stage {
     fine: DiscretePlant,
     fine_steps: usize,
     motion: PlantState,
-    body: Option<Body>,
+    nonlinear: Option<NonlinearPlant>,
     floor: Vec<Line>,
     floor_m_per_s2: f64,
     stop_m: f64,
@@ -50,12 +50,17 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// A stage at rest, to be carried by periods of `period_s`: `modes`, and a body where the plant is not among them.
-    pub(super) fn new(config: &Config, modes: &[Mode], body: Option<Body>, period_s: f64) -> Self {
+    /// A stage at rest, for periods of `period_s`: its linear `modes`, and the nonlinear plant, if there is one.
+    pub(super) fn new(
+        config: &Config,
+        modes: &[Mode],
+        nonlinear: Option<NonlinearPlant>,
+        period_s: f64,
+    ) -> Self {
         let contact_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
-        let fine_steps = body
+        let fine_steps = nonlinear
             .as_ref()
-            .map_or(0, |body| body.steps(period_s))
+            .map_or(0, |nonlinear| nonlinear.steps(period_s))
             .max(contact_steps);
         let (bandwidth_hz, force_constant) = (
             config.amplifier.bandwidth_hz,
@@ -72,7 +77,7 @@ impl Stage {
         let whole = sampled(period_s);
         Stage {
             motion: whole.at_rest(),
-            body,
+            nonlinear,
             whole,
             fine: sampled(period_s / fine_steps as f64),
             fine_steps,
@@ -92,14 +97,14 @@ impl Stage {
     /// Displacement at the probe in metres.
     pub(super) fn position_m(&self) -> f64 {
         let modes_m = self.whole.position_m(&self.motion);
-        self.body
+        self.nonlinear
             .as_ref()
-            .map_or(modes_m, |body| body.position_m() + modes_m)
+            .map_or(modes_m, |nonlinear| nonlinear.position_m() + modes_m)
     }
 
-    /// Where it is and where it goes.
-    pub(super) fn place(&self) -> Place {
-        Place {
+    /// Position and velocity at the probe.
+    pub(super) fn motion_state(&self) -> MotionState {
+        MotionState {
             position_m: self.position_m(),
             velocity_m_per_s: self.velocity_m_per_s(),
         }
@@ -108,8 +113,8 @@ impl Stage {
     /// Velocity at the probe in metres per second.
     fn velocity_m_per_s(&self) -> f64 {
         let modes_m_per_s = self.whole.velocity_m_per_s(&self.motion);
-        self.body.as_ref().map_or(modes_m_per_s, |body| {
-            body.velocity_m_per_s() + modes_m_per_s
+        self.nonlinear.as_ref().map_or(modes_m_per_s, |nonlinear| {
+            nonlinear.velocity_m_per_s() + modes_m_per_s
         })
     }
 
@@ -123,16 +128,16 @@ impl Stage {
         self.fine.period_s
     }
 
-    /// Fine steps in a period.
+    /// Fine steps per period.
     pub(super) fn fine_steps(&self) -> usize {
         self.fine_steps
     }
 
-    /// One period with the set-point held. Where the stop may be touched, and always with a body, in fine steps.
+    /// Advances by one period with a constant set-point; in fine steps near the stop, and always with a nonlinear plant.
     pub(super) fn advance(&mut self, setpoint_a: f64) {
-        self.shake();
+        self.update_floor();
         let reach_m = self.position_m().abs() + self.velocity_m_per_s().abs() * self.whole.period_s;
-        if self.body.is_none() && reach_m < self.stop_m {
+        if self.nonlinear.is_none() && reach_m < self.stop_m {
             let floor_m_per_s2 = self.floor_m_per_s2;
             return self.whole.step(&mut self.motion, setpoint_a, |block| {
                 -floor_m_per_s2 * block.floor
@@ -143,27 +148,27 @@ impl Stage {
         }
     }
 
-    /// The floor's acceleration for the next period.
-    pub(super) fn shake(&mut self) {
+    /// Updates the acceleration of the floor for the next period.
+    pub(super) fn update_floor(&mut self) {
         self.floor_m_per_s2 = self.floor.iter_mut().map(Line::next).sum();
     }
 
-    /// One fine step, with the stop.
+    /// Advances by one fine step, with the contact force of the stop.
     pub(super) fn advance_finely(&mut self, setpoint_a: f64) {
         let (contact_n, floor_m_per_s2) = (self.contact_n(), self.floor_m_per_s2);
-        if let Some(body) = &mut self.body {
+        if let Some(nonlinear) = &mut self.nonlinear {
             let load = Disturbance {
                 probe_n: contact_n,
                 floor_m_per_s2,
             };
-            body.step(self.fine.period_s, self.motion.current_a, setpoint_a, load);
+            nonlinear.step(self.fine.period_s, self.motion.current_a, setpoint_a, load);
         }
         self.fine.step(&mut self.motion, setpoint_a, |block| {
             contact_n * block.output - floor_m_per_s2 * block.floor
         });
     }
 
-    /// Force of the stop on the stage: a spring and a damper that push and never pull.
+    /// Force of the stop on the stage: a spring and a damper that never pull.
     fn contact_n(&self) -> f64 {
         let position_m = self.position_m();
         let depth_m = position_m.abs() - self.stop_m;

@@ -2,13 +2,17 @@
 
 use std::time::Duration;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::super::budget::{Exchange, Traffic};
 use super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
 use super::super::scale::Reference;
 use super::errors::OpenError;
 
 /// Which mode of operation the drive shall run in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum TorqueMode {
     /// Cyclic synchronous torque if the drive has it, else profile torque.
     #[default]
@@ -35,15 +39,20 @@ impl TorqueMode {
 }
 
 /// What the identity object 0x1018 must say; `None` is not checked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct ExpectedIdentity {
     /// Sub-index 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vendor: Option<u32>,
     /// Sub-index 2.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub product: Option<u32>,
     /// Sub-index 3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
     /// Sub-index 4.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub serial: Option<u32>,
 }
 

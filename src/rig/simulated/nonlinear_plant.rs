@@ -1,17 +1,17 @@
-//! The plant of a rig whose constraints are not linearised.
+//! The plant with constraints that are not linearised.
 
 use crate::config::Config;
 use crate::model::plant::{
     Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build,
 };
 
-/// A step turns the fastest mode by no more than this: its phase then errs by (0.02)^4/120 = 1.3e-9 of itself, its size by
-/// (0.02)^5/144 = 2e-11 a radian, against a damping ratio of 1e-3.
-const LARGEST_TURN: f64 = 0.02;
+/// Largest phase of the fastest mode per step, in radians. The relative error of the phase is then (0.02)^4/120 = 1.3e-9, and
+/// that of the amplitude (0.02)^5/144 = 2e-11 per radian, with a damping ratio of 1e-3.
+const MAX_PHASE_RAD: f64 = 0.02;
 
 /// The mechanism and its state.
 #[derive(Clone, Debug)]
-pub(super) struct Body {
+pub(super) struct NonlinearPlant {
     mechanism: QuadraticSr4dof,
     state: QuadraticState,
     fastest_rad_s: f64,
@@ -19,13 +19,13 @@ pub(super) struct Body {
     force_constant_n_per_a: f64,
 }
 
-impl Body {
+impl NonlinearPlant {
     /// At rest at the operating point.
-    pub(super) fn new(config: &Config) -> Result<Body, PlantError> {
-        let made = super::actual_plant(config);
-        let linear = ModalModel::of(&build(&made)?)?;
-        Ok(Body {
-            mechanism: QuadraticSr4dof::of(&made)?,
+    pub(super) fn new(config: &Config) -> Result<NonlinearPlant, PlantError> {
+        let plant = super::actual_plant(config);
+        let linear = ModalModel::of(&build(&plant)?)?;
+        Ok(NonlinearPlant {
+            mechanism: QuadraticSr4dof::of(&plant)?,
             state: QuadraticState::default(),
             fastest_rad_s: linear
                 .modes
@@ -37,9 +37,9 @@ impl Body {
         })
     }
 
-    /// Steps that a period needs.
+    /// Number of steps that a period needs.
     pub(super) fn steps(&self, period_s: f64) -> usize {
-        libm::ceil(period_s * self.fastest_rad_s / LARGEST_TURN) as usize
+        libm::ceil(period_s * self.fastest_rad_s / MAX_PHASE_RAD) as usize
     }
 
     /// x1 in metres.
@@ -52,7 +52,7 @@ impl Body {
         self.state.rate[0]
     }
 
-    /// One step: the current goes from `current_a` towards the set-point as the amplifier has it.
+    /// Advances by one step. The current approaches the set-point from `current_a` with the amplifier's bandwidth.
     pub(super) fn step(&mut self, step_s: f64, current_a: f64, setpoint_a: f64, load: Disturbance) {
         let after = |span_s: f64| {
             setpoint_a + (current_a - setpoint_a) * libm::exp(-self.lag_rad_s * span_s)

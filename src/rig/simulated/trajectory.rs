@@ -1,33 +1,33 @@
-//! Set-points and the stage that they move, with every moment between two steps.
+//! The motion of the stage under its set-points, at the steps and between them.
 
 use super::setpoints::Setpoints;
-use super::stage::{Place, Stage};
+use super::stage::{MotionState, Stage};
 use crate::config::Config;
 use crate::model::plant::PlantError;
 
-/// The stage under its set-points. Times are in periods since the start.
+/// The stage and its set-points. Times are in periods since the start.
 #[derive(Clone, Debug)]
-pub(super) struct Course {
+pub(super) struct Trajectory {
     stage: Stage,
     setpoints: Setpoints,
 }
 
-/// A step, and where the stage was during it.
+/// The motion during one step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Passed {
+pub(super) struct Interval {
     pub(super) from: f64,
     pub(super) to: f64,
-    /// Current at its end, in amperes.
+    /// Current at the end, in amperes.
     pub(super) current_a: f64,
-    before: Place,
-    after: Place,
+    before: MotionState,
+    after: MotionState,
     length_s: f64,
 }
 
-impl Passed {
-    /// Where the stage was at a time of the step, in metres.
+impl Interval {
+    /// Displacement at a time of the interval, in metres.
     pub(super) fn position_m(&self, time: f64) -> f64 {
-        self.before.towards(
+        self.before.interpolate(
             &self.after,
             self.length_s,
             (time - self.from) / (self.to - self.from),
@@ -35,66 +35,72 @@ impl Passed {
     }
 }
 
-impl Course {
-    /// At rest, to be carried by periods of `period_s`; room for the set-points that `delay` periods hold back.
+impl Trajectory {
+    /// A stage at rest, for periods of `period_s`, with capacity for the set-points of `delay` periods.
     pub(super) fn new(config: &Config, period_s: f64, delay: f64) -> Result<Self, PlantError> {
         let stage = super::stage(config, period_s)?;
-        Ok(Course {
+        Ok(Trajectory {
             stage,
             setpoints: Setpoints::new(delay),
         })
     }
 
-    /// Takes a set-point that acts from `due`.
+    /// Adds a set-point that takes effect at `due`.
     pub(super) fn push(&mut self, due: f64, current_a: f64) {
         self.setpoints.push(due, current_a);
     }
 
-    /// No set-point, and none to come.
+    /// Removes all set-points; the current set-point is zero.
     pub(super) fn clear(&mut self) {
         self.setpoints.clear();
     }
 
-    /// Where the stage is, in metres.
+    /// Displacement in metres.
     pub(super) fn position_m(&self) -> f64 {
         self.stage.position_m()
     }
 
-    /// Fine steps in a period.
+    /// Fine steps per period.
     pub(super) fn fine_steps(&self) -> usize {
         self.stage.fine_steps()
     }
 
-    /// The period `number`, the set-point at its start held.
+    /// Advances by the period `number`, with the set-point at its start.
     pub(super) fn advance(&mut self, number: u64) {
         self.stage.advance(self.setpoints.at(number as f64));
     }
 
-    /// The period `number`, with the mean of the set-points during it.
-    pub(super) fn pass(&mut self, number: u64) -> Passed {
+    /// Advances by the period `number`, with the mean of its set-points.
+    pub(super) fn advance_interval(&mut self, number: u64) -> Interval {
         let length_s = self.stage.period_s();
         self.step(number as f64, number as f64 + 1.0, length_s, Stage::advance)
     }
 
-    /// The fine step `step` of the period `number`; steps come in their order.
-    pub(super) fn pass_finely(&mut self, number: u64, step: usize) -> Passed {
+    /// Advances by the fine step `step` of the period `number`; the steps must be in order.
+    pub(super) fn advance_interval_finely(&mut self, number: u64, step: usize) -> Interval {
         if step == 0 {
-            self.stage.shake();
+            self.stage.update_floor();
         }
         let at = |step: usize| number as f64 + step as f64 / self.stage.fine_steps() as f64;
         let (from, to, length_s) = (at(step), at(step + 1), self.stage.fine_step_s());
         self.step(from, to, length_s, Stage::advance_finely)
     }
 
-    fn step(&mut self, from: f64, to: f64, length_s: f64, advance: fn(&mut Stage, f64)) -> Passed {
-        let before = self.stage.place();
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        length_s: f64,
+        advance: fn(&mut Stage, f64),
+    ) -> Interval {
+        let before = self.stage.motion_state();
         advance(&mut self.stage, self.setpoints.mean(from, to));
-        Passed {
+        Interval {
             from,
             to,
             current_a: self.stage.current_a(),
             before,
-            after: self.stage.place(),
+            after: self.stage.motion_state(),
             length_s,
         }
     }

@@ -1,0 +1,56 @@
+//! A VESC: from its settings to driver and emulation.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bench_hal::can::bus::Host;
+use bench_hal::can::emulator::{EmulatedAmplifier, EmulatedVesc};
+use bench_hal::can::vesc::{self, Vesc};
+
+use super::amplifier::{AmplifierError, CanAddress, CanAmplifier, OpenAmplifier, Requirements};
+use crate::config::VescSettings;
+
+/// Set-points are whole milliamperes.
+const STEP_A: f64 = 1e-3;
+
+impl CanAmplifier for VescSettings {
+    fn address(&self) -> CanAddress<'_> {
+        CanAddress {
+            interface: &self.interface,
+            bit_rate: self.bit_rate,
+            node: self.node,
+        }
+    }
+
+    fn current_step_a(&self) -> f64 {
+        STEP_A
+    }
+
+    fn check(&self, _requirements: Requirements) -> Result<(), AmplifierError> {
+        Ok(())
+    }
+
+    fn open(
+        &self,
+        requirements: Requirements,
+        host: Box<dyn Host>,
+    ) -> Result<OpenAmplifier, AmplifierError> {
+        let node = self.node;
+        let opened = Vesc::open(driver_settings(self, requirements), host);
+        let vesc = opened.map_err(|why| AmplifierError::Vesc { node, why })?;
+        Ok((Box::new(vesc), format!("vesc {node}")))
+    }
+
+    fn emulate(&self) -> Arc<Mutex<dyn EmulatedAmplifier>> {
+        Arc::new(Mutex::new(EmulatedVesc::new(self.node)))
+    }
+}
+
+/// The settings of the driver.
+pub fn driver_settings(device: &VescSettings, requirements: Requirements) -> vesc::VescSettings {
+    vesc::VescSettings {
+        node: device.node,
+        current_limit_a: requirements.current_limit_a,
+        status_timeout: Duration::from_secs_f64(device.status_lost_s),
+    }
+}
