@@ -1,4 +1,4 @@
-//! `bench doctor`: could a run start? Nothing moves.
+//! `bench doctor`: could the configured runs start? Nothing is moved.
 
 use std::path::{Path, PathBuf};
 
@@ -8,12 +8,13 @@ use super::margins::{closed_loop, require_modulus_margin};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
+use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::control::Margins;
-use crate::doctor::{RunChecks, examine};
+use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
 use crate::experiment::Plan;
 
-/// Which bench, and where runs are recorded.
+/// Configuration and folder of the runs
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -27,28 +28,96 @@ const OUT: &str = "recordings";
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
-    let report = examine(&config, &runs(args), &args.out);
+    let report = examine(&config, &run_checks(args), &args.out);
     if args.bench.json {
-        print_json(&report)?
+        print_json(&report)?;
     } else {
-        print_text(&report.text(&again(args)))?
+        print_text(&text(&report, &same_options(args)))?;
     }
-    Ok(if report.ready {
-        Outcome::Done
-    } else {
-        Outcome::Failed
+    Ok(match report.ready {
+        true => Outcome::Done,
+        false => Outcome::Failed,
     })
 }
 
-/// The very checks that `bench chirp` and `bench control` make before they open a device.
-fn runs(args: &Args) -> RunChecks {
-    let chirp = || Ok(chirp::check(&args.bench.load(Purpose::Chirp, &[])?)?.travel_m);
-    let control = || loop_margins(&args.bench.load(Purpose::Control, &[])?);
-    let words = |error: CliError| error.to_string();
+/// The checks that `bench chirp` and `bench control` make before they open a device.
+fn run_checks(args: &Args) -> RunChecks {
     RunChecks {
-        chirp: chirp().map_err(words),
-        control: control().map_err(words),
+        chirp: predicted_travel_m(&args.bench).map_err(|error| error.to_string()),
+        control: control_margins(&args.bench).map_err(|error| error.to_string()),
     }
+}
+
+fn predicted_travel_m(bench: &BenchOptions) -> Result<f64, CliError> {
+    let config = bench.load(Purpose::Chirp, &[])?;
+    Ok(chirp::check(&config)?.travel_m)
+}
+
+fn control_margins(bench: &BenchOptions) -> Result<Margins, CliError> {
+    loop_margins(&bench.load(Purpose::Control, &[])?)
+}
+
+/// The findings and the conclusion. `options` are those of the runs on the command line.
+fn text(report: &Report, options: &str) -> String {
+    let findings = report.findings.iter().map(finding_text);
+    findings.collect::<String>() + &conclusion(report, options)
+}
+
+/// Columns of the subject, and of subject and severity.
+const SUBJECT: usize = 15;
+const INDENT: usize = SUBJECT + 9;
+
+fn finding_text(finding: &Finding) -> String {
+    let head = format!(
+        "{:<SUBJECT$}{:<9}",
+        finding.subject.name(),
+        finding.severity.word()
+    );
+    let what = wrap(&finding.what, INDENT);
+    let what = what.get(INDENT..).unwrap_or("\n");
+    let remedy = match &finding.remedy {
+        Some(remedy) => wrap(&format!("-> {remedy}"), INDENT),
+        None => String::new(),
+    };
+    format!("{head}{what}{remedy}")
+}
+
+fn conclusion(report: &Report, options: &str) -> String {
+    let runs = report.could_start.iter();
+    let commands: Vec<String> = runs
+        .map(|run| format!("`bench {}{options}`", run.name()))
+        .collect();
+    let (commands, counts) = (commands.join(" and "), severity_counts(report));
+    if report.ready {
+        format!("ready ({counts}): {commands} could start now\n")
+    } else if commands.is_empty() {
+        format!("NOT READY ({counts}): no run could start; see each FAILURE for its remedy\n")
+    } else {
+        format!("NOT READY ({counts}): only {commands} could start now\n")
+    }
+}
+
+fn severity_counts(report: &Report) -> String {
+    let mut counts = Vec::new();
+    for severity in [
+        Severity::Ok,
+        Severity::Note,
+        Severity::Warning,
+        Severity::Failure,
+    ] {
+        let findings = report.findings.iter();
+        let count = findings.filter(|f| f.severity == severity).count();
+        let plural = if severity == Severity::Ok || count == 1 {
+            ""
+        } else {
+            "s"
+        };
+        if count > 0 {
+            let word = severity.word().to_lowercase();
+            counts.push(format!("{count} {word}{plural}"));
+        }
+    }
+    counts.join(", ")
 }
 
 fn loop_margins(config: &Config) -> Result<Margins, CliError> {
@@ -58,44 +127,34 @@ fn loop_margins(config: &Config) -> Result<Margins, CliError> {
     Ok(margins)
 }
 
-/// The same bench on a command line.
-fn again(args: &Args) -> String {
-    let BenchOptions {
-        config,
-        sets,
-        operating_point,
-        asymmetry,
-        seed,
-        json: _,
-    } = &args.bench;
-    let one = |flag: &str, value: &Option<String>| {
-        value
-            .iter()
-            .map(|v| format!(" {flag} {}", quoted(v)))
-            .collect::<String>()
+/// The options of this command as options of the runs.
+fn same_options(args: &Args) -> String {
+    let bench = &args.bench;
+    let mut options = String::new();
+    let mut add = |flag: &str, value: &str| {
+        options += &format!(" {flag} {}", shell_quoted(value));
     };
-    let sets: String = sets
-        .iter()
-        .map(|set| format!(" --set {}", quoted(set)))
-        .collect();
-    let out = (args.out.as_path() != Path::new(OUT)).then(|| args.out.display().to_string());
-    [
-        one("--config", config),
-        sets,
-        one("--operating-point", &text(operating_point)),
-        one("--asymmetry", &text(asymmetry)),
-        one("--seed", &text(seed)),
-        one("--out", &out),
-    ]
-    .concat()
+    if let Some(config) = &bench.config {
+        add("--config", config);
+    }
+    bench.sets.iter().for_each(|set| add("--set", set));
+    if let Some(point) = &bench.operating_point {
+        add("--operating-point", &point.to_string());
+    }
+    if let Some(asymmetry) = &bench.asymmetry {
+        add("--asymmetry", &asymmetry.to_string());
+    }
+    if let Some(seed) = bench.seed {
+        add("--seed", &seed.to_string());
+    }
+    if args.out.as_path() != Path::new(OUT) {
+        add("--out", &args.out.display().to_string());
+    }
+    options
 }
 
-fn text(value: &Option<impl ToString>) -> Option<String> {
-    value.as_ref().map(ToString::to_string)
-}
-
-/// As a shell takes it.
-fn quoted(text: &str) -> String {
+/// Quoted for a shell, if necessary.
+fn shell_quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=%+:,".contains(c);
     if !text.is_empty() && text.chars().all(is_plain) {
         text.into()
@@ -107,9 +166,10 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::doctor::Subject;
 
     #[test]
-    fn the_command_to_start_is_the_one_that_was_asked_about() {
+    fn offers_the_runs_with_the_same_options() {
         let bench = BenchOptions {
             config: Some("my bench.toml".into()),
             sets: vec!["loop.rate_hz=1000".into(), "title=it's".into()],
@@ -121,15 +181,63 @@ mod tests {
             out: "monday".into(),
         };
         assert_eq!(
-            again(&args),
+            same_options(&args),
             r" --config 'my bench.toml' --set loop.rate_hz=1000 --set 'title=it'\''s' --asymmetry -10% --out monday"
         );
         assert_eq!(
-            again(&Args {
+            same_options(&Args {
                 bench: BenchOptions::default(),
                 out: OUT.into()
             }),
             ""
+        );
+    }
+
+    fn report(findings: &[Finding], could_start: &[Subject]) -> Report {
+        Report {
+            ready: could_start.len() == 2,
+            could_start: could_start.to_vec(),
+            findings: findings.to_vec(),
+            ..Report::default()
+        }
+    }
+
+    #[test]
+    fn findings_are_aligned_and_wrapped_to_80_columns() {
+        let long = "a long sentence about a queue ".repeat(5);
+        let findings = [
+            Subject::Clock.ok("fine"),
+            Subject::Recordings.note(&long, "free some space"),
+        ];
+        let text = text(&report(&findings, &[]), "");
+        let ok = "clock          ok       fine\n";
+        let note = "recordings     note     a long sentence about";
+        assert!(text.starts_with(&format!("{ok}{note}")), "{text}");
+        assert!(
+            text.contains("\n                        -> free some space\n"),
+            "{text}"
+        );
+        assert!(text.lines().all(|line| line.chars().count() <= 80));
+    }
+
+    #[test]
+    fn the_conclusion_names_the_runs_that_could_start() {
+        let failure = [Subject::Control.failure("a", "b")];
+        let none = conclusion(&report(&failure, &[]), "");
+        assert_eq!(
+            none,
+            "NOT READY (1 failure): no run could start; see each FAILURE for its remedy\n"
+        );
+        let chirp = conclusion(&report(&failure, &[Subject::Chirp]), " --config lab");
+        assert_eq!(
+            chirp,
+            "NOT READY (1 failure): only `bench chirp --config lab` could start now\n"
+        );
+        let ok = [Subject::Clock.ok("a"), Subject::Clock.ok("a")];
+        let both = conclusion(&report(&ok, &[Subject::Chirp, Subject::Control]), "");
+        assert_eq!(
+            both,
+            "ready (2 ok): `bench chirp` and `bench control` could start now\n"
         );
     }
 }

@@ -1,71 +1,71 @@
-//! The amplifier, from the interface to what the device says. The node is claimed first, so that no running bench is
-//! disturbed, and free again afterwards.
+//! The amplifier, from its interface to what the device reports. The node is claimed during the examination, so that no
+//! running bench is disturbed.
 
+use std::fmt::Display;
 use std::time::Duration;
 
 use bench_hal::can::bus::{Host, NodeInUse, SocketPort, SystemHost};
 use bench_hal::can::drive::{DriveSettings, inspect};
 use bench_hal::can::vesc::VescSettings;
 
-use super::can_interface;
-use super::can_nodes::{self, Heard};
-use super::finding::{Finding, Severity};
+use super::can_nodes::{self, BusTraffic};
+use super::finding::{Finding, Severity, Subject};
 use super::report::Report;
-use super::{bus_load, drive, vesc};
-use crate::config::{AmplifierDevice, Config};
-use crate::rig::devices::amplifier::{drive_settings, vesc_settings};
+use super::{bus_load, can_interface, drive, vesc};
+use crate::config::{AmplifierDevice, AmplifierSettings, LoopSettings};
+use crate::rig::devices::Requirements;
+use crate::rig::devices::canopen::drive_settings;
+use crate::rig::devices::vesc::driver_settings;
 
 /// How long the bus is listened to.
 const LISTEN: Duration = Duration::from_millis(300);
 
-pub(super) fn examine(config: &Config, report: &mut Report) {
-    match &config.amplifier.device {
+pub(super) fn examine(amplifier: &AmplifierSettings, servo: &LoopSettings, report: &mut Report) {
+    let requirements = Requirements::new(amplifier, servo);
+    match &amplifier.device {
         AmplifierDevice::Simulated(_) => {}
         AmplifierDevice::Canopen(device) => {
-            let settings = drive_settings(device, config);
-            let (load, finding) = bus_load::of_drive(&settings);
-            report.figures.bus_load = Some(load);
-            report.find([finding]);
-            let Some(host) = interface(&device.interface, device.bit_rate, report) else {
-                return;
-            };
-            examine_canopen_drive(&host, &settings, device.maximum_current_ratio, report);
+            let settings = drive_settings(device, requirements);
+            examine_load(bus_load::of_drive(&settings), report);
+            if let Some(host) = open_bus(&device.interface, device.bit_rate, report) {
+                let maximum_ratio = device.maximum_current_ratio;
+                examine_canopen_drive(&host, &settings, maximum_ratio, report);
+            }
         }
         AmplifierDevice::Vesc(device) => {
-            let (load, finding) = bus_load::of_vesc(config.servo.rate_hz, device.bit_rate);
-            report.figures.bus_load = Some(load);
-            report.find([finding]);
-            let Some(host) = interface(&device.interface, device.bit_rate, report) else {
-                return;
-            };
-            watch(
-                &host,
-                &vesc_settings(device, config),
-                device.bit_rate,
-                report,
-            );
+            let bit_rate = device.bit_rate;
+            examine_load(bus_load::of_vesc(servo.rate_hz, bit_rate), report);
+            if let Some(host) = open_bus(&device.interface, bit_rate, report) {
+                let settings = driver_settings(device, requirements);
+                examine_vesc(&host, &settings, bit_rate, report);
+            }
         }
     }
+}
+
+fn examine_load((load, finding): (bus_load::BusLoad, Finding), report: &mut Report) {
+    report.figures.bus_load = Some(load);
+    report.extend([finding]);
 }
 
 /// The bus behind an interface, if it can be used as it is.
-fn interface(name: &str, bit_rate: u32, report: &mut Report) -> Option<SystemHost<SocketPort>> {
-    let found = can_interface::findings(&can_interface::gather(name, bit_rate));
-    let is_usable = found
-        .iter()
-        .all(|finding| finding.verdict < Severity::Failure);
-    report.find(found);
+fn open_bus(name: &str, bit_rate: u32, report: &mut Report) -> Option<SystemHost<SocketPort>> {
+    let findings = can_interface::findings(&can_interface::gather(name, bit_rate));
+    let is_usable = findings.iter().all(|f| f.severity < Severity::Failure);
+    report.extend(findings);
     if !is_usable {
         return None;
     }
-    let opened = SocketPort::open(name, bit_rate);
-    opened
-        .map(SystemHost::new)
-        .map_err(|error| report.find([Finding::refused("CAN interface", &error)]))
-        .ok()
+    match SocketPort::open(name, bit_rate) {
+        Ok(port) => Some(SystemHost::new(port)),
+        Err(error) => {
+            report.extend([Subject::CanInterface.refused(&error)]);
+            None
+        }
+    }
 }
 
-/// A CANopen drive on a bus: who is there, and what the drive says of itself. Read only.
+/// Examines a CANopen drive on a bus: the nodes on the bus, and what the drive reports. The drive is only read.
 pub fn examine_canopen_drive(
     host: &dyn Host,
     settings: &DriveSettings,
@@ -75,31 +75,30 @@ pub fn examine_canopen_drive(
     let node = settings.node;
     let _claim = match host.claim(node) {
         Ok(claim) => claim,
-        Err(other) => return report.find([held("drive", other)]),
+        Err(holder) => return report.extend([in_use(Subject::Drive, &holder)]),
     };
-    let Some(heard) = listen(host, LISTEN, node, settings.bit_rate, report) else {
+    let Some(traffic) = listen(host, LISTEN, node, settings.bit_rate, report) else {
         return;
     };
     match inspect(host, node, settings.sdo_timeout) {
-        Ok(seen) => {
-            report.find(drive::findings(&seen, settings, maximum_ratio));
-            report.figures.drive = Some(drive::figures(&seen));
+        Ok(inspection) => {
+            report.extend(drive::findings(&inspection, settings, maximum_ratio));
+            report.figures.drive = Some(drive::figures(&inspection));
         }
-        Err(error) => report.find([silent(node, &heard, &error)]),
+        Err(error) => report.extend([no_answer(node, &traffic, &error)]),
     }
 }
 
-/// A VESC on a bus: listening only.
-pub fn watch(host: &dyn Host, settings: &VescSettings, bit_rate: u32, report: &mut Report) {
+/// Examines a VESC on a bus, by listening only.
+pub fn examine_vesc(host: &dyn Host, settings: &VescSettings, bit_rate: u32, report: &mut Report) {
     let _claim = match host.claim(settings.node) {
         Ok(claim) => claim,
-        Err(other) => return report.find([held("VESC", other)]),
+        Err(holder) => return report.extend([in_use(Subject::Vesc, &holder)]),
     };
     let time = LISTEN.max(3 * settings.status_timeout);
-    let Some(heard) = listen(host, time, settings.node, bit_rate, report) else {
-        return;
-    };
-    report.find(vesc::findings(&heard, settings));
+    if let Some(traffic) = listen(host, time, settings.node, bit_rate, report) {
+        report.extend(vesc::findings(&traffic, settings));
+    }
 }
 
 fn listen(
@@ -108,48 +107,42 @@ fn listen(
     node: u8,
     bit_rate: u32,
     report: &mut Report,
-) -> Option<Heard> {
+) -> Option<BusTraffic> {
     match can_nodes::listen(host, time) {
-        Ok(heard) => {
-            report.find(can_nodes::findings(&heard, node, bit_rate));
-            report.figures.bus = Some(heard.figures(bit_rate));
-            Some(heard)
+        Ok(traffic) => {
+            report.extend(can_nodes::findings(&traffic, node, bit_rate));
+            report.figures.bus = Some(traffic.figures(bit_rate));
+            Some(traffic)
         }
         Err(error) => {
-            report.find([Finding::refused("CAN nodes", &error)]);
+            report.extend([Subject::CanNodes.refused(&error)]);
             None
         }
     }
 }
 
-fn held(subject: &'static str, NodeInUse { node, pid }: NodeInUse) -> Finding {
-    let (who, remedy) = match pid {
+fn in_use(subject: Subject, holder: &NodeInUse) -> Finding {
+    let node = holder.node;
+    let (holder, remedy) = match holder.pid {
         None => ("another process".into(), "end it first".into()),
         Some(pid) => (
             format!("process {pid}"),
-            format!("wait for its end, or end it: a run stops with zero current on `kill {pid}`"),
+            format!("wait for its end, or end it: `kill {pid}` stops a run with zero current"),
         ),
     };
-    Finding::failure(
-        subject,
-        format!("node {node} is held by {who}; it was not asked anything"),
-        remedy,
-    )
+    let what = format!("node {node} is used by {holder}; nothing was sent to it");
+    subject.failure(what, remedy)
 }
 
-/// A node that is heard and does not answer may be stopped: then it serves no SDO.
-fn silent(node: u8, heard: &Heard, error: &impl std::fmt::Display) -> Finding {
-    let finding = Finding::refused("drive", error);
-    match heard.nodes.get(&node) {
-        Some(state) => {
-            let what = format!(
-                "{}; its heartbeat says {}",
-                finding.what,
-                can_nodes::words(*state)
-            );
-            let remedy = "a stopped node answers nothing: switch its supply off and on, or let its NMT master start it";
-            Finding::failure("drive", what, remedy)
-        }
-        None => finding,
-    }
+/// A stopped node sends heartbeats, but does not answer to SDO.
+fn no_answer(node: u8, traffic: &BusTraffic, error: &impl Display) -> Finding {
+    let finding = Subject::Drive.refused(error);
+    let Some(state) = traffic.nodes.get(&node) else {
+        return finding;
+    };
+    let state = can_nodes::state_name(*state);
+    Subject::Drive.failure(
+        format!("{}; its heartbeat reports {state}", finding.what),
+        "a stopped node does not answer: switch its supply off and on, or let its NMT master start it",
+    )
 }

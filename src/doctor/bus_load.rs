@@ -1,27 +1,28 @@
-//! What the configuration puts on the CAN bus, by the budget: frames with the worst bit stuffing.
+//! The load of the CAN bus by the configuration, with worst-case bit stuffing.
 
 use bench_hal::can::budget::{Exchange, extended_frame_bits};
 use bench_hal::can::drive::DriveSettings;
 use serde::Serialize;
 
-use super::finding::Finding;
+use super::finding::{Finding, Subject};
 
-const SUBJECT: &str = "bus load";
-/// STATUS frames of a VESC in a second, as VESC Tool has it.
+/// STATUS frames per second of a VESC, as VESC Tool sets it.
 const VESC_STATUS_HZ: f64 = 50.0;
+/// Limit of the bus load with a VESC.
+const VESC_LOAD_LIMIT: f64 = 0.8;
 
-/// What the configuration puts on the bus.
+/// The bus load by the configuration.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct BusLoad {
-    /// Part of the bus's bits, at worst.
+    /// Worst-case load, as a ratio of the bit rate.
     pub load: f64,
     /// The largest load that is accepted.
     pub load_limit: f64,
-    /// The servo rate that the limit would allow, in hertz.
+    /// The servo rate at the limit, in hertz.
     pub highest_rate_hz: f64,
 }
 
-/// Of a CANopen drive; a load above its limit was refused with the configuration.
+/// The load of a CANopen drive. The configuration refuses a load above the limit.
 pub fn of_drive(settings: &DriveSettings) -> (BusLoad, Finding) {
     let traffic = settings.traffic();
     let load = BusLoad {
@@ -31,32 +32,27 @@ pub fn of_drive(settings: &DriveSettings) -> (BusLoad, Finding) {
     };
     let exchange = match settings.exchange {
         Exchange::Asynchronous { status_hz } => {
-            format!("asynchronous set-points, {status_hz} status frames a second")
+            format!("asynchronous set-points, {status_hz} status frames per second")
         }
         Exchange::Synchronous { status_every } => {
-            format!("set-points with SYNC, a status frame after every {status_every} SYNCs")
+            format!("set-points with SYNC, one status frame per {status_every} SYNCs")
         }
     };
-    let finding = judge(
-        &load,
-        &format!("{exchange}, {} Hz", settings.rate_hz),
-        settings.bit_rate,
-    );
+    let exchange = format!("{exchange}, {} Hz", settings.rate_hz);
+    let finding = judge(&load, &exchange, settings.bit_rate);
     (load, finding)
 }
 
-/// Of a VESC: a set-point of four bytes each tick, and its STATUS of eight.
+/// The load of a VESC: a set-point of four bytes per tick, and STATUS frames of eight bytes.
 pub fn of_vesc(rate_hz: f64, bit_rate: u32) -> (BusLoad, Finding) {
-    let (set_point, status) = (
-        f64::from(extended_frame_bits(4)),
-        VESC_STATUS_HZ * f64::from(extended_frame_bits(8)),
-    );
-    let (bits, load_limit) = (f64::from(bit_rate), 0.8);
-    let load = (rate_hz * set_point + status) / bits;
+    let set_point_bits = f64::from(extended_frame_bits(4));
+    let status_bits_per_s = VESC_STATUS_HZ * f64::from(extended_frame_bits(8));
+    let bits_per_s = f64::from(bit_rate);
+    let available = VESC_LOAD_LIMIT * bits_per_s - status_bits_per_s;
     let load = BusLoad {
-        load,
-        load_limit,
-        highest_rate_hz: ((load_limit * bits - status) / set_point).max(0.0),
+        load: (rate_hz * set_point_bits + status_bits_per_s) / bits_per_s,
+        load_limit: VESC_LOAD_LIMIT,
+        highest_rate_hz: (available / set_point_bits).max(0.0),
     };
     let finding = judge(&load, &format!("set-points at {rate_hz} Hz"), bit_rate);
     (load, finding)
@@ -64,23 +60,18 @@ pub fn of_vesc(rate_hz: f64, bit_rate: u32) -> (BusLoad, Finding) {
 
 fn judge(load: &BusLoad, exchange: &str, bit_rate: u32) -> Finding {
     let what = format!(
-        "{exchange}: {:.1} % of {bit_rate} bit/s at worst; {:.0} % is the limit, which allows {:.0} Hz",
+        "{exchange}: at most {:.1} % of {bit_rate} bit/s; the limit of {:.0} % allows {:.0} Hz",
         100.0 * load.load,
         100.0 * load.load_limit,
         load.highest_rate_hz
     );
-    match load.load {
-        load if load > 1.0 => Finding::failure(
-            SUBJECT,
-            what,
-            "lower loop.rate_hz or raise the bit rate of the bus",
-        ),
-        l if l > load.load_limit => Finding::warning(
-            SUBJECT,
-            what,
-            "lower loop.rate_hz or raise the bit rate of the bus",
-        ),
-        _ => Finding::ok(SUBJECT, what),
+    let remedy = "lower loop.rate_hz or raise the bit rate of the bus";
+    if load.load > 1.0 {
+        Subject::BusLoad.failure(what, remedy)
+    } else if load.load > load.load_limit {
+        Subject::BusLoad.warning(what, remedy)
+    } else {
+        Subject::BusLoad.ok(what)
     }
 }
 
@@ -98,7 +89,7 @@ mod tests {
             ..DriveSettings::default()
         });
         assert!((load.load - 0.204).abs() < 1e-9, "{load:?}");
-        assert_eq!(finding.verdict, Severity::Ok);
+        assert_eq!(finding.severity, Severity::Ok);
         assert!(
             finding.what.contains("20.4 % of 1000000 bit/s"),
             "{}",
@@ -107,12 +98,12 @@ mod tests {
     }
 
     #[test]
-    fn a_vesc_that_the_bus_cannot_carry_is_found() {
+    fn a_vesc_beyond_the_capacity_of_the_bus_is_a_failure() {
         // 67 + 32 + floor(85 / 4) = 120 bits a set-point, 160 a STATUS: 5 kHz on 500 kbit/s are 121.6 %.
         let (load, finding) = of_vesc(5000.0, 500_000);
         assert!((load.load - 1.216).abs() < 1e-9, "{load:?}");
-        assert_eq!(finding.verdict, Severity::Failure);
-        assert_eq!(of_vesc(3500.0, 500_000).1.verdict, Severity::Warning);
-        assert_eq!(of_vesc(1000.0, 500_000).1.verdict, Severity::Ok);
+        assert_eq!(finding.severity, Severity::Failure);
+        assert_eq!(of_vesc(3500.0, 500_000).1.severity, Severity::Warning);
+        assert_eq!(of_vesc(1000.0, 500_000).1.severity, Severity::Ok);
     }
 }

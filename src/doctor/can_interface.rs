@@ -1,219 +1,208 @@
-//! The CAN interface: is it there, up, at the configured bit rate, and in good health?
+//! The CAN interface: does it exist, is it up, at the configured bit rate, and without errors?
 
 use std::path::Path;
 
 use bench_hal::can::bus::{Interface, KernelError, check_can_support};
 
-use super::finding::Finding;
-use super::system::line;
+use super::finding::{Finding, Subject, read_line};
 
-const SUBJECT: &str = "CAN interface";
 /// `ARPHRD_CAN` [Linux, include/uapi/linux/if_arp.h].
-const CAN: &str = "280";
-/// Errors from which on a controller warns [ISO 11898-1].
-const MANY_ERRORS: u16 = 96;
+const CAN_TYPE: &str = "280";
+/// Error count from which a controller is in the state error warning [ISO 11898-1].
+const WARNING_LEVEL: u16 = 96;
 
-/// What is known of an interface.
+/// Facts about an interface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterfaceFacts {
-    /// Its name in the configuration.
+    /// The configured name.
     pub name: String,
     /// The configured bit rate, in bit/s.
     pub bit_rate: u32,
-    /// Whether the kernel speaks CAN at all.
+    /// Whether the kernel supports CAN.
     pub kernel: Result<(), KernelError>,
-    /// What it is.
+    /// What the name refers to.
     pub link: Link,
-    /// CAN interfaces that there are.
+    /// The CAN interfaces of this machine.
     pub others: Vec<String>,
-    /// Frames that may wait to be sent.
+    /// Length of the transmit queue, in frames.
     pub queue_length: Option<u32>,
 }
 
-/// What stands under a name.
+/// What an interface name refers to.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Link {
     /// Nothing.
     Missing,
     /// An interface of another kind.
     NotCan,
-    /// Something that cannot be asked; the system's words.
-    Unasked(String),
+    /// An interface whose state cannot be read, with the reason.
+    Unreadable(String),
     /// A CAN interface.
     Known(Interface),
 }
 
-/// Asks the kernel.
+/// Reads the facts from the kernel.
 pub fn gather(name: &str, bit_rate: u32) -> InterfaceFacts {
     let net = Path::new("/sys/class/net");
-    let property = |property: &str| {
-        if name.contains('/') {
-            None
-        } else {
-            line(net.join(name).join(property))
-        }
-    };
-    let link = match (Interface::read(name), property("type").as_deref()) {
-        (_, Some(kind)) if kind != CAN => Link::NotCan,
+    let link = match (Interface::read(name), property(net, name, "type")) {
+        (_, Some(kind)) if kind != CAN_TYPE => Link::NotCan,
         (Ok(interface), _) => Link::Known(interface),
         (Err(_), None) => Link::Missing,
-        (Err(error), Some(_)) => Link::Unasked(error.cause),
+        (Err(error), Some(_)) => Link::Unreadable(error.cause),
     };
+    let queue_length = property(net, name, "tx_queue_len");
     InterfaceFacts {
         name: name.to_string(),
         bit_rate,
         kernel: check_can_support(),
         link,
         others: can_interfaces(net),
-        queue_length: property("tx_queue_len").and_then(|text| text.parse().ok()),
+        queue_length: queue_length.and_then(|text| text.parse().ok()),
     }
 }
 
+fn property(net: &Path, name: &str, property: &str) -> Option<String> {
+    if name.contains('/') {
+        return None;
+    }
+    read_line(net.join(name).join(property))
+}
+
 fn can_interfaces(net: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(net).into_iter().flatten().flatten();
-    let is_can =
-        |entry: &std::fs::DirEntry| line(entry.path().join("type")).as_deref() == Some(CAN);
-    let mut names: Vec<String> = entries
-        .filter(is_can)
-        .map(|e| e.file_name().to_string_lossy().into_owned())
-        .collect();
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(net).into_iter().flatten().flatten() {
+        if read_line(entry.path().join("type")).as_deref() == Some(CAN_TYPE) {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
     names.sort();
     names
 }
 
-/// What that means; a failure among it means that nothing can be sent.
+/// Judges the facts. With a failure among the findings nothing can be sent.
 pub fn findings(facts: &InterfaceFacts) -> Vec<Finding> {
     if let Err(error) = &facts.kernel {
-        return vec![Finding::refused("CAN kernel", error)];
+        return vec![Subject::CanKernel.refused(error)];
     }
     match &facts.link {
-        Link::Known(interface) => known(facts, interface),
+        Link::Known(interface) => judge(facts, interface),
         _ => vec![absent(facts)],
     }
 }
 
 fn absent(facts: &InterfaceFacts) -> Finding {
     let name = &facts.name;
-    let there = if facts.others.is_empty() {
-        "no CAN interface at all".into()
-    } else {
-        facts.others.join(", ")
+    let others = match facts.others.is_empty() {
+        true => "this machine has no CAN interface".into(),
+        false => format!("the CAN interfaces are {}", facts.others.join(", ")),
     };
-    let fitting = "plug the adapter in and load its driver (`dmesg` names it), or name one of these in amplifier.device.interface";
-    match &facts.link {
-        Link::NotCan => Finding::failure(
-            SUBJECT,
-            format!("{name} is no CAN interface; there is {there}"),
-            fitting,
-        ),
-        Link::Unasked(why) => Finding::failure(
-            SUBJECT,
-            format!("{name} cannot be asked: {why}"),
-            format!("`ip -details link show {name}` may tell more"),
-        ),
-        Link::Missing | Link::Known(_) => Finding::failure(
-            SUBJECT,
-            format!("there is no {name}; there is {there}"),
-            fitting,
-        ),
+    if let Link::Unreadable(why) = &facts.link {
+        let remedy = format!("`ip -details link show {name}` may show more");
+        let what = format!("the state of {name} cannot be read: {why}");
+        return Subject::CanInterface.failure(what, remedy);
     }
+    let what = match facts.link {
+        Link::NotCan => format!("{name} is not a CAN interface; {others}"),
+        _ => format!("{name} does not exist; {others}"),
+    };
+    let remedy = "connect the adapter and load its driver (`dmesg` names it), or correct amplifier.device.interface";
+    Subject::CanInterface.failure(what, remedy)
 }
 
-fn known(facts: &InterfaceFacts, interface: &Interface) -> Vec<Finding> {
-    let (name, want) = (&facts.name, facts.bit_rate);
-    let again =
-        format!("`ip link set {name} down` and `ip link set {name} up type can bitrate {want}`");
+fn judge(facts: &InterfaceFacts, interface: &Interface) -> Vec<Finding> {
+    let name = &facts.name;
+    let up = format!(
+        "`ip link set {name} up type can bitrate {}`",
+        facts.bit_rate
+    );
     if !interface.is_up {
-        let up = format!(
-            "`ip link set {name} up type can bitrate {want}` (a virtual one: `ip link set {name} up`)"
-        );
-        return vec![Finding::failure(SUBJECT, format!("{name} is down"), up)];
+        let remedy = format!("{up} (a virtual one: `ip link set {name} up`)");
+        return vec![Subject::CanInterface.failure(format!("{name} is down"), remedy)];
     }
+    let restart = format!("`ip link set {name} down` and {up}");
     let findings = [
-        Some(bit_rate(facts, interface, &again)),
-        state(name, interface, &again),
+        Some(bit_rate(facts, interface, &restart)),
+        controller_state(name, interface, &restart),
         errors(name, interface),
-        restart(interface),
+        automatic_restart(name, interface),
         facts.queue_length.map(|length| queue(name, length)),
     ];
     findings.into_iter().flatten().collect()
 }
 
-fn bit_rate(facts: &InterfaceFacts, interface: &Interface, again: &str) -> Finding {
-    let (name, want) = (&facts.name, facts.bit_rate);
+fn bit_rate(facts: &InterfaceFacts, interface: &Interface, restart: &str) -> Finding {
+    let (name, configured) = (&facts.name, facts.bit_rate);
     match interface.bit_rate {
-        Some(have) if have == want => Finding::ok(SUBJECT, format!("{name} is up at {have} bit/s")),
-        Some(have) => Finding::failure(
-            SUBJECT,
-            format!("{name} runs at {have} bit/s, the configuration says {want}"),
-            format!("{again}, or change amplifier.device.bit_rate"),
+        Some(actual) if actual == configured => {
+            Subject::CanInterface.ok(format!("{name} is up at {actual} bit/s"))
+        }
+        Some(actual) => Subject::CanInterface.failure(
+            format!("{name} runs at {actual} bit/s, the configuration states {configured}"),
+            format!("{restart}, or change amplifier.device.bit_rate"),
         ),
-        None => Finding::note(
-            SUBJECT,
+        None => Subject::CanInterface.note(
             format!("{name} is up and virtual: it has no bit rate and no wire"),
-            "for rehearsals only: name the real interface in amplifier.device.interface",
+            "for rehearsals only; for a real bus name its interface in amplifier.device.interface",
         ),
     }
 }
 
-fn state(name: &str, interface: &Interface, again: &str) -> Option<Finding> {
+fn controller_state(name: &str, interface: &Interface, restart: &str) -> Option<Finding> {
     let state = interface.state?;
     let what = format!("the controller of {name} is in state {state}");
     let check =
-        "check cable, termination (120 ohms at both ends), bit rate, and that the drive is powered";
-    Some(match (interface.is_healthy, state) {
-        (false, _) => Finding::failure("CAN state", what, format!("{check}; then {again}")),
-        (true, "error active") => Finding::ok("CAN state", what),
-        (true, _) => Finding::warning("CAN state", what, check),
+        "check cable, termination (120 ohms at both ends), bit rate, and the supply of the drive";
+    Some(if !interface.is_healthy {
+        Subject::CanState.failure(what, format!("{check}; then {restart}"))
+    } else if state == "error active" {
+        Subject::CanState.ok(what)
+    } else {
+        Subject::CanState.warning(what, check)
     })
 }
 
 fn errors(name: &str, interface: &Interface) -> Option<Finding> {
     let (sent, received) = interface.error_counters?;
-    let what = format!("{name} counts {sent} errors sending, {received} receiving");
-    let check = "frames are damaged or not acknowledged: check cable, termination, bit rate and other nodes";
+    let what = format!("error counters of {name}: {sent} sending, {received} receiving");
+    let remedy = "frames are damaged or not acknowledged: check cable, termination, bit rate and other nodes";
     Some(match sent.max(received) {
-        0 => Finding::ok("CAN errors", what),
-        MANY_ERRORS.. => Finding::warning("CAN errors", what, check),
-        _ => Finding::note("CAN errors", what, check),
+        0 => Subject::CanErrors.ok(what),
+        WARNING_LEVEL.. => Subject::CanErrors.warning(what, remedy),
+        _ => Subject::CanErrors.note(what, remedy),
     })
 }
 
-fn restart(interface: &Interface) -> Option<Finding> {
+fn automatic_restart(name: &str, interface: &Interface) -> Option<Finding> {
     interface.state?;
     Some(match interface.restart_ms {
-        None | Some(0) => Finding::ok(
-            "CAN restart",
-            "after a bus-off the interface waits for a person",
-        ),
-        Some(ms) => Finding::note(
-            "CAN restart",
+        None | Some(0) => {
+            Subject::CanRestart.ok("after bus-off the interface stays off until it is restarted")
+        }
+        Some(ms) => Subject::CanRestart.note(
             format!(
-                "after a bus-off the interface comes back by itself within {ms} ms; the run has tripped by then"
+                "after bus-off the interface restarts within {ms} ms; the run has tripped by then"
             ),
-            "`ip link set IFACE type can restart-ms 0` leaves that to a person",
+            format!(
+                "`ip link set {name} type can restart-ms 0` leaves the restart to the operator"
+            ),
         ),
     })
 }
 
-/// A short queue loses bursts, a long one keeps set-points that nobody wants any more.
+/// A short queue loses bursts; a long queue delays set-points until they are outdated.
 fn queue(name: &str, length: u32) -> Finding {
-    let (what, remedy) = (
-        format!("{length} frames may wait to be sent on {name}"),
-        format!("`ip link set {name} txqueuelen 10`"),
-    );
+    let what = format!("the transmit queue of {name} holds {length} frames");
+    let remedy = format!("`ip link set {name} txqueuelen 10`");
     match length {
-        0..4 => Finding::warning(
-            "CAN queue",
-            format!("{what}: too few for a tick and the heartbeat"),
-            remedy,
-        ),
-        4..=100 => Finding::ok("CAN queue", what),
-        _ => Finding::note(
-            "CAN queue",
-            format!("{what}: on a bus that stalls, old set-points would"),
-            remedy,
-        ),
+        0..4 => {
+            let what = format!("{what}: too few for a set-point and a heartbeat");
+            Subject::CanQueue.warning(what, remedy)
+        }
+        4..=100 => Subject::CanQueue.ok(what),
+        _ => {
+            let what = format!("{what}: outdated set-points may wait there");
+            Subject::CanQueue.note(what, remedy)
+        }
     }
 }
 
@@ -234,14 +223,13 @@ mod tests {
     }
 
     fn facts(link: Link) -> InterfaceFacts {
-        let (kernel, queue_length) = (Result::Ok(()), Some(10));
         InterfaceFacts {
             name: "can0".into(),
             bit_rate: 1_000_000,
-            kernel,
+            kernel: Result::Ok(()),
             link,
             others: vec!["can1".into()],
-            queue_length,
+            queue_length: Some(10),
         }
     }
 
@@ -249,131 +237,101 @@ mod tests {
         findings(&facts(Link::Known(interface)))
     }
 
-    /// What is not ok.
-    fn verdicts(found: &[Finding]) -> Vec<(&'static str, Severity)> {
-        found
-            .iter()
-            .map(|f| (f.subject, f.verdict))
-            .filter(|(_, verdict)| *verdict != Ok)
-            .collect()
+    fn not_ok(found: &[Finding]) -> Vec<(Subject, Severity)> {
+        let all = found.iter().map(|f| (f.subject, f.severity));
+        all.filter(|(_, severity)| *severity != Ok).collect()
     }
 
     #[test]
-    fn a_sound_interface_is_ok_in_everything() {
-        assert_eq!(verdicts(&found(sound())), []);
+    fn a_sound_interface_is_ok() {
+        assert_eq!(not_ok(&found(sound())), []);
         assert_eq!(found(sound()).len(), 5);
     }
 
     #[test]
-    fn each_trouble_of_an_interface_has_its_verdict() {
-        let bus_off = Interface {
-            state: Some("bus off"),
-            is_healthy: false,
-            error_counters: Some((248, 0)),
-            ..sound()
+    fn each_defect_of_an_interface_has_its_severity() {
+        let mut cases: Vec<(Interface, Vec<(Subject, Severity)>)> = Vec::new();
+        let mut case = |change: fn(&mut Interface), expected: &[(Subject, Severity)]| {
+            let mut interface = sound();
+            change(&mut interface);
+            cases.push((interface, expected.to_vec()));
         };
-        let cases = [
-            (
-                Interface {
-                    is_up: false,
-                    ..sound()
-                },
-                vec![(SUBJECT, Failure)],
-            ),
-            (
-                Interface {
-                    bit_rate: Some(500_000),
-                    ..sound()
-                },
-                vec![(SUBJECT, Failure)],
-            ),
-            (
-                bus_off,
-                vec![("CAN state", Failure), ("CAN errors", Warning)],
-            ),
-            (
-                Interface {
-                    state: Some("error passive"),
-                    is_healthy: false,
-                    ..sound()
-                },
-                vec![("CAN state", Failure)],
-            ),
-            (
-                Interface {
-                    state: Some("error warning"),
-                    ..sound()
-                },
-                vec![("CAN state", Warning)],
-            ),
-            (
-                Interface {
-                    error_counters: Some((0, 3)),
-                    ..sound()
-                },
-                vec![("CAN errors", Note)],
-            ),
-            (
-                Interface {
-                    restart_ms: Some(100),
-                    ..sound()
-                },
-                vec![("CAN restart", Note)],
-            ),
-        ];
+        case(|i| i.is_up = false, &[(Subject::CanInterface, Failure)]);
+        case(
+            |i| i.bit_rate = Some(500_000),
+            &[(Subject::CanInterface, Failure)],
+        );
+        case(
+            |i| {
+                (i.state, i.is_healthy) = (Some("bus off"), false);
+                i.error_counters = Some((248, 0));
+            },
+            &[(Subject::CanState, Failure), (Subject::CanErrors, Warning)],
+        );
+        case(
+            |i| (i.state, i.is_healthy) = (Some("error passive"), false),
+            &[(Subject::CanState, Failure)],
+        );
+        case(
+            |i| i.state = Some("error warning"),
+            &[(Subject::CanState, Warning)],
+        );
+        case(
+            |i| i.error_counters = Some((0, 3)),
+            &[(Subject::CanErrors, Note)],
+        );
+        case(|i| i.restart_ms = Some(100), &[(Subject::CanRestart, Note)]);
         for (interface, expected) in cases {
-            assert_eq!(
-                verdicts(&found(interface.clone())),
-                expected,
-                "{interface:?}"
-            );
+            assert_eq!(not_ok(&found(interface.clone())), expected, "{interface:?}");
         }
     }
 
     #[test]
     fn remedies_name_the_interface_and_the_bit_rate() {
-        let down = &found(Interface {
-            is_up: false,
-            ..sound()
-        })[0];
-        assert!(
-            down.remedy
-                .as_deref()
-                .unwrap()
-                .starts_with("`ip link set can0 up type can bitrate 1000000`")
-        );
-        let slow = &found(Interface {
-            bit_rate: Some(500_000),
-            ..sound()
-        })[0];
+        let mut down = sound();
+        down.is_up = false;
+        let remedy = found(down)[0].remedy.clone().unwrap();
+        assert!(remedy.starts_with("`ip link set can0 up type can bitrate 1000000`"));
+        let mut slow = sound();
+        slow.bit_rate = Some(500_000);
         assert_eq!(
-            slow.what,
-            "can0 runs at 500000 bit/s, the configuration says 1000000"
+            found(slow)[0].what,
+            "can0 runs at 500000 bit/s, the configuration states 1000000"
         );
     }
 
     #[test]
     fn a_virtual_interface_is_a_note() {
-        let virtual_one = Interface {
+        let virtual_interface = Interface {
             is_up: true,
             is_healthy: true,
             ..Interface::default()
         };
-        assert_eq!(verdicts(&found(virtual_one)), [(SUBJECT, Note)]);
+        assert_eq!(
+            not_ok(&found(virtual_interface)),
+            [(Subject::CanInterface, Note)]
+        );
     }
 
     #[test]
-    fn what_is_not_there_is_told_with_what_is() {
-        for (link, words) in [
-            (Link::Missing, "there is no can0; there is can1"),
-            (Link::NotCan, "can0 is no CAN interface; there is can1"),
-            (Link::Unasked("EPERM".into()), "can0 cannot be asked: EPERM"),
+    fn an_absent_interface_is_reported_with_the_existing_ones() {
+        for (link, text) in [
+            (
+                Link::Missing,
+                "can0 does not exist; the CAN interfaces are can1",
+            ),
+            (
+                Link::NotCan,
+                "can0 is not a CAN interface; the CAN interfaces are can1",
+            ),
+            (
+                Link::Unreadable("EPERM".into()),
+                "the state of can0 cannot be read: EPERM",
+            ),
         ] {
             let found = findings(&facts(link));
-            assert_eq!(
-                (found.len(), found[0].verdict, found[0].what.as_str()),
-                (1, Failure, words)
-            );
+            assert_eq!(found.len(), 1);
+            assert_eq!((found[0].severity, found[0].what.as_str()), (Failure, text));
         }
     }
 
@@ -383,24 +341,17 @@ mod tests {
             kernel: Err(KernelError::Missing),
             ..facts(Link::Missing)
         });
-        assert_eq!(
-            (found.len(), found[0].what.as_str()),
-            (1, "this kernel has no CAN")
-        );
-        assert!(
-            found[0]
-                .remedy
-                .as_deref()
-                .unwrap()
-                .contains("modprobe can_raw")
-        );
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].subject, Subject::CanKernel);
+        let remedy = found[0].remedy.as_deref().unwrap();
+        assert!(remedy.contains("modprobe can_raw"), "{remedy}");
     }
 
     #[test]
-    fn a_queue_is_neither_too_short_nor_too_long() {
-        let verdict = |length| queue("can0", length).verdict;
+    fn a_queue_may_be_too_short_or_too_long() {
+        let severity = |length| queue("can0", length).severity;
         assert_eq!(
-            [2, 4, 10, 100, 1000].map(verdict),
+            [2, 4, 10, 100, 1000].map(severity),
             [Warning, Ok, Ok, Ok, Note]
         );
     }

@@ -1,4 +1,4 @@
-//! Who is on the bus: listening only.
+//! The traffic on the bus, by listening only.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -10,101 +10,114 @@ use bench_hal::can::frame::{CanFrame, Id};
 use bench_hal::can::{heartbeat, nmt, sync, vesc};
 use serde::Serialize;
 
-use super::finding::Finding;
+use super::finding::{Finding, Subject};
 
-const SUBJECT: &str = "CAN nodes";
-
-/// What was heard.
+/// What was received.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Heard {
-    /// For how long, in seconds.
+pub struct BusTraffic {
+    /// Duration in seconds.
     pub seconds: f64,
     /// Frames.
     pub frames: u64,
-    /// Their bits with the worst stuffing.
+    /// Bits of the frames, with worst-case stuffing.
     pub bits: u64,
     /// Heartbeats: node and its latest state.
     pub nodes: BTreeMap<u8, nmt::State>,
     /// Emergency messages: node and message.
     pub emergencies: Vec<(u8, Emergency)>,
-    /// STATUS of VESCs: node, how often, and the latest current in units of 0.1 A.
+    /// STATUS frames of VESCs: node, number of frames, and the latest current in units of 0.1 A.
     pub vescs: BTreeMap<u8, (u64, i16)>,
-    /// Nodes to which somebody sent set-points (their first receive PDO).
+    /// Nodes that received set-points (their first receive PDO).
     pub commanded: BTreeSet<u8>,
-    /// Whether somebody sent SYNC or NMT orders: a master.
+    /// Whether a master sent SYNC or NMT commands.
     pub master: bool,
-    /// What the controller told meanwhile, each once.
+    /// Conditions that the controller reported, each once.
     pub conditions: Vec<Condition>,
 }
 
-/// Figures of what was heard.
+/// Figures of the traffic.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct BusFigures {
-    /// How long was listened, in seconds.
+    /// Duration in seconds.
     pub listened_s: f64,
-    /// Frames heard.
+    /// Frames received.
     pub frames: u64,
-    /// Part of the bus's bits that they took, at worst.
+    /// Worst-case bus load, as a ratio of the bit rate.
     pub load: f64,
-    /// Nodes whose heartbeat was heard.
+    /// Nodes that sent a heartbeat.
     pub nodes: Vec<u8>,
 }
 
 /// Listens for `time`; sends nothing.
-pub fn listen(host: &dyn Host, time: Duration) -> Result<Heard, BusError> {
+pub fn listen(host: &dyn Host, time: Duration) -> Result<BusTraffic, BusError> {
     let mut bus = host.endpoint(&[])?;
-    let mut heard = Heard {
+    let mut traffic = BusTraffic {
         seconds: time.as_secs_f64(),
-        ..Heard::default()
+        ..BusTraffic::default()
     };
     let end_ns = host.now_ns().saturating_add(time.as_nanos() as u64);
-    while let Some(left_ns) = end_ns
-        .checked_sub(host.now_ns())
-        .filter(|left_ns| *left_ns > 0)
-    {
+    loop {
+        let left_ns = end_ns.saturating_sub(host.now_ns());
+        if left_ns == 0 {
+            return Ok(traffic);
+        }
         if let Some(event) = bus.receive(Duration::from_nanos(left_ns))? {
-            heard.take(event);
+            traffic.add(event);
         }
     }
-    Ok(heard)
 }
 
-impl Heard {
-    fn take(&mut self, event: BusEvent) {
+impl BusTraffic {
+    fn add(&mut self, event: BusEvent) {
         match event {
-            BusEvent::Frame(frame) => self.frame(&frame),
-            BusEvent::Condition(condition) if !self.conditions.contains(&condition) => {
-                self.conditions.push(condition)
+            BusEvent::Frame(frame) => self.add_frame(&frame),
+            BusEvent::Condition(condition) => {
+                if !self.conditions.contains(&condition) {
+                    self.conditions.push(condition);
+                }
             }
-            BusEvent::Condition(_) => {}
         }
     }
 
-    fn frame(&mut self, frame: &CanFrame) {
+    fn add_frame(&mut self, frame: &CanFrame) {
         let (id, data) = (frame.id(), frame.data());
+        let bytes = data.len() as u32;
         self.frames += 1;
-        self.bits += u64::from(bits(id, data.len() as u32));
         if id.is_extended() {
-            return self.vesc(id, data);
+            self.bits += u64::from(extended_frame_bits(bytes));
+            self.add_vesc_status(id, data);
+        } else {
+            self.bits += u64::from(base_frame_bits(bytes));
+            self.add_canopen(id, data);
         }
+    }
+
+    fn add_canopen(&mut self, id: Id, data: &[u8]) {
         let node = (id.raw() & 0x7F) as u8;
+        if id == nmt::COB_ID || id == sync::FRAME.id() {
+            self.master = true;
+            return;
+        }
         match id.raw() & 0x780 {
-            0x000 | 0x080 if id == nmt::COB_ID || id == sync::FRAME.id() => self.master = true,
-            0x080 => self
-                .emergencies
-                .extend(Emergency::decode(data).map(|emergency| (node, emergency))),
+            0x080 => {
+                let emergency = Emergency::decode(data);
+                self.emergencies.extend(emergency.map(|e| (node, e)));
+            }
             0x200 => self.commanded.extend([node]),
-            0x700 => self
-                .nodes
-                .extend(heartbeat::decode(data).map(|state| (node, state))),
+            0x700 => {
+                let state = heartbeat::decode(data);
+                self.nodes.extend(state.map(|state| (node, state)));
+            }
             _ => {}
         }
     }
 
-    fn vesc(&mut self, id: Id, data: &[u8]) {
+    fn add_vesc_status(&mut self, id: Id, data: &[u8]) {
         let node = (id.raw() & 0xFF) as u8;
-        let current = vesc::status_current(data).filter(|_| id == vesc::status_id(node));
-        if let Some(current) = current {
+        if id != vesc::status_id(node) {
+            return;
+        }
+        if let Some(current) = vesc::status_current(data) {
             let (count, latest) = self.vescs.entry(node).or_default();
             (*count, *latest) = (*count + 1, current);
         }
@@ -112,79 +125,61 @@ impl Heard {
 
     /// The figures, on a bus of `bit_rate` bit/s.
     pub fn figures(&self, bit_rate: u32) -> BusFigures {
+        let capacity_bits = f64::from(bit_rate) * self.seconds;
         BusFigures {
             listened_s: self.seconds,
             frames: self.frames,
-            load: self.bits as f64 / (f64::from(bit_rate) * self.seconds).max(1.0),
+            load: self.bits as f64 / capacity_bits.max(1.0),
             nodes: self.nodes.keys().copied().collect(),
         }
     }
 }
 
-fn bits(id: Id, bytes: u32) -> u32 {
-    if id.is_extended() {
-        extended_frame_bits(bytes)
-    } else {
-        base_frame_bits(bytes)
-    }
-}
-
-/// What that means for a run with `node`, which nobody else of this program holds.
-pub fn findings(heard: &Heard, node: u8, bit_rate: u32) -> Vec<Finding> {
-    let mut findings = vec![who(heard, bit_rate)];
+/// Judges the traffic for a run with `node`, which no other process of this program uses.
+pub fn findings(traffic: &BusTraffic, node: u8, bit_rate: u32) -> Vec<Finding> {
+    let mut findings = vec![nodes(traffic, bit_rate)];
+    findings.extend(traffic.conditions.iter().filter_map(|c| condition(*c)));
     findings.extend(
-        heard
-            .conditions
-            .iter()
-            .filter_map(|condition| trouble(*condition)),
-    );
-    findings.extend(
-        heard
+        traffic
             .emergencies
             .iter()
-            .map(|(from, emergency)| cry(*from, emergency)),
+            .map(|(from, e)| emergency(*from, e)),
     );
-    if heard.commanded.contains(&node) {
-        let what = format!("somebody else sends set-points to node {node}");
-        findings.push(Finding::warning(
-            SUBJECT,
-            what,
-            "end the other program, or unplug the other controller: two masters fight",
-        ));
-    } else if heard.master {
-        let remedy =
-            "end the other program, or unplug the other controller, unless it is meant to be there";
-        findings.push(Finding::warning(
-            SUBJECT,
-            "another master sends SYNC or NMT orders",
-            remedy,
-        ));
-    }
+    findings.extend(other_master(traffic, node));
     findings
 }
 
-fn who(heard: &Heard, bit_rate: u32) -> Finding {
-    let heartbeats = heard
-        .nodes
-        .iter()
-        .map(|(node, state)| format!("node {node} {}", words(*state)));
-    let vescs = heard.vescs.keys().map(|node| format!("VESC {node}"));
-    let all: Vec<String> = heartbeats.chain(vescs).collect();
-    let names = if all.is_empty() {
-        "nobody by heartbeat or STATUS".into()
-    } else {
-        all.join(", ")
-    };
-    let figures = heard.figures(bit_rate);
-    let (seconds, frames, percent) = (heard.seconds, heard.frames, 100.0 * figures.load);
-    Finding::ok(
-        SUBJECT,
-        format!("heard within {seconds} s: {names}; {frames} frames, {percent:.1} % of the bus"),
-    )
+fn other_master(traffic: &BusTraffic, node: u8) -> Option<Finding> {
+    let remedy = "end the other program, or disconnect the other controller";
+    if traffic.commanded.contains(&node) {
+        let what = format!("another master sends set-points to node {node}");
+        return Some(Subject::CanNodes.warning(what, remedy));
+    }
+    let remedy = format!("{remedy}, unless it is intended");
+    let what = "another master sends SYNC or NMT commands";
+    traffic
+        .master
+        .then(|| Subject::CanNodes.warning(what, remedy))
 }
 
-/// A state for people.
-pub(super) fn words(state: nmt::State) -> &'static str {
+fn nodes(traffic: &BusTraffic, bit_rate: u32) -> Finding {
+    let heartbeats = traffic.nodes.iter();
+    let heartbeats = heartbeats.map(|(node, state)| format!("node {node} {}", state_name(*state)));
+    let vescs = traffic.vescs.keys().map(|node| format!("VESC {node}"));
+    let names: Vec<String> = heartbeats.chain(vescs).collect();
+    let names = match names.is_empty() {
+        true => "no heartbeat and no STATUS".into(),
+        false => names.join(", "),
+    };
+    let percent = 100.0 * traffic.figures(bit_rate).load;
+    Subject::CanNodes.ok(format!(
+        "received within {} s: {names}; {} frames, {percent:.1} % of the bus",
+        traffic.seconds, traffic.frames
+    ))
+}
+
+/// The name of an NMT state.
+pub(super) fn state_name(state: nmt::State) -> &'static str {
     match state {
         nmt::State::BootUp => "starting",
         nmt::State::Stopped => "stopped",
@@ -193,33 +188,35 @@ pub(super) fn words(state: nmt::State) -> &'static str {
     }
 }
 
-fn trouble(condition: Condition) -> Option<Finding> {
+fn condition(condition: Condition) -> Option<Finding> {
     let what = match condition {
         Condition::BusOff => "the controller went into bus-off",
         Condition::Passive => "the controller became error passive",
         Condition::Overflow => "frames were lost",
-        Condition::Warning => "many errors: the controller warns",
-        Condition::NoAcknowledge => "nobody acknowledges frames: no other node hears this bus",
+        Condition::Warning => "the controller reports many errors",
+        Condition::NoAcknowledge => "no node acknowledges frames",
         Condition::Noise => "errors on the wire",
         Condition::Active => return None,
     };
     let remedy =
-        "check cable, termination (120 ohms at both ends), bit rate, and that the drive is powered";
+        "check cable, termination (120 ohms at both ends), bit rate, and the supply of the drive";
     Some(match condition {
-        Condition::BusOff | Condition::Passive => Finding::failure("CAN state", what, remedy),
-        _ => Finding::warning("CAN state", what, remedy),
+        Condition::BusOff | Condition::Passive => Subject::CanState.failure(what, remedy),
+        _ => Subject::CanState.warning(what, remedy),
     })
 }
 
-fn cry(node: u8, emergency: &Emergency) -> Finding {
-    let (code, text) = (emergency.code, emcy::text(emergency.code));
-    let what = format!("node {node} sent emergency 0x{code:04X}: {text}");
+fn emergency(node: u8, emergency: &Emergency) -> Finding {
+    let code = emergency.code;
+    let what = format!(
+        "node {node} sent emergency 0x{code:04X}: {}",
+        emcy::text(code)
+    );
     match code {
-        0 => Finding::note(SUBJECT, what, "none: the error is over"),
-        _ => Finding::warning(
-            SUBJECT,
+        0 => Subject::CanNodes.note(what, "none: the error is over"),
+        _ => Subject::CanNodes.warning(
             what,
-            "remove the cause; the drive's manual has the vendor's bytes",
+            "remove the cause; the manual of the drive explains the vendor's bytes",
         ),
     }
 }
@@ -229,107 +226,93 @@ mod tests {
     use super::*;
     use crate::doctor::Severity;
 
-    fn heard(frames: &[CanFrame]) -> Heard {
-        let mut heard = Heard {
+    fn traffic(frames: &[CanFrame]) -> BusTraffic {
+        let mut traffic = BusTraffic {
             seconds: 0.3,
-            ..Heard::default()
+            ..BusTraffic::default()
         };
-        frames
-            .iter()
-            .for_each(|frame| heard.take(BusEvent::Frame(*frame)));
-        heard
+        for frame in frames {
+            traffic.add(BusEvent::Frame(*frame));
+        }
+        traffic
     }
 
-    fn worst(heard: &Heard) -> Severity {
-        findings(heard, 5, 1_000_000)
-            .iter()
-            .map(|finding| finding.verdict)
-            .max()
-            .unwrap()
+    fn worst(traffic: &BusTraffic) -> Severity {
+        let findings = findings(traffic, 5, 1_000_000);
+        findings.iter().map(|f| f.severity).max().unwrap()
     }
 
     #[test]
-    fn nodes_are_known_by_their_heartbeats() {
-        let heard = heard(&[
+    fn nodes_are_detected_by_their_heartbeats() {
+        let traffic = traffic(&[
             heartbeat::frame(5, nmt::State::PreOperational),
             heartbeat::frame(9, nmt::State::Operational),
             heartbeat::frame(9, nmt::State::Stopped),
         ]);
-        let found = findings(&heard, 5, 1_000_000);
+        let found = findings(&traffic, 5, 1_000_000);
         assert_eq!(found.len(), 1);
         // Three heartbeats of 65 bits in 300 000 bits.
         assert_eq!(
             found[0].what,
-            "heard within 0.3 s: node 5 pre-operational, node 9 stopped; 3 frames, 0.1 % of the bus"
+            "received within 0.3 s: node 5 pre-operational, node 9 stopped; 3 frames, 0.1 % of the bus"
         );
-        assert_eq!(heard.figures(1_000_000).load, 195.0 / 300_000.0);
+        assert_eq!(traffic.figures(1_000_000).load, 195.0 / 300_000.0);
     }
 
     #[test]
     fn another_master_is_a_warning() {
-        assert_eq!(worst(&heard(&[sync::FRAME])), Severity::Warning);
-        assert_eq!(
-            worst(&heard(&[nmt::Command::Start.frame(9)])),
-            Severity::Warning
-        );
-        let commanded = heard(&[CanFrame::new(Id::standard(0x205), [0; 4])]);
-        assert!(
-            findings(&commanded, 5, 1_000_000)[1]
-                .what
-                .contains("set-points to node 5")
-        );
-        assert_eq!(
-            worst(&heard(&[CanFrame::new(Id::standard(0x206), [0; 4])])),
-            Severity::Ok,
-            "another's drive"
-        );
+        assert_eq!(worst(&traffic(&[sync::FRAME])), Severity::Warning);
+        let start = nmt::Command::Start.frame(9);
+        assert_eq!(worst(&traffic(&[start])), Severity::Warning);
+        let set_point = |id| CanFrame::new(Id::standard(id), [0; 4]);
+        let commanded = traffic(&[set_point(0x205)]);
+        let found = findings(&commanded, 5, 1_000_000);
+        assert!(found[1].what.contains("set-points to node 5"));
+        let other = traffic(&[set_point(0x206)]);
+        assert_eq!(worst(&other), Severity::Ok, "of another drive");
     }
 
     #[test]
-    fn emergencies_are_put_into_words() {
+    fn emergencies_are_reported_with_their_meaning() {
         let frame = Emergency {
             code: 0x4210,
             register: 8,
             vendor: [0; 5],
         }
         .frame(5);
-        let found = findings(&heard(&[frame]), 5, 1_000_000);
-        assert_eq!(found[1].what, "node 5 sent emergency 0x4210: drive too hot");
-        assert_eq!(found[1].verdict, Severity::Warning);
-        assert_eq!(
-            worst(&heard(&[Emergency::default().frame(5)])),
-            Severity::Note
-        );
+        let found = findings(&traffic(&[frame]), 5, 1_000_000);
+        let code = "node 5 sent emergency 0x4210: ";
+        assert!(found[1].what.starts_with(code), "{}", found[1].what);
+        assert_eq!(found[1].severity, Severity::Warning);
+        let over = Emergency::default().frame(5);
+        assert_eq!(worst(&traffic(&[over])), Severity::Note);
     }
 
     #[test]
-    fn what_the_controller_tells_is_told_once() {
-        let mut heard = heard(&[]);
+    fn conditions_of_the_controller_are_reported_once() {
+        let mut traffic = traffic(&[]);
         for condition in [
             Condition::BusOff,
             Condition::NoAcknowledge,
             Condition::BusOff,
             Condition::Active,
         ] {
-            heard.take(BusEvent::Condition(condition));
+            traffic.add(BusEvent::Condition(condition));
         }
-        let verdicts: Vec<Severity> = findings(&heard, 5, 1_000_000)
-            .iter()
-            .map(|f| f.verdict)
-            .collect();
+        let found = findings(&traffic, 5, 1_000_000);
+        let severities: Vec<Severity> = found.iter().map(|f| f.severity).collect();
         assert_eq!(
-            verdicts,
+            severities,
             [Severity::Ok, Severity::Failure, Severity::Warning]
         );
     }
 
     #[test]
-    fn a_vesc_is_known_by_its_status() {
-        let status = CanFrame::new(vesc::status_id(23), [0, 0, 0, 0, 0xFF, 0xFB, 0, 0]);
-        assert_eq!(
-            heard(&[status, status]).vescs,
-            BTreeMap::from([(23, (2, -5))])
-        );
-        assert!(heard(&[vesc::set_current(23, 1000)]).vescs.is_empty());
+    fn a_vesc_is_detected_by_its_status() {
+        let data = [0, 0, 0, 0, 0xFF, 0xFB, 0, 0];
+        let status = CanFrame::new(vesc::status_id(23), data);
+        let vescs = traffic(&[status, status]).vescs;
+        assert_eq!(vescs, BTreeMap::from([(23, (2, -5))]));
+        assert!(traffic(&[vesc::set_current(23, 1000)]).vescs.is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! The CANopen drive: is it the configured one, and would it take the configured run?
+//! The CANopen drive: is it the configured one, and does it accept the configured run?
 
 use bench_hal::can::cia402::{CYCLIC_TORQUE, REMOTE, State};
 use bench_hal::can::drive::{ABORT_CONNECTION, DriveSettings, Inspection};
@@ -6,16 +6,18 @@ use bench_hal::can::emcy;
 use bench_hal::can::scale::{Reference, Scale};
 use serde::Serialize;
 
-use super::finding::Finding;
+use super::finding::{Finding, Subject};
 
-const SUBJECT: &str = "drive";
+const DRIVE: Subject = Subject::Drive;
 /// The device profile of drives, in the lower half of 0x1000.
-const DRIVES: u32 = 402;
+const DRIVE_PROFILE: u32 = 402;
+/// Half the resolution of 0x6075 and 0x6072. The driver refuses larger differences.
+const TOLERANCE: f64 = 0.5e-3;
 
-/// What the drive says of itself; `null` where it does not.
+/// What the drive reports about itself; `null` for objects that it does not have.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DriveFigures {
-    /// Its name.
+    /// Name.
     pub name: Option<String>,
     /// Vendor, product, revision and serial number.
     pub identity: [Option<u32>; 4],
@@ -23,7 +25,7 @@ pub struct DriveFigures {
     pub statusword: Option<u16>,
     /// Error register.
     pub error_register: Option<u8>,
-    /// Supported modes, bit n - 1 is mode n.
+    /// Supported modes; bit n - 1 is mode n.
     pub modes: Option<u32>,
     /// Rated current in amperes.
     pub rated_current_a: Option<f64>,
@@ -32,123 +34,119 @@ pub struct DriveFigures {
 }
 
 /// The figures of an inspection.
-pub fn figures(seen: &Inspection) -> DriveFigures {
+pub fn figures(inspection: &Inspection) -> DriveFigures {
     DriveFigures {
-        name: seen.name.clone(),
-        identity: seen.identity,
-        statusword: seen.statusword,
-        error_register: seen.error_register,
-        modes: seen.modes,
-        rated_current_a: seen.rated_current_a,
-        past_errors: seen.past_errors.clone(),
+        name: inspection.name.clone(),
+        identity: inspection.identity,
+        statusword: inspection.statusword,
+        error_register: inspection.error_register,
+        modes: inspection.modes,
+        rated_current_a: inspection.rated_current_a,
+        past_errors: inspection.past_errors.clone(),
     }
 }
 
-/// What an inspection means for a run with these settings; `maximum_ratio` is the configured one of 0x6072.
-pub fn findings(seen: &Inspection, settings: &DriveSettings, maximum_ratio: f64) -> Vec<Finding> {
-    let mut findings = vec![identity(seen, settings)];
-    findings.extend(profile(seen));
-    findings.push(rated_current(seen, settings));
-    findings.extend(scale(seen, settings, maximum_ratio));
-    findings.push(mode(seen, settings));
-    findings.extend(watch(seen, settings));
-    findings.extend(state(seen));
-    findings.extend(errors(seen));
+/// Judges an inspection for a run with these settings; `maximum_ratio` is the configured value of 0x6072.
+pub fn findings(
+    inspection: &Inspection,
+    settings: &DriveSettings,
+    maximum_ratio: f64,
+) -> Vec<Finding> {
+    let mut findings = vec![identity(inspection, settings)];
+    findings.extend(inspection.device_type.and_then(profile));
+    findings.push(rated_current(inspection.rated_current_a, settings));
+    findings.extend(resolution(inspection, settings, maximum_ratio));
+    findings.push(mode(inspection.modes, settings));
+    findings.extend(missing_objects(inspection, settings));
+    findings.extend(state(inspection.statusword));
+    findings.extend(inspection.error_register.and_then(error_register));
+    findings.extend(past_errors(&inspection.past_errors));
     findings
 }
 
-fn identity(seen: &Inspection, settings: &DriveSettings) -> Finding {
-    let expected = [
-        settings.identity.vendor,
-        settings.identity.product,
-        settings.identity.revision,
-        settings.identity.serial,
+fn identity(inspection: &Inspection, settings: &DriveSettings) -> Finding {
+    let expected = &settings.identity;
+    let [vendor, product, revision, serial] = inspection.identity;
+    let fields = [
+        ("vendor", vendor, expected.vendor),
+        ("product", product, expected.product),
+        ("revision", revision, expected.revision),
+        ("serial", serial, expected.serial),
     ];
-    let fields = ["vendor", "product", "revision", "serial"];
-    let number =
-        |number: Option<u32>| number.map_or("none".into(), |number| format!("0x{number:08X}"));
-    let said: Vec<String> = fields
-        .iter()
-        .zip(seen.identity)
-        .map(|(name, have)| format!("{name} {}", number(have)))
-        .collect();
-    let name = seen.name.as_deref().unwrap_or("without a name");
-    let what = format!("node {} is {name}: {}", settings.node, said.join(", "));
-    let wrong = fields
-        .iter()
-        .zip(expected)
-        .zip(seen.identity)
-        .find(|((_, want), have)| want.is_some() && want != have);
-    match wrong {
-        Some(((field, want), _)) => Finding::failure(
-            SUBJECT,
-            format!("{what}; the configuration says {field} {}", number(want)),
+    let name = inspection.name.as_deref().unwrap_or("without a name");
+    let actual = fields.map(|(field, actual, _)| format!("{field} {}", hexadecimal(actual)));
+    let what = format!("node {} is {name}: {}", settings.node, actual.join(", "));
+    let differs = |(_, actual, expected): &&(_, Option<u32>, Option<u32>)| {
+        expected.is_some() && actual != expected
+    };
+    if let Some((field, _, expected)) = fields.iter().find(differs) {
+        let expected = hexadecimal(*expected);
+        return DRIVE.failure(
+            format!("{what}; the configuration states {field} {expected}"),
             "connect the right drive, or correct amplifier.device.identity",
-        ),
-        None if seen.identity[0].is_none() => Finding::failure(
-            SUBJECT,
-            format!("{what}; every CANopen node must tell its vendor"),
-            "is this a CANopen drive?",
-        ),
-        None => Finding::ok(SUBJECT, what),
+        );
+    }
+    if vendor.is_none() {
+        let what = format!("{what}; every CANopen node must report its vendor");
+        return DRIVE.failure(what, "check that this is a CANopen drive");
+    }
+    DRIVE.ok(what)
+}
+
+fn hexadecimal(number: Option<u32>) -> String {
+    match number {
+        Some(number) => format!("0x{number:08X}"),
+        None => "none".into(),
     }
 }
 
-fn profile(seen: &Inspection) -> Option<Finding> {
-    let profile = seen.device_type? & 0xFFFF;
-    let what = format!("it keeps device profile {profile}, drives keep {DRIVES}");
-    (profile != DRIVES).then(|| {
-        Finding::warning(
-            SUBJECT,
-            what,
-            "is this the node of the drive? See amplifier.device.node",
-        )
-    })
+fn profile(device_type: u32) -> Option<Finding> {
+    let profile = device_type & 0xFFFF;
+    let what = format!("device profile {profile} instead of {DRIVE_PROFILE} (drives)");
+    let remedy = "check that amplifier.device.node is the node of the drive";
+    (profile != DRIVE_PROFILE).then(|| DRIVE.warning(what, remedy))
 }
 
-/// The driver refuses a difference of half a milliampere, the step of 0x6075.
-fn rated_current(seen: &Inspection, settings: &DriveSettings) -> Finding {
-    let (node, want_a) = (settings.node, settings.rated_current_a);
-    match seen.rated_current_a {
-        Some(have_a) if (have_a - want_a).abs() < 0.5e-3 => {
-            Finding::ok(SUBJECT, format!("rated current {have_a} A, as configured"))
+fn rated_current(actual_a: Option<f64>, settings: &DriveSettings) -> Finding {
+    let configured_a = settings.rated_current_a;
+    match actual_a {
+        Some(actual_a) if (actual_a - configured_a).abs() < TOLERANCE => {
+            DRIVE.ok(format!("rated current {actual_a} A, as configured"))
         }
-        Some(have_a) => Finding::failure(
-            SUBJECT,
+        Some(actual_a) => DRIVE.failure(
             format!(
-                "the rated current (0x6075) is {have_a} A, the configuration says {want_a} A: every ampere would be wrong"
+                "the rated current (0x6075) is {actual_a} A, the configuration states {configured_a} A: every current would be wrong"
             ),
-            "correct amplifier.device.rated_current_a, or the drive by its commissioning program",
+            "correct amplifier.device.rated_current_a, or the drive with its commissioning program",
         ),
-        None => Finding::failure(
-            SUBJECT,
-            format!("node {node} does not tell its rated current (0x6075)"),
-            "commission its motor first: without it nobody knows what a count is",
+        None => DRIVE.failure(
+            format!("node {} does not report its rated current (0x6075)", settings.node),
+            "commission its motor first: the scale of the current depends on it",
         ),
     }
 }
 
-/// The step of the current and its limit.
-fn scale(seen: &Inspection, settings: &DriveSettings, maximum_ratio: f64) -> Option<Finding> {
-    let rated_a = seen.rated_current_a?;
-    let limit_a = settings.current_limit_a;
+/// The resolution of the current and its limit.
+fn resolution(
+    inspection: &Inspection,
+    settings: &DriveSettings,
+    maximum_ratio: f64,
+) -> Option<Finding> {
+    let rated_a = inspection.rated_current_a?;
     let reference_a = match settings.reference {
         Reference::Rated => rated_a,
-        Reference::Maximum => match maximum(seen.maximum_current_ratio, maximum_ratio) {
+        Reference::Maximum => match maximum(inspection.maximum_current_ratio, maximum_ratio) {
             Ok(ratio) => rated_a * ratio,
             Err(finding) => return Some(finding),
         },
     };
+    let limit_a = settings.current_limit_a;
     Some(match Scale::new(reference_a, limit_a) {
-        Some(scale) => Finding::ok(
-            SUBJECT,
-            format!(
-                "a count is {:.3} mA, commands end at {limit_a} A",
-                scale.step_a() * 1e3
-            ),
-        ),
-        None => Finding::failure(
-            SUBJECT,
+        Some(scale) => DRIVE.ok(format!(
+            "a count is {:.3} mA, the limit is {limit_a} A",
+            scale.step_a() * 1e3
+        )),
+        None => DRIVE.failure(
             format!("a count is {reference_a} mA, more than the limit of {limit_a} A"),
             "raise amplifier.current_limit_a",
         ),
@@ -156,149 +154,125 @@ fn scale(seen: &Inspection, settings: &DriveSettings, maximum_ratio: f64) -> Opt
 }
 
 /// The maximum that the target refers to, as a ratio of the rated current.
-fn maximum(said: Option<f64>, configured: f64) -> Result<f64, Finding> {
-    match said {
-        Some(ratio) if (ratio - configured).abs() < 0.5e-3 => Ok(ratio),
-        Some(ratio) => Err(Finding::warning(
-            SUBJECT,
-            format!(
-                "the maximum (0x6072) is {ratio} of the rated current, the configuration says {configured}"
-            ),
-            "correct amplifier.device.maximum_current_ratio: the step of the current follows from it",
+fn maximum(actual: Option<f64>, configured: f64) -> Result<f64, Finding> {
+    match actual {
+        Some(ratio) if (ratio - configured).abs() < TOLERANCE => Ok(ratio),
+        Some(ratio) => Err(DRIVE.warning(
+            format!("the maximum (0x6072) is {ratio} of the rated current, the configuration states {configured}"),
+            "correct amplifier.device.maximum_current_ratio: the resolution of the current depends on it",
         )),
-        None => Err(Finding::failure(
-            SUBJECT,
-            "it does not tell the maximum (0x6072) that its target refers to",
+        None => Err(DRIVE.failure(
+            "the drive does not report the maximum (0x6072) that its target refers to",
             "commission it first, or set amplifier.device.target_reference",
         )),
     }
 }
 
-fn mode(seen: &Inspection, settings: &DriveSettings) -> Finding {
-    let Some(supported) = seen.modes else {
-        let remedy = "none: the run sets a mode and looks whether the drive took it";
-        return Finding::note(
-            SUBJECT,
-            "it does not tell its modes of operation (0x6502)",
-            remedy,
+fn mode(supported: Option<u32>, settings: &DriveSettings) -> Finding {
+    let Some(supported) = supported else {
+        return DRIVE.note(
+            "the drive does not report its modes of operation (0x6502)",
+            "none: the run sets a mode and checks that the drive accepts it",
         );
     };
     match settings.mode.choose(supported) {
-        Some(CYCLIC_TORQUE) => Finding::ok(
-            SUBJECT,
-            "it would run in cyclic synchronous torque (mode 10)",
-        ),
-        Some(mode) => Finding::ok(
-            SUBJECT,
-            format!("it would run in profile torque (mode {mode}), with its slope"),
-        ),
-        None => Finding::failure(
-            SUBJECT,
-            format!("it has none of the configured modes (0x6502 is 0x{supported:08X})"),
+        Some(CYCLIC_TORQUE) => DRIVE.ok("mode of a run: cyclic synchronous torque (10)"),
+        Some(mode) => DRIVE.ok(format!("mode of a run: profile torque ({mode}), with its slope")),
+        None => DRIVE.failure(
+            format!("the drive has none of the configured modes (0x6502 is 0x{supported:08X})"),
             "set amplifier.device.mode to one that it has: bit 9 is cyclic synchronous torque, bit 3 profile torque",
         ),
     }
 }
 
-/// Without these objects it would not stop when nobody is left to stop it.
-fn watch(seen: &Inspection, settings: &DriveSettings) -> Option<Finding> {
-    let needed =
-        |address: &&_| settings.abort_connection.is_some() || **address != ABORT_CONNECTION;
-    let lacking: Vec<String> = seen
+/// Without these objects the drive does not stop when communication is lost.
+fn missing_objects(inspection: &Inspection, settings: &DriveSettings) -> Option<Finding> {
+    let needs_abort_connection = settings.abort_connection.is_some();
+    let missing: Vec<String> = inspection
         .missing_objects
         .iter()
-        .filter(needed)
+        .filter(|address| needs_abort_connection || **address != ABORT_CONNECTION)
         .map(|address| address.to_string())
         .collect();
-    let remedy = "choose a drive that watches its master; where only 0x6007 is missing, prove by unplugging the bus that it \
-                  stops, then set amplifier.device.when_unheard = \"own_reaction\"";
-    let what = || {
-        format!(
-            "it lacks {}: it would not stop when it no longer hears us",
-            lacking.join(", ")
-        )
-    };
-    (!lacking.is_empty()).then(|| Finding::failure(SUBJECT, what(), remedy))
+    if missing.is_empty() {
+        return None;
+    }
+    let missing = missing.join(", ");
+    let remedy = "choose a drive that monitors its master; if only 0x6007 is missing, unplug the bus to verify that \
+                  the drive stops, then set amplifier.device.when_unheard = \"own_reaction\"";
+    Some(DRIVE.failure(
+        format!("the drive lacks {missing}: it would not stop when communication is lost"),
+        remedy,
+    ))
 }
 
-fn state(seen: &Inspection) -> Vec<Finding> {
-    let Some(statusword) = seen.statusword else {
-        let remedy = "is this a drive of CiA 402? See amplifier.device.node";
-        return vec![Finding::failure(
-            SUBJECT,
-            "it has no statusword (0x6041)",
-            remedy,
-        )];
+fn state(statusword: Option<u16>) -> Vec<Finding> {
+    let Some(statusword) = statusword else {
+        let remedy = "check that amplifier.device.node is a drive (CiA 402)";
+        return vec![DRIVE.failure("the drive has no statusword (0x6041)", remedy)];
     };
-    let remote = (statusword & REMOTE == 0).then(|| {
-        let what = format!("it says that it does not listen to CAN (statusword 0x{statusword:04X}, bit 9)");
-        let remedy = "switch it from local to remote, and close its commissioning program; some drives say so only until \
-                      the run has made them operational";
-        Finding::warning(SUBJECT, what, remedy)
-    });
-    [of_state(statusword)].into_iter().chain(remote).collect()
+    let mut findings = vec![power_state(statusword)];
+    if statusword & REMOTE == 0 {
+        findings.push(DRIVE.warning(
+            format!("the drive does not accept commands from CAN (statusword 0x{statusword:04X}, bit 9)"),
+            "switch it from local to remote, and close its commissioning program; some drives report this only until \
+             the run has made them operational",
+        ));
+    }
+    findings
 }
 
-fn of_state(statusword: u16) -> Finding {
-    let say = |words: &str| format!("state {words} (statusword 0x{statusword:04X})");
-    let fault = "remove the cause (error register and past errors tell), then clear the fault with the drive's own \
+fn power_state(statusword: u16) -> Finding {
+    let what = |state: &str| format!("state {state} (statusword 0x{statusword:04X})");
+    let fault = "remove the cause (see error register and past errors), then clear the fault with the drive's own \
                  program or by switching its supply off and on";
     match State::decode(statusword) {
-        Some(State::SwitchOnDisabled) => Finding::ok(SUBJECT, say("switch on disabled: off")),
-        Some(State::ReadyToSwitchOn) => Finding::ok(SUBJECT, say("ready to switch on: off")),
-        Some(State::SwitchedOn) => Finding::ok(SUBJECT, say("switched on: no current")),
-        Some(State::NotReadyToSwitchOn) => Finding::warning(
-            SUBJECT,
-            say("not ready to switch on: it is starting"),
+        Some(State::SwitchOnDisabled) => DRIVE.ok(what("switch on disabled")),
+        Some(State::ReadyToSwitchOn) => DRIVE.ok(what("ready to switch on")),
+        Some(State::SwitchedOn) => DRIVE.ok(what("switched on, without current")),
+        Some(State::NotReadyToSwitchOn) => DRIVE.warning(
+            what("not ready to switch on: it is starting"),
             "wait, and check the supply of its power stage",
         ),
-        Some(State::OperationEnabled) => Finding::warning(
-            SUBJECT,
-            say("operation enabled, and not by this program"),
-            "end what drives it; a run would switch it off first",
+        Some(State::OperationEnabled) => DRIVE.warning(
+            what("operation enabled, by another program"),
+            "end the program that drives it; a run would switch it off first",
         ),
-        Some(State::QuickStopActive) => Finding::warning(
-            SUBJECT,
-            say("quick stop"),
+        Some(State::QuickStopActive) => DRIVE.warning(
+            what("quick stop"),
             "find out what stopped it; a run would switch it off first",
         ),
-        Some(State::FaultReactionActive) => Finding::failure(SUBJECT, say("fault reaction"), fault),
-        Some(State::Fault) => Finding::failure(SUBJECT, say("FAULT"), fault),
-        None => Finding::failure(
-            SUBJECT,
-            say("that no standard knows"),
-            "is this a drive of CiA 402?",
+        Some(State::FaultReactionActive) => DRIVE.failure(what("fault reaction"), fault),
+        Some(State::Fault) => DRIVE.failure(what("FAULT"), fault),
+        None => DRIVE.failure(
+            what("undefined by CiA 402"),
+            "check that this is a drive (CiA 402)",
         ),
     }
 }
 
-fn errors(seen: &Inspection) -> Vec<Finding> {
-    let register = seen
-        .error_register
-        .filter(|register| *register != 0)
-        .map(|register| {
-            let words: Vec<&str> = emcy::register_names(register).collect();
-            let what = format!("error register 0x{register:02X}: {}", words.join(", "));
-            Finding::warning(
-                SUBJECT,
-                what,
-                "the drive's manual says more; an error that is over clears the register",
-            )
-        });
-    let past: Vec<String> = seen
-        .past_errors
-        .iter()
-        .map(|code| format!("0x{code:04X} {}", emcy::text(*code)))
-        .collect();
-    let past = (!past.is_empty()).then(|| {
-        let what = format!("past errors, the latest first: {}", past.join(", "));
-        Finding::note(
-            SUBJECT,
-            what,
-            "none if you know them; writing 0 to 0x1003 forgets them",
-        )
-    });
-    register.into_iter().chain(past).collect()
+fn error_register(register: u8) -> Option<Finding> {
+    if register == 0 {
+        return None;
+    }
+    let names: Vec<&str> = emcy::register_names(register).collect();
+    Some(DRIVE.warning(
+        format!("error register 0x{register:02X}: {}", names.join(", ")),
+        "see the manual of the drive; the register is cleared when the error is over",
+    ))
+}
+
+fn past_errors(codes: &[u16]) -> Option<Finding> {
+    if codes.is_empty() {
+        return None;
+    }
+    let errors = codes.iter();
+    let errors = errors.map(|code| format!("0x{code:04X} {}", emcy::text(*code)));
+    let errors: Vec<String> = errors.collect();
+    Some(DRIVE.note(
+        format!("past errors, the latest first: {}", errors.join(", ")),
+        "none, if the errors are known; writing 0 to 0x1003 clears the list",
+    ))
 }
 
 #[cfg(test)]
@@ -322,209 +296,114 @@ mod tests {
         }
     }
 
-    fn bad(seen: Inspection, settings: &DriveSettings) -> Vec<(Severity, String)> {
-        let found = findings(&seen, settings, 1.5).into_iter();
+    fn not_ok(inspection: &Inspection, settings: &DriveSettings) -> Vec<(Severity, String)> {
+        let found = findings(inspection, settings, 1.5).into_iter();
         found
-            .filter(|finding| finding.verdict != Severity::Ok)
-            .map(|finding| (finding.verdict, finding.what))
+            .filter(|finding| finding.severity != Severity::Ok)
+            .map(|finding| (finding.severity, finding.what))
             .collect()
     }
 
-    #[test]
-    fn a_sound_drive_is_ok_in_everything() {
-        assert_eq!(bad(sound(), &DriveSettings::default()), []);
-        let maximum = DriveSettings {
-            reference: Reference::Maximum,
-            ..DriveSettings::default()
-        };
-        let found = findings(&sound(), &maximum, 1.5);
-        assert!(
-            found
-                .iter()
-                .any(|f| f.what == "a count is 6.000 mA, commands end at 4 A"),
-            "{found:?}"
-        );
+    fn settings(change: fn(&mut DriveSettings)) -> DriveSettings {
+        let mut settings = DriveSettings::default();
+        change(&mut settings);
+        settings
+    }
+
+    fn maximum_reference() -> DriveSettings {
+        settings(|s| s.reference = Reference::Maximum)
     }
 
     #[test]
-    fn each_trouble_of_a_drive_has_its_verdict_and_words() {
-        let cases = [
+    fn a_sound_drive_is_ok() {
+        assert_eq!(not_ok(&sound(), &DriveSettings::default()), []);
+        let found = findings(&sound(), &maximum_reference(), 1.5);
+        let expected = "a count is 6.000 mA, the limit is 4 A";
+        assert!(found.iter().any(|f| f.what == expected), "{found:?}");
+    }
+
+    #[test]
+    fn each_defect_of_a_drive_has_its_severity_and_text() {
+        type Change = fn(&mut Inspection);
+        let cases: [(Change, Severity, &str); 17] = [
             (
-                Inspection {
-                    rated_current_a: Some(2.0),
-                    ..sound()
-                },
+                |i| i.rated_current_a = Some(2.0),
                 Failure,
-                "is 2 A, the configuration says 4 A",
+                "is 2 A, the configuration states 4 A",
             ),
+            (|i| i.rated_current_a = None, Failure, "0x6075"),
+            (|i| i.modes = Some(1), Failure, "0x6502 is 0x00000001"),
+            (|i| i.modes = None, Note, "0x6502"),
             (
-                Inspection {
-                    rated_current_a: None,
-                    ..sound()
-                },
-                Failure,
-                "0x6075",
-            ),
-            (
-                Inspection {
-                    modes: Some(1),
-                    ..sound()
-                },
-                Failure,
-                "0x6502 is 0x00000001",
-            ),
-            (
-                Inspection {
-                    modes: None,
-                    ..sound()
-                },
-                Note,
-                "0x6502",
-            ),
-            (
-                Inspection {
-                    statusword: Some(0x0208),
-                    ..sound()
-                },
+                |i| i.statusword = Some(0x0208),
                 Failure,
                 "FAULT (statusword 0x0208)",
             ),
+            (|i| i.statusword = Some(0x020F), Failure, "fault reaction"),
             (
-                Inspection {
-                    statusword: Some(0x020F),
-                    ..sound()
-                },
-                Failure,
-                "fault reaction",
-            ),
-            (
-                Inspection {
-                    statusword: Some(0x0237),
-                    ..sound()
-                },
+                |i| i.statusword = Some(0x0237),
                 Warning,
                 "operation enabled",
             ),
+            (|i| i.statusword = Some(0x0217), Warning, "quick stop"),
+            (|i| i.statusword = Some(0x0200), Warning, "starting"),
+            (|i| i.statusword = Some(0x0248), Failure, "undefined"),
             (
-                Inspection {
-                    statusword: Some(0x0217),
-                    ..sound()
-                },
+                |i| i.statusword = Some(0x0040),
                 Warning,
-                "quick stop",
+                "does not accept commands from CAN",
             ),
+            (|i| i.statusword = None, Failure, "0x6041"),
+            (|i| i.error_register = Some(0x09), Warning, "0x09: generic"),
             (
-                Inspection {
-                    statusword: Some(0x0200),
-                    ..sound()
-                },
-                Warning,
-                "starting",
-            ),
-            (
-                Inspection {
-                    statusword: Some(0x0248),
-                    ..sound()
-                },
-                Failure,
-                "no standard knows",
-            ),
-            (
-                Inspection {
-                    statusword: Some(0x0040),
-                    ..sound()
-                },
-                Warning,
-                "does not listen to CAN",
-            ),
-            (
-                Inspection {
-                    statusword: None,
-                    ..sound()
-                },
-                Failure,
-                "0x6041",
-            ),
-            (
-                Inspection {
-                    error_register: Some(0x09),
-                    ..sound()
-                },
-                Warning,
-                "0x09: generic, temperature",
-            ),
-            (
-                Inspection {
-                    past_errors: vec![0x4210, 0x8130],
-                    ..sound()
-                },
+                |i| i.past_errors = vec![0x4210, 0x8130],
                 Note,
-                "0x4210 drive too hot, 0x8130 heartbeat",
+                "latest first: 0x4210 ",
             ),
             (
-                Inspection {
-                    missing_objects: vec![ABORT_CONNECTION],
-                    ..sound()
-                },
+                |i| i.missing_objects = vec![ABORT_CONNECTION],
                 Failure,
                 "lacks 0x6007:00",
             ),
             (
-                Inspection {
-                    device_type: Some(0x0001_0191),
-                    ..sound()
-                },
+                |i| i.device_type = Some(0x0001_0191),
                 Warning,
                 "profile 401",
             ),
-            (
-                Inspection {
-                    identity: [None; 4],
-                    ..sound()
-                },
-                Failure,
-                "vendor",
-            ),
+            (|i| i.identity = [None; 4], Failure, "vendor"),
         ];
-        for (seen, verdict, words) in cases {
-            let found = bad(seen.clone(), &DriveSettings::default());
-            assert_eq!(
-                (found.len(), found[0].0),
-                (1, verdict),
-                "{seen:?}: {found:?}"
-            );
-            assert!(found[0].1.contains(words), "{}: {words}", found[0].1);
+        for (change, severity, text) in cases {
+            let mut inspection = sound();
+            change(&mut inspection);
+            let found = not_ok(&inspection, &DriveSettings::default());
+            assert_eq!(found.len(), 1, "{inspection:?}: {found:?}");
+            assert_eq!(found[0].0, severity, "{found:?}");
+            assert!(found[0].1.contains(text), "{}: {text}", found[0].1);
         }
     }
 
     #[test]
-    fn another_drive_than_configured_is_refused_by_the_field_that_differs() {
-        for (identity, words) in [
-            (
-                ExpectedIdentity {
-                    vendor: Some(7),
-                    ..ExpectedIdentity::default()
-                },
-                "says vendor 0x00000007",
-            ),
-            (
-                ExpectedIdentity {
-                    serial: Some(4),
-                    ..ExpectedIdentity::default()
-                },
-                "says serial 0x00000004",
-            ),
+    fn another_drive_is_refused_with_the_field_that_differs() {
+        let with = |identity| DriveSettings {
+            identity,
+            ..DriveSettings::default()
+        };
+        let vendor = ExpectedIdentity {
+            vendor: Some(7),
+            ..ExpectedIdentity::default()
+        };
+        let serial = ExpectedIdentity {
+            serial: Some(4),
+            ..ExpectedIdentity::default()
+        };
+        for (identity, text) in [
+            (vendor, "states vendor 0x00000007"),
+            (serial, "states serial 0x00000004"),
         ] {
-            let found = bad(
-                sound(),
-                &DriveSettings {
-                    identity,
-                    ..DriveSettings::default()
-                },
-            );
+            let found = not_ok(&sound(), &with(identity));
             assert_eq!(found.len(), 1);
             assert!(
-                found[0].0 == Failure && found[0].1.contains(words),
+                found[0].0 == Failure && found[0].1.contains(text),
                 "{found:?}"
             );
         }
@@ -533,90 +412,31 @@ mod tests {
             serial: Some(3),
             ..ExpectedIdentity::default()
         };
-        assert_eq!(
-            bad(
-                sound(),
-                &DriveSettings {
-                    identity: same,
-                    ..DriveSettings::default()
-                }
-            ),
-            []
-        );
+        assert_eq!(not_ok(&sound(), &with(same)), []);
     }
 
     #[test]
-    fn what_only_some_settings_need_is_only_then_missed() {
-        let own = DriveSettings {
-            abort_connection: None,
-            ..DriveSettings::default()
-        };
-        assert_eq!(
-            bad(
-                Inspection {
-                    missing_objects: vec![ABORT_CONNECTION],
-                    ..sound()
-                },
-                &own
-            ),
-            []
-        );
-        assert_eq!(
-            bad(
-                Inspection {
-                    missing_objects: REQUIRED_OBJECTS.to_vec(),
-                    ..sound()
-                },
-                &own
-            )[0]
-            .0,
-            Failure
-        );
-        let maximum = DriveSettings {
-            reference: Reference::Maximum,
-            ..DriveSettings::default()
-        };
-        assert_eq!(
-            bad(
-                Inspection {
-                    maximum_current_ratio: None,
-                    ..sound()
-                },
-                &maximum
-            )[0]
-            .0,
-            Failure
-        );
-        assert_eq!(
-            bad(
-                Inspection {
-                    maximum_current_ratio: Some(2.0),
-                    ..sound()
-                },
-                &maximum
-            )[0]
-            .0,
-            Warning
-        );
-        let cyclic = DriveSettings {
-            mode: TorqueMode::Cyclic,
-            ..DriveSettings::default()
-        };
-        assert_eq!(
-            bad(
-                Inspection {
-                    modes: Some(1 << 3),
-                    ..sound()
-                },
-                &cyclic
-            )[0]
-            .0,
-            Failure
-        );
-        let tiny = DriveSettings {
-            current_limit_a: 0.001,
-            ..DriveSettings::default()
-        };
-        assert!(bad(sound(), &tiny)[0].1.contains("a count is 4 mA"));
+    fn objects_are_required_only_if_the_settings_need_them() {
+        let mut inspection = sound();
+        let own_reaction = settings(|s| s.abort_connection = None);
+        inspection.missing_objects = vec![ABORT_CONNECTION];
+        assert_eq!(not_ok(&inspection, &own_reaction), []);
+        inspection.missing_objects = REQUIRED_OBJECTS.to_vec();
+        assert_eq!(not_ok(&inspection, &own_reaction)[0].0, Failure);
+    }
+
+    #[test]
+    fn maximum_and_mode_must_fit_the_settings() {
+        let mut inspection = sound();
+        inspection.maximum_current_ratio = None;
+        assert_eq!(not_ok(&inspection, &maximum_reference())[0].0, Failure);
+        inspection.maximum_current_ratio = Some(2.0);
+        assert_eq!(not_ok(&inspection, &maximum_reference())[0].0, Warning);
+        let mut inspection = sound();
+        inspection.modes = Some(1 << 3);
+        let cyclic = settings(|s| s.mode = TorqueMode::Cyclic);
+        assert_eq!(not_ok(&inspection, &cyclic)[0].0, Failure);
+        let tiny = settings(|s| s.current_limit_a = 0.001);
+        assert!(not_ok(&sound(), &tiny)[0].1.contains("a count is 4 mA"));
     }
 }

@@ -1,25 +1,25 @@
-//! What the doctor says.
+//! What was examined, what was found, and how severe it is.
 
 use std::fmt::Display;
 
 use serde::Serialize;
 
-/// How grave a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// As it should be.
     Ok,
-    /// Good to know.
+    /// For information.
     Note,
-    /// The run starts, but something will be worse than it could.
+    /// The run starts, but its timing or its results may suffer.
     Warning,
     /// The run would not start, or would trip at once.
     Failure,
 }
 
 impl Severity {
-    /// As people read it.
+    /// The word in the text output.
     pub fn word(self) -> &'static str {
         match self {
             Severity::Ok => "ok",
@@ -30,87 +30,155 @@ impl Severity {
     }
 }
 
-/// One thing that was looked at.
+/// What was examined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "&'static str")]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Subject {
+    Configuration,
+    /// What concerns `bench chirp` only.
+    Chirp,
+    /// What concerns `bench control` only.
+    Control,
+    Kernel,
+    Clock,
+    Processors,
+    Throttling,
+    Loop,
+    Scheduler,
+    Memory,
+    Processor,
+    Lateness,
+    BusLoad,
+    CanKernel,
+    CanInterface,
+    CanState,
+    CanErrors,
+    CanRestart,
+    CanQueue,
+    CanNodes,
+    Drive,
+    Vesc,
+    SerialPort,
+    Readings,
+    Recordings,
+}
+
+impl From<Subject> for &'static str {
+    fn from(subject: Subject) -> Self {
+        subject.name()
+    }
+}
+
+impl Subject {
+    /// The name in the text output and in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Subject::Configuration => "configuration",
+            Subject::Chirp => "chirp",
+            Subject::Control => "control",
+            Subject::Kernel => "kernel",
+            Subject::Clock => "clock",
+            Subject::Processors => "processors",
+            Subject::Throttling => "throttling",
+            Subject::Loop => "loop",
+            Subject::Scheduler => "scheduler",
+            Subject::Memory => "memory",
+            Subject::Processor => "processor",
+            Subject::Lateness => "lateness",
+            Subject::BusLoad => "bus load",
+            Subject::CanKernel => "CAN kernel",
+            Subject::CanInterface => "CAN interface",
+            Subject::CanState => "CAN state",
+            Subject::CanErrors => "CAN errors",
+            Subject::CanRestart => "CAN restart",
+            Subject::CanQueue => "CAN queue",
+            Subject::CanNodes => "CAN nodes",
+            Subject::Drive => "drive",
+            Subject::Vesc => "VESC",
+            Subject::SerialPort => "serial port",
+            Subject::Readings => "readings",
+            Subject::Recordings => "recordings",
+        }
+    }
+
+    /// As it should be.
+    pub fn ok(self, what: impl Into<String>) -> Finding {
+        Finding::new(self, Severity::Ok, what, None)
+    }
+
+    /// For information.
+    pub fn note(self, what: impl Into<String>, remedy: impl Into<String>) -> Finding {
+        Finding::new(self, Severity::Note, what, Some(remedy.into()))
+    }
+
+    /// The run starts nevertheless.
+    pub fn warning(self, what: impl Into<String>, remedy: impl Into<String>) -> Finding {
+        Finding::new(self, Severity::Warning, what, Some(remedy.into()))
+    }
+
+    /// The run does not start, or trips at once.
+    pub fn failure(self, what: impl Into<String>, remedy: impl Into<String>) -> Finding {
+        Finding::new(self, Severity::Failure, what, Some(remedy.into()))
+    }
+
+    /// The run does not start because of an error, whose text is `what; remedy`.
+    pub fn refused(self, error: &impl Display) -> Finding {
+        let (what, remedy) = split_remedy(&error.to_string());
+        Finding::new(self, Severity::Failure, what, remedy)
+    }
+}
+
+/// A fact and its severity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was looked at.
-    pub subject: &'static str,
+    /// What was examined.
+    pub subject: Subject,
     /// What was found, with its figures.
     pub what: String,
-    /// How grave it is.
-    pub verdict: Severity,
+    /// How severe it is.
+    #[serde(rename = "verdict")]
+    pub severity: Severity,
     /// What to do about it.
     pub remedy: Option<String>,
 }
 
 impl Finding {
     fn new(
-        subject: &'static str,
-        verdict: Severity,
+        subject: Subject,
+        severity: Severity,
         what: impl Into<String>,
         remedy: Option<String>,
     ) -> Finding {
         Finding {
             subject,
             what: what.into(),
-            verdict,
+            severity,
             remedy,
         }
     }
 
-    /// As it should be.
-    pub fn ok(subject: &'static str, what: impl Into<String>) -> Finding {
-        Finding::new(subject, Severity::Ok, what, None)
-    }
-
-    /// Good to know.
-    pub fn note(
-        subject: &'static str,
-        what: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> Finding {
-        Finding::new(subject, Severity::Note, what, Some(remedy.into()))
-    }
-
-    /// The run starts nevertheless.
-    pub fn warning(
-        subject: &'static str,
-        what: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> Finding {
-        Finding::new(subject, Severity::Warning, what, Some(remedy.into()))
-    }
-
-    /// The run does not start, or trips at once.
-    pub fn failure(
-        subject: &'static str,
-        what: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> Finding {
-        Finding::new(subject, Severity::Failure, what, Some(remedy.into()))
-    }
-
-    /// The run does not start because of an error, whose text is `what; remedy`.
-    pub fn refused(subject: &'static str, error: &impl Display) -> Finding {
-        let (what, remedy) = parted(&error.to_string());
-        Finding::new(subject, Severity::Failure, what, remedy)
-    }
-
-    /// No graver than `worst`.
-    pub fn at_most(self, worst: Severity) -> Finding {
+    /// The finding with its severity limited to `limit`.
+    pub fn at_most(self, limit: Severity) -> Finding {
         Finding {
-            verdict: self.verdict.min(worst),
+            severity: self.severity.min(limit),
             ..self
         }
     }
 }
 
-/// A text `what; remedy` in its parts.
-pub(super) fn parted(text: &str) -> (String, Option<String>) {
+/// The two parts of a text `what; remedy`.
+pub(super) fn split_remedy(text: &str) -> (String, Option<String>) {
     match text.split_once("; ") {
         Some((what, remedy)) => (what.to_string(), Some(remedy.to_string())),
         None => (text.to_string(), None),
     }
+}
+
+/// The content of a file of one line, trimmed; `None` if it does not exist.
+pub(super) fn read_line(path: impl AsRef<std::path::Path>) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    Some(text.trim().to_string())
 }
 
 #[cfg(test)]
@@ -118,25 +186,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_errors_text_is_parted_into_what_and_remedy() {
-        let finding = Finding::refused("port", &"/dev/x: gone; plug it in; then start again");
+    fn an_error_text_is_split_into_what_and_remedy() {
+        let subject = Subject::SerialPort;
+        let finding = subject.refused(&"/dev/x: gone; plug it in; then start again");
         assert_eq!(finding.what, "/dev/x: gone");
-        assert_eq!(
-            finding.remedy.as_deref(),
-            Some("plug it in; then start again")
-        );
-        assert_eq!(Finding::refused("port", &"no idea").remedy, None);
+        let remedy = finding.remedy.as_deref();
+        assert_eq!(remedy, Some("plug it in; then start again"));
+        assert_eq!(subject.refused(&"no remedy").remedy, None);
     }
 
     #[test]
-    fn verdicts_are_softened_never_sharpened() {
-        let warning = Finding::warning("x", "y", "z");
+    fn severity_is_limited_and_never_raised() {
+        let warning = Subject::Clock.warning("y", "z");
+        let limited = warning.clone().at_most(Severity::Note);
+        assert_eq!(limited.severity, Severity::Note);
         assert_eq!(
-            warning.clone().at_most(Severity::Note).verdict,
-            Severity::Note
-        );
-        assert_eq!(
-            warning.at_most(Severity::Failure).verdict,
+            warning.at_most(Severity::Failure).severity,
             Severity::Warning
         );
     }

@@ -1,19 +1,21 @@
-//! `bench doctor`: could the configured run start, and what would be worse than it could be? Nothing moves.
+//! `bench doctor`: could the configured runs start, and what could impair them? Nothing is moved.
 //!
 //! ```text
-//!  system    kernel, clock, governor             \
-//!  trial     a thread like the loop's, for 1 s    |
-//!  scheduler what that thread was granted         |  facts, gathered by looking
-//!  can_interface  can_nodes  drive  vesc          |      |
-//!  serial_port    readings                        |      v
-//!  recordings     folder, space                   |  findings: a function of the facts and the configuration
-//!  runs           what the commands refuse       /
+//!  system         kernel, clock, governor             \
+//!  trial          a thread like the loop's, for 1 s    |
+//!  scheduler      the privileges of that thread        |  facts, gathered without side effects
+//!  can_interface  can_nodes  drive  vesc               |      |
+//!  serial_port    readings                             |      v
+//!  recordings     folder, space                        |  findings: a function of facts and settings
+//!  runs           whether the commands accept the     /
+//!                 configuration
 //! ```
 //!
-//! Each file gathers facts in one function and judges them in another: the second is tested with facts that no machine at
-//! hand has. Drives are read by SDO only; no NMT order, no controlword, no set-point is sent. A probe is asked as always.
+//! In each file one function gathers facts and another one judges them, so that the judgement can be tested with facts of any
+//! machine. A drive is read by SDO uploads only: no NMT command, controlword or set-point is sent. A probe is polled as
+//! in a run.
 //!
-//! A *failure* is what makes the run refuse to start or trip at once; what it merely suffers from is a *warning*.
+//! A *failure* makes the run refuse to start, or trip at once. A *warning* impairs it.
 
 mod amplifier;
 pub mod bus_load;
@@ -38,75 +40,69 @@ use crate::config::Config;
 use crate::rig::devices;
 use crate::rt::thread::Pace;
 
-pub use amplifier::{examine_canopen_drive, watch};
-pub use finding::{Finding, Severity};
+pub use amplifier::{examine_canopen_drive, examine_vesc};
+pub use finding::{Finding, Severity, Subject};
 pub use report::{Figures, Report};
 pub use runs::RunChecks;
 pub use trial::{Lateness, Trial, trial};
 
-/// Looks at everything that the runs of `config` need. `runs` is what their commands say of it; `out` is the folder for
-/// recordings.
-pub fn examine(config: &Config, runs: &RunChecks, out: &Path) -> Report {
-    let pace = if devices::is_simulated(config) {
-        Pace::Virtual
-    } else {
-        Pace::Realtime
+/// Examines everything that the runs of `config` need. `checks` are the results of the commands' own checks; `out` is the
+/// folder for recordings.
+pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
+    let pace = match devices::is_simulated(config) {
+        true => Pace::Virtual,
+        false => Pace::Realtime,
     };
     let mut report = Report::default();
-    report.find(runs::kinds(config));
-    report.find(runs::findings(runs, config.control.least_modulus_margin));
-    report.figures.control = runs.control.as_ref().ok().cloned();
-    system_and_loop(config, pace, &mut report);
-    amplifier::examine(config, &mut report);
-    probe(config, &mut report);
+    report.extend([runs::kinds(config)]);
+    report.extend(runs::findings(checks, config.control.least_modulus_margin));
+    report.figures.control = checks.control.as_ref().ok().cloned();
+    examine_system(config, pace, &mut report);
+    amplifier::examine(&config.amplifier, &config.servo, &mut report);
+    examine_probe(config, &mut report);
     let space = recordings::gather(out, runs::longest_ticks(config));
-    report.find(recordings::findings(&space));
+    report.extend([recordings::finding(&space)]);
     report.figures.recordings = Some(space.figures());
     report.conclude();
     report
 }
 
-fn system_and_loop(config: &Config, pace: Pace, report: &mut Report) {
-    report.find(system::findings(&system::gather(), pace));
+fn examine_system(config: &Config, pace: Pace, report: &mut Report) {
+    report.extend(system::findings(&system::gather(), pace));
     match trial(&config.servo) {
         Ok(trial) => {
             let facts = scheduler::gather(&config.servo, &trial);
-            report.find(scheduler::findings(&facts, pace));
-            report.find([trial::finding(
-                &trial.lateness,
-                config.interlock.overruns_per_s,
-                pace,
-            )]);
+            report.extend(scheduler::findings(&facts, pace));
+            let limit = config.interlock.overruns_per_s;
+            report.extend([trial::finding(&trial.lateness, limit, pace)]);
             report.figures.lateness = Some(trial.lateness);
         }
-        Err(error) => report.find([Finding::failure(
-            "loop",
-            format!("a thread cannot be started: {error}"),
+        Err(error) => report.extend([Subject::Loop.failure(
+            format!("cannot start a thread: {error}"),
             "raise the limit of processes (ulimit -u)",
         )]),
     }
 }
 
-fn probe(config: &Config, report: &mut Report) {
-    let Some(line) = config.probe.device.line() else {
+fn examine_probe(config: &Config, report: &mut Report) {
+    let Some(serial) = config.probe.device.serial() else {
         return;
     };
-    let facts = serial_port::gather(line);
-    let found = serial_port::findings(&facts);
-    let is_usable = found
-        .iter()
-        .all(|finding| finding.verdict < Severity::Failure);
-    report.find(found);
+    let facts = serial_port::gather(&serial.line);
+    let finding = serial_port::finding(&facts);
+    let is_usable = finding.severity < Severity::Failure;
+    report.extend([finding]);
     if !is_usable {
         return;
     }
-    match devices::probe::open(config) {
-        Err(error) => report.find([serial_port::refusal(&error, &facts)]),
+    match devices::probe::open(&config.probe, config.servo.priority) {
+        Err(error) => report.extend([serial_port::refusal(&error, &facts)]),
         Ok(mut probe) => {
-            report.find(serial_port::opened(&facts, line, probe.notes()));
-            let seen = readings::gather(&mut probe, config);
-            report.find(readings::findings(&seen, config));
-            report.figures.probe = Some(seen);
+            report.extend(serial_port::opened(&facts, &serial.line, probe.notes()));
+            let readings = readings::gather(&mut probe, config.servo.period_s());
+            let limits = &config.interlock;
+            report.extend(readings::findings(&readings, &config.probe, limits));
+            report.figures.probe = Some(readings);
         }
     }
 }

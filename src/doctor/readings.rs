@@ -1,4 +1,4 @@
-//! What the probe gives within about a second, seen as the loop sees it: the newest reading and its age.
+//! The readings of the probe during one second, as the loop sees them: the newest reading and its age.
 
 use std::time::{Duration, Instant};
 
@@ -6,91 +6,74 @@ use bench_hal::serial::{SerialProbe, Statistics};
 use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
 use serde::Serialize;
 
-use super::finding::Finding;
-use crate::config::{Config, InterlockSettings, ProbeSettings};
+use super::finding::{Finding, Subject};
+use crate::config::{InterlockSettings, ProbeSettings};
+use crate::rig::devices::first_reading;
 
-const SUBJECT: &str = "readings";
-/// How long a first reading may take: as long as a run waits.
-const FIRST: Duration = Duration::from_secs(2);
-/// How long readings are watched.
-const WATCHED: Duration = Duration::from_secs(1);
-/// Time between looks: as often as a loop of 1 kHz looks.
-const LOOK: Duration = Duration::from_millis(1);
+/// Duration of the observation.
+const OBSERVED: Duration = Duration::from_secs(1);
+/// Longest time between two samples: the period of a loop at 1 kHz.
+const SAMPLE_PERIOD: Duration = Duration::from_millis(1);
 
 /// Figures of the readings, in SI units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Readings {
-    /// How long they were watched.
+    /// Duration of the observation.
     pub watched_s: f64,
-    /// Whether a valid one came at all.
+    /// Whether a valid reading was received.
     pub came: bool,
-    /// Looks at the newest reading.
+    /// Samples of the newest reading.
     pub looks: u64,
-    /// Of these: it was valid.
+    /// Samples with a valid reading.
     pub valid_looks: u64,
-    /// Of these: it was out of the probe's range.
+    /// Samples with a reading out of the probe's range.
     pub out_of_range_looks: u64,
-    /// Readings a second.
+    /// Readings per second.
     pub rate_hz: f64,
-    /// Mean age of the newest reading, at a look.
+    /// Mean age of the newest reading.
     pub age_mean_s: f64,
-    /// Its largest age.
+    /// Largest age of the newest reading.
     pub age_max_s: f64,
     /// Mean position.
     pub position_mean_m: f64,
-    /// The position farthest from zero.
+    /// Position with the largest magnitude.
     pub position_farthest_m: f64,
-    /// Standard deviation of the positions: the noise, if the stage rests.
+    /// Standard deviation of the positions; it is the noise if the stage is at rest.
     pub noise_rms_m: f64,
-    /// Readings that are known to be missing.
+    /// Missing readings.
     pub gaps: u64,
-    /// Bytes that belonged to nothing.
+    /// Bytes that belong to no message.
     pub damaged_bytes: u64,
     /// Requests without an answer.
     pub timeouts: u64,
-    /// Times the probe said that it cannot measure.
+    /// Reports of the probe that it cannot measure.
     pub faults: u64,
     /// Bytes received.
     pub bytes: u64,
 }
 
-/// Watches an open probe.
-pub fn gather(probe: &mut SerialProbe, config: &Config) -> Readings {
-    let came = wait_for_first(probe);
-    let (before, began) = (probe.statistics(), Instant::now());
-    let look = LOOK.min(Duration::from_secs_f64(config.servo.period_s()));
-    let mut tally = Tally::default();
-    while began.elapsed() < WATCHED {
-        tally.take(&probe.latest(Tick::default()));
-        std::thread::sleep(look);
+/// Observes an open probe, sampled at least once per `period_s`.
+pub fn gather(probe: &mut SerialProbe, period_s: f64) -> Readings {
+    let came = first_reading(probe) == Validity::Valid;
+    let (before, start) = (probe.statistics(), Instant::now());
+    let pause = SAMPLE_PERIOD.min(Duration::from_secs_f64(period_s));
+    let mut samples = Samples::default();
+    while start.elapsed() < OBSERVED {
+        samples.add(&probe.latest(Tick::default()));
+        std::thread::sleep(pause);
     }
-    let watched_s = began.elapsed().as_secs_f64();
-    counted(
-        Readings {
-            came,
-            watched_s,
-            ..tally.figures()
-        },
-        &before,
-        &probe.statistics(),
-    )
+    let readings = Readings {
+        came,
+        watched_s: start.elapsed().as_secs_f64(),
+        ..samples.figures()
+    };
+    with_counts(readings, &before, &probe.statistics())
 }
 
-fn wait_for_first(probe: &mut SerialProbe) -> bool {
-    let began = Instant::now();
-    while probe.latest(Tick::default()).validity != Validity::Valid {
-        if began.elapsed() > FIRST {
-            return false;
-        }
-        std::thread::sleep(LOOK);
-    }
-    true
-}
-
-/// Counts between two looks at the statistics. Without a first reading, those since the opening tell more.
-fn counted(readings: Readings, before: &Statistics, after: &Statistics) -> Readings {
-    let nothing = Statistics::default();
-    let since = if readings.came { before } else { &nothing };
+/// Adds the counts of the observation; without a valid reading those since the port was opened.
+fn with_counts(readings: Readings, before: &Statistics, after: &Statistics) -> Readings {
+    let zero = Statistics::default();
+    let since = if readings.came { before } else { &zero };
     Readings {
         rate_hz: (after.published - before.published) as f64 / readings.watched_s,
         gaps: after.gaps - since.gaps,
@@ -102,10 +85,10 @@ fn counted(readings: Readings, before: &Statistics, after: &Statistics) -> Readi
     }
 }
 
-/// What the looks add up to.
+/// Sums over the samples.
 #[derive(Clone, Debug, Default)]
-struct Tally {
-    looks: u64,
+struct Samples {
+    count: u64,
     valid: u64,
     out_of_range: u64,
     age_sum_s: f64,
@@ -114,190 +97,189 @@ struct Tally {
     positions_m: Vec<f64>,
 }
 
-impl Tally {
-    fn take(&mut self, reading: &Reading) {
-        self.looks += 1;
-        self.out_of_range += u64::from(reading.validity == Validity::OutOfRange);
-        if reading.validity != Validity::Valid {
-            return;
+impl Samples {
+    fn add(&mut self, reading: &Reading) {
+        self.count += 1;
+        match reading.validity {
+            Validity::Valid => self.add_valid(reading),
+            Validity::OutOfRange => self.out_of_range += 1,
+            _ => {}
         }
+    }
+
+    fn add_valid(&mut self, reading: &Reading) {
         let age_s = reading.age_ns as f64 * 1e-9;
         self.valid += 1;
         self.age_sum_s += age_s;
         self.age_max_s = self.age_max_s.max(age_s);
-        if self.sequence.replace(reading.sequence) != Some(reading.sequence) {
+        if self.sequence != Some(reading.sequence) {
+            self.sequence = Some(reading.sequence);
             self.positions_m.push(reading.position_m);
         }
     }
 
     fn figures(&self) -> Readings {
-        let count = (self.positions_m.len() as f64).max(1.0);
-        // From the first on: where all are the same, nothing is left to be rounded.
-        let first_m = self.positions_m.first().copied().unwrap_or_default();
-        let mean_m = first_m + self.positions_m.iter().map(|x| x - first_m).sum::<f64>() / count;
-        let square_m2 = self
-            .positions_m
-            .iter()
-            .map(|x| (x - mean_m) * (x - mean_m))
-            .sum::<f64>()
-            / count;
-        let farther = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+        let (mean_m, sigma_m) = mean_and_deviation(&self.positions_m);
+        let by_magnitude = |a: &&f64, b: &&f64| a.abs().total_cmp(&b.abs());
+        let farthest_m = self.positions_m.iter().max_by(by_magnitude);
         Readings {
-            looks: self.looks,
+            looks: self.count,
             valid_looks: self.valid,
             out_of_range_looks: self.out_of_range,
             age_mean_s: self.age_sum_s / (self.valid as f64).max(1.0),
             age_max_s: self.age_max_s,
             position_mean_m: mean_m,
-            position_farthest_m: self.positions_m.iter().fold(0.0, farther),
-            noise_rms_m: square_m2.sqrt(),
+            position_farthest_m: farthest_m.copied().unwrap_or_default(),
+            noise_rms_m: sigma_m,
             ..Readings::default()
         }
     }
 }
 
-/// What the figures mean for a run.
-pub fn findings(seen: &Readings, config: &Config) -> Vec<Finding> {
-    if !seen.came {
-        return vec![none(seen)];
+/// Mean and standard deviation, computed relative to the first value: the deviation of equal values is exactly zero.
+fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let Some(first) = values.first() else {
+        return (0.0, 0.0);
+    };
+    let count = values.len() as f64;
+    let mean = first + values.iter().map(|x| x - first).sum::<f64>() / count;
+    let squares = values.iter().map(|x| (x - mean) * (x - mean));
+    (mean, (squares.sum::<f64>() / count).sqrt())
+}
+
+/// Judges the figures for a run.
+pub fn findings(
+    readings: &Readings,
+    probe: &ProbeSettings,
+    limits: &InterlockSettings,
+) -> Vec<Finding> {
+    if !readings.came {
+        return vec![no_reading(readings)];
     }
     let findings = [
-        validity(seen),
-        rate(seen, &config.probe),
-        Some(age(seen, &config.probe, &config.interlock)),
-        Some(position(seen, &config.interlock)),
-        Some(noise(seen)),
-        Some(damage(seen)),
+        validity(readings),
+        rate(readings.rate_hz, probe.rate_hz),
+        Some(age(readings, probe, limits.probe_stale_s)),
+        Some(position(readings, limits.soft_limit_m)),
+        Some(noise(readings.noise_rms_m)),
+        Some(damage(readings)),
     ];
     findings.into_iter().flatten().collect()
 }
 
-fn none(seen: &Readings) -> Finding {
-    let Readings {
-        bytes,
-        damaged_bytes,
-        timeouts,
-        faults,
-        ..
-    } = seen;
-    let figures = format!(
-        "{bytes} bytes, {damaged_bytes} of them damaged, {timeouts} missing answers, {faults} faults"
-    );
-    let (what, remedy) = match (bytes, seen.out_of_range_looks) {
-        (_, 1..) => (
+fn no_reading(readings: &Readings) -> Finding {
+    let (what, remedy) = if readings.out_of_range_looks > 0 {
+        (
             "the target is outside the probe's range",
             "move probe or stage until the probe's own display shows a value",
-        ),
-        (0, _) => (
-            "the probe says nothing",
-            "check its power and wiring (A and B swapped?), baud rate and address",
-        ),
-        _ if *faults > 0 => (
-            "the probe says that it cannot measure",
-            "its own display says why: target, cable, controller",
-        ),
-        _ => (
-            "bytes come, but no reading",
-            "check baud rate, parity and protocol in probe.device",
-        ),
-    };
-    Finding::failure(SUBJECT, format!("{what}: {figures}"), remedy)
-}
-
-fn validity(seen: &Readings) -> Option<Finding> {
-    let bad = seen.looks - seen.valid_looks;
-    let share = 100.0 * bad as f64 / (seen.looks as f64).max(1.0);
-    let what = format!(
-        "{bad} of {} looks met no valid reading ({share:.1} %; out of range {})",
-        seen.looks, seen.out_of_range_looks
-    );
-    (bad > 0).then(|| {
-        Finding::failure(
-            SUBJECT,
-            what,
-            "a run trips on the first: centre the stage in the probe's range, check its cable",
         )
+    } else if readings.bytes == 0 {
+        (
+            "the probe sends nothing",
+            "check its power and wiring (A and B swapped?), baud rate and address",
+        )
+    } else if readings.faults > 0 {
+        (
+            "the probe reports that it cannot measure",
+            "see its own display: target, cable, controller",
+        )
+    } else {
+        (
+            "bytes are received, but no reading",
+            "check baud rate, parity and protocol in probe.device",
+        )
+    };
+    let what = format!(
+        "{what}: {} bytes, {} of them damaged, {} missing answers, {} faults",
+        readings.bytes, readings.damaged_bytes, readings.timeouts, readings.faults
+    );
+    Subject::Readings.failure(what, remedy)
+}
+
+fn validity(readings: &Readings) -> Option<Finding> {
+    let total = readings.looks;
+    let invalid = total - readings.valid_looks;
+    if invalid == 0 {
+        return None;
+    }
+    let percent = 100.0 * invalid as f64 / total as f64;
+    let out_of_range = readings.out_of_range_looks;
+    Some(Subject::Readings.failure(
+        format!("{invalid} of {total} samples had no valid reading ({percent:.1} %; {out_of_range} out of range)"),
+        "a run trips on the first one: centre the stage in the probe's range, check its cable",
+    ))
+}
+
+fn rate(actual_hz: f64, configured_hz: Option<f64>) -> Option<Finding> {
+    let configured_hz = configured_hz?;
+    let what = format!("{actual_hz:.0} readings per second; probe.rate_hz is {configured_hz}");
+    let remedy = "set probe.rate_hz to the actual rate: margins and simulation depend on it";
+    Some(match actual_hz / configured_hz {
+        ..0.9 => Subject::Readings.warning(what, remedy),
+        1.1.. => Subject::Readings.note(what, remedy),
+        _ => Subject::Readings.ok(what),
     })
 }
 
-fn rate(seen: &Readings, probe: &ProbeSettings) -> Option<Finding> {
-    let configured_hz = probe.rate_hz?;
+/// The expected mean age is the age on arrival and half the time to the next reading.
+fn age(readings: &Readings, probe: &ProbeSettings, stale_s: f64) -> Finding {
+    let half_period_s = probe.rate_hz.map_or(0.0, |rate_hz| 0.5 / rate_hz);
+    let expected_s = probe.age_at_arrival_s() + half_period_s;
     let what = format!(
-        "{:.0} readings a second; probe.rate_hz is {configured_hz}",
-        seen.rate_hz
+        "mean age {}, largest age {}; by the configuration the mean is {} and the limit {}",
+        milliseconds(readings.age_mean_s),
+        milliseconds(readings.age_max_s),
+        milliseconds(expected_s),
+        milliseconds(stale_s)
     );
-    let remedy = "set probe.rate_hz to what comes: margins and simulation are computed with it";
-    Some(match seen.rate_hz / configured_hz {
-        ..0.9 => Finding::warning(SUBJECT, what, remedy),
-        1.1.. => Finding::note(SUBJECT, what, remedy),
-        _ => Finding::ok(SUBJECT, what),
-    })
+    let remedy = "correct probe.latency_s, transport_s and rate_hz; low latency of the adapter and an idle machine reduce the age";
+    if readings.age_max_s > stale_s {
+        let remedy = format!("{remedy}; or raise interlock.probe_stale_s if the loop allows it");
+        Subject::Readings.failure(what, remedy)
+    } else if readings.age_mean_s > 1.2 * expected_s {
+        Subject::Readings.warning(what, remedy)
+    } else {
+        Subject::Readings.ok(what)
+    }
 }
 
-/// In the mean a reading is as old as on its arrival and half the time to the next one.
-fn age(seen: &Readings, probe: &ProbeSettings, interlock: &InterlockSettings) -> Finding {
-    let ms = |s: f64| format!("{:.2} ms", s * 1e3);
-    let expected_s = probe.age_at_arrival_s() + probe.rate_hz.map_or(0.0, |rate_hz| 0.5 / rate_hz);
-    let stale_s = interlock.probe_stale_s;
+fn milliseconds(seconds: f64) -> String {
+    format!("{:.2} ms", seconds * 1e3)
+}
+
+fn position(readings: &Readings, soft_limit_m: f64) -> Finding {
     let what = format!(
-        "age {} in the mean, {} at most; the configuration expects {} in the mean and trips at {}",
-        ms(seen.age_mean_s),
-        ms(seen.age_max_s),
-        ms(expected_s),
-        ms(stale_s)
+        "mean position {:+.1} um, farthest {:+.1} um; the soft limit is {:.1} um",
+        readings.position_mean_m * 1e6,
+        readings.position_farthest_m * 1e6,
+        soft_limit_m * 1e6
     );
-    let remedy = "correct probe.latency_s, transport_s and rate_hz; low latency of the adapter and a quiet machine make readings younger";
-    match (seen.age_max_s > stale_s, seen.age_mean_s > 1.2 * expected_s) {
-        (true, _) => Finding::failure(
-            SUBJECT,
-            what,
-            format!("{remedy}; or raise interlock.probe_stale_s if the loop bears it"),
-        ),
-        (_, true) => Finding::warning(SUBJECT, what, remedy),
-        _ => Finding::ok(SUBJECT, what),
+    if readings.position_farthest_m.abs() <= soft_limit_m {
+        return Subject::Readings.ok(what);
+    }
+    let remedy =
+        "a run would trip at once: centre the stage, or correct gain and offset_m of the mounting";
+    Subject::Readings.failure(what, remedy)
+}
+
+fn noise(rms_m: f64) -> Finding {
+    if rms_m > 0.0 {
+        let what = format!("noise {} RMS, if the stage is at rest", length(rms_m));
+        return Subject::Readings.ok(what);
+    }
+    let remedy = "push the stage gently: the readings of a working probe change";
+    Subject::Readings.note("all readings are equal", remedy)
+}
+
+fn length(metres: f64) -> String {
+    match metres {
+        1e-3.. => format!("{:.2} mm", metres * 1e3),
+        1e-6.. => format!("{:.2} um", metres * 1e6),
+        _ => format!("{:.1} nm", metres * 1e9),
     }
 }
 
-fn position(seen: &Readings, interlock: &InterlockSettings) -> Finding {
-    let um = |m: f64| format!("{:+.1} um", m * 1e6);
-    let limit_m = interlock.soft_limit_m;
-    let (mean, farthest) = (um(seen.position_mean_m), um(seen.position_farthest_m));
-    let what = format!(
-        "position {mean} in the mean, {farthest} at the farthest; the soft limit is {:.1} um",
-        limit_m * 1e6
-    );
-    match seen.position_farthest_m.abs() > limit_m {
-        true => Finding::failure(
-            SUBJECT,
-            what,
-            "a run trips at once: centre the stage, or correct the mounting's gain and offset_m",
-        ),
-        false => Finding::ok(SUBJECT, what),
-    }
-}
-
-fn noise(seen: &Readings) -> Finding {
-    let what = format!("noise {} RMS, if the stage rests", length(seen.noise_rms_m));
-    match seen.noise_rms_m > 0.0 {
-        true => Finding::ok(SUBJECT, what),
-        false => Finding::note(
-            SUBJECT,
-            "every reading is the same",
-            "push the stage gently: a probe that measures shows it",
-        ),
-    }
-}
-
-/// In the unit that a person reads.
-fn length(m: f64) -> String {
-    match m {
-        1e-3.. => format!("{:.2} mm", m * 1e3),
-        1e-6.. => format!("{:.2} um", m * 1e6),
-        _ => format!("{:.1} nm", m * 1e9),
-    }
-}
-
-fn damage(seen: &Readings) -> Finding {
+fn damage(readings: &Readings) -> Finding {
     let Readings {
         gaps,
         damaged_bytes,
@@ -305,32 +287,30 @@ fn damage(seen: &Readings) -> Finding {
         faults,
         watched_s,
         ..
-    } = seen;
+    } = readings;
     let what = format!(
-        "within {watched_s:.1} s: {gaps} readings missing, {damaged_bytes} damaged bytes, {timeouts} missing answers, {faults} faults"
+        "within {watched_s:.1} s: {gaps} missing readings, {damaged_bytes} damaged bytes, {timeouts} missing answers, {faults} faults"
     );
-    match gaps + damaged_bytes + timeouts + faults {
-        0 => Finding::ok(SUBJECT, what),
-        _ => Finding::warning(
-            SUBJECT,
-            what,
-            "check shield, ground and termination of the line, and that nothing else talks on it",
-        ),
+    if gaps + damaged_bytes + timeouts + faults == 0 {
+        return Subject::Readings.ok(what);
     }
+    let remedy =
+        "check shield, ground and termination of the line, and that no other device sends on it";
+    Subject::Readings.warning(what, remedy)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use crate::config::{Config, Source, load};
     use crate::doctor::Severity::{self, Failure, Note, Warning};
 
     fn lab() -> Config {
-        load(&Source {
+        let source = Source {
             config: Some("lab".into()),
             ..Source::default()
-        })
-        .unwrap()
+        };
+        load(&source).unwrap()
     }
 
     fn sound() -> Readings {
@@ -350,182 +330,108 @@ mod tests {
         }
     }
 
-    fn bad(seen: Readings) -> Vec<(Severity, String)> {
-        let found = findings(&seen, &lab()).into_iter();
-        found
-            .filter(|finding| finding.verdict != Severity::Ok)
-            .map(|finding| (finding.verdict, finding.what))
+    fn not_ok(readings: &Readings) -> Vec<(Severity, String)> {
+        let lab = lab();
+        findings(readings, &lab.probe, &lab.interlock)
+            .into_iter()
+            .filter(|finding| finding.severity != Severity::Ok)
+            .map(|finding| (finding.severity, finding.what))
             .collect()
     }
 
     #[test]
-    fn sound_readings_are_ok_in_everything() {
-        assert_eq!(bad(sound()), []);
-        assert!(
-            findings(&sound(), &lab())
-                .iter()
-                .any(|f| f.what == "noise 40.0 nm RMS, if the stage rests")
-        );
+    fn sound_readings_are_ok() {
+        assert_eq!(not_ok(&sound()), []);
+        let expected = "noise 40.0 nm RMS, if the stage is at rest";
+        assert_eq!(noise(40e-9).what, expected);
     }
 
     #[test]
-    fn each_trouble_of_readings_has_its_verdict_and_words() {
+    fn each_defect_of_readings_has_its_severity_and_text() {
         // lab: expected 0.3 + 1.4 + 0.77 = 2.47 ms in the mean, stale at 10 ms, soft limit 900 um, 650 Hz.
-        let cases = [
+        type Change = fn(&mut Readings);
+        let cases: [(Change, Severity, &str); 13] = [
             (
-                Readings {
-                    came: false,
-                    bytes: 0,
-                    timeouts: 20,
-                    ..sound()
-                },
+                |r| (r.came, r.bytes, r.timeouts) = (false, 0, 20),
                 Failure,
-                "says nothing: 0 bytes",
+                "sends nothing: 0 bytes",
             ),
             (
-                Readings {
-                    came: false,
-                    damaged_bytes: 10_000,
-                    ..sound()
-                },
+                |r| (r.came, r.damaged_bytes) = (false, 10_000),
                 Failure,
-                "bytes come, but no reading",
+                "bytes are received, but no reading",
             ),
             (
-                Readings {
-                    came: false,
-                    faults: 3,
-                    ..sound()
-                },
+                |r| (r.came, r.faults) = (false, 3),
                 Failure,
                 "cannot measure",
             ),
             (
-                Readings {
-                    came: false,
-                    out_of_range_looks: 9,
-                    ..sound()
-                },
+                |r| (r.came, r.out_of_range_looks) = (false, 9),
                 Failure,
                 "outside the probe's range",
             ),
             (
-                Readings {
-                    valid_looks: 990,
-                    out_of_range_looks: 10,
-                    ..sound()
-                },
+                |r| (r.valid_looks, r.out_of_range_looks) = (990, 10),
                 Failure,
-                "10 of 1000 looks",
+                "10 of 1000 samples",
             ),
             (
-                Readings {
-                    rate_hz: 500.0,
-                    ..sound()
-                },
+                |r| r.rate_hz = 500.0,
                 Warning,
-                "500 readings a second; probe.rate_hz is 650",
+                "500 readings per second; probe.rate_hz is 650",
             ),
+            (|r| r.rate_hz = 900.0, Note, "900 readings per second"),
+            (|r| r.age_mean_s = 0.0031, Warning, "mean age 3.10 ms"),
+            (|r| r.age_max_s = 0.0101, Failure, "largest age 10.10 ms"),
             (
-                Readings {
-                    rate_hz: 900.0,
-                    ..sound()
-                },
-                Note,
-                "900 readings a second",
-            ),
-            (
-                Readings {
-                    age_mean_s: 0.0031,
-                    ..sound()
-                },
-                Warning,
-                "age 3.10 ms in the mean",
-            ),
-            (
-                Readings {
-                    age_max_s: 0.0101,
-                    ..sound()
-                },
+                |r| r.position_farthest_m = -950e-6,
                 Failure,
-                "10.10 ms at most",
+                "farthest -950.0 um",
             ),
-            (
-                Readings {
-                    position_farthest_m: -950e-6,
-                    ..sound()
-                },
-                Failure,
-                "-950.0 um at the farthest",
-            ),
-            (
-                Readings {
-                    noise_rms_m: 0.0,
-                    ..sound()
-                },
-                Note,
-                "every reading is the same",
-            ),
-            (
-                Readings { gaps: 1, ..sound() },
-                Warning,
-                "1 readings missing",
-            ),
-            (
-                Readings {
-                    damaged_bytes: 7,
-                    ..sound()
-                },
-                Warning,
-                "7 damaged bytes",
-            ),
+            (|r| r.noise_rms_m = 0.0, Note, "all readings are equal"),
+            (|r| r.gaps = 1, Warning, "1 missing readings"),
+            (|r| r.damaged_bytes = 7, Warning, "7 damaged bytes"),
         ];
-        for (seen, verdict, words) in cases {
-            let found = bad(seen.clone());
-            assert_eq!(
-                (found.len(), found[0].0),
-                (1, verdict),
-                "{seen:?}: {found:?}"
-            );
-            assert!(found[0].1.contains(words), "{}: {words}", found[0].1);
+        for (change, severity, text) in cases {
+            let mut readings = sound();
+            change(&mut readings);
+            let found = not_ok(&readings);
+            assert_eq!(found.len(), 1, "{readings:?}: {found:?}");
+            assert_eq!(found[0].0, severity, "{found:?}");
+            assert!(found[0].1.contains(text), "{}: {text}", found[0].1);
         }
     }
 
     #[test]
     fn noise_is_the_deviation_of_readings_each_counted_once() {
-        let reading = |sequence, position_m, validity| Reading {
-            sequence,
-            position_m,
-            validity,
-            age_ns: 1_000_000,
+        let mut samples = Samples::default();
+        let mut add = |sequence, position_m, validity| {
+            samples.add(&Reading {
+                sequence,
+                position_m,
+                validity,
+                age_ns: 1_000_000,
+            });
         };
-        let mut tally = Tally::default();
         for (sequence, position_m) in [(1, 1e-6), (1, 1e-6), (2, 3e-6), (2, 3e-6), (2, 3e-6)] {
-            tally.take(&reading(sequence, position_m, Validity::Valid));
+            add(sequence, position_m, Validity::Valid);
         }
-        tally.take(&reading(3, 1.0, Validity::OutOfRange));
-        let figures = tally.figures();
-        assert_eq!(
-            (
-                figures.looks,
-                figures.valid_looks,
-                figures.out_of_range_looks
-            ),
-            (6, 5, 1)
-        );
-        assert!(
-            (figures.position_mean_m - 2e-6).abs() < 1e-18
-                && (figures.noise_rms_m - 1e-6).abs() < 1e-18
-        );
+        add(3, 1.0, Validity::OutOfRange);
+        let figures = samples.figures();
+        assert_eq!((figures.looks, figures.valid_looks), (6, 5));
+        assert_eq!(figures.out_of_range_looks, 1);
+        assert!((figures.position_mean_m - 2e-6).abs() < 1e-18);
+        assert!((figures.noise_rms_m - 1e-6).abs() < 1e-18);
         assert_eq!(
             (figures.position_farthest_m, figures.age_max_s),
             (3e-6, 1e-3)
         );
-        assert_eq!(Tally::default().figures().noise_rms_m, 0.0);
+        assert_eq!(Samples::default().figures().noise_rms_m, 0.0);
     }
 
     #[test]
-    fn lengths_are_in_the_unit_that_a_person_reads() {
+    fn lengths_have_a_unit_that_fits() {
         assert_eq!(
             [40e-9, 1.5e-6, 2e-3].map(length),
             ["40.0 nm", "1.50 um", "2.00 mm"]

@@ -1,4 +1,4 @@
-//! The folder for recordings: may it be written, and is there room for a run? Nothing is made in it.
+//! The folder for recordings: is it writable, and is there enough space for a run? Nothing is created in it.
 
 use std::path::{Path, PathBuf};
 
@@ -6,57 +6,52 @@ use nix::sys::statvfs::statvfs;
 use nix::unistd::{AccessFlags, eaccess};
 use serde::Serialize;
 
-use super::finding::Finding;
+use super::finding::{Finding, Subject};
 
-const SUBJECT: &str = "recordings";
-/// Room that a tick may take in a recording, in bytes: above what a run really takes (`tests/doctor` measures it).
+/// Upper limit of the size of a tick in a recording, in bytes (`tests/doctor` measures it).
 pub const BYTES_PER_TICK: u64 = 120;
-/// With less room than this, in bytes, no recording can even be begun.
-const LEAST_BYTES: u64 = 1 << 20;
+/// With less free space than this, in bytes, a recording cannot begin.
+const MIN_FREE_BYTES: u64 = 1 << 20;
 
-/// What there is.
+/// Facts about the folder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpaceFacts {
     /// The folder for recordings.
     pub folder: PathBuf,
-    /// The folder itself, or the nearest one around it that exists: there it will be made.
+    /// The folder itself, or its nearest existing ancestor.
     pub existing: PathBuf,
     /// Whether that is a folder.
     pub is_folder: bool,
-    /// Why it may not be written, in the system's words.
-    pub refused: Option<String>,
-    /// Free room in bytes.
+    /// Why it is not writable.
+    pub not_writable: Option<String>,
+    /// Free space in bytes.
     pub free_bytes: Option<u64>,
-    /// Room for the longest configured run in bytes.
+    /// Space for the longest configured run in bytes.
     pub needed_bytes: u64,
 }
 
-/// Figures of the room for recordings.
+/// Space for recordings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Space {
     /// The folder.
     pub folder: String,
-    /// Free room in bytes.
+    /// Free space in bytes.
     pub free_bytes: Option<u64>,
-    /// Room for the longest configured run in bytes, at the most.
+    /// Upper limit of the space for the longest configured run, in bytes.
     pub needed_bytes: u64,
 }
 
-/// Looks at `folder`, for a run of so many ticks.
+/// Examines `folder`, for a run of `ticks`.
 pub fn gather(folder: &Path, ticks: u64) -> SpaceFacts {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
-    let existing = absolute
-        .ancestors()
-        .find(|path| path.exists())
-        .unwrap_or(Path::new("/"))
-        .to_path_buf();
+    let existing = absolute.ancestors().find(|path| path.exists());
+    let existing = existing.unwrap_or(Path::new("/")).to_path_buf();
+    let access = eaccess(&existing, AccessFlags::W_OK | AccessFlags::X_OK);
     let free = statvfs(&existing).map(|fs| fs.blocks_available() * fs.fragment_size());
     SpaceFacts {
         folder: folder.to_path_buf(),
         is_folder: existing.is_dir(),
-        refused: eaccess(&existing, AccessFlags::W_OK | AccessFlags::X_OK)
-            .err()
-            .map(|error| error.to_string()),
+        not_writable: access.err().map(|error| error.to_string()),
         existing,
         free_bytes: free.ok(),
         needed_bytes: ticks.saturating_mul(BYTES_PER_TICK),
@@ -66,60 +61,53 @@ pub fn gather(folder: &Path, ticks: u64) -> SpaceFacts {
 impl SpaceFacts {
     /// The figures.
     pub fn figures(&self) -> Space {
-        let (free_bytes, needed_bytes) = (self.free_bytes, self.needed_bytes);
         Space {
             folder: self.folder.display().to_string(),
-            free_bytes,
-            needed_bytes,
+            free_bytes: self.free_bytes,
+            needed_bytes: self.needed_bytes,
         }
     }
 }
 
-/// What that means.
-pub fn findings(facts: &SpaceFacts) -> Vec<Finding> {
+/// Judges the facts.
+pub fn finding(facts: &SpaceFacts) -> Finding {
     let existing = facts.existing.display();
     if !facts.is_folder {
         let what = format!("{existing} is not a folder");
-        return vec![Finding::failure(SUBJECT, what, "choose another with --out")];
+        return Subject::Recordings.failure(what, "choose another folder with --out");
     }
-    if let Some(why) = &facts.refused {
-        let what = format!("{existing} may not be written: {why}");
-        return vec![Finding::failure(
-            SUBJECT,
-            what,
-            "choose another with --out, or take ownership of it",
-        )];
+    if let Some(why) = &facts.not_writable {
+        let remedy = "choose another folder with --out, or take ownership of this one";
+        return Subject::Recordings.failure(format!("{existing} is not writable: {why}"), remedy);
     }
-    vec![room(facts)]
+    match facts.free_bytes {
+        Some(free_bytes) => space(facts, free_bytes),
+        None => Subject::Recordings.note(
+            format!("{existing} is writable; its free space is unknown"),
+            "`df` may show it",
+        ),
+    }
 }
 
-fn room(facts: &SpaceFacts) -> Finding {
-    let megabytes = |bytes: u64| format!("{:.1} MB", bytes as f64 * 1e-6);
-    let (folder, needed) = (facts.folder.display(), megabytes(facts.needed_bytes));
-    let Some(free_bytes) = facts.free_bytes else {
-        return Finding::note(
-            SUBJECT,
-            format!("{folder} can be written; its free room is unknown"),
-            "`df` may tell",
-        );
-    };
+fn space(facts: &SpaceFacts, free_bytes: u64) -> Finding {
     let what = format!(
-        "{folder} can be written, {} free; the longest configured run takes {needed} at the most",
-        megabytes(free_bytes)
+        "{} is writable, {} free; the longest configured run needs up to {}",
+        facts.folder.display(),
+        megabytes(free_bytes),
+        megabytes(facts.needed_bytes)
     );
-    match free_bytes {
-        ..LEAST_BYTES => Finding::failure(
-            SUBJECT,
-            what,
-            "free some room, or choose another folder with --out",
-        ),
-        _ if free_bytes < facts.needed_bytes => Finding::warning(
-            SUBJECT,
-            what,
-            "free some room, or choose another folder with --out: a full disk stops the run",
-        ),
-        _ => Finding::ok(SUBJECT, what),
+    let remedy = "free some space, or choose another folder with --out";
+    if free_bytes < MIN_FREE_BYTES {
+        Subject::Recordings.failure(what, remedy)
+    } else if free_bytes < facts.needed_bytes {
+        Subject::Recordings.warning(what, format!("{remedy}: a full disk stops the run"))
+    } else {
+        Subject::Recordings.ok(what)
     }
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 * 1e-6)
 }
 
 #[cfg(test)]
@@ -132,79 +120,51 @@ mod tests {
             folder: "recordings".into(),
             existing: "/data".into(),
             is_folder: true,
-            refused: None,
+            not_writable: None,
             free_bytes: Some(1 << 30),
             needed_bytes: 72_000_000,
         }
     }
 
     #[test]
-    fn each_trouble_has_its_verdict() {
-        let cases = [
-            (sound(), Severity::Ok),
-            (
-                SpaceFacts {
-                    free_bytes: None,
-                    ..sound()
-                },
-                Severity::Note,
-            ),
-            (
-                SpaceFacts {
-                    free_bytes: Some(50_000_000),
-                    ..sound()
-                },
-                Severity::Warning,
-            ),
-            (
-                SpaceFacts {
-                    free_bytes: Some(4096),
-                    ..sound()
-                },
-                Severity::Failure,
-            ),
-            (
-                SpaceFacts {
-                    refused: Some("EROFS".into()),
-                    ..sound()
-                },
-                Severity::Failure,
-            ),
-            (
-                SpaceFacts {
-                    is_folder: false,
-                    ..sound()
-                },
-                Severity::Failure,
-            ),
-        ];
-        for (facts, expected) in cases {
-            let found = findings(&facts);
-            assert_eq!((found.len(), found[0].verdict), (1, expected), "{facts:?}");
-            assert_eq!(found[0].remedy.is_some(), expected != Severity::Ok);
-        }
+    fn each_defect_has_its_severity() {
+        let severity = |change: fn(&mut SpaceFacts)| {
+            let mut facts = sound();
+            change(&mut facts);
+            let finding = finding(&facts);
+            assert_eq!(finding.remedy.is_some(), finding.severity != Severity::Ok);
+            finding.severity
+        };
+        assert_eq!(severity(|_| {}), Severity::Ok);
+        assert_eq!(severity(|f| f.free_bytes = None), Severity::Note);
+        assert_eq!(
+            severity(|f| f.free_bytes = Some(50_000_000)),
+            Severity::Warning
+        );
+        assert_eq!(severity(|f| f.free_bytes = Some(4096)), Severity::Failure);
+        assert_eq!(
+            severity(|f| f.not_writable = Some("EROFS".into())),
+            Severity::Failure
+        );
+        assert_eq!(severity(|f| f.is_folder = false), Severity::Failure);
     }
 
     #[test]
-    fn a_folder_that_is_not_there_yet_is_looked_for_around_it_and_not_made() {
+    fn a_folder_that_does_not_exist_is_judged_by_its_ancestor_and_not_created() {
         let folder = tempfile::tempdir().unwrap();
         let facts = gather(&folder.path().join("a/b"), 1000);
         assert_eq!(facts.existing, folder.path());
-        assert_eq!(
-            (facts.is_folder, facts.refused.clone(), facts.needed_bytes),
-            (true, None, 1000 * BYTES_PER_TICK)
-        );
+        assert_eq!((facts.is_folder, &facts.not_writable), (true, &None));
+        assert_eq!(facts.needed_bytes, 1000 * BYTES_PER_TICK);
         assert!(facts.free_bytes.is_some() && !folder.path().join("a").exists());
     }
 
     #[test]
-    fn a_file_in_the_way_is_found() {
+    fn a_file_in_place_of_the_folder_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
-        assert_eq!(
-            findings(&gather(&file.join("in"), 1))[0].what,
-            format!("{} is not a folder", file.display())
-        );
+        let finding = finding(&gather(&file.join("in"), 1));
+        assert_eq!(finding.what, format!("{} is not a folder", file.display()));
     }
 }

@@ -1,110 +1,82 @@
-//! What the commands themselves say of the configuration: would `bench chirp` and `bench control` take it?
+//! The commands' own checks of the configuration: would `bench chirp` and `bench control` accept it?
 
-use super::finding::Finding;
+use super::finding::{Finding, Subject};
 use crate::config::Config;
 use crate::control::Margins;
 use crate::excitation::{self, Excitation};
 use crate::rig::devices;
 
-/// Subject of what concerns `bench chirp` alone.
-pub const CHIRP: &str = "chirp";
-/// Subject of what concerns `bench control` alone.
-pub const CONTROL: &str = "control";
-
-/// The answers of the commands' own checks.
+/// The results of the commands' own checks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunChecks {
-    /// The travel in metres that `bench chirp` expects, or why it refuses.
+    /// The travel in metres that `bench chirp` predicts, or why it refuses.
     pub chirp: Result<f64, String>,
     /// The margins of the loop that `bench control` closes, or why it refuses.
     pub control: Result<Margins, String>,
 }
 
-/// Ticks of the longer of both runs.
+/// Ticks of the longer run.
 pub fn longest_ticks(config: &Config) -> u64 {
     let control_s = config.control.settle_s + config.control.duration_s;
-    excitation::of(config)
-        .ticks()
-        .max((control_s * config.servo.rate_hz).ceil() as u64)
+    let control_ticks = (control_s * config.servo.rate_hz).ceil() as u64;
+    excitation::of(config).ticks().max(control_ticks)
 }
 
-/// A loop has two devices or none.
-pub fn kinds(config: &Config) -> Vec<Finding> {
-    let (amplifier, probe) = (config.amplifier.device.kind(), config.probe.device.kind());
-    let what = format!(
-        "amplifier {amplifier}, probe {probe}, {} Hz: {}",
-        config.servo.rate_hz, config.title
-    );
-    let is_mixed = ("simulated" == amplifier) != ("simulated" == probe);
-    if is_mixed {
-        let error = devices::DevicesError::Mixed { amplifier, probe };
-        return vec![Finding::refused("configuration", &error)];
+/// Amplifier and probe must both be devices, or both simulated.
+pub fn kinds(config: &Config) -> Finding {
+    match devices::check_kinds(config) {
+        Err(error) => Subject::Configuration.refused(&error),
+        Ok(()) => Subject::Configuration.ok(format!(
+            "amplifier {}, probe {}, {} Hz: {}",
+            config.amplifier.device.kind(),
+            config.probe.device.kind(),
+            config.servo.rate_hz,
+            config.title
+        )),
     }
-    vec![Finding::ok("configuration", what)]
 }
 
-/// What the commands' checks mean; `least` is the modulus margin asked for.
-pub fn findings(runs: &RunChecks, least: f64) -> Vec<Finding> {
-    vec![chirp(&runs.chirp), control(&runs.control, least)]
-}
-
-fn chirp(answer: &Result<f64, String>) -> Finding {
-    match answer {
-        Ok(travel_m) => Finding::ok(
-            CHIRP,
-            format!(
-                "the excitation moves the stage by {:.0} um by the model",
-                travel_m * 1e6
-            ),
-        ),
+/// Judges the checks; `min_modulus_margin` is the configured limit.
+pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
+    let chirp = match &checks.chirp {
+        Ok(travel_m) => Subject::Chirp.ok(format!("predicted travel {:.0} um", travel_m * 1e6)),
         Err(why) => refused(
-            CHIRP,
+            Subject::Chirp,
             why,
-            "correct the settings of [chirp], or give them to `bench chirp`",
+            "correct the settings of [chirp], or give options to `bench chirp`",
         ),
-    }
+    };
+    let control = match &checks.control {
+        Ok(margins) => judge_margins(margins, min_modulus_margin),
+        Err(why) => refused(
+            Subject::Control,
+            why,
+            "correct the settings of [control], or give options to `bench control`",
+        ),
+    };
+    [chirp, control]
 }
 
-fn control(answer: &Result<Margins, String>, least: f64) -> Finding {
-    let margins = match answer {
-        Ok(margins) => margins,
-        Err(why) => {
-            return refused(
-                CONTROL,
-                why,
-                "correct the settings of [control], or give them to `bench control`",
-            );
-        }
-    };
-    let asked = if least > 0.0 {
-        format!("at least {least} is asked for")
-    } else {
-        "none is asked for".into()
-    };
-    if margins.stable {
-        return Finding::ok(
-            CONTROL,
-            format!(
-                "modulus margin {:.3} by the model; {asked}",
-                margins.modulus_margin
-            ),
+fn judge_margins(margins: &Margins, min_modulus_margin: f64) -> Finding {
+    if !margins.stable {
+        return Subject::Control.warning(
+            "the closed loop is unstable by the model and no modulus margin is required: the run would trip",
+            "choose another controller (--controller FILE), or set control.min_modulus_margin to refuse such loops",
         );
     }
-    Finding::warning(
-        CONTROL,
-        "the closed loop is unstable by the model; no modulus margin is asked for: it would run into a trip",
-        "choose another controller (--controller FILE), or set control.least_modulus_margin to have such loops refused",
-    )
+    let limit = match min_modulus_margin > 0.0 {
+        true => format!("at least {min_modulus_margin} is required"),
+        false => "none is required".into(),
+    };
+    let margin = margins.modulus_margin;
+    Subject::Control.ok(format!("modulus margin {margin:.3} by the model; {limit}"))
 }
 
-/// The commands' texts end in the remedy, if they have one.
-fn refused(subject: &'static str, why: &str, otherwise: &str) -> Finding {
-    let why = why.trim_end_matches("; nothing moved");
-    let finding = Finding::refused(subject, &why);
-    Finding {
-        remedy: finding.remedy.or_else(|| Some(otherwise.to_string())),
-        ..finding
-    }
+/// The texts of the commands end with the remedy, if there is one.
+fn refused(subject: Subject, why: &str, default_remedy: &str) -> Finding {
+    let finding = subject.refused(&why.trim_end_matches("; nothing moved"));
+    let remedy = finding.remedy.unwrap_or_else(|| default_remedy.to_string());
+    subject.failure(finding.what, remedy)
 }
 
 #[cfg(test)]
@@ -126,41 +98,35 @@ mod tests {
         }
     }
 
-    fn verdicts(runs: &RunChecks) -> Vec<Severity> {
-        findings(runs, 0.4)
-            .iter()
-            .map(|finding| finding.verdict)
-            .collect()
+    fn severities(checks: &RunChecks) -> [Severity; 2] {
+        findings(checks, 0.4).map(|finding| finding.severity)
     }
 
     #[test]
-    fn what_a_command_refuses_is_a_failure_with_its_remedy() {
+    fn a_refusal_of_a_command_is_a_failure_with_its_remedy() {
         let good = RunChecks {
             chirp: Ok(1e-4),
             control: Ok(margins(true)),
         };
-        assert_eq!(verdicts(&good), [Severity::Ok, Severity::Ok]);
-        let why = "refused: margin 0.3; choose a controller; nothing moved".to_string();
-        let bad = RunChecks {
-            control: Err(why),
-            ..good.clone()
+        assert_eq!(severities(&good), [Severity::Ok, Severity::Ok]);
+        let why = "refused: margin 0.3; choose a controller; nothing moved";
+        let refused = RunChecks {
+            control: Err(why.into()),
+            ..good
         };
-        assert_eq!(verdicts(&bad), [Severity::Ok, Severity::Failure]);
-        assert_eq!(
-            findings(&bad, 0.4)[1].remedy.as_deref(),
-            Some("choose a controller")
-        );
-        let wild = RunChecks {
+        assert_eq!(severities(&refused), [Severity::Ok, Severity::Failure]);
+        let remedy = findings(&refused, 0.4)[1].remedy.clone();
+        assert_eq!(remedy.as_deref(), Some("choose a controller"));
+    }
+
+    #[test]
+    fn an_unstable_loop_is_a_warning_if_no_margin_is_required() {
+        let checks = RunChecks {
             chirp: Err("too far".into()),
             control: Ok(margins(false)),
         };
-        assert_eq!(verdicts(&wild), [Severity::Failure, Severity::Warning]);
-        assert!(
-            findings(&wild, 0.0)[0]
-                .remedy
-                .as_deref()
-                .unwrap()
-                .contains("[chirp]")
-        );
+        assert_eq!(severities(&checks), [Severity::Failure, Severity::Warning]);
+        let remedy = findings(&checks, 0.0)[0].remedy.clone().unwrap();
+        assert!(remedy.contains("[chirp]"), "{remedy}");
     }
 }

@@ -1,92 +1,87 @@
-//! What a thread like the loop's is granted: a real-time priority, locked memory, a processor of its own.
+//! The privileges of the loop's thread: real-time priority, locked memory, a processor of its own.
 
 use caps::{CapSet, Capability, has_cap};
 use nix::sched::{CpuSet, sched_getaffinity};
 use nix::sys::resource::{Resource, getrlimit};
 use nix::unistd::Pid;
 
-use super::finding::{Finding, Severity, parted};
+use super::finding::{Finding, Severity, Subject, split_remedy};
 use super::trial::Trial;
 use crate::config::LoopSettings;
 use crate::rt::thread::{Pace, Scheduling};
 
-/// What was asked for, what was granted, and by what right.
+/// What was requested, what was granted, and the limits behind it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SchedulerFacts {
-    /// What the trial's thread was granted.
+    /// What the thread of the trial was granted.
     pub scheduling: Scheduling,
-    /// The priority asked for.
+    /// The requested priority.
     pub priority: i32,
-    /// The highest that the limit RLIMIT_RTPRIO allows.
+    /// The limit RLIMIT_RTPRIO.
     pub priority_limit: u64,
-    /// CAP_SYS_NICE, which needs no limit.
-    pub may_schedule: bool,
-    /// Memory that the limit RLIMIT_MEMLOCK allows to lock, in bytes.
+    /// CAP_SYS_NICE, which overrides the limit.
+    pub cap_sys_nice: bool,
+    /// The limit RLIMIT_MEMLOCK, in bytes.
     pub memory_limit_bytes: u64,
-    /// CAP_IPC_LOCK, which needs no limit.
-    pub may_lock: bool,
-    /// The processor asked for.
+    /// CAP_IPC_LOCK, which overrides the limit.
+    pub cap_ipc_lock: bool,
+    /// The requested processor.
     pub cpu: Option<usize>,
     /// The processors that this process may use.
     pub allowed: Vec<usize>,
 }
 
-/// Asks the system.
+/// Reads the limits from the system.
 pub fn gather(settings: &LoopSettings, trial: &Trial) -> SchedulerFacts {
     let limit = |resource| getrlimit(resource).map_or(0, |(soft, _)| soft);
-    let may = |capability| has_cap(None, CapSet::Effective, capability).unwrap_or(false);
+    let has = |capability| has_cap(None, CapSet::Effective, capability).unwrap_or(false);
     SchedulerFacts {
         scheduling: trial.scheduling.clone(),
         priority: settings.priority,
         priority_limit: limit(Resource::RLIMIT_RTPRIO),
-        may_schedule: may(Capability::CAP_SYS_NICE),
+        cap_sys_nice: has(Capability::CAP_SYS_NICE),
         memory_limit_bytes: limit(Resource::RLIMIT_MEMLOCK),
-        may_lock: may(Capability::CAP_IPC_LOCK),
+        cap_ipc_lock: has(Capability::CAP_IPC_LOCK),
         cpu: settings.cpu,
-        allowed: allowed(),
+        allowed: allowed_processors(),
     }
 }
 
-fn allowed() -> Vec<usize> {
+fn allowed_processors() -> Vec<usize> {
     let set = sched_getaffinity(Pid::from_raw(0)).unwrap_or_else(|_| CpuSet::new());
-    (0..CpuSet::count())
-        .filter(|&cpu| set.is_set(cpu).unwrap_or(false))
-        .collect()
+    let is_allowed = |cpu: &usize| set.is_set(*cpu).unwrap_or(false);
+    (0..CpuSet::count()).filter(is_allowed).collect()
 }
 
-/// What that means for a loop at this pace: a run starts without all of it, and says so.
+/// Judges the facts for a loop at this pace. A run starts without the privileges and reports that.
 pub fn findings(facts: &SchedulerFacts, pace: Pace) -> Vec<Finding> {
-    let worst = if pace == Pace::Virtual {
-        Severity::Note
-    } else {
-        Severity::Warning
-    };
+    let limit = severity_limit(pace);
     let findings = [Some(priority(facts)), Some(memory(facts)), processor(facts)];
-    findings
-        .into_iter()
-        .flatten()
-        .map(|finding| finding.at_most(worst))
-        .collect()
+    let findings = findings.into_iter().flatten();
+    findings.map(|finding| finding.at_most(limit)).collect()
+}
+
+/// At virtual pace the loop does not wait for the clock, so its timing cannot suffer.
+pub(super) fn severity_limit(pace: Pace) -> Severity {
+    match pace {
+        Pace::Virtual => Severity::Note,
+        Pace::Realtime => Severity::Warning,
+    }
 }
 
 fn priority(facts: &SchedulerFacts) -> Finding {
-    let right = format!(
+    let limits = format!(
         "limit rtprio {}, CAP_SYS_NICE {}",
         facts.priority_limit,
-        yes(facts.may_schedule)
+        yes_or_no(facts.cap_sys_nice)
     );
-    if facts.scheduling.policy.starts_with("SCHED_FIFO") {
-        return Finding::ok(
-            "scheduler",
-            format!("{} is granted ({right})", facts.scheduling.policy),
-        );
+    let policy = &facts.scheduling.policy;
+    if policy.starts_with("SCHED_FIFO") {
+        return Subject::Scheduler.ok(format!("{policy} is granted ({limits})"));
     }
     let (what, remedy) = refusal(&facts.scheduling, "SCHED_FIFO");
-    Finding::warning(
-        "scheduler",
-        format!("{what} for priority {} ({right})", facts.priority),
-        remedy,
-    )
+    let what = format!("{what} for priority {} ({limits})", facts.priority);
+    Subject::Scheduler.warning(what, remedy)
 }
 
 fn memory(facts: &SchedulerFacts) -> Finding {
@@ -94,50 +89,41 @@ fn memory(facts: &SchedulerFacts) -> Finding {
         u64::MAX => "unlimited".to_string(),
         bytes => format!("{} MiB", bytes >> 20),
     };
-    let right = format!(
-        "limit memlock {limit}, CAP_IPC_LOCK {}",
-        yes(facts.may_lock)
-    );
+    let capability = yes_or_no(facts.cap_ipc_lock);
+    let limits = format!("limit memlock {limit}, CAP_IPC_LOCK {capability}");
     if facts.scheduling.memory_locked {
-        return Finding::ok("memory", format!("can be locked ({right})"));
+        return Subject::Memory.ok(format!("can be locked ({limits})"));
     }
     let (what, remedy) = refusal(&facts.scheduling, "locking memory");
-    Finding::warning("memory", format!("{what} ({right})"), remedy)
+    Subject::Memory.warning(format!("{what} ({limits})"), remedy)
 }
 
 fn processor(facts: &SchedulerFacts) -> Option<Finding> {
     let cpu = facts.cpu?;
     if facts.scheduling.cpu == Some(cpu) {
-        return Some(Finding::ok(
-            "processor",
-            format!("the loop can be bound to processor {cpu}"),
-        ));
+        let what = format!("the loop can be bound to processor {cpu}");
+        return Some(Subject::Processor.ok(what));
     }
     let allowed: Vec<String> = facts.allowed.iter().map(usize::to_string).collect();
-    Some(Finding::warning(
-        "processor",
-        format!(
-            "loop.cpu is {cpu}, this process may use {}",
-            allowed.join(", ")
-        ),
-        "choose one of these in loop.cpu, or widen the process's affinity (taskset, the service's CPUAffinity=)",
+    let allowed = allowed.join(", ");
+    Some(Subject::Processor.warning(
+        format!("loop.cpu is {cpu}, this process may use {allowed}"),
+        "choose one of these in loop.cpu, or extend the affinity of the process (taskset, CPUAffinity= of the service)",
     ))
 }
 
-fn yes(is: bool) -> &'static str {
-    if is { "yes" } else { "no" }
+fn yes_or_no(value: bool) -> &'static str {
+    if value { "yes" } else { "no" }
 }
 
 /// What the system refused, and the remedy.
-fn refusal(scheduling: &Scheduling, what: &str) -> (String, String) {
-    let line = scheduling
-        .refused
-        .iter()
-        .find(|line| line.starts_with(what));
-    let (what, remedy) = parted(line.map_or(what, String::as_str));
+fn refusal(scheduling: &Scheduling, request: &str) -> (String, String) {
+    let refused = scheduling.refused.iter();
+    let text = refused.into_iter().find(|text| text.starts_with(request));
+    let (what, remedy) = split_remedy(text.map_or(request, String::as_str));
     (
         what,
-        remedy.unwrap_or_else(|| "see \"Two paces\" in the README".into()),
+        remedy.unwrap_or_else(|| "see docs/real-time.md".into()),
     )
 }
 
@@ -182,58 +168,39 @@ mod tests {
     }
 
     #[test]
-    fn what_is_granted_is_ok() {
-        assert!(
-            findings(&granted(), Pace::Realtime)
-                .iter()
-                .all(|f| f.verdict == Severity::Ok)
-        );
-        assert_eq!(
-            findings(
-                &SchedulerFacts {
-                    cpu: None,
-                    ..granted()
-                },
-                Pace::Realtime
-            )
-            .len(),
-            2
-        );
+    fn granted_privileges_are_ok() {
+        let mut facts = granted();
+        let found = findings(&facts, Pace::Realtime);
+        assert!(found.iter().all(|f| f.severity == Severity::Ok));
+        facts.cpu = None;
+        assert_eq!(findings(&facts, Pace::Realtime).len(), 2);
     }
 
     #[test]
-    fn what_is_refused_is_a_warning_with_limit_and_remedy_and_no_failure() {
+    fn refused_privileges_are_warnings_with_limit_and_remedy() {
         let found = findings(&refused(), Pace::Realtime);
         assert!(
-            found.iter().all(|f| f.verdict == Severity::Warning),
+            found.iter().all(|f| f.severity == Severity::Warning),
             "{found:?}"
         );
-        assert!(
-            found[0].what.contains("EPERM")
-                && found[0]
-                    .what
-                    .contains("priority 80 (limit rtprio 0, CAP_SYS_NICE no)")
-        );
+        let what = &found[0].what;
+        let limits = "priority 80 (limit rtprio 0, CAP_SYS_NICE no)";
+        assert!(what.contains("EPERM") && what.contains(limits), "{what}");
         assert_eq!(found[0].remedy.as_deref(), Some("raise `rtprio`"));
-        assert!(
-            found[1].what.contains("limit memlock 8 MiB"),
-            "{}",
-            found[1].what
-        );
-        assert_eq!(found[2].what, "loop.cpu is 7, this process may use 0, 1");
+        let memory = &found[1].what;
+        assert!(memory.contains("limit memlock 8 MiB"), "{memory}");
+        let processor = "loop.cpu is 7, this process may use 0, 1";
+        assert_eq!(found[2].what, processor);
     }
 
     #[test]
-    fn at_virtual_pace_it_is_only_worth_a_note() {
-        assert!(
-            findings(&refused(), Pace::Virtual)
-                .iter()
-                .all(|f| f.verdict == Severity::Note)
-        );
+    fn refused_privileges_are_notes_at_virtual_pace() {
+        let found = findings(&refused(), Pace::Virtual);
+        assert!(found.iter().all(|f| f.severity == Severity::Note));
     }
 
     #[test]
-    fn this_process_may_use_some_processor() {
-        assert!(!allowed().is_empty());
+    fn this_process_may_use_a_processor() {
+        assert!(!allowed_processors().is_empty());
     }
 }

@@ -1,283 +1,244 @@
-//! The serial port of the probe: is it there, may it be opened, who holds it, and did it take its line?
+//! The serial port of the probe: does it exist, may it be opened, which process uses it, and which line settings did it
+//! accept?
 
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use bench_hal::serial::{Note, SerialError};
+use bench_hal::serial::{Note, Parity, PortSettings, SerialError};
 use nix::unistd::{AccessFlags, Gid, Group, User, eaccess, getegid, geteuid, getgroups};
 
-use super::finding::Finding;
-use super::system::line;
+use super::finding::{Finding, Subject, read_line};
 use super::usb::Usb;
-use crate::config::{LineSettings, Parity};
 use crate::rig::devices::ProbeError;
 
-const SUBJECT: &str = "serial port";
-/// An adapter that collects bytes for longer is told, in milliseconds.
-const SLOW_MS: u32 = 2;
+const PORT: Subject = Subject::SerialPort;
+/// A longer latency of the adapter is a warning, in milliseconds.
+const MAX_LATENCY_MS: u32 = 2;
 
-/// What is known of a port before it is opened.
+/// Facts about a port, before it is opened.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PortFacts {
-    /// Its path in the configuration.
+    /// The configured path.
     pub path: PathBuf,
-    /// What that stands for; `None` if there is nothing.
+    /// The device behind the path; `None` if it does not exist.
     pub device: Option<PathBuf>,
     /// Whether that is a character device, as terminals are.
     pub is_character_device: bool,
     /// Whether this process may read and write it.
     pub may_open: bool,
-    /// Group that owns it.
+    /// Group of the device.
     pub group: String,
     /// Permission bits.
     pub mode: u32,
     /// This user.
     pub user: String,
-    /// This user's groups.
+    /// The groups of this user.
     pub groups: Vec<String>,
-    /// Links below /dev/serial/by-id with what they stand for.
+    /// The links in /dev/serial/by-id, with their devices.
     pub by_id: Vec<(PathBuf, PathBuf)>,
-    /// The USB adapter, if it is one.
+    /// The USB adapter.
     pub usb: Option<Usb>,
-    /// Other processes that have it open, as far as this user may see them.
+    /// Other processes that have the device open, as far as this user may see them.
     pub holders: Vec<u32>,
 }
 
-/// Looks at the port of `line`; does not open it.
-pub fn gather(line: &LineSettings) -> PortFacts {
-    let path = PathBuf::from(&line.port);
-    let by_id = links(Path::new("/dev/serial/by-id"));
-    let (user, groups) = who_am_i();
-    let unseen = PortFacts {
-        path,
-        by_id,
+/// Examines the port of `line` without opening it.
+pub fn gather(line: &PortSettings) -> PortFacts {
+    let (user, groups) = user_and_groups();
+    let facts = PortFacts {
+        path: line.path.clone(),
+        by_id: links(Path::new("/dev/serial/by-id")),
         user,
         groups,
         ..PortFacts::default()
     };
-    let found = unseen
-        .path
-        .canonicalize()
-        .ok()
-        .and_then(|device| Some((device.metadata().ok()?, device)));
-    let Some((metadata, device)) = found else {
-        return unseen;
+    match line.path.canonicalize() {
+        Ok(device) => with_device(facts, device),
+        Err(_) => facts,
+    }
+}
+
+fn with_device(facts: PortFacts, device: PathBuf) -> PortFacts {
+    let Ok(metadata) = device.metadata() else {
+        return facts;
     };
-    let name = device
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned())
-        .unwrap_or_default();
+    let name = device.file_name().unwrap_or_default().to_string_lossy();
+    let access = eaccess(&device, AccessFlags::R_OK | AccessFlags::W_OK);
     PortFacts {
         is_character_device: metadata.file_type().is_char_device(),
-        may_open: eaccess(&device, AccessFlags::R_OK | AccessFlags::W_OK).is_ok(),
+        may_open: access.is_ok(),
         group: group_name(Gid::from_raw(metadata.gid())),
         mode: metadata.mode() & 0o777,
         usb: Usb::of(Path::new("/sys/class/tty"), &name),
         holders: holders(&device),
-        device: Some(device),
-        ..unseen
+        device: Some(device.clone()),
+        ..facts
     }
 }
 
 fn links(folder: &Path) -> Vec<(PathBuf, PathBuf)> {
-    let entries = std::fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path());
-    let mut links: Vec<_> = entries
-        .filter_map(|link| Some((link.clone(), link.canonicalize().ok()?)))
-        .collect();
+    let mut links = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let link = entry.path();
+        if let Ok(device) = link.canonicalize() {
+            links.push((link, device));
+        }
+    }
     links.sort();
     links
 }
 
 fn group_name(gid: Gid) -> String {
-    Group::from_gid(gid)
-        .ok()
-        .flatten()
-        .map_or_else(|| gid.to_string(), |group| group.name)
+    match Group::from_gid(gid) {
+        Ok(Some(group)) => group.name,
+        _ => gid.to_string(),
+    }
 }
 
-fn who_am_i() -> (String, Vec<String>) {
+fn user_and_groups() -> (String, Vec<String>) {
     let uid = geteuid();
-    let user = User::from_uid(uid)
-        .ok()
-        .flatten()
-        .map_or_else(|| uid.to_string(), |user| user.name);
-    let mut groups: Vec<String> = getgroups()
-        .unwrap_or_default()
-        .into_iter()
-        .map(group_name)
-        .collect();
-    groups.push(group_name(getegid()));
+    let user = match User::from_uid(uid) {
+        Ok(Some(user)) => user.name,
+        _ => uid.to_string(),
+    };
+    let mut gids = getgroups().unwrap_or_default();
+    gids.push(getegid());
+    let mut groups: Vec<String> = gids.into_iter().map(group_name).collect();
     groups.sort();
     groups.dedup();
     (user, groups)
 }
 
-/// Processes with `device` open. Those of other users are seen by root only.
+/// Processes that have `device` open. Only root sees those of other users.
 fn holders(device: &Path) -> Vec<u32> {
-    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-    let pids =
-        processes.filter_map(|entry| entry.file_name().to_string_lossy().parse::<u32>().ok());
-    pids.filter(|pid| *pid != std::process::id() && has_open(*pid, device))
-        .collect()
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let pids = entries.filter_map(|entry| entry.file_name().to_string_lossy().parse().ok());
+    let others = pids.filter(|pid| *pid != std::process::id());
+    others.filter(|pid| has_open(*pid, device)).collect()
 }
 
 fn has_open(pid: u32, device: &Path) -> bool {
-    let files = std::fs::read_dir(format!("/proc/{pid}/fd"))
-        .into_iter()
-        .flatten()
-        .flatten();
-    files
-        .filter_map(|file| std::fs::read_link(file.path()).ok())
-        .any(|open| open == device)
+    let files = std::fs::read_dir(format!("/proc/{pid}/fd"));
+    let mut files = files.into_iter().flatten().flatten();
+    files.any(|file| std::fs::read_link(file.path()).is_ok_and(|open| open == device))
 }
 
-/// What that means, before anything is opened.
-pub fn findings(facts: &PortFacts) -> Vec<Finding> {
+/// Judges the facts.
+pub fn finding(facts: &PortFacts) -> Finding {
     let path = facts.path.display();
     let Some(device) = &facts.device else {
-        return vec![missing(facts)];
+        return PORT.failure(format!("{path} does not exist"), existing_ports(facts));
     };
     if !facts.is_character_device {
-        return vec![Finding::failure(
-            SUBJECT,
-            format!("{path} is no terminal"),
-            there(facts),
-        )];
+        let what = format!("{path} is not a terminal");
+        return PORT.failure(what, existing_ports(facts));
     }
     if !facts.may_open {
-        return vec![forbidden(facts, device)];
+        return no_permission(facts, device);
     }
-    let link = facts
-        .by_id
-        .iter()
-        .find(|(link, target)| target == device && *link != facts.path);
-    let what = format!("{path} is there, and {} may open it", facts.user);
-    vec![match link {
-        Some((link, _)) => {
-            let remedy = format!(
-                "{} keeps its name when adapters are plugged in another order",
-                link.display()
-            );
-            Finding::note(SUBJECT, what, remedy)
-        }
-        None => Finding::ok(SUBJECT, what),
-    }]
+    let what = format!("{path} exists, and {} may open it", facts.user);
+    let mut links = facts.by_id.iter();
+    let link = links.find(|(link, target)| target == device && *link != facts.path);
+    let Some((link, _)) = link else {
+        return PORT.ok(what);
+    };
+    let remedy = format!(
+        "{} keeps its name when the adapters are connected in another order",
+        link.display()
+    );
+    PORT.note(what, remedy)
 }
 
-fn missing(facts: &PortFacts) -> Finding {
-    Finding::failure(
-        SUBJECT,
-        format!("there is no {}", facts.path.display()),
-        there(facts),
-    )
-}
-
-/// What could be named instead.
-fn there(facts: &PortFacts) -> String {
-    let links: Vec<String> = facts
-        .by_id
-        .iter()
-        .map(|(link, _)| link.display().to_string())
-        .collect();
-    match links.is_empty() {
-        true => "plug the adapter in (there is nothing in /dev/serial/by-id), or correct probe.device.line.port".into(),
-        false => format!("set probe.device.line.port to one of {}", links.join(", ")),
+fn existing_ports(facts: &PortFacts) -> String {
+    if facts.by_id.is_empty() {
+        return "connect the adapter (/dev/serial/by-id is empty), or correct probe.device.line.port".into();
     }
+    let links = facts.by_id.iter();
+    let links: Vec<String> = links.map(|(link, _)| link.display().to_string()).collect();
+    format!("set probe.device.line.port to one of {}", links.join(", "))
 }
 
-fn forbidden(facts: &PortFacts, device: &Path) -> Finding {
+fn no_permission(facts: &PortFacts, device: &Path) -> Finding {
     let PortFacts {
         group, user, mode, ..
     } = facts;
-    let groups = facts.groups.join(", ");
     let what = format!(
-        "{user} may not open {}: group {group}, mode {mode:04o}; {user} is in {groups}",
-        device.display()
+        "{user} may not open {}: group {group}, mode {mode:04o}; {user} is in {}",
+        device.display(),
+        facts.groups.join(", ")
     );
-    // Nobody should join root's group for a port.
-    let a_group = if group == "root" { "dialout" } else { group };
-    let by_group = match mode & 0o060 == 0o060 && group != "root" && !facts.groups.contains(group) {
-        true => format!("`sudo usermod -aG {group} {user}` and log in again"),
-        false => {
-            format!(
-                "`sudo chgrp {a_group} {0} && sudo chmod g+rw {0}`, with {user} in {a_group}",
-                device.display()
-            )
-        }
+    // The group of root would grant more than a port.
+    let group_for_port = if group == "root" { "dialout" } else { group };
+    let group_may_open = mode & 0o060 == 0o060 && group != "root";
+    let by_group = if group_may_open && !facts.groups.contains(group) {
+        format!("`sudo usermod -aG {group} {user}` and log in again")
+    } else {
+        format!(
+            "`sudo chgrp {group_for_port} {0} && sudo chmod g+rw {0}`, with {user} in {group_for_port}",
+            device.display()
+        )
     };
     let by_rule = facts.usb.as_ref().map_or(String::new(), |usb| {
-        format!(
-            "; or put this line into /etc/udev/rules.d/70-bench.rules and plug the adapter in again: {}",
-            usb.rule(a_group)
-        )
+        let rule = usb.rule(group_for_port);
+        format!("; or add this line to /etc/udev/rules.d/70-bench.rules and reconnect the adapter: {rule}")
     });
-    Finding::failure(SUBJECT, what, by_group + &by_rule)
+    PORT.failure(what, by_group + &by_rule)
 }
 
-/// Why the probe could not be opened; what [`findings`] has said already is not said twice.
+/// Why the probe could not be opened.
 pub fn refusal(error: &ProbeError, facts: &PortFacts) -> Finding {
     let ProbeError::Serial(SerialError::PortInUse { pid, .. }) = error else {
-        return Finding::refused(SUBJECT, error);
-    };
-    let pids: Vec<u32> = pid.map_or_else(|| facts.holders.clone(), |pid| vec![pid]);
-    let name = |pid: &u32| {
-        let name =
-            line(format!("/proc/{pid}/comm")).map_or(String::new(), |name| format!(" ({name})"));
-        format!("process {pid}{name}")
+        return PORT.refused(error);
     };
     let path = facts.path.display();
-    match pids.is_empty() {
-        true => Finding::failure(
-            SUBJECT,
-            format!("{path} is held by another process"),
-            format!(
-                "`sudo fuser {path}` names it; end it first: two readers would take each other's bytes"
-            ),
-        ),
-        false => Finding::failure(
-            SUBJECT,
-            format!(
-                "{path} is held by {}",
-                pids.iter().map(name).collect::<Vec<_>>().join(", ")
-            ),
-            "wait for its end, or end it: two readers would take each other's bytes",
-        ),
+    let pids = match pid {
+        Some(pid) => &[*pid][..],
+        None => &facts.holders,
+    };
+    if pids.is_empty() {
+        return PORT.failure(
+            format!("{path} is used by another process"),
+            format!("`sudo fuser {path}` names it; end it first: two readers would lose bytes to each other"),
+        );
+    }
+    let names: Vec<String> = pids.iter().map(process_name).collect();
+    PORT.failure(
+        format!("{path} is used by {}", names.join(", ")),
+        "wait for its end, or end it: two readers would lose bytes to each other",
+    )
+}
+
+fn process_name(pid: &u32) -> String {
+    match read_line(format!("/proc/{pid}/comm")) {
+        Some(name) => format!("process {pid} ({name})"),
+        None => format!("process {pid}"),
     }
 }
 
-/// What an open port took, and what it did not.
-pub fn opened(facts: &PortFacts, line: &LineSettings, notes: &[Note]) -> Vec<Finding> {
+/// Which line settings an open port accepted.
+pub fn opened(facts: &PortFacts, line: &PortSettings, notes: &[Note]) -> Vec<Finding> {
     let parity = match line.parity {
         Parity::None => "no",
         Parity::Even => "even",
     };
-    let mut findings = vec![Finding::ok(
-        SUBJECT,
-        format!("opened at {} baud with {parity} parity", line.baud),
-    )];
-    findings.extend(
-        notes
-            .iter()
-            .map(|note| Finding::note(SUBJECT, note.what.clone(), note.remedy)),
-    );
-    findings.extend(facts.usb.as_ref().and_then(latency));
+    let what = format!("opened at {} baud with {parity} parity", line.baud);
+    let mut findings = vec![PORT.ok(what)];
+    for note in notes {
+        findings.push(PORT.note(note.what.clone(), note.remedy));
+    }
+    let latency_ms = facts.usb.as_ref().and_then(|usb| usb.latency_ms);
+    findings.extend(latency_ms.map(latency));
     findings
 }
 
-fn latency(usb: &Usb) -> Option<Finding> {
-    let ms = usb.latency_ms?;
-    let what = format!("the adapter collects bytes for {ms} ms at the most");
-    let remedy = "probe.device.line.low_latency = true asks for 1 ms; where that is refused, a udev rule with \
-                  ATTR{latency_timer}=\"1\" does it";
-    Some(if ms > SLOW_MS {
-        Finding::warning(SUBJECT, what, remedy)
-    } else {
-        Finding::ok(SUBJECT, what)
-    })
+fn latency(latency_ms: u32) -> Finding {
+    let what = format!("the adapter collects bytes for up to {latency_ms} ms");
+    if latency_ms <= MAX_LATENCY_MS {
+        return PORT.ok(what);
+    }
+    let remedy = "set probe.device.line.low_latency = true, which requests 1 ms; if that is refused, use a udev rule \
+                  with ATTR{latency_timer}=\"1\"";
+    PORT.warning(what, remedy)
 }
 
 #[cfg(test)]
@@ -309,19 +270,17 @@ mod tests {
     }
 
     fn only(facts: &PortFacts) -> Finding {
-        let mut found = findings(facts);
-        assert_eq!(found.len(), 1, "{found:?}");
-        found.remove(0)
+        finding(facts)
     }
 
     #[test]
-    fn permission_denied_names_the_group_the_users_groups_and_a_rule_to_paste() {
+    fn a_refused_permission_names_groups_and_a_udev_rule() {
         let found = only(&PortFacts {
             may_open: false,
             usb: usb(None),
             ..sound()
         });
-        assert_eq!(found.verdict, Failure);
+        assert_eq!(found.severity, Failure);
         assert_eq!(
             found.what,
             "ada may not open /dev/ttyUSB0: group dialout, mode 0660; ada is in ada, users"
@@ -340,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_port_that_its_group_may_not_open_either_needs_other_permission_bits() {
+    fn a_port_without_group_access_needs_other_permission_bits() {
         let remedy = |group: &str, groups: &[&str], mode| {
             let groups = groups.iter().map(|group| group.to_string()).collect();
             let facts = PortFacts {
@@ -362,22 +321,17 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_port_is_told_with_the_names_that_stay() {
+    fn a_missing_port_is_reported_with_the_permanent_names() {
         let missing = PortFacts {
             device: None,
             ..sound()
         };
         let found = only(&missing);
         assert_eq!(
-            (found.verdict, found.what.as_str()),
-            (Failure, "there is no /dev/ttyUSB0")
+            (found.severity, found.what.as_str()),
+            (Failure, "/dev/ttyUSB0 does not exist")
         );
-        assert!(
-            found
-                .remedy
-                .unwrap()
-                .contains("nothing in /dev/serial/by-id")
-        );
+        assert!(found.remedy.unwrap().contains("/dev/serial/by-id is empty"));
         let by_id = vec![("/dev/serial/by-id/usb-FTDI".into(), "/dev/ttyUSB1".into())];
         let remedy = only(&PortFacts { by_id, ..missing }).remedy.unwrap();
         assert_eq!(
@@ -387,13 +341,13 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_may_change_is_a_note_with_the_one_that_stays() {
+    fn a_name_that_may_change_is_a_note_with_the_permanent_name() {
         let by_id = vec![("/dev/serial/by-id/usb-FTDI".into(), "/dev/ttyUSB0".into())];
         let found = only(&PortFacts {
             by_id: by_id.clone(),
             ..sound()
         });
-        assert_eq!(found.verdict, Noted);
+        assert_eq!(found.severity, Noted);
         let path = "/dev/serial/by-id/usb-FTDI".into();
         assert_eq!(
             only(&PortFacts {
@@ -401,7 +355,7 @@ mod tests {
                 path,
                 ..sound()
             })
-            .verdict,
+            .severity,
             Ok
         );
         assert_eq!(
@@ -409,13 +363,13 @@ mod tests {
                 is_character_device: false,
                 ..sound()
             })
-            .verdict,
+            .severity,
             Failure
         );
     }
 
     #[test]
-    fn who_holds_a_port_is_named_by_lock_or_by_its_open_files() {
+    fn the_process_that_uses_a_port_is_named_by_lock_or_open_files() {
         let held = |pid| {
             ProbeError::Serial(SerialError::PortInUse {
                 path: "/dev/ttyUSB0".into(),
@@ -425,7 +379,7 @@ mod tests {
         assert!(
             refusal(&held(Some(999_999_999)), &sound())
                 .what
-                .ends_with("held by process 999999999")
+                .ends_with("used by process 999999999")
         );
         let me = std::process::id();
         let found = refusal(
@@ -456,15 +410,10 @@ mod tests {
     }
 
     #[test]
-    fn an_adapter_that_collects_bytes_is_a_warning() {
-        let line = LineSettings {
-            port: "/dev/ttyUSB0".into(),
-            baud: 230_400,
-            parity: Parity::Even,
-            low_latency: true,
-            lock_folder: "/run/lock".into(),
-        };
-        let verdicts = |ms| {
+    fn a_high_latency_of_the_adapter_is_a_warning() {
+        let mut line = PortSettings::new("/dev/ttyUSB0", 230_400);
+        line.parity = Parity::Even;
+        let severities = |ms| {
             let found = opened(
                 &PortFacts {
                     usb: usb(ms),
@@ -475,16 +424,16 @@ mod tests {
             );
             found
                 .iter()
-                .map(|finding| finding.verdict)
+                .map(|finding| finding.severity)
                 .collect::<Vec<_>>()
         };
-        assert_eq!(verdicts(Some(16)), [Ok, Warning]);
-        assert_eq!(verdicts(Some(1)), [Ok, Ok]);
-        assert_eq!(verdicts(None), [Ok]);
+        assert_eq!(severities(Some(16)), [Ok, Warning]);
+        assert_eq!(severities(Some(1)), [Ok, Ok]);
+        assert_eq!(severities(None), [Ok]);
         let note = Note {
             what: "no low latency: EPERM".into(),
             remedy: "ask root",
         };
-        assert_eq!(opened(&sound(), &line, &[note])[1].verdict, Noted);
+        assert_eq!(opened(&sound(), &line, &[note])[1].severity, Noted);
     }
 }

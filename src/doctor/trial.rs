@@ -1,58 +1,58 @@
-//! A thread like the loop's: scheduled as the loop asks for it, waiting by the loop's own clock, but without devices.
+//! A thread with the scheduling and the clock of the loop, but without devices.
 
 use std::time::Duration;
 
 use rtrb::RingBuffer;
 use serde::Serialize;
 
-use super::finding::Finding;
+use super::finding::{Finding, Subject};
 use crate::config::LoopSettings;
 use crate::rt::clock::{Clock, Realtime};
 use crate::rt::publisher::Publisher;
 use crate::rt::thread::{Pace, Scheduling, become_realtime};
 
-/// How long it is watched.
-const WATCHED: Duration = Duration::from_secs(1);
+/// Duration of the trial.
+const DURATION: Duration = Duration::from_secs(1);
 
-/// What such a thread was granted, and how punctually it was woken.
+/// The scheduling of the thread, and how late it woke up.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
-    /// What was granted.
+    /// What the system granted.
     pub scheduling: Scheduling,
-    /// How late it was woken.
+    /// How late the thread woke up.
     pub lateness: Lateness,
 }
 
-/// How late a thread was woken, beside how it was scheduled.
+/// How late a thread woke up, and how it was scheduled.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Lateness {
     /// `SCHED_FIFO 80`, `SCHED_OTHER`.
     pub policy: String,
     /// Whether the memory was locked.
     pub memory_locked: bool,
-    /// The processor it was bound to.
+    /// The processor that it was bound to.
     pub cpu: Option<usize>,
-    /// Ticks in a second.
+    /// Ticks per second.
     pub rate_hz: f64,
-    /// Ticks it was woken for.
+    /// Ticks for which it woke up.
     pub ticks: u64,
-    /// Ticks that passed while it slept.
+    /// Ticks that it missed.
     pub missed: u64,
-    /// Half of the ticks began no later than this, in seconds.
+    /// Median lateness in seconds.
     pub p50_s: f64,
-    /// 99 of 100 ticks began no later than this, in seconds.
+    /// 99 % quantile of the lateness in seconds.
     pub p99_s: f64,
-    /// The latest, in seconds.
+    /// Largest lateness in seconds.
     pub max_s: f64,
 }
 
-/// RunChecks such a thread for about a second. Its memory is unlocked again.
+/// Runs such a thread for about one second, and unlocks the memory afterwards.
 pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
     let settings = settings.clone();
     let work = move || {
         let scheduling = become_realtime(&settings);
-        let lateness = watch(&settings, &scheduling);
-        let _ = nix::sys::mman::munlockall(); // what was not locked is no harm
+        let lateness = measure(&settings, &scheduling);
+        let _ = nix::sys::mman::munlockall(); // an error means that nothing was locked
         Trial {
             scheduling,
             lateness,
@@ -63,39 +63,38 @@ pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
         .spawn(work)?;
     thread
         .join()
-        .map_err(|_| std::io::Error::other("the trial's thread died"))
+        .map_err(|_| std::io::Error::other("the thread of the trial panicked"))
 }
 
-fn watch(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
-    let ticks = (settings.rate_hz * WATCHED.as_secs_f64()).ceil() as u64;
+fn measure(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
+    let period_ns = settings.period_s() * 1e9;
+    let ticks = (settings.rate_hz * DURATION.as_secs_f64()).ceil() as u64;
     let mut late_ns: Vec<u64> = Vec::with_capacity(ticks as usize);
-    let (publisher, mut clock) = (
-        Publisher::new(RingBuffer::new(1).0),
-        Realtime::new(settings.period_s()),
-    );
+    let publisher = Publisher::new(RingBuffer::new(1).0);
+    let mut clock = Realtime::new(settings.period_s());
     let (mut number, mut missed) = (0, 0);
     while number < ticks {
-        let moment = clock.wait(number, &publisher);
-        let slept_through_ns = f64::from(moment.missed) * settings.period_s() * 1e9;
-        late_ns.push(
-            moment.woke_ns.saturating_sub(moment.tick.scheduled_ns) + slept_through_ns as u64,
-        );
-        missed += u64::from(moment.missed);
-        number = moment.tick.number + 1;
+        let timing = clock.wait(number, &publisher);
+        let missed_ns = (f64::from(timing.missed) * period_ns) as u64;
+        let woke_late_ns = timing.woke_ns.saturating_sub(timing.tick.scheduled_ns);
+        late_ns.push(woke_late_ns + missed_ns);
+        missed += u64::from(timing.missed);
+        number = timing.tick.number + 1;
     }
     late_ns.sort_unstable();
     Lateness::of(&late_ns, missed, settings.rate_hz, scheduling)
 }
 
+/// The `q` quantile of ascending nanoseconds, in seconds.
+fn quantile_s(late_ns: &[u64], q: f64) -> f64 {
+    let rank = (q * late_ns.len() as f64).ceil() as usize;
+    let late_ns = late_ns.get(rank.saturating_sub(1));
+    late_ns.map_or(0.0, |&ns| ns as f64 / 1e9)
+}
+
 impl Lateness {
-    /// Of rising latenesses in nanoseconds.
+    /// The figures of latenesses in ascending order, in nanoseconds.
     fn of(late_ns: &[u64], missed: u64, rate_hz: f64, scheduling: &Scheduling) -> Lateness {
-        let quantile = |q: f64| {
-            let rank = (q * late_ns.len() as f64).ceil() as usize;
-            late_ns
-                .get(rank.saturating_sub(1))
-                .map_or(0.0, |&ns| ns as f64 / 1e9)
-        };
         Lateness {
             policy: scheduling.policy.clone(),
             memory_locked: scheduling.memory_locked,
@@ -103,25 +102,23 @@ impl Lateness {
             rate_hz,
             ticks: late_ns.len() as u64,
             missed,
-            p50_s: quantile(0.5),
-            p99_s: quantile(0.99),
-            max_s: quantile(1.0),
+            p50_s: quantile_s(late_ns, 0.5),
+            p99_s: quantile_s(late_ns, 0.99),
+            max_s: quantile_s(late_ns, 1.0),
         }
     }
 
-    fn words(&self) -> String {
-        let us = |s: f64| format!("{:.1} us", s * 1e6);
-        let memory = if self.memory_locked {
-            "locked"
-        } else {
-            "not locked"
+    fn text(&self) -> String {
+        let memory = match self.memory_locked {
+            true => "memory locked",
+            false => "memory not locked",
         };
         format!(
-            "{}, memory {memory}: woken {} late (p50), {} (p99), {} (max) in {} ticks at {} Hz, {} missed",
+            "{}, {memory}: late by {:.1} us (p50), {:.1} us (p99), {:.1} us (max) in {} ticks at {} Hz, {} missed",
             self.policy,
-            us(self.p50_s),
-            us(self.p99_s),
-            us(self.max_s),
+            self.p50_s * 1e6,
+            self.p99_s * 1e6,
+            self.max_s * 1e6,
             self.ticks,
             self.rate_hz,
             self.missed
@@ -129,27 +126,24 @@ impl Lateness {
     }
 }
 
-/// A tick that begins later than the next one is due is missed; too many within a second trip.
+/// Judges the lateness. A tick that is late by more than a period is missed; too many of them within one second trip.
 pub fn finding(lateness: &Lateness, overruns_per_s: u32, pace: Pace) -> Finding {
     let remedy = "grant real-time scheduling, give the loop a processor of its own (loop.cpu, isolcpus=), \
-                  stop what else runs here, or lower loop.rate_hz";
-    let (what, is_late) = (
-        lateness.words(),
-        lateness.missed > 0 || lateness.max_s > 1.0 / lateness.rate_hz,
-    );
+                  end other programs, or lower loop.rate_hz";
+    let what = lateness.text();
+    let is_late = lateness.missed > 0 || lateness.max_s > 1.0 / lateness.rate_hz;
     match pace {
+        _ if !is_late => Subject::Lateness.ok(what),
         Pace::Realtime if lateness.missed > u64::from(overruns_per_s) => {
             let what =
-                format!("{what}; the interlock trips on more than {overruns_per_s} a second");
-            Finding::failure("lateness", what, remedy)
+                format!("{what}; the interlock trips on more than {overruns_per_s} per second");
+            Subject::Lateness.failure(what, remedy)
         }
-        Pace::Realtime if is_late => Finding::warning("lateness", what, remedy),
-        Pace::Virtual if is_late => {
-            let remedy = "none for virtual pace, which waits for no clock; before --pace realtime: "
-                .to_string() + remedy;
-            Finding::note("lateness", what, remedy)
+        Pace::Realtime => Subject::Lateness.warning(what, remedy),
+        Pace::Virtual => {
+            let remedy = format!("none at virtual pace; before --pace realtime: {remedy}");
+            Subject::Lateness.note(what, remedy)
         }
-        _ => Finding::ok("lateness", what),
     }
 }
 
@@ -168,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_ranks() {
+    fn quantiles_are_order_statistics() {
         let late_ns: Vec<u64> = (1..=1000).collect();
         let lateness = lateness(&late_ns, 0);
         assert_eq!(
@@ -182,9 +176,9 @@ mod tests {
     }
 
     #[test]
-    fn a_tick_late_is_a_warning_and_what_trips_the_interlock_a_failure() {
+    fn a_late_tick_is_a_warning_and_a_trip_is_a_failure() {
         let verdict =
-            |late_ns: &[u64], missed, pace| finding(&lateness(late_ns, missed), 50, pace).verdict;
+            |late_ns: &[u64], missed, pace| finding(&lateness(late_ns, missed), 50, pace).severity;
         assert_eq!(verdict(&[5000, 900_000], 0, Pace::Realtime), Severity::Ok);
         assert_eq!(
             verdict(&[5000, 1_100_000], 1, Pace::Realtime),
@@ -201,16 +195,16 @@ mod tests {
     }
 
     #[test]
-    fn the_policy_stands_beside_the_figures() {
+    fn the_text_begins_with_the_policy() {
         let what = finding(&lateness(&[5000, 9000], 0), 50, Pace::Realtime).what;
         assert!(
-            what.starts_with("SCHED_FIFO 80, memory locked: woken 5.0 us late (p50)"),
+            what.starts_with("SCHED_FIFO 80, memory locked: late by 5.0 us (p50)"),
             "{what}"
         );
     }
 
     #[test]
-    fn the_trial_counts_every_tick_of_its_second_as_woken_or_missed() {
+    fn every_tick_of_the_trial_is_counted() {
         let settings = LoopSettings {
             rate_hz: 1000.0,
             computing_delay_periods: 0,

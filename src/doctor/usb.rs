@@ -1,8 +1,8 @@
-//! What sysfs tells of a serial port behind a USB adapter.
+//! The USB adapter of a serial port, by sysfs.
 
 use std::path::Path;
 
-use super::system::line;
+use super::finding::read_line;
 
 /// The adapter of a port.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,26 +13,26 @@ pub struct Usb {
     pub product: String,
     /// Serial number, if the adapter has one.
     pub serial: Option<String>,
-    /// Milliseconds for which an FTDI adapter collects bytes.
+    /// Latency timer of an FTDI adapter in milliseconds: the longest time for which it collects bytes.
     pub latency_ms: Option<u32>,
 }
 
 impl Usb {
-    /// The adapter of the terminal `name` (`ttyUSB0`); `None` if it is none. `class` is `/sys/class/tty`.
+    /// The adapter of the terminal `name` (`ttyUSB0`); `None` for other terminals. `class` is `/sys/class/tty`.
     pub fn of(class: &Path, name: &str) -> Option<Usb> {
         let device = class.join(name).join("device").canonicalize().ok()?;
         let usb = device
             .ancestors()
             .find(|folder| folder.join("idVendor").exists())?;
         Some(Usb {
-            vendor: line(usb.join("idVendor"))?,
-            product: line(usb.join("idProduct"))?,
-            serial: line(usb.join("serial")),
-            latency_ms: line(device.join("latency_timer")).and_then(|text| text.parse().ok()),
+            vendor: read_line(usb.join("idVendor"))?,
+            product: read_line(usb.join("idProduct"))?,
+            serial: read_line(usb.join("serial")),
+            latency_ms: read_line(device.join("latency_timer")).and_then(|text| text.parse().ok()),
         })
     }
 
-    /// A udev rule that gives this adapter to `group` and to who sits at the machine.
+    /// A udev rule that gives `group` and the user at the console access to this adapter.
     pub fn rule(&self, group: &str) -> String {
         let Usb {
             vendor, product, ..
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_adapter_is_found_above_its_terminal() {
+    fn finds_the_adapter_of_a_terminal() {
         let sys = tempfile::tempdir().unwrap();
         let usb = sys.path().join("devices/usb1/1-2");
         let port = usb.join("1-2:1.0/ttyUSB0");

@@ -1,60 +1,45 @@
-//! A VESC: all that it says of itself without being asked.
+//! A VESC, by its STATUS frames.
 
 use bench_hal::can::vesc::VescSettings;
 
-use super::can_nodes::Heard;
-use super::finding::Finding;
+use super::can_nodes::BusTraffic;
+use super::finding::{Finding, Subject};
 
-const SUBJECT: &str = "VESC";
-/// More current than this without a command is told, in units of 0.1 A.
-const STRAY: u16 = 2;
+/// A current above this, without a command, is reported, in units of 0.1 A.
+const STRAY_CURRENT: u16 = 2;
 
-/// What was heard of the configured one.
-pub fn findings(heard: &Heard, settings: &VescSettings) -> Vec<Finding> {
+/// Judges what was received from the configured VESC.
+pub fn findings(traffic: &BusTraffic, settings: &VescSettings) -> Vec<Finding> {
     let node = settings.node;
-    let Some(&(count, tenths)) = heard.vescs.get(&node) else {
-        return vec![Finding::failure(
-            SUBJECT,
-            format!("VESC {node} sent no STATUS within {} s", heard.seconds),
-            "check its power and cable, its number, and that CAN status 1 is on in VESC Tool",
+    let Some(&(count, tenths)) = traffic.vescs.get(&node) else {
+        return vec![Subject::Vesc.failure(
+            format!("VESC {node} sent no STATUS within {} s", traffic.seconds),
+            "check its supply and cable, its number, and that CAN status 1 is enabled in VESC Tool",
         )];
     };
-    vec![
-        rate(
-            node,
-            count,
-            heard.seconds,
-            settings.status_timeout.as_secs_f64(),
-        ),
-        current(node, tenths),
-    ]
+    let rate_hz = count as f64 / traffic.seconds;
+    let timeout_s = settings.status_timeout.as_secs_f64();
+    vec![rate(node, rate_hz, timeout_s), current(node, tenths)]
 }
 
-fn rate(node: u8, count: u64, seconds: f64, lost_s: f64) -> Finding {
-    let rate_hz = count as f64 / seconds;
+fn rate(node: u8, rate_hz: f64, timeout_s: f64) -> Finding {
     let what = format!(
-        "VESC {node} sends STATUS {rate_hz:.0} times a second; it counts as lost after {lost_s} s without"
+        "VESC {node} sends {rate_hz:.0} STATUS frames per second; the timeout is {timeout_s} s"
     );
-    if rate_hz * lost_s >= 2.0 {
-        return Finding::ok(SUBJECT, what);
+    if rate_hz * timeout_s >= 2.0 {
+        return Subject::Vesc.ok(what);
     }
-    Finding::warning(
-        SUBJECT,
-        what,
-        "raise the rate of CAN status 1 in VESC Tool, or amplifier.device.status_lost_s",
-    )
+    let remedy = "raise the rate of CAN status 1 in VESC Tool, or amplifier.device.status_lost_s";
+    Subject::Vesc.warning(what, remedy)
 }
 
 fn current(node: u8, tenths: i16) -> Finding {
     let what = format!("VESC {node} gives {:.1} A", f64::from(tenths) * 0.1);
-    if tenths.unsigned_abs() <= STRAY {
-        return Finding::ok(SUBJECT, what);
+    if tenths.unsigned_abs() <= STRAY_CURRENT {
+        return Subject::Vesc.ok(what);
     }
-    Finding::warning(
-        SUBJECT,
-        format!("{what}, and this program commanded none"),
-        "find out who drives it before you start",
-    )
+    let what = format!("{what}, without a command of this program");
+    Subject::Vesc.warning(what, "find out what drives it before the run")
 }
 
 #[cfg(test)]
@@ -63,32 +48,30 @@ mod tests {
     use crate::doctor::Severity::{self, Failure, Ok, Warning};
     use std::time::Duration;
 
-    fn verdicts(vesc: u8, count: u64, tenths: i16) -> Vec<Severity> {
+    fn severities(vesc: u8, count: u64, tenths: i16) -> Vec<Severity> {
         let settings = VescSettings {
             node: 23,
             current_limit_a: 1.0,
             status_timeout: Duration::from_millis(100),
         };
-        let heard = Heard {
+        let traffic = BusTraffic {
             seconds: 0.5,
             vescs: [(vesc, (count, tenths))].into(),
-            ..Heard::default()
+            ..BusTraffic::default()
         };
-        findings(&heard, &settings)
-            .iter()
-            .map(|finding| finding.verdict)
-            .collect()
+        let findings = findings(&traffic, &settings);
+        findings.iter().map(|finding| finding.severity).collect()
     }
 
     #[test]
-    fn a_vesc_must_be_heard_often_enough_and_give_no_current() {
-        assert_eq!(verdicts(23, 25, -2), [Ok, Ok]);
-        assert_eq!(verdicts(24, 25, 0), [Failure], "another one");
+    fn a_vesc_must_send_often_enough_and_give_no_current() {
+        assert_eq!(severities(23, 25, -2), [Ok, Ok]);
+        assert_eq!(severities(24, 25, 0), [Failure], "another VESC");
         assert_eq!(
-            verdicts(23, 5, 0),
+            severities(23, 5, 0),
             [Warning, Ok],
-            "10 a second, lost after one missing"
+            "10 per second: one missing frame is a timeout"
         );
-        assert_eq!(verdicts(23, 25, -30), [Ok, Warning]);
+        assert_eq!(severities(23, 25, -30), [Ok, Warning]);
     }
 }

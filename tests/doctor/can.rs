@@ -1,9 +1,9 @@
-//! Drives on a bus in memory: what is found, and that nothing but uploads is sent.
+//! Drives on a bus in memory: the findings, and that only uploads are sent.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use bench::doctor::{Finding, Report, Severity, examine_canopen_drive, watch};
+use bench::doctor::{Finding, Report, Severity, examine_canopen_drive, examine_vesc};
 use std::num::NonZeroU32;
 
 use bench_hal::can::bus::{
@@ -37,7 +37,7 @@ fn bad(report: &Report) -> Vec<&Finding> {
     report
         .findings
         .iter()
-        .filter(|finding| finding.verdict > Severity::Note)
+        .filter(|finding| finding.severity > Severity::Note)
         .collect()
 }
 
@@ -93,7 +93,7 @@ fn a_drive_that_runs_stays_as_it_is() {
         report
             .findings
             .iter()
-            .all(|finding| finding.verdict < Severity::Failure),
+            .all(|finding| finding.severity < Severity::Failure),
         "{:?}",
         report.findings
     );
@@ -115,7 +115,7 @@ fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
         words[1].starts_with("state FAULT (statusword 0x"),
         "{words:?}"
     );
-    assert_eq!(bad(&report)[1].verdict, Severity::Failure);
+    assert_eq!(bad(&report)[1].severity, Severity::Failure);
     assert_eq!(
         device.lock().unwrap().power_state(),
         State::Fault,
@@ -134,7 +134,7 @@ fn a_drive_of_another_rating_is_refused_before_every_ampere_is_wrong() {
     assert!(
         bad(&report)[0]
             .what
-            .contains("is 2 A, the configuration says 4 A"),
+            .contains("is 2 A, the configuration states 4 A"),
         "{report:?}"
     );
 }
@@ -145,7 +145,7 @@ fn silence_is_a_failure_that_says_what_to_check() {
     let [finding] = bad(&report)[..] else {
         panic!("{report:?}")
     };
-    assert_eq!(finding.verdict, Severity::Failure);
+    assert_eq!(finding.severity, Severity::Failure);
     assert!(
         finding
             .what
@@ -175,7 +175,7 @@ fn a_stopped_node_is_told_from_an_absent_one_by_its_heartbeat() {
     let report = examine(&world);
     let finding = bad(&report)[0];
     assert!(
-        finding.what.ends_with("its heartbeat says stopped"),
+        finding.what.ends_with("its heartbeat reports stopped"),
         "{}",
         finding.what
     );
@@ -225,10 +225,10 @@ fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
     let [finding] = &report.findings[..] else {
         panic!("{report:?}")
     };
-    assert_eq!(finding.verdict, Severity::Failure);
+    assert_eq!(finding.severity, Severity::Failure);
     assert_eq!(
         finding.what,
-        "node 5 is held by process 4711; it was not asked anything"
+        "node 5 is used by process 4711; nothing was sent to it"
     );
     assert_eq!(heard(&mut ear), []);
 }
@@ -267,8 +267,8 @@ fn a_vesc_is_listened_to_and_sent_nothing() {
             status_timeout: Duration::from_millis(100),
         };
         let mut report = Report::default();
-        watch(&world, &settings, 500_000, &mut report);
-        report.findings.iter().map(|finding| finding.verdict).max()
+        examine_vesc(&world, &settings, 500_000, &mut report);
+        report.findings.iter().map(|finding| finding.severity).max()
     };
     assert_eq!(
         (find(23), find(24)),

@@ -227,7 +227,7 @@ fn an_interface_that_is_not_there_is_a_failure_with_its_remedy() {
         let found = [on(&report, "CAN kernel"), on(&report, "CAN interface")].concat();
         let known = [
             "failure: this kernel has no CAN",
-            "failure: there is no no-such-can",
+            "failure: no-such-can does not exist",
         ];
         assert!(
             found.len() == 1 && known.iter().any(|known| found[0].starts_with(known)),

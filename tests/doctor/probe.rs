@@ -1,9 +1,9 @@
-//! The probe's port: acting probes on pseudo terminals, seen by the program itself.
+//! The port of the probe: emulated probes on pseudo terminals, examined by the program.
 
 use std::sync::Arc;
 
 use bench::config::{Config, Source, load};
-use bench::rig::devices::probe::settings;
+use bench::rig::devices::probe::driver_settings;
 use bench_hal::serial::emulator::Fault;
 use bench_hal::serial::{Protocol, SerialProbe};
 use nix::fcntl::{Flock, FlockArg};
@@ -43,7 +43,7 @@ fn config(sets: Vec<String>) -> Config {
 }
 
 fn protocol() -> Arc<dyn Protocol> {
-    config(vec![]).probe.device.protocol().unwrap()
+    config(vec![]).probe.device.serial().unwrap().protocol
 }
 
 /// A probe that makes 650 readings a second of a stage 10 um beside its zero, which is the middle of the range of 2 mm.
@@ -63,7 +63,7 @@ fn doctor(sets: &[String]) -> Value {
 }
 
 #[test]
-fn readings_are_watched_and_judged_and_the_port_is_free_afterwards() {
+fn readings_are_judged_and_the_port_is_free_afterwards() {
     let rehearsal = rehearsal();
     let report = doctor(&sets(&rehearsal));
     let port = on(&report, "serial port");
@@ -87,20 +87,21 @@ fn readings_are_watched_and_judged_and_the_port_is_free_afterwards() {
         "{seen}"
     );
     assert!(
-        on(&report, "readings").contains(&"note: every reading is the same".to_string()),
+        on(&report, "readings").contains(&"note: all readings are equal".to_string()),
         "{report}"
     );
-    let probe = SerialProbe::open(settings(&config(sets(&rehearsal))).unwrap());
+    let probe = SerialProbe::open(driver_settings(&config(sets(&rehearsal)).probe).unwrap());
     assert!(probe.is_ok(), "{:?}", probe.err());
 }
 
 #[test]
-fn a_port_that_another_process_holds_is_told_with_its_number_and_name() {
+fn a_port_in_use_is_reported_with_the_process() {
     let rehearsal = rehearsal();
-    let _holder = SerialProbe::open(settings(&config(sets(&rehearsal))).unwrap()).unwrap();
+    let _holder =
+        SerialProbe::open(driver_settings(&config(sets(&rehearsal)).probe).unwrap()).unwrap();
     let found = on(&doctor(&sets(&rehearsal)), "serial port");
     let held = format!(
-        "{} is held by process {} (",
+        "{} is used by process {} (",
         rehearsal.path.display(),
         std::process::id()
     );
@@ -111,7 +112,7 @@ fn a_port_that_another_process_holds_is_told_with_its_number_and_name() {
 }
 
 #[test]
-fn who_holds_a_terminal_without_our_lock_is_found_by_its_open_files() {
+fn a_process_without_a_lock_file_is_found_by_its_open_files() {
     let rehearsal = rehearsal();
     let terminal = std::fs::File::options()
         .read(true)
@@ -121,18 +122,18 @@ fn who_holds_a_terminal_without_our_lock_is_found_by_its_open_files() {
     let _theirs = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
     let found = on(&doctor(&sets(&rehearsal)), "serial port");
     assert!(
-        found[1].contains(&format!("is held by process {} (", std::process::id())),
+        found[1].contains(&format!("is used by process {} (", std::process::id())),
         "{found:?}"
     );
 }
 
 #[test]
-fn a_silent_probe_is_a_failure_that_says_what_to_check() {
+fn a_silent_probe_is_a_failure_with_its_remedy() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::Silence);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
     assert!(
-        found.len() == 1 && found[0].starts_with("failure: the probe says nothing: 0 bytes"),
+        found.len() == 1 && found[0].starts_with("failure: the probe sends nothing: 0 bytes"),
         "{found:?}"
     );
 }
@@ -165,7 +166,7 @@ fn a_damaged_line_is_a_warning_with_the_count() {
 }
 
 #[test]
-fn a_stage_beyond_the_soft_limit_would_trip_at_once() {
+fn a_stage_beyond_the_soft_limit_is_a_failure() {
     let rehearsal = Rehearsal::new(&protocol(), 650.0, |_| 1.95e-3);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
     let tripping = found
@@ -173,13 +174,13 @@ fn a_stage_beyond_the_soft_limit_would_trip_at_once() {
         .find(|f| f.starts_with("failure: "))
         .expect("a failure");
     assert!(
-        tripping.contains("+950.0 um at the farthest; the soft limit is 900.0 um"),
+        tripping.contains("farthest +950.0 um; the soft limit is 900.0 um"),
         "{tripping}"
     );
 }
 
 #[test]
-fn a_missing_port_and_one_that_is_no_terminal_are_told_apart() {
+fn distinguishes_a_missing_port_from_another_file() {
     let with = |port: &str| {
         let port = format!("probe.device.line.port={port}");
         on(
@@ -189,11 +190,11 @@ fn a_missing_port_and_one_that_is_no_terminal_are_told_apart() {
     };
     assert_eq!(
         with("/dev/ttyNONE9"),
-        ["failure: there is no /dev/ttyNONE9"]
+        ["failure: /dev/ttyNONE9 does not exist"]
     );
     assert_eq!(
         with("/etc/hostname"),
-        ["failure: /etc/hostname is no terminal"]
+        ["failure: /etc/hostname is not a terminal"]
     );
     let null = with("/dev/null");
     assert!(
