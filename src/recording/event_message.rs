@@ -1,32 +1,24 @@
-//! Changes of the loop as messages of `/event`, and back, without loss.
+//! Conversion of the events of the loop to messages of `/event` and back, without loss.
 
-use super::messages::{Event as Message, Unknown, unknown};
+use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
 use crate::rt::record::{Event, EventKind, RequestKind};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
-        let message = match event.kind {
-            EventKind::Request(order) => of_order(order),
+        let mut message = match event.kind {
+            EventKind::Request(kind) => of_request(kind),
             EventKind::State { from, to } => of_state(from, to),
             EventKind::Trip(trip) => of_trip(trip),
-            EventKind::Completed => of("completed", "the program came to its end".into()),
-            EventKind::Lost { records } => Message {
-                records,
-                ..of(
-                    "lost",
-                    format!("{records} records did not fit into the ring"),
-                )
-            },
+            EventKind::Completed => message("completed", "the program came to its end".into()),
+            EventKind::Lost { records } => of_lost(records),
         };
-        Message {
-            tick: event.tick,
-            ..message
-        }
+        message.tick = event.tick;
+        message
     }
 }
 
-fn of(kind: &str, text: String) -> Message {
+fn message(kind: &str, text: String) -> Message {
     Message {
         kind: kind.into(),
         text,
@@ -34,11 +26,12 @@ fn of(kind: &str, text: String) -> Message {
     }
 }
 
-fn of_order(order: RequestKind) -> Message {
-    let name = order_name(order);
+fn of_request(kind: RequestKind) -> Message {
+    let found = REQUESTS.into_iter().find(|(other, _)| *other == kind);
+    let name = found.map_or("", |(_, name)| name);
     Message {
         order: name.into(),
-        ..of("order", format!("order: {name}"))
+        ..message("order", format!("order: {name}"))
     }
 }
 
@@ -47,43 +40,47 @@ fn of_state(from: State, to: State) -> Message {
     Message {
         from: from.name().into(),
         to: to.name().into(),
-        ..of("state", text)
+        ..message("state", text)
     }
 }
 
 fn of_trip(trip: Trip) -> Message {
     let (value, limit) = trip.value_and_limit().unwrap_or_default();
-    let code = if let Trip::Amplifier { code, .. } = trip {
-        code
-    } else {
-        0
+    let code = match trip {
+        Trip::Amplifier { code, .. } => code,
+        _ => 0,
     };
-    let remedy = trip.remedy().into();
     Message {
         reason: trip.reason().into(),
         value,
         limit,
         code,
-        remedy,
-        ..of("trip", trip.to_string())
+        remedy: trip.remedy().into(),
+        ..message("trip", trip.to_string())
     }
 }
 
-fn order_name(order: RequestKind) -> &'static str {
-    match order {
-        RequestKind::Arm => "arm",
-        RequestKind::Start => "start",
-        RequestKind::Stop => "stop",
-        RequestKind::Clear => "clear",
+fn of_lost(records: u64) -> Message {
+    let text = format!("{records} records did not fit into the ring");
+    Message {
+        records,
+        ..message("lost", text)
     }
 }
+
+const REQUESTS: [(RequestKind, &str); 4] = [
+    (RequestKind::Arm, "arm"),
+    (RequestKind::Start, "start"),
+    (RequestKind::Stop, "stop"),
+    (RequestKind::Clear, "clear"),
+];
 
 impl TryFrom<&Message> for Event {
-    type Error = Unknown;
+    type Error = UnknownValue;
 
-    fn try_from(message: &Message) -> Result<Event, Unknown> {
+    fn try_from(message: &Message) -> Result<Event, UnknownValue> {
         let kind = match message.kind.as_str() {
-            "order" => EventKind::Request(order(&message.order)?),
+            "order" => EventKind::Request(request(&message.order)?),
             "state" => EventKind::State {
                 from: state("from", &message.from)?,
                 to: state("to", &message.to)?,
@@ -102,31 +99,18 @@ impl TryFrom<&Message> for Event {
     }
 }
 
-fn order(name: &str) -> Result<RequestKind, Unknown> {
-    const ALL: [RequestKind; 4] = [
-        RequestKind::Arm,
-        RequestKind::Start,
-        RequestKind::Stop,
-        RequestKind::Clear,
-    ];
-    ALL.into_iter()
-        .find(|o| order_name(*o) == name)
-        .ok_or_else(|| unknown("order", name))
+fn request(name: &str) -> Result<RequestKind, UnknownValue> {
+    let found = REQUESTS.into_iter().find(|(_, other)| *other == name);
+    let kind = found.map(|(kind, _)| kind);
+    kind.ok_or_else(|| unknown("order", name))
 }
 
-fn state(field: &'static str, name: &str) -> Result<State, Unknown> {
-    const ALL: [State; 4] = [
-        State::Disarmed,
-        State::Armed,
-        State::Running,
-        State::Tripped,
-    ];
-    ALL.into_iter()
-        .find(|s| s.name() == name)
-        .ok_or_else(|| unknown(field, name))
+fn state(field: &'static str, name: &str) -> Result<State, UnknownValue> {
+    let found = STATES.into_iter().find(|state| state.name() == name);
+    found.ok_or_else(|| unknown(field, name))
 }
 
-fn trip(message: &Message) -> Result<Trip, Unknown> {
+fn trip(message: &Message) -> Result<Trip, UnknownValue> {
     let &Message {
         value, limit, code, ..
     } = message;

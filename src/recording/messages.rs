@@ -1,258 +1,260 @@
-//! The three messages of a recording, and how they stand for the loop's own records.
+//! The three messages of a recording: their wire format, their descriptors, and their conversion from and to the records of the
+//! loop.
 //!
-//! Protobuf (proto3), written by derive; [`super::schema`] describes the same fields to readers in other languages.
-//! Each `f64` is marked `required`, which for prost only means *always written*: a proto3 writer leaves out a field that
-//! equals zero, and -0.0 does, so its sign would be lost. Readers see an ordinary proto3 `double`.
+//! One line of [`messages!`] defines a field for both: for prost, which encodes it, and for the descriptor, by which readers in
+//! other languages decode it. The messages are protobuf (proto3). A `double` is marked `required`, which for prost means *always
+//! written*: a proto3 writer leaves out a field that equals zero, and -0.0 does, so its sign would be lost. Readers see an ordinary
+//! proto3 `double`.
 //!
-//! Numbers of enumerations begin with what an absent field must mean: no measurement, disarmed.
+//! Numbers of enumerations begin with the meaning of an absent field: no measurement, disarmed.
 
 use bench_hal::Validity;
+use prost_types::DescriptorProto;
+use prost_types::field_descriptor_proto::Type;
 
+use super::schema;
 use crate::rt::arming::State;
 use crate::rt::record::TickRecord;
 
-/// One tick, on channel `/loop`. Fields as in [`TickRecord`].
-#[derive(Clone, PartialEq, prost::Message)]
-#[allow(missing_docs, reason = "each field is that of TickRecord")]
-pub struct Loop {
-    #[prost(uint64, tag = "1")]
-    pub tick: u64,
-    #[prost(uint64, tag = "2")]
-    pub scheduled_ns: u64,
-    #[prost(uint64, tag = "3")]
-    pub woke_ns: u64,
-    #[prost(uint64, tag = "4")]
-    pub done_ns: u64,
-    #[prost(double, required, tag = "5")]
-    pub reference_m: f64,
-    #[prost(double, required, tag = "6")]
-    pub position_m: f64,
-    #[prost(double, required, tag = "7")]
-    pub requested_a: f64,
-    #[prost(double, required, tag = "8")]
-    pub command_a: f64,
-    #[prost(uint64, tag = "9")]
-    pub probe_sequence: u64,
-    #[prost(uint64, tag = "10")]
-    pub probe_age_ns: u64,
-    #[prost(enumeration = "ValidityCode", tag = "11")]
-    pub validity: i32,
-    #[prost(enumeration = "StateCode", tag = "12")]
-    pub state: i32,
-    #[prost(uint32, tag = "13")]
-    pub flags: u32,
-    #[prost(uint32, tag = "14")]
-    pub missed_ticks: u32,
-    #[prost(double, optional, tag = "15")]
-    pub actual_a: Option<f64>,
+/// Rust type of a field.
+macro_rules! rust_type {
+    (uint64) => { u64 };
+    (uint32) => { u32 };
+    (sint64) => { i64 };
+    (int32) => { i32 };
+    (string) => { String };
+    (double, required) => { f64 };
+    (double, optional) => { Option<f64> };
 }
 
-/// Something changed, on channel `/event`. Which fields have a meaning depends on `kind`.
-#[derive(Clone, PartialEq, prost::Message)]
-pub struct Event {
-    /// The tick at which it took effect.
-    #[prost(uint64, tag = "1")]
-    pub tick: u64,
-    /// `order`, `state`, `trip`, `completed` or `lost`.
-    #[prost(string, tag = "2")]
-    pub kind: String,
-    /// For a person, whatever the kind.
-    #[prost(string, tag = "3")]
-    pub text: String,
-    /// `arm`, `start`, `stop` or `clear`, of an order.
-    #[prost(string, tag = "4")]
-    pub order: String,
-    /// State before, of a state.
-    #[prost(string, tag = "5")]
-    pub from: String,
-    /// State after, of a state.
-    #[prost(string, tag = "6")]
-    pub to: String,
-    /// Short reason, of a trip.
-    #[prost(string, tag = "7")]
-    pub reason: String,
-    /// The value that crossed its limit, of a trip; metres, amperes, seconds or a count, as the reason has it.
-    #[prost(double, required, tag = "8")]
-    pub value: f64,
-    /// The limit, in the unit of `value`.
-    #[prost(double, required, tag = "9")]
-    pub limit: f64,
-    /// The device's own number, of a trip of the amplifier.
-    #[prost(sint64, tag = "10")]
-    pub code: i64,
-    /// How many records did not fit into the ring, of `lost`.
-    #[prost(uint64, tag = "11")]
-    pub records: u64,
-    /// What a person can do about it, of a trip.
-    #[prost(string, tag = "12")]
-    pub remedy: String,
+/// Type of a field in the descriptor, and whether the field may be absent.
+macro_rules! wire_type {
+    (uint64) => {
+        (Type::Uint64, false)
+    };
+    (uint32) => {
+        (Type::Uint32, false)
+    };
+    (sint64) => {
+        (Type::Sint64, false)
+    };
+    // The enumerations of Loop: prost writes them as their numbers.
+    (int32) => {
+        (Type::Enum, false)
+    };
+    (string) => {
+        (Type::String, false)
+    };
+    (double, required) => {
+        (Type::Double, false)
+    };
+    (double, optional) => {
+        (Type::Double, true)
+    };
 }
 
-/// A summary of up to one second of scheduled time, on channel `/timing`.
-#[derive(Clone, PartialEq, prost::Message)]
-pub struct Timing {
-    /// First tick of the summary.
-    #[prost(uint64, tag = "1")]
-    pub first_tick: u64,
-    /// Last tick of the summary.
-    #[prost(uint64, tag = "2")]
-    pub last_tick: u64,
-    /// Ticks recorded.
-    #[prost(uint64, tag = "3")]
-    pub ticks: u64,
-    /// Scheduled ticks that passed unserved.
-    #[prost(uint64, tag = "4")]
-    pub overruns: u64,
-    /// Records lost between loop and recording.
-    #[prost(uint64, tag = "5")]
-    pub lost_records: u64,
-    /// Median of woke - scheduled.
-    #[prost(uint64, tag = "6")]
-    pub lateness_p50_ns: u64,
-    /// 99 % quantile of woke - scheduled.
-    #[prost(uint64, tag = "7")]
-    pub lateness_p99_ns: u64,
-    /// 99.99 % quantile of woke - scheduled.
-    #[prost(uint64, tag = "8")]
-    pub lateness_p9999_ns: u64,
-    /// Largest woke - scheduled.
-    #[prost(uint64, tag = "9")]
-    pub lateness_max_ns: u64,
-    /// Median of done - woke.
-    #[prost(uint64, tag = "10")]
-    pub compute_p50_ns: u64,
-    /// 99 % quantile of done - woke.
-    #[prost(uint64, tag = "11")]
-    pub compute_p99_ns: u64,
-    /// 99.99 % quantile of done - woke.
-    #[prost(uint64, tag = "12")]
-    pub compute_p9999_ns: u64,
-    /// Largest done - woke.
-    #[prost(uint64, tag = "13")]
-    pub compute_max_ns: u64,
+/// Defines messages, each field by its number, its kind and its name.
+macro_rules! messages {
+    ($($(#[$doc:meta])* $name:ident {
+        $($(#[$field_doc:meta])* field $tag:tt ($($kind:tt)*) $field:ident,)*
+    })*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, PartialEq, prost::Message)]
+        pub struct $name {
+            $($(#[$field_doc])* #[prost($($kind)*, tag = $tag)] pub $field: rust_type!($($kind)*),)*
+        }
+
+        impl $name {
+            pub(super) fn descriptor() -> DescriptorProto {
+                let fields = [$(($tag, stringify!($field), wire_type!($($kind)*)),)*];
+                schema::message(stringify!($name), &fields)
+            }
+        }
+    )*};
 }
 
-/// [`Validity`] as a number of the schema.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, prost::Enumeration)]
-#[repr(i32)]
-#[allow(missing_docs, reason = "each value is that of Validity")]
-pub enum ValidityCode {
-    Missing = 0,
-    Valid = 1,
-    OutOfRange = 2,
-    Faulty = 3,
+messages! {
+    /// One tick, on channel `/loop`. Fields as in [`TickRecord`].
+    Loop {
+        /// Number of the tick.
+        field "1" (uint64) tick,
+        /// Scheduled time since the loop started.
+        field "2" (uint64) scheduled_ns,
+        /// Begin of the tick.
+        field "3" (uint64) woke_ns,
+        /// Time at which the command was written.
+        field "4" (uint64) done_ns,
+        /// Reference.
+        field "5" (double, required) reference_m,
+        /// Measured position.
+        field "6" (double, required) position_m,
+        /// Set-point before the interlocks.
+        field "7" (double, required) requested_a,
+        /// Set-point as the amplifier accepted it.
+        field "8" (double, required) command_a,
+        /// Number of the measurement.
+        field "9" (uint64) probe_sequence,
+        /// Age of the measurement.
+        field "10" (uint64) probe_age_ns,
+        /// Number of a [`Validity`].
+        field "11" (int32) validity,
+        /// Number of a [`State`].
+        field "12" (int32) state,
+        /// Sum of [`crate::rt::record::flag`].
+        field "13" (uint32) flags,
+        /// Scheduled ticks not served, directly before this one.
+        field "14" (uint32) missed_ticks,
+        /// Measured current, if the amplifier measures it.
+        field "15" (double, optional) actual_a,
+    }
+    /// A change, on channel `/event`. The meaning of the fields depends on `kind`.
+    Event {
+        /// The tick at which it took effect.
+        field "1" (uint64) tick,
+        /// `order`, `state`, `trip`, `completed` or `lost`.
+        field "2" (string) kind,
+        /// Readable text, for every kind.
+        field "3" (string) text,
+        /// Of an order: `arm`, `start`, `stop` or `clear`.
+        field "4" (string) order,
+        /// Of a state: the state before.
+        field "5" (string) from,
+        /// Of a state: the state after.
+        field "6" (string) to,
+        /// Of a trip: the short reason.
+        field "7" (string) reason,
+        /// Of a trip: the value that crossed its limit, in metres, amperes, seconds or as a count, by the reason.
+        field "8" (double, required) value,
+        /// Of a trip: the limit, in the unit of `value`.
+        field "9" (double, required) limit,
+        /// Of a trip of the amplifier: the number of the device.
+        field "10" (sint64) code,
+        /// Of `lost`: the number of records that did not fit into the ring.
+        field "11" (uint64) records,
+        /// Of a trip: what the operator can do about it.
+        field "12" (string) remedy,
+    }
+    /// A summary of up to one second of scheduled time, on channel `/timing`.
+    Timing {
+        /// First tick of the summary.
+        field "1" (uint64) first_tick,
+        /// Last tick of the summary.
+        field "2" (uint64) last_tick,
+        /// Recorded ticks.
+        field "3" (uint64) ticks,
+        /// Scheduled ticks that were not served.
+        field "4" (uint64) overruns,
+        /// Records lost between loop and recording.
+        field "5" (uint64) lost_records,
+        /// Median of woke - scheduled.
+        field "6" (uint64) lateness_p50_ns,
+        /// 99 % quantile of woke - scheduled.
+        field "7" (uint64) lateness_p99_ns,
+        /// 99.99 % quantile of woke - scheduled.
+        field "8" (uint64) lateness_p9999_ns,
+        /// Largest woke - scheduled.
+        field "9" (uint64) lateness_max_ns,
+        /// Median of done - woke.
+        field "10" (uint64) compute_p50_ns,
+        /// 99 % quantile of done - woke.
+        field "11" (uint64) compute_p99_ns,
+        /// 99.99 % quantile of done - woke.
+        field "12" (uint64) compute_p9999_ns,
+        /// Largest done - woke.
+        field "13" (uint64) compute_max_ns,
+    }
 }
 
-/// [`State`] as a number of the schema.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, prost::Enumeration)]
-#[repr(i32)]
-#[allow(missing_docs, reason = "each value is that of State")]
-pub enum StateCode {
-    Disarmed = 0,
-    Armed = 1,
-    Running = 2,
-    Tripped = 3,
-}
+/// The validities with their names; the index is the number in a message.
+pub(super) const VALIDITIES: [(Validity, &str); 4] = [
+    (Validity::Missing, "missing"),
+    (Validity::Valid, "valid"),
+    (Validity::OutOfRange, "out_of_range"),
+    (Validity::Faulty, "faulty"),
+];
 
-/// A word or number of a message that this version of the program does not know.
+/// The states; the index is the number in a message.
+pub(super) const STATES: [State; 4] = [
+    State::Disarmed,
+    State::Armed,
+    State::Running,
+    State::Tripped,
+];
+
+/// A name or number in a message that this version of the program does not know.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field} {found:?} is unknown to this version of bench")]
-pub struct Unknown {
+pub struct UnknownValue {
     field: &'static str,
     found: String,
 }
 
-pub(super) fn unknown(field: &'static str, found: impl ToString) -> Unknown {
-    Unknown {
-        field,
-        found: found.to_string(),
-    }
+pub(super) fn unknown(field: &'static str, found: impl ToString) -> UnknownValue {
+    let found = found.to_string();
+    UnknownValue { field, found }
 }
 
 impl From<&TickRecord> for Loop {
-    fn from(t: &TickRecord) -> Loop {
+    fn from(record: &TickRecord) -> Loop {
         Loop {
-            tick: t.tick,
-            scheduled_ns: t.scheduled_ns,
-            woke_ns: t.woke_ns,
-            done_ns: t.done_ns,
-            reference_m: t.reference_m,
-            position_m: t.position_m,
-            requested_a: t.requested_a,
-            command_a: t.command_a,
-            probe_sequence: t.probe_sequence,
-            probe_age_ns: t.probe_age_ns,
-            validity: validity_code(t.validity) as i32,
-            state: state_code(t.state) as i32,
-            flags: t.flags,
-            missed_ticks: t.missed_ticks,
-            actual_a: t.actual_a,
+            tick: record.tick,
+            scheduled_ns: record.scheduled_ns,
+            woke_ns: record.woke_ns,
+            done_ns: record.done_ns,
+            reference_m: record.reference_m,
+            position_m: record.position_m,
+            requested_a: record.requested_a,
+            command_a: record.command_a,
+            probe_sequence: record.probe_sequence,
+            probe_age_ns: record.probe_age_ns,
+            validity: number(VALIDITIES.map(|(validity, _)| validity), record.validity),
+            state: number(STATES, record.state),
+            flags: record.flags,
+            missed_ticks: record.missed_ticks,
+            actual_a: record.actual_a,
         }
     }
 }
 
 impl TryFrom<&Loop> for TickRecord {
-    type Error = Unknown;
+    type Error = UnknownValue;
 
-    fn try_from(m: &Loop) -> Result<TickRecord, Unknown> {
+    fn try_from(message: &Loop) -> Result<TickRecord, UnknownValue> {
+        let validities = VALIDITIES.map(|(validity, _)| validity);
         Ok(TickRecord {
-            tick: m.tick,
-            scheduled_ns: m.scheduled_ns,
-            woke_ns: m.woke_ns,
-            done_ns: m.done_ns,
-            reference_m: m.reference_m,
-            position_m: m.position_m,
-            requested_a: m.requested_a,
-            command_a: m.command_a,
-            probe_sequence: m.probe_sequence,
-            probe_age_ns: m.probe_age_ns,
-            validity: validity(m.validity)?,
-            state: state(m.state)?,
-            flags: m.flags,
-            missed_ticks: m.missed_ticks,
-            actual_a: m.actual_a,
+            tick: message.tick,
+            scheduled_ns: message.scheduled_ns,
+            woke_ns: message.woke_ns,
+            done_ns: message.done_ns,
+            reference_m: message.reference_m,
+            position_m: message.position_m,
+            requested_a: message.requested_a,
+            command_a: message.command_a,
+            probe_sequence: message.probe_sequence,
+            probe_age_ns: message.probe_age_ns,
+            validity: value("validity", validities, message.validity)?,
+            state: value("state", STATES, message.state)?,
+            flags: message.flags,
+            missed_ticks: message.missed_ticks,
+            actual_a: message.actual_a,
         })
     }
 }
 
-fn validity_code(validity: Validity) -> ValidityCode {
-    match validity {
-        Validity::Missing => ValidityCode::Missing,
-        Validity::Valid => ValidityCode::Valid,
-        Validity::OutOfRange => ValidityCode::OutOfRange,
-        Validity::Faulty => ValidityCode::Faulty,
-    }
+/// The number of a value: its index. Every value of the two types is in its table.
+fn number<T: PartialEq, const N: usize>(values: [T; N], value: T) -> i32 {
+    let index = values.iter().position(|other| *other == value);
+    index.unwrap_or_default() as i32
 }
 
-fn validity(number: i32) -> Result<Validity, Unknown> {
-    Ok(
-        match ValidityCode::try_from(number).map_err(|_| unknown("validity", number))? {
-            ValidityCode::Missing => Validity::Missing,
-            ValidityCode::Valid => Validity::Valid,
-            ValidityCode::OutOfRange => Validity::OutOfRange,
-            ValidityCode::Faulty => Validity::Faulty,
-        },
-    )
-}
-
-fn state_code(state: State) -> StateCode {
-    match state {
-        State::Disarmed => StateCode::Disarmed,
-        State::Armed => StateCode::Armed,
-        State::Running => StateCode::Running,
-        State::Tripped => StateCode::Tripped,
-    }
-}
-
-fn state(number: i32) -> Result<State, Unknown> {
-    Ok(
-        match StateCode::try_from(number).map_err(|_| unknown("state", number))? {
-            StateCode::Disarmed => State::Disarmed,
-            StateCode::Armed => State::Armed,
-            StateCode::Running => State::Running,
-            StateCode::Tripped => State::Tripped,
-        },
-    )
+fn value<T: Copy, const N: usize>(
+    field: &'static str,
+    values: [T; N],
+    number: i32,
+) -> Result<T, UnknownValue> {
+    let index = usize::try_from(number).ok();
+    let value = index.and_then(|index| values.get(index));
+    value.copied().ok_or_else(|| unknown(field, number))
 }
 
 #[cfg(test)]
@@ -260,41 +262,56 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_of_a_later_version_is_an_error_and_never_a_valid_measurement() {
+    fn rejects_numbers_of_a_later_version() {
         let good = Loop::from(&TickRecord {
             validity: Validity::Valid,
             ..TickRecord::default()
         });
         assert_eq!(
-            TickRecord::try_from(&good).map(|t| t.validity),
+            TickRecord::try_from(&good).map(|record| record.validity),
             Ok(Validity::Valid)
         );
         for number in [4, -1, i32::MAX] {
-            let error = TickRecord::try_from(&Loop {
+            let later = Loop {
                 validity: number,
                 ..good
-            })
-            .expect_err("unknown");
-            assert!(
-                error.to_string().contains("validity")
-                    && error.to_string().contains(&number.to_string())
-            );
-            assert!(
-                TickRecord::try_from(&Loop {
-                    state: number,
-                    ..good
-                })
-                .is_err()
-            );
+            };
+            let error = TickRecord::try_from(&later)
+                .expect_err("unknown")
+                .to_string();
+            assert!(error.contains("validity") && error.contains(&number.to_string()));
+            let later = Loop {
+                state: number,
+                ..good
+            };
+            assert!(TickRecord::try_from(&later).is_err());
         }
     }
 
     #[test]
-    fn an_empty_message_means_no_measurement_and_disarmed() {
-        let tick = TickRecord::try_from(&Loop::default()).expect("all fields have a meaning");
+    fn an_empty_message_is_disarmed_without_a_measurement() {
+        let record = TickRecord::try_from(&Loop::default()).expect("all fields have a meaning");
         assert_eq!(
-            (tick.validity, tick.state),
+            (record.validity, record.state),
             (Validity::Missing, State::Disarmed)
         );
+    }
+
+    #[test]
+    fn every_validity_and_state_has_a_number() {
+        let validities = [
+            Validity::Valid,
+            Validity::OutOfRange,
+            Validity::Faulty,
+            Validity::Missing,
+        ];
+        for (validity, state) in validities.into_iter().zip(STATES) {
+            let record = TickRecord {
+                validity,
+                state,
+                ..TickRecord::default()
+            };
+            assert_eq!(TickRecord::try_from(&Loop::from(&record)), Ok(record));
+        }
     }
 }
