@@ -1,43 +1,26 @@
-//! What `bench campaign` says, for a person and as JSON.
+//! The result of `bench campaign` as text and as JSON.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::table::table;
-use crate::experiment::campaign::{Answer, Offset, PutOn, Recommendation, Told, Tolerances};
+use super::table::{labelled, table, wrap};
+use crate::experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
 use crate::identify::verdict::Cnmp;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
-pub(super) struct Report {
-    profile: String,
+pub(super) struct Report<'a> {
+    profile: &'a str,
     plot: String,
-    points: Vec<PointJson>,
+    points: &'a [ComparedPoint<'a>],
     totals: Totals,
     agreement: Agreement,
-    /// `null` where no verdict tells.
-    offset: Option<OffsetJson>,
+    /// `null` if no verdict is decided.
+    offset: Option<OffsetReport>,
     tolerances: Tolerances,
-    /// `null` where every asymmetry has CNMP zeros somewhere in the range of operating points.
+    /// `null` if every asymmetry has CNMP zeros somewhere in the range of operating points.
     recommendation: Option<Recommendation>,
-}
-
-#[derive(Debug, Serialize)]
-struct PointJson {
-    operating_point: f64,
-    mass_asymmetry: f64,
-    cnmp: Cnmp,
-    why: String,
-    model_cnmp_pairs: u8,
-    model_damped_cnmp_pairs: u8,
-    modes_hz: Vec<f64>,
-    signs: String,
-    zeros_rad_s: Vec<[f64; 2]>,
-    loop_digest: String,
-    /// What a person put on, and how that was checked; not on the simulated stage.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    put_on: Option<PutOn>,
 }
 
 #[derive(Debug, Serialize)]
@@ -48,58 +31,76 @@ struct Totals {
     undecided: usize,
 }
 
-/// How many of the verdicts the model with damping contradicts.
+/// The number of verdicts that disagree with the model with damping.
 #[derive(Debug, Serialize)]
 struct Agreement {
     decided: usize,
     contradicted_as_configured: usize,
     contradicted_with_offset: Option<usize>,
-    /// By the stage that was simulated, `sim.asymmetry_offset` and all: none should be.
+    /// With the stage that was simulated, including `sim.asymmetry_offset`: none should disagree.
     contradicted_as_simulated: usize,
 }
 
 #[derive(Debug, Serialize)]
-struct OffsetJson {
+struct OffsetReport {
     best: f64,
     low: f64,
     high: f64,
     searched: [f64; 2],
 }
 
-impl Report {
-    pub fn of(answer: &Answer<'_>, plot: &Path, profile: &str) -> Report {
+impl OffsetReport {
+    fn of(offset: &Offset) -> OffsetReport {
+        let [low, high] = offset.interval;
+        OffsetReport {
+            best: offset.best,
+            low,
+            high,
+            searched: offset.searched,
+        }
+    }
+
+    fn is_open(&self) -> bool {
+        self.low <= self.searched[0] || self.high >= self.searched[1]
+    }
+}
+
+impl<'a> Report<'a> {
+    pub fn of(evaluation: &'a Evaluation<'a>, plot: &Path, profile: &'a str) -> Report<'a> {
         let [detected, excluded, undecided] =
-            [Cnmp::Detected, Cnmp::Excluded, Cnmp::Undecided].map(|cnmp| answer.count(cnmp));
+            [Cnmp::Detected, Cnmp::Excluded, Cnmp::Undecided].map(|cnmp| evaluation.count(cnmp));
+        let offset = evaluation.offset.as_ref();
+        let wrong = evaluation.points.iter().filter(|point| point.is_wrong);
         Report {
-            profile: profile.into(),
+            profile,
             plot: plot.display().to_string(),
-            points: answer.points.iter().map(point).collect(),
+            points: &evaluation.points,
             totals: Totals {
-                points: answer.points.len(),
+                points: evaluation.points.len(),
                 detected,
                 excluded,
                 undecided,
             },
             agreement: Agreement {
                 decided: detected + excluded,
-                contradicted_as_configured: answer.contradicted,
-                contradicted_with_offset: answer.offset.as_ref().map(|offset| offset.contradicted),
-                contradicted_as_simulated: answer.points.iter().filter(|told| told.wrong).count(),
+                contradicted_as_configured: evaluation.contradicted,
+                contradicted_with_offset: offset.map(|offset| offset.contradicted),
+                contradicted_as_simulated: wrong.count(),
             },
-            offset: answer.offset.as_ref().map(offset),
-            tolerances: answer.tolerances,
-            recommendation: answer.recommendation,
+            offset: offset.map(OffsetReport::of),
+            tolerances: evaluation.tolerances,
+            recommendation: evaluation.recommendation,
         }
     }
 
-    /// For people.
+    /// The result as text.
     pub fn text(&self) -> String {
         let header = [
             "Y1o/L %",
             "asymmetry %",
             "CNMP zeros",
-            "by the model",
-            "with damping",
+            "model pairs",
+            "damped",
             "signs",
         ];
         let rows: Vec<Vec<String>> = self.points.iter().map(row).collect();
@@ -110,134 +111,94 @@ impl Report {
             undecided,
         } = self.totals;
         format!(
-            "{}: {points} points\n\n{}\n{}{detected} detected, {excluded} excluded, {undecided} undecided\n{}{}{}picture     {}\n",
+            "{}: {points} points\n\n{}\n{}{detected} detected, {excluded} excluded, {undecided} undecided\n{}{}{}{}",
             self.profile,
             table(&header, &rows),
             self.undecided_text(),
-            self.agreement_text(),
-            self.offset_text(),
-            self.recommendation_text(),
-            self.plot,
+            labelled("model", &self.agreement_text()),
+            labelled("offset", &self.offset_text()),
+            labelled("recommend", &self.recommendation_text()),
+            labelled("picture", &self.plot),
         )
     }
 
     fn undecided_text(&self) -> String {
-        let line = |point: &PointJson| {
-            let (at, asymmetry) = (100.0 * point.operating_point, 100.0 * point.mass_asymmetry);
-            format!(
-                "undecided at {at:.3} % of L, {asymmetry:+.3} %: {}\n",
-                point.why
-            )
-        };
-        self.points
+        let undecided = self
+            .points
             .iter()
-            .filter(|point| point.cnmp == Cnmp::Undecided)
-            .map(line)
-            .collect()
+            .filter(|point| point.result.cnmp == Cnmp::Undecided);
+        let lines = undecided.map(|point| {
+            let (at, asymmetry) = (100.0 * point.operating_point, 100.0 * point.asymmetry);
+            let why = &point.result.why;
+            wrap(
+                &format!("undecided at {at:.3} % of L, {asymmetry:+.3} %: {why}"),
+                0,
+            )
+        });
+        lines.collect()
     }
 
     fn agreement_text(&self) -> String {
-        let Agreement {
-            decided,
-            contradicted_as_configured,
-            contradicted_as_simulated,
-            ..
-        } = self.agreement;
+        let agreement = &self.agreement;
         format!(
-            "model       contradicts {contradicted_as_configured} of {decided} verdicts as configured, \
-             {contradicted_as_simulated} as simulated (zeros with damping)\n"
+            "disagrees with {} of {} verdicts as configured, with {} as simulated (zeros with damping)",
+            agreement.contradicted_as_configured,
+            agreement.decided,
+            agreement.contradicted_as_simulated
         )
     }
 
     fn offset_text(&self) -> String {
-        let Some(OffsetJson {
-            best,
-            low,
-            high,
-            searched,
-        }) = self.offset
-        else {
-            return "offset      no verdict tells\n".into();
+        let Some(offset) = &self.offset else {
+            return "no verdict is decided".into();
         };
-        let contradicted = self.agreement.contradicted_with_offset.unwrap_or_default();
-        let open = if low <= searched[0] || high >= searched[1] {
-            "; open at an end of the search: measure closer to the border"
-        } else {
-            ""
+        let open = match offset.is_open() {
+            true => "; the interval is open at an end of the search: measure closer to the border",
+            false => "",
         };
         format!(
-            "offset      {:+.2} % of initial asymmetry fits best, 95 % within {:+.2} to {:+.2} %{open}; it contradicts \
-             {contradicted} verdicts\n",
-            100.0 * best,
-            100.0 * low,
-            100.0 * high
+            "{:+.2} % of initial asymmetry fits best, 95 % interval {:+.2} to {:+.2} %{open}; {} verdicts disagree with it",
+            100.0 * offset.best,
+            100.0 * offset.low,
+            100.0 * offset.high,
+            self.agreement.contradicted_with_offset.unwrap_or_default()
         )
     }
 
     fn recommendation_text(&self) -> String {
         let Some(best) = self.recommendation else {
-            return "recommended nothing: with every asymmetry of the range, and some initial one of the interval, an operating point has \
-                    CNMP zeros\n"
+            return "nothing: with every asymmetry of the range, and some initial asymmetry of the interval, an operating \
+                    point has CNMP zeros"
                 .into();
         };
-        let asymmetry = format!("recommended asymmetry {:+.2} %", 100.0 * best.asymmetry);
-        let end = if best.at_the_end {
-            "; it is at the end of the range, farther out may be better"
-        } else {
-            ""
-        };
+        let asymmetry = format!("asymmetry {:+.2} %", 100.0 * best.asymmetry);
         let (Some(distance), Some([point, border])) = (best.distance_tolerances, best.nearest)
         else {
-            return format!("{asymmetry}: no CNMP zeros in reach\n");
+            return format!("{asymmetry}: no CNMP zeros in the searched range");
         };
-        let tolerances = self.tolerances;
+        let end = match best.at_the_end {
+            true => "; it is at the end of the range, a larger one may be better",
+            false => "",
+        };
         format!(
-            "{asymmetry}: {distance:.1} tolerances from the nearest CNMP zeros, at {:.2} % of L and {:+.2} %{end}\n\
-             {:11} tolerances: {:.3} % of asymmetry, {:.3} % of L; over all operating points of the range and the interval \
-             of the offset\n",
+            "{asymmetry}: {distance:.1} tolerances from the nearest CNMP zeros, at {:.2} % of L and {:+.2} %{end}; \
+             tolerances: {:.3} % of asymmetry, {:.3} % of L; for all operating points of the range and the interval of \
+             the offset",
             100.0 * point,
             100.0 * border,
-            "",
-            100.0 * tolerances.asymmetry,
-            100.0 * tolerances.operating_point
+            100.0 * self.tolerances.asymmetry,
+            100.0 * self.tolerances.operating_point
         )
     }
 }
 
-fn point(told: &Told<'_>) -> PointJson {
-    let point = told.point.clone();
-    PointJson {
-        operating_point: told.operating_point,
-        mass_asymmetry: told.asymmetry,
-        cnmp: point.cnmp,
-        why: point.why,
-        model_cnmp_pairs: told.model_pairs,
-        model_damped_cnmp_pairs: told.model_pairs_damped,
-        modes_hz: point.modes_hz,
-        signs: point.signs,
-        zeros_rad_s: point.zeros_rad_s,
-        loop_digest: point.loop_digest,
-        put_on: point.put_on,
-    }
-}
-
-fn offset(offset: &Offset) -> OffsetJson {
-    let [low, high] = offset.interval;
-    OffsetJson {
-        best: offset.best,
-        low,
-        high,
-        searched: offset.searched,
-    }
-}
-
-fn row(point: &PointJson) -> Vec<String> {
+fn row(point: &ComparedPoint<'_>) -> Vec<String> {
     vec![
         format!("{:.3}", 100.0 * point.operating_point),
-        format!("{:+.3}", 100.0 * point.mass_asymmetry),
-        point.cnmp.name().into(),
-        point.model_cnmp_pairs.to_string(),
-        point.model_damped_cnmp_pairs.to_string(),
-        point.signs.clone(),
+        format!("{:+.3}", 100.0 * point.asymmetry),
+        point.result.cnmp.name().into(),
+        point.model_pairs.to_string(),
+        point.model_pairs_damped.to_string(),
+        point.result.signs.clone(),
     ]
 }

@@ -7,7 +7,7 @@ use super::outcome::Outcome;
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::excitation::ExcitationError;
-use crate::experiment::campaign::{AnswerError, CampaignError};
+use crate::experiment::campaign::CampaignError;
 use crate::experiment::{ExperimentError, PlanError};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
@@ -63,10 +63,7 @@ pub enum CliError {
     Study(#[from] StudyError),
     /// The campaign's grid or folder is refused, or its files cannot be written.
     #[error(transparent)]
-    Campaign(#[from] CampaignError),
-    /// The campaign's points are there, but the model cannot be analysed.
-    #[error(transparent)]
-    Answer(#[from] AnswerError),
+    Campaign(CampaignError),
     /// Something else went wrong on the way.
     #[error("{0}")]
     Failed(String),
@@ -104,6 +101,16 @@ pub enum ErrorKind {
     Failed,
 }
 
+impl From<CampaignError> for CliError {
+    fn from(error: CampaignError) -> Self {
+        match error {
+            CampaignError::Plant(error) => error.into(),
+            CampaignError::Run(error) => error.into(),
+            other => CliError::Campaign(other),
+        }
+    }
+}
+
 impl From<ExperimentError> for CliError {
     fn from(error: ExperimentError) -> Self {
         match error {
@@ -126,7 +133,7 @@ impl CliError {
             CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
             CliError::Table(ExternalCsvError::Columns(_)) => Outcome::Usage,
             CliError::Table(_) => Outcome::Failed,
-            CliError::Campaign(CampaignError::File { .. } | CampaignError::Rest { .. }) => {
+            CliError::Campaign(CampaignError::File { .. } | CampaignError::RestPosition { .. }) => {
                 Outcome::Failed
             }
             CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
@@ -143,7 +150,7 @@ impl CliError {
                 ErrorKind::Controller
             }
             CliError::Plan(_) | CliError::Excitation(_) => ErrorKind::Plan,
-            CliError::Plant(_) | CliError::Answer(_) => ErrorKind::Model,
+            CliError::Plant(_) => ErrorKind::Model,
             CliError::Devices(_) => ErrorKind::Devices,
             CliError::Calibration(_) => ErrorKind::Calibration,
             CliError::Margin(_) => ErrorKind::Margin,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::analysis_output;
-use super::chirp::{analysed, check};
+use super::chirp::analysed;
 use super::chirp_plan::Expected;
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
@@ -11,14 +11,19 @@ use super::linearity_output;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
+use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
-use super::table::table;
+use super::table::{labelled, table, wrap};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::excitation;
-use crate::experiment::{self, ModeOverAmplitude, Plan, RunSummary, modes_over_amplitude};
+use crate::experiment::linearity::{
+    self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
+};
+use crate::experiment::{self, Run, RunSummary, Runner};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
 use crate::report::run_pages::AnalysisOutputs;
+use crate::util::progress::Progress;
 use crate::util::quantity::Ratio;
 
 /// Odd lines, one in four left out.
@@ -26,10 +31,10 @@ const LINES: [(&str, &str); 2] = [
     ("excitation.kind", "multisine"),
     ("multisine.lines", "odd_random"),
 ];
-/// Amplitudes at most.
-const MOST: usize = 10;
+/// Largest number of amplitudes.
+const MAX_AMPLITUDES: usize = 10;
 
-/// Which bench, in which band, and with which amplitudes.
+/// Arguments of the command.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -54,32 +59,22 @@ impl Args {
     fn scales(&self) -> Result<Vec<f64>, CliError> {
         let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
         scales.sort_by(f64::total_cmp);
-        let sound = scales.iter().all(|scale| scale.is_finite() && *scale > 0.0);
-        let different = scales.windows(2).all(|pair| pair[0] < pair[1]);
-        if sound && different && (2..=MOST).contains(&scales.len()) {
+        let is_positive = scales.iter().all(|scale| scale.is_finite() && *scale > 0.0);
+        let is_rising = scales.windows(2).all(|pair| pair[0] < pair[1]);
+        if is_positive && is_rising && (2..=MAX_AMPLITUDES).contains(&scales.len()) {
             return Ok(scales);
         }
         Err(CliError::Usage(format!(
-            "--scales {scales:?}: two to {MOST} different ratios above 0 are needed, such as 0.5,1,2"
+            "--scales {scales:?}: two to {MAX_AMPLITUDES} different ratios above 0 are needed, for example 0.5,1,2"
         )))
     }
 
-    /// The settings of each run.
-    fn configs(&self) -> Result<Vec<(f64, Config)>, CliError> {
+    /// The settings with the planned amplitude.
+    fn planned(&self) -> Result<Config, CliError> {
         let lines = LINES.map(|(key, value)| OptionSetting::new(key, value, "bench linearity"));
         let settings = [&lines[..], &self.band.settings()].concat();
-        let planned = self.bench.load(Purpose::Chirp, &settings)?;
-        let planned = self.band.shaped(planned)?;
-        let scaled = |scale: f64| {
-            let mut config = planned.clone();
-            config
-                .chirp
-                .amplitude
-                .iter_mut()
-                .for_each(|point| point.current_a *= scale);
-            (scale, config)
-        };
-        Ok(self.scales()?.into_iter().map(scaled).collect())
+        let config = self.bench.load(Purpose::Chirp, &settings)?;
+        self.band.shaped(config)
     }
 }
 
@@ -87,264 +82,172 @@ impl Args {
 #[derive(Debug, Serialize)]
 struct Report {
     scales: Vec<f64>,
-    /// One an amplitude, as `bench chirp` tells it.
-    runs: Vec<RunMade>,
+    /// One for each amplitude, as of `bench chirp`.
+    runs: Vec<AmplitudeRun>,
     /// The modes of the smallest amplitude in all runs.
-    modes: Vec<ModeMade>,
-    /// Whether any figure of any mode differs from that at the smallest amplitude by more than its errors explain; null without modes,
-    /// and where none does but a run did not come to its end.
+    modes: Vec<ModeOverAmplitude>,
+    /// Whether a parameter of a mode differs from that at the smallest amplitude by more than its errors; null if that is not
+    /// known: without modes, or if no parameter differs but a run did not come to its end.
     shifted: Option<bool>,
     why: String,
 }
 
 #[derive(Debug, Serialize)]
-struct RunMade {
+struct AmplitudeRun {
     scale: f64,
     expected: Expected,
     #[serde(flatten)]
     run: RunSummary,
     #[serde(flatten)]
-    made: AnalysisOutputs,
+    outputs: AnalysisOutputs,
 }
 
-impl RunMade {
-    fn ended(&self) -> Outcome {
-        if self.made.is_cancelled() {
-            Outcome::Failed
-        } else {
-            exit(&self.run)
+impl AmplitudeRun {
+    fn exit(&self) -> Outcome {
+        match self.outputs.is_cancelled() {
+            true => Outcome::Failed,
+            false => exit(&self.run),
         }
     }
-}
-
-#[derive(Debug, Serialize)]
-struct ModeMade {
-    /// In the order of the runs; null where it is not seen.
-    by_run: Vec<Option<FittedMode>>,
-    frequency_shifts: bool,
-    damping_shifts: bool,
-    residue_shifts: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let configs = args.configs()?;
-    let expected = configs
-        .iter()
-        .map(|(scale, config)| expected(*scale, config))
-        .collect::<Result<Vec<_>, _>>()?;
-    let (mut runs, mut outcome) = (Vec::new(), Outcome::Done);
-    for ((scale, config), expected) in configs.iter().zip(expected) {
-        let made = one(args, *scale, config, expected)?;
-        let ended = made.ended();
-        outcome = if outcome == Outcome::Done {
-            ended
-        } else {
-            outcome
-        };
-        runs.push(made);
-        if ended == Outcome::Failed {
-            outcome = ended;
-            break;
-        }
-    }
-    let fitted: Vec<Vec<FittedMode>> = runs
-        .iter()
-        .map(|run| run.made.summary.modes.clone())
-        .collect();
-    let modes = modes_over_amplitude(&fitted);
-    let report = report(runs, &modes);
-    if args.bench.json {
-        print_json(&report)?;
-    } else {
-        print_text(&text(&report, &configs, &modes))?;
+    let plans = plan_amplitudes(&args.planned()?, &args.scales()?)?;
+    let runs = measure(args, &plans)?;
+    let outcome = outcome(&runs);
+    let report = report(runs, outcome != Outcome::Failed);
+    match args.bench.json {
+        true => print_json(&report)?,
+        false => print_text(&text(&report, &plans))?,
     }
     Ok(outcome)
 }
 
-/// What a run would do; refused where it crosses an interlock.
-fn expected(scale: f64, config: &Config) -> Result<Expected, CliError> {
-    let refused = |error: CliError| {
-        CliError::Usage(format!(
-            "at {scale} of the planned amplitude: {error}; nothing moved"
-        ))
+/// Runs and analyses the amplitudes until one fails.
+fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, CliError> {
+    let Some(first) = plans.first() else {
+        return Ok(Vec::new());
     };
-    Ok(Expected::of(&check(config).map_err(refused)?))
+    let setup = args.run.setup(&first.config)?;
+    let progress = Progress::new("linearity");
+    let _line = ProgressLine::show(&progress);
+    let mut runs = Vec::new();
+    linearity::run(&Runner { setup, progress }, plans, &mut |plan, run| {
+        let finished = finish(plan, run)?;
+        let is_failed = finished.exit() == Outcome::Failed;
+        runs.push(finished);
+        Ok::<bool, CliError>(!is_failed)
+    })?;
+    Ok(runs)
 }
 
-/// One amplitude: recorded, analysed, its report in its recording.
-fn one(args: &Args, scale: f64, config: &Config, expected: Expected) -> Result<RunMade, CliError> {
-    let mut run = args.run.run(&Plan::chirp(config.clone()), "linearity")?;
-    let told = RunSummary::of(&mut run)?;
-    let made = match told.is_completed() {
-        true => analysed(&run.path, config)?,
+/// Analyses a run and adds the result to its recording.
+fn finish(plan: &AmplitudePlan, mut run: Run) -> Result<AmplitudeRun, CliError> {
+    let summary = RunSummary::of(&mut run)?;
+    let outputs = match summary.is_completed() {
+        true => analysed(&run.path, &plan.config)?,
         false => AnalysisOutputs::run_incomplete(),
     };
-    let made = RunMade {
-        scale,
-        expected,
-        run: told,
-        made,
+    let finished = AmplitudeRun {
+        scale: plan.scale,
+        expected: Expected::of(&plan.predicted),
+        run: summary,
+        outputs,
     };
-    experiment::close(run, &made)?;
-    Ok(made)
+    experiment::close(run, &finished)?;
+    Ok(finished)
 }
 
-fn report(runs: Vec<RunMade>, modes: &[ModeOverAmplitude]) -> Report {
-    let compared = modes
+/// A failure of any run, or else the first outcome that is not `Done`.
+fn outcome(runs: &[AmplitudeRun]) -> Outcome {
+    let mut outcomes = runs.iter().map(AmplitudeRun::exit);
+    if outcomes.clone().any(|outcome| outcome == Outcome::Failed) {
+        return Outcome::Failed;
+    }
+    let impaired = outcomes.find(|outcome| *outcome != Outcome::Done);
+    impaired.unwrap_or(Outcome::Done)
+}
+
+fn report(runs: Vec<AmplitudeRun>, all_completed: bool) -> Report {
+    let fitted: Vec<Vec<FittedMode>> = runs
         .iter()
-        .any(|mode| mode.by_run.iter().flatten().count() > 1);
-    let whole = runs.iter().all(|run| run.ended() != Outcome::Failed);
-    let shifts = modes.iter().any(ModeOverAmplitude::shifts);
-    let shifted = (shifts || whole && compared).then_some(shifts);
-    let why = match shifted {
-        None if !whole => {
-            "not every amplitude was run and analysed to its end: whether modes shift is not known".into()
-        }
-        None => "no mode is seen at two amplitudes: take more periods (multisine.periods) or larger amplitudes".into(),
-        Some(false) => {
-            format!("no mode shifts with amplitude beyond what its errors explain{}", unseen(modes))
-        }
-        Some(true) => format!("with amplitude shift beyond what their errors explain: {}", shifting(modes)),
-    };
-    let mode = |over: &ModeOverAmplitude| ModeMade {
-        by_run: over.by_run.clone(),
-        frequency_shifts: over.frequency_shifts,
-        damping_shifts: over.damping_shifts,
-        residue_shifts: over.residue_shifts,
-    };
-    let scales = runs.iter().map(|run| run.scale).collect();
+        .map(|run| run.outputs.summary.modes.clone())
+        .collect();
+    let ModeComparison {
+        modes,
+        shifted,
+        why,
+    } = compare_modes(&fitted, all_completed);
     Report {
-        scales,
+        scales: runs.iter().map(|run| run.scale).collect(),
         runs,
-        modes: modes.iter().map(mode).collect(),
+        modes,
         shifted,
         why,
     }
 }
 
-/// Of which modes nothing is said, as not all amplitudes show them: noise may hide one, or it may have moved beyond all that is
-/// taken for the same.
-fn unseen(modes: &[ModeOverAmplitude]) -> String {
-    let at =
-        |mode: &ModeOverAmplitude| Some(mode.by_run.iter().flatten().next()?.frequency_hz().value);
-    let lost = modes
-        .iter()
-        .filter(|mode| !mode.is_seen_throughout())
-        .filter_map(at);
-    let lost: Vec<String> = lost.map(|hz| format!("{hz:.2} Hz")).collect();
-    if lost.is_empty() {
-        String::new()
-    } else {
-        format!("; not seen at every amplitude: {}", lost.join(", "))
-    }
-}
-
-/// Which figures of which modes shift.
-fn shifting(modes: &[ModeOverAmplitude]) -> String {
-    let of = |mode: &ModeOverAmplitude| {
-        let figures = [
-            ("frequency", mode.frequency_shifts),
-            ("damping", mode.damping_shifts),
-            ("residue", mode.residue_shifts),
-        ];
-        let names: Vec<&str> = figures
-            .into_iter()
-            .filter(|(_, shifts)| *shifts)
-            .map(|(name, _)| name)
-            .collect();
-        let at = mode.by_run.iter().flatten().next()?.frequency_hz().value;
-        (!names.is_empty()).then(|| format!("{} of the mode at {at:.2} Hz", names.join(" and ")))
-    };
-    modes.iter().filter_map(of).collect::<Vec<_>>().join(", ")
-}
-
-fn text(report: &Report, configs: &[(f64, Config)], modes: &[ModeOverAmplitude]) -> String {
-    let run = |(run, (_, config)): (&RunMade, &(f64, Config))| {
-        let linearity = run
-            .made
-            .linearity
-            .as_ref()
-            .map_or_else(|| analysis_output::text(&run.made), linearity_output::text);
-        let page = run
-            .made
-            .pages
-            .report
-            .as_ref()
-            .map_or(String::new(), |path| format!("  report     {path}\n"));
-        format!(
-            "{} of the amplitude; expected travel {:.0} um, current {:.3} A\n{}{page}{linearity}\n",
-            run.scale,
-            run.expected.travel_m * 1e6,
-            run.expected.current_a,
-            run_text(&run.run, config)
-        )
-    };
-    let words = configs
-        .first()
-        .map_or(String::new(), |(_, config)| excitation::words(config));
-    let runs: String = report.runs.iter().zip(configs).map(run).collect();
+fn text(report: &Report, plans: &[AmplitudePlan]) -> String {
+    let kind = plans.first().map(|plan| excitation::words(&plan.config));
+    let runs = report.runs.iter().zip(plans);
+    let runs: String = runs
+        .map(|(run, plan)| amplitude_text(run, &plan.config))
+        .collect();
     format!(
-        "{words}\n\n{runs}{}\nmodes over amplitude (* shifts): {}\n",
-        mode_table(&report.scales, modes),
-        report.why
+        "{}\n\n{runs}{}\n{}",
+        kind.unwrap_or_default(),
+        mode_table(&report.scales, &report.modes),
+        wrap(
+            &format!("modes over amplitude (* shifts): {}", report.why),
+            0
+        )
     )
 }
 
-/// A row a mode and amplitude; intervals hold the truth with 95 %.
-fn mode_table(scales: &[f64], modes: &[ModeOverAmplitude]) -> String {
-    let figure = |e: Estimate| interval(e.value, SIGMAS_95 * e.sigma);
-    let mark = |text: String, shifts: bool| if shifts { text + " *" } else { text };
-    let row = |over: &ModeOverAmplitude, (scale, seen): (&f64, &Option<FittedMode>)| match seen {
-        None => [
-            scale.to_string(),
-            "not seen".into(),
-            String::new(),
-            String::new(),
-        ]
-        .to_vec(),
-        Some(mode) => vec![
-            scale.to_string(),
-            mark(figure(mode.frequency_hz()), over.frequency_shifts),
-            mark(figure(mode.damping_ratio), over.damping_shifts),
-            mark(figure(mode.residue_per_kg), over.residue_shifts),
-        ],
+fn amplitude_text(run: &AmplitudeRun, config: &Config) -> String {
+    let page = run.outputs.pages.report.as_ref();
+    let page = page.map_or(String::new(), |path| labelled("report", path));
+    let linearity = match &run.outputs.linearity {
+        Some(linearity) => linearity_output::text(linearity),
+        None => analysis_output::text(&run.outputs),
     };
-    let rows: Vec<Vec<String>> = modes
-        .iter()
-        .flat_map(|over| {
-            scales
-                .iter()
-                .zip(&over.by_run)
-                .map(move |seen| row(over, seen))
-        })
-        .collect();
+    format!(
+        "{} of the amplitude; expected travel {:.0} um, current {:.3} A\n{}{page}{linearity}\n",
+        run.scale,
+        run.expected.travel_m * 1e6,
+        run.expected.current_a,
+        run_text(&run.run, config)
+    )
+}
+
+/// One row for each mode and amplitude, with 95 % intervals.
+fn mode_table(scales: &[f64], modes: &[ModeOverAmplitude]) -> String {
+    let rows = modes.iter().flat_map(|mode| {
+        let runs = scales.iter().zip(&mode.by_run);
+        runs.map(move |(scale, fitted)| mode_row(*scale, mode, fitted.as_ref()))
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
     table(&["amplitude", "mode Hz", "damping", "residue 1/kg"], &rows)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn mode_row(scale: f64, mode: &ModeOverAmplitude, fitted: Option<&FittedMode>) -> Vec<String> {
+    let Some(fitted) = fitted else {
+        return vec![
+            scale.to_string(),
+            "not found".into(),
+            String::new(),
+            String::new(),
+        ];
+    };
+    vec![
+        scale.to_string(),
+        cell(fitted.frequency_hz(), mode.frequency_shifts),
+        cell(fitted.damping_ratio, mode.damping_shifts),
+        cell(fitted.residue_per_kg, mode.residue_shifts),
+    ]
+}
 
-    #[test]
-    fn a_mode_that_is_not_seen_at_every_amplitude_is_named() {
-        let known = |value: f64| Estimate {
-            value,
-            sigma: 1e-3 * value,
-        };
-        let mode = |hz: f64| FittedMode {
-            omega_rad_s: known(hz * std::f64::consts::TAU),
-            damping_ratio: known(0.01),
-            residue_per_kg: known(0.5),
-        };
-        let said = |runs: &[Vec<FittedMode>]| report(Vec::new(), &modes_over_amplitude(runs)).why;
-        let both = vec![mode(29.0), mode(82.0)];
-        // 90 Hz is no 82 Hz: nothing shifts, but of that mode nothing is known.
-        let why = said(&[both.clone(), vec![mode(29.0), mode(90.0)]]);
-        assert!(
-            why.starts_with("no mode shifts")
-                && why.ends_with("; not seen at every amplitude: 82.00 Hz"),
-            "{why}"
-        );
-        assert!(said(&[both.clone(), both]).ends_with("explain"));
-    }
+fn cell(estimate: Estimate, shifts: bool) -> String {
+    let text = interval(estimate.value, SIGMAS_95 * estimate.sigma);
+    if shifts { text + " *" } else { text }
 }

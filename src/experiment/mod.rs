@@ -8,7 +8,6 @@
 //! tokio never stands in the loop's way: it watches counters, signals and the recorder's health, and talks to the loop
 //! through the ring of orders alone.
 
-mod amplitudes;
 mod analysis;
 pub mod calibration;
 pub mod campaign;
@@ -17,6 +16,7 @@ mod ending;
 mod error;
 mod external;
 mod gathered;
+pub mod linearity;
 mod measure;
 mod name;
 mod patterns;
@@ -29,7 +29,6 @@ mod runner;
 mod signals;
 mod swept;
 
-pub use amplitudes::{ModeOverAmplitude, modes_over_amplitude};
 pub use analysis::{
     Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress,
 };

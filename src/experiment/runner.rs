@@ -75,6 +75,14 @@ pub struct Runner {
 }
 
 impl Runner {
+    /// A runner without anyone who follows its progress.
+    pub fn new(setup: Setup) -> Runner {
+        Runner {
+            setup,
+            progress: Progress::default(),
+        }
+    }
+
     /// Runs a plan with the configured calibration.
     pub fn run(&self, plan: &Plan, phase: &'static str) -> Result<Run, ExperimentError> {
         self.run_calibrated(plan, phase, None)

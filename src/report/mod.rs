@@ -7,6 +7,7 @@
 //! ```
 
 pub mod bode;
+mod campaign;
 mod chart;
 mod coherence;
 mod distortion;
@@ -23,6 +24,7 @@ mod stability;
 mod trace;
 
 pub use bode::bode_svg;
+pub use campaign::{PictureError, campaign_picture};
 pub use chart::{
     Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
 };

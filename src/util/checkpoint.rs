@@ -30,6 +30,8 @@ pub enum FileAction {
     Read,
     /// Writing.
     Write,
+    /// Removing.
+    Remove,
 }
 
 impl fmt::Display for FileAction {
@@ -41,6 +43,7 @@ impl fmt::Display for FileAction {
             FileAction::Use => "use",
             FileAction::Read => "read",
             FileAction::Write => "write",
+            FileAction::Remove => "remove",
         })
     }
 }

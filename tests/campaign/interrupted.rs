@@ -1,10 +1,10 @@
-//! A campaign that is broken off goes on, to the same end; what is no part of it is refused or done again.
+//! An interrupted campaign continues to the same result; foreign files are refused or measured again.
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use bench::config::{Source, load};
-use bench::experiment::campaign::{Grid, Place, Point, Store};
+use bench::experiment::campaign::{Grid, GridPoint, PointResult, Store};
 use bench::identify::verdict::Cnmp;
 use serde_json::Value;
 
@@ -13,7 +13,7 @@ use crate::program::Bench;
 /// 4 x 3 points, each with the shortest chirp that passes over all modes.
 const GRID: &str = "campaign --operating-points 2%:8%:4 --asymmetries -5%:10%:3 --out c --threads 2 \
                     --set chirp.start_hz=5 --set chirp.duration_s=8 --set chirp.fade_in_s=0.5 --set chirp.quiet_after_s=2";
-/// A guard against waiting for ever, no figure of merit.
+/// Time limit of a wait, not a requirement.
 const PATIENCE: Duration = Duration::from_secs(240);
 
 fn start(bench: &Bench) -> Child {
@@ -42,8 +42,8 @@ fn points(bench: &Bench) -> Vec<PathBuf> {
     whole
 }
 
-/// Sends a signal as soon as three points are done; returns the exit code and what was said.
-fn broken_off(bench: &Bench, number: i32) -> (Option<i32>, String) {
+/// Sends a signal when three points are finished; returns the exit code and the messages.
+fn interrupted(bench: &Bench, number: i32) -> (Option<i32>, String) {
     let mut child = start(bench);
     let patience = Instant::now() + PATIENCE;
     while points(bench).len() < 3 {
@@ -75,7 +75,7 @@ fn circles(svg: &str, attribute: &str) -> usize {
 }
 
 #[test]
-fn broken_off_and_gone_on_it_ends_as_without_a_break() {
+fn an_interrupted_campaign_continues_to_the_same_result() {
     let whole = Bench::new();
     let answer = whole.run(&format!("{GRID} --json"));
     assert_eq!(answer.code, 0, "{}", answer.err);
@@ -108,7 +108,7 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
 
     for (number, expected) in [(libc::SIGKILL, None), (libc::SIGINT, Some(1))] {
         let broken = Bench::new();
-        let (code, said) = broken_off(&broken, number);
+        let (code, said) = interrupted(&broken, number);
         assert_eq!(code, expected, "{said}");
         let kept = points(&broken);
         assert!((3..12).contains(&kept.len()), "{kept:?}");
@@ -122,14 +122,14 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
         assert!(
             going_on
                 .err
-                .contains(&format!("{} of 12 points are done already", kept.len())),
+                .contains(&format!("{} of 12 points are finished already", kept.len())),
             "{}",
             going_on.err
         );
         assert_eq!((going_on.code, &going_on.out), (0, &answer.out));
     }
 
-    // What is torn, or of another point, does not count, and is measured again.
+    // A damaged file, or one of another point, does not count: the point is measured again.
     let files = points(&whole);
     let text = std::fs::read_to_string(&files[0]).expect("a file");
     std::fs::write(&files[0], &text[..text.len() / 2]).expect("a writable folder");
@@ -138,13 +138,13 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
     for words in [
         "is torn or damaged",
         "is of another campaign or another point",
-        "10 of 12 points are done already",
+        "10 of 12 points are finished already",
     ] {
         assert!(again.err.contains(words), "{}", again.err);
     }
     assert_eq!((again.code, &again.out), (0, &answer.out));
 
-    // Other settings are refused, and named.
+    // Other settings are refused with the difference.
     for (arguments, named) in [
         (
             format!("{GRID} --seed 7"),
@@ -157,7 +157,7 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
     ] {
         let other = whole.run(&arguments);
         assert!(
-            other.code == 2 && other.err.contains("holds a campaign of other settings"),
+            other.code == 2 && other.err.contains("holds a campaign with other settings"),
             "{other:?}"
         );
         assert!(other.err.contains(named), "{other:?}");
@@ -166,14 +166,14 @@ fn broken_off_and_gone_on_it_ends_as_without_a_break() {
 }
 
 #[test]
-fn what_is_no_campaign_is_refused_and_left_as_it_is() {
+fn refuses_a_folder_of_something_else_and_does_not_change_it() {
     let bench = Bench::new();
     std::fs::create_dir(bench.path("c")).expect("a writable folder");
     for text in ["", "not JSON", "{\"format\": \"bench study 1\"}", "[1, 2]"] {
         bench.write("c/campaign.json", text);
         let answer = bench.run(GRID);
         assert!(
-            answer.code == 2 && answer.err.contains("is not of a campaign"),
+            answer.code == 2 && answer.err.contains("does not belong to a campaign"),
             "{answer:?}"
         );
         assert_eq!(bench.read("c/campaign.json"), text);
@@ -181,13 +181,13 @@ fn what_is_no_campaign_is_refused_and_left_as_it_is() {
     for (arguments, words) in [
         (
             "campaign --config lab",
-            "standard input is no terminal; start it in one, or add --simulate",
+            "standard input is not a terminal; start it in a terminal, or add --simulate",
         ),
         (
             "campaign --config xy",
             "which the model `xy` does not have both",
         ),
-        ("campaign --asymmetry 2%", "fix what a campaign varies"),
+        ("campaign --asymmetry 2%", "set what a campaign varies"),
         (
             "campaign --operating-points 0%:200%:3",
             "beyond the length of the beams",
@@ -219,17 +219,17 @@ fn what_is_no_campaign_is_refused_and_left_as_it_is() {
 }
 
 #[test]
-fn points_of_the_simulated_stage_do_not_count_for_the_real_one_of_the_same_settings() {
+fn points_of_the_simulated_stage_do_not_count_for_devices() {
     let config = load(&Source::default()).expect("the default profile");
     let grid = Grid::new(vec![0.0, 0.08], vec![0.1], &config).expect("a grid");
-    let point = Point {
+    let point = PointResult {
         cnmp: Cnmp::Excluded,
         why: String::new(),
         modes_hz: vec![29.3],
         signs: "+".into(),
         zeros_rad_s: Vec::new(),
         loop_digest: String::new(),
-        put_on: None,
+        load_check: None,
     };
     for simulated_first in [true, false] {
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -237,7 +237,7 @@ fn points_of_the_simulated_stage_do_not_count_for_the_real_one_of_the_same_setti
         let first = open(!simulated_first).expect("a new folder");
         first
             .store
-            .add(Place { row: 1, column: 0 }, &point)
+            .add(GridPoint { row: 1, column: 0 }, &point)
             .expect("a point");
         drop(first);
         let error = open(simulated_first)
@@ -252,7 +252,7 @@ fn points_of_the_simulated_stage_do_not_count_for_the_real_one_of_the_same_setti
 }
 
 #[test]
-fn the_simulated_stage_has_the_offset_and_its_model_does_not_know() {
+fn the_simulated_stage_has_the_offset_and_the_model_does_not() {
     let bench = Bench::new();
     let short = "--set chirp.duration_s=8 --set chirp.start_hz=5 --set chirp.fade_in_s=0.5 --set chirp.quiet_after_s=1";
     let digest = |more: &str| bench.json(&format!("chirp {short} {more}"))["loop_digest"].clone();

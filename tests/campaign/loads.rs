@@ -1,6 +1,6 @@
-//! What a person is told to put on, against the statics of the stage with its constraints not linearised.
+//! The required load, against the statics of the stage with its constraints not linearised.
 use bench::config::{Config, PlantSettings, Purpose, Source, Sr4dofSettings, load};
-use bench::experiment::campaign::Load;
+use bench::experiment::campaign::{Load, StageModel};
 
 fn config(sets: &[&str]) -> Config {
     let sets = sets.iter().map(|set| set.to_string()).collect();
@@ -48,7 +48,7 @@ fn held(s: &Sr4dofSettings, y1: f64) -> (f64, f64) {
 }
 
 #[test]
-fn the_weight_holds_the_operating_point_and_the_stage_rests_where_it_was_in_x() {
+fn the_weight_holds_the_operating_point_and_does_not_move_the_stage_in_x() {
     for point_m in [-0.0038, 0.0005, 0.0019, 0.0038] {
         for pulley in [1.0, 0.8] {
             let set = [
@@ -59,28 +59,29 @@ fn the_weight_holds_the_operating_point_and_the_stage_rests_where_it_was_in_x() 
             let (force_n, x1_m) = held(stage(&config), point_m);
             // The descent ends at rounding: 1e-16 of lengths of 4 mm, and of forces of 34 N.
             assert!(x1_m.abs() < 1e-15, "{x1_m}");
-            let load = Load::of(&config).expect("a load");
+            let model = StageModel::of(&config).expect("a stage");
+            let load = model.required_load();
             let expected_kg = force_n / 9.80665 / pulley;
             assert!(
                 (load.hung_kg / expected_kg - 1.0).abs() < 1e-9,
                 "{} {expected_kg}",
                 load.hung_kg
             );
-            let carried = load
-                .carried(&config)
-                .expect("a stage")
-                .operating_point_m()
-                .expect("it has one");
+            let carried = model.loaded(&load).operating_point_m;
             assert!((carried / point_m - 1.0).abs() < 1e-12, "{carried}");
         }
     }
     // 34 N at 8 % of L: what the thesis's drawing has hanging there is kilograms, not grams.
-    let kg = Load::of(&config(&[])).expect("a load").hung_kg;
+    let config = config(&[]);
+    let kg = StageModel::of(&config)
+        .expect("a stage")
+        .required_load()
+        .hung_kg;
     assert!((3.0..4.0).contains(&kg), "{kg}");
 }
 
 #[test]
-fn masses_go_where_they_make_the_asymmetry_of_the_stage_as_it_was_built() {
+fn the_masses_give_the_asymmetry_in_whole_steps_on_one_stage() {
     for built in [-0.02, 0.0, 0.013] {
         for wanted in [-0.1, -0.05, -0.02, 0.0, 0.04, 0.1] {
             let set = [
@@ -88,7 +89,8 @@ fn masses_go_where_they_make_the_asymmetry_of_the_stage_as_it_was_built() {
                 format!("campaign.built_asymmetry={built:?}"),
             ];
             let config = config(&[&set[0], &set[1]]);
-            let load = Load::of(&config).expect("a load");
+            let model = StageModel::of(&config).expect("a stage");
+            let load = model.required_load();
             let [m2, m3] = [0.06 * (1.0 + built) + load.on_m2_kg, 0.06 + load.on_m3_kg];
             // Half a step of 0.5 g, over m3 or, beyond it, a little less.
             assert!(
@@ -104,9 +106,7 @@ fn masses_go_where_they_make_the_asymmetry_of_the_stage_as_it_was_built() {
                 (steps - steps.round()).abs() < 1e-9,
                 "whole steps: {load:?}"
             );
-            let PlantSettings::Sr4dof(carried) = load.carried(&config).expect("a stage") else {
-                panic!("a stage")
-            };
+            let carried = model.loaded(&load);
             assert!((carried.secondary_stage_mass_kg - m3).abs() < 1e-15);
             assert!((carried.mass_asymmetry - (m2 / m3 - 1.0)).abs() < 1e-12);
         }
@@ -114,41 +114,41 @@ fn masses_go_where_they_make_the_asymmetry_of_the_stage_as_it_was_built() {
 }
 
 #[test]
-fn a_person_is_told_how_much_in_all_and_what_changes() {
+fn instructions_state_the_total_and_the_change() {
     let on = |hung_kg, on_m2_kg, on_m3_kg| Load {
         hung_kg,
         on_m2_kg,
         on_m3_kg,
     };
-    let first = on(1.736, 0.006, 0.0).orders(&Load::default());
+    let first = on(1.736, 0.006, 0.0).instructions(&Load::default());
     assert_eq!(
         first,
         [
-            "weight in +Y: 1.736 kg in all (put on 1.736 kg)",
-            "on stage 2: 6.0 g in all (put on 6.0 g)",
-            "on stage 3: nothing (as it is)"
+            "weight in +Y: 1.736 kg in total (add 1.736 kg)",
+            "on stage 2: 6.0 g in total (add 6.0 g)",
+            "on stage 3: nothing (unchanged)"
         ]
     );
-    let next = on(1.736, 0.0, 0.0035).orders(&on(1.736, 0.006, 0.0));
+    let next = on(1.736, 0.0, 0.0035).instructions(&on(1.736, 0.006, 0.0));
     assert_eq!(
         next,
         [
-            "weight in +Y: 1.736 kg in all (as it is)",
-            "on stage 2: nothing (take off 6.0 g)",
-            "on stage 3: 3.5 g in all (put on 3.5 g)"
+            "weight in +Y: 1.736 kg in total (unchanged)",
+            "on stage 2: nothing (remove 6.0 g)",
+            "on stage 3: 3.5 g in total (add 3.5 g)"
         ]
     );
-    let other = on(-0.5, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0));
+    let other = on(-0.5, 0.0, 0.0).instructions(&on(1.0, 0.0, 0.0));
     assert_eq!(
         other[0],
-        "take the weight off the other side; weight in -Y: 0.500 kg in all (put on 0.500 kg)"
+        "remove the weight from the other side; weight in -Y: 0.500 kg in total (add 0.500 kg)"
     );
     assert_eq!(
-        on(0.25, 0.0, 0.0).orders(&on(1.0, 0.0, 0.0))[0],
-        "weight in +Y: 0.250 kg in all (take off 0.750 kg)"
+        on(0.25, 0.0, 0.0).instructions(&on(1.0, 0.0, 0.0))[0],
+        "weight in +Y: 0.250 kg in total (remove 0.750 kg)"
     );
     assert_eq!(
-        on(0.0, 0.0, 0.0).orders(&on(-0.5, 0.0, 0.0))[0],
-        "weight in -Y: nothing (take off 0.500 kg)"
+        on(0.0, 0.0, 0.0).instructions(&on(-0.5, 0.0, 0.0))[0],
+        "weight in -Y: nothing (remove 0.500 kg)"
     );
 }

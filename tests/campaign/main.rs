@@ -1,10 +1,10 @@
-//! `bench campaign`: a grid of chirps, what is kept of it, and what all verdicts say together.
+//! `bench campaign`: a grid of chirps, its folder, the load of the stage, and the evaluation of all verdicts.
 
 use bench_test_support::program;
 
 use bench_test_support::faulty_rig;
 
-mod answers;
-mod attended;
+mod guided;
 mod interrupted;
 mod loads;
+mod offset_and_recommendation;

@@ -1,18 +1,28 @@
-//! Where a campaign measures.
+//! The grid of a campaign.
 
 use serde::{Deserialize, Serialize};
 
-use super::CampaignError;
+use super::error::CampaignError;
 use crate::config::{Config, PlantSettings, Sr4dofSettings, validate};
 
-/// Points, at most: each takes a chirp of minutes.
-const MOST: usize = 10_000;
-/// Masses are put on in such steps (section 5.2.1), in kilograms.
+/// Largest number of points; each takes a chirp of minutes.
+const MAX_POINTS: usize = 10_000;
+/// Masses are added in these steps (section 5.2.1), in kilograms.
 pub(super) const MASS_STEP_KG: f64 = 0.0005;
-/// Seeds that a configuration may have.
+/// Number of seeds that a configuration may have.
 const SEEDS: u64 = 1 << 63;
 
-/// Operating points, a row each, by mass asymmetries, a column each.
+/// Operating points, one row each, by mass asymmetries, one column each.
+///
+/// ```
+/// use bench::config::{Source, load};
+/// use bench::experiment::campaign::Grid;
+///
+/// let config = load(&Source::default()).unwrap();
+/// let grid = Grid::new(vec![0.0, 0.04, 0.08], vec![-0.05, 0.05], &config).unwrap();
+/// assert_eq!(grid.points().count(), 6);
+/// assert!(Grid::new(vec![2.0], vec![0.0], &config).is_err(), "beyond the length of the beams");
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Y1o/L, ratios.
@@ -23,7 +33,7 @@ pub struct Grid {
 
 /// A point of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Place {
+pub struct GridPoint {
     /// Index of its operating point.
     pub row: usize,
     /// Index of its asymmetry.
@@ -31,7 +41,7 @@ pub struct Place {
 }
 
 impl Grid {
-    /// A grid for the stage of a configuration: refuses a model without operating point and asymmetry, more than 10,000
+    /// A grid for the stage of a configuration. Refuses a model without operating point and asymmetry, more than 10,000
     /// points, and values that the configuration does not allow.
     pub fn new(
         operating_points: Vec<f64>,
@@ -43,67 +53,62 @@ impl Grid {
             asymmetries,
         };
         let count = grid.operating_points.len() * grid.asymmetries.len();
-        if !(1..=MOST).contains(&count) {
+        if !(1..=MAX_POINTS).contains(&count) {
             return Err(CampaignError::Grid(format!(
-                "{count} points; a campaign has from 1 to {MOST}: take fewer"
+                "{count} points; a campaign has from 1 to {MAX_POINTS}: use fewer values"
             )));
         }
-        settings(config)?;
-        // Every range of a setting is an interval: what the values at the ends may be, those between may be.
-        for place in grid.places() {
-            if (place.row == 0 || place.row + 1 == grid.operating_points.len())
-                && (place.column == 0 || place.column + 1 == grid.asymmetries.len())
-            {
-                grid.config(config, place)?;
-            }
+        stage_settings(config)?;
+        // Every range of a setting is an interval: if the corners are allowed, so are all points between them.
+        for corner in grid.corners() {
+            grid.config_at(config, corner)?;
         }
         Ok(grid)
     }
 
-    /// The asymmetry that the smallest mass makes, a ratio of m3.
-    pub fn mass_step(&self, config: &Config) -> f64 {
-        settings(config).map_or(MASS_STEP_KG, |settings| {
-            MASS_STEP_KG / settings.secondary_stage_mass_kg
-        })
+    fn corners(&self) -> impl Iterator<Item = GridPoint> {
+        let (last_row, last_column) = (self.operating_points.len() - 1, self.asymmetries.len() - 1);
+        let rows = [0, last_row].into_iter();
+        rows.flat_map(move |row| [0, last_column].map(|column| GridPoint { row, column }))
+    }
+
+    /// The asymmetry of one mass step, as a ratio of m3.
+    pub fn mass_step(&self, stage: &Sr4dofSettings) -> f64 {
+        MASS_STEP_KG / stage.secondary_stage_mass_kg
     }
 
     /// All points, row by row.
-    pub fn places(&self) -> impl Iterator<Item = Place> + '_ {
+    pub fn points(&self) -> impl Iterator<Item = GridPoint> + '_ {
         let columns = self.asymmetries.len();
         (0..self.operating_points.len())
-            .flat_map(move |row| (0..columns).map(move |column| Place { row, column }))
+            .flat_map(move |row| (0..columns).map(move |column| GridPoint { row, column }))
     }
 
-    /// The configuration of a point: that of the campaign there, with a seed of its own, which is the point's alone.
-    pub fn config(&self, config: &Config, place: Place) -> Result<Config, CampaignError> {
+    /// The configuration at a point: that of the campaign, with a seed that depends on the point alone.
+    pub fn config_at(&self, config: &Config, point: GridPoint) -> Result<Config, CampaignError> {
+        let stage = stage_settings(config)?;
         let mut there = config.clone();
-        let settings = Sr4dofSettings {
-            operating_point_m: self.operating_points[place.row] * settings(config)?.beam_length_m,
-            mass_asymmetry: self.asymmetries[place.column],
-            ..settings(config)?.clone()
-        };
-        there.plant = PlantSettings::Sr4dof(settings);
-        let index = place.row * self.asymmetries.len() + place.column;
+        there.plant = PlantSettings::Sr4dof(Sr4dofSettings {
+            operating_point_m: self.operating_points[point.row] * stage.beam_length_m,
+            mass_asymmetry: self.asymmetries[point.column],
+            ..stage.clone()
+        });
+        let index = point.row * self.asymmetries.len() + point.column;
         there.sim.seed = config.sim.seed.wrapping_add(index as u64) % SEEDS;
         validate(&there).map_err(|error| {
-            CampaignError::Grid(format!("the grid leaves what is allowed: {error}"))
+            CampaignError::Grid(format!("the grid exceeds an allowed range: {error}"))
         })?;
         Ok(there)
     }
 }
 
-/// The settings of the one model that has operating point and asymmetry.
-pub(super) fn settings(config: &Config) -> Result<&Sr4dofSettings, CampaignError> {
-    of_plant(&config.plant)
-}
-
-/// The same of a model by itself.
-pub(super) fn of_plant(plant: &PlantSettings) -> Result<&Sr4dofSettings, CampaignError> {
-    match plant {
+/// The settings of SR4DoF, the one model that has both operating point and mass asymmetry.
+pub fn stage_settings(config: &Config) -> Result<&Sr4dofSettings, CampaignError> {
+    match &config.plant {
         PlantSettings::Sr4dof(settings) => Ok(settings),
         other => Err(CampaignError::Grid(format!(
-            "a campaign is over operating point and mass asymmetry, which the model `{}` does not have both; take one of \
-             `sr4dof` (--config stage, --config chapter2)",
+            "a campaign is over operating point and mass asymmetry, which the model `{}` does not have both; use a \
+             profile of `sr4dof` (--config stage, --config chapter2)",
             other.model()
         ))),
     }

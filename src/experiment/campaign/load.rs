@@ -1,17 +1,17 @@
-//! What a person hangs on the stage and adds to it, for a point of a grid.
+//! The weight and the masses that an operator adds to the stage for a point of the grid.
 
 use serde::{Deserialize, Serialize};
 
-use super::CampaignError;
-use super::grid::{MASS_STEP_KG, settings};
+use super::error::CampaignError;
+use super::grid::{MASS_STEP_KG, stage_settings};
 use crate::config::{CampaignSettings, Config, PlantSettings, Sr4dofSettings};
 
 /// Standard gravity in m/s^2.
 const GRAVITY_M_PER_S2: f64 = 9.80665;
-/// What is less than half of it is nothing, in kilograms.
-const NOTHING_KG: f64 = 0.0005;
+/// A mass below half of this is treated as zero, in kilograms.
+const NEGLIGIBLE_KG: f64 = 0.0005;
 
-/// What is on the stage beyond what it is made of, in kilograms.
+/// What is added to the stage as it was built, in kilograms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
@@ -23,93 +23,128 @@ pub struct Load {
     pub on_m3_kg: f64,
 }
 
-impl Load {
-    /// What makes the operating point and the asymmetry of a configuration.
-    ///
-    /// The weight is F/(g p) with the force F that holds the operating point ([`Sr4dofSettings::holding_force_n`]) and p of `pulley_ratio`. The
-    /// masses turn the asymmetry B of the stage as it was built, m2 = m3 (1 + B), into D: m3 (D - B) on stage 2, or, for D < B,
-    /// m3 ((1 + B)/(1 + D) - 1) on stage 3, to the nearest step of 0.5 g (section 5.2.1).
-    pub fn of(config: &Config) -> Result<Load, CampaignError> {
-        let (stage, with) = (settings(config)?, &config.campaign);
-        let (wanted, built) = (1.0 + stage.mass_asymmetry, 1.0 + with.built_asymmetry);
-        let (m2, m3) = (wanted - built, built / wanted - 1.0);
-        let stepped = |share: f64| {
-            MASS_STEP_KG
-                * libm::round(share.max(0.0) * stage.secondary_stage_mass_kg / MASS_STEP_KG)
-        };
-        Ok(Load {
-            hung_kg: stage.holding_force_n() / (GRAVITY_M_PER_S2 * with.pulley_ratio),
-            on_m2_kg: stepped(m2),
-            on_m3_kg: stepped(m3),
+/// The model of a stage that is loaded, with the settings of pulley, tolerances and asymmetry as built.
+#[derive(Clone, Copy, Debug)]
+pub struct StageModel<'a> {
+    /// The stage at its operating point and asymmetry.
+    pub stage: &'a Sr4dofSettings,
+    /// How it is loaded and checked.
+    pub settings: &'a CampaignSettings,
+}
+
+impl<'a> StageModel<'a> {
+    /// The stage of a configuration. Refuses a model without operating point and mass asymmetry.
+    pub fn of(config: &'a Config) -> Result<StageModel<'a>, CampaignError> {
+        Ok(StageModel {
+            stage: stage_settings(config)?,
+            settings: &config.campaign,
         })
     }
 
-    /// The force in newtons with which the weight pulls.
-    pub fn force_n(&self, with: &CampaignSettings) -> f64 {
-        self.hung_kg * GRAVITY_M_PER_S2 * with.pulley_ratio
+    /// The load that gives the stage its operating point and asymmetry.
+    ///
+    /// The weight is F/(g p) with the force F that holds the operating point ([`Sr4dofSettings::holding_force_n`]) and p of `pulley_ratio`.
+    /// The masses change the asymmetry B of the stage as it was built, m2 = m3 (1 + B), into D: m3 (D - B) on stage 2, or,
+    /// for D < B, m3 ((1 + B)/(1 + D) - 1) on stage 3, to the nearest step of 0.5 g (section 5.2.1).
+    pub fn required_load(&self) -> Load {
+        let wanted = 1.0 + self.stage.mass_asymmetry;
+        let built = 1.0 + self.settings.built_asymmetry;
+        let newtons_per_kg = GRAVITY_M_PER_S2 * self.settings.pulley_ratio;
+        Load {
+            hung_kg: self.stage.holding_force_n() / newtons_per_kg,
+            on_m2_kg: self.in_steps(wanted - built),
+            on_m3_kg: self.in_steps(built / wanted - 1.0),
+        }
     }
 
-    /// The model of the stage that carries it: what is added to stage 3 is there beside the asymmetry.
-    pub fn carried(&self, config: &Config) -> Result<PlantSettings, CampaignError> {
-        let (stage, with) = (settings(config)?, &config.campaign);
-        let built_kg = stage.secondary_stage_mass_kg;
-        let (m2_kg, m3_kg) = (
-            built_kg * (1.0 + with.built_asymmetry) + self.on_m2_kg,
-            built_kg + self.on_m3_kg,
-        );
-        let soft = Sr4dofSettings {
+    /// A positive ratio of m3 as whole mass steps.
+    fn in_steps(&self, ratio: f64) -> f64 {
+        let mass_kg = ratio.max(0.0) * self.stage.secondary_stage_mass_kg;
+        MASS_STEP_KG * libm::round(mass_kg / MASS_STEP_KG)
+    }
+
+    /// The force in newtons with which the weight pulls.
+    pub fn force_n(&self, load: &Load) -> f64 {
+        load.hung_kg * GRAVITY_M_PER_S2 * self.settings.pulley_ratio
+    }
+
+    /// The model of the stage under a load. A mass on stage 3 also increases the mass of the secondary stages.
+    pub fn loaded(&self, load: &Load) -> Sr4dofSettings {
+        let built_kg = self.stage.secondary_stage_mass_kg;
+        let m2_kg = built_kg * (1.0 + self.settings.built_asymmetry) + load.on_m2_kg;
+        let m3_kg = built_kg + load.on_m3_kg;
+        let at_one_metre = Sr4dofSettings {
             operating_point_m: 1.0,
-            ..stage.clone()
+            ..self.stage.clone()
         };
-        Ok(PlantSettings::Sr4dof(Sr4dofSettings {
+        Sr4dofSettings {
             secondary_stage_mass_kg: m3_kg,
             mass_asymmetry: m2_kg / m3_kg - 1.0,
-            operating_point_m: self.force_n(with) / soft.holding_force_n(),
-            ..stage.clone()
-        }))
+            operating_point_m: self.force_n(load) / at_one_metre.holding_force_n(),
+            ..self.stage.clone()
+        }
     }
 
-    /// What to do where `before` is on the stage: a line each for the weight and both stages.
-    pub fn orders(&self, before: &Load) -> [String; 3] {
-        // With nothing to hang it is the side that the weight is taken off.
-        let down = self.hung_kg < 0.0 || self.hung_kg == 0.0 && before.hung_kg < 0.0;
-        let side = if down { "-Y" } else { "+Y" };
-        let turned = self.hung_kg * before.hung_kg < 0.0;
-        let hung_before_kg = if turned { 0.0 } else { before.hung_kg.abs() };
-        let weight = order(
-            &format!("weight in {side}"),
-            self.hung_kg.abs(),
-            hung_before_kg,
-            1.0,
-            "kg",
-        );
-        let first = if turned {
-            "take the weight off the other side; "
-        } else {
-            ""
-        };
-        let gram = |name: &str, now_kg, before_kg| order(name, now_kg, before_kg, 1e3, "g");
-        [
-            format!("{first}{weight}"),
-            gram("on stage 2", self.on_m2_kg, before.on_m2_kg),
-            gram("on stage 3", self.on_m3_kg, before.on_m3_kg),
-        ]
+    /// The same as settings of a plant.
+    pub fn loaded_plant(&self, load: &Load) -> PlantSettings {
+        PlantSettings::Sr4dof(self.loaded(load))
     }
 }
 
-/// How much in all, and what that changes; `per_kg` makes the unit of a person.
-fn order(name: &str, now_kg: f64, before_kg: f64, per_kg: f64, unit: &str) -> String {
-    let decimals = if unit == "kg" { 3 } else { 1 };
-    let amount = |kg: f64| format!("{:.decimals$} {unit}", kg * per_kg);
-    let all = if now_kg < NOTHING_KG / 2.0 {
-        "nothing".to_string()
-    } else {
-        format!("{} in all", amount(now_kg))
+impl Load {
+    /// Instructions to change the load from `before`: one line for the weight and one for each stage.
+    pub fn instructions(&self, before: &Load) -> [String; 3] {
+        [
+            self.weight_instruction(before),
+            instruction("on stage 2", self.on_m2_kg, before.on_m2_kg, Unit::Gram),
+            instruction("on stage 3", self.on_m3_kg, before.on_m3_kg, Unit::Gram),
+        ]
+    }
+
+    fn weight_instruction(&self, before: &Load) -> String {
+        // Without a weight, the side is that of the weight to remove.
+        let is_down = self.hung_kg < 0.0 || self.hung_kg == 0.0 && before.hung_kg < 0.0;
+        let name = if is_down {
+            "weight in -Y"
+        } else {
+            "weight in +Y"
+        };
+        let (now_kg, before_kg) = (self.hung_kg.abs(), before.hung_kg.abs());
+        if self.hung_kg * before.hung_kg < 0.0 {
+            let line = instruction(name, now_kg, 0.0, Unit::Kilogram);
+            return format!("remove the weight from the other side; {line}");
+        }
+        instruction(name, now_kg, before_kg, Unit::Kilogram)
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Unit {
+    Kilogram,
+    Gram,
+}
+
+impl Unit {
+    fn amount(self, kg: f64) -> String {
+        match self {
+            Unit::Kilogram => format!("{kg:.3} kg"),
+            Unit::Gram => format!("{:.1} g", 1e3 * kg),
+        }
+    }
+}
+
+/// The total amount, and its change.
+fn instruction(name: &str, now_kg: f64, before_kg: f64, unit: Unit) -> String {
+    let limit_kg = NEGLIGIBLE_KG / 2.0;
+    let total = match now_kg < limit_kg {
+        true => "nothing".to_string(),
+        false => format!("{} in total", unit.amount(now_kg)),
     };
-    let change = match now_kg - before_kg {
-        more if more > NOTHING_KG / 2.0 => format!("put on {}", amount(more)),
-        less if less < -NOTHING_KG / 2.0 => format!("take off {}", amount(-less)),
-        _ => "as it is".to_string(),
+    let change_kg = now_kg - before_kg;
+    let change = match change_kg {
+        _ if change_kg > limit_kg => format!("add {}", unit.amount(change_kg)),
+        _ if change_kg < -limit_kg => format!("remove {}", unit.amount(-change_kg)),
+        _ => "unchanged".to_string(),
     };
-    format!("{name}: {all} ({change})")
+    format!("{name}: {total} ({change})")
 }

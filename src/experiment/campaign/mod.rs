@@ -1,96 +1,43 @@
-//! A campaign: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2, Fig 5-10), and what
-//! all verdicts together say of the stage.
+//! A campaign: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2, Fig 5-10), and the
+//! evaluation of all verdicts together.
 //!
 //! ```text
-//!  Grid --> Store (a folder: settings, one file a point) --> missing points --> work: threads --> one Point each --> Store
-//!                                                                                                        |
-//!  model with damping --> Region (where it has CNMP zeros) --> offset: the asymmetry that nobody put in <+
-//!                                       \__ recommend: farthest from it, within the tolerances <__/      |
-//!                                                                       picture: dots over the map <-----+
+//!  Grid --> Campaign: Store (a folder with one file for each point) --> missing points --> chirps --> Store
+//!               |                                             (in parallel, or guided: an operator loads the stage)
+//!               v
+//!  Evaluation: Region (where the model with damping has CNMP zeros) --> Offset (initial asymmetry of the stage)
+//!                                                                   --> Recommendation (asymmetry farthest from CNMP zeros)
 //! ```
 //!
-//! On devices a person stands between Store and Point: [`Load`] says what to put on, [`Attended`] asks for it and checks it
-//! (`check.rs`).
-//!
-//! Operating points are ratios Y1o/L, asymmetries m2/m3 - 1 as intended: what the stage has beside that is the offset.
+//! Operating points are ratios Y1o/L. Asymmetries are m2/m3 - 1 as intended; the initial asymmetry of the stage is the offset.
 
-mod answer;
-mod attended;
-mod check;
+mod error;
+mod evaluation;
 mod grid;
+mod guided;
 mod load;
-mod measured;
+mod load_check;
 mod offset;
-mod order;
-mod picture;
+mod parallel;
+mod point;
 mod recommend;
 mod region;
-mod rest;
+mod rest_position;
+mod run;
 mod store;
-mod work;
+mod visit_order;
 
-pub use answer::{Answer, AnswerError, Told};
-pub use attended::{Attended, Person, Question, Reply, Stage};
-pub use check::{Finding, LengthCheck, ModeCheck, PutOn};
-pub use grid::{Grid, Place};
-pub use load::Load;
-pub use measured::measured;
-pub use offset::{Offset, Said, Step, contradicted, offset};
-pub use order::order;
-pub use picture::{PictureError, picture};
+pub use error::CampaignError;
+pub use evaluation::{ComparedPoint, Evaluation, ends};
+pub use grid::{Grid, GridPoint};
+pub use guided::{GuidedCampaign, LoadedRig, Operator, Question, Reply};
+pub use load::{Load, StageModel};
+pub use load_check::{Finding, LengthCheck, LoadCheck, ModeCheck};
+pub use offset::{CHI2_95, Judgement, LikelihoodStep, Offset, disagreeing, estimate_offset};
+pub use point::{PointResult, analyse_point};
 pub use recommend::{Recommendation, Tolerances, recommend};
 pub use region::Region;
-pub use rest::Rest;
-pub use store::{Found, Point, Store};
-pub use work::work;
-
-/// Why there is no campaign.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CampaignError {
-    /// A grid that cannot be measured.
-    #[error("{0}")]
-    Grid(
-        /// What is wrong, with the remedy.
-        String,
-    ),
-    /// A folder of other settings.
-    #[error("{folder} holds a campaign of other settings; name another folder with --out, or give the same settings:\n{}", differences.join("\n"))]
-    Other {
-        /// The folder.
-        folder: String,
-        /// A line for each difference.
-        differences: Vec<String>,
-    },
-    /// Something else where the campaign's settings should be.
-    #[error(
-        "{path} is not of a campaign ({why}); it is left as it is: name another folder with --out"
-    )]
-    NotACampaign {
-        /// The file.
-        path: String,
-        /// What was found.
-        why: String,
-    },
-    /// A quiet run that says nothing.
-    #[error(
-        "{recording} does not tell where the stage rests: {why}; `bench doctor` looks at the probe"
-    )]
-    Rest {
-        /// The run.
-        recording: String,
-        /// What was missing.
-        why: String,
-    },
-    /// A file that cannot be written or read.
-    #[error("cannot {what} {path}: {why}; {remedy}")]
-    File {
-        /// What was tried.
-        what: &'static str,
-        /// The file.
-        path: String,
-        /// The system's words.
-        why: String,
-        /// What to do about it.
-        remedy: &'static str,
-    },
-}
+pub use rest_position::RestPosition;
+pub use run::{Campaign, RunPlan};
+pub use store::{OpenedStore, Store};
+pub use visit_order::visit_order;

@@ -1,136 +1,120 @@
-//! The asymmetry that the stage has beside what was put on: by manufacture (section 5.2.2 found -2 %).
+//! The initial asymmetry of the stage, in addition to the intended one (section 5.2.2 found -2 %).
 //!
-//! With an offset d the model says at a point of intended asymmetry D what it says at D + d. Of n verdicts, k contradict it.
-//! Each is wrong with the same unknown probability p:
+//! With an offset d the model predicts at a point of intended asymmetry D what it predicts at D + d. Of n verdicts, k
+//! disagree. Each verdict is wrong with the same unknown probability p:
 //!
 //! ```text
 //!  log L(d) = max over p of k ln p + (n - k) ln(1 - p),   1/(2n) <= p <= 1/2
 //! ```
 //!
-//! k changes only where a border crosses a point, so L is constant between these offsets, all of which are looked at. The best
-//! is the middle of the widest stretch with the highest L; the interval takes in all offsets with 2 (log L max - log L) up to
-//! 3.84, the 95 % quantile of chi-squared with one degree of freedom.
+//! k changes only where a border crosses a point: L is constant between these offsets, and each interval between them is
+//! evaluated. The best offset is the middle of the widest interval with the highest L. The confidence interval contains all
+//! offsets with 2 (log L max - log L) up to 3.84, the 95 % quantile of chi-squared with one degree of freedom.
 
-use super::Region;
+use super::region::Region;
 
 /// 95 % quantile of chi-squared with one degree of freedom.
-pub(super) const CHI2_95: f64 = 3.841_458_820_694_124;
+pub const CHI2_95: f64 = 3.841_458_820_694_124;
 
-/// What was said at a point: yes or no.
+/// A decided verdict at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Said {
+pub struct Judgement {
     /// Index of the operating point in the region.
     pub row: usize,
     /// The intended asymmetry.
     pub asymmetry: f64,
-    /// Whether CNMP zeros were detected, not excluded.
+    /// Whether CNMP zeros were detected; otherwise they were excluded.
     pub detected: bool,
 }
 
-/// Offsets between which the likelihood is constant.
+/// An interval of offsets with constant likelihood.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// From this offset.
+pub struct LikelihoodStep {
+    /// Lower end.
     pub from: f64,
-    /// To this one.
+    /// Upper end.
     pub to: f64,
-    /// Verdicts that the model contradicts there.
+    /// Number of verdicts that disagree with the model there.
     pub contradicted: usize,
     /// log L, natural.
     pub log_likelihood: f64,
 }
 
-/// The offset that fits best.
+/// The estimated offset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Offset {
-    /// The middle of the likeliest stretch.
+    /// The middle of the interval with the highest likelihood.
     pub best: f64,
-    /// The interval of 95 %.
+    /// The 95 % confidence interval.
     pub interval: [f64; 2],
-    /// Between which offsets it was looked for; an interval that ends there is not bounded there.
+    /// The range that was searched; a confidence interval that ends there is not bounded there.
     pub searched: [f64; 2],
-    /// Verdicts.
+    /// Number of verdicts.
     pub decided: usize,
-    /// Those that the model contradicts at the best offset.
+    /// Number of verdicts that disagree with the model at the best offset.
     pub contradicted: usize,
-    /// The whole likelihood, by rising offset.
-    pub steps: Vec<Step>,
+    /// The likelihood, by rising offset.
+    pub steps: Vec<LikelihoodStep>,
 }
 
-/// How many verdicts the model contradicts with an offset.
-pub fn contradicted(region: &Region, said: &[Said], offset: f64) -> usize {
-    said.iter()
-        .filter(|one| is_contradicted(region, one, offset))
-        .count()
+/// The number of verdicts that disagree with the model at an offset.
+pub fn disagreeing(region: &Region, judgements: &[Judgement], offset: f64) -> usize {
+    let wrong = judgements
+        .iter()
+        .filter(|one| disagrees(region, one, offset));
+    wrong.count()
 }
 
-fn is_contradicted(region: &Region, one: &Said, offset: f64) -> bool {
-    region.contains(one.row, one.asymmetry + offset) != one.detected
+fn disagrees(region: &Region, judgement: &Judgement, offset: f64) -> bool {
+    region.contains(judgement.row, judgement.asymmetry + offset) != judgement.detected
 }
 
-/// The offset that fits verdicts best; none without a verdict, or where the region was not looked at beyond all of them.
-pub fn offset(region: &Region, said: &[Said]) -> Option<Offset> {
-    let asymmetries = || said.iter().map(|one| one.asymmetry);
-    let least = region.searched[0] - asymmetries().fold(f64::INFINITY, f64::min);
-    let most = region.searched[1] - asymmetries().fold(f64::NEG_INFINITY, f64::max);
-    if said.is_empty() || least >= most {
+/// The offset that agrees best with the verdicts. None without a verdict, or if the region was not searched beyond all of them.
+pub fn estimate_offset(region: &Region, judgements: &[Judgement]) -> Option<Offset> {
+    let searched = searched(region, judgements);
+    if judgements.is_empty() || searched[0] >= searched[1] {
         return None;
     }
-    let steps = steps(region, said, [least, most]);
-    let highest = steps
-        .iter()
-        .map(|step| step.log_likelihood)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let width = |step: &Step| step.to - step.from;
-    let widest = steps
-        .iter()
-        .filter(|step| step.log_likelihood == highest)
-        .max_by(|a, b| width(a).total_cmp(&width(b)))?;
-    let likely = || {
-        steps
-            .iter()
-            .filter(|step| 2.0 * (highest - step.log_likelihood) <= CHI2_95)
-    };
+    let steps = steps(region, judgements, searched);
+    let likelihoods = steps.iter().map(|step| step.log_likelihood);
+    let highest = likelihoods.fold(f64::NEG_INFINITY, f64::max);
+    let best = widest(steps.iter().filter(|step| step.log_likelihood == highest))?;
+    let within = |step: &&LikelihoodStep| 2.0 * (highest - step.log_likelihood) <= CHI2_95;
+    let first = steps.iter().find(within)?;
+    let last = steps.iter().rfind(within)?;
     Some(Offset {
-        best: 0.5 * (widest.from + widest.to),
-        interval: [likely().next()?.from, likely().next_back()?.to],
-        searched: [least, most],
-        decided: said.len(),
-        contradicted: widest.contradicted,
+        best: 0.5 * (best.from + best.to),
+        interval: [first.from, last.to],
+        searched,
+        decided: judgements.len(),
+        contradicted: best.contradicted,
         steps: steps.clone(),
     })
 }
 
-/// The likelihood between any two offsets at which a verdict's contradiction comes or goes.
-fn steps(region: &Region, said: &[Said], [least, most]: [f64; 2]) -> Vec<Step> {
-    let crossing = |(index, one): (usize, &Said)| {
-        let at = one.asymmetry;
-        region
-            .borders(one.row)
-            .map(move |border| (border - at, index))
-            .collect::<Vec<_>>()
-    };
-    let mut crossings: Vec<(f64, usize)> = said.iter().enumerate().flat_map(crossing).collect();
-    crossings.retain(|(at, _)| *at > least && *at < most);
-    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut wrong: Vec<bool> = said
-        .iter()
-        .map(|one| is_contradicted(region, one, least))
+/// The offsets at which all verdicts are within the region that was searched.
+fn searched(region: &Region, judgements: &[Judgement]) -> [f64; 2] {
+    let asymmetries = || judgements.iter().map(|one| one.asymmetry);
+    let low = asymmetries().fold(f64::INFINITY, f64::min);
+    let high = asymmetries().fold(f64::NEG_INFINITY, f64::max);
+    [region.searched[0] - low, region.searched[1] - high]
+}
+
+fn widest<'a>(steps: impl Iterator<Item = &'a LikelihoodStep>) -> Option<&'a LikelihoodStep> {
+    steps.max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)))
+}
+
+/// The likelihood between any two offsets at which a verdict begins or ceases to disagree.
+fn steps(region: &Region, judgements: &[Judgement], [low, high]: [f64; 2]) -> Vec<LikelihoodStep> {
+    let crossings = crossings(region, judgements, [low, high]);
+    let mut wrong: Vec<bool> = (judgements.iter())
+        .map(|one| disagrees(region, one, low))
         .collect();
-    let (mut from, mut steps) = (least, Vec::new());
-    for (to, index) in crossings
-        .into_iter()
-        .map(|(at, index)| (at, Some(index)))
-        .chain([(most, None)])
-    {
+    let (mut from, mut steps) = (low, Vec::new());
+    let ends = crossings.iter().map(|(at, index)| (*at, Some(*index)));
+    for (to, index) in ends.chain([(high, None)]) {
         if to > from {
-            let contradicted = wrong.iter().filter(|wrong| **wrong).count();
-            steps.push(Step {
-                from,
-                to,
-                contradicted,
-                log_likelihood: log_likelihood(contradicted, said.len()),
-            });
+            steps.push(step(from, to, &wrong));
             from = to;
         }
         if let Some(index) = index {
@@ -138,6 +122,32 @@ fn steps(region: &Region, said: &[Said], [least, most]: [f64; 2]) -> Vec<Step> {
         }
     }
     steps
+}
+
+/// The offsets at which a border crosses a point, rising, with the index of the point.
+fn crossings(
+    region: &Region,
+    judgements: &[Judgement],
+    [low, high]: [f64; 2],
+) -> Vec<(f64, usize)> {
+    let mut crossings = Vec::new();
+    for (index, one) in judgements.iter().enumerate() {
+        let offsets = region.borders(one.row).map(|border| border - one.asymmetry);
+        let within = offsets.filter(|at| *at > low && *at < high);
+        crossings.extend(within.map(|at| (at, index)));
+    }
+    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    crossings
+}
+
+fn step(from: f64, to: f64, wrong: &[bool]) -> LikelihoodStep {
+    let contradicted = wrong.iter().filter(|wrong| **wrong).count();
+    LikelihoodStep {
+        from,
+        to,
+        contradicted,
+        log_likelihood: log_likelihood(contradicted, wrong.len()),
+    }
 }
 
 fn log_likelihood(contradicted: usize, decided: usize) -> f64 {

@@ -1,34 +1,34 @@
-//! Where the model with damping has CNMP zeros, over operating point and asymmetry.
+//! The region of operating points and asymmetries in which the model with damping has CNMP zeros.
 
 use crate::config::{PlantSettings, Sr4dofSettings};
 use crate::model::plant::{self, PlantError};
 use crate::model::zeros::{cnmp_pairs, damped_zeros};
 
-/// Asymmetries are looked at so closely; a band that is narrower may be missed.
+/// Step of the search over the asymmetries; a narrower band may be missed.
 const STEP: f64 = 0.002;
-/// Halvings of a step: a border is known to 2e-9.
-const HALVINGS: usize = 20;
+/// Number of bisections of a step: a border has an error of 2e-9.
+const BISECTIONS: usize = 20;
 
-/// The asymmetries with CNMP zeros at each of some operating points.
+/// The asymmetries with CNMP zeros at several operating points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// Y1o/L, ratios.
     pub operating_points: Vec<f64>,
-    /// For each of them the bands of asymmetries with CNMP zeros, rising, from and to.
+    /// For each of them the bands of asymmetries with CNMP zeros: rising, from and to.
     pub bands: Vec<Vec<[f64; 2]>>,
-    /// Between which asymmetries they were looked for; a band that ends there has no border there.
+    /// The range of asymmetries that was searched; a band that ends at its end has no border there.
     pub searched: [f64; 2],
 }
 
 impl Region {
-    /// By the zeros with damping of `settings` at these operating points (ratios Y1o/L), between two asymmetries. Fails where
-    /// the model cannot be analysed.
+    /// The region by the zeros with damping of `stage`, at these operating points (ratios Y1o/L) and between two asymmetries.
+    /// Fails if the model cannot be analysed.
     pub fn of(
-        settings: &Sr4dofSettings,
+        stage: &Sr4dofSettings,
         operating_points: &[f64],
         searched: [f64; 2],
     ) -> Result<Region, PlantError> {
-        let row = |&point: &f64| bands(searched, |asymmetry| has_pairs(settings, point, asymmetry));
+        let row = |&point: &f64| bands(searched, |asymmetry| has_pairs(stage, point, asymmetry));
         let bands = operating_points.iter().map(row).collect::<Result<_, _>>()?;
         Ok(Region {
             operating_points: operating_points.into(),
@@ -39,78 +39,68 @@ impl Region {
 
     /// Whether there are CNMP zeros at an operating point, by its index, and an asymmetry.
     pub fn contains(&self, row: usize, asymmetry: f64) -> bool {
-        self.bands[row]
-            .iter()
-            .any(|[from, to]| (*from..*to).contains(&asymmetry))
+        let mut bands = self.bands[row].iter();
+        bands.any(|[from, to]| (*from..*to).contains(&asymmetry))
     }
 
     /// The borders at an operating point, by its index: asymmetries.
     pub fn borders(&self, row: usize) -> impl Iterator<Item = f64> + '_ {
-        self.bands[row]
-            .iter()
-            .flatten()
-            .copied()
-            .filter(|border| !self.searched.contains(border))
+        let ends = self.bands[row].iter().flatten().copied();
+        ends.filter(|border| !self.searched.contains(border))
     }
 }
 
-/// Whether the zeros with damping of SR4DoF have a CNMP pair among them.
-fn has_pairs(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<bool, PlantError> {
-    let operating_point_m = point * settings.beam_length_m;
-    let there = Sr4dofSettings {
-        operating_point_m,
+/// Whether the zeros with damping of SR4DoF include a CNMP pair.
+fn has_pairs(stage: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<bool, PlantError> {
+    let plant = plant::build(&PlantSettings::Sr4dof(Sr4dofSettings {
+        operating_point_m: point * stage.beam_length_m,
         mass_asymmetry: asymmetry,
-        ..settings.clone()
-    };
-    Ok(
-        cnmp_pairs(&damped_zeros(&plant::build(&PlantSettings::Sr4dof(
-            there,
-        ))?)?)
-            > 0,
-    )
+        ..stage.clone()
+    }))?;
+    Ok(cnmp_pairs(&damped_zeros(&plant)?) > 0)
 }
 
-/// The bands in which `has` holds: by steps, and halvings where it changes between two.
+/// The bands in which `has` holds: by steps, and by bisection of a step in which it changes.
 fn bands(
     [low, high]: [f64; 2],
     has: impl Fn(f64) -> Result<bool, PlantError>,
 ) -> Result<Vec<[f64; 2]>, PlantError> {
     let steps = libm::ceil((high - low) / STEP).max(1.0) as usize;
-    let at = |k: usize| {
-        if k == steps {
+    let width = high - low;
+    let (mut bands, mut previous) = (Vec::new(), low);
+    let mut inside = has(low)?.then_some(low);
+    for k in 1..=steps {
+        let next = if k == steps {
             high
         } else {
-            low + (high - low) * k as f64 / steps as f64
+            low + width * k as f64 / steps as f64
+        };
+        let now = has(next)?;
+        if now != inside.is_some() {
+            let border = border([previous, next], now, &has)?;
+            match inside.take() {
+                Some(from) => bands.push([from, border]),
+                None => inside = Some(border),
+            }
         }
-    };
-    let (mut bands, mut inside) = (Vec::new(), has(low)?.then_some(low));
-    for k in 1..=steps {
-        let now = has(at(k))?;
-        if now == inside.is_some() {
-            continue;
-        }
-        let border = halved([at(k - 1), at(k)], now, &has)?;
-        match inside.take() {
-            Some(from) => bands.push([from, border]),
-            None => inside = Some(border),
-        }
+        previous = next;
     }
     bands.extend(inside.map(|from| [from, high]));
     Ok(bands)
 }
 
 /// Where `has` becomes `after` between two values.
-fn halved(
+fn border(
     [mut low, mut high]: [f64; 2],
     after: bool,
     has: &impl Fn(f64) -> Result<bool, PlantError>,
 ) -> Result<f64, PlantError> {
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
         if has(middle)? == after {
-            high = middle
+            high = middle;
         } else {
-            low = middle
+            low = middle;
         }
     }
     Ok(0.5 * (low + high))
@@ -121,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_are_found_wherever_they_begin_and_end() {
+    fn bands_are_found_at_any_begin_and_end() {
         let within =
             |bands: [[f64; 2]; 2]| move |x: f64| Ok(bands.iter().any(|[a, b]| x >= *a && x < *b));
         let near = |found: &[[f64; 2]], expected: &[[f64; 2]]| {

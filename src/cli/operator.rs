@@ -1,4 +1,4 @@
-//! The person at the terminal: questions go to standard error, answers come from standard input.
+//! The operator at the terminal: questions go to standard error, answers come from standard input.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,55 +6,59 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::error::CliError;
-use crate::experiment::campaign::{Person, Question, Reply};
+use super::output::print_note;
+use super::table::wrap;
+use crate::experiment::campaign::{Operator, Question, Reply};
 use crate::util::quantity::Quantity;
 
-/// Ctrl-C is looked for so often while an answer is waited for.
-const LOOK: Duration = Duration::from_millis(100);
+/// Interval of checks for Ctrl-C while waiting for an answer.
+const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Asks at the terminal. An end of input, or `stop` being set, is the answer `stop`.
-pub(super) struct AtTerminal<'a> {
+/// Asks at the terminal. The end of the input, or `stop` being set, is the answer `stop`.
+pub(super) struct TerminalOperator<'a> {
     stop: &'a AtomicBool,
     beam_length_m: Option<f64>,
     lines: Receiver<String>,
 }
 
-impl<'a> AtTerminal<'a> {
+impl<'a> TerminalOperator<'a> {
     pub fn new(
         stop: &'a AtomicBool,
         beam_length_m: Option<f64>,
-    ) -> Result<AtTerminal<'a>, CliError> {
-        AtTerminal::of(stop, beam_length_m, || {
+    ) -> Result<TerminalOperator<'a>, CliError> {
+        TerminalOperator::of(stop, beam_length_m, || {
             std::io::stdin().lines().map_while(Result::ok)
         })
     }
 
-    /// Of these lines, which a thread of its own takes as they come, asked for or not: what waits to be taken could not be told
-    /// from an answer.
+    /// An operator who types these lines. A thread reads them immediately, so that a line typed before a question can be
+    /// distinguished from an answer.
     fn of<L: Iterator<Item = String>>(
         stop: &'a AtomicBool,
         beam_length_m: Option<f64>,
         typed: impl FnOnce() -> L + Send + 'static,
-    ) -> Result<AtTerminal<'a>, CliError> {
-        let (tell, lines) = channel();
-        // Ends with the input, or with the process: a read cannot be broken off.
-        let read = move || typed().try_for_each(|line| tell.send(line));
+    ) -> Result<TerminalOperator<'a>, CliError> {
+        let (sender, lines) = channel();
+        // Ends with the input or with the process: a read cannot be interrupted.
+        let read = move || typed().try_for_each(|line| sender.send(line));
         let thread = std::thread::Builder::new().name("bench-answers".into());
         let started = thread.spawn(move || drop(read()));
         started.map_err(|e| {
-            CliError::Failed(format!("cannot wait for answers: {e}; start it again"))
+            CliError::Failed(format!(
+                "cannot wait for answers: {e}; start the command again"
+            ))
         })?;
-        Ok(AtTerminal {
+        Ok(TerminalOperator {
             stop,
             beam_length_m,
             lines,
         })
     }
 
-    /// A line; none at the end of input, or where the person stops the command.
+    /// A line; none at the end of the input, or if the operator stops the command.
     fn line(&self) -> Option<String> {
         while !self.stop.load(Ordering::Relaxed) {
-            match self.lines.recv_timeout(LOOK) {
+            match self.lines.recv_timeout(CHECK_INTERVAL) {
                 Ok(line) => return Some(line),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return None,
@@ -64,14 +68,14 @@ impl<'a> AtTerminal<'a> {
     }
 }
 
-impl Person for AtTerminal<'_> {
+impl Operator for TerminalOperator<'_> {
     fn ask(&mut self, question: &Question) -> Reply {
-        // What was typed during a run answers nothing.
+        // Lines typed during a run are not answers.
         while self.lines.try_recv().is_ok() {}
         self.tell(&question.text);
         loop {
-            eprint!("  {}: ", choices(question));
-            // An answer can be given all the same.
+            eprint!("{}: ", wrap(&choices(question), 2).trim_end());
+            // A prompt that cannot be shown does not prevent an answer.
             let _ = std::io::stderr().flush();
             let Some(line) = self.line() else {
                 return Reply::Stop;
@@ -84,30 +88,27 @@ impl Person for AtTerminal<'_> {
     }
 
     fn tell(&mut self, text: &str) {
-        eprintln!("bench: {text}");
+        print_note(text);
     }
 }
 
+/// The answers that a question accepts.
 fn choices(question: &Question) -> String {
-    let choices = [
-        (true, "Enter when it is done"),
-        (
-            question.may_read,
-            "with the displacement in Y if you can read it, as 3.80mm",
-        ),
-        (question.may_confirm, "`right` if it is right all the same"),
-        (question.may_skip, "`skip` to leave the point out"),
-        (true, "`stop`"),
-    ];
-    choices
-        .into_iter()
-        .filter(|(offered, _)| *offered)
-        .map(|(_, words)| words)
-        .collect::<Vec<_>>()
-        .join(", ")
+    let mut choices = vec!["Enter when done"];
+    if question.may_read {
+        choices.push("or the measured displacement in Y (for example 3.80mm)");
+    }
+    if question.may_confirm {
+        choices.push("`right` to confirm the load");
+    }
+    if question.may_skip {
+        choices.push("`skip` to leave this point out");
+    }
+    choices.push("`stop`");
+    choices.join(", ")
 }
 
-/// An answer; why it is none.
+/// The meaning of an answer, or why it is not accepted.
 fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<Reply, String> {
     let line = line.trim();
     match line {
@@ -123,7 +124,7 @@ fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<
     let read_m = read.and_then(|read| read.operating_point_m(beam_length_m).ok());
     read_m
         .map(|m| Reply::Done(Some(m)))
-        .ok_or_else(|| format!("`{line}` is no answer here; {}", choices(question)))
+        .ok_or_else(|| format!("`{line}` is not accepted here: {}", choices(question)))
 }
 
 #[cfg(test)]
@@ -140,31 +141,32 @@ mod tests {
     }
 
     #[test]
-    fn what_was_typed_during_a_run_answers_no_question_however_much_it_was() {
+    fn ignores_lines_typed_before_the_question() {
         let (ended, all_read) = channel();
         let (input, open) = channel::<()>();
         let lines = (0..5).map(|_| String::new());
         let end = std::iter::from_fn(move || {
-            let told = ended.send(());
+            let sent = ended.send(());
             // Until the input ends.
-            told.ok().and(open.recv().ok()).map(|()| String::new())
+            sent.ok().and(open.recv().ok()).map(|()| String::new())
         });
         let stop = AtomicBool::new(false);
-        let mut person = AtTerminal::of(&stop, None, || lines.chain(end)).expect("a thread");
+        let mut operator =
+            TerminalOperator::of(&stop, None, || lines.chain(end)).expect("a thread");
         let patience = Duration::from_secs(60);
         all_read
             .recv_timeout(patience)
             .expect("each line is taken when it is typed");
         drop(input);
         assert_eq!(
-            person.ask(&question(true)),
+            operator.ask(&question(true)),
             Reply::Stop,
             "five times Enter, and then the end of the input"
         );
     }
 
     #[test]
-    fn an_answer_is_taken_where_it_is_offered_and_nothing_else_is() {
+    fn accepts_offered_answers_only() {
         let open = |line| reply(line, &question(true), Some(0.05));
         let done = |m| Ok(Reply::Done(Some(m)));
         assert_eq!(
@@ -187,7 +189,7 @@ mod tests {
             assert!(
                 open(line)
                     .unwrap_err()
-                    .contains("is no answer here; Enter when it is done"),
+                    .contains("is not accepted here: Enter when done"),
                 "{line}"
             );
         }

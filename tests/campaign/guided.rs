@@ -1,11 +1,11 @@
-//! A campaign on a stage that a person loads: what was put on is checked, and nothing that was not seen is passed.
+//! A campaign on a stage that an operator loads: every load is checked, and no check passes without evidence.
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::campaign::{
-    AnswerError, Attended, CampaignError, Finding, Grid, Load, Person, Place, Point, PutOn,
-    Question, Reply, Rest, Stage, measured, order,
+    CampaignError, Finding, Grid, GridPoint, GuidedCampaign, Load, LoadCheck, LoadedRig, Operator,
+    PointResult, Question, Reply, RestPosition, StageModel, analyse_point, visit_order,
 };
 use bench::experiment::{Plan, run};
 use bench::recording::Recording;
@@ -37,7 +37,7 @@ fn config(more: &[&str]) -> Config {
     .expect("a configuration")
 }
 
-/// What is really on the stage, and what pulls it in X.
+/// The actual load of the stage, and what pulls it in X.
 #[derive(Clone, Copy, Default)]
 struct Really {
     on: Load,
@@ -46,17 +46,17 @@ struct Really {
     blind: bool,
 }
 
-/// What a person of the script does before an answer.
+/// What the operator of the script does before an answer.
 type Does = Box<dyn Fn(&mut Really)>;
 
-/// A person who does and answers what stands in a script; at its end, `stop`.
+/// An operator who follows a script; at its end the answer is `stop`.
 struct Scripted<'a> {
     really: &'a RefCell<Really>,
     script: VecDeque<(Does, Reply)>,
     asked: &'a RefCell<Vec<Question>>,
 }
 
-impl Person for Scripted<'_> {
+impl Operator for Scripted<'_> {
     fn ask(&mut self, question: &Question) -> Reply {
         self.asked.borrow_mut().push(question.clone());
         let Some((does, reply)) = self.script.pop_front() else {
@@ -69,37 +69,22 @@ impl Person for Scripted<'_> {
     fn tell(&mut self, _text: &str) {}
 }
 
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct Failed(String);
-
-impl From<CampaignError> for Failed {
-    fn from(error: CampaignError) -> Failed {
-        Failed(error.to_string())
-    }
-}
-
-impl From<AnswerError> for Failed {
-    fn from(error: AnswerError) -> Failed {
-        Failed(error.to_string())
-    }
-}
-
-/// The simulated stage with whatever is really on it, run, recorded and analysed as devices are.
+/// The simulated stage with the actual load; run, recorded and analysed as devices are.
 struct Simulated<'a> {
     config: &'a Config,
     grid: &'a Grid,
     really: &'a RefCell<Really>,
     folder: tempfile::TempDir,
     chirps: usize,
-    kept: Vec<(Place, Point)>,
+    kept: Vec<(GridPoint, PointResult)>,
 }
 
 impl Simulated<'_> {
-    /// The rig does what is on it; the plan knows only what it was asked to be.
+    /// The rig has the actual load; the plan has the requested one.
     fn rig(&self, config: &Config, chirps: bool) -> Box<FaultyRig<SimulatedRig>> {
         let really = *self.really.borrow();
-        let plant = really.on.carried(self.config).expect("a stage");
+        let model = StageModel::of(self.config).expect("a stage");
+        let plant = model.loaded_plant(&really.on);
         let rig = SimulatedRig::new(&Config {
             plant,
             ..config.clone()
@@ -115,10 +100,8 @@ impl Simulated<'_> {
     }
 }
 
-impl Stage for Simulated<'_> {
-    type Error = Failed;
-
-    fn rest(&mut self) -> Result<Option<Rest>, Failed> {
+impl LoadedRig for Simulated<'_> {
+    fn rest_position(&mut self) -> Result<Option<RestPosition>, CampaignError> {
         let plan = Plan::quiet(self.config.clone());
         let run = run(
             &plan,
@@ -131,15 +114,15 @@ impl Stage for Simulated<'_> {
         assert!(run.ended.trip.is_none());
         let path = run.path.clone();
         run.finish("{}").expect("a file");
-        Ok(Some(Rest::of(
+        Ok(Some(RestPosition::of(
             &Recording::open(&path).expect("a recording"),
             "rest.mcap",
         )?))
     }
 
-    fn measure(&mut self, place: Place) -> Result<Option<Point>, Failed> {
+    fn measure(&mut self, place: GridPoint) -> Result<Option<PointResult>, CampaignError> {
         self.chirps += 1;
-        let plan = Plan::chirp(self.grid.config(self.config, place)?);
+        let plan = Plan::chirp(self.grid.config_at(self.config, place)?);
         let rig = self.rig(&plan.config, true);
         let mut run = run(
             &plan,
@@ -149,37 +132,47 @@ impl Stage for Simulated<'_> {
             &mut |_, _| {},
         )
         .expect("a run");
-        Ok(Some(measured(&mut run, &plan.config).expect("a recording")))
+        let result = analyse_point(&mut run, &plan.config).expect("a recording");
+        Ok(Some(result))
     }
 
-    fn keep(&mut self, place: Place, point: &Point) -> Result<(), Failed> {
+    fn keep(&mut self, place: GridPoint, point: &PointResult) -> Result<(), CampaignError> {
         self.kept.push((place, point.clone()));
         Ok(())
     }
 }
 
-/// What came of a campaign.
-struct Came {
+/// What outcome of a campaign.
+struct Outcome {
     asked: Vec<Question>,
     chirps: usize,
-    kept: Vec<(Place, Point)>,
+    kept: Vec<(GridPoint, PointResult)>,
 }
 
-impl Came {
-    fn put_on(&self, index: usize) -> &PutOn {
-        self.kept[index].1.put_on.as_ref().expect("what was put on")
+impl Outcome {
+    fn check(&self, index: usize) -> &LoadCheck {
+        self.kept[index]
+            .1
+            .load_check
+            .as_ref()
+            .expect("a load check")
     }
 }
 
-fn campaign(config: &Config, grid: &Grid, places: &[Place], script: Vec<(Does, Reply)>) -> Came {
+fn campaign(
+    config: &Config,
+    grid: &Grid,
+    places: &[GridPoint],
+    script: Vec<(Does, Reply)>,
+) -> Outcome {
     let (really, asked) = (RefCell::default(), RefCell::default());
-    let person = Scripted {
+    let mut operator = Scripted {
         really: &really,
         script: script.into(),
         asked: &asked,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let stage = Simulated {
+    let rig = Simulated {
         config,
         grid,
         really: &really,
@@ -187,35 +180,40 @@ fn campaign(config: &Config, grid: &Grid, places: &[Place], script: Vec<(Does, R
         chirps: 0,
         kept: Vec::new(),
     };
-    let mut attended = Attended {
+    let mut guided = GuidedCampaign {
         config,
         grid,
         tolerance: 0.002,
-        person,
-        stage,
+        operator: &mut operator,
+        rig,
     };
-    attended.go(places).expect("a campaign");
-    let (chirps, kept) = (attended.stage.chirps, attended.stage.kept);
-    Came {
+    guided.run(places).expect("a campaign");
+    let (chirps, kept) = (guided.rig.chirps, guided.rig.kept);
+    Outcome {
         asked: asked.into_inner(),
         chirps,
         kept,
     }
 }
 
-fn all(grid: &Grid) -> Vec<Place> {
-    order(grid, &grid.places().collect::<Vec<_>>())
+fn all(grid: &Grid) -> Vec<GridPoint> {
+    visit_order(grid, &grid.points().collect::<Vec<_>>())
 }
 
 fn grid(points: &[f64], asymmetries: &[f64]) -> Grid {
     Grid::new(points.into(), asymmetries.into(), &config(&[])).expect("a grid")
 }
 
-/// Puts on what a point needs.
+/// Sets the load of a point.
 fn puts(config: &Config, grid: &Grid, row: usize, column: usize) -> Does {
-    let load =
-        Load::of(&grid.config(config, Place { row, column }).expect("a point")).expect("a load");
+    let load = required(config, grid, row, column);
     Box::new(move |really| really.on = load)
+}
+
+fn required(config: &Config, grid: &Grid, row: usize, column: usize) -> Load {
+    let there = grid.config_at(config, GridPoint { row, column });
+    let there = there.expect("a point");
+    StageModel::of(&there).expect("a stage").required_load()
 }
 
 fn nothing() -> Does {
@@ -225,24 +223,24 @@ fn nothing() -> Does {
 const DONE: Reply = Reply::Done(None);
 
 #[test]
-fn what_was_put_on_as_asked_is_told_from_none_by_the_modes_and_where_it_cannot_be_told_that_is_said()
- {
-    // An asymmetry by manufacture that nobody knows of is within what is allowed.
+fn modes_distinguish_the_requested_load_from_none_or_the_check_cannot_tell() {
+    // An unknown asymmetry by manufacture is within the tolerances.
     for made in ["0.0", "-0.02", "0.02"] {
         let config = config(&[&format!("sim.asymmetry_offset={made}")]);
         let grid = grid(&[0.0, 0.08], &[0.0, 0.1]);
-        let places = [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(row, column)| Place { row, column });
+        let places =
+            [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(row, column)| GridPoint { row, column });
         assert_eq!(all(&grid), places);
         let mut script = vec![(nothing(), DONE)];
         script.extend(places.map(|place| (puts(&config, &grid, place.row, place.column), DONE)));
-        let came = campaign(&config, &grid, &places, script);
+        let outcome = campaign(&config, &grid, &places, script);
         assert_eq!(
-            (came.kept.len(), came.chirps, came.asked.len()),
+            (outcome.kept.len(), outcome.chirps, outcome.asked.len()),
             (4, 4, 5),
             "{:?}",
-            came.asked.last()
+            outcome.asked.last()
         );
-        assert!(came.asked[0].text.contains("nothing on"));
+        assert!(outcome.asked[0].text.contains("unloaded stage"));
         for (index, expected) in [
             Finding::CannotTell,
             Finding::CannotTell,
@@ -252,17 +250,17 @@ fn what_was_put_on_as_asked_is_told_from_none_by_the_modes_and_where_it_cannot_b
         .iter()
         .enumerate()
         {
-            let put_on = came.put_on(index);
-            assert_eq!(put_on.finding(), *expected, "{made} {index} {put_on:?}");
-            assert!(!put_on.confirmed_by_hand && put_on.read.is_none());
-            // The stage rests where it did, which tells nothing of the weight.
-            assert_eq!(put_on.rest.finding, Finding::CannotTell, "{put_on:?}");
-            assert_eq!(put_on.rest.expected_m, 0.0);
-            assert!(put_on.rest.seen_m.abs() < 0.5e-6, "{put_on:?}");
+            let check = outcome.check(index);
+            assert_eq!(check.finding(), *expected, "{made} {index} {check:?}");
+            assert!(!check.confirmed_by_hand && check.read.is_none());
+            // The rest position does not change, which proves nothing about the weight.
+            assert_eq!(check.rest.finding, Finding::CannotTell, "{check:?}");
+            assert_eq!(check.rest.expected_m, 0.0);
+            assert!(check.rest.seen_m.abs() < 0.5e-6, "{check:?}");
         }
         // At 8 % and with 10 % there are R, u and v to look at; u and v tell.
-        let findings: Vec<Finding> = came
-            .put_on(2)
+        let findings: Vec<Finding> = outcome
+            .check(2)
             .modes
             .iter()
             .map(|mode| mode.finding)
@@ -272,7 +270,7 @@ fn what_was_put_on_as_asked_is_told_from_none_by_the_modes_and_where_it_cannot_b
             [Finding::CannotTell, Finding::Holds, Finding::Holds]
         );
         assert_eq!(
-            came.put_on(0).modes.len(),
+            outcome.check(0).modes.len(),
             1,
             "without a weight mode R is alone"
         );
@@ -280,21 +278,16 @@ fn what_was_put_on_as_asked_is_told_from_none_by_the_modes_and_where_it_cannot_b
 }
 
 #[test]
-fn a_weight_left_off_or_too_small_or_masses_on_the_wrong_stage_are_asked_for_again() {
+fn asks_again_for_a_missing_weight_or_masses_on_the_wrong_stage() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
-    let right = Load::of(
-        &grid
-            .config(&config, Place { row: 0, column: 0 })
-            .expect("a point"),
-    )
-    .expect("a load");
+    let right = required(&config, &grid, 0, 0);
     for (wrong, told) in [
         (
             Load {
                 hung_kg: 0.0,
                 ..right
             },
-            "is not seen",
+            "is missing",
         ),
         (
             Load {
@@ -303,7 +296,7 @@ fn a_weight_left_off_or_too_small_or_masses_on_the_wrong_stage_are_asked_for_aga
             },
             "the mode expected at",
         ),
-        // The same frequencies, mirrored: the signs tell.
+        // The same frequencies, mirrored: only the signs differ.
         (
             Load {
                 on_m2_kg: 0.0,
@@ -326,31 +319,31 @@ fn a_weight_left_off_or_too_small_or_masses_on_the_wrong_stage_are_asked_for_aga
             (does, DONE),
             (puts(&config, &grid, 0, 0), DONE),
         ];
-        let came = campaign(&config, &grid, &all(&grid), script);
+        let outcome = campaign(&config, &grid, &all(&grid), script);
         assert_eq!(
-            (came.asked.len(), came.chirps, came.kept.len()),
+            (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
             (3, 2, 1),
             "{wrong:?}"
         );
         assert!(
-            came.asked[2].text.contains(told) && came.asked[2].may_confirm,
+            outcome.asked[2].text.contains(told) && outcome.asked[2].may_confirm,
             "{:?}",
-            came.asked[2]
+            outcome.asked[2]
         );
         assert!(
-            !came.asked[1].may_confirm,
-            "nothing to confirm before anything failed"
+            !outcome.asked[1].may_confirm,
+            "nothing to confirm before a check failed"
         );
-        let put_on = came.put_on(0);
+        let check = outcome.check(0);
         assert!(
-            put_on.finding() == Finding::Holds && !put_on.confirmed_by_hand,
-            "{put_on:?}"
+            check.finding() == Finding::Holds && !check.confirmed_by_hand,
+            "{check:?}"
         );
     }
 }
 
 #[test]
-fn what_a_person_says_is_right_is_kept_as_said_by_hand_with_what_failed() {
+fn keeps_a_confirmed_load_with_its_failed_checks() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
     // The same chirp is kept that failed: nothing was moved.
     let script = vec![
@@ -358,28 +351,33 @@ fn what_a_person_says_is_right_is_kept_as_said_by_hand_with_what_failed() {
         (nothing(), DONE),
         (nothing(), Reply::Right),
     ];
-    let came = campaign(&config, &grid, &all(&grid), script);
-    assert_eq!((came.asked.len(), came.chirps, came.kept.len()), (3, 1, 1));
-    let put_on = came.put_on(0);
-    assert!(
-        put_on.confirmed_by_hand && put_on.finding() == Finding::Fails,
-        "{put_on:?}"
-    );
-    let json = serde_json::to_value(&came.kept[0].1).expect("JSON");
-    assert_eq!(json["put_on"]["confirmed_by_hand"], true);
-    assert!(json["put_on"]["modes"][1]["expected_hz"].is_f64(), "{json}");
-    let back: Point = serde_json::from_value(json).expect("a point");
+    let outcome = campaign(&config, &grid, &all(&grid), script);
     assert_eq!(
-        back.put_on.as_ref().map(|put_on| put_on.load),
-        Some(put_on.load)
+        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+        (3, 1, 1)
+    );
+    let check = outcome.check(0);
+    assert!(
+        check.confirmed_by_hand && check.finding() == Finding::Fails,
+        "{check:?}"
+    );
+    let json = serde_json::to_value(&outcome.kept[0].1).expect("JSON");
+    assert_eq!(json["load_check"]["confirmed_by_hand"], true);
+    assert!(
+        json["load_check"]["modes"][1]["expected_hz"].is_f64(),
+        "{json}"
+    );
+    let back: PointResult = serde_json::from_value(json).expect("a point");
+    assert_eq!(
+        back.load_check.as_ref().map(|check| check.load),
+        Some(check.load)
     );
 }
 
 #[test]
-fn what_a_person_says_of_the_rest_confirms_no_modes_and_a_displacement_that_was_read_stays_as_read()
-{
+fn confirming_the_rest_position_does_not_confirm_the_modes() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
-    // Nothing is put on, but something touches the stage: `right` to that is no `right` to modes nobody has seen yet.
+    // No load, and something touches the stage: `right` to that does not confirm modes that are not measured yet.
     let touched: Does = Box::new(|really| really.askew_m = 20e-6);
     let script = vec![
         (nothing(), DONE),
@@ -388,58 +386,58 @@ fn what_a_person_says_of_the_rest_confirms_no_modes_and_a_displacement_that_was_
         (puts(&config, &grid, 0, 0), DONE),
         (nothing(), Reply::Right),
     ];
-    let came = campaign(&config, &grid, &all(&grid), script);
+    let outcome = campaign(&config, &grid, &all(&grid), script);
     assert_eq!(
-        (came.asked.len(), came.chirps, came.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
         (5, 2, 1),
         "{:?}",
-        came.asked.last()
+        outcome.asked.last()
     );
     assert!(
-        !came.asked[2].text.contains("the mode expected")
-            && came.asked[3].text.contains("is not seen"),
+        !outcome.asked[2].text.contains("the mode expected")
+            && outcome.asked[3].text.contains("is missing"),
         "{:?}",
-        came.asked
+        outcome.asked
     );
-    let put_on = came.put_on(0);
+    let check = outcome.check(0);
     assert!(
-        put_on.confirmed_by_hand && put_on.rest.finding == Finding::Fails,
-        "{put_on:?}"
+        check.confirmed_by_hand && check.rest.finding == Finding::Fails,
+        "{check:?}"
     );
     assert!(
-        put_on
+        check
             .modes
             .iter()
             .all(|mode| mode.finding != Finding::Fails),
-        "{put_on:?}"
+        "{check:?}"
     );
 
     let read: (Does, Reply) = (puts(&config, &grid, 0, 0), Reply::Done(Some(3.6e-3)));
-    let came = campaign(
+    let outcome = campaign(
         &config,
         &grid,
         &all(&grid),
         vec![(nothing(), DONE), read, (nothing(), Reply::Right)],
     );
     assert_eq!(
-        (came.asked.len(), came.chirps, came.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
         (3, 1, 1),
         "{:?}",
-        came.asked.last()
+        outcome.asked.last()
     );
-    let put_on = came.put_on(0);
+    let check = outcome.check(0);
     assert!(
-        put_on.confirmed_by_hand && put_on.finding() == Finding::Fails,
-        "{put_on:?}"
+        check.confirmed_by_hand && check.finding() == Finding::Fails,
+        "{check:?}"
     );
     assert_eq!(
-        put_on.read.as_ref().map(|read| (read.seen_m, read.finding)),
+        check.read.as_ref().map(|read| (read.seen_m, read.finding)),
         Some((3.6e-3, Finding::Fails))
     );
 }
 
 #[test]
-fn a_chirp_that_tripped_is_told_as_such_and_not_as_a_load_alone() {
+fn reports_a_tripped_chirp_with_its_reason() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
     let load = puts(&config, &grid, 0, 0);
     let blind: Does = Box::new(move |really| {
@@ -447,28 +445,28 @@ fn a_chirp_that_tripped_is_told_as_such_and_not_as_a_load_alone() {
         really.blind = true;
     });
     let sees: Does = Box::new(|really| really.blind = false);
-    let came = campaign(
+    let outcome = campaign(
         &config,
         &grid,
         &all(&grid),
         vec![(nothing(), DONE), (blind, DONE), (sees, DONE)],
     );
     assert_eq!(
-        (came.asked.len(), came.chirps, came.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
         (3, 2, 1),
         "{:?}",
-        came.asked.last()
+        outcome.asked.last()
     );
     assert!(
-        came.asked[2].text.contains("tripped"),
+        outcome.asked[2].text.contains("tripped"),
         "{:?}",
-        came.asked[2]
+        outcome.asked[2]
     );
-    assert!(came.put_on(0).finding() == Finding::Holds && !came.put_on(0).confirmed_by_hand);
+    assert!(outcome.check(0).finding() == Finding::Holds && !outcome.check(0).confirmed_by_hand);
 }
 
 #[test]
-fn a_cable_that_pulls_askew_is_told_before_the_chirp_and_so_is_a_displacement_read_wrong() {
+fn reports_a_misaligned_cable_and_a_wrong_displacement_before_the_chirp() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
     // 34 N askew by 0.02 rad are 9.5 um at 72 N/mm, and 2 um may drift.
     for (shift_m, fails) in [(8e-6, false), (-8e-6, false), (20e-6, true), (-20e-6, true)] {
@@ -478,22 +476,22 @@ fn a_cable_that_pulls_askew_is_told_before_the_chirp_and_so_is_a_displacement_re
             really.askew_m = shift_m;
         });
         let straight: Does = Box::new(|really| really.askew_m = 0.0);
-        let came = campaign(
+        let outcome = campaign(
             &config,
             &grid,
             &all(&grid),
             vec![(nothing(), DONE), (askew, DONE), (straight, DONE)],
         );
         assert_eq!(
-            (came.asked.len(), came.chirps, came.kept.len()),
+            (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
             (2 + usize::from(fails), 1, 1),
             "{shift_m}"
         );
         if fails {
             assert!(
-                came.asked[2].text.contains("the cable pulls in X"),
+                outcome.asked[2].text.contains("the cable pulls in X"),
                 "{:?}",
-                came.asked[2]
+                outcome.asked[2]
             );
         }
     }
@@ -510,39 +508,40 @@ fn a_cable_that_pulls_askew_is_told_before_the_chirp_and_so_is_a_displacement_re
             (puts(&config, &grid, 0, 0), Reply::Done(Some(read_m))),
             (nothing(), Reply::Done(Some(3.8e-3))),
         ];
-        let came = campaign(&config, &grid, &all(&grid), script);
+        let outcome = campaign(&config, &grid, &all(&grid), script);
         assert_eq!(
-            (came.asked.len(), came.chirps, came.kept.len()),
+            (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
             (2 + usize::from(fails), 1, 1),
             "{read_m}"
         );
         assert_eq!(
-            came.put_on(0).read.as_ref().map(|read| read.finding),
+            outcome.check(0).read.as_ref().map(|read| read.finding),
             Some(Finding::Holds)
         );
     }
 }
 
 #[test]
-fn skipped_points_are_missing_and_a_campaign_that_was_stopped_goes_on_with_what_is_missing() {
+fn skipped_points_stay_missing_and_a_stopped_campaign_continues() {
     let (config, grid) = (config(&[]), grid(&[0.0, 0.08], &[0.0]));
     let script = vec![
         (nothing(), DONE),
         (nothing(), Reply::Skip),
         (puts(&config, &grid, 1, 0), DONE),
     ];
-    let came = campaign(&config, &grid, &all(&grid), script);
+    let outcome = campaign(&config, &grid, &all(&grid), script);
     assert_eq!(
-        came.kept
+        outcome
+            .kept
             .iter()
             .map(|(place, _)| place.row)
             .collect::<Vec<_>>(),
         [1]
     );
     assert!(
-        came.asked[2].text.contains("point 2 of 2") && came.asked[2].text.contains("put on 3."),
+        outcome.asked[2].text.contains("point 2 of 2") && outcome.asked[2].text.contains("add 3."),
         "{:?}",
-        came.asked[2]
+        outcome.asked[2]
     );
 
     for script in [
@@ -550,8 +549,8 @@ fn skipped_points_are_missing_and_a_campaign_that_was_stopped_goes_on_with_what_
         vec![(nothing(), DONE)],
         vec![(nothing(), DONE), (nothing(), Reply::Stop)],
     ] {
-        let came = campaign(&config, &grid, &all(&grid), script);
-        assert_eq!((came.kept.len(), came.chirps), (0, 0));
+        let outcome = campaign(&config, &grid, &all(&grid), script);
+        assert_eq!((outcome.kept.len(), outcome.chirps), (0, 0));
     }
     let first = campaign(
         &config,
@@ -564,7 +563,7 @@ fn skipped_points_are_missing_and_a_campaign_that_was_stopped_goes_on_with_what_
         1,
         "the script ends with `stop` at the second point"
     );
-    let missing: Vec<Place> = all(&grid)
+    let missing: Vec<GridPoint> = all(&grid)
         .into_iter()
         .filter(|place| *place != first.kept[0].0)
         .collect();
@@ -588,7 +587,7 @@ fn skipped_points_are_missing_and_a_campaign_that_was_stopped_goes_on_with_what_
 }
 
 #[test]
-fn the_weight_changes_once_a_row_and_the_masses_never_between_rows() {
+fn visit_order_changes_the_weight_once_a_row_and_no_mass_between_rows() {
     // In any order of the grid's own values.
     let grid = grid(&[0.08, 0.0, 0.04], &[0.05, -0.05, 0.0, 0.1]);
     let places = all(&grid);

@@ -1,97 +1,124 @@
-//! The same modes at several amplitudes: whether they are where they were.
+//! The modes of a stage at several amplitudes, and whether they shift.
+
+use serde::Serialize;
 
 use crate::identify::modal::{Estimate, FittedMode};
 
-/// Two modes are one if they are no farther apart than this part of their frequency, and than half of the way to the next.
-const SAME: f64 = 0.05;
-/// Figures are said to shift where chance makes any of them differ as much with less than this probability.
-const CHANCE: f64 = 0.01;
-/// Figures of a mode.
-const FIGURES: usize = 3;
+/// Two modes are the same if they differ by no more than this ratio of their frequency, and by no more than half the distance to
+/// the next mode.
+const SAME_MODE_RATIO: f64 = 0.05;
+/// Probability that noise alone makes any of the compared parameters shift.
+const FALSE_ALARM: f64 = 0.01;
+/// Compared parameters of a mode.
+const PARAMETERS: usize = 3;
 
-/// A mode of the first run through all runs.
-#[derive(Clone, Debug)]
+/// A mode of the first run in all runs.
+#[derive(Clone, Debug, Serialize)]
 pub struct ModeOverAmplitude {
-    /// What each run shows of it, if it does.
+    /// The mode in each run; none if the run does not show it.
     pub by_run: Vec<Option<FittedMode>>,
     /// Whether its frequency differs from that of the first run by more than both errors explain.
     pub frequency_shifts: bool,
-    /// The same of its damping ratio.
+    /// The same for its damping ratio.
     pub damping_shifts: bool,
-    /// The same of its residue.
+    /// The same for its residue.
     pub residue_shifts: bool,
 }
 
 impl ModeOverAmplitude {
-    /// Whether all runs show it.
-    pub fn is_seen_throughout(&self) -> bool {
+    /// Whether every run shows the mode.
+    pub fn is_in_every_run(&self) -> bool {
         self.by_run.iter().all(Option::is_some)
     }
 
-    /// Whether anything of it shifts.
+    /// Whether a parameter shifts.
     pub fn shifts(&self) -> bool {
         self.frequency_shifts || self.damping_shifts || self.residue_shifts
     }
+
+    /// Frequency in the first run that shows the mode, in hertz.
+    pub fn frequency_hz(&self) -> f64 {
+        let mut shown = self.by_run.iter().flatten();
+        shown
+            .next()
+            .map_or(f64::NAN, |mode| mode.frequency_hz().value)
+    }
+
+    /// The names of the parameters that shift.
+    pub fn shifting(&self) -> Vec<&'static str> {
+        let parameters = [
+            ("frequency", self.frequency_shifts),
+            ("damping", self.damping_shifts),
+            ("residue", self.residue_shifts),
+        ];
+        let shifting = parameters.into_iter().filter(|(_, shifts)| *shifts);
+        shifting.map(|(name, _)| name).collect()
+    }
 }
 
-/// The modes of the first run in the others. Of z = (x - x_1)/sqrt(sigma^2 + sigma_1^2), |z| is beyond chance where
-/// erfc(|z|/sqrt 2) < 1 %/(all figures that are compared): so all figures of a linear stage together are said to shift once in a hundred
-/// campaigns at most (Bonferroni).
+/// The modes of the first run in all runs. With z = (x - x_1)/sqrt(sigma^2 + sigma_1^2), a parameter shifts where
+/// erfc(|z|/sqrt 2) < 1 %/(number of compared parameters): a linear stage shows any shift in at most one of a hundred campaigns
+/// (Bonferroni).
 pub fn modes_over_amplitude(runs: &[Vec<FittedMode>]) -> Vec<ModeOverAmplitude> {
     let Some((first, others)) = runs.split_first() else {
         return Vec::new();
     };
-    let through = |k: usize| {
-        let same = |modes: &Vec<FittedMode>| nearest(first, k, modes);
-        std::iter::once(Some(first[k]))
-            .chain(others.iter().map(same))
-            .collect::<Vec<_>>()
-    };
-    let all: Vec<Vec<Option<FittedMode>>> = (0..first.len()).map(through).collect();
-    let compared = FIGURES
-        * all
-            .iter()
-            .map(|runs| runs.iter().flatten().count() - 1)
-            .sum::<usize>();
-    let shifts = |runs: &[Option<FittedMode>], of: fn(&FittedMode) -> Estimate| {
-        let mut figures = runs.iter().flatten().map(of);
-        figures.next().is_some_and(|base| {
-            figures.any(|other| by_chance(base, other) * (compared as f64) < CHANCE)
-        })
-    };
-    let mode = |by_run: Vec<Option<FittedMode>>| ModeOverAmplitude {
-        frequency_shifts: shifts(&by_run, |mode| mode.omega_rad_s),
-        damping_shifts: shifts(&by_run, |mode| mode.damping_ratio),
-        residue_shifts: shifts(&by_run, |mode| mode.residue_per_kg),
+    let modes = 0..first.len();
+    let matched: Vec<Vec<Option<FittedMode>>> = modes.map(|k| in_runs(first, k, others)).collect();
+    let limit = FALSE_ALARM / compared(&matched) as f64;
+    let modes = matched.into_iter().map(|by_run| ModeOverAmplitude {
+        frequency_shifts: shifts(&by_run, limit, |mode| mode.omega_rad_s),
+        damping_shifts: shifts(&by_run, limit, |mode| mode.damping_ratio),
+        residue_shifts: shifts(&by_run, limit, |mode| mode.residue_per_kg),
         by_run,
-    };
-    all.into_iter().map(mode).collect()
+    });
+    modes.collect()
 }
 
-/// The probability that two estimates of the same differ as much.
-fn by_chance(a: Estimate, b: Estimate) -> f64 {
+/// Mode `k` of the first run in all runs.
+fn in_runs(first: &[FittedMode], k: usize, others: &[Vec<FittedMode>]) -> Vec<Option<FittedMode>> {
+    let others = others.iter().map(|modes| nearest(first, k, modes));
+    std::iter::once(Some(first[k])).chain(others).collect()
+}
+
+/// The number of comparisons with the first run.
+fn compared(matched: &[Vec<Option<FittedMode>>]) -> usize {
+    let per_mode = matched
+        .iter()
+        .map(|by_run| by_run.iter().flatten().count() - 1);
+    PARAMETERS * per_mode.sum::<usize>()
+}
+
+fn shifts(by_run: &[Option<FittedMode>], limit: f64, of: fn(&FittedMode) -> Estimate) -> bool {
+    let mut estimates = by_run.iter().flatten().map(of);
+    let Some(first) = estimates.next() else {
+        return false;
+    };
+    estimates.any(|other| probability_of_difference(first, other) < limit)
+}
+
+/// The probability that two estimates of the same value differ this much.
+fn probability_of_difference(a: Estimate, b: Estimate) -> f64 {
     let z = (a.value - b.value).abs() / libm::hypot(a.sigma, b.sigma);
     // 0/0: both without error, and equal.
     if z.is_nan() {
-        1.0
-    } else {
-        libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2)
+        return 1.0;
     }
+    libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// The mode of another run that is mode `k` of the first.
 fn nearest(first: &[FittedMode], k: usize, modes: &[FittedMode]) -> Option<FittedMode> {
-    let at = |mode: &FittedMode| mode.omega_rad_s.value;
-    let here = at(&first[k]);
-    let apart = |mode: &FittedMode| (at(mode) - here).abs();
-    let to_next = first
+    let here = first[k].omega_rad_s.value;
+    let distance = |mode: &FittedMode| (mode.omega_rad_s.value - here).abs();
+    let distances = first.iter().map(distance).filter(|away| *away > 0.0);
+    let to_next = distances.fold(f64::INFINITY, f64::min);
+    let found = modes
         .iter()
-        .map(apart)
-        .filter(|distance| *distance > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    let found = modes.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
-    // A free body is at 0 in each run.
-    (apart(found) <= (0.5 * to_next).min(SAME * here)).then_some(*found)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    // A rigid-body mode is at 0 in each run.
+    let limit = (0.5 * to_next).min(SAME_MODE_RATIO * here);
+    (distance(found) <= limit).then_some(*found)
 }
 
 #[cfg(test)]
@@ -111,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_by_more_than_the_errors_shifts_and_nothing_else_does() {
+    fn only_differences_beyond_the_errors_are_shifts() {
         let runs = [
             vec![mode(180.0, 0.01), mode(500.0, 0.004)],
             vec![mode(180.3, 0.01), mode(500.0, 0.00403)],
@@ -132,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_is_no_other_one_that_happens_to_be_near() {
+    fn does_not_match_a_different_mode_nearby() {
         // 510 is nearer to 504 than half of the way from 500; 540 is farther than 5 % from 510.
         let modes = modes_over_amplitude(&[
             vec![mode(500.0, 0.01), mode(510.0, 0.01)],
@@ -158,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn chance_shifts_the_modes_of_a_linear_stage_once_in_a_hundred_campaigns() {
+    fn noise_shifts_modes_in_at_most_one_of_a_hundred_campaigns() {
         use rand_core::{Rng, SeedableRng};
         let mut random = rand_pcg::Pcg64::seed_from_u64(7);
         let mut uniform = || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;

@@ -1,7 +1,9 @@
 //! Offset and recommendation on regions that are known in closed form.
-use bench::experiment::campaign::{Region, Said, Tolerances, contradicted, offset, recommend};
+use bench::experiment::campaign::{
+    Judgement, Region, Tolerances, disagreeing, estimate_offset, recommend,
+};
 
-/// How exactly both are set.
+/// How exactly both can be set.
 const TOLERANCES: Tolerances = Tolerances {
     asymmetry: 0.004,
     operating_point: 0.002,
@@ -30,34 +32,34 @@ fn curved(y: f64) -> f64 {
     0.05 - 8.0 * y * y
 }
 
-/// What is said on the grid of section 5.2.2 of a stage with an offset, without error.
-fn table(made: f64) -> (Region, Vec<Said>) {
+/// Verdicts without errors on the grid of section 5.2.2, of a stage with an offset.
+fn table(made: f64) -> (Region, Vec<Judgement>) {
     let (points, asymmetries) = (even(0.0, 0.08, 15), even(-0.1, 0.1, 10));
-    let said = |row: usize, asymmetry: f64| Said {
+    let judgement = |row: usize, asymmetry: f64| Judgement {
         row,
         asymmetry,
         detected: asymmetry + made >= curved(points[row]),
     };
     let all = (0..15)
         .flat_map(|row| asymmetries.iter().map(move |d| (row, *d)))
-        .map(|(row, d)| said(row, d))
+        .map(|(row, d)| judgement(row, d))
         .collect();
     (beyond(&points, curved), all)
 }
 
 #[test]
-fn the_interval_of_the_offset_is_what_the_verdicts_allow() {
+fn offset_interval_contains_exactly_the_offsets_that_agree_with_all_verdicts() {
     for made in [-0.02, -0.0043, 0.0, 0.031] {
-        let (region, said) = table(made);
-        let found = offset(&region, &said).expect("verdicts");
+        let (region, judgements) = table(made);
+        let found = estimate_offset(&region, &judgements).expect("verdicts");
         // D + d >= border where detected, below it where excluded.
-        let bound = |one: &Said| curved(region.operating_points[one.row]) - one.asymmetry;
-        let low = said
+        let bound = |one: &Judgement| curved(region.operating_points[one.row]) - one.asymmetry;
+        let low = judgements
             .iter()
             .filter(|one| one.detected)
             .map(bound)
             .fold(f64::MIN, f64::max);
-        let high = said
+        let high = judgements
             .iter()
             .filter(|one| !one.detected)
             .map(bound)
@@ -72,7 +74,7 @@ fn the_interval_of_the_offset_is_what_the_verdicts_allow() {
             "{made}: {low} to {high}"
         );
         assert_eq!(
-            (found.contradicted, contradicted(&region, &said, made)),
+            (found.contradicted, disagreeing(&region, &judgements, made)),
             (0, 0)
         );
         assert_eq!(found.decided, 150);
@@ -80,15 +82,18 @@ fn the_interval_of_the_offset_is_what_the_verdicts_allow() {
 }
 
 #[test]
-fn wrong_verdicts_widen_the_interval_and_do_not_move_it_away() {
+fn wrong_verdicts_widen_the_offset_interval_and_keep_the_truth_in_it() {
     let made = -0.02;
-    let (region, mut said) = table(made);
-    let narrow = offset(&region, &said).expect("verdicts").interval;
+    let (region, mut judgements) = table(made);
+    let narrow = estimate_offset(&region, &judgements)
+        .expect("verdicts")
+        .interval;
     // Every sixth, 25 of 150, on both sides of the border.
-    said.iter_mut()
+    judgements
+        .iter_mut()
         .step_by(6)
         .for_each(|one| one.detected = !one.detected);
-    let found = offset(&region, &said).expect("verdicts");
+    let found = estimate_offset(&region, &judgements).expect("verdicts");
     let [low, high] = found.interval;
     assert!(low <= made && made <= high, "{found:?}");
     assert!(
@@ -97,26 +102,26 @@ fn wrong_verdicts_widen_the_interval_and_do_not_move_it_away() {
     );
     // As good as the truth, or better.
     assert!(
-        found.contradicted <= contradicted(&region, &said, made) && found.contradicted >= 20,
+        found.contradicted <= disagreeing(&region, &judgements, made) && found.contradicted >= 20,
         "{found:?}"
     );
 }
 
 #[test]
-fn without_a_verdict_or_without_a_border_no_offset_is_told() {
-    let (region, said) = table(0.0);
-    assert_eq!(offset(&region, &[]), None);
+fn no_offset_without_verdicts_and_no_bounds_without_a_border() {
+    let (region, judgements) = table(0.0);
+    assert_eq!(estimate_offset(&region, &[]), None);
     let nowhere = Region {
         bands: vec![Vec::new(); 15],
         ..region
     };
-    let found = offset(&nowhere, &said).expect("verdicts");
+    let found = estimate_offset(&nowhere, &judgements).expect("verdicts");
     // Open at both ends: all offsets are as good.
     assert_eq!(found.interval, found.searched);
 }
 
 #[test]
-fn between_two_bands_the_middle_is_recommended() {
+fn recommends_the_middle_between_two_bands() {
     let points = even(0.0, 0.08, 41);
     let bands = vec![vec![[-0.3, -0.06], [0.1, 0.3]]; 41];
     let region = Region {
@@ -125,7 +130,7 @@ fn between_two_bands_the_middle_is_recommended() {
         searched: [-0.3, 0.3],
     };
     let candidates = even(-0.1, 0.1, 201);
-    // The middle, less what the stage may have beside; half of the room, less half of the interval.
+    // The middle, less the initial asymmetry; half of the room, less half of the interval.
     for (offset, middle, room) in [
         ([0.0, 0.0], 0.02, 0.08),
         ([-0.02, -0.02], 0.04, 0.08),
@@ -139,7 +144,7 @@ fn between_two_bands_the_middle_is_recommended() {
             (distance - room / TOLERANCES.asymmetry).abs() < 1e-6,
             "{best:?}"
         );
-        // The border as a person sees it: where the intended asymmetry reaches it.
+        // The border as an intended asymmetry.
         let border = best.nearest.expect("a border")[1];
         assert!(
             ((border - best.asymmetry).abs() - room).abs() < 1e-9 && !best.at_the_end,
@@ -149,7 +154,7 @@ fn between_two_bands_the_middle_is_recommended() {
 }
 
 #[test]
-fn the_distance_to_a_straight_border_is_that_to_a_line() {
+fn distance_to_a_straight_border_is_the_distance_to_a_line() {
     // Border D = 0.1 - 1.5 Y; the range ends at 8 % of L. From (D, 0.08), in tolerances t and q, the line is
     // (0.1 - 0.12 - D)/sqrt(t^2 + (1.5 q)^2) away. Rows 0.05 % apart miss its foot by a quarter of a tolerance at most:
     // sqrt(d^2 + 0.125^2) - d < 1e-3 for d > 8.
@@ -173,7 +178,7 @@ fn the_distance_to_a_straight_border_is_that_to_a_line() {
 }
 
 #[test]
-fn nothing_with_cnmp_zeros_is_recommended() {
+fn does_not_recommend_an_asymmetry_with_cnmp_zeros() {
     let everywhere = beyond(&even(0.0, 0.08, 9), |_| -0.3);
     let candidates = even(-0.1, 0.1, 21);
     assert_eq!(
@@ -187,12 +192,12 @@ fn nothing_with_cnmp_zeros_is_recommended() {
         ),
         None
     );
-    // Nor anything beside a point where they were measured, whatever the model says.
+    // Nor an asymmetry beside a point where they were detected, whatever the model predicts.
     let nowhere = Region {
         bands: vec![Vec::new(); 9],
         ..everywhere
     };
-    let seen = [Said {
+    let seen = [Judgement {
         row: 3,
         asymmetry: 0.001,
         detected: true,

@@ -1,0 +1,75 @@
+//! The result of a campaign at one point.
+
+use serde::{Deserialize, Serialize};
+
+use super::load_check::LoadCheck;
+use crate::config::Config;
+use crate::experiment::analysis::{Analysis, AnalysisError, analyse};
+use crate::experiment::run::Run;
+use crate::identify::modal::FittedMode;
+use crate::identify::verdict::Cnmp;
+use crate::recording::{Recording, RecordingError};
+
+/// Verdict, modes and zeros of the chirp at one point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointResult {
+    /// Verdict on CNMP zeros.
+    pub cnmp: Cnmp,
+    /// Its reasons.
+    pub why: String,
+    /// Frequencies of the modes in hertz, lowest first.
+    pub modes_hz: Vec<f64>,
+    /// Signs of their residues.
+    pub signs: String,
+    /// The zeros with damping in the band of the verdict, real and imaginary part in rad/s, those above the real axis.
+    pub zeros_rad_s: Vec<[f64; 2]>,
+    /// Equal for two runs whose loops received and did the same, bit for bit.
+    pub loop_digest: String,
+    /// The load that the operator set, and its check; none on the simulated stage.
+    #[serde(default, skip_serializing_if = "Option::is_none", alias = "put_on")]
+    pub load_check: Option<LoadCheck>,
+}
+
+/// Analyses the finished run of a point. A run that tripped, or whose recording contains no frequency response, is undecided
+/// with the reason. Fails if the recording cannot be read.
+pub fn analyse_point(run: &mut Run, config: &Config) -> Result<PointResult, RecordingError> {
+    let loop_digest = format!("{:016x}", run.totals()?.loop_digest);
+    if let Some((trip, tick)) = run.ended.trip {
+        let remedy = trip.remedy();
+        let why = format!("the run tripped at tick {tick}: {trip}; {remedy}");
+        return Ok(undecided(why, loop_digest));
+    }
+    match analyse(&Recording::open(&run.path)?, config) {
+        Ok(analysis) => Ok(result(&analysis, loop_digest)),
+        Err(AnalysisError::Recording(error)) => Err(error),
+        Err(error) => Ok(undecided(error.to_string(), loop_digest)),
+    }
+}
+
+fn undecided(why: String, loop_digest: String) -> PointResult {
+    PointResult {
+        cnmp: Cnmp::Undecided,
+        why,
+        modes_hz: Vec::new(),
+        signs: String::new(),
+        zeros_rad_s: Vec::new(),
+        loop_digest,
+        load_check: None,
+    }
+}
+
+fn result(analysis: &Analysis, loop_digest: String) -> PointResult {
+    let verdict = &analysis.verdict;
+    let modes = analysis.fit.as_ref().map(|fit| fit.modes());
+    let modes = modes.unwrap_or_default();
+    PointResult {
+        cnmp: verdict.cnmp,
+        why: verdict.why.clone(),
+        modes_hz: modes.iter().map(|mode| mode.frequency_hz().value).collect(),
+        signs: modes.iter().map(FittedMode::sign).collect(),
+        zeros_rad_s: verdict.zeros.iter().map(|z| [z.s.re, z.s.im]).collect(),
+        loop_digest,
+        load_check: None,
+    }
+}

@@ -1,0 +1,219 @@
+//! Runs a campaign: opens its folder, measures the missing points, keeps each result, and evaluates all of them.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use super::error::{CampaignError, file_error};
+use super::evaluation::Evaluation;
+use super::grid::{Grid, GridPoint};
+use super::guided::{GuidedCampaign, LoadedRig, Operator};
+use super::parallel::measure_in_parallel;
+use super::point::{PointResult, analyse_point};
+use super::recommend::Tolerances;
+use super::rest_position::RestPosition;
+use super::store::{OpenedStore, Store};
+use super::visit_order::visit_order;
+use crate::config::Config;
+use crate::experiment::ending::Ending;
+use crate::experiment::error::ExperimentError;
+use crate::experiment::plan::Plan;
+use crate::experiment::prediction::predicted_extremes;
+use crate::experiment::run::Run;
+use crate::experiment::runner::{Runner, Setup, close};
+use crate::recording::Recording;
+use crate::util::checkpoint::FileAction;
+use crate::util::progress::Progress;
+
+/// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown; the last argument names the phase.
+pub type RunPlan<'a> = dyn FnMut(Setup, &Plan, &'static str) -> Result<Run, ExperimentError> + 'a;
+
+/// A campaign in progress.
+pub struct Campaign<'a> {
+    config: &'a Config,
+    grid: &'a Grid,
+    store: Store,
+    keep_recordings: bool,
+    done: Vec<(GridPoint, PointResult)>,
+    /// Files of points that do not count, and why.
+    pub rejected: Vec<String>,
+}
+
+impl<'a> Campaign<'a> {
+    /// Opens the folder of a campaign, or creates it; see [`Store::open`]. `keep_recordings` keeps the recording of each point.
+    pub fn open(
+        folder: &Path,
+        grid: &'a Grid,
+        config: &'a Config,
+        on_devices: bool,
+        keep_recordings: bool,
+    ) -> Result<Campaign<'a>, CampaignError> {
+        let OpenedStore {
+            store,
+            done,
+            rejected,
+        } = Store::open(folder, grid, config, on_devices)?;
+        Ok(Campaign {
+            config,
+            grid,
+            store,
+            keep_recordings,
+            done,
+            rejected,
+        })
+    }
+
+    /// The finished points, in the order of the grid.
+    pub fn done(&self) -> &[(GridPoint, PointResult)] {
+        &self.done
+    }
+
+    /// The points that are not finished, in the order of the grid.
+    pub fn missing(&self) -> Vec<GridPoint> {
+        let is_missing = |point: &GridPoint| self.done.iter().all(|(done, _)| done != point);
+        self.grid.points().filter(is_missing).collect()
+    }
+
+    /// Measures the missing points on the simulated stage, on up to `threads` threads. The results do not depend on their
+    /// number. Ends early when `stop` is set, after the points in progress.
+    pub fn run_simulated(
+        &mut self,
+        threads: usize,
+        progress: &Progress,
+        stop: &AtomicBool,
+    ) -> Result<(), CampaignError> {
+        let missing = self.missing();
+        progress.begin("campaign", missing.len() as u64);
+        let (config, grid, store) = (self.config, self.grid, &self.store);
+        let keep = self.keep_recordings;
+        let measure = |point| {
+            let run = |setup, plan: &Plan| Runner::new(setup).run(plan, "chirp");
+            let setup = Setup::simulated(store.recordings(point));
+            measure_point(&grid.config_at(config, point)?, setup, keep, run)
+        };
+        let done = &mut self.done;
+        let take = |point, result| {
+            store.add(point, &result)?;
+            done.push((point, result));
+            progress.advance(1);
+            Ok(())
+        };
+        let outcome = measure_in_parallel(&missing, threads, stop, measure, take);
+        self.done.sort_by_key(|(point, _)| *point);
+        outcome
+    }
+
+    /// Measures the missing points on devices, with an operator who loads the stage. `tolerance` is the allowed error of a
+    /// measured displacement, a ratio of the beam length; `run` makes each run.
+    pub fn run_guided(
+        &mut self,
+        operator: &mut dyn Operator,
+        tolerance: f64,
+        run: &mut RunPlan<'_>,
+    ) -> Result<(), CampaignError> {
+        let points = visit_order(self.grid, &self.missing());
+        let (config, grid) = (self.config, self.grid);
+        let outcome = GuidedCampaign {
+            config,
+            grid,
+            tolerance,
+            operator,
+            rig: DeviceRig {
+                campaign: self,
+                run,
+            },
+        }
+        .run(&points);
+        self.done.sort_by_key(|(point, _)| *point);
+        outcome
+    }
+
+    /// Evaluates the finished points.
+    pub fn evaluate(&self, tolerances: Tolerances) -> Result<Evaluation<'_>, CampaignError> {
+        Evaluation::of(self.config, self.grid, &self.done, tolerances)
+    }
+}
+
+/// Makes, analyses and records the chirp of one point; `None` if the run was stopped.
+fn measure_point(
+    config: &Config,
+    setup: Setup,
+    keep_recording: bool,
+    run: impl FnOnce(Setup, &Plan) -> Result<Run, ExperimentError>,
+) -> Result<Option<PointResult>, CampaignError> {
+    predicted_extremes(config)?;
+    let folder = setup.folder.clone();
+    // A recording without a result, of a process that was killed.
+    remove(&folder)?;
+    let plan = Plan::chirp(config.clone());
+    let mut run = run(setup, &plan)?;
+    if run.stopped {
+        remove(&folder)?;
+        return Ok(None);
+    }
+    let result = analyse_point(&mut run, config).map_err(ExperimentError::from)?;
+    close(run, &result)?;
+    if !keep_recording {
+        remove(&folder)?;
+    }
+    Ok(Some(result))
+}
+
+fn remove(folder: &Path) -> Result<(), CampaignError> {
+    match std::fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(file_error(FileAction::Remove, folder, &e))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The configured devices, with the stage that the operator loads.
+struct DeviceRig<'r, 'a, 'f> {
+    campaign: &'r mut Campaign<'a>,
+    run: &'r mut RunPlan<'f>,
+}
+
+impl LoadedRig for DeviceRig<'_, '_, '_> {
+    /// Recorded in the folder `rest` of the campaign. A trip is an error: no point can be measured on such a bench.
+    fn rest_position(&mut self) -> Result<Option<RestPosition>, CampaignError> {
+        let setup = Setup::on_devices(self.campaign.store.folder().join("rest"));
+        let plan = Plan::quiet(self.campaign.config.clone());
+        let run = (self.run)(setup, &plan, "rest")?;
+        if let Some((trip, tick)) = run.ended.trip {
+            let remedy = trip.remedy();
+            return Err(ExperimentError::Failed(format!(
+                "the bench tripped at rest, at tick {tick}: {trip}; {remedy}"
+            ))
+            .into());
+        }
+        if run.stopped {
+            return Ok(None);
+        }
+        let path = run.path.clone();
+        // Every tick is in the file once it is closed.
+        close(run, &serde_json::json!({ "outcome": Ending::Completed }))?;
+        let name = path.display().to_string();
+        let recording = Recording::open(&path).map_err(|e| CampaignError::RestPosition {
+            recording: name.clone(),
+            why: e.to_string(),
+        })?;
+        RestPosition::of(&recording, &name).map(Some)
+    }
+
+    fn measure(&mut self, point: GridPoint) -> Result<Option<PointResult>, CampaignError> {
+        let campaign = &*self.campaign;
+        let config = campaign.grid.config_at(campaign.config, point)?;
+        let setup = Setup::on_devices(campaign.store.recordings(point));
+        let run = &mut self.run;
+        let keep = campaign.keep_recordings;
+        measure_point(&config, setup, keep, |setup, plan| {
+            run(setup, plan, "chirp")
+        })
+    }
+
+    fn keep(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError> {
+        self.campaign.store.add(point, result)?;
+        self.campaign.done.push((point, result.clone()));
+        Ok(())
+    }
+}
