@@ -4,6 +4,7 @@ mod accuracy;
 mod bad_data;
 mod curves;
 mod frf_csv;
+mod harmonics;
 mod joint;
 mod noise;
 use bench_test_support::python;
