@@ -15,7 +15,7 @@ run() {
   ./bench "$@" --config real.toml --out recordings --json >"$name.json" 2>"$name.err"
   echo $? >"$name.code"
 }
-act() { ./bench device amplifier probe --config real.toml --pty /tmp/probe --log "$1.jsonl" >"$1.out" 2>&1 & device=$!; sleep 1; }
+act() { ./bench emulate amplifier probe --config real.toml --pty /tmp/probe --log "$1.jsonl" >"$1.out" 2>&1 & device=$!; sleep 1; }
 leave() { kill -INT "$device"; wait "$device"; echo $? >"$1.device.code"; }
 
 act well
@@ -57,7 +57,7 @@ sleep 1
 run after_cable control
 leave cable
 
-./bench device amplifier probe --config real.toml --pty /tmp/probe --fault amplifier.fault=0x2310@1 --log fault.jsonl >fault.out 2>&1 &
+./bench emulate amplifier probe --config real.toml --pty /tmp/probe --fault amplifier.fault=0x2310@1 --log fault.jsonl >fault.out 2>&1 &
 device=$!
 sleep 1
 run fault control
