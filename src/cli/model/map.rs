@@ -98,43 +98,47 @@ fn sr4dof(args: &Args, settings: &[OptionSetting]) -> Result<Sr4dofSettings, Cli
     }
 }
 
+/// A point of the map.
+struct Point {
+    operating_point: f64,
+    asymmetry: f64,
+    pairs: u8,
+}
+
+impl Report<'_> {
+    fn points(&self) -> Vec<Point> {
+        let mut points = Vec::new();
+        for (&operating_point, row) in self.operating_points.iter().zip(&self.cnmp_pairs) {
+            for (&asymmetry, &pairs) in self.asymmetries.iter().zip(row) {
+                points.push(Point {
+                    operating_point,
+                    asymmetry,
+                    pairs,
+                });
+            }
+        }
+        points
+    }
+}
+
 /// A row for each point of the map.
 fn columns(report: &Report) -> Vec<Column> {
-    let column = |axis: usize| cells(report).map(|cell| cell[axis]).collect();
-    let counts = report
-        .cnmp_pairs
-        .iter()
-        .flatten()
-        .map(|&pairs| Some(u64::from(pairs)));
+    let points = report.points();
+    let operating_points = points.iter().map(|point| point.operating_point);
+    let asymmetries = points.iter().map(|point| point.asymmetry);
+    let counts = points.iter().map(|point| Some(u64::from(point.pairs)));
     vec![
-        Column::real("operating_point", column(0)),
-        Column::real("mass_asymmetry", column(1)),
+        Column::real("operating_point", operating_points.collect()),
+        Column::real("mass_asymmetry", asymmetries.collect()),
         Column::count("cnmp_pairs", counts),
     ]
 }
 
-/// Operating point, asymmetry and count of each point of the map.
-fn cells<'a>(report: &'a Report) -> impl Iterator<Item = [f64; 3]> + 'a {
-    report
-        .operating_points
-        .iter()
-        .zip(&report.cnmp_pairs)
-        .flat_map(|(&point, row)| {
-            report
-                .asymmetries
-                .iter()
-                .zip(row)
-                .map(move |(&asymmetry, &pairs)| [point, asymmetry, f64::from(pairs)])
-        })
-}
-
 fn text(report: &Report, profile: &str) -> String {
     let (rows, columns) = (report.operating_points.len(), report.asymmetries.len());
-    let fits = rows <= PICTURE.0 && columns <= PICTURE.1;
-    let rest = if fits {
-        picture(report)
-    } else {
-        format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1)
+    let rest = match rows <= PICTURE.0 && columns <= PICTURE.1 {
+        true => picture(report),
+        false => format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1),
     };
     let summary = format!(
         "{profile}: CNMP zeros without damping at {}",
@@ -144,56 +148,47 @@ fn text(report: &Report, profile: &str) -> String {
 }
 
 fn summary(report: &Report) -> String {
-    let all = report.operating_points.len() * report.asymmetries.len();
-    let with: Vec<[f64; 3]> = cells(report).filter(|cell| cell[2] > 0.0).collect();
-    let range = |axis: usize| {
-        let ends = with.iter().map(|cell| 100.0 * cell[axis]);
-        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-            (low.min(x), high.max(x))
-        });
-        format!("{low:.3} to {high:.3} %")
-    };
+    let points = report.points();
+    let with: Vec<&Point> = points.iter().filter(|point| point.pairs > 0).collect();
     if with.is_empty() {
-        return format!("none of {all} points");
+        return format!("none of {} points", points.len());
     }
     format!(
-        "{} of {all} points: Y1o from {} of L, asymmetry from {}",
+        "{} of {} points: Y1o from {} of L, asymmetry from {}",
         with.len(),
-        range(0),
-        range(1)
+        points.len(),
+        range(with.iter().map(|point| point.operating_point)),
+        range(with.iter().map(|point| point.asymmetry))
     )
+}
+
+/// The range of some ratios in %.
+fn range(ratios: impl Iterator<Item = f64> + Clone) -> String {
+    let low = ratios.clone().fold(f64::INFINITY, f64::min);
+    let high = ratios.fold(f64::NEG_INFINITY, f64::max);
+    format!("{:.3} to {:.3} %", 100.0 * low, 100.0 * high)
 }
 
 /// A line for each operating point, a character for each asymmetry: its CNMP pairs, `.` for none.
 fn picture(report: &Report) -> String {
-    let symbol = |&pairs: &u8| {
-        if pairs == 0 {
-            '.'
-        } else {
-            char::from(b'0' + pairs.min(9))
-        }
-    };
-    let line = |(point, row): (&f64, &Vec<u8>)| {
-        format!(
-            "{:>9.3} %  {}\n",
-            100.0 * point,
-            row.iter().map(symbol).collect::<String>()
-        )
-    };
-    let lines: String = report
-        .operating_points
-        .iter()
-        .zip(&report.cnmp_pairs)
-        .map(line)
-        .collect();
-    let (first, last) = (
-        report.asymmetries[0],
-        report.asymmetries[report.asymmetries.len() - 1],
-    );
-    format!(
-        "{:>11}  asymmetry from {:+.2} to {:+.2} %\n{lines}",
+    let asymmetries = report.asymmetries;
+    let (first, last) = (asymmetries[0], asymmetries[asymmetries.len() - 1]);
+    let mut picture = format!(
+        "{:>11}  asymmetry from {:+.2} to {:+.2} %\n",
         "Y1o/L",
         100.0 * first,
         100.0 * last
-    )
+    );
+    for (point, row) in report.operating_points.iter().zip(&report.cnmp_pairs) {
+        let symbols: String = row.iter().map(|pairs| symbol(*pairs)).collect();
+        picture += &format!("{:>9.3} %  {symbols}\n", 100.0 * point);
+    }
+    picture
+}
+
+fn symbol(pairs: u8) -> char {
+    match pairs {
+        0 => '.',
+        pairs => char::from(b'0' + pairs.min(9)),
+    }
 }

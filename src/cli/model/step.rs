@@ -123,7 +123,7 @@ fn text(report: &Report) -> String {
         false => "  the features DISAGREE with the prediction\n",
     };
     format!(
-        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N (predicted: {})\n  zero crossings      {} in the first {:.3} ms (predicted: at least {}, at most {} as a rule)\n{}  reversals           {} in the first {:.3} ms\n{}{disagreement}",
+        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N (predicted: {})\n  zero crossings      {} in the first {:.3} ms\n                      (predicted: at least {}, as a rule at most {})\n{}  reversals           {} in the first {:.3} ms\n{}{disagreement}",
         report.profile,
         report.dominant_sequence,
         report.zeros,

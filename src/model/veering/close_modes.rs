@@ -109,32 +109,51 @@ impl CloseModes {
 
 impl Remainder {
     fn of(terms: &[ModalTerm], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
+        let others = Others { terms, pair };
         let middle = (wu * wv).sqrt();
-        let others = || {
-            let terms = terms.iter().enumerate();
-            terms.filter(|(mode, _)| !pair.contains(mode))
-        };
-        let all = |w: f64| others().map(|(_, term)| term.part(w)).sum::<f64>();
-        let residue_per_kg = -middle * middle * all(middle);
-        let size = |term: &ModalTerm| term.part(middle).abs();
-        let largest = others()
-            .max_by(|a, b| size(a.1).total_cmp(&size(b.1)))
-            .filter(|(_, term)| term.part(middle) != 0.0);
-        let departure = |w: f64| (-w * w * all(w) / residue_per_kg - 1.0).abs();
-        let others_ratio = |term: &ModalTerm| {
+        let residue_per_kg = -middle * middle * others.part(middle);
+        let largest = others.largest(middle);
+        let others_ratio = largest.map(|(_, term)| {
             let part = term.part(middle);
-            ((all(middle) - part) / part).abs()
-        };
+            ((others.part(middle) - part) / part).abs()
+        });
+        let departure = |w: f64| (-w * w * others.part(w) / residue_per_kg - 1.0).abs();
         Remainder {
             residue_per_kg,
             mode: largest.map(|(mode, _)| mode),
-            others_ratio: largest.map_or(0.0, |(_, term)| others_ratio(term)),
+            others_ratio: others_ratio.unwrap_or(0.0),
             nearness_ratio: largest.map_or(0.0, |(_, term)| nearness(term, [wu, wv])),
             integrator_ratio: match residue_per_kg == 0.0 {
                 true => 0.0,
                 false => departure(wu).max(departure(wv)),
             },
         }
+    }
+}
+
+/// All modes beside the two.
+struct Others<'a> {
+    terms: &'a [ModalTerm],
+    pair: [usize; 2],
+}
+
+impl<'a> Others<'a> {
+    fn terms(&self) -> impl Iterator<Item = (usize, &'a ModalTerm)> {
+        let terms = self.terms.iter().enumerate();
+        terms.filter(|(mode, _)| !self.pair.contains(mode))
+    }
+
+    /// Their sum at a frequency.
+    fn part(&self, omega_rad_s: f64) -> f64 {
+        self.terms().map(|(_, term)| term.part(omega_rad_s)).sum()
+    }
+
+    /// The mode with the largest part at a frequency, if any has one.
+    fn largest(&self, omega_rad_s: f64) -> Option<(usize, &'a ModalTerm)> {
+        let part = |term: &ModalTerm| term.part(omega_rad_s);
+        self.terms()
+            .max_by(|a, b| part(a.1).abs().total_cmp(&part(b.1).abs()))
+            .filter(|(_, term)| part(term) != 0.0)
     }
 }
 

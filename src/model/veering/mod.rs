@@ -15,12 +15,12 @@ mod loci;
 mod modes_at;
 mod pair;
 pub mod placement;
-#[cfg(test)]
-mod properties;
 pub mod propositions;
 mod quadrants;
 mod remedies;
 pub mod report;
+#[cfg(test)]
+mod tests;
 mod trajectory;
 
 pub use close_modes::{CloseModes, Remainder};

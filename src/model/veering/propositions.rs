@@ -13,7 +13,7 @@
 //! just below it is between them.
 //!
 //! The premises as printed, with signs at one value only, are wrong for 40 of some 700 random systems of Eq. (4-1) for which
-//! P4-2 predicts zeros, and for 40 of 400 of P4-2y; read as here, for none (`properties.rs`). P4-2 and P4-2y are not necessary: fixed
+//! P4-2 predicts zeros, and for 40 of 400 of P4-2y; read as here, for none (`tests.rs`). P4-2 and P4-2y are not necessary: fixed
 //! frequencies and other residues give zeros without any veering.
 //!
 //! A plant is not Eq. (4-1). Its own zeros are reported beside those of the equation. Where the two differ, Assumptions A4-4
