@@ -4,20 +4,23 @@ use core::ops::ControlFlow;
 
 use nalgebra::Complex;
 
-use super::closed_loop::{self, ClosedLoopError, ClosedResponses};
+use super::analysis_error::AnalysisError;
+use super::closed_loop;
 use super::ending::Ending;
 use super::gathered::{Gathered, Ran};
 use super::patterns::{Taken, taken};
 use super::plan::{KIND, RunKind};
+use super::response_estimate::ClosedResponses;
+use super::response_estimate::ResponseEstimate;
 use crate::config::Config;
 use crate::excitation::{self, Excitation};
 use crate::identify::delay::excess_delay;
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::verdict::{Verdict, VerdictInput, verdict};
-use crate::identify::{Estimate, Frf, FrfDatum, IdentifyError, Signals, frf_data, response};
-use crate::model::plant::{self, LoopPlant, ModalModel, Mode, PlantError, Sign};
-use crate::recording::{Recording, RecordingError};
+use crate::identify::{Estimate, Frf, FrfDatum, Signals, frf_data, response};
+use crate::model::plant::{self, LoopPlant, ModalModel, Mode, Sign};
+use crate::recording::Recording;
 use crate::rt::arming::State;
 use crate::rt::record::flag;
 
@@ -25,41 +28,6 @@ use crate::rt::record::flag;
 const LAST_MODE: f64 = 1.2;
 /// Progress is reported after this many ticks.
 const TICKS_PER_REPORT: usize = 1 << 15;
-
-/// Why a recording gives no frequency response.
-#[derive(Debug, thiserror::Error)]
-pub enum AnalysisError {
-    /// The recording cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// The signals allow no estimate.
-    #[error(transparent)]
-    Identify(#[from] IdentifyError),
-    /// The model cannot be analysed.
-    #[error(transparent)]
-    Plant(#[from] PlantError),
-    /// A closed loop whose controller is not known, or whose reference did not sweep.
-    #[error(transparent)]
-    Loop(#[from] ClosedLoopError),
-    /// No program ran.
-    #[error("no program ran in this recording: there is no excitation to analyse")]
-    NothingRan,
-    /// The receiver of the progress cancelled the analysis.
-    #[error("the analysis was cancelled")]
-    Cancelled,
-    /// Too many ticks are missing.
-    #[error(
-        "{missing} ticks or more are missing beside the {ticks} that were recorded, {allowed} may be filled in; repeat the run at a rate the machine keeps, or in real-time scheduling"
-    )]
-    Gaps {
-        /// Missing ticks, up to where there were too many.
-        missing: u64,
-        /// Recorded ones.
-        ticks: u64,
-        /// Ticks that may be missing.
-        allowed: u64,
-    },
-}
 
 /// The analysis of a recorded excitation.
 #[derive(Clone, Debug)]
@@ -139,15 +107,15 @@ pub fn analyse_with_progress(
     } = ran(recording, config.servo.rate_hz, closed, progress)?;
     report(progress, AnalysisPhase::Response, 0.0)?;
     let band_hz = config.chirp.band_hz();
-    let (seen, linearity) = if closed {
+    let (estimate, linearity) = if closed {
         (
-            closed_loop::seen(&loop_signals, band_hz, recording, config)?,
+            closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)?,
             None,
         )
     } else {
         open_loop(loop_signals.signals, band_hz, config)?
     };
-    let analysis = with_modes(seen, config, filled_ticks, progress)?;
+    let analysis = with_modes(estimate, config, filled_ticks, progress)?;
     let verdict = analysis.verdict.with(Ending::of(recording).caution());
     Ok(Analysis {
         linearity,
@@ -168,18 +136,11 @@ fn report(
     }
 }
 
-/// A response in both its forms.
-pub(super) struct Seen {
-    pub(super) frf: Frf,
-    pub(super) frf_data: Vec<FrfDatum>,
-    pub(super) closed: Option<ClosedResponses>,
-}
-
 fn open_loop(
     signals: Signals,
     band_hz: (f64, f64),
     config: &Config,
-) -> Result<(Seen, Option<Linearity>), AnalysisError> {
+) -> Result<(ResponseEstimate, Option<Linearity>), AnalysisError> {
     let pattern = excitation::of(config).pattern();
     let (frf, frf_data, linearity) = match taken(signals, &pattern, band_hz)? {
         Taken::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
@@ -193,7 +154,7 @@ fn open_loop(
         }
     };
     Ok((
-        Seen {
+        ResponseEstimate {
             frf,
             frf_data,
             closed: None,
@@ -204,16 +165,16 @@ fn open_loop(
 
 /// The modes of a response, compared with the model.
 fn with_modes(
-    seen: Seen,
+    estimate: ResponseEstimate,
     config: &Config,
     filled_ticks: u64,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
-    let Seen {
+    let ResponseEstimate {
         frf,
         frf_data,
         closed,
-    } = seen;
+    } = estimate;
     let modal = ModalModel::of(&plant::build(&config.plant)?)?;
     let frequencies_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s);
     let judged_up_to_rad_s = LAST_MODE * frequencies_rad_s.fold(0.0, f64::max);

@@ -2,72 +2,25 @@
 
 use nalgebra::Complex;
 
-use super::analysis::{AnalysisError, Seen};
-use super::plan::{Plan, PlanError};
+use super::analysis_error::{AnalysisError, ClosedLoopError};
+use super::plan::Plan;
+use super::plan_error::PlanError;
+use super::response_estimate::{ClosedResponses, MeasuredMargins, ResponseEstimate};
 use crate::config::{Config, ReferenceSettings};
-use crate::control::{ClosedLoop, ControllerError, Margins};
+use crate::control::ClosedLoop;
 use crate::identify::Frf;
 use crate::identify::joint::{self, JointEstimate, LoopSignals};
 use crate::identify::modal::Estimate;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::recording::Recording;
 
-/// A recording of a closed loop that shows no plant.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ClosedLoopError {
-    /// The reference stayed where it was, or was a single sine or step.
-    #[error(
-        "the reference of this recording, {kind}, does not sweep the band of [chirp]; repeat the run with `bench control --reference chirp`"
-    )]
-    Reference {
-        /// Its kind.
-        kind: &'static str,
-    },
-    /// The recording does not say what ran.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// Its controller is not one.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-}
-
-/// The loop as measured, and by the model at the same frequencies.
-#[derive(Clone, Debug)]
-pub struct ClosedResponses {
-    /// T, from reference to reading.
-    pub complementary: Frf,
-    /// S, from reference to error.
-    pub sensitivity: Frf,
-    /// L = P C, from error to reading.
-    pub loop_gain: Frf,
-    /// L by the model, at the frequencies of `loop_gain`.
-    pub model_loop: Vec<Complex<f64>>,
-    /// Margins of the model's loop.
-    pub predicted: Margins,
-    /// Those of the measured one.
-    pub margins: MeasuredMargins,
-}
-
-/// Margins of the measured loop, within the band that was swept.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeasuredMargins {
-    /// Lowest frequency in rad/s at which |L| falls through 1.
-    pub crossover_rad_s: Option<f64>,
-    /// 180 degrees + arg L there.
-    pub phase_margin_deg: Option<Estimate>,
-    /// 1/max|S|.
-    pub modulus_margin: Estimate,
-    /// Where |S| is largest, in rad/s.
-    pub sensitivity_peak_rad_s: f64,
-}
-
 /// The plant by the reference as instrument, and the loop.
-pub(super) fn seen(
+pub(super) fn estimate_loop(
     signals: &LoopSignals,
     band_hz: (f64, f64),
     recording: &Recording,
     config: &Config,
-) -> Result<Seen, AnalysisError> {
+) -> Result<ResponseEstimate, AnalysisError> {
     swept(&config.control.reference)?;
     let JointEstimate {
         plant,
@@ -92,7 +45,7 @@ pub(super) fn seen(
         predicted,
         margins,
     };
-    Ok(Seen {
+    Ok(ResponseEstimate {
         frf: plant,
         frf_data,
         closed: Some(closed),

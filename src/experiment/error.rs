@@ -1,8 +1,8 @@
 //! Why an experiment was refused before it began, or failed on its way.
 
-use super::analysis::AnalysisError;
-use super::plan::PlanError;
-use super::run::RunError;
+use super::analysis_error::AnalysisError;
+use super::plan_error::PlanError;
+use super::run_error::RunError;
 use crate::excitation::ExcitationError;
 use crate::model::plant::PlantError;
 use crate::recording::RecordingError;

@@ -2,8 +2,8 @@
 
 use nalgebra::Complex;
 
-use super::AnalysisError;
 use super::analysis::judge;
+use super::analysis_error::AnalysisError;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Repetition};
 use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};

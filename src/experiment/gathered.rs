@@ -1,6 +1,6 @@
 //! The ticks of a recorded run as signals on the loop's regular times.
 
-use super::AnalysisError;
+use super::analysis_error::AnalysisError;
 use crate::identify::joint::LoopSignals;
 use crate::identify::resampling::Readings;
 use crate::identify::{Signals, setpoint_timing};

@@ -9,6 +9,7 @@
 //! through the ring of orders alone.
 
 mod analysis;
+mod analysis_error;
 pub mod calibration;
 pub mod campaign;
 mod closed_loop;
@@ -21,26 +22,30 @@ mod measure;
 mod name;
 mod patterns;
 mod plan;
+mod plan_error;
 mod prediction;
 mod replay;
+mod response_estimate;
 mod run;
+mod run_error;
 mod run_summary;
 mod runner;
 mod signals;
 mod swept;
 
-pub use analysis::{
-    Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress,
-};
-pub use closed_loop::{ClosedLoopError, ClosedResponses, MeasuredMargins};
+pub use analysis::{Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress};
+pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub use ending::Ending;
 pub use error::ExperimentError;
 pub use external::{ExternalAnalysis, analyse_external};
 pub use measure::{Measured, measure};
-pub use plan::{Plan, PlanError, RunKind};
+pub use plan::{Plan, RunKind};
+pub use plan_error::PlanError;
 pub use prediction::{predicted_extremes, rig_model};
 pub use replay::{Difference, ReplayError, Replayed, replay};
-pub use run::{Run, RunError, run};
+pub use response_estimate::{ClosedResponses, MeasuredMargins};
+pub use run::{Run, run};
+pub use run_error::RunError;
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};
 pub use signals::{abandon_on_signal, stop_on_signal};

@@ -9,7 +9,8 @@ use std::sync::Arc;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::plan::{Plan, PlanError};
+use super::plan::Plan;
+use super::plan_error::PlanError;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::{State, Trip};
 use crate::rt::clock::{Clock, TickTiming};

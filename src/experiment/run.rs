@@ -12,7 +12,8 @@ use rtrb::{Producer, RingBuffer};
 use tokio::signal::unix::Signal;
 
 use super::name;
-use super::plan::{KIND, Plan, PlanError};
+use super::plan::{KIND, Plan};
+use super::run_error::RunError;
 use super::signals::signals;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
@@ -27,41 +28,6 @@ const RING_SLOTS: usize = 1 << 16;
 const TAIL_S: f64 = 0.1;
 /// How often the supervisor looks.
 const BEAT: Duration = Duration::from_millis(5);
-
-/// A run that could not be made, or whose recording failed.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The plan is refused.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// The recording could not be made; nothing moved.
-    #[error("{0}; nothing moved")]
-    Create(RecordingError),
-    /// The folder could not be made; nothing moved.
-    #[error(
-        "cannot make the folder {folder} for recordings: {why}; choose another with --out; nothing moved"
-    )]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// The system's words.
-        why: String,
-    },
-    /// The recording failed; the run was stopped.
-    #[error("{0}; the run was stopped with zero current")]
-    Recording(#[from] RecordingError),
-    /// The system refused a thread or the supervisor.
-    #[error("cannot {what}: {why}")]
-    System {
-        /// What was asked.
-        what: &'static str,
-        /// The system's words.
-        why: String,
-    },
-    /// The loop's thread died; the amplifier was disabled on the way.
-    #[error("the loop's thread died; the amplifier was disabled; the recording up to there is {0}")]
-    LoopDied(PathBuf),
-}
 
 /// A run that came to an end, its recording still open for results.
 pub struct Run {

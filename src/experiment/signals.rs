@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::run::RunError;
+use super::run_error::RunError;
 
 /// Interrupt (Ctrl-C) and terminate, from now on for the whole process.
 pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {

@@ -1,6 +1,6 @@
 //! A swept reference before its run: its amplitudes, where it has none, and what it would do.
 
-use super::plan::PlanError;
+use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
 use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use crate::excitation::{Chirp, Excitation, Extremes, reference, within};

@@ -12,7 +12,7 @@ use bench_hal::Validity;
 use prost_types::DescriptorProto;
 use prost_types::field_descriptor_proto::Type;
 
-use super::schema;
+use super::descriptor;
 use crate::rt::arming::State;
 use crate::rt::record::TickRecord;
 
@@ -67,7 +67,7 @@ macro_rules! messages {
         impl $name {
             pub(super) fn descriptor() -> DescriptorProto {
                 let fields = [$(($tag, stringify!($field), wire_type!($($kind)*)),)*];
-                schema::message(stringify!($name), &fields)
+                descriptor::message(stringify!($name), &fields)
             }
         }
     )*};

@@ -30,6 +30,7 @@
 //!   three channels.
 
 mod continuity;
+mod descriptor;
 mod digest;
 mod error;
 mod event_message;

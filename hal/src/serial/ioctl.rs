@@ -4,7 +4,7 @@
 use std::io;
 use std::os::fd::AsRawFd;
 
-use super::port::Note;
+use super::note::Note;
 
 const TIOCGSERIAL: libc::Ioctl = 0x541E;
 const TIOCSSERIAL: libc::Ioctl = 0x541F;

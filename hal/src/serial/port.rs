@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::error::SerialError;
 use super::ioctl;
 use super::lock::PortLock;
+use super::note::Note;
 
 /// Parity of a character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -87,15 +88,6 @@ impl PortSettings {
     pub fn line_time_ns(&self, bytes: u32) -> u64 {
         u64::from(bytes) * self.parity.bits() * 1_000_000_000 / u64::from(self.baud.max(1))
     }
-}
-
-/// A setting that an open port did not accept. The port can be read nevertheless.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Note {
-    /// What differs from the configuration.
-    pub what: String,
-    /// The consequence, or what to do.
-    pub remedy: &'static str,
 }
 
 /// An open port, locked for this process.

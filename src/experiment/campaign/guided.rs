@@ -214,7 +214,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         let Some(mut result) = self.rig.measure(visit.point)? else {
             return Ok(Some(PointEnd::Stopped));
         };
-        check.modes = visit.model.check_modes(&visit.load, &result)?;
+        check.modes = visit.model.check_modes(&visit.load, &result.modes())?;
         visit.question = failed_question(&check, Some(&result));
         // A confirmation before the chirp does not include the modes.
         let modes = check.modes_finding();

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use super::error::CampaignError;
 use super::load::{Load, StageModel};
-use super::point::PointResult;
 use super::rest_position::RestPosition;
 use crate::config::{PlantSettings, Sr4dofSettings};
 use crate::model::plant::{self, ModalModel, Mode, Sign};
@@ -139,7 +138,8 @@ impl StageModel<'_> {
         LengthCheck::new(read_m, self.stage.operating_point_m, tolerance_m)
     }
 
-    /// Checks the modes of the chirp at a point against the modes of the model under the load.
+    /// Checks the modes of the chirp at a point, frequency in hertz and sign of the residue, against the modes of the model
+    /// under the load.
     ///
     /// A mode holds within `campaign.frequency_tolerance_ratio` and with the sign of its residue, if that is certain. It proves
     /// the load if the mode of that number is not visible without the load, or is more than twice the tolerance away.
@@ -147,7 +147,7 @@ impl StageModel<'_> {
     pub fn check_modes(
         &self,
         load: &Load,
-        point: &PointResult,
+        measured: &[(f64, char)],
     ) -> Result<Vec<ModeCheck>, CampaignError> {
         let loaded = self.loaded(load);
         let expected = ExpectedModes {
@@ -161,7 +161,7 @@ impl StageModel<'_> {
         };
         let numbers = 0..expected.loaded.len();
         let visible = numbers.filter(|k| residue_ratio(&expected.loaded, *k) > NEGLIGIBLE_RATIO);
-        Ok(visible.map(|k| expected.check(k, point)).collect())
+        Ok(visible.map(|k| expected.check(k, measured)).collect())
     }
 }
 
@@ -187,9 +187,9 @@ struct ExpectedModes {
 }
 
 impl ExpectedModes {
-    fn check(&self, k: usize, point: &PointResult) -> ModeCheck {
+    fn check(&self, k: usize, measured: &[(f64, char)]) -> ModeCheck {
         let (expected_hz, unloaded_hz) = (hz(&self.loaded[k]), hz(&self.unloaded[k]));
-        let seen = nearest(expected_hz, point);
+        let seen = nearest(expected_hz, measured);
         let expected_sign = self.sign(k);
         let (seen_hz, seen_sign) = seen.unzip();
         ModeCheck {
@@ -242,8 +242,8 @@ impl ExpectedModes {
 }
 
 /// Frequency and sign of the measured mode nearest to a frequency, if it is not another mode.
-fn nearest(expected_hz: f64, point: &PointResult) -> Option<(f64, char)> {
-    let modes = point.modes_hz.iter().copied().zip(point.signs.chars());
+fn nearest(expected_hz: f64, measured: &[(f64, char)]) -> Option<(f64, char)> {
+    let modes = measured.iter().copied();
     let away = |mode: &(f64, char)| distance(mode.0, expected_hz);
     let nearest = modes.min_by(|a, b| away(a).total_cmp(&away(b)));
     nearest.filter(|mode| away(mode) < OTHER_MODE_RATIO)

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::load_check::LoadCheck;
 use crate::config::Config;
-use crate::experiment::analysis::{Analysis, AnalysisError, analyse};
+use crate::experiment::analysis::{Analysis, analyse};
+use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::run::Run;
 use crate::identify::modal::FittedMode;
 use crate::identify::verdict::Cnmp;
@@ -29,6 +30,14 @@ pub struct PointResult {
     /// The load that the operator set, and its check; none on the simulated stage.
     #[serde(default, skip_serializing_if = "Option::is_none", alias = "put_on")]
     pub load_check: Option<LoadCheck>,
+}
+
+impl PointResult {
+    /// Frequency in hertz and sign of the residue of each mode.
+    pub fn modes(&self) -> Vec<(f64, char)> {
+        let frequencies = self.modes_hz.iter().copied();
+        frequencies.zip(self.signs.chars()).collect()
+    }
 }
 
 /// Analyses the finished run of a point. A run that tripped, or whose recording contains no frequency response, is undecided

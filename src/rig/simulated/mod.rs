@@ -5,6 +5,7 @@
 //! The same seed and settings give bit-identical readings on every x86-64 and ARM machine: the order of sums is fixed, every
 //! transcendental function comes from the `libm` crate, and no library selects code by the processor.
 
+mod actual_model;
 mod floor;
 mod live;
 mod noise;
@@ -16,13 +17,12 @@ mod trajectory;
 
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
-use crate::config::{Config, Geometry, PlantSettings, UnmodelledMode};
-use crate::model::plant::{self, ModalModel, Mode, PlantError};
-use nonlinear_plant::NonlinearPlant;
+use crate::config::Config;
+use crate::model::plant::PlantError;
 use probe::Probe;
-use stage::Stage;
 use trajectory::Trajectory;
 
+pub use actual_model::{actual_plant, modes};
 pub use live::LiveStage;
 pub use probe::Sensor;
 
@@ -105,52 +105,6 @@ impl SimulatedRig {
             reached_a
         };
         stepped_a.clamp(-self.current_limit_a, self.current_limit_a)
-    }
-}
-
-/// The stage, with a linear or a nonlinear plant, for periods of `period_s`.
-fn stage(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
-    match config.sim.geometry {
-        Geometry::Linear => Ok(Stage::new(config, &modes(config)?, None, period_s)),
-        Geometry::Quadratic => Ok(Stage::new(
-            config,
-            &unmodelled_modes(config),
-            Some(NonlinearPlant::new(config)?),
-            period_s,
-        )),
-    }
-}
-
-/// The modes of the linear rig: those of the plant's model, and the unmodelled ones.
-pub fn modes(config: &Config) -> Result<Vec<Mode>, PlantError> {
-    let mut modes = ModalModel::of(&plant::build(&actual_plant(config))?)?.modes;
-    modes.extend(unmodelled_modes(config));
-    Ok(modes)
-}
-
-/// The plant of the simulated stage. Its mass asymmetry differs from the configured one by `sim.asymmetry_offset`.
-pub fn actual_plant(config: &Config) -> PlantSettings {
-    let mut plant = config.plant.clone();
-    if let PlantSettings::Sr4dof(settings) = &mut plant {
-        settings.mass_asymmetry += config.sim.asymmetry_offset;
-    }
-    plant
-}
-
-fn unmodelled_modes(config: &Config) -> Vec<Mode> {
-    config.sim.unmodelled.iter().map(unmodelled_mode).collect()
-}
-
-/// An unmodelled mode has a residue, but no shape, and the floor does not excite it.
-fn unmodelled_mode(mode: &UnmodelledMode) -> Mode {
-    let size = mode.residue_per_kg.abs().sqrt();
-    Mode {
-        omega_rad_s: 2.0 * std::f64::consts::PI * mode.frequency_hz,
-        damping_ratio: mode.damping_ratio,
-        shape: nalgebra::DVector::zeros(0),
-        force_gain: size * mode.residue_per_kg.signum(),
-        sensor_gain: size,
-        floor_gain: 0.0,
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) struct NonlinearPlant {
 impl NonlinearPlant {
     /// At rest at the operating point.
     pub(super) fn new(config: &Config) -> Result<NonlinearPlant, PlantError> {
-        let plant = super::actual_plant(config);
+        let plant = super::actual_model::actual_plant(config);
         let linear = ModalModel::of(&build(&plant)?)?;
         Ok(NonlinearPlant {
             mechanism: QuadraticSr4dof::of(&plant)?,

@@ -3,11 +3,12 @@
 //! With linear geometry the modes are those of the plant and the unmodelled ones; the solution over a period is exact. With
 //! quadratic geometry the plant is a [`NonlinearPlant`], solved in fine steps, and only the unmodelled modes are linear.
 
+use super::actual_model::{modes, unmodelled_modes};
 use super::floor::Line;
 use super::noise::Gaussian;
 use super::nonlinear_plant::NonlinearPlant;
-use crate::config::Config;
-use crate::model::plant::{DiscretePlant, Disturbance, Mode, PlantState};
+use crate::config::{Config, Geometry};
+use crate::model::plant::{DiscretePlant, Disturbance, Mode, PlantError, PlantState};
 
 /// Largest step during contact with the stop. The contact frequency with the smallest effective mass is
 /// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, so a step is 0.1 rad.
@@ -50,6 +51,19 @@ pub(super) struct Stage {
 }
 
 impl Stage {
+    /// The stage, with a linear or a nonlinear plant, for periods of `period_s`.
+    pub(super) fn configured(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
+        match config.sim.geometry {
+            Geometry::Linear => Ok(Stage::new(config, &modes(config)?, None, period_s)),
+            Geometry::Quadratic => Ok(Stage::new(
+                config,
+                &unmodelled_modes(config),
+                Some(NonlinearPlant::new(config)?),
+                period_s,
+            )),
+        }
+    }
+
     /// A stage at rest, for periods of `period_s`: its linear `modes`, and the nonlinear plant, if there is one.
     pub(super) fn new(
         config: &Config,

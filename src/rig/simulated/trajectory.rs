@@ -38,7 +38,7 @@ impl Interval {
 impl Trajectory {
     /// A stage at rest, for periods of `period_s`, with capacity for the set-points of `delay` periods.
     pub(super) fn new(config: &Config, period_s: f64, delay: f64) -> Result<Self, PlantError> {
-        let stage = super::stage(config, period_s)?;
+        let stage = Stage::configured(config, period_s)?;
         Ok(Trajectory {
             stage,
             setpoints: Setpoints::new(delay),

@@ -9,7 +9,8 @@ use serialport::{ClearBuffer, SerialPort, TTYPort};
 
 use crate::serial::error::SerialError;
 use crate::serial::ioctl;
-use crate::serial::port::{Note, Port, PortSettings, is_no_data};
+use crate::serial::note::Note;
+use crate::serial::port::{Port, PortSettings, is_no_data};
 
 /// If more bytes than this are waiting in the terminal, nobody reads it.
 const UNREAD_MAX: u32 = 2048;
