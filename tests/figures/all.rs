@@ -4,26 +4,21 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use bench::report::{Chart, Mark};
-use thesis_figures::{Content, Made, Workshop, make_all, selected};
+use thesis_figures::{Content, Figure, Runs, make_all, selected};
 
 /// Where they are kept, to look at.
 pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("figures")
 }
 
-/// Every entry of the registry, as `bench figures` makes it.
-pub fn all() -> &'static [Made] {
-    static ALL: OnceLock<Vec<Made>> = OnceLock::new();
+/// Every entry of the registry, as `thesis-figures` makes it.
+pub fn all() -> &'static [Figure] {
+    static ALL: OnceLock<Vec<Figure>> = OnceLock::new();
     ALL.get_or_init(|| {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let entries = selected(&[]).expect("all");
-        make_all(
-            &entries,
-            &folder(),
-            &Workshop::new(runs.path()),
-            &mut |_, _| {},
-        )
-        .expect("all can be made")
+        make_all(&entries, &folder(), &Runs::new(runs.path()), &mut |_, _| {})
+            .expect("all can be made")
     })
 }
 
@@ -33,7 +28,7 @@ pub fn content(number: &str) -> &'static Content {
         .iter()
         .find(|made| made.entry.number == number)
         .expect("in the registry");
-    &made.outcome.as_ref().expect("is computed").0
+    made.content().expect("is computed")
 }
 
 /// A chart of a figure by the beginning of its heading.

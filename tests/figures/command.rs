@@ -7,12 +7,12 @@ use bench_test_support::program::Bench;
 use crate::all::{all, folder};
 
 #[test]
-fn every_command_on_the_page_runs_in_the_folder_of_the_page() {
+fn runs_every_command_of_the_page_in_its_folder() {
     let bench = Bench::new();
     let place = bench.path(".");
     let mut commands: Vec<&str> = Vec::new();
     for made in all() {
-        let Ok((content, _)) = &made.outcome else {
+        let Some(content) = made.content() else {
             continue;
         };
         for (name, _) in &content.files {

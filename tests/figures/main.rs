@@ -1,5 +1,5 @@
-//! The figures of the thesis: each there or with its reason, printed beside computed, drawn within its frame, and its
-//! curves those of Python. All are made once, for all tests.
+//! The figures of the thesis: all present or with a reason, printed values beside computed ones, drawn within their frames,
+//! curves equal to those of Python. They are made once for all tests.
 
 mod all;
 mod command;

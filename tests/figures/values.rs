@@ -28,7 +28,7 @@ fn curve(number: &str, heading: &str, name: &str) -> &'static [(f64, f64)] {
 }
 
 #[test]
-fn the_open_loops_of_figs_6_8_and_6_10_are_those_of_python() {
+fn open_loops_of_figs_6_8_and_6_10_equal_python() {
     let bench = Bench::new();
     for (figure, controller) in [("6-8", "slow"), ("6-10", "fast")] {
         let config = bench.json(&format!(
@@ -55,7 +55,7 @@ fn the_open_loops_of_figs_6_8_and_6_10_are_those_of_python() {
 }
 
 #[test]
-fn the_transfer_functions_of_fig_2_4_are_those_of_eq_2_5() {
+fn transfer_functions_of_fig_2_4_equal_eq_2_5() {
     let bench = Bench::new();
     for (heading, asymmetry) in [("Asymmetry 0", 0.0), ("Asymmetry 5", 0.05)] {
         for (name, point) in [("2.5 % of L", 2.5), ("5 % of L", 5.0)] {
@@ -87,7 +87,7 @@ fn the_transfer_functions_of_fig_2_4_are_those_of_eq_2_5() {
 }
 
 #[test]
-fn the_step_responses_of_figs_3_5_and_3_12_are_those_of_python() {
+fn step_responses_of_figs_3_5_and_3_12_equal_python() {
     let u_v = |r: f64| json!([[1.0, 0.001, 1.0], [10.0, 0.001, r]]);
     let r_u_v = |size: f64| {
         json!([
@@ -122,7 +122,7 @@ fn the_step_responses_of_figs_3_5_and_3_12_are_those_of_python() {
 }
 
 #[test]
-fn the_zeros_marked_in_fig_3_12_are_those_of_60_digits() {
+fn zeros_of_fig_3_12_equal_those_with_60_digits() {
     let map = chart("3-12", "(c)");
     for size in [0.5, 5.0, 10.0, 15.0, 21.0] {
         let ring = |mark: &'_ Mark| matches!(mark, Mark::Points { name, .. } if *name == format!("α0 = {size}"));
@@ -151,7 +151,7 @@ fn the_zeros_marked_in_fig_3_12_are_those_of_60_digits() {
 }
 
 #[test]
-fn cells_of_the_maps_of_figs_2_5_and_5_2_are_black_where_python_has_a_cnmp_pair() {
+fn maps_of_figs_2_5_and_5_2_equal_python() {
     let bench = Bench::new();
     for (figure, heading, profile) in [
         ("2-5", "(a)", "chapter2"),
@@ -203,7 +203,7 @@ fn cells_of_the_maps_of_figs_2_5_and_5_2_are_black_where_python_has_a_cnmp_pair(
 }
 
 #[test]
-fn every_point_of_the_circles_of_fig_1_3_sees_the_band_under_one_angle() {
+fn circles_of_fig_1_3_have_a_constant_angle() {
     for (heading, angle) in [("(a)", 90.0), ("(b)", 50.0)] {
         let circle = curve("1-3", heading, "same Θ");
         for (x, y) in picked(circle, 97).into_iter().filter(|(x, _)| *x > 0.05) {
@@ -216,7 +216,7 @@ fn every_point_of_the_circles_of_fig_1_3_sees_the_band_under_one_angle() {
 }
 
 #[test]
-fn the_parabolas_of_fig_4_2_are_those_of_eq_4_3_and_touch_the_line_where_zeros_meet() {
+fn parabolas_of_fig_4_2_follow_eq_4_3_and_touch_zero() {
     for (name, residue) in [
         ("αR = −1.0", -1.0),
         ("αR = 0.1", 0.1),
@@ -246,7 +246,7 @@ fn the_parabolas_of_fig_4_2_are_those_of_eq_4_3_and_touch_the_line_where_zeros_m
 }
 
 #[test]
-fn the_loci_of_fig_2_6_cross_where_python_says() {
+fn loci_of_fig_2_6_cross_where_python_says() {
     let bench = Bench::new();
     let config = bench.json("config show --config chapter2 --asymmetry 0");
     let Some(answers) = truth::ask(&[json!({"what": "crossing", "config": config})]) else {

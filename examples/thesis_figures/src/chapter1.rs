@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::bode::circle;
 use super::content::signed;
 use super::plane::plane;
-use super::{Comparison, Content, FigureError, Workshop};
+use super::{Comparison, Content, FigureError, Runs};
 use bench::model::zeros::{bandwidth_rad_s, guaranteed_peak, opening_angle};
 use bench::report::colours::{BLUE, GREEN, GREY, INK, VERMILION};
 use bench::report::{Chart, Mark, Pen, Symbol};
@@ -37,7 +37,7 @@ fn degrees(angle: f64) -> String {
     format!("{} deg", signed(angle.to_degrees(), 4))
 }
 
-pub(crate) fn fig_1_3(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_1_3(_: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("The angle Θ under which a zero z in the right half plane sees the band from −jω0 to jω0. Every zero on the circle through the three points sees it under the same angle.")
         .setting("Eq. (1-2)")
         .assumed("ω0 = 1 rad/s; (b) Θ = 50 deg; where on the circles z and z2 are");
@@ -96,7 +96,7 @@ pub(crate) fn fig_1_3(_: &Workshop) -> Result<Content, FigureError> {
         .command("bench model bounds --bandwidth 100"))
 }
 
-pub(crate) fn fig_1_4(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_1_4(_: &Runs) -> Result<Content, FigureError> {
     let angle = 30f64.to_radians();
     let z = Complex::new(2.0, 3.0);
     let omega_0 = bandwidth_rad_s(z, angle);

@@ -1,13 +1,13 @@
 //! Chapter 5: the map of the stage that was designed and of the one that was built.
 
 use super::model::{Model, even};
-use super::{Comparison, Content, FigureError, Workshop};
+use super::{Comparison, Content, FigureError, Runs};
 use bench::config::PlantSettings;
 use bench::model::zeros::cnmp_map;
 use bench::report::colours::Colour;
 use bench::report::{Chart, Mark, Scale};
 
-pub(crate) fn fig_5_2(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_5_2(_: &Runs) -> Result<Content, FigureError> {
     let (points, asymmetries) = (even(-0.15, 0.15, 201), even(-0.10, 0.10, 201));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut charts = Vec::new();

@@ -1,4 +1,4 @@
-//! What a figure shows and says.
+//! What a figure shows.
 
 use serde::Serialize;
 
@@ -11,20 +11,20 @@ pub struct Content {
     pub drawn: String,
     /// Profile, settings and equations.
     pub settings: Vec<String>,
-    /// What the thesis does not print and was chosen.
+    /// Values that the thesis does not print, and that were chosen.
     pub assumed: Vec<String>,
     /// The charts.
     pub rows: Vec<Row>,
-    /// Printed beside computed.
+    /// Comparisons of printed and computed values.
     pub compared: Vec<Comparison>,
-    /// Commands that give the numbers, in the folder of the page.
+    /// Commands that give the numbers, to be run in the folder of the page.
     pub commands: Vec<String>,
-    /// Files which these need beside the page: name and text.
+    /// Files that the commands need beside the page: name and text.
     pub files: Vec<(String, String)>,
 }
 
 impl Content {
-    /// A figure of which so much is known.
+    /// A figure with a description of what is drawn.
     pub fn new(drawn: &str) -> Content {
         Content {
             drawn: drawn.into(),
@@ -32,76 +32,76 @@ impl Content {
         }
     }
 
-    /// With a setting.
+    /// Adds a setting.
     pub fn setting(mut self, text: impl Into<String>) -> Content {
         self.settings.push(text.into());
         self
     }
 
-    /// With an assumption.
+    /// Adds an assumption.
     pub fn assumed(mut self, text: impl Into<String>) -> Content {
         self.assumed.push(text.into());
         self
     }
 
-    /// With a row of charts.
+    /// Adds a row of charts.
     pub fn row(mut self, height: f64, charts: impl Into<Vec<Chart>>) -> Content {
         self.rows.push(Row::new(height, charts.into()));
         self
     }
 
-    /// With a figure beside the printed one.
+    /// Adds a comparison.
     pub fn compare(mut self, comparison: Comparison) -> Content {
         self.compared.push(comparison);
         self
     }
 
-    /// With a command.
+    /// Adds a command.
     pub fn command(mut self, command: impl Into<String>) -> Content {
         self.commands.push(command.into());
         self
     }
 
-    /// With a file that a command needs.
+    /// Adds a file that a command needs.
     pub fn file(mut self, name: &str, text: &str) -> Content {
         self.files.push((name.into(), text.into()));
         self
     }
 }
 
-/// What a comparison says.
+/// The result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Within the tolerance.
     Agrees,
-    /// Beyond it.
+    /// Beyond the tolerance.
     Differs,
-    /// The thesis prints no figure.
+    /// The thesis prints no value.
     NotPrinted,
 }
 
-/// A figure as printed and as computed.
+/// A value as printed and as computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Of what.
+    /// The quantity.
     pub what: String,
     /// As printed, with its unit.
     pub printed: String,
     /// As computed, with its unit.
     pub computed: String,
-    /// Computed less printed, or in words.
+    /// Computed minus printed, or in words.
     pub difference: String,
-    /// How large a difference agrees: half of the last printed digit unless the remark says otherwise.
+    /// Largest difference that agrees: half of the last printed digit unless the remark says otherwise.
     pub tolerance: Option<f64>,
-    /// What follows.
+    /// The result.
     pub verdict: Verdict,
-    /// Why it differs, or how it is meant.
+    /// The reason of a difference, or an explanation.
     pub remark: String,
 }
 
 impl Comparison {
-    /// A number printed with so many digits behind the point.
+    /// A number printed with so many decimals.
     pub fn number(
         what: &str,
         printed: f64,
@@ -119,7 +119,7 @@ impl Comparison {
         )
     }
 
-    /// The same with another tolerance, in the unit.
+    /// A number with another tolerance, in its unit.
     pub fn within(
         what: &str,
         printed: f64,
@@ -155,7 +155,7 @@ impl Comparison {
         }
     }
 
-    /// Words: a kind of zeros, a sequence of signs.
+    /// Text: a kind of zeros, a sequence of signs.
     pub fn words(what: &str, printed: &str, computed: &str) -> Comparison {
         let same = printed == computed;
         Comparison {
@@ -173,7 +173,7 @@ impl Comparison {
         }
     }
 
-    /// A statement of the thesis, and whether it holds here, with the figures that say so.
+    /// A statement of the thesis, whether it holds, and the computed evidence.
     pub fn holds(what: &str, printed: &str, holds: bool, computed: &str) -> Comparison {
         let words = Comparison::words(what, "", "");
         Comparison {
@@ -189,7 +189,7 @@ impl Comparison {
         }
     }
 
-    /// What the thesis does not print.
+    /// A value that the thesis does not print.
     pub fn unprinted(what: &str, computed: impl Into<String>) -> Comparison {
         let words = Comparison::words(what, "", "");
         let (printed, difference) = ("not printed".into(), String::new());
@@ -202,7 +202,7 @@ impl Comparison {
         }
     }
 
-    /// With a remark.
+    /// Sets the remark.
     pub fn remark(self, text: &str) -> Comparison {
         Comparison {
             remark: text.into(),

@@ -1,4 +1,4 @@
-//! Why a figure could not be made.
+//! Errors of figures.
 
 use bench::config::ConfigError;
 use bench::control::ControllerError;
@@ -8,15 +8,15 @@ use bench::recording::RecordingError;
 use bench::report::ReportError;
 use bench::rig::devices::DevicesError;
 
-/// A figure that could not be made.
+/// Why a figure could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
-    /// A number that no figure has.
-    #[error("no figure or table is called {unknown}; there are {known}")]
+    /// An unknown number.
+    #[error("unknown figure or table {unknown}; known are {known}")]
     Unknown {
-        /// What was asked for.
+        /// The number given.
         unknown: String,
-        /// All that there are.
+        /// All numbers.
         known: String,
     },
     /// A plant's settings are refused.
@@ -43,15 +43,18 @@ pub enum FigureError {
     /// Its recording carries no response.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
-    /// A run ended early.
+    /// A computation or run did not give what the figure needs.
     #[error("{0}; run the command below the figure to see why")]
     Run(String),
+    /// The result cannot be printed, or the program was stopped.
+    #[error("{0}")]
+    Output(String),
     /// A file cannot be written.
-    #[error("cannot write {path}: {why}; free some space or choose another folder with --output")]
+    #[error("cannot write {path}: {why}; free some space or choose another folder with --out")]
     Write {
-        /// Which.
+        /// Its path.
         path: String,
-        /// The system's words.
+        /// The message of the system.
         why: String,
     },
 }

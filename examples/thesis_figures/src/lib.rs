@@ -1,14 +1,14 @@
-//! The figures and tables of the thesis, drawn anew from what the commands compute.
+//! The figures and tables of the thesis, computed with the `bench` library.
 //!
 //! ```text
-//!  registry (number, title, function) -> Content (charts in values, printed beside computed, commands) -> SVG, page
-//!                                           |  model: settings as a command takes them
-//!                                           |  bode, plane: charts that several figures have
-//!                                           v  measured: runs of the simulated stage, through the session
+//!  registry (number, title, function) -> Content (charts, comparisons, commands) -> SVG, page
+//!                                           |  model: a profile and settings, as a command takes them
+//!                                           |  bode, plane: charts of several figures
+//!                                              measured: runs of the simulated stage
 //! ```
 //!
-//! No figure has a computation of its own: zeros, loci, sequences, margins, steps and runs are those of the commands that
-//! stand below it. To add one: a function that gives a [`Content`], and a line in `registry.rs`.
+//! Zeros, loci, sequences, margins, steps and runs are computed by the library, as by the commands that the page lists. To
+//! add a figure: a function that returns a [`Content`], and a line in `registry.rs`.
 
 mod bode;
 mod chapter1;
@@ -29,7 +29,7 @@ mod write;
 
 pub use content::{Comparison, Content, Verdict};
 pub use error::FigureError;
-pub use measured::Workshop;
+pub use measured::Runs;
 pub use page::page;
 pub use registry::{Entry, FIGURES, Make, selected};
-pub use write::{Made, make_all};
+pub use write::{Figure, Outcome, make_all};

@@ -1,24 +1,26 @@
-//! The figures and tables of the thesis, computed: one SVG a figure and one page of HTML.
+//! Computes the figures and tables of the thesis: one SVG a figure and one page of HTML.
 
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use bench::experiment::abandon_on_signal;
 use clap::Parser;
 use serde::Serialize;
-use thesis_figures::{Comparison, FigureError, Made, Verdict, Workshop, make_all, selected};
+use thesis_figures::{
+    Comparison, Content, Figure, FigureError, Outcome, Runs, Verdict, make_all, selected,
+};
 
 /// Compute the figures and tables of the thesis: one SVG a figure and one HTML page.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "thesis-figures", version)]
 struct Args {
-    /// Figures by their numbers, tables as table-2-2 [default: all]
+    /// Numbers of figures, and of tables as table-2-2 [default: all]
     #[arg(long, value_name = "2-5,6-12,table-2-2", value_delimiter = ',')]
     only: Vec<String>,
     /// Folder for one SVG a figure and the page index.html
     #[arg(long, value_name = "FOLDER", default_value = "figures")]
-    output: PathBuf,
+    out: PathBuf,
     /// Print one JSON object on standard output, and nothing else there
     #[arg(long)]
     json: bool,
@@ -27,11 +29,11 @@ struct Args {
 #[derive(Debug, Serialize)]
 struct Report {
     page: String,
-    figures: Vec<FigureJson>,
+    figures: Vec<FigureReport>,
 }
 
 #[derive(Debug, Serialize)]
-struct FigureJson {
+struct FigureReport {
     number: &'static str,
     title: &'static str,
     svg: Option<String>,
@@ -47,79 +49,76 @@ struct FigureJson {
 fn main() -> ExitCode {
     match run(&Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err((code, message)) => {
-            eprintln!("thesis-figures: {message}");
-            ExitCode::from(code)
+        Err(error) => {
+            eprintln!("thesis-figures: {error}");
+            let usage = matches!(error, FigureError::Unknown { .. });
+            ExitCode::from(if usage { 2 } else { 1 })
         }
     }
 }
 
-/// Exit code and message of a failure.
-type Failure = (u8, String);
-
-fn failure(error: FigureError) -> Failure {
-    match error {
-        FigureError::Unknown { .. } => (2, error.to_string()),
-        other => (1, other.to_string()),
-    }
+fn run(args: &Args) -> Result<(), FigureError> {
+    let figures = make(args)?;
+    let figures = figures
+        .into_iter()
+        .map(|figure| figure_report(&args.out, figure));
+    let report = Report {
+        page: args.out.join("index.html").display().to_string(),
+        figures: figures.collect(),
+    };
+    let text = match args.json {
+        true => {
+            serde_json::to_string_pretty(&report)
+                .map_err(|error| FigureError::Output(error.to_string()))?
+                + "\n"
+        }
+        false => text(&report),
+    };
+    let written = std::io::stdout().lock().write_all(text.as_bytes());
+    written.map_err(|error| FigureError::Output(error.to_string()))
 }
 
-fn run(args: &Args) -> Result<(), Failure> {
-    let entries = selected(&args.only).map_err(failure)?;
-    let runs = args.output.join(format!(".runs-{}", std::process::id()));
-    let (folder, recordings) = (args.output.clone(), runs.clone());
+/// Makes the selected figures; the recordings of their runs are removed afterwards.
+fn make(args: &Args) -> Result<Vec<Figure>, FigureError> {
+    let entries = selected(&args.only)?;
+    let runs = args.out.join(format!(".runs-{}", std::process::id()));
+    let (folder, recordings) = (args.out.clone(), runs.clone());
     let work = move || {
         make_all(
             &entries,
             &folder,
-            &Workshop::new(&recordings),
+            &Runs::new(&recordings),
             &mut show_progress,
         )
     };
     let made = abandon_on_signal(work);
-    // The recordings were only there to be measured; if some stay, they are hidden and named after the process.
+    // If removal fails, the folder stays: it is hidden and named after the process.
     let _ = std::fs::remove_dir_all(&runs);
-    let Some(made) = made.map_err(|error| (1, error.to_string()))? else {
-        let folder = args.output.display();
-        return Err((
-            1,
-            format!("stopped; the files in {folder} so far are complete"),
-        ));
-    };
-    let report = report(&args.output, made.map_err(failure)?);
-    let text = if args.json {
-        serde_json::to_string_pretty(&report).map_err(|error| (1, error.to_string()))? + "\n"
-    } else {
-        text(&report)
-    };
-    let written = std::io::stdout().lock().write_all(text.as_bytes());
-    written.map_err(|error| (1, format!("cannot write to standard output: {error}")))
+    let made = made.map_err(|error| FigureError::Output(error.to_string()))?;
+    made.unwrap_or_else(|| {
+        let folder = args.out.display();
+        Err(FigureError::Output(format!(
+            "stopped; the files in {folder} so far are complete"
+        )))
+    })
 }
 
 fn show_progress(done: u64, all: u64) {
-    use std::io::IsTerminal as _;
     if std::io::stderr().is_terminal() && done < all {
         eprintln!("figure {} of {all}", done + 1);
     }
 }
 
-fn report(folder: &Path, made: Vec<Made>) -> Report {
-    let page = folder.join("index.html").display().to_string();
-    Report {
-        page,
-        figures: made.into_iter().map(|made| figure(folder, made)).collect(),
-    }
-}
-
-fn figure(folder: &Path, made: Made) -> FigureJson {
-    let (reason, content, drawn) = match made.outcome {
-        Err(reason) => (Some(reason), Default::default(), false),
-        Ok((content, svg)) => (None, content, svg.is_some()),
+fn figure_report(folder: &Path, figure: Figure) -> FigureReport {
+    let (reason, content, svg) = match figure.outcome {
+        Outcome::NotComputed(reason) => (Some(reason), Content::default(), None),
+        Outcome::Computed { content, svg } => (None, content, svg),
     };
-    FigureJson {
-        number: made.entry.number,
-        title: made.entry.title,
-        svg: drawn.then(|| folder.join(made.entry.file()).display().to_string()),
+    let file = folder.join(figure.entry.file()).display().to_string();
+    FigureReport {
+        number: figure.entry.number,
+        title: figure.entry.title,
+        svg: svg.map(|_| file),
         reason,
         drawn: content.drawn,
         settings: content.settings,
@@ -130,37 +129,24 @@ fn figure(folder: &Path, made: Made) -> FigureJson {
 }
 
 fn text(report: &Report) -> String {
-    let count = |figure: &FigureJson, verdict| {
-        figure
-            .compared
-            .iter()
-            .filter(|row| row.verdict == verdict)
-            .count()
+    let lines: String = report.figures.iter().map(line).collect();
+    format!("{lines}{}\n", report.page)
+}
+
+fn line(figure: &FigureReport) -> String {
+    let comparison = match figure.reason {
+        Some(reason) => format!("not computed: {reason}"),
+        None => agreement(&figure.compared),
     };
-    let line = |figure: &FigureJson| match figure.reason {
-        Some(reason) => format!(
-            "  {:<9}  {}: not computed: {reason}\n",
-            figure.number, figure.title
-        ),
-        None => {
-            let (agree, differ) = (
-                count(figure, Verdict::Agrees),
-                count(figure, Verdict::Differs),
-            );
-            let differ = if differ > 0 {
-                format!(", {differ} differ")
-            } else {
-                String::new()
-            };
-            format!(
-                "  {:<9}  {}: {agree} printed figures agree{differ}\n",
-                figure.number, figure.title
-            )
-        }
-    };
-    format!(
-        "{}{}\n",
-        report.figures.iter().map(line).collect::<String>(),
-        report.page
-    )
+    format!("  {:<9}  {}: {comparison}\n", figure.number, figure.title)
+}
+
+/// `12 of 14 printed values agree`.
+fn agreement(compared: &[Comparison]) -> String {
+    let count = |verdict| compared.iter().filter(|row| row.verdict == verdict).count();
+    let (agree, differ) = (count(Verdict::Agrees), count(Verdict::Differs));
+    match agree + differ {
+        0 => "no printed value to compare".into(),
+        all => format!("{agree} of {all} printed values agree"),
+    }
 }

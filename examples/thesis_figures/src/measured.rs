@@ -1,4 +1,4 @@
-//! Runs of the simulated stage, through the session, as `bench chirp` and `bench control` make them.
+//! Runs of the simulated stage, as `bench chirp` and `bench control` make them.
 
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use bench::rig::devices;
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::thread::Pace;
 
-/// Where runs are recorded, and what was measured already: several figures show the same run.
+/// Runs that several figures show; each is made once.
 #[derive(Debug)]
-pub struct Workshop {
+pub struct Runs {
     folder: PathBuf,
     chirp: OnceCell<Analysis>,
     steps: [OnceCell<Closed>; 2],
@@ -41,18 +41,18 @@ impl Which {
 /// A closed-loop run.
 #[derive(Clone, Debug)]
 pub(crate) struct Closed {
-    /// Time in seconds after the loop closed, and position in metres relative to where the stage rested.
+    /// Time in seconds after the loop closed, and position in metres relative to the rest position.
     pub course: Vec<(f64, f64)>,
-    /// The reference likewise.
+    /// Time and reference, likewise.
     pub reference: Vec<(f64, f64)>,
-    /// Its figures.
+    /// Its metrics.
     pub measured: Measured,
 }
 
-impl Workshop {
-    /// Recordings of runs go into `folder`, which need not be there; whoever gives it removes it.
-    pub fn new(folder: &Path) -> Workshop {
-        Workshop {
+impl Runs {
+    /// Records runs in `folder`, which is created; the caller removes it.
+    pub fn new(folder: &Path) -> Runs {
+        Runs {
             folder: folder.into(),
             chirp: OnceCell::new(),
             steps: [OnceCell::new(), OnceCell::new()],
@@ -112,7 +112,7 @@ impl Workshop {
     }
 }
 
-/// The ticks with the loop closed, relative to where the stage rested before.
+/// The ticks with the loop closed, relative to the rest position before.
 fn closed(ticks: &[TickRecord], period_s: f64, measured: Measured) -> Closed {
     let active: Vec<&TickRecord> = ticks
         .iter()

@@ -1,114 +1,101 @@
-//! All figures on one page of HTML that needs nothing from elsewhere.
+//! All figures on one self-contained HTML page.
 
-use super::{Comparison, Content, Made, Verdict};
+use super::{Comparison, Content, Figure, Outcome, Verdict};
 use bench::report::html::{document, escaped, picture, table};
 
-/// The page, as an HTML document.
-pub fn page(all: &[Made]) -> String {
-    let contents: String = chapters(all)
-        .iter()
-        .map(|(name, made)| contents(name, made))
-        .collect();
-    let body: String = chapters(all)
-        .iter()
-        .map(|(name, made)| chapter(name, made))
-        .collect();
-    let title = "Figures and tables of the thesis, computed";
-    let body = format!(
-        "<h1>{title}</h1>\n<p>L. Cui, <cite>On the Complex Non-Minimum Phase Zeros in Flexure Mechanisms</cite>. Each figure under its number, drawn by <code>bench figures</code> from what the other commands compute; printed figures beside ours. Commands run in the folder of this page. A difference is computed less printed; it agrees within half of the last printed digit, unless a remark gives another tolerance.</p>\n{}<nav>\n{contents}</nav>\n{body}",
-        summary(all)
-    );
-    document(title, &body)
+const TITLE: &str = "Figures and tables of the thesis, computed";
+const INTRODUCTION: &str = "<p>L. Cui, <cite>On the Complex Non-Minimum Phase Zeros in Flexure Mechanisms</cite>. Each figure is drawn \
+    from what the <code>bench</code> commands compute, with printed values beside computed ones. Commands run in the folder of this \
+    page. A difference is computed minus printed; it agrees within half of the last printed digit, unless a remark gives another \
+    tolerance.</p>\n";
+
+/// The page as an HTML document.
+pub fn page(figures: &[Figure]) -> String {
+    let chapters = chapters(figures);
+    let contents: String = chapters.iter().map(|figures| contents(figures)).collect();
+    let body: String = chapters.iter().map(|figures| chapter(figures)).collect();
+    let summary = summary(figures);
+    let body = format!("<h1>{TITLE}</h1>\n{INTRODUCTION}{summary}<nav>\n{contents}</nav>\n{body}");
+    document(TITLE, &body)
 }
 
-/// How many figures agree.
-fn summary(all: &[Made]) -> String {
-    let compared = || {
-        all.iter()
-            .filter_map(|made| made.outcome.as_ref().ok())
-            .flat_map(|(content, _)| &content.compared)
-    };
+/// How many values agree.
+fn summary(figures: &[Figure]) -> String {
+    let contents: Vec<&Content> = figures.iter().filter_map(Figure::content).collect();
+    let compared = || contents.iter().flat_map(|content| &content.compared);
     let count = |verdict: Verdict| {
         compared()
             .filter(|comparison| comparison.verdict == verdict)
             .count()
     };
-    let none = all.iter().filter(|made| made.outcome.is_err()).count();
+    let (agree, differ) = (count(Verdict::Agrees), count(Verdict::Differs));
+    let not_computed = figures.len() - contents.len();
     format!(
-        "<p class=\"quiet\">{} entries, {none} of them listed with the reason why they are not computed. Of {} printed figures and statements {} agree and {} differ; each that differs says why.</p>\n",
-        all.len(),
-        count(Verdict::Agrees) + count(Verdict::Differs),
-        count(Verdict::Agrees),
-        count(Verdict::Differs)
+        "<p class=\"quiet\">{} entries; {not_computed} of them are not computed, with the reason. Of {} printed values and statements \
+         {agree} agree and {differ} differ; each that differs has a remark.</p>\n",
+        figures.len(),
+        agree + differ,
     )
 }
 
-/// Entries by chapter, in their order.
-fn chapters(all: &[Made]) -> Vec<(String, &[Made])> {
-    let chapter = |made: &Made| made.entry.chapter();
-    all.chunk_by(|a, b| chapter(a) == chapter(b))
-        .map(|made| (format!("Chapter {}", chapter(&made[0])), made))
-        .collect()
+/// Figures by chapter.
+fn chapters(figures: &[Figure]) -> Vec<&[Figure]> {
+    let chapter = |figure: &Figure| figure.entry.chapter();
+    figures.chunk_by(|a, b| chapter(a) == chapter(b)).collect()
 }
 
-fn contents(name: &str, all: &[Made]) -> String {
-    let item = |made: &Made| {
-        let (id, name) = (made.entry.id(), made.entry.name());
-        let missing = if made.outcome.is_err() {
-            " (not computed)"
-        } else {
-            ""
-        };
-        format!(
-            "<li><a href=\"#{id}\">{}</a> {}{missing}</li>\n",
-            escaped(&name),
-            escaped(made.entry.title)
-        )
-    };
-    format!(
-        "<p>{}</p>\n<ul>\n{}</ul>\n",
-        escaped(name),
-        all.iter().map(item).collect::<String>()
-    )
+fn contents(figures: &[Figure]) -> String {
+    let chapter = figures[0].entry.chapter();
+    let items: String = figures.iter().map(item).collect();
+    format!("<p>Chapter {chapter}</p>\n<ul>\n{items}</ul>\n")
 }
 
-fn chapter(name: &str, all: &[Made]) -> String {
-    format!(
-        "<h2>{}</h2>\n{}",
-        escaped(name),
-        all.iter().map(section).collect::<String>()
-    )
-}
-
-fn section(made: &Made) -> String {
-    let head = format!(
-        "<section id=\"{}\">\n<h3>{}</h3>\n",
-        made.entry.id(),
-        escaped(&made.entry.heading())
+fn item(figure: &Figure) -> String {
+    let (id, name, title) = (
+        figure.entry.id(),
+        figure.entry.name(),
+        escaped(figure.entry.title),
     );
-    let body = match &made.outcome {
-        Err(reason) => format!("<p class=\"quiet\">Not computed: {}</p>\n", escaped(reason)),
-        Ok((content, svg)) => {
-            figure(&made.entry.heading(), content, svg.as_deref()) + &facts(content)
-        }
+    let missing = if figure.content().is_some() {
+        ""
+    } else {
+        " (not computed)"
     };
-    format!("{head}{body}</section>\n")
+    format!("<li><a href=\"#{id}\">{name}</a> {title}{missing}</li>\n")
 }
 
-fn figure(heading: &str, content: &Content, svg: Option<&str>) -> String {
-    match svg {
+fn chapter(figures: &[Figure]) -> String {
+    let sections: String = figures.iter().map(section).collect();
+    format!(
+        "<h2>Chapter {}</h2>\n{sections}",
+        figures[0].entry.chapter()
+    )
+}
+
+fn section(figure: &Figure) -> String {
+    let (id, heading) = (figure.entry.id(), escaped(&figure.entry.heading()));
+    let body = match &figure.outcome {
+        Outcome::NotComputed(reason) => {
+            format!("<p class=\"quiet\">Not computed: {}</p>\n", escaped(reason))
+        }
+        Outcome::Computed { content, .. } => drawing(figure, content) + &facts(content),
+    };
+    format!("<section id=\"{id}\">\n<h3>{heading}</h3>\n{body}</section>\n")
+}
+
+fn drawing(figure: &Figure, content: &Content) -> String {
+    match figure.svg() {
         None => format!("<p>{}</p>\n", escaped(&content.drawn)),
-        Some(svg) => picture(svg, heading, &content.drawn),
+        Some(svg) => picture(svg, &figure.entry.heading(), &content.drawn),
     }
 }
 
 fn facts(content: &Content) -> String {
-    let item = |label: &str, text: &String| format!("<li>{label}: {}</li>\n", escaped(text));
-    let settings = content.settings.iter().map(|text| item("Settings", text));
+    let settings = content.settings.iter().map(|text| fact("Settings", text));
     let assumed = content
         .assumed
         .iter()
-        .map(|text| item("Assumed, as the thesis does not print it", text));
+        .map(|text| fact("Assumed, not printed in the thesis", text));
     let list: String = settings.chain(assumed).collect();
     let list = if list.is_empty() {
         list
@@ -118,13 +105,17 @@ fn facts(content: &Content) -> String {
     list + &comparisons(&content.compared) + &commands(&content.commands)
 }
 
+fn fact(label: &str, text: &str) -> String {
+    format!("<li>{label}: {}</li>\n", escaped(text))
+}
+
 fn comparisons(compared: &[Comparison]) -> String {
     if compared.is_empty() {
         return String::new();
     }
     let rows: String = compared.iter().map(comparison).collect();
     table(
-        &["Figure", "Printed", "Computed", "Difference", "Verdict"],
+        &["Value", "Printed", "Computed", "Difference", "Verdict"],
         &rows,
     )
 }
@@ -135,25 +126,28 @@ fn comparison(row: &Comparison) -> String {
         Verdict::Differs => (" class=\"differs\"", "differs"),
         Verdict::NotPrinted => ("", ""),
     };
+    let remark = match row.remark.as_str() {
+        "" => String::new(),
+        remark => format!("<br><span class=\"quiet\">{}</span>", escaped(remark)),
+    };
     let tolerance = row
         .tolerance
         .map_or(String::new(), |t| format!(" (±{})", short(t)));
-    let remark = if row.remark.is_empty() {
-        String::new()
-    } else {
-        format!("<br><span class=\"quiet\">{}</span>", escaped(&row.remark))
-    };
+    let numbers = [
+        &row.printed,
+        &row.computed,
+        &(row.difference.clone() + &tolerance),
+    ];
+    let numbers = numbers
+        .map(|text| format!("<td class=\"n\">{}</td>", escaped(text)))
+        .concat();
     format!(
-        "<tr><td>{}{remark}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}{}</td><td{class}>{verdict}</td></tr>\n",
-        escaped(&row.what),
-        escaped(&row.printed),
-        escaped(&row.computed),
-        escaped(&row.difference),
-        escaped(&tolerance)
+        "<tr><td>{}{remark}</td>{numbers}<td{class}>{verdict}</td></tr>\n",
+        escaped(&row.what)
     )
 }
 
-/// A tolerance in as few digits as it has.
+/// A tolerance without trailing zeros.
 fn short(tolerance: f64) -> String {
     let text = format!("{tolerance:.8}");
     text.trim_end_matches('0').trim_end_matches('.').into()
@@ -174,10 +168,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_means_something_to_html_is_escaped() {
-        let row = Comparison::words("|S| < 1 & more", "<b>", "<b>");
-        assert!(
-            comparison(&row).contains("|S| &lt; 1 &amp; more") && !comparison(&row).contains("<b>")
-        );
+    fn escapes_the_special_characters_of_html() {
+        let row = comparison(&Comparison::words("|S| < 1 & more", "<b>", "<b>"));
+        assert!(row.contains("|S| &lt; 1 &amp; more") && !row.contains("<b>"));
     }
 }

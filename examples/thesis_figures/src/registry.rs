@@ -7,7 +7,7 @@ use super::chapter4::*;
 use super::chapter5::*;
 use super::chapter6::*;
 use super::tables::*;
-use super::{Content, FigureError, Workshop};
+use super::{Content, FigureError, Runs};
 
 /// A figure or table of the thesis.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ pub struct Entry {
 #[derive(Clone, Copy, Debug)]
 pub enum Make {
     /// By this function.
-    Draw(fn(&Workshop) -> Result<Content, FigureError>),
+    Draw(fn(&Runs) -> Result<Content, FigureError>),
     /// It cannot be computed, and this is why.
     Not(&'static str),
 }
@@ -67,7 +67,7 @@ impl Entry {
 const fn draw(
     number: &'static str,
     title: &'static str,
-    make: fn(&Workshop) -> Result<Content, FigureError>,
+    make: fn(&Runs) -> Result<Content, FigureError>,
 ) -> Entry {
     Entry {
         number,

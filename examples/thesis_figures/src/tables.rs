@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 
 use super::content::signed;
 use super::model::Model;
-use super::{Comparison, Content, FigureError, Workshop};
+use super::{Comparison, Content, FigureError, Runs};
 use bench::config::{PlantSettings, XySettings};
 use bench::model::plant;
 use bench::model::zeros::{
@@ -39,7 +39,7 @@ const TABLE_2_2: [(f64, [f64; 4], [[f64; 4]; 4]); 2] = [
     ),
 ];
 
-pub(crate) fn table_2_2(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn table_2_2(_: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("Frequencies and eigenvectors of the SR4DoF at 5 % of L. Eigenvectors have unit length; their sign is free and is the one that fits the printed vector.")
         .setting("profile chapter2: plate modulus E/(1 - nu^2), I = H T^3/12 = 0.5086 mm^4 (the table's 5.09e-4 mm^4 is a slip of unit), m3 = 18.747 g (printed as 18 g), m2 = m3 (1 + D)")
         .setting("an element agrees within 5e-4: half of its last digit, and the table's masses, which are rounded to 0.1 %");
@@ -157,7 +157,7 @@ fn labelling(base: &XySettings) -> Result<[usize; 8], FigureError> {
     }
 }
 
-pub(crate) fn table_2_3(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn table_2_3(_: &Runs) -> Result<Content, FigureError> {
     let PlantSettings::Xy(base) = Model::profile("xy").config()?.plant else {
         return Err(FigureError::Run("profile xy is another model".into()));
     };
@@ -358,19 +358,19 @@ fn table_of_chapter_3(index: usize, class: &str) -> Result<Content, FigureError>
     Ok(content)
 }
 
-pub(crate) fn table_3_1(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn table_3_1(_: &Runs) -> Result<Content, FigureError> {
     table_of_chapter_3(0, "a double integrator and a mode, Eq. 3-3")
 }
 
-pub(crate) fn table_3_2(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn table_3_2(_: &Runs) -> Result<Content, FigureError> {
     Ok(table_of_chapter_3(1, "two modes, Eq. 3-5")?
         .setting("places of the MMP zeros as corrected: the printed column stands one row too low"))
 }
 
-pub(crate) fn table_3_3(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn table_3_3(_: &Runs) -> Result<Content, FigureError> {
     table_of_chapter_3(2, "a double integrator and two modes, Eq. 3-7")
 }
 
-pub(crate) fn table_3_4(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn table_3_4(_: &Runs) -> Result<Content, FigureError> {
     table_of_chapter_3(3, "two modes and a constant, Eq. 3-10")
 }

@@ -1,64 +1,90 @@
-//! Makes figures and writes them: whole files only, each under another name until it is whole.
+//! Makes figures and writes them. Each file is complete or absent.
 
 use std::path::Path;
 
-use super::{Content, Entry, FigureError, Make, Workshop, page};
+use super::{Content, Entry, FigureError, Make, Runs, page};
 use bench::report::sheet_svg;
 use bench::util::atomic_file::write_whole;
 
-/// A figure that was made, or why there is none.
+/// A figure that was made, or the reason why it is not computed.
 #[derive(Clone, Debug)]
-pub struct Made {
-    /// Its number and title.
+pub struct Figure {
+    /// Number and title.
     pub entry: &'static Entry,
-    /// What it shows, with its SVG where it has charts; the reason where it cannot be computed.
-    pub outcome: Result<(Content, Option<String>), &'static str>,
+    /// What was made.
+    pub outcome: Outcome,
 }
 
-/// Makes figures in their order, each written into `folder` as soon as it is made, and the page at last. `watch` is told
-/// figures done and figures in all.
+/// What was made of an entry.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// The figure, with its SVG if it has charts.
+    Computed {
+        /// What it shows.
+        content: Content,
+        /// The picture.
+        svg: Option<String>,
+    },
+    /// The reason why it cannot be computed.
+    NotComputed(&'static str),
+}
+
+impl Figure {
+    /// What the figure shows, if it is computed.
+    pub fn content(&self) -> Option<&Content> {
+        match &self.outcome {
+            Outcome::Computed { content, .. } => Some(content),
+            Outcome::NotComputed(_) => None,
+        }
+    }
+
+    /// The picture, if the figure is computed and has charts.
+    pub fn svg(&self) -> Option<&str> {
+        match &self.outcome {
+            Outcome::Computed { svg, .. } => svg.as_deref(),
+            Outcome::NotComputed(_) => None,
+        }
+    }
+}
+
+/// Makes figures in their order. Each is written into `folder` when it is made, the page at the end. `progress` gets the
+/// number of figures made and the number of all.
 pub fn make_all(
     entries: &[&'static Entry],
     folder: &Path,
-    workshop: &Workshop,
-    watch: &mut dyn FnMut(u64, u64),
-) -> Result<Vec<Made>, FigureError> {
+    runs: &Runs,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Vec<Figure>, FigureError> {
     std::fs::create_dir_all(folder).map_err(|e| failed(folder, &e))?;
-    let mut all = Vec::new();
-    for (index, entry) in entries.iter().enumerate() {
-        watch(index as u64, entries.len() as u64);
-        all.push(made(entry, folder, workshop)?);
+    let count = entries.len() as u64;
+    let mut figures = Vec::new();
+    for (index, entry) in (0..).zip(entries) {
+        progress(index, count);
+        let outcome = make(entry, folder, runs)?;
+        figures.push(Figure { entry, outcome });
     }
-    write(&folder.join("index.html"), &page(&all))?;
-    watch(entries.len() as u64, entries.len() as u64);
-    Ok(all)
+    write(&folder.join("index.html"), &page(&figures))?;
+    progress(count, count);
+    Ok(figures)
 }
 
-fn made(entry: &'static Entry, folder: &Path, workshop: &Workshop) -> Result<Made, FigureError> {
-    let make = match entry.make {
-        Make::Not(reason) => {
-            return Ok(Made {
-                entry,
-                outcome: Err(reason),
-            });
-        }
-        Make::Draw(make) => make,
+fn make(entry: &Entry, folder: &Path, runs: &Runs) -> Result<Outcome, FigureError> {
+    let draw = match entry.make {
+        Make::Not(reason) => return Ok(Outcome::NotComputed(reason)),
+        Make::Draw(draw) => draw,
     };
-    let content = make(workshop)?;
+    let content = draw(runs)?;
     for (name, text) in &content.files {
         write(&folder.join(name), text)?;
     }
-    let svg = match content.rows.is_empty() {
-        true => None,
-        false => Some(sheet_svg(&entry.heading(), "", &content.rows)?),
-    };
+    let has_charts = !content.rows.is_empty();
+    let svg = has_charts
+        .then(|| sheet_svg(&entry.heading(), "", &content.rows))
+        .transpose()?;
     if let Some(svg) = &svg {
         write(&folder.join(entry.file()), svg)?;
     }
-    Ok(Made {
-        entry,
-        outcome: Ok((content, svg)),
-    })
+    Ok(Outcome::Computed { content, svg })
 }
 
 fn write(path: &Path, text: &str) -> Result<(), FigureError> {

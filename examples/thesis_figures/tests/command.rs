@@ -7,9 +7,9 @@ fn figures() -> Bench {
 }
 
 #[test]
-fn two_figures_are_two_files_and_a_page() {
+fn writes_selected_figures_and_a_page() {
     let bench = figures();
-    let answer = bench.json("--only 4-2,table-2-2 --output pictures");
+    let answer = bench.json("--only 4-2,table-2-2 --out pictures");
     let numbers: Vec<&str> = answer["figures"]
         .as_array()
         .expect("a list")
@@ -33,7 +33,7 @@ fn two_figures_are_two_files_and_a_page() {
 }
 
 #[test]
-fn an_unknown_number_is_refused_before_anything_is_written() {
+fn rejects_an_unknown_number_before_writing() {
     let bench = figures();
     bench
         .run("--only 9-1")
@@ -42,13 +42,13 @@ fn an_unknown_number_is_refused_before_anything_is_written() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_is_named() {
+fn names_a_folder_that_cannot_be_created() {
     let bench = figures();
     bench.write("figures", "a file");
     let answer = bench.run("--only 4-2");
     assert_eq!(answer.code, 1, "{answer:?}");
     assert!(
-        answer.err.contains("figures") && answer.err.contains("--output"),
+        answer.err.contains("figures") && answer.err.contains("--out"),
         "{}",
         answer.err
     );

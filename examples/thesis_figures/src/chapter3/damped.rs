@@ -3,7 +3,7 @@
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, even, geometric};
 use super::super::plane::{Part, changes, locus, plane, tracks};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use bench::model::zeros::{
     Crossing, LocusPlane, ModalTerm, critical_damping, touching_damping, two_mode_break_points,
 };
@@ -11,7 +11,7 @@ use bench::report::Pen;
 use bench::report::Symbol;
 use bench::report::colours::{BLUE, GREEN, INK, ORANGE, PURPLE, VERMILION};
 
-pub(in super::super) fn fig_3_15(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_15(_: &Runs) -> Result<Content, FigureError> {
     let key = "plant.modes.v.residue_per_kg";
     let cases = [
         ("(a) Same damping ratios, 0.3", 0.3, 0.3, (-18.0, 3.0), 9.0),
@@ -87,7 +87,7 @@ pub(in super::super) fn fig_3_15(_: &Workshop) -> Result<Content, FigureError> {
     Ok(content.row(400.0, charts))
 }
 
-pub(in super::super) fn fig_3_16(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_16(_: &Runs) -> Result<Content, FigureError> {
     let key = "plant.modes.R.residue_per_kg";
     let critical = critical_damping(0.9 / 1.1, 2.0).unwrap_or(f64::NAN);
     let touching = touching_damping(0.9 / 1.1, 2.0).unwrap_or(f64::NAN);

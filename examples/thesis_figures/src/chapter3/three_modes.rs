@@ -4,7 +4,7 @@ use super::super::bode::{Curve, bode, critical, nyquist, origin};
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, geometric, kinds, response};
 use super::super::plane::{Part, changes, locus, plane, tracks};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
 use bench::control::{self, ControllerText, continuous_response};
 use bench::model::zeros::{Crossing, LocusPlane, ModalSum};
@@ -27,7 +27,7 @@ fn ratios() -> Vec<f64> {
     geometric(1e4, 1e-4, 401)
 }
 
-pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_9(_: &Runs) -> Result<Content, FigureError> {
     let cases = [
         ("a", 2.0),
         ("b", -0.5),
@@ -104,7 +104,7 @@ pub(in super::super) fn fig_3_9(_: &Workshop) -> Result<Content, FigureError> {
         )))
 }
 
-pub(in super::super) fn fig_3_10(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_10(_: &Runs) -> Result<Content, FigureError> {
     let mut chart = plane("", (0.0, 3.3), (0.0, 2.1)).equal();
     let families: [(&str, Colour, &[f64]); 3] = [
         (
@@ -180,7 +180,7 @@ fn equal_pair(size: f64) -> Result<ModalSum, FigureError> {
     sum(&[(0.0, 0.0, 1.0), (10.0, 0.0, -size), (11.0, 0.0, size)])
 }
 
-pub(in super::super) fn fig_3_11(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_11(_: &Runs) -> Result<Content, FigureError> {
     let over = dense(7.0, 16.0, &[10.0, 11.0]);
     let range = |chart: Chart| chart.line("mode R", Pen::solid(INK), part(0.0, 1.0, &over));
     let mut chart = range(Chart::new(
@@ -266,7 +266,7 @@ fn model_3_9(size: f64) -> Model {
     ])
 }
 
-pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_12(_: &Runs) -> Result<Content, FigureError> {
     let cases = [
         (0.01, BLUE, "dual MMP"),
         (5.0, GREEN, "CMP-CNMP"),
@@ -388,7 +388,7 @@ pub(in super::super) fn fig_3_12(_: &Workshop) -> Result<Content, FigureError> {
         )))
 }
 
-pub(in super::super) fn fig_3_13(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_13(_: &Runs) -> Result<Content, FigureError> {
     let zeta = 0.004;
     let mut charts = Vec::new();
     let mut content = Content::new("Nyquist plots of a double integrator and two close modes with alternating signs: the corner between the two resonance circles lies left of the origin where mode R takes back over (dual MMP), right of it where it does not (CMP-CNMP).")
@@ -467,7 +467,7 @@ type Case = (
     Colour,
 );
 
-pub(in super::super) fn fig_3_14(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_14(_: &Runs) -> Result<Content, FigureError> {
     let zeta = 0.01;
     let cases: [Case; 3] = [
         ("Dual MMP", "3-14a.controller.toml", 0.3, None, BLUE),

@@ -4,7 +4,7 @@ use super::super::bode::{Curve, bode, nyquist, origin};
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, even, kinds, response};
 use super::super::plane::{Part, locus, plane, tracks};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
 use bench::model::zeros::{Locus, LocusPlane, ModalSum, ZeroKind, phase_drop_deg};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
@@ -73,7 +73,7 @@ fn migration(omega_u: f64, segments: &[Segment], content: Content) -> Result<Con
     Ok(content.row(360.0, [a.points("poles", INK, Symbol::Cross, poles), b]))
 }
 
-pub(in super::super) fn fig_3_2(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_2(_: &Runs) -> Result<Content, FigureError> {
     let segments: [Segment; 3] = [
         ("I–III: αv > 0", 1e-4, 500.0, BLUE, "MMP"),
         ("I–II: −αu < αv < 0", -0.9999, -1e-4, GREEN, "MMP"),
@@ -89,7 +89,7 @@ pub(in super::super) fn fig_3_2(_: &Workshop) -> Result<Content, FigureError> {
     )))
 }
 
-pub(in super::super) fn fig_3_8(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_8(_: &Runs) -> Result<Content, FigureError> {
     let segments: [Segment; 4] = [
         ("I–IV: αv > 0", 1e-4, 500.0, BLUE, "MMP"),
         ("I–II: −αu < αv < 0", -0.9999, -1e-4, GREEN, "MMP"),
@@ -108,7 +108,7 @@ pub(in super::super) fn fig_3_8(_: &Workshop) -> Result<Content, FigureError> {
     migration(5.0, &segments, content)
 }
 
-pub(in super::super) fn fig_3_3(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_3(_: &Runs) -> Result<Content, FigureError> {
     let over = dense(1.0, 100.0, &[10.0]);
     let mut content = Content::new("A double integrator u and a mode v, in phase and out of phase: sizes of both and of their sum G, and the phase of G. Where both have one size and opposite signs there is a pair of MMP zeros.")
         .setting("Eq. (3-3)")
@@ -158,7 +158,7 @@ pub(in super::super) fn fig_3_3(_: &Workshop) -> Result<Content, FigureError> {
     Ok(content.row(240.0, gains).row(150.0, phases))
 }
 
-pub(in super::super) fn fig_3_4(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_4(_: &Runs) -> Result<Content, FigureError> {
     let over = dense(1.0, 100.0, &[10.0]);
     let mut chart = Chart::new(
         "",
@@ -220,7 +220,7 @@ fn eq_3_4(residue: f64) -> Result<ModalSum, FigureError> {
     sum(&[(1.0, 0.001, 1.0), (10.0, 0.001, residue)])
 }
 
-pub(in super::super) fn fig_3_5(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_5(_: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new(
         "The MMP and the RMP-RNMP case: Bode plots, step responses, and the beginning of these.",
     )
@@ -302,7 +302,7 @@ pub(in super::super) fn fig_3_5(_: &Workshop) -> Result<Content, FigureError> {
         .row(160.0, starts))
 }
 
-pub(in super::super) fn fig_3_6(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_3_6(_: &Runs) -> Result<Content, FigureError> {
     let chart = |heading: &str, residue: f64, colour: Colour, size: f64| {
         let sum = sum(&[(0.0, 0.0, 1.0), (10.0, 0.1, residue)])?;
         let curve = Curve::new("", Pen::solid(colour), response(&sum, 3.0, 300.0)?);

@@ -2,7 +2,7 @@
 
 use super::super::content::signed;
 use super::super::model::{Model, even};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::{K, K23, L, Y, sr4dof};
 use bench::model::veering::{Loci, ModesAt};
 use bench::report::colours::{BLUE, INK, VERMILION};
@@ -63,7 +63,7 @@ fn drawn(chart: Chart, name: &str, pen: Pen, pair: &Pair, scale: (f64, f64)) -> 
         .line("", pen, scaled(&pair.fast))
 }
 
-pub(crate) fn fig_4_1(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_1(_: &Runs) -> Result<Content, FigureError> {
     let values = even(0.0, 0.03, 121);
     let mut chart = Chart::new(
         "(b) Loci of the modes of mu and mv",
@@ -117,7 +117,7 @@ pub(crate) fn fig_4_1(_: &Workshop) -> Result<Content, FigureError> {
     Ok(content.row(340.0, [chart]))
 }
 
-pub(crate) fn fig_4_7(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_7(_: &Runs) -> Result<Content, FigureError> {
     let mut chart = Chart::new(
         "(b) Close modes over the operating point",
         Scale::linear("Operating point (% of L)").within(0.0, 12.0),
@@ -151,7 +151,7 @@ pub(crate) fn fig_4_7(_: &Workshop) -> Result<Content, FigureError> {
     Ok(content.row(340.0, [chart]))
 }
 
-pub(crate) fn fig_4_9(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_9(_: &Runs) -> Result<Content, FigureError> {
     let model = Model::profile("four-mass");
     let pair = pair(&model, K23, &even(0.0, 300.0, 151), None)?;
     let chart = Chart::new(

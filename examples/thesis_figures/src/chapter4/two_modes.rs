@@ -4,7 +4,7 @@ use super::super::bode::{Curve, bode};
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, even, geometric, kinds, response};
 use super::super::plane::locus;
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::W;
 use bench::model::zeros::{
     Crossing, LocusPlane, ModalSum, ModalTerm, Sequence, critical_residues, critical_sums,
@@ -25,7 +25,7 @@ fn parabola(residue_r: f64, x: f64) -> f64 {
     residue_r * (x + 1.0) * (x + 2.0) - x * (x + 2.0) + x * (x + 1.0)
 }
 
-pub(crate) fn fig_4_2(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_2(_: &Runs) -> Result<Content, FigureError> {
     let (u, v) = example();
     let [low, high] = critical_residues(0.0, &u, &v).unwrap_or([f64::NAN; 2]);
     let [b21, b22] = critical_sums(0.0, &u, &v).unwrap_or([f64::NAN; 2]);
@@ -125,7 +125,7 @@ pub(crate) fn fig_4_2(_: &Workshop) -> Result<Content, FigureError> {
         .command(model.command("model locus", &format!("--vary {key} --from 0.01 --to 100"))))
 }
 
-pub(crate) fn fig_4_4(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_4(_: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("Sizes of mode R and of two close modes u and v: as their frequencies approach each other, the two crossings Z1 and Z2 of G with zero move together and vanish.")
         .setting("Eq. (4-1) with alternating signs")
         .assumed("αR = 1, αu = −0.02, αv = 0.02 1/kg, wu = 10 rad/s, wv = 11 (a) and 10.2 rad/s (b); the sum with a damping ratio of 0.0002");

@@ -4,7 +4,7 @@ use super::super::bode::{Curve, bode};
 use super::super::content::signed;
 use super::super::model::{Model, even, kinds, response};
 use super::super::plane::{Part, changes, locus, places, plane, tracks};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::{K, K23, L, W, Y, sr4dof, three_mass};
 use bench::model::zeros::{Crossing, Locus, LocusPlane, undamped_zeros};
 use bench::report::colours::{BLUE, Colour, GREEN, GREY, VERMILION};
@@ -99,7 +99,7 @@ fn axis_changes(locus: &Locus) -> Vec<f64> {
         .collect()
 }
 
-pub(crate) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_6(_: &Runs) -> Result<Content, FigureError> {
     let model = Model::profile("three-mass");
     let study = Study {
         model: &model,
@@ -144,7 +144,7 @@ pub(crate) fn fig_4_6(_: &Workshop) -> Result<Content, FigureError> {
         .command(model.command("model locus", &format!("--vary {K} --from 0 --to 0.13"))))
 }
 
-pub(crate) fn fig_4_8(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_8(_: &Runs) -> Result<Content, FigureError> {
     let model = sr4dof(0.01);
     let study = Study {
         model: &model,
@@ -195,7 +195,7 @@ pub(crate) fn fig_4_8(_: &Workshop) -> Result<Content, FigureError> {
         .command(model.command("model locus", "--vary plant.operating_point_m --from 1% --to 9%")))
 }
 
-pub(crate) fn fig_4_10(_: &Workshop) -> Result<Content, FigureError> {
+pub(crate) fn fig_4_10(_: &Runs) -> Result<Content, FigureError> {
     let model = Model::profile("four-mass");
     let study = Study {
         model: &model,

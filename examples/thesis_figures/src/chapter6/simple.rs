@@ -4,7 +4,7 @@ use super::super::bode::{Curve, bode, critical, nyquist, origin};
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, kinds};
 use super::super::plane::{plane, pole_zero};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, step};
 use nalgebra::Complex;
 
@@ -97,7 +97,7 @@ fn spread(values: &[f64]) -> f64 {
     high - low
 }
 
-pub(in super::super) fn fig_6_2(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_2(_: &Runs) -> Result<Content, FigureError> {
     let dampings = [0.001, 0.01, 0.05];
     let file = "6-2.controller.toml";
     let loops = dampings
@@ -242,7 +242,7 @@ fn compensated(heading: &str, model: &Model, text: &str, size: f64) -> Result<Ch
         .directed("G with the compensation", l.pen, l.polar()))
 }
 
-pub(in super::super) fn fig_6_3(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_3(_: &Runs) -> Result<Content, FigureError> {
     let plant = plant(-1.65, 1.52)?;
     let only_notch = format!(
         "title = \"notch\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = 1e-6\n{}",
@@ -265,7 +265,7 @@ pub(in super::super) fn fig_6_3(_: &Workshop) -> Result<Content, FigureError> {
         .command(plant.model.command("model modes", "")))
 }
 
-pub(in super::super) fn fig_6_5(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_5(_: &Runs) -> Result<Content, FigureError> {
     let plant = plant(1.65, -1.52)?;
     let pair = format!(
         "title = \"pair\"\n[[section]]\nkind = \"gain\"\ngain_a_per_um = {:?}\n{}",
@@ -288,7 +288,7 @@ pub(in super::super) fn fig_6_5(_: &Workshop) -> Result<Content, FigureError> {
         .command(plant.model.command("model modes", "")))
 }
 
-pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_4(_: &Runs) -> Result<Content, FigureError> {
     let (file, text) = ("6-4.controller.toml", eq_6_4());
     let dampings = [0.0005, 0.001, 0.002, 0.01];
     let notch = ControllerText {
@@ -344,7 +344,7 @@ pub(in super::super) fn fig_6_4(_: &Workshop) -> Result<Content, FigureError> {
         .command(margins_command(&eq_6_3(-1.65, 1.52, 0.001), file)))
 }
 
-pub(in super::super) fn fig_6_6(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_6(_: &Runs) -> Result<Content, FigureError> {
     let model = eq_6_3(1.65, -1.52, 0.001);
     let cases = [
         (0.001, "6-6a.controller.toml", BLUE),

@@ -6,7 +6,7 @@ use super::super::bode::{Curve, bode, critical, nyquist};
 use super::super::content::signed;
 use super::super::measured::{Closed, Which};
 use super::super::model::{Model, kinds, response};
-use super::super::{Comparison, Content, FigureError, Workshop};
+use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, sensitivity, step};
 use bench::control::{ControllerText, Margins, continuous_response, step_metrics};
 use bench::model::zeros::sign_sequence;
@@ -34,8 +34,8 @@ fn pen(which: Which) -> Pen {
 }
 
 /// The measured response in um/A over rad/s, and the model's at the same frequencies.
-fn measured(workshop: &Workshop) -> Result<(Curve, Curve), FigureError> {
-    let analysis = workshop.chirp()?;
+fn measured(runs: &Runs) -> Result<(Curve, Curve), FigureError> {
+    let analysis = runs.chirp()?;
     let points = |values: &[Complex<f64>]| {
         analysis
             .frf
@@ -67,10 +67,10 @@ fn peak_rad_s(curve: &Curve, low: f64, high: f64) -> f64 {
         .map_or(f64::NAN, |(w, _)| *w)
 }
 
-pub(in super::super) fn fig_6_7(workshop: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_7(runs: &Runs) -> Result<Content, FigureError> {
     let model = Model::stage();
     let (modal, sum) = (model.modal()?, model.sum()?);
-    let (ours, theirs) = measured(workshop)?;
+    let (ours, theirs) = measured(runs)?;
     let whole = [ours.part(6.0, 2000.0), theirs.part(6.0, 2000.0)];
     let near = [ours.part(400.0, 700.0), theirs.part(400.0, 700.0)];
     let (a, a_phase) = bode(
@@ -170,15 +170,15 @@ fn with_margins(content: Content, which: Which, margins: &Margins, of: &str) -> 
         ))
 }
 
-pub(in super::super) fn fig_6_8(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_8(_: &Runs) -> Result<Content, FigureError> {
     loop_figure(Which::Slow, "Eq. (6-6)")
 }
 
-pub(in super::super) fn fig_6_10(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_10(_: &Runs) -> Result<Content, FigureError> {
     loop_figure(Which::Fast, "Eq. (6-7)")
 }
 
-pub(in super::super) fn fig_6_9(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_9(_: &Runs) -> Result<Content, FigureError> {
     let points = [
         (0.02, GREEN),
         (0.04, PURPLE),
@@ -238,7 +238,7 @@ pub(in super::super) fn fig_6_9(_: &Workshop) -> Result<Content, FigureError> {
     Ok(content.row(240.0, gains).row(200.0, phases))
 }
 
-pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_11(_: &Runs) -> Result<Content, FigureError> {
     let model = Model::stage();
     let (mut curves, mut steps) = (Vec::new(), Vec::new());
     let mut content = Content::new("Closed loop of the slow and of the fast controller by the model: transfer function from the reference, and its step response.")
@@ -287,8 +287,8 @@ pub(in super::super) fn fig_6_11(_: &Workshop) -> Result<Content, FigureError> {
 }
 
 /// L of the measured plant and the ideal controller.
-fn measured_loop(workshop: &Workshop, which: Which) -> Result<Curve, FigureError> {
-    let analysis = workshop.chirp()?;
+fn measured_loop(runs: &Runs, which: Which) -> Result<Curve, FigureError> {
+    let analysis = runs.chirp()?;
     let sections = ControllerText::find(which.name())?.sections(5000.0)?;
     let at = |(f, h): (&f64, &Complex<f64>)| {
         (
@@ -324,14 +324,14 @@ fn measured_margins(l: &Curve) -> Option<(f64, f64)> {
     ))
 }
 
-pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_12(runs: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("Slow and fast control with the measured response of the stage and the ideal controllers: open loops, their Nyquist plots, closed loops and sensitivities; by the model for comparison.")
         .setting(format!("asymmetry +10 %, operating point 8 % of L; plant {RIG}; controllers of Eqs. (6-6) and (6-7) in continuous time, as in the thesis; model without hold, delay and amplifier"));
     let (mut bodes, mut polar, mut ts, mut ss) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (which, letters) in [(Which::Slow, ["a", "b"]), (Which::Fast, ["c", "d"])] {
         let of = closed_loop(&Model::stage(), which.name(), None)?;
         let model = Curve::new("model", Pen::dashed(INK).thin(), open(&of, 6.0, 2500.0));
-        let l = measured_loop(workshop, which)?.part(6.0, 2500.0);
+        let l = measured_loop(runs, which)?.part(6.0, 2500.0);
         let (crossover, phase) = measured_margins(&l).unwrap_or((f64::NAN, f64::NAN));
         let smallest = l
             .points
@@ -405,11 +405,7 @@ pub(in super::super) fn fig_6_12(workshop: &Workshop) -> Result<Content, FigureE
 }
 
 /// Steady state of `bench control --reference hold`.
-fn hold(
-    workshop: &Workshop,
-    which: Which,
-    operating_point: Option<f64>,
-) -> Result<Closed, FigureError> {
+fn hold(runs: &Runs, which: Which, operating_point: Option<f64>) -> Result<Closed, FigureError> {
     let model = Model::stage()
         .set(&format!("control.controller={}", which.name()))
         .set("control.reference={kind=\"hold\"}")
@@ -418,7 +414,7 @@ fn hold(
         Some(point) => model.at(point, 0.1),
         None => model,
     };
-    workshop.closed(model.config()?)
+    runs.closed(model.config()?)
 }
 
 /// Length of the steady-state runs.
@@ -454,7 +450,7 @@ fn density(closed: &Closed) -> Vec<(f64, f64)> {
         .collect()
 }
 
-pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureError> {
+pub(in super::super) fn fig_6_13(runs: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("Closed-loop runs of the simulated rig: step response of both controllers, and the distribution of the positioning error in the steady state. Bars have the width of the probe's quantisation, 0.030 µm.")
         .setting(format!("asymmetry +10 %, operating point 8 % of L; {RIG}"))
         .setting(format!("steady state over {HOLD_S} s at 5 kHz; the thesis: 16,000 points, which it calls 3 s (3 s are 15,000)"))
@@ -470,7 +466,7 @@ pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureE
         Scale::linear("Probability density (1/µm)"),
     );
     for (which, settling, sigma) in [(Which::Slow, 0.1663, 0.066), (Which::Fast, 0.0858, 0.050)] {
-        let run = workshop.step(which)?;
+        let run = runs.step(which)?;
         a = a.line(
             which.name(),
             pen(which),
@@ -480,7 +476,7 @@ pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureE
                 .filter(|(t, _)| *t < 0.5)
                 .collect(),
         );
-        let held = hold(workshop, which, None)?;
+        let held = hold(runs, which, None)?;
         let outline = density(&held);
         let area = outline
             .iter()
@@ -531,7 +527,7 @@ pub(in super::super) fn fig_6_13(workshop: &Workshop) -> Result<Content, FigureE
                 &format!("--{controller} --reference hold --duration {HOLD_S:.0}"),
             ));
     }
-    let centre = hold(workshop, Which::Fast, Some(0.0))?;
+    let centre = hold(runs, Which::Fast, Some(0.0))?;
     Ok(content
         .row(280.0, [a, b])
         .compare(
