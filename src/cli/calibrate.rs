@@ -140,7 +140,7 @@ fn current_text(amplifier: &AmplifierCalibration) -> String {
 
 fn chain_text(chain: &ChainCalibration) -> String {
     format!(
-        "  compliance    {:+.3} +- {:.3} um/A, by the model {:+.3} um/A\n  linearity     {:.4} % from a straight line, {:.4} % between up and down\n{}",
+        "  compliance    {:+.3} ± {:.3} um/A, by the model {:+.3} um/A\n  linearity     {:.4} % from a straight line, {:.4} % between up and down\n{}",
         chain.compliance_m_per_a * 1e6,
         2e6 * chain.compliance_sigma_m_per_a,
         chain.model_m_per_a * 1e6,
@@ -155,7 +155,7 @@ fn delay_text(chain: &ChainCalibration) -> String {
         return String::new();
     };
     format!(
-        "  delay         {:.3} +- {:.3} ms from command to reading; if it differs from\n                `bench margins`, set amplifier.latency_s\n",
+        "  delay         {:.3} ± {:.3} ms from command to reading; if it differs from\n                `bench margins`, set amplifier.latency_s\n",
         delay_s * 1e3,
         2e3 * chain.delay_sigma_s.unwrap_or(0.0)
     )

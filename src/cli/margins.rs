@@ -11,6 +11,7 @@ use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::model::plant::{self, LoopPlant, ModalModel};
+use crate::report::number::angular_frequency;
 
 /// Which loop.
 #[derive(Clone, Debug, clap::Args)]
@@ -110,6 +111,10 @@ fn chain_text(config: &Config) -> String {
     text
 }
 
+fn or_none(omega_rad_s: Option<f64>) -> String {
+    omega_rad_s.map_or_else(|| "none".into(), angular_frequency)
+}
+
 /// Margins in words.
 pub(super) fn text(config: &Config, margins: &Margins) -> String {
     let or =
@@ -129,11 +134,11 @@ pub(super) fn text(config: &Config, margins: &Margins) -> String {
         } else {
             "UNSTABLE: the closed loop has poles outside the stable region; the margins below mean nothing"
         },
-        or(margins.crossover_rad_s, "rad/s"),
+        or_none(margins.crossover_rad_s),
         or(margins.phase_margin_deg, "deg"),
         or(margins.gain_margin_db, "dB"),
         margins.modulus_margin,
         margins.sensitivity_peak_db,
-        or(margins.sensitivity_bandwidth_rad_s, "rad/s"),
+        or_none(margins.sensitivity_bandwidth_rad_s),
     )
 }

@@ -12,19 +12,11 @@ pub(super) fn text(summary: &ModalSummary) -> String {
     if summary.modes.is_empty() {
         return verdict;
     }
-    let header = [
-        "mode Hz",
-        "+-",
-        "damping",
-        "+-",
-        "residue 1/kg",
-        "+-",
-        "sign",
-    ];
+    let header = ["mode Hz", "±", "damping", "±", "residue 1/kg", "±", "sign"];
     let rows: Vec<_> = summary.modes.iter().map(mode_row).collect();
     let modes = table(&header, &rows);
     let zeros = zero_table(&summary.zeros);
-    format!("\n{modes}\n{zeros}\n+- is the 95 % confidence interval\n{verdict}")
+    format!("\n{modes}\n{zeros}\n± is the 95 % confidence interval\n{verdict}")
 }
 
 fn mode_row(mode: &FittedMode) -> Vec<String> {
@@ -44,14 +36,14 @@ fn zero_table(zeros: &[UncertainZero]) -> String {
     if zeros.is_empty() {
         return "no zeros in the band of the verdict\n".into();
     }
-    let header = ["zero rad/s", "+- re", "kind", "right of the axis"];
+    let header = ["zero rad/s", "± re", "kind", "right of the axis"];
     let rows: Vec<_> = zeros.iter().map(zero_row).collect();
     table(&header, &rows)
 }
 
 fn zero_row(zero: &UncertainZero) -> Vec<String> {
     vec![
-        format!("{:+.3} +- {:.3}j", zero.s.re, zero.s.im),
+        format!("{:+.3} ± {:.3}j", zero.s.re, zero.s.im),
         format!("{:.1e}", zero.real_part().half_width_95()),
         zero.kind.name().into(),
         format!("{:.2} %", 100.0 * zero.rhp_probability),

@@ -111,7 +111,7 @@ impl LengthCheck {
         let [seen, expected, tolerance] =
             [self.seen_m, self.expected_m, self.tolerance_m].map(|m| m * 1e6);
         Some(format!(
-            "{what} {seen:+.1} um, expected {expected:+.1} +- {tolerance:.1} um: {remedy}"
+            "{what} {seen:+.1} um, expected {expected:+.1} ± {tolerance:.1} um: {remedy}"
         ))
     }
 }

@@ -173,7 +173,7 @@ fn uncertain_side(zeros: &[UncertainZero]) -> Option<String> {
     let zero = zeros.iter().find(|zero| !has_certain_side(zero))?;
     let real_part = zero.real_part();
     Some(format!(
-        "the zero {:.3} +- {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, or for longer",
+        "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, or for longer",
         real_part.value,
         real_part.half_width_95(),
         hertz(zero.s.norm()),
