@@ -7,7 +7,10 @@ use bench::config::{
     AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Source, Sweep, TravelPoint, load,
 };
 use bench::control::{ControlDesign, ControllerText};
-use bench::excitation::{Chirp, Quiet as NoCurrent, of, reference};
+use bench::excitation::{
+    Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,
+    StepReference, SweptReference, ZeroCurrent,
+};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Realtime, TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
@@ -40,30 +43,30 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
                 numerator = [1.0, 2.0, 90000.0]\ndenominator = [1.0, 400.0, 90000.0]\nprewarp_rad_s = 300.0\n";
     std::fs::write(&own, text).expect("a file");
     let references = [
-        ReferenceSettings::Hold,
-        ReferenceSettings::Step {
+        ReferenceSettings::Hold(HoldReference {}),
+        ReferenceSettings::Step(StepReference {
             amplitude_m: 50e-6,
             at_s: 0.1,
-        },
-        ReferenceSettings::Ramp {
+        }),
+        ReferenceSettings::Ramp(RampReference {
             amplitude_m: 50e-6,
             speed_m_per_s: 1e-4,
             at_s: 0.1,
-        },
-        ReferenceSettings::Sine {
+        }),
+        ReferenceSettings::Sine(SineReference {
             amplitude_m: 20e-6,
             frequency_hz: 3.0,
-        },
-        ReferenceSettings::Chirp {
+        }),
+        ReferenceSettings::Chirp(SweptReference {
             amplitude: vec![TravelPoint {
                 frequency_hz: 1.0,
                 amplitude_m: 1e-6,
             }],
             travel_m: 20e-6,
-        },
-        ReferenceSettings::File {
+        }),
+        ReferenceSettings::File(FileReference {
             path: "points.csv".into(),
-        },
+        }),
     ];
     let mut programs: Vec<(String, Box<dyn Program>)> = Vec::new();
     for name in ["fast", "slow", own.to_str().expect("text")] {
@@ -73,8 +76,12 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
             .expect("valid");
         for settings in &references {
             let points = "time_s,reference_m\n0.0,0.0\n0.2,1e-5\n0.4,2e-5\n";
-            let reference =
-                reference(settings, &config.chirp, Some(points), period_s).expect("valid");
+            let context = ReferenceContext {
+                chirp: &config.chirp,
+                period_s,
+                file: Some(points),
+            };
+            let reference = settings.design().build(&context).expect("valid");
             let program = Control::new(sections.law(period_s), reference, 500, 4500);
             programs.push((format!("{name}, {settings:?}"), Box::new(program)));
         }
@@ -99,22 +106,21 @@ fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
             Box::new(Excite(Chirp::new(&chirp, period_s))),
         ));
     }
-    for kind in [
-        ExcitationKind::Chirp,
-        ExcitationKind::Multisine,
-        ExcitationKind::SteppedSine,
-        ExcitationKind::Prbs,
-    ] {
+    for &kind in ExcitationKind::ALL {
         programs.push((
             format!("{kind:?} by its settings"),
-            Box::new(Excite(of(&short(config, kind)))),
+            Box::new(Excite(short(config, kind).chosen_excitation().build())),
         ));
     }
     let mut campaign = config.campaign.clone();
     (campaign.settle_s, campaign.average_s) = (0.5, 0.5);
     programs.push((
         NO_CURRENT.into(),
-        Box::new(Excite(NoCurrent::new(&campaign, period_s))),
+        Box::new(Excite(ZeroCurrent::new(
+            campaign.settle_s,
+            campaign.average_s,
+            period_s,
+        ))),
     ));
     programs
 }
@@ -141,9 +147,9 @@ fn short(config: &Config, kind: ExcitationKind) -> Config {
         current_a: 0.2,
     }];
     let (multisine, prbs, sines) = (
-        &mut config.multisine,
-        &mut config.prbs,
-        &mut config.stepped_sine,
+        &mut config.excitations.multisine,
+        &mut config.excitations.prbs,
+        &mut config.excitations.stepped_sine,
     );
     (multisine.period_s, multisine.periods) = (0.1, 7);
     (

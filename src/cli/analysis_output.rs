@@ -6,7 +6,6 @@ use super::error::CliError;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
-use crate::excitation::{swept_words, words};
 use crate::experiment::{AnalysisError, analyse};
 use crate::identify::modal::MeasurementChain;
 use crate::recording::Recording;
@@ -37,8 +36,8 @@ pub(super) fn analyse_and_write(
         chain: MeasurementChain::bench(config),
         title: config.title.clone(),
         excitation: match analysis.closed {
-            Some(_) => swept_words(config),
-            None => words(config),
+            Some(_) => config.swept_reference_text(),
+            None => config.chosen_excitation().describe(),
         },
         rate_hz: config.servo.rate_hz,
     };

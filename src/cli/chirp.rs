@@ -17,7 +17,7 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, exit, run_text};
 use super::table::{labelled, wrap};
 use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
-use crate::excitation::{self, Extremes};
+use crate::excitation::Extremes;
 use crate::experiment::{self, Plan, RunSummary, abandon_on_signal};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
@@ -148,7 +148,10 @@ pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
 
 /// What the run will do, printed before it starts.
 fn plan_text(config: &Config, expected: &Expected) -> String {
-    let (words, travel_um) = (excitation::words(config), expected.travel_m * 1e6);
+    let (words, travel_um) = (
+        config.chosen_excitation().describe(),
+        expected.travel_m * 1e6,
+    );
     let plan = wrap(&format!("{words}; expected travel {travel_um:.0} um"), 0);
     plan + &unmodelled_text(config)
 }

@@ -1,6 +1,6 @@
 //! What a run would do, before it does it, and the amplitude that suits it.
 
-use std::f64::consts::PI;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use serde::Serialize;
@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
-use crate::config::{AmplitudePoint, Config, ExcitationKind};
-use crate::excitation::{CurrentLimit, Extremes, LARGEST_SPAN, of, shaped_amplitude, words};
-use crate::experiment::rig_model;
+use crate::config::{AmplitudePoint, Config};
+use crate::excitation::{CurrentLimit, Extremes, shaped_amplitude};
+use crate::experiment::extremes;
 use crate::identify::frf_csv;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 
@@ -73,12 +73,13 @@ pub(super) fn show(config: &Config, expected: &Expected, json: bool) -> Result<O
         thermal_current_a: config.motor.continuous_current_a(),
         slew_a_per_s: config.amplifier.slew_limit_a_per_s,
     };
-    let amplitude = match config.excitation.kind {
-        ExcitationKind::Prbs => &[],
-        _ => config.chirp.amplitude.as_slice(),
+    let chosen = config.chosen_excitation();
+    let amplitude = match chosen.design.has_amplitude_curve() {
+        true => config.chirp.amplitude.as_slice(),
+        false => &[],
     };
     let report = Report {
-        excitation: words(config),
+        excitation: chosen.describe(),
         expected,
         limits,
         amplitude,
@@ -124,45 +125,40 @@ pub(super) fn shape(
     source: Option<&str>,
     given: bool,
 ) -> Result<Config, CliError> {
-    let kind = config.excitation.kind;
-    let automatic = (kind == ExcitationKind::SteppedSine && !given).then_some("model");
+    let chosen = config.chosen_excitation();
+    let automatic = (chosen.design.is_shaped_by_default() && !given).then_some("model");
     let Some(source) = source.or(automatic) else {
         return Ok(config);
     };
-    if kind == ExcitationKind::Prbs {
-        let what = "--shape has no meaning for a binary sequence, which has one amplitude: set prbs.amplitude_a, or take another --excitation";
-        return Err(CliError::Usage(what.into()));
+    if !chosen.design.has_amplitude_curve() {
+        return Err(CliError::Usage(format!(
+            "--shape has no meaning for an excitation with one amplitude: set {}, or take another --excitation",
+            chosen.design.amplitude_key()
+        )));
     }
-    let response = if source == "model" {
-        by_model(&config)?
-    } else {
-        by_file(&config, Path::new(source))?
+    let response = match source {
+        "model" => by_model(&config)?,
+        path => by_file(&config, Path::new(path))?,
     };
-    let travel_m = config
-        .shape
-        .travel_m
-        .unwrap_or(config.interlock.soft_limit_m / 3.0);
-    let span = if kind == ExcitationKind::Multisine {
-        LARGEST_SPAN
-    } else {
-        f64::INFINITY
-    };
-    config.chirp.amplitude = shaped_amplitude(&response, travel_m, CurrentLimit::of(&config), span);
-    if kind == ExcitationKind::Multisine {
+    let default_m = config.interlock.soft_limit_m / 3.0;
+    let travel_m = config.shape.travel_m.unwrap_or(default_m);
+    let limit = CurrentLimit::new(&config.excitation_limits(), config.shape.current_ratio);
+    let span = chosen.design.max_span().unwrap_or(f64::INFINITY);
+    let is_broadband = chosen.design.is_broadband();
+    config.chirp.amplitude = shaped_amplitude(&response, travel_m, limit, span);
+    if is_broadband {
         lower_to(&mut config, travel_m)?;
     }
     Ok(config)
 }
 
-/// The lines of a multisine add up: all of them smaller, until the sum moves the stage no farther.
+/// Lowers all amplitudes of a broadband excitation, whose displacements add up, until it moves the stage by `travel_m`.
 fn lower_to(config: &mut Config, travel_m: f64) -> Result<(), CliError> {
-    let share =
-        (travel_m / Extremes::of(&of(config), config, &rig_model(config)?).travel_m).min(1.0);
-    config
-        .chirp
-        .amplitude
-        .iter_mut()
-        .for_each(|point| point.current_a *= share);
+    let excitation = config.chosen_excitation().build();
+    let ratio = (travel_m / extremes(&excitation, config)?.travel_m).min(1.0);
+    for point in &mut config.chirp.amplitude {
+        point.current_a *= ratio;
+    }
     Ok(())
 }
 
@@ -172,7 +168,7 @@ fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
     let chain = LoopPlant::with_mean_age(config, &modal.modes);
     let (low_hz, high_hz) = config.chirp.band_hz();
     let grid = (0..=GRID).map(|k| low_hz * libm::pow(high_hz / low_hz, k as f64 / GRID as f64));
-    let modes = modal.modes.iter().map(|mode| mode.omega_rad_s / (2.0 * PI));
+    let modes = modal.modes.iter().map(|mode| mode.omega_rad_s / (TAU));
     let mut frequencies: Vec<f64> = grid
         .chain(modes.filter(|f| (low_hz..high_hz).contains(f)))
         .collect();
@@ -180,7 +176,7 @@ fn by_model(config: &Config) -> Result<Vec<(f64, f64)>, CliError> {
     frequencies.dedup();
     Ok(frequencies
         .into_iter()
-        .map(|f| (f, chain.response(2.0 * PI * f).norm()))
+        .map(|f| (f, chain.response(TAU * f).norm()))
         .collect())
 }
 

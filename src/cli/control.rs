@@ -12,9 +12,8 @@ use super::outcome::Outcome;
 use super::output::print_text;
 use super::run_options::{close, exit, run_text};
 use super::table::labelled;
-use crate::config::{Config, Purpose, ReferenceSettings};
+use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
-use crate::excitation;
 use crate::experiment::{Measured, Plan, RunSummary, measure};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
@@ -63,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut run = args.run.run(&plan, "control")?;
     let report = RunSummary::of(&mut run)?;
     let completed = report.is_completed();
-    let swept = matches!(config.control.reference, ReferenceSettings::Chirp { .. });
+    let swept = config.control.reference.is_swept();
     let measured = match completed && !swept {
         true => measure(&Recording::open(&run.path)?, &config)?,
         false => None,
@@ -94,9 +93,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The step by the linear model, if the reference is one that happens.
 fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetrics> {
-    let ReferenceSettings::Step { amplitude_m, at_s } = config.control.reference else {
-        return None;
-    };
+    let step = config.control.reference.design().step()?;
+    let (amplitude_m, at_s) = (step.height_m, step.at_s);
     let after_s = config.control.duration_s - at_s;
     let ticks = ((after_s * config.servo.rate_hz) as usize).min(PREDICTED_TICKS);
     let positions = closed_loop.simulate(ticks, |_| amplitude_m);
@@ -123,29 +121,12 @@ fn plan_text(config: &Config, predicted: &Predicted, expected: Option<&Expected>
 
 /// The reference, and how long the loop is closed.
 fn reference_text(config: &Config) -> String {
-    let um = |metres: f64| format!("{} um", (metres * 1e9).round() / 1e3);
     let duration_s = config.control.duration_s;
-    let reference = match &config.control.reference {
-        ReferenceSettings::Hold => "the position at rest".to_string(),
-        ReferenceSettings::Step { amplitude_m, at_s } => {
-            format!("step of {} at {at_s} s", um(*amplitude_m))
-        }
-        ReferenceSettings::Ramp {
-            amplitude_m,
-            speed_m_per_s,
-            at_s,
-        } => format!(
-            "ramp to {} at {}/s from {at_s} s",
-            um(*amplitude_m),
-            um(*speed_m_per_s)
-        ),
-        ReferenceSettings::Sine {
-            amplitude_m,
-            frequency_hz,
-        } => format!("sine of {} at {frequency_hz} Hz", um(*amplitude_m)),
-        ReferenceSettings::Chirp { .. } => return excitation::swept_words(config),
-        ReferenceSettings::File { path } => format!("the file {path}"),
-    };
+    let reference = &config.control.reference;
+    if reference.is_swept() {
+        return config.swept_reference_text();
+    }
+    let reference = reference.design().describe();
     format!("{reference}; the loop is closed for {duration_s} s")
 }
 

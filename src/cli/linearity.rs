@@ -15,7 +15,6 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::{labelled, table, wrap};
 use crate::config::{Config, OptionSetting, Purpose};
-use crate::excitation;
 use crate::experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
@@ -188,7 +187,9 @@ fn report(runs: Vec<AmplitudeRun>, all_completed: bool) -> Report {
 }
 
 fn text(report: &Report, plans: &[AmplitudePlan]) -> String {
-    let kind = plans.first().map(|plan| excitation::words(&plan.config));
+    let kind = plans
+        .first()
+        .map(|plan| plan.config.chosen_excitation().describe());
     let runs = report.runs.iter().zip(plans);
     let runs: String = runs
         .map(|(run, plan)| amplitude_text(run, &plan.config))

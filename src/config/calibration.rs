@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::excitation::StaircaseSteps;
+
 /// The static steps of `bench calibrate`, and the chirp that it measures the delay by.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -33,6 +35,19 @@ pub struct CalibrateSettings {
     /// Largest distance between the ways up and down, as a ratio of the whole travel.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub largest_hysteresis_ratio: f64,
+}
+
+impl CalibrateSettings {
+    /// The steps of current.
+    pub fn steps(&self) -> StaircaseSteps {
+        StaircaseSteps {
+            amplitude_a: self.amplitude_a,
+            levels: self.levels,
+            ramp_s: self.ramp_s,
+            settle_s: self.settle_s,
+            average_s: self.average_s,
+        }
+    }
 }
 
 /// By what the probe's scale is known.

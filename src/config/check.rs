@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
+use super::renamed::new_name;
 use crate::util::finding::Finding;
 use crate::util::nearest::nearest;
 use crate::util::quantity::{Dimension, Quantity};
@@ -159,7 +160,7 @@ fn table(
     for (key, value) in entries {
         match properties.get(key).or(named) {
             Some(schema) => node(root, schema, value, &join(path, key), out),
-            None => out.add(&join(path, key), unknown_key(key, properties)),
+            None => unknown_key(path, key, properties, out),
         }
     }
     let required = keywords
@@ -257,12 +258,15 @@ fn tag_of(variant: &Json) -> Option<String> {
         .map(|(key, _)| key.clone())
 }
 
-fn unknown_key(key: &str, properties: &Map<String, Json>) -> String {
+fn unknown_key(path: &str, key: &str, properties: &Map<String, Json>, out: &mut Findings) {
+    let path = join(path, key);
     let nearest = nearest(key, properties.keys().map(String::as_str));
-    match nearest {
-        Some(nearest) => format!("is not a setting; the nearest is `{nearest}`"),
-        None => "is not a setting; this table has none".into(),
-    }
+    let what = match (new_name(&path), nearest) {
+        (Some(new), _) => format!("is an earlier name; it is called `{new}` now"),
+        (None, Some(nearest)) => format!("is not a setting; the nearest is `{nearest}`"),
+        (None, None) => "is not a setting; this table has none".into(),
+    };
+    out.add(&path, what);
 }
 
 fn not_one_of(given: &str, words: &[&str]) -> String {

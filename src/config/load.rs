@@ -1,24 +1,32 @@
 //! From layers of TOML to a checked [`Config`].
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
 use super::check;
+use super::cross_checks::cross_checks;
+use super::error::ConfigError;
 use super::layer::{Layer, lay, same_kind};
 use super::overrides::{
     OptionSetting, convert_quantities, in_terms_of_option, options_table, sets,
 };
 use super::place::line_of;
 use super::profiles::{self, EmbeddedFile};
-use super::{Config, IdentifySettings, ReferenceSettings, TravelPoint, excited, relations, schema};
+use super::{Config, renamed, schema};
 use crate::util::finding::Finding;
 
-/// Longest excitation in ticks, over an hour at 5 kHz: it is analysed as one record, in some 80 bytes a tick.
-const CHIRP_TICKS: f64 = 2e7;
-
-/// What a person asked for: a profile or file, and single settings over it.
+/// A profile or file, and single settings over it.
+///
+/// ```
+/// use bench::config::{Source, load};
+///
+/// let sets = vec!["loop.rate_hz=1000".to_string()];
+/// let config = load(&Source { sets, ..Source::default() })?;
+/// assert_eq!(config.servo.period_s(), 1e-3);
+/// # Ok::<(), bench::config::ConfigError>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     /// A profile's name or the path of a TOML file; the default profile if absent.
@@ -27,11 +35,11 @@ pub struct Source {
     pub sets: Vec<String>,
     /// Settings that command-line options stand for, over all of `sets`.
     pub options: Vec<OptionSetting>,
-    /// What it is for.
+    /// Its use.
     pub purpose: Purpose,
 }
 
-/// What a configuration is for: relations between settings that a command does not use do not stand in its way.
+/// The use of a configuration: relations between settings that the command does not use are not checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Purpose {
     /// Models, margins, replay.
@@ -41,65 +49,13 @@ pub enum Purpose {
     Chirp,
     /// A closed loop.
     Control,
-    /// Whatever may come.
+    /// All commands.
     All,
 }
 
 impl Purpose {
-    fn includes(self, other: Purpose) -> bool {
+    pub(super) fn includes(self, other: Purpose) -> bool {
         self == other || self == Purpose::All
-    }
-}
-
-/// Why a configuration is refused. Nothing has moved yet when it is.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ConfigError {
-    /// Neither a profile nor a file.
-    #[error("no {what} and no file is called `{name}`; {}a file is named with its path", if known.is_empty() { String::new() } else { format!("there are {known}; ") })]
-    NotFound {
-        /// Profile or controller.
-        what: &'static str,
-        /// What was asked for.
-        name: String,
-        /// The names there are.
-        known: String,
-    },
-    /// The file is there but cannot be read.
-    #[error("cannot read {path}: {why}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The system's words.
-        why: String,
-    },
-    /// The text is not TOML.
-    #[error("{place} is not TOML: {why}")]
-    Syntax {
-        /// File or flag.
-        place: String,
-        /// The parser's words, with line and column.
-        why: String,
-    },
-    /// Keys, types, ranges or their combination are wrong.
-    #[error("refused:\n{}", .0.join("\n"))]
-    Refused(
-        /// A line a finding, with its place.
-        Vec<String>,
-    ),
-}
-
-impl ConfigError {
-    /// The file, line or option that is wrong; of several the first.
-    pub fn place(&self) -> Option<String> {
-        match self {
-            ConfigError::NotFound { name, .. } => Some(name.clone()),
-            ConfigError::Unreadable { path, .. } => Some(path.display().to_string()),
-            ConfigError::Syntax { place, .. } => Some(place.clone()),
-            ConfigError::Refused(findings) => {
-                let (place, _) = findings.first()?.split_once(": `")?;
-                Some(place.trim().to_string())
-            }
-        }
     }
 }
 
@@ -126,7 +82,9 @@ pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
         base.table.retain(|key, _| LATER.contains(&key));
         layers.push(base);
     }
-    layers.push(Layer::parse(name.to_string(), text.to_string())?);
+    let mut recorded = Layer::parse(name.to_string(), text.to_string())?;
+    renamed::translate(&mut recorded.table);
+    layers.push(recorded);
     checked(&layers, &[], Purpose::Model)
 }
 
@@ -287,172 +245,4 @@ where
     refuse(std::slice::from_ref(&layer), &[], findings, &schema, &value)?;
     let typed: Result<T, toml::de::Error> = value.try_into();
     typed.map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
-}
-
-/// What no single setting can say: relations between settings.
-fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
-    let mut relations = Relations(relations::plant(config));
-    relations.rig(config);
-    let swept = matches!(config.control.reference, ReferenceSettings::Chirp { .. });
-    if purpose.includes(Purpose::Chirp) || swept && purpose.includes(Purpose::Control) {
-        relations.chirp(config);
-        relations.identify(config);
-    }
-    if purpose.includes(Purpose::Control) {
-        relations.control(config);
-    }
-    relations.0
-}
-
-struct Relations(Vec<Finding>);
-
-impl Relations {
-    fn must(&mut self, good: bool, path: &str, what: String) {
-        if !good {
-            self.0.push(Finding {
-                path: path.into(),
-                what,
-                missing: false,
-            });
-        }
-    }
-
-    fn rig(&mut self, config: &Config) {
-        let (soft_m, stop_m, seen_m) = (
-            config.interlock.soft_limit_m,
-            config.sim.stop_m,
-            config.probe.range_m / 2.0,
-        );
-        let path = "interlock.soft_limit_m";
-        self.must(
-            soft_m < stop_m,
-            path,
-            format!("is {soft_m} m; it must lie inside the stop at {stop_m} m"),
-        );
-        self.must(
-            soft_m <= seen_m,
-            path,
-            format!(
-                "is {soft_m} m, beyond what the probe sees, {seen_m} m (half of probe.range_m)"
-            ),
-        );
-        let (continuous_n, peak_n) = (config.motor.continuous_force_n, config.motor.peak_force_n);
-        let what = format!("is {continuous_n} N, above the peak force of {peak_n} N");
-        self.must(continuous_n <= peak_n, "motor.continuous_force_n", what);
-        let (stale_s, period_s) = (config.interlock.probe_stale_s, config.servo.period_s());
-        let what = format!("is {stale_s} s, shorter than a tick of {period_s} s");
-        self.must(stale_s >= period_s, "interlock.probe_stale_s", what);
-        let oldest_s = config.probe.age_at_arrival_s()
-            + config.probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
-        let what = format!(
-            "is {stale_s} s, but a reading may be {oldest_s} s old before the next one (probe.latency_s, transport_s, rate_hz)"
-        );
-        self.must(stale_s > oldest_s, "interlock.probe_stale_s", what);
-    }
-
-    fn chirp(&mut self, config: &Config) {
-        let (chirp, nyquist_hz) = (&config.chirp, config.servo.rate_hz / 2.0);
-        let (start_hz, stop_hz) = (chirp.start_hz, chirp.stop_hz);
-        let what = format!(
-            "is {stop_hz} Hz, but the sweep starts at {start_hz} Hz; a sweep needs two frequencies"
-        );
-        self.must(start_hz != stop_hz, "chirp.stop_hz", what);
-        for (path, hz) in [("chirp.start_hz", start_hz), ("chirp.stop_hz", stop_hz)] {
-            let what =
-                format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz");
-            self.must(hz < nyquist_hz, path, what);
-            let seen_hz = config.probe.rate_hz.unwrap_or(f64::INFINITY) / 2.0;
-            let what =
-                format!("is {hz} Hz; the probe sees frequencies below half its rate, {seen_hz} Hz");
-            self.must(hz < seen_hz, path, what);
-        }
-        let (ticks, path, value) = excited::ticks(config);
-        let unit = if path.ends_with("_s") { " s" } else { "" };
-        let what = format!(
-            "is {value}{unit}, with the quiet before and after {ticks} ticks; {CHIRP_TICKS} can be analysed as one record: shorten it or lower loop.rate_hz"
-        );
-        self.must(ticks <= CHIRP_TICKS, path, what);
-        self.0.extend(excited::excitation(config));
-        let fades_s = chirp.fade_in_s + chirp.fade_out_s;
-        let what = format!(
-            "is {} s, shorter than both fades, {fades_s} s",
-            chirp.duration_s
-        );
-        self.must(fades_s <= chirp.duration_s, "chirp.duration_s", what);
-        let rising = chirp
-            .amplitude
-            .windows(2)
-            .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
-        self.must(
-            rising,
-            "chirp.amplitude",
-            "has frequencies that do not rise from point to point".into(),
-        );
-    }
-
-    /// A swept reference.
-    fn swept(&mut self, config: &Config, amplitude: &[TravelPoint], travel_m: f64) {
-        let soft_m = config.interlock.soft_limit_m;
-        let largest_m = amplitude
-            .iter()
-            .map(|point| point.amplitude_m)
-            .fold(travel_m, f64::max);
-        let what = format!(
-            "reaches {largest_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)"
-        );
-        self.must(largest_m <= soft_m, "control.reference", what);
-        let rising = amplitude
-            .windows(2)
-            .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
-        let what = "has frequencies that do not rise from point to point";
-        self.must(rising, "control.reference.amplitude", what.into());
-    }
-
-    fn identify(&mut self, config: &Config) {
-        let IdentifySettings::Local(local) = &config.identify else {
-            return;
-        };
-        let rising = local
-            .resolution
-            .windows(2)
-            .all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
-        self.must(
-            rising,
-            "identify.resolution",
-            "has frequencies that do not rise from point to point".into(),
-        );
-    }
-
-    fn control(&mut self, config: &Config) {
-        let nyquist_hz = config.servo.rate_hz / 2.0;
-        let path = "control.reference.amplitude_m";
-        let soft_m = config.interlock.soft_limit_m;
-        match config.control.reference {
-            ReferenceSettings::Step { amplitude_m, .. }
-            | ReferenceSettings::Ramp { amplitude_m, .. }
-            | ReferenceSettings::Sine { amplitude_m, .. } => {
-                let what = format!(
-                    "is {amplitude_m} m, beyond the soft limit of {soft_m} m (interlock.soft_limit_m)"
-                );
-                self.must(amplitude_m.abs() <= soft_m, path, what);
-            }
-            ReferenceSettings::Chirp {
-                ref amplitude,
-                travel_m,
-            } => {
-                self.swept(config, amplitude, travel_m);
-            }
-            ReferenceSettings::Hold | ReferenceSettings::File { .. } => {}
-        }
-        if let ReferenceSettings::Sine { frequency_hz, .. } = config.control.reference {
-            let what = format!(
-                "is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz"
-            );
-            self.must(
-                frequency_hz < nyquist_hz,
-                "control.reference.frequency_hz",
-                what,
-            );
-        }
-    }
 }

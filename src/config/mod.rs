@@ -15,11 +15,11 @@
 mod calibration;
 mod campaign;
 mod check;
-mod chirp;
 mod control;
+mod cross_checks;
 mod devices;
+mod error;
 mod excitation;
-mod excited;
 mod identify;
 mod interlock;
 mod layer;
@@ -28,21 +28,26 @@ mod overrides;
 mod place;
 pub mod profiles;
 mod relations;
+mod renamed;
 mod rig;
 mod servo;
 mod settings;
 mod signal_path;
 mod sim;
 
+pub use crate::excitation::{
+    AmplitudePoint, ChirpSettings, ExcitationKind, Lines, MultisineSettings, PrbsSettings,
+    ReferenceSettings, Spacing, SteppedSineSettings, Sweep, TravelPoint,
+};
 pub use calibration::*;
 pub use campaign::*;
-pub use chirp::*;
 pub use control::*;
 pub use devices::*;
+pub use error::ConfigError;
 pub use excitation::*;
 pub use identify::*;
 pub use interlock::*;
-pub use load::{ConfigError, Purpose, Source, load, whole};
+pub use load::{Purpose, Source, load, whole};
 pub(crate) use load::{text_of, text_of_file, typed, validate};
 pub use overrides::OptionSetting;
 pub use rig::*;

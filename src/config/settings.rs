@@ -1,4 +1,5 @@
-//! The settings as a whole. The ranges of each stand at its type and nowhere else.
+//! All settings. The range of each stands at its type and nowhere else; a flattened table excludes `deny_unknown_fields`, so
+//! that the schema refuses unknown tables.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,21 +7,20 @@ use serde::{Deserialize, Serialize};
 use super::PlantSettings;
 use super::calibration::{CalibrateSettings, CalibrationSettings};
 use super::campaign::CampaignSettings;
-use super::chirp::ChirpSettings;
 use super::control::ControlSettings;
-use super::excitation::{
-    ExcitationSettings, MultisineSettings, PrbsSettings, ShapeSettings, SteppedSineSettings,
-};
+use super::excitation::{ExcitationSettings, ShapeSettings};
 use super::identify::IdentifySettings;
 use super::interlock::InterlockSettings;
 use super::rig::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::servo::LoopSettings;
 use super::sim::SimSettings;
+use crate::excitation::{
+    ChirpSettings, ChosenExcitation, ExcitationTables, Limits, SharedSettings,
+};
 
 /// Everything a run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(title = "bench configuration")]
+#[schemars(title = "bench configuration", extend("additionalProperties" = false))]
 pub struct Config {
     /// What this configuration is, in words.
     pub title: String,
@@ -43,12 +43,9 @@ pub struct Config {
     pub excitation: ExcitationSettings,
     /// The chirp; and band, quiet, fades and amplitude over frequency of every excitation.
     pub chirp: ChirpSettings,
-    /// The multisine.
-    pub multisine: MultisineSettings,
-    /// The stepped sine.
-    pub stepped_sine: SteppedSineSettings,
-    /// The pseudo-random binary sequence.
-    pub prbs: PrbsSettings,
+    /// The tables of the other excitations.
+    #[serde(flatten)]
+    pub excitations: ExcitationTables,
     /// What `bench chirp --shape` aims at.
     pub shape: ShapeSettings,
     /// How the frequency response is estimated.
@@ -59,6 +56,41 @@ pub struct Config {
     pub calibrate: CalibrateSettings,
     /// The calibration that runs use.
     pub calibration: CalibrationSettings,
-    /// How a person loads the stage between the points of a campaign.
+    /// How the operator loads the stage between the points of a campaign.
     pub campaign: CampaignSettings,
+}
+
+impl Config {
+    /// The excitation of `excitation.kind`.
+    pub fn chosen_excitation(&self) -> ChosenExcitation<'_> {
+        ChosenExcitation {
+            design: self.excitations.design(self.excitation.kind),
+            shared: SharedSettings {
+                chirp: &self.chirp,
+                rate_hz: self.servo.rate_hz,
+            },
+        }
+    }
+
+    /// The swept reference of a closed loop in words.
+    pub fn swept_reference_text(&self) -> String {
+        let (chirp, controller) = (&self.chirp, &self.control.controller);
+        format!(
+            "under the {controller} controller, reference swept {} to {} Hz in {} s",
+            chirp.start_hz, chirp.stop_hz, chirp.duration_s
+        )
+    }
+
+    /// What an excitation must keep within.
+    pub fn excitation_limits(&self) -> Limits {
+        Limits {
+            travel_m: self.interlock.soft_limit_m,
+            peak_current_a: self.motor.peak_current_a(),
+            amplifier_current_a: self.amplifier.current_limit_a,
+            continuous_current_a: self.motor.continuous_current_a(),
+            slew_a_per_s: self.amplifier.slew_limit_a_per_s,
+            thermal_time_constant_s: self.motor.thermal_time_constant_s,
+            period_s: self.servo.period_s(),
+        }
+    }
 }

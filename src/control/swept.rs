@@ -10,7 +10,7 @@
 
 use super::ClosedLoop;
 use crate::config::{ChirpSettings, TravelPoint};
-use crate::excitation::Amplitude;
+use crate::excitation::AmplitudeCurve;
 use crate::util::units::rad_s;
 
 /// Points over the band; a configuration holds 64.
@@ -34,7 +34,7 @@ pub fn swept_reference_amplitudes(
     closed_loop: &ClosedLoop,
     limits: &SweptLimits<'_>,
 ) -> Vec<TravelPoint> {
-    let command = Amplitude::new(&limits.chirp.amplitude);
+    let command = AmplitudeCurve::of_current(&limits.chirp.amplitude);
     let (low_hz, high_hz) = limits.chirp.band_hz();
     let frequency_hz = |x: f64| low_hz * libm::pow(high_hz / low_hz, x);
     let allowed_m = |x: f64| allowed_m(closed_loop, &command, limits.travel_m, frequency_hz(x));
@@ -61,7 +61,7 @@ fn neighbourhood(point: usize) -> impl Iterator<Item = f64> {
 /// The largest amplitude of the reference for which neither command nor position exceeds its own.
 fn allowed_m(
     closed_loop: &ClosedLoop,
-    command: &Amplitude,
+    command: &AmplitudeCurve,
     travel_m: f64,
     frequency_hz: f64,
 ) -> f64 {

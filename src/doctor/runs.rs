@@ -3,7 +3,7 @@
 use super::finding::{Finding, Subject};
 use crate::config::Config;
 use crate::control::Margins;
-use crate::excitation::{self, Excitation};
+use crate::excitation::Excitation;
 use crate::rig::devices;
 
 /// The results of the commands' own checks.
@@ -19,7 +19,8 @@ pub struct RunChecks {
 pub fn longest_ticks(config: &Config) -> u64 {
     let control_s = config.control.settle_s + config.control.duration_s;
     let control_ticks = (control_s * config.servo.rate_hz).ceil() as u64;
-    excitation::of(config).ticks().max(control_ticks)
+    let excitation = config.chosen_excitation().build();
+    excitation.ticks().max(control_ticks)
 }
 
 /// Amplifier and probe must both be devices, or both simulated.

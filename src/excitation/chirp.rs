@@ -1,118 +1,89 @@
-//! A sine of rising (or falling) frequency, by its integrated phase.
-//!
-//! ```text
-//!  u(t) = A(f(t)) e(t) (sin phi(t) - m)        phi(t) = 2 pi integral of f from 0 to t
-//!  linear       f = f0 + (f1 - f0) t/T         phi = 2 pi (f0 t + (f1 - f0) t^2/(2 T))
-//!  logarithmic  f = f0 exp(k t), k = ln(f1/f0)/T      phi = 2 pi f0 (exp(k t) - 1)/k
-//! ```
-//!
-//! (sin(2 pi f(t) t) would end at 2 f1 - f0.) e(t) is the cosine fade at both ends, A the amplitude over frequency, and m the
-//! constant that makes the sum over all ticks zero, so that neither motor nor stage is left with an impulse.
+//! The chirp: a swept sine as current, once or several times.
 
-use std::f64::consts::PI;
+use super::amplitude::AmplitudeCurve;
+use super::design::{ExcitationDesign, Length, SharedSettings};
+use super::repeated::Repeated;
+use super::sweep::{ChirpSettings, Sweep, SweptSine};
+use super::waveform::Excitation;
 
-use super::Excitation;
-use super::envelope::{Amplitude, fade};
-use crate::config::{ChirpSettings, Sweep};
-
-/// A chirp with quiet before and after.
+/// A chirp with quiet before and after, in amperes.
 #[derive(Clone, Debug)]
-pub struct Chirp {
-    settings: ChirpSettings,
-    amplitude: Amplitude,
-    period_s: f64,
-    start_tick: u64,
-    sweep_ticks: u64,
-    ticks: u64,
-    rate: f64,
-    mean: f64,
-}
+pub struct Chirp(SweptSine);
 
 impl Chirp {
-    /// The chirp of the settings at a period of the loop.
+    /// The chirp of the settings for a loop of this period.
     pub fn new(settings: &ChirpSettings, period_s: f64) -> Chirp {
-        let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
-        let (start_tick, sweep_ticks) =
-            (ticks(settings.quiet_before_s), ticks(settings.duration_s));
-        let mut chirp = Chirp {
-            amplitude: Amplitude::new(&settings.amplitude),
-            period_s,
-            start_tick,
-            sweep_ticks,
-            ticks: start_tick + sweep_ticks + ticks(settings.quiet_after_s),
-            rate: match settings.sweep {
-                Sweep::Linear => (settings.stop_hz - settings.start_hz) / settings.duration_s,
-                Sweep::Logarithmic => {
-                    libm::log(settings.stop_hz / settings.start_hz) / settings.duration_s
-                }
-            },
-            mean: 0.0,
-            settings: settings.clone(),
-        };
-        let (sum, weight) = (0..sweep_ticks).fold((0.0, 0.0), |(sum, weight), tick| {
-            let (envelope, sine) = chirp.parts(tick as f64 * period_s);
-            (sum + envelope * sine, weight + envelope)
-        });
-        chirp.mean = if weight > 0.0 { sum / weight } else { 0.0 };
-        chirp
+        let amplitude = AmplitudeCurve::of_current(&settings.amplitude);
+        Chirp(SweptSine::new(settings, amplitude, period_s))
     }
 
-    /// The instantaneous frequency in hertz at a time in seconds after the sweep's start.
+    /// The instantaneous frequency in hertz at a time in seconds after the start of the sweep.
     pub fn frequency_hz(&self, time_s: f64) -> f64 {
-        match self.settings.sweep {
-            Sweep::Linear => self.settings.start_hz + self.rate * time_s,
-            Sweep::Logarithmic => self.settings.start_hz * libm::exp(self.rate * time_s),
-        }
-    }
-
-    /// Envelope A(f) e(t) and sin phi at a time after the sweep's start.
-    fn parts(&self, time_s: f64) -> (f64, f64) {
-        let s = &self.settings;
-        let (ln_frequency, phase) = match s.sweep {
-            Sweep::Linear => (
-                libm::log(s.start_hz + self.rate * time_s),
-                s.start_hz * time_s + 0.5 * self.rate * time_s * time_s,
-            ),
-            Sweep::Logarithmic => {
-                let ln = libm::log(s.start_hz) + self.rate * time_s;
-                (ln, s.start_hz * libm::expm1(self.rate * time_s) / self.rate)
-            }
-        };
-        let fade = fade(time_s, s.fade_in_s) * fade(s.duration_s - time_s, s.fade_out_s);
-        (
-            fade * self.amplitude.at(ln_frequency),
-            libm::sin(2.0 * PI * (phase - libm::floor(phase))),
-        )
+        self.0.frequency_hz(time_s)
     }
 }
 
 impl Excitation for Chirp {
     fn current_a(&self, tick: u64) -> f64 {
-        if !self.active(tick) {
-            return 0.0;
-        }
-        let (envelope, sine) = self.parts((tick - self.start_tick) as f64 * self.period_s);
-        envelope * (sine - self.mean)
-    }
-
-    fn active(&self, tick: u64) -> bool {
-        (self.start_tick..self.start_tick + self.sweep_ticks).contains(&tick)
+        self.0.at(tick)
     }
 
     fn ticks(&self) -> u64 {
-        self.ticks
+        self.0.ticks()
+    }
+
+    fn active(&self, tick: u64) -> bool {
+        self.0.active(tick)
     }
 
     fn frequency_at_hz(&self, tick: u64) -> Option<f64> {
-        let time_s = tick.saturating_sub(self.start_tick) as f64 * self.period_s;
-        Some(self.frequency_hz(time_s.min(self.settings.duration_s)))
+        Some(self.0.frequency_at_hz(tick))
+    }
+}
+
+/// The chirp as a kind of excitation: all its settings are the shared ones.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ChirpDesign;
+
+impl ExcitationDesign for ChirpDesign {
+    fn describe(&self, shared: &SharedSettings<'_>) -> String {
+        let chirp = shared.chirp;
+        let sweep = match chirp.sweep {
+            Sweep::Linear => "linear",
+            Sweep::Logarithmic => "logarithmic",
+        };
+        let times = match chirp.repetitions {
+            0 | 1 => String::new(),
+            several => format!(", {several} times"),
+        };
+        let (band, duration_s) = (shared.band(), chirp.duration_s);
+        format!("{sweep} chirp, {band} in {duration_s} s{times}")
+    }
+
+    fn length(&self, shared: &SharedSettings<'_>) -> Length {
+        let chirp = shared.chirp;
+        let once_s = shared.quiet_s() + chirp.duration_s;
+        Length {
+            ticks: once_s * f64::from(chirp.repetitions) * shared.rate_hz,
+            key: "chirp.duration_s",
+            value: chirp.duration_s,
+        }
+    }
+
+    fn build(&self, shared: &SharedSettings<'_>) -> Box<dyn Excitation> {
+        let chirp = Chirp::new(shared.chirp, shared.period_s());
+        match shared.chirp.repetitions {
+            0 | 1 => Box::new(chirp),
+            several => Box::new(Repeated::new(chirp, several)),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{AmplitudePoint, Source, load};
+    use crate::config::{Source, load};
+    use crate::excitation::AmplitudePoint;
 
     const PERIOD_S: f64 = 2e-4;
 
@@ -156,12 +127,12 @@ mod tests {
     }
 
     #[test]
-    fn the_frequency_that_is_heard_ends_at_the_stop_frequency() {
+    fn the_measured_frequency_ends_at_the_stop_frequency() {
         for sweep in [Sweep::Linear, Sweep::Logarithmic] {
             for (start_hz, stop_hz) in [(5.0, 400.0), (300.0, 20.0)] {
                 let chirp = Chirp::new(&settings(sweep, start_hz, stop_hz), PERIOD_S);
                 for time_s in [2.0, 5.0, 8.0] {
-                    let heard_hz =
+                    let measured_hz =
                         crossings_per_second(&chirp, 0.5 + time_s - 0.5, 0.5 + time_s + 0.5) / 2.0;
                     // Mean frequency over the second: from the phase's closed form; one crossing in the second may be missed.
                     let steps = 1000;
@@ -174,8 +145,8 @@ mod tests {
                         .sum::<f64>()
                         / f64::from(steps);
                     assert!(
-                        (heard_hz - mean_hz).abs() <= 1.01,
-                        "{sweep:?} {start_hz}-{stop_hz} at {time_s}: {heard_hz} for {mean_hz}"
+                        (measured_hz - mean_hz).abs() <= 1.01,
+                        "{sweep:?} {start_hz}-{stop_hz} at {time_s}: {measured_hz} for {mean_hz}"
                     );
                 }
                 assert!((chirp.frequency_hz(10.0) / stop_hz - 1.0).abs() < 1e-12);
@@ -220,7 +191,6 @@ mod tests {
                 current_a: 0.01,
             },
         ];
-        let chirp = Chirp::new(&s, PERIOD_S);
         // Two decades down over one decade up: A = (10 Hz/f)^2.
         for (frequency_hz, amplitude_a) in [
             (5.0, 1.0),
@@ -230,7 +200,7 @@ mod tests {
             (100.0, 0.01),
             (200.0, 0.01),
         ] {
-            let ours = chirp.amplitude.at(libm::log(frequency_hz));
+            let ours = AmplitudeCurve::of_current(&s.amplitude).at(libm::log(frequency_hz));
             assert!(
                 (ours / amplitude_a - 1.0).abs() < 1e-12,
                 "{frequency_hz}: {ours}"

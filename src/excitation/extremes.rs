@@ -1,8 +1,7 @@
-//! What an excitation would do to stage and motor, by the model.
+//! The extremes of current and travel of an excitation, by the model of the plant.
 
-use super::Excitation;
-use crate::config::Config;
-use crate::model::plant::DiscretePlant;
+use super::limits::Limits;
+use super::waveform::Excitation;
 
 /// The extremes of an excitation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,46 +23,70 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// Runs the whole excitation through the model of the plant.
+    /// Runs the whole excitation. `position_m` is the model of the plant: it takes the command of each tick and returns the
+    /// position after it.
     pub fn of(
         excitation: &(impl Excitation + ?Sized),
-        config: &Config,
-        plant: &DiscretePlant,
+        limits: &Limits,
+        mut position_m: impl FnMut(f64) -> f64,
     ) -> Extremes {
-        let mut motion = plant.at_rest();
-        let course = (0..excitation.ticks()).map(|tick| {
+        let signals = (0..excitation.ticks()).map(|tick| {
             let command_a = excitation.current_a(tick);
-            plant.step(&mut motion, command_a, |_| 0.0);
-            (command_a, plant.position_m(&motion))
+            (command_a, position_m(command_a))
         });
-        Extremes::over(course, config)
+        Extremes::over(signals, limits)
     }
 
-    /// Of a course of command (A) and position (m), one pair a tick.
-    pub fn over(course: impl Iterator<Item = (f64, f64)>, config: &Config) -> Extremes {
-        let period_s = config.servo.period_s();
-        let cooling = period_s / config.motor.thermal_time_constant_s;
-        let (mut before_a, mut square_a2, mut heat_a2, mut ticks) = (0.0, 0.0, 0.0, 0);
-        let mut extremes = Extremes::default();
-        for (tick, (command_a, position_m)) in (0..).zip(course) {
-            extremes.current_a = extremes.current_a.max(command_a.abs());
-            extremes.slew_a_per_s = extremes
-                .slew_a_per_s
-                .max((command_a - before_a).abs() / period_s);
-            before_a = command_a;
-            square_a2 += command_a * command_a;
-            heat_a2 += cooling * (command_a * command_a - heat_a2);
-            extremes.thermal_a = extremes.thermal_a.max(heat_a2.sqrt());
-            if position_m.abs() > extremes.travel_m {
-                (extremes.travel_m, extremes.travel_tick) = (position_m.abs(), tick);
-            }
-            ticks = tick + 1;
-        }
-        let rms_current_a = (square_a2 / ticks.max(1) as f64).sqrt();
+    /// Of command (A) and position (m), one pair a tick.
+    pub fn over(signals: impl Iterator<Item = (f64, f64)>, limits: &Limits) -> Extremes {
+        let period_s = limits.period_s;
+        let mut running = RunningExtremes::new(limits);
+        signals.for_each(|(command_a, position_m)| running.push(command_a, position_m));
+        let ticks = running.ticks;
         Extremes {
-            rms_current_a,
+            rms_current_a: (running.square_a2 / ticks.max(1) as f64).sqrt(),
             duration_s: ticks as f64 * period_s,
-            ..extremes
+            ..running.extremes
         }
+    }
+}
+
+/// Extremes of the ticks so far.
+struct RunningExtremes {
+    extremes: Extremes,
+    period_s: f64,
+    cooling: f64,
+    before_a: f64,
+    square_a2: f64,
+    heat_a2: f64,
+    ticks: u64,
+}
+
+impl RunningExtremes {
+    fn new(limits: &Limits) -> RunningExtremes {
+        RunningExtremes {
+            extremes: Extremes::default(),
+            period_s: limits.period_s,
+            cooling: limits.period_s / limits.thermal_time_constant_s,
+            before_a: 0.0,
+            square_a2: 0.0,
+            heat_a2: 0.0,
+            ticks: 0,
+        }
+    }
+
+    fn push(&mut self, command_a: f64, position_m: f64) {
+        let extremes = &mut self.extremes;
+        let slew_a_per_s = (command_a - self.before_a).abs() / self.period_s;
+        extremes.current_a = extremes.current_a.max(command_a.abs());
+        extremes.slew_a_per_s = extremes.slew_a_per_s.max(slew_a_per_s);
+        self.before_a = command_a;
+        self.square_a2 += command_a * command_a;
+        self.heat_a2 += self.cooling * (command_a * command_a - self.heat_a2);
+        extremes.thermal_a = extremes.thermal_a.max(self.heat_a2.sqrt());
+        if position_m.abs() > extremes.travel_m {
+            (extremes.travel_m, extremes.travel_tick) = (position_m.abs(), self.ticks);
+        }
+        self.ticks += 1;
     }
 }

@@ -1,7 +1,7 @@
-//! A Fourier transform that is the same on every machine, bit for bit: a replay makes the same multisine again.
+//! A Fourier transform that gives the same bits on every machine: a replay must make the same multisine again.
 //!
-//! The crates' transforms choose their kernel by the processor and their twiddles come from the platform's libm. This one has
-//! neither choice, and runs a few times before a run.
+//! The transforms of the crates choose their kernel by the processor and take their twiddle factors from the platform's libm.
+//! This one does neither; it is executed a few times before a run.
 //!
 //! ```text
 //! X_k = sum_n x_n exp(2 pi i k n / N)        N a power of two: Cooley, Tukey

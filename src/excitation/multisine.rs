@@ -4,20 +4,105 @@
 //!  u(n) = sum over lines k of a_k cos(2 pi k n/N + phi_k)        a_k in the shape of A(k rate/N), max |u| = largest A in the band
 //! ```
 //!
-//! The phases are drawn at random, and then moved so that the sum's peak falls: clip the signal, keep the phases of what is
-//! left, give the lines their amplitudes back, again (Van der Ouderaa, Schoukens, Renneboog, IEEE Trans. Instrum. Meas. 37, 1988).
+//! The phases are drawn at random and then optimised for a low peak of the sum: clip the signal, keep the phases of the
+//! clipped signal, restore the amplitudes, repeat (Van der Ouderaa, Schoukens, Renneboog, IEEE Trans. Instrum. Meas. 37, 1988).
 
-use std::f64::consts::PI;
+use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 use nalgebra::Complex;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::envelope::Amplitude;
+use super::amplitude::AmplitudeCurve;
+use super::design::{ExcitationDesign, Length, SharedSettings};
 use super::fourier::{samples, transform, turn};
 use super::periodic::Periodic;
-use crate::config::{Config, Lines, MultisineSettings};
+use super::waveform::Excitation;
+use crate::util::finding::Finding;
 
+/// A random-phase multisine. Amplitudes over its lines have the shape of `chirp.amplitude`, whose largest value within the
+/// band is the largest current of the sum.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MultisineSettings {
+    /// Length of a period in seconds, rounded to ticks: lines stand at multiples of one over it.
+    #[schemars(range(min = 0.01, max = 1000.0))]
+    pub period_s: f64,
+    /// Periods that are measured; the last shows the drift of the one before it.
+    #[schemars(range(min = 5, max = 100000))]
+    pub periods: u32,
+    /// Periods before them, in which it fades in and the stage settles.
+    #[schemars(range(min = 1, max = 1000))]
+    pub settle_periods: u32,
+    /// Which lines are excited.
+    pub lines: Lines,
+    /// Seed of the phases, and of the lines left out.
+    #[schemars(range(min = 0, max = 9223372036854775807i64))]
+    pub seed: u64,
+}
+
+/// Which lines of a multisine are excited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Lines {
+    /// All of the band.
+    Full,
+    /// The odd ones: even distortion falls between them.
+    Odd,
+    /// The odd ones but one in four, drawn at random in each group: odd distortion shows there.
+    OddRandom,
+}
+
+impl ExcitationDesign for MultisineSettings {
+    fn describe(&self, shared: &SharedSettings<'_>) -> String {
+        let lines = match self.lines {
+            Lines::Full => "all",
+            Lines::Odd => "odd",
+            Lines::OddRandom => "three in four odd",
+        };
+        let (band, period_s, periods) = (shared.band(), self.period_s, self.periods);
+        format!("multisine, {band}, {lines} lines of 1/{period_s} s, {periods} periods")
+    }
+
+    fn length(&self, shared: &SharedSettings<'_>) -> Length {
+        let periods = self.periods.saturating_add(self.settle_periods);
+        Length {
+            ticks: Periodic::length(shared, self.period_s, periods),
+            key: "multisine.period_s",
+            value: self.period_s,
+        }
+    }
+
+    fn build(&self, shared: &SharedSettings<'_>) -> Box<dyn Excitation> {
+        Box::new(multisine(self, shared))
+    }
+
+    fn check(&self, shared: &SharedSettings<'_>) -> Vec<Finding> {
+        let (period_s, line_hz) = (self.period_s, 1.0 / self.period_s);
+        let (low_hz, high_hz) = shared.chirp.band_hz();
+        if high_hz - low_hz >= 10.0 * line_hz {
+            return Vec::new();
+        }
+        let what = format!(
+            "is {period_s} s: lines are {line_hz} Hz apart, and the band from {low_hz} to {high_hz} Hz holds too few; it needs ten of them"
+        );
+        vec![Finding::new("multisine.period_s", what)]
+    }
+
+    fn is_broadband(&self) -> bool {
+        true
+    }
+
+    fn max_span(&self) -> Option<f64> {
+        Some(MAX_SPAN)
+    }
+}
+
+/// A periodic analysis ignores lines below a hundredth of the largest; half of that is kept clear.
+const MAX_SPAN: f64 = 50.0;
 /// Odd lines a group, of which one is left out.
 const GROUP: usize = 4;
 /// Rounds of clipping.
@@ -27,59 +112,56 @@ const CLIP: (f64, f64) = (0.5, 0.97);
 /// Samples to a turn of the fastest line while its phases are sought: peaks between them are 4 % higher at most.
 const OVERSAMPLING: usize = 8;
 
-/// The multisine of a configuration.
-pub fn multisine(config: &Config) -> Periodic {
-    let settings = &config.multisine;
-    let length = libm::round(settings.period_s * config.servo.rate_hz).max(8.0) as usize;
-    let line_hz = config.servo.rate_hz / length as f64;
-    let chirp = &config.chirp;
-    let (low_hz, high_hz) = chirp.band_hz();
-    let amplitude = Amplitude::new(&chirp.amplitude);
-    let of = |k: usize| (k, amplitude.at(libm::log(k as f64 * line_hz)));
+/// The multisine of the settings.
+fn multisine(settings: &MultisineSettings, shared: &SharedSettings<'_>) -> Periodic {
+    let length = libm::round(settings.period_s * shared.rate_hz).max(8.0) as usize;
+    let line_hz = shared.rate_hz / length as f64;
+    let (low_hz, high_hz) = shared.chirp.band_hz();
+    let amplitude = AmplitudeCurve::of_current(&shared.chirp.amplitude);
     let lines = lines(settings, within(low_hz, high_hz, line_hz, length));
-    let weighted: Vec<(usize, f64)> = lines.into_iter().map(of).collect();
+    let amplitude_a = |k: usize| amplitude.at(libm::log(k as f64 * line_hz));
+    let weighted: Vec<(usize, f64)> = lines.into_iter().map(|k| (k, amplitude_a(k))).collect();
     let mut table = table(&weighted, settings.seed, length);
-    let peak_a = table.iter().fold(0.0f64, |peak, u| peak.max(u.abs()));
-    let scale = if peak_a > 0.0 {
-        amplitude.range_a(low_hz, high_hz).1 / peak_a
-    } else {
-        0.0
-    };
+    scale_peak(&mut table, amplitude.range(low_hz, high_hz).1);
+    Periodic::new(shared, table, settings.settle_periods, settings.periods)
+}
+
+/// Scales the signal to a largest value.
+fn scale_peak(table: &mut [f64], peak_a: f64) {
+    let peak = table.iter().fold(0.0f64, |peak, u| peak.max(u.abs()));
+    let scale = if peak > 0.0 { peak_a / peak } else { 0.0 };
     table.iter_mut().for_each(|u| *u *= scale);
-    Periodic::new(config, table, settings.settle_periods, settings.periods)
 }
 
 /// The lines of the band below half the rate; one that is a limit up to rounding counts.
-fn within(
-    low_hz: f64,
-    high_hz: f64,
-    line_hz: f64,
-    length: usize,
-) -> std::ops::RangeInclusive<usize> {
+fn within(low_hz: f64, high_hz: f64, line_hz: f64, length: usize) -> RangeInclusive<usize> {
     let low = libm::ceil(low_hz / line_hz - 1e-6).max(1.0) as usize;
     low..=(libm::floor(high_hz / line_hz + 1e-6) as usize).min((length - 1) / 2)
 }
 
-/// Those of the band that are excited.
-fn lines(settings: &MultisineSettings, band: std::ops::RangeInclusive<usize>) -> Vec<usize> {
+/// The excited lines of the band.
+fn lines(settings: &MultisineSettings, band: RangeInclusive<usize>) -> Vec<usize> {
+    let odd = band.clone().filter(|k| k % 2 == 1);
     match settings.lines {
         Lines::Full => band.collect(),
-        Lines::Odd => band.filter(|k| k % 2 == 1).collect(),
-        Lines::OddRandom => {
-            let odd: Vec<usize> = band.filter(|k| k % 2 == 1).collect();
-            let mut random = Pcg64::seed_from_u64(settings.seed);
-            let kept = |group: &[usize]| {
-                let out = if group.len() == GROUP {
-                    (random.next_u64() >> 62) as usize
-                } else {
-                    GROUP
-                };
-                let rest = group.iter().enumerate().filter(|(place, _)| *place != out);
-                rest.map(|(_, k)| *k).collect::<Vec<_>>()
-            };
-            odd.chunks(GROUP).flat_map(kept).collect()
-        }
+        Lines::Odd => odd.collect(),
+        Lines::OddRandom => without_one_a_group(&odd.collect::<Vec<_>>(), settings.seed),
     }
+}
+
+/// Leaves out one line of each complete group, at random.
+fn without_one_a_group(odd: &[usize], seed: u64) -> Vec<usize> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut kept = Vec::with_capacity(odd.len());
+    for group in odd.chunks(GROUP) {
+        let left_out = match group.len() {
+            GROUP => (random.next_u64() >> 62) as usize,
+            _ => GROUP,
+        };
+        let rest = group.iter().enumerate();
+        kept.extend(rest.filter(|(i, _)| *i != left_out).map(|(_, k)| *k));
+    }
+    kept
 }
 
 /// One period of the sum of lines (number, amplitude).
@@ -94,12 +176,9 @@ fn table(lines: &[(usize, f64)], seed: u64, length: usize) -> Vec<f64> {
     samples(&spectrum, length)
 }
 
-/// exp(i phi) of each line, by which the sum's peak is low.
+/// exp(i phi) of each line, by which the peak of the sum is low.
 fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
-    let mut random = Pcg64::new(u128::from(seed), 1);
-    let mut draw =
-        || turn(2.0 * PI * (random.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64));
-    let mut phases: Vec<Complex<f64>> = lines.iter().map(|_| draw()).collect();
+    let mut phases = random_phases(lines.len(), seed);
     let last = lines.last().map_or(0, |(k, _)| *k);
     let mut signal = vec![Complex::new(0.0, 0.0); (OVERSAMPLING * last).next_power_of_two()];
     let (mut best, mut lowest) = (phases.clone(), f64::INFINITY);
@@ -108,19 +187,40 @@ fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
         if peak < lowest {
             (best, lowest) = (phases.clone(), peak);
         }
-        let level = peak * (CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS));
-        signal
-            .iter_mut()
-            .for_each(|u| *u = Complex::new(u.re.clamp(-level, level), 0.0));
+        let ratio = CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS);
+        clip(&mut signal, peak * ratio);
         transform(&mut signal);
-        for ((k, _), phase) in lines.iter().zip(&mut phases) {
-            // What turns by exp(+i) in the signal stands conjugate in its transform with exp(+i) again.
-            let left = signal[*k].conj();
-            let size = left.norm_sqr().sqrt();
-            *phase = if size > 0.0 { left / size } else { *phase };
-        }
+        take_phases(lines, &signal, &mut phases);
     }
     best
+}
+
+fn random_phases(count: usize, seed: u64) -> Vec<Complex<f64>> {
+    const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
+    let mut random = Pcg64::new(u128::from(seed), 1);
+    let mut phases = Vec::with_capacity(count);
+    for _ in 0..count {
+        phases.push(turn(TAU * (random.next_u64() >> 11) as f64 * UNIT));
+    }
+    phases
+}
+
+fn clip(signal: &mut [Complex<f64>], level: f64) {
+    for u in signal {
+        *u = Complex::new(u.re.clamp(-level, level), 0.0);
+    }
+}
+
+/// The phases of the lines in the transform of a signal.
+fn take_phases(lines: &[(usize, f64)], transform: &[Complex<f64>], phases: &mut [Complex<f64>]) {
+    for ((k, _), phase) in lines.iter().zip(phases) {
+        // A line exp(+i) of the signal is conjugate in its transform with exp(+i).
+        let line = transform[*k].conj();
+        let size = line.norm_sqr().sqrt();
+        if size > 0.0 {
+            *phase = line / size;
+        }
+    }
 }
 
 /// The samples of the sum, and its peak.
@@ -136,8 +236,7 @@ fn sum(lines: &[(usize, f64)], phases: &[Complex<f64>], signal: &mut [Complex<f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{AmplitudePoint, Source, load};
-    use crate::excitation::Excitation;
+    use crate::config::{AmplitudePoint, Config, Source, load};
 
     /// Periods of a second at 5 kHz, lines from 20 to 219 Hz.
     fn config(lines: Lines, seed: u64, amplitude: &[(f64, f64)]) -> Config {
@@ -149,11 +248,18 @@ mod tests {
         };
         config.chirp.amplitude = amplitude.iter().map(point).collect();
         (
-            config.multisine.period_s,
-            config.multisine.lines,
-            config.multisine.seed,
+            config.excitations.multisine.period_s,
+            config.excitations.multisine.lines,
+            config.excitations.multisine.seed,
         ) = (1.0, lines, seed);
         config
+    }
+
+    fn built(config: &Config) -> Periodic {
+        multisine(
+            &config.excitations.multisine,
+            &config.chosen_excitation().shared,
+        )
     }
 
     const FLAT: [(f64, f64); 1] = [(1.0, 0.7)];
@@ -177,7 +283,7 @@ mod tests {
     #[test]
     fn a_full_flat_one_has_its_lines_alike_nothing_else_and_half_the_crest_of_random_phases() {
         for seed in 1..=8 {
-            let multisine = multisine(&config(Lines::Full, seed, &FLAT));
+            let multisine = built(&config(Lines::Full, seed, &FLAT));
             let table = multisine.table();
             assert_eq!(table.len(), 5000);
             let amplitudes = amplitudes(table);
@@ -204,7 +310,7 @@ mod tests {
     #[test]
     fn lines_follow_the_amplitude_over_frequency() {
         let points = [(30.0, 0.1), (60.0, 0.4), (120.0, 0.05)];
-        let amplitudes = amplitudes(multisine(&config(Lines::Full, 3, &points)).table());
+        let amplitudes = amplitudes(built(&config(Lines::Full, 3, &points)).table());
         // ln A is straight over ln f: A = 0.1 (f/30)^2 up to 60 Hz, 0.4 (f/60)^-3 up to 120 Hz.
         let expected = |f: f64| match f {
             ..=30.0 => 0.1,
@@ -221,7 +327,7 @@ mod tests {
     #[test]
     fn lines_left_out_are_zero_even_ones_and_one_in_each_group_of_four_odd_ones() {
         for (lines, left) in [(Lines::Odd, 100), (Lines::OddRandom, 75)] {
-            let amplitudes = amplitudes(multisine(&config(lines, 5, &FLAT)).table());
+            let amplitudes = amplitudes(built(&config(lines, 5, &FLAT)).table());
             let excited: Vec<usize> = (0..amplitudes.len())
                 .filter(|k| amplitudes[*k] > 1e-3)
                 .collect();
@@ -240,14 +346,19 @@ mod tests {
                 assert_eq!(within, left / 25, "{lines:?}, group {group}");
             }
         }
-        let out = |seed| lines(&config(Lines::OddRandom, seed, &FLAT).multisine, 20..=219);
+        let out = |seed| {
+            lines(
+                &config(Lines::OddRandom, seed, &FLAT).excitations.multisine,
+                20..=219,
+            )
+        };
         assert_ne!(out(1), out(2), "others with another seed");
     }
 
     #[test]
     fn the_same_seed_is_the_same_current_and_another_is_another() {
         let at = |seed: u64, tick: u64| {
-            multisine(&config(Lines::Full, seed, &FLAT))
+            built(&config(Lines::Full, seed, &FLAT))
                 .current_a(tick)
                 .to_bits()
         };
@@ -259,6 +370,6 @@ mod tests {
     fn a_band_without_a_line_is_no_current_and_no_panic() {
         let mut config = config(Lines::Full, 1, &FLAT);
         (config.chirp.start_hz, config.chirp.stop_hz) = (20.2, 20.8);
-        assert!(multisine(&config).table().iter().all(|u| *u == 0.0));
+        assert!(built(&config).table().iter().all(|u| *u == 0.0));
     }
 }

@@ -5,13 +5,12 @@
 //!        0           settle_periods     + periods
 //! ```
 //!
-//! It fades in over half of the settling periods at most, so that the rest of them lets the stage forget how it began, and
-//! goes on past the last measured period while it fades out. So nothing jumps at either end, and every measured period is
-//! like the next.
+//! It fades in over half of the settling periods at most, so that transients decay in the other half. It fades out after the
+//! last measured period. There is no step at either end, and all measured periods are equal.
 
-use super::envelope::fade;
-use super::{Excitation, Pattern};
-use crate::config::Config;
+use super::amplitude::fade;
+use super::design::SharedSettings;
+use super::waveform::{Excitation, Pattern};
 
 /// A periodic excitation.
 #[derive(Clone, Debug)]
@@ -29,21 +28,20 @@ pub struct Periodic {
 impl Periodic {
     /// `table` over and over, with the quiet and the fades of `[chirp]`.
     pub(super) fn new(
-        config: &Config,
+        shared: &SharedSettings<'_>,
         table: Vec<f64>,
         settle_periods: u32,
         measured_periods: u32,
     ) -> Periodic {
-        let ticks = |seconds: f64| libm::round(seconds * config.servo.rate_hz) as u64;
-        let chirp = &config.chirp;
+        let chirp = shared.chirp;
         let settle = table.len() as u64 * u64::from(settle_periods);
         Periodic {
-            start_tick: ticks(chirp.quiet_before_s),
+            start_tick: shared.ticks(chirp.quiet_before_s),
             settle_periods: u64::from(settle_periods),
             measured_periods: u64::from(measured_periods),
-            fade_in_ticks: ticks(chirp.fade_in_s).min(settle / 2),
-            fade_out_ticks: ticks(chirp.fade_out_s),
-            quiet_after_ticks: ticks(chirp.quiet_after_s),
+            fade_in_ticks: shared.ticks(chirp.fade_in_s).min(settle / 2),
+            fade_out_ticks: shared.ticks(chirp.fade_out_s),
+            quiet_after_ticks: shared.ticks(chirp.quiet_after_s),
             table,
         }
     }
@@ -51,6 +49,12 @@ impl Periodic {
     /// One period in amperes.
     pub fn table(&self) -> &[f64] {
         &self.table
+    }
+
+    /// Length in ticks of a periodic excitation, before it is built.
+    pub(super) fn length(shared: &SharedSettings<'_>, period_s: f64, periods: u32) -> f64 {
+        let periods_s = period_s * f64::from(periods);
+        (shared.quiet_s() + periods_s + shared.chirp.fade_out_s) * shared.rate_hz
     }
 
     /// Ticks of the whole periods.
@@ -106,7 +110,8 @@ mod tests {
             chirp.fade_out_s,
         ) = (0.02, 0.04, 5.0, 0.01);
         let table: Vec<f64> = (0..200).map(|n| libm::sin(f64::from(n))).collect();
-        let periodic = Periodic::new(&config, table.clone(), 2, 5);
+        let shared = config.chosen_excitation().shared;
+        let periodic = Periodic::new(&shared, table.clone(), 2, 5);
         // At 5 kHz: 100 ticks of quiet, 7 periods, 50 ticks of fade, 200 of quiet.
         assert_eq!(periodic.ticks(), 100 + 1400 + 50 + 200);
         assert_eq!(

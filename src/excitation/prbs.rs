@@ -1,4 +1,4 @@
-//! A pseudo-random binary sequence: what a shift register of n cells gives that runs through all its 2^n - 1 states.
+//! A pseudo-random binary sequence: the output of a shift register of n cells that runs through all its 2^n - 1 states.
 //!
 //! ```text
 //!  s(k + n) = s(k) + sum of s(k + j) over the other taps (modulo 2)      u = +a for 1, -a for 0, held for d ticks
@@ -7,8 +7,92 @@
 //!
 //! So its spectrum is flat but for the hold of d ticks, with its first zero at rate/d.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::design::{ExcitationDesign, Length, SharedSettings};
 use super::periodic::Periodic;
-use crate::config::{Config, PrbsSettings};
+use super::waveform::Excitation;
+use crate::util::finding::Finding;
+
+/// A maximum-length sequence of plus and minus one amplitude.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PrbsSettings {
+    /// Cells n of the shift register: 2^n - 1 steps a period.
+    #[schemars(range(min = 7, max = 20))]
+    pub order: u32,
+    /// Ticks a step.
+    #[schemars(range(min = 1, max = 1000))]
+    pub clock_divider: u32,
+    /// Current in amperes, to both sides.
+    #[schemars(range(min = 1e-9, max = 1000.0))]
+    pub amplitude_a: f64,
+    /// Periods that are measured; the last shows the drift of the one before it.
+    #[schemars(range(min = 5, max = 100000))]
+    pub periods: u32,
+    /// Periods before them, in which it fades in and the stage settles.
+    #[schemars(range(min = 1, max = 1000))]
+    pub settle_periods: u32,
+}
+
+impl PrbsSettings {
+    /// Length of a period in seconds.
+    fn period_s(&self, rate_hz: f64) -> f64 {
+        let steps = (1u64 << self.order.min(20)) - 1;
+        steps as f64 * f64::from(self.clock_divider) / rate_hz
+    }
+}
+
+impl ExcitationDesign for PrbsSettings {
+    fn describe(&self, shared: &SharedSettings<'_>) -> String {
+        format!(
+            "binary sequence of order {}, steps of {} ticks, {} periods, {} analysed",
+            self.order,
+            self.clock_divider,
+            self.periods,
+            shared.band()
+        )
+    }
+
+    fn length(&self, shared: &SharedSettings<'_>) -> Length {
+        let periods = self.periods.saturating_add(self.settle_periods);
+        Length {
+            ticks: Periodic::length(shared, self.period_s(shared.rate_hz), periods),
+            key: "prbs.order",
+            value: f64::from(self.order),
+        }
+    }
+
+    fn build(&self, shared: &SharedSettings<'_>) -> Box<dyn Excitation> {
+        Box::new(prbs(self, shared))
+    }
+
+    fn check(&self, shared: &SharedSettings<'_>) -> Vec<Finding> {
+        let limit_hz = shared.rate_hz / f64::from(self.clock_divider) / 2.0;
+        let (_, highest_hz) = shared.chirp.band_hz();
+        if highest_hz <= limit_hz {
+            return Vec::new();
+        }
+        let what = format!(
+            "is {}: the sequence excites up to {limit_hz} Hz, the band goes to {highest_hz} Hz; lower it, or chirp.stop_hz",
+            self.clock_divider
+        );
+        vec![Finding::new("prbs.clock_divider", what)]
+    }
+
+    fn amplitude_key(&self) -> &'static str {
+        "prbs.amplitude_a"
+    }
+
+    fn has_amplitude_curve(&self) -> bool {
+        false
+    }
+
+    fn is_broadband(&self) -> bool {
+        true
+    }
+}
 
 /// Exponents of a primitive polynomial x^n + ... + 1 of the orders 7 to 20, without the 1 (P. Alfke, Xilinx XAPP 052, 1996).
 const TAPS: [&[u32]; 14] = [
@@ -28,19 +112,19 @@ const TAPS: [&[u32]; 14] = [
     &[20, 17],
 ];
 
-/// The sequence of a configuration.
-pub fn prbs(config: &Config) -> Periodic {
-    let settings = &config.prbs;
-    let held = |bit: bool| {
+/// The sequence of the settings.
+fn prbs(settings: &PrbsSettings, shared: &SharedSettings<'_>) -> Periodic {
+    let ticks_a_step = settings.clock_divider.max(1) as usize;
+    let mut table = Vec::new();
+    for bit in sequence(settings) {
         let current_a = if bit {
             settings.amplitude_a
         } else {
             -settings.amplitude_a
         };
-        std::iter::repeat_n(current_a, settings.clock_divider.max(1) as usize)
-    };
-    let table = sequence(settings).into_iter().flat_map(held).collect();
-    Periodic::new(config, table, settings.settle_periods, settings.periods)
+        table.extend(std::iter::repeat_n(current_a, ticks_a_step));
+    }
+    Periodic::new(shared, table, settings.settle_periods, settings.periods)
 }
 
 /// One period of the register's output, all ones at first.
@@ -63,16 +147,20 @@ fn sequence(settings: &PrbsSettings) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use crate::config::{Config, Source, load};
 
     fn settings(order: u32, clock_divider: u32) -> Config {
         let mut config = load(&Source::default()).unwrap();
         (
-            config.prbs.order,
-            config.prbs.clock_divider,
-            config.prbs.amplitude_a,
+            config.excitations.prbs.order,
+            config.excitations.prbs.clock_divider,
+            config.excitations.prbs.amplitude_a,
         ) = (order, clock_divider, 0.5);
         config
+    }
+
+    fn built(config: &Config) -> Periodic {
+        prbs(&config.excitations.prbs, &config.chosen_excitation().shared)
     }
 
     /// |U_k|^2 of a period.
@@ -86,7 +174,7 @@ mod tests {
     #[test]
     fn its_autocorrelation_has_two_values() {
         for order in 7..=11 {
-            let bits: Vec<i64> = prbs(&settings(order, 1))
+            let bits: Vec<i64> = built(&settings(order, 1))
                 .table()
                 .iter()
                 .map(|u| if *u > 0.0 { 1 } else { -1 })
@@ -109,7 +197,7 @@ mod tests {
     #[test]
     fn its_spectrum_is_flat_at_every_order() {
         for order in 7..=20 {
-            let table = prbs(&settings(order, 1)).table().to_vec();
+            let table = built(&settings(order, 1)).table().to_vec();
             // The transform of the autocorrelation: L + 1 at every line but 0, where the one step more of + leaves 1.
             let (length, powers) = (table.len() as f64, powers(&table));
             assert!(
@@ -129,7 +217,7 @@ mod tests {
     #[test]
     fn a_step_of_several_ticks_gives_the_spectrum_of_a_hold() {
         let (order, divider) = (9, 3);
-        let table = prbs(&settings(order, divider)).table().to_vec();
+        let table = built(&settings(order, divider)).table().to_vec();
         let length = f64::from((1u32 << order) - 1);
         assert_eq!(table.len() as f64, 3.0 * length);
         for (k, power) in powers(&table).into_iter().enumerate().skip(1) {

@@ -1,21 +1,21 @@
-//! A chirp, its quiet included, over and over.
+//! A chirp with its quiet, several times.
 
-use super::{Chirp, Excitation, Pattern};
-use crate::config::ChirpSettings;
+use super::chirp::Chirp;
+use super::waveform::{Excitation, Pattern};
 
 /// A chirp repeated: each repetition begins and ends at rest, so that their mean is one chirp with less noise.
 #[derive(Clone, Debug)]
-pub struct Repeated {
+pub(super) struct Repeated {
     chirp: Chirp,
     count: u64,
 }
 
 impl Repeated {
-    /// As often as the settings say.
-    pub fn new(chirp: Chirp, settings: &ChirpSettings) -> Repeated {
+    /// `count` repetitions.
+    pub(super) fn new(chirp: Chirp, count: u32) -> Repeated {
         Repeated {
             chirp,
-            count: u64::from(settings.repetitions),
+            count: u64::from(count),
         }
     }
 
@@ -67,7 +67,7 @@ mod tests {
             settings.repetitions,
         ) = (6.0, 0.1, 0.2, 3);
         let chirp = Chirp::new(&settings, 1e-3);
-        let repeated = Repeated::new(chirp.clone(), &settings);
+        let repeated = Repeated::new(chirp.clone(), settings.repetitions);
         assert_eq!(repeated.ticks(), 3 * 6300);
         assert_eq!(
             repeated.pattern(),

@@ -1,20 +1,22 @@
-//! Amplitude over frequency by a response: as much displacement everywhere, up to what the current may be.
+//! Amplitude over frequency by a response: the same displacement at all frequencies, up to the limit of the current.
 //!
 //! ```text
-//!  A(f) = min(travel / |G(f)|, cap(f))
+//!  A(f) = min(travel / |G(f)|, limit(f))
 //! ```
 //!
-//! so that resonances are not driven into the interlocks, and zeros get as much current as there is. The curve is put
-//! into few points, joined by straight lines on logarithmic axes, that nowhere lie above it.
+//! Resonances stay below the interlocks, and zeros get the largest current. The curve is simplified to few points, joined by
+//! straight lines on logarithmic axes, that nowhere lie above it.
 
-use crate::config::{AmplitudePoint, Config};
+use super::amplitude::AmplitudePoint;
+use super::limits::Limits;
+use crate::util::units::rad_s;
 
 /// Points that an amplitude may have.
 pub const MOST_POINTS: usize = 64;
 /// Distance in ln A that a curve through fewer points may have.
 const CLOSE: f64 = 0.01;
 
-/// What the current may be.
+/// Limits of the current of a sine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentLimit {
     /// Amplitude in amperes at any frequency.
@@ -24,56 +26,54 @@ pub struct CurrentLimit {
 }
 
 impl CurrentLimit {
-    /// A share of what motor and amplifier allow; a sine of the continuous current has sqrt 2 times its amplitude.
-    pub fn of(config: &Config) -> CurrentLimit {
-        let (motor, amplifier, share) =
-            (&config.motor, &config.amplifier, config.shape.current_ratio);
-        let continuous_a = std::f64::consts::SQRT_2 * motor.continuous_current_a();
+    /// A ratio of what motor and amplifier allow; a sine of the continuous current has sqrt 2 times its amplitude.
+    pub fn new(limits: &Limits, ratio: f64) -> CurrentLimit {
+        let continuous_a = std::f64::consts::SQRT_2 * limits.continuous_current_a;
         let current_a = continuous_a
-            .min(motor.peak_current_a())
-            .min(amplifier.current_limit_a);
+            .min(limits.peak_current_a)
+            .min(limits.amplifier_current_a);
         CurrentLimit {
-            current_a: share * current_a,
-            slew_a_per_s: share * amplifier.slew_limit_a_per_s,
+            current_a: ratio * current_a,
+            slew_a_per_s: ratio * limits.slew_a_per_s,
         }
     }
 
     fn at_a(&self, frequency_hz: f64) -> f64 {
-        self.current_a
-            .min(self.slew_a_per_s / (2.0 * std::f64::consts::PI * frequency_hz))
+        self.current_a.min(self.slew_a_per_s / rad_s(frequency_hz))
     }
 }
 
-/// The amplitude by which |G| moves the stage by `travel_m`, up to `cap`; `response` is (frequency in hertz, |G| in metres per
-/// ampere) with rising frequencies. At most [`MOST_POINTS`] points. `span` is how many times the least amplitude the largest
-/// may be.
+/// The amplitude that moves the stage by `travel_m`, up to `limit`. `response` is (frequency in hertz, |G| in metres per
+/// ampere) with rising frequencies; the result has at most [`MOST_POINTS`] points. The largest amplitude is at most `span`
+/// times the smallest one.
 pub fn shaped_amplitude(
     response: &[(f64, f64)],
     travel_m: f64,
-    cap: CurrentLimit,
+    limit: CurrentLimit,
     span: f64,
 ) -> Vec<AmplitudePoint> {
     let wanted = |(frequency_hz, gain): &(f64, f64)| {
-        let limit_a = cap.at_a(*frequency_hz);
-        let current_a = if *gain > 0.0 {
-            limit_a.min(travel_m / gain)
+        let limit_a = limit.at_a(*frequency_hz);
+        let by_travel_a = if *gain > 0.0 {
+            travel_m / gain
         } else {
             limit_a
         };
-        (libm::log(*frequency_hz), libm::log(current_a))
+        (
+            libm::log(*frequency_hz),
+            libm::log(limit_a.min(by_travel_a)),
+        )
     };
     let mut curve: Vec<(f64, f64)> = response.iter().map(wanted).collect();
     let least = curve.iter().map(|(_, a)| *a).fold(f64::INFINITY, f64::min);
-    curve
-        .iter_mut()
-        .for_each(|(_, a)| *a = a.min(least + libm::log(span)));
-    simplified(&curve)
-        .into_iter()
-        .map(|(f, a)| AmplitudePoint {
-            frequency_hz: libm::exp(f),
-            current_a: libm::exp(a),
-        })
-        .collect()
+    let highest = least + libm::log(span);
+    curve.iter_mut().for_each(|(_, a)| *a = a.min(highest));
+    let points = simplified(&curve).into_iter();
+    let points = points.map(|(f, a)| AmplitudePoint {
+        frequency_hz: libm::exp(f),
+        current_a: libm::exp(a),
+    });
+    points.collect()
 }
 
 /// The curve by few of its points, lowered to where they lie nowhere above it.
@@ -111,7 +111,7 @@ fn off(curve: &[(f64, f64)], kept: &[(f64, f64)]) -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::excitation::Amplitude;
+    use crate::excitation::AmplitudeCurve;
 
     const CAP: CurrentLimit = CurrentLimit {
         current_a: 2.0,
@@ -140,11 +140,11 @@ mod tests {
             "{}",
             points.len()
         );
-        let amplitude = Amplitude::new(&points);
+        let amplitude = AmplitudeCurve::of_current(&points);
         for (f, gain) in response() {
             let (current_a, cap_a) = (
                 amplitude.at(f.ln()),
-                2f64.min(4000.0 / (2.0 * std::f64::consts::PI * f)),
+                2f64.min(4000.0 / (std::f64::consts::TAU * f)),
             );
             let wanted_a = cap_a.min(100e-6 / gain);
             // Never above, by rounding of a logarithm; below by twice what the simplification may miss.

@@ -8,8 +8,22 @@
 //!                        |____|
 //! ```
 
-use super::Excitation;
-use crate::config::CalibrateSettings;
+use super::waveform::Excitation;
+
+/// Levels and times of a staircase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StaircaseSteps {
+    /// Largest current in amperes, to both sides.
+    pub amplitude_a: f64,
+    /// Levels on either side of zero.
+    pub levels: u32,
+    /// Time in seconds from a level to the next.
+    pub ramp_s: f64,
+    /// Time in seconds for the stage to come to rest.
+    pub settle_s: f64,
+    /// Time in seconds over which a level is averaged.
+    pub average_s: f64,
+}
 
 /// A staircase of current.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,8 +35,8 @@ pub struct Staircase {
 }
 
 impl Staircase {
-    /// The staircase of the settings at a period of the loop.
-    pub fn new(settings: &CalibrateSettings, period_s: f64) -> Staircase {
+    /// The staircase for a loop of this period.
+    pub fn new(settings: &StaircaseSteps, period_s: f64) -> Staircase {
         let ticks = |seconds: f64| libm::round(seconds / period_s).max(1.0) as u64;
         let n = i64::from(settings.levels);
         let steps = (0..=n).chain((-n..n).rev()).chain(-n + 1..=0);
@@ -36,7 +50,7 @@ impl Staircase {
         }
     }
 
-    /// The level whose average a tick belongs to, if it belongs to one.
+    /// The level in whose average the tick counts, if it counts in one.
     pub fn level(&self, tick: u64) -> Option<usize> {
         let within = tick % self.level_ticks();
         let level = (tick / self.level_ticks()) as usize;
@@ -84,13 +98,12 @@ mod tests {
     use super::*;
 
     fn staircase() -> Staircase {
-        let settings = CalibrateSettings {
+        let settings = StaircaseSteps {
             amplitude_a: 0.4,
             levels: 2,
             ramp_s: 0.2,
             settle_s: 1.0,
             average_s: 0.5,
-            ..crate::config::load(&Default::default()).unwrap().calibrate
         };
         Staircase::new(&settings, 1e-3)
     }

@@ -7,21 +7,101 @@
 //!  sine j + 1                                      \~~~/~~~~~|======measured======|
 //! ```
 //!
-//! Six blocks of m ticks are measured, each a whole number q of turns: f = q rate/m, next to the frequency asked for. As
-//! one sine goes the next one comes, by the same cosine, so that nothing jumps.
+//! Six blocks of m ticks are measured, each a whole number q of periods: f = q rate/m, next to the required frequency. One
+//! sine fades out while the next one fades in, by the same cosine, so that the sum has no step.
 
-use std::f64::consts::PI;
+use std::f64::consts::TAU;
 
-use super::envelope::{Amplitude, fade};
-use super::{Excitation, Pattern, Window};
-use crate::config::{BLOCKS_PER_SINE, Config};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::amplitude::{AmplitudeCurve, fade};
+use super::design::{ExcitationDesign, Length, SharedSettings};
+use super::waveform::{Excitation, Pattern, Window};
+
+/// Sines one after the other, each settled and then measured over whole periods.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SteppedSineSettings {
+    /// How many frequencies, from `chirp.start_hz` to `chirp.stop_hz`.
+    #[schemars(range(min = 2, max = 10000))]
+    pub count: u32,
+    /// How they are spaced.
+    pub spacing: Spacing,
+    /// Time in seconds for which each sine runs before it is measured; over the first half it takes the place of the one
+    /// before.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub settle_s: f64,
+    /// Least time in seconds for which each is measured: six blocks of whole periods, the last of which shows the drift.
+    #[schemars(range(min = 0.001, max = 10000.0))]
+    pub measure_s: f64,
+}
+
+/// Blocks in which a sine is measured: five that are averaged, and one that shows the drift.
+const BLOCKS_PER_SINE: f64 = 6.0;
+
+impl SteppedSineSettings {
+    /// The frequencies asked for in hertz; what fits whole ticks is next to them.
+    pub fn frequencies_hz(&self, start_hz: f64, stop_hz: f64) -> Vec<f64> {
+        let last = f64::from(self.count.max(2) - 1);
+        let at = |share: f64| match self.spacing {
+            Spacing::Linear => start_hz + (stop_hz - start_hz) * share,
+            Spacing::Logarithmic => start_hz * libm::pow(stop_hz / start_hz, share),
+        };
+        (0..self.count.max(2))
+            .map(|k| at(f64::from(k) / last))
+            .collect()
+    }
+}
+
+/// How frequencies are spaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Spacing {
+    /// At equal differences.
+    Linear,
+    /// At equal ratios.
+    Logarithmic,
+}
+
+impl ExcitationDesign for SteppedSineSettings {
+    fn describe(&self, shared: &SharedSettings<'_>) -> String {
+        let spacing = match self.spacing {
+            Spacing::Linear => "linear",
+            Spacing::Logarithmic => "logarithmic",
+        };
+        let (count, band) = (self.count, shared.band());
+        format!("stepped sine, {count} frequencies, {band}, {spacing}")
+    }
+
+    fn length(&self, shared: &SharedSettings<'_>) -> Length {
+        let frequencies_hz = self.frequencies_hz(shared.chirp.start_hz, shared.chirp.stop_hz);
+        let lengths_s = frequencies_hz
+            .into_iter()
+            .map(|f| self.settle_s + self.measure_s.max(BLOCKS_PER_SINE / f));
+        let sines_s: f64 = lengths_s.sum();
+        Length {
+            ticks: (shared.quiet_s() + sines_s + self.settle_s) * shared.rate_hz,
+            key: "stepped_sine.count",
+            value: f64::from(self.count),
+        }
+    }
+
+    fn build(&self, shared: &SharedSettings<'_>) -> Box<dyn Excitation> {
+        Box::new(SteppedSine::new(self, shared))
+    }
+
+    fn is_shaped_by_default(&self) -> bool {
+        true
+    }
+}
 
 /// Ticks of a block at least.
 const LEAST_BLOCK: f64 = 16.0;
 
 /// Sines one after the other, with quiet before and after.
 #[derive(Clone, Debug)]
-pub struct SteppedSine {
+struct SteppedSine {
     sines: Vec<Sine>,
     rate_hz: f64,
     fade_ticks: u64,
@@ -33,10 +113,10 @@ pub struct SteppedSine {
 #[derive(Clone, Copy, Debug)]
 struct Sine {
     amplitude_a: f64,
-    /// Turns a block, and ticks.
+    /// Periods a block, and ticks.
     turns: u64,
     block: u64,
-    /// Where it begins to come.
+    /// Tick at which it begins to fade in.
     start: u64,
 }
 
@@ -48,57 +128,52 @@ impl Sine {
         let n = (tick - self.start) % self.block + self.block - before;
         let share = (u128::from(n) * u128::from(self.turns) % u128::from(self.block)) as f64
             / self.block as f64;
-        self.amplitude_a * libm::sin(2.0 * PI * share)
+        self.amplitude_a * libm::sin(TAU * share)
     }
 
-    /// Where its measured blocks end.
+    /// End of its measured blocks.
     fn end(&self, settle_ticks: u64) -> u64 {
         self.start + settle_ticks + BLOCKS_PER_SINE as u64 * self.block
     }
 }
 
 impl SteppedSine {
-    /// The sines of a configuration.
-    pub fn new(config: &Config) -> SteppedSine {
-        let (chirp, settings, rate_hz) =
-            (&config.chirp, &config.stepped_sine, config.servo.rate_hz);
-        let ticks = |seconds: f64| libm::round(seconds * rate_hz) as u64;
-        let (start_tick, settle_ticks) =
-            (ticks(chirp.quiet_before_s), ticks(settings.settle_s).max(2));
-        let amplitude = Amplitude::new(&chirp.amplitude);
+    /// The sines of the settings.
+    fn new(settings: &SteppedSineSettings, shared: &SharedSettings<'_>) -> SteppedSine {
+        let (chirp, rate_hz) = (shared.chirp, shared.rate_hz);
+        let start_tick = shared.ticks(chirp.quiet_before_s);
+        let settle_ticks = shared.ticks(settings.settle_s).max(2);
+        let amplitude = AmplitudeCurve::of_current(&chirp.amplitude);
+        let least_s = settings.measure_s / BLOCKS_PER_SINE;
         let mut sines: Vec<Sine> = Vec::new();
         for frequency_hz in settings.frequencies_hz(chirp.start_hz, chirp.stop_hz) {
-            let (turns, block) = block(frequency_hz, settings.measure_s / BLOCKS_PER_SINE, rate_hz);
-            let amplitude_a = amplitude.at(libm::log(frequency_hz));
-            let start = sines
-                .last()
-                .map_or(start_tick, |before| before.end(settle_ticks));
+            let (turns, block) = block(frequency_hz, least_s, rate_hz);
+            let before = sines.last();
             sines.push(Sine {
-                amplitude_a,
+                amplitude_a: amplitude.at(libm::log(frequency_hz)),
                 turns,
                 block,
-                start,
+                start: before.map_or(start_tick, |before| before.end(settle_ticks)),
             });
         }
-        let quiet_after_ticks = ticks(chirp.quiet_after_s);
         SteppedSine {
             sines,
             rate_hz,
             fade_ticks: settle_ticks / 2,
             settle_ticks,
             start_tick,
-            quiet_after_ticks,
+            quiet_after_ticks: shared.ticks(chirp.quiet_after_s),
         }
     }
 
-    /// Where the last sine is gone.
+    /// End of the last fade.
     fn end(&self) -> u64 {
         self.sines.last().map_or(self.start_tick, |last| {
             last.end(self.settle_ticks) + self.fade_ticks
         })
     }
 
-    /// The sine that runs or comes at a tick, with the one before it.
+    /// The sine that runs or fades in at a tick, with the one before it.
     fn at(&self, tick: u64) -> (Option<&Sine>, Option<&Sine>) {
         let after = self.sines.partition_point(|sine| sine.start <= tick);
         let sine = |back: usize| after.checked_sub(back).and_then(|i| self.sines.get(i));
@@ -161,7 +236,8 @@ impl Excitation for SteppedSine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{AmplitudePoint, Source, Spacing, load};
+    use crate::config::{Config, Source, load};
+    use crate::excitation::AmplitudePoint;
 
     fn config(spacing: Spacing, start_hz: f64, stop_hz: f64) -> Config {
         let mut config = load(&Source::default()).unwrap();
@@ -176,7 +252,7 @@ mod tests {
                 current_a,
             })
             .to_vec();
-        let settings = &mut config.stepped_sine;
+        let settings = &mut config.excitations.stepped_sine;
         (
             settings.count,
             settings.spacing,
@@ -184,6 +260,11 @@ mod tests {
             settings.measure_s,
         ) = (9, spacing, 0.3, 0.2);
         config
+    }
+
+    fn built(config: &Config) -> SteppedSine {
+        let settings = &config.excitations.stepped_sine;
+        SteppedSine::new(settings, &config.chosen_excitation().shared)
     }
 
     fn windows(sines: &SteppedSine) -> Vec<Window> {
@@ -200,11 +281,13 @@ mod tests {
             (Spacing::Logarithmic, 431.0, 7.3),
         ] {
             let config = config(spacing, start_hz, stop_hz);
-            let sines = SteppedSine::new(&config);
-            for (window, asked_hz) in windows(&sines)
-                .iter()
-                .zip(config.stepped_sine.frequencies_hz(start_hz, stop_hz))
-            {
+            let sines = built(&config);
+            for (window, asked_hz) in windows(&sines).iter().zip(
+                config
+                    .excitations
+                    .stepped_sine
+                    .frequencies_hz(start_hz, stop_hz),
+            ) {
                 let frequency_hz = window.turns as f64 * 5000.0 / window.period as f64;
                 // The nearest whole number of ticks is half a tick off at most.
                 assert!(
@@ -219,7 +302,7 @@ mod tests {
                 let amplitude_a = 0.2 * 10.0 / asked_hz.clamp(10.0, 100.0);
                 for n in 0..window.period * window.periods {
                     let turns = (n * window.turns % window.period) as f64 / window.period as f64;
-                    let expected_a = amplitude_a * (2.0 * PI * turns).sin();
+                    let expected_a = amplitude_a * (TAU * turns).sin();
                     let current_a = sines.current_a((window.start + n) as u64);
                     assert!(
                         (current_a - expected_a).abs() < 1e-12 * amplitude_a.max(0.1),
@@ -232,7 +315,7 @@ mod tests {
 
     #[test]
     fn it_jumps_nowhere_and_rises_from_zero_and_falls_back_to_it() {
-        let sines = SteppedSine::new(&config(Spacing::Logarithmic, 20.0, 200.0));
+        let sines = built(&config(Spacing::Logarithmic, 20.0, 200.0));
         let signal: Vec<f64> = (0..sines.ticks())
             .map(|tick| sines.current_a(tick))
             .collect();
@@ -257,8 +340,11 @@ mod tests {
     #[test]
     fn settings_at_their_limits_make_no_panic() {
         let mut config = config(Spacing::Linear, 2499.0, 1e-4);
-        (config.stepped_sine.settle_s, config.stepped_sine.measure_s) = (0.001, 0.001);
-        let sines = SteppedSine::new(&config);
+        (
+            config.excitations.stepped_sine.settle_s,
+            config.excitations.stepped_sine.measure_s,
+        ) = (0.001, 0.001);
+        let sines = built(&config);
         for tick in (0..sines.ticks()).step_by(9973).chain([0, u64::MAX]) {
             assert!(sines.current_a(tick).abs() <= 0.4, "{tick}");
         }

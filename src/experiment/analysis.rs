@@ -13,7 +13,7 @@ use super::plan::{KIND, RunKind};
 use super::response_estimate::ClosedResponses;
 use super::response_estimate::ResponseEstimate;
 use crate::config::Config;
-use crate::excitation::{self, Excitation};
+use crate::excitation::Excitation;
 use crate::identify::delay::excess_delay;
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
@@ -141,7 +141,7 @@ fn open_loop(
     band_hz: (f64, f64),
     config: &Config,
 ) -> Result<(ResponseEstimate, Option<Linearity>), AnalysisError> {
-    let pattern = excitation::of(config).pattern();
+    let pattern = config.chosen_excitation().build().pattern();
     let (frf, frf_data, linearity) = match taken(signals, &pattern, band_hz)? {
         Taken::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
         Taken::Record(signals) => {

@@ -56,14 +56,12 @@ const TURN: f64 = 2.0 * std::f64::consts::PI;
 
 /// Refuses references that do not sweep; a file may.
 fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
-    let kind = match reference {
-        ReferenceSettings::Chirp { .. } | ReferenceSettings::File { .. } => return Ok(()),
-        ReferenceSettings::Hold => "hold",
-        ReferenceSettings::Step { .. } => "step",
-        ReferenceSettings::Ramp { .. } => "ramp",
-        ReferenceSettings::Sine { .. } => "sine",
-    };
-    Err(ClosedLoopError::Reference { kind })
+    let reference = reference.design();
+    let kind = reference.name();
+    match reference.can_identify() {
+        true => Ok(()),
+        false => Err(ClosedLoopError::Reference { kind }),
+    }
 }
 
 /// The loop of the recorded controller around the configured model.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::config::{Config, ReferenceSettings};
+use crate::config::Config;
 use crate::control::{StepMeter, StepMetrics};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::flag;
@@ -24,15 +24,9 @@ pub struct Measured {
 /// Measures a run; `None` if it ended before its steady state. One pass in little memory: a run may last for days.
 pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured>, RecordingError> {
     let tick = |seconds: f64| (seconds * config.servo.rate_hz).round() as u64;
-    let (change, height_m) = match config.control.reference {
-        ReferenceSettings::Step { amplitude_m, at_s } => (tick(at_s), amplitude_m),
-        ReferenceSettings::Ramp {
-            amplitude_m,
-            speed_m_per_s,
-            at_s,
-        } => (tick(at_s + amplitude_m.abs() / speed_m_per_s), 0.0),
-        _ => (0, 0.0),
-    };
+    let reference = config.control.reference.design();
+    let change = tick(reference.last_change_s());
+    let height_m = reference.step().map_or(0.0, |step| step.height_m);
     let steady = change.saturating_add(tick(config.control.steady_after_s));
     let (mut step, mut error, mut origin_m, mut active) =
         (StepMeter::new(height_m), RunningStats::default(), 0.0, 0);

@@ -41,7 +41,7 @@ pub use external::{ExternalAnalysis, analyse_external};
 pub use measure::{Measured, measure};
 pub use plan::{Plan, RunKind};
 pub use plan_error::PlanError;
-pub use prediction::{predicted_extremes, rig_model};
+pub use prediction::{extremes, predicted_extremes, rig_model};
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use response_estimate::{ClosedResponses, MeasuredMargins};
 pub use run::{Run, run};

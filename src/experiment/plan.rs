@@ -3,11 +3,9 @@
 
 use super::plan_error::PlanError;
 use super::swept;
-use crate::config::{Config, ReferenceSettings, whole};
+use crate::config::{Config, whole};
 use crate::control::ControllerText;
-use crate::excitation::{
-    self, Chirp, Excitation, Extremes, Quiet, Staircase, reference, reference_text,
-};
+use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
 use crate::recording::Recording;
 use crate::rt::program::{Control, Excite, Program};
 
@@ -97,7 +95,7 @@ impl Plan {
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
         let (config, predicted_extremes) = swept::planned(config, &controller)?;
-        let reference = reference_text(&config.control.reference)?;
+        let reference = config.control.reference.design().text()?;
         Ok(Plan {
             controller: Some(controller),
             reference,
@@ -143,14 +141,18 @@ impl Plan {
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
         match self.kind {
-            RunKind::Chirp => return Ok(Box::new(Excite(excitation::of(config)))),
+            RunKind::Chirp => return Ok(Box::new(Excite(config.chosen_excitation().build()))),
             RunKind::Calibrate => {
                 return Ok(Box::new(Excite(Staircase::new(
-                    &config.calibrate,
+                    &config.calibrate.steps(),
                     period_s,
                 ))));
             }
-            RunKind::Quiet => return Ok(Box::new(Excite(Quiet::new(&config.campaign, period_s)))),
+            RunKind::Quiet => {
+                let (settle_s, average_s) = (config.campaign.settle_s, config.campaign.average_s);
+                let zero = ZeroCurrent::new(settle_s, average_s, period_s);
+                return Ok(Box::new(Excite(zero)));
+            }
             RunKind::Control => {}
         }
         let text = self
@@ -158,18 +160,16 @@ impl Plan {
             .as_ref()
             .ok_or(PlanError::Missing("controller"))?;
         let law = text.design(config.servo.rate_hz)?.law(period_s);
-        let reference = reference(
-            &config.control.reference,
-            &config.chirp,
-            self.reference.as_deref(),
+        let design = config.control.reference.design();
+        let context = ReferenceContext {
+            chirp: &config.chirp,
             period_s,
-        )?;
-        let ticks = |seconds: f64| libm::round(seconds / period_s) as u64;
-        let closed = match config.control.reference {
-            ReferenceSettings::Chirp { .. } => Chirp::new(&config.chirp, period_s).ticks(),
-            _ => ticks(config.control.duration_s),
+            file: self.reference.as_deref(),
         };
-        let settle = ticks(config.control.settle_s);
+        let reference = design.build(&context)?;
+        let settle = context.ticks(config.control.settle_s);
+        let closed = design.closed_ticks(&context);
+        let closed = closed.unwrap_or_else(|| context.ticks(config.control.duration_s));
         Ok(Box::new(Control::new(law, reference, settle, closed)))
     }
 

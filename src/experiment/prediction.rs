@@ -2,7 +2,7 @@
 
 use super::error::ExperimentError;
 use crate::config::Config;
-use crate::excitation::{self, Extremes};
+use crate::excitation::{Excitation, Extremes};
 use crate::model::plant::DiscretePlant;
 use crate::rig::simulated;
 
@@ -22,6 +22,27 @@ pub fn rig_model(config: &Config) -> Result<DiscretePlant, ExperimentError> {
 
 /// The extremes of the configured excitation. Refuses an excitation that would trip an interlock.
 pub fn predicted_extremes(config: &Config) -> Result<Extremes, ExperimentError> {
-    let excitation = excitation::of(config);
-    Ok(excitation::check(&excitation, config, &rig_model(config)?)?)
+    let model = rig_model(config)?;
+    let limits = config.excitation_limits();
+    let checked = config.chosen_excitation().check(&limits, positions(&model));
+    Ok(checked?)
+}
+
+/// The extremes of any excitation.
+pub fn extremes(
+    excitation: &impl Excitation,
+    config: &Config,
+) -> Result<Extremes, ExperimentError> {
+    let model = rig_model(config)?;
+    let limits = config.excitation_limits();
+    Ok(Extremes::of(excitation, &limits, positions(&model)))
+}
+
+/// The position in metres after the command of each tick, from rest.
+fn positions(model: &DiscretePlant) -> impl FnMut(f64) -> f64 {
+    let mut motion = model.at_rest();
+    move |command_a| {
+        model.step(&mut motion, command_a, |_| 0.0);
+        model.position_m(&motion)
+    }
 }

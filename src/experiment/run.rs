@@ -19,7 +19,8 @@ use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
 use crate::rt::publisher::Publisher;
-use crate::rt::servo::{Connections, Progress, REQUESTS_PER_TICK, Request, Servo};
+use crate::rt::record::REQUESTS_PER_TICK;
+use crate::rt::servo::{Connections, Progress, Request, Servo};
 use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, should the disk hang for a while.

@@ -1,9 +1,9 @@
-//! A swept reference before its run: its amplitudes, where it has none, and what it would do.
+//! The plan of a swept reference: its amplitudes, where the user gives none, and its extremes by the model.
 
 use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
 use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
-use crate::excitation::{Chirp, Excitation, Extremes, reference, within};
+use crate::excitation::{Extremes, ReferenceContext, SweptReference};
 use crate::model::plant::LoopPlant;
 use crate::rig::simulated;
 
@@ -13,11 +13,7 @@ pub(super) fn planned(
     mut config: Config,
     controller: &ControllerText,
 ) -> Result<(Config, Option<Extremes>), PlanError> {
-    let ReferenceSettings::Chirp {
-        amplitude,
-        travel_m,
-    } = &config.control.reference
-    else {
+    let ReferenceSettings::Chirp(swept) = &config.control.reference else {
         return Ok((config, None));
     };
     let modes = simulated::modes(&config)?;
@@ -27,21 +23,22 @@ pub(super) fn planned(
         config.motor.force_constant_n_per_a,
         controller.design(config.servo.rate_hz)?,
     )?;
-    let amplitude = match amplitude.is_empty() {
+    let travel_m = swept.travel_m;
+    let amplitude = match swept.amplitude.is_empty() {
         true => {
             let limits = SweptLimits {
                 chirp: &config.chirp,
-                travel_m: *travel_m,
+                travel_m,
                 reference_m: config.interlock.soft_limit_m,
             };
             swept_reference_amplitudes(&closed_loop, &limits)
         }
-        false => amplitude.clone(),
+        false => swept.amplitude.clone(),
     };
-    config.control.reference = ReferenceSettings::Chirp {
+    config.control.reference = ReferenceSettings::Chirp(SweptReference {
         amplitude,
-        travel_m: *travel_m,
-    };
+        travel_m,
+    });
     // What is not allowed now could not be read back from the recording.
     validate(&config)?;
     // What a loop that runs away would do has no largest current to lower.
@@ -52,23 +49,30 @@ pub(super) fn planned(
             PlanError::Unstable
         }
     };
-    let extremes = predicted_extremes(&config, &closed_loop).map_err(unstable)?;
+    let extremes = match &config.control.reference {
+        ReferenceSettings::Chirp(swept) => predicted_extremes(swept, &config, &closed_loop),
+        _ => return Ok((config, None)),
+    };
+    let extremes = extremes.map_err(unstable)?;
     Ok((config, Some(extremes)))
 }
 
 /// The run by the linear model, against every interlock.
-fn predicted_extremes(config: &Config, closed_loop: &ClosedLoop) -> Result<Extremes, PlanError> {
-    let period_s = config.servo.period_s();
-    let reference = reference(&config.control.reference, &config.chirp, None, period_s)?;
-    let chirp = Chirp::new(&config.chirp, period_s);
-    let course = closed_loop.signals(chirp.ticks() as usize, |tick| reference.at_m(tick as u64));
-    let extremes = Extremes::over(course, config);
-    let frequency_hz = chirp.frequency_at_hz(extremes.travel_tick);
-    within(
-        &extremes,
-        config,
-        frequency_hz,
-        "the amplitudes of control.reference and of chirp",
-    )?;
+fn predicted_extremes(
+    reference: &SweptReference,
+    config: &Config,
+    closed_loop: &ClosedLoop,
+) -> Result<Extremes, PlanError> {
+    let sweep = reference.sweep(&ReferenceContext {
+        chirp: &config.chirp,
+        period_s: config.servo.period_s(),
+        file: None,
+    });
+    let signals = closed_loop.signals(sweep.ticks() as usize, |tick| sweep.at(tick as u64));
+    let limits = config.excitation_limits();
+    let extremes = Extremes::over(signals, &limits);
+    let frequency_hz = sweep.frequency_at_hz(extremes.travel_tick);
+    let setting = "the amplitudes of control.reference and of chirp";
+    limits.check(&extremes, Some(frequency_hz), setting)?;
     Ok(extremes)
 }

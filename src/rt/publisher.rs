@@ -3,8 +3,7 @@
 
 use rtrb::Producer;
 
-use super::record::{Event, EventKind, LoopMessage, TickRecord};
-use super::servo::REQUESTS_PER_TICK;
+use super::record::{Event, EventKind, LoopMessage, REQUESTS_PER_TICK, TickRecord};
 
 /// Publishes records and events without waiting.
 pub struct Publisher {

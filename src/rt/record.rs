@@ -86,6 +86,9 @@ pub enum EventKind {
     },
 }
 
+/// Requests that one tick takes; more wait for the next.
+pub const REQUESTS_PER_TICK: usize = 16;
+
 /// Requests, as they appear in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestKind {

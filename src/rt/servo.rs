@@ -11,7 +11,7 @@ use super::clock::{Clock, TickTiming};
 use super::interlock::Interlocks;
 use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
-use super::record::{EventKind, RequestKind, TickRecord, flag};
+use super::record::{EventKind, REQUESTS_PER_TICK, RequestKind, TickRecord, flag};
 
 /// The driver returned a current that is not finite.
 const NOT_FINITE: DeviceError = DeviceError {
@@ -19,9 +19,6 @@ const NOT_FINITE: DeviceError = DeviceError {
     remedy: "this is a fault of the driver; please report it",
     code: 0,
 };
-
-/// Requests that one tick takes; more wait for the next.
-pub const REQUESTS_PER_TICK: usize = 16;
 
 /// A request to the loop, taken at a tick boundary. Its content is complete and immutable.
 pub enum Request {

@@ -2,7 +2,7 @@
 
 /// An error at the path of a setting.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Finding {
+pub struct Finding {
     /// Dotted path of the key.
     pub path: String,
     /// The error, with value, limit and remedy.
@@ -13,10 +13,10 @@ pub(crate) struct Finding {
 
 impl Finding {
     /// An error in the value of a key that is there.
-    pub fn new(path: &str, what: String) -> Finding {
+    pub fn new(path: &str, what: impl Into<String>) -> Finding {
         Finding {
             path: path.into(),
-            what,
+            what: what.into(),
             missing: false,
         }
     }

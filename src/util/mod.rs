@@ -2,7 +2,7 @@
 
 pub mod atomic_file;
 pub mod checkpoint;
-pub(crate) mod finding;
+pub mod finding;
 pub mod nearest;
 pub mod new_file;
 pub mod numeric;

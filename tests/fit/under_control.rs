@@ -2,6 +2,7 @@
 use std::f64::consts::TAU;
 
 use bench::config::{Config, ReferenceSettings, Source, load};
+use bench::excitation::SweptReference;
 use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench::identify::verdict::Cnmp;
 use bench::model::plant::LoopPlant;
@@ -128,7 +129,8 @@ fn its_modes_zeros_and_margins_are_told_as_well() {
 fn a_planned_sweep_keeps_travel_and_current() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 10e-6 }";
     let plan = Plan::control(config(&[set, "chirp.duration_s=40"])).expect("a plan");
-    let ReferenceSettings::Chirp { amplitude, .. } = &plan.config.control.reference else {
+    let ReferenceSettings::Chirp(SweptReference { amplitude, .. }) = &plan.config.control.reference
+    else {
         panic!()
     };
     assert!(amplitude.len() > 10 && amplitude.iter().all(|point| point.amplitude_m > 0.0));
@@ -172,7 +174,8 @@ fn a_planned_sweep_is_read_back_from_its_recording_whatever_the_controller() {
         "chirp.fade_in_s=1",
     ];
     let plan = Plan::control(config(&sets)).expect("a plan");
-    let ReferenceSettings::Chirp { amplitude, .. } = &plan.config.control.reference else {
+    let ReferenceSettings::Chirp(SweptReference { amplitude, .. }) = &plan.config.control.reference
+    else {
         panic!()
     };
     // No reference that a person gives may reach beyond the soft limit of 0.9 mm; where the loop follows it is the travel.

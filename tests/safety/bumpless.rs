@@ -3,7 +3,7 @@ use std::ops::Range;
 
 use bench::config::{Config, ReferenceSettings};
 use bench::control::{ControlLaw, Controller, ControllerText, LawInput, SectionController};
-use bench::excitation::reference;
+use bench::excitation::{HoldReference, Reference, ReferenceContext};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Program, ProgramInput};
@@ -36,14 +36,17 @@ fn controller(config: &Config) -> Controller {
     )
 }
 
+fn reference(config: &Config, settings: &ReferenceSettings) -> Box<dyn Reference> {
+    let context = ReferenceContext {
+        chirp: &config.chirp,
+        period_s: config.servo.period_s(),
+        file: None,
+    };
+    settings.design().build(&context).expect("no file")
+}
+
 fn program(config: &Config, settle: u64, closed: u64) -> Control {
-    let reference = reference(
-        &config.control.reference,
-        &config.chirp,
-        None,
-        config.servo.period_s(),
-    )
-    .expect("no file");
+    let reference = reference(config, &config.control.reference);
     let law = SectionController::new(controller(config));
     Control::new(Box::new(law), reference, settle, closed)
 }
@@ -118,7 +121,7 @@ fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
     for name in ["fast", "slow"] {
         for (seed, offset_m) in [(1, 300e-6), (2, -300e-6), (3, 0.0), (4, 850e-6)] {
             let mut config = config(name, seed);
-            config.control.reference = ReferenceSettings::Hold;
+            config.control.reference = ReferenceSettings::Hold(HoldReference {});
             let rig = SimulatedRig::new(&config).expect("a rig");
             let mut bench = Bench::around(
                 &config,
@@ -185,7 +188,7 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
         );
         bench.run(50_000);
 
-        config.control.reference = ReferenceSettings::Hold;
+        config.control.reference = ReferenceSettings::Hold(HoldReference {});
         let from = bench.ticks().last().expect("ticks").tick + 1;
         bench.order(Request::Arm);
         bench.order(Request::Start(Box::new(program(&config, 2500, 2500))));
@@ -216,22 +219,14 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
 fn a_controller_that_was_used_before_starts_from_rest() {
     for name in ["fast", "slow"] {
         let mut config = config(name, 6);
-        config.control.reference = ReferenceSettings::Hold;
+        config.control.reference = ReferenceSettings::Hold(HoldReference {});
         let mut used = SectionController::new(controller(&config));
         let moved = (0..1000).map(|_| used.update(&error(100e-6))).last();
         assert!(
             moved.is_some_and(|current_a| current_a.abs() > 1e-3),
             "{moved:?}"
         );
-        let hold = || {
-            reference(
-                &ReferenceSettings::Hold,
-                &config.chirp,
-                None,
-                config.servo.period_s(),
-            )
-            .expect("no file")
-        };
+        let hold = || reference(&config, &ReferenceSettings::Hold(HoldReference {}));
         let mut after = Control::new(Box::new(used), hold(), 10, 100);
         let mut fresh = Control::new(
             Box::new(SectionController::new(controller(&config))),

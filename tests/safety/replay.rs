@@ -3,6 +3,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use bench::config::{AmplitudePoint, Config, ReferenceSettings, Sweep};
+use bench::excitation::{SineReference, StepReference};
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::simulated::SimulatedRig;
@@ -64,10 +65,10 @@ fn is_the_same(path: &Path, what: &str) {
 fn chirps_and_closed_loops_replay_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut hold = control("fast");
-    hold.config.control.reference = ReferenceSettings::Sine {
+    hold.config.control.reference = ReferenceSettings::Sine(SineReference {
         amplitude_m: 20e-6,
         frequency_hz: 3.0,
-    };
+    });
     let plans = [
         short_chirp(Sweep::Linear),
         short_chirp(Sweep::Logarithmic),
@@ -137,10 +138,10 @@ fn a_trip_of_the_controllers_own_making_replays_bit_for_bit() {
     std::fs::write(&file, text).expect("a file");
     let mut config = stage();
     config.control.controller = file.display().to_string();
-    config.control.reference = ReferenceSettings::Step {
+    config.control.reference = ReferenceSettings::Step(StepReference {
         amplitude_m: 500e-6,
         at_s: 0.01,
-    };
+    });
     let path = record(&Plan::control(config).expect("a plan"), &[], folder.path());
     // The recording carries the controller: its file may be gone.
     std::fs::remove_file(file).expect("it was there");

@@ -4,11 +4,11 @@ use std::time::SystemTime;
 
 use super::staircase_fit::{StaircaseFit, fit};
 use crate::config::{Config, ExcitationKind};
-use crate::excitation::{Extremes, Staircase};
+use crate::excitation::Staircase;
 use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
-use crate::experiment::prediction::{predicted_extremes, rig_model};
+use crate::experiment::prediction::{extremes, predicted_extremes};
 use crate::experiment::run_summary::RunSummary;
 use crate::experiment::runner::{Runner, close};
 use crate::experiment::signals::abandon_on_signal;
@@ -45,8 +45,8 @@ pub fn settings(mut config: Config) -> Config {
 /// Refuses steps, or a chirp, that would trip an interlock by the model of the whole rig.
 pub fn check(config: &Config) -> Result<(), ExperimentError> {
     compliance_m_per_a(config)?;
-    let steps = Staircase::new(&config.calibrate, config.servo.period_s());
-    let extremes = Extremes::of(&steps, config, &rig_model(config)?);
+    let steps = Staircase::new(&config.calibrate.steps(), config.servo.period_s());
+    let extremes = extremes(&steps, config)?;
     let limit_a = (config.amplifier.current_limit_a).min(config.motor.peak_current_a());
     let amplitude_a = config.calibrate.amplitude_a;
     let soft_limit_m = config.interlock.soft_limit_m;

@@ -72,7 +72,7 @@ pub fn fit(
     settings: &CalibrateSettings,
     period_s: f64,
 ) -> Result<StaircaseFit, StaircaseError> {
-    let staircase = Staircase::new(settings, period_s);
+    let staircase = Staircase::new(&settings.steps(), period_s);
     let levels = levels(recording, &staircase)?;
     let (rest_m, slope, sigma) = line(levels.iter().map(Level::reading));
     let noise = mean_variance(&levels);

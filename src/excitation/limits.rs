@@ -1,13 +1,11 @@
-//! Whether an excitation may run: what it would do by the model, against every interlock.
+//! Whether an excitation may run: its extremes by the model, against every interlock.
 
-use super::{Amplitude, Excitation, Extremes};
-use crate::config::{Config, ExcitationKind};
-use crate::model::plant::DiscretePlant;
+use super::amplitude::AmplitudeCurve;
+use super::design::ChosenExcitation;
+use super::extremes::Extremes;
+use super::waveform::Excitation;
 
-/// A periodic analysis takes lines below a hundredth of the largest for ones that were not excited; half of that is kept clear.
-pub const LARGEST_SPAN: f64 = 50.0;
-
-/// An excitation that the interlocks would trip, or that would not show what it is for.
+/// An excitation that the interlocks would trip, or whose record could not be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExcitationError {
     /// Beyond the motor or the amplifier.
@@ -19,7 +17,7 @@ pub enum ExcitationError {
         current_a: f64,
         /// The limit.
         limit_a: f64,
-        /// Whose limit it is.
+        /// The part with this limit.
         what: &'static str,
         /// The setting to lower.
         setting: &'static str,
@@ -36,7 +34,7 @@ pub enum ExcitationError {
         /// The setting to lower.
         setting: &'static str,
     },
-    /// Too hot.
+    /// Beyond the thermal rating of the motor.
     #[error(
         "the excitation would heat the motor to a thermal current of {thermal_a:.3} A, {limit_a:.3} A are allowed; lower {setting} or shorten it"
     )]
@@ -48,7 +46,7 @@ pub enum ExcitationError {
         /// The setting to lower.
         setting: &'static str,
     },
-    /// Too far.
+    /// Beyond the soft limit.
     #[error(
         "by the model the stage would travel {travel_um:.0} um{}, the soft limit is {limit_um:.0} um; lower {setting}{}",
         .frequency_hz.map_or(String::new(), |f| format!(" at {f:.1} Hz")),
@@ -57,121 +55,137 @@ pub enum ExcitationError {
     Travel {
         /// Largest travel by the model.
         travel_um: f64,
-        /// The one frequency excited when it happens, if it is one.
+        /// The frequency that is excited then, if it is a single one.
         frequency_hz: Option<f64>,
         /// The soft limit.
         limit_um: f64,
         /// The setting to lower.
         setting: &'static str,
     },
-    /// Some lines are too small beside others.
+    /// Some lines are too small compared with others.
     #[error(
-        "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; of a multisine, lines below 1/{LARGEST_SPAN} of the largest cannot be told from unexcited ones: raise the least or lower the largest"
+        "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; lines below 1/{max_span} of the largest cannot be distinguished from lines that are not excited: raise the smallest or lower the largest"
     )]
     Span {
         /// The least amplitude within the band.
         least_a: f64,
         /// The largest.
         most_a: f64,
+        /// The largest ratio of both.
+        max_span: f64,
     },
 }
 
-/// Refuses an excitation that would trip an interlock by the model of the plant; returns what it would do.
-pub fn check(
-    excitation: &(impl Excitation + ?Sized),
-    config: &Config,
-    plant: &DiscretePlant,
-) -> Result<Extremes, ExcitationError> {
-    span(config)?;
-    let extremes = Extremes::of(excitation, config, plant);
-    let frequency_hz = excitation.frequency_at_hz(extremes.travel_tick);
-    within(&extremes, config, frequency_hz, setting(config))?;
-    Ok(extremes)
+/// What an excitation must keep within.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Travel in metres to either side.
+    pub travel_m: f64,
+    /// Peak current of the motor in amperes.
+    pub peak_current_a: f64,
+    /// Current limit of the amplifier in amperes.
+    pub amplifier_current_a: f64,
+    /// Continuous current of the motor in amperes.
+    pub continuous_current_a: f64,
+    /// Slew rate of the amplifier in A/s.
+    pub slew_a_per_s: f64,
+    /// Thermal time constant of the motor in seconds.
+    pub thermal_time_constant_s: f64,
+    /// Length of a tick in seconds.
+    pub period_s: f64,
 }
 
-/// Refuses what would trip an interlock; `frequency_hz` is the one excited where the travel is largest, `setting` the one to
-/// lower.
-pub fn within(
-    extremes: &Extremes,
-    config: &Config,
-    frequency_hz: Option<f64>,
-    setting: &'static str,
-) -> Result<(), ExcitationError> {
-    current(config, extremes, setting)?;
-    let limit_a_per_s = config.amplifier.slew_limit_a_per_s;
-    if extremes.slew_a_per_s > limit_a_per_s {
-        return Err(ExcitationError::Slew {
-            slew_a_per_s: extremes.slew_a_per_s,
-            limit_a_per_s,
-            setting,
-        });
+impl ChosenExcitation<'_> {
+    /// Refuses an excitation that would trip an interlock; returns its extremes. `position_m` is the model of the plant: it
+    /// takes the command of each tick and returns the position after it.
+    pub fn check(
+        &self,
+        limits: &Limits,
+        position_m: impl FnMut(f64) -> f64,
+    ) -> Result<Extremes, ExcitationError> {
+        self.check_span()?;
+        let excitation = self.build();
+        let extremes = Extremes::of(&excitation, limits, position_m);
+        let frequency_hz = excitation.frequency_at_hz(extremes.travel_tick);
+        limits.check(&extremes, frequency_hz, self.design.amplitude_key())?;
+        Ok(extremes)
     }
-    let limit_a = config.motor.continuous_current_a();
-    if extremes.thermal_a > limit_a {
-        return Err(ExcitationError::Heat {
-            thermal_a: extremes.thermal_a,
-            limit_a,
-            setting,
-        });
-    }
-    if extremes.travel_m > config.interlock.soft_limit_m {
-        let (travel_um, limit_um) = (extremes.travel_m * 1e6, config.interlock.soft_limit_m * 1e6);
-        return Err(ExcitationError::Travel {
-            travel_um,
-            frequency_hz,
-            limit_um,
-            setting,
-        });
-    }
-    Ok(())
-}
 
-fn current(
-    config: &Config,
-    extremes: &Extremes,
-    setting: &'static str,
-) -> Result<(), ExcitationError> {
-    let limits = [
-        (config.motor.peak_current_a(), "the motor's peak current"),
-        (config.amplifier.current_limit_a, "the amplifier's limit"),
-    ];
-    let current_a = extremes.current_a;
-    match limits.into_iter().find(|(limit_a, _)| current_a > *limit_a) {
-        Some((limit_a, what)) => Err(ExcitationError::Current {
-            current_a,
-            limit_a,
-            what,
-            setting,
-        }),
-        None => Ok(()),
+    fn check_span(&self) -> Result<(), ExcitationError> {
+        let chirp = self.shared.chirp;
+        let (low_hz, high_hz) = chirp.band_hz();
+        let (least_a, most_a) = AmplitudeCurve::of_current(&chirp.amplitude).range(low_hz, high_hz);
+        match self.design.max_span() {
+            Some(max_span) if most_a > max_span * least_a => Err(ExcitationError::Span {
+                least_a,
+                most_a,
+                max_span,
+            }),
+            _ => Ok(()),
+        }
     }
 }
 
-fn span(config: &Config) -> Result<(), ExcitationError> {
-    let (low_hz, high_hz) = config.chirp.band_hz();
-    let (least_a, most_a) = Amplitude::new(&config.chirp.amplitude).range_a(low_hz, high_hz);
-    let wide =
-        config.excitation.kind == ExcitationKind::Multisine && most_a > LARGEST_SPAN * least_a;
-    if wide {
-        Err(ExcitationError::Span { least_a, most_a })
-    } else {
+impl Limits {
+    /// Refuses what would trip an interlock. `frequency_hz` is the frequency that is excited where the travel is largest,
+    /// `setting` the setting to lower.
+    pub fn check(
+        &self,
+        extremes: &Extremes,
+        frequency_hz: Option<f64>,
+        setting: &'static str,
+    ) -> Result<(), ExcitationError> {
+        self.check_current(extremes.current_a, setting)?;
+        let (slew_a_per_s, limit_a_per_s) = (extremes.slew_a_per_s, self.slew_a_per_s);
+        if slew_a_per_s > limit_a_per_s {
+            return Err(ExcitationError::Slew {
+                slew_a_per_s,
+                limit_a_per_s,
+                setting,
+            });
+        }
+        let (thermal_a, limit_a) = (extremes.thermal_a, self.continuous_current_a);
+        if thermal_a > limit_a {
+            return Err(ExcitationError::Heat {
+                thermal_a,
+                limit_a,
+                setting,
+            });
+        }
+        if extremes.travel_m > self.travel_m {
+            return Err(ExcitationError::Travel {
+                travel_um: extremes.travel_m * 1e6,
+                frequency_hz,
+                limit_um: self.travel_m * 1e6,
+                setting,
+            });
+        }
         Ok(())
     }
-}
 
-/// The setting of the current.
-fn setting(config: &Config) -> &'static str {
-    match config.excitation.kind {
-        ExcitationKind::Prbs => "prbs.amplitude_a",
-        _ => "chirp.amplitude",
+    fn check_current(&self, current_a: f64, setting: &'static str) -> Result<(), ExcitationError> {
+        let limits = [
+            (self.peak_current_a, "the motor's peak current"),
+            (self.amplifier_current_a, "the amplifier's limit"),
+        ];
+        match limits.into_iter().find(|(limit_a, _)| current_a > *limit_a) {
+            Some((limit_a, what)) => Err(ExcitationError::Current {
+                current_a,
+                limit_a,
+                what,
+                setting,
+            }),
+            None => Ok(()),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{AmplitudePoint, Source, load};
-    use crate::excitation::of;
+    use crate::config::{Config, Source, load};
+    use crate::excitation::{AmplitudePoint, ExcitationKind};
+    use crate::model::plant::DiscretePlant;
 
     fn checked(change: &dyn Fn(&mut Config)) -> Result<Extremes, ExcitationError> {
         let mut config = load(&Source::default()).unwrap();
@@ -190,7 +204,14 @@ mod tests {
             force_constant,
             config.servo.period_s(),
         );
-        check(&of(&config), &config, &plant)
+        let mut motion = plant.at_rest();
+        let position_m = |command_a| {
+            plant.step(&mut motion, command_a, |_| 0.0);
+            plant.position_m(&motion)
+        };
+        config
+            .chosen_excitation()
+            .check(&config.excitation_limits(), position_m)
     }
 
     fn flat(config: &mut Config, current_a: f64) {
@@ -238,12 +259,12 @@ mod tests {
     fn every_kind_is_refused_where_it_would_trip_and_told_what_to_lower() {
         let with = |kind: ExcitationKind, current_a: f64| {
             move |config: &mut Config| {
-                (config.excitation.kind, config.prbs.amplitude_a) = (kind, current_a);
+                (config.excitation.kind, config.excitations.prbs.amplitude_a) = (kind, current_a);
                 (config.chirp.start_hz, config.chirp.quiet_after_s) = (20.0, 0.5);
                 (
-                    config.multisine.periods,
-                    config.prbs.periods,
-                    config.stepped_sine.count,
+                    config.excitations.multisine.periods,
+                    config.excitations.prbs.periods,
+                    config.excitations.stepped_sine.count,
                 ) = (5, 5, 30);
                 flat(config, current_a);
             }

@@ -1,0 +1,127 @@
+//! What is known of a reference from its settings, before it is built.
+
+use crate::excitation::sweep::ChirpSettings;
+use crate::excitation::waveform::{Reference, ticks};
+use crate::util::finding::Finding;
+
+/// What a reference is built with, beside its own settings.
+#[derive(Clone, Copy, Debug)]
+pub struct ReferenceContext<'a> {
+    /// The sweep that one kind follows.
+    pub chirp: &'a ChirpSettings,
+    /// Length of a tick in seconds.
+    pub period_s: f64,
+    /// Text of the file that the settings name, if they name one.
+    pub file: Option<&'a str>,
+}
+
+impl ReferenceContext<'_> {
+    /// The tick nearest to a time in seconds.
+    pub fn ticks(&self, seconds: f64) -> u64 {
+        ticks(seconds, self.period_s)
+    }
+}
+
+/// A step within a reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepOfReference {
+    /// Height in metres.
+    pub height_m: f64,
+    /// Time in seconds after the loop closed.
+    pub at_s: f64,
+}
+
+/// The settings of one kind of reference. Everything that the program does differently for a kind is asked here.
+pub trait ReferenceDesign {
+    /// Name of the kind, as in `control.reference.kind`.
+    fn name(&self) -> &'static str;
+
+    /// Kind and values in words.
+    fn describe(&self) -> String;
+
+    /// The reference.
+    fn build(&self, context: &ReferenceContext<'_>) -> Result<Box<dyn Reference>, ReferenceError>;
+
+    /// Values that the limits of the bench forbid.
+    fn check(&self, _soft_limit_m: f64, _rate_hz: f64) -> Vec<Finding> {
+        Vec::new()
+    }
+
+    /// The step, of a kind that is one.
+    fn step(&self) -> Option<StepOfReference> {
+        None
+    }
+
+    /// Time in seconds of its last change: the steady state is measured after it.
+    fn last_change_s(&self) -> f64 {
+        self.step().map_or(0.0, |step| step.at_s)
+    }
+
+    /// Whether a record with this reference can be identified: it excites a band of frequencies.
+    fn can_identify(&self) -> bool {
+        false
+    }
+
+    /// Ticks with the loop closed, of a kind that decides its own length.
+    fn closed_ticks(&self, _context: &ReferenceContext<'_>) -> Option<u64> {
+        None
+    }
+
+    /// The file that it reads, if it reads one.
+    fn path(&self) -> Option<&str> {
+        None
+    }
+
+    /// The text of that file: it travels with a recording.
+    fn text(&self) -> Result<Option<String>, ReferenceError> {
+        let Some(path) = self.path() else {
+            return Ok(None);
+        };
+        let text = std::fs::read_to_string(path);
+        text.map(Some).map_err(|e| ReferenceError::Unreadable {
+            path: path.into(),
+            why: e.to_string(),
+        })
+    }
+}
+
+/// A length in micrometres, rounded to nanometres.
+pub(super) fn um(metres: f64) -> String {
+    format!("{} um", (metres * 1e9).round() / 1e3)
+}
+
+/// A finding about an amplitude beyond the soft limit.
+pub(super) fn check_amplitude(amplitude_m: f64, soft_limit_m: f64) -> Vec<Finding> {
+    if amplitude_m.abs() <= soft_limit_m {
+        return Vec::new();
+    }
+    let what = format!(
+        "is {amplitude_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m)"
+    );
+    vec![Finding::new("control.reference.amplitude_m", what)]
+}
+
+/// A reference file that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ReferenceError {
+    /// The file cannot be read.
+    #[error("cannot read the reference {path}: {why}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// The system's message.
+        why: String,
+    },
+    /// A line is not two numbers, or time does not rise.
+    #[error(
+        "{path} line {line}: {why}; a reference has the header `time_s,reference_m` and rising times"
+    )]
+    Line {
+        /// The file.
+        path: String,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        why: String,
+    },
+}

@@ -1,0 +1,99 @@
+//! A reference from a CSV file.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::design::{ReferenceContext, ReferenceDesign, ReferenceError};
+use crate::excitation::waveform::Reference;
+
+/// A CSV file with the columns `time_s,reference_m`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FileReference {
+    /// Path of the file.
+    pub path: String,
+}
+
+impl ReferenceDesign for FileReference {
+    fn name(&self) -> &'static str {
+        "file"
+    }
+
+    fn describe(&self) -> String {
+        format!("the file {}", self.path)
+    }
+
+    fn build(&self, context: &ReferenceContext<'_>) -> Result<Box<dyn Reference>, ReferenceError> {
+        let text = context.file.unwrap_or_default();
+        Ok(Box::new(Table::parse(&self.path, text, context.period_s)?))
+    }
+
+    fn can_identify(&self) -> bool {
+        true
+    }
+
+    fn path(&self) -> Option<&str> {
+        Some(&self.path)
+    }
+}
+
+/// Points of a file, joined by straight lines; the first value before them, the last one after.
+struct Table {
+    points: Vec<(f64, f64)>,
+    period_s: f64,
+}
+
+impl Table {
+    fn parse(path: &str, text: &str, period_s: f64) -> Result<Table, ReferenceError> {
+        let wrong = |line: usize, why: String| ReferenceError::Line {
+            path: path.into(),
+            line,
+            why,
+        };
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (index, line) in text
+            .lines()
+            .enumerate()
+            .filter(|(_, line)| !line.trim().is_empty())
+        {
+            if index == 0 && line.trim() == "time_s,reference_m" {
+                continue;
+            }
+            let point = point(line)
+                .ok_or_else(|| wrong(index + 1, format!("`{line}` is not two finite numbers")))?;
+            if points.last().is_some_and(|before| before.0 >= point.0) {
+                return Err(wrong(
+                    index + 1,
+                    format!("the time {} s does not rise", point.0),
+                ));
+            }
+            points.push(point);
+        }
+        if points.is_empty() {
+            Err(wrong(1, "there is no point".into()))
+        } else {
+            Ok(Table { points, period_s })
+        }
+    }
+}
+
+fn point(line: &str) -> Option<(f64, f64)> {
+    let (time, value) = line.split_once(',')?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    Some((number(time)?, number(value)?))
+}
+
+impl Reference for Table {
+    fn at_m(&self, tick: u64) -> f64 {
+        let time_s = tick as f64 * self.period_s;
+        let after = self.points.partition_point(|(t, _)| *t <= time_s);
+        match (
+            after.checked_sub(1).and_then(|i| self.points.get(i)),
+            self.points.get(after),
+        ) {
+            (Some(&(t0, r0)), Some(&(t1, r1))) => r0 + (r1 - r0) * (time_s - t0) / (t1 - t0),
+            (Some(&(_, r)), None) | (None, Some(&(_, r))) => r,
+            (None, None) => 0.0,
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The seams of this module: a current over time, a reference over time.
+
+/// A current over time, as a function of the tick alone: so that a run can be repeated and replayed.
+///
+/// ```
+/// use bench::excitation::Excitation;
+///
+/// /// A pulse of 0.1 A over the first ten ticks of a hundred.
+/// struct Pulse;
+///
+/// impl Excitation for Pulse {
+///     fn current_a(&self, tick: u64) -> f64 {
+///         if tick < 10 { 0.1 } else { 0.0 }
+///     }
+///     fn ticks(&self) -> u64 {
+///         100
+///     }
+/// }
+///
+/// assert!(Pulse.active(99) && !Pulse.active(100));
+/// // bench::rt::program::Excite(Pulse) is the program that runs it.
+/// ```
+pub trait Excitation: Send {
+    /// Amperes at a tick of the excitation, counted from 0. *In the tick.*
+    fn current_a(&self, tick: u64) -> f64;
+
+    /// Length in ticks, quiet included. *In the tick.*
+    fn ticks(&self) -> u64;
+
+    /// Whether the tick belongs to the excitation proper, not to the quiet before or after. *In the tick.*
+    fn active(&self, tick: u64) -> bool {
+        tick < self.ticks()
+    }
+
+    /// The frequency in hertz that is excited at a tick, if it is a single one.
+    fn frequency_at_hz(&self, _tick: u64) -> Option<f64> {
+        None
+    }
+
+    /// How it repeats.
+    fn pattern(&self) -> Pattern {
+        Pattern::Once
+    }
+}
+
+impl<E: Excitation + ?Sized> Excitation for Box<E> {
+    fn current_a(&self, tick: u64) -> f64 {
+        (**self).current_a(tick)
+    }
+
+    fn ticks(&self) -> u64 {
+        (**self).ticks()
+    }
+
+    fn active(&self, tick: u64) -> bool {
+        (**self).active(tick)
+    }
+
+    fn frequency_at_hz(&self, tick: u64) -> Option<f64> {
+        (**self).frequency_at_hz(tick)
+    }
+
+    fn pattern(&self) -> Pattern {
+        (**self).pattern()
+    }
+}
+
+/// How an excitation repeats; all counts in ticks of it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pattern {
+    /// Not at all: from rest to rest.
+    Once,
+    /// From rest to rest, several times.
+    Repeated {
+        /// Ticks of one repetition.
+        period: usize,
+        /// Number of repetitions.
+        count: usize,
+    },
+    /// Without a pause.
+    Periodic {
+        /// Start of the first period.
+        start: usize,
+        /// Ticks of one period.
+        period: usize,
+        /// Periods in which the stage settles.
+        skip: usize,
+        /// Periods after these.
+        periods: usize,
+    },
+    /// One sine after the other, each alone in its window.
+    Stepped(Vec<Window>),
+}
+
+/// The ticks in which one sine is alone and steady.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Its first tick.
+    pub start: usize,
+    /// Ticks of a block.
+    pub period: usize,
+    /// Periods of the sine in a block.
+    pub turns: usize,
+    /// Blocks.
+    pub periods: usize,
+}
+
+/// A reference over time, from the tick at which the loop closes.
+pub trait Reference: Send {
+    /// Metres relative to the rest position, at a tick counted from 0. *In the tick.*
+    fn at_m(&self, tick: u64) -> f64;
+}
+
+/// The tick nearest to a time.
+pub(super) fn ticks(seconds: f64, period_s: f64) -> u64 {
+    libm::round(seconds / period_s) as u64
+}
