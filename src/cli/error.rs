@@ -43,7 +43,7 @@ pub enum CliError {
     Calibration(#[from] CalibrationError),
     /// The loop's margin is too small.
     #[error(
-        "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.least_modulus_margin if you know better; nothing moved"
+        "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.min_modulus_margin if you know better; nothing moved"
     )]
     Margin(String),
     /// Another mistake in the call.

@@ -74,17 +74,17 @@ pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
 
 /// Refuses a loop with less than the configured modulus margin.
 pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Result<(), CliError> {
-    let least = config.control.least_modulus_margin;
+    let least = config.control.min_modulus_margin;
     let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
     if least > 0.0 && !margins.stable {
         return Err(CliError::Margin(format!(
-            "with the {name} controller at {rate_hz} Hz the closed loop is unstable and has no modulus margin, at least {least} is asked for (control.least_modulus_margin)"
+            "with the {name} controller at {rate_hz} Hz the closed loop is unstable and has no modulus margin, at least {least} is asked for (control.min_modulus_margin)"
         )));
     }
     if margins.modulus_margin < least {
         let margin = margins.modulus_margin;
         return Err(CliError::Margin(format!(
-            "with the {name} controller at {rate_hz} Hz the modulus margin is {margin:.3}, at least {least} is asked for (control.least_modulus_margin)"
+            "with the {name} controller at {rate_hz} Hz the modulus margin is {margin:.3}, at least {least} is asked for (control.min_modulus_margin)"
         )));
     }
     Ok(())

@@ -31,10 +31,10 @@ pub struct CalibrateSettings {
     pub scale_by: ScaleBy,
     /// Largest distance of a level from a straight line, as a ratio of the whole travel.
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub largest_nonlinearity_ratio: f64,
+    pub max_nonlinearity_ratio: f64,
     /// Largest distance between the ways up and down, as a ratio of the whole travel.
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub largest_hysteresis_ratio: f64,
+    pub max_hysteresis_ratio: f64,
 }
 
 impl CalibrateSettings {
@@ -73,7 +73,7 @@ pub struct CalibrationSettings {
     /// What happens when it is older.
     pub when_expired: OnInvalidCalibration,
     /// What happens when it is of other devices.
-    pub when_foreign: OnInvalidCalibration,
+    pub when_other_devices: OnInvalidCalibration,
 }
 
 /// What happens when a calibration is not fit.

@@ -15,7 +15,7 @@ pub struct CampaignSettings {
     pub pulley_ratio: f64,
     /// By how much the cable may pull beside Y, in radians.
     #[schemars(range(min = 0.0, max = 0.5))]
-    pub askew_rad: f64,
+    pub cable_misalignment_rad: f64,
     /// By how much the mounting of the probe may drift in a session, in metres.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub rest_tolerance_m: f64,

@@ -13,7 +13,7 @@ pub struct ControlSettings {
     pub controller: String,
     /// A loop with a smaller modulus margin (1/max|S|), or an unstable one, is refused; 0 refuses none.
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub least_modulus_margin: f64,
+    pub min_modulus_margin: f64,
     /// Zero current before the loop closes, in seconds; the mean position over it is the rest position, from which the reference counts.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub settle_s: f64,

@@ -199,7 +199,7 @@ fn missing_objects(inspection: &Inspection, settings: &DriveSettings) -> Option<
     }
     let missing = missing.join(", ");
     let remedy = "choose a drive that monitors its master; if only 0x6007 is missing, unplug the bus to verify that \
-                  the drive stops, then set amplifier.device.when_unheard = \"own_reaction\"";
+                  the drive stops, then set amplifier.device.on_communication_loss = \"own_reaction\"";
     Some(DRIVE.failure(
         format!("the drive lacks {missing}: it would not stop when communication is lost"),
         remedy,

@@ -55,7 +55,7 @@ pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
     };
     let mut report = Report::default();
     report.extend([runs::kinds(config)]);
-    report.extend(runs::findings(checks, config.control.least_modulus_margin));
+    report.extend(runs::findings(checks, config.control.min_modulus_margin));
     report.figures.control = checks.control.as_ref().ok().cloned();
     examine_system(config, pace, &mut report);
     amplifier::examine(&config.amplifier, &config.servo, &mut report);

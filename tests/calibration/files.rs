@@ -111,7 +111,7 @@ fn an_expired_or_foreign_calibration_is_a_warning_or_a_refusal_as_set() {
         ("old.toml", "when_expired", "180", "days ago"),
         (
             "foreign.toml",
-            "when_foreign",
+            "when_other_devices",
             "another amplifier",
             "canopen 0x1-0x2",
         ),

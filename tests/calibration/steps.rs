@@ -119,8 +119,8 @@ fn backlash_and_a_bent_probe_are_refused_with_their_figures() {
         "{back}"
     );
     let mut generous = config.clone();
-    generous.calibrate.largest_hysteresis_ratio = 0.05;
-    generous.calibrate.largest_nonlinearity_ratio = 0.05;
+    generous.calibrate.max_hysteresis_ratio = 0.05;
+    generous.calibrate.max_nonlinearity_ratio = 0.05;
     let fit = fitted(
         Skew {
             backlash_m: 2e-6,
@@ -141,7 +141,7 @@ fn backlash_and_a_bent_probe_are_refused_with_their_figures() {
     .expect_err("bent")
     .to_string();
     assert!(
-        bent.contains("straight line") && bent.contains("largest_nonlinearity_ratio"),
+        bent.contains("straight line") && bent.contains("max_nonlinearity_ratio"),
         "{bent}"
     );
 }

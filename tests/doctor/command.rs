@@ -157,7 +157,7 @@ fn a_configuration_that_cannot_be_is_refused_like_by_every_command() {
 
 #[test]
 fn a_loop_with_too_little_margin_stops_control_and_leaves_the_chirp() {
-    let answer = Bench::new().run("doctor --set control.least_modulus_margin=0.9 --json");
+    let answer = Bench::new().run("doctor --set control.min_modulus_margin=0.9 --json");
     let report = sound(&answer);
     assert_eq!(
         (answer.code, &report["could_start"]),

@@ -122,7 +122,7 @@ fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_
     assert_eq!(code, 2, "{errors}");
     for word in [
         "modulus margin",
-        "control.least_modulus_margin",
+        "control.min_modulus_margin",
         "0.4",
         "--controller",
         "nothing moved",
@@ -142,13 +142,13 @@ fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_
         );
     }
     // The threshold is a setting: the slow controller has 0.69.
-    let (code, _, errors) = control(&["--slow", "--set", "control.least_modulus_margin=0.75"]);
+    let (code, _, errors) = control(&["--slow", "--set", "control.min_modulus_margin=0.75"]);
     assert!(
         code == 2 && errors.contains("0.69") && errors.contains("0.75"),
         "{errors}"
     );
     // Who knows better is let through, and the interlocks stand below.
-    let (code, report, _) = control(&["--fast", "--set", "control.least_modulus_margin=0"]);
+    let (code, report, _) = control(&["--fast", "--set", "control.min_modulus_margin=0"]);
     assert_eq!((code, report["outcome"].as_str()), (1, Some("tripped")));
 }
 

@@ -72,7 +72,7 @@ pub struct CanopenSettings {
     pub identity: ExpectedIdentity,
     /// Reaction of the drive to the loss of communication (0x6007).
     #[serde(default)]
-    pub when_unheard: OnCommunicationLoss,
+    pub on_communication_loss: OnCommunicationLoss,
     /// Heartbeat periods and timeouts.
     #[serde(default)]
     pub times: CanopenTimeouts,

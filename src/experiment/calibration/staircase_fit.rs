@@ -117,14 +117,14 @@ fn require_straight(
     require_ratio(
         "the distance between the ways up and down",
         fit.hysteresis_ratio,
-        settings.largest_hysteresis_ratio,
-        "calibrate.largest_hysteresis_ratio",
+        settings.max_hysteresis_ratio,
+        "calibrate.max_hysteresis_ratio",
     )?;
     require_ratio(
         "the distance from a straight line",
         fit.nonlinearity_ratio,
-        settings.largest_nonlinearity_ratio,
-        "calibrate.largest_nonlinearity_ratio",
+        settings.max_nonlinearity_ratio,
+        "calibrate.max_nonlinearity_ratio",
     )
 }
 

@@ -125,7 +125,7 @@ impl StageModel<'_> {
         rest: &RestPosition,
         unloaded: &RestPosition,
     ) -> LengthCheck {
-        let sideways_n = self.force_n(load).abs() * libm::sin(self.settings.askew_rad);
+        let sideways_n = self.force_n(load).abs() * libm::sin(self.settings.cable_misalignment_rad);
         let sideways_m = sideways_n / (2.0 * self.stage.spring_stiffness_n_per_m);
         let noise_m = SIGMAS * libm::hypot(rest.sigma_m, unloaded.sigma_m);
         let tolerance_m = self.settings.rest_tolerance_m + noise_m + sideways_m;

@@ -133,8 +133,8 @@ pub fn load_calibration(
         ),
         (
             other_device(&calibration, amplifier, probe),
-            settings.when_foreign,
-            "calibration.when_foreign",
+            settings.when_other_devices,
+            "calibration.when_other_devices",
         ),
     ];
     let mut warnings = Vec::new();

@@ -75,7 +75,7 @@ pub fn drive_settings(device: &CanopenSettings, requirements: Requirements) -> D
         rated_current_a: device.rated_current_a,
         current_limit_a: requirements.current_limit_a,
         identity: device.identity,
-        abort_connection: abort_connection(device.when_unheard),
+        abort_connection: abort_connection(device.on_communication_loss),
         heartbeat_period: seconds(times.heartbeat_s),
         heartbeat_timeout: seconds(times.heartbeat_lost_s),
         own_heartbeat_period: seconds(times.own_heartbeat_s),

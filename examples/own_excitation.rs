@@ -1,0 +1,92 @@
+//! An excitation of your own, run in the loop with the simulated stage: a decaying train of pulses.
+//!
+//! `cargo run --example own_excitation`
+
+use bench::config::{Config, Source, load};
+use bench::excitation::{Excitation, Extremes};
+use bench::rig::simulated::SimulatedRig;
+use bench::rt::clock::{Clock, Virtual};
+use bench::rt::program::{Excite, Program, ProgramInput};
+use bench::rt::{interlock::Interlocks, publisher::Publisher};
+use bench_hal::{CurrentAmplifier, DisplacementProbe};
+
+/// Pulses of alternating sign, each 1 ms long, their size halved from pulse to pulse.
+struct Pulses {
+    first_a: f64,
+    width: u64,
+    interval: u64,
+    count: u64,
+}
+
+impl Excitation for Pulses {
+    fn current_a(&self, tick: u64) -> f64 {
+        let (pulse, within) = (tick / self.interval, tick % self.interval);
+        let is_on = pulse < self.count && within < self.width;
+        if is_on {
+            self.first_a * (-0.5f64).powi(pulse as i32)
+        } else {
+            0.0
+        }
+    }
+
+    fn ticks(&self) -> u64 {
+        self.count * self.interval
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let config = load(&Source::default())?;
+    let (positions_m, commands_a) = run(&config)?;
+    let signals = commands_a.iter().copied().zip(positions_m.iter().copied());
+    let limits = config.excitation_limits();
+    let extremes = Extremes::over(signals, &limits);
+    limits.check(&extremes, None, "Pulses::first_a")?;
+    let (travel_um, current_a) = (extremes.travel_m * 1e6, extremes.current_a);
+    println!("travel {travel_um:.1} um, largest current {current_a:.3} A");
+    assert_eq!(current_a, 0.5, "the first pulse is the largest");
+    assert!(
+        (1.0..900.0).contains(&travel_um),
+        "the stage moves inside its limits"
+    );
+    Ok(())
+}
+
+/// The program of the loop, tick by tick, with the interlocks between it and the simulated stage.
+fn run(config: &Config) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Error>> {
+    let mut program = Excite(Pulses {
+        first_a: 0.5,
+        width: 5,
+        interval: 5000,
+        count: 4,
+    });
+    let mut interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let mut rig = SimulatedRig::new(config)?;
+    let mut clock = Virtual {
+        period_s: config.servo.period_s(),
+    };
+    let publisher = Publisher::new(rtrb::RingBuffer::new(64).0);
+    let (mut positions_m, mut commands_a) = (Vec::new(), Vec::new());
+    rig.enable()?;
+    for tick in 0..program.ticks() {
+        let now = clock.wait(tick, &publisher).tick;
+        let reading = rig.latest(now);
+        interlocks
+            .check_reading(&reading, now)
+            .map_err(|trip| trip.to_string())?;
+        let position_m = reading.position_m;
+        let decision = program.decide(&ProgramInput {
+            tick,
+            position_m,
+            ..ProgramInput::default()
+        });
+        interlocks
+            .check_command(decision.requested_a)
+            .map_err(|trip| trip.to_string())?;
+        let command_a = rig.command(decision.requested_a)?;
+        interlocks.note(command_a);
+        positions_m.push(position_m);
+        commands_a.push(command_a);
+    }
+    rig.disable();
+    Ok((positions_m, commands_a))
+}
