@@ -1,6 +1,6 @@
 //! Relations between settings, which no single range expresses.
 
-use super::load::Purpose;
+use super::purpose::Purpose;
 use super::{
     AmplitudePoint, Config, IdentifySettings, InterlockSettings, MotorSettings, ProbeSettings,
     relations,

@@ -14,6 +14,7 @@ use super::overrides::{
 };
 use super::place::line_of;
 use super::profiles::{self, EmbeddedFile};
+use super::purpose::Purpose;
 use super::{Config, renamed, schema};
 use crate::util::finding::Finding;
 
@@ -37,26 +38,6 @@ pub struct Source {
     pub options: Vec<OptionSetting>,
     /// Its use.
     pub purpose: Purpose,
-}
-
-/// The use of a configuration: relations between settings that the command does not use are not checked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Purpose {
-    /// Models, margins, replay.
-    #[default]
-    Model,
-    /// An excitation.
-    Chirp,
-    /// A closed loop.
-    Control,
-    /// All commands.
-    All,
-}
-
-impl Purpose {
-    pub(super) fn includes(self, other: Purpose) -> bool {
-        self == other || self == Purpose::All
-    }
 }
 
 /// Loads, merges and checks a configuration.

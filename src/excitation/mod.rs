@@ -10,6 +10,7 @@
 //! line in `reference/mod.rs`. A program that uses this library can run its own [`Excitation`] or [`Reference`] without either.
 
 mod amplitude;
+mod check;
 mod chirp;
 mod design;
 mod extremes;
@@ -29,11 +30,12 @@ mod waveform;
 mod zero_current;
 
 pub use amplitude::{AmplitudeCurve, AmplitudePoint, TravelPoint};
+pub use check::ExcitationError;
 pub use chirp::Chirp;
 pub use design::{ChosenExcitation, ExcitationDesign, Length, SharedSettings};
 pub use extremes::Extremes;
 pub use kinds::{ExcitationKind, ExcitationTables};
-pub use limits::{ExcitationError, Limits};
+pub use limits::Limits;
 pub use multisine::{Lines, MultisineSettings};
 pub use periodic::Periodic;
 pub use prbs::PrbsSettings;

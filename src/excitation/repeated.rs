@@ -1,52 +1,50 @@
-//! A chirp with its quiet, several times.
+//! An excitation with its quiet, several times.
 
-use super::chirp::Chirp;
 use super::waveform::{Excitation, Pattern};
 
-/// A chirp repeated: each repetition begins and ends at rest, so that their mean is one chirp with less noise.
+/// Repetitions that each begin and end at rest, so that their mean is one of them with less noise.
 #[derive(Clone, Debug)]
-pub(super) struct Repeated {
-    chirp: Chirp,
+pub(super) struct Repeated<E> {
+    once: E,
     count: u64,
 }
 
-impl Repeated {
+impl<E: Excitation> Repeated<E> {
     /// `count` repetitions.
-    pub(super) fn new(chirp: Chirp, count: u32) -> Repeated {
+    pub(super) fn new(once: E, count: u32) -> Repeated<E> {
         Repeated {
-            chirp,
+            once,
             count: u64::from(count),
         }
     }
 
     /// The tick within its repetition.
     fn within(&self, tick: u64) -> Option<u64> {
-        (tick < self.ticks()).then(|| tick % self.chirp.ticks())
+        (tick < self.ticks()).then(|| tick % self.once.ticks())
     }
 }
 
-impl Excitation for Repeated {
+impl<E: Excitation> Excitation for Repeated<E> {
     fn current_a(&self, tick: u64) -> f64 {
         self.within(tick)
-            .map_or(0.0, |tick| self.chirp.current_a(tick))
+            .map_or(0.0, |tick| self.once.current_a(tick))
     }
 
     fn active(&self, tick: u64) -> bool {
-        self.within(tick)
-            .is_some_and(|tick| self.chirp.active(tick))
+        self.within(tick).is_some_and(|tick| self.once.active(tick))
     }
 
     fn ticks(&self) -> u64 {
-        self.chirp.ticks() * self.count
+        self.once.ticks() * self.count
     }
 
     fn frequency_at_hz(&self, tick: u64) -> Option<f64> {
-        self.chirp.frequency_at_hz(self.within(tick)?)
+        self.once.frequency_at_hz(self.within(tick)?)
     }
 
     fn pattern(&self) -> Pattern {
         Pattern::Repeated {
-            period: self.chirp.ticks() as usize,
+            period: self.once.ticks() as usize,
             count: self.count as usize,
         }
     }
@@ -56,6 +54,7 @@ impl Excitation for Repeated {
 mod tests {
     use super::*;
     use crate::config::{Source, load};
+    use crate::excitation::Chirp;
 
     #[test]
     fn every_repetition_is_the_chirp_bit_for_bit_and_then_there_is_nothing() {

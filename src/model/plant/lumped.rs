@@ -193,10 +193,10 @@ fn check_node(name: &str, mass_kg: f64) -> Option<Finding> {
     let path = format!("plant.nodes.{name}");
     if name == GROUND {
         let what = "has the name of the fixed end of a spring; give the node another name";
-        return Some(Finding::new(&path, what.into()));
+        return Some(Finding::new(&path, what));
     }
     let what = "is 0, which leaves the motion of the node undefined; give it a mass, or join the springs that meet there";
-    (mass_kg == 0.0).then(|| Finding::new(&format!("{path}.mass_kg"), what.into()))
+    (mass_kg == 0.0).then(|| Finding::new(&format!("{path}.mass_kg"), what))
 }
 
 impl PlantModel for LumpedSettings {

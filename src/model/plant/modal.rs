@@ -51,7 +51,7 @@ impl PlantModel for ModalSettings {
         let mut findings = Vec::new();
         if self.modes.values().all(|mode| mode.residue_per_kg == 0.0) {
             let what = "have no residue that is not zero: no force would reach the probe; give at least one `residue_per_kg`";
-            findings.push(Finding::new("plant.modes", what.into()));
+            findings.push(Finding::new("plant.modes", what));
         }
         for (name, mode) in &self.modes {
             if mode.omega_rad_s == 0.0 && mode.damping_ratio != 0.0 {

@@ -1,0 +1,286 @@
+//! Whether an excitation may run: its extremes by the model, against every interlock.
+
+use super::amplitude::AmplitudeCurve;
+use super::design::ChosenExcitation;
+use super::extremes::Extremes;
+use super::limits::Limits;
+use super::waveform::Excitation;
+
+/// An excitation that the interlocks would trip, or whose record could not be analysed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExcitationError {
+    /// Beyond the motor or the amplifier.
+    #[error(
+        "the excitation's largest current of {current_a:.3} A is beyond {limit_a:.3} A, {what}; lower {setting}"
+    )]
+    Current {
+        /// The largest current.
+        current_a: f64,
+        /// The limit.
+        limit_a: f64,
+        /// The part with this limit.
+        what: &'static str,
+        /// The setting to lower.
+        setting: &'static str,
+    },
+    /// Faster than the amplifier can follow.
+    #[error(
+        "the excitation changes by up to {slew_a_per_s:.0} A/s, the amplifier follows {limit_a_per_s:.0} A/s; lower {setting} or the highest frequency"
+    )]
+    Slew {
+        /// Its largest change.
+        slew_a_per_s: f64,
+        /// The amplifier's limit.
+        limit_a_per_s: f64,
+        /// The setting to lower.
+        setting: &'static str,
+    },
+    /// Beyond the thermal rating of the motor.
+    #[error(
+        "the excitation would heat the motor to a thermal current of {thermal_a:.3} A, {limit_a:.3} A are allowed; lower {setting} or shorten it"
+    )]
+    Heat {
+        /// Largest thermal current.
+        thermal_a: f64,
+        /// Continuous rating.
+        limit_a: f64,
+        /// The setting to lower.
+        setting: &'static str,
+    },
+    /// Beyond the soft limit.
+    #[error(
+        "by the model the stage would travel {travel_um:.0} um{}, the soft limit is {limit_um:.0} um; lower {setting}{}",
+        .frequency_hz.map_or(String::new(), |f| format!(" at {f:.1} Hz")),
+        .frequency_hz.map_or("", |_| " there, or take --shape model")
+    )]
+    Travel {
+        /// Largest travel by the model.
+        travel_um: f64,
+        /// The frequency that is excited then, if it is a single one.
+        frequency_hz: Option<f64>,
+        /// The soft limit.
+        limit_um: f64,
+        /// The setting to lower.
+        setting: &'static str,
+    },
+    /// Some lines are too small compared with others.
+    #[error(
+        "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; lines below 1/{max_span} of the largest cannot be distinguished from lines that are not excited: raise the smallest or lower the largest"
+    )]
+    Span {
+        /// The least amplitude within the band.
+        least_a: f64,
+        /// The largest.
+        most_a: f64,
+        /// The largest ratio of both.
+        max_span: f64,
+    },
+}
+
+impl ChosenExcitation<'_> {
+    /// Refuses an excitation that would trip an interlock; returns its extremes. `position_m` is the model of the plant: it
+    /// takes the command of each tick and returns the position after it.
+    pub fn check(
+        &self,
+        limits: &Limits,
+        position_m: impl FnMut(f64) -> f64,
+    ) -> Result<Extremes, ExcitationError> {
+        self.check_span()?;
+        let excitation = self.build();
+        let extremes = Extremes::of(&excitation, limits, position_m);
+        let frequency_hz = excitation.frequency_at_hz(extremes.travel_tick);
+        limits.check(&extremes, frequency_hz, self.design.amplitude_key())?;
+        Ok(extremes)
+    }
+
+    fn check_span(&self) -> Result<(), ExcitationError> {
+        let chirp = self.shared.chirp;
+        let (low_hz, high_hz) = chirp.band_hz();
+        let (least_a, most_a) = AmplitudeCurve::of_current(&chirp.amplitude).range(low_hz, high_hz);
+        match self.design.max_span() {
+            Some(max_span) if most_a > max_span * least_a => Err(ExcitationError::Span {
+                least_a,
+                most_a,
+                max_span,
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Limits {
+    /// Refuses what would trip an interlock. `frequency_hz` is the frequency that is excited where the travel is largest,
+    /// `setting` the setting to lower.
+    pub fn check(
+        &self,
+        extremes: &Extremes,
+        frequency_hz: Option<f64>,
+        setting: &'static str,
+    ) -> Result<(), ExcitationError> {
+        self.check_current(extremes.current_a, setting)?;
+        let (slew_a_per_s, limit_a_per_s) = (extremes.slew_a_per_s, self.slew_a_per_s);
+        if slew_a_per_s > limit_a_per_s {
+            return Err(ExcitationError::Slew {
+                slew_a_per_s,
+                limit_a_per_s,
+                setting,
+            });
+        }
+        let (thermal_a, limit_a) = (extremes.thermal_a, self.continuous_current_a);
+        if thermal_a > limit_a {
+            return Err(ExcitationError::Heat {
+                thermal_a,
+                limit_a,
+                setting,
+            });
+        }
+        if extremes.travel_m > self.travel_m {
+            return Err(ExcitationError::Travel {
+                travel_um: extremes.travel_m * 1e6,
+                frequency_hz,
+                limit_um: self.travel_m * 1e6,
+                setting,
+            });
+        }
+        Ok(())
+    }
+
+    fn check_current(&self, current_a: f64, setting: &'static str) -> Result<(), ExcitationError> {
+        let limits = [
+            (self.peak_current_a, "the motor's peak current"),
+            (self.amplifier_current_a, "the amplifier's limit"),
+        ];
+        match limits.into_iter().find(|(limit_a, _)| current_a > *limit_a) {
+            Some((limit_a, what)) => Err(ExcitationError::Current {
+                current_a,
+                limit_a,
+                what,
+                setting,
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Config, Source, load};
+    use crate::excitation::{AmplitudePoint, ExcitationKind};
+    use crate::model::plant::DiscretePlant;
+
+    fn checked(change: &dyn Fn(&mut Config)) -> Result<Extremes, ExcitationError> {
+        let mut config = load(&Source::default()).unwrap();
+        change(&mut config);
+        let structure = crate::model::plant::build(&config.plant).unwrap();
+        let modes = crate::model::plant::ModalModel::of(&structure)
+            .unwrap()
+            .modes;
+        let (bandwidth_hz, force_constant) = (
+            config.amplifier.bandwidth_hz,
+            config.motor.force_constant_n_per_a,
+        );
+        let plant = DiscretePlant::new(
+            &modes,
+            bandwidth_hz,
+            force_constant,
+            config.servo.period_s(),
+        );
+        let mut motion = plant.at_rest();
+        let position_m = |command_a| {
+            plant.step(&mut motion, command_a, |_| 0.0);
+            plant.position_m(&motion)
+        };
+        config
+            .chosen_excitation()
+            .check(&config.excitation_limits(), position_m)
+    }
+
+    fn flat(config: &mut Config, current_a: f64) {
+        config.chirp.amplitude = vec![AmplitudePoint {
+            frequency_hz: 1.0,
+            current_a,
+        }];
+    }
+
+    #[test]
+    fn what_the_interlocks_would_trip_is_refused_with_the_figures() {
+        let travel_m = checked(&|_| {}).unwrap().travel_m;
+        assert!(
+            (300e-6..900e-6).contains(&travel_m),
+            "the default moves and stays inside: {travel_m}"
+        );
+        assert!(matches!(
+            checked(&|c| flat(c, 9.99)),
+            Err(ExcitationError::Current { .. })
+        ));
+        assert!(matches!(
+            checked(&|c| flat(c, 8.0)),
+            Err(ExcitationError::Slew { .. })
+        ));
+        assert!(matches!(
+            checked(&|c| flat(c, 3.5)),
+            Err(ExcitationError::Heat { .. })
+        ));
+        let Err(ExcitationError::Travel {
+            travel_um,
+            frequency_hz,
+            ..
+        }) = checked(&|c| flat(c, 0.3))
+        else {
+            panic!()
+        };
+        // Mode R at 183.9 rad/s = 29.3 Hz rings up as the sweep passes it.
+        assert!(
+            (27.0..33.0).contains(&frequency_hz.unwrap()) && travel_um > 900.0,
+            "{travel_um} {frequency_hz:?}"
+        );
+    }
+
+    #[test]
+    fn every_kind_is_refused_where_it_would_trip_and_told_what_to_lower() {
+        let with = |kind: ExcitationKind, current_a: f64| {
+            move |config: &mut Config| {
+                (config.excitation.kind, config.excitations.prbs.amplitude_a) = (kind, current_a);
+                (config.chirp.start_hz, config.chirp.quiet_after_s) = (20.0, 0.5);
+                (
+                    config.excitations.multisine.periods,
+                    config.excitations.prbs.periods,
+                    config.excitations.stepped_sine.count,
+                ) = (5, 5, 30);
+                flat(config, current_a);
+            }
+        };
+        for (kind, setting) in [
+            (ExcitationKind::Multisine, "chirp.amplitude"),
+            (ExcitationKind::SteppedSine, "chirp.amplitude"),
+            (ExcitationKind::Prbs, "prbs.amplitude_a"),
+        ] {
+            assert!(checked(&with(kind, 0.01)).is_ok(), "{kind:?}");
+            // By the motor's peak current, or by the travel.
+            for current_a in [12.0, 3.0] {
+                let error = checked(&with(kind, current_a)).unwrap_err().to_string();
+                assert!(error.contains(setting), "{kind:?}: {error}");
+            }
+        }
+        // From +a to -a within a tick of 0.2 ms: 22,000 A/s at 2.2 A, of 20,000.
+        let slow = |config: &mut Config| {
+            with(ExcitationKind::Prbs, 2.2)(config);
+            config.interlock.soft_limit_m = 1.0;
+        };
+        assert!(matches!(checked(&slow), Err(ExcitationError::Slew { .. })));
+    }
+
+    #[test]
+    fn a_multisine_whose_lines_differ_too_much_is_refused() {
+        let steep = |config: &mut Config| {
+            config.excitation.kind = ExcitationKind::Multisine;
+            let point = |frequency_hz, current_a| AmplitudePoint {
+                frequency_hz,
+                current_a,
+            };
+            config.chirp.amplitude = vec![point(1.0, 0.001), point(100.0, 0.06)];
+        };
+        assert!(matches!(checked(&steep), Err(ExcitationError::Span { .. })));
+    }
+}
