@@ -149,3 +149,19 @@ impl Rate {
         Some(rate_hz)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reports_a_restart_as_the_latest_error() {
+        let counters = Counters::default();
+        assert_eq!(counters.snapshot().last_error, None);
+        counters.count(Event::Restart);
+        let statistics = counters.snapshot();
+        let error = statistics.last_error.expect("an error");
+        assert_eq!(statistics.restarts, 1);
+        assert!(error.what.contains("restarted"), "{error}");
+    }
+}
