@@ -1,4 +1,4 @@
-//! Heartbeat (CiA 301, 7.2.8.2.2): a node says that it lives, and who stops hearing it knows.
+//! Heartbeat (CiA 301, 7.2.8.2.2): a node sends its state periodically, and others detect its loss.
 //!
 //! ```text
 //! 0x700 + node   [state]      0 boot-up, 4 stopped, 5 operational, 0x7F pre-operational

@@ -1,17 +1,17 @@
 //! Devices on a CAN bus: a CANopen drive (CiA 301, CiA 402) and a VESC.
 //!
 //! ```text
-//!  frame            one CAN frame; everything below speaks it, nothing below knows a socket
+//!  frame            a CAN frame, independent of sockets
 //!  sdo nmt heartbeat emcy sync pdo cia402     codecs and state machines, without input or output
 //!  budget scale     what fits on the bus; amperes and counts
 //!  bus              where frames go: SocketCAN, or a bus in memory with real or virtual time
 //!  drive  vesc      the two drivers: bench_hal::CurrentAmplifier
-//!  emulator         the other end: a simulated drive, for tests and rehearsal
+//!  emulator         emulated devices, for tests and rehearsals
 //! ```
 //!
-//! # Who stops the current when
+//! # How the current is stopped
 //!
-//! | what dies | who notices | how |
+//! | failure of | detected by | by |
 //! |---|---|---|
 //! | the loop (no more set-points) | the service thread | [`drive::DriveSettings::command_timeout`] |
 //! | this process | the drive | its heartbeat consumer (0x1016) and abort connection option (0x6007) |
@@ -19,7 +19,7 @@
 //! | the drive's power stage | the service thread | EMCY, statusword |
 //! | the bus, the adapter | both ends | error frames here, heartbeat there |
 //!
-//! A successful write proves nothing: SocketCAN accepts frames in bus-off. Only what comes in is evidence.
+//! A successful write is no evidence, because SocketCAN accepts frames in bus-off. Only received frames are.
 
 pub mod budget;
 pub mod bus;

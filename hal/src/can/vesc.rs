@@ -6,8 +6,8 @@
 //! from the VESC    command 9   STATUS        rpm i32, current i16 in 0.1 A, duty i16 in 1/1000
 //! ```
 //!
-//! A VESC lets go of the motor after 0.5 s without a command. The loop's commands keep it alive; nothing else does, so a
-//! loop that stands still ends with no current.
+//! A VESC releases the motor after 0.5 s without a command. Only the loop sends commands, so the current is zero when the loop
+//! stops.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
@@ -35,14 +35,14 @@ pub fn status_current(data: &[u8]) -> Option<i16> {
     Some(i16::from_be_bytes([high, low]))
 }
 
-/// What is configured of a VESC.
+/// Settings of a VESC.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VescSettings {
-    /// Its number on the bus.
+    /// Node number.
     pub node: u8,
     /// Commands beyond this are limited, in amperes.
     pub current_limit_a: f64,
-    /// It is lost after this time without STATUS.
+    /// The VESC is lost after this time without STATUS.
     pub status_timeout: Duration,
 }
 
@@ -85,7 +85,7 @@ const fn error(code: u32) -> DeviceError {
     }
 }
 
-/// What the watch tells the tick.
+/// State that the monitor passes to the tick.
 #[derive(Debug, Default)]
 struct Shared {
     fault: AtomicU32,
@@ -97,7 +97,7 @@ impl Shared {
     fn latch(&self, code: u32) {
         let _ = self
             .fault
-            .compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire); // the first one counts
+            .compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire); // the first fault is kept
     }
 }
 
@@ -113,12 +113,12 @@ pub struct Vesc {
 }
 
 impl Vesc {
-    /// Claims the VESC and begins to watch its STATUS. The error is text for a person.
+    /// Claims the VESC and starts to monitor its STATUS.
     pub fn open(settings: VescSettings, host: Box<dyn Host>) -> Result<Vesc, String> {
         let limit_a = settings.current_limit_a;
         if !(limit_a > 0.0 && limit_a <= 1000.0) {
             return Err(format!(
-                "current_limit_a = {limit_a} cannot be: above 0, at most 1000"
+                "current_limit_a = {limit_a} is invalid: expected above 0, at most 1000"
             ));
         }
         let claim = host.claim(settings.node).map_err(|held| held.to_string())?;
@@ -176,7 +176,7 @@ impl CurrentAmplifier for Vesc {
             return Err(error(NOT_ARMED));
         }
         let limit_a = self.settings.current_limit_a;
-        let current_ma = (current_a.clamp(-limit_a, limit_a) * 1e3) as i32; // towards zero; not a number becomes 0
+        let current_ma = (current_a.clamp(-limit_a, limit_a) * 1e3) as i32; // rounded towards zero; NaN becomes 0
         self.bus
             .send(&set_current(self.settings.node, current_ma))
             .map_err(|_| error(NOT_SENT))?;
@@ -185,7 +185,7 @@ impl CurrentAmplifier for Vesc {
 
     fn disable(&mut self) {
         self.is_on = false;
-        let _ = self.bus.send(&set_current(self.settings.node, 0)); // unsent or unheard, 0.5 s of silence do the same
+        let _ = self.bus.send(&set_current(self.settings.node, 0)); // if it is lost, 0.5 s without command have the same effect
     }
 
     fn status(&self) -> AmplifierStatus {
@@ -219,7 +219,7 @@ impl Drop for Vesc {
     }
 }
 
-/// Listens for STATUS and for trouble.
+/// Receives STATUS and error frames.
 struct Watch {
     bus: Box<dyn CanBus>,
     shared: Arc<Shared>,

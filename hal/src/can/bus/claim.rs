@@ -1,4 +1,4 @@
-//! Only one process drives a node.
+//! Claims a node for one process.
 //!
 //! The claim is a listening socket with an abstract name, `bench-can/IFACE/NODE`. The kernel gives it to one process of
 //! a network namespace, which is where a CAN interface lives too, whoever the user is; it vanishes with the process,
@@ -12,7 +12,7 @@ use std::os::unix::net::{SocketAddr, UnixListener};
 use nix::sys::socket::{self, AddressFamily, SockFlag, SockType, UnixAddr, sockopt};
 use thiserror::Error;
 
-/// Another process drives the node.
+/// Another process uses the node.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("node {node} is driven by {} already; end that first{}, or choose another node", who(*pid), kill(*pid))]
 pub struct NodeInUse {
@@ -33,17 +33,17 @@ fn kill(pid: Option<NonZeroU32>) -> String {
     pid.map_or_else(String::new, |pid| format!(" (`kill {pid}`)"))
 }
 
-/// Holds a node until dropped.
+/// Claims a node until it is dropped.
 #[derive(Debug)]
 pub struct Claim(#[allow(dead_code, reason = "held, not read")] Option<UnixListener>);
 
 impl Claim {
-    /// For a bus that nobody else can reach.
+    /// No claim, for a bus that other processes cannot reach.
     pub const fn none() -> Claim {
         Claim(None)
     }
 
-    /// Claims `node` on `interface`, or tells the process that has it.
+    /// Claims `node` on `interface`. The error names the process that has it.
     pub fn new(interface: &str, node: u8) -> Result<Claim, NodeInUse> {
         let name = format!("bench-can/{interface}/{node}");
         let address =
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_second_claim_is_refused_with_the_holders_process_until_the_first_ends() {
+    fn second_claim_is_refused_with_the_process_number_until_the_first_ends() {
         let me = std::process::id();
         let interface = format!("test-{me}");
         let first = Claim::new(&interface, 5).unwrap();
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_holder_that_is_not_known_is_not_to_be_killed() {
+    fn unknown_process_is_not_offered_to_kill() {
         let text =
             "node 5 is driven by another process already; end that first, or choose another node";
         assert_eq!(NodeInUse { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller

@@ -1,14 +1,14 @@
-//! Error frames of SocketCAN (`linux/can/error.h`): what the controller says of the bus.
+//! Error frames of SocketCAN (`linux/can/error.h`): conditions that the controller reports.
 //!
 //! ```text
 //! can_id   CAN_ERR_FLAG | class bits: 0x004 controller, 0x020 no acknowledge, 0x040 bus-off, 0x100 restarted, ...
 //! data[1]  controller: 0x03 overflow, 0x0C warning level, 0x30 error passive, 0x40 error active again
 //! ```
 
-/// What an error frame says, the worst first if it says several things.
+/// The condition in an error frame; the most severe one if there are several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
-    /// The controller has left the bus: nothing goes out, though writes succeed.
+    /// The controller has left the bus: nothing is sent, although writes succeed.
     BusOff,
     /// 128 or more errors: the controller may no longer mark errors of others.
     Passive,
@@ -16,9 +16,9 @@ pub enum Condition {
     Overflow,
     /// 96 or more errors.
     Warning,
-    /// Nobody acknowledged a frame: no other node hears this bus.
+    /// No node acknowledged a frame.
     NoAcknowledge,
-    /// Error active again: all is well.
+    /// Error active again: normal operation.
     Active,
     /// A single error on the wire; the controller repeats the frame.
     Noise,
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn error_frames_are_read_by_the_bits_of_linux_can_error_h() {
+    fn decodes_the_bits_of_linux_can_error_h() {
         let cases = [
             (0x040, [0; 8], Condition::BusOff),
             (0x004, [0, 0x20, 0, 0, 0, 0, 0, 0], Condition::Passive),
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_back() {
+    fn encode_and_decode_are_inverse() {
         use Condition::*;
         for condition in [
             BusOff,

@@ -1,10 +1,10 @@
-//! The state of a CAN interface, asked of the kernel by netlink.
+//! The state of a CAN interface, read from the kernel by netlink.
 
 use socketcan::CanInterface;
 use socketcan::nl::CanState;
 use thiserror::Error;
 
-/// What the kernel says of an interface.
+/// State of an interface.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Interface {
     /// Whether it is up.
@@ -15,13 +15,13 @@ pub struct Interface {
     pub state: Option<&'static str>,
     /// Whether the controller takes part in the bus (error active or warning); true for a virtual interface.
     pub is_healthy: bool,
-    /// Transmit and receive error counters, where the controller tells them.
+    /// Transmit and receive error counters, if the controller reports them.
     pub error_counters: Option<(u16, u16)>,
     /// Time after which the kernel restarts a controller in bus-off, in milliseconds; 0 is never.
     pub restart_ms: Option<u32>,
 }
 
-/// The interface could not be asked.
+/// The state of the interface could not be read.
 #[derive(Debug, Error)]
 #[error("CAN interface {name}: {cause}; `ip link show type can` lists what there is")]
 pub struct InterfaceError {
@@ -32,7 +32,7 @@ pub struct InterfaceError {
 }
 
 impl Interface {
-    /// Asks for the state of interface `name`.
+    /// Reads the state of interface `name`.
     pub fn read(name: &str) -> Result<Interface, InterfaceError> {
         let error = |cause: String| InterfaceError {
             name: name.to_owned(),

@@ -1,10 +1,10 @@
-//! Whether this kernel speaks CAN at all: without the module no interface ever appears, and the reason is easily missed.
+//! Checks whether the kernel supports CAN. Without the kernel module no CAN interface appears.
 
 use nix::errno::Errno;
 use nix::sys::socket::{AddressFamily, SockFlag, SockProtocol, SockType, socket};
 use thiserror::Error;
 
-/// Raw CAN sockets cannot be had.
+/// Raw CAN sockets cannot be opened.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum KernelError {
     /// The kernel has no CAN.
@@ -18,7 +18,7 @@ pub enum KernelError {
     )]
     Denied,
     /// Anything else, with the system's number.
-    #[error("a CAN socket cannot be had: {0}; see the kernel's messages (dmesg)")]
+    #[error("a CAN socket cannot be opened: {0}; see the kernel messages (dmesg)")]
     Other(Errno),
 }
 
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_kernel_without_can_is_told_from_a_process_that_may_not() {
+    fn distinguishes_missing_support_from_missing_permission() {
         assert!(
             of(Errno::EAFNOSUPPORT)
                 .to_string()

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::super::frame::{CanFrame, Id};
 use super::{BusError, BusEvent, CanBus, Condition, Port};
 
-/// Events that wait at an endpoint; more are lost, as in a socket nobody reads.
+/// Largest number of events that wait at an endpoint; further ones are lost, as in a socket that is not read.
 const LONGEST_QUEUE: usize = 10_000;
 
 /// A bus; clones are the same bus.
@@ -34,7 +34,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl MemoryBus {
-    /// A new endpoint that hears `ids`, or all if there are none.
+    /// A new endpoint that receives `ids`, or all identifiers if empty.
     pub fn connect(&self, ids: &[Id]) -> MemoryEndpoint {
         let mailbox = Arc::new(Mailbox {
             ids: ids.to_vec(),
@@ -48,14 +48,14 @@ impl MemoryBus {
         }
     }
 
-    /// Tells all endpoints of a condition, as their controllers would.
+    /// Sends a condition to all endpoints, as their controllers would do.
     pub fn tell(&self, condition: Condition) {
         for mailbox in &lock(&self.wire).mailboxes {
             mailbox.put(BusEvent::Condition(condition));
         }
     }
 
-    /// Takes the interface down, or up again: all endpoints fail meanwhile.
+    /// Sets the interface down or up; while it is down all endpoints fail.
     pub fn set_down(&self, is_down: bool) {
         lock(&self.wire).is_down = is_down;
     }

@@ -1,8 +1,8 @@
-//! Where frames go and come from, whose clock it is, and who runs the service task.
+//! Access to a CAN bus, the clock, and the threads of a driver.
 //!
-//! A [`Host`] is all a driver needs of the world. [`SystemHost`] is the real one: the system's clock and threads around a
-//! [`Port`], which is a SocketCAN interface ([`SocketPort`]) or a bus in memory ([`MemoryBus`]). [`SimulatedHost`] is a bus in
-//! memory with a clock of its own: tests run through it in no time and always alike.
+//! A driver uses a [`Host`]. [`SystemHost`] has the system's clock and threads around a [`Port`], which is a SocketCAN
+//! interface ([`SocketPort`]) or a bus in memory ([`MemoryBus`]). [`SimulatedHost`] is a bus in memory with a simulated clock:
+//! tests with it are fast and repeatable.
 
 mod claim;
 mod condition;
@@ -30,19 +30,19 @@ pub use system_host::SystemHost;
 
 use super::frame::{CanFrame, Id};
 
-/// What comes from a bus.
+/// Something received from a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusEvent {
     /// A frame of another node.
     Frame(CanFrame),
-    /// The controller tells of the bus or of itself (an error frame of SocketCAN).
+    /// A condition of the bus or of the controller (an error frame of SocketCAN).
     Condition(Condition),
 }
 
-/// A bus did not do as told. Small and static: it is made inside the tick.
+/// Error of a bus. Small and static, because it is created in the tick.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum BusError {
-    /// The transmit queue is full: nobody takes the frames, or there are too many.
+    /// The transmit queue is full: no other node acknowledges the frames, or there are too many.
     #[error(
         "the transmit queue of the CAN interface is full; check that another node is on the bus and powered"
     )]
@@ -53,13 +53,13 @@ pub enum BusError {
     /// The interface is gone.
     #[error("the CAN interface is gone; plug the adapter in again")]
     Gone,
-    /// Anything else, with the system's number.
+    /// Another error, with the number of the system.
     #[error("the CAN interface failed with errno {0}")]
     Other(i32),
 }
 
 impl BusError {
-    /// From a system error.
+    /// Converts a system error.
     pub fn from_io(error: &std::io::Error) -> BusError {
         match error.raw_os_error() {
             Some(libc::ENOBUFS | libc::EAGAIN) => BusError::QueueFull,
@@ -70,53 +70,53 @@ impl BusError {
     }
 }
 
-/// One connection to a bus. It does not hear itself.
+/// A connection to a bus. It does not receive its own frames.
 pub trait CanBus: Send {
-    /// Queues a frame; never waits. *In the tick.* Success says only that the frame was queued.
+    /// Queues a frame without waiting; called in the tick. Success means only that the frame was queued.
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError>;
 
-    /// The next event, waiting up to `timeout` for it; `None` if there was none.
+    /// The next event that arrives within `timeout`; `None` if there is none.
     fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError>;
 }
 
-/// Makes connections to one bus.
+/// Creates connections to a bus.
 pub trait Port: Send + Sync {
-    /// A connection that hears the identifiers `ids` (all, if there are none) and all conditions.
+    /// A connection that receives the identifiers `ids` (all if empty) and all conditions.
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError>;
 
-    /// Claims a node of this bus for this process, or names the process that has it.
+    /// Claims a node of this bus for this process. The error names the process that has it.
     fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
         let _ = node;
         Ok(Claim::none())
     }
 
-    /// Tells every endpoint of a condition that its controller did not find, for rehearsals. Not every bus can.
+    /// Sends a condition to every endpoint as if its controller had detected it, for rehearsals. Not supported by every bus.
     fn tell(&self, condition: Condition) -> Result<(), BusError> {
         let _ = condition;
         Err(BusError::Other(libc::EOPNOTSUPP))
     }
 }
 
-/// Work that goes on beside the tick.
+/// Work in a thread beside the loop.
 pub trait Task: Send {
-    /// Takes what has come, waiting up to `wait` for it, then does what is due. `now_ns` is the host's clock. An error
-    /// makes the host pause before the next step.
+    /// Processes received events, waiting up to `wait` for the first, then does what is due. `now_ns` is the clock of the host.
+    /// After an error the host pauses before the next step.
     fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError>;
 }
 
-/// The world of a driver.
+/// A bus with a clock and threads.
 pub trait Host: Port {
-    /// Time since some fixed moment, in nanoseconds.
+    /// Time since a fixed moment, in nanoseconds.
     fn now_ns(&self) -> u64;
 
-    /// Lets time pass. Not in the tick.
+    /// Waits. Not called by methods that must not block.
     fn sleep(&self, time: Duration);
 
     /// Runs a task until the handle is dropped.
     fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle>;
 }
 
-/// A task at work; dropping it ends the task and waits for its end.
+/// A running task; dropping the handle ends the task and waits for its end.
 #[derive(Debug, Default)]
 pub struct TaskHandle {
     stop: Arc<AtomicBool>,
@@ -127,7 +127,7 @@ impl Drop for TaskHandle {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // a task that panicked has said so already
+            let _ = thread.join(); // a panic was reported by the task itself
         }
     }
 }

@@ -1,7 +1,7 @@
-//! A bus in memory with a clock of its own: waiting is running the others.
+//! A bus in memory with a simulated clock.
 //!
-//! Time passes only while somebody sleeps or waits for a frame, in steps of 100 us; each step runs all tasks in the
-//! order they were started. So a test of minutes takes milliseconds, is the same each time, and asserts no wall time.
+//! The time advances only while a caller sleeps or waits for a frame, in steps of 100 us. Each step runs all tasks in the
+//! order in which they were started. Tests are therefore fast, repeatable and independent of the load of the machine.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -17,7 +17,7 @@ const STEP_NS: u64 = 100_000;
 /// Tasks with what stops them.
 type Tasks = Vec<(Arc<AtomicBool>, Box<dyn Task>)>;
 
-/// A world; clones are the same world.
+/// A host with a simulated clock; clones share bus and clock.
 #[derive(Clone, Default)]
 pub struct SimulatedHost {
     shared: Arc<Shared>,
@@ -31,7 +31,7 @@ struct Shared {
 }
 
 impl SimulatedHost {
-    /// The bus of this world.
+    /// The bus.
     pub fn bus(&self) -> &MemoryBus {
         &self.shared.bus
     }

@@ -1,4 +1,4 @@
-//! The real world: the system's clock and threads around a port.
+//! A port with the clock and the threads of the system.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use super::super::frame::Id;
 use super::{BusError, CanBus, Claim, Condition, Host, NodeInUse, Port, Task, TaskHandle};
 
-/// How long a task waits for a frame before it looks at the clock again: a tenth of the shortest time that matters.
+/// How long a task waits for a frame before it reads the clock again.
 const WAIT: Duration = Duration::from_millis(1);
 
-/// A port in real time.
+/// A port with the clock and the threads of the system.
 pub struct SystemHost<P> {
     port: P,
     start: Instant,
@@ -18,12 +18,12 @@ pub struct SystemHost<P> {
 }
 
 impl<P: Port> SystemHost<P> {
-    /// Time begins now.
+    /// The clock starts at 0 now.
     pub fn new(port: P) -> SystemHost<P> {
         SystemHost::since(port, Instant::now())
     }
 
-    /// Time began at `start`: for hosts that share a clock with others.
+    /// The clock was 0 at `start`, for hosts that share a clock.
     pub fn since(port: P, start: Instant) -> SystemHost<P> {
         SystemHost {
             port,

@@ -1,4 +1,4 @@
-//! Why a drive could not be opened.
+//! Errors when a drive is opened.
 
 use thiserror::Error;
 
@@ -6,23 +6,23 @@ use super::super::budget::BudgetError;
 use super::super::bus::{BusError, NodeInUse};
 use super::super::sdo::{Address, SdoError};
 
-/// Why a drive could not be opened: value, limit and next step.
+/// Why a drive could not be opened. The messages contain value, limit and remedy.
 #[derive(Debug, Error)]
 pub enum OpenError {
-    /// A setting that cannot be.
-    #[error("{name} = {value} cannot be: {limit}")]
+    /// An invalid setting.
+    #[error("{name} = {value} is invalid: expected {limit}")]
     Setting {
         /// The setting.
         name: &'static str,
         /// Its value.
         value: String,
-        /// What could be.
+        /// The valid values.
         limit: &'static str,
     },
     /// The bus cannot carry the configuration.
     #[error(transparent)]
     Budget(#[from] BudgetError),
-    /// Another process drives this node.
+    /// Another process uses this node.
     #[error(transparent)]
     NodeInUse(#[from] NodeInUse),
     /// The interface failed.
@@ -31,33 +31,33 @@ pub enum OpenError {
     /// A transfer failed.
     #[error(transparent)]
     Sdo(#[from] SdoError),
-    /// Another drive than configured.
+    /// The drive is not the configured one.
     #[error(
-        "{field} of node {node} is 0x{have:08X}, the configuration says 0x{want:08X}: this is another drive, or the configuration is another's"
+        "{field} of node {node} is 0x{have:08X}, the configuration says 0x{want:08X}: connect the configured drive, or correct the configuration"
     )]
     Identity {
         /// The node.
         node: u8,
         /// Vendor, product, revision or serial number.
         field: &'static str,
-        /// What the drive says.
+        /// Value of the drive.
         have: u32,
-        /// What is configured.
+        /// Configured value.
         want: u32,
     },
-    /// Another rated current than configured: every ampere would be wrong.
+    /// The rated current differs from the configuration; all currents would be wrong.
     #[error(
-        "the rated current of node {node} (0x6075) is {have_a} A, the configuration says {want_a} A; correct whichever is wrong"
+        "the rated current of node {node} (0x6075) is {have_a} A, the configuration says {want_a} A; correct the one that is wrong"
     )]
     RatedCurrent {
         /// The node.
         node: u8,
-        /// What the drive says, in amperes.
+        /// Value of the drive, in amperes.
         have_a: f64,
-        /// What is configured, in amperes.
+        /// Configured value, in amperes.
         want_a: f64,
     },
-    /// The drive missing_objects the mode.
+    /// The drive has none of the configured modes.
     #[error(
         "node {node} has none of the configured modes of operation (0x6502 = 0x{supported:08X}; bit 9 is cyclic synchronous torque, bit 3 profile torque)"
     )]
@@ -67,40 +67,40 @@ pub enum OpenError {
         /// Its supported modes.
         supported: u32,
     },
-    /// The drive does not take the mode.
+    /// The drive did not accept the mode.
     #[error(
-        "node {node} shows mode of operation {have} (0x6061) after {want} was set (0x6060); check that the drive's motor is configured"
+        "node {node} shows mode of operation {have} (0x6061) after {want} was set (0x6060); check that the motor is configured in the drive"
     )]
     ModeDisplay {
         /// The node.
         node: u8,
-        /// What it shows.
+        /// The active mode.
         have: i8,
-        /// What was set.
+        /// The requested mode.
         want: i8,
     },
-    /// The drive did not keep what was written.
+    /// The drive did not accept a value.
     #[error(
-        "node {node} keeps 0x{have:X} in {address} after 0x{want:X} was written; its firmware does not allow this configuration"
+        "node {node} has 0x{have:X} in {address} after 0x{want:X} was written; its firmware does not allow this configuration"
     )]
     Verification {
         /// The node.
         node: u8,
-        /// Where.
+        /// The object.
         address: Address,
-        /// What it has.
+        /// Value of the drive.
         have: u32,
-        /// What was written.
+        /// Written value.
         want: u32,
     },
-    /// The drive missing_objects an object without which it would not stop when this program dies.
+    /// The drive lacks an object without which it would not stop when this program ends.
     #[error(
-        "node {node} cannot be told to stop when it no longer hears us: {cause}; with abort_connection unset its own reaction is trusted: prove it by unplugging the bus"
+        "node {node} cannot be configured to stop when the heartbeat of this program is lost: {cause}; if the drive stops by itself (prove it by unplugging the bus), leave abort_connection unset"
     )]
     NoStop {
         /// The node.
         node: u8,
-        /// What the drive said.
+        /// Answer of the drive.
         cause: SdoError,
     },
     /// The drive does not become operational.
@@ -113,17 +113,19 @@ pub enum OpenError {
         /// The limit, in milliseconds.
         timeout_ms: u128,
     },
-    /// The drive cannot pace its status frames by itself.
+    /// The drive has no timer for its status frames.
     #[error(
         "node {node} has no inhibit time or event timer for its status frames, which an asynchronous exchange needs: {cause}; choose the synchronous exchange, in which the drive answers SYNC"
     )]
     NoTimer {
         /// The node.
         node: u8,
-        /// What the drive said.
+        /// Answer of the drive.
         cause: SdoError,
     },
     /// The service thread could not be started.
-    #[error("the thread that watches the drive could not be started: {0}")]
+    #[error(
+        "the thread that monitors the drive could not be started: {0}; raise the limit of processes (ulimit -u)"
+    )]
     Thread(std::io::Error),
 }

@@ -1,9 +1,9 @@
-//! The faults of a CANopen drive, with codes that stay.
+//! The faults of a CANopen drive. The codes do not change between versions.
 //!
 //! ```text
 //! 0x0001_eeee   emergency message of the drive; eeee is its code
-//! 0x0002_00nn   the drive's communication
-//! 0x0003_00nn   the drive's power stage
+//! 0x0002_00nn   communication with the drive
+//! 0x0003_00nn   power stage of the drive
 //! 0x0004_00nn   the bus
 //! 0x0005_00nn   this program
 //! ```
@@ -12,21 +12,25 @@ use super::super::bus::{BusError, Condition};
 use super::super::emcy;
 use crate::{DeviceError, FaultText};
 
-/// Emergency messages: added to the code that the drive sent.
+/// Emergency messages: the code of the drive is added.
 pub const EMERGENCY: u32 = 0x0001_0000;
+const COMMUNICATION: u32 = 0x0002_0000;
+const POWER: u32 = 0x0003_0000;
+const BUS: u32 = 0x0004_0000;
+const PROGRAM: u32 = 0x0005_0000;
 /// No heartbeat of the drive.
 pub const HEARTBEAT_LOST: u32 = 0x0002_0001;
 /// The drive restarted by itself.
 pub const RESTARTED: u32 = 0x0002_0002;
 /// The drive left NMT operational.
 pub const NOT_OPERATIONAL: u32 = 0x0002_0003;
-/// A frame of the drive is not laid out as configured.
+/// A frame of the drive has not the configured layout.
 pub const MALFORMED: u32 = 0x0002_0004;
-/// The drive did not take its configuration again.
+/// The drive did not accept its configuration again.
 pub const NOT_CONFIGURED: u32 = 0x0002_0005;
 /// State Fault without an emergency message.
 pub const DRIVE_FAULT: u32 = 0x0003_0001;
-/// Operation is no longer enabled, and nobody asked for that.
+/// Operation is no longer enabled without a command.
 pub const SWITCHED_OFF: u32 = 0x0003_0002;
 /// The drive does not follow its target (bit 12 of the statusword).
 pub const TARGET_IGNORED: u32 = 0x0003_0003;
@@ -34,7 +38,7 @@ pub const TARGET_IGNORED: u32 = 0x0003_0003;
 pub const STATUS_LOST: u32 = 0x0003_0004;
 /// The drive did not become enabled in time.
 pub const NOT_ENABLED: u32 = 0x0003_0005;
-/// The drive does not listen to its controlword (bit 9 of the statusword).
+/// The drive does not accept its controlword (bit 9 of the statusword).
 pub const NOT_REMOTE: u32 = 0x0003_0006;
 /// The drive stays in Fault.
 pub const FAULT_REMAINS: u32 = 0x0003_0007;
@@ -46,44 +50,69 @@ pub const BUS_PASSIVE: u32 = 0x0004_0002;
 pub const BUS_DOWN: u32 = 0x0004_0003;
 /// The interface is gone.
 pub const BUS_GONE: u32 = 0x0004_0004;
-/// Frames were lost on the way in.
+/// Received frames were lost.
 pub const OVERFLOW: u32 = 0x0004_0005;
 /// The transmit queue is full.
 pub const QUEUE_FULL: u32 = 0x0004_0006;
-/// The interface failed otherwise.
+/// The interface failed for another reason.
 pub const BUS_FAILED: u32 = 0x0004_0007;
-/// The loop stopped commanding.
+/// The loop sent no more commands.
 pub const COMMANDS_STOPPED: u32 = 0x0005_0001;
 /// The drive did not confirm that it is off.
 pub const STILL_ENABLED: u32 = 0x0005_0002;
 /// A command to a drive that is not enabled.
 pub const NOT_ARMED: u32 = 0x0005_0003;
-/// A command that is not a number.
+/// A command that is not finite.
 pub const NOT_FINITE: u32 = 0x0005_0004;
 
-/// What a code means and what to do about it.
+/// Meaning and remedy of a code.
 pub const fn fault_text(code: u32) -> FaultText {
-    let (what, remedy) = match code {
+    let (what, remedy) = match code & 0xFFFF_0000 {
+        EMERGENCY => (
+            emcy::text(code as u16),
+            "the drive reports this in an emergency message; remove the cause, then clear the fault",
+        ),
+        COMMUNICATION => communication_fault(code),
+        POWER => power_fault(code),
+        BUS => bus_fault(code),
+        PROGRAM => program_fault(code),
+        _ => UNKNOWN,
+    };
+    FaultText { what, remedy }
+}
+
+const UNKNOWN: (&str, &str) = ("unknown fault", "please report the code");
+
+/// Faults of the communication with the drive.
+const fn communication_fault(code: u32) -> (&'static str, &'static str) {
+    match code {
         HEARTBEAT_LOST => (
             "the drive's heartbeat is lost",
             "check the drive's power and the CAN cable, then clear the fault",
         ),
         RESTARTED => (
             "the drive restarted by itself",
-            "check its supply for dips, then clear the fault: that configures it again",
+            "check its supply for dips, then clear the fault; this configures the drive again",
         ),
         NOT_OPERATIONAL => (
             "the drive left the NMT state operational",
             "look for another NMT master on the bus, then clear the fault",
         ),
         MALFORMED => (
-            "a frame of the drive is not laid out as configured",
+            "a frame of the drive has not the configured layout",
             "look for a second node with the same number, then clear the fault",
         ),
         NOT_CONFIGURED => (
-            "the drive did not take its configuration again",
-            "open the drive anew: the error names the object",
+            "the drive did not accept its configuration again",
+            "open the drive again: the error names the object",
         ),
+        _ => UNKNOWN,
+    }
+}
+
+/// Faults of the power stage of the drive.
+const fn power_fault(code: u32) -> (&'static str, &'static str) {
+    match code {
         DRIVE_FAULT => (
             "the drive is in Fault and sent no emergency message",
             "read the drive's display or its error history 0x1003, remove the cause, then clear the fault",
@@ -105,13 +134,20 @@ pub const fn fault_text(code: u32) -> FaultText {
             "check its power stage supply and its enable input",
         ),
         NOT_REMOTE => (
-            "the drive does not listen to CAN (bit 9 of the statusword)",
+            "the drive does not accept commands over CAN (bit 9 of the statusword)",
             "switch the drive from local to remote, and close its commissioning program",
         ),
         FAULT_REMAINS => (
             "the drive stays in Fault after the reset",
             "remove the cause first: read the drive's display or its error history 0x1003",
         ),
+        _ => UNKNOWN,
+    }
+}
+
+/// Faults of the bus.
+const fn bus_fault(code: u32) -> (&'static str, &'static str) {
+    match code {
         BUS_OFF => (
             "the CAN controller is in bus-off",
             "check cable, termination and bit rate; `ip link set IFACE down` and up again, then clear the fault",
@@ -140,30 +176,32 @@ pub const fn fault_text(code: u32) -> FaultText {
             "the CAN interface failed",
             "read the kernel's messages (dmesg), then clear the fault",
         ),
+        _ => UNKNOWN,
+    }
+}
+
+/// Faults of this program.
+const fn program_fault(code: u32) -> (&'static str, &'static str) {
+    match code {
         COMMANDS_STOPPED => (
-            "the loop stopped commanding and the drive was switched off",
+            "the loop sent no more commands and the drive was switched off",
             "look for overruns; the limit is the setting command_timeout",
         ),
         STILL_ENABLED => (
-            "the drive did not confirm that it is off; it was told by NMT and our heartbeat was stopped",
+            "the drive did not confirm that it is off; it was stopped by NMT and the heartbeat of this program ended",
             "cut the drive's power, find the cause, then clear the fault",
         ),
         NOT_ARMED => ("the drive is not enabled", "arm first"),
         NOT_FINITE => (
             "the commanded current is not a number",
-            "this is a fault of the program; please report it",
+            "this is an error of the program; please report it",
         ),
-        _ if code >> 16 == EMERGENCY >> 16 => (
-            emcy::text(code as u16),
-            "the drive says so in an emergency message; remove the cause, then clear the fault",
-        ),
-        _ => ("unknown fault", "please report the code"),
-    };
-    FaultText { what, remedy }
+        _ => UNKNOWN,
+    }
 }
 
-/// Whether `code` says of the same fault more than `first` does: an emergency message what a bare Fault is; and an adapter
-/// that is pulled out goes down before it is gone.
+/// Whether `code` describes the same fault as `first` more precisely: an emergency message after the state Fault; an interface
+/// that is gone, because it goes down first when the adapter is unplugged.
 pub(super) const fn explains(code: u32, first: u32) -> bool {
     match first {
         DRIVE_FAULT => code >> 16 == EMERGENCY >> 16,
@@ -172,7 +210,7 @@ pub(super) const fn explains(code: u32, first: u32) -> bool {
     }
 }
 
-/// A fault as the answer to a call.
+/// A fault as an error of a call.
 pub(super) const fn device_error(code: u32) -> DeviceError {
     let FaultText { what, remedy } = fault_text(code);
     DeviceError {
@@ -182,7 +220,7 @@ pub(super) const fn device_error(code: u32) -> DeviceError {
     }
 }
 
-/// The code of a failure of the interface.
+/// The code of an interface error.
 pub(super) const fn of_bus_error(error: BusError) -> u32 {
     match error {
         BusError::QueueFull => QUEUE_FULL,
@@ -192,7 +230,7 @@ pub(super) const fn of_bus_error(error: BusError) -> u32 {
     }
 }
 
-/// The code of a condition of the controller, if it is a fault.
+/// The code of a controller condition that is a fault.
 pub(super) const fn of_condition(condition: Condition) -> Option<u32> {
     match condition {
         Condition::BusOff => Some(BUS_OFF),
@@ -209,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_code_has_a_text_and_a_remedy_of_its_own() {
+    fn every_code_has_its_own_text() {
         let codes = [
             HEARTBEAT_LOST,
             RESTARTED,

@@ -1,9 +1,9 @@
-//! Watches the drive: what comes in becomes status and faults, what must go out goes out. Sans-I/O.
+//! Monitors the drive: received frames become status and faults, and determines the frames to send. Without bus and clock.
 //!
 //! ```text
-//!  heartbeat, EMCY, status frame, error frame --handle--> fault latched, the first one counts
-//!  time --poll--> our heartbeat | heartbeat, status or commands overdue: fault | after a fault or disable:
-//!                 `disable voltage` until the drive confirms, then NMT stop and silence, so that its own watch acts
+//!  heartbeat, EMCY, status frame, error frame --handle--> fault latched, the first is kept
+//!  time --poll--> heartbeat of this program | heartbeat, status or commands overdue: fault | after a fault or disable:
+//!                 `disable voltage` until the drive confirms, then NMT stop and no more heartbeats, so that the drive stops itself
 //! ```
 
 use std::sync::Arc;
@@ -21,10 +21,10 @@ use super::shared::{Intent, Shared};
 
 /// Time between repeats of `disable voltage`.
 const REPEAT_NS: u64 = 10_000_000;
-/// Time between SYNCs while nobody commands, so that a synchronous drive still tells its state.
+/// Time between SYNCs without commands, so that a synchronous drive still sends its status.
 const IDLE_SYNC_NS: u64 = 20_000_000;
 
-/// The three identifiers that a drive sends by itself, and nothing else, reach the monitor.
+/// The identifiers that the monitor receives: those that a drive sends without request.
 pub(super) fn heard_ids(node: u8) -> [Id; 3] {
     [
         heartbeat::cob_id(node),
@@ -33,7 +33,7 @@ pub(super) fn heard_ids(node: u8) -> [Id; 3] {
     ]
 }
 
-/// The set-point frame, and the SYNC that makes a synchronous drive take it.
+/// The set-point frame.
 pub(super) fn set_point(node: u8, controlword: u16, target: i16) -> CanFrame {
     CanFrame::new(
         pdo::cob_id(Direction::Receive, 1, node),
@@ -41,7 +41,7 @@ pub(super) fn set_point(node: u8, controlword: u16, target: i16) -> CanFrame {
     )
 }
 
-/// The watch after a disable: until the drive says that it is off.
+/// Monitoring after a disable, until the drive confirms that it is off.
 #[derive(Clone, Copy, Debug)]
 struct OffWatch {
     since_ns: u64,
@@ -50,7 +50,7 @@ struct OffWatch {
     escalated: bool,
 }
 
-/// The watch while commands are followed.
+/// Monitoring while commands are followed.
 #[derive(Clone, Copy, Debug)]
 struct OnWatch {
     since_ns: u64,
@@ -109,7 +109,7 @@ impl Monitor {
         self.shared.latch(faults::of_bus_error(error));
     }
 
-    /// Takes what came from the bus.
+    /// Processes an event of the bus.
     pub(super) fn handle(&mut self, event: &BusEvent, now_ns: u64) {
         match event {
             BusEvent::Condition(condition) => {
@@ -196,7 +196,7 @@ impl Monitor {
         self.shared.intent().is_in_use()
     }
 
-    /// Lets time pass; what must go out is given to `send`.
+    /// Advances the time; frames to send are passed to `send`.
     pub(super) fn poll(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
         if now_ns.saturating_sub(self.heard_ns) > self.heartbeat_timeout_ns {
             self.shared.latch(faults::HEARTBEAT_LOST);
@@ -205,13 +205,13 @@ impl Monitor {
         }
         self.follow_intent(now_ns);
         self.watch_commands(now_ns);
-        self.follow_intent(now_ns); // a fault found just now switches off just now
-        self.see_to_it_that_it_is_off(now_ns, send);
+        self.follow_intent(now_ns); // a fault that was just found switches off immediately
+        self.ensure_off(now_ns, send);
         self.sync_while_idle(now_ns, send);
-        self.beat(now_ns, send);
+        self.send_heartbeat(now_ns, send);
     }
 
-    /// What the caller wants, with a fault above it.
+    /// Follows the intent of the caller; a fault has priority.
     fn follow_intent(&mut self, now_ns: u64) {
         let intent = match self.shared.intent() {
             Intent::Resetting => Intent::Resetting,
@@ -267,8 +267,9 @@ impl Monitor {
         }
     }
 
-    /// Repeats `disable voltage` until the drive says that it is off; if it does not in time, takes the other ways.
-    fn see_to_it_that_it_is_off(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
+    /// Repeats `disable voltage` until the drive confirms that it is off; after the time limit sends NMT stop and ends the
+    /// heartbeat.
+    fn ensure_off(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
         let Some(mut watch) = self.off else { return };
         if self.is_confirmed_off(&watch) {
             self.off = None;
@@ -287,7 +288,7 @@ impl Monitor {
         self.off = Some(watch);
     }
 
-    /// A status frame since the disable says off.
+    /// Whether a status frame after the disable reports off.
     fn is_confirmed_off(&self, watch: &OffWatch) -> bool {
         let is_off = matches!(
             self.shared.state(),
@@ -311,8 +312,8 @@ impl Monitor {
         }
     }
 
-    /// Our heartbeat; silence is the last way to stop a drive that does not confirm.
-    fn beat(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
+    /// The heartbeat of this program; its end is the last means to stop a drive that does not confirm.
+    fn send_heartbeat(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
         let is_silent = self.off.is_some_and(|watch| watch.escalated);
         if !is_silent && now_ns >= self.own_due_ns {
             self.own_due_ns = now_ns + self.own_period_ns;

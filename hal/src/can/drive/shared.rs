@@ -1,11 +1,11 @@
-//! What the tick and the service thread tell each other: atomics, no locks.
+//! State that is shared by the tick and the service thread: atomics, no locks.
 
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32, Ordering};
 
 use super::super::cia402::{FOLLOWS_TARGET, State};
 use super::super::nmt;
 
-/// What the caller wants of the drive.
+/// Intent of the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Intent {
