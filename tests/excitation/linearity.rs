@@ -276,7 +276,7 @@ fn amplitudes_that_would_cross_an_interlock_or_are_none_are_refused_and_nothing_
             &[
                 "at 1 of the planned amplitude",
                 "peak current",
-                "nothing moved",
+                "nothing was moved",
             ],
         ),
         ("--scales 1", &["--scales", "two to 10 different"]),
