@@ -14,7 +14,7 @@ use super::run_options::{close, exit, run_text};
 use super::table::labelled;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
-use crate::experiment::{Measured, Plan, RunSummary, measure};
+use crate::experiment::{Plan, RunSummary, TrackingMetrics, tracking_metrics};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
 
@@ -27,7 +27,7 @@ struct Report {
     #[serde(flatten)]
     run: RunSummary,
     predicted: Predicted,
-    measured: Option<Measured>,
+    measured: Option<TrackingMetrics>,
     /// What a swept reference does by the model.
     expected: Option<Expected>,
     /// What a swept reference shows of plant and loop.
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let completed = report.is_completed();
     let swept = config.control.reference.is_swept();
     let measured = match completed && !swept {
-        true => measure(&Recording::open(&run.path)?, &config)?,
+        true => tracking_metrics(&Recording::open(&run.path)?, &config)?,
         false => None,
     };
     let made = match (swept, completed) {
@@ -147,7 +147,7 @@ fn text(report: &Report, config: &Config) -> String {
     }
 }
 
-fn measured_text(measured: Option<&Measured>) -> String {
+fn measured_text(measured: Option<&TrackingMetrics>) -> String {
     let Some(measured) = measured else {
         return labelled("measured", "nothing: the run did not reach a steady state");
     };

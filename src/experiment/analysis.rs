@@ -7,11 +7,11 @@ use nalgebra::Complex;
 use super::analysis_error::AnalysisError;
 use super::closed_loop;
 use super::ending::Ending;
-use super::gathered::{Gathered, Ran};
-use super::patterns::{Taken, taken};
 use super::plan::{KIND, RunKind};
 use super::response_estimate::ClosedResponses;
 use super::response_estimate::ResponseEstimate;
+use super::segments::{Segments, segments};
+use super::signal_builder::{RunSignals, SignalBuilder};
 use crate::config::Config;
 use crate::excitation::Excitation;
 use crate::identify::delay::excess_delay;
@@ -101,7 +101,7 @@ pub fn analyse_with_progress(
 ) -> Result<Analysis, AnalysisError> {
     let kind = recording.metadata().get(KIND);
     let closed = kind.is_some_and(|kind| kind == RunKind::Control.name());
-    let Ran {
+    let RunSignals {
         loop_signals,
         filled_ticks,
     } = ran(recording, config.servo.rate_hz, closed, progress)?;
@@ -142,9 +142,9 @@ fn open_loop(
     config: &Config,
 ) -> Result<(ResponseEstimate, Option<Linearity>), AnalysisError> {
     let pattern = config.chosen_excitation().build().pattern();
-    let (frf, frf_data, linearity) = match taken(signals, &pattern, band_hz)? {
-        Taken::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
-        Taken::Record(signals) => {
+    let (frf, frf_data, linearity) = match segments(signals, &pattern, band_hz)? {
+        Segments::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
+        Segments::Record(signals) => {
             let frf = response(&signals, band_hz, &config.identify)?;
             (
                 frf,
@@ -241,8 +241,8 @@ fn ran(
     rate_hz: f64,
     closed: bool,
     progress: &mut AnalysisProgress<'_>,
-) -> Result<Ran, AnalysisError> {
-    let mut gathered = Gathered::new(recording, rate_hz);
+) -> Result<RunSignals, AnalysisError> {
+    let mut gathered = SignalBuilder::new(recording, rate_hz);
     let total = recording.tick_count().max(1) as f64;
     for (index, record) in recording.ticks()?.enumerate() {
         let record = record?;

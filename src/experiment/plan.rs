@@ -2,7 +2,7 @@
 //! the same plan can be made again from it.
 
 use super::plan_error::PlanError;
-use super::swept;
+use super::swept_reference;
 use crate::config::{Config, whole};
 use crate::control::ControllerText;
 use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
@@ -94,7 +94,7 @@ impl Plan {
     /// recording.
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
-        let (config, predicted_extremes) = swept::planned(config, &controller)?;
+        let (config, predicted_extremes) = swept_reference::planned(config, &controller)?;
         let reference = config.control.reference.design().text()?;
         Ok(Plan {
             controller: Some(controller),

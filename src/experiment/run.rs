@@ -11,7 +11,7 @@ use bench_hal::Rig;
 use rtrb::{Producer, RingBuffer};
 use tokio::signal::unix::Signal;
 
-use super::name;
+use super::file_name;
 use super::plan::{KIND, Plan};
 use super::run_error::RunError;
 use super::signals::signals;
@@ -135,7 +135,7 @@ fn create(
         folder: folder.into(),
         why: e.to_string(),
     })?;
-    let path = name::recording(folder, plan.kind.name(), SystemTime::now());
+    let path = file_name::recording(folder, plan.kind.name(), SystemTime::now());
     let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
     for (name, media_type, text) in plan.attachments() {
         recorder

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::FigureError;
 use super::model::Model;
 use bench::config::Config;
-use bench::experiment::{self, Analysis, Measured, Plan};
+use bench::experiment::{self, Analysis, Plan, TrackingMetrics};
 use bench::recording::Recording;
 use bench::rig::devices;
 use bench::rt::record::{TickRecord, flag};
@@ -46,7 +46,7 @@ pub(crate) struct Closed {
     /// Time and reference, likewise.
     pub reference: Vec<(f64, f64)>,
     /// Its metrics.
-    pub measured: Measured,
+    pub measured: TrackingMetrics,
 }
 
 impl Runs {
@@ -87,7 +87,7 @@ impl Runs {
     pub(crate) fn closed(&self, config: Config) -> Result<Closed, FigureError> {
         let plan = Plan::control(config.clone()).map_err(experiment::RunError::Plan)?;
         let recording = self.run(&plan, "control")?;
-        let measured = experiment::measure(&recording, &config)?;
+        let measured = experiment::tracking_metrics(&recording, &config)?;
         let measured = measured
             .ok_or_else(|| FigureError::Run("the run ended before its steady state".into()))?;
         let ticks: Vec<TickRecord> = recording.ticks()?.collect::<Result<_, _>>()?;
@@ -113,7 +113,7 @@ impl Runs {
 }
 
 /// The ticks with the loop closed, relative to the rest position before.
-fn closed(ticks: &[TickRecord], period_s: f64, measured: Measured) -> Closed {
+fn closed(ticks: &[TickRecord], period_s: f64, measured: TrackingMetrics) -> Closed {
     let active: Vec<&TickRecord> = ticks
         .iter()
         .filter(|tick| tick.flags & flag::ACTIVE != 0)

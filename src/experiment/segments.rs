@@ -17,7 +17,7 @@ use crate::identify::{Frf, FrfDatum, IdentifyError, Signals, repeated};
 const NEIGHBOURS: usize = 4;
 
 /// What the lines of a run show, or the record to be estimated as a whole.
-pub(super) enum Taken {
+pub(super) enum Segments {
     /// A record from rest to rest.
     Record(Signals),
     /// A response at single frequencies; how linear it is, where lines between were left out.
@@ -25,15 +25,15 @@ pub(super) enum Taken {
 }
 
 /// Takes a run apart.
-pub(super) fn taken(
+pub(super) fn segments(
     signals: Signals,
     pattern: &Pattern,
     band_hz: (f64, f64),
-) -> Result<Taken, IdentifyError> {
+) -> Result<Segments, IdentifyError> {
     match pattern {
-        Pattern::Once => Ok(Taken::Record(signals)),
+        Pattern::Once => Ok(Segments::Record(signals)),
         Pattern::Repeated { period, count } => {
-            Ok(Taken::Record(repeated::mean(&signals, *period, *count)))
+            Ok(Segments::Record(repeated::mean(&signals, *period, *count)))
         }
         Pattern::Periodic {
             start,
@@ -52,7 +52,7 @@ pub(super) fn taken(
             let frf_data = linearity
                 .as_ref()
                 .map_or_else(|| frf_data.clone(), |l| l.with_odd_distortion(&frf_data));
-            Ok(Taken::Lines(
+            Ok(Segments::Lines(
                 frf,
                 with_noise_of_neighbours(&frf_data),
                 linearity,
@@ -95,7 +95,7 @@ fn stepped(
     signals: &Signals,
     windows: &[Window],
     (low_hz, high_hz): (f64, f64),
-) -> Result<Taken, IdentifyError> {
+) -> Result<Segments, IdentifyError> {
     let (mut frf, mut frf_data) = (Frf::default(), Vec::new());
     let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
     // A run that was stopped has those that it came to.
@@ -122,7 +122,11 @@ fn stepped(
     if frf_data.is_empty() {
         return Err(IdentifyError::NotExcited { low_hz, high_hz });
     }
-    Ok(Taken::Lines(frf, with_noise_of_neighbours(&frf_data), None))
+    Ok(Segments::Lines(
+        frf,
+        with_noise_of_neighbours(&frf_data),
+        None,
+    ))
 }
 
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {

@@ -10,7 +10,7 @@ use crate::util::running_stats::RunningStats;
 
 /// What the recording of a closed loop shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Measured {
+pub struct TrackingMetrics {
     /// Settling and overshoot, where the reference is a step; a settling band (2 % of the step) below three sigma of the
     /// steady state is lost in it, and there is no settling time.
     #[serde(flatten)]
@@ -22,7 +22,10 @@ pub struct Measured {
 }
 
 /// Measures a run; `None` if it ended before its steady state. One pass in little memory: a run may last for days.
-pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured>, RecordingError> {
+pub fn tracking_metrics(
+    recording: &Recording,
+    config: &Config,
+) -> Result<Option<TrackingMetrics>, RecordingError> {
     let tick = |seconds: f64| (seconds * config.servo.rate_hz).round() as u64;
     let reference = config.control.reference.design();
     let change = tick(reference.last_change_s());
@@ -60,7 +63,7 @@ pub fn measure(recording: &Recording, config: &Config) -> Result<Option<Measured
             ..figures
         }
     });
-    Ok(Some(Measured {
+    Ok(Some(TrackingMetrics {
         step,
         steady_state_mean_error_m: error.mean,
         steady_state_sigma_m: sigma,

@@ -15,7 +15,7 @@ const FILLED_RATIO: f64 = 1e-3;
 const SAME: f64 = 1e-3;
 
 /// A run on regular times.
-pub(super) struct Ran {
+pub(super) struct RunSignals {
     /// Reference, command and position.
     pub(super) loop_signals: LoopSignals,
     /// Ticks that were filled in.
@@ -23,7 +23,7 @@ pub(super) struct Ran {
 }
 
 /// Command and position of every tick of a run as they come, missing ones filled in.
-pub(super) struct Gathered {
+pub(super) struct SignalBuilder {
     input_a: Vec<f64>,
     output_m: Vec<f64>,
     reference_m: Vec<f64>,
@@ -43,18 +43,18 @@ pub(super) struct Gathered {
     ticks: u64,
 }
 
-impl Gathered {
+impl SignalBuilder {
     pub(super) fn new(recording: &Recording, rate_hz: f64) -> Self {
         let on_devices = recording
             .metadata()
             .get("probe")
             .is_some_and(|probe| probe != "simulated");
-        Gathered::of(recording.tick_count(), rate_hz, on_devices)
+        SignalBuilder::of(recording.tick_count(), rate_hz, on_devices)
     }
 
     /// Of a recording of so many ticks.
     fn of(ticks: u64, rate_hz: f64, on_devices: bool) -> Self {
-        Gathered {
+        SignalBuilder {
             input_a: Vec::new(),
             output_m: Vec::new(),
             reference_m: Vec::new(),
@@ -139,7 +139,7 @@ impl Gathered {
     }
 
     /// Where times differ from tick to tick, the currents as of the median time, the positions as of the mean age.
-    pub(super) fn finish(self) -> Result<Ran, AnalysisError> {
+    pub(super) fn finish(self) -> Result<RunSignals, AnalysisError> {
         if self.input_a.is_empty() {
             return Err(AnalysisError::NothingRan);
         }
@@ -155,7 +155,7 @@ impl Gathered {
             input_a: currents(self.input_a, self.late),
             output_m,
         };
-        Ok(Ran {
+        Ok(RunSignals {
             loop_signals: LoopSignals {
                 signals,
                 reference_m: self.reference_m,
@@ -202,9 +202,9 @@ mod tests {
     use super::*;
 
     /// The ticks from 0 to `count`, without those that are `lost`.
-    fn gathered(count: u64, lost: impl Fn(u64) -> bool) -> Result<Ran, AnalysisError> {
+    fn gathered(count: u64, lost: impl Fn(u64) -> bool) -> Result<RunSignals, AnalysisError> {
         let kept: Vec<u64> = (0..count).filter(|tick| !lost(*tick)).collect();
-        let mut gathered = Gathered::of(kept.len() as u64, 1000.0, false);
+        let mut gathered = SignalBuilder::of(kept.len() as u64, 1000.0, false);
         for tick in kept {
             let (ns, position_m) = (tick * 1_000_000, tick as f64 * 1e-9);
             let times = TickRecord {
