@@ -23,10 +23,13 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
         ),
         (
             "chirp --start 5 --stop 5",
-            &["`chirp.stop_hz` is 5 Hz", "starts at 5 Hz"],
+            &["--stop 5 is 5 Hz", "starts at 5 Hz"],
         ),
-        ("chirp --start -1", &["`chirp.start_hz` is -1"]),
-        ("chirp --stop 3000", &["3000 Hz", "2500 Hz"]),
+        (
+            "chirp --start -1",
+            &["--start -1 is -1 Hz", "0.0001 to 50000 Hz"],
+        ),
+        ("chirp --stop 3000", &["--stop 3000 is 3000 Hz", "2500 Hz"]),
         (
             "chirp --amplitude 100",
             &["100.0", "9.982 A", "the motor's peak current"],
@@ -40,20 +43,23 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
         ("chirp --amplitude 0.3", &["travel", "900 um"]),
         (
             "chirp --amplitude 0",
-            &["`chirp.amplitude.0.current_a` is 0"],
+            &["--amplitude 0 is 0 A", "to 1000 A"],
         ),
         (
             "chirp --amplitude -1",
-            &["`chirp.amplitude.0.current_a` is -1"],
+            &["--amplitude -1 is -1 A", "to 1000 A"],
         ),
         ("chirp --amplitude garbage", &["garbage", "--amplitude"]),
         (
             "chirp --sweep sideways",
             &["sideways", "linear, logarithmic"],
         ),
-        ("chirp --duration 0", &["`chirp.duration_s` is 0"]),
-        ("chirp --duration -5", &["`chirp.duration_s` is -5"]),
-        ("control --duration -5", &["`control.duration_s` is -5"]),
+        (
+            "chirp --duration 0",
+            &["--duration 0 is 0 s", "0.001 to 100000 s"],
+        ),
+        ("chirp --duration -5", &["--duration -5 is -5 s"]),
+        ("control --duration -5", &["--duration -5 is -5 s"]),
         ("control --amplitude garbage", &["`garbage`", "50um"]),
         ("control --reference step --amplitude 5%", &["`5%`", "50um"]),
         (
@@ -66,7 +72,7 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
         ),
         (
             "control --reference ramp --speed -1e-4",
-            &["speed_m_per_s` is -0.0001"],
+            &["--speed -1e-4 is -0.0001 m/s"],
         ),
         (
             "control --reference hold --amplitude 5um",
@@ -88,7 +94,7 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
         ),
         (
             "model modes --operating-point 1e9",
-            &["1000000000", "-0.5 to 0.5"],
+            &["--operating-point 1e9 is 1000000000 m", "-0.5 to 0.5 m"],
         ),
         (
             "model modes --operating-point 400%",
@@ -186,7 +192,7 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
             "model bounds --alpha 1",
             &["--alpha is 1", "between 0 and 1"],
         ),
-        ("model bounds --alpha nan", &["--alpha is NaN"]),
+        ("model bounds --alpha nan", &["`nan`", "--alpha"]),
         ("model bounds --peak 1", &["--peak is 1", "above 1"]),
         (
             "model bounds --bandwidth 0",
@@ -238,24 +244,8 @@ fn nan_and_infinity_are_refused_in_every_flag_that_takes_a_number() {
     {
         for value in ["nan", "NaN", "inf", "-inf", "1e999"] {
             let bench = Bench::new();
-            // The value itself is named, however it is spelt.
-            let spelt = match value {
-                "1e999"
-                    if flag.contains("-point")
-                        || flag.contains("-asym")
-                        || flag == "control --amplitude" =>
-                {
-                    "1e999"
-                }
-                "nan" | "NaN" => "N",
-                _ => "inf",
-            };
             let answer = bench.run(&format!("{flag} {value}"));
-            let named = if spelt == "N" {
-                answer.err.to_lowercase().contains("nan")
-            } else {
-                answer.err.contains(spelt)
-            };
+            let named = answer.err.contains(value);
             assert!(
                 answer.code == 2 && named && bench.files().is_empty(),
                 "{flag} {value}: {answer:?}"
@@ -273,7 +263,7 @@ fn a_chirp_too_long_to_be_analysed_is_refused_at_once() {
         .is_refused(&["100000 s", "20000000", "shorten"]);
     bench
         .run("chirp --duration 1e30")
-        .is_refused(&["`chirp.duration_s`", "0.001 to 100000"]);
+        .is_refused(&["--duration 1e30", "0.001 to 100000 s"]);
     assert_eq!(bench.files(), [""; 0]);
 }
 
@@ -339,10 +329,7 @@ fn a_reference_beyond_the_stage_is_refused_or_ends_in_a_trip() {
     ] {
         let bench = Bench::new();
         let refused = bench.run(&format!("control --fast {options}"));
-        refused.is_refused(&[
-            "`control.reference.amplitude_m`",
-            "the soft limit of 0.0009 m",
-        ]);
+        refused.is_refused(&["--amplitude", "the soft limit of 0.0009 m"]);
         assert_eq!(bench.files(), [""; 0], "{options}");
     }
     let bench = Bench::new();

@@ -102,16 +102,60 @@ fn a_wrong_type_is_refused_with_what_is_there_and_what_belongs_there() {
 }
 
 #[test]
-fn a_unit_in_a_value_is_refused_with_the_number_in_si_units() {
+fn a_unit_in_a_file_is_refused_with_the_number_in_si_units() {
     refused_file(
         "[plant]\noperating_point_m = \"3.8mm\"\n",
         &["mine.toml line 2", "\"3.8mm\"", "SI units", "write 0.0038"],
     );
+}
+
+#[test]
+fn a_unit_in_a_set_value_is_converted() {
+    let bench = Bench::new();
+    for (set, pointer, expected) in [
+        (
+            "plant.operating_point_m=4%",
+            "/plant/operating_point_m",
+            0.04 * 0.0475,
+        ),
+        (
+            "plant.operating_point_m=3.8mm",
+            "/plant/operating_point_m",
+            3.8 * 1e-3,
+        ),
+        ("plant.mass_asymmetry=10%", "/plant/mass_asymmetry", 0.1),
+        ("loop.rate_hz=2kHz", "/loop/rate_hz", 2000.0),
+        (
+            "interlock.current_error_s=50ms",
+            "/interlock/current_error_s",
+            50.0 * 1e-3,
+        ),
+        (
+            "motor.force_constant_n_per_a=11",
+            "/motor/force_constant_n_per_a",
+            11.0,
+        ),
+    ] {
+        let shown = bench.json(&format!("config show --set {set}"));
+        let value = number(shown.pointer(pointer).expect("a setting"));
+        assert_eq!(value, expected, "{set}");
+    }
+}
+
+#[test]
+fn rejects_a_unit_that_does_not_belong_to_the_setting() {
     refused_set(
-        "plant.operating_point_m=3.8mm",
-        &["\"3.8mm\"", "SI units", "write 0.0038"],
+        "plant.operating_point_m=4s",
+        &["`4s` is a time in s", "50um"],
     );
-    refused_set("plant.mass_asymmetry=10%", &["\"10%\"", "write 0.1"]);
+    refused_set(
+        "interlock.soft_limit_m=4%",
+        &["`4%` is a percentage", "a length"],
+    );
+    refused_set(
+        "loop.rate_hz=5mm",
+        &["`loop.rate_hz`", "`5mm` is a length in m"],
+    );
 }
 
 #[test]

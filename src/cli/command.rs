@@ -6,8 +6,8 @@ use super::error::{CliError, ErrorReport};
 use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
-    calibrate, campaign, chirp, config, control, doctor, emulate, identify, linearity, margins,
-    model, recover, replay,
+    calibrate, campaign, chirp, completions, config, control, doctor, emulate, identify, linearity,
+    margins, model, recover, replay,
 };
 
 /// A controller daemon for a precision-motion test bench.
@@ -26,7 +26,7 @@ pub struct Cli {
 enum Command {
     /// Excite the stage, record, estimate its frequency response: recording, CSV and Bode plot
     Chirp(chirp::Args),
-    /// A multisine at several amplitudes: distortion told apart from noise, and whether modes shift with amplitude
+    /// Run a multisine at several amplitudes: distortion and noise apart, and whether modes shift with amplitude
     Linearity(linearity::Args),
     /// Close the loop with a reference: recording, predicted and measured figures
     Control(control::Args),
@@ -34,23 +34,27 @@ enum Command {
     Campaign(campaign::Args),
     /// Find scale, sign, offset and delay of amplifier and probe by small static steps
     Calibrate(calibrate::Args),
-    /// The mechanics by the model: modes, residues, signs, zeros
+    /// Analyse the model of the mechanics: modes, residues, signs, zeros
     Model(model::Args),
-    /// Crossover, phase, gain and modulus margin of a controller with the model
+    /// Crossover, phase, gain and modulus margin of a controller with the model; exit code 1 of an unstable loop
     Margins(margins::Args),
-    /// The analysis of `bench chirp`, from a recording or from a CSV of other hands
+    /// Analyse a recording or an external CSV as `bench chirp` does
     Identify(identify::Args),
     /// Run the recorded probe through the same loop and compare every command bit for bit
     Replay(replay::Args),
-    /// Make a cut-off recording readable and say what was lost
+    /// Make a truncated recording readable and report what was lost
     Recover(recover::Args),
-    /// Emulate the configured devices with the simulated stage behind them, for a rehearsal without hardware
+    /// Emulate the configured devices, with the simulated stage behind them: a rehearsal without hardware
     #[command(alias = "device")]
     Emulate(emulate::Args),
-    /// The effective settings, their validation, their schema
+    /// Show, check and describe settings; list profiles; write a file for a stage of your own
     Config(config::Args),
-    /// Could a run start? System, devices, recordings, each finding with its remedy; nothing moves
+    /// Check whether a run can start: system, devices, recordings, each finding with its remedy; no motion
     Doctor(doctor::Args),
+    /// Print the completions of a shell, to be sourced or installed
+    Completions(completions::CompletionArgs),
+    /// Print or write the manual pages
+    Man(completions::ManArgs),
 }
 
 /// Parses the arguments of the process, runs the command and reports an error: as text on standard error and, with
@@ -100,5 +104,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Emulate(args) => emulate::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Completions(args) => completions::run_completions(&args),
+        Command::Man(args) => completions::run_man(&args),
     }
 }

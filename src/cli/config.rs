@@ -1,12 +1,18 @@
 //! `bench config`: the effective settings.
 
-use clap::Subcommand;
+use std::fs::File;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Subcommand, ValueEnum};
+use serde::Serialize;
 
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
-use crate::config::Purpose;
+use super::table::labelled;
+use crate::config::{Purpose, profiles};
 
 /// What to do with the configuration.
 #[derive(Clone, Debug, clap::Args)]
@@ -23,29 +29,135 @@ enum What {
     Check(BenchOptions),
     /// Print the JSON schema of a configuration
     Schema,
+    /// List the profiles that --config finds by name, built in and your own
+    Profiles {
+        /// One JSON object on standard output, nothing else there
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write a commented file for a stage of your own
+    Init(InitArgs),
+}
+
+/// What kind of file, and where.
+#[derive(Clone, Debug, clap::Args)]
+struct InitArgs {
+    /// The model of the mechanics
+    #[arg(long, value_name = "MODEL", default_value = "lumped")]
+    plant: Template,
+    /// The file, which must not exist
+    #[arg(long, value_name = "FILE", default_value = "my-stage.toml")]
+    out: PathBuf,
+    /// One JSON object on standard output, nothing else there
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Template {
+    /// Masses and springs along one line
+    Lumped,
+    /// A sum of modes
+    Modal,
+}
+
+impl Template {
+    fn text(self) -> &'static str {
+        match self {
+            Template::Lumped => include_str!("../../bench-config/templates/lumped.toml"),
+            Template::Modal => include_str!("../../bench-config/templates/modal.toml"),
+        }
+    }
+}
+
+/// A profile that `--config` finds by its name.
+#[derive(Debug, Serialize)]
+struct Profile {
+    name: String,
+    /// The file of an own profile; `null` of one that is built in.
+    file: Option<String>,
+    /// Whether a profile of the same name comes before it.
+    hidden: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
-        What::Show(options) => {
-            let config = options.load(Purpose::Model, &[])?;
-            if options.json {
-                print_json(&config)?
-            } else {
-                print_text(&to_toml(&config)?)?
-            }
-        }
-        What::Check(options) => {
-            let config = options.load(Purpose::All, &[])?;
-            if options.json {
-                print_json(&serde_json::json!({ "valid": true, "title": config.title }))?
-            } else {
-                print_text(&format!("valid: {}\n", config.title))?
-            }
-        }
+        What::Show(options) => show(options)?,
+        What::Check(options) => check(options)?,
         What::Schema => print_json(&crate::config::schema())?,
+        What::Profiles { json } => list_profiles(*json)?,
+        What::Init(args) => init(args)?,
     }
     Ok(Outcome::Done)
+}
+
+fn show(options: &BenchOptions) -> Result<(), CliError> {
+    let config = options.load(Purpose::Model, &[])?;
+    match options.json {
+        true => print_json(&config),
+        false => print_text(&to_toml(&config)?),
+    }
+}
+
+fn check(options: &BenchOptions) -> Result<(), CliError> {
+    let config = options.load(Purpose::All, &[])?;
+    match options.json {
+        true => print_json(&serde_json::json!({ "valid": true, "title": config.title })),
+        false => print_text(&format!("valid: {}\n", config.title)),
+    }
+}
+
+fn list_profiles(json: bool) -> Result<(), CliError> {
+    let profiles = all_profiles();
+    if json {
+        return print_json(&serde_json::json!({ "profiles": profiles }));
+    }
+    let lines = profiles.iter().map(|profile| {
+        let place = profile.file.as_deref().unwrap_or("built in");
+        let hidden = if profile.hidden {
+            " (hidden: give its path)"
+        } else {
+            ""
+        };
+        labelled(&profile.name, &format!("{place}{hidden}"))
+    });
+    print_text(&lines.collect::<String>())
+}
+
+/// Built-in profiles come first, then those of the folders in their order.
+fn all_profiles() -> Vec<Profile> {
+    let built_in = profiles::PROFILES.iter().map(|profile| Profile {
+        name: profile.name.into(),
+        file: None,
+        hidden: false,
+    });
+    let own = profiles::own_profiles().into_iter().map(|(name, file)| {
+        let is_built_in = profiles::find(profiles::PROFILES, &name).is_some();
+        let hidden = is_built_in || profiles::own(&name, "").as_ref() != Some(&file);
+        Profile {
+            name,
+            file: Some(file.display().to_string()),
+            hidden,
+        }
+    });
+    built_in.chain(own).collect()
+}
+
+fn init(args: &InitArgs) -> Result<(), CliError> {
+    let file = args.out.display().to_string();
+    let created = File::create_new(&args.out);
+    let written = created.and_then(|mut file| file.write_all(args.plant.text().as_bytes()));
+    written.map_err(|e| {
+        CliError::Failed(format!(
+            "cannot write {file}: {e}; name another file with --out"
+        ))
+    })?;
+    if args.json {
+        return print_json(&serde_json::json!({ "file": file }));
+    }
+    print_text(&format!(
+        "{file} written; `bench config check --config {file}` checks it\n"
+    ))
 }
 
 /// The whole effective configuration, as it travels with a recording.

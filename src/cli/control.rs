@@ -7,7 +7,7 @@ use super::chirp::analysed;
 use super::chirp_plan::Expected;
 pub(super) use super::control_options::Args;
 use super::error::CliError;
-use super::margins::{closed_loop, require_modulus_margin, text as margins_text};
+use super::margins::{Pole, closed_loop, pole_list, require_modulus_margin, text as margins_text};
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::run_options::{close, exit, run_text};
@@ -57,7 +57,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let plan = Plan::control(config.clone())?;
     let expected = plan.predicted_extremes.as_ref().map(Expected::of);
     if !args.bench.json {
-        print_text(&plan_text(&config, &predicted, expected.as_ref()))?;
+        let poles = pole_list(&closed_loop.poles(), &config);
+        print_text(&plan_text(&config, &predicted, &poles, expected.as_ref()))?;
     }
     let mut run = args.run.run(&plan, "control")?;
     let report = RunSummary::of(&mut run)?;
@@ -103,8 +104,13 @@ fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetri
 }
 
 /// Margins, reference and predicted step, printed before the run.
-fn plan_text(config: &Config, predicted: &Predicted, expected: Option<&Expected>) -> String {
-    let margins = margins_text(config, &predicted.margins);
+fn plan_text(
+    config: &Config,
+    predicted: &Predicted,
+    poles: &[Pole],
+    expected: Option<&Expected>,
+) -> String {
+    let margins = margins_text(config, &predicted.margins, poles);
     let reference = labelled("reference", &reference_text(config));
     let step = predicted.step.as_ref().map_or(String::new(), |step| {
         labelled("predicted", &step_text(step))

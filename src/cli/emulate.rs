@@ -12,7 +12,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::print_json;
+use super::output::{print_json, print_note};
 use crate::config::{OptionSetting, Purpose};
 use crate::rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
@@ -209,12 +209,12 @@ impl Server<'_> {
             ["help"] => eprint!("fault KIND, quit, help; the kinds are\n{}", fault::help()),
             ["fault", fault] => {
                 if let Err(why) = self.inject(fault) {
-                    eprintln!("bench emulate: {why}");
+                    print_note(&why.to_string());
                 }
             }
-            _ => eprintln!(
-                "bench emulate: `{line}` is not a command; the commands are fault KIND, quit, help"
-            ),
+            _ => print_note(&format!(
+                "`{line}` is not a command; the commands are fault KIND, quit, help"
+            )),
         }
     }
 

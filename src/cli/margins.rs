@@ -1,13 +1,17 @@
 //! `bench margins`: how far a loop is from trouble.
 
+use std::f64::consts::PI;
+
+use nalgebra::Complex;
 use serde::Serialize;
+use serde_json::Value;
 
 use super::controller_choice::ControllerChoice;
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
-use super::table::wrap;
+use super::table::{table, wrap};
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::model::plant::{self, LoopPlant, ModalModel};
@@ -25,36 +29,97 @@ pub(super) struct Args {
     continuous: bool,
 }
 
-/// The JSON object of the command.
+/// The JSON object of the command. An unstable loop has no margins: they are `null`.
 #[derive(Debug, Serialize)]
-struct Report<'a> {
+struct Report {
     #[serde(flatten)]
-    margins: &'a Margins,
+    margins: Value,
+    /// Poles of the closed loop below half the sampling rate, and all unstable ones.
+    poles: Vec<Pole>,
     /// From a command to the position that its reading shows, in the mean, without hold and lag.
     delay_s: f64,
+}
+
+/// A pole of the closed loop in the s plane; one of each conjugate pair.
+#[derive(Debug, Serialize)]
+pub(super) struct Pole {
+    re_rad_s: f64,
+    im_rad_s: f64,
+    frequency_hz: f64,
+    damping_ratio: f64,
+    stable: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
     let closed_loop = closed_loop(&config)?;
-    let margins = match args.continuous {
-        true => closed_loop.continuous_margins()?,
-        false => closed_loop.margins(),
+    let (margins, poles, delay_s) = match args.continuous {
+        true => {
+            let margins = closed_loop.continuous_margins()?;
+            (margins, closed_loop.continuous_poles(), 0.0)
+        }
+        false => {
+            let delay_s = closed_loop.plant().delay_s();
+            (closed_loop.margins(), closed_loop.poles(), delay_s)
+        }
     };
+    let poles = pole_list(&poles, &config);
     if args.bench.json {
-        let delay_s = if args.continuous {
-            0.0
-        } else {
-            closed_loop.plant().delay_s()
-        };
         print_json(&Report {
-            margins: &margins,
+            margins: margins_json(&margins)?,
+            poles,
             delay_s,
         })?
     } else {
-        print_text(&text(&config, &margins))?
+        print_text(&text(&config, &margins, &poles))?
     }
-    Ok(Outcome::Done)
+    Ok(match margins.stable {
+        true => Outcome::Done,
+        false => Outcome::Failed,
+    })
+}
+
+/// The margins with their names; `null` where the loop is unstable.
+fn margins_json(margins: &Margins) -> Result<Value, CliError> {
+    let failed = |e| CliError::Failed(format!("cannot write JSON: {e}"));
+    let mut json = serde_json::to_value(margins).map_err(failed)?;
+    if let (false, Some(object)) = (margins.stable, json.as_object_mut()) {
+        let figures = object.iter_mut().filter(|(_, value)| value.is_number());
+        figures.for_each(|(_, value)| *value = Value::Null);
+    }
+    Ok(json)
+}
+
+/// The poles of a loop, unstable ones first.
+pub(super) fn pole_list(poles: &[Complex<f64>], config: &Config) -> Vec<Pole> {
+    let nyquist_rad_s = PI * config.servo.rate_hz;
+    let is_listed = |s: &&Complex<f64>| s.im >= 0.0 && (s.re >= 0.0 || s.norm() < nyquist_rad_s);
+    let mut listed: Vec<Pole> = poles.iter().filter(is_listed).map(Pole::of).collect();
+    listed.sort_by(|a, b| b.re_rad_s.total_cmp(&a.re_rad_s));
+    listed
+}
+
+impl Pole {
+    fn of(s: &Complex<f64>) -> Pole {
+        let omega_rad_s = s.norm();
+        Pole {
+            re_rad_s: s.re,
+            im_rad_s: s.im,
+            frequency_hz: omega_rad_s / (2.0 * PI),
+            // A pole at the origin is not damped.
+            damping_ratio: -s.re / omega_rad_s.max(f64::MIN_POSITIVE),
+            stable: s.re < 0.0,
+        }
+    }
+
+    fn row(&self) -> Vec<String> {
+        let s = match self.im_rad_s {
+            0.0 => format!("{:+.3}", self.re_rad_s),
+            im => format!("{:+.3} +- {im:.3}j", self.re_rad_s),
+        };
+        let (hz, damping) = (self.frequency_hz, self.damping_ratio);
+        vec![s, format!("{hz:.3}"), format!("{damping:+.4}")]
+    }
 }
 
 /// The loop of a configuration around the model of its plant.
@@ -111,34 +176,39 @@ fn chain_text(config: &Config) -> String {
     text
 }
 
-fn or_none(omega_rad_s: Option<f64>) -> String {
-    omega_rad_s.map_or_else(|| "none".into(), angular_frequency)
-}
-
-/// Margins in words.
-pub(super) fn text(config: &Config, margins: &Margins) -> String {
-    let or =
-        |value: Option<f64>, unit: &str| value.map_or("none".into(), |v| format!("{v:.2} {unit}"));
+/// The loop and its margins; of an unstable one the unstable poles.
+pub(super) fn text(config: &Config, margins: &Margins, poles: &[Pole]) -> String {
     let time = match margins.continuous {
         true => "continuous time, without delay and amplifier".to_string(),
         false => chain_text(config),
     };
+    let title = format!("{} controller, {time}", config.control.controller);
+    let rest = match margins.stable {
+        true => margin_lines(margins),
+        false => unstable_text(poles),
+    };
+    wrap(&title, 0) + &rest
+}
+
+fn unstable_text(poles: &[Pole]) -> String {
+    let unstable = poles.iter().filter(|pole| !pole.stable);
+    let rows: Vec<Vec<String>> = unstable.map(Pole::row).collect();
+    let header = ["unstable pole rad/s", "Hz", "damping"];
+    let text = "UNSTABLE: the closed loop has poles in the right half plane, and so no margins";
+    wrap(text, 2) + &table(&header, &rows)
+}
+
+fn margin_lines(margins: &Margins) -> String {
+    let or_none = |text: Option<String>| text.unwrap_or("none".into());
+    let degrees = margins.phase_margin_deg.map(|deg| format!("{deg:.2} deg"));
+    let decibels = margins.gain_margin_db.map(|db| format!("{db:.2} dB"));
     format!(
-        "{}  {}\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {:.4} (peak of S {:.2} dB)\n  sensitivity bandwidth  {}\n",
-        wrap(
-            &format!("{} controller, {time}", config.control.controller),
-            0
-        ),
-        if margins.stable {
-            "stable"
-        } else {
-            "UNSTABLE: the closed loop has poles outside the stable region; the margins below mean nothing"
-        },
-        or_none(margins.crossover_rad_s),
-        or(margins.phase_margin_deg, "deg"),
-        or(margins.gain_margin_db, "dB"),
+        "  stable\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {:.4} (peak of S {:.2} dB)\n  sensitivity bandwidth  {}\n",
+        or_none(margins.crossover_rad_s.map(angular_frequency)),
+        or_none(degrees),
+        or_none(decibels),
         margins.modulus_margin,
         margins.sensitivity_peak_db,
-        or_none(margins.sensitivity_bandwidth_rad_s),
+        or_none(margins.sensitivity_bandwidth_rad_s.map(angular_frequency)),
     )
 }

@@ -8,6 +8,7 @@ mod chirp;
 mod chirp_plan;
 mod columns;
 mod command;
+mod completions;
 mod config;
 mod control;
 mod control_options;

@@ -183,7 +183,13 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
 }
 
 fn read(name: &str, known: &[EmbeddedFile], what: &'static str) -> Result<String, ConfigError> {
-    let path = Path::new(name);
+    let folder = if what == "controller" {
+        "controllers"
+    } else {
+        ""
+    };
+    let own = profiles::own(name, folder);
+    let path = own.as_deref().unwrap_or(Path::new(name));
     if !path.exists() {
         return Err(ConfigError::NotFound {
             what,

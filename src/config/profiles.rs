@@ -1,4 +1,7 @@
-//! The profiles and controllers that travel inside the program, so that it works in an empty directory.
+//! The profiles and controllers that travel inside the program, so that it works in an empty directory, and the own ones
+//! of a user.
+
+use std::path::{Path, PathBuf};
 
 /// A TOML file of `bench-config/`, embedded.
 #[derive(Clone, Copy, Debug)]
@@ -79,4 +82,43 @@ pub fn names(list: &[EmbeddedFile]) -> String {
         .map(|entry| entry.name)
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+/// Folders of own profiles: `bench-config` where the program runs, and `bench` in the user's configuration folder. Own
+/// controllers are in the folder `controllers` of each.
+pub fn own_folders() -> Vec<PathBuf> {
+    let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+    let home = variable("HOME").map(|home| PathBuf::from(home).join(".config"));
+    let user = variable("XDG_CONFIG_HOME").map(PathBuf::from).or(home);
+    let user = user.map(|folder| folder.join("bench"));
+    [Some(PathBuf::from("bench-config")), user]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// The file of the own profile called `name`; `kind` is the folder below, empty for profiles.
+pub fn own(name: &str, kind: &str) -> Option<PathBuf> {
+    // A path is not a name.
+    let is_name = Path::new(name).file_name().is_some_and(|file| file == name);
+    let files = own_folders()
+        .into_iter()
+        .map(|folder| folder.join(kind).join(format!("{name}.toml")));
+    files.into_iter().find(|file| is_name && file.is_file())
+}
+
+/// Names and files of all own profiles.
+pub fn own_profiles() -> Vec<(String, PathBuf)> {
+    let mut found = Vec::new();
+    for folder in own_folders() {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let files = entries
+            .map(|entry| entry.path())
+            .filter(|path| path.is_file());
+        let files = files.filter(|path| path.extension().is_some_and(|end| end == "toml"));
+        let named = files.filter_map(|path| Some((path.file_stem()?.to_str()?.to_string(), path)));
+        found.extend(named);
+    }
+    found.sort();
+    found
 }

@@ -174,22 +174,45 @@ impl ClosedLoop {
         pairs.map(|s| (s.norm(), (s.re / s.norm()).abs())).collect()
     }
 
-    /// All poles of the sampled closed loop lie inside the unit circle.
-    fn is_stable(&self) -> bool {
-        let (a, b, c) = self.plant.state_space();
-        let plant = StateSpace { a, b, c, d: 0.0 };
-        let poles = self.linear.state_space().then(&plant).closed_poles();
-        poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+    /// Poles of the sampled closed loop in rad/s, s = ln(z)/T. Empty if they cannot be computed.
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        let period_s = self.plant.period_s();
+        let poles = self.sampled_poles().unwrap_or_default();
+        poles.iter().map(|z| z.ln() / period_s).collect()
     }
 
-    /// All poles of the continuous closed loop lie left of the imaginary axis.
-    fn is_stable_in_continuous_time(&self, sections: &[Section]) -> bool {
+    /// Poles of the closed loop in continuous time in rad/s. Empty for a law that was not designed as continuous
+    /// sections.
+    pub fn continuous_poles(&self) -> Vec<Complex<f64>> {
+        let sections = self.design.sections();
+        let poles = sections.and_then(|sections| self.poles_in_continuous_time(sections));
+        poles.unwrap_or_default()
+    }
+
+    fn sampled_poles(&self) -> Option<Vec<Complex<f64>>> {
+        let (a, b, c) = self.plant.state_space();
+        let plant = StateSpace { a, b, c, d: 0.0 };
+        self.linear.state_space().then(&plant).closed_poles()
+    }
+
+    fn poles_in_continuous_time(&self, sections: &[Section]) -> Option<Vec<Complex<f64>>> {
         let gain = StateSpace::gain(UM_PER_M);
         let law = sections.iter().fold(gain, |cascade, section| {
             cascade.then(&StateSpace::from(section))
         });
         let plant = StateSpace::of_modes(&self.modes, self.force_constant_n_per_a);
-        let poles = law.then(&plant).closed_poles();
+        law.then(&plant).closed_poles()
+    }
+
+    /// All poles of the sampled closed loop lie inside the unit circle.
+    fn is_stable(&self) -> bool {
+        let poles = self.sampled_poles();
+        poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+    }
+
+    /// All poles of the continuous closed loop lie left of the imaginary axis.
+    fn is_stable_in_continuous_time(&self, sections: &[Section]) -> bool {
+        let poles = self.poles_in_continuous_time(sections);
         poles.is_some_and(|poles| poles.iter().all(|pole| pole.re < 0.0))
     }
 }

@@ -1,6 +1,8 @@
 //! What a run will do: made from the configuration and the texts it names, all of which travel with the recording, so that
 //! the same plan can be made again from it.
 
+use std::path::Path;
+
 use super::plan_error::PlanError;
 use super::swept_reference;
 use crate::config::{Config, whole};
@@ -137,6 +139,22 @@ impl Plan {
         })
     }
 
+    /// What the file name of the recording says of the run: `chirp`, `prbs`, `control-fast-step`.
+    pub fn label(&self) -> String {
+        let config = &self.config;
+        match self.kind {
+            RunKind::Chirp => config.excitation.kind.name().into(),
+            RunKind::Control => {
+                let controller = file_stem(&config.control.controller);
+                format!(
+                    "control-{controller}-{}",
+                    config.control.reference.design().name()
+                )
+            }
+            RunKind::Calibrate | RunKind::Quiet => self.kind.name().into(),
+        }
+    }
+
     /// The program of the loop.
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
@@ -198,4 +216,11 @@ impl Plan {
             .chain(calibration)
             .collect()
     }
+}
+
+/// The name of a controller or of its file, without what does not belong into a file name.
+fn file_stem(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or_default();
+    let is_plain = |c: &char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+    stem.to_string_lossy().chars().filter(is_plain).collect()
 }

@@ -135,7 +135,7 @@ fn create(
         folder: folder.into(),
         why: e.to_string(),
     })?;
-    let path = file_name::recording(folder, plan.kind.name(), SystemTime::now());
+    let path = file_name::recording(folder, &plan.label(), SystemTime::now());
     let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
     for (name, media_type, text) in plan.attachments() {
         recorder

@@ -1,4 +1,5 @@
 //! The program itself, stopped, killed and starved from outside.
+mod command_line;
 mod common;
 mod disk;
 mod kill;

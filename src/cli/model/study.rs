@@ -6,7 +6,7 @@ use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::outcome::Outcome;
-use super::super::output::{print_json, print_text};
+use super::super::output::{print_json, print_note, print_text};
 use super::super::progress::ProgressLine;
 use super::study_text::text;
 use crate::config::Purpose;
@@ -60,7 +60,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         joined(&args.join)?
     };
     if !results.is_done() {
-        eprintln!("bench: {}", stopped(args, &results));
+        print_note(&stopped(args, &results));
         return Ok(Outcome::Failed);
     }
     args.table.write(|| columns(&results))?;
@@ -108,11 +108,13 @@ fn threads(args: &Args) -> usize {
 fn report_progress(opened: &Opened) {
     let (dropped, results) = (opened.dropped, &opened.results);
     if dropped > 0 {
-        eprintln!("bench: {dropped} damaged lines are ignored; their draws are done again");
+        print_note(&format!(
+            "{dropped} damaged lines are ignored; their draws are done again"
+        ));
     }
     if results.done() > 0 {
         let (done, total) = (results.done(), results.total());
-        eprintln!("bench: {done} of {total} draws are done already");
+        print_note(&format!("{done} of {total} draws are done already"));
     }
 }
 

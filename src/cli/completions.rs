@@ -1,0 +1,60 @@
+//! `bench completions` and `bench man`: what shells and `man` know of the program.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Command, CommandFactory};
+use clap_complete::Shell;
+
+use super::command::Cli;
+use super::error::CliError;
+use super::outcome::Outcome;
+use super::output::print_text;
+
+/// Which shell.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct CompletionArgs {
+    /// The shell
+    shell: Shell,
+}
+
+/// Where the manual pages go.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct ManArgs {
+    /// Folder for one page a command [default: the page of `bench` on standard output]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run_completions(args: &CompletionArgs) -> Result<Outcome, CliError> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "bench", &mut script);
+    print_text(&String::from_utf8_lossy(&script))?;
+    Ok(Outcome::Done)
+}
+
+pub(super) fn run_man(args: &ManArgs) -> Result<Outcome, CliError> {
+    let command = Cli::command();
+    match &args.out {
+        Some(folder) => write_pages(&command, folder)?,
+        None => print_text(&page(command)?)?,
+    }
+    Ok(Outcome::Done)
+}
+
+fn write_pages(command: &Command, folder: &Path) -> Result<(), CliError> {
+    let written = std::fs::create_dir_all(folder)
+        .and_then(|()| clap_mangen::generate_to(command.clone(), folder));
+    written.map_err(|e| {
+        let folder = folder.display();
+        CliError::Failed(format!(
+            "cannot write the manual pages to {folder}: {e}; choose another folder with --out"
+        ))
+    })
+}
+
+fn page(command: Command) -> Result<String, CliError> {
+    let mut page = Vec::new();
+    let rendered = clap_mangen::Man::new(command).render(&mut page);
+    rendered.map_err(|e| CliError::Failed(format!("cannot write the manual page: {e}")))?;
+    Ok(String::from_utf8_lossy(&page).into_owned())
+}
