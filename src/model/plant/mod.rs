@@ -15,7 +15,7 @@
 //! | `modal` | `modal.rs` | residues, frequencies and damping ratios: Eqs. (3-3) to (3-15), (6-1), (6-3) |
 //!
 //! A new model is one file with its settings and their [`PlantModel`], and one line in `plant_models!` below. To the rest of
-//! the program it is a [`Structure`]. `bench-config/README.md` shows how to describe a stage as masses and springs without
+//! the program it is a [`Structure`]. `docs/own-stage.md` shows how to describe a stage as masses and springs without
 //! any code.
 //!
 //! Signs: positive current gives positive force, positive force gives positive displacement at low frequency.
