@@ -5,10 +5,10 @@
 use bench::config::{Config, Source, load};
 use bench::excitation::{Excitation, Extremes};
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::clock::{Clock, Virtual};
+use bench::rt::arming::Trip;
+use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Excite, Program, ProgramInput};
-use bench::rt::{interlock::Interlocks, publisher::Publisher};
-use bench_hal::{CurrentAmplifier, DisplacementProbe};
+use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 
 /// Pulses of alternating sign, each 1 ms long, their size halved from pulse to pulse.
 struct Pulses {
@@ -22,11 +22,7 @@ impl Excitation for Pulses {
     fn current_a(&self, tick: u64) -> f64 {
         let (pulse, within) = (tick / self.interval, tick % self.interval);
         let is_on = pulse < self.count && within < self.width;
-        if is_on {
-            self.first_a * (-0.5f64).powi(pulse as i32)
-        } else {
-            0.0
-        }
+        f64::from(is_on) * self.first_a * (-0.5f64).powi(pulse as i32)
     }
 
     fn ticks(&self) -> u64 {
@@ -61,30 +57,21 @@ fn run(config: &Config) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Erro
     });
     let mut interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
     let mut rig = SimulatedRig::new(config)?;
-    let mut clock = Virtual {
-        period_s: config.servo.period_s(),
-    };
-    let publisher = Publisher::new(rtrb::RingBuffer::new(64).0);
+    let period_ns = (config.servo.period_s() * 1e9) as u64;
+    let (mut now, mut input) = (Tick::default(), ProgramInput::default());
+    let refused = |trip: Trip| trip.to_string();
     let (mut positions_m, mut commands_a) = (Vec::new(), Vec::new());
     rig.enable()?;
-    for tick in 0..program.ticks() {
-        let now = clock.wait(tick, &publisher).tick;
+    for number in 0..program.ticks() {
+        (now.number, now.scheduled_ns) = (number, number * period_ns);
         let reading = rig.latest(now);
-        interlocks
-            .check_reading(&reading, now)
-            .map_err(|trip| trip.to_string())?;
-        let position_m = reading.position_m;
-        let decision = program.decide(&ProgramInput {
-            tick,
-            position_m,
-            ..ProgramInput::default()
-        });
-        interlocks
-            .check_command(decision.requested_a)
-            .map_err(|trip| trip.to_string())?;
-        let command_a = rig.command(decision.requested_a)?;
+        interlocks.check_reading(&reading, now).map_err(refused)?;
+        (input.tick, input.position_m) = (number, reading.position_m);
+        let requested_a = program.decide(&input).requested_a;
+        interlocks.check_command(requested_a).map_err(refused)?;
+        let command_a = rig.command(requested_a)?;
         interlocks.note(command_a);
-        positions_m.push(position_m);
+        positions_m.push(reading.position_m);
         commands_a.push(command_a);
     }
     rig.disable();
