@@ -405,11 +405,11 @@ fn where_nothing_can_be_written_nothing_moves_and_the_remedy_is_named() {
     let proc = Path::new("/proc");
     for arguments in ["control --duration 0.1", "chirp --duration 10"] {
         let answer = program::run_in(proc, arguments.split(' '));
-        assert_eq!(
-            (answer.code, answer.out.as_str()),
-            (1, ""),
-            "{}",
-            answer.err
+        assert_eq!(answer.code, 1, "{}", answer.err);
+        assert!(
+            !answer.out.contains("overruns"),
+            "the plan, but no results: {}",
+            answer.out
         );
         for word in ["recordings", "--out", "nothing moved"] {
             assert!(answer.err.contains(word), "{word}: {}", answer.err);

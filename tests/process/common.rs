@@ -164,6 +164,10 @@ pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+pub fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
 /// The one recording in a folder.
 pub fn recording_in(folder: &Path) -> PathBuf {
     let files = std::fs::read_dir(folder)

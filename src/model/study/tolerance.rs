@@ -266,7 +266,8 @@ mod tests {
             ("k=+-1mm", "a length in m"),
             ("m_kg=+-5%", "nominal value"),
         ] {
-            let error = deviation(text, "k", 0.0).unwrap_err().to_string();
+            let key = text.split('=').next().expect("a key");
+            let error = deviation(text, key, 0.0).unwrap_err().to_string();
             assert!(error.contains(word) && error.contains(text), "{error}");
         }
     }
