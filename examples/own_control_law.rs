@@ -10,7 +10,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::program::{Control, Program, ProgramInput};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 
-/// Position and velocity of the slowest mode are observed; the error is integrated.
+/// Position and velocity of the first driven mode are observed; the error is integrated.
 struct StateFeedback {
     period_s: f64,
     /// w^2, 2 zeta w, and acceleration per ampere.
@@ -51,20 +51,21 @@ impl Reference for Step {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = load(&Source::default())?;
     let period_s = config.servo.period_s();
-    let mode = ModalModel::of(&build(&config.plant)?)?.modes[0].clone();
+    let modes = ModalModel::of(&build(&config.plant)?)?.modes;
+    let mut driven = modes.iter().filter(|mode| mode.residue_per_kg() > 0.1);
+    let mode = driven.next().ok_or("no mode that the motor drives")?;
     let w = mode.omega_rad_s;
     let gain = mode.residue_per_kg() * config.motor.force_constant_n_per_a;
     let law = StateFeedback {
         period_s,
         mode: [w * w, 2.0 * mode.damping_ratio * w, gain],
-        gains: [0.6 * w / gain, 8.0 * w * w / gain],
+        gains: [0.3 * w / gain, 5.0 * w * w / gain],
         state: [0.0; 4],
     };
     let mut program = Control::new(Box::new(law), Box::new(Step), 2500, 10_000);
     let mut rig = SimulatedRig::new(&config)?;
     rig.enable()?;
-    let (mut now, mut input) = (Tick::default(), ProgramInput::default());
-    let mut error_m = f64::NAN;
+    let (mut now, mut input, mut error_m) = (Tick::default(), ProgramInput::default(), f64::NAN);
     for tick in 0..program.ticks() {
         (now.number, now.scheduled_ns) = (tick, (tick as f64 * period_s * 1e9) as u64);
         (input.tick, input.position_m) = (tick, rig.latest(now).position_m);

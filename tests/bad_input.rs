@@ -6,7 +6,7 @@ use bench_test_support::program;
 
 use std::path::Path;
 
-use program::Bench;
+use program::{Answer, Bench};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -178,7 +178,7 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
         ),
         (
             "model placement --actuator x1=0,y2=0",
-            &["--actuator", "zeros", "other than 0"],
+            &["--actuator", "all weights are 0", "other than 0"],
         ),
         (
             "model placement --sensor x1=banana",
@@ -429,6 +429,11 @@ fn where_nothing_can_be_written_nothing_moves_and_the_remedy_is_named() {
     );
 }
 
+/// `bench margins` of an unstable loop: exit code 1, and an object that says so.
+fn is_unstable(answer: &Answer) -> bool {
+    answer.code == 1 && answer.json()["stable"] == false
+}
+
 /// Cases are the same in every run; a call takes some 10 ms.
 fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig {
@@ -510,7 +515,7 @@ proptest! {
         for command in ["config show", "model modes", "margins --fast", "margins --slow --continuous"] {
             let arguments = command.split(' ').map(str::to_string).chain(sets.clone()).chain(["--json".to_string()]);
             let answer = bench.run_with(arguments);
-            prop_assert!([0, 2].contains(&answer.code), "{sets:?}: {answer:?}");
+            prop_assert!([0, 2].contains(&answer.code) || is_unstable(&answer), "{sets:?}: {answer:?}");
             if answer.code == 0 {
                 answer.json();
             }

@@ -18,7 +18,7 @@ use crate::experiment::campaign::{Campaign, Evaluation, Grid, StageModel, Tolera
 use crate::experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
 use crate::report::campaign_picture;
 use crate::rig::devices;
-use crate::util::atomic_file::write_whole;
+use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
 use crate::util::quantity::{OfRatio, si};
 
@@ -154,7 +154,7 @@ fn show(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<(),
 fn draw(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<PathBuf, CliError> {
     let path = args.out.join("campaign.svg");
     let drawn = campaign_picture(&config.title, evaluation).map_err(|error| error.to_string());
-    let written = drawn.and_then(|svg| write_whole(&path, &svg).map_err(|e| e.to_string()));
+    let written = drawn.and_then(|svg| write_atomic(&path, &svg).map_err(|e| e.to_string()));
     written.map_err(|error| {
         let path = path.display();
         CliError::Failed(format!("cannot draw {path}: {error}; the points are kept"))

@@ -1,6 +1,6 @@
 //! The commands and their dispatch.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use super::error::{CliError, ErrorReport};
 use super::outcome::Outcome;
@@ -104,7 +104,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Emulate(args) => emulate::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Doctor(args) => doctor::run(&args),
-        Command::Completions(args) => completions::run_completions(&args),
-        Command::Man(args) => completions::run_man(&args),
+        Command::Completions(args) => completions::run_completions(&args, Cli::command()),
+        Command::Man(args) => completions::run_man(&args, Cli::command()),
     }
 }

@@ -1,11 +1,10 @@
-//! `bench completions` and `bench man`: what shells and `man` know of the program.
+//! `bench completions` and `bench man`: completions of shells, and manual pages.
 
 use std::path::{Path, PathBuf};
 
-use clap::{Command, CommandFactory};
+use clap::Command;
 use clap_complete::Shell;
 
-use super::command::Cli;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::print_text;
@@ -25,18 +24,22 @@ pub(super) struct ManArgs {
     out: Option<PathBuf>,
 }
 
-pub(super) fn run_completions(args: &CompletionArgs) -> Result<Outcome, CliError> {
+/// Prints the completions of `program` for a shell.
+pub(super) fn run_completions(
+    args: &CompletionArgs,
+    mut program: Command,
+) -> Result<Outcome, CliError> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "bench", &mut script);
+    clap_complete::generate(args.shell, &mut program, "bench", &mut script);
     print_text(&String::from_utf8_lossy(&script))?;
     Ok(Outcome::Done)
 }
 
-pub(super) fn run_man(args: &ManArgs) -> Result<Outcome, CliError> {
-    let command = Cli::command();
+/// Writes the manual pages of `program`.
+pub(super) fn run_man(args: &ManArgs, program: Command) -> Result<Outcome, CliError> {
     match &args.out {
-        Some(folder) => write_pages(&command, folder)?,
-        None => print_text(&page(command)?)?,
+        Some(folder) => write_pages(&program, folder)?,
+        None => print_text(&page(program)?)?,
     }
     Ok(Outcome::Done)
 }

@@ -21,8 +21,16 @@ pub(super) fn default_value(key: &str) -> Option<String> {
         value = value.get(part)?;
     }
     let number = value.as_float().or(value.as_integer().map(|n| n as f64));
-    let text = number.map(|number| Dimension::of_key(key).display(number));
+    let text = number.map(|number| with_unit(key, number));
     text.or_else(|| value.as_str().map(str::to_string))
+}
+
+/// A value of a setting with its unit; lengths below a millimetre are in micrometres.
+fn with_unit(key: &str, si: f64) -> String {
+    if key.ends_with("_m") && si != 0.0 && si.abs() < 1e-3 {
+        return format!("{} um", (si * 1e9).round() / 1e3);
+    }
+    Dimension::of_key(key).display(si)
 }
 
 fn profile() -> &'static Table {

@@ -98,12 +98,15 @@ impl Plan {
         let controller = ControllerText::find(&config.control.controller)?;
         let (config, predicted_extremes) = swept_reference::planned(config, &controller)?;
         let reference = config.control.reference.design().text()?;
-        Ok(Plan {
+        let plan = Plan {
             controller: Some(controller),
             reference,
             predicted_extremes,
             ..Plan::excitation(RunKind::Control, config)
-        })
+        };
+        // A reference or a controller that cannot be built is refused before anything is announced.
+        plan.program()?;
+        Ok(plan)
     }
 
     /// The plan of a recorded run.

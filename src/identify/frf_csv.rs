@@ -3,14 +3,14 @@
 //! One row a frequency. Phases are wrapped to (-180, 180] degrees; a lag is negative. Numbers are written with as many
 //! digits as reading back the same number needs.
 
-use std::fs::OpenOptions;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Complex;
 use thiserror::Error;
 
 use super::Frf;
+use crate::util::atomic_file::write_atomic;
 
 /// Name of the magnitude column of a response from current to displacement.
 pub const METRES_PER_AMPERE: &str = "magnitude_m_per_a";
@@ -25,9 +25,6 @@ const COLUMNS: usize = 7;
 /// Why an FRF cannot be written or read.
 #[derive(Debug, Error)]
 pub enum FrfCsvError {
-    /// Results are never overwritten.
-    #[error("{0} exists already and is not overwritten: move it away or give another name")]
-    Exists(PathBuf),
     /// The file cannot be read or written.
     #[error("{0}: {1}")]
     File(PathBuf, io::Error),
@@ -71,23 +68,13 @@ fn row(frf: &Frf, k: usize) -> [String; COLUMNS] {
     ]
 }
 
-/// Writes the FRF into a new file; `magnitude` names the magnitude column.
+/// Writes the FRF into a file, which is replaced as a whole if it exists; `magnitude` names the magnitude column.
 ///
 /// # Errors
-/// When the file exists already, or cannot be written.
-pub fn write_new(path: &Path, frf: &Frf, magnitude: &str) -> Result<(), FrfCsvError> {
-    let failed = |source: io::Error| match source.kind() {
-        io::ErrorKind::AlreadyExists => FrfCsvError::Exists(path.to_owned()),
-        _ => FrfCsvError::File(path.to_owned(), source),
-    };
-    let mut file = OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(path)
-        .map_err(failed)?;
-    file.write_all(to_string(frf, magnitude).as_bytes())
-        .and_then(|()| file.sync_all())
-        .map_err(failed)
+/// When the file cannot be written.
+pub fn write(path: &Path, frf: &Frf, magnitude: &str) -> Result<(), FrfCsvError> {
+    write_atomic(path, &to_string(frf, magnitude))
+        .map_err(|source| FrfCsvError::File(path.to_owned(), source))
 }
 
 /// Reads an FRF in metres per ampere from a file.

@@ -4,7 +4,6 @@ pub mod atomic_file;
 pub mod checkpoint;
 pub mod finding;
 pub mod nearest;
-pub mod new_file;
 pub mod numeric;
 pub mod progress;
 pub mod quantity;

@@ -142,7 +142,7 @@ fn what_would_cross_an_interlock_is_refused_with_figure_limit_and_remedy_and_not
         ),
         (
             "--excitation noise",
-            &["excitation.kind", "multisine", "stepped_sine", "prbs"],
+            &["--excitation", "multisine", "stepped_sine", "prbs"],
         ),
         ("--shape missing.csv", &["missing.csv", "model"]),
         (

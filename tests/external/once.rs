@@ -110,10 +110,10 @@ fn a_record_gets_the_pictures_and_the_page_that_a_run_gets() {
         assert!(answer["plots"][kind].is_null(), "{kind}");
     }
     let page = bench.read(answer["report"].as_str().expect("a page"));
-    let verdict = answer["cnmp"].as_str().expect("a verdict");
+    let verdict = format!("<strong>{}", answer["cnmp"].as_str().expect("a verdict"));
     let words = [
         "force_n to position_m",
-        verdict,
+        &verdict,
         "<h2>Modes",
         "position_m per force_n and s^2",
         "<svg",

@@ -61,7 +61,7 @@ fn options_that_do_not_go_with_the_file_are_refused() {
             "--rate 1000 --period 0.99995s",
             &["--period 0.99995s", "1000 Hz"],
         ),
-        ("--rate 1000 --band 5-200", &["--band 5-200", "11:250"]),
+        ("--rate 1000 --band 5-200", &["--band 5-200", "11Hz:250Hz"]),
     ] {
         asked(good(), more).is_refused(words);
     }

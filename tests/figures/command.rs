@@ -36,8 +36,10 @@ fn runs_every_command_of_the_page_in_its_folder() {
             .env("PATH", &path)
             .output()
             .expect("bash");
+        // The thesis shows unstable loops as well; `bench margins` exits with 1 for them.
+        let unstable = String::from_utf8_lossy(&output.stdout).contains("UNSTABLE");
         assert!(
-            output.status.success(),
+            output.status.success() || unstable,
             "{command}: {}",
             String::from_utf8_lossy(&output.stderr)
         );

@@ -1,4 +1,4 @@
-use bench::identify::frf_csv::{self, FrfCsvError, METRES_PER_AMPERE};
+use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
 use nalgebra::Complex;
 
@@ -60,7 +60,7 @@ fn a_measured_response_comes_back_from_its_file_as_it_was() {
     let path = directory.path().join("frf.csv");
     let signals = stage::with_noise(&stage::clean_run(), 1);
     let frf = local::estimate(&signals, (0.5, 450.0), &EstimatorSettings::default()).unwrap();
-    frf_csv::write_new(&path, &frf, METRES_PER_AMPERE).unwrap();
+    frf_csv::write(&path, &frf, METRES_PER_AMPERE).unwrap();
     let back = frf_csv::read(&path).unwrap();
     let exact = |frf: &Frf| {
         (
@@ -79,20 +79,15 @@ fn a_measured_response_comes_back_from_its_file_as_it_was() {
 }
 
 #[test]
-fn a_file_that_exists_is_never_overwritten() {
+fn replaces_an_existing_file_as_a_whole() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("frf.csv");
-    frf_csv::write_new(&path, &frf(&[(1e-4, 0.0)]), METRES_PER_AMPERE).unwrap();
-    let before = std::fs::read(&path).unwrap();
-    let error = frf_csv::write_new(&path, &frf(&[(2e-4, 0.0)]), METRES_PER_AMPERE).unwrap_err();
-    assert!(matches!(error, FrfCsvError::Exists(_)));
-    assert!(
-        error
-            .to_string()
-            .contains("frf.csv exists already and is not overwritten"),
-        "{error}"
-    );
-    assert_eq!(std::fs::read(&path).unwrap(), before);
+    let (first, second) = (frf(&[(1e-4, 0.0), (2e-4, 0.1)]), frf(&[(2e-4, 0.0)]));
+    frf_csv::write(&path, &first, METRES_PER_AMPERE).unwrap();
+    frf_csv::write(&path, &second, METRES_PER_AMPERE).unwrap();
+    assert_eq!(frf_csv::read(&path).unwrap().len(), second.len());
+    let files = std::fs::read_dir(directory.path()).unwrap().count();
+    assert_eq!(files, 1, "no partial file is left");
 }
 
 #[test]

@@ -82,7 +82,7 @@ fn rejects_plants_and_options_without_a_map() {
         ("--config xy", "sr4dof"),
         ("--config three-mass", "sr4dof"),
         ("--operating-points 0:0.1", "FROM:TO:COUNT"),
-        ("--operating-points 1mm:2mm:5", "a ratio"),
+        ("--operating-points 1mm:2mm:5", "without unit"),
         ("--asymmetries 0:0.1:1", "from 2 to"),
         ("--asymmetries 0.1:10%:5", "empty sweep"),
         ("--operating-points 0:2:5", "--operating-points is 0.095 m"),

@@ -454,7 +454,7 @@ fn rejects_invalid_plants_with_place_and_remedy() {
             &[
                 "mine.toml line 4",
                 "`plant.nodes.a.mass_kg`",
-                "without mass",
+                "give it a mass",
             ],
         ),
         (

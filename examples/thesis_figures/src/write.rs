@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Content, Entry, FigureError, Make, Runs, page};
 use bench::report::sheet_svg;
-use bench::util::atomic_file::write_whole;
+use bench::util::atomic_file::write_atomic;
 
 /// A figure that was made, or the reason why it is not computed.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ fn make(entry: &Entry, folder: &Path, runs: &Runs) -> Result<Outcome, FigureErro
 }
 
 fn write(path: &Path, text: &str) -> Result<(), FigureError> {
-    write_whole(path, text).map_err(|e| failed(path, &e))
+    write_atomic(path, text).map_err(|e| failed(path, &e))
 }
 
 fn failed(path: &Path, error: &std::io::Error) -> FigureError {

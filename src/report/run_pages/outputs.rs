@@ -16,7 +16,7 @@ use crate::identify::linearity::Linearity;
 use crate::identify::modal::{FittedMode, ModalFit, ModelOrder};
 use crate::identify::verdict::{Cnmp, UncertainZero, Verdict};
 use crate::report::ReportError;
-use crate::util::new_file::{free_path, write_new};
+use crate::util::atomic_file::write_atomic;
 
 /// Why the files of an analysis cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -75,14 +75,20 @@ impl PageFiles {
     }
 }
 
+/// `STEM_what.ext` beside `path`, with its stem. The results of an earlier analysis of the same record are replaced.
+fn path_beside(path: &Path, what: &str, extension: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}_{what}.{extension}"))
+}
+
 fn write_text(
     beside: &Path,
     what: &str,
     extension: &str,
     text: &str,
 ) -> Result<String, OutputError> {
-    let path = free_path(beside, what, extension);
-    write_new(&path, text).map_err(|error| OutputError::File(path.clone(), error))?;
+    let path = path_beside(beside, what, extension);
+    write_atomic(&path, text).map_err(|error| OutputError::File(path.clone(), error))?;
     Ok(path.display().to_string())
 }
 
@@ -96,8 +102,8 @@ pub fn write_frf(
     frf: &Frf,
     magnitude: &str,
 ) -> Result<String, OutputError> {
-    let path = free_path(beside, what, "csv");
-    frf_csv::write_new(&path, frf, magnitude)?;
+    let path = path_beside(beside, what, "csv");
+    frf_csv::write(&path, frf, magnitude)?;
     Ok(path.display().to_string())
 }
 

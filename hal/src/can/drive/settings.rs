@@ -266,7 +266,10 @@ mod tests {
     #[test]
     fn settings_that_cannot_be_are_refused_with_value_and_limit() {
         assert!(DriveSettings::default().check().is_ok());
-        assert_eq!(refusal(|s| s.node = 0), "node = 0 cannot be: 1 to 127");
+        assert_eq!(
+            refusal(|s| s.node = 0),
+            "node = 0 is invalid: expected 1 to 127"
+        );
         assert!(refusal(|s| s.own_node = 5).contains("not that of the drive"));
         assert!(
             refusal(|s| s.heartbeat_timeout = Duration::from_millis(30))
