@@ -48,6 +48,8 @@
 //! positive force, positive force gives positive displacement at low frequency; u = C (r - y). The gains of controllers are
 //! printed in amperes per micrometre, as in the thesis.
 
+#![deny(unsafe_code)]
+
 pub mod cli;
 pub mod config;
 pub mod control;

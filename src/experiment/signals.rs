@@ -80,6 +80,7 @@ fn died(_: tokio::sync::oneshot::error::RecvError) -> RunError {
 }
 
 #[cfg(test)]
+#[allow(unsafe_code, reason = "the tests raise signals")]
 mod tests {
     use super::*;
 

@@ -110,6 +110,7 @@ fn run(
 
 /// Packing a chunk takes milliseconds, and the ring waits for seconds: whatever else runs, the kernel's own work between a
 /// serial port and its reader above all, comes first. Best effort.
+#[allow(unsafe_code, reason = "setpriority has no safe wrapper")]
 fn yield_to_others() {
     // SAFETY: no memory is touched; 0 is the calling thread, and raising its nice value is always permitted.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };

@@ -3,6 +3,7 @@
 /// Gives the calling thread the scheduling class SCHED_FIFO with a priority from 1 to 99.
 ///
 /// Linux refuses this without CAP_SYS_NICE or a sufficient limit RLIMIT_RTPRIO.
+#[allow(unsafe_code, reason = "sched_setscheduler has no safe wrapper")]
 pub(crate) fn set_fifo(priority: i32) -> nix::Result<()> {
     let parameters = libc::sched_param {
         sched_priority: priority,
