@@ -20,7 +20,7 @@ bench:
 
 # The thesis figures, in target/figures
 figures:
-    cargo run --release -p thesis-figures -- --output target/figures
+    cargo run --release -p thesis-figures -- --out target/figures
 
 # Licences and advisories of all libraries (needs cargo-deny)
 deny:

@@ -29,7 +29,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "CURRENT", allow_hyphen_values = true,
         help = with_setting("Largest current, to both sides", "calibrate.amplitude_a"))]
     amplitude: Option<Current>,
-    /// The calibration's file [default: beside the recording, under its name]
+    /// Calibration file to write [default: in the folder of the recording, with the same name]
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
     /// Do not measure the delay by a chirp

@@ -38,7 +38,7 @@ pub(super) struct Args {
         allow_hyphen_values = true
     )]
     operating_points: ValueRange,
-    /// Mass asymmetries m2/m3 - 1, as intended
+    /// Nominal mass asymmetries m2/m3 - 1 (without the unknown asymmetry of the stage)
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
@@ -55,13 +55,13 @@ pub(super) struct Args {
     /// Keep the recording of each chirp as well, about 9 MB each
     #[arg(long)]
     keep_recordings: bool,
-    /// How exactly an asymmetry can be set, for the recommendation [default: half a mass step of 0.5 g]
+    /// Accuracy with which an asymmetry can be set, for the recommendation [default: half of a mass step of 0.5 g]
     #[arg(long, value_name = "RATIO", value_parser = si::<OfRatio>)]
     asymmetry_tolerance: Option<f64>,
-    /// How exactly an operating point can be set, as a ratio of the beam length
+    /// Accuracy with which an operating point can be set, as a ratio of the beam length
     #[arg(long, value_name = "RATIO", default_value_t = 0.002, value_parser = si::<OfRatio>)]
     operating_point_tolerance: f64,
-    /// Number of points measured at a time [default: one for each processor]; the results do not depend on it
+    /// Number of points simulated in parallel [default: one for each processor]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -185,7 +185,7 @@ fn check_mode(args: &Args, config: &Config) -> Result<(), CliError> {
     let is_guided = is_guided(args, config);
     if is_guided && !std::io::stdin().is_terminal() {
         return Err(CliError::Usage(
-            "the configuration names devices: an operator is asked to load the stage for each point of a campaign, and \
+            "the configuration names devices: an operator must load the stage for each point of a campaign, and \
              standard input is not a terminal; start it in a terminal, or add --simulate, or run `bench chirp \
              --operating-point Y --asymmetry D` at each point"
                 .into(),

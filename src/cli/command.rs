@@ -12,9 +12,11 @@ use super::{
 
 /// A controller daemon for a precision-motion test bench.
 ///
-/// Without a configuration every command works on the simulated stage of the thesis. Exit codes: 0 done, 1 failed (a trip of
-/// the interlocks included), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) of a run
-/// that did not come to its end.
+/// Without a configuration every command works on the simulated stage of the thesis. Exit codes:
+/// 0 done, 1 failed (also if
+/// an interlock tripped), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) the
+/// run
+/// in the recording was not completed.
 #[derive(Debug, Parser)]
 #[command(name = "bench", version, max_term_width = 80)]
 pub struct Cli {
@@ -24,32 +26,33 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Excite the stage, record, estimate its frequency response: recording, CSV and Bode plot
+    /// Excite the stage and estimate its frequency response; writes a recording, a CSV file and a Bode plot
     Chirp(chirp::Args),
-    /// Run a multisine at several amplitudes: distortion and noise apart, and whether modes shift with amplitude
+    /// Run a multisine at several amplitudes: separates distortion from noise and detects amplitude-dependent modes
     Linearity(linearity::Args),
-    /// Close the loop with a reference: recording, predicted and measured figures
+    /// Run the closed loop with a reference signal; writes a recording, and predicted and measured performance values
     Control(control::Args),
-    /// One chirp at each point of a grid of operating points and asymmetries: dots over the map, offset, recommendation
+    /// Measure a chirp at each point of a grid of operating points and asymmetries: map of the results,
+    /// asymmetry offset, recommended settings
     Campaign(campaign::Args),
     /// Find scale, sign, offset and delay of amplifier and probe by small static steps
     Calibrate(calibrate::Args),
     /// Analyse the model of the mechanics: modes, residues, signs, zeros
     Model(model::Args),
-    /// Crossover, phase, gain and modulus margin of a controller with the model; exit code 1 of an unstable loop
+    /// Crossover, phase, gain and modulus margin of a controller with the model; exit code 1 if the loop is unstable
     Margins(margins::Args),
-    /// Analyse a recording or an external CSV as `bench chirp` does
+    /// Analyse a recording or an external CSV file with the same method as `bench chirp`
     Identify(identify::Args),
-    /// Run the recorded probe through the same loop and compare every command bit for bit
+    /// Run the same loop on the recorded probe measurements and compare every command bit for bit
     Replay(replay::Args),
     /// Make a truncated recording readable and report what was lost
     Recover(recover::Args),
-    /// Emulate the configured devices, with the simulated stage behind them: a rehearsal without hardware
+    /// Emulate the configured devices with the simulated stage, to test a run without hardware
     #[command(alias = "device")]
     Emulate(emulate::Args),
-    /// Show, check and describe settings; list profiles; write a file for a stage of your own
+    /// Show, check and describe settings; list profiles; write a configuration file for your own stage
     Config(config::Args),
-    /// Check whether a run can start: system, devices, recordings, each finding with its remedy; no motion
+    /// Check whether a run can start (system, devices, recordings) and print a remedy for each problem; no motion
     Doctor(doctor::Args),
     /// Print the completions of a shell, to be sourced or installed
     Completions(completions::CompletionArgs),

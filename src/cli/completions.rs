@@ -19,7 +19,7 @@ pub(super) struct CompletionArgs {
 /// Where the manual pages go.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct ManArgs {
-    /// Folder for one page a command [default: the page of `bench` on standard output]
+    /// Folder for the manual pages, one for each command [default: print the page of `bench` on standard output]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

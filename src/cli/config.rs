@@ -25,17 +25,17 @@ pub(super) struct Args {
 enum What {
     /// Print the effective settings as TOML (or JSON)
     Show(BenchOptions),
-    /// Say whether the settings are valid
+    /// Check whether the settings are valid
     Check(BenchOptions),
     /// Print the JSON schema of a configuration
     Schema,
-    /// List the profiles that --config finds by name, built in and your own
+    /// List the profiles that --config accepts by name: built-in profiles and your own
     Profiles {
-        /// One JSON object on standard output, nothing else there
+        /// Print one JSON object on standard output and nothing else
         #[arg(long)]
         json: bool,
     },
-    /// Write a commented file for a stage of your own
+    /// Write a configuration file with comments for your own stage
     Init(InitArgs),
 }
 
@@ -48,7 +48,7 @@ struct InitArgs {
     /// The file, which must not exist
     #[arg(long, value_name = "FILE", default_value = "my-stage.toml")]
     out: PathBuf,
-    /// One JSON object on standard output, nothing else there
+    /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     json: bool,
 }

@@ -38,7 +38,7 @@ pub(super) struct Args {
     /// time_s,reference_m [default: control.reference of the profile]
     #[arg(long, value_name = "step|hold|ramp|sine|chirp|FILE", value_parser = reference)]
     reference: Option<Reference>,
-    /// Height of step and ramp, amplitude of the sine [default: 50um]; of a chirp the largest travel by the model
+    /// Height of step and ramp, amplitude of the sine [default: 50um]; for a chirp: largest travel by the model
     /// [default: 20um]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     amplitude: Option<Length>,
@@ -56,7 +56,7 @@ pub(super) struct Args {
 fn duration_help() -> String {
     let sweep = default_value("chirp.duration_s").unwrap_or_default();
     let closed = with_setting("Time with the loop closed", "control.duration_s");
-    format!("{closed}; of a chirp the length of its sweep [default: chirp.duration_s; {sweep}]")
+    format!("{closed}; for a chirp: length of the sweep [default: chirp.duration_s; {sweep}]")
 }
 
 fn what_happens_without_options() -> String {

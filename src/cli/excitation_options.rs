@@ -20,11 +20,11 @@ pub(super) struct ExcitationOptions {
         help = with_setting("Last frequency", "chirp.stop_hz"))]
     stop: Option<Frequency>,
     /// The same amplitude at all frequencies: 0.1A or 100mA [default: chirp.amplitude of the profile, which depends on
-    /// the frequency; of a binary sequence prbs.amplitude_a]
+    /// the frequency; for a binary sequence prbs.amplitude_a]
     #[arg(long, value_name = "CURRENT", allow_hyphen_values = true)]
     amplitude: Option<Current>,
-    /// Amplitude over frequency for the same displacement at all frequencies, by the model or by an FRF measured before
-    /// [default of a stepped sine without --amplitude: model]
+    /// Amplitude as a function of frequency for equal displacement at all frequencies, from the model or a measured FRF
+    /// [default for a stepped sine without --amplitude: model]
     #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
     shape: Option<String>,
 }

@@ -25,7 +25,7 @@ pub(super) struct Args {
     /// Folder of the results; that of the recording or CSV without it
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// One JSON object on standard output, nothing else there
+    /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     json: bool,
 }
@@ -64,7 +64,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         )));
     }
     if plan.kind == RunKind::Quiet {
-        let what = "is a quiet run of `bench campaign`, in which no current flowed: it says where the stage rests";
+        let what = "is a quiet run of `bench campaign`, without current: \
+            it only contains the rest position of the stage";
         return Err(CliError::Usage(format!(
             "{} {what}",
             args.recording.display()

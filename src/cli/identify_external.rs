@@ -23,13 +23,13 @@ const WHOLE_SAMPLES: f64 = 1e-3;
 #[derive(Clone, Debug, clap::Args)]
 #[group(id = "table")]
 pub(super) struct ExternalOptions {
-    /// Column of the force, or of what stands for it, in any unit: the file is a CSV
+    /// Column of the force, or of a signal proportional to it, in any unit; the file is then read as CSV
     #[arg(long, value_name = "COLUMN", requires = "output")]
     input: Option<String>,
-    /// Column of the displacement, or of what stands for it, in any unit
+    /// Column of the displacement, or of a signal proportional to it, in any unit
     #[arg(long, value_name = "COLUMN", requires = "input")]
     output: Option<String>,
-    /// Column of the times in seconds, which must be regular
+    /// Column of the times in seconds, which must be equally spaced
     #[arg(
         long,
         value_name = "COLUMN",
@@ -44,13 +44,13 @@ pub(super) struct ExternalOptions {
         requires = "input",
         allow_hyphen_values = true, value_parser = si::<OfFrequency>)]
     rate: Option<f64>,
-    /// The record repeats: samples a period (2500) or seconds (1s). Without it the record begins and ends at rest
+    /// Period of a periodic record, in samples (2500) or seconds (1s). Without it the record must begin and end at rest
     #[arg(long, value_name = "SAMPLES|S", requires = "input")]
     period: Option<String>,
-    /// Periods at the beginning that are left out, in which the plant still settles
+    /// Number of periods to skip at the beginning, while the plant settles
     #[arg(long, value_name = "N", requires = "period")]
     skip_periods: Option<usize>,
-    /// Frequencies to look at, in hertz: 11:250. Without it all up to half the rate
+    /// Frequency band to analyse, in hertz: 11:250. Without it: all frequencies up to half of the sampling rate
     #[arg(
         long,
         value_name = "LOW:HIGH",

@@ -42,7 +42,7 @@ pub(super) struct Args {
     run: RunOptions,
     #[command(flatten)]
     band: ExcitationOptions,
-    /// Amplitudes as ratios of the planned one, one run each
+    /// Amplitudes as ratios of the planned amplitude; one run for each ratio
     #[arg(
         long,
         value_name = "RATIO,RATIO,...",

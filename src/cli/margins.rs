@@ -24,7 +24,7 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     choice: ControllerChoice,
-    /// Leave out sampling, delay and amplifier
+    /// Neglect sampling, delay and amplifier dynamics
     #[arg(long)]
     continuous: bool,
 }

@@ -22,10 +22,10 @@ pub(super) struct BenchOptions {
     /// Mass asymmetry m2/m3 - 1: 10% or 0.1
     #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub asymmetry: Option<Ratio>,
-    /// Seed of noise and disturbance
+    /// Seed of the random generator for noise and disturbance
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
-    /// One JSON object on standard output, nothing else there
+    /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     pub json: bool,
 }

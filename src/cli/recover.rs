@@ -15,7 +15,7 @@ pub(super) struct Args {
     /// The file to make [default: the recording's name with `_recovered`]
     #[arg(long, value_name = "FILE")]
     to: Option<PathBuf>,
-    /// One JSON object on standard output, nothing else there
+    /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     json: bool,
 }

@@ -13,7 +13,7 @@ use crate::recording::Recording;
 pub(super) struct Args {
     /// The recording (MCAP)
     recording: PathBuf,
-    /// One JSON object on standard output, nothing else there
+    /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     json: bool,
 }

@@ -24,10 +24,10 @@ pub(super) struct RunOptions {
     /// Run on the simulated stage, with the rates, delays and steps of the configured devices
     #[arg(long)]
     simulate: bool,
-    /// Clear a fault that the amplifier has kept, after the operator removed its cause
+    /// Clear a latched fault of the amplifier; first remove its cause
     #[arg(long)]
     clear_fault: bool,
-    /// Folder for the recording and what is made from it
+    /// Folder for the recording and the files computed from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
 }

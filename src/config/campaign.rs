@@ -22,7 +22,7 @@ pub struct CampaignSettings {
     /// How well the model's frequencies are known, as a ratio.
     #[schemars(range(min = 1e-6, max = 0.5))]
     pub frequency_tolerance_ratio: f64,
-    /// Zero current after a person has touched the stage, in seconds.
+    /// Duration of zero current after the operator has touched the stage, in seconds.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub settle_s: f64,
     /// Time over which the place where the stage rests is averaged, in seconds.

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     /// Neither a profile nor a file.
-    #[error("no {what} and no file is called `{name}`; {}a file is named with its path", if known.is_empty() { String::new() } else { format!("there are {known}; ") })]
+    #[error("no {what} and no file has the name `{name}`; \
+        {}give a file with its path", if known.is_empty() { String::new() } else { format!("there are {known}; ") })]
     NotFound {
         /// Profile or controller.
         what: &'static str,
@@ -28,13 +29,13 @@ pub enum ConfigError {
     Syntax {
         /// File or flag.
         place: String,
-        /// The parser's words, with line and column.
+        /// The parser's error message, with line and column.
         why: String,
     },
     /// Keys, types, ranges or their combination are wrong.
     #[error("refused:\n{}", .0.join("\n"))]
     Refused(
-        /// A line a finding, with its place.
+        /// One line for each error, with its location in the configuration.
         Vec<String>,
     ),
 }

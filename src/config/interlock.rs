@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What trips: zero current in the same tick, amplifier disabled.
+/// Limits of the interlocks. A trip sets zero current in the same tick and disables the amplifier.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InterlockSettings {

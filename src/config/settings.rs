@@ -22,7 +22,7 @@ use crate::excitation::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(title = "bench configuration", extend("additionalProperties" = false))]
 pub struct Config {
-    /// What this configuration is, in words.
+    /// Short description of this configuration.
     pub title: String,
     /// The real-time loop.
     #[serde(rename = "loop")]
@@ -35,7 +35,7 @@ pub struct Config {
     pub amplifier: AmplifierSettings,
     /// The displacement probe.
     pub probe: ProbeSettings,
-    /// What trips.
+    /// Limits of the interlocks.
     pub interlock: InterlockSettings,
     /// The simulated rig.
     pub sim: SimSettings,
@@ -72,7 +72,7 @@ impl Config {
         }
     }
 
-    /// The swept reference of a closed loop in words.
+    /// Text that describes the swept reference of a closed loop.
     pub fn swept_reference_text(&self) -> String {
         let (chirp, controller) = (&self.chirp, &self.control.controller);
         format!(

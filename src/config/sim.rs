@@ -21,7 +21,8 @@ pub struct SimSettings {
     /// The constraints of the simulated stage, linearised or not.
     #[serde(default)]
     pub geometry: Geometry,
-    /// What the simulated stage has of mass asymmetry m2/m3 - 1 beyond `plant.mass_asymmetry`, which nobody knows of: an
+    /// Mass asymmetry m2/m3 - 1 of the simulated stage in addition to `plant.mass_asymmetry`, unknown to the analysis:
+    /// an
     /// initial asymmetry by manufacture (section 5.2.2). Plant `sr4dof` only.
     #[serde(default)]
     #[schemars(range(min = -0.5, max = 0.5))]

@@ -227,7 +227,7 @@ impl Comparison {
     }
 }
 
-/// Says what the probe said, and takes or refuses commands as the amplifier did.
+/// Returns the recorded probe readings, and accepts or rejects commands like the recorded amplifier.
 struct RecordedRig {
     now: Seen,
     seen: Consumer<Seen>,

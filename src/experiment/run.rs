@@ -58,7 +58,8 @@ impl Run {
     }
 }
 
-/// Runs `plan` on `rig` and records it in `folder`. `watch` is told ticks done and ticks in all, now and then.
+/// Runs `plan` on `rig` and records it in `folder`. `watch` is called
+/// periodically with the number of completed ticks and of all ticks.
 pub fn run(
     plan: &Plan,
     rig: Box<dyn Rig>,

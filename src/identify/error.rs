@@ -16,7 +16,8 @@ pub enum IdentifyError {
     Periods(String),
     /// The input has no energy in the band.
     #[error(
-        "the input has no energy between {low_hz} and {high_hz} Hz that could separate a response from noise: excite this band or select the band that was excited"
+        "the input has no energy between {low_hz} and {high_hz} Hz to distinguish \
+         the response from noise; excite this band, or select the band that was excited"
     )]
     NotExcited {
         /// Lower limit of the band.

@@ -87,7 +87,8 @@ pub enum RecordingError {
         state: &'static str,
     },
     /// Bytes of the file were altered, or parts of it are missing within.
-    #[error("{}: damaged at byte {at_byte}, after {ticks} good ticks: {what}; `bench recover` saves what stands before the damage", path.display())]
+    #[error("{}: damaged at byte {at_byte}, after {ticks} good ticks: {what}; \
+        `bench recover` saves the data before the damage", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,

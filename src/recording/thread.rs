@@ -116,7 +116,7 @@ fn yield_to_others() {
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
-/// Says that recording has failed if its thread dies of a panic: the run shall not go on unrecorded.
+/// Reports a recording failure if the recorder thread panics, so that the run does not continue without a recording.
 struct Alarm<'a>(&'a Health);
 
 impl Drop for Alarm<'_> {

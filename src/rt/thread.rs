@@ -17,7 +17,7 @@ use crate::util::thread_priority::set_fifo;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {
-    /// Ticks back to back: studies, tests.
+    /// Each tick starts immediately after the previous one: for studies and tests.
     Virtual,
     /// Ticks when they are due: rigs.
     Realtime,
@@ -145,7 +145,7 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutc
     }
 }
 
-/// Asks the system for everything that keeps it from interrupting the calling thread, which is the loop's.
+/// Requests all system settings that prevent interruptions of the calling thread, which is the thread of the loop.
 pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
     let mut scheduling = Scheduling::default();
     scheduling.memory_locked = scheduling.ask(

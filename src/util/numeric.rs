@@ -53,7 +53,8 @@ const Z_95: f64 = 1.959_963_984_540_054;
 ///  (p + z^2/2n -+ z sqrt(p (1 - p)/n + z^2/4n^2))/(1 + z^2/n),  p = yes/n
 /// ```
 ///
-/// It has a width for none and for all as well, where the normal approximation has none. 0 to 1 without draws.
+/// The width is above zero also for `yes` = 0 and `yes` = `all`, unlike that of the normal approximation. [0, 1] if
+/// `all` is 0.
 pub fn wilson_interval(yes: u64, all: u64) -> [f64; 2] {
     if all == 0 {
         return [0.0, 1.0];

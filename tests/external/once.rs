@@ -113,11 +113,11 @@ fn a_record_gets_the_pictures_and_the_page_that_a_run_gets() {
     let verdict = format!("<strong>{}", answer["cnmp"].as_str().expect("a verdict"));
     let words = [
         "force_n to position_m",
+        "20000",
         &verdict,
         "<h2>Modes",
         "position_m per force_n and s^2",
         "<svg",
-        "20000",
     ];
     let places: Vec<usize> = words
         .iter()

@@ -17,13 +17,13 @@ use crate::util::quantity::{OfAngularFrequency, OfRatio, si};
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// |S| stays below this up to the bandwidth (Eq. 1-1), between 0 and 1
+    /// Upper limit of |S| up to the bandwidth (Eq. 1-1), between 0 and 1
     #[arg(long, value_name = "RATIO", default_value_t = PlantSummary::ALPHA, value_parser = si::<OfRatio>)]
     alpha: f64,
-    /// |S| stays below this at all frequencies, above 1; 2 is a modulus margin of 0.5
+    /// Upper limit of |S| at all frequencies, above 1; 2 corresponds to a modulus margin of 0.5
     #[arg(long, value_name = "RATIO", default_value_t = PlantSummary::PEAK, value_parser = si::<OfRatio>)]
     peak: f64,
-    /// Compute the peak that this bandwidth costs, instead of the bandwidth that a peak allows
+    /// Compute the smallest possible sensitivity peak for this bandwidth, instead of the bandwidth for a given peak
     #[arg(long, value_name = "RAD_PER_S", value_parser = si::<OfAngularFrequency>)]
     bandwidth: Option<f64>,
 }

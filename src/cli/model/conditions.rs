@@ -19,7 +19,7 @@ use crate::model::veering::{
 pub(super) struct Args {
     #[command(flatten)]
     modes: CloseModesArgs,
-    /// The value to explain [default: the setting's own, where it is in the range; else the veering point]
+    /// The value to explain [default: the configured value if it is in the range, else the veering point]
     #[arg(long, value_name = "X", allow_hyphen_values = true)]
     at: Option<String>,
 }

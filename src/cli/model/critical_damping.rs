@@ -17,7 +17,7 @@ pub(super) struct Args {
     /// |residue of u / residue of v|, above (omega_v/omega_u)^2
     #[arg(long, default_value_t = 2.0, value_parser = si::<OfRatio>)]
     ratio: f64,
-    /// One JSON object on standard output, nothing else there
+    /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     json: bool,
 }

@@ -23,7 +23,7 @@ pub(super) struct Args {
     /// Place of the actuator: a stage or node, or weights as in u=0.117,b=0.56 [default: as configured]
     #[arg(long, value_name = "PLACE")]
     actuator: Option<String>,
-    /// Place of the probe, likewise
+    /// Place of the probe, in the same notation as --actuator
     #[arg(long, value_name = "PLACE")]
     sensor: Option<String>,
     /// Draw the quadrants before, at and after the veering point to this file

@@ -28,16 +28,16 @@ pub(super) struct Args {
     /// Number of draws; --seed selects them
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     draws: u64,
-    /// Do the I-th of N parts alone, for --join to combine
+    /// Compute only the I-th of N parts; combine the parts with --join
     #[arg(long, value_name = "I/N", requires = "file")]
     shard: Option<Shard>,
-    /// Store completed draws in this file; started again with the same arguments, the study continues there
+    /// Store completed draws in this file; the same command started again continues an interrupted study
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
     /// Count the CNMP pairs of the zeros with damping as well
     #[arg(long)]
     damped: bool,
-    /// Threads [default: one for each processor]; the answer does not depend on them
+    /// Number of threads [default: one for each processor]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Combine the shards in these files

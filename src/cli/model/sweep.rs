@@ -13,16 +13,16 @@ use crate::util::quantity::{Quantity, QuantityError};
 pub(super) struct SweepArgs {
     #[command(flatten)]
     pub bench: BenchOptions,
-    /// The setting that varies: plant.operating_point_m, plant.mass_asymmetry, any number
+    /// The setting that varies: plant.operating_point_m, plant.mass_asymmetry or any other numeric setting
     #[arg(long, value_name = "KEY")]
     pub vary: String,
     /// First value: 3.8mm, 0.0038, 8% of the beam length for an operating point, 8% for a ratio
     #[arg(long, value_name = "A", allow_hyphen_values = true)]
     from: String,
-    /// Last value, likewise
+    /// Last value, in the same notation as --from
     #[arg(long, value_name = "B", allow_hyphen_values = true)]
     to: String,
-    /// Values of the grid, refined where needed
+    /// Number of values of the grid; more values are added where needed
     #[arg(long, value_name = "N", default_value_t = 101, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     count: u32,
 }
@@ -97,7 +97,7 @@ impl SweepArgs {
 pub(super) struct CloseModesArgs {
     #[command(flatten)]
     pub sweep: SweepArgs,
-    /// The two modes, slowest first at the first value [default: the pair that comes closest]
+    /// Numbers of the two modes, by rising frequency at the first value [default: the pair with the closest approach]
     #[arg(long, value_name = "I,J", value_delimiter = ',')]
     pub modes: Vec<usize>,
 }

@@ -75,7 +75,7 @@ impl EstimatorSettings {
         }
     }
 
-    /// Bins half of a half-width apart.
+    /// Bin positions with a spacing of half of the half-width.
     fn half_width_steps(&self, first: f64, last: f64, bin_hz: f64) -> Vec<f64> {
         let mut positions = Vec::new();
         let mut bin = first;

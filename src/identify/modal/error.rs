@@ -10,7 +10,8 @@ pub type Progress<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 pub enum FitError {
     /// No mode is significant.
     #[error(
-        "no mode exceeds the noise between {low_hz:.3} and {high_hz:.3} Hz; excite more, or for longer, or check that the probe sees the stage"
+        "no mode exceeds the noise between {low_hz:.3} and {high_hz:.3} Hz; \
+         increase the amplitude or the duration, or check that the probe measures the stage"
     )]
     NoMode {
         /// Lowest frequency.
@@ -28,7 +29,7 @@ pub enum FitError {
     },
     /// The covariance is singular.
     #[error(
-        "the response does not determine the parameters of {modes} modes; record for longer or excite more"
+        "the response does not determine the parameters of {modes} modes; increase the duration or the amplitude"
     )]
     Undetermined {
         /// Number of modes found.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
-/// J^T W J and J^T W e; real and imaginary parts are data of their own.
+/// J^T W J and J^T W e; real and imaginary parts are separate data points.
 pub(super) struct NormalEquations {
     /// J^T W J, lower triangle.
     matrix: DMatrix<f64>,

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::harmonics::{Harmonics, LineLevel, noise_probability};
 use crate::identify::FrfDatum;
 
-/// Distortion is detected if noise alone gives as much with a probability below this.
+/// Distortion is detected if the probability that noise alone gives at least this level is below this value.
 const FALSE_ALARM_PROBABILITY: f64 = 1e-3;
 /// A loss of coherence below this is negligible.
 const NEGLIGIBLE_LOSS: f64 = 1e-3;

@@ -41,7 +41,7 @@ const WRONG_SIGN_PROBABILITY: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cnmp {
-    /// There are.
+    /// There are CNMP zeros.
     Detected,
     /// There are none.
     Excluded,

@@ -16,7 +16,9 @@ pub enum PlantError {
     },
     /// A rigid-body or buckling mode where the settings announce none.
     #[error(
-        "mode {number} has the eigenvalue {eigenvalue_rad2_s2:.3e} rad^2/s^2, which is negative or, beside that of the fastest mode, zero to rounding: no spring holds the stage in that direction, or a mass is too light or a spring too stiff for double precision"
+        "the eigenvalue of mode {number}, {eigenvalue_rad2_s2:.3e} rad^2/s^2, is negative or, compared with that of \
+         the fastest mode, zero within rounding errors: no spring supports the stage in that direction, \
+         or a mass is too small or a spring too stiff for double precision"
     )]
     Unsupported {
         /// Number of the mode, from 1.
@@ -26,12 +28,14 @@ pub enum PlantError {
     },
     /// The actuator's force does not reach the probe.
     #[error(
-        "the residues of all modes are zero: the actuator's force does not reach the probe; join the two by springs, or move one of them"
+        "the residues of all modes are zero: \
+         the actuator does not excite the probe; connect the two by springs, or move one of them"
     )]
     NoResponse,
     /// Mass-proportional damping holds a free body to ground.
     #[error(
-        "mass-proportional damping of {mass_per_s} 1/s would hold a free body to ground; use damping of kind \"uniform\", or \"rayleigh\" with mass_per_s = 0"
+        "mass-proportional damping of {mass_per_s} 1/s would connect a free body to ground; \
+         use damping of kind \"uniform\", or \"rayleigh\" with mass_per_s = 0"
     )]
     DampedFreeBody {
         /// The coefficient of the mass matrix.
@@ -44,7 +48,7 @@ pub enum PlantError {
         model: &'static str,
     },
     /// A free body has no static compliance.
-    #[error("{0} is not defined for a free body, which no spring holds in place")]
+    #[error("{0} is not defined for a free body (a body without a spring to ground)")]
     FreeBody(
         /// The quantity.
         &'static str,

@@ -70,7 +70,8 @@ pub enum StudyError {
         why: String,
     },
     /// A file of other settings.
-    #[error("{path} holds a study of other settings; name another file, or give the same settings:\n{}", differences.join("\n"))]
+    #[error("{path} contains a study with different settings; \
+        choose another file, or use the same settings:\n{}", differences.join("\n"))]
     OtherSettings {
         /// The file.
         path: String,

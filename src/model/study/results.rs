@@ -56,7 +56,7 @@ impl Block {
             .extend(counted.err().map(|why| Failure { draw, why }));
     }
 
-    /// Whether it is complete, as one of a shard's blocks.
+    /// Whether this block has a count for each of the `wanted` draws.
     fn fits(&self, plan: &Plan, wanted: &Range<u64>) -> bool {
         let length = (wanted.end - wanted.start) as usize;
         let damped = if plan.damped { length } else { 0 };

@@ -196,7 +196,7 @@ pub struct QuadrantSummary {
     pub sensor_quadrant: Option<usize>,
     /// The quadrant in which the probe would make the signs alternate.
     pub avoid_quadrant: Option<usize>,
-    /// Whether the probe's octant is across the planes of R, u, v from the actuator's.
+    /// For each of the planes of R, u, v: whether actuator and probe are on opposite sides of it.
     pub across: Option<[bool; 3]>,
     /// aR, au, av in 1/kg.
     pub residues_per_kg: Option<[f64; 3]>,

@@ -26,7 +26,8 @@ pub fn opening_angle_allowed(alpha: f64, peak: f64) -> f64 {
     std::f64::consts::PI * power / (1.0 + power)
 }
 
-/// The w0 in rad/s at which the zero sees the band under the angle Theta (0 to pi): Eq. (1-2) solved for w0,
+/// The w0 in rad/s at which the band, viewed from the zero, has the opening angle Theta
+/// (0 to pi): Eq. (1-2) solved for w0,
 /// w0^2 sin Theta + 2 x w0 cos Theta - |z|^2 sin Theta = 0.
 pub fn bandwidth_rad_s(zero_rad_s: Complex<f64>, opening_angle_rad: f64) -> f64 {
     let (sine, cosine) = opening_angle_rad.sin_cos();

@@ -77,7 +77,7 @@ pub fn critical_damping(eta: f64, kappa: f64) -> Option<f64> {
 }
 
 /// The damping ratio at which the locus of the zeros of Eq. (3-15) touches the imaginary axis: above it there are no zeros
-/// in the right half plane, whatever the size of the residues.
+/// in the right half plane for any magnitude of the residues.
 ///
 /// A zero s = jw, X = w^2, makes s^2 (au A + av B)/(A B) real, where A and B are the denominators of v and u:
 ///

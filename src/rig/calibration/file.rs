@@ -88,7 +88,7 @@ pub enum CalibrationError {
     Config(#[from] ConfigError),
     /// The date cannot be read.
     #[error(
-        "calibration {file}: made = {made:?} is not a date (RFC 3339); repeat `bench calibrate`"
+        "calibration {file}: the key `made` = {made:?} is not a date (RFC 3339); repeat `bench calibrate`"
     )]
     Date {
         /// The file.

@@ -79,7 +79,8 @@ pub enum EmulatorError {
     Plant(#[from] PlantError),
     /// The CAN interface cannot be used.
     #[error(
-        "{0}; for a rehearsal on this computer alone: `ip link add vcan0 type vcan`, `ip link set vcan0 up`, and --interface vcan0"
+        "{0}; for a test on this computer without hardware: \
+         `ip link add vcan0 type vcan`, `ip link set vcan0 up`, and --interface vcan0"
     )]
     Port(#[from] PortError),
     /// The CAN interface failed.
@@ -97,7 +98,8 @@ pub enum EmulatorError {
     #[error(transparent)]
     Serial(#[from] SerialError),
     /// The link to the terminal cannot be made.
-    #[error("cannot make the link {}: {why}; remove what is there, or choose another name with --pty", path.display())]
+    #[error("cannot create the link {}: {why}; \
+        remove the existing file, or choose another name with --pty", path.display())]
     Link {
         /// The link.
         path: PathBuf,

@@ -33,7 +33,8 @@ pub enum OpenError {
     Sdo(#[from] SdoError),
     /// The drive is not the configured one.
     #[error(
-        "{field} of node {node} is 0x{have:08X}, the configuration says 0x{want:08X}: connect the configured drive, or correct the configuration"
+        "{field} of node {node} is 0x{have:08X}, \
+         but 0x{want:08X} is configured: connect the configured drive, or correct the configuration"
     )]
     Identity {
         /// The node.
@@ -47,7 +48,8 @@ pub enum OpenError {
     },
     /// The rated current differs from the configuration; all currents would be wrong.
     #[error(
-        "the rated current of node {node} (0x6075) is {have_a} A, the configuration says {want_a} A; correct the one that is wrong"
+        "the rated current of node {node} (0x6075) is {have_a} A, \
+         but {want_a} A is configured; correct the one that is wrong"
     )]
     RatedCurrent {
         /// The node.
@@ -81,7 +83,8 @@ pub enum OpenError {
     },
     /// The drive did not accept a value.
     #[error(
-        "node {node} has 0x{have:X} in {address} after 0x{want:X} was written; its firmware does not allow this configuration"
+        "node {node} returns 0x{have:X} for {address} after 0x{want:X} was written; \
+         its firmware does not accept this configuration"
     )]
     Verification {
         /// The node.

@@ -83,7 +83,7 @@ pub struct DriveSettings {
     pub current_limit_a: f64,
     /// Who the drive must be.
     pub identity: ExpectedIdentity,
-    /// What the drive does when it no longer hears us (0x6007): 1 fault, 2 disable voltage, 3 quick stop. `None` leaves
+    /// Reaction of the drive to a lost connection (0x6007): 1 fault, 2 disable voltage, 3 quick stop. `None` leaves
     /// the drive's own reaction, for drives without this object: prove by unplugging the bus that it stops.
     pub abort_connection: Option<i16>,
     /// Time between heartbeats of the drive.
