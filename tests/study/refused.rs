@@ -31,9 +31,10 @@ fn rejects_invalid_tolerances() {
         ("plant.beam_length_m=uniform:1um:-1um", &["empty tolerance"]),
         ("plant.beam_length_m=normal:0", &["above zero"]),
         ("plant.youngs_modulus_pa=+-1mm", &["a length in m", "Pa"]),
+        // Of a ratio, a percentage is of 1.
         (
-            "plant.secondary_mass_deviation.sL=+-15%",
-            &["is of the nominal value", "as in 0.15"],
+            "plant.secondary_mass_deviation.sL=+-100%",
+            &["reaches -1", "allowed is -0.9 to 9"],
         ),
         // Out of range at one end; a normal one at six sigma; a relation between two settings.
         (
