@@ -143,7 +143,7 @@ fn another_drive_than_configured_is_refused() {
     let refused = refusal(with(serial), EmulatedDriveSettings::default());
     assert!(
         refused.contains(
-            "the serial number of node 5 is 0x00000001, the configuration says 0x00000007"
+            "the serial number of node 5 is 0x00000001, but 0x00000007 is configured"
         ),
         "{refused}"
     );
@@ -155,7 +155,7 @@ fn another_drive_than_configured_is_refused() {
         EmulatedDriveSettings::default(),
     );
     assert!(
-        refused.contains("is 4 A, the configuration says 4.5 A"),
+        refused.contains("is 4 A, but 4.5 A is configured"),
         "{refused}"
     );
 }
