@@ -243,7 +243,7 @@ fn rejects_and_keeps_a_file_of_other_settings() {
         ),
     ] {
         let answer = bench.run(&format!("{XY} {DRAWS} --file a.study {arguments}"));
-        answer.is_refused(&[words, &["a.study", "other settings"]].concat());
+        answer.is_refused(&[words, &["a.study", "different settings"]].concat());
     }
     let answer = bench.run(&format!("{XY} --draws 2601 --shard 1/2 --file a.study"));
     answer.is_refused(&["`draws` is 2600 there, 2601 here"]);

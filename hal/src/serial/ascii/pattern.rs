@@ -140,11 +140,11 @@ impl Pattern {
 
     /// Width and number of decimals that `{value}` requires.
     fn value_size(&self) -> (Option<usize>, Option<usize>) {
-        let sizes = self.pieces.iter().filter_map(|piece| match piece {
+        let mut sizes = self.pieces.iter().filter_map(|piece| match piece {
             Piece::Value { width, decimals } => Some((*width, *decimals)),
             _ => None,
         });
-        sizes.last().unwrap_or_default()
+        sizes.next_back().unwrap_or_default()
     }
 
     /// The number of digits after the point that `{value}` requires.
