@@ -209,7 +209,7 @@ impl Server<'_> {
             ["help"] => eprint!("fault KIND, quit, help; the kinds are\n{}", fault::help()),
             ["fault", fault] => {
                 if let Err(why) = self.inject(fault) {
-                    print_note(&why.to_string());
+                    print_note(&why);
                 }
             }
             _ => print_note(&format!(

@@ -88,10 +88,8 @@ impl Device {
 
     fn signal(&mut self, signal: i32) {
         // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
-        assert_eq!(
-            unsafe { libc::kill(self.child().id() as libc::pid_t, signal) },
-            0
-        );
+        let result = unsafe { libc::kill(self.child().id() as libc::pid_t, signal) };
+        assert_eq!(result, 0);
     }
 
     /// Waits for its end; its one JSON object.

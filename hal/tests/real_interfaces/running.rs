@@ -91,9 +91,7 @@ fn a_drive_says_who_it_is_and_another_than_configured_is_refused() {
         },
     );
     assert!(
-        refused.contains(
-            "the serial number of node 5 is 0x00000001, but 0x00000007 is configured"
-        ),
+        refused.contains("the serial number of node 5 is 0x00000001, but 0x00000007 is configured"),
         "{refused}"
     );
 }

@@ -42,10 +42,8 @@ fn exclusive_use_ends_after_a_reader_was_killed() {
         .open(&rehearsal.path)
         .unwrap();
     // SAFETY: the descriptor is open; TIOCEXCL has no argument.
-    assert_eq!(
-        unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) },
-        0
-    );
+    let result = unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) };
+    assert_eq!(result, 0);
     drop(killed);
     for _ in 0..60_000 {
         if !is_exclusive(&observer) {

@@ -106,7 +106,7 @@ struct PointInProgress<'a> {
 enum NextStep {
     End(PointEnd),
     /// The operator confirmed the failed chirp.
-    KeepFailed(PointResult),
+    KeepFailed(Box<PointResult>),
     Check {
         confirmed: bool,
     },
@@ -168,7 +168,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         loop {
             match self.ask(&mut visit) {
                 NextStep::End(end) => return Ok(end),
-                NextStep::KeepFailed(result) => return self.keep(point, confirmed(result)),
+                NextStep::KeepFailed(result) => return self.keep(point, confirmed(*result)),
                 NextStep::Check { confirmed } => {
                     state.load = load;
                     if let Some(end) = self.measure(&mut visit, &state.unloaded, confirmed)? {
@@ -184,7 +184,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         match (self.operator.ask(&visit.question), failed) {
             (Reply::Stop, _) => NextStep::End(PointEnd::Stopped),
             (Reply::Skip, _) => NextStep::End(PointEnd::Skipped),
-            (Reply::Right, Some(result)) => NextStep::KeepFailed(result),
+            (Reply::Right, Some(result)) => NextStep::KeepFailed(Box::new(result)),
             (Reply::Right, None) => NextStep::Check {
                 confirmed: visit.question.may_confirm,
             },

@@ -12,7 +12,7 @@
 //! The devices themselves are those of [`bench_hal`]. This module gives them their settings, the stage, and faults.
 
 pub mod amplifier;
-mod emulator;
+mod emulated_bench;
 pub mod event_log;
 pub mod fault;
 pub mod fault_schedule;
@@ -30,7 +30,7 @@ use serde::Serialize;
 use crate::model::plant::PlantError;
 
 pub use amplifier::AmplifierServer;
-pub use emulator::{EmulatedDevices, Emulator, Summary};
+pub use emulated_bench::{EmulatedDevices, Emulator, Summary};
 pub use event_log::{EventLog, LogEntry, LogEvent};
 pub use fault::{AmplifierFault, EmulatedFault, FaultRequest};
 pub use fault_schedule::{FaultSchedule, PlannedFault};

@@ -142,9 +142,7 @@ fn another_drive_than_configured_is_refused() {
     };
     let refused = refusal(with(serial), EmulatedDriveSettings::default());
     assert!(
-        refused.contains(
-            "the serial number of node 5 is 0x00000001, but 0x00000007 is configured"
-        ),
+        refused.contains("the serial number of node 5 is 0x00000001, but 0x00000007 is configured"),
         "{refused}"
     );
     let refused = refusal(
