@@ -1,4 +1,4 @@
-//! The kinds of excitation. A new one is one file, and one line in [`excitations!`].
+//! The kinds of excitation. A new one is one file, and one line in `excitations!`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! The three messages of a recording: their wire format, their descriptors, and their conversion from and to the records of the
 //! loop.
 //!
-//! One line of [`messages!`] defines a field for both: for prost, which encodes it, and for the descriptor, by which readers in
+//! One line of `messages!` defines a field for both: for prost, which encodes it, and for the descriptor, by which readers in
 //! other languages decode it. The messages are protobuf (proto3). A `double` is marked `required`, which for prost means *always
 //! written*: a proto3 writer leaves out a field that equals zero, and -0.0 does, so its sign would be lost. Readers see an ordinary
 //! proto3 `double`.

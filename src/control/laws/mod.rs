@@ -1,6 +1,6 @@
 //! Control laws that a controller file may name in `[law]`, beside the cascade of sections.
 //!
-//! A new law is one file here with its settings, and one line in [`control_laws!`].
+//! A new law is one file here with its settings, and one line in `control_laws!`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! References for the closed loop, in metres relative to the rest position at which the loop closes.
 //!
-//! A new reference is one file here with its settings, and one line in [`references!`].
+//! A new reference is one file here with its settings, and one line in `references!`.
 
 mod design;
 mod file;

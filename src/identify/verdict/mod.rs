@@ -5,7 +5,7 @@
 //! 1. the zeros of the fit, each with its probability of lying in the right half plane;
 //! 2. the signs of the residues: two close modes of opposite signs beside a remainder are necessary for CNMP zeros between
 //!    them (sections 3.2.2 and 3.2.4);
-//! 3. the excess phase over Bode's relation, independent of the modes: each CNMP pair adds one turn of lag ([`phase_drop`]).
+//! 3. the excess phase over Bode's relation, independent of the modes: each CNMP pair adds one turn of lag ([`phase_drop()`]).
 //!
 //! A verdict needs sufficient data: as many modes as the model has, and residuals that are noise. It covers the band up to a
 //! given frequency. All comparisons state what must hold, so that a number that is not finite (a singular covariance, a bin

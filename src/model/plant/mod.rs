@@ -14,7 +14,7 @@
 //! | `lumped` | `lumped.rs` | named masses and springs: sections 4.4.1 and 4.4.3, Fig 4-3, or a stage of your own |
 //! | `modal` | `modal.rs` | residues, frequencies and damping ratios: Eqs. (3-3) to (3-15), (6-1), (6-3) |
 //!
-//! A new model is one file with its settings and their [`PlantModel`], and one line in `plant_models!` below. To the rest of
+//! A new model is one file with its settings and their `PlantModel`, and one line in `plant_models!` below. To the rest of
 //! the program it is a [`Structure`]. `docs/own-stage.md` shows how to describe a stage as masses and springs without
 //! any code.
 //!
