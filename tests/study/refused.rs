@@ -105,7 +105,7 @@ fn rejects_a_plant_without_response() {
         .is_refused(&[
             "nominal plant cannot be analysed",
             "residues of all modes are zero",
-            "join the two",
+            "connect the two by springs",
         ]);
     bench.write(
         "silent.toml",

@@ -546,7 +546,10 @@ fn rejects_invalid_matrices_where_they_are_needed() {
     bench.write("apart.toml", two);
     bench
         .run("model modes --config apart.toml --json")
-        .is_refused(&["residues of all modes are zero", "join the two"]);
+        .is_refused(&[
+            "residues of all modes are zero",
+            "connect the two by springs",
+        ]);
     let held = "plant.damping={kind=\"rayleigh\",mass_per_s=1.0,stiffness_s=0.0}";
     bench
         .run(&format!("model modes --config four-mass --set {held}"))
