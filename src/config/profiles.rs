@@ -1,12 +1,11 @@
-//! The profiles and controllers that travel inside the program, so that it works in an empty directory, and the own ones
-//! of a user.
+//! The profiles and controllers that are embedded in the program, and those of the user.
 
 use std::path::{Path, PathBuf};
 
 /// A TOML file of `bench-config/`, embedded.
 #[derive(Clone, Copy, Debug)]
 pub struct EmbeddedFile {
-    /// The name a person types.
+    /// Name of the file without its ending, as the user types it.
     pub name: &'static str,
     /// The text of the file.
     pub text: &'static str,
@@ -15,61 +14,23 @@ pub struct EmbeddedFile {
 /// The profile below all others.
 pub const DEFAULT: &str = "stage";
 
-/// All profiles. A new one is one file and one line.
-pub const PROFILES: &[EmbeddedFile] = &[
-    EmbeddedFile {
-        name: "stage",
-        text: include_str!("../../bench-config/stage.toml"),
-    },
-    EmbeddedFile {
-        name: "chapter2",
-        text: include_str!("../../bench-config/chapter2.toml"),
-    },
-    EmbeddedFile {
-        name: "xy",
-        text: include_str!("../../bench-config/xy.toml"),
-    },
-    EmbeddedFile {
-        name: "three-mass",
-        text: include_str!("../../bench-config/three-mass.toml"),
-    },
-    EmbeddedFile {
-        name: "four-mass",
-        text: include_str!("../../bench-config/four-mass.toml"),
-    },
-    EmbeddedFile {
-        name: "lab",
-        text: include_str!("../../bench-config/lab.toml"),
-    },
-];
+/// Embeds files of a folder of `bench-config/`, each by its name.
+macro_rules! embedded {
+    ($folder:literal: $($name:literal),* $(,)?) => {
+        &[$(EmbeddedFile {
+            name: $name,
+            text: include_str!(concat!("../../bench-config/", $folder, $name, ".toml")),
+        }),*]
+    };
+}
 
-/// All controllers. A new one is one file and one line.
-pub const CONTROLLERS: &[EmbeddedFile] = &[
-    EmbeddedFile {
-        name: "fast",
-        text: include_str!("../../bench-config/controllers/fast.toml"),
-    },
-    EmbeddedFile {
-        name: "slow",
-        text: include_str!("../../bench-config/controllers/slow.toml"),
-    },
-    EmbeddedFile {
-        name: "lab",
-        text: include_str!("../../bench-config/controllers/lab.toml"),
-    },
-    EmbeddedFile {
-        name: "xy",
-        text: include_str!("../../bench-config/controllers/xy.toml"),
-    },
-    EmbeddedFile {
-        name: "three-mass",
-        text: include_str!("../../bench-config/controllers/three-mass.toml"),
-    },
-    EmbeddedFile {
-        name: "four-mass",
-        text: include_str!("../../bench-config/controllers/four-mass.toml"),
-    },
-];
+/// All profiles. A new one is one file and its name.
+pub const PROFILES: &[EmbeddedFile] =
+    embedded!("": "stage", "chapter2", "xy", "three-mass", "four-mass", "lab");
+
+/// All controllers. A new one is one file and its name.
+pub const CONTROLLERS: &[EmbeddedFile] =
+    embedded!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass");
 
 /// The entry called `name`.
 pub fn find(list: &[EmbeddedFile], name: &str) -> Option<EmbeddedFile> {
