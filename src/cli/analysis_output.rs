@@ -1,15 +1,17 @@
 //! The analysis of a recording, as text.
 
+use core::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
-use crate::experiment::{AnalysisError, analyse};
+use crate::experiment::{AnalysisError, analyse_with_progress};
 use crate::identify::modal::MeasurementChain;
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles};
+use crate::util::progress::Progress;
 
 impl From<AnalysisError> for CliError {
     fn from(error: AnalysisError) -> Self {
@@ -23,13 +25,22 @@ impl From<OutputError> for CliError {
     }
 }
 
+/// Steps of the progress of an analysis.
+const STEPS: u64 = 1000;
+
 /// Analyses a recording and writes its files beside a path, under its name.
 pub(super) fn analyse_and_write(
     recording: &Recording,
     config: &Config,
     beside: &Path,
+    progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
-    let analysis = &analyse(recording, config)?;
+    progress.begin("analysing", STEPS);
+    let analysis = &analyse_with_progress(recording, config, &mut |phase, fraction| {
+        let done = (phase.overall(fraction) * STEPS as f64) as u64;
+        progress.set(done, STEPS);
+        ControlFlow::Continue(())
+    })?;
     let run = BenchRun {
         analysis,
         recording,

@@ -128,9 +128,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The analysis, which can be cancelled: the recording is complete all the same.
 pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
-    let _line = ProgressLine::show(&Progress::new("analysing"));
+    let progress = Progress::new("analysing");
+    let _line = ProgressLine::show(&progress);
     let (recording, config) = (path.to_path_buf(), config.clone());
-    let work = move || analyse_and_write(&Recording::open(&recording)?, &config, &recording);
+    let work = move || {
+        let opened = Recording::open(&recording)?;
+        analyse_and_write(&opened, &config, &recording, &progress)
+    };
     let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));
     outputs.map_err(|error| {

@@ -9,11 +9,13 @@ use super::error::CliError;
 use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
 use super::output::{print_json, print_text};
+use super::progress::ProgressLine;
 use super::run_options::trip_text;
 use crate::config::Config;
 use crate::experiment::{Ending, Plan, RunKind, TripSummary};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
+use crate::util::progress::Progress;
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]
@@ -72,6 +74,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         )));
     }
     let ending = Ending::of(&recording);
+    let made = analysed(&recording, &plan.config, args)?;
     let report = Report {
         outcome: ending,
         trip: TripSummary::of(ending),
@@ -80,11 +83,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         overruns: recording.overruns(),
         lost_records: recording.lost_records(),
         truncated: recording.truncated(),
-        made: analyse_and_write(
-            &recording,
-            &plan.config,
-            &in_folder(args.out.as_deref(), &args.recording)?,
-        )?,
+        made,
     };
     if args.json {
         print_json(&report)?
@@ -99,6 +98,18 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     } else {
         Outcome::Impaired
     })
+}
+
+/// The analysis, with its progress on a terminal.
+fn analysed(
+    recording: &Recording,
+    config: &Config,
+    args: &Args,
+) -> Result<AnalysisOutputs, CliError> {
+    let beside = in_folder(args.out.as_deref(), &args.recording)?;
+    let progress = Progress::new("analysing");
+    let _line = ProgressLine::show(&progress);
+    analyse_and_write(recording, config, &beside, &progress)
 }
 
 impl Report {
