@@ -6,19 +6,19 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::analysis_output::{self, analyse_and_write};
-use super::chirp_plan::{Expected, show};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::help::with_setting;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::print_text;
+use super::output::{print_json, print_text};
+use super::plan_output;
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, exit, run_text};
 use super::table::{labelled, wrap};
 use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
 use crate::excitation::Extremes;
-use crate::experiment::{self, Plan, RunSummary, abandon_on_signal};
+use crate::experiment::{ExcitationPlan, Plan, RunSummary, abandon_on_signal, predicted_extremes};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
 use crate::rig::devices;
@@ -90,16 +90,16 @@ struct Report {
     #[serde(flatten)]
     run: RunSummary,
     expected_travel_m: f64,
-    expected: Expected,
+    expected: Extremes,
     #[serde(flatten)]
     made: AnalysisOutputs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.config()?;
-    let expected = Expected::of(&check(&config)?);
+    let expected = predicted_extremes(&config)?;
     if args.plan {
-        return show(&config, &expected, args.bench.json);
+        return show(&ExcitationPlan::new(&config, expected), args.bench.json);
     }
     if !args.bench.json {
         print_text(&plan_text(&config, &expected))?;
@@ -145,13 +145,17 @@ pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, 
     })
 }
 
-/// Refuses an excitation that would trip an interlock, by the model of the whole rig; returns what to expect.
-pub(super) fn check(config: &Config) -> Result<Extremes, CliError> {
-    Ok(experiment::predicted_extremes(config)?)
+/// Prints what the run would do.
+fn show(plan: &ExcitationPlan, json: bool) -> Result<Outcome, CliError> {
+    match json {
+        true => print_json(plan)?,
+        false => print_text(&plan_output::text(plan))?,
+    }
+    Ok(Outcome::Done)
 }
 
 /// What the run will do, printed before it starts.
-fn plan_text(config: &Config, expected: &Expected) -> String {
+fn plan_text(config: &Config, expected: &Extremes) -> String {
     let (words, travel_um) = (
         config.chosen_excitation().describe(),
         expected.travel_m * 1e6,

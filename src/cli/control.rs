@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::analysis_output;
 use super::chirp::analysed;
-use super::chirp_plan::Expected;
 pub(super) use super::control_options::Args;
 use super::error::CliError;
 use super::margins::{Pole, closed_loop, pole_list, require_modulus_margin, text as margins_text};
@@ -14,6 +13,7 @@ use super::run_options::{close, exit, run_text};
 use super::table::labelled;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
+use crate::excitation::Extremes;
 use crate::experiment::{Plan, RunSummary, TrackingMetrics, tracking_metrics};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
@@ -29,7 +29,7 @@ struct Report {
     predicted: Predicted,
     measured: Option<TrackingMetrics>,
     /// What a swept reference does by the model.
-    expected: Option<Expected>,
+    expected: Option<Extremes>,
     /// What a swept reference shows of plant and loop.
     #[serde(flatten)]
     made: Option<AnalysisOutputs>,
@@ -55,7 +55,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     let predicted = Predicted { margins, step };
     let plan = Plan::control(config.clone())?;
-    let expected = plan.predicted_extremes.as_ref().map(Expected::of);
+    let expected = plan.predicted_extremes;
     if !args.bench.json {
         let poles = pole_list(&closed_loop.poles(), &config);
         print_text(&plan_text(&config, &predicted, &poles, expected.as_ref()))?;
@@ -108,7 +108,7 @@ fn plan_text(
     config: &Config,
     predicted: &Predicted,
     poles: &[Pole],
-    expected: Option<&Expected>,
+    expected: Option<&Extremes>,
 ) -> String {
     let margins = margins_text(config, &predicted.margins, poles);
     let reference = labelled("reference", &reference_text(config));

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use super::chirp;
 use super::error::CliError;
 use super::margins::{closed_loop, require_modulus_margin};
 use super::options::BenchOptions;
@@ -12,7 +11,7 @@ use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::control::Margins;
 use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
-use crate::experiment::Plan;
+use crate::experiment::{Plan, predicted_extremes};
 
 /// Configuration and folder of the runs
 #[derive(Clone, Debug, clap::Args)]
@@ -50,7 +49,7 @@ fn run_checks(args: &Args) -> RunChecks {
 
 fn predicted_travel_m(bench: &BenchOptions) -> Result<f64, CliError> {
     let config = bench.load(Purpose::Chirp, &[])?;
-    Ok(chirp::check(&config)?.travel_m)
+    Ok(predicted_extremes(&config)?.travel_m)
 }
 
 fn control_margins(bench: &BenchOptions) -> Result<Margins, CliError> {

@@ -2,10 +2,10 @@
 
 use toml::{Table, Value};
 
-use super::chirp_plan::shape;
 use super::error::CliError;
 use super::help::with_setting;
 use crate::config::{Config, OptionSetting};
+use crate::experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 use crate::util::quantity::{Current, Frequency};
 
 /// Which frequencies, and with how much.
@@ -26,7 +26,7 @@ pub(super) struct ExcitationOptions {
     /// Amplitude as a function of frequency for equal displacement at all frequencies, from the model or a measured FRF
     /// [default for a stepped sine without --amplitude: model]
     #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
-    shape: Option<String>,
+    shape: Option<ResponseSource>,
 }
 
 impl ExcitationOptions {
@@ -48,7 +48,23 @@ impl ExcitationOptions {
 
     /// The configuration with the requested amplitude over frequency.
     pub(super) fn shaped(&self, config: Config) -> Result<Config, CliError> {
-        shape(config, self.shape.as_deref(), self.amplitude.is_some())
+        match (&self.shape, &self.amplitude) {
+            (Some(source), _) => {
+                shape_amplitude(config, source).map_err(|error| refused(source, error))
+            }
+            (None, Some(_)) => Ok(config),
+            (None, None) => {
+                default_amplitude(config).map_err(|error| refused(&ResponseSource::Model, error))
+            }
+        }
+    }
+}
+
+/// A failure of the model stands alone; every other one is a wrong `--shape`.
+fn refused(source: &ResponseSource, error: AmplitudePlanError) -> CliError {
+    match error {
+        AmplitudePlanError::Model(error) => error.into(),
+        other => CliError::Usage(format!("--shape {source}: {other}")),
     }
 }
 

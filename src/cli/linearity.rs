@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::analysis_output;
 use super::chirp::analysed;
-use super::chirp_plan::Expected;
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::linearity_output;
@@ -15,6 +14,7 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::{labelled, table, wrap};
 use crate::config::{Config, OptionSetting, Purpose};
+use crate::excitation::Extremes;
 use crate::experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
@@ -94,7 +94,7 @@ struct Report {
 #[derive(Debug, Serialize)]
 struct AmplitudeRun {
     scale: f64,
-    expected: Expected,
+    expected: Extremes,
     #[serde(flatten)]
     run: RunSummary,
     #[serde(flatten)]
@@ -149,7 +149,7 @@ fn finish(plan: &AmplitudePlan, mut run: Run) -> Result<AmplitudeRun, CliError> 
     };
     let finished = AmplitudeRun {
         scale: plan.scale,
-        expected: Expected::of(&plan.predicted),
+        expected: plan.predicted,
         run: summary,
         outputs,
     };

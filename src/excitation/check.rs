@@ -126,7 +126,7 @@ impl Limits {
                 setting,
             });
         }
-        let (thermal_a, limit_a) = (extremes.thermal_a, self.continuous_current_a);
+        let (thermal_a, limit_a) = (extremes.thermal_current_a, self.continuous_current_a);
         if thermal_a > limit_a {
             return Err(ExcitationError::Heat {
                 thermal_a,

@@ -1,23 +1,26 @@
 //! The extremes of current and travel of an excitation, by the model of the plant.
 
+use serde::Serialize;
+
 use super::limits::Limits;
 use super::waveform::Excitation;
 
 /// The extremes of an excitation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Extremes {
+    /// Largest travel in metres.
+    pub travel_m: f64,
+    /// The tick of the largest travel.
+    #[serde(skip)]
+    pub travel_tick: u64,
     /// Largest current in amperes.
     pub current_a: f64,
     /// RMS of the current in amperes over the whole run, quiet included.
     pub rms_current_a: f64,
+    /// Largest thermal current in amperes.
+    pub thermal_current_a: f64,
     /// Largest change of the current in amperes per second.
     pub slew_a_per_s: f64,
-    /// Largest thermal current in amperes.
-    pub thermal_a: f64,
-    /// Largest travel in metres.
-    pub travel_m: f64,
-    /// The tick of the largest travel.
-    pub travel_tick: u64,
     /// Length of the run in seconds, quiet included.
     pub duration_s: f64,
 }
@@ -83,7 +86,7 @@ impl RunningExtremes {
         self.before_a = command_a;
         self.square_a2 += command_a * command_a;
         self.heat_a2 += self.cooling * (command_a * command_a - self.heat_a2);
-        extremes.thermal_a = extremes.thermal_a.max(self.heat_a2.sqrt());
+        extremes.thermal_current_a = extremes.thermal_current_a.max(self.heat_a2.sqrt());
         if position_m.abs() > extremes.travel_m {
             (extremes.travel_m, extremes.travel_tick) = (position_m.abs(), self.ticks);
         }

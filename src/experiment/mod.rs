@@ -8,6 +8,7 @@
 //! tokio never stands in the loop's way: it watches counters, signals and the recorder's health, and talks to the loop
 //! through the ring of orders alone.
 
+mod amplitude_plan;
 mod analysis;
 mod analysis_error;
 pub mod calibration;
@@ -15,6 +16,7 @@ pub mod campaign;
 mod closed_loop;
 mod ending;
 mod error;
+mod excitation_plan;
 mod external;
 mod file_name;
 pub mod linearity;
@@ -33,10 +35,12 @@ mod signals;
 mod swept_reference;
 mod tracking;
 
+pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 pub use analysis::{Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress};
 pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub use ending::Ending;
 pub use error::ExperimentError;
+pub use excitation_plan::{ExcitationPlan, PlanLimits};
 pub use external::{ExternalAnalysis, analyse_external};
 pub use plan::{Plan, RunKind};
 pub use plan_error::PlanError;

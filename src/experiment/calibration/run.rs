@@ -59,7 +59,7 @@ pub fn check(config: &Config) -> Result<(), ExperimentError> {
     )?;
     require(extremes.travel_m, soft_limit_m, "m", "the soft limit")?;
     require(
-        extremes.thermal_a,
+        extremes.thermal_current_a,
         continuous_a,
         "A",
         "the continuous current",

@@ -1,0 +1,62 @@
+//! What an excitation would do, beside the limits of the bench.
+
+use serde::Serialize;
+
+use crate::config::Config;
+use crate::excitation::{AmplitudePoint, Extremes};
+
+/// What an excitation would do by the model.
+#[derive(Clone, Debug, Serialize)]
+pub struct ExcitationPlan {
+    /// Kind, band and length in words.
+    pub excitation: String,
+    /// Its extremes by the model.
+    pub expected: Extremes,
+    /// The limits of these extremes.
+    pub limits: PlanLimits,
+    /// Amplitude over frequency; empty for an excitation with one amplitude.
+    pub amplitude: Vec<AmplitudePoint>,
+}
+
+/// Values that trip an interlock, or that the amplifier cannot follow.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PlanLimits {
+    /// Travel to either side in metres.
+    pub travel_m: f64,
+    /// Current in amperes.
+    pub current_a: f64,
+    /// Thermal current of the motor in amperes.
+    pub thermal_current_a: f64,
+    /// Change of the current in amperes per second.
+    pub slew_a_per_s: f64,
+}
+
+impl ExcitationPlan {
+    /// The plan of the configured excitation with its extremes.
+    pub fn new(config: &Config, expected: Extremes) -> ExcitationPlan {
+        let chosen = config.chosen_excitation();
+        let amplitude = match chosen.design.has_amplitude_curve() {
+            true => config.chirp.amplitude.clone(),
+            false => Vec::new(),
+        };
+        ExcitationPlan {
+            excitation: chosen.describe(),
+            expected,
+            limits: PlanLimits::of(config),
+            amplitude,
+        }
+    }
+}
+
+impl PlanLimits {
+    /// The limits of the configured bench.
+    pub fn of(config: &Config) -> PlanLimits {
+        let limits = config.excitation_limits();
+        PlanLimits {
+            travel_m: limits.travel_m,
+            current_a: limits.amplifier_current_a.min(limits.peak_current_a),
+            thermal_current_a: limits.continuous_current_a,
+            slew_a_per_s: limits.slew_a_per_s,
+        }
+    }
+}
