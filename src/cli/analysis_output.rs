@@ -8,7 +8,6 @@ use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
 use crate::experiment::{AnalysisError, analyse_with_progress};
-use crate::identify::modal::MeasurementChain;
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles};
 use crate::util::progress::Progress;
@@ -36,22 +35,12 @@ pub(super) fn analyse_and_write(
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
-    let analysis = &analyse_with_progress(recording, config, &mut |phase, fraction| {
+    let analysis = analyse_with_progress(recording, config, &mut |phase, fraction| {
         let done = (phase.overall(fraction) * STEPS as f64) as u64;
         progress.set(done, STEPS);
         ControlFlow::Continue(())
     })?;
-    let run = BenchRun {
-        analysis,
-        recording,
-        chain: MeasurementChain::bench(config),
-        title: config.title.clone(),
-        excitation: match analysis.closed {
-            Some(_) => config.swept_reference_text(),
-            None => config.chosen_excitation().describe(),
-        },
-        rate_hz: config.servo.rate_hz,
-    };
+    let run = BenchRun::new(recording, &analysis, config);
     Ok(AnalysisOutputs::write(&run, beside)?)
 }
 

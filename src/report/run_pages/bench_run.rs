@@ -4,6 +4,7 @@ use nalgebra::Complex;
 
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport};
+use crate::config::Config;
 use crate::experiment::{Analysis, ClosedResponses};
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::MeasurementChain;
@@ -32,20 +33,34 @@ const METADATA: [&str; 10] = [
 #[derive(Clone, Debug)]
 pub struct BenchRun<'a> {
     /// Its analysis.
-    pub analysis: &'a Analysis,
-    /// Its recording.
-    pub recording: &'a Recording,
+    pub(super) analysis: &'a Analysis,
+    recording: &'a Recording,
     /// What lies between set-point and reading beside the mechanics.
-    pub chain: MeasurementChain,
+    chain: MeasurementChain,
     /// Title of the configuration.
-    pub title: String,
+    title: String,
     /// How the stage was excited.
-    pub excitation: String,
+    excitation: String,
     /// Ticks per second.
-    pub rate_hz: f64,
+    rate_hz: f64,
 }
 
 impl<'a> BenchRun<'a> {
+    /// A run with its analysis and the configuration that it ran with.
+    pub fn new(recording: &'a Recording, analysis: &'a Analysis, config: &Config) -> BenchRun<'a> {
+        BenchRun {
+            analysis,
+            recording,
+            chain: MeasurementChain::bench(config),
+            title: config.title.clone(),
+            excitation: match analysis.closed {
+                Some(_) => config.swept_reference_text(),
+                None => config.chosen_excitation().describe(),
+            },
+            rate_hz: config.servo.rate_hz,
+        }
+    }
+
     /// The report of the run.
     ///
     /// # Errors
