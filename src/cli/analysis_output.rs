@@ -7,16 +7,10 @@ use super::error::CliError;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
-use crate::experiment::{AnalysisError, analyse_with_progress};
+use crate::experiment::analyse_with_progress;
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles};
 use crate::util::progress::Progress;
-
-impl From<AnalysisError> for CliError {
-    fn from(error: AnalysisError) -> Self {
-        CliError::Failed(error.to_string())
-    }
-}
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {

@@ -4,72 +4,44 @@ use clap::error::ContextKind;
 use serde::Serialize;
 
 use super::outcome::Outcome;
-use crate::config::ConfigError;
-use crate::control::ControllerError;
-use crate::excitation::ExcitationError;
 use crate::experiment::campaign::CampaignError;
 use crate::experiment::{ExperimentError, PlanError};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
-use crate::model::plant::PlantError;
 use crate::model::study::StudyError;
-use crate::recording::RecordingError;
-use crate::rig::calibration::CalibrationError;
-use crate::rig::devices::DevicesError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// The configuration is refused.
+    /// A configuration, model, device, run or recording is refused, or failed.
     #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The controller is refused.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-    /// The run cannot be planned.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// The excitation would trip an interlock.
-    #[error(transparent)]
-    Excitation(#[from] ExcitationError),
-    /// The model cannot be analysed.
-    #[error(transparent)]
-    Plant(#[from] PlantError),
-    /// The devices cannot be opened, or cannot be as configured.
-    #[error(transparent)]
-    Devices(#[from] DevicesError),
-    /// The calibration may not be used.
-    #[error(transparent)]
-    Calibration(#[from] CalibrationError),
-    /// The loop's margin is too small.
+    Experiment(ExperimentError),
+    /// The stability margin of the loop is too small.
     #[error(
         "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.min_modulus_margin if you know better; nothing moved"
     )]
     Margin(String),
-    /// Another mistake in the call.
+    /// Wrong options or arguments.
     #[error("{0}")]
     Usage(String),
-    /// The recording cannot be written or read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// The data do not carry the analysis.
+    /// The data do not allow the analysis.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// The table is no record.
+    /// The external CSV file cannot be used.
     #[error(transparent)]
     Table(#[from] ExternalCsvError),
-    /// There is no such study, or its file cannot be used.
+    /// The study is refused, or its file cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// The campaign's grid or folder is refused, or its files cannot be written.
+    /// The campaign is refused, or its files cannot be used.
     #[error(transparent)]
     Campaign(CampaignError),
-    /// Something else went wrong on the way.
+    /// Any other failure.
     #[error("{0}")]
     Failed(String),
 }
 
-/// The kinds of error, by which a script can tell them apart.
+/// The kinds of error that a script can distinguish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
@@ -83,22 +55,28 @@ pub enum ErrorKind {
     Plan,
     /// The model cannot be analysed.
     Model,
-    /// The devices cannot be opened, or not as configured.
+    /// The devices cannot be opened, or differ from their settings.
     Devices,
     /// The calibration cannot be used.
     Calibration,
-    /// The loop has too little stability margin.
+    /// The stability margin of the loop is too small.
     Margin,
     /// A recording cannot be written or read.
     Recording,
-    /// The data carry no such analysis.
+    /// The data do not allow the analysis.
     Data,
     /// A study is refused, or its file cannot be used.
     Study,
     /// A campaign is refused, or its files cannot be used.
     Campaign,
-    /// Anything else, at run time.
+    /// Any other failure at run time.
     Failed,
+}
+
+impl<E: Into<ExperimentError>> From<E> for CliError {
+    fn from(error: E) -> Self {
+        CliError::Experiment(error.into())
+    }
 }
 
 impl From<CampaignError> for CliError {
@@ -111,50 +89,34 @@ impl From<CampaignError> for CliError {
     }
 }
 
-impl From<ExperimentError> for CliError {
-    fn from(error: ExperimentError) -> Self {
-        match error {
-            ExperimentError::Plan(error) => error.into(),
-            ExperimentError::Excitation(error) => error.into(),
-            ExperimentError::Plant(error) => error.into(),
-            ExperimentError::Devices(error) => error.into(),
-            ExperimentError::Calibration(error) => error.into(),
-            ExperimentError::Recording(error) => error.into(),
-            ExperimentError::Refused(what) => CliError::Usage(what),
-            other => CliError::Failed(other.to_string()),
-        }
-    }
-}
-
 impl CliError {
-    /// Wrong usage and configurations are told apart from failures at run time.
+    /// The outcome of the command: wrong usage and refused settings are distinguished from failures at run time.
     pub fn outcome(&self) -> Outcome {
-        match self {
-            CliError::Recording(_) | CliError::Identify(_) | CliError::Failed(_) => Outcome::Failed,
-            CliError::Table(ExternalCsvError::Columns(_)) => Outcome::Usage,
-            CliError::Table(_) => Outcome::Failed,
-            CliError::Campaign(CampaignError::File { .. } | CampaignError::RestPosition { .. }) => {
-                Outcome::Failed
+        let is_failure = match self {
+            CliError::Experiment(error) => is_failure(error),
+            CliError::Identify(_) | CliError::Failed(_) => true,
+            CliError::Table(error) => !matches!(error, ExternalCsvError::Columns(_)),
+            CliError::Campaign(error) => matches!(
+                error,
+                CampaignError::File { .. } | CampaignError::RestPosition { .. }
+            ),
+            CliError::Study(error) => {
+                matches!(error, StudyError::File { .. } | StudyError::Shards(_))
             }
-            CliError::Study(StudyError::File { .. } | StudyError::Shards(_)) => Outcome::Failed,
-            _ => Outcome::Usage,
+            CliError::Margin(_) | CliError::Usage(_) => false,
+        };
+        match is_failure {
+            true => Outcome::Failed,
+            false => Outcome::Usage,
         }
     }
 
     /// The kind of the error.
     pub fn kind(&self) -> ErrorKind {
         match self {
+            CliError::Experiment(error) => experiment_kind(error),
             CliError::Usage(_) => ErrorKind::Usage,
-            CliError::Config(_) | CliError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
-            CliError::Controller(_) | CliError::Plan(PlanError::Controller(_)) => {
-                ErrorKind::Controller
-            }
-            CliError::Plan(_) | CliError::Excitation(_) => ErrorKind::Plan,
-            CliError::Plant(_) => ErrorKind::Model,
-            CliError::Devices(_) => ErrorKind::Devices,
-            CliError::Calibration(_) => ErrorKind::Calibration,
             CliError::Margin(_) => ErrorKind::Margin,
-            CliError::Recording(_) => ErrorKind::Recording,
             CliError::Identify(_) | CliError::Table(_) => ErrorKind::Data,
             CliError::Study(_) => ErrorKind::Study,
             CliError::Campaign(_) => ErrorKind::Campaign,
@@ -165,9 +127,38 @@ impl CliError {
     /// The option, file or line that is wrong, if the error has one.
     pub fn place(&self) -> Option<String> {
         match self {
-            CliError::Config(error) | CliError::Plan(PlanError::Config(error)) => error.place(),
-            CliError::Usage(message) => option_in(message),
+            CliError::Experiment(ExperimentError::Plan(PlanError::Config(error))) => error.place(),
+            CliError::Experiment(ExperimentError::Refused(message)) | CliError::Usage(message) => {
+                option_in(message)
+            }
             _ => None,
+        }
+    }
+}
+
+/// Whether an experiment failed at run time, not because of its settings.
+fn is_failure(error: &ExperimentError) -> bool {
+    matches!(
+        error,
+        ExperimentError::Run(_)
+            | ExperimentError::Recording(_)
+            | ExperimentError::Analysis(_)
+            | ExperimentError::Failed(_)
+    )
+}
+
+fn experiment_kind(error: &ExperimentError) -> ErrorKind {
+    match error {
+        ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
+        ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
+        ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
+        ExperimentError::Plant(_) => ErrorKind::Model,
+        ExperimentError::Devices(_) => ErrorKind::Devices,
+        ExperimentError::Calibration(_) => ErrorKind::Calibration,
+        ExperimentError::Refused(_) => ErrorKind::Usage,
+        ExperimentError::Recording(_) => ErrorKind::Recording,
+        ExperimentError::Run(_) | ExperimentError::Analysis(_) | ExperimentError::Failed(_) => {
+            ErrorKind::Failed
         }
     }
 }

@@ -3,6 +3,8 @@
 use super::analysis_error::AnalysisError;
 use super::plan_error::PlanError;
 use super::run_error::RunError;
+use crate::config::ConfigError;
+use crate::control::ControllerError;
 use crate::excitation::ExcitationError;
 use crate::model::plant::PlantError;
 use crate::recording::RecordingError;
@@ -42,6 +44,18 @@ pub enum ExperimentError {
     /// Another failure on the way.
     #[error("{0}")]
     Failed(String),
+}
+
+impl From<ConfigError> for ExperimentError {
+    fn from(error: ConfigError) -> Self {
+        PlanError::from(error).into()
+    }
+}
+
+impl From<ControllerError> for ExperimentError {
+    fn from(error: ControllerError) -> Self {
+        PlanError::from(error).into()
+    }
 }
 
 impl From<RunError> for ExperimentError {
