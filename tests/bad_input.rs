@@ -411,7 +411,7 @@ fn where_nothing_can_be_written_nothing_moves_and_the_remedy_is_named() {
             "the plan, but no results: {}",
             answer.out
         );
-        for word in ["recordings", "--out", "nothing moved"] {
+        for word in ["recordings", "--out", "nothing was moved"] {
             assert!(answer.err.contains(word), "{word}: {}", answer.err);
         }
     }

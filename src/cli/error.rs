@@ -18,7 +18,7 @@ pub enum CliError {
     Experiment(ExperimentError),
     /// The stability margin of the loop is too small.
     #[error(
-        "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.min_modulus_margin if you know better; nothing moved"
+        "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.min_modulus_margin if you know better; nothing was moved"
     )]
     Margin(String),
     /// Wrong options or arguments.

@@ -9,7 +9,7 @@ pub enum Outcome {
     Done,
     /// Ran, but did not reach its end: tripped, stopped, different.
     Failed,
-    /// Wrong usage or configuration; nothing moved.
+    /// Wrong usage or configuration; nothing was moved.
     Usage,
     /// Done, but with overruns or lost records.
     Impaired,

@@ -75,7 +75,7 @@ fn judge_margins(margins: &Margins, min_modulus_margin: f64) -> Finding {
 
 /// The texts of the commands end with the remedy, if there is one.
 fn refused(subject: Subject, why: &str, default_remedy: &str) -> Finding {
-    let finding = subject.refused(&why.trim_end_matches("; nothing moved"));
+    let finding = subject.refused(&why.trim_end_matches("; nothing was moved"));
     let remedy = finding.remedy.unwrap_or_else(|| default_remedy.to_string());
     subject.failure(finding.what, remedy)
 }
@@ -110,7 +110,7 @@ mod tests {
             control: Ok(margins(true)),
         };
         assert_eq!(severities(&good), [Severity::Ok, Severity::Ok]);
-        let why = "refused: margin 0.3; choose a controller; nothing moved";
+        let why = "refused: margin 0.3; choose a controller; nothing was moved";
         let refused = RunChecks {
             control: Err(why.into()),
             ..good

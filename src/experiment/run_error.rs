@@ -11,12 +11,12 @@ pub enum RunError {
     /// The plan is refused.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The recording could not be made; nothing moved.
-    #[error("{0}; nothing moved")]
+    /// The recording could not be made; nothing was moved.
+    #[error("{0}; nothing was moved")]
     Create(RecordingError),
-    /// The folder could not be made; nothing moved.
+    /// The folder could not be made; nothing was moved.
     #[error(
-        "cannot make the folder {folder} for recordings: {why}; choose another with --out; nothing moved"
+        "cannot make the folder {folder} for recordings: {why}; choose another with --out; nothing was moved"
     )]
     Folder {
         /// The folder.

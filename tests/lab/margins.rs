@@ -125,7 +125,7 @@ fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_
         "control.min_modulus_margin",
         "0.4",
         "--controller",
-        "nothing moved",
+        "nothing was moved",
     ] {
         assert!(errors.contains(word), "{word}: {errors}");
     }
@@ -218,5 +218,5 @@ fn devices_keep_their_own_pace_and_one_device_alone_makes_no_loop() {
     );
     // This machine has no can0, or no such port: nothing moves, and the word says which.
     let (code, _, errors) = bench(folder.path(), &["control", "--config", "lab", "--slow"]);
-    assert!(code == 2 && errors.contains("nothing moved"), "{errors}");
+    assert!(code == 2 && errors.contains("nothing was moved"), "{errors}");
 }

@@ -98,7 +98,7 @@ fn a_disk_that_is_full_from_the_start_moves_nothing() {
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(
-        said.contains("File too large") && said.contains("nothing moved"),
+        said.contains("File too large") && said.contains("nothing was moved"),
         "{said}"
     );
 }
@@ -124,7 +124,7 @@ fn a_folder_that_cannot_be_written_to_is_told_before_anything_moves() {
             let said = stderr(&output);
             assert_eq!(output.status.code(), Some(1), "{said}");
             assert!(
-                said.contains(out.to_str().expect("text")) && said.contains("nothing moved"),
+                said.contains(out.to_str().expect("text")) && said.contains("nothing was moved"),
                 "{said}"
             );
             assert!(

@@ -364,7 +364,7 @@ fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
             let error = experiment::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
                 .err()
                 .expect("no recording");
-            assert!(error.to_string().contains("nothing moved"), "{error}");
+            assert!(error.to_string().contains("nothing was moved"), "{error}");
             // The loop's thread holds the log until it is gone.
             let gone = (0..1000).any(|_| {
                 std::thread::sleep(Duration::from_millis(10));

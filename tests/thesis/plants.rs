@@ -675,7 +675,7 @@ fn each_plant_has_a_controller_and_rejects_the_fast_one() {
                 "slow controller",
                 "at least 0.3 is asked for",
                 "--controller FILE",
-                "nothing moved",
+                "nothing was moved",
             ],
         );
         refused("--fast", &["fast"]);

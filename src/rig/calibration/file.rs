@@ -101,7 +101,7 @@ pub enum CalibrationError {
     Text(String),
     /// Too old, or of other devices.
     #[error(
-        "calibration {file}: {why}; repeat `bench calibrate`, or set {setting} = \"warn\"; nothing moved"
+        "calibration {file}: {why}; repeat `bench calibrate`, or set {setting} = \"warn\"; nothing was moved"
     )]
     Unfit {
         /// The file.

@@ -37,10 +37,10 @@ pub enum DevicesError {
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// The amplifier.
-    #[error("amplifier: {0}; nothing moved")]
+    #[error("amplifier: {0}; nothing was moved")]
     Amplifier(#[from] AmplifierError),
     /// The probe.
-    #[error("probe: {0}; nothing moved")]
+    #[error("probe: {0}; nothing was moved")]
     Probe(#[from] ProbeError),
     /// Only one of both is simulated.
     #[error(
@@ -54,7 +54,7 @@ pub enum DevicesError {
     },
     /// The probe is open, but gives no valid reading.
     #[error(
-        "probe: {what} within {} s of opening ({bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers received); `bench doctor` examines it; nothing moved",
+        "probe: {what} within {} s of opening ({bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers received); `bench doctor` examines it; nothing was moved",
         FIRST_READING.as_secs()
     )]
     NoReading {
