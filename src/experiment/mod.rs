@@ -1,12 +1,12 @@
-//! One run of the bench, from arming to the closed file.
+//! Runs of the bench, from arming to the complete recording, and what is made of them.
 //!
 //! ```text
 //!  Plan (config -> program, texts)  ->  run: loop thread + recorder thread, tokio supervising from outside  ->  Run
-//!                                                                                    Recording -> replay
+//!                                                                                    Recording -> replay, analyse
 //! ```
 //!
-//! tokio never stands in the loop's way: it watches counters, signals and the recorder's health, and talks to the loop
-//! through the ring of orders alone.
+//! tokio cannot delay the loop: it watches counters, signals and the state of the recorder, and sends requests to the loop
+//! through a ring.
 
 mod amplitude_plan;
 mod analysis;
@@ -14,6 +14,7 @@ mod analysis_error;
 pub mod calibration;
 pub mod campaign;
 mod closed_loop;
+mod connections;
 mod ending;
 mod error;
 mod excitation_plan;
@@ -23,6 +24,7 @@ pub mod linearity;
 mod plan;
 mod plan_error;
 mod prediction;
+mod recorded_rig;
 mod replay;
 mod response_estimate;
 mod run;

@@ -1,4 +1,4 @@
-//! Runs a plan on a rig: threads, rings, signals, and a recording that is whole whatever happens.
+//! Runs a plan on a rig: loop thread, recorder thread, signals. The recording is closed properly however the run ends.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,45 +8,45 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use bench_hal::Rig;
-use rtrb::{Producer, RingBuffer};
+use rtrb::Producer;
 use tokio::signal::unix::Signal;
 
+use super::connections::{OutsideEnds, connect};
 use super::file_name;
 use super::plan::{KIND, Plan};
 use super::run_error::RunError;
-use super::signals::signals;
+use super::signals::{runtime, signals};
+use crate::config::Config;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
-use crate::rt::publisher::Publisher;
-use crate::rt::record::REQUESTS_PER_TICK;
-use crate::rt::servo::{Connections, Progress, Request, Servo};
+use crate::rt::servo::{Connections, Request, Servo};
 use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
 
-/// Slots of the ring to the recorder: 13 s at 5 kHz, should the disk hang for a while.
+/// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;
-/// Seconds recorded after the motor went off.
+/// Seconds that are recorded after the motor was switched off.
 const TAIL_S: f64 = 0.1;
-/// How often the supervisor looks.
+/// Period of the supervisor.
 const BEAT: Duration = Duration::from_millis(5);
 
-/// A run that came to an end, its recording still open for results.
+/// A run that has ended; results can still be added to its recording.
 pub struct Run {
-    /// The file.
+    /// Path of the recording.
     pub path: PathBuf,
     /// How the loop ended.
     pub ended: LoopOutcome,
-    /// Its pace.
+    /// Pace of the loop.
     pub pace: Pace,
-    /// How it was scheduled.
+    /// How the loop was scheduled.
     pub scheduling: Scheduling,
-    /// Whether a person (or the system) stopped it.
+    /// Whether the operator or the system stopped it.
     pub stopped: bool,
     recorder: Recorder,
 }
 
 impl Run {
-    /// What is in the recording so far: all ticks.
+    /// Counts of the recording, which contains all ticks by now.
     pub fn totals(&mut self) -> Result<Totals, RecordingError> {
         self.recorder.complete()
     }
@@ -67,70 +67,71 @@ pub fn run(
     folder: &Path,
     watch: &mut dyn FnMut(u64, u64),
 ) -> Result<Run, RunError> {
+    prepare_run(plan, rig, pace, folder)?.supervise(watch)
+}
+
+/// A run with its thread and its file, before the first tick.
+struct PreparedRun {
+    servo_loop: PreparedLoop,
+    recorder: Recorder,
+    outside: OutsideEnds,
+    pace: Pace,
+    total_ticks: u64,
+}
+
+fn prepare_run(
+    plan: &Plan,
+    rig: Box<dyn Rig>,
+    pace: Pace,
+    folder: &Path,
+) -> Result<PreparedRun, RunError> {
     let program = plan.program()?;
     let total_ticks = program.ticks();
-    let (publisher, records) = RingBuffer::new(RING_SLOTS);
-    let (mut requests, taken) = RingBuffer::new(REQUESTS_PER_TICK);
-    let (retired, _kept_until_the_end) = RingBuffer::new(16);
-    let progress = Arc::new(Progress::default());
-    let connections = Connections {
-        requests: taken,
-        retired,
-        publisher: Publisher::new(publisher),
-        progress: Arc::clone(&progress),
-    };
-    let config = &plan.config;
-    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
-    let servo = Servo::new(rig, interlocks, connections);
-    queue(&mut requests, program);
-    let tail_ticks = (TAIL_S * plan.config.servo.rate_hz) as u64;
-    let prepared =
-        prepare(servo, &plan.config.servo, pace, tail_ticks).map_err(|e| RunError::System {
-            what: "start the loop's thread",
-            why: e.to_string(),
-        })?;
-    let recorder = create(plan, pace, &prepared, folder)?;
-    let path = recorder.path().to_path_buf();
-    let recorder = recording::spawn(recorder, records).map_err(RunError::Create)?;
-    let scheduling = prepared.scheduling().clone();
-    let mut supervisor = Supervisor {
-        requests,
-        health: recorder.health(),
-        stopped: false,
-    };
-    let watching = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
-    let ended = supervisor.watch_over(prepared, watching)?;
-    let recorder = recorder.join()?;
-    let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
-    Ok(Run {
-        path,
-        ended,
-        pace,
-        scheduling,
-        stopped: supervisor.stopped,
+    let (connections, mut outside) = connect(RING_SLOTS);
+    queue_start(&mut outside.requests, program);
+    let servo_loop = prepare_loop(&plan.config, rig, connections, pace)?;
+    let recorder = create_recording(plan, pace, servo_loop.scheduling(), folder)?;
+    Ok(PreparedRun {
+        servo_loop,
         recorder,
+        outside,
+        pace,
+        total_ticks,
     })
 }
 
-/// Arm and start: in the ring before the loop begins, so that they take effect at tick 0.
-fn queue(requests: &mut Producer<Request>, program: Box<dyn Program>) {
-    for order in [Request::Arm, Request::Start(program)] {
-        // The ring is new and holds more than two.
-        let _ = requests.push(order);
+/// Requests to arm and to start, queued before the loop begins: they take effect at tick 0.
+fn queue_start(requests: &mut Producer<Request>, program: Box<dyn Program>) {
+    for request in [Request::Arm, Request::Start(program)] {
+        // The ring is empty and holds more than two requests.
+        let _ = requests.push(request);
     }
 }
 
-/// The file, with everything that is known before the first tick.
-fn create(
+fn prepare_loop(
+    config: &Config,
+    rig: Box<dyn Rig>,
+    connections: Connections,
+    pace: Pace,
+) -> Result<PreparedLoop, RunError> {
+    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let servo = Servo::new(rig, interlocks, connections);
+    let tail_ticks = (TAIL_S * config.servo.rate_hz) as u64;
+    prepare(servo, &config.servo, pace, tail_ticks)
+        .map_err(RunError::system("start the thread of the loop"))
+}
+
+/// Creates the recording, with everything that is known before the first tick.
+fn create_recording(
     plan: &Plan,
     pace: Pace,
-    prepared: &PreparedLoop,
+    scheduling: &Scheduling,
     folder: &Path,
 ) -> Result<Recorder, RunError> {
     let header = Header {
         config_toml: plan.config_toml()?,
         period_ns: libm::round(plan.config.servo.period_s() * 1e9) as u64,
-        metadata: metadata(plan, pace, prepared.scheduling()),
+        metadata: metadata(plan, pace, scheduling),
     };
     std::fs::create_dir_all(folder).map_err(|e| RunError::Folder {
         folder: folder.into(),
@@ -139,41 +140,70 @@ fn create(
     let path = file_name::recording(folder, &plan.label(), SystemTime::now());
     let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
     for (name, media_type, text) in plan.attachments() {
-        recorder
-            .attach(name, media_type, text.as_bytes())
-            .map_err(RunError::Create)?;
+        let attached = recorder.attach(name, media_type, text.as_bytes());
+        attached.map_err(RunError::Create)?;
     }
     Ok(recorder)
 }
 
 fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String, String> {
-    let file = |path: &str| {
-        std::fs::read_to_string(path).map_or("unknown".into(), |text| text.trim().to_string())
-    };
+    let started = humantime::format_rfc3339_millis(SystemTime::now());
     let cpu = scheduling.cpu.map_or("any".into(), |cpu| cpu.to_string());
     let pairs = [
         (KIND, plan.kind.name().to_string()),
         ("program", format!("bench {}", env!("CARGO_PKG_VERSION"))),
-        (
-            "started",
-            humantime::format_rfc3339_millis(SystemTime::now()).to_string(),
-        ),
-        ("host", file("/proc/sys/kernel/hostname")),
-        ("kernel", file("/proc/sys/kernel/osrelease")),
+        ("started", started.to_string()),
+        ("host", kernel_parameter("hostname")),
+        ("kernel", kernel_parameter("osrelease")),
         ("pace", pace.name().into()),
         ("policy", scheduling.policy.clone()),
         ("memory_locked", scheduling.memory_locked.to_string()),
         ("cpu", cpu),
         ("refused", scheduling.refused.join("\n")),
     ];
-    pairs
-        .into_iter()
-        .chain(plan.devices.iter().cloned())
-        .map(|(key, value)| (key.to_string(), value))
-        .collect()
+    let pairs = pairs.into_iter().chain(plan.devices.iter().cloned());
+    pairs.map(|(key, value)| (key.to_string(), value)).collect()
 }
 
-/// Watches from outside: signals, progress, the recorder's health.
+fn kernel_parameter(name: &str) -> String {
+    let text = std::fs::read_to_string(Path::new("/proc/sys/kernel").join(name));
+    text.map_or("unknown".into(), |text| text.trim().to_string())
+}
+
+impl PreparedRun {
+    /// Runs the loop to its end, or until it is stopped.
+    fn supervise(self, watch: &mut dyn FnMut(u64, u64)) -> Result<Run, RunError> {
+        let OutsideEnds {
+            requests,
+            records,
+            progress,
+            retired: _until_the_end,
+        } = self.outside;
+        let path = self.recorder.path().to_path_buf();
+        let scheduling = self.servo_loop.scheduling().clone();
+        let recorder = recording::spawn(self.recorder, records).map_err(RunError::Create)?;
+        let mut supervisor = Supervisor {
+            requests,
+            health: recorder.health(),
+            stopped: false,
+        };
+        let total_ticks = self.total_ticks;
+        let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
+        let ended = supervisor.watch_over(self.servo_loop, report)?;
+        let recorder = recorder.join()?;
+        let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
+        Ok(Run {
+            path,
+            ended,
+            pace: self.pace,
+            scheduling,
+            stopped: supervisor.stopped,
+            recorder,
+        })
+    }
+}
+
+/// Watches the loop from outside: signals, progress, and the state of the recorder.
 struct Supervisor {
     requests: Producer<Request>,
     health: Arc<Health>,
@@ -181,21 +211,16 @@ struct Supervisor {
 }
 
 impl Supervisor {
+    /// Starts the loop and waits for its end.
     fn watch_over(
         &mut self,
         prepared: PreparedLoop,
         watch: impl FnMut(),
     ) -> Result<std::thread::Result<LoopOutcome>, RunError> {
-        let system = |e: std::io::Error| RunError::System {
-            what: "start the supervisor",
-            why: e.to_string(),
-        };
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(system)?;
+        const WHAT: &str = "start the supervisor of the run";
+        let runtime = runtime().map_err(RunError::system(WHAT))?;
         runtime.block_on(async {
-            let signals = signals().map_err(system)?;
+            let signals = signals().map_err(RunError::system(WHAT))?;
             let thread = prepared.begin();
             self.until_finished(&thread, signals, watch).await;
             Ok(thread.join())
@@ -205,10 +230,9 @@ impl Supervisor {
     async fn until_finished(
         &mut self,
         thread: &JoinHandle<LoopOutcome>,
-        signals: (Signal, Signal),
+        (mut interrupt, mut terminate): (Signal, Signal),
         mut watch: impl FnMut(),
     ) {
-        let (mut interrupt, mut terminate) = signals;
         let mut beat = tokio::time::interval(BEAT);
         while !thread.is_finished() {
             tokio::select! {
@@ -222,7 +246,7 @@ impl Supervisor {
         }
     }
 
-    /// Zero current at the next tick boundary. Said once; the loop takes it, or has ended.
+    /// Requests zero current at the next tick, once. If the request is not taken, the loop has ended.
     fn stop(&mut self) {
         if !self.stopped {
             self.stopped = self.requests.push(Request::Stop).is_ok();

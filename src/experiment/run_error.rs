@@ -1,41 +1,53 @@
-//! Why a run could not be made, or failed.
+//! Why a run was refused or failed.
 
 use std::path::PathBuf;
 
 use super::plan_error::PlanError;
 use crate::recording::RecordingError;
 
-/// A run that could not be made, or whose recording failed.
+/// A run that was refused, or that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The plan is refused.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The recording could not be made; nothing was moved.
+    /// The recording could not be created.
     #[error("{0}; nothing was moved")]
     Create(RecordingError),
-    /// The folder could not be made; nothing was moved.
+    /// The folder could not be created.
     #[error(
-        "cannot make the folder {folder} for recordings: {why}; choose another with --out; nothing was moved"
+        "cannot create the folder {folder} for recordings: {why}; choose another with --out; nothing was moved"
     )]
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// The system's words.
+        /// The error of the operating system.
         why: String,
     },
-    /// The recording failed; the run was stopped.
+    /// The recording failed.
     #[error("{0}; the run was stopped with zero current")]
     Recording(#[from] RecordingError),
-    /// The system refused a thread or the supervisor.
+    /// The operating system refused a thread or the supervisor, or a thread panicked.
     #[error("cannot {what}: {why}")]
     System {
-        /// What was asked.
+        /// What was to be done.
         what: &'static str,
-        /// The system's words.
+        /// The error of the operating system, or the cause.
         why: String,
     },
-    /// The loop's thread died; the amplifier was disabled on the way.
-    #[error("the loop's thread died; the amplifier was disabled; the recording up to there is {0}")]
+    /// The thread of the loop panicked.
+    #[error(
+        "the thread of the loop panicked; the amplifier was disabled; the recording up to then is {0}"
+    )]
     LoopDied(PathBuf),
+}
+
+impl RunError {
+    /// Turns an error of the operating system into a [`RunError::System`].
+    pub(super) fn system(what: &'static str) -> impl Fn(std::io::Error) -> RunError {
+        move |error| RunError::System {
+            what,
+            why: error.to_string(),
+        }
+    }
 }

@@ -1,13 +1,16 @@
-//! A person may stop what takes its time, and files stay whole.
+//! Interrupt and terminate signals: a long computation can be stopped, and files stay complete.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::oneshot::error::RecvError;
 
 use super::run_error::RunError;
 
-/// Interrupt (Ctrl-C) and terminate, from now on for the whole process.
+const START: &str = "start the analysis";
+
+/// Receives interrupt (Ctrl-C) and terminate, from now on for the whole process.
 pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
     Ok((
         signal(SignalKind::interrupt())?,
@@ -15,41 +18,39 @@ pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
     ))
 }
 
-/// Does `work` in a thread of its own and returns what it made; `None` if a person stops it before it is done. The thread
-/// is then left behind, and ends with the process: `work` must not hold what has to be closed in order.
+/// Does `work` on a thread and returns its result; `None` if a signal arrives before it is done. The thread is then
+/// abandoned and ends with the process: `work` must not hold anything that has to be closed.
 pub fn abandon_on_signal<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<Option<T>, RunError> {
-    runtime()?.block_on(async {
-        let (mut interrupt, mut terminate) = signals().map_err(system)?;
-        let (tell, told) = tokio::sync::oneshot::channel();
-        let thread = std::thread::Builder::new().name("bench-analysis".into());
-        thread
-            .spawn(move || drop(tell.send(work())))
-            .map_err(system)?;
+    let runtime = runtime().map_err(RunError::system(START))?;
+    runtime.block_on(async {
+        let (mut interrupt, mut terminate) = signals().map_err(RunError::system(START))?;
+        let (sender, result) = tokio::sync::oneshot::channel();
+        let thread = analysis_thread().spawn(move || drop(sender.send(work())));
+        thread.map_err(RunError::system(START))?;
         tokio::select! {
-            result = told => result.map(Some).map_err(died),
+            result = result => result.map(Some).map_err(died),
             _ = interrupt.recv() => Ok(None),
             _ = terminate.recv() => Ok(None),
         }
     })
 }
 
-/// Does `work` in a thread of its own and waits until it ends. A person who stops it sets the flag that `work` is given; it
-/// then comes to an end in order.
+/// Does `work` on a thread and waits until it ends. A signal sets the flag that `work` receives; `work` must then end in order.
 pub fn stop_on_signal<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Result<T, RunError> {
-    let (runtime, stop) = (runtime()?, AtomicBool::new(false));
+    let runtime = runtime().map_err(RunError::system(START))?;
+    let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         runtime.block_on(async {
-            let (mut interrupt, mut terminate) = signals().map_err(system)?;
-            let (tell, mut told) = tokio::sync::oneshot::channel();
-            let thread = std::thread::Builder::new().name("bench-analysis".into());
-            thread
-                .spawn_scoped(scope, || drop(tell.send(work(&stop))))
-                .map_err(system)?;
+            let (mut interrupt, mut terminate) = signals().map_err(RunError::system(START))?;
+            let (sender, mut result) = tokio::sync::oneshot::channel();
+            let send = || drop(sender.send(work(&stop)));
+            let thread = analysis_thread().spawn_scoped(scope, send);
+            thread.map_err(RunError::system(START))?;
             loop {
                 tokio::select! {
-                    result = &mut told => return result.map_err(died),
+                    result = &mut result => return result.map_err(died),
                     _ = interrupt.recv() => stop.store(true, Ordering::Relaxed),
                     _ = terminate.recv() => stop.store(true, Ordering::Relaxed),
                 }
@@ -58,24 +59,21 @@ pub fn stop_on_signal<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Re
     })
 }
 
-fn runtime() -> Result<Runtime, RunError> {
+fn analysis_thread() -> std::thread::Builder {
+    std::thread::Builder::new().name("bench-analysis".into())
+}
+
+/// A runtime on the calling thread.
+pub(super) fn runtime() -> std::io::Result<Runtime> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
-        .map_err(system)
 }
 
-fn system(e: std::io::Error) -> RunError {
-    RunError::System {
-        what: "start the analysis",
-        why: e.to_string(),
-    }
-}
-
-fn died(_: tokio::sync::oneshot::error::RecvError) -> RunError {
+fn died(_: RecvError) -> RunError {
     RunError::System {
         what: "finish the analysis",
-        why: "its thread died of a panic".into(),
+        why: "its thread panicked; please report this with the command and its input".into(),
     }
 }
 

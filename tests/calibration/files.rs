@@ -129,7 +129,11 @@ fn an_expired_or_foreign_calibration_is_a_warning_or_a_refusal_as_set() {
                 errors.contains(first) && errors.contains(second),
                 "{errors}"
             );
-            assert_eq!(errors.contains("nothing was moved"), wanted == 2, "{errors}");
+            assert_eq!(
+                errors.contains("nothing was moved"),
+                wanted == 2,
+                "{errors}"
+            );
         }
     }
 }

@@ -218,5 +218,8 @@ fn devices_keep_their_own_pace_and_one_device_alone_makes_no_loop() {
     );
     // This machine has no can0, or no such port: nothing moves, and the word says which.
     let (code, _, errors) = bench(folder.path(), &["control", "--config", "lab", "--slow"]);
-    assert!(code == 2 && errors.contains("nothing was moved"), "{errors}");
+    assert!(
+        code == 2 && errors.contains("nothing was moved"),
+        "{errors}"
+    );
 }

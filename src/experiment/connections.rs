@@ -1,0 +1,43 @@
+//! The rings and counters between a loop and what surrounds it.
+
+use std::sync::Arc;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::rt::program::Program;
+use crate::rt::publisher::Publisher;
+use crate::rt::record::{LoopMessage, REQUESTS_PER_TICK};
+use crate::rt::servo::{Connections, Progress, Request};
+
+/// The ends of a loop's [`Connections`] that stay outside the loop.
+pub(super) struct OutsideEnds {
+    /// Requests to the loop.
+    pub(super) requests: Producer<Request>,
+    /// What the loop publishes.
+    pub(super) records: Consumer<LoopMessage>,
+    /// Programs that ended, to be freed.
+    pub(super) retired: Consumer<Box<dyn Program>>,
+    /// Progress of the run.
+    pub(super) progress: Arc<Progress>,
+}
+
+/// Both ends of new connections, with room for `record_slots` published records.
+pub(super) fn connect(record_slots: usize) -> (Connections, OutsideEnds) {
+    let (published, records) = RingBuffer::new(record_slots);
+    let (requests, taken) = RingBuffer::new(REQUESTS_PER_TICK);
+    let (ended, retired) = RingBuffer::new(REQUESTS_PER_TICK);
+    let progress = Arc::new(Progress::default());
+    let connections = Connections {
+        requests: taken,
+        retired: ended,
+        publisher: Publisher::new(published),
+        progress: Arc::clone(&progress),
+    };
+    let outside = OutsideEnds {
+        requests,
+        records,
+        retired,
+        progress,
+    };
+    (connections, outside)
+}

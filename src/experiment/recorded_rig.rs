@@ -1,0 +1,148 @@
+//! Rig and clock of a recording.
+
+use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::rt::clock::{Clock, TickTiming};
+use crate::rt::publisher::Publisher;
+use crate::rt::record::{TickRecord, flag};
+
+/// The record of a tick, and whether the amplifier caused a trip in it.
+#[derive(Clone, Copy, Default)]
+pub(super) struct RecordedTick {
+    pub(super) record: TickRecord,
+    /// The amplifier reported a fault, refused the command or returned an invalid value.
+    pub(super) amplifier_tripped: bool,
+}
+
+/// Returns the recorded probe readings, and accepts or rejects commands like the recorded amplifier.
+pub(super) struct RecordedRig {
+    now: RecordedTick,
+    ticks: Consumer<RecordedTick>,
+    enables: Consumer<bool>,
+    clears: Consumer<()>,
+    status: AmplifierStatus,
+}
+
+/// What a [`RecordedRig`] does next. The rig takes each entry within the tick for which it is pushed.
+pub(super) struct RigFeed {
+    /// The tick.
+    pub(super) ticks: Producer<RecordedTick>,
+    /// Whether the amplifier accepts to be enabled.
+    pub(super) enables: Producer<bool>,
+    /// One entry for each accepted reset of a fault.
+    pub(super) clears: Producer<()>,
+}
+
+/// The ring of a replay must hold everything that happens in one tick.
+const SLOTS: usize = 64;
+
+const REFUSED: DeviceError = DeviceError {
+    what: "the amplifier refused, as recorded",
+    remedy: "see the events of the recording",
+    code: 0,
+};
+
+impl RecordedRig {
+    /// A disabled rig, and its feed.
+    pub(super) fn new() -> (RecordedRig, RigFeed) {
+        let (to_rig, ticks) = RingBuffer::new(SLOTS);
+        let (enabled, enables) = RingBuffer::new(SLOTS);
+        let (cleared, clears) = RingBuffer::new(SLOTS);
+        let rig = RecordedRig {
+            now: RecordedTick::default(),
+            ticks,
+            enables,
+            clears,
+            status: AmplifierStatus::Disabled,
+        };
+        let feed = RigFeed {
+            ticks: to_rig,
+            enables: enabled,
+            clears: cleared,
+        };
+        (rig, feed)
+    }
+}
+
+impl CurrentAmplifier for RecordedRig {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        if self.enables.pop() == Ok(false) {
+            return Err(REFUSED);
+        }
+        self.status = AmplifierStatus::Enabled;
+        Ok(())
+    }
+
+    /// Returns the recorded command for the recorded request. Another request is returned unchanged; the comparison
+    /// detects it.
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        if self.now.amplifier_tripped {
+            return Err(REFUSED);
+        }
+        let record = &self.now.record;
+        let same = current_a.to_bits() == record.requested_a.to_bits();
+        Ok(if same { record.command_a } else { current_a })
+    }
+
+    fn disable(&mut self) {
+        self.status = AmplifierStatus::Disabled;
+    }
+
+    fn actual_current_a(&self) -> Option<f64> {
+        self.now.record.actual_a
+    }
+
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        self.clears.pop().map_err(|_| REFUSED)
+    }
+
+    /// After a fault the loop asks no program for a command. If there was a command, it was the command that failed.
+    fn status(&self) -> AmplifierStatus {
+        let record = &self.now.record;
+        let has_command = record.requested_a.to_bits() | record.reference_m.to_bits() != 0
+            || record.flags & flag::ACTIVE != 0;
+        if self.now.amplifier_tripped && !has_command {
+            AmplifierStatus::Fault(0)
+        } else {
+            self.status
+        }
+    }
+}
+
+impl DisplacementProbe for RecordedRig {
+    fn latest(&mut self, _now: Tick) -> Reading {
+        if let Ok(tick) = self.ticks.pop() {
+            self.now = tick;
+        }
+        let record = &self.now.record;
+        Reading {
+            position_m: record.position_m,
+            sequence: record.probe_sequence,
+            age_ns: record.probe_age_ns,
+            validity: record.validity,
+        }
+    }
+}
+
+/// The clock of a recorded tick: now is the recorded end of the tick, in nanoseconds.
+pub(super) struct RecordedClock(pub(super) u64);
+
+impl Clock for RecordedClock {
+    fn wait(&mut self, number: u64, _outlet: &Publisher) -> TickTiming {
+        TickTiming {
+            tick: Tick {
+                number,
+                scheduled_ns: 0,
+            },
+            woke_ns: 0,
+            missed: 0,
+        }
+    }
+
+    fn now_ns(&self, _tick: Tick) -> u64 {
+        self.0
+    }
+
+    fn restart(&mut self, _number: u64) {}
+}
