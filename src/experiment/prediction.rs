@@ -1,4 +1,4 @@
-//! What an excitation would do, by the model of the whole rig.
+//! The extremes of an excitation by the model of the whole rig.
 
 use super::error::ExperimentError;
 use crate::config::Config;
@@ -8,16 +8,11 @@ use crate::rig::simulated;
 
 /// The model of the rig: plant with all its modes, amplifier and hold.
 pub fn rig_model(config: &Config) -> Result<DiscretePlant, ExperimentError> {
-    let modes = simulated::modes(config)?;
-    let bandwidth_hz = config.amplifier.bandwidth_hz;
+    let modes = simulated::modes(&config.plant, &config.sim)?;
+    let (bandwidth_hz, period_s) = (config.amplifier.bandwidth_hz, config.servo.period_s());
     let force_constant = config.motor.force_constant_n_per_a;
-    let period_s = config.servo.period_s();
-    Ok(DiscretePlant::new(
-        &modes,
-        bandwidth_hz,
-        force_constant,
-        period_s,
-    ))
+    let model = DiscretePlant::new(&modes, bandwidth_hz, force_constant, period_s);
+    Ok(model)
 }
 
 /// The extremes of the configured excitation. Refuses an excitation that would trip an interlock.

@@ -1,14 +1,15 @@
-//! The plan of a swept reference: its amplitudes, where the user gives none, and its extremes by the model.
+//! The plan of a swept reference: its amplitudes, unless the user states them, and its extremes by the model.
 
 use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
 use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
-use crate::excitation::{Extremes, ReferenceContext, SweptReference};
+use crate::excitation::{Extremes, ReferenceContext, SweptReference, TravelPoint};
 use crate::model::plant::LoopPlant;
 use crate::rig::simulated;
 
-/// The configuration with amplitudes by the model of the whole rig, and what the run would do by it; as it is, and nothing,
-/// of another reference. Refused where an interlock would trip.
+/// The configuration with the amplitudes of a swept reference, and the predicted extremes of the run, both by the model of the
+/// whole rig. Another reference has no extremes, and its configuration is returned unchanged. Refuses a run that would trip
+/// an interlock.
 pub(super) fn planned(
     mut config: Config,
     controller: &ControllerText,
@@ -16,48 +17,44 @@ pub(super) fn planned(
     let ReferenceSettings::Chirp(swept) = &config.control.reference else {
         return Ok((config, None));
     };
-    let modes = simulated::modes(&config)?;
-    let closed_loop = ClosedLoop::new(
-        LoopPlant::new(&config, &modes),
-        modes,
-        config.motor.force_constant_n_per_a,
-        controller.design(config.servo.rate_hz)?,
-    )?;
-    let travel_m = swept.travel_m;
-    let amplitude = match swept.amplitude.is_empty() {
-        true => {
-            let limits = SweptLimits {
-                chirp: &config.chirp,
-                travel_m,
-                reference_m: config.interlock.soft_limit_m,
-            };
-            swept_reference_amplitudes(&closed_loop, &limits)
-        }
-        false => swept.amplitude.clone(),
+    let closed_loop = closed_loop(&config, controller)?;
+    let swept = SweptReference {
+        amplitude: match swept.amplitude.is_empty() {
+            true => amplitudes(swept.travel_m, &config, &closed_loop),
+            false => swept.amplitude.clone(),
+        },
+        travel_m: swept.travel_m,
     };
-    config.control.reference = ReferenceSettings::Chirp(SweptReference {
-        amplitude,
-        travel_m,
-    });
-    // What is not allowed now could not be read back from the recording.
+    config.control.reference = ReferenceSettings::Chirp(swept.clone());
+    // Values that are not allowed could not be read back from the recording.
     validate(&config)?;
-    // What a loop that runs away would do has no largest current to lower.
-    let unstable = |error| {
-        if closed_loop.margins().stable {
-            error
-        } else {
-            PlanError::Unstable
-        }
-    };
-    let extremes = match &config.control.reference {
-        ReferenceSettings::Chirp(swept) => predicted_extremes(swept, &config, &closed_loop),
-        _ => return Ok((config, None)),
-    };
-    let extremes = extremes.map_err(unstable)?;
-    Ok((config, Some(extremes)))
+    let extremes = predicted_extremes(&swept, &config, &closed_loop);
+    match extremes {
+        // A smaller current would not help.
+        Err(_) if !closed_loop.margins().stable => Err(PlanError::Unstable),
+        extremes => Ok((config, Some(extremes?))),
+    }
 }
 
-/// The run by the linear model, against every interlock.
+fn closed_loop(config: &Config, controller: &ControllerText) -> Result<ClosedLoop, PlanError> {
+    let modes = simulated::modes(&config.plant, &config.sim)?;
+    let plant = LoopPlant::new(config, &modes);
+    let force_constant_n_per_a = config.motor.force_constant_n_per_a;
+    let design = controller.design(config.servo.rate_hz)?;
+    let closed_loop = ClosedLoop::new(plant, modes, force_constant_n_per_a, design)?;
+    Ok(closed_loop)
+}
+
+fn amplitudes(travel_m: f64, config: &Config, closed_loop: &ClosedLoop) -> Vec<TravelPoint> {
+    let limits = SweptLimits {
+        chirp: &config.chirp,
+        travel_m,
+        reference_m: config.interlock.soft_limit_m,
+    };
+    swept_reference_amplitudes(closed_loop, &limits)
+}
+
+/// The extremes of the run by the linear model, checked against every interlock.
 fn predicted_extremes(
     reference: &SweptReference,
     config: &Config,

@@ -42,7 +42,10 @@ const CARRIED: f64 = 0.0025;
 fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_within_1_percent() {
     let (closed, plain) = (swept(&[]), config(&[]));
     let open = analysed(&plain, &plain).frf;
-    let rig = LoopPlant::with_mean_age(&plain, &simulated_modes(&plain).expect("modes"));
+    let rig = LoopPlant::with_mean_age(
+        &plain,
+        &simulated_modes(&plain.plant, &plain.sim).expect("modes"),
+    );
     let mut carried = 0;
     for (k, f) in closed
         .frf

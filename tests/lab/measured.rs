@@ -49,7 +49,7 @@ fn a_slow_probe_of_its_own_clock_blurs_nothing() {
     let config = lab(&QUIET);
     let (analysis, modes) = (
         measured(&config, &config),
-        simulated_modes(&config).expect("modes"),
+        simulated_modes(&config.plant, &config.sim).expect("modes"),
     );
     let all = ratios(&analysis, &config, &modes, (0.5, 140.0));
     assert!(all.len() > 1000);

@@ -123,7 +123,7 @@ fn off(config: &Config, wires: &Wires) -> (f64, f64, f64) {
         mean.probe.latency_s,
         mean.probe.transport_s,
     ) = (None, age_s - WOKE_S, 0.0);
-    let modes: Vec<Mode> = simulated::modes(config).expect("modes");
+    let modes: Vec<Mode> = simulated::modes(&config.plant, &config.sim).expect("modes");
     let points = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response);
     // Around a resonance the estimator's own resolution counts, whatever the wires do.
     let narrow = [(27.0, 32.0), (80.0, 88.0)];

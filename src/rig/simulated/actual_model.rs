@@ -1,26 +1,26 @@
 //! The linear model of the simulated stage, with what the configured model does not contain.
 
-use crate::config::{Config, PlantSettings, UnmodelledMode};
+use crate::config::{PlantSettings, SimSettings, UnmodelledMode};
 use crate::model::plant::{self, ModalModel, Mode, PlantError};
 
 /// The modes of the linear rig: those of the plant's model, and the unmodelled ones.
-pub fn modes(config: &Config) -> Result<Vec<Mode>, PlantError> {
-    let mut modes = ModalModel::of(&plant::build(&actual_plant(config))?)?.modes;
-    modes.extend(unmodelled_modes(config));
+pub fn modes(plant: &PlantSettings, sim: &SimSettings) -> Result<Vec<Mode>, PlantError> {
+    let mut modes = ModalModel::of(&plant::build(&actual_plant(plant, sim))?)?.modes;
+    modes.extend(unmodelled_modes(sim));
     Ok(modes)
 }
 
 /// The plant of the simulated stage. Its mass asymmetry differs from the configured one by `sim.asymmetry_offset`.
-pub fn actual_plant(config: &Config) -> PlantSettings {
-    let mut plant = config.plant.clone();
+pub(super) fn actual_plant(plant: &PlantSettings, sim: &SimSettings) -> PlantSettings {
+    let mut plant = plant.clone();
     if let PlantSettings::Sr4dof(settings) = &mut plant {
-        settings.mass_asymmetry += config.sim.asymmetry_offset;
+        settings.mass_asymmetry += sim.asymmetry_offset;
     }
     plant
 }
 
-pub(super) fn unmodelled_modes(config: &Config) -> Vec<Mode> {
-    config.sim.unmodelled.iter().map(unmodelled_mode).collect()
+pub(super) fn unmodelled_modes(sim: &SimSettings) -> Vec<Mode> {
+    sim.unmodelled.iter().map(unmodelled_mode).collect()
 }
 
 /// An unmodelled mode has a residue, but no shape, and the floor does not excite it.

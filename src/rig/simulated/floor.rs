@@ -1,8 +1,8 @@
 //! The acceleration of the floor: a sum of lines, each of which is band-passed white noise with a given RMS.
 //!
-//! p'' + 2 zeta w p' + w^2 p = white noise; the line is v = p', whose spectrum is a band-pass about w. In the steady
-//! state the covariance of (w p, v) is rms^2 I, so the process is sampled exactly by x+ = F x + L n with F the exponential
-//! over a period and L L^T = rms^2 (I - F F^T): neither RMS nor spectrum depends on the tick.
+//! p'' + 2 zeta w p' + w^2 p = white noise; the line is v = p', whose spectrum is a band-pass around w. In the steady state the
+//! covariance of x = (w p, v) is rms^2 I. Exact samples are x+ = F x + L n with the matrix exponential F over a period and
+//! L L^T = rms^2 (I - F F^T). RMS and spectrum therefore do not depend on the period of the ticks.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -22,23 +22,14 @@ pub(super) struct Line {
 impl Line {
     pub(super) fn new(line: &FloorLine, period_s: f64, mut noise: Gaussian) -> Self {
         let w = 2.0 * std::f64::consts::PI * line.frequency_hz;
-        let over_period = matrix_exponential(
-            &(Matrix2::new(0.0, w, -w, -2.0 * line.damping_ratio * w) * period_s),
-        );
+        let rates = Matrix2::new(0.0, w, -w, -2.0 * line.damping_ratio * w);
+        let over_period = matrix_exponential(&(rates * period_s));
         let rms = line.acceleration_rms_m_per_s2;
         let missing = Matrix2::identity() - over_period * over_period.transpose();
-        // Cholesky of a 2 x 2 matrix that is positive but for rounding.
-        let l11 = missing[(0, 0)].max(0.0).sqrt();
-        let l21 = if l11 > 0.0 {
-            missing[(1, 0)] / l11
-        } else {
-            0.0
-        };
-        let l22 = (missing[(1, 1)] - l21 * l21).max(0.0).sqrt();
         let state = Vector2::new(noise.next(), noise.next()) * rms;
         Line {
             over_period,
-            noise_gain: Matrix2::new(l11, 0.0, l21, l22) * rms,
+            noise_gain: cholesky(&missing) * rms,
             state,
             noise,
         }
@@ -51,6 +42,14 @@ impl Line {
         self.state = self.over_period * self.state + self.noise_gain * fresh;
         acceleration
     }
+}
+
+/// The lower triangular factor of a matrix that is positive semidefinite except for rounding.
+fn cholesky(matrix: &Matrix2<f64>) -> Matrix2<f64> {
+    let l11 = matrix[(0, 0)].max(0.0).sqrt();
+    let l21 = if l11 > 0.0 { matrix[(1, 0)] / l11 } else { 0.0 };
+    let l22 = (matrix[(1, 1)] - l21 * l21).max(0.0).sqrt();
+    Matrix2::new(l11, 0.0, l21, l22)
 }
 
 #[cfg(test)]

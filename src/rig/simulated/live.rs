@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::stage::Stage;
 use super::trajectory::{Interval, Trajectory};
 use crate::config::Config;
 use crate::model::plant::PlantError;
@@ -26,7 +27,7 @@ impl LiveStage {
     /// The configured stage, at rest.
     pub fn new(config: &Config) -> Result<Self, PlantError> {
         Ok(LiveStage {
-            trajectory: Trajectory::new(config, STEP_S, 0.0)?,
+            trajectory: Trajectory::new(Stage::new(config, STEP_S)?, 0.0),
             done: 0,
             past: VecDeque::with_capacity(STORED + 1),
         })

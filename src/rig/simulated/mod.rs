@@ -20,9 +20,10 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProb
 use crate::config::Config;
 use crate::model::plant::PlantError;
 use probe::Probe;
+use stage::Stage;
 use trajectory::Trajectory;
 
-pub use actual_model::{actual_plant, modes};
+pub use actual_model::modes;
 pub use live::LiveStage;
 pub use probe::Sensor;
 
@@ -58,8 +59,9 @@ impl SimulatedRig {
     pub fn new(config: &Config) -> Result<Self, PlantError> {
         let latency = config.amplifier.latency_s * config.servo.rate_hz;
         let delay = f64::from(config.servo.computing_delay_periods) + latency;
+        let stage = Stage::new(config, config.servo.period_s())?;
         Ok(SimulatedRig {
-            trajectory: Trajectory::new(config, config.servo.period_s(), delay)?,
+            trajectory: Trajectory::new(stage, delay),
             status: AmplifierStatus::Disabled,
             delay,
             accepted_a: 0.0,
@@ -92,21 +94,24 @@ impl SimulatedRig {
     /// The set-point that the amplifier accepts: limited in slope, rounded to its resolution, limited in size.
     fn accept(&self, current_a: f64) -> f64 {
         let change_a = current_a - self.accepted_a;
-        let within = change_a.abs() <= self.max_change_a;
-        let reached_a = if within {
-            current_a
-        } else {
-            self.accepted_a + self.max_change_a.copysign(change_a)
+        let reached_a = match change_a.abs() <= self.max_change_a {
+            true => current_a,
+            false => self.accepted_a + self.max_change_a.copysign(change_a),
         };
         let step_a = self.current_step_a;
-        let stepped_a = if step_a > 0.0 {
-            libm::round(reached_a / step_a) * step_a
-        } else {
-            reached_a
+        let stepped_a = match step_a > 0.0 {
+            true => libm::round(reached_a / step_a) * step_a,
+            false => reached_a,
         };
         stepped_a.clamp(-self.current_limit_a, self.current_limit_a)
     }
 }
+
+const DISABLED: DeviceError = DeviceError {
+    what: "the simulated amplifier is disabled",
+    remedy: "arm the loop first",
+    code: 0,
+};
 
 impl CurrentAmplifier for SimulatedRig {
     fn enable(&mut self) -> Result<(), DeviceError> {
@@ -116,18 +121,11 @@ impl CurrentAmplifier for SimulatedRig {
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         if self.status != AmplifierStatus::Enabled {
-            let remedy = "arm the loop first";
-            return Err(DeviceError {
-                what: "the simulated amplifier is disabled",
-                remedy,
-                code: 0,
-            });
+            return Err(DISABLED);
         }
         self.accepted_a = self.accept(current_a);
-        self.trajectory.push(
-            self.tick.unwrap_or_default() as f64 + self.delay,
-            self.accepted_a,
-        );
+        let due = self.tick.unwrap_or_default() as f64 + self.delay;
+        self.trajectory.push(due, self.accepted_a);
         Ok(self.accepted_a)
     }
 

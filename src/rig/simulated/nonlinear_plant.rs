@@ -1,6 +1,7 @@
 //! The plant with constraints that are not linearised.
 
-use crate::config::Config;
+use super::stage::Drive;
+use crate::config::PlantSettings;
 use crate::model::plant::{
     Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build,
 };
@@ -21,19 +22,15 @@ pub(super) struct NonlinearPlant {
 
 impl NonlinearPlant {
     /// At rest at the operating point.
-    pub(super) fn new(config: &Config) -> Result<NonlinearPlant, PlantError> {
-        let plant = super::actual_model::actual_plant(config);
-        let linear = ModalModel::of(&build(&plant)?)?;
+    pub(super) fn new(plant: &PlantSettings, drive: Drive) -> Result<NonlinearPlant, PlantError> {
+        let linear = ModalModel::of(&build(plant)?)?;
+        let frequencies_rad_s = linear.modes.iter().map(|mode| mode.omega_rad_s);
         Ok(NonlinearPlant {
-            mechanism: QuadraticSr4dof::of(&plant)?,
+            mechanism: QuadraticSr4dof::of(plant)?,
             state: QuadraticState::default(),
-            fastest_rad_s: linear
-                .modes
-                .iter()
-                .map(|mode| mode.omega_rad_s)
-                .fold(0.0, f64::max),
-            lag_rad_s: 2.0 * std::f64::consts::PI * config.amplifier.bandwidth_hz,
-            force_constant_n_per_a: config.motor.force_constant_n_per_a,
+            fastest_rad_s: frequencies_rad_s.fold(0.0, f64::max),
+            lag_rad_s: std::f64::consts::TAU * drive.bandwidth_hz,
+            force_constant_n_per_a: drive.force_constant_n_per_a,
         })
     }
 

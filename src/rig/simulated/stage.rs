@@ -3,11 +3,11 @@
 //! With linear geometry the modes are those of the plant and the unmodelled ones; the solution over a period is exact. With
 //! quadratic geometry the plant is a [`NonlinearPlant`], solved in fine steps, and only the unmodelled modes are linear.
 
-use super::actual_model::{modes, unmodelled_modes};
+use super::actual_model::{actual_plant, modes, unmodelled_modes};
 use super::floor::Line;
 use super::noise::Gaussian;
 use super::nonlinear_plant::NonlinearPlant;
-use crate::config::{Config, Geometry};
+use crate::config::{Config, Geometry, SimSettings};
 use crate::model::plant::{DiscretePlant, Disturbance, Mode, PlantError, PlantState};
 
 /// Largest step during contact with the stop. The contact frequency with the smallest effective mass is
@@ -22,7 +22,7 @@ pub(super) struct MotionState {
 }
 
 impl MotionState {
-    /// The position at the fraction `share` of the time to `after`, which is `length_s` later: cubic Hermite interpolation.
+    /// The position at the fraction `share` of the time to `after`, which is `length_s` later, by cubic Hermite interpolation.
     pub(super) fn interpolate(&self, after: &MotionState, length_s: f64, share: f64) -> f64 {
         let rise_m = after.position_m - self.position_m;
         let (start_m, end_m) = (
@@ -33,6 +33,36 @@ impl MotionState {
             3.0 * rise_m - 2.0 * start_m - end_m + share * (start_m + end_m - 2.0 * rise_m);
         self.position_m + share * (start_m + share * bend_m)
     }
+}
+
+/// Amplifier and motor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drive {
+    /// Bandwidth of the current loop in hertz.
+    pub(super) bandwidth_hz: f64,
+    /// Force constant of the motor in newtons per ampere.
+    pub(super) force_constant_n_per_a: f64,
+}
+
+impl Drive {
+    /// Modes behind this drive, sampled with a period.
+    fn sampled(self, modes: &[Mode], period_s: f64) -> DiscretePlant {
+        DiscretePlant::new(
+            modes,
+            self.bandwidth_hz,
+            self.force_constant_n_per_a,
+            period_s,
+        )
+    }
+}
+
+/// The lines of the floor's acceleration; the noise of each is a stream of its own.
+fn floor_lines(sim: &SimSettings, period_s: f64) -> Vec<Line> {
+    let streams = (1..).map(|stream| Gaussian::new(sim.seed, stream));
+    let lines = sim.floor.iter().zip(streams);
+    lines
+        .map(|(line, noise)| Line::new(line, period_s, noise))
+        .collect()
 }
 
 /// The state of the simulated mechanics.
@@ -51,55 +81,46 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// The stage, with a linear or a nonlinear plant, for periods of `period_s`.
-    pub(super) fn configured(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
-        match config.sim.geometry {
-            Geometry::Linear => Ok(Stage::new(config, &modes(config)?, None, period_s)),
-            Geometry::Quadratic => Ok(Stage::new(
-                config,
-                &unmodelled_modes(config),
-                Some(NonlinearPlant::new(config)?),
-                period_s,
-            )),
-        }
+    /// The configured stage at rest, with a linear or a nonlinear plant, for periods of `period_s`.
+    pub(super) fn new(config: &Config, period_s: f64) -> Result<Stage, PlantError> {
+        let (plant, sim) = (&config.plant, &config.sim);
+        let drive = Drive {
+            bandwidth_hz: config.amplifier.bandwidth_hz,
+            force_constant_n_per_a: config.motor.force_constant_n_per_a,
+        };
+        let (modes, nonlinear) = match sim.geometry {
+            Geometry::Linear => (modes(plant, sim)?, None),
+            Geometry::Quadratic => {
+                let nonlinear = NonlinearPlant::new(&actual_plant(plant, sim), drive)?;
+                (unmodelled_modes(sim), Some(nonlinear))
+            }
+        };
+        Ok(Stage::of(&modes, nonlinear, drive, sim, period_s))
     }
 
-    /// A stage at rest, for periods of `period_s`: its linear `modes`, and the nonlinear plant, if there is one.
-    pub(super) fn new(
-        config: &Config,
+    /// A stage with linear `modes`, and with a nonlinear plant, if there is one.
+    fn of(
         modes: &[Mode],
         nonlinear: Option<NonlinearPlant>,
+        drive: Drive,
+        sim: &SimSettings,
         period_s: f64,
-    ) -> Self {
+    ) -> Stage {
         let contact_steps = libm::ceil(period_s / CONTACT_STEP_S).max(1.0) as usize;
-        let fine_steps = nonlinear
-            .as_ref()
-            .map_or(0, |nonlinear| nonlinear.steps(period_s))
-            .max(contact_steps);
-        let (bandwidth_hz, force_constant) = (
-            config.amplifier.bandwidth_hz,
-            config.motor.force_constant_n_per_a,
-        );
-        let sampled = |period_s| DiscretePlant::new(modes, bandwidth_hz, force_constant, period_s);
-        let line = |(index, line)| {
-            Line::new(
-                line,
-                period_s,
-                Gaussian::new(config.sim.seed, 1 + index as u64),
-            )
-        };
-        let whole = sampled(period_s);
+        let plant_steps = nonlinear.as_ref().map_or(0, |plant| plant.steps(period_s));
+        let fine_steps = plant_steps.max(contact_steps);
+        let whole = drive.sampled(modes, period_s);
         Stage {
             motion: whole.at_rest(),
             nonlinear,
             whole,
-            fine: sampled(period_s / fine_steps as f64),
+            fine: drive.sampled(modes, period_s / fine_steps as f64),
             fine_steps,
-            floor: config.sim.floor.iter().enumerate().map(line).collect(),
+            floor: floor_lines(sim, period_s),
             floor_m_per_s2: 0.0,
-            stop_m: config.sim.stop_m,
-            stop_stiffness_n_per_m: config.sim.stop_stiffness_n_per_m,
-            stop_damping_n_s_per_m: config.sim.stop_damping_n_s_per_m,
+            stop_m: sim.stop_m,
+            stop_stiffness_n_per_m: sim.stop_stiffness_n_per_m,
+            stop_damping_n_s_per_m: sim.stop_damping_n_s_per_m,
         }
     }
 

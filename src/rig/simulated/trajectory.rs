@@ -2,8 +2,6 @@
 
 use super::setpoints::Setpoints;
 use super::stage::{MotionState, Stage};
-use crate::config::Config;
-use crate::model::plant::PlantError;
 
 /// The stage and its set-points. Times are in periods since the start.
 #[derive(Clone, Debug)]
@@ -36,13 +34,12 @@ impl Interval {
 }
 
 impl Trajectory {
-    /// A stage at rest, for periods of `period_s`, with capacity for the set-points of `delay` periods.
-    pub(super) fn new(config: &Config, period_s: f64, delay: f64) -> Result<Self, PlantError> {
-        let stage = Stage::configured(config, period_s)?;
-        Ok(Trajectory {
+    /// The motion of a stage, with capacity for the set-points of `delay` periods.
+    pub(super) fn new(stage: Stage, delay: f64) -> Self {
+        Trajectory {
             stage,
             setpoints: Setpoints::new(delay),
-        })
+        }
     }
 
     /// Adds a set-point that takes effect at `due`.
