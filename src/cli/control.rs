@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let completed = report.is_completed();
     let swept = config.control.reference.is_swept();
     let measured = match completed && !swept {
-        true => tracking_metrics(&Recording::open(&run.path)?, &config)?,
+        true => tracking_metrics(&Recording::open(&run.path)?, &config.control, &config.servo)?,
         false => None,
     };
     let made = match (swept, completed) {

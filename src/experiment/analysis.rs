@@ -1,6 +1,7 @@
-//! The analysis of an excitation: one function, whether it runs after a chirp, on an old recording or elsewhere.
+//! The analysis of a recorded excitation: one function for all commands.
 
 use core::ops::ControlFlow;
+use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
@@ -8,8 +9,7 @@ use super::analysis_error::AnalysisError;
 use super::closed_loop;
 use super::ending::Ending;
 use super::plan::{KIND, RunKind};
-use super::response_estimate::ClosedResponses;
-use super::response_estimate::ResponseEstimate;
+use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::segments::{Segments, segments};
 use super::signal_builder::{RunSignals, SignalBuilder};
 use crate::config::Config;
@@ -24,7 +24,7 @@ use crate::recording::Recording;
 use crate::rt::arming::State;
 use crate::rt::record::flag;
 
-/// The model's phase is used, and a verdict given, up to this multiple of its last mode: the model has no modes beyond.
+/// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;
 /// Progress is reported after this many ticks.
 const TICKS_PER_REPORT: usize = 1 << 15;
@@ -32,16 +32,16 @@ const TICKS_PER_REPORT: usize = 1 << 15;
 /// The analysis of a recorded excitation.
 #[derive(Clone, Debug)]
 pub struct Analysis {
-    /// The frequency response from the amplifier's set-point (A) to the probe (m): hold, amplifier, plant, delays, and the
-    /// mean age of the readings; differences of their ages are corrected.
+    /// The frequency response from the set-point of the amplifier (A) to the probe (m). It includes hold, amplifier, plant,
+    /// delays, and the mean age of the readings; differences of their ages are corrected.
     pub frf: Frf,
-    /// The same by the model, at the same frequencies, for readings of the mean age.
+    /// The response of the model at the same frequencies, for readings of the mean age.
     pub model: Vec<Complex<f64>>,
-    /// Mean time in seconds from a command to the position that its reading shows, by the model.
+    /// Mean time in seconds from a command to the position in the reading, by the model.
     pub delay_s: f64,
     /// Excess delay over the model in seconds, from the phases up to the last mode of the model.
     pub excess_delay: Option<Estimate>,
-    /// Missing ticks that were interpolated: the current held, the position linear.
+    /// Number of missing ticks that were interpolated: current by zero-order hold, position linearly.
     pub filled_ticks: u64,
     /// The fitted modes, or why none can be fitted.
     pub fit: Result<ModalFit, FitError>,
@@ -49,9 +49,9 @@ pub struct Analysis {
     pub verdict: Verdict,
     /// The verdict covers modes and zeros up to here, in rad/s.
     pub judged_up_to_rad_s: f64,
-    /// The loop, of a closed-loop recording.
+    /// The responses of the loop, if the recording is of a closed loop.
     pub closed: Option<ClosedResponses>,
-    /// Noise and distortion, of a multisine that omits lines.
+    /// Noise and distortion, if the excitation is a multisine that omits lines.
     pub linearity: Option<Linearity>,
 }
 
@@ -82,7 +82,7 @@ impl AnalysisPhase {
 pub type AnalysisProgress<'a> = dyn FnMut(AnalysisPhase, f64) -> ControlFlow<()> + 'a;
 
 /// Analyses a recording made with `config`: of an excitation, or of a closed loop with a swept reference. The reasons of the
-/// verdict mention a run that did not come to its end.
+/// verdict mention a run that was not completed.
 ///
 /// # Errors
 /// When the recording cannot be read, or contains no frequency response: see [`AnalysisError`].
@@ -99,29 +99,28 @@ pub fn analyse_with_progress(
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
-    let kind = recording.metadata().get(KIND);
-    let closed = kind.is_some_and(|kind| kind == RunKind::Control.name());
+    let is_closed_loop = is_closed_loop(recording);
     let RunSignals {
         loop_signals,
         filled_ticks,
-    } = ran(recording, config.servo.rate_hz, closed, progress)?;
+    } = read_signals(recording, config.servo.rate_hz, is_closed_loop, progress)?;
     report(progress, AnalysisPhase::Response, 0.0)?;
     let band_hz = config.chirp.band_hz();
-    let (estimate, linearity) = if closed {
-        (
-            closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)?,
-            None,
-        )
-    } else {
-        open_loop(loop_signals.signals, band_hz, config)?
+    let estimate = match is_closed_loop {
+        true => closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)?,
+        false => open_loop(loop_signals.signals, band_hz, config)?,
     };
     let analysis = with_modes(estimate, config, filled_ticks, progress)?;
     let verdict = analysis.verdict.with(Ending::of(recording).caution());
     Ok(Analysis {
-        linearity,
         verdict,
         ..analysis
     })
+}
+
+fn is_closed_loop(recording: &Recording) -> bool {
+    let kind = recording.metadata().get(KIND);
+    kind.is_some_and(|kind| kind == RunKind::Control.name())
 }
 
 /// Reports progress; an error if the receiver cancels.
@@ -140,71 +139,78 @@ fn open_loop(
     signals: Signals,
     band_hz: (f64, f64),
     config: &Config,
-) -> Result<(ResponseEstimate, Option<Linearity>), AnalysisError> {
+) -> Result<ResponseEstimate, AnalysisError> {
     let pattern = config.chosen_excitation().build().pattern();
     let (frf, frf_data, linearity) = match segments(signals, &pattern, band_hz)? {
         Segments::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
         Segments::Record(signals) => {
             let frf = response(&signals, band_hz, &config.identify)?;
-            (
-                frf,
-                frf_data(&signals, band_hz, &config.identify.local())?,
-                None,
-            )
+            let data = frf_data(&signals, band_hz, &config.identify.local())?;
+            (frf, data, None)
         }
     };
-    Ok((
-        ResponseEstimate {
-            frf,
-            frf_data,
-            closed: None,
-        },
+    Ok(ResponseEstimate {
+        frf,
+        frf_data,
+        closed: None,
         linearity,
-    ))
+    })
 }
 
-/// The modes of a response, compared with the model.
+/// Fits the modes of a response and compares it with the model.
 fn with_modes(
     estimate: ResponseEstimate,
     config: &Config,
     filled_ticks: u64,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
-    let ResponseEstimate {
-        frf,
-        frf_data,
-        closed,
-    } = estimate;
     let modal = ModalModel::of(&plant::build(&config.plant)?)?;
-    let frequencies_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s);
-    let judged_up_to_rad_s = LAST_MODE * frequencies_rad_s.fold(0.0, f64::max);
-    let plant = LoopPlant::with_mean_age(config, &modal.modes);
-    let at = |f: &f64| plant.response(2.0 * std::f64::consts::PI * f);
-    let model: Vec<Complex<f64>> = frf.frequency_hz.iter().map(at).collect();
-    let up_to_hz = judged_up_to_rad_s / (2.0 * std::f64::consts::PI);
     let chain = MeasurementChain::bench(config);
-    let fit = modal::fit_with_progress(&frf_data, &chain, &mut |fraction| {
-        progress(AnalysisPhase::Modes, fraction)
-    });
-    if fit == Err(FitError::Cancelled) {
-        return Err(AnalysisError::Cancelled);
-    }
+    let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
+    let up_to_rad_s = LAST_MODE * highest_mode_rad_s(&modal);
+    let verdict = judge(&fit, &estimate.frf_data, &chain, up_to_rad_s, Some(&modal))?;
+    let plant = LoopPlant::with_mean_age(config, &modal.modes);
+    let frf = estimate.frf;
+    let model = model_response(&plant, &frf.frequency_hz);
     Ok(Analysis {
-        excess_delay: excess_delay(&frf, &model, up_to_hz),
-        verdict: judge(&fit, &frf_data, &chain, judged_up_to_rad_s, Some(&modal))?,
+        excess_delay: excess_delay(&frf, &model, up_to_rad_s / TAU),
         delay_s: plant.delay_s(),
         frf,
         model,
         filled_ticks,
         fit,
-        judged_up_to_rad_s,
-        closed,
-        linearity: None,
+        verdict,
+        judged_up_to_rad_s: up_to_rad_s,
+        closed: estimate.closed,
+        linearity: estimate.linearity,
     })
 }
 
+/// The fitted modes, or why none can be fitted. Fails only if the receiver of the progress cancels.
+fn fit_modes(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Result<ModalFit, FitError>, AnalysisError> {
+    let mut report = |fraction| progress(AnalysisPhase::Modes, fraction);
+    match modal::fit_with_progress(data, chain, &mut report) {
+        Err(FitError::Cancelled) => Err(AnalysisError::Cancelled),
+        fit => Ok(fit),
+    }
+}
+
+fn highest_mode_rad_s(modal: &ModalModel) -> f64 {
+    let frequencies_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s);
+    frequencies_rad_s.fold(0.0, f64::max)
+}
+
+fn model_response(plant: &LoopPlant, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
+    let response = frequency_hz.iter().map(|f| plant.response(TAU * f));
+    response.collect()
+}
+
 impl Analysis {
-    /// Time from a command to the position that its reading shows, in seconds: by the configuration, plus the excess delay.
+    /// Measured time in seconds from a command to the position in the reading: that of the model plus the excess delay.
     pub fn measured_delay_s(&self) -> f64 {
         self.delay_s + self.excess_delay.map_or(0.0, |delay| delay.value)
     }
@@ -222,10 +228,7 @@ pub(super) fn judge(
         Ok(fit) => fit,
         Err(error) => return Ok(Verdict::undecided(error.to_string())),
     };
-    let shows =
-        |(mode, sign): &(&Mode, Sign)| *sign != Sign::Hidden && mode.omega_rad_s <= up_to_rad_s;
-    let expected_modes =
-        model.map(|modal| modal.modes.iter().zip(modal.signs()).filter(shows).count());
+    let expected_modes = model.map(|modal| visible_modes(modal, up_to_rad_s));
     Ok(verdict(&VerdictInput {
         fit,
         chain,
@@ -235,23 +238,32 @@ pub(super) fn judge(
     })?)
 }
 
-/// Every tick of the run, or those with the loop closed.
-fn ran(
+/// Number of modes up to a frequency with a residue.
+fn visible_modes(modal: &ModalModel, up_to_rad_s: f64) -> usize {
+    let modes = modal.modes.iter().zip(modal.signs());
+    let is_visible =
+        |(mode, sign): &(&Mode, Sign)| *sign != Sign::Hidden && mode.omega_rad_s <= up_to_rad_s;
+    modes.filter(is_visible).count()
+}
+
+/// Reads every tick of the run, or only those with the loop closed.
+fn read_signals(
     recording: &Recording,
     rate_hz: f64,
-    closed: bool,
+    only_closed: bool,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<RunSignals, AnalysisError> {
-    let mut gathered = SignalBuilder::new(recording, rate_hz);
+    let mut signals = SignalBuilder::new(recording, rate_hz);
     let total = recording.tick_count().max(1) as f64;
     for (index, record) in recording.ticks()?.enumerate() {
         let record = record?;
-        if record.state == State::Running && (!closed || record.flags & flag::ACTIVE != 0) {
-            gathered.push(&record)?;
+        let is_closed = record.flags & flag::ACTIVE != 0;
+        if record.state == State::Running && (is_closed || !only_closed) {
+            signals.push(&record)?;
         }
         if index % TICKS_PER_REPORT == 0 {
             report(progress, AnalysisPhase::Reading, index as f64 / total)?;
         }
     }
-    gathered.finish()
+    signals.finish()
 }

@@ -18,44 +18,44 @@ pub enum AnalysisError {
     /// The model cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// A closed loop whose controller is not known, or whose reference did not sweep.
+    /// The controller of a closed loop is not known, or its reference did not sweep the band.
     #[error(transparent)]
     Loop(#[from] ClosedLoopError),
     /// No program ran.
-    #[error("no program ran in this recording: there is no excitation to analyse")]
+    #[error("no program ran in this recording: it contains no excitation to analyse")]
     NothingRan,
     /// The receiver of the progress cancelled the analysis.
     #[error("the analysis was cancelled")]
     Cancelled,
     /// Too many ticks are missing.
     #[error(
-        "{missing} ticks or more are missing beside the {ticks} that were recorded, {allowed} may be filled in; repeat the run at a rate the machine keeps, or in real-time scheduling"
+        "at least {missing} ticks are missing between the {ticks} recorded ones, at most {allowed} can be interpolated; repeat the run with a lower loop.rate_hz or with real-time scheduling"
     )]
     Gaps {
-        /// Missing ticks, up to where there were too many.
+        /// Missing ticks, counted until there were too many.
         missing: u64,
-        /// Recorded ones.
+        /// Recorded ticks.
         ticks: u64,
-        /// Ticks that may be missing.
+        /// Number of ticks that can be interpolated.
         allowed: u64,
     },
 }
 
-/// A recording of a closed loop that shows no plant.
+/// A closed-loop recording from which the plant cannot be estimated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ClosedLoopError {
-    /// The reference stayed where it was, or was a single sine or step.
+    /// The reference did not sweep the band: it was constant, a step, or a single sine.
     #[error(
         "the reference of this recording, {kind}, does not sweep the band of [chirp]; repeat the run with `bench control --reference chirp`"
     )]
     Reference {
-        /// Its kind.
+        /// Kind of the reference.
         kind: &'static str,
     },
-    /// The recording does not say what ran.
+    /// The recording does not contain the plan of the run.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Its controller is not one.
+    /// The recorded controller is invalid.
     #[error(transparent)]
     Controller(#[from] ControllerError),
 }

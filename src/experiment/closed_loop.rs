@@ -1,4 +1,6 @@
-//! What a recording under control shows: the plant, and the loop around it.
+//! The responses in a closed-loop recording: the plant and the loop.
+
+use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
@@ -14,48 +16,40 @@ use crate::identify::modal::Estimate;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::recording::Recording;
 
-/// The plant by the reference as instrument, and the loop.
+/// Estimates plant and loop, with the reference as instrument.
 pub(super) fn estimate_loop(
     signals: &LoopSignals,
     band_hz: (f64, f64),
     recording: &Recording,
     config: &Config,
 ) -> Result<ResponseEstimate, AnalysisError> {
-    swept(&config.control.reference)?;
-    let JointEstimate {
-        plant,
-        frf_data,
-        complementary,
-        sensitivity,
-        loop_gain,
-    } = joint::estimate(signals, band_hz, &config.identify.local())?;
+    require_swept(&config.control.reference)?;
+    let estimate = joint::estimate(signals, band_hz, &config.identify.local())?;
     let model = model(recording, config)?;
-    let model_loop = loop_gain
-        .frequency_hz
-        .iter()
-        .map(|f| model.sampled_loop(TURN * f))
-        .collect();
-    let margins = margins(&loop_gain, &sensitivity);
-    let predicted = model.margins();
-    let closed = ClosedResponses {
-        complementary,
-        sensitivity,
-        loop_gain,
-        model_loop,
-        predicted,
-        margins,
-    };
-    Ok(ResponseEstimate {
-        frf: plant,
-        frf_data,
-        closed: Some(closed),
-    })
+    Ok(with_margins(estimate, &model))
 }
 
-const TURN: f64 = 2.0 * std::f64::consts::PI;
+fn with_margins(estimate: JointEstimate, model: &ClosedLoop) -> ResponseEstimate {
+    let loop_gain = estimate.loop_gain;
+    let frequencies = loop_gain.frequency_hz.iter();
+    let closed = ClosedResponses {
+        model_loop: frequencies.map(|f| model.sampled_loop(TAU * f)).collect(),
+        predicted: model.margins(),
+        margins: margins(&loop_gain, &estimate.sensitivity),
+        complementary: estimate.complementary,
+        sensitivity: estimate.sensitivity,
+        loop_gain,
+    };
+    ResponseEstimate {
+        frf: estimate.plant,
+        frf_data: estimate.frf_data,
+        closed: Some(closed),
+        linearity: None,
+    }
+}
 
-/// Refuses references that do not sweep; a file may.
-fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
+/// Refuses a reference that does not sweep the band. A reference from a file may sweep it.
+fn require_swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
     let reference = reference.design();
     let kind = reference.name();
     match reference.can_identify() {
@@ -64,68 +58,69 @@ fn swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
     }
 }
 
-/// The loop of the recorded controller around the configured model.
+/// The loop of the recorded controller and the configured model.
 fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, AnalysisError> {
     let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
-    let plan = Plan::of(recording).map_err(ClosedLoopError::Plan)?;
-    let text = plan
-        .controller
-        .ok_or(ClosedLoopError::Plan(PlanError::Missing("controller")))?;
-    let design = text
-        .design(config.servo.rate_hz)
-        .map_err(ClosedLoopError::Controller)?;
+    Ok(loop_around(modes, recording, config)?)
+}
+
+fn loop_around(
+    modes: Vec<plant::Mode>,
+    recording: &Recording,
+    config: &Config,
+) -> Result<ClosedLoop, ClosedLoopError> {
+    let controller = Plan::of(recording)?.controller;
+    let controller = controller.ok_or(PlanError::Missing("controller"))?;
+    let design = controller.design(config.servo.rate_hz)?;
     let plant = LoopPlant::new(config, &modes);
     let force_constant_n_per_a = config.motor.force_constant_n_per_a;
-    let closed_loop = ClosedLoop::new(plant, modes, force_constant_n_per_a, design);
-    Ok(closed_loop.map_err(ClosedLoopError::Controller)?)
+    let closed_loop = ClosedLoop::new(plant, modes, force_constant_n_per_a, design)?;
+    Ok(closed_loop)
 }
 
 fn margins(loop_gain: &Frf, sensitivity: &Frf) -> MeasuredMargins {
-    let crossing = loop_gain
-        .response
-        .windows(2)
-        .position(|pair| pair[0].norm() > 1.0 && pair[1].norm() <= 1.0);
-    let peak = (0..sensitivity.len()).max_by(|a, b| {
-        sensitivity.response[*a]
-            .norm_sqr()
-            .total_cmp(&sensitivity.response[*b].norm_sqr())
-    });
-    let modulus_margin = peak.map_or(
-        Estimate {
-            value: f64::NAN,
-            sigma: f64::NAN,
-        },
-        |k| {
-            let size = sensitivity.response[k].norm();
-            Estimate {
-                value: 1.0 / size,
-                sigma: sensitivity.magnitude_sigma[k] / (size * size),
-            }
-        },
-    );
+    let falls_below_1 = |pair: &[Complex<f64>]| pair[0].norm() > 1.0 && pair[1].norm() <= 1.0;
+    let crossing = loop_gain.response.windows(2).position(falls_below_1);
+    let size = |k: &usize| sensitivity.response[*k].norm_sqr();
+    let peak = (0..sensitivity.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
     MeasuredMargins {
-        crossover_rad_s: crossing.map(|k| TURN * crossed(loop_gain, k)),
+        crossover_rad_s: crossing.map(|k| TAU * crossover_hz(loop_gain, k)),
         phase_margin_deg: crossing.map(|k| phase_margin_deg(loop_gain, k)),
-        modulus_margin,
-        sensitivity_peak_rad_s: peak.map_or(f64::NAN, |k| TURN * sensitivity.frequency_hz[k]),
+        modulus_margin: peak.map_or(UNKNOWN, |k| modulus_margin(sensitivity, k)),
+        sensitivity_peak_rad_s: peak.map_or(f64::NAN, |k| TAU * sensitivity.frequency_hz[k]),
     }
 }
 
-/// Where |L| is 1 between two frequencies: ln |L| over ln f is a straight line.
-fn crossed(loop_gain: &Frf, k: usize) -> f64 {
-    let share = share(loop_gain, k);
-    loop_gain.frequency_hz[k]
-        * (loop_gain.frequency_hz[k + 1] / loop_gain.frequency_hz[k]).powf(share)
+/// The estimate of an empty response.
+const UNKNOWN: Estimate = Estimate {
+    value: f64::NAN,
+    sigma: f64::NAN,
+};
+
+/// 1/|S| at index `k`.
+fn modulus_margin(sensitivity: &Frf, k: usize) -> Estimate {
+    let size = sensitivity.response[k].norm();
+    Estimate {
+        value: 1.0 / size,
+        sigma: sensitivity.magnitude_sigma[k] / (size * size),
+    }
 }
 
-fn share(loop_gain: &Frf, k: usize) -> f64 {
+/// The frequency between `k` and `k + 1` at which |L| is 1, with ln |L| linear in ln f.
+fn crossover_hz(loop_gain: &Frf, k: usize) -> f64 {
+    let (from_hz, to_hz) = (loop_gain.frequency_hz[k], loop_gain.frequency_hz[k + 1]);
+    from_hz * (to_hz / from_hz).powf(crossing_fraction(loop_gain, k))
+}
+
+/// Position of the crossing between `k` (0) and `k + 1` (1), on logarithmic axes.
+fn crossing_fraction(loop_gain: &Frf, k: usize) -> f64 {
     let height = |k: usize| loop_gain.response[k].norm().ln();
     height(k) / (height(k) - height(k + 1))
 }
 
 fn phase_margin_deg(loop_gain: &Frf, k: usize) -> Estimate {
     let (from, to) = (loop_gain.response[k], loop_gain.response[k + 1]);
-    let turned = (to / from).arg() * share(loop_gain, k);
+    let turned = (to / from).arg() * crossing_fraction(loop_gain, k);
     let value = (-from * Complex::from_polar(1.0, turned))
         .arg()
         .to_degrees();

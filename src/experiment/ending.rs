@@ -1,4 +1,4 @@
-//! How a run came to its end, as its loop or its recording tells it.
+//! How a run ended, by its loop or by its recording.
 
 use serde::{Serialize, Serializer};
 
@@ -10,17 +10,17 @@ use crate::rt::thread::LoopOutcome;
 /// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ending {
-    /// It ran to its end.
+    /// The program was completed.
     Completed,
     /// An interlock tripped, at a tick.
     Tripped(Trip, u64),
-    /// A person stopped it, or the system.
+    /// The operator or the system stopped it.
     Stopped,
-    /// The recording ends before the run does.
+    /// The recording ends before the run.
     CutOff,
 }
 
-/// As its [`name`](Ending::name).
+/// Serialised as its [`name`](Ending::name).
 impl Serialize for Ending {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
@@ -34,20 +34,15 @@ impl From<&LoopOutcome> for Ending {
 }
 
 impl Ending {
-    /// By the events of a recording. A trip counts though the program had come to its end; a file that is still being written
-    /// has no end of its own, and is whole for all that if the program had come to its.
+    /// The ending by the events of a recording. A trip after the program was completed counts as a trip. A file that is still
+    /// being written is not cut off if the program was completed.
     pub fn of(recording: &Recording) -> Ending {
-        let trip = recording
-            .events()
-            .iter()
-            .find_map(|event| match event.kind {
-                EventKind::Trip(trip) => Some((trip, event.tick)),
-                _ => None,
-            });
-        let completed = recording
-            .events()
-            .iter()
-            .any(|event| event.kind == EventKind::Completed);
+        let mut events = recording.events().iter();
+        let completed = events.clone().any(|e| e.kind == EventKind::Completed);
+        let trip = events.find_map(|event| match event.kind {
+            EventKind::Trip(trip) => Some((trip, event.tick)),
+            _ => None,
+        });
         match Ending::by(trip, completed) {
             Ending::Stopped if recording.truncated() => Ending::CutOff,
             ending => ending,
@@ -80,14 +75,14 @@ impl Ending {
         }
     }
 
-    /// What must be told beside all that such a run shows; nothing of one that completed.
+    /// A warning that belongs to all results of the run; `None` if it was completed.
     pub fn caution(&self) -> Option<String> {
         let how = match self {
             Ending::Completed => return None,
             Ending::Tripped(trip, tick) => format!("the run tripped at tick {tick} ({trip})"),
             Ending::Stopped => "the run was stopped before its end".into(),
-            Ending::CutOff => "the recording is cut off before the end of its run".into(),
+            Ending::CutOff => "the recording is cut off before the end of the run".into(),
         };
-        Some(format!("{how}: this is what was recorded until then"))
+        Some(format!("{how}: the results are from the data before it"))
     }
 }

@@ -1,4 +1,4 @@
-//! Why an experiment was refused before it began, or failed on its way.
+//! Why an experiment was refused or failed.
 
 use super::analysis_error::AnalysisError;
 use super::plan_error::PlanError;
@@ -17,7 +17,7 @@ pub enum ExperimentError {
     /// The run cannot be planned.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// By the model the excitation would trip an interlock.
+    /// The excitation would trip an interlock by the model.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
     /// The model cannot be analysed.
@@ -26,7 +26,7 @@ pub enum ExperimentError {
     /// The devices cannot be opened, or do not match their settings.
     #[error(transparent)]
     Devices(#[from] DevicesError),
-    /// The calibration may not be used.
+    /// The calibration cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The settings do not allow the experiment.
@@ -41,7 +41,7 @@ pub enum ExperimentError {
     /// The recording does not contain a frequency response.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
-    /// Another failure on the way.
+    /// Another failure.
     #[error("{0}")]
     Failed(String),
 }

@@ -1,4 +1,4 @@
-//! The analysis of external signals: from force to displacement, or what takes their place, and without a model.
+//! The analysis of external signals, from force to displacement or similar quantities, without a model.
 
 use nalgebra::Complex;
 
@@ -13,17 +13,17 @@ use crate::identify::{
 
 /// Half of the frequencies must have at least this coherence.
 const MIN_COHERENCE: f64 = 0.5;
-/// A mechanical response does not grow with a higher power of frequency at the end of the band, unless the next mode is right
-/// above it.
+/// At the end of the band a mechanical response does not grow with a higher power of frequency than this, unless the next mode
+/// lies just above it.
 const MAX_SLOPE: f64 = 1.0;
-/// The slope is measured over this part of ln f at the end of the band.
+/// The slope is measured over this fraction of the band, in ln f, at its end.
 const SLOPE_PART: f64 = 0.25;
-/// An output is early if it precedes its input by more than this part of a sample and by [`CERTAIN_SIGMAS`].
+/// An output is early if it precedes its input by more than this fraction of a sample and by more than [`CERTAIN_SIGMAS`].
 const EARLY_SAMPLES: f64 = 0.5;
-/// A deviation by this many standard deviations is certain.
+/// A deviation of more standard deviations is not noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
 
-/// The chain of external signals: none.
+/// External signals have no measurement chain.
 const CHAIN: MeasurementChain = MeasurementChain::Direct;
 
 /// The analysis of external signals.
@@ -41,8 +41,8 @@ pub struct ExternalAnalysis {
     pub periods: Option<usize>,
 }
 
-/// Analyses input and output between two frequencies: with a repetition as averaged periods, without one as a record that
-/// begins and ends at rest.
+/// Analyses input and output between two frequencies. With a repetition, periods are averaged; without one, the record must
+/// begin and end at rest.
 ///
 /// # Errors
 /// When the signals allow no estimate, or the zeros cannot be computed.
@@ -89,8 +89,8 @@ fn describes(fit: &ModalFit) -> bool {
     fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
 }
 
-/// The modes of averaged periods. If they do not describe the data, distortion is added to the noise. (Without periods the noise
-/// is estimated from neighbouring frequencies and includes distortion.)
+/// The modes of averaged periods. If they do not describe the data, they are fitted again with distortion added to the noise.
+/// (Without periods, the noise is estimated from neighbouring frequencies and already includes distortion.)
 fn fit_of_periods(data: &[FrfDatum]) -> Result<ModalFit, FitError> {
     let fit = modal::fit(data, &CHAIN);
     if fit.as_ref().is_ok_and(describes) {
@@ -114,7 +114,7 @@ fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum]) -> f64 {
     data.iter().zip(&fitted).map(square).sum::<f64>() / freedom as f64
 }
 
-/// Why the signals are not input and output of a mechanical system.
+/// The reason, if the signals cannot be input and output of a mechanical system.
 fn implausible(
     rate_hz: f64,
     frf: &Frf,
@@ -127,7 +127,7 @@ fn implausible(
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
 
-/// Modes that describe the inverse of the response, but not the response.
+/// Whether modes describe the inverse of the response, but not the response.
 fn inverse_fits(data: &[FrfDatum], fit: &Result<ModalFit, FitError>) -> Option<String> {
     if fit.as_ref().is_ok_and(describes) {
         return None;

@@ -1,27 +1,16 @@
-//! Names of recordings: when and what. A file that exists is never overwritten.
+//! Names of recordings: time and kind of the run. An existing file is never overwritten.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// `2026-11-21T16-21-09Z_chirp.mcap` in `folder`, with `-2`, `-3`, ... where that is taken.
 pub(super) fn recording(folder: &Path, what: &str, now: SystemTime) -> PathBuf {
-    let stem = format!(
-        "{}_{what}",
-        humantime::format_rfc3339_seconds(now)
-            .to_string()
-            .replace(':', "-")
-    );
-    let numbered = |n: u32| {
-        if n == 1 {
-            stem.clone()
-        } else {
-            format!("{stem}-{n}")
-        }
-    };
-    let free = (1..)
-        .map(|n| folder.join(numbered(n) + ".mcap"))
-        .find(|path| !path.exists());
-    free.unwrap_or_else(|| folder.join(stem + ".mcap"))
+    let time = humantime::format_rfc3339_seconds(now).to_string();
+    let stem = format!("{}_{what}", time.replace(':', "-"));
+    let first = folder.join(format!("{stem}.mcap"));
+    let numbered = (2..).map(|n: u32| folder.join(format!("{stem}-{n}.mcap")));
+    let mut paths = std::iter::once(first.clone()).chain(numbered);
+    paths.find(|path| !path.exists()).unwrap_or(first)
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! What a run will do: made from the configuration and the texts it names, all of which travel with the recording, so that
-//! the same plan can be made again from it.
+//! The plan of a run: the configuration and the files that it names. The recording contains all of them, so that the same plan
+//! can be made from it again.
 
 use std::path::Path;
 
@@ -11,11 +11,11 @@ use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
 use crate::recording::Recording;
 use crate::rt::program::{Control, Excite, Program};
 
-/// Name of the attachment with the controller's text.
+/// Name of the attachment with the controller.
 const CONTROLLER: &str = "controller.toml";
 /// Name of the attachment with the calibration in use.
 const CALIBRATION: &str = "calibration.toml";
-/// Name of the attachment with the reference's points.
+/// Name of the attachment with the points of the reference.
 const REFERENCE: &str = "reference.csv";
 /// Metadata key of the kind of run.
 pub(super) const KIND: &str = "run";
@@ -29,11 +29,18 @@ pub enum RunKind {
     Control,
     /// Static steps.
     Calibrate,
-    /// No current: where the stage rests.
+    /// No current, to measure the rest position.
     Quiet,
 }
 
 impl RunKind {
+    const ALL: [RunKind; 4] = [
+        RunKind::Chirp,
+        RunKind::Control,
+        RunKind::Calibrate,
+        RunKind::Quiet,
+    ];
+
     /// The name in file names and metadata.
     pub fn name(self) -> &'static str {
         match self {
@@ -45,7 +52,7 @@ impl RunKind {
     }
 }
 
-/// Everything that decides the commands of a run, but the probe.
+/// Everything that determines the commands of a run, except the readings of the probe.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// What kind of run it is.
@@ -58,9 +65,9 @@ pub struct Plan {
     pub calibration: Option<String>,
     /// Which devices, for the recording's metadata.
     pub devices: Vec<(&'static str, String)>,
-    /// What a swept reference would do by the model.
+    /// Extremes of a swept reference by the model.
     pub predicted_extremes: Option<Extremes>,
-    /// The reference's file, if it has one.
+    /// Text of the file of the reference, if it has one.
     reference: Option<String>,
 }
 
@@ -92,8 +99,8 @@ impl Plan {
         }
     }
 
-    /// A closed loop. A swept reference without amplitudes gets them here, from the model, so that they travel with the
-    /// recording.
+    /// A closed loop. The amplitudes of a swept reference without any are computed here from the model, so that the recording
+    /// contains them.
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
         let (config, predicted_extremes) = swept_reference::planned(config, &controller)?;
@@ -104,55 +111,37 @@ impl Plan {
             predicted_extremes,
             ..Plan::excitation(RunKind::Control, config)
         };
-        // A reference or a controller that cannot be built is refused before anything is announced.
+        // Refuses a reference or a controller that cannot be built before the plan is shown.
         plan.program()?;
         Ok(plan)
     }
 
     /// The plan of a recorded run.
     pub fn of(recording: &Recording) -> Result<Plan, PlanError> {
-        let config = whole(
-            "the recording's configuration",
-            recording
-                .config_toml()
-                .ok_or(PlanError::Missing("configuration"))?,
-        )?;
-        let text = |name| {
-            recording
-                .attachment(name)
-                .map(|a| String::from_utf8_lossy(&a.data).into_owned())
-        };
-        let kind = match recording.metadata().get(KIND).map(String::as_str) {
-            Some("chirp") => RunKind::Chirp,
-            Some("control") => RunKind::Control,
-            Some("calibrate") => RunKind::Calibrate,
-            Some("quiet") => RunKind::Quiet,
-            _ => return Err(PlanError::Missing("kind of run")),
-        };
-        let controller = text(CONTROLLER).map(|text| ControllerText {
+        let config = recording.config_toml();
+        let config = config.ok_or(PlanError::Missing("configuration"))?;
+        let config = whole("the configuration of the recording", config)?;
+        let controller = attached_text(recording, CONTROLLER).map(|text| ControllerText {
             name: config.control.controller.clone(),
             text,
         });
-        let calibration = text(CALIBRATION);
         Ok(Plan {
             controller,
-            calibration,
-            reference: text(REFERENCE),
-            ..Plan::excitation(kind, config)
+            calibration: attached_text(recording, CALIBRATION),
+            reference: attached_text(recording, REFERENCE),
+            ..Plan::excitation(kind(recording)?, config)
         })
     }
 
-    /// What the file name of the recording says of the run: `chirp`, `prbs`, `control-fast-step`.
+    /// The run as described in the file name of its recording: `chirp`, `prbs`, `control-fast-step`.
     pub fn label(&self) -> String {
         let config = &self.config;
         match self.kind {
             RunKind::Chirp => config.excitation.kind.name().into(),
             RunKind::Control => {
                 let controller = file_stem(&config.control.controller);
-                format!(
-                    "control-{controller}-{}",
-                    config.control.reference.design().name()
-                )
+                let reference = config.control.reference.design().name();
+                format!("control-{controller}-{reference}")
             }
             RunKind::Calibrate | RunKind::Quiet => self.kind.name().into(),
         }
@@ -161,37 +150,35 @@ impl Plan {
     /// The program of the loop.
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
-        match self.kind {
-            RunKind::Chirp => return Ok(Box::new(Excite(config.chosen_excitation().build()))),
+        Ok(match self.kind {
+            RunKind::Chirp => Box::new(Excite(config.chosen_excitation().build())),
+            RunKind::Control => Box::new(self.control_program()?),
             RunKind::Calibrate => {
-                return Ok(Box::new(Excite(Staircase::new(
-                    &config.calibrate.steps(),
-                    period_s,
-                ))));
+                Box::new(Excite(Staircase::new(&config.calibrate.steps(), period_s)))
             }
             RunKind::Quiet => {
                 let (settle_s, average_s) = (config.campaign.settle_s, config.campaign.average_s);
-                let zero = ZeroCurrent::new(settle_s, average_s, period_s);
-                return Ok(Box::new(Excite(zero)));
+                Box::new(Excite(ZeroCurrent::new(settle_s, average_s, period_s)))
             }
-            RunKind::Control => {}
-        }
-        let text = self
-            .controller
-            .as_ref()
-            .ok_or(PlanError::Missing("controller"))?;
-        let law = text.design(config.servo.rate_hz)?.law(period_s);
-        let design = config.control.reference.design();
+        })
+    }
+
+    fn control_program(&self) -> Result<Control, PlanError> {
+        let (control, servo) = (&self.config.control, &self.config.servo);
+        let controller = self.controller.as_ref();
+        let controller = controller.ok_or(PlanError::Missing("controller"))?;
+        let law = controller.design(servo.rate_hz)?.law(servo.period_s());
+        let design = control.reference.design();
         let context = ReferenceContext {
-            chirp: &config.chirp,
-            period_s,
+            chirp: &self.config.chirp,
+            period_s: servo.period_s(),
             file: self.reference.as_deref(),
         };
         let reference = design.build(&context)?;
-        let settle = context.ticks(config.control.settle_s);
+        let settle = context.ticks(control.settle_s);
         let closed = design.closed_ticks(&context);
-        let closed = closed.unwrap_or_else(|| context.ticks(config.control.duration_s));
-        Ok(Box::new(Control::new(law, reference, settle, closed)))
+        let closed = closed.unwrap_or_else(|| context.ticks(control.duration_s));
+        Ok(Control::new(law, reference, settle, closed))
     }
 
     /// The effective configuration as TOML.
@@ -199,29 +186,33 @@ impl Plan {
         toml::to_string(&self.config).map_err(|e| PlanError::Text(e.to_string()))
     }
 
-    /// Texts that the configuration names, for the recording.
+    /// The files that the configuration names, as name, media type and text.
     pub fn attachments(&self) -> Vec<(&'static str, &'static str, &str)> {
-        let controller = self
-            .controller
-            .as_ref()
-            .map(|c| (CONTROLLER, "application/toml", c.text.as_str()));
-        let reference = self
-            .reference
-            .as_ref()
-            .map(|text| (REFERENCE, "text/csv", text.as_str()));
-        let calibration = self
-            .calibration
-            .as_ref()
-            .map(|text| (CALIBRATION, "application/toml", text.as_str()));
-        controller
-            .into_iter()
-            .chain(reference)
-            .chain(calibration)
-            .collect()
+        let controller = self.controller.as_ref().map(|found| found.text.as_str());
+        let attachments = [
+            (CONTROLLER, "application/toml", controller),
+            (REFERENCE, "text/csv", self.reference.as_deref()),
+            (CALIBRATION, "application/toml", self.calibration.as_deref()),
+        ];
+        let present = attachments.into_iter();
+        let present = present.filter_map(|(name, media, text)| Some((name, media, text?)));
+        present.collect()
     }
 }
 
-/// The name of a controller or of its file, without what does not belong into a file name.
+fn kind(recording: &Recording) -> Result<RunKind, PlanError> {
+    let name = recording.metadata().get(KIND);
+    let mut kind = RunKind::ALL.into_iter();
+    let kind = kind.find(|kind| name.is_some_and(|name| name == kind.name()));
+    kind.ok_or(PlanError::Missing("kind of run"))
+}
+
+fn attached_text(recording: &Recording, name: &str) -> Option<String> {
+    let attachment = recording.attachment(name)?;
+    Some(String::from_utf8_lossy(&attachment.data).into_owned())
+}
+
+/// The name of a controller or of its file, without characters that are unusual in file names.
 fn file_stem(name: &str) -> String {
     let stem = Path::new(name).file_stem().unwrap_or_default();
     let is_plain = |c: &char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');

@@ -5,7 +5,7 @@ use crate::control::ControllerError;
 use crate::excitation::{ExcitationError, ReferenceError};
 use crate::model::plant::PlantError;
 
-/// A run that cannot be made.
+/// A run that cannot be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// The configuration is refused.
@@ -20,18 +20,18 @@ pub enum PlanError {
     /// The model that a swept reference is planned from cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// A swept reference that the interlocks would trip.
+    /// A swept reference that would trip an interlock by the model.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
-    /// A swept reference for a loop that runs away by the model.
+    /// A swept reference for a loop that is unstable by the model.
     #[error(
-        "by the model this loop is unstable: a swept reference would run away until an interlock trips; `bench margins` shows the loop; choose a controller, an operating point or an asymmetry with which it is stable"
+        "by the model this loop is unstable: with a swept reference the stage would run away until an interlock trips; `bench margins` shows the loop; choose a controller, an operating point or an asymmetry with which it is stable"
     )]
     Unstable,
-    /// A recording without what a plan needs.
-    #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
+    /// The recording lacks a part of the plan.
+    #[error("the recording has no {0}: it was not made by a run of bench")]
     Missing(&'static str),
-    /// A configuration that cannot be written down.
+    /// The configuration cannot be written as TOML.
     #[error("the configuration cannot be written as TOML: {0}")]
     Text(String),
 }

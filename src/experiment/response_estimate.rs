@@ -1,12 +1,13 @@
-//! The responses that a recording contains, before modes are fitted.
+//! The responses in a recording, before modes are fitted.
 
 use nalgebra::Complex;
 
 use crate::control::Margins;
+use crate::identify::linearity::Linearity;
 use crate::identify::modal::Estimate;
 use crate::identify::{Frf, FrfDatum};
 
-/// The loop as measured, and by the model at the same frequencies.
+/// The measured responses of a closed loop, and those of the model at the same frequencies.
 #[derive(Clone, Debug)]
 pub struct ClosedResponses {
     /// T, from reference to reading.
@@ -15,30 +16,31 @@ pub struct ClosedResponses {
     pub sensitivity: Frf,
     /// L = P C, from error to reading.
     pub loop_gain: Frf,
-    /// L by the model, at the frequencies of `loop_gain`.
+    /// L of the model, at the frequencies of `loop_gain`.
     pub model_loop: Vec<Complex<f64>>,
-    /// Margins of the model's loop.
+    /// Margins by the model.
     pub predicted: Margins,
-    /// Those of the measured one.
+    /// Measured margins.
     pub margins: MeasuredMargins,
 }
 
-/// Margins of the measured loop, within the band that was swept.
+/// Margins of the measured loop, within the swept band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasuredMargins {
-    /// Lowest frequency in rad/s at which |L| falls through 1.
+    /// Lowest frequency in rad/s at which |L| falls below 1.
     pub crossover_rad_s: Option<f64>,
-    /// 180 degrees + arg L there.
+    /// 180 degrees + arg L at the crossover.
     pub phase_margin_deg: Option<Estimate>,
     /// 1/max|S|.
     pub modulus_margin: Estimate,
-    /// Where |S| is largest, in rad/s.
+    /// Frequency of the largest |S|, in rad/s.
     pub sensitivity_peak_rad_s: f64,
 }
 
-/// A response in both its forms.
+/// A response: for display, and as data for the fit.
 pub(super) struct ResponseEstimate {
     pub(super) frf: Frf,
     pub(super) frf_data: Vec<FrfDatum>,
     pub(super) closed: Option<ClosedResponses>,
+    pub(super) linearity: Option<Linearity>,
 }

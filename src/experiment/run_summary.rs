@@ -1,4 +1,4 @@
-//! How a run ended, as every command reports it and as its recording contains it.
+//! The summary of a run, in the output of every command and in the recording.
 
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ pub struct RunSummary {
     pub lost_records: u64,
     /// Path of the recording.
     pub recording: String,
-    /// Equal for two runs whose loops received and did the same, bit for bit.
+    /// Equal for two runs whose loops had the same input and output, bit for bit.
     pub loop_digest: String,
     /// Pace, scheduling and timing of the loop.
     pub timing: TimingSummary,
@@ -50,9 +50,9 @@ pub struct TimingSummary {
     /// How its thread was scheduled.
     #[serde(flatten)]
     pub scheduling: Scheduling,
-    /// Woke - due.
+    /// Time at which the loop woke up minus time at which the tick was due.
     pub lateness_ns: Quantiles,
-    /// Done - woke.
+    /// Time from waking up to the written command.
     pub compute_ns: Quantiles,
 }
 
@@ -82,7 +82,7 @@ impl RunSummary {
             trip: TripSummary::of(ending),
             ticks: totals.ticks,
             overruns: totals.overruns,
-            // A loss at the very end leaves no gap; only the loop's own count contains it.
+            // Records lost at the very end leave no gap in the file; only the loop counts them.
             lost_records: totals.lost_records.max(run.ended.lost_records),
             recording: run.path.display().to_string(),
             loop_digest: format!("{:016x}", totals.loop_digest),
@@ -95,7 +95,7 @@ impl RunSummary {
         })
     }
 
-    /// Whether the run came to its end.
+    /// Whether the run was completed.
     pub fn is_completed(&self) -> bool {
         self.outcome == Ending::Completed
     }

@@ -15,16 +15,16 @@ use crate::rig::devices::{self, OpenRig};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
 
-/// On which rig a plan runs, at which pace, and where it is recorded.
+/// The rig on which a plan runs, its pace, and the folder for its recording.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Pace of the loop.
     pub pace: Pace,
     /// Whether the simulated stage replaces the configured devices.
     pub simulate: bool,
-    /// Whether a fault that the amplifier has stored is cleared first. The operator confirms that its cause is removed.
+    /// Whether a stored fault of the amplifier is cleared first. The operator confirms that its cause was removed.
     pub clear_fault: bool,
-    /// Folder of the recordings.
+    /// Folder for the recordings.
     pub folder: PathBuf,
 }
 
@@ -66,16 +66,16 @@ impl Setup {
     }
 }
 
-/// Runs plans one after another.
+/// Runs plans.
 pub struct Runner {
-    /// On which rig, and where to.
+    /// Rig, pace and folder.
     pub setup: Setup,
     /// Receives the progress of each run.
     pub progress: Progress,
 }
 
 impl Runner {
-    /// A runner without anyone who follows its progress.
+    /// A runner whose progress is not shown.
     pub fn new(setup: Setup) -> Runner {
         Runner {
             setup,
@@ -104,7 +104,7 @@ impl Runner {
     }
 }
 
-/// The rig corrected by `given` or by the configured calibration, and the plan with devices and calibration stated.
+/// The rig, corrected by the given or the configured calibration, and the plan with devices and calibration added.
 fn calibrated(
     plan: &Plan,
     opened: OpenRig,

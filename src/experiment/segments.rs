@@ -1,11 +1,11 @@
-//! The response of a run by how its excitation repeats.
+//! The parts of a run from which its response is estimated. They depend on how the excitation repeats.
 //!
-//! | excitation | what is estimated |
+//! | excitation | estimate |
 //! |---|---|
-//! | from rest to rest, once | the whole record, as configured |
-//! | from rest to rest, repeated | the mean of the repetitions, tick by tick, as one record: the same signal with less noise |
-//! | periodic | each line from the periods after the settled ones, the noise from their scatter, and, where lines were left out, odd distortion as a noise of its own |
-//! | one sine after the other | each sine from its frf_data, likewise |
+//! | from rest to rest, once | from the whole record, with the configured estimator |
+//! | from rest to rest, repeated | the same, from the mean of the repetitions, which has less noise |
+//! | periodic | each line from the periods after those for settling, and the noise from their scatter; if lines are omitted, odd distortion is added to the noise |
+//! | stepped sine | each sine from its own periods, and the noise from their scatter |
 
 use crate::excitation::{Pattern, Window};
 use crate::identify::harmonics::harmonics;
@@ -13,18 +13,18 @@ use crate::identify::linearity::Linearity;
 use crate::identify::periodic::{self, Periods, Repetition};
 use crate::identify::{Frf, FrfDatum, IdentifyError, Signals, repeated};
 
-/// Lines to either side over which the noise is averaged for a fit.
+/// Number of lines on either side over which the noise is averaged for a fit.
 const NEIGHBOURS: usize = 4;
 
-/// What the lines of a run show, or the record to be estimated as a whole.
+/// A record to be estimated as a whole, or the estimate from the lines of a run.
 pub(super) enum Segments {
     /// A record from rest to rest.
     Record(Signals),
-    /// A response at single frequencies; how linear it is, where lines between were left out.
+    /// A response at single frequencies, and its linearity if lines are omitted between them.
     Lines(Frf, Vec<FrfDatum>, Option<Box<Linearity>>),
 }
 
-/// Takes a run apart.
+/// Divides a run by the pattern of its excitation.
 pub(super) fn segments(
     signals: Signals,
     pattern: &Pattern,
@@ -46,41 +46,42 @@ pub(super) fn segments(
                 period: *period,
                 skip: *skip,
             };
-            let Periods { frf, frf_data, .. } = periodic::estimate(&whole, band_hz, repetition)?;
-            let linearity = harmonics(&whole, band_hz, repetition)?
-                .map(|lines| Box::new(Linearity::new(lines)));
-            let frf_data = linearity
-                .as_ref()
-                .map_or_else(|| frf_data.clone(), |l| l.with_odd_distortion(&frf_data));
-            Ok(Segments::Lines(
-                frf,
-                with_noise_of_neighbours(&frf_data),
-                linearity,
-            ))
+            periodic_lines(&whole, band_hz, repetition)
         }
         Pattern::Stepped(windows) => stepped(&signals, windows, band_hz),
     }
 }
 
-/// The frf_data with the mean variance of the lines around each: the noise of a line alone, by the scatter of a few periods, comes
-/// out far too small now and then, and a fit would take such a line for a mode.
-fn with_noise_of_neighbours(frf_data: &[FrfDatum]) -> Vec<FrfDatum> {
-    let around = |k: usize| {
-        let near =
-            &frf_data[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(frf_data.len())];
-        near.iter().map(|block| block.variance).sum::<f64>() / near.len() as f64
+fn periodic_lines(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    repetition: Repetition,
+) -> Result<Segments, IdentifyError> {
+    let Periods { frf, frf_data, .. } = periodic::estimate(signals, band_hz, repetition)?;
+    let Some(lines) = harmonics(signals, band_hz, repetition)? else {
+        return Ok(Segments::Lines(frf, with_mean_variance(&frf_data), None));
     };
-    frf_data
-        .iter()
-        .enumerate()
-        .map(|(k, block)| FrfDatum {
-            variance: around(k),
-            ..*block
-        })
-        .collect()
+    let linearity = Linearity::new(lines);
+    let data = with_mean_variance(&linearity.with_odd_distortion(&frf_data));
+    Ok(Segments::Lines(frf, data, Some(Box::new(linearity))))
 }
 
-/// The samples of a signal from `start` on, as far as there are.
+/// The data with the mean variance of neighbouring lines. The scatter of a few periods alone is occasionally far too small,
+/// and a fit would then take such a line for a mode.
+fn with_mean_variance(data: &[FrfDatum]) -> Vec<FrfDatum> {
+    let with_mean = |k: usize| FrfDatum {
+        variance: mean_variance(data, k),
+        ..data[k]
+    };
+    (0..data.len()).map(with_mean).collect()
+}
+
+fn mean_variance(data: &[FrfDatum], k: usize) -> f64 {
+    let near = &data[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(data.len())];
+    near.iter().map(|datum| datum.variance).sum::<f64>() / near.len() as f64
+}
+
+/// Up to `length` samples of a signal from `start` on.
 fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     let of = |samples: &[f64]| samples.iter().skip(start).take(length).copied().collect();
     Signals {
@@ -90,43 +91,41 @@ fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     }
 }
 
-/// Each sine by its frf_data; the frequencies rise, whichever way the sines went.
+/// Estimates each sine from its periods.
 fn stepped(
     signals: &Signals,
     windows: &[Window],
     (low_hz, high_hz): (f64, f64),
 ) -> Result<Segments, IdentifyError> {
-    let (mut frf, mut frf_data) = (Frf::default(), Vec::new());
-    let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
-    // A run that was stopped has those that it came to.
-    let whole = |window: &&Window| window.start + window.period * window.periods <= signals.len();
-    let mut rising: Vec<&Window> = windows.iter().filter(whole).collect();
-    rising.sort_by(|a, b| hz(a).total_cmp(&hz(b)));
-    // Frequencies that fit whole ticks may fall together.
-    rising.dedup_by(|a, b| hz(a) <= hz(b));
-    for window in rising {
-        match sine(signals, window, hz(window)) {
-            Ok(Periods {
-                frf: one,
-                frf_data: of_one,
-                ..
-            }) => {
-                append(&mut frf, one);
-                frf_data.extend(of_one);
+    let (mut frf, mut data) = (Frf::default(), Vec::new());
+    for (hz, window) in rising_windows(signals, windows) {
+        match sine(signals, window, hz) {
+            Ok(periods) => {
+                append(&mut frf, periods.frf);
+                data.extend(periods.frf_data);
             }
-            // A sine that did not come through is no reason to lose the others.
+            // The other sines are still usable.
             Err(IdentifyError::NotExcited { .. }) => {}
             Err(error) => return Err(error),
         }
     }
-    if frf_data.is_empty() {
-        return Err(IdentifyError::NotExcited { low_hz, high_hz });
+    match data.is_empty() {
+        true => Err(IdentifyError::NotExcited { low_hz, high_hz }),
+        false => Ok(Segments::Lines(frf, with_mean_variance(&data), None)),
     }
-    Ok(Segments::Lines(
-        frf,
-        with_noise_of_neighbours(&frf_data),
-        None,
-    ))
+}
+
+/// The complete windows with their frequencies, rising; an upward and a downward sweep give the same order.
+fn rising_windows<'a>(signals: &Signals, windows: &'a [Window]) -> Vec<(f64, &'a Window)> {
+    // The last window of a run that was stopped is not complete.
+    let end = |window: &Window| window.start + window.period * window.periods;
+    let complete = windows.iter().filter(|w| end(w) <= signals.len());
+    let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
+    let mut rising: Vec<(f64, &Window)> = complete.map(|window| (hz(window), window)).collect();
+    rising.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Different sines may have the same frequency once their periods are whole ticks.
+    rising.dedup_by(|a, b| a.0 <= b.0);
+    rising
 }
 
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {

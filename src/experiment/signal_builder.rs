@@ -1,4 +1,4 @@
-//! The ticks of a recorded run as signals on the loop's regular times.
+//! The ticks of a recorded run as signals at regular times.
 
 use super::analysis_error::AnalysisError;
 use crate::identify::joint::LoopSignals;
@@ -8,35 +8,35 @@ use crate::recording::Recording;
 use crate::rt::record::TickRecord;
 use crate::util::running_stats::RunningStats;
 
-/// Ticks that may be filled in, as a ratio of all: each adds an error of its own.
+/// Largest ratio of interpolated ticks: each of them adds an error.
 const FILLED_RATIO: f64 = 1e-3;
 
-/// Times that differ by less than this part of a period are the same.
+/// Times that differ by less than this ratio of a period are treated as equal.
 const SAME: f64 = 1e-3;
 
-/// A run on regular times.
+/// The signals of a run at regular times.
 pub(super) struct RunSignals {
     /// Reference, command and position.
     pub(super) loop_signals: LoopSignals,
-    /// Ticks that were filled in.
+    /// Number of interpolated ticks.
     pub(super) filled_ticks: u64,
 }
 
-/// Command and position of every tick of a run as they come, missing ones filled in.
+/// Collects reference, command and position of every tick of a run, and interpolates missing ticks.
 pub(super) struct SignalBuilder {
     input_a: Vec<f64>,
     output_m: Vec<f64>,
     reference_m: Vec<f64>,
-    /// Periods from each tick to its command.
+    /// Time from each tick to its command, in periods; NaN if it is not known.
     late: Vec<f64>,
     readings: Readings,
-    /// Mean, and extremes, of the time in seconds from a tick to the measurement it had: minus the age.
+    /// Mean and range of the time in seconds from a tick to the measurement of its reading, which is minus the age.
     offset_s: RunningStats,
     offset_range_s: (f64, f64),
     before: Option<TickRecord>,
     first_s: f64,
     rate_hz: f64,
-    /// Devices answer when they are asked; the simulated stage answers at the tick itself, however late it was served.
+    /// Devices answer when they are read; the simulated stage answers at the scheduled time, even if the tick was late.
     on_devices: bool,
     filled: u64,
     allowed: u64,
@@ -52,7 +52,7 @@ impl SignalBuilder {
         SignalBuilder::of(recording.tick_count(), rate_hz, on_devices)
     }
 
-    /// Of a recording of so many ticks.
+    /// For a recording of this number of ticks.
     fn of(ticks: u64, rate_hz: f64, on_devices: bool) -> Self {
         SignalBuilder {
             input_a: Vec::new(),
@@ -77,7 +77,7 @@ impl SignalBuilder {
             None => self.first_s = seconds(record.scheduled_ns),
             Some(before) => self.fill(&before, record)?,
         }
-        self.take_times(record);
+        self.push_times(record);
         self.input_a.push(record.command_a);
         self.output_m.push(record.position_m);
         self.reference_m.push(record.reference_m);
@@ -85,35 +85,36 @@ impl SignalBuilder {
         Ok(())
     }
 
-    /// The true times of command and reading. Within a tick longer than a period an amplifier was enabled, and the schedule
-    /// began anew after it, as if it had been on time; what its reading's age is counted from is not recorded.
-    fn take_times(&mut self, record: &TickRecord) {
+    /// Adds the true times of command and reading. They are not known in a tick that is longer than a period: the amplifier was
+    /// enabled in it, the schedule began anew after it, and the age of its reading refers to an unknown time.
+    fn push_times(&mut self, record: &TickRecord) {
         let scheduled_s = seconds(record.scheduled_ns);
-        if self.on_devices
-            && seconds(record.done_ns.saturating_sub(record.woke_ns)) * self.rate_hz > 1.0
-        {
+        let duration_s = seconds(record.done_ns.saturating_sub(record.woke_ns));
+        if self.on_devices && duration_s * self.rate_hz > 1.0 {
             self.late.push(f64::NAN);
             return;
         }
-        let late = (seconds(record.done_ns) - scheduled_s) * self.rate_hz;
-        self.late.push(if self.on_devices { late } else { 0.0 });
-        let asked_s = if self.on_devices {
-            seconds(record.woke_ns)
-        } else {
-            scheduled_s
+        let (read_s, late) = match self.on_devices {
+            true => {
+                let late = (seconds(record.done_ns) - scheduled_s) * self.rate_hz;
+                (seconds(record.woke_ns), late)
+            }
+            false => (scheduled_s, 0.0),
         };
-        let measured_s = asked_s - seconds(record.probe_age_ns);
-        let offset_s = measured_s - scheduled_s;
+        self.late.push(late);
+        let measured_s = read_s - seconds(record.probe_age_ns);
         self.readings.push(measured_s, record.position_m);
-        self.offset_s.push(offset_s);
-        self.offset_range_s = (
-            self.offset_range_s.0.min(offset_s),
-            self.offset_range_s.1.max(offset_s),
-        );
+        self.push_offset(measured_s - scheduled_s);
     }
 
-    /// Fills the gap between two records, unless all gaps so far are too long: the current held, the position on a straight
-    /// line.
+    fn push_offset(&mut self, offset_s: f64) {
+        let (low_s, high_s) = self.offset_range_s;
+        self.offset_s.push(offset_s);
+        self.offset_range_s = (low_s.min(offset_s), high_s.max(offset_s));
+    }
+
+    /// Interpolates the ticks between two records: current by zero-order hold, position and reference linearly. Fails if too
+    /// many ticks are missing so far.
     fn fill(&mut self, before: &TickRecord, after: &TickRecord) -> Result<(), AnalysisError> {
         let missing = after.tick.saturating_sub(before.tick).saturating_sub(1);
         let all = self.filled.saturating_add(missing);
@@ -127,56 +128,53 @@ impl SignalBuilder {
         for step in 1..=missing {
             let share = step as f64 / (missing + 1) as f64;
             let between = |from: f64, to: f64| from + share * (to - from);
+            let position_m = between(before.position_m, after.position_m);
+            let reference_m = between(before.reference_m, after.reference_m);
             self.input_a.push(before.command_a);
             self.late.push(f64::NAN);
-            self.output_m
-                .push(between(before.position_m, after.position_m));
-            self.reference_m
-                .push(between(before.reference_m, after.reference_m));
+            self.output_m.push(position_m);
+            self.reference_m.push(reference_m);
         }
         self.filled += missing;
         Ok(())
     }
 
-    /// Where times differ from tick to tick, the currents as of the median time, the positions as of the mean age.
+    /// The signals. If the times differ from tick to tick, currents are shifted to the median time and positions to the mean
+    /// age.
     pub(super) fn finish(self) -> Result<RunSignals, AnalysisError> {
         if self.input_a.is_empty() {
             return Err(AnalysisError::NothingRan);
         }
-        let (rate_hz, filled_ticks) = (self.rate_hz, self.filled);
-        let aligned = self.positions();
-        let output_m = if aligned.len() == self.output_m.len() {
-            aligned
-        } else {
-            self.output_m
-        };
+        let aligned_m = self.aligned_positions();
         let signals = Signals {
-            rate_hz,
-            input_a: currents(self.input_a, self.late),
-            output_m,
+            rate_hz: self.rate_hz,
+            input_a: aligned_currents(self.input_a, self.late),
+            output_m: aligned_m.unwrap_or(self.output_m),
         };
         Ok(RunSignals {
             loop_signals: LoopSignals {
                 signals,
                 reference_m: self.reference_m,
             },
-            filled_ticks,
+            filled_ticks: self.filled,
         })
     }
 
-    /// The positions at the mean age, where ages differ; else none.
-    fn positions(&self) -> Vec<f64> {
-        if (self.offset_range_s.1 - self.offset_range_s.0) * self.rate_hz <= SAME {
-            return Vec::new();
+    /// The positions at the mean age; `None` if all ages are equal.
+    fn aligned_positions(&self) -> Option<Vec<f64>> {
+        let (low_s, high_s) = self.offset_range_s;
+        if (high_s - low_s) * self.rate_hz <= SAME {
+            return None;
         }
         let start_s = self.first_s + self.offset_s.mean;
-        self.readings
-            .at_regular_times(start_s, 1.0 / self.rate_hz, self.output_m.len())
+        let (period_s, count) = (1.0 / self.rate_hz, self.output_m.len());
+        let aligned = self.readings.at_regular_times(start_s, period_s, count);
+        Some(aligned).filter(|aligned| aligned.len() == count)
     }
 }
 
-/// The currents as of the median time; those whose own is not known (`NAN`) came then.
-fn currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
+/// The currents at the median time. A current whose time is not known (NaN) is treated as if it came then.
+fn aligned_currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
     let mut known: Vec<f64> = late.iter().copied().filter(|late| !late.is_nan()).collect();
     known.sort_by(f64::total_cmp);
     let (Some(first), Some(last)) = (known.first(), known.last()) else {
@@ -186,10 +184,8 @@ fn currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
         return input_a;
     }
     let median = known[known.len() / 2];
-    let later: Vec<f64> = late
-        .into_iter()
-        .map(|late| if late.is_nan() { 0.0 } else { late - median })
-        .collect();
+    let later = late.into_iter().map(|late| late - median);
+    let later: Vec<f64> = later.map(|x| if x.is_nan() { 0.0 } else { x }).collect();
     setpoint_timing::at_regular_times(&input_a, &later)
 }
 

@@ -2,17 +2,20 @@
 
 use serde::Serialize;
 
-use crate::config::Config;
+use crate::config::{ControlSettings, LoopSettings};
 use crate::control::{StepMeter, StepMetrics};
 use crate::recording::{Recording, RecordingError};
-use crate::rt::record::flag;
+use crate::rt::record::{TickRecord, flag};
 use crate::util::running_stats::RunningStats;
 
-/// What the recording of a closed loop shows.
+/// Ratio of the height of a step; the settling band.
+const SETTLING_BAND: f64 = 0.02;
+
+/// How well a closed loop followed its reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TrackingMetrics {
-    /// Settling and overshoot, where the reference is a step; a settling band (2 % of the step) below three sigma of the
-    /// steady state is lost in it, and there is no settling time.
+    /// Settling and overshoot, if the reference is a step. There is no settling time if the settling band (2 % of the step)
+    /// is below three sigma of the steady state.
     #[serde(flatten)]
     pub step: Option<StepMetrics>,
     /// Mean of r - y in metres over the steady state.
@@ -21,51 +24,84 @@ pub struct TrackingMetrics {
     pub steady_state_sigma_m: f64,
 }
 
-/// Measures a run; `None` if it ended before its steady state. One pass in little memory: a run may last for days.
+/// The metrics of a run; `None` if it ended before its steady state. One pass with constant memory: a run may last for days.
 pub fn tracking_metrics(
     recording: &Recording,
-    config: &Config,
+    control: &ControlSettings,
+    servo: &LoopSettings,
 ) -> Result<Option<TrackingMetrics>, RecordingError> {
-    let tick = |seconds: f64| (seconds * config.servo.rate_hz).round() as u64;
-    let reference = config.control.reference.design();
-    let change = tick(reference.last_change_s());
-    let height_m = reference.step().map_or(0.0, |step| step.height_m);
-    let steady = change.saturating_add(tick(config.control.steady_after_s));
-    let (mut step, mut error, mut origin_m, mut active) =
-        (StepMeter::new(height_m), RunningStats::default(), 0.0, 0);
+    let mut meter = TrackingMeter::new(control, servo.rate_hz);
     for record in recording.ticks()? {
-        let record = record?;
-        if record.flags & flag::ACTIVE == 0 {
-            // Where the stage rests is known best in the last tick before the loop closes; a step may come with the first.
-            origin_m = if active == 0 {
-                record.reference_m
-            } else {
-                origin_m
-            };
-            continue;
-        }
-        if active >= change {
-            step.push(record.position_m - origin_m);
-        }
-        if active >= steady {
-            error.push(record.reference_m - record.position_m);
-        }
-        active += 1;
+        meter.push(&record?);
     }
-    let Some(sigma) = error.sigma() else {
-        return Ok(None);
-    };
-    let step = (height_m != 0.0).then(|| {
-        let figures = step.figures(config.servo.period_s());
-        let seen = 0.02 * height_m.abs() > 3.0 * sigma;
+    Ok(meter.metrics(servo.period_s()))
+}
+
+/// Sums over the ticks of a run. Times are in ticks since the loop closed.
+struct TrackingMeter {
+    /// The last change of the reference.
+    last_change: u64,
+    /// Begin of the steady state.
+    steady: u64,
+    /// Ticks with the loop closed.
+    active: u64,
+    origin_m: f64,
+    height_m: f64,
+    step: StepMeter,
+    error: RunningStats,
+}
+
+impl TrackingMeter {
+    fn new(control: &ControlSettings, rate_hz: f64) -> TrackingMeter {
+        let ticks = |seconds: f64| (seconds * rate_hz).round() as u64;
+        let reference = control.reference.design();
+        let last_change = ticks(reference.last_change_s());
+        let height_m = reference.step().map_or(0.0, |step| step.height_m);
+        TrackingMeter {
+            last_change,
+            steady: last_change.saturating_add(ticks(control.steady_after_s)),
+            active: 0,
+            origin_m: 0.0,
+            height_m,
+            step: StepMeter::new(height_m),
+            error: RunningStats::default(),
+        }
+    }
+
+    fn push(&mut self, record: &TickRecord) {
+        if record.flags & flag::ACTIVE == 0 {
+            // The last tick before the loop closes has the best estimate of the rest position; the first tick after it may
+            // already contain a step.
+            if self.active == 0 {
+                self.origin_m = record.reference_m;
+            }
+            return;
+        }
+        if self.active >= self.last_change {
+            self.step.push(record.position_m - self.origin_m);
+        }
+        if self.active >= self.steady {
+            self.error.push(record.reference_m - record.position_m);
+        }
+        self.active += 1;
+    }
+
+    fn metrics(&self, period_s: f64) -> Option<TrackingMetrics> {
+        let sigma_m = self.error.sigma()?;
+        let step = (self.height_m != 0.0).then(|| self.step_metrics(sigma_m, period_s));
+        Some(TrackingMetrics {
+            step,
+            steady_state_mean_error_m: self.error.mean,
+            steady_state_sigma_m: sigma_m,
+        })
+    }
+
+    fn step_metrics(&self, sigma_m: f64, period_s: f64) -> StepMetrics {
+        let figures = self.step.figures(period_s);
+        let is_band_visible = SETTLING_BAND * self.height_m.abs() > 3.0 * sigma_m;
         StepMetrics {
-            settling_time_s: figures.settling_time_s.filter(|_| seen),
+            settling_time_s: figures.settling_time_s.filter(|_| is_band_visible),
             ..figures
         }
-    });
-    Ok(Some(TrackingMetrics {
-        step,
-        steady_state_mean_error_m: error.mean,
-        steady_state_sigma_m: sigma,
-    }))
+    }
 }

@@ -87,7 +87,7 @@ impl Runs {
     pub(crate) fn closed(&self, config: Config) -> Result<Closed, FigureError> {
         let plan = Plan::control(config.clone()).map_err(experiment::RunError::Plan)?;
         let recording = self.run(&plan, "control")?;
-        let measured = experiment::tracking_metrics(&recording, &config)?;
+        let measured = experiment::tracking_metrics(&recording, &config.control, &config.servo)?;
         let measured = measured
             .ok_or_else(|| FigureError::Run("the run ended before its steady state".into()))?;
         let ticks: Vec<TickRecord> = recording.ticks()?.collect::<Result<_, _>>()?;

@@ -18,7 +18,7 @@ use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 
-/// A calibration and the runs that it was made from.
+/// A calibration and its runs.
 #[derive(Clone, Debug)]
 pub struct CalibrationRun {
     /// The run of the static steps.
@@ -42,29 +42,25 @@ pub fn settings(mut config: Config) -> Config {
     config
 }
 
-/// Refuses steps, or a chirp, that would trip an interlock by the model of the whole rig.
+/// Refuses steps or a chirp that would trip an interlock by the model of the whole rig.
 pub fn check(config: &Config) -> Result<(), ExperimentError> {
     compliance_m_per_a(config)?;
+    check_steps(config)?;
+    predicted_extremes(config).map(drop)
+}
+
+fn check_steps(config: &Config) -> Result<(), ExperimentError> {
     let steps = Staircase::new(&config.calibrate.steps(), config.servo.period_s());
     let extremes = extremes(&steps, config)?;
-    let limit_a = (config.amplifier.current_limit_a).min(config.motor.peak_current_a());
     let amplitude_a = config.calibrate.amplitude_a;
+    let limit_a = (config.amplifier.current_limit_a).min(config.motor.peak_current_a());
     let soft_limit_m = config.interlock.soft_limit_m;
     let continuous_a = config.motor.continuous_current_a();
-    require(
-        amplitude_a,
-        limit_a,
-        "A",
-        "the limit of amplifier and motor",
-    )?;
+    let limit = "the limit of amplifier and motor";
+    require(amplitude_a, limit_a, "A", limit)?;
     require(extremes.travel_m, soft_limit_m, "m", "the soft limit")?;
-    require(
-        extremes.thermal_current_a,
-        continuous_a,
-        "A",
-        "the continuous current",
-    )?;
-    predicted_extremes(config).map(drop)
+    let limit = "the continuous current";
+    require(extremes.thermal_current_a, continuous_a, "A", limit)
 }
 
 fn require(value: f64, limit: f64, unit: &str, what: &str) -> Result<(), ExperimentError> {
@@ -76,7 +72,7 @@ fn require(value: f64, limit: f64, unit: &str, what: &str) -> Result<(), Experim
     Ok(())
 }
 
-/// Makes a calibration: runs the static steps, fits them, and measures the delay by a chirp if `with_delay`.
+/// Makes a calibration: runs the static steps, fits them, and measures the delay with a chirp if `with_delay`.
 pub fn run(
     runner: &Runner,
     config: &Config,
@@ -128,36 +124,45 @@ fn calibration(
 ) -> Result<Calibration, ExperimentError> {
     let model_m_per_a = compliance_m_per_a(config)?;
     let gain = fit.probe_gain(config.calibrate.scale_by, model_m_per_a);
-    let (current_gain, current_offset_a) = fit.current.unwrap_or((1.0, 0.0));
     let device = |key: &str| recording.metadata().get(key).cloned().unwrap_or_default();
     Ok(Calibration {
         made: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         recording: recording.path().display().to_string(),
-        amplifier: AmplifierCalibration {
-            device: device("amplifier"),
-            current_gain,
-            current_offset_a,
-            measures_current: fit.current.is_some(),
-        },
+        amplifier: amplifier_calibration(fit, device("amplifier")),
         probe: ProbeCalibration {
             device: device("probe"),
             gain,
             offset_m: -gain * fit.rest_m,
             noise_rms_m: fit.noise_rms_m,
         },
-        chain: ChainCalibration {
-            compliance_m_per_a: fit.compliance_m_per_a,
-            compliance_sigma_m_per_a: fit.compliance_sigma_m_per_a,
-            model_m_per_a,
-            nonlinearity_ratio: fit.nonlinearity_ratio,
-            hysteresis_ratio: fit.hysteresis_ratio,
-            delay_s: None,
-            delay_sigma_s: None,
-        },
+        chain: chain_calibration(fit, model_m_per_a),
     })
 }
 
-/// Measures the delay by a chirp with `calibration` in use, which gives the chain its sign; returns the recording.
+fn amplifier_calibration(fit: &StaircaseFit, device: String) -> AmplifierCalibration {
+    let (current_gain, current_offset_a) = fit.current.unwrap_or((1.0, 0.0));
+    AmplifierCalibration {
+        device,
+        current_gain,
+        current_offset_a,
+        measures_current: fit.current.is_some(),
+    }
+}
+
+/// The chain, without the delay.
+fn chain_calibration(fit: &StaircaseFit, model_m_per_a: f64) -> ChainCalibration {
+    ChainCalibration {
+        compliance_m_per_a: fit.compliance_m_per_a,
+        compliance_sigma_m_per_a: fit.compliance_sigma_m_per_a,
+        model_m_per_a,
+        nonlinearity_ratio: fit.nonlinearity_ratio,
+        hysteresis_ratio: fit.hysteresis_ratio,
+        delay_s: None,
+        delay_sigma_s: None,
+    }
+}
+
+/// Measures the delay with a chirp and returns its recording. `calibration` is in use, so that the chain has its correct sign.
 fn measure_delay(
     runner: &Runner,
     config: &Config,
@@ -191,9 +196,8 @@ fn compliance_m_per_a(config: &Config) -> Result<f64, ExperimentError> {
         let what = "a static compliance, which `bench calibrate` measures,";
         return Err(PlantError::FreeBody(what).into());
     }
-    let static_m_per_n: f64 = modes
+    let compliances = modes
         .iter()
-        .map(|mode| mode.residue_per_kg() / (mode.omega_rad_s * mode.omega_rad_s))
-        .sum();
-    Ok(static_m_per_n * config.motor.force_constant_n_per_a)
+        .map(|mode| mode.residue_per_kg() / (mode.omega_rad_s * mode.omega_rad_s));
+    Ok(compliances.sum::<f64>() * config.motor.force_constant_n_per_a)
 }

@@ -18,27 +18,27 @@ pub enum StaircaseError {
     Recording(#[from] RecordingError),
     /// A level has no ticks.
     #[error(
-        "level {0} of the staircase has no ticks in the recording: the run did not come to its end"
+        "level {0} of the staircase has no ticks in the recording: the run was not completed; repeat it"
     )]
     Short(usize),
     /// The stage did not move.
     #[error(
-        "the reading moved by {travel_m:.3e} m over the whole staircase, with {noise_m:.3e} m of noise in a level's mean: the stage does not follow the current; check motor, amplifier and probe, or raise calibrate.amplitude_a"
+        "the reading changed by {travel_m:.3e} m over the whole staircase, with a noise of {noise_m:.3e} m in the mean of a level: the stage does not follow the current; check motor, amplifier and probe, or raise calibrate.amplitude_a"
     )]
     NoMotion {
-        /// From the lowest to the highest level.
+        /// Travel from the lowest to the highest level.
         travel_m: f64,
-        /// Standard deviation of a mean.
+        /// Standard deviation of the mean of a level.
         noise_m: f64,
     },
     /// The readings are not on a straight line.
     #[error(
-        "{what} is {found:.4} of the travel, {limit} is allowed ({setting}): friction, a stop, or a probe near the end of its range; look at the recording"
+        "{what} is {found:.4} of the travel, {limit} is allowed ({setting}): friction, a stop, or a probe near the end of its range is likely; examine the recording"
     )]
     NotStraight {
-        /// What is too large.
+        /// The quantity that is too large.
         what: &'static str,
-        /// How large.
+        /// Its value.
         found: f64,
         /// The limit.
         limit: f64,
@@ -50,9 +50,9 @@ pub enum StaircaseError {
 /// The fit of a staircase, in readings and commands as recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaircaseFit {
-    /// Metres of reading per ampere commanded, with its sign.
+    /// Change of the reading in metres per ampere of command, with its sign.
     pub compliance_m_per_a: f64,
-    /// Its standard deviation, from the scatter about the line.
+    /// Its standard deviation, from the scatter around the line.
     pub compliance_sigma_m_per_a: f64,
     /// Reading in metres at zero command, by the line.
     pub rest_m: f64,
@@ -60,13 +60,13 @@ pub struct StaircaseFit {
     pub nonlinearity_ratio: f64,
     /// See [`crate::rig::calibration::ChainCalibration::hysteresis_ratio`].
     pub hysteresis_ratio: f64,
-    /// RMS of the reading about the means of its levels, in metres.
+    /// RMS of the readings around the means of their levels, in metres.
     pub noise_rms_m: f64,
-    /// Measured current per ampere commanded, and at zero command, if the amplifier measures its current.
+    /// Gain and offset of the measured current over the command, if the amplifier measures its current.
     pub current: Option<(f64, f64)>,
 }
 
-/// Fits the recording of a staircase that ran with these settings and period.
+/// Fits the recording of a staircase with these settings and this period.
 pub fn fit(
     recording: &Recording,
     settings: &CalibrateSettings,
@@ -115,13 +115,13 @@ fn require_straight(
     settings: &CalibrateSettings,
 ) -> Result<(), StaircaseError> {
     require_ratio(
-        "the distance between the ways up and down",
+        "the difference between rising and falling current",
         fit.hysteresis_ratio,
         settings.max_hysteresis_ratio,
         "calibrate.max_hysteresis_ratio",
     )?;
     require_ratio(
-        "the distance from a straight line",
+        "the deviation from a straight line",
         fit.nonlinearity_ratio,
         settings.max_nonlinearity_ratio,
         "calibrate.max_nonlinearity_ratio",

@@ -63,9 +63,9 @@ impl From<FileError> for CampaignError {
     fn from(error: FileError) -> Self {
         let remedy = match error.action {
             FileAction::Write => {
-                "the finished points are kept: free space and start it again with the same arguments"
+                "the finished points are stored: free some space and start the campaign again with the same arguments"
             }
-            FileAction::Use => "wait until it ends, or name another folder with --out",
+            FileAction::Use => "wait until that process ends, or name another folder with --out",
             _ => "check that the folder can be read and written, or name another with --out",
         };
         CampaignError::File { error, remedy }

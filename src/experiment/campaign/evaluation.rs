@@ -13,7 +13,7 @@ use crate::identify::verdict::Cnmp;
 use crate::model::plant::PlantError;
 use crate::model::zeros::cnmp_map;
 
-/// Offsets are searched this far on both sides of the grid's asymmetries, and the region of the model as far beyond them.
+/// Offsets are searched this far on both sides of the asymmetries of the grid, and the region of the model equally far.
 const SEARCH_RANGE: f64 = 0.1;
 /// Smallest asymmetry that a stage may have.
 const MIN_ASYMMETRY: f64 = -0.9;
@@ -36,10 +36,10 @@ pub struct ComparedPoint<'a> {
     /// CNMP pairs of the model as configured, without damping.
     #[serde(rename = "model_cnmp_pairs")]
     pub model_pairs: u8,
-    /// The same with damping.
+    /// CNMP pairs of the model with damping.
     #[serde(rename = "model_damped_cnmp_pairs")]
     pub model_pairs_damped: u8,
-    /// Whether the verdict is wrong, by the zeros with damping of the stage that was simulated.
+    /// Whether the verdict disagrees with the zeros with damping of the simulated stage.
     #[serde(skip)]
     pub is_wrong: bool,
 }
@@ -59,7 +59,7 @@ pub struct Evaluation<'a> {
     pub contradicted: usize,
     /// The estimated offset.
     pub offset: Option<Offset>,
-    /// How exactly both can be set.
+    /// How exactly asymmetry and operating point can be set.
     pub tolerances: Tolerances,
     /// The recommended asymmetry.
     pub recommendation: Option<Recommendation>,
@@ -74,33 +74,38 @@ impl<'a> Evaluation<'a> {
         tolerances: Tolerances,
     ) -> Result<Evaluation<'a>, CampaignError> {
         let stage = stage_settings(config)?;
-        let (low, high) = ends(&grid.asymmetries);
-        let searched = [(low - SEARCH_RANGE).max(MIN_ASYMMETRY), high + SEARCH_RANGE];
+        let searched = searched(grid);
         let measured = Region::of(stage, &grid.operating_points, searched)?;
-        let (first, last) = ends(&grid.operating_points);
-        let region = Region::of(stage, &map_rows(first, last, tolerances), searched)?;
+        let region = Region::of(stage, &map_rows(grid, tolerances), searched)?;
         let judgements = judgements(grid, done);
-        let offset = estimate_offset(&measured, &judgements);
-        let interval = offset.as_ref().map_or([0.0, 0.0], |offset| offset.interval);
-        let candidates = mass_steps(low, high, grid.mass_step(stage));
-        let recommendation = recommend(
-            &region,
-            [first, last],
-            &candidates,
-            interval,
-            tolerances,
-            &judgements,
-        );
-        Ok(Evaluation {
+        let mut evaluation = Evaluation {
             stage,
             grid,
             points: compared(stage, config.sim.asymmetry_offset, grid, done, &measured)?,
             region,
             contradicted: disagreeing(&measured, &judgements, 0.0),
-            offset,
+            offset: estimate_offset(&measured, &judgements),
             tolerances,
-            recommendation,
-        })
+            recommendation: None,
+        };
+        evaluation.recommendation = evaluation.recommend(&judgements);
+        Ok(evaluation)
+    }
+
+    /// The best asymmetry in whole mass steps within those of the grid.
+    fn recommend(&self, judgements: &[Judgement]) -> Option<Recommendation> {
+        let (low, high) = ends(&self.grid.asymmetries);
+        let (first, last) = ends(&self.grid.operating_points);
+        let candidates = mass_steps(low, high, self.grid.mass_step(self.stage));
+        let offset = self.offset.as_ref();
+        recommend(
+            &self.region,
+            [first, last],
+            &candidates,
+            offset.map_or([0.0, 0.0], |offset| offset.interval),
+            self.tolerances,
+            judgements,
+        )
     }
 
     /// The number of points with a verdict.
@@ -110,7 +115,7 @@ impl<'a> Evaluation<'a> {
     }
 }
 
-/// The verdict of a point, if it is decided.
+/// The verdict at a point, if it is decided.
 fn judgement(grid: &Grid, point: GridPoint, result: &PointResult) -> Option<Judgement> {
     (result.cnmp != Cnmp::Undecided).then_some(Judgement {
         row: point.row,
@@ -136,15 +141,14 @@ fn compared<'a>(
     let pairs = cnmp_map(stage, &grid.operating_points, &grid.asymmetries, 1)?;
     let compare = |(point, result): &'a (GridPoint, PointResult)| {
         let asymmetry = grid.asymmetries[point.column];
-        let judgement = judgement(grid, *point, result);
-        let wrong = |one| disagreeing(region, &[one], simulated_offset) > 0;
+        let is_wrong = |one| disagreeing(region, &[one], simulated_offset) > 0;
         ComparedPoint {
             operating_point: grid.operating_points[point.row],
             asymmetry,
             result,
             model_pairs: pairs[point.row][point.column],
             model_pairs_damped: u8::from(region.contains(point.row, asymmetry)),
-            is_wrong: judgement.is_some_and(wrong),
+            is_wrong: judgement(grid, *point, result).is_some_and(is_wrong),
         }
     };
     Ok(done.iter().map(compare).collect())
@@ -158,8 +162,15 @@ fn mass_steps(low: f64, high: f64, step: f64) -> Vec<f64> {
     (first..=last).map(|k| k as f64 * step).collect()
 }
 
-/// The operating points of the map: those of the grid, and what is near enough to affect a recommendation.
-fn map_rows(first: f64, last: f64, tolerances: Tolerances) -> Vec<f64> {
+/// The range of asymmetries in which regions are searched.
+fn searched(grid: &Grid) -> [f64; 2] {
+    let (low, high) = ends(&grid.asymmetries);
+    [(low - SEARCH_RANGE).max(MIN_ASYMMETRY), high + SEARCH_RANGE]
+}
+
+/// The operating points of the map: those of the grid, and those near enough to affect a recommendation.
+fn map_rows(grid: &Grid, tolerances: Tolerances) -> Vec<f64> {
+    let (first, last) = ends(&grid.operating_points);
     let margin = MAX_TOLERANCES * tolerances.operating_point;
     let (low, high) = (first - margin, last + margin);
     let row = |k: usize| low + (high - low) * k as f64 / (MAP_ROWS - 1) as f64;

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::error::CampaignError;
 use crate::config::{Config, PlantSettings, Sr4dofSettings, validate};
 
-/// Largest number of points; each takes a chirp of minutes.
+/// Largest number of points; the chirp of each point takes minutes.
 const MAX_POINTS: usize = 10_000;
 /// Masses are added in these steps (section 5.2.1), in kilograms.
 pub(super) const MASS_STEP_KG: f64 = 0.0005;
-/// Number of seeds that a configuration may have.
+/// Number of seeds that a configuration allows.
 const SEEDS: u64 = 1 << 63;
 
 /// Operating points, one row each, by mass asymmetries, one column each.
@@ -102,13 +102,13 @@ impl Grid {
     }
 }
 
-/// The settings of SR4DoF, the one model that has both operating point and mass asymmetry.
+/// The settings of SR4DoF, the only model with operating point and mass asymmetry.
 pub fn stage_settings(config: &Config) -> Result<&Sr4dofSettings, CampaignError> {
     match &config.plant {
         PlantSettings::Sr4dof(settings) => Ok(settings),
         other => Err(CampaignError::Grid(format!(
-            "a campaign is over operating point and mass asymmetry, which the model `{}` does not have both; use a \
-             profile of `sr4dof` (--config stage, --config chapter2)",
+            "a campaign varies operating point and mass asymmetry; the model `{}` does not have both: use a profile with \
+             the model `sr4dof` (--config stage, --config chapter2)",
             other.model()
         ))),
     }

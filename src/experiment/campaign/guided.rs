@@ -62,7 +62,7 @@ pub trait LoadedRig {
     fn keep(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError>;
 }
 
-/// A campaign over a grid on a stage that an operator loads.
+/// A campaign on a stage that an operator loads.
 pub struct GuidedCampaign<'a, O: ?Sized, R> {
     /// Settings of the whole grid.
     pub config: &'a Config,
@@ -84,7 +84,7 @@ enum PointEnd {
     Stopped,
 }
 
-/// What is on the stage, and where it rests unloaded.
+/// The load of the stage, and the rest position of the unloaded stage.
 struct StageState {
     load: Load,
     unloaded: RestPosition,
@@ -102,7 +102,7 @@ struct PointInProgress<'a> {
     failed: Option<PointResult>,
 }
 
-/// What follows from an answer.
+/// The next step after an answer.
 enum NextStep {
     End(PointEnd),
     /// The operator confirmed the failed chirp.
@@ -113,7 +113,7 @@ enum NextStep {
 }
 
 impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
-    /// Visits `points` in their order (see [`super::visit_order()`]). Ends early if the operator stops; kept results remain.
+    /// Visits `points` in this order (see [`super::visit_order()`]). If the operator stops, the results so far are kept.
     pub fn run(&mut self, points: &[GridPoint]) -> Result<(), CampaignError> {
         if points.is_empty() {
             return Ok(());
@@ -211,12 +211,21 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
             visit.question = failed_question(&check, None);
             return Ok(None);
         }
-        let Some(mut result) = self.rig.measure(visit.point)? else {
-            return Ok(Some(PointEnd::Stopped));
-        };
+        match self.rig.measure(visit.point)? {
+            Some(result) => self.check_chirp(visit, check, result),
+            None => Ok(Some(PointEnd::Stopped)),
+        }
+    }
+
+    /// Checks the modes of a chirp. A confirmation before the chirp does not include them.
+    fn check_chirp(
+        &mut self,
+        visit: &mut PointInProgress<'_>,
+        mut check: LoadCheck,
+        mut result: PointResult,
+    ) -> Result<Option<PointEnd>, CampaignError> {
         check.modes = visit.model.check_modes(&visit.load, &result.modes())?;
         visit.question = failed_question(&check, Some(&result));
-        // A confirmation before the chirp does not include the modes.
         let modes = check.modes_finding();
         result.load_check = Some(check);
         if modes == Finding::Fails {
@@ -279,7 +288,7 @@ fn confirmed(mut result: PointResult) -> PointResult {
     result
 }
 
-/// What is wrong, and what can be done. A chirp without modes, as of a run that tripped, states its reason first.
+/// The failed checks and their remedy. For a chirp without modes, for example after a trip, the reason is stated first.
 fn failed_question(check: &LoadCheck, result: Option<&PointResult>) -> Question {
     let without_modes = result.filter(|result| result.modes_hz.is_empty());
     let reason = without_modes.map(|result| format!("the chirp shows no modes: {}", result.why));

@@ -11,11 +11,11 @@ const GRAVITY_M_PER_S2: f64 = 9.80665;
 /// A mass below half of this is treated as zero, in kilograms.
 const NEGLIGIBLE_KG: f64 = 0.0005;
 
-/// What is added to the stage as it was built, in kilograms.
+/// Masses that are added to the stage as it was built, in kilograms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
-    /// Hangs on the virtual pulley (section 5.1.3) and pulls in +Y; negative: in -Y.
+    /// Weight on the virtual pulley (section 5.1.3). A positive one pulls in +Y, a negative one in -Y.
     pub hung_kg: f64,
     /// Added to secondary stage 2.
     pub on_m2_kg: f64,
@@ -28,7 +28,7 @@ pub struct Load {
 pub struct StageModel<'a> {
     /// The stage at its operating point and asymmetry.
     pub stage: &'a Sr4dofSettings,
-    /// How it is loaded and checked.
+    /// How the stage is loaded and checked.
     pub settings: &'a CampaignSettings,
 }
 
@@ -85,7 +85,7 @@ impl<'a> StageModel<'a> {
         }
     }
 
-    /// The same as settings of a plant.
+    /// The model of [`StageModel::loaded`] as settings of a plant.
     pub fn loaded_plant(&self, load: &Load) -> PlantSettings {
         PlantSettings::Sr4dof(self.loaded(load))
     }
@@ -102,7 +102,7 @@ impl Load {
     }
 
     fn weight_instruction(&self, before: &Load) -> String {
-        // Without a weight, the side is that of the weight to remove.
+        // If no weight is needed, the side is that of the weight to remove.
         let is_down = self.hung_kg < 0.0 || self.hung_kg == 0.0 && before.hung_kg < 0.0;
         let name = if is_down {
             "weight in -Y"
@@ -133,7 +133,7 @@ impl Unit {
     }
 }
 
-/// The total amount, and its change.
+/// The total mass and its change.
 fn instruction(name: &str, now_kg: f64, before_kg: f64, unit: Unit) -> String {
     let limit_kg = NEGLIGIBLE_KG / 2.0;
     let total = match now_kg < limit_kg {

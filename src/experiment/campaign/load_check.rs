@@ -1,8 +1,8 @@
 //! Checks the load of the stage by its rest position, by a displacement that the operator measured, and by its modes.
 //!
-//! Limits of the X probe (see [`crate::config::Sr4dofSettings::holding_force_n`]): the rest position in X does not depend on the load in
-//! Y. A change of it therefore reveals a misaligned cable, not a missing weight. The displacement in Y is measured by the
-//! operator with a gauge, or follows from the modes of the chirp: u and v depend on the operating point and on the masses.
+//! Limits of the X probe (see [`crate::config::Sr4dofSettings::holding_force_n`]): the rest position in X does not depend on the
+//! load in Y. A change of it therefore reveals a misaligned cable, not a missing weight. The operator measures the displacement
+//! in Y with a gauge, or it follows from the modes of the chirp: u and v depend on the operating point and on the masses.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,16 +12,16 @@ use super::rest_position::RestPosition;
 use crate::config::{PlantSettings, Sr4dofSettings};
 use crate::model::plant::{self, ModalModel, Mode, Sign};
 
-/// A difference of more standard deviations is not noise: it occurs once in two million.
+/// A difference of more standard deviations is not noise; noise alone exceeds it once in two million cases.
 const SIGMAS: f64 = 5.0;
 /// A mode with this ratio of the largest residue must be visible in the response.
 const VISIBLE_RATIO: f64 = 1e-2;
 /// A mode with less than this ratio of the largest residue is not expected in the response.
 const NEGLIGIBLE_RATIO: f64 = 1e-3;
-/// Unknown asymmetry that a stage may have: the thesis found 2 % (section 5.2.2).
+/// Largest unknown asymmetry of a stage; the thesis found 2 % (section 5.2.2).
 const UNKNOWN_ASYMMETRY: f64 = 0.03;
-/// A mode farther away than this ratio is another mode. No load of the grid shifts one by more than half of it, and R, u and
-/// the first mode that the model leaves out are factors of 2.6 and more apart.
+/// A mode farther away than this ratio is another mode. No load of the grid shifts a mode by more than half of it, and R, u and
+/// the first unmodelled mode are factors of at least 2.6 apart.
 const OTHER_MODE_RATIO: f64 = 0.2;
 
 /// Result of a check.
@@ -54,15 +54,15 @@ pub struct LengthCheck {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModeCheck {
-    /// Its frequency by the model with the load.
+    /// Frequency by the model with the load.
     pub expected_hz: f64,
-    /// Its frequency by the model without a load.
+    /// Frequency by the model without a load.
     pub unloaded_hz: f64,
-    /// The nearest measured mode; none if there is none near.
+    /// Frequency of the nearest measured mode, if one is near.
     pub seen_hz: Option<f64>,
-    /// The sign of its residue; none if an unknown asymmetry may change it, or if the residue is small.
+    /// Expected sign of its residue; `None` if an unknown asymmetry may change it, or if the residue is small.
     pub expected_sign: Option<char>,
-    /// The sign of the measured mode.
+    /// Sign of the residue of the measured mode.
     pub seen_sign: Option<char>,
     /// Result of the check.
     pub finding: Finding,

@@ -69,7 +69,8 @@ fn disagrees(region: &Region, judgement: &Judgement, offset: f64) -> bool {
     region.contains(judgement.row, judgement.asymmetry + offset) != judgement.detected
 }
 
-/// The offset that agrees best with the verdicts. None without a verdict, or if the region was not searched beyond all of them.
+/// The offset that agrees best with the verdicts. `None` if there is no verdict, or if the region was not searched beyond all
+/// of them.
 pub fn estimate_offset(region: &Region, judgements: &[Judgement]) -> Option<Offset> {
     let searched = searched(region, judgements);
     if judgements.is_empty() || searched[0] >= searched[1] {
@@ -79,17 +80,22 @@ pub fn estimate_offset(region: &Region, judgements: &[Judgement]) -> Option<Offs
     let likelihoods = steps.iter().map(|step| step.log_likelihood);
     let highest = likelihoods.fold(f64::NEG_INFINITY, f64::max);
     let best = widest(steps.iter().filter(|step| step.log_likelihood == highest))?;
-    let within = |step: &&LikelihoodStep| 2.0 * (highest - step.log_likelihood) <= CHI2_95;
-    let first = steps.iter().find(within)?;
-    let last = steps.iter().rfind(within)?;
     Some(Offset {
         best: 0.5 * (best.from + best.to),
-        interval: [first.from, last.to],
+        interval: confidence_interval(&steps, highest)?,
         searched,
         decided: judgements.len(),
         contradicted: best.contradicted,
         steps: steps.clone(),
     })
+}
+
+/// From the first to the last step within the 95 % quantile of the `highest` likelihood.
+fn confidence_interval(steps: &[LikelihoodStep], highest: f64) -> Option<[f64; 2]> {
+    let is_within = |step: &&LikelihoodStep| 2.0 * (highest - step.log_likelihood) <= CHI2_95;
+    let first = steps.iter().find(is_within)?;
+    let last = steps.iter().rfind(is_within)?;
+    Some([first.from, last.to])
 }
 
 /// The offsets at which all verdicts are within the region that was searched.
@@ -107,9 +113,8 @@ fn widest<'a>(steps: impl Iterator<Item = &'a LikelihoodStep>) -> Option<&'a Lik
 /// The likelihood between any two offsets at which a verdict begins or ceases to disagree.
 fn steps(region: &Region, judgements: &[Judgement], [low, high]: [f64; 2]) -> Vec<LikelihoodStep> {
     let crossings = crossings(region, judgements, [low, high]);
-    let mut wrong: Vec<bool> = (judgements.iter())
-        .map(|one| disagrees(region, one, low))
-        .collect();
+    let wrong = judgements.iter().map(|one| disagrees(region, one, low));
+    let mut wrong: Vec<bool> = wrong.collect();
     let (mut from, mut steps) = (low, Vec::new());
     let ends = crossings.iter().map(|(at, index)| (*at, Some(*index)));
     for (to, index) in ends.chain([(high, None)]) {

@@ -40,6 +40,7 @@ pub(super) fn measure_in_parallel<E: Send>(
         failed: AtomicBool::new(false),
         stop,
     };
+    let mut outcome = Ok(());
     std::thread::scope(|scope| {
         let (sender, results) = channel();
         for _ in 0..threads.clamp(1, points.len().max(1)) {
@@ -47,15 +48,24 @@ pub(super) fn measure_in_parallel<E: Send>(
             scope.spawn(move || measure_until_empty(queue, measure, &sender));
         }
         drop(sender);
-        let mut outcome = Ok(());
-        // Results that arrive after an error are taken as well: they are measured.
+        // Results that arrive after an error are kept as well.
         for result in results {
-            let taken = result.and_then(|done| done.map_or(Ok(()), |(at, point)| take(at, point)));
+            let taken = take_result(result, &mut take);
             queue.failed.fetch_or(taken.is_err(), Ordering::Relaxed);
-            outcome = outcome.and(taken);
+            outcome = std::mem::replace(&mut outcome, Ok(())).and(taken);
         }
-        outcome
-    })
+    });
+    outcome
+}
+
+fn take_result<E>(
+    result: Measured<E>,
+    take: &mut impl FnMut(GridPoint, PointResult) -> Result<(), E>,
+) -> Result<(), E> {
+    match result? {
+        Some((point, result)) => take(point, result),
+        None => Ok(()),
+    }
 }
 
 fn measure_until_empty<E>(

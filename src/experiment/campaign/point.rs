@@ -17,15 +17,15 @@ use crate::recording::{Recording, RecordingError};
 pub struct PointResult {
     /// Verdict on CNMP zeros.
     pub cnmp: Cnmp,
-    /// Its reasons.
+    /// Reasons of the verdict.
     pub why: String,
     /// Frequencies of the modes in hertz, lowest first.
     pub modes_hz: Vec<f64>,
     /// Signs of their residues.
     pub signs: String,
-    /// The zeros with damping in the band of the verdict, real and imaginary part in rad/s, those above the real axis.
+    /// The zeros with damping in the band of the verdict, as real and imaginary part in rad/s, without those below the real axis.
     pub zeros_rad_s: Vec<[f64; 2]>,
-    /// Equal for two runs whose loops received and did the same, bit for bit.
+    /// Equal for two runs whose loops had the same input and output, bit for bit.
     pub loop_digest: String,
     /// The load that the operator set, and its check; none on the simulated stage.
     #[serde(default, skip_serializing_if = "Option::is_none", alias = "put_on")]

@@ -12,12 +12,14 @@
 //! 0 has CNMP zeros at some operating point and is not recommended. The recommended asymmetry has the largest distance; of equal
 //! ones it is the smallest.
 
+use std::cmp::Ordering;
+
 use serde::Serialize;
 
 use super::offset::Judgement;
 use super::region::Region;
 
-/// How exactly the operator can set both.
+/// How exactly the operator can set asymmetry and operating point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tolerances {
     /// Of the asymmetry, a ratio.
@@ -33,15 +35,15 @@ pub struct Recommendation {
     pub asymmetry: f64,
     /// Distance to the nearest point with CNMP zeros, in tolerances; `null` if there is none in the searched range.
     pub distance_tolerances: Option<f64>,
-    /// That point: operating point (Y1o/L) and intended asymmetry at which the model, with the offset, begins to have them.
+    /// That point: operating point (Y1o/L) and intended asymmetry, at the border of the region of the model with the offset.
     pub nearest: Option<[f64; 2]>,
     /// Whether it is the first or the last candidate: a larger one may be better.
     pub at_the_end: bool,
 }
 
 /// The best of `candidates` (intended asymmetries, rising) for the operating points from `range[0]` to `range[1]` (Y1o/L), with
-/// the interval `offset` of the initial asymmetry. A candidate within a tolerance of a detection is excluded. None if every
-/// candidate has CNMP zeros somewhere in the range.
+/// the interval `offset` of the initial asymmetry. A candidate within a tolerance of a detection is excluded. `None` if every
+/// candidate has CNMP zeros somewhere in the range or is excluded.
 pub fn recommend(
     region: &Region,
     range: [f64; 2],
@@ -51,20 +53,27 @@ pub fn recommend(
     judgements: &[Judgement],
 ) -> Option<Recommendation> {
     let ends = [*candidates.first()?, *candidates.last()?];
-    let is_detected = |asymmetry: f64| {
-        let near = |one: &Judgement| (one.asymmetry - asymmetry).abs() <= tolerances.asymmetry;
-        judgements.iter().any(|one| one.detected && near(one))
-    };
-    let rated = candidates.iter().filter_map(|&asymmetry| {
+    let free = candidates.iter().filter_map(|&asymmetry| {
         let stage = offset.map(|offset| asymmetry + offset);
         let nearest = nearest(region, range, stage, tolerances);
-        let is_free = nearest.is_none_or(|nearest| nearest.distance > 0.0);
-        (is_free && !is_detected(asymmetry)).then(|| recommendation(asymmetry, nearest, ends))
+        let has_zeros = nearest.is_some_and(|nearest| nearest.distance <= 0.0);
+        let is_excluded = has_zeros || is_near_detection(judgements, asymmetry, tolerances);
+        (!is_excluded).then(|| recommendation(asymmetry, nearest, ends))
     });
-    rated.max_by(|a, b| {
-        let by_distance = distance(a).total_cmp(&distance(b));
-        by_distance.then(b.asymmetry.abs().total_cmp(&a.asymmetry.abs()))
-    })
+    free.max_by(compare)
+}
+
+/// Whether CNMP zeros were detected within a tolerance of an asymmetry.
+fn is_near_detection(judgements: &[Judgement], asymmetry: f64, tolerances: Tolerances) -> bool {
+    let mut detections = judgements.iter().filter(|one| one.detected);
+    detections.any(|one| (one.asymmetry - asymmetry).abs() <= tolerances.asymmetry)
+}
+
+/// The better one has the larger distance; of equal distances the smaller asymmetry.
+fn compare(a: &Recommendation, b: &Recommendation) -> Ordering {
+    let distance = |one: &Recommendation| one.distance_tolerances.unwrap_or(f64::INFINITY);
+    let by_distance = distance(a).total_cmp(&distance(b));
+    by_distance.then(b.asymmetry.abs().total_cmp(&a.asymmetry.abs()))
 }
 
 fn recommendation(asymmetry: f64, nearest: Option<Nearest>, ends: [f64; 2]) -> Recommendation {
@@ -77,10 +86,6 @@ fn recommendation(asymmetry: f64, nearest: Option<Nearest>, ends: [f64; 2]) -> R
         }),
         at_the_end: ends.contains(&asymmetry),
     }
-}
-
-fn distance(one: &Recommendation) -> f64 {
-    one.distance_tolerances.unwrap_or(f64::INFINITY)
 }
 
 /// The nearest point of the region.
@@ -100,28 +105,24 @@ fn nearest(
     tolerances: Tolerances,
 ) -> Option<Nearest> {
     let rows = region.operating_points.iter().zip(&region.bands);
-    let all = rows.flat_map(|(&operating_point, bands)| {
-        let away = (range[0] - operating_point)
-            .max(operating_point - range[1])
-            .max(0.0);
+    let points = rows.flat_map(|(&operating_point, bands)| {
+        let outside = (range[0] - operating_point).max(operating_point - range[1]);
+        let away = outside.max(0.0) / tolerances.operating_point;
         bands.iter().map(move |band| {
             let (gap, asymmetry, end) = gap(stage, *band);
-            let (gap, away) = (
-                gap / tolerances.asymmetry,
-                away / tolerances.operating_point,
-            );
             Nearest {
-                distance: libm::hypot(gap, away),
+                distance: libm::hypot(gap / tolerances.asymmetry, away),
                 operating_point,
                 asymmetry,
                 end,
             }
         })
     });
-    all.min_by(|a, b| a.distance.total_cmp(&b.distance))
+    points.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
-/// Distance between two intervals, and the ends that are nearest to each other: of the second one, of the first one.
+/// Distance between two intervals, and the ends that are nearest to each other: that of the second interval, then that of the
+/// first.
 fn gap([low, high]: [f64; 2], [from, to]: [f64; 2]) -> (f64, f64, f64) {
     if high < from {
         (from - high, from, high)

@@ -14,9 +14,9 @@ const BISECTIONS: usize = 20;
 pub struct Region {
     /// Y1o/L, ratios.
     pub operating_points: Vec<f64>,
-    /// For each of them the bands of asymmetries with CNMP zeros: rising, from and to.
+    /// For each operating point the bands of asymmetries with CNMP zeros, rising: begin and end of each band.
     pub bands: Vec<Vec<[f64; 2]>>,
-    /// The range of asymmetries that was searched; a band that ends at its end has no border there.
+    /// The searched range of asymmetries. A band that reaches an end of the range has no border there.
     pub searched: [f64; 2],
 }
 
@@ -60,7 +60,7 @@ fn has_pairs(stage: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<bool,
     Ok(cnmp_pairs(&damped_zeros(&plant)?) > 0)
 }
 
-/// The bands in which `has` holds: by steps, and by bisection of a step in which it changes.
+/// The bands in which `has` holds. They are found by steps, and by bisection of each step in which `has` changes.
 fn bands(
     [low, high]: [f64; 2],
     has: impl Fn(f64) -> Result<bool, PlantError>,
@@ -89,7 +89,7 @@ fn bands(
     Ok(bands)
 }
 
-/// Where `has` becomes `after` between two values.
+/// The value at which `has` changes to `after`.
 fn border(
     [mut low, mut high]: [f64; 2],
     after: bool,

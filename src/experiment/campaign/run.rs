@@ -1,4 +1,4 @@
-//! Runs a campaign: opens its folder, measures the missing points, keeps each result, and evaluates all of them.
+//! Runs a campaign: opens its folder, measures the missing points, stores each result, and evaluates all of them.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -21,10 +21,11 @@ use crate::experiment::prediction::predicted_extremes;
 use crate::experiment::run::Run;
 use crate::experiment::runner::{Runner, Setup, close};
 use crate::recording::Recording;
+use crate::rt::arming::Trip;
 use crate::util::checkpoint::FileAction;
 use crate::util::progress::Progress;
 
-/// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown; the last argument names the phase.
+/// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown. The last argument names the phase.
 pub type RunPlan<'a> = dyn FnMut(Setup, &Plan, &'static str) -> Result<Run, ExperimentError> + 'a;
 
 /// A campaign in progress.
@@ -34,12 +35,13 @@ pub struct Campaign<'a> {
     store: Store,
     keep_recordings: bool,
     done: Vec<(GridPoint, PointResult)>,
-    /// Files of points that do not count, and why.
+    /// Files of points that are ignored, with the reason.
     pub rejected: Vec<String>,
 }
 
 impl<'a> Campaign<'a> {
-    /// Opens the folder of a campaign, or creates it; see [`Store::open`]. `keep_recordings` keeps the recording of each point.
+    /// Opens the folder of a campaign, or creates it; see [`Store::open`]. With `keep_recordings`, the recording of each point is
+    /// not removed after its analysis.
     pub fn open(
         folder: &Path,
         grid: &'a Grid,
@@ -142,7 +144,7 @@ fn measure_point(
 ) -> Result<Option<PointResult>, CampaignError> {
     predicted_extremes(config)?;
     let folder = setup.folder.clone();
-    // A recording without a result, of a process that was killed.
+    // There is a recording without a result if an earlier process was killed.
     remove(&folder)?;
     let plan = Plan::chirp(config.clone());
     let mut run = run(setup, &plan)?;
@@ -167,7 +169,7 @@ fn remove(folder: &Path) -> Result<(), CampaignError> {
     }
 }
 
-/// The configured devices, with the stage that the operator loads.
+/// The configured devices, with a stage that the operator loads.
 struct DeviceRig<'r, 'a, 'f> {
     campaign: &'r mut Campaign<'a>,
     run: &'r mut RunPlan<'f>,
@@ -180,24 +182,15 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         let plan = Plan::quiet(self.campaign.config.clone());
         let run = (self.run)(setup, &plan, "rest")?;
         if let Some((trip, tick)) = run.ended.trip {
-            let remedy = trip.remedy();
-            return Err(ExperimentError::Failed(format!(
-                "the bench tripped at rest, at tick {tick}: {trip}; {remedy}"
-            ))
-            .into());
+            return Err(tripped_at_rest(trip, tick).into());
         }
         if run.stopped {
             return Ok(None);
         }
         let path = run.path.clone();
-        // Every tick is in the file once it is closed.
+        // The file contains every tick once it is closed.
         close(run, &serde_json::json!({ "outcome": Ending::Completed }))?;
-        let name = path.display().to_string();
-        let recording = Recording::open(&path).map_err(|e| CampaignError::RestPosition {
-            recording: name.clone(),
-            why: e.to_string(),
-        })?;
-        RestPosition::of(&recording, &name).map(Some)
+        read_rest_position(&path).map(Some)
     }
 
     fn measure(&mut self, point: GridPoint) -> Result<Option<PointResult>, CampaignError> {
@@ -215,5 +208,23 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         self.campaign.store.add(point, result)?;
         self.campaign.done.push((point, result.clone()));
         Ok(())
+    }
+}
+
+fn tripped_at_rest(trip: Trip, tick: u64) -> ExperimentError {
+    let remedy = trip.remedy();
+    ExperimentError::Failed(format!(
+        "the bench tripped at rest, at tick {tick}: {trip}; {remedy}"
+    ))
+}
+
+fn read_rest_position(path: &Path) -> Result<RestPosition, CampaignError> {
+    let name = path.display().to_string();
+    match Recording::open(path) {
+        Ok(recording) => RestPosition::of(&recording, &name),
+        Err(error) => Err(CampaignError::RestPosition {
+            recording: name,
+            why: error.to_string(),
+        }),
     }
 }

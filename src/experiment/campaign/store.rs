@@ -1,8 +1,8 @@
 //! The folder of a campaign: `campaign.json` with all settings, and one file for each point in `points/`.
 //!
-//! Each file is written completely or not at all. A file of a point that is damaged or belongs to other settings (each file
-//! contains the checksum of its `campaign.json`) does not count: its point is measured again. A process that works on the folder
-//! holds a lock on it, which the operating system releases however the process ends.
+//! Each file is written completely or not at all. The file of a point that is damaged or belongs to other settings (each file
+//! contains the checksum of its `campaign.json`) is ignored: the point is measured again. A process that works on the folder
+//! holds a lock on it. The operating system releases the lock when the process ends, in any way.
 
 use std::fs::File;
 use std::io::ErrorKind;
@@ -26,7 +26,7 @@ const MAX_DIFFERENCES: usize = 12;
 struct Header<'a> {
     format: &'static str,
     version: &'static str,
-    /// Whether devices measured it: results of the simulated stage do not count for the real one.
+    /// Whether it was measured on devices. Results of the simulated stage are not valid for a real stage.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     on_devices: bool,
     #[serde(flatten)]
@@ -61,13 +61,13 @@ pub struct OpenedStore {
     pub store: Store,
     /// The finished points, in the order of the grid.
     pub done: Vec<(GridPoint, PointResult)>,
-    /// Files of points that do not count, and why.
+    /// Files of points that are ignored, with the reason.
     pub rejected: Vec<String>,
 }
 
 impl Store {
     /// Opens the folder of a campaign, or creates it. Refuses a folder with other settings, one of the simulated stage for a
-    /// campaign on devices and the reverse, one that another process uses, and one whose `campaign.json` has another content.
+    /// campaign on devices and the reverse, one that another process uses, and one whose `campaign.json` is not of a campaign.
     /// A refused folder is not changed.
     pub fn open(
         folder: &Path,
@@ -136,7 +136,7 @@ impl Store {
         self.folder.join("points").join(name(point) + ".json")
     }
 
-    /// The result of a point, if it exists; or why its file does not count.
+    /// The result of a point, if it exists; or why its file is ignored.
     fn read(&self, point: GridPoint) -> Result<Option<PointResult>, String> {
         let text = match std::fs::read_to_string(self.path(point)) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),

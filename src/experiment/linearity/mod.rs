@@ -1,4 +1,4 @@
-//! The same multisine at several amplitudes: distortion, noise, and whether modes shift with amplitude.
+//! Runs of the same multisine at several amplitudes: distortion, noise, and whether modes shift with amplitude.
 
 mod mode_shifts;
 
@@ -16,7 +16,7 @@ pub use mode_shifts::{ModeOverAmplitude, modes_over_amplitude};
 /// A run at one amplitude.
 #[derive(Clone, Debug)]
 pub struct AmplitudePlan {
-    /// Ratio of the planned amplitude.
+    /// Amplitude as a ratio of the planned one.
     pub scale: f64,
     /// The settings of the run.
     pub config: Config,
@@ -24,7 +24,7 @@ pub struct AmplitudePlan {
     pub predicted: Extremes,
 }
 
-/// Plans a run at each of `scales` times the amplitude of `planned`. Refuses all of them if one would trip an interlock.
+/// Plans a run at each of `scales` times the amplitude of `planned`. Refuses all of them if one of them would trip an interlock.
 pub fn plan_amplitudes(
     planned: &Config,
     scales: &[f64],
@@ -70,7 +70,7 @@ pub fn run<E: From<ExperimentError>>(
 pub struct ModeComparison {
     /// The modes of the smallest amplitude in all runs.
     pub modes: Vec<ModeOverAmplitude>,
-    /// Whether a parameter of a mode shifts. None if that is not known.
+    /// Whether a parameter of a mode shifts; `None` if that is not known.
     pub shifted: Option<bool>,
     /// The reason.
     pub why: String,
@@ -79,25 +79,26 @@ pub struct ModeComparison {
 /// Compares the modes of the runs. `all_completed` states whether every amplitude was run and analysed to its end.
 pub fn compare_modes(runs: &[Vec<FittedMode>], all_completed: bool) -> ModeComparison {
     let modes = modes_over_amplitude(runs);
-    let is_compared = |mode: &ModeOverAmplitude| mode.by_run.iter().flatten().count() > 1;
     let shifts = modes.iter().any(ModeOverAmplitude::shifts);
-    let is_known = shifts || all_completed && modes.iter().any(is_compared);
-    let why = match is_known {
-        true if shifts => shift_text(&modes),
-        true => no_shift_text(&modes),
-        false if all_completed => {
-            "no mode is found at two amplitudes: use more periods (multisine.periods) or larger amplitudes".into()
-        }
-        false => {
-            "not every amplitude was run and analysed to its end: whether modes shift is not known".into()
-        }
+    let is_compared = |mode: &ModeOverAmplitude| mode.by_run.iter().flatten().count() > 1;
+    let (shifted, why) = match (shifts, all_completed) {
+        (true, _) => (Some(true), shift_text(&modes)),
+        (false, false) => (None, NOT_COMPLETED.into()),
+        (false, true) if modes.iter().any(is_compared) => (Some(false), no_shift_text(&modes)),
+        (false, true) => (None, NOT_COMPARED.into()),
     };
     ModeComparison {
         modes,
-        shifted: is_known.then_some(shifts),
+        shifted,
         why,
     }
 }
+
+const NOT_COMPARED: &str =
+    "no mode is found at two amplitudes: use more periods (multisine.periods) or larger amplitudes";
+
+const NOT_COMPLETED: &str =
+    "not every amplitude was run and analysed to its end: whether modes shift is not known";
 
 fn shift_text(modes: &[ModeOverAmplitude]) -> String {
     let shifting = modes.iter().filter(|mode| mode.shifts()).map(|mode| {
