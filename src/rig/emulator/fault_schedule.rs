@@ -1,8 +1,9 @@
-//! Planned faults: `KIND@SECONDS` begins a fault, `KIND@FROM..TO` also ends it.
+//! Planned faults: `KIND@TIME` begins a fault, `KIND@FROM..TO` also ends it.
 
 use std::collections::VecDeque;
 
 use super::fault::{FaultError, FaultRequest};
+use crate::util::quantity::Time;
 
 /// Latest planned time, in seconds: one day.
 const LATEST_S: f64 = 86_400.0;
@@ -23,7 +24,7 @@ pub enum PlannedFaultError {
     Fault(#[from] FaultError),
     /// The time.
     #[error(
-        "`{text}`: expected KIND@SECONDS or KIND@FROM..TO, with times from 0 to {LATEST_S} s and the end after the start, as in probe.silence@2..2.5"
+        "`{text}`: expected KIND@TIME or KIND@FROM..TO, with times from 0 to {LATEST_S} s (2s, 500ms, or a number of seconds) and the end after the start, as in probe.silence@2s..2.5s"
     )]
     Time {
         /// The text.
@@ -57,7 +58,7 @@ fn split(text: &str) -> Option<(&str, f64, Option<f64>)> {
 }
 
 fn seconds(text: &str) -> Option<f64> {
-    let seconds: f64 = text.parse().ok()?;
+    let seconds = text.parse::<Time>().ok()?.si();
     (0.0..=LATEST_S).contains(&seconds).then_some(seconds)
 }
 
@@ -104,7 +105,7 @@ mod tests {
     fn faults_begin_and_end_at_the_planned_times() {
         let plan = [
             planned("probe.stuck@2.5"),
-            planned("amplifier.late=20ms@1..2"),
+            planned("amplifier.late=20ms@1000ms..2s"),
         ];
         let mut schedule = FaultSchedule::new(&plan);
         let mut due = |time_s| {
@@ -129,6 +130,8 @@ mod tests {
             "probe.stuck@-1",
             "probe.stuck@2..1",
             "probe.stuck@NaN",
+            "probe.stuck@2A",
+            "probe.stuck@2s..500ms",
             "@1..x",
         ] {
             let error = text.parse::<PlannedFault>().expect_err(text).to_string();
