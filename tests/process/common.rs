@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use bench::recording::Recording;
 use bench::rt::record::TickRecord;
 
-/// How long a test waits for what must come: a guard against waiting for ever, no figure of merit.
+/// Largest time that a test waits for an event. It only prevents endless waiting; it is no requirement.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// As many late ticks as this machine may have under load: what is tested here is not its timing.
+/// More late ticks are allowed than a loaded machine has: timing is not tested here.
 pub const PATIENT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
 /// The chirp's last frequency must lie below half the rate in any configuration.
 pub const AT_1_KHZ: [&str; 6] = [
@@ -28,7 +28,7 @@ pub fn bench(arguments: &[&str]) -> Command {
     command
 }
 
-/// A minute of closed loop with the slow controller, or of chirp: longer than any test lets it run.
+/// A minute of closed loop with the slow controller, or of chirp: longer than a test lets it run.
 pub fn minute(what: &str) -> Vec<&str> {
     let own: &[&str] = match what {
         "control" => &[
@@ -54,7 +54,7 @@ pub fn minute(what: &str) -> Vec<&str> {
     [own, &["--json"], &AT_1_KHZ, &PATIENT].concat()
 }
 
-/// The program under way; killed if a test ends early.
+/// The running program. It is killed if a test ends early.
 pub struct Running(Option<Child>);
 
 impl Running {
@@ -78,12 +78,12 @@ impl Running {
     }
 
     pub fn signal(&self, signal: i32) {
-        // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
+        // SAFETY: a child that was not waited for yet, so its id is not reused.
         let result = unsafe { libc::kill(self.pid(), signal) };
         assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
     }
 
-    /// Sleeps of the loop's thread: one a tick at the most, so no more than the ticks begun (and a few before the first).
+    /// Number of sleeps of the loop's thread: at most one for each started tick, and a few before the first tick.
     fn sleeps(&self) -> u64 {
         let tasks =
             std::fs::read_dir(format!("/proc/{}/task", self.pid())).expect("a running process");
@@ -101,7 +101,7 @@ impl Running {
         0
     }
 
-    /// Waits until it ends of its own.
+    /// Waits until the program ends by itself.
     pub fn until_ended(&mut self) {
         let patience = Instant::now() + PATIENCE;
         while self
@@ -117,7 +117,7 @@ impl Running {
         }
     }
 
-    /// Waits until the loop has slept so often; returns how often it has.
+    /// Waits until the loop has slept at least `times` times; returns the number of sleeps.
     pub fn until_slept(&mut self, times: u64) -> u64 {
         let patience = Instant::now() + PATIENCE;
         loop {

@@ -1,4 +1,4 @@
-//! No room, no permission.
+//! Full disks and folders that cannot be written to.
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -7,7 +7,7 @@ use bench::rt::record::flag;
 
 use crate::common::{AT_1_KHZ, PATIENT, Running, bench, recording_in, stderr, stdout};
 
-/// The program where no file may grow beyond so many blocks, so that writing fails half-way.
+/// The program with a limit of `blocks` for the size of a file, so that writing fails half-way.
 fn little_room(blocks: u32, arguments: &[&str], out: &Path) -> Command {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
     let mut command = Command::new("sh");
@@ -26,7 +26,7 @@ fn with_little_room(blocks: u32, arguments: &[&str], out: &Path) -> Output {
 }
 
 #[test]
-fn a_disk_that_fills_up_stops_the_run_says_so_and_keeps_what_was_written() {
+fn a_disk_that_fills_up_stops_the_run_with_a_message_and_keeps_the_written_part() {
     for arguments in [&["chirp"][..], &["control", "--fast", "--duration", "100"]] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         // 2048 blocks of 512 bytes (1024 in some shells): 1 or 2 MiB of some 25 MiB.
@@ -71,7 +71,7 @@ fn a_disk_that_fills_up_stops_the_run_says_so_and_keeps_what_was_written() {
 
 #[test]
 fn a_run_in_real_time_is_stopped_when_the_disk_fills_up() {
-    // An hour; 64 blocks are full within seconds. Were the run not stopped, it would not end while this test has patience.
+    // The run takes an hour, and 64 blocks are full within seconds. If the run is not stopped, this test times out.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let arguments = [
         &["control", "--slow", "--duration", "3600"][..],
@@ -92,7 +92,7 @@ fn a_run_in_real_time_is_stopped_when_the_disk_fills_up() {
 }
 
 #[test]
-fn a_disk_that_is_full_from_the_start_moves_nothing() {
+fn with_a_disk_that_is_full_from_the_start_there_is_no_motion() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = with_little_room(0, &["chirp"], folder.path());
     let said = stderr(&output);
@@ -104,8 +104,8 @@ fn a_disk_that_is_full_from_the_start_moves_nothing() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_to_is_told_before_anything_moves() {
-    // Nobody, root included, can make a file in /proc.
+fn a_folder_that_cannot_be_written_to_is_reported_before_any_motion() {
+    // No user, not even root, can create a file in /proc.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a_file");
     std::fs::write(&file, "in the way").expect("a file");

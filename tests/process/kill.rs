@@ -1,10 +1,10 @@
-//! SIGKILL: nothing can be done any more, and what was recorded is still there.
+//! SIGKILL: the program cannot react, and the written part of the recording is still readable.
 use bench::recording::Recording;
 
 use crate::common::{RATE_HZ, Running, bench, minute, recording_in, stderr};
 
 #[test]
-fn of_a_killed_run_all_but_the_last_second_is_recovered() {
+fn a_killed_run_is_recovered_except_for_the_last_second() {
     for what in ["control", "chirp"] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut running = Running::start(&minute(what), folder.path());
@@ -20,7 +20,7 @@ fn of_a_killed_run_all_but_the_last_second_is_recovered() {
             .expect("it runs");
         let said: serde_json::Value =
             serde_json::from_slice(&output.stdout).expect("one JSON object");
-        // 0, or 3 if the machine was too slow to hand all records over.
+        // 3 if the machine was too slow to pass on all records.
         let lost = said["lost_records"].as_u64().expect("a count");
         assert_eq!(
             output.status.code(),

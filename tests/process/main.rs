@@ -1,4 +1,4 @@
-//! The program itself, stopped, killed and starved from outside.
+//! The program as a process: stopped by signals, killed, and without disk space.
 mod command_line;
 mod common;
 mod disk;

@@ -1,4 +1,4 @@
-//! `bench replay`, as a script sees it.
+//! Exit codes and output of `bench replay`.
 use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
@@ -30,7 +30,7 @@ fn a_run_in_real_time_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     .concat();
     let mut running = Running::start(&arguments, folder.path());
     running.until_slept(800);
-    // Held up for 50 ms and more: some fifty ticks at 1 kHz pass unserved.
+    // The process is paused for at least 50 ms: some fifty ticks at 1 kHz are not served.
     running.signal(libc::SIGSTOP);
     std::thread::sleep(Duration::from_millis(50));
     running.signal(libc::SIGCONT);
@@ -125,7 +125,7 @@ fn an_altered_recording_exits_with_1_and_names_the_tick() {
             new.record(&LoopMessage::Event(*event))
                 .expect("a good disk");
         }
-        // 2^30 of 2^52: a reading of 50 um alters by 12 pm, the command of this very tick by 460 A/m times that, 5 nA.
+        // 2^30 of 2^52: a reading of 50 um changes by 12 pm, the command of the same tick by 460 A/m times that, 5 nA.
         if record.tick == 6000 {
             record.position_m = f64::from_bits(record.position_m.to_bits() ^ (1 << 30));
         }
@@ -149,7 +149,7 @@ fn an_altered_recording_exits_with_1_and_names_the_tick() {
 }
 
 #[test]
-fn files_that_are_no_recordings_are_refused_with_a_reason_and_without_a_panic() {
+fn other_files_than_recordings_are_refused_with_a_reason_and_without_a_panic() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = bench(&["control", "--slow", "--duration", "1", "--out"])
         .arg(folder.path())
@@ -202,7 +202,7 @@ fn files_that_are_no_recordings_are_refused_with_a_reason_and_without_a_panic() 
         stderr(&output)
     );
 
-    // Cut off in the middle: what is there replays, and the program says that it is cut.
+    // Cut off in the middle: the readable part replays, and the program reports the cut.
     let cut = folder.path().join("cut.mcap");
     std::fs::write(&cut, &whole[..whole.len() * 2 / 3]).expect("a file");
     let output = replay(&cut);

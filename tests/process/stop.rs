@@ -5,7 +5,7 @@ use bench::rt::record::{EventKind, RequestKind, TickRecord};
 
 use crate::common::{RATE_HZ, Running, bench, minute, recording_in, stderr, ticks};
 
-/// A run stopped from outside ends at zero current, with everything recorded and said.
+/// A run stopped by a signal ends at zero current, with a complete recording and report.
 fn stopped_by(signal: i32, what: &str) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut running = Running::start(&minute(what), folder.path());
@@ -58,7 +58,7 @@ fn stopped_by(signal: i32, what: &str) {
         after.iter().all(|record| record.command_a.to_bits() == 0),
         "none from the order's tick on"
     );
-    // A tenth of a second is recorded after the stop; ticks that came late count as well.
+    // A tenth of a second is recorded after the stop, including late ticks.
     let watched = recording.last_tick() - stop.tick;
     assert!(
         (RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&watched) && after.len() as u64 >= RATE_HZ / 10,
@@ -97,7 +97,7 @@ fn sigterm_stops_a_chirp_with_zero_current_and_a_whole_recording_that_replays() 
 }
 
 #[test]
-fn a_second_ctrl_c_neither_hurts_nor_is_needed() {
+fn a_second_ctrl_c_has_no_effect() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut running = Running::start(&minute("control"), folder.path());
     running.until_slept(RATE_HZ);
