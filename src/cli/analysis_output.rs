@@ -48,18 +48,17 @@ pub(super) fn text(outputs: &AnalysisOutputs) -> String {
         0 => String::new(),
         ticks => format!(", {ticks} missing ticks interpolated"),
     };
-    let response = response_text(frf_csv, outputs.frequencies, coherence);
-    let closed = outputs
-        .closed
-        .as_ref()
-        .map_or(String::new(), loop_output::text);
-    let linearity = outputs
-        .linearity
-        .as_ref()
-        .map_or(String::new(), linearity_output::line);
-    let (delay, pages) = (delay_text(outputs), pages_text(&outputs.pages));
-    let summary = modal_output::text(&outputs.summary);
-    format!("{response}{filled}\n{closed}{delay}{linearity}{pages}{summary}")
+    let closed = outputs.closed.as_ref().map(loop_output::text);
+    let linearity = outputs.linearity.as_ref().map(linearity_output::line);
+    format!(
+        "{}{filled}\n{}{}{}{}{}",
+        response_text(frf_csv, outputs.frequencies, coherence),
+        closed.unwrap_or_default(),
+        delay_text(outputs),
+        linearity.unwrap_or_default(),
+        pages_text(&outputs.pages),
+        modal_output::text(&outputs.summary)
+    )
 }
 
 /// The file of a response and its size.
@@ -81,7 +80,7 @@ fn delay_text(outputs: &AnalysisOutputs) -> String {
         return without;
     };
     format!(
-        "  delay      {:.3} ms from command to reading: {:.3} ms by the configuration,\n             {:+.4} ± {:.4} ms beyond it by the phases\n{without}",
+        "  delay      {:.3} ms from command to reading: {:.3} ms as configured,\n             {:+.4} ± {:.4} ms in addition, from the phases\n{without}",
         (delay_s + excess_s) * 1e3,
         delay_s * 1e3,
         excess_s * 1e3,

@@ -1,4 +1,4 @@
-//! `bench calibrate`: scale, sign and offset of amplifier and probe, and the chain's delay.
+//! `bench calibrate`: scale, sign and offset of amplifier and probe, and the delay from command to reading.
 
 use std::path::{Path, PathBuf};
 
@@ -6,13 +6,14 @@ use serde::Serialize;
 
 use super::error::CliError;
 use super::help::with_setting;
-use super::options::BenchOptions;
+use super::options::{BenchOptions, given};
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
-use crate::config::{Config, OptionSetting, Purpose};
-use crate::experiment::calibration;
+use super::table::wrap;
+use crate::config::{Config, Purpose};
+use crate::experiment::calibration::{self, CalibrationPlan};
 use crate::experiment::{RunSummary, Runner};
 use crate::rig::calibration::{AmplifierCalibration, Calibration, ChainCalibration};
 use crate::util::progress::Progress;
@@ -51,29 +52,46 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
-    calibration::check(&config)?;
+    let plan = calibration::check(&config)?;
     let setup = args.run.setup(&config)?;
+    if !args.bench.json {
+        print_text(&plan_text(&plan, &config, !args.no_delay))?;
+    }
     let progress = Progress::new("static steps");
     let line = ProgressLine::show(&progress);
     let made = calibration::run(&Runner { setup, progress }, &config, !args.no_delay)?;
     drop(line);
     let report = report(args, made)?;
-    if args.bench.json {
-        print_json(&report)?
-    } else {
-        print_text(&text(&report, &config))?
-    }
+    print_result(args.bench.json, &report, |report| text(report, &config))?;
     Ok(match report.calibration {
         Some(_) => exit(&report.run),
         None => Outcome::Failed,
     })
 }
 
+/// Steps and chirp with their extremes, printed before the first run.
+fn plan_text(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> String {
+    let steps = format!(
+        "static steps up to {:.3} A to both sides in {:.1} s; expected travel {:.0} um",
+        plan.steps.current_a,
+        plan.steps.duration_s,
+        plan.steps.travel_m * 1e6
+    );
+    let chirp = format!(
+        "then, for the delay: {}; expected travel {:.0} um",
+        config.chosen_excitation().describe(),
+        plan.chirp.travel_m * 1e6
+    );
+    let chirp = match with_delay {
+        true => wrap(&chirp, 0),
+        false => String::new(),
+    };
+    wrap(&steps, 0) + &chirp
+}
+
 fn config(args: &Args) -> Result<Config, CliError> {
-    let amplitude = args.amplitude.as_ref().map(|amplitude| {
-        let option = format!("--amplitude {amplitude}");
-        OptionSetting::new("calibrate.amplitude_a", amplitude.si(), option)
-    });
+    let amplitude = args.amplitude.as_ref();
+    let amplitude = given("calibrate.amplitude_a", "--amplitude", amplitude);
     let config = args.bench.load(Purpose::Chirp, amplitude.as_slice())?;
     Ok(calibration::settings(config))
 }
@@ -111,19 +129,19 @@ fn write(args: &Args, calibration: &Calibration, recording: &str) -> Result<Stri
 fn text(report: &Report, config: &Config) -> String {
     let run = run_text(&report.run, config);
     let Some(c) = &report.calibration else {
-        let why = report.why.as_deref().unwrap_or("the run gave none");
+        let why = report.why.as_deref().unwrap_or("the run gave no result");
         return format!("{run}  no calibration: {why}\n");
     };
     let file = report.calibration_file.as_deref().unwrap_or_default();
+    let (probe, chain) = (&c.probe, chain_text(&c.chain));
     format!(
-        "{run}  amplifier     {} ({})\n  probe         {}\n                gain {:+.5}, offset {:+.3} um, noise {:.4} um RMS\n{}  calibration   {file}\n",
+        "{run}  amplifier     {} ({})\n  probe         {}\n                gain {:+.5}, offset {:+.3} um, noise {:.4} um RMS\n{chain}  calibration   {file}\n",
         c.amplifier.device,
         current_text(&c.amplifier),
-        c.probe.device,
-        c.probe.gain,
-        c.probe.offset_m * 1e6,
-        c.probe.noise_rms_m * 1e6,
-        chain_text(&c.chain),
+        probe.device,
+        probe.gain,
+        probe.offset_m * 1e6,
+        probe.noise_rms_m * 1e6,
     )
 }
 

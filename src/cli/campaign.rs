@@ -10,7 +10,7 @@ use super::error::CliError;
 use super::operator::TerminalOperator;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_json, print_note, print_text};
+use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
 use super::value_range::ValueRange;
 use crate::config::{Config, Purpose, profiles};
@@ -22,7 +22,7 @@ use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
 use crate::util::quantity::{OfRatio, si};
 
-/// Section 5.2.2 was identified at 1 kHz; the sweep has to stay below half of that.
+/// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
 
 /// Arguments of the command.
@@ -75,11 +75,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut campaign = Campaign::open(&args.out, &grid, &config, on_devices, args.keep_recordings)?;
     show_state(&campaign);
     if !campaign.missing().is_empty() {
-        stop_on_signal(|stop| match on_devices {
-            true => measure_guided(&mut campaign, &config, tolerances, stop),
-            false => measure_simulated(&mut campaign, args, stop),
-        })
-        .map_err(ExperimentError::from)??;
+        measure(args, &mut campaign, &config, tolerances)?;
     }
     if !campaign.missing().is_empty() {
         print_note(&stopped(args, &campaign));
@@ -87,6 +83,20 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     show(args, &config, &campaign.evaluate(tolerances)?)?;
     Ok(Outcome::Done)
+}
+
+/// Measures the missing points until all are done, or a signal stops it.
+fn measure(
+    args: &Args,
+    campaign: &mut Campaign<'_>,
+    config: &Config,
+    tolerances: Tolerances,
+) -> Result<(), CliError> {
+    let measured = stop_on_signal(|stop| match is_guided(args, config) {
+        true => measure_guided(campaign, config, tolerances, stop),
+        false => measure_simulated(campaign, args, stop),
+    });
+    measured.map_err(ExperimentError::from)?
 }
 
 fn show_state(campaign: &Campaign<'_>) {
@@ -144,10 +154,7 @@ fn run_shown(setup: Setup, plan: &Plan, phase: &'static str) -> Result<Run, Expe
 fn show(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<(), CliError> {
     let picture = draw(args, config, evaluation)?;
     let report = Report::of(evaluation, &picture, args.bench.profile());
-    match args.bench.json {
-        true => print_json(&report),
-        false => print_text(&report.text()),
-    }
+    print_result(args.bench.json, &report, Report::text)
 }
 
 /// Draws the picture into the folder; returns its path.
@@ -170,9 +177,8 @@ fn config(args: &Args) -> Result<Config, CliError> {
         ));
     }
     let mut bench = args.bench.clone();
-    let is_named = |name: &str| name != profiles::DEFAULT;
     let is_rate = |set: &String| set.trim_start().starts_with("loop.rate_hz");
-    if !bench.config.as_deref().is_some_and(is_named) && !bench.sets.iter().any(is_rate) {
+    if bench.profile() == profiles::DEFAULT && !bench.sets.iter().any(is_rate) {
         bench.sets.splice(0..0, RATE.map(String::from));
     }
     let config = bench.load(Purpose::Chirp, &[])?;
@@ -180,23 +186,19 @@ fn config(args: &Args) -> Result<Config, CliError> {
     Ok(config)
 }
 
+const NO_TERMINAL: &str = "the configuration names devices: an operator must load the stage for each point of a campaign, and \
+    standard input is not a terminal; start it in a terminal, or add --simulate, or run `bench chirp \
+    --operating-point Y --asymmetry D` at each point";
+const CALIBRATED_SIMULATION: &str = "`calibration.file` is set, but the simulated stage of a campaign needs no correction; leave it out";
+
 /// Refuses a guided campaign without a terminal, and a simulated one with a calibration.
 fn check_mode(args: &Args, config: &Config) -> Result<(), CliError> {
-    let is_guided = is_guided(args, config);
-    if is_guided && !std::io::stdin().is_terminal() {
-        return Err(CliError::Usage(
-            "the configuration names devices: an operator must load the stage for each point of a campaign, and \
-             standard input is not a terminal; start it in a terminal, or add --simulate, or run `bench chirp \
-             --operating-point Y --asymmetry D` at each point"
-                .into(),
-        ));
-    }
-    if !is_guided && config.calibration.file.is_some() {
-        return Err(CliError::Usage(
-            "`calibration.file` is set, but the simulated stage of a campaign needs no correction; leave it out".into(),
-        ));
-    }
-    Ok(())
+    let refusal = match is_guided(args, config) {
+        true if !std::io::stdin().is_terminal() => NO_TERMINAL,
+        false if config.calibration.file.is_some() => CALIBRATED_SIMULATION,
+        _ => return Ok(()),
+    };
+    Err(CliError::Usage(refusal.into()))
 }
 
 /// Whether an operator loads the stage.
@@ -205,8 +207,8 @@ fn is_guided(args: &Args, config: &Config) -> bool {
 }
 
 fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, CliError> {
-    let half_a_step = 0.5 * grid.mass_step(StageModel::of(config)?.stage);
-    let asymmetry = args.asymmetry_tolerance.unwrap_or(half_a_step);
+    let half_step = 0.5 * grid.mass_step(StageModel::of(config)?.stage);
+    let asymmetry = args.asymmetry_tolerance.unwrap_or(half_step);
     Ok(Tolerances {
         asymmetry: ratio("--asymmetry-tolerance", asymmetry)?,
         operating_point: ratio(

@@ -65,29 +65,40 @@ impl OffsetReport {
     }
 }
 
-impl<'a> Report<'a> {
-    pub fn of(evaluation: &'a Evaluation<'a>, plot: &Path, profile: &'a str) -> Report<'a> {
-        let [detected, excluded, undecided] =
-            [Cnmp::Detected, Cnmp::Excluded, Cnmp::Undecided].map(|cnmp| evaluation.count(cnmp));
+impl Totals {
+    fn of(evaluation: &Evaluation<'_>) -> Totals {
+        Totals {
+            points: evaluation.points.len(),
+            detected: evaluation.count(Cnmp::Detected),
+            excluded: evaluation.count(Cnmp::Excluded),
+            undecided: evaluation.count(Cnmp::Undecided),
+        }
+    }
+}
+
+impl Agreement {
+    fn of(evaluation: &Evaluation<'_>, totals: &Totals) -> Agreement {
         let offset = evaluation.offset.as_ref();
         let wrong = evaluation.points.iter().filter(|point| point.is_wrong);
+        Agreement {
+            decided: totals.detected + totals.excluded,
+            contradicted_as_configured: evaluation.contradicted,
+            contradicted_with_offset: offset.map(|offset| offset.contradicted),
+            contradicted_as_simulated: wrong.count(),
+        }
+    }
+}
+
+impl<'a> Report<'a> {
+    pub fn of(evaluation: &'a Evaluation<'a>, plot: &Path, profile: &'a str) -> Report<'a> {
+        let totals = Totals::of(evaluation);
         Report {
             profile,
             plot: plot.display().to_string(),
             points: &evaluation.points,
-            totals: Totals {
-                points: evaluation.points.len(),
-                detected,
-                excluded,
-                undecided,
-            },
-            agreement: Agreement {
-                decided: detected + excluded,
-                contradicted_as_configured: evaluation.contradicted,
-                contradicted_with_offset: offset.map(|offset| offset.contradicted),
-                contradicted_as_simulated: wrong.count(),
-            },
-            offset: offset.map(OffsetReport::of),
+            agreement: Agreement::of(evaluation, &totals),
+            totals,
+            offset: evaluation.offset.as_ref().map(OffsetReport::of),
             tolerances: evaluation.tolerances,
             recommendation: evaluation.recommendation,
         }
@@ -95,6 +106,24 @@ impl<'a> Report<'a> {
 
     /// The result as text.
     pub fn text(&self) -> String {
+        let totals = &self.totals;
+        format!(
+            "{}: {} points\n\n{}\n{}{} detected, {} excluded, {} undecided\n{}{}{}{}",
+            self.profile,
+            totals.points,
+            self.points_table(),
+            self.undecided_text(),
+            totals.detected,
+            totals.excluded,
+            totals.undecided,
+            labelled("model", &self.agreement_text()),
+            labelled("offset", &self.offset_text()),
+            labelled("recommend", &self.recommendation_text()),
+            labelled("picture", &self.plot),
+        )
+    }
+
+    fn points_table(&self) -> String {
         let header = [
             "Y1o/L %",
             "asymmetry %",
@@ -104,22 +133,7 @@ impl<'a> Report<'a> {
             "signs",
         ];
         let rows: Vec<Vec<String>> = self.points.iter().map(row).collect();
-        let Totals {
-            points,
-            detected,
-            excluded,
-            undecided,
-        } = self.totals;
-        format!(
-            "{}: {points} points\n\n{}\n{}{detected} detected, {excluded} excluded, {undecided} undecided\n{}{}{}{}",
-            self.profile,
-            table(&header, &rows),
-            self.undecided_text(),
-            labelled("model", &self.agreement_text()),
-            labelled("offset", &self.offset_text()),
-            labelled("recommend", &self.recommendation_text()),
-            labelled("picture", &self.plot),
-        )
+        table(&header, &rows)
     }
 
     fn undecided_text(&self) -> String {
@@ -167,21 +181,25 @@ impl<'a> Report<'a> {
 
     fn recommendation_text(&self) -> String {
         let Some(best) = self.recommendation else {
-            return "nothing: with every asymmetry of the range, and some initial asymmetry of the interval, an operating \
-                    point has CNMP zeros"
-                .into();
+            return NO_RECOMMENDATION.into();
         };
         let asymmetry = format!("asymmetry {:+.2} %", 100.0 * best.asymmetry);
-        let (Some(distance), Some([point, border])) = (best.distance_tolerances, best.nearest)
-        else {
-            return format!("{asymmetry}: no CNMP zeros in the searched range");
-        };
-        let end = match best.at_the_end {
+        match (best.distance_tolerances, best.nearest) {
+            (Some(distance), Some(nearest)) => {
+                let distance = self.distance_text(distance, nearest, best.at_the_end);
+                format!("{asymmetry}: {distance}")
+            }
+            _ => format!("{asymmetry}: no CNMP zeros in the searched range"),
+        }
+    }
+
+    fn distance_text(&self, tolerances: f64, [point, border]: [f64; 2], at_end: bool) -> String {
+        let end = match at_end {
             true => "; it is at the end of the range, a larger one may be better",
             false => "",
         };
         format!(
-            "{asymmetry}: {distance:.1} tolerances from the nearest CNMP zeros, at {:.2} % of L and {:+.2} %{end}; \
+            "{tolerances:.1} tolerances from the nearest CNMP zeros, at {:.2} % of L and {:+.2} %{end}; \
              tolerances: {:.3} % of asymmetry, {:.3} % of L; for all operating points of the range and the interval of \
              the offset",
             100.0 * point,
@@ -191,6 +209,9 @@ impl<'a> Report<'a> {
         )
     }
 }
+
+const NO_RECOMMENDATION: &str = "nothing: with every asymmetry of the range, and some initial asymmetry of the interval, an operating \
+    point has CNMP zeros";
 
 fn row(point: &ComparedPoint<'_>) -> Vec<String> {
     vec![

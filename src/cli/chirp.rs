@@ -9,9 +9,9 @@ use super::analysis_output::{self, analyse_and_write};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::help::with_setting;
-use super::options::BenchOptions;
+use super::options::{BenchOptions, given};
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::{print_result, print_text};
 use super::plan_output;
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, exit, run_text};
@@ -25,15 +25,15 @@ use crate::rig::devices;
 use crate::util::progress::Progress;
 use crate::util::quantity::Time;
 
-/// Which bench, and how to excite it.
+/// The bench and its excitation.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     #[command(flatten)]
     run: RunOptions,
-    /// What to excite with
-    #[arg(long, value_name = "KIND", help = with_setting("What to excite with", "excitation.kind"))]
+    /// Kind of excitation
+    #[arg(long, value_name = "KIND", help = with_setting("Kind of excitation", "excitation.kind"))]
     excitation: Option<ExcitationKind>,
     #[command(flatten)]
     band: ExcitationOptions,
@@ -51,23 +51,13 @@ pub(super) struct Args {
 
 impl Args {
     fn settings(&self) -> Vec<OptionSetting> {
+        let duration = given("chirp.duration_s", "--duration", self.duration.as_ref());
+        let sweep = self.sweep.map(word);
+        let kind = self.excitation.map(word);
         let mut settings = self.band.settings();
-        if let Some(duration) = &self.duration {
-            let option = format!("--duration {duration}");
-            settings.push(OptionSetting::new(
-                "chirp.duration_s",
-                duration.si(),
-                option,
-            ));
-        }
-        if let Some(sweep) = self.sweep {
-            let option = format!("--sweep {}", word(sweep));
-            settings.push(OptionSetting::new("chirp.sweep", word(sweep), option));
-        }
-        if let Some(kind) = self.excitation {
-            let option = format!("--excitation {}", word(kind));
-            settings.push(OptionSetting::new("excitation.kind", word(kind), option));
-        }
+        settings.extend(duration);
+        settings.extend(sweep.map(|word| word_setting("chirp.sweep", "--sweep", word)));
+        settings.extend(kind.map(|word| word_setting("excitation.kind", "--excitation", word)));
         settings
     }
 
@@ -76,6 +66,11 @@ impl Args {
         let config = self.bench.load(Purpose::Chirp, &self.settings())?;
         self.band.shaped(config)
     }
+}
+
+fn word_setting(key: &str, option: &str, word: String) -> OptionSetting {
+    let option = format!("{option} {word}");
+    OptionSetting::new(key, word, option)
 }
 
 /// The word of a value in help and settings.
@@ -99,35 +94,49 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.config()?;
     let expected = predicted_extremes(&config)?;
     if args.plan {
-        return show(&ExcitationPlan::new(&config, expected), args.bench.json);
+        let plan = ExcitationPlan::new(&config, expected);
+        print_result(args.bench.json, &plan, plan_output::text)?;
+        return Ok(Outcome::Done);
     }
     if !args.bench.json {
         print_text(&plan_text(&config, &expected))?;
     }
-    let plan = Plan::chirp(config.clone());
-    let mut run = args.run.run(&plan, "chirp")?;
-    let report = RunSummary::of(&mut run)?;
-    let made = match report.is_completed() {
-        true => analysed(&run.path, &config)?,
-        false => AnalysisOutputs::run_incomplete(),
-    };
+    let mut run = args.run.run(&Plan::chirp(config.clone()), "chirp")?;
+    let summary = RunSummary::of(&mut run)?;
+    let made = outputs(&summary, &run.path, &config)?;
     let report = Report {
-        run: report,
+        run: summary,
         expected_travel_m: expected.travel_m,
         expected,
         made,
     };
     let text = run_text(&report.run, &config) + &analysis_output::text(&report.made);
     close(run, &report, args.bench.json, &text)?;
-    Ok(if report.made.is_cancelled() {
-        Outcome::Failed
-    } else {
-        exit(&report.run)
-    })
+    Ok(outcome(&report.run, &report.made))
 }
 
-/// The analysis, which can be cancelled: the recording is complete all the same.
-pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
+/// The outcome of a run with its analysis.
+pub(super) fn outcome(run: &RunSummary, outputs: &AnalysisOutputs) -> Outcome {
+    match outputs.is_cancelled() {
+        true => Outcome::Failed,
+        false => exit(run),
+    }
+}
+
+/// Analyses a run, if it is completed.
+pub(super) fn outputs(
+    run: &RunSummary,
+    path: &Path,
+    config: &Config,
+) -> Result<AnalysisOutputs, CliError> {
+    match run.is_completed() {
+        true => analysed(path, config),
+        false => Ok(AnalysisOutputs::run_incomplete()),
+    }
+}
+
+/// The analysis, which Ctrl-C cancels; the recording stays complete.
+fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
     let (recording, config) = (path.to_path_buf(), config.clone());
@@ -137,48 +146,38 @@ pub(super) fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, 
     };
     let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));
-    outputs.map_err(|error| {
-        let path = path.display();
-        CliError::Failed(format!(
-            "{error}; the recording of the run is complete: {path}"
-        ))
-    })
+    outputs.map_err(|error| analysis_failed(&error, path))
 }
 
-/// Prints what the run would do.
-fn show(plan: &ExcitationPlan, json: bool) -> Result<Outcome, CliError> {
-    match json {
-        true => print_json(plan)?,
-        false => print_text(&plan_output::text(plan))?,
-    }
-    Ok(Outcome::Done)
+fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
+    let path = recording.display();
+    CliError::Failed(format!(
+        "{error}; the recording of the run is complete: {path}"
+    ))
 }
 
 /// What the run will do, printed before it starts.
 fn plan_text(config: &Config, expected: &Extremes) -> String {
-    let (words, travel_um) = (
-        config.chosen_excitation().describe(),
-        expected.travel_m * 1e6,
-    );
-    let plan = wrap(&format!("{words}; expected travel {travel_um:.0} um"), 0);
-    plan + &unmodelled_text(config)
+    let excitation = config.chosen_excitation().describe();
+    let travel_um = expected.travel_m * 1e6;
+    let plan = format!("{excitation}; expected travel {travel_um:.0} um");
+    wrap(&plan, 0) + &unmodelled_text(config)
 }
 
 /// Modes of the simulated stage that the model of the plant does not have.
 fn unmodelled_text(config: &Config) -> String {
-    let frequencies = config.sim.unmodelled.iter().map(|mode| mode.frequency_hz);
     let (low_hz, high_hz) = config.chirp.band_hz();
-    let inside: Vec<f64> = frequencies
+    let frequencies = config.sim.unmodelled.iter().map(|mode| mode.frequency_hz);
+    let mut inside: Vec<f64> = frequencies
         .filter(|hz| (low_hz..=high_hz).contains(hz))
         .collect();
-    if inside.is_empty() || !devices::is_simulated(config) {
+    inside.sort_by(f64::total_cmp);
+    let (Some(lowest), Some(highest), true) =
+        (inside.first(), inside.last(), devices::is_simulated(config))
+    else {
         return String::new();
-    }
-    let (count, lowest) = (
-        inside.len(),
-        inside.iter().copied().fold(f64::INFINITY, f64::min),
-    );
-    let highest = inside.iter().copied().fold(0.0, f64::max);
+    };
+    let count = inside.len();
     let text = format!(
         "the simulated stage has {count} modes from {lowest} to {highest} Hz that are not part of the model (sim.unmodelled); the analysis finds them as well"
     );

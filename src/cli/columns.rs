@@ -1,4 +1,4 @@
-//! Tables out: columns with a name and a unit in it, as CSV, and as Parquet where the program is built with that feature.
+//! Tables of columns whose names contain the unit, written as CSV, and as Parquet if the program is built with that feature.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub(super) struct TableOptions {
 }
 
 impl TableOptions {
-    /// Refuses what this program was not built for, before anything is computed.
+    /// Refuses a format that this program is built without, before anything is computed.
     pub fn check(&self) -> Result<(), CliError> {
         match self.parquet {
             Some(_) if !cfg!(feature = "parquet") => Err(CliError::Usage(
@@ -27,18 +27,18 @@ impl TableOptions {
         }
     }
 
-    /// Writes the files that are asked for, over whatever was there; the columns are made only then.
+    /// Writes the requested files and replaces existing ones. Without a file, the columns are not computed.
     pub fn write(&self, columns: impl FnOnce() -> Vec<Column>) -> Result<(), CliError> {
         if self.csv.is_none() && self.parquet.is_none() {
             return Ok(());
         }
         let columns = columns();
         if let Some(path) = &self.csv {
-            write_csv(path, &columns).map_err(|e| failed(path, &e))?;
+            write_csv(path, &columns).map_err(|e| cannot_write(path, &e))?;
         }
         match &self.parquet {
             #[cfg(feature = "parquet")]
-            Some(path) => parquet::write(path, &columns).map_err(|e| failed(path, &e)),
+            Some(path) => parquet::write(path, &columns).map_err(|e| cannot_write(path, &e)),
             _ => self.check(),
         }
     }
@@ -48,8 +48,8 @@ impl TableOptions {
         self.csv.as_ref().map(|path| path.display().to_string())
     }
 
-    /// A line that says where `what` is; nothing without a file.
-    pub fn told(&self, what: &str) -> String {
+    /// The files that `what` is in, as a line; empty without a file.
+    pub fn files_text(&self, what: &str) -> String {
         let files: Vec<String> = [&self.csv, &self.parquet]
             .into_iter()
             .flatten()
@@ -66,9 +66,9 @@ impl TableOptions {
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
-    /// Its name, which ends in the unit.
+    /// The name, which ends with the unit.
     pub name: String,
-    /// Its numbers, as many as in every other column of the table.
+    /// The numbers, equally many in each column of a table.
     pub numbers: Numbers,
 }
 
@@ -99,23 +99,18 @@ impl Column {
         }
     }
 
-    /// Columns of quantities from rows of as many.
+    /// Columns of quantities, from rows.
     pub fn of_rows(
         names: impl IntoIterator<Item = String>,
         rows: impl Iterator<Item = Vec<f64>>,
     ) -> Vec<Column> {
-        let mut columns: Vec<(String, Vec<f64>)> =
-            names.into_iter().map(|name| (name, Vec::new())).collect();
-        for row in rows {
-            columns
-                .iter_mut()
-                .zip(row)
-                .for_each(|((_, numbers), number)| numbers.push(number));
-        }
-        columns
-            .into_iter()
-            .map(|(name, numbers)| Column::real(name, numbers))
-            .collect()
+        let rows: Vec<Vec<f64>> = rows.collect();
+        let names = names.into_iter().enumerate();
+        let columns = names.map(|(index, name)| {
+            let numbers = rows.iter().filter_map(|row| row.get(index)).copied();
+            Column::real(name, numbers.collect())
+        });
+        columns.collect()
     }
 
     fn len(&self) -> usize {
@@ -125,7 +120,7 @@ impl Column {
         }
     }
 
-    /// The shortest text that reads as the same number; `inf` at infinity, nothing of what is missing.
+    /// The shortest text of the same number: `inf` for infinity, empty for a missing one.
     fn cell(&self, row: usize) -> String {
         match &self.numbers {
             Numbers::Real(numbers) => format!("{:e}", numbers[row]),
@@ -136,7 +131,7 @@ impl Column {
     }
 }
 
-/// A header, then a row a line.
+/// A header line, and a line for each row.
 fn write_csv(path: &Path, columns: &[Column]) -> std::io::Result<()> {
     let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
@@ -148,7 +143,7 @@ fn write_csv(path: &Path, columns: &[Column]) -> std::io::Result<()> {
     file.flush()
 }
 
-fn failed(path: &Path, error: &impl std::fmt::Display) -> CliError {
+pub(super) fn cannot_write(path: &Path, error: &impl std::fmt::Display) -> CliError {
     CliError::Failed(format!(
         "cannot write {}: {error}; free some space or choose another file",
         path.display()
@@ -171,7 +166,7 @@ mod parquet {
 
     use super::{Column, Numbers};
 
-    /// Rows of a group, which a reader takes at a time.
+    /// Number of rows in a row group, which a reader loads as a whole.
     const GROUP: usize = 1 << 20;
 
     pub fn write(path: &Path, columns: &[Column]) -> Result<()> {
@@ -219,18 +214,13 @@ mod parquet {
                     .write_batch(&numbers[rows], None, None)?;
             }
             Numbers::Count(numbers) => {
-                let there: Vec<i16> = numbers[rows.clone()]
-                    .iter()
-                    .map(|number| i16::from(number.is_some()))
-                    .collect();
-                let numbers: Vec<i64> = numbers[rows]
-                    .iter()
-                    .flatten()
-                    .map(|&number| number as i64)
-                    .collect();
-                writer
-                    .typed::<Int64Type>()
-                    .write_batch(&numbers, Some(&there), None)?;
+                let numbers = &numbers[rows];
+                let levels = numbers.iter().map(|number| i16::from(number.is_some()));
+                let levels: Vec<i16> = levels.collect();
+                let values = numbers.iter().flatten().map(|&number| number as i64);
+                let values: Vec<i64> = values.collect();
+                let column = writer.typed::<Int64Type>();
+                column.write_batch(&values, Some(&levels), None)?;
             }
         }
         writer.close()

@@ -12,10 +12,8 @@ use super::{
 
 /// A controller daemon for a precision-motion test bench.
 ///
-/// Without a configuration every command works on the simulated stage of the thesis. Exit codes:
-/// 0 done, 1 failed (also if
-/// an interlock tripped), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) the
-/// run
+/// Without a configuration every command works on the simulated stage of the thesis. Exit codes: 0 done, 1 failed (also if
+/// an interlock tripped), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) the run
 /// in the recording was not completed.
 #[derive(Debug, Parser)]
 #[command(name = "bench", version, max_term_width = 80)]
@@ -73,7 +71,7 @@ pub fn main() -> Outcome {
 fn failed(error: &CliError, json: bool) -> Outcome {
     print_note(&error.to_string());
     if json {
-        // The exit code says the rest, should standard output be closed.
+        // If standard output is closed, the exit code still reports the failure.
         let _ = print_json(&ErrorReport::of(error));
     }
     error.outcome()

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::{print_json, print_result};
 use super::table::labelled;
 use crate::config::{Purpose, profiles};
 
@@ -80,6 +80,17 @@ struct Profile {
     hidden: bool,
 }
 
+impl Profile {
+    fn line(&self) -> String {
+        let place = self.file.as_deref().unwrap_or("built in");
+        let hidden = match self.hidden {
+            true => " (hidden: give its path)",
+            false => "",
+        };
+        labelled(&self.name, &format!("{place}{hidden}"))
+    }
+}
+
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
         What::Show(options) => show(options)?,
@@ -93,35 +104,23 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 fn show(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
-    match options.json {
-        true => print_json(&config),
-        false => print_text(&to_toml(&config)?),
-    }
+    let toml = to_toml(&config)?;
+    print_result(options.json, &config, |_| toml)
 }
 
 fn check(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::All, &[])?;
-    match options.json {
-        true => print_json(&serde_json::json!({ "valid": true, "title": config.title })),
-        false => print_text(&format!("valid: {}\n", config.title)),
-    }
+    let title = &config.title;
+    let result = serde_json::json!({ "valid": true, "title": title });
+    print_result(options.json, &result, |_| format!("valid: {title}\n"))
 }
 
 fn list_profiles(json: bool) -> Result<(), CliError> {
     let profiles = all_profiles();
-    if json {
-        return print_json(&serde_json::json!({ "profiles": profiles }));
-    }
-    let lines = profiles.iter().map(|profile| {
-        let place = profile.file.as_deref().unwrap_or("built in");
-        let hidden = if profile.hidden {
-            " (hidden: give its path)"
-        } else {
-            ""
-        };
-        labelled(&profile.name, &format!("{place}{hidden}"))
-    });
-    print_text(&lines.collect::<String>())
+    let result = serde_json::json!({ "profiles": profiles });
+    print_result(json, &result, |_| {
+        profiles.iter().map(Profile::line).collect()
+    })
 }
 
 /// Built-in profiles come first, then those of the folders in their order.
@@ -152,16 +151,14 @@ fn init(args: &InitArgs) -> Result<(), CliError> {
             "cannot write {file}: {e}; name another file with --out"
         ))
     })?;
-    if args.json {
-        return print_json(&serde_json::json!({ "file": file }));
-    }
-    print_text(&format!(
-        "{file} written; `bench config check --config {file}` checks it\n"
-    ))
+    let result = serde_json::json!({ "file": file });
+    print_result(args.json, &result, |_| {
+        format!("{file} written; `bench config check --config {file}` checks it\n")
+    })
 }
 
-/// The whole effective configuration, as it travels with a recording.
-pub(super) fn to_toml(config: &crate::config::Config) -> Result<String, CliError> {
+/// The whole effective configuration, as in a recording.
+fn to_toml(config: &crate::config::Config) -> Result<String, CliError> {
     toml::to_string(config)
         .map_err(|e| CliError::Failed(format!("cannot write the configuration as TOML: {e}")))
 }

@@ -1,9 +1,9 @@
-//! `bench control`: close the loop with a reference.
+//! `bench control`: run the closed loop with a reference.
 
 use serde::Serialize;
 
 use super::analysis_output;
-use super::chirp::analysed;
+use super::chirp::{outcome, outputs};
 pub(super) use super::control_options::Args;
 use super::error::CliError;
 use super::margins::{Pole, closed_loop, pole_list, require_modulus_margin, text as margins_text};
@@ -14,11 +14,11 @@ use super::table::labelled;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
 use crate::excitation::Extremes;
-use crate::experiment::{Plan, RunSummary, TrackingMetrics, tracking_metrics};
+use crate::experiment::{Plan, Run, RunSummary, TrackingMetrics, tracking_metrics};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
 
-/// A step is predicted over as many ticks at most: 200 s at 5 kHz, however long the run.
+/// Largest number of ticks of a predicted step: 200 s at 5 kHz.
 const PREDICTED_TICKS: usize = 1_000_000;
 
 /// The JSON object of the command.
@@ -28,9 +28,9 @@ struct Report {
     run: RunSummary,
     predicted: Predicted,
     measured: Option<TrackingMetrics>,
-    /// What a swept reference does by the model.
+    /// Extremes of a swept reference by the model.
     expected: Option<Extremes>,
-    /// What a swept reference shows of plant and loop.
+    /// Responses of plant and loop, from a swept reference.
     #[serde(flatten)]
     made: Option<AnalysisOutputs>,
 }
@@ -46,53 +46,58 @@ struct Predicted {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
     let closed_loop = closed_loop(&config)?;
-    let margins = closed_loop.margins();
-    require_modulus_margin(&config, &margins)?;
-    let step = if margins.stable {
-        predicted_step(&config, &closed_loop)
-    } else {
-        None
-    };
-    let predicted = Predicted { margins, step };
+    let predicted = predicted(&config, &closed_loop)?;
     let plan = Plan::control(config.clone())?;
-    let expected = plan.predicted_extremes;
     if !args.bench.json {
         let poles = pole_list(&closed_loop.poles(), &config);
-        print_text(&plan_text(&config, &predicted, &poles, expected.as_ref()))?;
+        print_text(&plan_text(&plan, &predicted, &poles))?;
     }
     let mut run = args.run.run(&plan, "control")?;
-    let report = RunSummary::of(&mut run)?;
-    let completed = report.is_completed();
-    let swept = config.control.reference.is_swept();
-    let measured = match completed && !swept {
-        true => tracking_metrics(&Recording::open(&run.path)?, &config.control, &config.servo)?,
-        false => None,
-    };
-    let made = match (swept, completed) {
-        (true, true) => Some(analysed(&run.path, &plan.config)?),
-        (true, false) => Some(AnalysisOutputs::run_incomplete()),
-        (false, _) => None,
-    };
-    let report = Report {
-        run: report,
-        predicted,
-        measured,
-        expected,
-        made,
-    };
+    let report = report(&mut run, &plan, predicted)?;
     close(run, &report, args.bench.json, &text(&report, &config))?;
-    let stopped = report
-        .made
-        .as_ref()
-        .is_some_and(AnalysisOutputs::is_cancelled);
-    Ok(if stopped {
-        Outcome::Failed
-    } else {
-        exit(&report.run)
+    Ok(match &report.made {
+        Some(made) => outcome(&report.run, made),
+        None => exit(&report.run),
     })
 }
 
-/// The step by the linear model, if the reference is one that happens.
+/// The margins and the step by the model. Refuses a loop with too small a margin.
+fn predicted(config: &Config, closed_loop: &ClosedLoop) -> Result<Predicted, CliError> {
+    let margins = closed_loop.margins();
+    require_modulus_margin(config, &margins)?;
+    let step = match margins.stable {
+        true => predicted_step(config, closed_loop),
+        false => None,
+    };
+    Ok(Predicted { margins, step })
+}
+
+/// What the run shows: tracking, or responses of a swept reference.
+fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, CliError> {
+    let summary = RunSummary::of(run)?;
+    let is_swept = plan.config.control.reference.is_swept();
+    let measured = match summary.is_completed() && !is_swept {
+        true => tracking_metrics(
+            &Recording::open(&run.path)?,
+            &plan.config.control,
+            &plan.config.servo,
+        )?,
+        false => None,
+    };
+    let made = match is_swept {
+        true => Some(outputs(&summary, &run.path, &plan.config)?),
+        false => None,
+    };
+    Ok(Report {
+        run: summary,
+        predicted,
+        measured,
+        expected: plan.predicted_extremes,
+        made,
+    })
+}
+
+/// The step by the linear model, if the reference is a step within the run.
 fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetrics> {
     let step = config.control.reference.design().step()?;
     let (amplitude_m, at_s) = (step.height_m, step.at_s);
@@ -104,25 +109,25 @@ fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetri
 }
 
 /// Margins, reference and predicted step, printed before the run.
-fn plan_text(
-    config: &Config,
-    predicted: &Predicted,
-    poles: &[Pole],
-    expected: Option<&Extremes>,
-) -> String {
-    let margins = margins_text(config, &predicted.margins, poles);
-    let reference = labelled("reference", &reference_text(config));
+fn plan_text(plan: &Plan, predicted: &Predicted, poles: &[Pole]) -> String {
+    let margins = margins_text(&plan.config, &predicted.margins, poles);
+    let reference = labelled("reference", &reference_text(&plan.config));
     let step = predicted.step.as_ref().map_or(String::new(), |step| {
         labelled("predicted", &step_text(step))
     });
-    let travel = expected.map_or(String::new(), |expected| {
-        let travel_um = expected.travel_m * 1e6;
-        labelled(
-            "expected",
-            &format!("travel of {travel_um:.1} um by the model"),
-        )
-    });
+    let travel = plan
+        .predicted_extremes
+        .as_ref()
+        .map_or(String::new(), travel_text);
     margins + &reference + &step + &travel
+}
+
+fn travel_text(extremes: &Extremes) -> String {
+    let travel_um = extremes.travel_m * 1e6;
+    labelled(
+        "expected",
+        &format!("travel of {travel_um:.1} um by the model"),
+    )
 }
 
 /// The reference, and how long the loop is closed.
@@ -144,7 +149,7 @@ fn step_text(step: &StepMetrics) -> String {
     format!("settling to 2 % in {settling}, overshoot {overshoot:.1} %")
 }
 
-/// How the run went and what it shows.
+/// The result of the run.
 fn text(report: &Report, config: &Config) -> String {
     let run = run_text(&report.run, config);
     match &report.made {

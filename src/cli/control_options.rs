@@ -8,23 +8,23 @@ use toml::{Table, Value};
 use super::controller_choice::ControllerChoice;
 use super::error::CliError;
 use super::help::{default_value, with_setting};
-use super::options::BenchOptions;
+use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
 use crate::config::OptionSetting;
 use crate::util::quantity::{Frequency, Length, Speed, Time};
 
-/// Height of a step or ramp and amplitude of a sine without `--amplitude`, in metres.
-const AMPLITUDE_M: f64 = 50e-6;
-/// Largest travel of a swept reference without `--amplitude`, in metres.
-const TRAVEL_M: f64 = 20e-6;
-/// Frequency of a sine without `--frequency`, in hertz.
-const FREQUENCY_HZ: f64 = 1.0;
-/// Speed of a ramp without `--speed`, in metres per second.
-const SPEED_M_PER_S: f64 = 1e-4;
-/// Start of a step or ramp after the loop closed, in seconds.
-const START_S: f64 = 0.2;
+/// Height of a step or ramp and amplitude of a sine without `--amplitude`.
+const HEIGHT: (&str, f64) = ("amplitude_m", 50e-6);
+/// Largest travel of a swept reference without `--amplitude`.
+const TRAVEL: (&str, f64) = ("travel_m", 20e-6);
+/// Frequency of a sine without `--frequency`.
+const FREQUENCY: (&str, f64) = ("frequency_hz", 1.0);
+/// Speed of a ramp without `--speed`.
+const SPEED: (&str, f64) = ("speed_m_per_s", 1e-4);
+/// Start of a step or ramp after the loop is closed.
+const START: (&str, f64) = ("at_s", 0.2);
 
-/// Which loop, and what it follows.
+/// The loop and its reference.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = what_happens_without_options())]
 pub(super) struct Args {
@@ -34,7 +34,7 @@ pub(super) struct Args {
     choice: ControllerChoice,
     #[command(flatten)]
     pub run: RunOptions,
-    /// What to follow: step, hold, ramp, sine, chirp (identification in closed loop), or a CSV file with the columns
+    /// The reference: step, hold, ramp, sine, chirp (identification in closed loop), or a CSV file with the columns
     /// time_s,reference_m [default: control.reference of the profile]
     #[arg(long, value_name = "step|hold|ramp|sine|chirp|FILE", value_parser = reference)]
     reference: Option<Reference>,
@@ -88,27 +88,43 @@ enum Reference {
     File(String),
 }
 
+impl ReferenceKind {
+    fn name(self) -> &'static str {
+        match self {
+            ReferenceKind::Step => "step",
+            ReferenceKind::Hold => "hold",
+            ReferenceKind::Ramp => "ramp",
+            ReferenceKind::Sine => "sine",
+            ReferenceKind::Chirp => "chirp",
+        }
+    }
+
+    /// Its settings without other options.
+    fn defaults(self) -> &'static [(&'static str, f64)] {
+        match self {
+            ReferenceKind::Step => &[HEIGHT, START],
+            ReferenceKind::Hold => &[],
+            ReferenceKind::Ramp => &[HEIGHT, START, SPEED],
+            ReferenceKind::Sine => &[HEIGHT, FREQUENCY],
+            ReferenceKind::Chirp => &[TRAVEL],
+        }
+    }
+}
+
 impl Reference {
     /// The whole table with default values; the other options replace them.
     fn setting(&self) -> OptionSetting {
-        let number = |key: &str, value| (key.to_string(), Value::Float(value));
-        let word = |key: &str, text: &str| (key.to_string(), Value::String(text.into()));
-        let height = number("amplitude_m", AMPLITUDE_M);
-        let start = number("at_s", START_S);
-        let (kind, entries) = match self {
-            Reference::File(path) => ("file", vec![word("path", path)]),
-            Reference::Kind(ReferenceKind::Hold) => ("hold", Vec::new()),
-            Reference::Kind(ReferenceKind::Step) => ("step", vec![height, start]),
-            Reference::Kind(ReferenceKind::Ramp) => {
-                let speed = number("speed_m_per_s", SPEED_M_PER_S);
-                ("ramp", vec![height, start, speed])
+        let (kind, mut table) = match self {
+            Reference::File(path) => {
+                let path = ("path".to_string(), Value::String(path.clone()));
+                ("file", Table::from_iter([path]))
             }
-            Reference::Kind(ReferenceKind::Sine) => {
-                ("sine", vec![height, number("frequency_hz", FREQUENCY_HZ)])
+            Reference::Kind(kind) => {
+                let defaults = kind.defaults().iter();
+                let entries = defaults.map(|(key, si)| (key.to_string(), Value::Float(*si)));
+                (kind.name(), entries.collect())
             }
-            Reference::Kind(ReferenceKind::Chirp) => ("chirp", vec![number("travel_m", TRAVEL_M)]),
         };
-        let mut table = Table::from_iter(entries);
         table.insert("kind".into(), Value::String(kind.into()));
         OptionSetting::new("control.reference", table, format!("--reference {kind}"))
     }
@@ -132,18 +148,19 @@ impl Args {
         self.refuse_unused()?;
         let mut settings = self.choice.settings();
         settings.extend(self.reference.as_ref().map(Reference::setting));
-        settings.extend(self.amplitude_setting());
-        settings.extend(self.duration_setting());
-        if let Some(frequency) = &self.frequency {
-            let option = format!("--frequency {frequency}");
-            let key = "control.reference.frequency_hz";
-            settings.push(OptionSetting::new(key, frequency.si(), option));
-        }
-        if let Some(speed) = &self.speed {
-            let option = format!("--speed {speed}");
-            let key = "control.reference.speed_m_per_s";
-            settings.push(OptionSetting::new(key, speed.si(), option));
-        }
+        let (amplitude_key, duration_key) = match self.kind() {
+            Some(ReferenceKind::Chirp) => ("control.reference.travel_m", "chirp.duration_s"),
+            _ => ("control.reference.amplitude_m", "control.duration_s"),
+        };
+        let frequency_key = "control.reference.frequency_hz";
+        let speed_key = "control.reference.speed_m_per_s";
+        let options = [
+            given(amplitude_key, "--amplitude", self.amplitude.as_ref()),
+            given(duration_key, "--duration", self.duration.as_ref()),
+            given(frequency_key, "--frequency", self.frequency.as_ref()),
+            given(speed_key, "--speed", self.speed.as_ref()),
+        ];
+        settings.extend(options.into_iter().flatten());
         Ok(settings)
     }
 
@@ -154,46 +171,23 @@ impl Args {
         }
     }
 
-    fn amplitude_setting(&self) -> Option<OptionSetting> {
-        let amplitude = self.amplitude.as_ref()?;
-        let key = match self.kind() {
-            Some(ReferenceKind::Chirp) => "control.reference.travel_m",
-            _ => "control.reference.amplitude_m",
-        };
-        let option = format!("--amplitude {amplitude}");
-        Some(OptionSetting::new(key, amplitude.si(), option))
-    }
-
-    fn duration_setting(&self) -> Option<OptionSetting> {
-        let duration = self.duration.as_ref()?;
-        let key = match self.kind() {
-            Some(ReferenceKind::Chirp) => "chirp.duration_s",
-            _ => "control.duration_s",
-        };
-        let option = format!("--duration {duration}");
-        Some(OptionSetting::new(key, duration.si(), option))
-    }
-
-    /// Refuses an option that the reference has no use for.
+    /// Refuses an option that the reference does not use.
     fn refuse_unused(&self) -> Result<(), CliError> {
         let is_file = matches!(self.reference, Some(Reference::File(_)));
-        let has_amplitude = !is_file && self.kind() != Some(ReferenceKind::Hold);
-        let is_sine = self.kind() == Some(ReferenceKind::Sine);
-        let is_ramp = self.kind() == Some(ReferenceKind::Ramp);
-        let unused = [
-            (
-                self.amplitude.is_some() && !has_amplitude,
-                "--amplitude",
-                "step, ramp, sine or chirp",
-            ),
-            (self.frequency.is_some() && !is_sine, "--frequency", "sine"),
-            (self.speed.is_some() && !is_ramp, "--speed", "ramp"),
-        ];
-        match unused.iter().find(|(is_unused, ..)| *is_unused) {
-            Some((_, option, kinds)) => Err(CliError::Usage(format!(
-                "{option} goes with --reference {kinds} only"
-            ))),
-            None => Ok(()),
+        let kind = self.kind();
+        if self.amplitude.is_some() && (is_file || kind == Some(ReferenceKind::Hold)) {
+            return Err(unused("--amplitude", "step, ramp, sine or chirp"));
         }
+        if self.frequency.is_some() && kind != Some(ReferenceKind::Sine) {
+            return Err(unused("--frequency", "sine"));
+        }
+        if self.speed.is_some() && kind != Some(ReferenceKind::Ramp) {
+            return Err(unused("--speed", "ramp"));
+        }
+        Ok(())
     }
+}
+
+fn unused(option: &str, kinds: &str) -> CliError {
+    CliError::Usage(format!("{option} goes with --reference {kinds} only"))
 }

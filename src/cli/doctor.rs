@@ -1,4 +1,4 @@
-//! `bench doctor`: could the configured runs start? Nothing is moved.
+//! `bench doctor`: whether the configured runs could start. There is no motion.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use super::error::CliError;
 use super::margins::{closed_loop, require_modulus_margin};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::print_result;
 use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::control::Margins;
@@ -28,11 +28,9 @@ const OUT: &str = "recordings";
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
     let report = examine(&config, &run_checks(args), &args.out);
-    if args.bench.json {
-        print_json(&report)?;
-    } else {
-        print_text(&text(&report, &same_options(args)))?;
-    }
+    print_result(args.bench.json, &report, |report| {
+        text(report, &same_options(args))
+    })?;
     Ok(match report.ready {
         true => Outcome::Done,
         false => Outcome::Failed,
@@ -97,26 +95,31 @@ fn conclusion(report: &Report, options: &str) -> String {
 }
 
 fn severity_counts(report: &Report) -> String {
-    let mut counts = Vec::new();
-    for severity in [
+    let severities = [
         Severity::Ok,
         Severity::Note,
         Severity::Warning,
         Severity::Failure,
-    ] {
+    ];
+    let counts = severities.map(|severity| {
         let findings = report.findings.iter();
-        let count = findings.filter(|f| f.severity == severity).count();
-        let plural = if severity == Severity::Ok || count == 1 {
-            ""
-        } else {
-            "s"
-        };
-        if count > 0 {
-            let word = severity.word().to_lowercase();
-            counts.push(format!("{count} {word}{plural}"));
-        }
-    }
+        (
+            severity,
+            findings.filter(|f| f.severity == severity).count(),
+        )
+    });
+    let counts = counts.iter().filter(|(_, count)| *count > 0);
+    let counts: Vec<String> = counts.map(count_text).collect();
     counts.join(", ")
+}
+
+fn count_text((severity, count): &(Severity, usize)) -> String {
+    let plural = match severity {
+        Severity::Ok => "",
+        _ if *count == 1 => "",
+        _ => "s",
+    };
+    format!("{count} {}{plural}", severity.word().to_lowercase())
 }
 
 fn loop_margins(config: &Config) -> Result<Margins, CliError> {
@@ -129,27 +132,24 @@ fn loop_margins(config: &Config) -> Result<Margins, CliError> {
 /// The options of this command as options of the runs.
 fn same_options(args: &Args) -> String {
     let bench = &args.bench;
-    let mut options = String::new();
-    let mut add = |flag: &str, value: &str| {
-        options += &format!(" {flag} {}", shell_quoted(value));
-    };
-    if let Some(config) = &bench.config {
-        add("--config", config);
-    }
-    bench.sets.iter().for_each(|set| add("--set", set));
-    if let Some(point) = &bench.operating_point {
-        add("--operating-point", &point.to_string());
-    }
-    if let Some(asymmetry) = &bench.asymmetry {
-        add("--asymmetry", &asymmetry.to_string());
-    }
-    if let Some(seed) = bench.seed {
-        add("--seed", &seed.to_string());
-    }
-    if args.out.as_path() != Path::new(OUT) {
-        add("--out", &args.out.display().to_string());
-    }
-    options
+    let sets = bench.sets.iter().map(|set| ("--set", Some(set.clone())));
+    let folder = (args.out.as_path() != Path::new(OUT)).then(|| args.out.display().to_string());
+    let point = bench.operating_point.as_ref().map(ToString::to_string);
+    let asymmetry = bench.asymmetry.as_ref().map(ToString::to_string);
+    let seed = bench.seed.map(|seed| seed.to_string());
+    let options = [("--config", bench.config.clone())]
+        .into_iter()
+        .chain(sets)
+        .chain([
+            ("--operating-point", point),
+            ("--asymmetry", asymmetry),
+            ("--seed", seed),
+            ("--out", folder),
+        ]);
+    let given = options.filter_map(|(flag, value)| Some((flag, value?)));
+    given
+        .map(|(flag, value)| format!(" {flag} {}", shell_quoted(&value)))
+        .collect()
 }
 
 /// Quoted for a shell, if necessary.

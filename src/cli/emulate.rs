@@ -12,20 +12,20 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_json, print_note};
-use crate::config::{OptionSetting, Purpose};
+use super::output::{print_json, print_message, print_note};
+use crate::config::{Config, OptionSetting, Purpose};
 use crate::rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,
 };
 use crate::util::quantity::{OfFrequency, OfTime, si};
 
-/// Period at which commands, signals and planned faults are handled.
+/// Period at which commands and planned faults are handled.
 const PERIOD: Duration = Duration::from_millis(2);
 
 /// Which devices are emulated, and where
 #[derive(Clone, Debug, clap::Args)]
-#[command(after_help = format!("Faults, for --fault KIND@SECONDS and on standard input:\n{}", fault::help()))]
+#[command(after_help = format!("Faults, for --fault KIND@TIME and on standard input:\n{}", fault::help()))]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
@@ -44,8 +44,8 @@ pub(super) struct Args {
     /// Measurements of the probe per second [default: as configured]
     #[arg(long, value_name = "FREQUENCY", value_parser = si::<OfFrequency>)]
     measuring_rate: Option<f64>,
-    /// Inject a fault at a time (KIND@SECONDS) or for an interval (KIND@FROM..TO), repeatable; the kinds are listed below
-    #[arg(long = "fault", value_name = "KIND@SECONDS")]
+    /// Inject a fault at a time (KIND@2s) or for an interval (KIND@500ms..2s), repeatable; the kinds are listed below
+    #[arg(long = "fault", value_name = "KIND@TIME")]
     faults: Vec<PlannedFault>,
     /// Origin of the times of --fault: the first enable of the amplifier, or the start
     /// [default: enable; start if no amplifier is emulated]
@@ -97,20 +97,20 @@ impl Args {
 
     /// Refuses options of a device that is not emulated, and invalid values.
     fn check(&self) -> Result<(), CliError> {
+        let no_probe = !self.emulates(EmulatedDevice::Probe);
+        let no_amplifier = !self.emulates(EmulatedDevice::Amplifier);
         let has_probe_options =
             self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
-        let refusal = if has_probe_options && !self.emulates(EmulatedDevice::Probe) {
-            "--port, --pty and --measuring-rate need the device `probe`"
-        } else if self.interface.is_some() && !self.emulates(EmulatedDevice::Amplifier) {
-            "--interface needs the device `amplifier`"
-        } else if !is_positive(self.measuring_rate) {
-            "--measuring-rate must be above zero"
-        } else if !is_positive(self.duration) {
-            "--duration must be above zero"
-        } else {
-            return Ok(());
-        };
-        Err(CliError::Usage(refusal.into()))
+        if no_probe && has_probe_options {
+            let what = "--port, --pty and --measuring-rate need the device `probe`";
+            return Err(CliError::Usage(what.into()));
+        }
+        if no_amplifier && self.interface.is_some() {
+            let what = "--interface needs the device `amplifier`";
+            return Err(CliError::Usage(what.into()));
+        }
+        require_positive("--measuring-rate", self.measuring_rate)?;
+        require_positive("--duration", self.duration)
     }
 
     fn origin(&self) -> Origin {
@@ -122,8 +122,11 @@ impl Args {
     }
 }
 
-fn is_positive(value: Option<f64>) -> bool {
-    value.is_none_or(|value| value > 0.0)
+fn require_positive(option: &str, value: Option<f64>) -> Result<(), CliError> {
+    match value.is_none_or(|value| value > 0.0) {
+        true => Ok(()),
+        false => Err(CliError::Usage(format!("{option} must be above zero"))),
+    }
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -133,19 +136,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let signals = watch_signals();
     let (runtime, signals) =
         signals.map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
-    let emulator = Emulator::start(&config, &args.emulated_devices())?;
-    let schedule = FaultSchedule::new(&args.faults);
-    for step in schedule.steps() {
-        emulator.check(step)?;
-    }
-    let mut server = Server {
-        emulator,
-        schedule,
-        log,
-        input: read_lines(),
-        args,
-        is_over: false,
-    };
+    let mut server = Server::start(args, &config, log)?;
     runtime.block_on(server.serve(signals))?;
     if args.bench.json {
         print_json(&server.emulator.summary())?;
@@ -162,7 +153,24 @@ struct Server<'a> {
     is_over: bool,
 }
 
-impl Server<'_> {
+impl<'a> Server<'a> {
+    /// Starts the devices. Refuses a planned fault that no emulated device can have.
+    fn start(args: &'a Args, config: &Config, log: Option<LogFile>) -> Result<Self, CliError> {
+        let emulator = Emulator::start(config, &args.emulated_devices())?;
+        let schedule = FaultSchedule::new(&args.faults);
+        for step in schedule.steps() {
+            emulator.check(step)?;
+        }
+        Ok(Server {
+            emulator,
+            schedule,
+            log,
+            input: read_lines(),
+            args,
+            is_over: false,
+        })
+    }
+
     /// Serves until a signal, `quit`, or the end of the duration.
     async fn serve(&mut self, [mut interrupt, mut terminate]: [Signal; 2]) -> Result<(), CliError> {
         let mut period = tokio::time::interval(PERIOD);
@@ -190,13 +198,8 @@ impl Server<'_> {
         while let Ok(line) = self.input.try_recv() {
             self.execute(line.trim());
         }
-        if self
-            .args
-            .duration
-            .is_some_and(|duration_s| time_s >= duration_s)
-        {
-            self.is_over = true;
-        }
+        let duration_s = self.args.duration.unwrap_or(f64::INFINITY);
+        self.is_over |= time_s >= duration_s;
         self.report()
     }
 
@@ -206,11 +209,12 @@ impl Server<'_> {
         match words[..] {
             [] => {}
             ["quit"] => self.is_over = true,
-            ["help"] => eprint!("fault KIND, quit, help; the kinds are\n{}", fault::help()),
+            ["help"] => {
+                let kinds = fault::help();
+                print_message(&format!("fault KIND, quit, help; the kinds are\n{kinds}"));
+            }
             ["fault", fault] => {
-                if let Err(why) = self.inject(fault) {
-                    print_note(&why);
-                }
+                let _ = self.inject(fault).map_err(|why| print_note(&why));
             }
             _ => print_note(&format!(
                 "`{line}` is not a command; the commands are fault KIND, quit, help"
@@ -228,7 +232,7 @@ impl Server<'_> {
     /// Prints new log entries, and writes them to the file.
     fn report(&mut self) -> Result<(), CliError> {
         for entry in self.emulator.new_entries() {
-            eprintln!("{entry}");
+            print_message(&format!("{entry}\n"));
             if let Some(log) = &mut self.log {
                 log.write(&entry)?;
             }

@@ -1,14 +1,15 @@
-//! Options of the excitation, for every command that makes one.
+//! Options of the excitation, for every command that excites the stage.
 
 use toml::{Table, Value};
 
 use super::error::CliError;
 use super::help::with_setting;
+use super::options::given;
 use crate::config::{Config, OptionSetting};
 use crate::experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 use crate::util::quantity::{Current, Frequency};
 
-/// Which frequencies, and with how much.
+/// Frequency band and amplitude.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct ExcitationOptions {
     /// First frequency
@@ -31,15 +32,9 @@ pub(super) struct ExcitationOptions {
 
 impl ExcitationOptions {
     pub(super) fn settings(&self) -> Vec<OptionSetting> {
-        let mut settings = Vec::new();
-        if let Some(start) = &self.start {
-            let option = format!("--start {start}");
-            settings.push(OptionSetting::new("chirp.start_hz", start.si(), option));
-        }
-        if let Some(stop) = &self.stop {
-            let option = format!("--stop {stop}");
-            settings.push(OptionSetting::new("chirp.stop_hz", stop.si(), option));
-        }
+        let start = given("chirp.start_hz", "--start", self.start.as_ref());
+        let stop = given("chirp.stop_hz", "--stop", self.stop.as_ref());
+        let mut settings: Vec<OptionSetting> = start.into_iter().chain(stop).collect();
         if let Some(amplitude) = &self.amplitude {
             settings.extend(flat(amplitude));
         }
@@ -48,15 +43,13 @@ impl ExcitationOptions {
 
     /// The configuration with the requested amplitude over frequency.
     pub(super) fn shaped(&self, config: Config) -> Result<Config, CliError> {
-        match (&self.shape, &self.amplitude) {
-            (Some(source), _) => {
-                shape_amplitude(config, source).map_err(|error| refused(source, error))
-            }
+        let shaped = match (&self.shape, &self.amplitude) {
+            (Some(source), _) => shape_amplitude(config, source),
             (None, Some(_)) => Ok(config),
-            (None, None) => {
-                default_amplitude(config).map_err(|error| refused(&ResponseSource::Model, error))
-            }
-        }
+            (None, None) => default_amplitude(config),
+        };
+        let source = self.shape.as_ref().unwrap_or(&ResponseSource::Model);
+        shaped.map_err(|error| refused(source, error))
     }
 }
 

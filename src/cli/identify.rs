@@ -1,6 +1,6 @@
 //! `bench identify`: the analysis of `bench chirp`, from a recording.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use super::analysis_output::{self, analyse_and_write, in_folder};
 use super::error::CliError;
 use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::print_result;
 use super::progress::ProgressLine;
 use super::run_options::trip_text;
 use crate::config::Config;
@@ -17,14 +17,14 @@ use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
 use crate::util::progress::Progress;
 
-/// Which recording.
+/// The recording, and where the results go.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     /// The recording (MCAP) of a chirp, or an external CSV with --input and --output
     recording: PathBuf,
     #[command(flatten)]
     table: ExternalOptions,
-    /// Folder of the results; that of the recording or CSV without it
+    /// Folder for the results [default: the folder of the recording or CSV]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Print one JSON object on standard output and nothing else
@@ -35,7 +35,7 @@ pub(super) struct Args {
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
 struct Report {
-    /// `completed`, `tripped`, `stopped`, or `cut_off` where the file ends before the run does.
+    /// `completed`, `tripped`, `stopped`, or `cut_off` if the file ends before the run.
     outcome: Ending,
     trip: Option<TripSummary>,
     recording: String,
@@ -58,46 +58,27 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     let recording = Recording::open(&args.recording)?;
     let plan = Plan::of(&recording)?;
-    if plan.kind == RunKind::Calibrate {
-        let what = "is the recording of static steps, which `bench calibrate` analyses";
-        return Err(CliError::Usage(format!(
-            "{} {what}",
-            args.recording.display()
-        )));
-    }
-    if plan.kind == RunKind::Quiet {
-        let what = "is a quiet run of `bench campaign`, without current: \
-            it only contains the rest position of the stage";
-        return Err(CliError::Usage(format!(
-            "{} {what}",
-            args.recording.display()
-        )));
-    }
-    let ending = Ending::of(&recording);
+    check_kind(plan.kind, &args.recording)?;
     let made = analysed(&recording, &plan.config, args)?;
-    let report = Report {
-        outcome: ending,
-        trip: TripSummary::of(ending),
-        recording: args.recording.display().to_string(),
-        ticks: recording.tick_count(),
-        overruns: recording.overruns(),
-        lost_records: recording.lost_records(),
-        truncated: recording.truncated(),
-        made,
-    };
-    if args.json {
-        print_json(&report)?
-    } else {
-        print_text(&report.text(&plan.config))?
-    }
-    let whole = report.overruns + report.lost_records == 0
-        && !report.truncated
-        && ending == Ending::Completed;
-    Ok(if whole {
-        Outcome::Done
-    } else {
-        Outcome::Impaired
+    let report = Report::new(&recording, &args.recording, made);
+    print_result(args.json, &report, |report| report.text(&plan.config))?;
+    Ok(match report.is_whole() {
+        true => Outcome::Done,
+        false => Outcome::Impaired,
     })
+}
+
+/// Refuses a recording without an excitation.
+fn check_kind(kind: RunKind, path: &Path) -> Result<(), CliError> {
+    let what = match kind {
+        RunKind::Chirp | RunKind::Control => return Ok(()),
+        RunKind::Calibrate => "is the recording of static steps, which `bench calibrate` analyses",
+        RunKind::Quiet => {
+            "is a quiet run of `bench campaign`, without current: \
+             it only contains the rest position of the stage"
+        }
+    };
+    Err(CliError::Usage(format!("{} {what}", path.display())))
 }
 
 /// The analysis, with its progress on a terminal.
@@ -113,7 +94,28 @@ fn analysed(
 }
 
 impl Report {
-    /// How the run ended, and what its recording shows.
+    fn new(recording: &Recording, path: &Path, made: AnalysisOutputs) -> Report {
+        let outcome = Ending::of(recording);
+        Report {
+            outcome,
+            trip: TripSummary::of(outcome),
+            recording: path.display().to_string(),
+            ticks: recording.tick_count(),
+            overruns: recording.overruns(),
+            lost_records: recording.lost_records(),
+            truncated: recording.truncated(),
+            made,
+        }
+    }
+
+    /// Whether the run was completed and nothing of it is missing.
+    fn is_whole(&self) -> bool {
+        self.outcome == Ending::Completed
+            && self.overruns + self.lost_records == 0
+            && !self.truncated
+    }
+
+    /// How the run ended, and its analysis.
     fn text(&self, config: &Config) -> String {
         let period_s = config.servo.period_s();
         let cut = if self.truncated {
@@ -122,7 +124,7 @@ impl Report {
             ""
         };
         format!(
-            "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}{}\n{}",
+            "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}\n{}{}",
             self.outcome.name().replace('_', " "),
             self.ticks,
             self.ticks as f64 * period_s,

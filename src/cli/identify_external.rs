@@ -8,15 +8,15 @@ use super::analysis_output::{in_folder, pages_text, response_text};
 use super::error::CliError;
 use super::modal_output;
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
-use crate::experiment::{ExternalAnalysis, analyse_external};
+use super::output::print_result;
+use crate::experiment::analyse_external;
 use crate::identify::external_csv::{self, Columns, Sampling};
+use crate::identify::frf_csv;
 use crate::identify::periodic::Repetition;
-use crate::identify::{Signals, frf_csv};
 use crate::report::run_pages::{ExternalRecord, ModalSummary, PageFiles, write_frf};
 use crate::util::quantity::{Frequency, OfFrequency, Time, si};
 
-/// A period given in seconds may differ from whole samples by so many: a thousandth of what it takes to leak.
+/// Largest difference of a period in seconds from a whole number of samples; leakage needs a thousand times more.
 const WHOLE_SAMPLES: f64 = 1e-3;
 
 /// What the columns of a CSV mean.
@@ -60,10 +60,10 @@ pub(super) struct ExternalOptions {
     band: Option<String>,
 }
 
-/// The JSON object of the command: that of a recording, and what only a CSV has.
+/// The JSON object of the command: as for a recording, with fields of a CSV.
 #[derive(Debug, Serialize)]
 struct Report {
-    /// Of how others' runs ended nothing is known: `null`, as is a trip.
+    /// Always `null`, as is the trip: the file does not state how the run ended.
     outcome: Option<&'static str>,
     trip: Option<&'static str>,
     recording: String,
@@ -75,7 +75,7 @@ struct Report {
     truncated: bool,
     rate_hz: f64,
     band_hz: (f64, f64),
-    /// Periods that were averaged; `null` of a record that does not repeat.
+    /// Number of averaged periods; `null` if the record is not periodic.
     periods: Option<usize>,
     frf_csv: String,
     #[serde(flatten)]
@@ -97,31 +97,30 @@ impl ExternalOptions {
     }
 
     fn columns(&self, path: &Path) -> Result<Columns, CliError> {
-        let there = || Ok::<_, CliError>(external_csv::names(path)?.join(", "));
         let (Some(input), Some(output)) = (self.input.clone(), self.output.clone()) else {
-            let text = format!(
-                "which columns of {}? --input COLUMN --output COLUMN of {}",
-                path.display(),
-                there()?
-            );
-            return Err(CliError::Usage(text));
-        };
-        let sampling = match (&self.time, self.rate) {
-            (Some(time), _) => Sampling::TimeColumn(time.clone()),
-            (None, Some(rate_hz)) => Sampling::RateHz(rate_hz),
-            (None, None) => {
-                let text = format!(
-                    "when were the lines sampled? --time COLUMN (of {}) or --rate HZ",
-                    there()?
-                );
-                return Err(CliError::Usage(text));
-            }
+            let (file, names) = (path.display(), names(path)?);
+            return Err(CliError::Usage(format!(
+                "which columns of {file}? --input COLUMN --output COLUMN of {names}"
+            )));
         };
         Ok(Columns {
             input,
             output,
-            sampling,
+            sampling: self.sampling(path)?,
         })
+    }
+
+    fn sampling(&self, path: &Path) -> Result<Sampling, CliError> {
+        match (&self.time, self.rate) {
+            (Some(time), _) => Ok(Sampling::TimeColumn(time.clone())),
+            (None, Some(rate_hz)) => Ok(Sampling::RateHz(rate_hz)),
+            (None, None) => {
+                let names = names(path)?;
+                Err(CliError::Usage(format!(
+                    "when were the lines sampled? --time COLUMN (of {names}) or --rate HZ"
+                )))
+            }
+        }
     }
 
     fn band_hz(&self, rate_hz: f64) -> Result<(f64, f64), CliError> {
@@ -143,32 +142,32 @@ impl ExternalOptions {
         let Some(text) = &self.period else {
             return Ok(None);
         };
-        let wrong = || {
+        let period = period_samples(text, rate_hz).ok_or_else(|| {
             CliError::Usage(format!(
                 "--period {text}: it must be a whole number of samples, or seconds that make one at {rate_hz} Hz, as in 2500 or 1s"
             ))
-        };
-        // A bare number is one of samples.
-        let samples: f64 = match text.parse() {
-            Ok(samples) => samples,
-            Err(_) => text.parse::<Time>().map_err(|_| wrong())?.si() * rate_hz,
-        };
-        // A NaN compares as false, and so fails.
-        let whole =
-            (1.0..1e15).contains(&samples) && (samples - samples.round()).abs() <= WHOLE_SAMPLES;
-        let period = samples.round() as usize;
-        if whole {
-            Ok(Some(Repetition {
-                period,
-                skip: self.skip_periods.unwrap_or(0),
-            }))
-        } else {
-            Err(wrong())
-        }
+        })?;
+        let skip = self.skip_periods.unwrap_or(0);
+        Ok(Some(Repetition { period, skip }))
     }
 }
 
-/// Analyses a CSV; the files stand beside it, or in the folder asked for, under its name.
+/// The period in samples. A bare number is a number of samples; seconds must make a whole number.
+fn period_samples(text: &str, rate_hz: f64) -> Option<usize> {
+    let samples: f64 = match text.parse() {
+        Ok(samples) => samples,
+        Err(_) => text.parse::<Time>().ok()?.si() * rate_hz,
+    };
+    // NaN is outside of the range.
+    let is_whole = (samples - samples.round()).abs() <= WHOLE_SAMPLES;
+    ((1.0..1e15).contains(&samples) && is_whole).then_some(samples.round() as usize)
+}
+
+fn names(path: &Path) -> Result<String, CliError> {
+    Ok(external_csv::names(path)?.join(", "))
+}
+
+/// Analyses a CSV and writes the results under its name: beside it, or to the requested folder.
 pub(super) fn run(
     path: &Path,
     out: Option<&Path>,
@@ -180,62 +179,51 @@ pub(super) fn run(
     signals.check()?;
     let band_hz = options.band_hz(signals.rate_hz)?;
     let analysis = analyse_external(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
-    let report = report(
-        path,
-        &columns,
-        &signals,
-        band_hz,
-        &analysis,
-        &in_folder(out, path)?,
-    )?;
-    if json {
-        print_json(&report)?
-    } else {
-        print_text(&report.text())?
-    }
-    Ok(Outcome::Done)
-}
-
-fn report(
-    path: &Path,
-    columns: &Columns,
-    signals: &Signals,
-    band_hz: (f64, f64),
-    analysis: &ExternalAnalysis,
-    beside: &Path,
-) -> Result<Report, CliError> {
-    let Columns { input, output, .. } = columns;
-    let magnitude = frf_csv::external_magnitude(input, output);
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
     let record = ExternalRecord {
-        analysis,
-        file: &path.file_name().unwrap_or_default().to_string_lossy(),
-        input,
-        output,
+        analysis: &analysis,
+        file: &file,
+        input: &columns.input,
+        output: &columns.output,
         rate_hz: signals.rate_hz,
         samples: signals.len(),
     };
-    Ok(Report {
-        outcome: None,
-        trip: None,
-        recording: path.display().to_string(),
-        input: input.clone(),
-        output: output.clone(),
-        ticks: signals.len(),
-        overruns: 0,
-        lost_records: 0,
-        truncated: false,
-        rate_hz: signals.rate_hz,
-        band_hz,
-        periods: analysis.periods,
-        frf_csv: write_frf(beside, "frf", &analysis.frf, &magnitude)?,
-        pages: PageFiles::write(&record.report(), beside)?,
-        frequencies: analysis.frf.len(),
-        coherence_median: analysis.frf.median_coherence(),
-        summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
-    })
+    let report = Report::write(&record, path, &in_folder(out, path)?, band_hz)?;
+    print_result(json, &report, Report::text)?;
+    Ok(Outcome::Done)
 }
 
 impl Report {
+    /// Writes the files of an analysed CSV under the name of `beside`.
+    fn write(
+        record: &ExternalRecord,
+        path: &Path,
+        beside: &Path,
+        band_hz: (f64, f64),
+    ) -> Result<Report, CliError> {
+        let (analysis, input, output) = (record.analysis, record.input, record.output);
+        let magnitude = frf_csv::external_magnitude(input, output);
+        Ok(Report {
+            outcome: None,
+            trip: None,
+            recording: path.display().to_string(),
+            input: input.into(),
+            output: output.into(),
+            ticks: record.samples,
+            overruns: 0,
+            lost_records: 0,
+            truncated: false,
+            rate_hz: record.rate_hz,
+            band_hz,
+            periods: analysis.periods,
+            frf_csv: write_frf(beside, "frf", &analysis.frf, &magnitude)?,
+            pages: PageFiles::write(&record.report(), beside)?,
+            frequencies: analysis.frf.len(),
+            coherence_median: analysis.frf.median_coherence(),
+            summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
+        })
+    }
+
     fn text(&self) -> String {
         let Report {
             recording,
@@ -260,7 +248,7 @@ impl Report {
     }
 }
 
-/// A rate in nine significant digits: times in a file are decimal, and their quotient is not.
+/// A rate with nine significant digits. A rate computed from decimal times has rounding errors.
 fn hertz(rate_hz: f64) -> String {
     let rounded: f64 = format!("{rate_hz:.8e}").parse().unwrap_or(rate_hz);
     format!("{rounded} Hz")

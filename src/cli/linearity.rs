@@ -3,15 +3,15 @@
 use serde::Serialize;
 
 use super::analysis_output;
-use super::chirp::analysed;
+use super::chirp::{outcome, outputs};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::linearity_output;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
-use super::run_options::{RunOptions, exit, run_text};
+use super::run_options::{RunOptions, run_text};
 use super::table::{labelled, table, wrap};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::excitation::Extremes;
@@ -81,12 +81,12 @@ impl Args {
 #[derive(Debug, Serialize)]
 struct Report {
     scales: Vec<f64>,
-    /// One for each amplitude, as of `bench chirp`.
+    /// One for each amplitude, as by `bench chirp`.
     runs: Vec<AmplitudeRun>,
     /// The modes of the smallest amplitude in all runs.
     modes: Vec<ModeOverAmplitude>,
-    /// Whether a parameter of a mode differs from that at the smallest amplitude by more than its errors; null if that is not
-    /// known: without modes, or if no parameter differs but a run did not come to its end.
+    /// Whether a parameter of a mode differs from that at the smallest amplitude by more than its errors; null if unknown:
+    /// without modes, or if no parameter differs but a run was not completed.
     shifted: Option<bool>,
     why: String,
 }
@@ -102,27 +102,43 @@ struct AmplitudeRun {
 }
 
 impl AmplitudeRun {
-    fn exit(&self) -> Outcome {
-        match self.outputs.is_cancelled() {
-            true => Outcome::Failed,
-            false => exit(&self.run),
-        }
+    fn outcome(&self) -> Outcome {
+        outcome(&self.run, &self.outputs)
     }
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let plans = plan_amplitudes(&args.planned()?, &args.scales()?)?;
-    let runs = measure(args, &plans)?;
-    let outcome = outcome(&runs);
-    let report = report(runs, outcome != Outcome::Failed);
-    match args.bench.json {
-        true => print_json(&report)?,
-        false => print_text(&text(&report, &plans))?,
+    if !args.bench.json {
+        print_text(&plan_text(&plans))?;
     }
+    let runs = measure(args, &plans)?;
+    let outcome = overall(&runs);
+    let report = report(runs, outcome != Outcome::Failed);
+    print_result(args.bench.json, &report, |report| text(report, &plans))?;
     Ok(outcome)
 }
 
-/// Runs and analyses the amplitudes until one fails.
+/// The excitation and its extremes at each amplitude, printed before the first run.
+fn plan_text(plans: &[AmplitudePlan]) -> String {
+    let excitation = plans.first().map(|plan| plan.config.chosen_excitation());
+    let excitation = excitation.map_or(String::new(), |chosen| wrap(&chosen.describe(), 0));
+    let amplitudes = plans.iter().map(|plan| {
+        let line = expected_text(plan.scale, &plan.predicted);
+        wrap(&line, 2)
+    });
+    excitation + &amplitudes.collect::<String>() + "\n"
+}
+
+fn expected_text(scale: f64, extremes: &Extremes) -> String {
+    format!(
+        "{scale} of the amplitude; expected travel {:.0} um, current {:.3} A",
+        extremes.travel_m * 1e6,
+        extremes.current_a
+    )
+}
+
+/// Runs and analyses each amplitude, until a run fails.
 fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, CliError> {
     let Some(first) = plans.first() else {
         return Ok(Vec::new());
@@ -133,7 +149,7 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
     let mut runs = Vec::new();
     linearity::run(&Runner { setup, progress }, plans, &mut |plan, run| {
         let finished = finish(plan, run)?;
-        let is_failed = finished.exit() == Outcome::Failed;
+        let is_failed = finished.outcome() == Outcome::Failed;
         runs.push(finished);
         Ok::<bool, CliError>(!is_failed)
     })?;
@@ -143,10 +159,7 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
 /// Analyses a run and adds the result to its recording.
 fn finish(plan: &AmplitudePlan, mut run: Run) -> Result<AmplitudeRun, CliError> {
     let summary = RunSummary::of(&mut run)?;
-    let outputs = match summary.is_completed() {
-        true => analysed(&run.path, &plan.config)?,
-        false => AnalysisOutputs::run_incomplete(),
-    };
+    let outputs = outputs(&summary, &run.path, &plan.config)?;
     let finished = AmplitudeRun {
         scale: plan.scale,
         expected: plan.predicted,
@@ -158,8 +171,8 @@ fn finish(plan: &AmplitudePlan, mut run: Run) -> Result<AmplitudeRun, CliError> 
 }
 
 /// A failure of any run, or else the first outcome that is not `Done`.
-fn outcome(runs: &[AmplitudeRun]) -> Outcome {
-    let mut outcomes = runs.iter().map(AmplitudeRun::exit);
+fn overall(runs: &[AmplitudeRun]) -> Outcome {
+    let mut outcomes = runs.iter().map(AmplitudeRun::outcome);
     if outcomes.clone().any(|outcome| outcome == Outcome::Failed) {
         return Outcome::Failed;
     }
@@ -187,16 +200,12 @@ fn report(runs: Vec<AmplitudeRun>, all_completed: bool) -> Report {
 }
 
 fn text(report: &Report, plans: &[AmplitudePlan]) -> String {
-    let kind = plans
-        .first()
-        .map(|plan| plan.config.chosen_excitation().describe());
     let runs = report.runs.iter().zip(plans);
     let runs: String = runs
         .map(|(run, plan)| amplitude_text(run, &plan.config))
         .collect();
     format!(
-        "{}\n\n{runs}{}\n{}",
-        kind.unwrap_or_default(),
+        "{runs}{}\n{}",
         mode_table(&report.scales, &report.modes),
         wrap(
             &format!("modes over amplitude (* shifts): {}", report.why),
@@ -213,10 +222,8 @@ fn amplitude_text(run: &AmplitudeRun, config: &Config) -> String {
         None => analysis_output::text(&run.outputs),
     };
     format!(
-        "{} of the amplitude; expected travel {:.0} um, current {:.3} A\n{}{page}{linearity}\n",
-        run.scale,
-        run.expected.travel_m * 1e6,
-        run.expected.current_a,
+        "{}\n{}{page}{linearity}\n",
+        expected_text(run.scale, &run.expected),
         run_text(&run.run, config)
     )
 }

@@ -1,4 +1,4 @@
-//! `bench margins`: how far a loop is from trouble.
+//! `bench margins`: the stability margins of a loop.
 
 use std::f64::consts::PI;
 
@@ -10,14 +10,14 @@ use super::controller_choice::ControllerChoice;
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
+use super::output::print_result;
 use super::table::{table, wrap};
-use crate::config::{Config, Purpose};
+use crate::config::{Config, ProbeSettings, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::report::number::angular_frequency;
 
-/// Which loop.
+/// The bench and the controller.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -36,7 +36,7 @@ struct Report {
     margins: Value,
     /// Poles of the closed loop below half the sampling rate, and all unstable ones.
     poles: Vec<Pole>,
-    /// From a command to the position that its reading shows, in the mean, without hold and lag.
+    /// Mean delay from a command to the position that its reading shows, without hold and amplifier lag.
     delay_s: f64,
 }
 
@@ -63,16 +63,14 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             (closed_loop.margins(), closed_loop.poles(), delay_s)
         }
     };
-    let poles = pole_list(&poles, &config);
-    if args.bench.json {
-        print_json(&Report {
-            margins: margins_json(&margins)?,
-            poles,
-            delay_s,
-        })?
-    } else {
-        print_text(&text(&config, &margins, &poles))?
-    }
+    let report = Report {
+        margins: margins_json(&margins)?,
+        poles: pole_list(&poles, &config),
+        delay_s,
+    };
+    print_result(args.bench.json, &report, |report| {
+        text(&config, &margins, &report.poles)
+    })?;
     Ok(match margins.stable {
         true => Outcome::Done,
         false => Outcome::Failed,
@@ -140,40 +138,44 @@ pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
 /// Refuses a loop with less than the configured modulus margin.
 pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Result<(), CliError> {
     let least = config.control.min_modulus_margin;
+    let found = match margins.stable {
+        true if margins.modulus_margin < least => {
+            format!("the modulus margin is {:.3}", margins.modulus_margin)
+        }
+        false if least > 0.0 => "the closed loop is unstable and has no modulus margin".into(),
+        _ => return Ok(()),
+    };
     let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
-    if least > 0.0 && !margins.stable {
-        return Err(CliError::Margin(format!(
-            "with the {name} controller at {rate_hz} Hz the closed loop is unstable and has no modulus margin, at least {least} is asked for (control.min_modulus_margin)"
-        )));
-    }
-    if margins.modulus_margin < least {
-        let margin = margins.modulus_margin;
-        return Err(CliError::Margin(format!(
-            "with the {name} controller at {rate_hz} Hz the modulus margin is {margin:.3}, at least {least} is asked for (control.min_modulus_margin)"
-        )));
-    }
-    Ok(())
+    Err(CliError::Margin(format!(
+        "with the {name} controller at {rate_hz} Hz {found}, at least {least} is asked for (control.min_modulus_margin)"
+    )))
 }
 
 /// Rates and delays of the chain in words.
 fn chain_text(config: &Config) -> String {
-    let (amplifier, probe) = (&config.amplifier, &config.probe);
-    let mut text = format!(
-        "{} Hz, hold, {} period(s) of computing delay, amplifier of {} Hz",
-        config.servo.rate_hz, config.servo.computing_delay_periods, amplifier.bandwidth_hz
-    );
-    if amplifier.latency_s > 0.0 {
-        text += &format!(" that acts {:.2} ms late", amplifier.latency_s * 1e3);
-    }
+    let (servo, amplifier) = (&config.servo, &config.amplifier);
+    let latency = match amplifier.latency_s > 0.0 {
+        true => format!(" and {:.2} ms latency", amplifier.latency_s * 1e3),
+        false => String::new(),
+    };
+    format!(
+        "{} Hz, hold, {} period(s) of computing delay, amplifier of {} Hz{latency}{}",
+        servo.rate_hz,
+        servo.computing_delay_periods,
+        amplifier.bandwidth_hz,
+        probe_text(&config.probe)
+    )
+}
+
+fn probe_text(probe: &ProbeSettings) -> String {
     let age_ms = probe.age_at_arrival_s() * 1e3;
     match probe.rate_hz {
         Some(rate_hz) => {
-            text += &format!(", {rate_hz} readings a second, {age_ms:.2} ms old on arrival, held")
+            format!(", {rate_hz} readings a second, {age_ms:.2} ms old on arrival, held")
         }
-        None if age_ms > 0.0 => text += &format!(", readings {age_ms:.2} ms old"),
-        None => {}
+        None if age_ms > 0.0 => format!(", readings {age_ms:.2} ms old"),
+        None => String::new(),
     }
-    text
 }
 
 /// The loop and its margins; of an unstable one the unstable poles.
@@ -200,15 +202,16 @@ fn unstable_text(poles: &[Pole]) -> String {
 
 fn margin_lines(margins: &Margins) -> String {
     let or_none = |text: Option<String>| text.unwrap_or("none".into());
-    let degrees = margins.phase_margin_deg.map(|deg| format!("{deg:.2} deg"));
-    let decibels = margins.gain_margin_db.map(|db| format!("{db:.2} dB"));
+    let crossover = margins.crossover_rad_s.map(angular_frequency);
+    let phase = margins.phase_margin_deg.map(|deg| format!("{deg:.2} deg"));
+    let gain = margins.gain_margin_db.map(|db| format!("{db:.2} dB"));
+    let bandwidth = margins.sensitivity_bandwidth_rad_s.map(angular_frequency);
+    let (modulus, peak_db) = (margins.modulus_margin, margins.sensitivity_peak_db);
     format!(
-        "  stable\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {:.4} (peak of S {:.2} dB)\n  sensitivity bandwidth  {}\n",
-        or_none(margins.crossover_rad_s.map(angular_frequency)),
-        or_none(degrees),
-        or_none(decibels),
-        margins.modulus_margin,
-        margins.sensitivity_peak_db,
-        or_none(margins.sensitivity_bandwidth_rad_s.map(angular_frequency)),
+        "  stable\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {modulus:.4} (peak of S {peak_db:.2} dB)\n  sensitivity bandwidth  {}\n",
+        or_none(crossover),
+        or_none(phase),
+        or_none(gain),
+        or_none(bandwidth),
     )
 }

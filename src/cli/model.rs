@@ -1,4 +1,4 @@
-//! `bench model`: analyses of the mechanics that need no bench.
+//! `bench model`: analyses of the model of the mechanics, without a bench.
 
 mod bounds;
 mod conditions;
@@ -22,6 +22,7 @@ use serde::Serialize;
 use super::error::CliError;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
+use crate::model::veering::report::VeeringPoint;
 
 /// What to compute.
 #[derive(Clone, Debug, clap::Args)]
@@ -81,7 +82,18 @@ struct Profiled<'a, T> {
     report: T,
 }
 
-/// At most 25 of some rows, evenly spread: the JSON and the files have all.
+/// How two modes meet, and where.
+fn meeting_text(point: &VeeringPoint) -> String {
+    format!(
+        "they {} at {:.9}: {:.4} Hz, {:.3e} Hz apart",
+        point.meeting.verb(),
+        point.value,
+        point.frequency_hz,
+        point.gap_hz
+    )
+}
+
+/// At most 25 of some rows, evenly spread. JSON and files contain all rows.
 fn screenful<T>(rows: &[T]) -> impl Iterator<Item = &T> {
     rows.iter().step_by(rows.len().div_ceil(25).max(1))
 }

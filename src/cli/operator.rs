@@ -1,12 +1,11 @@
 //! The operator at the terminal: questions go to standard error, answers come from standard input.
 
-use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::error::CliError;
-use super::output::print_note;
+use super::output::{print_message, print_note};
 use super::table::wrap;
 use crate::experiment::campaign::{Operator, Question, Reply};
 use crate::util::quantity::Quantity;
@@ -31,19 +30,18 @@ impl<'a> TerminalOperator<'a> {
         })
     }
 
-    /// An operator who types these lines. A thread reads them immediately, so that a line typed before a question can be
-    /// distinguished from an answer.
+    /// An operator who types these lines. A thread reads each line when it is typed, so that a line typed before a question
+    /// can be distinguished from an answer.
     fn of<L: Iterator<Item = String>>(
         stop: &'a AtomicBool,
         beam_length_m: Option<f64>,
         typed: impl FnOnce() -> L + Send + 'static,
     ) -> Result<TerminalOperator<'a>, CliError> {
         let (sender, lines) = channel();
-        // Ends with the input or with the process: a read cannot be interrupted.
-        let read = move || typed().try_for_each(|line| sender.send(line));
+        // The thread ends with the input or with the process: a read cannot be interrupted.
+        let read = move || drop(typed().try_for_each(|line| sender.send(line)));
         let thread = std::thread::Builder::new().name("bench-answers".into());
-        let started = thread.spawn(move || drop(read()));
-        started.map_err(|e| {
+        thread.spawn(read).map_err(|e| {
             CliError::Failed(format!(
                 "cannot wait for answers: {e}; start the command again"
             ))
@@ -74,15 +72,13 @@ impl Operator for TerminalOperator<'_> {
         while self.lines.try_recv().is_ok() {}
         self.tell(&question.text);
         loop {
-            eprint!("{}: ", wrap(&choices(question), 2).trim_end());
-            // A prompt that cannot be shown does not prevent an answer.
-            let _ = std::io::stderr().flush();
+            print_message(&format!("{}: ", wrap(&choices(question), 2).trim_end()));
             let Some(line) = self.line() else {
                 return Reply::Stop;
             };
             match reply(&line, question, self.beam_length_m) {
                 Ok(reply) => return reply,
-                Err(why) => eprintln!("  {why}"),
+                Err(why) => print_message(&format!("  {why}\n")),
             }
         }
     }
@@ -111,20 +107,24 @@ fn choices(question: &Question) -> String {
 /// The meaning of an answer, or why it is not accepted.
 fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<Reply, String> {
     let line = line.trim();
-    match line {
-        "" => return Ok(Reply::Done(None)),
-        "stop" => return Ok(Reply::Stop),
-        "skip" if question.may_skip => return Ok(Reply::Skip),
-        "right" if question.may_confirm => return Ok(Reply::Right),
-        _ => {}
+    let reply = match line {
+        "" => Some(Reply::Done(None)),
+        "stop" => Some(Reply::Stop),
+        "skip" if question.may_skip => Some(Reply::Skip),
+        "right" if question.may_confirm => Some(Reply::Right),
+        _ if question.may_read => displacement_m(line, beam_length_m).map(|m| Reply::Done(Some(m))),
+        _ => None,
+    };
+    reply.ok_or_else(|| format!("`{line}` is not accepted here: {}", choices(question)))
+}
+
+/// A displacement with its unit. A bare number is refused: it may be in millimetres or in metres.
+fn displacement_m(text: &str, beam_length_m: Option<f64>) -> Option<f64> {
+    let typed: Quantity = text.parse().ok()?;
+    if typed.is_bare() {
+        return None;
     }
-    // A bare number may be millimetres or metres.
-    let read: Option<Quantity> = line.parse().ok();
-    let read = read.filter(|read| question.may_read && !read.is_bare());
-    let read_m = read.and_then(|read| read.operating_point_m(beam_length_m).ok());
-    read_m
-        .map(|m| Reply::Done(Some(m)))
-        .ok_or_else(|| format!("`{line}` is not accepted here: {}", choices(question)))
+    typed.operating_point_m(beam_length_m).ok()
 }
 
 #[cfg(test)]

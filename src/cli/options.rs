@@ -1,11 +1,11 @@
-//! The options that all commands on a bench share.
+//! The options that all commands on a bench share, and the settings that they stand for.
 
 use clap::Args;
 
 use super::error::CliError;
 use crate::config::{Config, OptionSetting, PlantSettings, Purpose, Source, load};
 use crate::rig::devices;
-use crate::util::quantity::{OperatingPoint, Ratio};
+use crate::util::quantity::{Measure, OperatingPoint, Ratio};
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]
@@ -58,13 +58,11 @@ impl BenchOptions {
     }
 
     fn asymmetry_setting(&self, plant: &PlantSettings) -> Result<Option<OptionSetting>, CliError> {
-        let Some(asymmetry) = &self.asymmetry else {
-            return Ok(None);
-        };
-        require(plant, plant.mass_asymmetry(), "--asymmetry")?;
-        let option = format!("--asymmetry {asymmetry}");
-        let setting = OptionSetting::new("plant.mass_asymmetry", asymmetry.si(), option);
-        Ok(Some(setting))
+        if self.asymmetry.is_some() {
+            require(plant, plant.mass_asymmetry(), "--asymmetry")?;
+        }
+        let asymmetry = self.asymmetry.as_ref();
+        Ok(given("plant.mass_asymmetry", "--asymmetry", asymmetry))
     }
 
     fn operating_point_setting(
@@ -82,6 +80,17 @@ impl BenchOptions {
         let setting = OptionSetting::new("plant.operating_point_m", point_m, option);
         Ok(Some(setting))
     }
+}
+
+/// The setting `key` that `option` with a quantity stands for, if it is given.
+pub(super) fn given<D>(
+    key: &str,
+    option: &str,
+    quantity: Option<&Measure<D>>,
+) -> Option<OptionSetting> {
+    let quantity = quantity?;
+    let option = format!("{option} {quantity}");
+    Some(OptionSetting::new(key, quantity.si(), option))
 }
 
 fn seed(seed: u64) -> OptionSetting {

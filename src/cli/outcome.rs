@@ -5,9 +5,9 @@ use std::process::ExitCode;
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// All done.
+    /// The command is done.
     Done,
-    /// Ran, but did not reach its end: tripped, stopped, different.
+    /// The command failed, or the run was tripped or stopped, or a replay differs.
     Failed,
     /// Wrong usage or configuration; nothing was moved.
     Usage,

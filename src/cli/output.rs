@@ -13,6 +13,18 @@ pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print_text(&format!("{text}\n"))
 }
 
+/// Prints the result of a command as its JSON object or as text.
+pub(super) fn print_result<T: Serialize>(
+    json: bool,
+    result: &T,
+    text: impl FnOnce(&T) -> String,
+) -> Result<(), CliError> {
+    match json {
+        true => print_json(result),
+        false => print_text(&text(result)),
+    }
+}
+
 /// Prints to standard output and flushes it. A reader that has closed it (`| head -1`) is not an error.
 pub(super) fn print_text(text: &str) -> Result<(), CliError> {
     let mut output = std::io::stdout().lock();
@@ -27,7 +39,15 @@ pub(super) fn print_text(text: &str) -> Result<(), CliError> {
     }
 }
 
-/// Prints a message to standard error. Where that cannot be written to, the message is lost and the command goes on.
+/// Prints a message to standard error.
 pub(super) fn print_note(text: &str) {
-    let _ = writeln!(std::io::stderr(), "bench: {text}");
+    print_message(&format!("bench: {text}\n"));
+}
+
+/// Prints text to standard error and flushes it. If standard error is closed, the text is lost and the command continues.
+pub(super) fn print_message(text: &str) {
+    let mut output = std::io::stderr().lock();
+    let _ = output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush());
 }

@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::util::progress::{Progress, Snapshot};
 
-/// Between two looks at the progress.
+/// Interval between two updates of the line.
 const INTERVAL: Duration = Duration::from_millis(100);
 
 /// Shows a [`Progress`] until it is dropped, if standard error is a terminal.
@@ -24,7 +24,7 @@ impl ProgressLine {
         let is_over = Arc::new(AtomicBool::new(false));
         let (progress, ends) = (progress.clone(), Arc::clone(&is_over));
         let thread = std::thread::Builder::new().name("bench-progress".into());
-        // Without a thread there is no line, and nothing else changes.
+        // If the thread cannot be started, the line is omitted.
         let thread = std::io::stderr()
             .is_terminal()
             .then(|| thread.spawn(move || draw_until(&ends, &progress)).ok());
@@ -72,7 +72,7 @@ fn draw(bar: &ProgressBar, seen: &Snapshot) {
     bar.tick();
 }
 
-/// `12 s, 30 s left`; nothing is said of the rest where nothing is known of it.
+/// `12 s, 30 s left`, or the elapsed time alone if the remaining time is unknown.
 fn times(seen: &Snapshot) -> String {
     let elapsed = seconds(seen.elapsed);
     match seen.remaining() {
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn says_nothing_of_the_rest_before_the_first_step() {
+    fn shows_no_remaining_time_before_the_first_step() {
         let seen = |done, total, seconds| Snapshot {
             stage: "figures",
             done,

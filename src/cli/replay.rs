@@ -1,12 +1,14 @@
-//! `bench replay`: the recorded probe through the same loop.
+//! `bench replay`: runs the same loop on the recorded probe measurements.
 
 use std::path::PathBuf;
 
+use serde::Serialize;
+
 use super::error::CliError;
 use super::outcome::Outcome;
-use super::output::{print_json, print_text};
-use crate::experiment::{Replayed, replay};
-use crate::recording::Recording;
+use super::output::print_result;
+use crate::experiment::{Difference, replay};
+use crate::recording::{Cut, Recording};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]
@@ -18,38 +20,48 @@ pub(super) struct Args {
     json: bool,
 }
 
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report {
+    recording: String,
+    truncated: bool,
+    ticks: u64,
+    different: u64,
+    identical: bool,
+    first: Option<Difference>,
+}
+
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let recording = Recording::open(&args.recording)?;
     let replayed = replay(&recording)
         .map_err(|e| CliError::Failed(format!("{}: {e}", args.recording.display())))?;
-    let same = replayed.different == 0;
-    if args.json {
-        print_json(&serde_json::json!({
-            "recording": args.recording.display().to_string(),
-            "truncated": recording.truncated(),
-            "ticks": replayed.ticks,
-            "different": replayed.different,
-            "identical": same,
-            "first": replayed.first.map(|d| serde_json::json!({ "tick": d.tick, "recorded_a": d.recorded_a, "replayed_a": d.replayed_a })),
-        }))?;
-    } else {
-        print_text(&text(&recording, &replayed))?;
-    }
-    Ok(if same { Outcome::Done } else { Outcome::Failed })
+    let report = Report {
+        recording: args.recording.display().to_string(),
+        truncated: recording.truncated(),
+        ticks: replayed.ticks,
+        different: replayed.different,
+        identical: replayed.different == 0,
+        first: replayed.first,
+    };
+    print_result(args.json, &report, |report| text(report, recording.cut()))?;
+    Ok(match report.identical {
+        true => Outcome::Done,
+        false => Outcome::Failed,
+    })
 }
 
-fn text(recording: &Recording, replayed: &Replayed) -> String {
-    let cut = recording.cut().map_or(String::new(), |cut| {
+fn text(report: &Report, cut: Option<&Cut>) -> String {
+    let cut = cut.map_or(String::new(), |cut| {
         format!("the recording is cut off: {}\n", cut.why)
     });
-    match replayed.first {
-        None => format!(
-            "{cut}{} ticks replayed, every command the same bit for bit\n",
-            replayed.ticks
-        ),
+    let Report {
+        ticks, different, ..
+    } = report;
+    match &report.first {
+        None => format!("{cut}{ticks} ticks replayed, every command the same bit for bit\n"),
         Some(first) => format!(
-            "{cut}{} of {} ticks DIFFER, the first at tick {}: recorded {:e} A, replayed {:e} A\n",
-            replayed.different, replayed.ticks, first.tick, first.recorded_a, first.replayed_a
+            "{cut}{different} of {ticks} ticks DIFFER, the first at tick {}: recorded {:e} A, replayed {:e} A\n",
+            first.tick, first.recorded_a, first.replayed_a
         ),
     }
 }

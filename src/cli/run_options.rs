@@ -1,4 +1,4 @@
-//! Options of every command that makes a run, and the text of its ending.
+//! Options of every command that makes a run, and how the run ended, as text.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
-use super::table::labelled;
+use super::table::{labelled, wrap};
 use crate::config::Config;
 use crate::experiment::{self, Plan, Run, RunSummary, Runner, Setup, TimingSummary, TripSummary};
 use crate::rig::devices;
@@ -37,11 +37,11 @@ impl RunOptions {
         self.simulate || devices::is_simulated(config)
     }
 
-    /// The pace asked for, or that of the rig; devices cannot be hurried.
+    /// The requested pace, or that of the rig. Devices run in real time only.
     fn pace(&self, config: &Config) -> Result<Pace, CliError> {
         match (self.pace, self.is_simulated(config)) {
             (Some(Pace::Virtual), false) => Err(CliError::Usage(
-                "--pace virtual is for the simulated stage; devices have a pace of their own: leave it out, or add --simulate".into(),
+                "--pace virtual is for the simulated stage, and devices run in real time: leave it out, or add --simulate".into(),
             )),
             (Some(pace), _) => Ok(pace),
             (None, true) => Ok(Pace::Virtual),
@@ -87,53 +87,56 @@ pub(super) fn exit(summary: &RunSummary) -> Outcome {
     }
 }
 
-/// A trip, on two lines.
+/// Reason, time and remedy of a trip.
 pub(super) fn trip_text(trip: &TripSummary, period_s: f64) -> String {
-    format!(
-        "\n  TRIPPED at tick {} ({:.4} s): {}; zero current, amplifier disabled\n  remedy     {}",
-        trip.tick,
-        trip.tick as f64 * period_s,
-        trip.text,
-        trip.remedy
-    )
+    let (tick, time_s) = (trip.tick, trip.tick as f64 * period_s);
+    let reason = format!(
+        "TRIPPED at tick {tick} ({time_s:.4} s): {}; zero current, amplifier disabled",
+        trip.text
+    );
+    wrap(&reason, 2) + &labelled("remedy", trip.remedy)
 }
 
 /// Ending, counts and timing of a run.
 pub(super) fn run_text(summary: &RunSummary, config: &Config) -> String {
     let period_s = config.servo.period_s();
     let trip = summary.trip.as_ref().map(|trip| trip_text(trip, period_s));
-    format!(
-        "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records\n  {}{}\n{}",
+    let ending = format!(
+        "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records",
         summary.outcome.name(),
         summary.ticks,
         summary.ticks as f64 * period_s,
         config.servo.rate_hz,
         summary.overruns,
         summary.lost_records,
-        timing_text(&summary.timing),
-        trip.unwrap_or_default(),
-        labelled("recording", &summary.recording)
-    )
+    );
+    wrap(&ending, 0)
+        + &timing_text(&summary.timing)
+        + &trip.unwrap_or_default()
+        + &labelled("recording", &summary.recording)
 }
 
 fn timing_text(timing: &TimingSummary) -> String {
-    let scheduling = &timing.scheduling;
-    let refused = scheduling.refused.iter();
+    let refused = timing.scheduling.refused.iter();
     let refused: String = refused
-        .map(|line| format!("\n  not granted: {line}"))
+        .map(|what| wrap(&format!("not granted: {what}"), 2))
         .collect();
-    if timing.pace == Pace::Virtual {
-        return format!("virtual pace (no timing to report){refused}");
+    match timing.pace {
+        Pace::Virtual => format!("  virtual pace (no timing to report)\n{refused}"),
+        Pace::Realtime => realtime_text(timing) + &refused,
     }
-    let locked = if scheduling.memory_locked {
-        "locked"
-    } else {
-        "not locked"
-    };
+}
+
+fn realtime_text(timing: &TimingSummary) -> String {
     let us = |ns: u64| ns as f64 / 1e3;
-    let (lateness, compute) = (&timing.lateness_ns, &timing.compute_ns);
+    let (scheduling, lateness, compute) =
+        (&timing.scheduling, &timing.lateness_ns, &timing.compute_ns);
+    let memory = match scheduling.memory_locked {
+        true => "locked",
+        false => "not locked",
+    };
     format!(
-        "{}, memory {locked}; lateness p50 {:.1} us, p99 {:.1} us, max {:.1} us; compute p50 {:.1} us, max {:.1} us{refused}",
+        "  schedule   {}, memory {memory}\n  lateness   p50 {:.1} us, p99 {:.1} us, max {:.1} us\n  compute    p50 {:.1} us, max {:.1} us\n",
         scheduling.policy,
         us(lateness.p50_ns),
         us(lateness.p99_ns),
@@ -141,4 +144,40 @@ fn timing_text(timing: &TimingSummary) -> String {
         us(compute.p50_ns),
         us(compute.max_ns)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Quantiles;
+    use crate::rt::thread::Scheduling;
+
+    #[test]
+    fn timing_of_a_real_time_run_fits_80_columns() {
+        let slow = Quantiles {
+            p50_ns: 9_999_999_999,
+            p99_ns: 9_999_999_999,
+            p9999_ns: 9_999_999_999,
+            max_ns: 9_999_999_999,
+        };
+        let timing = TimingSummary {
+            pace: Pace::Realtime,
+            scheduling: Scheduling {
+                policy: "SCHED_FIFO 80".into(),
+                memory_locked: false,
+                cpu: None,
+                refused: vec!["a real-time priority ".repeat(8)],
+            },
+            lateness_ns: slow,
+            compute_ns: slow,
+        };
+        let text = timing_text(&timing);
+        assert!(
+            text.lines().all(|line| line.chars().count() <= 80),
+            "{text}"
+        );
+        for word in ["not locked", "p99 9999999.9", "max", "not granted: a"] {
+            assert!(text.contains(word), "{word}: {text}");
+        }
+    }
 }

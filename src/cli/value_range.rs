@@ -1,15 +1,21 @@
-//! FROM:TO:COUNT, as grids are typed.
+//! A grid as it is typed: FROM:TO:COUNT.
 
 use std::str::FromStr;
 
 use crate::util::quantity::{OfRatio, si};
 
-/// Values of a grid, at most.
+/// Largest number of values of a grid.
 const MOST: usize = 10_000;
 
-/// Values at equal distances, both ends among them.
+/// At least two values at equal distances, with both ends.
 #[derive(Clone, Debug)]
 pub(super) struct ValueRange(pub Vec<f64>);
+
+impl ValueRange {
+    pub fn ends(&self) -> [f64; 2] {
+        [self.0[0], self.0[self.0.len() - 1]]
+    }
+}
 
 impl FromStr for ValueRange {
     type Err = String;
@@ -19,26 +25,20 @@ impl FromStr for ValueRange {
             return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
         };
         let ratio = |text: &str| si::<OfRatio>(text).map_err(|e| e.to_string());
-        let (from, to) = (ratio(from)?, ratio(to)?);
-        let count = count
-            .trim()
-            .parse()
-            .ok()
-            .filter(|count| (2..=MOST).contains(count));
-        let count: usize = count.ok_or(format!("COUNT is a whole number from 2 to {MOST}"))?;
+        let (from, to, count) = (ratio(from)?, ratio(to)?, count_of(count)?);
         if from == to {
             return Err(format!(
                 "an empty sweep: FROM and TO are both {from}; give two values"
             ));
         }
         let last = (count - 1) as f64;
-        let value = |k: usize| {
-            if k + 1 == count {
-                to
-            } else {
-                from + (to - from) * k as f64 / last
-            }
-        };
-        Ok(ValueRange((0..count).map(value).collect()))
+        let inner = (0..count - 1).map(|k| from + (to - from) * k as f64 / last);
+        Ok(ValueRange(inner.chain([to]).collect()))
     }
+}
+
+fn count_of(text: &str) -> Result<usize, String> {
+    let count = text.trim().parse().ok();
+    let count = count.filter(|count| (2..=MOST).contains(count));
+    count.ok_or_else(|| format!("COUNT is a whole number from 2 to {MOST}"))
 }

@@ -7,6 +7,7 @@ use std::iter::Peekable;
 
 use bench_hal::Tick;
 use rtrb::Producer;
+use serde::Serialize;
 
 use super::connections::{OutsideEnds, connect};
 use super::plan::Plan;
@@ -43,13 +44,13 @@ pub enum ReplayError {
 }
 
 /// A tick at which the replay differs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Number of the tick.
     pub tick: u64,
-    /// The recorded command.
+    /// The recorded command in amperes.
     pub recorded_a: f64,
-    /// The command of the replay.
+    /// The command of the replay in amperes.
     pub replayed_a: f64,
 }
 

@@ -5,6 +5,8 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::continuity::{Continuity, Gap};
 use super::digest::Digest;
 use super::messages::Timing;
@@ -25,13 +27,13 @@ pub struct StoredAttachment {
 }
 
 /// Where a recording that is not complete stops being readable.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Cut {
-    /// Up to this byte everything was read.
+    /// Number of bytes that could be read.
     pub at_byte: u64,
     /// Size of the file.
     pub of_bytes: u64,
-    /// What is the matter there.
+    /// The reason.
     pub why: String,
 }
 

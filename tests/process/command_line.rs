@@ -193,7 +193,7 @@ fn help_fits_80_columns_and_shows_kinds_and_defaults() {
     let bench = Bench::new();
     let help = |command: &str| bench.run(&format!("{command} --help")).out;
     for command in [
-        "", "chirp", "control", "margins", "config", "identify", "emulate",
+        "", "chirp", "control", "margins", "config", "identify", "emulate", "model",
     ] {
         let wide = |line: &&str| line.chars().count() > 80;
         let text = help(command);
@@ -236,4 +236,44 @@ fn a_full_or_closed_output_ends_without_a_panic() {
         .status()
         .expect("it runs");
     assert_eq!(output.code(), Some(1));
+    // The emulator reports on standard error while it runs.
+    let emulate = "emulate probe --config lab --duration 300ms --fault probe.silence@100ms";
+    let mut emulator = bench(&emulate.split(' ').collect::<Vec<_>>());
+    let status = emulator
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(full())
+        .status()
+        .expect("it runs");
+    assert_eq!(status.code(), Some(0));
+}
+
+#[test]
+fn calibrate_and_linearity_print_their_plan_before_the_first_run() {
+    let bench = Bench::new();
+    // A file in place of the folder: the run cannot begin.
+    std::fs::write(bench.path("taken"), "").expect("a file");
+    for (command, words) in [
+        (
+            "calibrate --amplitude 20mA",
+            ["static steps up to 0.020 A", "for the delay"],
+        ),
+        (
+            "linearity --scales 0.5,1",
+            [
+                "0.5 of the amplitude; expected travel",
+                "1 of the amplitude",
+            ],
+        ),
+    ] {
+        let answer = bench.run(&format!("{command} --out taken"));
+        assert!(
+            answer.code != 0 && answer.err.contains("taken"),
+            "{}",
+            answer.err
+        );
+        for word in words {
+            assert!(answer.out.contains(word), "{word}: {}", answer.out);
+        }
+    }
 }

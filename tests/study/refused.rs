@@ -155,7 +155,7 @@ fn failed_draws_are_reported_separately() {
     let text = bench.run(&format!("model study {stage} {vary} --draws 400"));
     assert!(
         text.out
-            .contains("draws could not be analysed, and are in no probability"),
+            .contains("draws could not be analysed; no probability includes them"),
         "{}",
         text.out
     );

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::Profiled;
 use crate::config::Purpose;
@@ -39,48 +39,53 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     check(args)?;
+    let profile = args.bench.profile();
+    let report = report(args)?;
+    let report = Profiled { profile, report };
+    print_result(args.bench.json, &report, |profiled| {
+        text(profile, &profiled.report)
+    })
+}
+
+fn report(args: &Args) -> Result<Report, CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
     let structure = plant::build(&config.plant)?;
-    let demand = args
-        .bandwidth
-        .map_or(Demand::Peak(args.peak), Demand::Bandwidth);
-    let report = Report {
-        alpha: args.alpha,
-        peak: args.bandwidth.is_none().then_some(args.peak),
-        zeros: Bound::of(&undamped_zeros(&structure)?, args.alpha, demand),
-        damped_zeros: Bound::of(&damped_zeros(&structure)?, args.alpha, demand),
-    };
-    let profile = args.bench.profile();
-    if args.bench.json {
-        print_json(&Profiled { profile, report })
-    } else {
-        print_text(&text(profile, &report))
-    }
+    let (alpha, peak) = (args.alpha, args.peak);
+    let demand = args.bandwidth.map_or(Demand::Peak(peak), Demand::Bandwidth);
+    Ok(Report {
+        alpha,
+        peak: args.bandwidth.is_none().then_some(peak),
+        zeros: Bound::of(&undamped_zeros(&structure)?, alpha, demand),
+        damped_zeros: Bound::of(&damped_zeros(&structure)?, alpha, demand),
+    })
 }
 
 fn check(args: &Args) -> Result<(), CliError> {
-    let refuse = |option: &str, value: f64, limits: &str| {
-        Err(CliError::Usage(format!(
-            "{option} is {value}; it is {limits} (Eqs. 1-1 and 1-3)"
-        )))
-    };
-    let is_positive = |x: f64| x > 0.0 && x.is_finite();
+    let is_above = |value: f64, limit: f64| value > limit && value.is_finite();
     if !(args.alpha > 0.0 && args.alpha < 1.0) {
-        return refuse("--alpha", args.alpha, "a ratio between 0 and 1");
+        return Err(refused("--alpha", args.alpha, "a ratio between 0 and 1"));
     }
-    if !(args.peak > 1.0 && args.peak.is_finite()) {
-        return refuse("--peak", args.peak, "a ratio above 1");
+    if !is_above(args.peak, 1.0) {
+        return Err(refused("--peak", args.peak, "a ratio above 1"));
     }
     match args.bandwidth {
-        Some(omega) if !is_positive(omega) => refuse("--bandwidth", omega, "in rad/s and above 0"),
+        Some(omega) if !is_above(omega, 0.0) => {
+            Err(refused("--bandwidth", omega, "in rad/s and above 0"))
+        }
         _ => Ok(()),
     }
+}
+
+fn refused(option: &str, value: f64, limits: &str) -> CliError {
+    CliError::Usage(format!(
+        "{option} is {value}; it must be {limits} (Eqs. 1-1 and 1-3)"
+    ))
 }
 
 fn text(profile: &str, report: &Report) -> String {
     let alpha = report.alpha;
     let statement = format!(
-        "{profile}: a loop that is stable with and without feedback and keeps |S| < {alpha} up to the band has a peak of |S| above"
+        "{profile}: a stable closed loop with a stable open loop and |S| < {alpha} up to the band has a peak of |S| above the value in the last column"
     );
     format!(
         "{}\nwithout damping\n{}\nwith damping\n{}",

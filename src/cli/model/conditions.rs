@@ -1,10 +1,12 @@
 //! `bench model conditions`: Conditions C4-1 to C4-4y and the propositions of section 4.2.3, for two close modes as one
 //! setting varies.
 
+use std::ops::RangeInclusive;
+
 use serde::Serialize;
 
 use super::super::error::CliError;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::conditions_text::text;
 use super::sweep::CloseModesArgs;
 use crate::model::veering::report::ConditionsReport;
@@ -34,6 +36,19 @@ struct Report<'a> {
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let sweep = &args.modes.sweep;
+    let report = Report {
+        profile: sweep.bench.profile(),
+        vary: &sweep.vary,
+        conditions: conditions(args)?,
+    };
+    print_result(sweep.bench.json, &report, |report| {
+        text(report.profile, report.vary, &report.conditions)
+    })
+}
+
+/// The conditions along the sweep, and at the value to explain.
+fn conditions(args: &Args) -> Result<ConditionsReport, CliError> {
+    let sweep = &args.modes.sweep;
     let values = sweep.values()?;
     let mut loci = Loci::follow(&values, |value| sweep.structure(value))?;
     let pair = meeting_pair(&args.modes.modes, &loci)?;
@@ -44,16 +59,13 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let closest = loci.at(closest_value)?.clone();
     let at = loci.at(value)?;
     let here = Sample::of(at, pair, as_configured(at))?;
-    let report = Report {
-        profile: sweep.bench.profile(),
-        vary: &sweep.vary,
-        conditions: ConditionsReport::of(&trajectory, pair, &closest, (at, &here), &values),
-    };
-    if sweep.bench.json {
-        print_json(&report)
-    } else {
-        print_text(&text(report.profile, report.vary, &report.conditions))
-    }
+    Ok(ConditionsReport::of(
+        &trajectory,
+        pair,
+        &closest,
+        (at, &here),
+        &values,
+    ))
 }
 
 /// The value to explain: as asked, or the setting's own if it is in the range, or the veering point.
@@ -67,11 +79,15 @@ fn explained(args: &Args, trajectory: &Trajectory) -> Result<f64, CliError> {
         return Ok(configured.unwrap_or(samples[trajectory.closest].value));
     };
     let value = sweep.value("--at", text)?;
-    if range.contains(&value) {
-        return Ok(value);
+    match range.contains(&value) {
+        true => Ok(value),
+        false => Err(outside(value, &range)),
     }
-    let (low, high) = range.into_inner();
-    Err(CliError::Usage(format!(
+}
+
+fn outside(value: f64, range: &RangeInclusive<f64>) -> CliError {
+    let (low, high) = (range.start(), range.end());
+    CliError::Usage(format!(
         "--at {value} is outside of the range {low} to {high}"
-    )))
+    ))
 }

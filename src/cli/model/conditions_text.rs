@@ -1,7 +1,7 @@
 //! The text of `bench model conditions`.
 
 use super::super::table::{table, wrap};
-use super::screenful;
+use super::{meeting_text, screenful};
 use crate::model::veering::conditions::Condition;
 use crate::model::veering::propositions::Proposition;
 use crate::model::veering::report::{
@@ -27,30 +27,23 @@ pub(super) fn text(profile: &str, vary: &str, conditions: &ConditionsReport) -> 
 }
 
 fn head_text(profile: &str, vary: &str, conditions: &ConditionsReport) -> String {
-    let point = &conditions.point;
-    let [u, v] = point.modes;
-    let bands: Vec<String> = conditions
-        .cnmp_bands
-        .iter()
+    let [u, v] = conditions.point.modes;
+    let title = format!("{profile}: modes {u} and {v} over {vary}");
+    let meeting = meeting_text(&conditions.point);
+    let bands = bands_text(&conditions.cnmp_bands);
+    wrap(&title, 0) + &wrap(&meeting, 0) + &wrap(&bands, 0)
+}
+
+fn bands_text(bands: &[[f64; 2]]) -> String {
+    let ranges = bands.iter();
+    let ranges: Vec<String> = ranges
         .map(|[from, to]| format!("{from:.9} to {to:.9}"))
         .collect();
-    let bands = match bands.is_empty() {
+    let ranges = match ranges.is_empty() {
         true => "none".into(),
-        false => bands.join(", "),
+        false => ranges.join(", "),
     };
-    let title = format!("{profile}: modes {u} and {v} over {vary}");
-    let meeting = format!(
-        "they {} at {:.9}: {:.4} Hz, {:.3e} Hz apart",
-        point.meeting.verb(),
-        point.value,
-        point.frequency_hz,
-        point.gap_hz
-    );
-    let bands = format!("CNMP zeros of these modes: {bands}");
-    [title, meeting, bands]
-        .iter()
-        .map(|line| wrap(line, 0))
-        .collect()
+    format!("CNMP zeros of these modes: {ranges}")
 }
 
 fn explanation_text(here: &Explanation) -> String {
@@ -68,27 +61,28 @@ fn explanation_text(here: &Explanation) -> String {
 }
 
 fn assumptions_text(assumptions: &Assumptions) -> String {
-    let number = |ratio: Option<f64>| ratio.map_or("-".into(), |ratio| format!("{ratio:.4}"));
     let mode_r = assumptions
         .mode_r
         .map_or("-".into(), |mode| mode.to_string());
-    let sentences = [
-        format!(
-            "A4-2: damping ratio {:.4}, {} of half the gap",
-            assumptions.damping_ratio,
-            number(assumptions.damping_over_half_gap)
-        ),
-        format!(
-            "A4-4: mode R is mode {mode_r}; frequency ratio to the nearer mode {}; all other modes are {} of it",
-            number(assumptions.nearness_ratio),
-            number(assumptions.others_ratio)
-        ),
-        format!(
-            "A4-5: deviation from a double integrator between the two modes {}",
-            number(assumptions.integrator_ratio)
-        ),
-    ];
-    sentences.iter().map(|sentence| wrap(sentence, 2)).collect()
+    let damping = format!(
+        "A4-2: damping ratio {:.4}, {} of half the gap",
+        assumptions.damping_ratio,
+        or_dash(assumptions.damping_over_half_gap)
+    );
+    let nearness = format!(
+        "A4-4: mode R is mode {mode_r}; frequency ratio to the nearer mode {}; all other modes are {} of it",
+        or_dash(assumptions.nearness_ratio),
+        or_dash(assumptions.others_ratio)
+    );
+    let integrator = format!(
+        "A4-5: deviation from a double integrator between the two modes {}",
+        or_dash(assumptions.integrator_ratio)
+    );
+    wrap(&damping, 2) + &wrap(&nearness, 2) + &wrap(&integrator, 2)
+}
+
+fn or_dash(ratio: Option<f64>) -> String {
+    ratio.map_or("-".into(), |ratio| format!("{ratio:.4}"))
 }
 
 fn tally_text(tally: &PredictionTally) -> String {

@@ -1,11 +1,11 @@
 //! `bench model critical-damping`: Eq. (3-16), and the damping above which no zero is in the right half plane.
 
 use super::super::error::CliError;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use crate::model::zeros::CriticalDamping;
 use crate::util::quantity::{OfAngularFrequency, OfRatio, si};
 
-/// Two close modes beside a double integrator (Eq. 3-15).
+/// Two close modes and a double integrator (Eq. 3-15).
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     /// Frequency of mode u
@@ -29,16 +29,12 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
             "omega_u = {u} rad/s, omega_v = {v} rad/s, ratio = {ratio}: Eq. (3-16) requires 0 < omega_u < omega_v and a ratio above (omega_v/omega_u)^2"
         ))
     })?;
-    if args.json {
-        print_json(&damping)
-    } else {
-        print_text(&text(&damping))
-    }
+    print_result(args.json, &damping, text)
 }
 
 fn text(damping: &CriticalDamping) -> String {
     format!(
-        "modes of {} and {} rad/s, residues of ratio {}, beside a double integrator\n  Eq. (3-16)                          {:.4}\n  locus touches the imaginary axis at {:.4}\n  With more damping no zero is in the right half plane.\n",
+        "modes of {} and {} rad/s, ratio of residues {}, and a double integrator\n  Eq. (3-16)                          {:.4}\n  locus touches the imaginary axis at {:.4}\n  With more damping no zero is in the right half plane.\n",
         damping.omega_u_rad_s,
         damping.omega_v_rad_s,
         damping.ratio,

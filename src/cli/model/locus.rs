@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::screenful;
 use super::sweep::SweepArgs;
@@ -78,11 +78,9 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         Column::of_rows(names(args, &locus), rows)
     })?;
     let report = report(args, locus)?;
-    if args.sweep.bench.json {
-        print_json(&report)
-    } else {
-        print_text(&(text(&report) + &args.table.told("tracks")))
-    }
+    print_result(args.sweep.bench.json, &report, |report| {
+        text(report) + &args.table.files_text("tracks")
+    })
 }
 
 fn zeros(args: &Args, value: f64) -> Result<Vec<Zero>, CliError> {
@@ -215,13 +213,15 @@ fn closed_form_text(closed_form: &ClosedForm) -> String {
                 format!("sum of residues {b2:.6} 1/kg; critical by Eq. (4-6) {eq_4_6_shifted:.6}");
             wrap(&residue, 4) + &wrap(&sum, 4)
         }
-        ClosedForm::TwoModes { eq_3_14_rad_s } => {
-            let [first, second] = eq_3_14_rad_s.map(|s| match s.is_finite() {
-                true => format!("{s:.4}"),
-                false => "infinity".into(),
-            });
-            let sentence = format!("break points by Eq. (3-14) {first} and {second} rad/s");
-            wrap(&sentence, 4)
-        }
+        ClosedForm::TwoModes { eq_3_14_rad_s } => break_points_text(eq_3_14_rad_s),
     }
+}
+
+fn break_points_text(points_rad_s: &[f64; 2]) -> String {
+    let [first, second] = points_rad_s.map(|s| match s.is_finite() {
+        true => format!("{s:.4}"),
+        false => "infinity".into(),
+    });
+    let sentence = format!("break points by Eq. (3-14) {first} and {second} rad/s");
+    wrap(&sentence, 4)
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::super::table::wrap;
 use super::super::value_range::ValueRange;
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
@@ -59,11 +59,8 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         cnmp_pairs,
     };
     args.table.write(|| columns(&report))?;
-    if args.bench.json {
-        print_json(&report)
-    } else {
-        print_text(&text(&report, args.bench.profile()))
-    }
+    let profile = args.bench.profile();
+    print_result(args.bench.json, &report, |report| text(report, profile))
 }
 
 /// The plant, found valid at the ends of both grids.
@@ -73,11 +70,8 @@ fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
         return Err(CliError::Usage(what.into()));
     }
     let settings = sr4dof(args, &[])?;
-    let ends = |grid: &ValueRange| [grid.0[0], grid.0[grid.0.len() - 1]];
-    for (point, asymmetry) in ends(&args.operating_points)
-        .into_iter()
-        .zip(ends(&args.asymmetries))
-    {
+    let (points, asymmetries) = (args.operating_points.ends(), args.asymmetries.ends());
+    for (point, asymmetry) in points.into_iter().zip(asymmetries) {
         let point_m = point * settings.beam_length_m;
         let settings = [
             OptionSetting::new("plant.operating_point_m", point_m, "--operating-points"),

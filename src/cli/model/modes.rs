@@ -2,7 +2,7 @@
 
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::super::table::table;
 use super::Profiled;
 use crate::config::Purpose;
@@ -12,21 +12,18 @@ pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
     let report = PlantSummary::of(&config.plant)?;
     let profile = options.profile();
-    if options.json {
-        print_json(&Profiled { profile, report })
-    } else {
-        print_text(&text(profile, &report))
-    }
+    let report = Profiled { profile, report };
+    print_result(options.json, &report, |profiled| {
+        text(profile, &profiled.report)
+    })
 }
 
 fn text(profile: &str, plant: &PlantSummary) -> String {
+    let tables = [modes_table(&plant.modes), shapes_table(plant)].join("\n");
+    let (zeros, damped) = (zeros_table(&plant.zeros), zeros_table(&plant.damped_zeros));
     format!(
-        "{}\n\n{}\n{}\nzeros without damping\n{}\nzeros with damping\n{}\nsigns           {}\ndominant modes  {}\nCNMP pairs      {} ({} with damping)\nphase drop      {} deg\n{}",
+        "{}\n\n{tables}\nzeros without damping\n{zeros}\nzeros with damping\n{damped}\nsigns           {}\ndominant modes  {}\nCNMP pairs      {} ({} with damping)\nphase drop      {} deg\n{}",
         title(profile, plant),
-        modes_table(&plant.modes),
-        shapes_table(plant),
-        zeros_table(&plant.zeros),
-        zeros_table(&plant.damped_zeros),
         plant.sign_sequence,
         plant.dominant_sequence,
         plant.cnmp_pairs,

@@ -4,8 +4,9 @@ use std::path::{Path as FilePath, PathBuf};
 
 use serde::Serialize;
 
+use super::super::columns::cannot_write;
 use super::super::error::CliError;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::placement_text::text;
 use super::sweep::CloseModesArgs;
 use crate::model::plant::{Port, PortWeights, ports};
@@ -42,6 +43,22 @@ struct Report<'a> {
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let sweep = &args.modes.sweep;
+    let report = Report {
+        profile: sweep.bench.profile(),
+        vary: &sweep.vary,
+        placements: placements(args)?,
+        svg: args.svg.as_ref().map(|path| path.display().to_string()),
+    };
+    print_result(sweep.bench.json, &report, |report| {
+        let svg = report.svg.as_ref();
+        let file = svg.map_or(String::new(), |path| format!("picture in {path}\n"));
+        text(report.profile, report.vary, &report.placements) + &file
+    })
+}
+
+/// Tries the placements along the sweep, and draws the quadrants if requested.
+fn placements(args: &Args) -> Result<PlacementReport, CliError> {
+    let sweep = &args.modes.sweep;
     let values = sweep.values()?;
     let chosen = chosen(args, &places(args, values[0])?)?;
     let mut loci = Loci::follow(&values, |value| sweep.structure(value))?;
@@ -50,32 +67,14 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     require_meeting(meeting, closest.value, pair)?;
     let grid = values.iter().map(|value| loci.near(*value)).collect();
     let path = Path::new(grid, &closest, pair);
-    let ports = path
-        .modes
-        .iter()
-        .map(|at| places(args, at.value))
-        .collect::<Result<Vec<_>, _>>()?;
+    let ports = path.modes.iter().map(|at| places(args, at.value));
+    let ports = ports.collect::<Result<Vec<_>, _>>()?;
     let placements = Placements::new(&path, &ports, &chosen);
     if let Some(file) = &args.svg {
-        draw(
-            file,
-            args,
-            &path.diagrams(placements.own()),
-            &placements.names,
-        )?;
+        let diagrams = path.diagrams(placements.own());
+        draw(file, args, &diagrams, &placements.names)?;
     }
-    let report = Report {
-        profile: sweep.bench.profile(),
-        vary: &sweep.vary,
-        placements: PlacementReport::of(&placements, meeting)?,
-        svg: args.svg.as_ref().map(|path| path.display().to_string()),
-    };
-    if sweep.bench.json {
-        return print_json(&report);
-    }
-    let svg = report.svg.as_ref();
-    let file = svg.map_or(String::new(), |path| format!("picture in {path}\n"));
-    print_text(&(text(report.profile, report.vary, &report.placements) + &file))
+    Ok(PlacementReport::of(&placements, meeting)?)
 }
 
 /// The places of the plant at a value; a plant given by its modes has none.
@@ -109,26 +108,23 @@ fn draw(
     [actuator, sensor]: &[String; 2],
 ) -> Result<(), CliError> {
     let sweep = &args.modes.sweep;
-    let panels: Vec<QuadrantPanel> = ["before", "at the veering point", "after"]
-        .into_iter()
-        .zip(diagrams)
-        .map(|(when, diagram)| QuadrantPanel {
-            title: format!("{when}: {:.6}", diagram.value),
-            picture: diagram.clone(),
-        })
-        .collect();
     let profile = sweep.bench.profile();
     let title = format!("{profile}: actuator at {actuator}, probe at {sensor}");
     let subtitle = format!(
         "Quadrants of the two close shapes over {} (section 4.2.4)",
         sweep.vary
     );
-    let svg =
-        quadrants_svg(&panels, &title, &subtitle).map_err(|e| CliError::Failed(e.to_string()))?;
-    std::fs::write(file, svg).map_err(|e| {
-        CliError::Failed(format!(
-            "cannot write {}: {e}; free some space or choose another file",
-            file.display()
-        ))
-    })
+    let svg = quadrants_svg(&panels(diagrams), &title, &subtitle);
+    let svg = svg.map_err(|e| CliError::Failed(e.to_string()))?;
+    std::fs::write(file, svg).map_err(|e| cannot_write(file, &e))
+}
+
+fn panels(diagrams: &[QuadrantDiagram; 3]) -> Vec<QuadrantPanel> {
+    let places = ["before", "at the veering point", "after"];
+    let panels = places.into_iter().zip(diagrams);
+    let panels = panels.map(|(place, diagram)| QuadrantPanel {
+        title: format!("{place}: {:.6}", diagram.value),
+        picture: diagram.clone(),
+    });
+    panels.collect()
 }

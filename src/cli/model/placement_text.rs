@@ -39,17 +39,24 @@ fn judgement(trial: &Trial) -> String {
         true => "signs alternate somewhere",
         false => "signs alternate nowhere",
     };
-    let remark = if trial.differs {
+    format!(
+        "diagram: {diagram}; model: CNMP zeros of these modes at {} of {} values, of any modes at {}{}",
+        trial.with_cnmp,
+        trial.values,
+        trial.with_any_cnmp,
+        remark(trial)
+    )
+}
+
+/// Why diagram and model may differ.
+fn remark(trial: &Trial) -> &'static str {
+    if trial.differs {
         "; the two differ: the plane of the shapes or aR changes over the range, or other modes contribute"
     } else if trial.picture_alternates && trial.with_cnmp == 0 {
         "; the gap is outside of the band of C4-2 (`bench model conditions`)"
     } else {
         ""
-    };
-    format!(
-        "diagram: {diagram}; model: CNMP zeros of these modes at {} of {} values, of any modes at {}{remark}",
-        trial.with_cnmp, trial.values, trial.with_any_cnmp
-    )
+    }
 }
 
 fn diagrams_text(diagrams: &[QuadrantSummary]) -> String {
@@ -125,23 +132,11 @@ fn best_text(which: &str, best: Option<&Placement>) -> String {
 }
 
 fn trials_text(report: &PlacementReport) -> String {
-    let is_related = |placement: &&Placement| {
-        report.here.as_ref().is_none_or(|here| {
-            placement.actuator == here.actuator || placement.sensor == here.sensor
-        })
-    };
-    let related = report.trials.iter().filter(is_related);
+    let related = report
+        .trials
+        .iter()
+        .filter(|one| is_related(one, report.here.as_ref()));
     let rows: Vec<Vec<String>> = related.take(LISTED).map(trial_row).collect();
-    let header = [
-        "actuator",
-        "probe",
-        "any CNMP",
-        "of these",
-        "C4-1 max",
-        "diagram",
-        "",
-        "|aR| 1/kg",
-    ];
     let differing = report.trials.iter().filter(|one| one.trial.differs).count();
     let summary = format!(
         "{} of {} placements listed, those with this actuator or this probe, best first; {} more have no response, {} no zeros that can be computed; diagram and model differ for {differing}",
@@ -150,8 +145,24 @@ fn trials_text(report: &PlacementReport) -> String {
         report.without_response,
         report.not_computed,
     );
-    table(&header, &rows) + &wrap(&summary, 0)
+    table(&TRIAL_HEADER, &rows) + &wrap(&summary, 0)
 }
+
+/// Whether a placement has the present actuator or the present probe.
+fn is_related(placement: &Placement, here: Option<&Placement>) -> bool {
+    here.is_none_or(|here| placement.actuator == here.actuator || placement.sensor == here.sensor)
+}
+
+const TRIAL_HEADER: [&str; 8] = [
+    "actuator",
+    "probe",
+    "any CNMP",
+    "of these",
+    "C4-1 max",
+    "diagram",
+    "",
+    "|aR| 1/kg",
+];
 
 fn trial_row(placement: &Placement) -> Vec<String> {
     let trial = &placement.trial;

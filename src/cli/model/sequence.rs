@@ -2,7 +2,7 @@
 
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::Profiled;
 use crate::config::Purpose;
 use crate::model::plant::{ModalModel, build};
@@ -12,11 +12,10 @@ pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
     let report = SequenceReport::of(&ModalModel::of(&build(&config.plant)?)?)?;
     let profile = options.profile();
-    if options.json {
-        print_json(&Profiled { profile, report })
-    } else {
-        print_text(&text(profile, &report))
-    }
+    let report = Profiled { profile, report };
+    print_result(options.json, &report, |profiled| {
+        text(profile, &profiled.report)
+    })
 }
 
 fn text(profile: &str, report: &SequenceReport) -> String {

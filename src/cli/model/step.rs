@@ -1,11 +1,11 @@
-//! `bench model step`: the beginning of the response to a step, beside the prediction from the zeros (Chapter 3).
+//! `bench model step`: the beginning of the response to a step, compared with the prediction from the zeros (Chapter 3).
 
 use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use super::super::output::{print_json, print_text};
+use super::super::output::print_result;
 use super::super::table::wrap;
 use crate::config::Purpose;
 use crate::model::plant::{self, ModalModel};
@@ -23,7 +23,7 @@ pub(super) struct Args {
     #[command(flatten)]
     table: TableOptions,
     /// Length of the response in the file [default: until the window of the zero crossings ends]
-    #[arg(long, value_name = "SECONDS", value_parser = si::<OfTime>)]
+    #[arg(long, value_name = "TIME", value_parser = si::<OfTime>)]
     duration: Option<f64>,
     /// Rows of the file
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
@@ -34,7 +34,7 @@ pub(super) struct Args {
 struct Report<'a> {
     profile: &'a str,
     dominant_sequence: String,
-    /// Kinds of the zeros without damping, of the modes that can be observed.
+    /// Number of zeros of each kind without damping, of the observable modes.
     zeros: ZeroCounts,
     end_m_per_n: Option<f64>,
     initial_undershoot: bool,
@@ -50,13 +50,7 @@ struct Report<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
-    if let Some(seconds) = args.duration
-        && !(seconds > 0.0 && seconds.is_finite())
-    {
-        return Err(CliError::Usage(format!(
-            "--duration is {seconds}; it is in seconds and above 0"
-        )));
-    }
+    check_duration(args.duration)?;
     args.table.check()?;
     let config = args.bench.load(Purpose::Model, &[])?;
     let sum = ModalSum::visible(&ModalModel::of(&plant::build(&config.plant)?)?)?;
@@ -68,10 +62,17 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         Column::of_rows(names(&sum), times_s.map(|t| row(&response, t)))
     })?;
     let report = report(args, &sum, &response, features)?;
-    if args.bench.json {
-        print_json(&report)
-    } else {
-        print_text(&(text(&report) + &args.table.told("  response           ")))
+    print_result(args.bench.json, &report, |report| {
+        text(report) + &args.table.files_text("  response           ")
+    })
+}
+
+fn check_duration(duration_s: Option<f64>) -> Result<(), CliError> {
+    match duration_s {
+        Some(seconds) if !(seconds > 0.0 && seconds.is_finite()) => Err(CliError::Usage(format!(
+            "--duration is {seconds}; it is in seconds and above 0"
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -113,28 +114,49 @@ fn report<'a>(
 }
 
 fn text(report: &Report) -> String {
-    let yes = |yes: bool| if yes { "yes" } else { "no" };
-    let predicted = &report.predicted;
     let end = report
         .end_m_per_n
         .map_or("unlimited".into(), |end| format!("{:.4} um/N", end * 1e6));
-    let disagreement = match predicted.agrees {
+    let disagreement = match report.predicted.agrees {
         true => "",
         false => "  the features DISAGREE with the prediction\n",
     };
     format!(
-        "{}: {}, {}\n  end                 {end}\n  initial undershoot  {}, {:.4} um/N (predicted: {})\n  zero crossings      {} in the first {:.3} ms\n                      (predicted: at least {}, as a rule at most {})\n{}  reversals           {} in the first {:.3} ms\n{}{disagreement}",
+        "{}: {}, {}\n  end                 {end}\n{}{}{}{disagreement}",
         report.profile,
         report.dominant_sequence,
         report.zeros,
+        undershoot_text(report),
+        crossings_text(report),
+        reversals_text(report),
+    )
+}
+
+fn undershoot_text(report: &Report) -> String {
+    let yes = |yes: bool| if yes { "yes" } else { "no" };
+    format!(
+        "  initial undershoot  {}, {:.4} um/N (predicted: {})\n",
         yes(report.initial_undershoot),
         report.undershoot_m_per_n * 1e6,
-        yes(predicted.initial_undershoot),
+        yes(report.predicted.initial_undershoot),
+    )
+}
+
+fn crossings_text(report: &Report) -> String {
+    let predicted = &report.predicted;
+    format!(
+        "  zero crossings      {} in the first {:.3} ms\n                      (predicted: at least {}, as a rule at most {})\n{}",
         report.zero_crossings,
         report.window_s * 1e3,
         predicted.least_zero_crossings,
         predicted.usual_zero_crossings,
         times_text(&report.zero_crossings_s),
+    )
+}
+
+fn reversals_text(report: &Report) -> String {
+    format!(
+        "  reversals           {} in the first {:.3} ms\n{}",
         report.reversals,
         report.initial_s * 1e3,
         times_text(&report.reversals_s),

@@ -6,7 +6,7 @@ use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::outcome::Outcome;
-use super::super::output::{print_json, print_note, print_text};
+use super::super::output::{print_note, print_result};
 use super::super::progress::ProgressLine;
 use super::study_text::text;
 use crate::config::Purpose;
@@ -65,11 +65,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     args.table.write(|| columns(&results))?;
     let answer = Answer::of(&results);
-    if args.bench.json {
-        print_json(&answer)?
-    } else {
-        print_text(&(text(&answer) + &args.table.told("draws")))?
-    }
+    print_result(args.bench.json, &answer, |answer| {
+        text(answer) + &args.table.files_text("draws")
+    })?;
     Ok(Outcome::Done)
 }
 
@@ -86,18 +84,25 @@ fn drawn(args: &Args) -> Result<Results, CliError> {
         }
         None => (None, Results::none(plan, shard)),
     };
+    draw(&mut results, file.as_mut(), threads(args))?;
+    Ok(results)
+}
+
+/// Makes the missing draws, with progress on a terminal.
+fn draw(
+    results: &mut Results,
+    file: Option<&mut StudyFile>,
+    threads: usize,
+) -> Result<(), CliError> {
     let progress = Progress::default();
     progress.begin("draws", results.left());
-    let line = ProgressLine::show(&progress);
+    let _line = ProgressLine::show(&progress);
     let completed = stop_on_signal(|stop| {
-        let threads = threads(args);
-        complete(&mut results, file.as_mut(), threads, stop, |draws| {
+        complete(results, file, threads, stop, |draws| {
             progress.advance(draws);
         })
     });
-    drop(line);
-    completed.map_err(|error| CliError::Failed(error.to_string()))??;
-    Ok(results)
+    Ok(completed.map_err(|error| CliError::Failed(error.to_string()))??)
 }
 
 fn threads(args: &Args) -> usize {

@@ -44,6 +44,8 @@ fn rounded(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 
+const SHARE_LEGEND: &str = "share of the variance of \"has pairs\" that a setting explains alone; probability of pairs in the lower, middle and upper third of the setting";
+
 fn counted(counted: &Counted) -> String {
     let probabilities = counted.probabilities.iter().chain([&counted.any]);
     let probabilities: Vec<Vec<String>> = probabilities.map(probability).collect();
@@ -52,11 +54,10 @@ fn counted(counted: &Counted) -> String {
     let effects_header = [
         "setting", "share %", "noise %", "sign", "lower %", "middle %", "upper %",
     ];
-    let legend = "share of the variance of \"has pairs\" that a setting explains alone; probability of pairs in the lower, middle and upper third of the setting";
     format!(
         "{}\n{}{}{}",
         table(&header, &probabilities),
-        wrap(legend, 0),
+        wrap(SHARE_LEGEND, 0),
         table(&effects_header, &settings),
         interactions(counted),
     )
@@ -71,9 +72,11 @@ fn probability(p: &Probability) -> Vec<String> {
     ]
 }
 
+const SIDES_LEGEND: &str = "probability of pairs with both settings on the same side of their medians, and on opposite sides";
+
 fn interactions(counted: &Counted) -> String {
     let sums = format!(
-        "alone they explain {} %, interactions of two beyond that {} %; the rest takes three or more together",
+        "single settings explain {} % of the variance, interactions of two {} % more; the rest are interactions of three or more",
         maybe_percent(counted.share_alone),
         maybe_percent(counted.share_of_interactions)
     );
@@ -81,12 +84,11 @@ fn interactions(counted: &Counted) -> String {
         return wrap(&sums, 0);
     }
     let rows: Vec<Vec<String>> = counted.interactions.iter().map(interaction).collect();
-    let legend = "probability of pairs with both settings on the same side of their medians, and on opposite sides";
     let header = ["settings", "share %", "noise %", "same %", "opposite %"];
     format!(
         "{}\n{}{}",
         wrap(&sums, 0),
-        wrap(legend, 0),
+        wrap(SIDES_LEGEND, 0),
         table(&header, &rows)
     )
 }
@@ -139,7 +141,7 @@ fn not_analysed(answer: &Answer) -> String {
     let examples = missing.examples.iter();
     let examples = examples.map(|failure| format!("  draw {}: {}\n", failure.draw, failure.why));
     format!(
-        "\n{} draws could not be analysed, and are in no probability:\n{}",
+        "\n{} draws could not be analysed; no probability includes them:\n{}",
         missing.draws,
         examples.collect::<String>()
     )

@@ -4,16 +4,17 @@ use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
-use super::super::output::{print_json, print_text};
+use super::super::options::BenchOptions;
+use super::super::output::print_result;
 use super::super::table::{table, wrap};
-use super::screenful;
 use super::sweep::CloseModesArgs;
+use super::{meeting_text, screenful};
 use crate::config::Purpose;
 use crate::model::veering::report::{Shares, VeeringReport};
 use crate::model::veering::{Loci, ModesAt, close_pair};
 use crate::util::units::hz;
 
-/// The setting that varies, and the modes.
+/// The setting that varies, and the two modes.
 #[derive(Clone, Debug, clap::Args)]
 #[command(mut_arg("from", |arg| arg.default_value("0")))]
 pub(super) struct Args {
@@ -36,34 +37,37 @@ struct Report<'a> {
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     args.table.check()?;
     let sweep = &args.modes.sweep;
+    let coordinates = coordinates(&sweep.bench)?;
+    let report = Report {
+        profile: sweep.bench.profile(),
+        vary: &sweep.vary,
+        veering: veering(args, &coordinates)?,
+        coordinates,
+        csv: args.table.csv(),
+    };
+    print_result(sweep.bench.json, &report, |report| {
+        text(report) + &args.table.files_text("loci and shapes")
+    })
+}
+
+/// Follows the modes over the sweep, and writes the table.
+fn veering(args: &Args, coordinates: &[String]) -> Result<VeeringReport, CliError> {
+    let sweep = &args.modes.sweep;
     let values = sweep.values()?;
-    let config = sweep.bench.load(Purpose::Model, &[])?;
-    let coordinates: Vec<String> = config
-        .plant
-        .coordinates()
-        .into_iter()
-        .map(String::from)
-        .collect();
     let mut loci = Loci::follow(&values, |value| sweep.structure(value))?;
     let pair = close_pair(&args.modes.modes, &loci)?;
     let (meeting, closest) = loci.meeting(pair)?;
     let grid: Vec<&ModesAt> = values.iter().map(|&value| loci.near(value)).collect();
     args.table.write(|| {
-        let names = names(&sweep.vary, &coordinates, &closest, pair);
+        let names = names(&sweep.vary, coordinates, &closest, pair);
         Column::of_rows(names, grid.iter().map(|at| row(at, pair)))
     })?;
-    let report = Report {
-        profile: sweep.bench.profile(),
-        vary: &sweep.vary,
-        coordinates,
-        veering: VeeringReport::of(&grid, pair, meeting, &closest),
-        csv: args.table.csv(),
-    };
-    if sweep.bench.json {
-        print_json(&report)
-    } else {
-        print_text(&(text(&report) + &args.table.told("loci and shapes")))
-    }
+    Ok(VeeringReport::of(&grid, pair, meeting, &closest))
+}
+
+fn coordinates(bench: &BenchOptions) -> Result<Vec<String>, CliError> {
+    let plant = bench.load(Purpose::Model, &[])?.plant;
+    Ok(plant.coordinates().into_iter().map(String::from).collect())
 }
 
 fn names(vary: &str, coordinates: &[String], at: &ModesAt, pair: [usize; 2]) -> Vec<String> {
@@ -88,13 +92,7 @@ fn text(report: &Report) -> String {
     let [u, v] = point.modes;
     let [[uu, uv], [vu, vv]] = report.veering.mac_across;
     let title = format!("{}: modes {u} and {v} over {}", report.profile, report.vary);
-    let meeting = format!(
-        "they {} at {:.9}: {:.4} Hz, {:.3e} Hz apart",
-        point.meeting.verb(),
-        point.value,
-        point.frequency_hz,
-        point.gap_hz
-    );
+    let meeting = meeting_text(point);
     let mac = format!(
         "MAC from the first value to the last: {u} to {u} {uu:.4}, {u} to {v} {uv:.4}, {v} to {u} {vu:.4}, {v} to {v} {vv:.4}"
     );

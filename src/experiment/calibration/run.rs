@@ -4,7 +4,7 @@ use std::time::SystemTime;
 
 use super::staircase_fit::{StaircaseFit, fit};
 use crate::config::{Config, ExcitationKind};
-use crate::excitation::Staircase;
+use crate::excitation::{Extremes, Staircase};
 use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
@@ -42,14 +42,24 @@ pub fn settings(mut config: Config) -> Config {
     config
 }
 
-/// Refuses steps or a chirp that would trip an interlock by the model of the whole rig.
-pub fn check(config: &Config) -> Result<(), ExperimentError> {
-    compliance_m_per_a(config)?;
-    check_steps(config)?;
-    predicted_extremes(config).map(drop)
+/// What the runs of a calibration would do, by the model of the whole rig.
+#[derive(Clone, Copy, Debug)]
+pub struct CalibrationPlan {
+    /// Extremes of the static steps.
+    pub steps: Extremes,
+    /// Extremes of the chirp for the delay.
+    pub chirp: Extremes,
 }
 
-fn check_steps(config: &Config) -> Result<(), ExperimentError> {
+/// Predicts the runs of a calibration. Refuses steps, or a chirp, that would trip an interlock.
+pub fn check(config: &Config) -> Result<CalibrationPlan, ExperimentError> {
+    compliance_m_per_a(config)?;
+    let steps = check_steps(config)?;
+    let chirp = predicted_extremes(config)?;
+    Ok(CalibrationPlan { steps, chirp })
+}
+
+fn check_steps(config: &Config) -> Result<Extremes, ExperimentError> {
     let steps = Staircase::new(&config.calibrate.steps(), config.servo.period_s());
     let extremes = extremes(&steps, config)?;
     let amplitude_a = config.calibrate.amplitude_a;
@@ -60,7 +70,8 @@ fn check_steps(config: &Config) -> Result<(), ExperimentError> {
     require(amplitude_a, limit_a, "A", limit)?;
     require(extremes.travel_m, soft_limit_m, "m", "the soft limit")?;
     let limit = "the continuous current";
-    require(extremes.thermal_current_a, continuous_a, "A", limit)
+    require(extremes.thermal_current_a, continuous_a, "A", limit)?;
+    Ok(extremes)
 }
 
 fn require(value: f64, limit: f64, unit: &str, what: &str) -> Result<(), ExperimentError> {
