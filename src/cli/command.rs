@@ -3,6 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use super::error::{CliError, ErrorReport};
+use super::help::GLOSSARY;
 use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
@@ -16,7 +17,7 @@ use super::{
 /// an interlock tripped), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) the run
 /// in the recording was not completed.
 #[derive(Debug, Parser)]
-#[command(name = "bench", version, max_term_width = 80)]
+#[command(name = "bench", version, max_term_width = 80, after_help = GLOSSARY)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -7,6 +7,10 @@ use toml::Table;
 use crate::config::profiles;
 use crate::util::quantity::Dimension;
 
+/// Where the terms of the help texts are explained.
+pub(super) const GLOSSARY: &str =
+    "docs/glossary.md explains the terms: CNMP zeros, residues, signs, operating point.";
+
 /// `TEXT [default: KEY of the profile; 0.1 Hz in "stage"]`, with the value of the default profile.
 pub(super) fn with_setting(text: &str, key: &str) -> String {
     let value = default_value(key).unwrap_or_default();

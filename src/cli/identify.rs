@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::analysis_output::{self, analyse_and_write, in_folder};
 use super::error::CliError;
+use super::help::GLOSSARY;
 use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
 use super::output::print_result;
@@ -19,6 +20,7 @@ use crate::util::progress::Progress;
 
 /// The recording, and where the results go.
 #[derive(Clone, Debug, clap::Args)]
+#[command(after_help = GLOSSARY)]
 pub(super) struct Args {
     /// The recording (MCAP) of a chirp, or an external CSV with --input and --output
     recording: PathBuf,

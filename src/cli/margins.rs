@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::controller_choice::ControllerChoice;
 use super::error::CliError;
+use super::help::GLOSSARY;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_result;
@@ -19,6 +20,7 @@ use crate::report::number::angular_frequency;
 
 /// The bench and the controller.
 #[derive(Clone, Debug, clap::Args)]
+#[command(after_help = GLOSSARY)]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,

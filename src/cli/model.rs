@@ -20,12 +20,14 @@ use clap::Subcommand;
 use serde::Serialize;
 
 use super::error::CliError;
+use super::help::GLOSSARY;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use crate::model::veering::report::VeeringPoint;
 
 /// What to compute.
 #[derive(Clone, Debug, clap::Args)]
+#[command(after_help = GLOSSARY)]
 pub(super) struct Args {
     #[command(subcommand)]
     what: What,

@@ -203,6 +203,9 @@ fn help_fits_80_columns_and_shows_kinds_and_defaults() {
     for word in ["multisine", "logarithmic", "realtime", "0.1 Hz", "110 s"] {
         assert!(chirp.contains(word), "{word}: {chirp}");
     }
+    for command in ["", "model", "margins", "identify"] {
+        assert!(help(command).contains("docs/glossary.md"), "{command}");
+    }
     let control = help("control").replace('\n', " ");
     assert!(control.contains("step of 50 um at 0.2 s"), "{control}");
 }
