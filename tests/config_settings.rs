@@ -76,6 +76,30 @@ fn an_unknown_key_is_refused_with_its_line_and_the_nearest_name() {
 }
 
 #[test]
+fn measured_damping_ratios_without_positive_damping_are_refused() {
+    let second = "plant.damping.second.omega_rad_s";
+    // Two ratios at one frequency: the equations of the two Rayleigh coefficients have no solution.
+    refused_set(
+        &format!("{second}=179"),
+        &["plant.damping.second.omega_rad_s", "179 rad/s", "uniform"],
+    );
+    // Negative damping below z1 w1/w2 = 0.009 x 179/520 or above z1 w2/w1 = 0.009 x 520/179.
+    for ratio in ["0.003", "0.03"] {
+        refused_set(
+            &format!("plant.damping.second.ratio={ratio}"),
+            &["179 rad/s", "520 rad/s", ratio, "3.0981e-3", "2.6145e-2"],
+        );
+    }
+    // At nearly equal frequencies, z2 = 0.004 of the profile is not between z1 w1/w2 and z1 w2/w1, both near 0.009.
+    for (omega_rad_s, limit) in [("179.0000001", "9.0000e-3"), ("180", "8.9500e-3")] {
+        let set = format!("{second}={omega_rad_s}");
+        Bench::new()
+            .run_with(["chirp", "--plan", "--json", "--set", &set])
+            .is_refused(&["`plant.damping.second.ratio`", "0.004", omega_rad_s, limit]);
+    }
+}
+
+#[test]
 fn a_wrong_type_is_refused_with_what_is_there_and_what_belongs_there() {
     refused_file(
         "[loop]\nrate_hz = true\n",

@@ -48,6 +48,11 @@ impl Coordinate {
         free
     }
 
+    /// The gradient as a slice.
+    pub fn slice(&self) -> &[f64] {
+        self.row.as_slice()
+    }
+
     /// The difference of this coordinate from another.
     pub fn from(&self, other: &Coordinate) -> Coordinate {
         let curves = self.curve.as_ref().zip(other.curve.as_ref());

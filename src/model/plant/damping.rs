@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::linear_algebra::modes;
 use super::{PlantError, Structure};
+use crate::util::finding::Finding;
+
+/// A coefficient with less than this ratio of the damping is zero but for rounding.
+const ROUNDING_RATIO: f64 = 1e-9;
 
 /// Damping, proportional to mass and stiffness or the same in every mode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -13,9 +17,9 @@ use super::{PlantError, Structure};
 pub enum DampingSettings {
     /// Rayleigh damping through two measured ratios: zeta(w) = mass_per_s/(2 w) + stiffness_s w/2.
     Measured {
-        /// The lower of the two.
+        /// One measurement.
         first: DampingPoint,
-        /// The upper of the two.
+        /// Another one, at another frequency.
         second: DampingPoint,
     },
     /// Rayleigh damping C = mass_per_s M + stiffness_s K.
@@ -33,6 +37,44 @@ pub enum DampingSettings {
         #[schemars(range(min = 0.0, max = 0.99))]
         ratio: f64,
     },
+}
+
+impl DampingSettings {
+    /// Measured ratios that do not determine the damping, or by which the damping of some frequencies is negative.
+    pub(super) fn check(&self) -> Option<Finding> {
+        let DampingSettings::Measured { first, second } = self else {
+            return None;
+        };
+        if first.omega_rad_s == second.omega_rad_s {
+            return Some(one_frequency(first.omega_rad_s));
+        }
+        let (mass_per_s, stiffness_s) = rayleigh_coefficients(first, second);
+        let least = -ROUNDING_RATIO * (first.ratio + second.ratio);
+        let is_positive =
+            mass_per_s / first.omega_rad_s >= least && stiffness_s * first.omega_rad_s >= least;
+        (!is_positive).then(|| negative_damping(first, second))
+    }
+}
+
+fn one_frequency(omega_rad_s: f64) -> Finding {
+    let what = format!(
+        "is {omega_rad_s} rad/s, and so is `plant.damping.first.omega_rad_s`: two ratios at the same frequency do not \
+         determine the damping; give two different frequencies, or use damping of kind \"uniform\""
+    );
+    Finding::new("plant.damping.second.omega_rad_s", what)
+}
+
+/// Both Rayleigh coefficients are positive where the second ratio lies between z1 w1/w2 and z1 w2/w1.
+fn negative_damping(first: &DampingPoint, second: &DampingPoint) -> Finding {
+    let (z1, z2) = (first.ratio, second.ratio);
+    let (w1, w2) = (first.omega_rad_s, second.omega_rad_s);
+    let spread = (w1 / w2).max(w2 / w1);
+    let (low, high) = (z1 / spread, z1 * spread);
+    let what = format!(
+        "is {z2} at {w2} rad/s, with a first ratio of {z1} at {w1} rad/s: the damping of some frequencies would be \
+         negative; give a ratio from {low:.4e} to {high:.4e}, or frequencies that are further apart"
+    );
+    Finding::new("plant.damping.second.ratio", what)
 }
 
 /// A damping ratio measured at a frequency.

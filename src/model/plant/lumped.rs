@@ -4,13 +4,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::damping::{DampingSettings, damping_matrix};
 use super::structure::Assembly;
-use super::{PlantError, PlantModel, Port, Structure};
+use super::{DampingSettings, PlantModel, Port, Structure};
 use crate::util::finding::Finding;
 use crate::util::nearest::nearest;
 
@@ -25,7 +23,7 @@ pub struct LumpedSettings {
     pub nodes: BTreeMap<String, NodeSettings>,
     /// The springs by name.
     pub springs: BTreeMap<String, SpringSettings>,
-    /// How many bodies hang on no spring to ground; each moves freely, at a frequency of zero.
+    /// Number of bodies without a spring to ground; each moves freely, at a frequency of zero.
     #[serde(default)]
     #[schemars(range(min = 0, max = 64))]
     pub free_bodies: usize,
@@ -56,7 +54,7 @@ pub struct NodeSettings {
 pub struct SpringSettings {
     /// The two ends, each a node or `ground`.
     pub between: [String; 2],
-    /// Stiffness in newtons per metre; 0 joins nothing.
+    /// Stiffness in newtons per metre; 0 is no connection.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub stiffness_n_per_m: f64,
 }
@@ -152,41 +150,46 @@ impl LumpedSettings {
 
     fn check_spring(&self, name: &str, spring: &SpringSettings) -> Vec<Finding> {
         let path = format!("plant.springs.{name}.between");
-        let known = || self.nodes.keys().map(String::as_str).chain([GROUND]);
         let [one, other] = &spring.between;
-        let unknown = spring
-            .between
-            .iter()
-            .filter(|end| !known().any(|node| node == *end));
-        let unknown = unknown.map(|end| {
-            let hint = nearest(end, known()).unwrap_or(GROUND);
-            format!("names the node `{end}`, which is not there; the nearest is `{hint}`")
-        });
-        let looped = (one == other).then(|| format!("joins `{one}` to itself"));
-        unknown
-            .chain(looped)
-            .map(|what| Finding::new(&path, what))
-            .collect()
+        let unknown = spring.between.iter().filter_map(|end| self.check_end(end));
+        let looped = (one == other).then(|| format!("joins `{one}` to itself; name two ends"));
+        let findings = unknown.chain(looped);
+        findings.map(|what| Finding::new(&path, what)).collect()
+    }
+
+    /// The error of a spring's end that is neither a node nor ground.
+    fn check_end(&self, end: &str) -> Option<String> {
+        let mut known = self.nodes.keys().map(String::as_str).chain([GROUND]);
+        let hint = nearest(end, known.clone()).unwrap_or(GROUND);
+        (!known.any(|node| node == end)).then(|| {
+            format!("names the node `{end}`, which does not exist; the nearest is `{hint}`")
+        })
     }
 
     fn check_free_bodies(&self) -> Option<Finding> {
-        let free = self.free();
-        let bodies: Vec<String> = free
-            .iter()
-            .map(|body| format!("[{}]", body.join(" ")))
-            .collect();
-        let found = match bodies.is_empty() {
-            true => "every node is held by ground".into(),
-            false => format!("free are {}", bodies.join(", ")),
-        };
-        let remedy = "join them to ground by a spring, or state how many are meant to be free";
-        let (stated, count) = (self.free_bodies, free.len());
+        let (stated, free) = (self.free_bodies, self.free());
+        let (count, found) = (free.len(), named_bodies(&free));
         (count != stated).then(|| {
-            let what =
-                format!("is {stated}, but {count} hang on no spring to ground: {found}; {remedy}");
-            Finding::new("plant.free_bodies", what)
+            Finding::new(
+                "plant.free_bodies",
+                format!(
+                    "is {stated}, but {count} bodies have no spring to ground: {found}; \
+                     join them to ground by a spring, or set this to the number of bodies that are meant to be free"
+                ),
+            )
         })
     }
+}
+
+fn named_bodies(bodies: &[Vec<&str>]) -> String {
+    if bodies.is_empty() {
+        return "springs join every node to ground".into();
+    }
+    let names: Vec<String> = bodies
+        .iter()
+        .map(|body| format!("[{}]", body.join(" ")))
+        .collect();
+    format!("free are {}", names.join(", "))
 }
 
 fn check_node(name: &str, mass_kg: f64) -> Option<Finding> {
@@ -232,8 +235,8 @@ impl PlantModel for LumpedSettings {
         }
     }
 
-    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError> {
-        damping_matrix(undamped, &self.damping)
+    fn damping_settings(&self) -> Option<&DampingSettings> {
+        Some(&self.damping)
     }
 
     /// The displacement of each node.

@@ -41,6 +41,8 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use beam::Beam;
+use damping::damping_matrix;
 pub use damping::{DampingPoint, DampingSettings};
 pub use discrete::{DiscreteMode, DiscretePlant, PlantState};
 pub use error::PlantError;
@@ -62,8 +64,8 @@ trait PlantModel {
     /// Names of the coordinates of a mode's shape, in their order.
     fn coordinates(&self) -> Vec<&str>;
 
-    /// Length of the beams in metres, of a model with beams.
-    fn beam_length_m(&self) -> Option<f64> {
+    /// The beams, of a model that has them.
+    fn beam(&self) -> Option<Beam> {
         None
     }
 
@@ -85,8 +87,18 @@ trait PlantModel {
     /// The structure with C = 0.
     fn undamped(&self) -> Structure;
 
-    /// C of that structure.
-    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError>;
+    /// The settings of the damping.
+    fn damping_settings(&self) -> Option<&DampingSettings> {
+        None
+    }
+
+    /// C of the undamped structure: that of the damping settings; zero without them.
+    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError> {
+        match self.damping_settings() {
+            Some(settings) => damping_matrix(undamped, settings),
+            None => Ok(undamped.damping.clone()),
+        }
+    }
 
     /// Places where a force may act and a probe may measure, in the model's order.
     fn ports(&self) -> Vec<Port> {
@@ -153,7 +165,7 @@ impl PlantSettings {
 
     /// Length of the beams in metres, of a model with beams.
     pub fn beam_length_m(&self) -> Option<f64> {
-        self.as_model().beam_length_m()
+        self.as_model().beam().map(|beam| beam.length_m)
     }
 
     /// Static Y displacement of the motion stage in metres, of a model with an operating point.
@@ -168,8 +180,11 @@ impl PlantSettings {
 
     /// Errors in the relations between settings, each of which is within its range.
     pub(crate) fn check(&self) -> Vec<Finding> {
+        let model = self.as_model();
+        let damping = model.damping_settings().and_then(DampingSettings::check);
         let mut findings: Vec<Finding> = self.check_operating_point().into_iter().collect();
-        findings.extend(self.as_model().check());
+        findings.extend(damping);
+        findings.extend(model.check());
         findings
     }
 

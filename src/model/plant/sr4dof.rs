@@ -10,14 +10,12 @@
 //!
 //! The force P acts in X on stage 4, the probe measures x1. The sum over masses and springs is Eq. (2-5) as printed.
 
-use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::beam::Beam;
-use super::damping::{DampingSettings, damping_matrix};
 use super::structure::Assembly;
-use super::{PlantError, PlantModel, Port, Structure};
+use super::{DampingSettings, PlantModel, Port, Structure};
 
 const NONE: [f64; 4] = [0.0; 4];
 const X1: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
@@ -116,8 +114,8 @@ impl PlantModel for Sr4dofSettings {
         vec!["x1", "y1", "y2", "y3"]
     }
 
-    fn beam_length_m(&self) -> Option<f64> {
-        Some(self.beam_length_m)
+    fn beam(&self) -> Option<Beam> {
+        Some(self.beam())
     }
 
     fn operating_point_m(&self) -> Option<f64> {
@@ -144,8 +142,8 @@ impl PlantModel for Sr4dofSettings {
         parts.into_structure(&x4, &X1)
     }
 
-    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError> {
-        damping_matrix(undamped, &self.damping)
+    fn damping_settings(&self) -> Option<&DampingSettings> {
+        Some(&self.damping)
     }
 
     /// Displacements of the five stages in X, and of those that move in Y.

@@ -26,9 +26,8 @@ use serde::{Deserialize, Serialize};
 
 use super::beam::Beam;
 use super::coordinate::Coordinate;
-use super::damping::{DampingSettings, damping_matrix};
 use super::structure::Assembly;
-use super::{PlantError, PlantModel, Port, Structure};
+use super::{DampingSettings, PlantModel, Port, Structure};
 
 /// Degrees of freedom.
 const N: usize = 10;
@@ -157,6 +156,74 @@ impl XySettings {
     }
 }
 
+/// The sides of the motion stage, each as its inner, intermediate and outer stage.
+impl XySettings {
+    fn free(&self, index: usize, at_m: f64) -> Coordinate {
+        Coordinate::free(N, self.geometric_stiffness, index, at_m)
+    }
+
+    fn joined(&self, anchor: &Coordinate, across: &Coordinate, side: f64) -> Coordinate {
+        anchor.joined(across, side, self.beam().shortening_per_m())
+    }
+
+    /// Left or right (`at` = -1 or 1), with the degrees of freedom of inner and outer stage. The inner module has its beams
+    /// along X and deflects in Y. The outer one has them along Y, its secondary stage on `side` of ground in Y.
+    fn across_y(
+        &self,
+        motion: &Stage,
+        [inner, outer]: [usize; 2],
+        at: f64,
+        side: f64,
+    ) -> [Stage; 3] {
+        let ground = Coordinate::ground(N, self.geometric_stiffness);
+        let (inner_y, outer_x) = (
+            self.free(inner, self.operating_point_m / 2.0),
+            self.free(outer, 0.0),
+        );
+        let inner = Stage {
+            x: self.joined(&motion.x, &inner_y.from(&motion.y), at),
+            y: inner_y,
+        };
+        // The intermediate stage does not move in Y: its row is zero, as the outer module is not bent at rest. The curve of
+        // its y would change only the curve of its x, along which no static force acts.
+        let x = self.joined(&inner.x, &ground.from(&inner.y), -at);
+        let outer = Stage {
+            y: self.joined(&ground, &outer_x, side),
+            x: outer_x,
+        };
+        let y = self.joined(&outer.y, &x.from(&outer.x), -side);
+        [inner, Stage { x, y }, outer]
+    }
+
+    /// Top or bottom (`at` = 1 or -1): as [`Self::across_y`] with X and Y exchanged, but here the outer module is bent at
+    /// rest.
+    fn across_x(
+        &self,
+        motion: &Stage,
+        [inner, outer]: [usize; 2],
+        at: f64,
+        side: f64,
+    ) -> [Stage; 3] {
+        let ground = Coordinate::ground(N, self.geometric_stiffness);
+        let (inner_x, outer_y) = (
+            self.free(inner, 0.0),
+            self.free(outer, self.operating_point_m / 2.0),
+        );
+        let inner = Stage {
+            y: self.joined(&motion.y, &inner_x.from(&motion.x), at),
+            x: inner_x,
+        };
+        let outer = Stage {
+            x: self.joined(&ground, &outer_y, side),
+            y: outer_y,
+        };
+        // To first order the intermediate stage follows the inner one in Y, as the inner module is not bent at rest.
+        let x = self.joined(&outer.x, &inner.y.from(&outer.y), -side);
+        let y = self.joined(&inner.y, &x.from(&inner.x), -at);
+        [inner, Stage { x, y }, outer]
+    }
+}
+
 impl PlantModel for XySettings {
     fn coordinates(&self) -> Vec<&str> {
         vec![
@@ -164,8 +231,8 @@ impl PlantModel for XySettings {
         ]
     }
 
-    fn beam_length_m(&self) -> Option<f64> {
-        Some(self.beam_length_m)
+    fn beam(&self) -> Option<Beam> {
+        Some(self.beam())
     }
 
     fn operating_point_m(&self) -> Option<f64> {
@@ -176,23 +243,22 @@ impl PlantModel for XySettings {
         let (stages, k) = (Stages::new(self), self.beam().parallelogram_n_per_m());
         let mut parts = Assembly::new(N);
         for (kilograms, stage) in stages.masses(self) {
-            parts.add_mass(kilograms, stage.x.row.as_slice(), stage.y.row.as_slice());
+            parts.add_mass(kilograms, stage.x.slice(), stage.y.slice());
         }
         let springs = stages.elongations();
         for spring in &springs {
-            parts.add_spring(k, spring.row.as_slice());
+            parts.add_spring(k, spring.slice());
         }
         let [pushed, .., loaded] = &stages.intermediate;
-        let (force, sensor) = (&pushed.x.row, &stages.motion.x.row);
-        let mut structure = parts.into_structure(force.as_slice(), sensor.as_slice());
+        let mut structure = parts.into_structure(pushed.x.slice(), stages.motion.x.slice());
         if self.geometric_stiffness {
             structure.stiffness += geometric_stiffness(&springs, k, &loaded.y);
         }
         structure
     }
 
-    fn damping(&self, undamped: &Structure) -> Result<DMatrix<f64>, PlantError> {
-        damping_matrix(undamped, &self.damping)
+    fn damping_settings(&self) -> Option<&DampingSettings> {
+        Some(&self.damping)
     }
 
     /// Displacements of the thirteen stages in X and in Y; the row of one that cannot move is zero.
@@ -210,8 +276,8 @@ impl PlantModel for XySettings {
 }
 
 fn both_ports((name, stage): (&str, Stage)) -> [Port; 2] {
-    [("x", stage.x.row), ("y", stage.y.row)]
-        .map(|(axis, row)| Port::new(&format!("{axis}_{name}"), row.as_slice()))
+    [("x", stage.x), ("y", stage.y)]
+        .map(|(axis, place)| Port::new(&format!("{axis}_{name}"), place.slice()))
 }
 
 /// The sum of static forces times curves: k d curve of each parallelogram bent by d, minus F curve of the holding force F,
@@ -232,49 +298,36 @@ fn geometric_stiffness(springs: &[Coordinate], k: f64, held: &Coordinate) -> DMa
 
 impl Stages {
     fn new(s: &XySettings) -> Stages {
-        let c = s.beam().shortening_per_m();
-        let (y0, half) = (s.operating_point_m, s.operating_point_m / 2.0);
-        let free = |index, at_m| Coordinate::free(N, s.geometric_stiffness, index, at_m);
         let (side_top, side_bottom) = s.sides();
         let motion = Stage {
-            x: free(0, 0.0),
-            y: free(Y_MS, y0),
+            x: s.free(0, 0.0),
+            y: s.free(Y_MS, s.operating_point_m),
         };
-        let left = across_y(&motion, free(2, half), free(6, 0.0), -1.0, 1.0, c);
-        let right = across_y(&motion, free(3, half), free(7, 0.0), 1.0, -1.0, c);
-        let top = across_x(&motion, free(4, 0.0), free(8, half), 1.0, side_top, c);
-        let bottom = across_x(&motion, free(5, 0.0), free(9, half), -1.0, side_bottom, c);
+        let sides = [
+            s.across_y(&motion, [2, 6], -1.0, 1.0),
+            s.across_y(&motion, [3, 7], 1.0, -1.0),
+            s.across_x(&motion, [4, 8], 1.0, side_top),
+            s.across_x(&motion, [5, 9], -1.0, side_bottom),
+        ];
+        let of = |which: usize| sides.each_ref().map(|side| side[which].clone());
         Stages {
+            inner: of(0),
+            intermediate: of(1),
+            outer: of(2),
             motion,
-            intermediate: [left.1, right.1, top.1, bottom.1],
-            inner: [left.0, right.0, top.0, bottom.0],
-            outer: [left.2, right.2, top.2, bottom.2],
         }
     }
 
     /// Each stage with its mass in kilograms.
-    fn masses(&self, s: &XySettings) -> Vec<(f64, &Stage)> {
+    fn masses(&self, s: &XySettings) -> impl Iterator<Item = (f64, &Stage)> {
         let d = &s.secondary_mass_deviation;
-        let secondary = |deviation: f64| s.secondary_stage_mass_kg * (1.0 + deviation);
-        let mut masses = vec![(s.motion_stage_mass_kg, &self.motion)];
-        masses.extend(
-            [s.intermediate_stage_mass_kg; 4]
-                .into_iter()
-                .zip(&self.intermediate),
-        );
-        masses.extend(
-            [d.sL, d.sR, d.sT, d.sB]
-                .map(secondary)
-                .into_iter()
-                .zip(&self.inner),
-        );
-        masses.extend(
-            [d.gL, d.gR, d.gT, d.gB]
-                .map(secondary)
-                .into_iter()
-                .zip(&self.outer),
-        );
-        masses
+        let secondary_kg = [d.sL, d.sR, d.sT, d.sB, d.gL, d.gR, d.gT, d.gB]
+            .map(|deviation| s.secondary_stage_mass_kg * (1.0 + deviation));
+        let secondary = self.inner.iter().chain(&self.outer);
+        let intermediate = self.intermediate.iter();
+        std::iter::once((s.motion_stage_mass_kg, &self.motion))
+            .chain(intermediate.map(|stage| (s.intermediate_stage_mass_kg, stage)))
+            .chain(secondary_kg.into_iter().zip(secondary))
     }
 
     /// The transverse elongation of each of the sixteen parallelograms.
@@ -304,54 +357,4 @@ impl Stages {
             ]
         }
     }
-}
-
-/// Left or right (`at` = -1 or 1). The inner module has its beams along X and deflects in Y. The outer one has them along Y,
-/// its secondary stage on `side` of ground in Y. Returns inner, intermediate and outer stage.
-fn across_y(
-    motion: &Stage,
-    inner_y: Coordinate,
-    outer_x: Coordinate,
-    at: f64,
-    side: f64,
-    c: f64,
-) -> (Stage, Stage, Stage) {
-    let ground = Coordinate::ground(N, motion.x.curve.is_some());
-    let inner = Stage {
-        x: motion.x.joined(&inner_y.from(&motion.y), at, c),
-        y: inner_y,
-    };
-    // The intermediate stage does not move in Y: its row is zero, as the outer module is not bent at rest. The curve of its
-    // y would change only the curve of its x, along which no static force acts.
-    let x = inner.x.joined(&ground.from(&inner.y), -at, c);
-    let outer = Stage {
-        y: ground.joined(&outer_x, side, c),
-        x: outer_x,
-    };
-    let y = outer.y.joined(&x.from(&outer.x), -side, c);
-    (inner, Stage { x, y }, outer)
-}
-
-/// Top or bottom (`at` = 1 or -1): as [`across_y`] with X and Y exchanged, but here the outer module is bent at rest.
-fn across_x(
-    motion: &Stage,
-    inner_x: Coordinate,
-    outer_y: Coordinate,
-    at: f64,
-    side: f64,
-    c: f64,
-) -> (Stage, Stage, Stage) {
-    let ground = Coordinate::ground(N, motion.x.curve.is_some());
-    let inner = Stage {
-        y: motion.y.joined(&inner_x.from(&motion.x), at, c),
-        x: inner_x,
-    };
-    let outer = Stage {
-        x: ground.joined(&outer_y, side, c),
-        y: outer_y,
-    };
-    // To first order the intermediate stage follows the inner one in Y, as the inner module is not bent at rest.
-    let x = outer.x.joined(&inner.y.from(&outer.y), -side, c);
-    let y = inner.y.joined(&x.from(&inner.x), -at, c);
-    (inner, Stage { x, y }, outer)
 }
