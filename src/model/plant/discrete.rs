@@ -58,11 +58,14 @@ impl DiscretePlant {
         period_s: f64,
     ) -> DiscretePlant {
         let lag_rad_s = 2.0 * std::f64::consts::PI * bandwidth_hz;
-        let discrete = |mode| DiscreteMode::new(mode, lag_rad_s, force_constant_n_per_a, period_s);
+        let modes = modes.iter().map(|mode| {
+            let rates = rates(mode, lag_rad_s, force_constant_n_per_a);
+            DiscreteMode::new(mode, &matrix_exponential(&(rates * period_s)))
+        });
         DiscretePlant {
             period_s,
             lag: libm::exp(-lag_rad_s * period_s),
-            modes: modes.iter().map(discrete).collect(),
+            modes: modes.collect(),
         }
     }
 
@@ -117,12 +120,7 @@ impl DiscretePlant {
 
     /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ...].
     pub fn state_space(&self) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-        let n = 1 + 2 * self.modes.len();
-        let (mut a, mut b, mut c) = (
-            DMatrix::zeros(n, n),
-            DMatrix::zeros(n, 1),
-            DMatrix::zeros(1, n),
-        );
+        let (mut a, mut b, mut c) = zero_system(1 + 2 * self.modes.len());
         a[(0, 0)] = self.lag;
         b[(0, 0)] = 1.0 - self.lag;
         for (index, mode) in self.modes.iter().enumerate() {
@@ -139,25 +137,32 @@ impl DiscretePlant {
     }
 }
 
+/// A, B and C of a system with n states, all zero.
+pub(super) fn zero_system(n: usize) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+    (
+        DMatrix::zeros(n, n),
+        DMatrix::zeros(n, 1),
+        DMatrix::zeros(1, n),
+    )
+}
+
+/// F of x' = F x with the states [q, q'/scale, i, u, f] of a mode.
+fn rates(mode: &Mode, lag_rad_s: f64, force_constant_n_per_a: f64) -> Matrix5<f64> {
+    let (w, scale) = (mode.omega_rad_s, mode.rate_scale_rad_s());
+    let mut rates = Matrix5::zeros();
+    rates[(0, 1)] = scale;
+    rates[(1, 0)] = -w;
+    rates[(1, 1)] = -2.0 * mode.damping_ratio * w;
+    rates[(1, 2)] = mode.force_gain * force_constant_n_per_a / scale;
+    rates[(1, 4)] = 1.0 / scale;
+    rates[(2, 2)] = -lag_rad_s;
+    rates[(2, 3)] = lag_rad_s;
+    rates
+}
+
 impl DiscreteMode {
-    /// exp(F T) with the states [q, q'/scale, i, u, f].
-    fn new(
-        mode: &Mode,
-        lag_rad_s: f64,
-        force_constant_n_per_a: f64,
-        period_s: f64,
-    ) -> DiscreteMode {
-        let w = mode.omega_rad_s;
-        let scale = mode.rate_scale_rad_s();
-        let mut rate = Matrix5::zeros();
-        rate[(0, 1)] = scale;
-        rate[(1, 0)] = -w;
-        rate[(1, 1)] = -2.0 * mode.damping_ratio * w;
-        rate[(1, 2)] = mode.force_gain * force_constant_n_per_a / scale;
-        rate[(1, 4)] = 1.0 / scale;
-        rate[(2, 2)] = -lag_rad_s;
-        rate[(2, 3)] = lag_rad_s;
-        let over = matrix_exponential(&(rate * period_s));
+    /// From exp(F T).
+    fn new(mode: &Mode, over: &Matrix5<f64>) -> DiscreteMode {
         let column = |j: usize| [over[(0, j)], over[(1, j)]];
         DiscreteMode {
             a: [[over[(0, 0)], over[(0, 1)]], [over[(1, 0)], over[(1, 1)]]],
@@ -165,7 +170,7 @@ impl DiscreteMode {
             setpoint: column(3),
             force: column(4),
             output: mode.sensor_gain,
-            output_rate: mode.sensor_gain * scale,
+            output_rate: mode.sensor_gain * mode.rate_scale_rad_s(),
             floor: mode.floor_gain,
         }
     }

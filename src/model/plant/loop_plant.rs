@@ -17,6 +17,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
+use super::discrete::zero_system;
 use super::{DiscreteMode, DiscretePlant, Mode, PlantState};
 
 /// Nodes of the mean over a probe's period. The midpoint rule with n nodes errs by (w Tp)^2/(24 n^2): 1e-5 at w Tp = 1.
@@ -141,14 +142,9 @@ impl LoopPlant {
 
     /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ..., next reading, the one after it, ...].
     pub fn state_space(&self) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-        let (moving, register) = (1 + 2 * self.held.modes.len(), self.longest());
-        let n = moving + register;
         let (a0, b0, _) = self.held.state_space();
-        let (mut a, mut b, mut c) = (
-            DMatrix::zeros(n, n),
-            DMatrix::zeros(n, 1),
-            DMatrix::zeros(1, n),
-        );
+        let (moving, register) = (a0.nrows(), self.longest());
+        let (mut a, mut b, mut c) = zero_system(moving + register);
         a.view_mut((0, 0), (moving, moving)).copy_from(&a0);
         b.view_mut((0, 0), (moving, 1)).copy_from(&b0);
         for place in 1..register {

@@ -11,15 +11,7 @@ const TERMS: u32 = 13;
 pub(crate) fn matrix_exponential<const N: usize>(
     matrix: &SMatrix<f64, N, N>,
 ) -> SMatrix<f64, N, N> {
-    let norm = matrix
-        .column_iter()
-        .map(|column| column.iter().map(|x| x.abs()).sum::<f64>())
-        .fold(0.0, f64::max);
-    let squarings = if norm > 0.0 {
-        (libm::ceil(libm::log2(norm)) as i32 + 4).max(0)
-    } else {
-        0
-    };
+    let squarings = squarings(norm(matrix));
     let scaled = matrix * libm::exp2(-f64::from(squarings));
     // Horner: I + A (I + A/2 (I + A/3 (...))).
     let mut sum = SMatrix::<f64, N, N>::identity();
@@ -27,6 +19,22 @@ pub(crate) fn matrix_exponential<const N: usize>(
         sum = SMatrix::identity() + scaled * sum / f64::from(term);
     }
     (0..squarings).fold(sum, |power, _| power * power)
+}
+
+/// The largest sum of the absolute values of a column.
+fn norm<const N: usize>(matrix: &SMatrix<f64, N, N>) -> f64 {
+    let columns = matrix.column_iter();
+    let sums = columns.map(|column| column.iter().map(|x| x.abs()).sum::<f64>());
+    sums.fold(0.0, f64::max)
+}
+
+/// s for which norm/2^s is 1/16 at most.
+fn squarings(norm: f64) -> i32 {
+    if norm > 0.0 {
+        (libm::ceil(libm::log2(norm)) as i32 + 4).max(0)
+    } else {
+        0
+    }
 }
 
 #[cfg(test)]

@@ -42,26 +42,30 @@ impl ModalSettings {
     }
 }
 
+/// The error of a double integrator with damping.
+fn check_damping(name: &str, mode: &ModeSettings) -> Option<Finding> {
+    let ratio = mode.damping_ratio;
+    (mode.omega_rad_s == 0.0 && ratio != 0.0).then(|| {
+        let path = format!("plant.modes.{name}.damping_ratio");
+        let what = format!("is {ratio}, but a double integrator has no damping; set 0");
+        Finding::new(&path, what)
+    })
+}
+
 impl PlantModel for ModalSettings {
     fn coordinates(&self) -> Vec<&str> {
         self.modes.keys().map(String::as_str).collect()
     }
 
     fn check(&self) -> Vec<Finding> {
-        let mut findings = Vec::new();
-        if self.modes.values().all(|mode| mode.residue_per_kg == 0.0) {
-            let what = "have no residue that is not zero: no force would reach the probe; give at least one `residue_per_kg`";
-            findings.push(Finding::new("plant.modes", what));
-        }
-        for (name, mode) in &self.modes {
-            if mode.omega_rad_s == 0.0 && mode.damping_ratio != 0.0 {
-                let path = format!("plant.modes.{name}.damping_ratio");
-                let ratio = mode.damping_ratio;
-                let what = format!("is {ratio}, but a double integrator has none; set 0");
-                findings.push(Finding::new(&path, what));
-            }
-        }
-        findings
+        let is_silent = self.modes.values().all(|mode| mode.residue_per_kg == 0.0);
+        let silent = is_silent.then(|| {
+            let what = "have residues of zero only: no force would reach the probe; give at least one `residue_per_kg`";
+            Finding::new("plant.modes", what)
+        });
+        let modes = self.modes.iter();
+        let damped = modes.filter_map(|(name, mode)| check_damping(name, mode));
+        silent.into_iter().chain(damped).collect()
     }
 
     fn undamped(&self) -> Structure {

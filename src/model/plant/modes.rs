@@ -125,6 +125,25 @@ const OBSERVED_RATIO: f64 = 1e-3;
 /// Damping ratio assumed for that decision where the model has less.
 const OBSERVED_DAMPING: f64 = 1e-3;
 
+/// The frequency of a mode from the eigenvalues, which rise: 0 of a free body.
+fn frequency_rad_s(
+    squares: &DVector<f64>,
+    index: usize,
+    free_bodies: usize,
+) -> Result<f64, PlantError> {
+    let square = squares[index];
+    if index < free_bodies {
+        Ok(0.0)
+    } else if square > HELD_RATIO * squares.amax() {
+        Ok(square.sqrt())
+    } else {
+        Err(PlantError::Unsupported {
+            number: index + 1,
+            eigenvalue_rad2_s2: square,
+        })
+    }
+}
+
 /// A structure as the sum of its modes, slowest first.
 ///
 /// ```
@@ -147,21 +166,11 @@ impl ModalModel {
     /// The modes of a structure whose damping matrix is diagonal in its mode shapes.
     pub fn of(structure: &Structure) -> Result<ModalModel, PlantError> {
         let (squares, shapes) = modes(&structure.mass, &structure.stiffness)?;
-        let least = HELD_RATIO * squares.amax();
         let mut modal = ModalModel { modes: Vec::new() };
-        for (index, &square) in squares.iter().enumerate() {
-            let omega_rad_s = match index < structure.free_bodies {
-                true => 0.0,
-                false if square > least => square.sqrt(),
-                false => {
-                    return Err(PlantError::Unsupported {
-                        number: index + 1,
-                        eigenvalue_rad2_s2: square,
-                    });
-                }
-            };
-            let shape = shapes.column(index).into_owned();
-            modal.modes.push(Mode::new(structure, omega_rad_s, shape));
+        for (index, shape) in shapes.column_iter().enumerate() {
+            let omega_rad_s = frequency_rad_s(&squares, index, structure.free_bodies)?;
+            let mode = Mode::new(structure, omega_rad_s, shape.into_owned());
+            modal.modes.push(mode);
         }
         match modal.has_response() {
             true => Ok(modal),

@@ -22,6 +22,15 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::{PlantError, PlantSettings, Sr4dofSettings, Structure, build};
 
+/// Stiffness of the four parallelograms across their beams, in that of one.
+#[rustfmt::skip]
+const BENDING: Matrix4<f64> = Matrix4::new(
+    0.0, 0.0, 0.0, 0.0,
+    0.0, 2.0, -1.0, -1.0,
+    0.0, -1.0, 2.0, 0.0,
+    0.0, -1.0, 0.0, 2.0,
+);
+
 /// The mechanism.
 #[derive(Clone, Debug)]
 pub(crate) struct QuadraticSr4dof {
@@ -64,10 +73,34 @@ pub(crate) struct Disturbance {
     pub floor_m_per_s2: f64,
 }
 
+/// The actuator's force in newtons with the other loads.
+#[derive(Clone, Copy)]
+struct Load {
+    force_n: f64,
+    disturbance: Disturbance,
+}
+
 /// x_i of a stage, its gradient, and the part of its acceleration that z' causes.
 struct StageMotion {
     along_m: f64,
     gradient: Vector4<f64>,
+    bend_m_per_s2: f64,
+}
+
+impl StageMotion {
+    fn new(along_m: f64, gradient: [f64; 4], bend_m_per_s2: f64) -> StageMotion {
+        StageMotion {
+            along_m,
+            gradient: gradient.into(),
+            bend_m_per_s2,
+        }
+    }
+}
+
+/// p(d) of a parallelogram, dp/dd, and the part of p'' that the rate of d causes.
+struct Shortening {
+    along_m: f64,
+    slope: f64,
     bend_m_per_s2: f64,
 }
 
@@ -85,19 +118,12 @@ impl QuadraticSr4dof {
     fn new(s: &Sr4dofSettings, linear: &Structure) -> QuadraticSr4dof {
         let beam = s.beam();
         let [m1, m2, m3, m4, m5] = s.masses_kg();
-        #[rustfmt::skip]
-        let bending = beam.parallelogram_n_per_m() * Matrix4::new(
-            0.0, 0.0, 0.0, 0.0,
-            0.0, 2.0, -1.0, -1.0,
-            0.0, -1.0, 2.0, 0.0,
-            0.0, -1.0, 0.0, 2.0,
-        );
         QuadraticSr4dof {
             slope: beam.shortening_per_m() * s.operating_point_m,
             shortening_per_m: beam.shortening_per_m(),
             masses_kg: [m2, m3, m4, m5],
             straight: Matrix4::from_diagonal(&Vector4::new(m1, m1, m2, m3)),
-            bending,
+            bending: beam.parallelogram_n_per_m() * BENDING,
             damping: Matrix4::from_fn(|row, column| linear.damping[(row, column)]),
             spring_n_per_m: s.spring_stiffness_n_per_m,
         }
@@ -113,104 +139,95 @@ impl QuadraticSr4dof {
         force_n: [f64; 3],
         disturbance: Disturbance,
     ) {
-        let start = *state;
+        let [start, middle, end] = force_n.map(|force_n| Load {
+            force_n,
+            disturbance,
+        });
         let half_s = 0.5 * step_s;
-        let k1 = self.slope_at(start, force_n[0], disturbance);
-        let k2 = self.slope_at(start.advanced(&k1, half_s), force_n[1], disturbance);
-        let k3 = self.slope_at(start.advanced(&k2, half_s), force_n[1], disturbance);
-        let k4 = self.slope_at(start.advanced(&k3, step_s), force_n[2], disturbance);
+        let k1 = self.slope_at(*state, start);
+        let k2 = self.slope_at(state.advanced(&k1, half_s), middle);
+        let k3 = self.slope_at(state.advanced(&k2, half_s), middle);
+        let k4 = self.slope_at(state.advanced(&k3, step_s), end);
         let sixth_s = step_s / 6.0;
         state.place += (k1.place + (k2.place + k3.place) * 2.0 + k4.place) * sixth_s;
         state.rate += (k1.rate + (k2.rate + k3.rate) * 2.0 + k4.rate) * sixth_s;
     }
 
     /// The time derivative of a state.
-    fn slope_at(
-        &self,
-        state: QuadraticState,
-        force_n: f64,
-        disturbance: Disturbance,
-    ) -> QuadraticState {
+    fn slope_at(&self, state: QuadraticState, load: Load) -> QuadraticState {
         QuadraticState {
             place: state.rate,
-            rate: self.acceleration(&state, force_n, disturbance),
+            rate: self.acceleration(&state, load),
         }
     }
 
     /// z''.
-    fn acceleration(
-        &self,
-        state: &QuadraticState,
-        force_n: f64,
-        disturbance: Disturbance,
-    ) -> Vector4<f64> {
+    fn acceleration(&self, state: &QuadraticState, load: Load) -> Vector4<f64> {
         let motions = self.motions(state);
-        let mut mass = self.straight;
-        let mut force =
-            motions[2].gradient * force_n - self.bending * state.place - self.damping * state.rate;
-        // Stage 1 moves along x1 itself.
-        force[0] += disturbance.probe_n - self.straight[(0, 0)] * disturbance.floor_m_per_s2;
-        for (motion, m) in motions.iter().zip(self.masses_kg) {
-            mass += motion.gradient * motion.gradient.transpose() * m;
-            force -= motion.gradient * (m * (motion.bend_m_per_s2 + disturbance.floor_m_per_s2));
-        }
-        for motion in &motions[2..] {
-            force -= motion.gradient * (self.spring_n_per_m * motion.along_m);
-        }
+        let force = self.force(state, &motions, load);
         // Positive definite for any finite z, as `straight` is. A state that is not finite stays so and shows at the probe.
-        mass.cholesky()
+        self.mass(&motions)
+            .cholesky()
             .map_or(Vector4::from_element(f64::NAN), |factor| {
                 factor.solve(&force)
             })
     }
 
-    /// p(d).
-    fn shortening_m(&self, d: f64) -> f64 {
-        (self.slope + self.shortening_per_m * d) * d
+    /// M(z).
+    fn mass(&self, motions: &[StageMotion; 4]) -> Matrix4<f64> {
+        let mut mass = self.straight;
+        for (motion, m) in motions.iter().zip(self.masses_kg) {
+            mass += motion.gradient * motion.gradient.transpose() * m;
+        }
+        mass
     }
 
-    /// dp/dd.
-    fn slope_of(&self, d: f64) -> f64 {
-        self.slope + 2.0 * self.shortening_per_m * d
+    /// M(z) z''.
+    fn force(
+        &self,
+        state: &QuadraticState,
+        motions: &[StageMotion; 4],
+        load: Load,
+    ) -> Vector4<f64> {
+        let floor_m_per_s2 = load.disturbance.floor_m_per_s2;
+        let actuator = motions[2].gradient * load.force_n;
+        let mut force = actuator - self.bending * state.place - self.damping * state.rate;
+        // Stage 1 moves along x1 itself.
+        force[0] += load.disturbance.probe_n - self.straight[(0, 0)] * floor_m_per_s2;
+        for (motion, m) in motions.iter().zip(self.masses_kg) {
+            force -= motion.gradient * (m * (motion.bend_m_per_s2 + floor_m_per_s2));
+        }
+        for motion in &motions[2..] {
+            force -= motion.gradient * (self.spring_n_per_m * motion.along_m);
+        }
+        force
     }
 
-    /// The part of p'' that the rate of d causes.
-    fn bend_of(&self, rate: f64) -> f64 {
-        2.0 * self.shortening_per_m * rate * rate
+    /// The shortening of a parallelogram that is bent by `d` and bends at `rate`.
+    fn shortening(&self, d: f64, rate: f64) -> Shortening {
+        Shortening {
+            along_m: (self.slope + self.shortening_per_m * d) * d,
+            slope: self.slope + 2.0 * self.shortening_per_m * d,
+            bend_m_per_s2: 2.0 * self.shortening_per_m * rate * rate,
+        }
     }
 
     /// Stages 2, 3, 4, 5.
     fn motions(&self, state: &QuadraticState) -> [StageMotion; 4] {
         let [x1, y1, y2, y3] = state.place.into();
         let [_, v1, v2, v3] = state.rate.into();
-        let (s12, s2) = (self.slope_of(y1 - y2), self.slope_of(y2));
-        let (s13, s3) = (self.slope_of(y1 - y3), self.slope_of(y3));
-        let (x2, x3) = (
-            x1 + self.shortening_m(y1 - y2),
-            x1 - self.shortening_m(y1 - y3),
-        );
-        let (b2, b3) = (self.bend_of(v1 - v2), -self.bend_of(v1 - v3));
+        let (p12, p2) = (self.shortening(y1 - y2, v1 - v2), self.shortening(y2, v2));
+        let (p13, p3) = (self.shortening(y1 - y3, v1 - v3), self.shortening(y3, v3));
+        let (x2, x3) = (x1 + p12.along_m, x1 - p13.along_m);
+        let (s12, s13) = (p12.slope, p13.slope);
+        let (b2, b3) = (p12.bend_m_per_s2, -p13.bend_m_per_s2);
+        let (x4, x5) = (x2 - p2.along_m, x3 + p3.along_m);
+        let (b4, b5) = (b2 - p2.bend_m_per_s2, b3 + p3.bend_m_per_s2);
         [
-            StageMotion {
-                along_m: x2,
-                gradient: Vector4::new(1.0, s12, -s12, 0.0),
-                bend_m_per_s2: b2,
-            },
-            StageMotion {
-                along_m: x3,
-                gradient: Vector4::new(1.0, -s13, 0.0, s13),
-                bend_m_per_s2: b3,
-            },
-            StageMotion {
-                along_m: x2 - self.shortening_m(y2),
-                gradient: Vector4::new(1.0, s12, -s12 - s2, 0.0),
-                bend_m_per_s2: b2 - self.bend_of(v2),
-            },
-            StageMotion {
-                along_m: x3 + self.shortening_m(y3),
-                gradient: Vector4::new(1.0, -s13, 0.0, s13 + s3),
-                bend_m_per_s2: b3 + self.bend_of(v3),
-            },
+            StageMotion::new(x2, [1.0, s12, -s12, 0.0], b2),
+            StageMotion::new(x3, [1.0, -s13, 0.0, s13], b3),
+            StageMotion::new(x4, [1.0, s12, -s12 - p2.slope, 0.0], b4),
+            StageMotion::new(x5, [1.0, -s13, 0.0, s13 + p3.slope], b5),
         ]
     }
 }
@@ -274,7 +291,13 @@ mod tests {
                     probe_n: 0.3 * force_n,
                     floor_m_per_s2: 0.2 * force_n,
                 };
-                let ours = q.acceleration(&state, force_n, load);
+                let ours = q.acceleration(
+                    &state,
+                    Load {
+                        force_n,
+                        disturbance: load,
+                    },
+                );
                 let vector = |v: &Vector4<f64>| DVector::from_column_slice(v.as_slice());
                 let mut force = &linear.force * force_n - &linear.floor * load.floor_m_per_s2;
                 force[0] += load.probe_n;
