@@ -11,7 +11,7 @@ use super::Zero;
 /// Theta of Eq. (1-2) in radians, 0 to pi: atan((w0 - y)/x) + atan((w0 + y)/x).
 pub fn opening_angle(zero_rad_s: Complex<f64>, omega_0_rad_s: f64) -> f64 {
     let (x, y) = (zero_rad_s.re, zero_rad_s.im);
-    // From one arctangent: no difference of two that are nearly equal where |y| is far above w0.
+    // The sum as one arctangent: where |y| is far above w0, two arctangents would cancel.
     (2.0 * x * omega_0_rad_s).atan2(x * x + y * y - omega_0_rad_s * omega_0_rad_s)
 }
 
@@ -26,15 +26,14 @@ pub fn opening_angle_allowed(alpha: f64, peak: f64) -> f64 {
     std::f64::consts::PI * power / (1.0 + power)
 }
 
-/// The w0 in rad/s at which the band, viewed from the zero, has the opening angle Theta
-/// (0 to pi): Eq. (1-2) solved for w0,
+/// The w0 in rad/s at which the band, viewed from the zero, has the opening angle Theta (0 to pi). Eq. (1-2) solved for w0:
 /// w0^2 sin Theta + 2 x w0 cos Theta - |z|^2 sin Theta = 0.
 pub fn bandwidth_rad_s(zero_rad_s: Complex<f64>, opening_angle_rad: f64) -> f64 {
     let (sine, cosine) = opening_angle_rad.sin_cos();
     let along = zero_rad_s.re * cosine;
     let square = zero_rad_s.norm_sqr();
     let root = (along * along + square * sine * sine).sqrt();
-    // Of the two forms of the positive root the one without cancellation.
+    // The form of the positive root without cancellation.
     if along >= 0.0 {
         square * sine / (along + root)
     } else {

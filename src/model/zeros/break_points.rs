@@ -13,15 +13,10 @@ use super::{ModalSum, ModalTerm};
 /// In rad/s, the smaller magnitude first; the second is infinite where zu wu = zv wv. `None` where they are complex
 /// (large and very different damping) or the frequencies are equal.
 pub fn two_mode_break_points(u: &ModalTerm, v: &ModalTerm) -> Option<[f64; 2]> {
-    let ((wu, zu), (wv, zv)) = (
-        (u.omega_rad_s, u.damping_ratio),
-        (v.omega_rad_s, v.damping_ratio),
-    );
-    let (a, b, c) = (
-        zu * wu - zv * wv,
-        (wu - wv) * (wu + wv),
-        wu * wv * (zv * wu - zu * wv),
-    );
+    let (wu, zu) = (u.omega_rad_s, u.damping_ratio);
+    let (wv, zv) = (v.omega_rad_s, v.damping_ratio);
+    let (a, b) = (zu * wu - zv * wv, (wu - wv) * (wu + wv));
+    let c = wu * wv * (zv * wu - zu * wv);
     let discriminant = b * b - 4.0 * a * c;
     if b == 0.0 || discriminant < 0.0 {
         return None;

@@ -20,7 +20,7 @@ use crate::model::plant::{PlantError, Structure};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum ZeroKind {
-    /// Marginally minimum phase: on the imaginary axis but for the damping.
+    /// Marginally minimum phase: without damping on the imaginary axis.
     Mmp,
     /// Real, left half plane.
     Rmp,
@@ -207,17 +207,27 @@ pub(super) fn undamped(system: &System) -> Result<Vec<Zero>, PlantError> {
 pub(super) fn damped(system: &System) -> Result<Vec<Zero>, PlantError> {
     let scale = system.frequency_scale();
     let [mass, damping, stiffness] = system.reduced(scale);
-    let n = mass.nrows();
-    let mut constant = DMatrix::identity(2 * n, 2 * n);
-    let mut linear = DMatrix::zeros(2 * n, 2 * n);
-    constant.view_mut((n, n), (n, n)).copy_from(&stiffness);
-    linear.view_mut((0, n), (n, n)).fill_diagonal(-1.0);
-    linear.view_mut((n, 0), (n, n)).copy_from(&mass);
-    linear.view_mut((n, n), (n, n)).copy_from(&damping);
+    let [constant, linear] = linearised(&mass, &damping, &stiffness);
     let undamped = undamped(system)?;
     let roots = pencil_roots(&constant, &linear)?;
     let zeros = roots.iter().map(|s| damped_zero(s * scale, &undamped));
     Ok(sorted(zeros.collect()))
+}
+
+/// The pencil P + s L of twice the size with the roots of s^2 M + s C + K.
+fn linearised(
+    mass: &DMatrix<f64>,
+    damping: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
+) -> [DMatrix<f64>; 2] {
+    let n = mass.nrows();
+    let mut constant = DMatrix::identity(2 * n, 2 * n);
+    let mut linear = DMatrix::zeros(2 * n, 2 * n);
+    constant.view_mut((n, n), (n, n)).copy_from(stiffness);
+    linear.view_mut((0, n), (n, n)).fill_diagonal(-1.0);
+    linear.view_mut((n, 0), (n, n)).copy_from(mass);
+    linear.view_mut((n, n), (n, n)).copy_from(damping);
+    [constant, linear]
 }
 
 impl System<'_> {
@@ -256,7 +266,8 @@ impl System<'_> {
         [self.mass, self.damping, self.stiffness].map(|matrix| input.transpose() * matrix * &output)
     }
 
-    /// A frequency amid those of the structure, by which scaled masses and stiffnesses have one size.
+    /// A frequency between those of the structure: with its inverse as the unit of time, masses and stiffnesses have similar
+    /// magnitudes.
     fn frequency_scale(&self) -> f64 {
         let squared = self.stiffness.norm() / self.mass.norm();
         if squared > 0.0 { squared.sqrt() } else { 1.0 }
@@ -280,7 +291,7 @@ fn zeros_of_square(u: Complex<f64>) -> [Zero; 2] {
     };
     let size = u.re.abs().sqrt();
     match is_real(u) {
-        // Both u and its conjugate come by here: each gives a right half plane zero and its mirror image.
+        // Called for u and for its conjugate: each call gives one zero in the right half plane and its mirror image.
         false => {
             let s = u.sqrt();
             [

@@ -86,9 +86,10 @@ fn by_pencil(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<u8
     Ok(u8::from(cnmp_pairs(&zeros) > 0))
 }
 
-/// Whether two of the three u are complex; `None` where rounding leaves it open.
+/// Whether two of the three u are complex; `None` where rounding could change the answer.
 fn by_discriminant(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Option<bool> {
-    let discriminant = discriminant(cubic(settings, point, asymmetry));
+    let pencil = Scaled::new(settings, point, asymmetry).pencil();
+    let discriminant = discriminant(pencil.determinant());
     let is_decisive = discriminant.value.abs() > DECISIVE_RATIO * discriminant.size;
     is_decisive.then_some(discriminant.value < 0.0)
 }
@@ -148,33 +149,71 @@ fn minor([p, q]: [Linear; 2], [r, s]: [Linear; 2]) -> [Bounded; 3] {
     [p[0] * q[0] - r[0] * s[0], middle, p[1] * q[1] - r[1] * s[1]]
 }
 
-/// det(A + u B) by powers of u, expanded along the second column.
-fn cubic(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> [Bounded; 4] {
-    let b = (0.6 * point) * (0.6 * point);
-    let m3 = settings.secondary_stage_mass_kg;
-    let m1 = settings.motion_stage_mass_kg / m3;
-    let m2 = 1.0 + asymmetry;
-    let m4 = settings.intermediate_stage_mass_kg / m3;
-    let bk = b * settings.spring_stiffness_n_per_m / settings.beam().parallelogram_n_per_m();
-    let entry = |constant: f64, linear: Bounded| [Bounded::of(constant), linear];
-    let near = Bounded::of(b * (1.0 + m4));
-    let far = Bounded::of(b * (2.0 + 4.0 * m4));
-    let none = Bounded::of(0.0);
-    let r11 = entry(2.0 + 2.0 * bk, Bounded::of(m1) + near + near);
-    let r13 = entry(-1.0 - 4.0 * bk, none - far);
-    let r21 = entry(-1.0 - 2.0 * bk, Bounded::of(b * m2) - near - near);
-    let r22 = entry(2.0, Bounded::of(m2) - Bounded::of(b * m2));
-    let r23 = entry(4.0 * bk, far);
-    let r31 = entry(-1.0 - 2.0 * bk, Bounded::of(-b * (1.0 + 2.0 * m4)));
-    let r33 = entry(2.0 + 4.0 * bk, Bounded::of(1.0 + b * (1.0 + 4.0 * m4)));
-    let first = minor([r21, r33], [r23, r31]);
-    let second = minor([r11, r33], [r13, r31]);
-    [
-        first[0] + r22[0] * second[0],
-        first[1] + r22[0] * second[1] + r22[1] * second[0],
-        first[2] + r22[0] * second[2] + r22[1] * second[1],
-        r22[1] * second[2],
-    ]
+/// The parameters of the pencil: masses in m3, springs in k.
+struct Scaled {
+    m1: f64,
+    m2: f64,
+    m4: f64,
+    /// b = a^2.
+    b: f64,
+    /// b kappa.
+    bk: f64,
+}
+
+impl Scaled {
+    fn new(settings: &Sr4dofSettings, point: f64, asymmetry: f64) -> Scaled {
+        let b = (0.6 * point) * (0.6 * point);
+        let m3 = settings.secondary_stage_mass_kg;
+        Scaled {
+            m1: settings.motion_stage_mass_kg / m3,
+            m2: 1.0 + asymmetry,
+            m4: settings.intermediate_stage_mass_kg / m3,
+            b,
+            bk: b * settings.spring_stiffness_n_per_m / settings.beam().parallelogram_n_per_m(),
+        }
+    }
+
+    fn pencil(&self) -> Pencil {
+        let Scaled { m1, m2, m4, b, bk } = *self;
+        let number = Bounded::of;
+        let near = number(b * (1.0 + m4));
+        let far = number(b * (2.0 + 4.0 * m4));
+        Pencil {
+            r11: [number(2.0 + 2.0 * bk), number(m1) + near + near],
+            r13: [number(-1.0 - 4.0 * bk), number(0.0) - far],
+            r21: [number(-1.0 - 2.0 * bk), number(b * m2) - near - near],
+            r22: [number(2.0), number(m2) - number(b * m2)],
+            r23: [number(4.0 * bk), far],
+            r31: [number(-1.0 - 2.0 * bk), number(-b * (1.0 + 2.0 * m4))],
+            r33: [number(2.0 + 4.0 * bk), number(1.0 + b * (1.0 + 4.0 * m4))],
+        }
+    }
+}
+
+/// A + u B; the two other entries of the second column are constants: -1 in the first row, 0 in the third.
+struct Pencil {
+    r11: Linear,
+    r13: Linear,
+    r21: Linear,
+    r22: Linear,
+    r23: Linear,
+    r31: Linear,
+    r33: Linear,
+}
+
+impl Pencil {
+    /// det(A + u B) by powers of u, expanded along the second column.
+    fn determinant(&self) -> [Bounded; 4] {
+        let first = minor([self.r21, self.r33], [self.r23, self.r31]);
+        let second = minor([self.r11, self.r33], [self.r13, self.r31]);
+        let [constant, linear] = self.r22;
+        [
+            first[0] + constant * second[0],
+            first[1] + constant * second[1] + linear * second[0],
+            first[2] + constant * second[2] + linear * second[1],
+            linear * second[2],
+        ]
+    }
 }
 
 /// Of d + c u + b u^2 + a u^3: below zero for one real and two complex roots.

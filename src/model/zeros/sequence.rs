@@ -68,14 +68,9 @@ impl Sequence {
         let mut dominants: Vec<Dominant> = first_dominant(sum, &events)?.into_iter().collect();
         for (index, event) in events.iter().enumerate() {
             let is_last = index + 1 == events.len();
-            dominants.push(match event {
-                Event::Resonance { mode, .. } => Dominant::Mode(*mode),
-                Event::Crossing(crossing) => dominant_above(sum, crossing, is_last)?,
-            });
+            dominants.push(event.dominant(sum, is_last)?);
         }
-        if sum.has_constant() {
-            dominants.push(Dominant::Constant);
-        }
+        dominants.extend(sum.has_constant().then_some(Dominant::Constant));
         dominants.dedup();
         Ok(Sequence {
             dominants,
@@ -142,6 +137,14 @@ impl Event {
         match self {
             Event::Resonance { omega_rad_s, .. } => *omega_rad_s,
             Event::Crossing(crossing) => crossing.omega_rad_s,
+        }
+    }
+
+    /// The dominant part above the event.
+    fn dominant(&self, sum: &ModalSum, is_last: bool) -> Result<Dominant, PlantError> {
+        match self {
+            Event::Resonance { mode, .. } => Ok(Dominant::Mode(*mode)),
+            Event::Crossing(crossing) => dominant_above(sum, crossing, is_last),
         }
     }
 }
@@ -275,19 +278,27 @@ fn crosses_alone(
     candidate: Part,
     rest: &[Part],
 ) -> Result<bool, PlantError> {
+    let range = Range::around(sum, crossing.omega_rad_s);
+    let alone = sum_of(sum, rest.iter().chain([&candidate]))?;
+    Ok(crossings(&alone)?.iter().any(|other| {
+        range.contains(other.omega_rad_s) && other.positive_after == crossing.positive_after
+    }))
+}
+
+/// The sum of some parts of a sum.
+fn sum_of<'a>(
+    sum: &ModalSum,
+    parts: impl Iterator<Item = &'a Part>,
+) -> Result<ModalSum, PlantError> {
     let mut terms: Vec<ModalTerm> = Vec::new();
     let mut constant_m_per_n = 0.0;
-    for part in rest.iter().chain([&candidate]) {
+    for part in parts {
         match part {
             Part::Mode(mode) => terms.push(sum.terms()[*mode]),
             Part::Constant => constant_m_per_n = sum.constant_m_per_n(),
         }
     }
-    let range = Range::around(sum, crossing.omega_rad_s);
-    let crossings = crossings(&ModalSum::new(terms, constant_m_per_n)?)?;
-    Ok(crossings.iter().any(|other| {
-        range.contains(other.omega_rad_s) && other.positive_after == crossing.positive_after
-    }))
+    ModalSum::new(terms, constant_m_per_n)
 }
 
 /// The dominant part above a crossing, definitions (1) and (2).

@@ -15,9 +15,9 @@ use serde::Serialize;
 use super::{ModalSum, ModalTerm, ZeroCounts};
 use crate::util::numeric::bisect;
 
-/// Samples of the shortest period that are looked at.
+/// Samples in the shortest period.
 const SAMPLES_PER_PERIOD: f64 = 64.0;
-/// Halvings of the first sampling step, for features that last shortly.
+/// Halvings of the first sampling step, for features that are over early.
 const EARLY_HALVINGS: i32 = 24;
 
 /// The response of a plant to a step of 1 N.
@@ -113,17 +113,18 @@ impl<'a> StepResponse<'a> {
     /// Directions, zero crossings and reversals.
     pub fn initial(&self) -> StepFeatures {
         let window_s = self.window_s();
-        let second_s = self.sum.terms().get(1).map(period_s);
-        let initial_s = second_s.map_or(window_s, |period_s| period_s.min(window_s));
-        let extrema_s = self.extrema_s(window_s);
+        let second_s = self.sum.terms().get(1).map_or(window_s, period_s);
+        let initial_s = second_s.min(window_s);
+        let mut extrema_s = self.extrema_s(window_s);
         let zero_crossings_s = self.zero_crossings_s(&extrema_s, window_s);
         let last_s = zero_crossings_s.last().copied().unwrap_or(0.0);
-        let early = extrema_s.iter().copied().filter(|t| *t <= initial_s);
+        let undershoot_m = self.undershoot_m(&extrema_s, last_s);
+        extrema_s.retain(|t| *t <= initial_s);
         StepFeatures {
             starts_positive: self.starts_positive(window_s),
             ends_positive: self.ends_positive(),
-            undershoot_m: self.undershoot_m(&extrema_s, last_s),
-            reversals_s: early.collect(),
+            undershoot_m,
+            reversals_s: extrema_s,
             zero_crossings_s,
             window_s,
             initial_s,
@@ -237,11 +238,9 @@ fn oscillation(term: &ModalTerm, time_s: f64) -> (f64, f64) {
     } else if angle < 1.0 {
         (envelope * angle.cosh(), envelope * angle.sinh() / rate)
     } else {
-        // Separately, as one of the two exponentials alone may overflow.
-        let (slow, fast) = (
-            ((rate - decay) * time_s).exp(),
-            (-(rate + decay) * time_s).exp(),
-        );
+        let slow = ((rate - decay) * time_s).exp();
+        let fast = (-(rate + decay) * time_s).exp();
+        // The sums of exponentials: the hyperbolic functions alone may overflow.
         (0.5 * (slow + fast), 0.5 * (slow - fast) / rate)
     }
 }
@@ -260,14 +259,19 @@ fn position(term: &ModalTerm, time_s: f64) -> f64 {
     }
     let (cosine, sine) = oscillation(term, time_s);
     let risen = if zeta < 1.0 {
-        // 1 - exp(-a)(cos + ...) without cancellation at small times: 1 - cos x = 2 sin^2(x/2).
-        let half = (0.5 * w * ((1.0 - zeta) * (1.0 + zeta)).sqrt() * time_s).sin();
-        let envelope = (-zeta * w * time_s).exp();
-        -(-zeta * w * time_s).exp_m1() + envelope * 2.0 * half * half - zeta * w * sine
+        one_less_cosine(term, time_s) - zeta * w * sine
     } else {
         1.0 - cosine - zeta * w * sine
     };
     term.part(0.0) * risen
+}
+
+/// 1 - exp(-zeta w t) cos(wd t) without cancellation at small times: 1 - cos x = 2 sin^2(x/2).
+fn one_less_cosine(term: &ModalTerm, time_s: f64) -> f64 {
+    let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
+    let half = (0.5 * w * ((1.0 - zeta) * (1.0 + zeta)).sqrt() * time_s).sin();
+    let envelope = (-zeta * w * time_s).exp();
+    -(-zeta * w * time_s).exp_m1() + envelope * 2.0 * half * half
 }
 
 #[cfg(test)]

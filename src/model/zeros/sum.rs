@@ -144,23 +144,28 @@ impl ModalSum {
         if n == 0 {
             return Ok(Vec::new());
         }
-        let vector =
-            |of: fn(&ModalTerm) -> f64| DVector::from_iterator(n, self.terms.iter().map(of));
-        let root = |term: &ModalTerm| term.residue_per_kg.abs().sqrt();
         zeros(&System {
             mass: &DMatrix::identity(n, n),
-            damping: &DMatrix::from_diagonal(&vector(|t| 2.0 * t.damping_ratio * t.omega_rad_s)),
-            stiffness: &DMatrix::from_diagonal(&vector(|t| t.omega_rad_s * t.omega_rad_s)),
-            force: &DVector::from_iterator(
-                n,
-                self.terms
-                    .iter()
-                    .map(|t| root(t).copysign(t.residue_per_kg)),
-            ),
-            sensor: &DVector::from_iterator(n, self.terms.iter().map(root)),
+            damping: &self.diagonal(|term| 2.0 * term.damping_ratio * term.omega_rad_s),
+            stiffness: &self.diagonal(|term| term.omega_rad_s * term.omega_rad_s),
+            force: &self.vector(|term| root(term).copysign(term.residue_per_kg)),
+            sensor: &self.vector(root),
             constant_m_per_n: self.constant_m_per_n,
         })
     }
+
+    fn vector(&self, of: fn(&ModalTerm) -> f64) -> DVector<f64> {
+        DVector::from_iterator(self.terms.len(), self.terms.iter().map(of))
+    }
+
+    fn diagonal(&self, of: fn(&ModalTerm) -> f64) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.vector(of))
+    }
+}
+
+/// The root of a residue's size.
+fn root(term: &ModalTerm) -> f64 {
+    term.residue_per_kg.abs().sqrt()
 }
 
 #[cfg(test)]

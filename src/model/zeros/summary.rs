@@ -26,6 +26,13 @@ pub struct ModeSummary {
 }
 
 impl ModeSummary {
+    fn all(modal: &ModalModel) -> Vec<ModeSummary> {
+        let modes = modal.modes.iter().zip(modal.signs());
+        modes
+            .map(|(mode, sign)| ModeSummary::new(mode, sign))
+            .collect()
+    }
+
     fn new(mode: &Mode, sign: Sign) -> ModeSummary {
         ModeSummary {
             omega_rad_s: mode.omega_rad_s,
@@ -81,16 +88,12 @@ impl PlantSummary {
         let modal = ModalModel::of(&structure)?;
         let zeros = undamped_zeros(&structure)?;
         let damped_zeros = damped_zeros(&structure)?;
-        let modes = modal.modes.iter().zip(modal.signs());
-        let coordinates = plant.coordinates().into_iter();
         Ok(PlantSummary {
             model: plant.model(),
             operating_point_m: plant.operating_point_m(),
             mass_asymmetry: plant.mass_asymmetry(),
-            coordinates: coordinates.map(String::from).collect(),
-            modes: modes
-                .map(|(mode, sign)| ModeSummary::new(mode, sign))
-                .collect(),
+            coordinates: plant.coordinates().into_iter().map(String::from).collect(),
+            modes: ModeSummary::all(&modal),
             cnmp_pairs: cnmp_pairs(&zeros),
             damped_cnmp_pairs: cnmp_pairs(&damped_zeros),
             sign_sequence: sign_sequence(&modal),

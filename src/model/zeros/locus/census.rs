@@ -69,12 +69,12 @@ impl LocusPlane {
                 .filter(|zero| is_real(zero.s) == real && (zero.s.re > 0.0) == right)
                 .count()
         };
-        Census::Damped {
+        Census::Damped(DampedCounts {
             complex_left: count(false, false) / 2,
             complex_right: count(false, true) / 2,
             real_left: count(true, false),
             real_right: count(true, true),
-        }
+        })
     }
 }
 
@@ -94,34 +94,45 @@ fn square(zero: &Zero) -> Complex<f64> {
     }
 }
 
-/// Numbers of zeros by kind; complex ones by conjugate pairs.
+/// Numbers of zeros by kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Census {
     Undamped(ZeroCounts),
-    Damped {
-        complex_left: usize,
-        complex_right: usize,
-        real_left: usize,
-        real_right: usize,
-    },
+    Damped(DampedCounts),
+}
+
+/// Numbers of zeros by half plane; complex ones by conjugate pairs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct DampedCounts {
+    complex_left: usize,
+    pub complex_right: usize,
+    real_left: usize,
+    real_right: usize,
+}
+
+impl DampedCounts {
+    pub fn real(&self) -> usize {
+        self.real_left + self.real_right
+    }
 }
 
 impl fmt::Display for Census {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let parts = match *self {
-            Census::Undamped(counts) => return counts.fmt(f),
-            Census::Damped {
-                complex_left,
-                complex_right,
-                real_left,
-                real_right,
-            } => [
-                (complex_left, "MMP or CMP"),
-                (complex_right, "CNMP"),
-                (real_left, "RMP"),
-                (real_right, "RNMP"),
-            ],
-        };
+        match self {
+            Census::Undamped(counts) => counts.fmt(f),
+            Census::Damped(counts) => counts.fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for DampedCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [
+            (self.complex_left, "MMP or CMP"),
+            (self.complex_right, "CNMP"),
+            (self.real_left, "RMP"),
+            (self.real_right, "RNMP"),
+        ];
         let parts: Vec<String> = parts
             .iter()
             .filter(|(count, _)| *count > 0)

@@ -70,29 +70,15 @@ pub(super) fn change(plane: LocusPlane, low: &Sample, high: &Sample) -> KindChan
 
 fn crossing(low: &Sample, high: &Sample) -> (Crossing, Complex<f64>) {
     match (low.census, high.census) {
-        (Census::Undamped(a), Census::Undamped(b)) if a.quartets != b.quartets => {
-            let complex = if a.quartets > b.quartets { low } else { high };
-            let at = meeting(complex);
-            match at.re > 0.0 {
-                true => (Crossing::RealAxis, at),
-                false => (Crossing::ImaginaryAxis, at),
+        (Census::Undamped(a), Census::Undamped(b)) => match a.quartets.cmp(&b.quartets) {
+            Ordering::Equal => through_origin_or_infinity(low),
+            Ordering::Less => meeting_of_squares(high),
+            Ordering::Greater => meeting_of_squares(low),
+        },
+        (Census::Damped(a), Census::Damped(b)) => match a.real().cmp(&b.real()) {
+            Ordering::Equal if a.complex_right != b.complex_right => {
+                (Crossing::ImaginaryAxis, on_imaginary_axis(low))
             }
-        }
-        (
-            Census::Damped {
-                real_left: al,
-                real_right: ar,
-                complex_right: a,
-                ..
-            },
-            Census::Damped {
-                real_left: bl,
-                real_right: br,
-                complex_right: b,
-                ..
-            },
-        ) => match (al + ar).cmp(&(bl + br)) {
-            Ordering::Equal if a != b => (Crossing::ImaginaryAxis, on_imaginary_axis(low)),
             Ordering::Equal => through_origin_or_infinity(low),
             // The complex pair is on the side with fewer real zeros. (Through infinity one real zero comes or goes.)
             Ordering::Less => (Crossing::RealAxis, meeting(low)),
@@ -100,6 +86,18 @@ fn crossing(low: &Sample, high: &Sample) -> (Crossing, Complex<f64>) {
         },
         _ => through_origin_or_infinity(low),
     }
+}
+
+/// Where the two squares of a quartet become real: zeros of a positive square meet on the real axis.
+fn meeting_of_squares(with_quartet: &Sample) -> (Crossing, Complex<f64>) {
+    let square = meeting(with_quartet);
+    let is_positive = square.re > 0.0;
+    let crossing = if is_positive {
+        Crossing::RealAxis
+    } else {
+        Crossing::ImaginaryAxis
+    };
+    (crossing, square)
 }
 
 /// The complex zero with the least of some measure.

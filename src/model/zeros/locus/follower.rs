@@ -15,7 +15,7 @@ const VANISHING_RATIO: f64 = 0.67;
 pub(super) struct Follower<F> {
     plane: LocusPlane,
     zeros: F,
-    /// Samples beside the grid that may still be taken to follow tracks.
+    /// Number of samples between those of the grid that may still be computed to follow tracks.
     left: usize,
 }
 
@@ -55,7 +55,7 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         Ok(tracks)
     }
 
-    /// The point of the sample `to` to which each of the points `from`, at the value `at`, moves.
+    /// For each of the points `from` at the value `at`, the point of the sample `to` that continues it.
     fn moved(
         &mut self,
         from: &[Point],
@@ -75,8 +75,26 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         self.moved(&half, middle.value, to, scale, depth - 1)
     }
 
-    /// All changes of kind between two samples, as far as the kinds at both differ.
-    pub fn changes(
+    /// All changes of kind, by rising value.
+    pub fn all_changes(
+        &mut self,
+        samples: &[Sample],
+        tracks: &[Vec<Point>],
+    ) -> Result<Vec<KindChange>, E> {
+        let mut found = Vec::new();
+        for pair in samples.windows(2) {
+            self.changes(&pair[0], &pair[1], &mut found)?;
+        }
+        for (index, triple) in samples.windows(3).enumerate() {
+            let near = approaching(tracks, index);
+            self.hidden_changes(triple, &near, &mut found)?;
+        }
+        found.sort_by(|a, b| a.value.total_cmp(&b.value));
+        Ok(found)
+    }
+
+    /// The changes of kind between two samples, as far as the kinds at both differ.
+    fn changes(
         &mut self,
         from: &Sample,
         to: &Sample,
@@ -113,28 +131,21 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         }
     }
 
-    /// Changes to other kinds and back between three samples of the same kinds.
-    pub fn hidden_changes(
+    /// Changes to other kinds and back between three samples of the same kinds, where a pair of points is `near`.
+    fn hidden_changes(
         &mut self,
         triple: &[Sample],
-        tracks: &[Vec<Point>],
-        index: usize,
+        near: &[[Point; 2]],
         found: &mut Vec<KindChange>,
     ) -> Result<(), E> {
         let [a, b, c] = triple else { return Ok(()) };
         if a.census != b.census || b.census != c.census {
             return Ok(());
         }
-        for (i, first) in tracks.iter().enumerate() {
-            for second in &tracks[i + 1..] {
-                if !may_meet(&first[index..index + 3], &second[index..index + 3]) {
-                    continue;
-                }
-                let pair = [first[index + 1], second[index + 1]];
-                if let Some(other) = self.nearest_approach(triple, pair)? {
-                    self.changes(a, &other, found)?;
-                    self.changes(&other, c, found)?;
-                }
+        for pair in near {
+            if let Some(other) = self.nearest_approach(triple, *pair)? {
+                self.changes(a, &other, found)?;
+                self.changes(&other, c, found)?;
             }
         }
         Ok(())
@@ -164,6 +175,19 @@ impl<E, F: FnMut(f64) -> Result<Vec<Zero>, E>> Follower<F> {
         }
         Ok(None)
     }
+}
+
+/// The pairs of tracks that may meet between the three samples from `index` on: their points in the middle sample.
+fn approaching(tracks: &[Vec<Point>], index: usize) -> Vec<[Point; 2]> {
+    let mut pairs = Vec::new();
+    for (i, first) in tracks.iter().enumerate() {
+        for second in &tracks[i + 1..] {
+            if may_meet(&first[index..index + 3], &second[index..index + 3]) {
+                pairs.push([first[index + 1], second[index + 1]]);
+            }
+        }
+    }
+    pairs
 }
 
 fn median_magnitude(samples: &[Sample]) -> f64 {

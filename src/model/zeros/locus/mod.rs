@@ -44,14 +44,7 @@ impl Locus {
             .map(|value| follower.sample(*value))
             .collect::<Result<Vec<_>, E>>()?;
         let tracks = follower.tracks(&samples)?;
-        let mut changes = Vec::new();
-        for pair in samples.windows(2) {
-            follower.changes(&pair[0], &pair[1], &mut changes)?;
-        }
-        for (index, triple) in samples.windows(3).enumerate() {
-            follower.hidden_changes(triple, &tracks, index, &mut changes)?;
-        }
-        changes.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let mut changes = follower.all_changes(&samples, &tracks)?;
         if values.first() > values.last() {
             changes.reverse();
         }
