@@ -22,9 +22,9 @@ fn rejects_invalid_tolerances() {
         ),
         (
             "loop.rate_hz=+-1%",
-            &["`loop.rate_hz` is not of the plant", "`plant.`"],
+            &["`loop.rate_hz` is not a setting of the plant", "`plant.`"],
         ),
-        ("plant.layout=+-1", &["`plant.layout` is no quantity"]),
+        ("plant.layout=+-1", &["`plant.layout` is not a quantity"]),
         ("plant.beam_length_m", &["KEY=uniform:LOW:HIGH"]),
         ("plant.beam_length_m=1%", &["KEY=+-LIMIT"]),
         ("plant.beam_length_m=uniform:x:y", &["`x` is not a number"]),
@@ -60,7 +60,7 @@ fn rejects_invalid_tolerances() {
         .is_refused(&["varies already"]);
     bench
         .run("model study --config four-mass --vary plant.free_bodies=+-1")
-        .is_refused(&["no quantity"]);
+        .is_refused(&["not a quantity"]);
     assert_eq!(bench.files(), [""; 0]);
 }
 

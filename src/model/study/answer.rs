@@ -20,15 +20,15 @@ pub struct Answer {
     pub model: &'static str,
     /// The nominal operating point, of a model that has one.
     pub operating_point_m: Option<f64>,
-    /// Of the random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// How many draws were done.
+    /// Number of completed draws.
     pub draws: u64,
-    /// `I/N` of a part, `null` of the whole.
+    /// `I/N` of a shard, `null` of the whole study.
     pub shard: Option<String>,
     /// The varied settings.
     pub varied: Vec<Varied>,
-    /// The draws that are not in the probabilities.
+    /// The draws that the probabilities exclude.
     pub not_analysed: NotAnalysed,
     /// CNMP pairs without damping.
     pub cnmp_pairs: Counted,
@@ -39,22 +39,22 @@ pub struct Answer {
 /// Draws that could not be analysed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotAnalysed {
-    /// How many.
+    /// Their number.
     pub draws: u64,
-    /// The first of them.
+    /// The first few.
     pub examples: Vec<Failure>,
 }
 
-/// How likely each number of pairs is, and what decides whether there are any.
+/// The probability of each number of pairs, and the settings that decide whether there are any.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Counted {
-    /// From no pair to the most that were found, three at least.
+    /// From no pair to the largest number found, three at least.
     pub probabilities: Vec<Probability>,
-    /// One pair or more.
+    /// Of one pair or more.
     pub any: Probability,
-    /// The sum of what the settings explain alone; `null` of too few draws.
+    /// Sum of the shares that the settings explain alone; `null` with too few draws.
     pub share_alone: Option<f64>,
-    /// The sum of what interactions explain beyond that. The rest takes three settings or more together.
+    /// Sum of the shares of interactions of two settings. The remainder belongs to three or more settings together.
     pub share_of_interactions: Option<f64>,
     /// Each setting, the strongest first.
     pub settings: Vec<Effect>,
@@ -65,16 +65,16 @@ pub struct Counted {
 /// The probability of a number of pairs among the draws that were analysed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Probability {
-    /// How many pairs; nothing for one or more.
+    /// Number of pairs; absent for one or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pairs: Option<u32>,
-    /// How many draws had them.
+    /// Number of draws with so many pairs.
     pub draws: u64,
-    /// Their ratio.
+    /// Its ratio to all analysed draws.
     pub probability: f64,
-    /// Its 95 % interval by Wilson, from here
+    /// Lower end of the 95 % confidence interval (Wilson).
     pub low: f64,
-    /// to here.
+    /// Upper end of it.
     pub high: f64,
 }
 
@@ -83,12 +83,12 @@ pub struct Probability {
 pub struct Effect {
     /// The setting.
     pub key: String,
-    /// The share of the variance of "has pairs" that it explains alone; `null` of too few draws.
+    /// The share of the variance of "has pairs" that it explains alone; `null` with too few draws.
     pub share: Option<f64>,
-    /// The share's standard deviation if there were no effect.
+    /// Standard deviation of the share if there were no effect.
     pub share_noise: Option<f64>,
-    /// `+` if pairs are more likely in the upper third of the setting than in the lower one by more than chance, `-` if less,
-    /// `0` if neither.
+    /// `+` if pairs are significantly more likely in the upper third of the setting than in the lower third, `-` if
+    /// significantly less likely, `0` otherwise.
     pub direction: char,
     /// The probability of pairs in the lower, the middle and the upper third.
     pub probability_by_third: [Option<f64>; 3],
@@ -103,9 +103,9 @@ pub struct Interaction {
     pub share: f64,
     /// Its standard deviation if there were no effect.
     pub share_noise: f64,
-    /// The probability of pairs where both lie on the same side of their medians,
+    /// The probability of pairs where both settings lie on the same side of their medians.
     pub probability_same_side: Option<f64>,
-    /// and where they lie on opposite sides.
+    /// The probability of pairs where they lie on opposite sides.
     pub probability_opposite_sides: Option<f64>,
 }
 
@@ -125,54 +125,79 @@ impl Answer {
                 draws: failures.len() as u64,
                 examples: failures.into_iter().take(EXAMPLES).cloned().collect(),
             },
-            cnmp_pairs: counted(results, |block| &block.cnmp_pairs),
+            cnmp_pairs: Counted::of(results, |block| &block.cnmp_pairs),
             damped_cnmp_pairs: plan
                 .damped
-                .then(|| counted(results, |block| &block.damped_cnmp_pairs)),
+                .then(|| Counted::of(results, |block| &block.damped_cnmp_pairs)),
         }
     }
 }
 
-fn counted(results: &Results, of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
-    let mut effects = Effects::new(results.plan.varied.len(), results.done());
-    // 0, 1, 2 and 3 pairs are always reported.
-    let mut counts = vec![0; 4];
-    for block in results.blocks() {
-        for (pairs, drawn) in of(block).iter().zip(results.plan.from_draw(block.first)) {
-            let Some(pairs) = *pairs else { continue };
-            counts.resize(counts.len().max(pairs as usize + 1), 0);
-            counts[pairs as usize] += 1;
-            effects.add(&drawn.ranks, pairs > 0);
+/// The analysed draws by their number of pairs, and by the ranks of their settings.
+struct Tally {
+    counts: Vec<u64>,
+    effects: Effects,
+}
+
+impl Tally {
+    fn of(results: &Results, pairs_of: fn(&Block) -> &Vec<Option<u32>>) -> Tally {
+        let mut tally = Tally {
+            // 0, 1, 2 and 3 pairs are always reported.
+            counts: vec![0; 4],
+            effects: Effects::new(results.plan.varied.len(), results.done()),
+        };
+        for block in results.blocks() {
+            let drawn = results.plan.from_draw(block.first);
+            for (pairs, drawn) in pairs_of(block).iter().zip(drawn) {
+                if let Some(pairs) = *pairs {
+                    tally.add(pairs as usize, &drawn.ranks);
+                }
+            }
         }
+        tally
     }
-    let all: u64 = counts.iter().sum();
-    let varied = &results.plan.varied;
-    let probabilities = (0..).zip(&counts);
-    let alone = (0..varied.len()).map(|index| Some(effects.single(index)?.value));
-    let together = effects.interactions().map(|(_, share)| Some(share?.value));
-    Counted {
-        probabilities: probabilities
-            .map(|(pairs, &yes)| probability(Some(pairs), yes, all))
-            .collect(),
-        any: probability(None, all - counts[0], all),
-        share_alone: alone.sum(),
-        share_of_interactions: together.sum(),
-        settings: settings(varied, &effects),
-        interactions: interactions(varied, &effects),
+
+    fn add(&mut self, pairs: usize, ranks: &[f64]) {
+        let length = self.counts.len().max(pairs + 1);
+        self.counts.resize(length, 0);
+        self.counts[pairs] += 1;
+        self.effects.add(ranks, pairs > 0);
     }
 }
 
-fn probability(pairs: Option<u32>, yes: u64, all: u64) -> Probability {
-    let [low, high] = wilson_interval(yes, all);
-    Probability {
-        pairs,
-        draws: yes,
-        probability: match all {
-            0 => 0.0,
-            _ => yes as f64 / all as f64,
-        },
-        low,
-        high,
+impl Counted {
+    fn of(results: &Results, pairs_of: fn(&Block) -> &Vec<Option<u32>>) -> Counted {
+        let Tally { counts, effects } = Tally::of(results, pairs_of);
+        let (all, varied): (u64, _) = (counts.iter().sum(), &results.plan.varied);
+        let probabilities = (0..).zip(&counts);
+        let alone = (0..varied.len()).map(|index| Some(effects.single(index)?.value));
+        let together = effects.interactions().map(|(_, share)| Some(share?.value));
+        Counted {
+            probabilities: probabilities
+                .map(|(pairs, &draws)| Probability::new(Some(pairs), draws, all))
+                .collect(),
+            any: Probability::new(None, all - counts[0], all),
+            share_alone: alone.sum(),
+            share_of_interactions: together.sum(),
+            settings: settings(varied, &effects),
+            interactions: interactions(varied, &effects),
+        }
+    }
+}
+
+impl Probability {
+    fn new(pairs: Option<u32>, draws: u64, all: u64) -> Probability {
+        let [low, high] = wilson_interval(draws, all);
+        Probability {
+            pairs,
+            draws,
+            probability: match all {
+                0 => 0.0,
+                _ => draws as f64 / all as f64,
+            },
+            low,
+            high,
+        }
     }
 }
 

@@ -29,7 +29,7 @@ impl<'a> Counter<'a> {
         keys: impl Iterator<Item = &'k str>,
         damped: bool,
     ) -> Counter<'a> {
-        // A table of plain numbers and words is always JSON.
+        // A table of numbers and strings can always be converted to JSON.
         let mut settings = serde_json::to_value(nominal).unwrap_or_default();
         if let Some(table) = settings.as_object_mut() {
             table.shift_remove("model");

@@ -1,4 +1,4 @@
-//! The settings that decide whether there are CNMP pairs: shares of the variance of that yes or no.
+//! The settings that decide whether there are CNMP pairs: shares of the variance of the answer, yes or no.
 //!
 //! With Y = 1 for a draw with pairs and 0 for one without, Var Y = p (1 - p). The share of a setting X (Sobol's first-order
 //! index) and that of the interaction of two settings beyond their own (second-order) are
@@ -81,7 +81,7 @@ pub(super) struct Effects {
 }
 
 impl Effects {
-    /// For so many settings and draws.
+    /// For a number of settings and of draws.
     pub fn new(settings: usize, draws: u64) -> Effects {
         let classes = 2 * ((draws as f64 / DRAWS_IN_PAIR_CLASS).sqrt() / 2.0) as usize;
         let pair_classes = classes.clamp(*PAIR_CLASSES.start(), *PAIR_CLASSES.end());
@@ -113,7 +113,7 @@ impl Effects {
         }
     }
 
-    /// The share that a setting explains alone; `None` of too few draws, or where all are equal.
+    /// The share that a setting explains alone; `None` with too few draws, or where all draws are equal.
     pub fn single(&self, index: usize) -> Option<Share> {
         let cells = &self.single[index];
         let spread = Spread::of(cells)?;
@@ -162,12 +162,9 @@ fn setting_pairs(settings: usize) -> impl Iterator<Item = (usize, usize)> {
 
 fn interaction(cells: &[Cell], n: usize) -> Option<Share> {
     let spread = Spread::of(cells)?;
-    let line = |cells: Vec<&Cell>| Cell::sum(cells);
-    let rows: Vec<Cell> = (0..n)
-        .map(|i| line(cells[i * n..(i + 1) * n].iter().collect()))
-        .collect();
+    let rows: Vec<Cell> = cells.chunks(n).map(Cell::sum).collect();
     let columns: Vec<Cell> = (0..n)
-        .map(|j| line(cells.iter().skip(j).step_by(n).collect()))
+        .map(|j| Cell::sum(cells.iter().skip(j).step_by(n)))
         .collect();
     let beyond = spread.between - Spread::of(&rows)?.between - Spread::of(&columns)?.between;
     Some(spread.share(beyond, ((n - 1) * (n - 1)) as f64))

@@ -1,5 +1,5 @@
 //! The completed part of a study, in a [`RecordFile`]: the header with format, version, shard and plan, then blocks of
-//! draws in the order in which they were completed. The draws of a damaged line are done again.
+//! draws in the order in which they were completed. The draws of a damaged line are computed again.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -44,9 +44,9 @@ pub struct StudyFile {
 pub struct Opened {
     /// The file, to append to.
     pub file: StudyFile,
-    /// The draws that are done.
+    /// The completed draws.
     pub results: Results,
-    /// Number of damaged lines, which do not count.
+    /// Number of damaged lines, which were left out.
     pub dropped: usize,
 }
 
@@ -209,20 +209,21 @@ fn without_index(header: &str) -> String {
 
 /// A line for each reason why the files are not a complete study.
 fn findings(parts: &[Content]) -> Vec<String> {
-    let count = parts.first().map_or(0, |part| part.results.shard.count);
     let given: BTreeSet<u64> = parts.iter().map(|part| part.results.shard.index).collect();
+    let twice = given.iter().filter_map(|index| given_twice(parts, *index));
+    let incomplete = parts.iter().filter_map(incomplete);
+    let missing = missing_shards(parts, &given).into_iter();
+    missing.chain(twice).chain(incomplete).collect()
+}
+
+fn missing_shards(parts: &[Content], given: &BTreeSet<u64>) -> Option<String> {
+    let count = parts.first()?.results.shard.count;
     let missing: Vec<String> = (1..=count)
         .filter(|index| !given.contains(index))
         .map(|index| index.to_string())
         .collect();
-    let mut findings = Vec::new();
-    if !missing.is_empty() {
-        let missing = missing.join(", ");
-        findings.push(format!("  of {count} shards there is no file of {missing}"));
-    }
-    findings.extend(given.iter().filter_map(|index| given_twice(parts, *index)));
-    findings.extend(parts.iter().filter_map(incomplete));
-    findings
+    let names = missing.join(", ");
+    (!missing.is_empty()).then(|| format!("  of {count} shards there is no file of {names}"))
 }
 
 fn given_twice(parts: &[Content], index: u64) -> Option<String> {
@@ -247,6 +248,6 @@ fn incomplete(part: &Content) -> Option<String> {
 }
 
 fn json(value: &impl Serialize) -> String {
-    // Numbers, words and lists of them are always JSON.
+    // Numbers, strings and lists of them can always be converted to JSON.
     serde_json::to_string(value).unwrap_or_default()
 }

@@ -1,4 +1,5 @@
-//! Monte Carlo over manufacturing tolerances: how likely each number of CNMP pairs is, and which settings decide it.
+//! Monte Carlo study of manufacturing tolerances: the probability of each number of CNMP pairs, and the settings that
+//! decide it.
 //!
 //! ```text
 //!  Tolerance (as typed) + settings -> Plan -> draw k: its own random numbers -> plant -> zeros -> Count

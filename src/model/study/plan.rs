@@ -45,12 +45,12 @@ pub struct Plan {
     pub damped: bool,
 }
 
-/// The part of a study that one process computes: `index` of `count`, from 1.
+/// The part of a study that one process computes, `index` of `count`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// Which one.
+    /// Number of the part, from 1.
     pub index: u64,
-    /// Of how many.
+    /// Number of parts.
     pub count: u64,
 }
 
@@ -58,9 +58,9 @@ impl Shard {
     /// The whole study.
     pub const WHOLE: Shard = Shard { index: 1, count: 1 };
 
-    /// Its draws: the I-th of N equal parts, to one draw.
+    /// Its draws: the I-th of N parts, whose sizes differ by one draw at most.
     pub fn draws(&self, plan: &Plan) -> Range<u64> {
-        // 128 bits hold the product of any two counts of 64.
+        // 128 bits hold the product of any two 64-bit numbers.
         let limit =
             |part: u64| (u128::from(plan.draws) * u128::from(part) / u128::from(self.count)) as u64;
         limit(self.index - 1)..limit(self.index)
@@ -145,8 +145,9 @@ impl Plan {
                 let mut values = nominal.clone();
                 values[index] += end;
                 let plant = counter.plant(&values);
-                let checked = plant.and_then(|plant| check_plant(config, plant));
-                checked.map_err(|why| reaches_too_far(&one.key, values[index], &why))?;
+                plant
+                    .and_then(|plant| check_plant(config, plant))
+                    .map_err(|why| out_of_range(&one.key, values[index], &why))?;
             }
         }
         Ok(())
@@ -181,7 +182,7 @@ fn check_plant(config: &Config, plant: PlantSettings) -> Result<(), String> {
     validate(&config).map_err(|error| error.to_string())
 }
 
-fn reaches_too_far(key: &str, value: f64, why: &str) -> StudyError {
+fn out_of_range(key: &str, value: f64, why: &str) -> StudyError {
     StudyError::Plan(format!(
         "the tolerance of `{key}` reaches {value}: narrow it, or move the nominal value; {why}"
     ))
@@ -208,14 +209,19 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
             });
         }
     }
-    match varied.len() {
+    check_count(varied.len())?;
+    Ok(varied)
+}
+
+fn check_count(varied: usize) -> Result<(), StudyError> {
+    match varied {
         0 => Err(StudyError::Plan(
             "nothing varies; give --vary KEY=TOLERANCE, as in plant.mass_asymmetry=+-0.02".into(),
         )),
-        count if count > MOST_VARIED => Err(StudyError::Plan(format!(
-            "{count} settings would vary; at most {MOST_VARIED} may: name fewer"
+        1..=MOST_VARIED => Ok(()),
+        _ => Err(StudyError::Plan(format!(
+            "{varied} settings would vary; the limit is {MOST_VARIED}: name fewer"
         ))),
-        _ => Ok(varied),
     }
 }
 
@@ -224,38 +230,38 @@ fn numbers<'a>(
     tolerance: &Tolerance,
     settings: &'a [(String, Value)],
 ) -> Result<Vec<(&'a String, f64)>, StudyError> {
-    let matched = || settings.iter().filter(|(key, _)| tolerance.matches(key));
-    let numbers: Vec<(&String, f64)> = matched()
-        .filter(|(_, value)| value.is_f64())
+    let quantities = settings.iter().filter(|(_, value)| value.is_f64());
+    let numbers: Vec<(&String, f64)> = quantities
+        .filter(|(key, _)| tolerance.matches(key))
         .filter_map(|(key, value)| Some((key, value.as_f64()?)))
         .collect();
-    if !numbers.is_empty() {
-        return Ok(numbers);
+    match numbers.is_empty() {
+        true => Err(tolerance.wrong(no_numbers(tolerance, settings))),
+        false => Ok(numbers),
     }
+}
+
+/// The reason why a tolerance applies to no numeric setting.
+fn no_numbers(tolerance: &Tolerance, settings: &[(String, Value)]) -> String {
+    let mut keys = settings.iter().map(|(key, _)| key.as_str());
     let pattern = tolerance.pattern();
-    Err(tolerance.wrong(match matched().next() {
-        Some((key, _)) => format!("`{key}` is no quantity: only quantities can deviate"),
-        None if !pattern.starts_with("plant.") => {
-            format!(
-                "`{pattern}` is not of the plant; a study varies settings that begin with `plant.`"
-            )
-        }
-        None => {
-            let keys = settings.iter().map(|(key, _)| key.as_str());
-            let hint = nearest(pattern, keys).unwrap_or("plant");
-            format!("`{pattern}` is not a setting of this plant; the nearest is `{hint}`")
-        }
-    }))
+    if let Some(key) = keys.clone().find(|key| tolerance.matches(key)) {
+        return format!("`{key}` is not a quantity; only quantities can vary");
+    }
+    if !pattern.starts_with("plant.") {
+        return format!(
+            "`{pattern}` is not a setting of the plant; a study varies settings that begin with `plant.`"
+        );
+    }
+    let hint = nearest(pattern, &mut keys).unwrap_or("plant");
+    format!("`{pattern}` is not a setting of this plant; the nearest is `{hint}`")
 }
 
 /// All settings of a plant, with their dotted paths.
 fn settings(plant: &PlantSettings) -> Vec<(String, Value)> {
+    let plant = serde_json::to_value(plant).unwrap_or_default();
     let mut found = Vec::new();
-    leaves(
-        "plant",
-        &serde_json::to_value(plant).unwrap_or_default(),
-        &mut found,
-    );
+    leaves("plant", &plant, &mut found);
     found
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::counter::Count;
 use super::{Plan, Shard};
 
-/// Draws of a block: the work that a thread takes at a time, and at most loses when it is killed.
+/// Draws of a block: the unit of work of a thread, and the most that it loses when it is killed.
 pub(super) const BLOCK: u64 = 500;
 
 /// A draw that could not be analysed.
@@ -16,7 +16,7 @@ pub(super) const BLOCK: u64 = 500;
 pub struct Failure {
     /// Its number, from 0.
     pub draw: u64,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
@@ -92,7 +92,7 @@ impl Results {
             .map(move |first| first..end.min(first + BLOCK))
     }
 
-    /// The ranges of draws that are still to do, block by block; of a shard that is not joined from others.
+    /// The ranges of draws that are not completed, block by block. Not for results that were joined from shards.
     pub fn missing(&self) -> Vec<Range<u64>> {
         self.ranges()
             .filter(|range| !self.blocks.contains_key(&range.start))
@@ -112,7 +112,7 @@ impl Results {
         is_valid
     }
 
-    /// Adds the blocks of another shard of the same study, which begin where they do there.
+    /// Adds the blocks of another shard of the same study, without a check of their ranges.
     pub(super) fn absorb(&mut self, other: Results) {
         self.blocks.extend(other.blocks);
     }
@@ -123,7 +123,7 @@ impl Results {
         draws.end - draws.start
     }
 
-    /// Number of draws that are still to do.
+    /// Number of draws that are not completed.
     pub fn left(&self) -> u64 {
         self.total() - self.done()
     }

@@ -1,4 +1,4 @@
-//! By how much a setting deviates: as a person types it, and as a distribution.
+//! The deviation of a setting: as typed, and as a distribution.
 
 use std::str::FromStr;
 
@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use super::StudyError;
 use crate::util::quantity::{Dimension, Quantity, QuantityError};
 
-/// Where a normal deviation ends, in standard deviations: two values in 10^9 lie beyond, and are put there.
+/// Limit of a normal deviation in standard deviations: two values in 10^9 lie beyond it and are set to it.
 const NORMAL_END: f64 = 6.0;
 
 /// The distribution of a setting's deviation from its nominal value, in the setting's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "distribution", rename_all = "snake_case")]
 pub enum Deviation {
-    /// As likely anywhere between two limits.
+    /// Uniform between two limits.
     Uniform {
         /// The lower limit.
         low: f64,
@@ -29,7 +29,7 @@ pub enum Deviation {
 }
 
 impl Deviation {
-    /// Its ends.
+    /// Its limits.
     pub fn ends(&self) -> [f64; 2] {
         match *self {
             Deviation::Uniform { low, high } => [low, high],
@@ -39,7 +39,7 @@ impl Deviation {
 
     /// The deviation and its rank, the probability of a smaller one, from two independent numbers, uniform in [0, 1).
     ///
-    /// A normal one by Box and Muller, sqrt(-2 ln(1 - a)) cos(2 pi b).
+    /// A normal deviation follows Box and Muller, sqrt(-2 ln(1 - a)) cos(2 pi b).
     pub(super) fn drawn(&self, [a, b]: [f64; 2]) -> (f64, f64) {
         match *self {
             Deviation::Uniform { low, high } => (low + (high - low) * a, a),
@@ -56,7 +56,7 @@ impl Deviation {
     }
 }
 
-/// Which settings deviate, and by how much: `KEY=uniform:LOW:HIGH`, `KEY=normal:SIGMA`, or `KEY=+-LIMIT` for a uniform one.
+/// The settings that deviate, and the distribution: `KEY=uniform:LOW:HIGH`, `KEY=normal:SIGMA`, or `KEY=+-LIMIT` for a uniform one.
 ///
 /// The deviation is added to the nominal value. A percentage of an operating point is of the beam length, of a ratio of 1,
 /// and of any other setting of its nominal value. `*` in the key stands for any part of a name between dots.
@@ -66,6 +66,8 @@ pub struct Tolerance {
     pattern: String,
     amounts: Amounts,
 }
+
+const USAGE: &str = "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
 
 #[derive(Clone, Debug, PartialEq)]
 enum Amounts {
@@ -78,41 +80,50 @@ impl FromStr for Tolerance {
     type Err = StudyError;
 
     fn from_str(text: &str) -> Result<Tolerance, StudyError> {
-        let wrong = |why: String| StudyError::Tolerance {
-            text: text.into(),
-            why,
-        };
-        let usage = "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
-        let (pattern, amounts) = text.split_once('=').ok_or_else(|| wrong(usage.into()))?;
-        let number = |text: &str| {
-            text.parse()
-                .map_err(|e: QuantityError| wrong(e.to_string()))
-        };
-        let limit = ["+-", "±"]
-            .iter()
-            .find_map(|sign| amounts.trim().strip_prefix(sign));
-        let parts: Vec<&str> = amounts.split(':').map(str::trim).collect();
-        let amounts = match (limit, parts.as_slice()) {
-            (Some(limit), _) => Amounts::Symmetric(number(limit)?),
-            (None, ["uniform", low, high]) => Amounts::Uniform(number(low)?, number(high)?),
-            (None, ["normal", sigma]) => Amounts::Normal(number(sigma)?),
-            _ => return Err(wrong(usage.into())),
-        };
-        Ok(Tolerance {
-            text: text.into(),
-            pattern: pattern.trim().into(),
-            amounts,
-        })
+        let parsed = text.split_once('=').ok_or_else(|| USAGE.to_string());
+        let parsed = parsed.and_then(|(pattern, amounts)| Ok((pattern, amounts.parse()?)));
+        let text = text.to_string();
+        match parsed {
+            Err(why) => Err(StudyError::Tolerance { text, why }),
+            Ok((pattern, amounts)) => Ok(Tolerance {
+                pattern: pattern.trim().into(),
+                amounts,
+                text,
+            }),
+        }
     }
 }
 
+impl FromStr for Amounts {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Amounts, String> {
+        let signs = ["+-", "±"];
+        let limit = signs.iter().find_map(|sign| text.trim().strip_prefix(sign));
+        if let Some(limit) = limit {
+            return Ok(Amounts::Symmetric(quantity(limit)?));
+        }
+        let parts: Vec<&str> = text.split(':').map(str::trim).collect();
+        match parts.as_slice() {
+            ["uniform", low, high] => Ok(Amounts::Uniform(quantity(low)?, quantity(high)?)),
+            ["normal", sigma] => Ok(Amounts::Normal(quantity(sigma)?)),
+            _ => Err(USAGE.into()),
+        }
+    }
+}
+
+fn quantity(text: &str) -> Result<Quantity, String> {
+    text.parse()
+        .map_err(|error: QuantityError| error.to_string())
+}
+
 impl Tolerance {
-    /// The key, perhaps with `*`.
+    /// The key; it may contain `*`.
     pub fn pattern(&self) -> &str {
         &self.pattern
     }
 
-    /// Whether it is about this key.
+    /// Whether the tolerance applies to this key.
     pub fn matches(&self, key: &str) -> bool {
         let (patterns, parts) = (self.pattern.split('.'), key.split('.'));
         patterns.clone().count() == parts.clone().count()
@@ -122,7 +133,7 @@ impl Tolerance {
     /// The deviation of one of its settings from a nominal value, on a plant with beams of this length.
     ///
     /// # Errors
-    /// If it is empty, if its unit does not belong to the setting, or if it is in percent of zero.
+    /// The range is empty, the unit is not that of the setting, or the deviation is a percentage of zero.
     pub fn deviation(
         &self,
         key: &str,
@@ -145,7 +156,7 @@ impl Tolerance {
             return Ok(Deviation::Uniform { low, high });
         }
         Err(self.wrong(format!(
-            "an empty tolerance of `{key}`: from {low} to {high}; give a lower and a higher limit"
+            "the tolerance of `{key}` is empty: from {low} to {high}; give a lower and a higher limit"
         )))
     }
 
