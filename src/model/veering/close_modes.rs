@@ -29,7 +29,7 @@ pub struct CloseModes {
     pub remainder: Remainder,
 }
 
-/// All other modes, evaluated amid the two.
+/// All other modes, evaluated at w0 between the two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Remainder {
     /// aR in 1/kg.
@@ -111,21 +111,17 @@ impl Remainder {
     fn of(terms: &[ModalTerm], pair: [usize; 2], [wu, wv]: [f64; 2]) -> Remainder {
         let others = Others { terms, pair };
         let middle = (wu * wv).sqrt();
-        let residue_per_kg = -middle * middle * others.part(middle);
+        let residue_per_kg = others.integrator_per_kg(middle);
         let largest = others.largest(middle);
-        let others_ratio = largest.map(|(_, term)| {
-            let part = term.part(middle);
-            ((others.part(middle) - part) / part).abs()
-        });
-        let departure = |w: f64| (-w * w * others.part(w) / residue_per_kg - 1.0).abs();
+        let deviation = |w: f64| (others.integrator_per_kg(w) / residue_per_kg - 1.0).abs();
         Remainder {
             residue_per_kg,
             mode: largest.map(|(mode, _)| mode),
-            others_ratio: others_ratio.unwrap_or(0.0),
+            others_ratio: largest.map_or(0.0, |(_, term)| others.ratio_to(term, middle)),
             nearness_ratio: largest.map_or(0.0, |(_, term)| nearness(term, [wu, wv])),
             integrator_ratio: match residue_per_kg == 0.0 {
                 true => 0.0,
-                false => departure(wu).max(departure(wv)),
+                false => deviation(wu).max(deviation(wv)),
             },
         }
     }
@@ -146,6 +142,17 @@ impl<'a> Others<'a> {
     /// Their sum at a frequency.
     fn part(&self, omega_rad_s: f64) -> f64 {
         self.terms().map(|(_, term)| term.part(omega_rad_s)).sum()
+    }
+
+    /// The residue of the double integrator that equals their sum at a frequency.
+    fn integrator_per_kg(&self, omega_rad_s: f64) -> f64 {
+        -omega_rad_s * omega_rad_s * self.part(omega_rad_s)
+    }
+
+    /// The sum of all but one of them at a frequency, over the part of that one.
+    fn ratio_to(&self, term: &ModalTerm, omega_rad_s: f64) -> f64 {
+        let part = term.part(omega_rad_s);
+        ((self.part(omega_rad_s) - part) / part).abs()
     }
 
     /// The mode with the largest part at a frequency, if any has one.

@@ -2,7 +2,7 @@
 //!
 //! | condition | quantity | holds | margin |
 //! |---|---|---|---|
-//! | C4-1 | aR, au, av in a pattern of alternating signs | all three have the signs + - + or - + - | of the better of the two patterns, the worst fitting residue over the largest of the three: above 0 the least residue that would have to change its sign, below 0 the one with the wrong sign |
+//! | C4-1 | aR, au, av in a pattern of alternating signs | all three have the signs + - + or - + - | of the better of the two patterns, the worst fitting residue over the largest of the three: above 0 the least residue that would have to change its sign, below 0 the residue with the wrong sign |
 //! | C4-2 | b2-hat in the direction of av, Eqs. (4-11), (4-12) | between the sizes of b21-hat and b22-hat | distance to the nearer of the two over the larger: it fails at -1 where wv^2 - wu^2 is twice too large |
 //! | C4-3 | size of b2-hat over that of b22-hat where the modes are closest | below 1, and they veer or cross in the range | 1 less that |
 //! | C4-4 | b2-hat in the direction of av, Eqs. (4-13), (4-14) | above the size of b21-hat | distance over the size of b22-hat |
@@ -25,7 +25,7 @@ use serde::Serialize;
 use super::{CloseModes, Meeting};
 use crate::model::zeros::{Zero, ZeroKind};
 
-/// A condition at some value of the setting.
+/// A condition at one value of the setting.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Condition {
     /// `C4-1` and so on.
@@ -91,27 +91,23 @@ pub fn c4_1(modes: &CloseModes) -> Condition {
 /// C4-2: b2-hat between b21-hat and b22-hat. Figure and limits in 1/kg.
 pub fn c4_2(modes: &CloseModes) -> Condition {
     let (figure, [low, high]) = (modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
-    let margin = if modes.are_opposed() {
-        (figure - low).min(high - figure) / high
-    } else {
-        to_oppose(modes)
-    };
+    let margin = opposed_margin(modes, (figure - low).min(high - figure) / high);
     Condition::by_margin("C4-2", figure, [low, high], margin)
 }
 
 /// C4-4 at one value: b2-hat above b21-hat. Figure and limit in 1/kg.
 pub fn c4_4(modes: &CloseModes) -> Condition {
     let (figure, [low, high]) = (modes.signed_b2_per_kg(), modes.critical_b2_per_kg());
-    let margin = if modes.are_opposed() {
-        (figure - low) / high
-    } else {
-        to_oppose(modes)
-    };
+    let margin = opposed_margin(modes, (figure - low) / high);
     Condition::by_margin("C4-4", figure, [low, f64::INFINITY], margin)
 }
 
-/// Minus the smaller of au and av over the larger: the one that would have to change its sign for au av < 0.
-fn to_oppose(modes: &CloseModes) -> f64 {
+/// The margin of a condition that needs au av < 0. Where it is not so, minus the smaller of au and av over the larger: the
+/// one that would have to change its sign.
+fn opposed_margin(modes: &CloseModes, margin: f64) -> f64 {
+    if modes.are_opposed() {
+        return margin;
+    }
     let (u, v) = (modes.u.residue_per_kg.abs(), modes.v.residue_per_kg.abs());
     -u.min(v) / u.max(v).max(f64::MIN_POSITIVE)
 }
@@ -138,22 +134,23 @@ pub fn c4_3(meeting: Meeting, closest: Option<&CloseModes>) -> Condition {
 pub fn c4_4y(modes: &CloseModes, zeros: &[Zero]) -> Condition {
     let (wu, wv) = (modes.u.omega_rad_s, modes.v.omega_rad_s);
     let depth = |w: f64| (w - wu).min(wv - w) / (wv - wu);
-    let upper = |zero: &&Zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0;
-    let mut places: Vec<f64> = zeros.iter().filter(upper).map(|zero| zero.s.im).collect();
-    places.sort_by(|a, b| depth(*b).total_cmp(&depth(*a)));
-    let inside = places.iter().filter(|w| depth(**w) > 0.0).count();
-    let margin = match places.as_slice() {
-        [first, second, ..] if inside >= 2 => {
-            depth(*second).min((first - second).abs() / (wv - wu))
-        }
-        [_, second, ..] => depth(*second).max(-1.0),
-        _ => -1.0,
-    };
+    let zeros = zeros
+        .iter()
+        .filter(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0);
+    let mut places: Vec<(f64, f64)> = zeros.map(|zero| (depth(zero.s.im), zero.s.im)).collect();
+    places.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let inside = places.iter().filter(|(depth, _)| *depth > 0.0).count();
     Condition {
         name: "C4-4y",
         holds: inside == 2,
         figure: inside as f64,
         limits: [2.0, 2.0],
-        margin,
+        margin: match places.as_slice() {
+            [(_, first), (depth, second), ..] if inside >= 2 => {
+                depth.min((first - second).abs() / (wv - wu))
+            }
+            [_, (depth, _), ..] => depth.max(-1.0),
+            _ => -1.0,
+        },
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::CloseModes;
 use crate::model::plant::{ModalModel, Mode, PlantError, Structure};
 use crate::model::zeros::ModalTerm;
 use crate::util::numeric::assign;
@@ -88,6 +89,14 @@ impl ModesAt {
             .zip(residues)
             .map(|(w, (force, sensor))| ModalTerm::undamped(*w, force * sensor))
             .collect()
+    }
+
+    /// Two modes with the remainder of all `terms`; `None` where the modes cross.
+    pub(super) fn close_modes(&self, terms: &[ModalTerm], pair: [usize; 2]) -> Option<CloseModes> {
+        match self.are_equal(pair) {
+            true => None,
+            false => CloseModes::of(terms, pair),
+        }
     }
 
     /// Gains of all modes; 0 where they are rounding.
@@ -203,11 +212,8 @@ impl ModesAt {
     fn align(&mut self, before: &ModesAt, first: usize, count: usize) {
         let group = self.shapes.columns(first, count).into_owned();
         let overlap = before.shapes.transpose() * &self.structure.mass * &group;
-        let size = |i: usize| overlap.row(i).norm_squared();
-        let mut order: Vec<usize> = (0..overlap.nrows()).collect();
-        order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
-        order.truncate(count);
-        let svd = overlap.select_rows(&order).svd(true, true);
+        let rows = largest_rows(&overlap, count);
+        let svd = overlap.select_rows(&rows).svd(true, true);
         if let (Some(u), Some(w_t)) = (svd.u, svd.v_t) {
             let aligned = group * (u * w_t).transpose();
             self.shapes.columns_mut(first, count).copy_from(&aligned);
@@ -229,6 +235,15 @@ impl ModesAt {
             false => (self.omega_rad_s[i] - self.omega_rad_s[j]).signum(),
         }
     }
+}
+
+/// The indices of the rows of the largest norm.
+fn largest_rows(matrix: &DMatrix<f64>, count: usize) -> Vec<usize> {
+    let size = |i: usize| matrix.row(i).norm_squared();
+    let mut order: Vec<usize> = (0..matrix.nrows()).collect();
+    order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
+    order.truncate(count);
+    order
 }
 
 /// For each mode before the index of its continuation: the most similar pairs first.

@@ -8,21 +8,26 @@ use crate::model::plant::{PlantError, Structure};
 #[error("{0}")]
 pub struct PairError(String);
 
+const TOO_FEW: &str =
+    "fewer than two modes of this plant have a frequency above zero: there is no pair to follow";
+const NO_MEETING: &str =
+    "no two modes veer or cross inside the range; move --from or --to, or vary another setting";
+
 /// The two modes from 0: those `asked` for by their numbers from 1, or the closest.
 pub fn close_pair<E, F>(asked: &[usize], loci: &Loci<F>) -> Result<[usize; 2], PairError>
 where
     E: From<PlantError>,
     F: FnMut(f64) -> Result<Structure, E>,
 {
-    let count = loci.path()[0].omega_rad_s.len();
-    let is_mode = |mode: &usize| (1..=count).contains(mode);
+    let modes = 1..=loci.path()[0].omega_rad_s.len();
     match asked {
-        [] => loci.closest_pair().ok_or_else(|| {
-            PairError("fewer than two modes of this plant are held by a spring: there is no pair to follow".into())
-        }),
-        [i, j] if i != j && is_mode(i) && is_mode(j) => Ok([i.min(j) - 1, i.max(j) - 1]),
+        [] => loci.closest_pair().ok_or_else(|| PairError(TOO_FEW.into())),
+        [i, j] if i != j && modes.contains(i) && modes.contains(j) => {
+            Ok([i.min(j) - 1, i.max(j) - 1])
+        }
         _ => Err(PairError(format!(
-            "--modes {asked:?}: give two different modes, I,J, of 1 to {count}"
+            "--modes {asked:?}: give two different modes, I,J, of 1 to {}",
+            modes.end()
         ))),
     }
 }
@@ -37,12 +42,8 @@ where
         return close_pair(asked, loci);
     }
     let pairs = loci.meeting_pairs();
-    pairs.first().copied().ok_or_else(|| {
-        PairError(
-            "no two modes veer or cross inside the range; move --from or --to, or vary another setting"
-                .into(),
-        )
-    })
+    let pair = pairs.first().copied();
+    pair.ok_or_else(|| PairError(NO_MEETING.into()))
 }
 
 /// Refuses a range without a veering point.

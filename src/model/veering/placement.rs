@@ -5,13 +5,13 @@ use std::cmp::Ordering;
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::conditions::{Condition, c4_1};
+use super::conditions::c4_1;
 use super::trajectory::Ports;
 use super::{Meeting, ModesAt, QuadrantDiagram, QuadrantSummary, Sample, ZeroConfiguration};
 use crate::model::plant::{PlantError, Port, PortWeights};
 use crate::model::zeros::cnmp_pairs;
 
-/// Placements with less than this ratio of the present aR are not recommended: the controlled motion hardly shows there.
+/// Placements with less than this ratio of the present aR are not recommended: the probe hardly measures the controlled motion.
 pub const LEAST_REMAINDER_RATIO: f64 = 0.1;
 
 /// A placement over a range of values.
@@ -37,16 +37,19 @@ pub struct Trial {
 
 impl Trial {
     fn of(samples: &[Sample], picture_alternates: bool) -> Trial {
-        let close = samples.iter().filter_map(|sample| sample.modes);
-        let conditions: Vec<Condition> = close.map(|modes| c4_1(&modes)).collect();
-        let margins = conditions.iter().map(|condition| condition.margin);
+        let conditions = || {
+            samples
+                .iter()
+                .filter_map(|sample| Some(c4_1(&sample.modes?)))
+        };
+        let margins = conditions().map(|condition| condition.margin);
         let with_cnmp = count(samples, |s| s.plant == ZeroConfiguration::Quartet);
         let middle = samples[samples.len() / 2].modes;
         Trial {
             values: samples.len(),
             with_cnmp,
             with_any_cnmp: count(samples, |sample| cnmp_pairs(&sample.zeros) > 0),
-            alternating: conditions.iter().filter(|one| one.holds).count(),
+            alternating: conditions().filter(|condition| condition.holds).count(),
             c4_1_margin: margins.fold(f64::NEG_INFINITY, f64::max),
             picture_alternates,
             differs: !picture_alternates && with_cnmp > 0,
@@ -185,6 +188,17 @@ struct Tried {
     not_computed: usize,
 }
 
+impl Tried {
+    /// The best placement of some with at least so large a remainder.
+    fn best(&self, least_per_kg: f64, of: impl Fn(&Placement) -> bool) -> Option<Placement> {
+        let mut measured = self
+            .placements
+            .iter()
+            .filter(|one| one.trial.remainder_per_kg >= least_per_kg);
+        measured.find(|one| of(one)).cloned()
+    }
+}
+
 impl<'a> Placements<'a> {
     /// The placements beside the chosen actuator and probe, with the `places` of the plant at each value of the path.
     pub fn new(
@@ -230,19 +244,8 @@ impl<'a> Placements<'a> {
     /// All pairs of places, and the present actuator and probe with all places.
     fn all(&self) -> Result<Tried, PlantError> {
         let mut tried = Tried::default();
-        let known: Vec<Option<usize>> = (0..self.places[0].len()).map(Some).collect();
-        let is_other = |name: &String| !self.places[0].iter().any(|port| port.name == *name);
-        let [other_actuator, other_sensor] = self.names.each_ref().map(is_other);
-        for &place in &known {
-            for &sensor in &known {
-                self.try_pair(place, sensor, &mut tried)?;
-            }
-            if other_sensor {
-                self.try_pair(place, None, &mut tried)?;
-            }
-            if other_actuator {
-                self.try_pair(None, place, &mut tried)?;
-            }
+        for [actuator, sensor] in self.pairs() {
+            self.try_pair(actuator, sensor, &mut tried)?;
         }
         tried
             .placements
@@ -250,7 +253,20 @@ impl<'a> Placements<'a> {
         Ok(tried)
     }
 
-    /// Tries one pair of places, `None` for the present one.
+    /// Indices of actuator and probe among the places; `None` is the present one, unless it is one of the places.
+    fn pairs(&self) -> Vec<[Option<usize>; 2]> {
+        let is_other = |name: &String| !self.places[0].iter().any(|port| port.name == *name);
+        let [other_actuator, other_sensor] = self.names.each_ref().map(is_other);
+        let places: Vec<Option<usize>> = (0..self.places[0].len()).map(Some).collect();
+        let mut pairs = Vec::new();
+        for &place in &places {
+            pairs.extend(places.iter().map(|&sensor| [place, sensor]));
+            pairs.extend(other_sensor.then_some([place, None]));
+            pairs.extend(other_actuator.then_some([None, place]));
+        }
+        pairs
+    }
+
     fn try_pair(
         &self,
         actuator: Option<usize>,
@@ -343,22 +359,15 @@ impl PlacementReport {
         let [actuator, sensor] = &placements.names;
         let present = here.as_ref().map(|here| here.trial.remainder_per_kg);
         let least = LEAST_REMAINDER_RATIO * present.unwrap_or(0.0);
-        let shown = || {
-            let all = tried.placements.iter();
-            all.filter(|placement| placement.trial.remainder_per_kg >= least)
-        };
-        let recommended = shown().next().cloned();
-        let best_sensor = shown().find(|one| one.actuator == *actuator).cloned();
-        let best_actuator = shown().find(|one| one.sensor == *sensor).cloned();
         Ok(PlacementReport {
             modes: path.pair.map(|mode| mode + 1),
             meeting,
             value: path.modes[path.closest].value,
             pictures: diagrams.each_ref().map(QuadrantSummary::from),
             here,
-            recommended,
-            best_sensor,
-            best_actuator,
+            recommended: tried.best(least, |_| true),
+            best_sensor: tried.best(least, |one| one.actuator == *actuator),
+            best_actuator: tried.best(least, |one| one.sensor == *sensor),
             trials: tried.placements,
             without_response: tried.without_response,
             not_computed: tried.not_computed,

@@ -177,22 +177,28 @@ impl<'a> Interval<'a> {
     /// P4-2, P4-2x and P4-2y on this side.
     pub fn propositions(&self) -> [Proposition; 3] {
         let (alternating, close) = (self.alternating(), self.close());
-        let beyond = self.best("C4-4", |sample| sample.modes.map(|modes| c4_4(&modes)));
-        let dual = self.best("C4-4y", |sample| {
-            let modes = sample.modes?;
-            Some(c4_4y(&modes, &sample.zeros))
-        });
-        let necessary = match (close.holds, all_hold(&[alternating, beyond])) {
+        let beyond = self.best("C4-4", |sample| Some(c4_4(&sample.modes?)));
+        let dual = self.best("C4-4y", |sample| Some(c4_4y(&sample.modes?, &sample.zeros)));
+        [
+            self.sufficient("P4-2", vec![alternating, close, beyond]),
+            self.necessary("P4-2x", close, [alternating, beyond]),
+            self.sufficient("P4-2y", vec![close, dual, alternating]),
+        ]
+    }
+
+    /// A proposition that, under a condition, holds if and only if two others hold.
+    fn necessary(
+        &self,
+        name: &'static str,
+        under: Condition,
+        [first, second]: [Condition; 2],
+    ) -> Proposition {
+        let predicted = match (under.holds, first.holds && second.holds) {
             (false, _) => Prediction::Nothing,
             (true, true) => Prediction::Appear,
             (true, false) => Prediction::Absent,
         };
-        let premises = vec![close, alternating, beyond];
-        [
-            self.sufficient("P4-2", vec![alternating, close, beyond]),
-            Proposition::new("P4-2x", premises, necessary, &self.samples),
-            self.sufficient("P4-2y", vec![close, dual, alternating]),
-        ]
+        Proposition::new(name, vec![under, first, second], predicted, &self.samples)
     }
 
     fn sufficient(&self, name: &'static str, premises: Vec<Condition>) -> Proposition {

@@ -28,8 +28,8 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
+use super::ModesAt;
 use super::trajectory::Ports;
-use super::{CloseModes, ModesAt};
 
 /// Samples of the angle by which the shapes turn.
 const STEPS: usize = 720;
@@ -55,22 +55,18 @@ impl QuadrantDiagram {
     /// The diagram at `at`, in the frame of the pair's shapes at `frame`.
     pub fn of(at: &ModesAt, frame: &ModesAt, pair: [usize; 2], ports: &Ports) -> QuadrantDiagram {
         let [force, sensor] = ports;
-        let is_crossing = at.are_equal(pair);
         let [i, j] = pair;
         let ordered = match at.omega_rad_s[i] <= at.omega_rad_s[j] {
             true => [i, j],
             false => [j, i],
         };
         let direction = |mode| unit(pair.map(|other| at.cosine(mode, frame, other)));
-        let modes = match is_crossing {
-            true => None,
-            false => CloseModes::of(&at.terms(force, sensor), pair),
-        };
+        let modes = at.close_modes(&at.terms(force, sensor), pair);
         QuadrantDiagram {
             value: at.value,
             shapes: ordered.map(direction),
-            actuator: components(at, ordered, force, is_crossing),
-            sensor: components(at, ordered, sensor, is_crossing),
+            actuator: components(at, ordered, force),
+            sensor: components(at, ordered, sensor),
             residues_per_kg: modes.map(|modes| modes.residues_per_kg()),
         }
     }
@@ -141,15 +137,13 @@ pub(super) fn residue_signs(residues: [f64; 3]) -> [char; 3] {
 }
 
 /// Components of a row along two shapes, as ratios of its length over all shapes.
-fn components(
-    at: &ModesAt,
-    ordered: [usize; 2],
-    row: &DVector<f64>,
-    is_crossing: bool,
-) -> [f64; 2] {
+fn components(at: &ModesAt, ordered: [usize; 2], row: &DVector<f64>) -> [f64; 2] {
     let raw: Vec<f64> = (0..at.count()).map(|mode| at.gain(mode, row)).collect();
     let length = raw.iter().map(|gain| gain * gain).sum::<f64>().sqrt();
-    let gains = if is_crossing { raw } else { at.gains(row) };
+    let gains = match at.are_equal(ordered) {
+        true => raw,
+        false => at.gains(row),
+    };
     ordered.map(|mode| match length > 0.0 {
         true => gains[mode] / length,
         false => 0.0,

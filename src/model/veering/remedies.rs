@@ -1,7 +1,7 @@
 //! How to break the conditions for CNMP zeros that hold, and what would fulfil those that fail.
 
 use super::CloseModes;
-use super::conditions::{Condition, c4_1, c4_2, deciding_residue, pattern};
+use super::conditions::{c4_1, c4_2, deciding_residue, pattern};
 use super::quadrants::residue_signs;
 
 /// A sentence on C4-1 and one on C4-2.
@@ -12,46 +12,54 @@ pub(super) fn remedies(modes: &CloseModes) -> Vec<String> {
 fn on_signs(modes: &CloseModes) -> String {
     let (condition, residues) = (c4_1(modes), modes.residues_per_kg());
     let which = deciding_residue(residues);
-    let (name, value) = (["R", "u", "v"][which], residues[which]);
+    let residue = format!(
+        "a{} = {:+.4e} 1/kg",
+        ["R", "u", "v"][which],
+        residues[which]
+    );
     let signs: String = residue_signs(residues).iter().collect();
-    let size = condition.margin.abs() * 100.0;
-    if condition.holds {
-        return format!(
-            "C4-1 holds by {size:.1} %: signs {signs}. To break it, change the sign of the smallest residue, a{name} = {value:+.4e} 1/kg, by moving actuator or sensor (`bench model placement`) or by the mass asymmetry"
-        );
-    }
-    let alternating = if pattern(residues) > 0.0 {
+    let percent = condition.margin.abs() * 100.0;
+    let pattern = if pattern(residues) > 0.0 {
         "+-+"
     } else {
         "-+-"
     };
-    format!(
-        "C4-1 fails by {size:.1} % of the largest residue: signs {signs}. Keep them: they become {alternating} when a{name} = {value:+.4e} 1/kg changes its sign"
-    )
+    match condition.holds {
+        true => format!(
+            "C4-1 holds by {percent:.1} %: signs {signs}. To break it, change the sign of the smallest residue, {residue}, \
+             by moving actuator or sensor (`bench model placement`) or by the mass asymmetry"
+        ),
+        false => format!(
+            "C4-1 fails by {percent:.1} % of the largest residue: signs {signs}. \
+             They become {pattern} if {residue} changes its sign; keep its sign to avoid CNMP zeros"
+        ),
+    }
 }
 
 /// As factors on wv^2 - wu^2 with unchanged residues.
 fn on_gap(modes: &CloseModes) -> String {
-    let Condition {
-        holds,
-        figure,
-        limits: [low, high],
-        margin,
-        ..
-    } = c4_2(modes);
-    let (percent, near, far) = (margin.abs() * 100.0, low / figure, high / figure);
+    let condition = c4_2(modes);
+    let (figure, [low, high]) = (condition.figure, condition.limits);
+    let (near, far) = (low / figure, high / figure);
+    let percent = condition.margin.abs() * 100.0;
     if !modes.are_opposed() {
-        "C4-2 fails: the residues of modes u and v do not have opposite signs, so that no gap between them gives CMP-CNMP zeros".into()
-    } else if holds {
+        NOT_OPPOSED.into()
+    } else if condition.holds {
         format!(
-            "C4-2 holds by {percent:.1} % of |b22|. To break it, move the modes apart, wv^2 - wu^2 times {far:.3} or more, or together, times {near:.3} or less"
+            "C4-2 holds by {percent:.1} % of |b22|. To break it, move the modes apart, \
+             wv^2 - wu^2 times {far:.3} or more, or together, times {near:.3} or less"
         )
     } else if figure <= 0.0 {
-        "C4-2 fails: the sum of all residues has the sign of au, at any gap".into()
+        NOT_AT_ANY_GAP.into()
     } else {
         let way = if figure >= high { "apart" } else { "together" };
         format!(
-            "C4-2 fails by {percent:.1} % of |b22|: the modes are too far {way}. It would hold with wv^2 - wu^2 times {near:.3} to {far:.3}"
+            "C4-2 fails by {percent:.1} % of |b22|: the modes are too far {way}. \
+             It would hold with wv^2 - wu^2 times {near:.3} to {far:.3}"
         )
     }
 }
+
+const NOT_OPPOSED: &str = "C4-2 fails: the residues of modes u and v do not have opposite signs, \
+    so that no gap between them gives CMP-CNMP zeros";
+const NOT_AT_ANY_GAP: &str = "C4-2 fails: the sum of all residues has the sign of au, at any gap";

@@ -45,24 +45,19 @@ impl ZeroConfiguration {
         }
     }
 
-    fn of(modes: &CloseModes, zeros: &[Zero]) -> ZeroConfiguration {
-        let (wu, wv) = (modes.u.omega_rad_s, modes.v.omega_rad_s);
-        let is_between = |w: f64| wu < w && w < wv;
-        let between = zeros
-            .iter()
-            .filter(|zero| zero.kind == ZeroKind::Mmp && is_between(zero.s.im));
-        if has_quartet(zeros) {
+    /// Of the zeros of two modes; `None` where the modes cross.
+    fn of(modes: Option<&CloseModes>, zeros: &[Zero]) -> ZeroConfiguration {
+        let [wu, wv] = modes.map_or([0.0; 2], |modes| [modes.u.omega_rad_s, modes.v.omega_rad_s]);
+        let is_between =
+            |zero: &&Zero| zero.kind == ZeroKind::Mmp && wu < zero.s.im && zero.s.im < wv;
+        if zeros.iter().any(|zero| zero.kind == ZeroKind::Cnmp) {
             ZeroConfiguration::Quartet
-        } else if between.count() == 2 {
+        } else if zeros.iter().filter(is_between).count() == 2 {
             ZeroConfiguration::Between
         } else {
             ZeroConfiguration::Elsewhere
         }
     }
-}
-
-fn has_quartet(zeros: &[Zero]) -> bool {
-    zeros.iter().any(|zero| zero.kind == ZeroKind::Cnmp)
 }
 
 /// One value of the setting.
@@ -94,26 +89,18 @@ impl Sample {
             sensor,
             ..at.structure().clone()
         })?;
-        let modes = match at.are_equal(pair) {
-            true => None,
-            false => CloseModes::of(&terms, pair),
-        };
-        let equation = match &modes {
-            Some(modes) => Some(ZeroConfiguration::of(modes, &modes.zeros()?)),
-            None => None,
-        };
+        let modes = at.close_modes(&terms, pair);
         let own = own_zeros(&terms, pair, &zeros);
-        let plant = match &modes {
-            Some(modes) => ZeroConfiguration::of(modes, &own),
-            None if has_quartet(&own) => ZeroConfiguration::Quartet,
-            None => ZeroConfiguration::Elsewhere,
-        };
+        let equation = modes.map(|modes| {
+            let zeros = modes.zeros()?;
+            Ok::<_, PlantError>(ZeroConfiguration::of(Some(&modes), &zeros))
+        });
         Ok(Sample {
             value: at.value,
             modes,
+            plant: ZeroConfiguration::of(modes.as_ref(), &own),
+            equation: equation.transpose()?,
             zeros,
-            equation,
-            plant,
         })
     }
 
@@ -122,26 +109,25 @@ impl Sample {
     }
 }
 
+/// The other modes that are not silent.
+fn observed_beside(terms: &[ModalTerm], pair: [usize; 2]) -> impl Iterator<Item = &ModalTerm> {
+    let sizes = terms.iter().map(|term| term.residue_per_kg.abs());
+    let least = SILENT_RATIO * sizes.fold(0.0, f64::max);
+    let others = terms.iter().enumerate();
+    let others = others.filter(move |(mode, _)| !pair.contains(mode));
+    others
+        .map(|(_, term)| term)
+        .filter(move |term| term.residue_per_kg.abs() > least)
+}
+
 /// The zeros of a magnitude between the modes next to the two.
 fn own_zeros(terms: &[ModalTerm], pair: [usize; 2], zeros: &[Zero]) -> Vec<Zero> {
-    let largest = terms
-        .iter()
-        .map(|term| term.residue_per_kg.abs())
-        .fold(0.0, f64::max);
-    let is_silent = |term: &ModalTerm| term.residue_per_kg.abs() <= SILENT_RATIO * largest;
     let [i, j] = pair.map(|mode| terms[mode].omega_rad_s);
-    let (mut slower, mut faster) = (0.0, f64::INFINITY);
-    for (mode, term) in terms.iter().enumerate() {
-        let w = term.omega_rad_s;
-        if pair.contains(&mode) || is_silent(term) {
-            continue;
-        }
-        if w < i.min(j) {
-            slower = f64::max(slower, w);
-        } else if w > i.max(j) {
-            faster = f64::min(faster, w);
-        }
-    }
+    let others = || observed_beside(terms, pair).map(|term| term.omega_rad_s);
+    let slower = others().filter(|w| *w < i.min(j)).fold(0.0, f64::max);
+    let faster = others()
+        .filter(|w| *w > i.max(j))
+        .fold(f64::INFINITY, f64::min);
     let is_own = |zero: &&Zero| slower < zero.s.norm() && zero.s.norm() < faster;
     zeros.iter().filter(is_own).copied().collect()
 }
@@ -169,27 +155,18 @@ impl Trajectory {
         E: From<PlantError>,
         F: FnMut(f64) -> Result<Structure, E>,
     {
-        let (meeting, at) = loci.meeting(pair)?;
-        let closest_value = at.value;
+        let (meeting, closest) = loci.meeting(pair)?;
+        let sample = |at: &ModesAt| Sample::of(at, pair, ports(at));
         let path = loci.path().iter();
-        let mut samples = path
-            .map(|at| Sample::of(at, pair, ports(at)))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut sample_at = |value: f64| {
-            let at = loci.at(value)?;
-            Ok::<Sample, E>(Sample::of(at, pair, ports(at))?)
-        };
-        let configurations: [Configuration; 2] =
-            [|sample| sample.equation, |sample| Some(sample.plant)];
-        for configuration in configurations {
-            refine(&mut samples, configuration, &mut sample_at)?;
-        }
-        let is_closest = |sample: &Sample| sample.value == closest_value;
-        let closest = samples.iter().position(is_closest).unwrap_or(0);
+        let mut samples = path.map(sample).collect::<Result<Vec<_>, _>>()?;
+        let mut sample_at = |value: f64| Ok::<Sample, E>(sample(loci.at(value)?)?);
+        refine(&mut samples, |sample| sample.equation, &mut sample_at)?;
+        refine(&mut samples, |sample| Some(sample.plant), &mut sample_at)?;
+        let closest = samples.iter().position(|one| one.value == closest.value);
         Ok(Trajectory {
             meeting,
             samples,
-            closest,
+            closest: closest.unwrap_or(0),
         })
     }
 
@@ -214,19 +191,19 @@ fn refine<E>(
     configuration: Configuration,
     sample_at: &mut impl FnMut(f64) -> Result<Sample, E>,
 ) -> Result<(), E> {
-    let is_rising = samples[0].value < samples[samples.len() - 1].value;
+    let is_falling = samples[0].value > samples[samples.len() - 1].value;
     let mut added = Vec::new();
     for step in samples.windows(2) {
-        if hides_quartet([&step[0], &step[1]], configuration) {
-            let ends = [&step[0], &step[1]];
+        let ends = [&step[0], &step[1]];
+        if hides_quartet(ends, configuration) {
             bisect_quartet(ends, configuration, BISECTIONS, &mut added, sample_at)?;
         }
     }
     samples.append(&mut added);
-    samples.sort_by(|a, b| match is_rising {
-        true => a.value.total_cmp(&b.value),
-        false => b.value.total_cmp(&a.value),
-    });
+    samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+    if is_falling {
+        samples.reverse();
+    }
     Ok(())
 }
 
