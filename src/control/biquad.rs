@@ -32,7 +32,7 @@ pub struct Biquad {
     a: [f64; 2],
 }
 
-/// The memory of a section between two samples, in transposed direct form II. At rest by default.
+/// The state of a section between two samples, in transposed direct form II. At rest by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BiquadState([f64; 2]);
 

@@ -144,7 +144,7 @@ impl ClosedLoop {
         std::f64::consts::PI / self.plant.period_s()
     }
 
-    /// The lowest frequency at which a crossing is looked for.
+    /// The lowest frequency of the search for crossings.
     fn lowest_rad_s(&self) -> f64 {
         let slowest = self.modes.iter().find(|mode| mode.omega_rad_s > 0.0);
         1e-3 * slowest
@@ -152,8 +152,8 @@ impl ClosedLoop {
             .min(self.nyquist_rad_s())
     }
 
-    /// Frequency and damping ratio of all that turns the response of the loop quickly: the modes of the plant and the
-    /// lightly damped pairs of the control law.
+    /// Frequency and damping ratio of each resonance and antiresonance of the loop: the modes of the plant and the lightly
+    /// damped pairs of the control law.
     fn features(&self) -> Vec<(f64, f64)> {
         let modes = self.modes.iter();
         let modes = modes.map(|mode| (mode.omega_rad_s, mode.damping_ratio));

@@ -112,7 +112,7 @@ pub enum ControllerError {
     /// The file is missing or not TOML, or its keys, types and ranges are wrong.
     #[error(transparent)]
     File(#[from] ConfigError),
-    /// A section that no controller may have.
+    /// An invalid section.
     #[error("{name}: section {number} {why}")]
     Section {
         /// The controller.
@@ -156,7 +156,7 @@ pub enum ControllerError {
     NotLinear,
 }
 
-/// A controller as text, as it travels with a recording.
+/// A controller as text, as it is stored in a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControllerText {
     /// `fast`, `slow` or the path of a file.
@@ -211,68 +211,80 @@ impl ControllerText {
         settings: &SectionSettings,
         rate_hz: f64,
     ) -> Result<Section, ControllerError> {
-        let name = self.name.clone();
+        let name = || self.name.clone();
+        let section = settings
+            .section()
+            .checked()
+            .map_err(|why| ControllerError::Section {
+                name: name(),
+                number,
+                why,
+            })?;
         let limit_rad_s = std::f64::consts::PI * rate_hz;
-        match section(settings).checked() {
-            Err(why) => Err(ControllerError::Section { name, number, why }),
-            Ok(Section {
-                prewarp_rad_s: Some(prewarp_rad_s),
-                ..
-            }) if prewarp_rad_s >= limit_rad_s => Err(ControllerError::Prewarp {
-                name,
+        match section.prewarp_rad_s {
+            Some(prewarp_rad_s) if prewarp_rad_s >= limit_rad_s => Err(ControllerError::Prewarp {
+                name: name(),
                 number,
                 prewarp_rad_s,
                 limit_rad_s,
             }),
-            Ok(section) => Ok(section),
+            _ => Ok(section),
         }
     }
 }
 
-fn section(settings: &SectionSettings) -> Section {
-    let plain = |numerator, denominator| Section {
-        numerator,
-        denominator,
-        prewarp_rad_s: None,
-    };
-    let pair = |w: f64, zeta: f64| [w * w, 2.0 * zeta * w, 1.0];
-    match *settings {
-        SectionSettings::Gain { gain_a_per_um } => {
-            plain([gain_a_per_um, 0.0, 0.0], [1.0, 0.0, 0.0])
+impl SectionSettings {
+    fn section(&self) -> Section {
+        let (numerator, denominator) = self.coefficients();
+        Section {
+            numerator,
+            denominator,
+            prewarp_rad_s: self.prewarp_rad_s(),
         }
-        SectionSettings::Integrator { gain_a_per_um } => {
-            plain([gain_a_per_um, 0.0, 0.0], [0.0, 1.0, 0.0])
-        }
-        SectionSettings::ZeroPole {
-            zero_rad_s,
-            pole_rad_s,
-        } => plain([zero_rad_s, 1.0, 0.0], [pole_rad_s, 1.0, 0.0]),
-        SectionSettings::Pole { pole_rad_s } => plain([1.0, 0.0, 0.0], [pole_rad_s, 1.0, 0.0]),
-        SectionSettings::PolePair {
-            omega_rad_s: w,
-            damping_ratio,
-        } => plain([w * w, 0.0, 0.0], pair(w, damping_ratio)),
-        SectionSettings::Biquad {
-            zeros_rad_s,
-            zeros_damping_ratio,
-            poles_rad_s,
-            poles_damping_ratio,
-            prewarp_rad_s,
-        } => Section {
-            numerator: pair(zeros_rad_s, zeros_damping_ratio),
-            denominator: pair(poles_rad_s, poles_damping_ratio),
-            prewarp_rad_s,
-        },
-        SectionSettings::Coefficients {
-            ref numerator,
-            ref denominator,
-            prewarp_rad_s,
-        } => Section {
-            numerator: rising(numerator),
-            denominator: rising(denominator),
-            prewarp_rad_s,
-        },
     }
+
+    fn prewarp_rad_s(&self) -> Option<f64> {
+        match self {
+            SectionSettings::Biquad { prewarp_rad_s, .. }
+            | SectionSettings::Coefficients { prewarp_rad_s, .. } => *prewarp_rad_s,
+            _ => None,
+        }
+    }
+
+    /// Numerator and denominator by rising powers of s.
+    fn coefficients(&self) -> ([f64; 3], [f64; 3]) {
+        use SectionSettings as Kind;
+        match *self {
+            Kind::Gain { gain_a_per_um: k } => ([k, 0.0, 0.0], [1.0, 0.0, 0.0]),
+            Kind::Integrator { gain_a_per_um: k } => ([k, 0.0, 0.0], [0.0, 1.0, 0.0]),
+            Kind::ZeroPole {
+                zero_rad_s: z,
+                pole_rad_s: p,
+            } => ([z, 1.0, 0.0], [p, 1.0, 0.0]),
+            Kind::Pole { pole_rad_s: p } => ([1.0, 0.0, 0.0], [p, 1.0, 0.0]),
+            Kind::PolePair {
+                omega_rad_s: w,
+                damping_ratio: zeta,
+            } => ([w * w, 0.0, 0.0], pair(w, zeta)),
+            Kind::Biquad {
+                zeros_rad_s: wz,
+                zeros_damping_ratio: zz,
+                poles_rad_s: wp,
+                poles_damping_ratio: zp,
+                ..
+            } => (pair(wz, zz), pair(wp, zp)),
+            Kind::Coefficients {
+                ref numerator,
+                ref denominator,
+                ..
+            } => (rising(numerator), rising(denominator)),
+        }
+    }
+}
+
+/// s^2 + 2 zeta w s + w^2 by rising powers.
+fn pair(w: f64, zeta: f64) -> [f64; 3] {
+    [w * w, 2.0 * zeta * w, 1.0]
 }
 
 /// From coefficients by falling powers to coefficients by rising powers.

@@ -1,11 +1,11 @@
-//! The seam for control laws: what the loop runs, and what margins and stability need of it.
+//! The interface of control laws: the loop runs a [`ControlLaw`]; margins and stability need its [`LinearLaw`].
 
 use nalgebra::Complex;
 
 use super::Section;
 use super::state_space::StateSpace;
 
-/// What a control law may use in a tick.
+/// Input of a control law in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LawInput {
     /// Reference r in metres, in the coordinate of the probe.

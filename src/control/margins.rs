@@ -11,7 +11,7 @@ use serde::Serialize;
 /// A frequency at which |L| passes through 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Crossing {
-    /// Where.
+    /// Frequency in rad/s.
     pub rad_s: f64,
     /// 180 deg + arg L there, within +-180 deg.
     pub phase_margin_deg: f64,
@@ -40,8 +40,8 @@ pub struct Margins {
     pub continuous: bool,
 }
 
-/// Margins of `response` on a rising grid fine enough that between two points nothing is missed; every crossing and the
-/// peak of |S| are then refined on the function itself.
+/// Margins of `response`, from a rising grid that is fine enough to show every crossing. Each crossing and the peak of |S|
+/// are then refined on the function itself.
 pub(super) fn margins(
     response: &dyn Fn(f64) -> Complex<f64>,
     grid_rad_s: &[f64],
@@ -150,8 +150,8 @@ fn local_maxima(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
         .filter(|&i| values[i] >= values[i - 1] && values[i] >= values[i + 1])
 }
 
-/// A logarithmic grid, denser where light damping makes the response turn: around each resonance or antiresonance (w,
-/// zeta) points at w (1 + zeta sinh x), which follow its circle evenly.
+/// A logarithmic grid, with additional points w (1 + zeta sinh x) around each resonance or antiresonance (w, zeta): they are
+/// evenly spaced along its circle in the Nyquist plot.
 pub fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64> {
     const PER_DECADE: f64 = 400.0;
     let decades = libm::log10(high_rad_s / low_rad_s);
@@ -159,15 +159,16 @@ pub fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64
     let mut grid: Vec<f64> = (0..=count)
         .map(|i| low_rad_s * libm::pow(10.0, decades * i as f64 / count as f64))
         .collect();
-    for &(w, zeta) in features {
-        grid.extend(
-            (-240..=240).map(|i| w * (1.0 + zeta.max(1e-6) * libm::sinh(f64::from(i) / 40.0))),
-        );
-    }
+    grid.extend(features.iter().copied().flat_map(around));
     grid.retain(|w| (low_rad_s..=high_rad_s).contains(w));
     grid.sort_by(f64::total_cmp);
     grid.dedup();
     grid
+}
+
+/// Frequencies around a resonance or antiresonance.
+fn around((w, zeta): (f64, f64)) -> impl Iterator<Item = f64> {
+    (-240..=240).map(move |i| w * (1.0 + zeta.max(1e-6) * libm::sinh(f64::from(i) / 40.0)))
 }
 
 fn phase_margin_deg(l: Complex<f64>) -> f64 {

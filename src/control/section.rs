@@ -15,7 +15,7 @@ pub struct Section {
     pub prewarp_rad_s: Option<f64>,
 }
 
-/// A section that no controller may have.
+/// The reason why a section is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SectionError {
     /// More zeros than poles: infinite gain at high frequency.
@@ -52,14 +52,10 @@ impl Section {
 
     /// This section, if it is proper and has no unstable pole. One pole at the origin is allowed.
     pub fn checked(self) -> Result<Section, SectionError> {
-        let finite = self
-            .numerator
-            .iter()
-            .chain(&self.denominator)
-            .all(|c| c.is_finite());
-        let (Some(denominator), true) = (order(&self.denominator), finite) else {
-            return Err(SectionError::Degenerate);
-        };
+        let mut coefficients = self.numerator.iter().chain(&self.denominator);
+        let is_finite = coefficients.all(|c| c.is_finite());
+        let denominator = order(&self.denominator).filter(|_| is_finite);
+        let denominator = denominator.ok_or(SectionError::Degenerate)?;
         let numerator = order(&self.numerator).unwrap_or(0);
         if numerator > denominator {
             return Err(SectionError::Improper {
@@ -68,15 +64,15 @@ impl Section {
             });
         }
         match self.unstable_pole() {
-            Some(Complex {
-                re: re_rad_s,
-                im: im_rad_s,
-            }) => Err(SectionError::Unstable { re_rad_s, im_rad_s }),
+            Some(pole) => Err(SectionError::Unstable {
+                re_rad_s: pole.re,
+                im_rad_s: pole.im,
+            }),
             None => Ok(self),
         }
     }
 
-    /// A pole in the right half plane or on the imaginary axis; a single one at the origin is none.
+    /// A pole in the right half plane or on the imaginary axis. A single pole at the origin is allowed.
     fn unstable_pole(&self) -> Option<Complex<f64>> {
         let poles = self.poles();
         let at_origin = poles.iter().filter(|pole| pole.norm() == 0.0).count();

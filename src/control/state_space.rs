@@ -19,6 +19,17 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
+    /// From A row by row, B and C.
+    fn new(a: &[f64], b: &[f64], c: &[f64], d: f64) -> Self {
+        let n = b.len();
+        StateSpace {
+            a: DMatrix::from_row_slice(n, n, a),
+            b: DMatrix::from_row_slice(n, 1, b),
+            c: DMatrix::from_row_slice(1, n, c),
+            d,
+        }
+    }
+
     /// y = d u.
     pub fn gain(d: f64) -> Self {
         StateSpace {
@@ -96,7 +107,7 @@ impl From<&Biquad> for StateSpace {
     }
 }
 
-/// Controllable form in time scaled by the frequency of the pole pair, which keeps the entries of one size.
+/// Controllable form. Time is scaled by the frequency of the pole pair, so that the entries have similar magnitudes.
 impl From<&Section> for StateSpace {
     fn from(section: &Section) -> Self {
         let order = section.poles().len();
@@ -104,20 +115,14 @@ impl From<&Section> for StateSpace {
         let n = section.numerator.map(|c| c / lead);
         let m = section.denominator.map(|c| c / lead);
         let d = n[order];
-        if order == 0 {
-            return StateSpace::gain(d);
-        }
-        if order == 1 {
-            let one = |x| DMatrix::from_element(1, 1, x);
-            let (a, b, c) = (one(-m[0]), one(1.0), one(n[0] - m[0] * d));
-            return StateSpace { a, b, c, d };
-        }
-        let w = if m[0] > 0.0 { m[0].sqrt() } else { 1.0 };
-        StateSpace {
-            a: DMatrix::from_row_slice(2, 2, &[0.0, w, -m[0] / w, -m[1]]),
-            b: DMatrix::from_row_slice(2, 1, &[0.0, 1.0]),
-            c: DMatrix::from_row_slice(1, 2, &[(n[0] - m[0] * d) / w, n[1] - m[1] * d]),
-            d,
+        match order {
+            0 => StateSpace::gain(d),
+            1 => StateSpace::new(&[-m[0]], &[1.0], &[n[0] - m[0] * d], d),
+            _ => {
+                let w = if m[0] > 0.0 { m[0].sqrt() } else { 1.0 };
+                let c = [(n[0] - m[0] * d) / w, n[1] - m[1] * d];
+                StateSpace::new(&[0.0, w, -m[0] / w, -m[1]], &[0.0, 1.0], &c, d)
+            }
         }
     }
 }
@@ -131,8 +136,8 @@ fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
-/// Scales rows and columns by powers of two until they are of one size (Osborne 1960): a similarity that changes no
-/// eigenvalue, not even in its last bit, and lets the iteration resolve poles beside entries many decades larger.
+/// Scales rows and columns by powers of two until they have similar magnitudes (Osborne 1960). Such a similarity changes no
+/// eigenvalue, not even in its last bit, and the iteration resolves poles beside entries that are many decades larger.
 fn balance(matrix: &mut DMatrix<f64>) {
     for _ in 0..100 {
         let mut settled = true;
@@ -145,7 +150,7 @@ fn balance(matrix: &mut DMatrix<f64>) {
     }
 }
 
-/// Whether row and column `i` were of one size before.
+/// Whether row and column `i` had similar magnitudes before.
 fn balance_row_and_column(matrix: &mut DMatrix<f64>, i: usize) -> bool {
     let row = off_diagonal_sum(matrix.row(i).iter(), i);
     let column = off_diagonal_sum(matrix.column(i).iter(), i);

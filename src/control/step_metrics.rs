@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-/// What a step response shows.
+/// Figures of a step response.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StepMetrics {
-    /// Seconds from the step until the position has entered the band of 2 % of the step around the reference for good; absent where it never does.
+    /// Seconds from the step until the position stays within 2 % of the step around the reference; absent if it never does.
     pub settling_time_s: Option<f64>,
     /// Largest excursion beyond the reference, in per cent of the step.
     pub overshoot_percent: f64,
@@ -15,9 +15,9 @@ pub struct StepMetrics {
 #[derive(Clone, Copy, Debug)]
 pub struct StepMeter {
     height_m: f64,
-    /// Positions so far.
+    /// Number of positions so far.
     seen: u64,
-    /// Positions up to and with the last one outside of the band.
+    /// Number of positions up to and including the last one outside the band.
     settled: u64,
     beyond_m: f64,
 }
@@ -43,7 +43,7 @@ impl StepMeter {
         self.beyond_m = self.beyond_m.max(error_m * self.height_m.signum());
     }
 
-    /// What the positions so far show.
+    /// Figures of the positions so far.
     pub fn figures(&self, period_s: f64) -> StepMetrics {
         StepMetrics {
             settling_time_s: (self.settled < self.seen).then_some(self.settled as f64 * period_s),

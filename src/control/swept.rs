@@ -5,8 +5,8 @@
 //! ```
 //!
 //! A_u is the amplitude of the chirp in open loop: motor and amplifier are driven as there. At a resonance of the plant
-//! |C S| is small and the travel limits. Each point takes the smallest value up to its neighbours. Far above its bandwidth a
-//! slow loop hardly follows: both limits would then allow metres, and the reference has a largest amplitude of its own.
+//! |C S| is small, and the travel is the limit. Each point has the smallest value between its two neighbours. Far above its
+//! bandwidth a slow loop hardly follows, and both limits would allow metres: the amplitude of the reference is limited too.
 
 use super::ClosedLoop;
 use crate::config::{ChirpSettings, TravelPoint};
@@ -37,12 +37,11 @@ pub fn swept_reference_amplitudes(
     let command = AmplitudeCurve::of_current(&limits.chirp.amplitude);
     let (low_hz, high_hz) = limits.chirp.band_hz();
     let frequency_hz = |x: f64| low_hz * libm::pow(high_hz / low_hz, x);
-    let allowed_m = |x: f64| allowed_m(closed_loop, &command, limits.travel_m, frequency_hz(x));
     (0..POINTS)
         .map(|point| TravelPoint {
             frequency_hz: frequency_hz(point as f64 * STEP),
             amplitude_m: neighbourhood(point)
-                .map(allowed_m)
+                .map(|x| allowed_m(closed_loop, &command, limits.travel_m, frequency_hz(x)))
                 .fold(limits.reference_m, f64::min),
         })
         .collect()
@@ -58,7 +57,7 @@ fn neighbourhood(point: usize) -> impl Iterator<Item = f64> {
         .map(|x| x.clamp(0.0, 1.0))
 }
 
-/// The largest amplitude of the reference for which neither command nor position exceeds its own.
+/// The largest amplitude of the reference for which neither command nor position exceeds its limit.
 fn allowed_m(
     closed_loop: &ClosedLoop,
     command: &AmplitudeCurve,

@@ -42,20 +42,11 @@ pub struct StateSpaceLaw {
 
 impl ControlLawSettings for StateSpaceLaw {
     fn check(&self, rate_hz: f64) -> Result<(), String> {
-        let states = self.a.len();
-        let rows = self.a.iter().map(|row| ("a", row));
-        let vectors = [
-            ("b_reference", &self.b_reference),
-            ("b_position", &self.b_position),
-            ("c", &self.c),
-        ];
-        for (name, row) in rows.chain(vectors) {
-            if row.len() != states {
-                let given = row.len();
-                return Err(format!(
-                    "has {given} numbers in `{name}`; `a` has {states} rows, so {states} are needed"
-                ));
-            }
+        if let Some((name, given)) = self.wrong_size() {
+            let states = self.a.len();
+            return Err(format!(
+                "has {given} numbers in `{name}`; `a` has {states} rows, so {states} are needed"
+            ));
         }
         if self.rate_hz != rate_hz {
             return Err(format!(
@@ -64,6 +55,20 @@ impl ControlLawSettings for StateSpaceLaw {
             ));
         }
         Ok(())
+    }
+}
+
+impl StateSpaceLaw {
+    /// A row of A or a vector that has not one number a state: its name and its length.
+    fn wrong_size(&self) -> Option<(&'static str, usize)> {
+        let vectors = [
+            ("b_reference", self.b_reference.len()),
+            ("b_position", self.b_position.len()),
+            ("c", self.c.len()),
+        ];
+        let rows = self.a.iter().map(|row| ("a", row.len()));
+        let mut lengths = rows.chain(vectors);
+        lengths.find(|(_, length)| *length != self.a.len())
     }
 }
 
