@@ -26,9 +26,9 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     run: RunOptions,
-    /// Largest current, to both sides
+    /// Largest current, in both directions
     #[arg(long, value_name = "CURRENT", allow_hyphen_values = true,
-        help = with_setting("Largest current, to both sides", "calibrate.amplitude_a"))]
+        help = with_setting("Largest current, in both directions", "calibrate.amplitude_a"))]
     amplitude: Option<Current>,
     /// Calibration file to write [default: in the folder of the recording, with the same name]
     #[arg(long, value_name = "FILE")]

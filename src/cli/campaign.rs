@@ -30,7 +30,7 @@ const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// Operating points as ratios of the beam length
+    /// Operating points, in % or as a ratio of the beam length
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
@@ -38,7 +38,7 @@ pub(super) struct Args {
         allow_hyphen_values = true
     )]
     operating_points: ValueRange,
-    /// Nominal mass asymmetries m2/m3 - 1 (without the unknown asymmetry of the stage)
+    /// Nominal mass asymmetries m2/m3 - 1 (without the asymmetry offset of the stage)
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
@@ -49,13 +49,14 @@ pub(super) struct Args {
     /// Folder of the campaign; the same command continues an interrupted campaign
     #[arg(long, value_name = "DIR", default_value = "campaign")]
     out: PathBuf,
-    /// Run on the simulated stage, with the rates, delays and steps of the configured devices
+    /// Run on the simulated stage, with the rates, delays and resolution of the configured devices
     #[arg(long)]
     simulate: bool,
     /// Keep the recording of each chirp as well, about 9 MB each
     #[arg(long)]
     keep_recordings: bool,
-    /// Accuracy with which an asymmetry can be set, for the recommendation [default: half of a mass step of 0.5 g]
+    /// Accuracy with which an asymmetry can be set, for the recommendation [default: 0.25 g
+    /// divided by m3, half of a mass step of 0.5 g]
     #[arg(long, value_name = "RATIO", value_parser = si::<OfRatio>)]
     asymmetry_tolerance: Option<f64>,
     /// Accuracy with which an operating point can be set, as a ratio of the beam length

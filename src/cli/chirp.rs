@@ -41,8 +41,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true,
         help = with_setting("Length of the sweep", "chirp.duration_s"))]
     duration: Option<Time>,
-    /// Frequency over time
-    #[arg(long, value_name = "KIND", help = with_setting("Frequency over time", "chirp.sweep"))]
+    /// Frequency as a function of time
+    #[arg(long, value_name = "KIND", help = with_setting("Frequency as a function of time", "chirp.sweep"))]
     sweep: Option<Sweep>,
     /// Only print what the run would do: travel, current, heat, duration; no motion
     #[arg(long)]

@@ -11,11 +11,11 @@ use super::{
     margins, model, recover, replay,
 };
 
-/// A controller daemon for a precision-motion test bench.
+/// Identifies and controls a precision-motion stage.
 ///
-/// Without a configuration every command works on the simulated stage of the thesis. Exit codes: 0 done, 1 failed (also if
-/// an interlock tripped), 2 wrong usage or configuration, 3 done, but with overruns or lost records, or (identify) the run
-/// in the recording was not completed.
+/// Without `--config`, every run uses the simulated stage of the thesis. Exit codes: 0 success; 1 failure, for example
+/// an interlock trip; 2 wrong usage or configuration, no motion; 3 success, but with overruns or lost records
+/// (identify: the recorded run was not completed; recover: records are lost).
 #[derive(Debug, Parser)]
 #[command(name = "bench", version, max_term_width = 80, after_help = GLOSSARY)]
 pub struct Cli {
@@ -29,31 +29,34 @@ enum Command {
     Chirp(chirp::Args),
     /// Run a multisine at several amplitudes: separates distortion from noise and detects amplitude-dependent modes
     Linearity(linearity::Args),
-    /// Run the closed loop with a reference signal; writes a recording, and predicted and measured performance values
+    /// Run the closed loop with a reference signal; writes a recording and prints predicted and measured settling time,
+    /// overshoot and error
     Control(control::Args),
-    /// Measure a chirp at each point of a grid of operating points and asymmetries: map of the results,
-    /// asymmetry offset, recommended settings
+    /// Run a chirp at each point of a grid of operating points and asymmetries; prints a map of the verdicts, the
+    /// asymmetry offset and a recommendation
     Campaign(campaign::Args),
-    /// Find scale, sign, offset and delay of amplifier and probe by small static steps
+    /// Measure scale, sign and offset of amplifier and probe with small static steps, and the delay with a chirp; the
+    /// stage moves
     Calibrate(calibrate::Args),
     /// Analyse the model of the mechanics: modes, residues, signs, zeros
     Model(model::Args),
-    /// Crossover, phase, gain and modulus margin of a controller with the model; exit code 1 if the loop is unstable
+    /// Compute crossover, phase margin, gain margin and modulus margin of a controller with the model; exit code 1 if the
+    /// loop is unstable
     Margins(margins::Args),
     /// Analyse a recording or an external CSV file with the same method as `bench chirp`
     Identify(identify::Args),
-    /// Run the same loop on the recorded probe measurements and compare every command bit for bit
+    /// Feed the recorded probe measurements to the loop code again and compare every command bit for bit
     Replay(replay::Args),
-    /// Make a truncated recording readable and report what was lost
+    /// Write a readable copy of a truncated or damaged recording and report what was lost
     Recover(recover::Args),
     /// Emulate the configured devices with the simulated stage, to test a run without hardware
     #[command(alias = "device")]
     Emulate(emulate::Args),
-    /// Show, check and describe settings; list profiles; write a configuration file for your own stage
+    /// Show and check settings, print their schema, list profiles, write a template for your own stage
     Config(config::Args),
     /// Check whether a run can start (system, devices, recordings) and print a remedy for each problem; no motion
     Doctor(doctor::Args),
-    /// Print the completions of a shell, to be sourced or installed
+    /// Print the completion script for a shell
     Completions(completions::CompletionArgs),
     /// Print or write the manual pages
     Man(completions::ManArgs),

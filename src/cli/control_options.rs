@@ -34,11 +34,13 @@ pub(super) struct Args {
     choice: ControllerChoice,
     #[command(flatten)]
     pub run: RunOptions,
-    /// The reference: step, hold, ramp, sine, chirp (identification in closed loop), or a CSV file with the columns
+    /// Reference signal: step, hold (constant rest position), ramp, sine, chirp (identification in closed loop), or a CSV
+    /// file with the columns
     /// time_s,reference_m [default: control.reference of the profile]
     #[arg(long, value_name = "step|hold|ramp|sine|chirp|FILE", value_parser = reference)]
     reference: Option<Reference>,
-    /// Height of step and ramp, amplitude of the sine [default: 50um]; for a chirp: largest travel by the model
+    /// Height of step and ramp, amplitude of the sine [default: 50um]; for a chirp: largest travel
+    /// predicted by the model
     /// [default: 20um]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     amplitude: Option<Length>,
@@ -62,7 +64,7 @@ fn duration_help() -> String {
 fn what_happens_without_options() -> String {
     let value = |key| default_value(key).unwrap_or_default();
     format!(
-        "Without options, in the profile `stage`: the {} controller follows a {} of {} at {} after the loop closed, for {} in all.",
+        "Without options, in the profile `stage`: {} controller; reference: {} of {}, {} after the loop is closed; the loop is closed for {}.",
         value("control.controller"),
         value("control.reference.kind"),
         value("control.reference.amplitude_m"),

@@ -34,7 +34,7 @@ impl ControllerChoice {
 fn controller_help() -> String {
     let names = profiles::names(profiles::CONTROLLERS);
     let text = format!(
-        "A controller by name ({names}), or a TOML file with a `title` and one [[section]] for each factor of C(s). Kinds of section: gain, integrator, zero_pole, pole, pole_pair, biquad, and coefficients with `numerator` and `denominator` by falling powers of s"
+        "A controller by name ({names}), or a TOML file with a `title` and either [[section]] tables, one for each factor of C(s) (gain, integrator, zero_pole, pole, pole_pair, biquad, coefficients: docs/own-stage.md lists their keys), or a [law] table"
     );
     with_setting(&text, "control.controller")
 }

@@ -29,19 +29,20 @@ const PERIOD: Duration = Duration::from_millis(2);
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// The emulated devices: amplifier, probe, or both with one stage
+    /// Devices to emulate: amplifier, probe, or both (on the same simulated stage)
     #[arg(required = true, value_name = "amplifier|probe")]
     devices: Vec<EmulatedDevice>,
     /// CAN interface instead of the configured one
     #[arg(long, value_name = "NAME")]
     interface: Option<String>,
-    /// Serial port of the probe: the other end of a null-modem cable [default: a pseudo terminal, whose path is printed]
+    /// Serial port on which the probe is emulated, connected by a null-modem cable [default: a new pseudo terminal; its
+    /// path is printed]
     #[arg(long, value_name = "PATH", conflicts_with = "pty")]
     port: Option<PathBuf>,
-    /// Make a pseudo terminal for the probe, with a link of this name for the reader
+    /// Emulate the probe on a new pseudo terminal and create the symbolic link LINK to it
     #[arg(long, value_name = "LINK")]
     pty: Option<PathBuf>,
-    /// Measurements of the probe per second [default: as configured]
+    /// Measuring rate of the probe [default: as configured]
     #[arg(long, value_name = "FREQUENCY", value_parser = si::<OfFrequency>)]
     measuring_rate: Option<f64>,
     /// Inject a fault at a time (KIND@2s) or for an interval (KIND@500ms..2s), repeatable; the kinds are listed below

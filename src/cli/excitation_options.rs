@@ -20,7 +20,7 @@ pub(super) struct ExcitationOptions {
     #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true,
         help = with_setting("Last frequency", "chirp.stop_hz"))]
     stop: Option<Frequency>,
-    /// The same amplitude at all frequencies: 0.1A or 100mA [default: chirp.amplitude of the profile, which depends on
+    /// Constant amplitude: 0.1A or 100mA [default: chirp.amplitude of the profile, which depends on
     /// the frequency; for a binary sequence prbs.amplitude_a]
     #[arg(long, value_name = "CURRENT", allow_hyphen_values = true)]
     amplitude: Option<Current>,

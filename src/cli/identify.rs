@@ -26,7 +26,7 @@ pub(super) struct Args {
     recording: PathBuf,
     #[command(flatten)]
     table: ExternalOptions,
-    /// Folder for the results [default: the folder of the recording or CSV]
+    /// Output folder [default: the folder of the input file]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Print one JSON object on standard output and nothing else

@@ -23,13 +23,13 @@ const WHOLE_SAMPLES: f64 = 1e-3;
 #[derive(Clone, Debug, clap::Args)]
 #[group(id = "table")]
 pub(super) struct ExternalOptions {
-    /// Column of the force, or of a signal proportional to it, in any unit; the file is then read as CSV
+    /// Input column: the force or a signal proportional to it, in any unit; the file is read as CSV
     #[arg(long, value_name = "COLUMN", requires = "output")]
     input: Option<String>,
-    /// Column of the displacement, or of a signal proportional to it, in any unit
+    /// Output column: the displacement or a signal proportional to it, in any unit
     #[arg(long, value_name = "COLUMN", requires = "input")]
     output: Option<String>,
-    /// Column of the times in seconds, which must be equally spaced
+    /// Time column, in seconds; the times must be equally spaced
     #[arg(
         long,
         value_name = "COLUMN",
@@ -37,14 +37,15 @@ pub(super) struct ExternalOptions {
         conflicts_with = "rate"
     )]
     time: Option<String>,
-    /// Samples per second, for a CSV without times
+    /// Sampling rate, for a CSV file without a time column
     #[arg(
         long,
         value_name = "HZ",
         requires = "input",
         allow_hyphen_values = true, value_parser = si::<OfFrequency>)]
     rate: Option<f64>,
-    /// Period of a periodic record, in samples (2500) or seconds (1s). Without it the record must begin and end at rest
+    /// Period of a periodic record: number of samples (2500) or time with unit (1s). Without it, the record must begin and
+    /// end at rest
     #[arg(long, value_name = "SAMPLES|S", requires = "input")]
     period: Option<String>,
     /// Number of periods to skip at the beginning, while the plant settles

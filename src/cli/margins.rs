@@ -26,7 +26,7 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     choice: ControllerChoice,
-    /// Neglect sampling, delay and amplifier dynamics
+    /// Neglect zero-order hold, computing delay and amplifier dynamics, as in the thesis
     #[arg(long)]
     continuous: bool,
 }

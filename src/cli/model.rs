@@ -39,23 +39,23 @@ enum What {
     Modes(BenchOptions),
     /// The sequence of dominant modes, and the kinds of zeros that follow from it by Tables 3-1 to 3-4
     Sequence(BenchOptions),
-    /// Migration of the zeros as one setting varies, with the points where they meet
+    /// Zero loci as one setting varies, with the points where zeros coincide
     Locus(locus::Args),
-    /// Number of pairs of CNMP zeros over operating point and mass asymmetry, for SR4DoF
+    /// Number of CNMP pairs as a function of operating point and mass asymmetry (SR4DoF only)
     Map(map::Args),
     /// Probability of CNMP zeros within manufacturing tolerances, and the settings with the largest influence on it
     Study(study::Args),
-    /// Two close modes as one setting varies: whether they cross or veer, where, and how their shapes change
+    /// Crossing or veering of two close modes as one setting varies: position, and change of the mode shapes
     Veering(veering::Args),
     /// Conditions C4-1 to C4-4y and the propositions for two close modes as one setting varies
     Conditions(conditions::Args),
-    /// Places for actuator and probe, relative to the shapes of two close modes, that give no CNMP zeros
+    /// Locations of actuator and probe without CNMP zeros, relative to the shapes of two close modes
     Placement(placement::Args),
     /// Limits on bandwidth and sensitivity peak due to zeros in the right half plane (Eqs. 1-2, 1-3)
     Bounds(bounds::Args),
     /// The response to a step: undershoot, zero crossings and reversals, compared with the prediction from the zeros
     Step(step::Args),
-    /// The damping that keeps all zeros of two close modes out of the right half plane (Eq. 3-16)
+    /// Smallest damping ratio for which two close modes have no zeros in the right half plane (Eq. 3-16)
     CriticalDamping(critical_damping::Args),
 }
 

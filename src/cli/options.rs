@@ -13,16 +13,16 @@ pub(super) struct BenchOptions {
     /// A TOML file, or a profile by name
     #[arg(long, value_name = "FILE|NAME")]
     pub config: Option<String>,
-    /// Override one setting, repeatable: --set plant.mass_asymmetry=0.05
+    /// Override one setting (repeatable): --set plant.mass_asymmetry=0.05; `bench config show` lists all keys
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
-    /// Static Y displacement of the motion stage: 8% of the beam length, 3.8mm, or metres
+    /// Static Y displacement of the motion stage: 3.8mm, a number in metres (0.0038), or in % of the beam length (8%)
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub operating_point: Option<OperatingPoint>,
     /// Mass asymmetry m2/m3 - 1: 10% or 0.1
     #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub asymmetry: Option<Ratio>,
-    /// Seed of the random generator for noise and disturbance
+    /// Seed of the random generator (noise and disturbance of the simulated stage)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
     /// Print one JSON object on standard output and nothing else

@@ -14,7 +14,7 @@ use crate::recording::{Cut, recover};
 pub(super) struct Args {
     /// The recording (MCAP); it is not changed
     recording: PathBuf,
-    /// The file to write [default: the recording's name with `_recovered`]
+    /// Output file [default: the name of the recording with `_recovered`]
     #[arg(long, value_name = "FILE")]
     to: Option<PathBuf>,
     /// Print one JSON object on standard output and nothing else

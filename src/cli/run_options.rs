@@ -21,7 +21,7 @@ pub(super) struct RunOptions {
     /// Pace of the loop [default: virtual on the simulated stage, realtime on devices]
     #[arg(long, value_name = "PACE")]
     pace: Option<Pace>,
-    /// Run on the simulated stage, with the rates, delays and steps of the configured devices
+    /// Run on the simulated stage, with the rates, delays and resolution of the configured devices
     #[arg(long)]
     simulate: bool,
     /// Clear a latched fault of the amplifier; first remove its cause

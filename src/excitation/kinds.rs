@@ -55,10 +55,10 @@ macro_rules! excitations {
 }
 
 excitations! {
-    /// Many sines at once, periodic, `[multisine]`.
+    /// Periodic sum of sines; settings in `[multisine]`.
     Multisine(multisine: MultisineSettings),
-    /// One sine after the other, `[stepped_sine]`.
+    /// One frequency after the other; settings in `[stepped_sine]`.
     SteppedSine(stepped_sine: SteppedSineSettings),
-    /// A pseudo-random binary sequence, periodic, `[prbs]`.
+    /// Periodic pseudo-random binary sequence; settings in `[prbs]`.
     Prbs(prbs: PrbsSettings),
 }

@@ -17,9 +17,9 @@ use crate::util::thread_priority::set_fifo;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {
-    /// Each tick starts immediately after the previous one: for studies and tests.
+    /// Each tick starts immediately after the previous one: for simulation and tests.
     Virtual,
-    /// Ticks when they are due: rigs.
+    /// Each tick starts at its scheduled time: for hardware.
     Realtime,
 }
 

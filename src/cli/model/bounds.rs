@@ -23,7 +23,8 @@ pub(super) struct Args {
     /// Upper limit of |S| at all frequencies, above 1; 2 corresponds to a modulus margin of 0.5
     #[arg(long, value_name = "RATIO", default_value_t = PlantSummary::PEAK, value_parser = si::<OfRatio>)]
     peak: f64,
-    /// Compute the smallest possible sensitivity peak for this bandwidth, instead of the bandwidth for a given peak
+    /// Compute the smallest possible sensitivity peak for this bandwidth in rad/s, instead of the bandwidth for a given
+    /// peak
     #[arg(long, value_name = "RAD_PER_S", value_parser = si::<OfAngularFrequency>)]
     bandwidth: Option<f64>,
 }

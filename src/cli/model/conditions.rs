@@ -21,7 +21,7 @@ use crate::model::veering::{
 pub(super) struct Args {
     #[command(flatten)]
     modes: CloseModesArgs,
-    /// The value to explain [default: the configured value if it is in the range, else the veering point]
+    /// Value of the setting for which the conditions are listed [default: the configured value if it is in the range, else the veering point]
     #[arg(long, value_name = "X", allow_hyphen_values = true)]
     at: Option<String>,
 }
@@ -68,7 +68,7 @@ fn conditions(args: &Args) -> Result<ConditionsReport, CliError> {
     ))
 }
 
-/// The value to explain: as asked, or the setting's own if it is in the range, or the veering point.
+/// Value of the setting for which the conditions are listed: as asked, or the setting's own if it is in the range, or the veering point.
 fn explained(args: &Args, trajectory: &Trajectory) -> Result<f64, CliError> {
     let samples = &trajectory.samples;
     let (first, last) = (samples[0].value, samples[samples.len() - 1].value);

@@ -22,7 +22,8 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     table: TableOptions,
-    /// Length of the response in the file [default: until the window of the zero crossings ends]
+    /// Length of the response in the file [default: the time window in which zero
+    /// crossings are counted]
     #[arg(long, value_name = "TIME", value_parser = si::<OfTime>)]
     duration: Option<f64>,
     /// Rows of the file

@@ -21,14 +21,16 @@ use crate::util::progress::Progress;
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// A setting of the plant and its tolerance, repeatable: KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, added to
-    /// the setting, or in % of it; * in the key stands for any name: plant.secondary_mass_deviation.*=+-0.15
+    /// A setting of the plant and its tolerance (repeatable): KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT. The
+    /// deviation is added to the setting. It is in the unit of the setting, or in %: of the beam length for an operating
+    /// point, of 1 for a ratio, of the nominal value otherwise. * in the key stands for any characters:
+    /// plant.secondary_mass_deviation.*=+-0.15
     #[arg(long, value_name = "KEY=TOLERANCE", required_unless_present = "join")]
     vary: Vec<Tolerance>,
     /// Number of draws; --seed selects them
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     draws: u64,
-    /// Compute only the I-th of N parts; combine the parts with --join
+    /// Compute only shard I of N; combine the shards with --join
     #[arg(long, value_name = "I/N", requires = "file")]
     shard: Option<Shard>,
     /// Store completed draws in this file; the same command started again continues an interrupted study

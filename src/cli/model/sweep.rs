@@ -16,7 +16,8 @@ pub(super) struct SweepArgs {
     /// The setting that varies: plant.operating_point_m, plant.mass_asymmetry or any other numeric setting
     #[arg(long, value_name = "KEY")]
     pub vary: String,
-    /// First value: 3.8mm, 0.0038, 8% of the beam length for an operating point, 8% for a ratio
+    /// First value, with a unit (3.8mm) or in SI units (0.0038); in %, it is relative to the beam length for an operating
+    /// point, and 1% is 0.01 for a ratio
     #[arg(long, value_name = "A", allow_hyphen_values = true)]
     from: String,
     /// Last value, in the same notation as --from

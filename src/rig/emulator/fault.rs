@@ -103,17 +103,17 @@ const KINDS: [FaultKind; 23] = [
     kind("amplifier.set-points-ignored", fixed_drive(DeviceFault::SetPointsIgnored), "ignores set-points, obeys NMT"),
     kind("amplifier.orders-ignored", fixed_drive(DeviceFault::CommandsIgnored), "ignores set-points and NMT"),
     kind("amplifier.switches-off", fixed_drive(DeviceFault::SwitchesOff), "switches itself off without a fault"),
-    kind("amplifier.late", with_value("50ms", late_drive), "sends everything later by this time"),
+    kind("amplifier.late", with_value("50ms", late_drive), "delays all messages by this time"),
     kind("amplifier.reset", fixed_drive(DeviceFault::Reset), "restarts, as after a loss of power"),
     kind("amplifier.bus-off", Form::Fixed(EmulatedFault::Amplifier(AmplifierFault::BusOff)), "makes the host report bus-off; no frame passes (virtual interfaces only)"),
     kind("probe.none", fixed_probe(Fault::None), "ends the fault of the probe"),
     kind("probe.silence", fixed_probe(Fault::Silence), "sends nothing"),
-    kind("probe.corrupt", with_value("1", corrupt), "changes one of every N bytes (=N)"),
+    kind("probe.corrupt", with_value("1", corrupt), "corrupts every N-th byte (=N)"),
     kind("probe.stuck", fixed_probe(Fault::Stuck), "sends the same value repeatedly as a new measurement"),
     kind("probe.jump", with_value("50um", jump), "shifts every second value by this length"),
     kind("probe.out-of-range", fixed_probe(Fault::OutOfRange), "reports a target out of range"),
-    kind("probe.late", with_value("50ms", late_probe), "sends everything later by this time"),
-    kind("probe.reset", fixed_probe(Fault::Reset), "restarts, and its counter starts again"),
+    kind("probe.late", with_value("50ms", late_probe), "delays all messages by this time"),
+    kind("probe.reset", fixed_probe(Fault::Reset), "restarts; the measurement counter starts again at zero"),
 ];
 
 /// The list of all kinds, one line each.
