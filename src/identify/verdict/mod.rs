@@ -5,7 +5,7 @@
 //! 1. the zeros of the fit, each with its probability of lying in the right half plane;
 //! 2. the signs of the residues: two close modes of opposite signs beside a remainder are necessary for CNMP zeros between
 //!    them (sections 3.2.2 and 3.2.4);
-//! 3. the excess phase over Bode's relation, independent of the modes: each CNMP pair adds one turn of lag ([`phase_drop()`]).
+//! 3. the phase drop beyond Bode's relation, independent of the modes: each CNMP pair adds one turn of lag ([`phase_drop()`]).
 //!
 //! A verdict needs sufficient data: as many modes as the model has, and residuals that are noise. It covers the band up to a
 //! given frequency. All comparisons state what must hold, so that a number that is not finite (a singular covariance, a bin
@@ -30,12 +30,16 @@ const WRONG_SIDE_PROBABILITY: f64 = 1e-3;
 const FIT_ACCURACY: f64 = 1e-4;
 /// With a larger reduced chi-square the fit does not describe the stage.
 pub(crate) const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
-/// Largest deviation of the excess phase from a number of half turns, in degrees.
+/// Largest deviation of the phase drop from a number of half turns, in degrees.
 const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
 /// A response is significant above this multiple of the power of its noise.
 const SIGNIFICANT_POWER: f64 = 20.0;
 /// A residue with a larger probability of the opposite sign has no certain sign.
 const WRONG_SIGN_PROBABILITY: f64 = 1e-3;
+
+const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes";
+const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
+const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; look at the plot, and excite more";
 
 /// Whether there are CNMP zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,7 +74,7 @@ pub struct Verdict {
     /// The zeros in the band of the verdict.
     pub zeros: Vec<UncertainZero>,
     /// The phase drop over the modes of the band, if there are two or more.
-    pub phase: Option<PhaseDrop>,
+    pub phase_drop: Option<PhaseDrop>,
 }
 
 impl Verdict {
@@ -80,7 +84,7 @@ impl Verdict {
             cnmp: Cnmp::Undecided,
             why,
             zeros: Vec::new(),
-            phase: None,
+            phase_drop: None,
         }
     }
 
@@ -108,28 +112,42 @@ pub struct VerdictInput<'a> {
     pub expected_modes: Option<usize>,
 }
 
+impl VerdictInput<'_> {
+    /// Whether the verdict covers an angular frequency: from the first datum to the upper limit.
+    fn covers(&self, omega_rad_s: f64) -> bool {
+        let low_rad_s = self.frf_data.first().map_or(0.0, FrfDatum::omega_rad_s);
+        omega_rad_s <= self.up_to_rad_s && omega_rad_s >= low_rad_s
+    }
+
+    /// Indices of the first and the last datum between `low_rad_s` and the upper limit.
+    fn indices_above(&self, low_rad_s: f64) -> Option<(usize, usize)> {
+        let mut omega_rad_s = self.frf_data.iter().map(FrfDatum::omega_rad_s);
+        let first = omega_rad_s.clone().position(|omega| omega >= low_rad_s)?;
+        let last = omega_rad_s.rposition(|omega| omega <= self.up_to_rad_s)?;
+        Some((first, last))
+    }
+}
+
 /// Evaluates the criteria.
 ///
 /// # Errors
 /// When the zeros of the fit cannot be computed.
 pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
-    let low_rad_s = input.frf_data.first().map_or(0.0, FrfDatum::omega_rad_s);
-    let in_band = |w: f64| w <= input.up_to_rad_s && w >= low_rad_s;
     let mut zeros = zeros(input.fit)?;
-    zeros.retain(|zero| in_band(zero.s.norm()));
+    zeros.retain(|zero| input.covers(zero.s.norm()));
     let mut modes = input.fit.modes();
-    modes.retain(|mode| in_band(mode.omega_rad_s.value));
-    let phase = phase_drop_over(input, &modes);
+    modes.retain(|mode| input.covers(mode.omega_rad_s.value));
+    let phase_drop = phase_drop_over(input, &modes);
     let insufficient = insufficient_data(input, &modes).or_else(|| uncertain_side(&zeros));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
-        None => evaluate(&zeros, &modes, phase),
+        None => evaluate(&zeros, &modes, phase_drop),
     };
     Ok(Verdict {
         cnmp,
         why,
         zeros,
-        phase,
+        phase_drop,
     })
 }
 
@@ -160,12 +178,15 @@ fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
 }
 
 fn uncertain_sign(modes: &[FittedMode]) -> Option<String> {
-    let certain = |mode: &FittedMode| mode.sign_error_probability() <= WRONG_SIGN_PROBABILITY;
-    let uncertain = modes.iter().find(|mode| !certain(mode))?;
+    let uncertain = modes.iter().find(|mode| !has_certain_sign(mode))?;
     Some(format!(
         "the sign of the residue at {:.2} Hz is uncertain; excite more there, or for longer",
         uncertain.frequency_hz().value
     ))
+}
+
+fn has_certain_sign(mode: &FittedMode) -> bool {
+    mode.sign_error_probability() <= WRONG_SIGN_PROBABILITY
 }
 
 /// A zero that may lie on either side of the imaginary axis.
@@ -191,50 +212,73 @@ fn has_certain_side(zero: &UncertainZero) -> bool {
 fn evaluate(
     zeros: &[UncertainZero],
     modes: &[FittedMode],
-    phase: Option<PhaseDrop>,
+    phase_drop: Option<PhaseDrop>,
 ) -> (Cnmp, String) {
-    let right = || zeros.iter().filter(|zero| zero.s.re > 0.0);
-    let pairs = right().filter(|zero| zero.kind == ZeroKind::Cnmp).count();
-    let real = right().count() - pairs;
-    let half_turns = (2 * pairs + real) as i32;
-    let Some(phase) = phase else {
-        let why = "fewer than two modes are found, and the phase check needs two modes";
-        return (Cnmp::Undecided, why.into());
+    let right = RightHalfPlane::count(zeros);
+    let Some(phase_drop) = phase_drop else {
+        return (Cnmp::Undecided, NO_PHASE_DROP.into());
     };
-    let agrees = phase.deviation_deg <= MAX_PHASE_DEVIATION_DEG && phase.half_turns == half_turns;
-    if !agrees {
-        (Cnmp::Undecided, phase_disagrees(half_turns, phase))
-    } else if pairs == 0 {
-        let why = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
-        (Cnmp::Excluded, why.into())
+    if !right.agrees_with(phase_drop) {
+        (Cnmp::Undecided, right.disagreement(phase_drop))
+    } else if right.cnmp_pairs == 0 {
+        (Cnmp::Excluded, NO_CNMP.into())
     } else if !has_opposite_neighbours(modes) {
-        let why = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; look at the plot, and excite more";
-        (Cnmp::Undecided, why.into())
+        (Cnmp::Undecided, NO_OPPOSITE_NEIGHBOURS.into())
     } else {
-        (Cnmp::Detected, detected(pairs, modes, phase))
+        (Cnmp::Detected, right.detected(modes, phase_drop))
     }
 }
 
-fn detected(pairs: usize, modes: &[FittedMode], phase: PhaseDrop) -> String {
-    let plural = if pairs == 1 { "" } else { "s" };
-    let signs: String = modes.iter().map(FittedMode::sign).collect();
-    format!(
-        "{pairs} pair{plural} of CNMP zeros, residues of opposite signs ({signs}), and {:.0} degrees more phase lag than a minimum-phase system of this magnitude",
-        -phase.excess_phase_deg
-    )
+/// Numbers of zeros in the right half plane.
+struct RightHalfPlane {
+    cnmp_pairs: usize,
+    real: usize,
 }
 
-fn phase_disagrees(half_turns: i32, phase: PhaseDrop) -> String {
-    format!(
-        "the zeros of the fit give {} degrees more phase lag than a minimum-phase system, the measured response {:.0}; excite more between the modes, or for longer",
-        180 * half_turns,
-        -phase.excess_phase_deg
-    )
+impl RightHalfPlane {
+    fn count(zeros: &[UncertainZero]) -> Self {
+        let right = zeros.iter().filter(|zero| zero.s.re > 0.0);
+        let (pairs, real): (Vec<&UncertainZero>, Vec<&UncertainZero>) =
+            right.partition(|zero| zero.kind == ZeroKind::Cnmp);
+        Self {
+            cnmp_pairs: pairs.len(),
+            real: real.len(),
+        }
+    }
+
+    /// The phase drop of these zeros in half turns.
+    fn half_turns(&self) -> i32 {
+        (2 * self.cnmp_pairs + self.real) as i32
+    }
+
+    fn agrees_with(&self, phase_drop: PhaseDrop) -> bool {
+        phase_drop.deviation_deg <= MAX_PHASE_DEVIATION_DEG
+            && phase_drop.half_turns == self.half_turns()
+    }
+
+    fn disagreement(&self, phase_drop: PhaseDrop) -> String {
+        format!(
+            "the zeros of the fit give {} degrees more phase lag than a minimum-phase system, the measured response {:.0}; excite more between the modes, or for longer",
+            180 * self.half_turns(),
+            phase_drop.drop_deg
+        )
+    }
+
+    fn detected(&self, modes: &[FittedMode], phase_drop: PhaseDrop) -> String {
+        let pairs = self.cnmp_pairs;
+        let plural = if pairs == 1 { "" } else { "s" };
+        let signs: String = modes.iter().map(FittedMode::sign).collect();
+        format!(
+            "{pairs} pair{plural} of CNMP zeros, residues of opposite signs ({signs}), and {:.0} degrees more phase lag than a minimum-phase system of this magnitude",
+            phase_drop.drop_deg
+        )
+    }
 }
 
 fn has_opposite_neighbours(modes: &[FittedMode]) -> bool {
-    let product = |pair: &[FittedMode]| pair[0].residue_per_kg.value * pair[1].residue_per_kg.value;
-    modes.windows(2).any(|pair| product(pair) < 0.0)
+    modes
+        .windows(2)
+        .any(|pair| pair[0].residue_per_kg.value * pair[1].residue_per_kg.value < 0.0)
 }
 
 /// The phase drop from well below the first mode of the band to its end. Beyond the end the magnitude is used as far as it is
@@ -243,21 +287,17 @@ fn phase_drop_over(input: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<Pha
     let [first, .., _] = modes else {
         return None;
     };
-    let low_rad_s = 0.5 * first.omega_rad_s.value;
-    let data = input.frf_data;
-    let from = data
-        .iter()
-        .position(|datum| datum.omega_rad_s() >= low_rad_s)?;
-    let to = data
-        .iter()
-        .rposition(|datum| datum.omega_rad_s() <= input.up_to_rad_s)?;
-    let significant =
-        |datum: &&FrfDatum| datum.response.norm_sqr() > SIGNIFICANT_POWER * datum.variance;
-    let beyond = data[to + 1..].iter().take_while(significant).count();
-    let used = &data[..to + 1 + beyond];
+    let (from, to) = input.indices_above(0.5 * first.omega_rad_s.value)?;
+    let (_, beyond) = input.frf_data.split_at(to + 1);
+    let significant = beyond.iter().take_while(|datum| is_significant(datum));
+    let used = &input.frf_data[..to + 1 + significant.count()];
     let omega_rad_s: Vec<f64> = used.iter().map(FrfDatum::omega_rad_s).collect();
     let mechanics = input.chain.mechanics(used, input.fit.parameters.delay_s);
     (from < to).then(|| phase_drop(&omega_rad_s, &mechanics, from, to))
+}
+
+fn is_significant(datum: &FrfDatum) -> bool {
+    datum.response.norm_sqr() > SIGNIFICANT_POWER * datum.variance
 }
 
 fn hertz(omega_rad_s: f64) -> f64 {

@@ -14,15 +14,15 @@
 
 use nalgebra::Complex;
 
-/// The measured phase drop compared with that of a minimum-phase system of the same magnitude.
+/// The phase lag between two frequencies beyond that of a minimum-phase system of the same magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseDrop {
-    /// The change of the measured phase from the lower to the upper frequency, minus that of the minimum-phase system, in
-    /// degrees; negative for additional lag.
-    pub excess_phase_deg: f64,
-    /// The nearest number of half turns, positive for additional lag: 2 for each CNMP pair.
+    /// The phase drop in degrees: the change of the minimum phase from the lower to the upper frequency, minus that of the
+    /// measured phase. Positive for additional lag.
+    pub drop_deg: f64,
+    /// The nearest number of half turns: 2 for each CNMP pair.
     pub half_turns: i32,
-    /// Deviation of the difference from that number of half turns, in degrees: 0 to 90.
+    /// Deviation of the phase drop from that number of half turns, in degrees: 0 to 90.
     pub deviation_deg: f64,
 }
 
@@ -44,45 +44,72 @@ pub fn phase_drop(
         .sum::<f64>();
     let minimum =
         minimum_phase(omega_rad_s, response, to) - minimum_phase(omega_rad_s, response, from);
-    let excess_phase_deg = (measured - minimum).to_degrees();
-    let half_turns = -(excess_phase_deg / 180.0).round();
+    let drop_deg = (minimum - measured).to_degrees();
+    let half_turns = (drop_deg / 180.0).round();
     PhaseDrop {
-        excess_phase_deg,
+        drop_deg,
         half_turns: half_turns as i32,
-        deviation_deg: (excess_phase_deg + 180.0 * half_turns).abs(),
+        deviation_deg: (drop_deg - 180.0 * half_turns).abs(),
     }
 }
 
 /// The phase in radians of the minimum-phase system at one frequency.
 fn minimum_phase(omega_rad_s: &[f64], response: &[Complex<f64>], at: usize) -> f64 {
-    let x: Vec<f64> = omega_rad_s
-        .iter()
-        .map(|w| (w / omega_rad_s[at]).ln())
-        .collect();
-    let height: Vec<f64> = response.iter().map(|h| h.norm().ln()).collect();
-    let slope = |i: usize| (height[i] - height[i - 1]) / (x[i] - x[i - 1]);
-    let within: f64 = (1..x.len())
-        .map(|i| slope(i) * (weight(x[i]) - weight(x[i - 1])))
-        .sum();
-    let (first, last) = (x[0], x[x.len() - 1]);
-    let below = end_slope(&x, &height, first, first + END_INTERVAL)
-        * (weight(first) - weight(f64::NEG_INFINITY));
-    let above =
-        end_slope(&x, &height, last - END_INTERVAL, last) * (weight(f64::INFINITY) - weight(last));
-    (within + below + above) / std::f64::consts::PI
+    let magnitude = LogMagnitude {
+        x: omega_rad_s
+            .iter()
+            .map(|w| (w / omega_rad_s[at]).ln())
+            .collect(),
+        height: response.iter().map(|h| h.norm().ln()).collect(),
+    };
+    (magnitude.integral_within() + magnitude.integral_below() + magnitude.integral_above())
+        / std::f64::consts::PI
 }
 
-/// The median slope of the height between x values [`SLOPE_INTERVAL`] apart, from `low` to `high`: robust against noise and
-/// against a resonance at the end of the band.
-fn end_slope(x: &[f64], height: &[f64], low: f64, high: f64) -> f64 {
-    let first = x.partition_point(|x| *x < low);
-    let slope = |i: usize| {
-        let j = x.partition_point(|other| *other < x[i] + SLOPE_INTERVAL);
-        (j < x.len() && x[j] <= high).then(|| (height[j] - height[i]) / (x[j] - x[i]))
-    };
-    let mut slopes: Vec<f64> = (first..x.len()).map_while(slope).collect();
-    slopes.sort_by(f64::total_cmp);
-    slopes.get(slopes.len() / 2).copied().unwrap_or(0.0)
+/// ln|G| over x = ln(w/w0), and the parts of Bode's integral.
+struct LogMagnitude {
+    x: Vec<f64>,
+    height: Vec<f64>,
+}
+
+impl LogMagnitude {
+    fn slope(&self, i: usize, j: usize) -> f64 {
+        (self.height[j] - self.height[i]) / (self.x[j] - self.x[i])
+    }
+
+    fn integral_within(&self) -> f64 {
+        (1..self.x.len())
+            .map(|i| self.slope(i - 1, i) * (weight(self.x[i]) - weight(self.x[i - 1])))
+            .sum()
+    }
+
+    fn integral_below(&self) -> f64 {
+        let first = self.x[0];
+        self.end_slope(first, first + END_INTERVAL) * (weight(first) - weight(f64::NEG_INFINITY))
+    }
+
+    fn integral_above(&self) -> f64 {
+        let last = self.x[self.x.len() - 1];
+        self.end_slope(last - END_INTERVAL, last) * (weight(f64::INFINITY) - weight(last))
+    }
+
+    /// The median slope between x values [`SLOPE_INTERVAL`] apart, from `low` to `high`: robust against noise and against a
+    /// resonance at the end of the band.
+    fn end_slope(&self, low: f64, high: f64) -> f64 {
+        let first = self.x.partition_point(|x| *x < low);
+        let mut slopes: Vec<f64> = (first..self.x.len())
+            .map_while(|i| self.slope_over_interval(i, high))
+            .collect();
+        slopes.sort_by(f64::total_cmp);
+        slopes.get(slopes.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// The slope from `i` to the first x at least [`SLOPE_INTERVAL`] above it, if that is not above `high`.
+    fn slope_over_interval(&self, i: usize, high: f64) -> Option<f64> {
+        let end = self.x[i] + SLOPE_INTERVAL;
+        let j = self.x.partition_point(|x| *x < end);
+        (j < self.x.len() && self.x[j] <= high).then(|| self.slope(i, j))
+    }
 }
 
 /// The integral of ln coth(|t|/2) from 0 to x, which is odd in x and has the limit pi^2/4: with e = exp(-|x|),
@@ -108,9 +135,9 @@ fn weight_near_zero(t: f64) -> f64 {
 
 fn weight_by_series(t: f64) -> f64 {
     let e = (-t).exp();
-    let term = |k: i32| e.powi(2 * k + 1) / f64::from((2 * k + 1) * (2 * k + 1));
-    let limit = std::f64::consts::PI * std::f64::consts::PI / 4.0;
-    limit - 2.0 * (0..120).map(term).sum::<f64>()
+    let odd = (0..120).map(|k| 2 * k + 1);
+    let sum: f64 = odd.map(|n| e.powi(n) / f64::from(n * n)).sum();
+    std::f64::consts::PI * std::f64::consts::PI / 4.0 - 2.0 * sum
 }
 
 #[cfg(test)]

@@ -69,14 +69,7 @@ pub fn zeros(fit: &ModalFit) -> Result<Vec<UncertainZero>, PlantError> {
 }
 
 fn uncertain_zero(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZero {
-    let rows = derivatives(fit, s);
-    let product =
-        |i: usize, j: usize| (rows.row(i) * &fit.covariance * rows.row(j).transpose())[(0, 0)];
-    let covariance = if s.im == 0.0 {
-        [[product(0, 0), 0.0], [0.0, 0.0]]
-    } else {
-        [0, 1].map(|i| [0, 1].map(|j| product(i, j)))
-    };
+    let covariance = zero_covariance(fit, s);
     let mirrored = Estimate {
         value: -s.re,
         sigma: covariance[0][0].sqrt(),
@@ -86,6 +79,18 @@ fn uncertain_zero(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZ
         covariance,
         rhp_probability: mirrored.below_zero_probability(),
         kind,
+    }
+}
+
+/// J cov(theta) J^T; a real zero has no imaginary part.
+fn zero_covariance(fit: &ModalFit, s: Complex<f64>) -> [[f64; 2]; 2] {
+    let rows = derivatives(fit, s);
+    let entry =
+        |i: usize, j: usize| (rows.row(i) * &fit.covariance * rows.row(j).transpose())[(0, 0)];
+    if s.im == 0.0 {
+        [[entry(0, 0), 0.0], [0.0, 0.0]]
+    } else {
+        [0, 1].map(|i| [0, 1].map(|j| entry(i, j)))
     }
 }
 

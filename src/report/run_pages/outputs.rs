@@ -124,8 +124,10 @@ pub struct ModalSummary {
     pub fit_delay_s: Option<f64>,
     /// Its standard deviation.
     pub fit_delay_sigma_s: Option<f64>,
-    /// Phase lag over the modes beyond that of a minimum-phase system of the same magnitude: 360 for each pair of CNMP zeros.
-    pub phase_fall_deg: Option<f64>,
+    /// Phase drop over the modes: lag beyond that of a minimum-phase system of the same magnitude, 360 for each pair of CNMP
+    /// zeros.
+    #[serde(rename = "phase_fall_deg")]
+    pub phase_drop_deg: Option<f64>,
     /// The modes of each significant model order: the stability chart.
     pub orders: Vec<ModelOrder>,
 }
@@ -141,7 +143,7 @@ impl ModalSummary {
             fit_chi2_per_freedom: fit.map(|fit| fit.chi2_per_freedom),
             fit_delay_s: fit.map(|fit| fit.delay_s().value),
             fit_delay_sigma_s: fit.map(|fit| fit.delay_s().sigma),
-            phase_fall_deg: verdict.phase.map(|phase| -phase.excess_phase_deg),
+            phase_drop_deg: verdict.phase_drop.map(|phase_drop| phase_drop.drop_deg),
             orders: fit.map_or(Vec::new(), |fit| fit.orders.clone()),
         }
     }

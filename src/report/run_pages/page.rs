@@ -51,24 +51,24 @@ fn verdict(report: &RecordReport<'_>) -> String {
 fn evidence(report: &RecordReport<'_>) -> Vec<(String, String)> {
     let limit = format!("{:.1} Hz", report.judged_up_to_rad_s / TAU);
     let chi2 = report.fit.map(|fit| format!("{:.3}", fit.chi2_per_freedom));
-    let lag = report
-        .verdict
-        .phase
-        .map(|phase| format!("{:.1} deg", -phase.excess_phase_deg));
+    let phase_drop = report.verdict.phase_drop;
+    let drop_deg = phase_drop.map(|phase_drop| format!("{:.1} deg", phase_drop.drop_deg));
     named([
         ("Upper limit of the verdict", Some(limit)),
         ("Reduced chi-square of the fit", chi2),
         (
             "Phase lag beyond that of a minimum-phase system of this magnitude",
-            lag,
+            drop_deg,
         ),
     ])
 }
 
 /// The pairs that have a value.
 pub(super) fn named<const N: usize>(pairs: [(&str, Option<String>); N]) -> Vec<(String, String)> {
-    let with_value = |(name, value): (&str, Option<String>)| Some((name.to_string(), value?));
-    pairs.into_iter().filter_map(with_value).collect()
+    pairs
+        .into_iter()
+        .filter_map(|(name, value)| Some((name.to_string(), value?)))
+        .collect()
 }
 
 /// An estimate with its 95 % interval.
@@ -137,14 +137,14 @@ fn zeros(report: &RecordReport<'_>) -> String {
 }
 
 fn zero_row(zero: &UncertainZero) -> String {
-    let part = |value: f64, k: usize| interval(value, SIGMAS_95 * zero.covariance[k][k].sqrt());
+    let half_widths = [0, 1].map(|k| SIGMAS_95 * zero.covariance[k][k].sqrt());
     row(&[
         format!("{:.3}", zero.s.norm() / TAU),
-        part(zero.s.re, 0),
+        interval(zero.s.re, half_widths[0]),
         if zero.s.im == 0.0 {
             "0".into()
         } else {
-            part(zero.s.im, 1)
+            interval(zero.s.im, half_widths[1])
         },
         zero.kind.name().into(),
         percent(zero.rhp_probability),
