@@ -19,12 +19,17 @@ pub(super) fn bins(
     let high = (high_hz / bin_hz + 1e-6)
         .floor()
         .min(last_bin(samples) as f64) as usize;
-    if low > high {
-        return Err(IdentifyError::Band(format!(
-            "no frequency of this record lies between {low_hz} and {high_hz} Hz, its bins are {bin_hz} Hz apart and begin at {bin_hz} Hz: widen the band or use a longer record or segment"
-        )));
+    if low <= high {
+        Ok(low..=high)
+    } else {
+        Err(no_bin(band_hz, bin_hz))
     }
-    Ok(low..=high)
+}
+
+fn no_bin((low_hz, high_hz): (f64, f64), bin_hz: f64) -> IdentifyError {
+    IdentifyError::Band(format!(
+        "no frequency of this record lies between {low_hz} and {high_hz} Hz, its bins are {bin_hz} Hz apart and begin at {bin_hz} Hz: widen the band or use a longer record or segment"
+    ))
 }
 
 /// The highest bin below the Nyquist frequency.

@@ -59,10 +59,9 @@ impl Phase {
 }
 
 fn phases(measured: &Frf, model: &[Complex<f64>], max_hz: f64) -> Vec<Phase> {
-    let usable = |k: &usize| measured.frequency_hz[*k] <= max_hz;
     let count = model.len().min(measured.len());
     (0..count)
-        .filter(usable)
+        .filter(|k| measured.frequency_hz[*k] <= max_hz)
         .filter_map(|k| phase(measured, k, model[k]))
         .collect()
 }
@@ -84,14 +83,18 @@ fn coarse(phases: &[Phase]) -> Option<f64> {
     let max_rad_s = phases.iter().map(|p| p.omega_rad_s).fold(0.0, f64::max);
     let step_s = std::f64::consts::PI / (4.0 * max_rad_s);
     let steps = (MAX_DELAY_S / step_s).ceil() as i64;
-    let alignment = |tau_s: f64| {
-        phases
-            .iter()
-            .map(|p| p.weight * p.residual(tau_s).cos())
-            .sum::<f64>()
-    };
     let candidates = (-steps..=steps).map(|step| step as f64 * step_s);
-    candidates.max_by(|a, b| alignment(*a).total_cmp(&alignment(*b)))
+    let aligned = candidates.map(|tau_s| (alignment(phases, tau_s), tau_s));
+    let best = aligned.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(best.1)
+}
+
+/// The weighted sum of the cosines of the residual phases: largest where the delay explains the phases.
+fn alignment(phases: &[Phase], tau_s: f64) -> f64 {
+    phases
+        .iter()
+        .map(|phase| phase.weight * phase.residual(tau_s).cos())
+        .sum()
 }
 
 /// The change of tau by weighted least squares.

@@ -84,16 +84,22 @@ pub fn names(path: &Path) -> Result<Vec<String>, ExternalCsvError> {
 /// The most frequent separator in the first line: comma, semicolon or tab.
 fn separator(text: &[u8]) -> u8 {
     let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let count = |separator: &u8| first.iter().filter(|byte| *byte == separator).count();
     [b'\t', b';', b',']
         .into_iter()
-        .max_by_key(count)
+        .max_by_key(|separator| first.iter().filter(|byte| *byte == separator).count())
         .unwrap_or(b',')
 }
 
 struct Table<'a> {
     path: &'a Path,
     text: Vec<u8>,
+}
+
+/// The selected columns of a table.
+struct Selection<'a> {
+    names: &'a [&'a str],
+    /// Indices in a row of the file.
+    indices: Vec<usize>,
 }
 
 /// Columns of numbers, with the line of each row in the file.
@@ -142,20 +148,33 @@ impl Table<'_> {
         let mut reader = self.reader();
         let header = self.header(&mut reader)?;
         let indices = self.column_indices(&header, names)?;
+        let selection = Selection { names, indices };
         let mut numbers = Numbers {
             lines: Vec::new(),
             values: vec![Vec::new(); names.len()],
         };
         for record in reader.records() {
             let record = record.map_err(|error| self.not_a_table(&error))?;
-            let line = record.position().map_or(0, csv::Position::line);
-            numbers.lines.push(line);
-            for ((values, index), name) in numbers.values.iter_mut().zip(&indices).zip(names) {
-                let text = record.get(*index).unwrap_or_default();
-                values.push(self.number(text, line, name)?);
-            }
+            self.push_row(&record, &selection, &mut numbers)?;
         }
         Ok(numbers)
+    }
+
+    /// Appends the selected columns of a row.
+    fn push_row(
+        &self,
+        record: &csv::StringRecord,
+        selection: &Selection<'_>,
+        numbers: &mut Numbers,
+    ) -> Result<(), ExternalCsvError> {
+        let line = record.position().map_or(0, csv::Position::line);
+        numbers.lines.push(line);
+        let columns = selection.indices.iter().zip(selection.names);
+        for (values, (index, name)) in numbers.values.iter_mut().zip(columns) {
+            let text = record.get(*index).unwrap_or_default();
+            values.push(self.number(text, line, name)?);
+        }
+        Ok(())
     }
 
     fn column_indices(
@@ -163,8 +182,8 @@ impl Table<'_> {
         header: &csv::StringRecord,
         names: &[&str],
     ) -> Result<Vec<usize>, ExternalCsvError> {
-        let duplicate = |(k, name): &(usize, &&str)| names[..*k].contains(*name);
-        if let Some((_, name)) = names.iter().enumerate().find(duplicate) {
+        let duplicate = (1..names.len()).find(|k| names[..*k].contains(&names[*k]));
+        if let Some(name) = duplicate.map(|k| names[k]) {
             return Err(ExternalCsvError::Columns(format!(
                 "`{name}` is selected twice; input, output and time must be different columns"
             )));
@@ -182,18 +201,17 @@ impl Table<'_> {
     ) -> Result<usize, ExternalCsvError> {
         let path = self.path.display();
         let mut matches = (0..header.len()).filter(|index| &header[*index] == name);
-        match (matches.next(), matches.next()) {
-            (Some(index), None) => Ok(index),
-            (Some(_), Some(_)) => Err(ExternalCsvError::Columns(format!(
-                "{path} has more than one column `{name}`; give each a name of its own"
-            ))),
+        let why = match (matches.next(), matches.next()) {
+            (Some(index), None) => return Ok(index),
+            (Some(_), Some(_)) => {
+                format!("{path} has more than one column `{name}`; give each a name of its own")
+            }
             (None, _) => {
                 let available = header.iter().collect::<Vec<_>>().join(", ");
-                Err(ExternalCsvError::Columns(format!(
-                    "{path} has no column `{name}`; its columns are {available}"
-                )))
+                format!("{path} has no column `{name}`; its columns are {available}")
             }
-        }
+        };
+        Err(ExternalCsvError::Columns(why))
     }
 
     fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, ExternalCsvError> {
@@ -220,23 +238,35 @@ impl Table<'_> {
                 time_s.len()
             )));
         };
+        self.check_rising(column, time_s, lines)?;
         let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        if let Some(k) = steps_s.iter().position(|step_s| *step_s <= 0.0) {
-            let what = format!(
-                "the time {} s in column `{column}` is not after the previous time of {} s; sort the lines, or cut the file there",
-                time_s[k + 1],
-                time_s[k]
-            );
-            return Err(self.invalid_line(lines[k + 1], &what));
-        }
         self.check_regular(&steps_s, lines)?;
         Ok(steps_s.len() as f64 / (last_s - first_s))
     }
 
+    fn check_rising(
+        &self,
+        column: &str,
+        time_s: &[f64],
+        lines: &[u64],
+    ) -> Result<(), ExternalCsvError> {
+        let mut steps = time_s.windows(2);
+        let Some(k) = steps.position(|pair| pair[1] - pair[0] <= 0.0) else {
+            return Ok(());
+        };
+        let what = format!(
+            "the time {} s in column `{column}` is not after the previous time of {} s; sort the lines, or cut the file there",
+            time_s[k + 1],
+            time_s[k]
+        );
+        Err(self.invalid_line(lines[k + 1], &what))
+    }
+
     fn check_regular(&self, steps_s: &[f64], lines: &[u64]) -> Result<(), ExternalCsvError> {
         let median_s = median(steps_s);
-        let irregular = |step_s: &f64| (step_s - median_s).abs() > MAX_IRREGULARITY * median_s;
-        let Some(k) = steps_s.iter().position(irregular) else {
+        let limit_s = MAX_IRREGULARITY * median_s;
+        let mut deviations_s = steps_s.iter().map(|step_s| (step_s - median_s).abs());
+        let Some(k) = deviations_s.position(|deviation_s| deviation_s > limit_s) else {
             return Ok(());
         };
         let what = format!(

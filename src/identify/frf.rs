@@ -108,13 +108,11 @@ impl Frf {
 
     /// The response with a delay removed from its phases: H exp(j w delay).
     pub fn without_delay(&self, delay_s: f64) -> Frf {
-        let advance =
-            |(f, h): (&f64, &Complex<f64>)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s);
         let response = self
             .frequency_hz
             .iter()
             .zip(&self.response)
-            .map(advance)
+            .map(|(f, h)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s))
             .collect();
         Frf {
             response,

@@ -105,7 +105,9 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     let mut frf = Frf::default();
     for record in reader.records() {
         let record = record.map_err(|error| FrfCsvError::Format(error.to_string()))?;
-        push_row(&record, &mut frf).ok_or_else(|| invalid_row(&record))?;
+        finite_numbers(&record)
+            .and_then(|numbers| push_row(numbers, &mut frf))
+            .ok_or_else(|| invalid_row(&record))?;
     }
     Ok(frf)
 }
@@ -118,28 +120,28 @@ fn invalid_row(record: &csv::StringRecord) -> FrfCsvError {
     ))
 }
 
-fn push_row(record: &csv::StringRecord, frf: &mut Frf) -> Option<()> {
-    let numbers: Vec<f64> = record
-        .iter()
-        .map(|field| field.parse().ok())
-        .collect::<Option<_>>()?;
-    let numbers: [f64; COLUMNS] = numbers.try_into().ok()?;
-    let [
-        frequency,
-        magnitude,
-        phase_deg,
-        coherence,
-        magnitude_sigma,
-        phase_sigma_deg,
-        resolution,
-    ] = numbers;
-    let rising = frf.frequency_hz.last().is_none_or(|last| frequency > *last);
-    if !rising || numbers.iter().any(|number| !number.is_finite()) {
+/// The numbers of a row, if there is one for each column and all are finite.
+fn finite_numbers(record: &csv::StringRecord) -> Option<[f64; COLUMNS]> {
+    let fields = record.iter().map(|field| field.parse().ok());
+    let numbers: Vec<f64> = fields.collect::<Option<_>>()?;
+    let finite = numbers.iter().all(|number| number.is_finite());
+    numbers.try_into().ok().filter(|_| finite)
+}
+
+/// Appends a row; `None` if its frequency is not above the one before.
+fn push_row(numbers: [f64; COLUMNS], frf: &mut Frf) -> Option<()> {
+    let [frequency, magnitude, phase_deg, rest @ ..] = numbers;
+    let [coherence, magnitude_sigma, phase_sigma_deg, resolution] = rest;
+    if frf
+        .frequency_hz
+        .last()
+        .is_some_and(|last| frequency <= *last)
+    {
         return None;
     }
+    let response = Complex::from_polar(magnitude, phase_deg.to_radians());
     frf.frequency_hz.push(frequency);
-    frf.response
-        .push(Complex::from_polar(magnitude, phase_deg.to_radians()));
+    frf.response.push(response);
     frf.coherence.push(coherence);
     frf.magnitude_sigma.push(magnitude_sigma);
     frf.phase_sigma_rad.push(phase_sigma_deg.to_radians());

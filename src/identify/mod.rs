@@ -31,6 +31,7 @@ mod fft;
 mod frf;
 pub mod frf_csv;
 mod local_model;
+mod mean;
 pub mod modal;
 mod multisine_lines;
 pub mod repeated;

@@ -22,6 +22,8 @@ pub fn mean(signals: &Signals, length: usize, count: usize) -> Signals {
 }
 
 fn mean_of(samples: &[f64], length: usize, count: usize) -> Vec<f64> {
-    let sum = |n: usize| (0..count).map(|r| samples[r * length + n]).sum::<f64>();
-    (0..length).map(|n| sum(n) / count as f64).collect()
+    (0..length)
+        .map(|n| samples[n..].iter().step_by(length).take(count))
+        .map(|repetitions| repetitions.sum::<f64>() / count as f64)
+        .collect()
 }

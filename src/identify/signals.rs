@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use super::IdentifyError;
+use super::mean::mean;
 
 /// A shorter record has too few neighbouring bins to separate a response from noise.
 const MIN_SAMPLES: usize = 64;
@@ -67,17 +68,18 @@ impl Signals {
 
     fn check_motion(&self) -> Result<(), IdentifyError> {
         let samples = self.len();
-        if let Some(value) = constant_value(&self.input_a) {
-            return Err(IdentifyError::Signals(format!(
+        let why = if let Some(value) = constant_value(&self.input_a) {
+            format!(
                 "the input is {value} A at every one of {samples} samples: nothing was excited; check that the amplifier was enabled and that the excitation is not zero"
-            )));
-        }
-        if let Some(value) = constant_value(&self.output_m) {
-            return Err(IdentifyError::Signals(format!(
+            )
+        } else if let Some(value) = constant_value(&self.output_m) {
+            format!(
                 "the output is {value} m at every one of {samples} samples: the probe did not see the stage; check its range, its cable and its validity flag"
-            )));
-        }
-        Ok(())
+            )
+        } else {
+            return Ok(());
+        };
+        Err(IdentifyError::Signals(why))
     }
 
     /// The output minus the straight line through its rest positions before and after the excitation, in metres.
@@ -88,8 +90,10 @@ impl Signals {
     /// one after it (when the stage has rung out) give d. Without both intervals only the mean is subtracted.
     pub(super) fn output_without_drift_m(&self) -> Vec<f64> {
         let (offset, slope) = self.drift();
-        let subtract = |(k, y): (usize, &f64)| y - offset - slope * k as f64;
-        self.output_m.iter().enumerate().map(subtract).collect()
+        let output_m = self.output_m.iter().enumerate();
+        output_m
+            .map(|(k, y)| y - offset - slope * k as f64)
+            .collect()
     }
 
     /// Offset in metres and slope in metres per sample of the drift.
@@ -141,9 +145,7 @@ pub(super) fn check_min_samples(samples: usize, min: usize) -> Result<(), Identi
 }
 
 fn check_samples(column: &str, samples: &[f64]) -> Result<(), IdentifyError> {
-    // A comparison with NaN is false, so NaN is rejected.
-    let valid = |sample: &f64| sample.abs() <= MAX_SAMPLE;
-    let Some(index) = samples.iter().position(|sample| !valid(sample)) else {
+    let Some(index) = samples.iter().position(|sample| !is_valid(*sample)) else {
         return Ok(());
     };
     Err(IdentifyError::Signals(format!(
@@ -152,14 +154,15 @@ fn check_samples(column: &str, samples: &[f64]) -> Result<(), IdentifyError> {
     )))
 }
 
+/// Whether a sample is within the limit; NaN is not, as a comparison with it is false.
+fn is_valid(sample: f64) -> bool {
+    sample.abs() <= MAX_SAMPLE
+}
+
 /// The value of all samples, if they are all equal.
 fn constant_value(samples: &[f64]) -> Option<f64> {
     let first = *samples.first()?;
     samples.iter().all(|s| *s == first).then_some(first)
-}
-
-fn mean(samples: &[f64]) -> f64 {
-    samples.iter().sum::<f64>() / samples.len() as f64
 }
 
 /// Middle index and mean of a range of samples.

@@ -14,6 +14,7 @@ use nalgebra::Complex;
 use super::error::check_setting;
 use super::estimator::from_h1;
 use super::fft::RealFft;
+use super::mean::mean;
 use super::signals::check_min_samples;
 use super::{Estimator, Frf, FrfPoint, IdentifyError, Signals, band};
 
@@ -141,7 +142,7 @@ impl Sums {
     }
 
     fn windowed(&self, samples: &[f64]) -> Vec<Complex<f64>> {
-        let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+        let mean = mean(samples);
         let mut windowed: Vec<f64> = samples
             .iter()
             .zip(&self.window)

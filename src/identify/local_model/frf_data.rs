@@ -60,19 +60,16 @@ pub(super) fn of_spectra(
         min_half_width_bins: settings.min_half_width_bins,
         ..EstimatorSettings::default()
     };
-    let floor = NoiseFloor::new(
-        spectra,
-        (*bins.start() as f64, *bins.end() as f64),
-        &noise_settings,
-    );
-    let noise_power = |block: &RangeInclusive<usize>| {
-        let middle = 0.5 * (block.start() + block.end()) as f64;
-        floor.power(middle, noise_settings.half_width(middle, spectra.bin_hz()))
-    };
+    let ends = (*bins.start() as f64, *bins.end() as f64);
+    let floor = NoiseFloor::new(spectra, ends, &noise_settings);
     blocks(bins)
-        .into_iter()
-        .filter_map(|block| datum(spectra, &block, noise_power(&block)))
+        .iter()
+        .filter_map(|block| datum(spectra, block, floor.power(middle(block))))
         .collect()
+}
+
+fn middle(block: &RangeInclusive<usize>) -> f64 {
+    0.5 * (block.start() + block.end()) as f64
 }
 
 /// Ranges of neighbouring bins.
@@ -101,23 +98,28 @@ fn datum(
         response: output / input,
         variance: noise_power * instrument_power / input.norm_sqr(),
     };
-    let valid =
-        datum.variance > 0.0 && datum.variance.is_finite() && datum.response.norm().is_finite();
-    (valid && centre.is_finite()).then_some(datum)
+    (is_usable(&datum) && centre.is_finite()).then_some(datum)
+}
+
+fn is_usable(datum: &FrfDatum) -> bool {
+    datum.variance > 0.0 && datum.variance.is_finite() && datum.response.norm().is_finite()
 }
 
 /// Mean and standard deviation of the bins of a block, weighted with |U conj(R)|.
 fn moments(spectra: &impl Spectra, block: &RangeInclusive<usize>) -> (f64, f64) {
-    let weight = |k: usize| spectra.input_cross(k).norm();
-    let total = block.clone().map(weight).sum::<f64>();
+    let bins = block.clone();
+    let weighted: Vec<(f64, f64)> = bins
+        .map(|k| (spectra.input_cross(k).norm(), k as f64))
+        .collect();
     let low = *block.start() as f64;
-    let mean_offset = block
-        .clone()
-        .map(|k| weight(k) * (k as f64 - low))
-        .sum::<f64>()
-        / total;
-    let centre = low + mean_offset;
-    let square = |k: usize| weight(k) * ((k as f64 - centre) * (k as f64 - centre));
-    let variance = block.clone().map(square).sum::<f64>() / total;
+    let centre = low + weighted_mean(&weighted, |bin| bin - low);
+    let variance = weighted_mean(&weighted, |bin| (bin - centre) * (bin - centre));
     (centre, variance.sqrt())
+}
+
+/// The mean of a function of the bins, each with its weight.
+fn weighted_mean(weighted: &[(f64, f64)], value: impl Fn(f64) -> f64) -> f64 {
+    let total: f64 = weighted.iter().map(|(weight, _)| weight).sum();
+    let terms = weighted.iter().map(|(weight, bin)| weight * value(*bin));
+    terms.sum::<f64>() / total
 }

@@ -93,20 +93,10 @@ fn estimate_bins(
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
 ) -> Result<JointEstimate, IdentifyError> {
-    let ReferenceResponses {
-        command,
-        position,
-        error,
-    } = responses;
+    let (position, error) = (&responses.position, &responses.error);
     let positions = settings.positions(bins, band_hz, position.bin_hz());
-    let plant = Ratio {
-        input: command,
-        output: position,
-    };
-    let loop_gain = Ratio {
-        input: error,
-        output: position,
-    };
+    let plant = responses.position_over(&responses.command);
+    let loop_gain = responses.position_over(error);
     Ok(JointEstimate {
         plant: collect(h1(&plant, &positions, settings)),
         frf_data: non_empty(of_spectra(&plant, bins, settings), band_hz)?,
@@ -131,20 +121,25 @@ impl ReferenceResponses {
         }: &LoopSignals,
     ) -> Self {
         let fft = RealFft::new(signals.len());
-        let spectrum = |samples: &[f64]| fft.below_nyquist(samples.to_vec());
-        let reference = spectrum(reference_m);
-        let position = spectrum(&signals.output_m);
-        let error = reference
-            .iter()
-            .zip(&position)
-            .map(|(r, y)| r - y)
-            .collect();
+        let reference = fft.below_nyquist(reference_m.clone());
+        let command = fft.below_nyquist(signals.input_a.clone());
+        let position = fft.below_nyquist(signals.output_m.clone());
+        let difference = reference.iter().zip(&position).map(|(r, y)| r - y);
+        let error = difference.collect();
         let bin_hz = signals.rate_hz / signals.len() as f64;
-        let from_reference = |output| RecordSpectra::new(reference.clone(), output, bin_hz);
+        let [command, position, error] = [command, position, error]
+            .map(|output| RecordSpectra::new(reference.clone(), output, bin_hz));
         Self {
-            command: from_reference(spectrum(&signals.input_a)),
-            position: from_reference(position),
-            error: from_reference(error),
+            command,
+            position,
+            error,
+        }
+    }
+
+    fn position_over<'a>(&'a self, input: &'a RecordSpectra) -> Ratio<'a> {
+        Ratio {
+            input,
+            output: &self.position,
         }
     }
 }
@@ -220,13 +215,14 @@ impl Side {
     }
 }
 
-/// Contribution of one bin to a ratio.
+/// Contribution of one bin to a ratio, or the sum over bins.
+#[derive(Default)]
 struct Contribution {
-    /// Error of the ratio, times X_0, for noise of 1.
-    error: Complex<f64>,
-    /// v, weighted.
-    residual: Complex<f64>,
-    /// E|v|^2 for noise of power 1, without its weight.
+    /// |error of the ratio, times X_0|^2 for noise of power 1, weighted.
+    noise_gain: f64,
+    /// |v|^2, weighted.
+    residual_power: f64,
+    /// E|v|^2 for noise of power 1, weighted.
     freedom: f64,
 }
 
@@ -234,33 +230,44 @@ struct Contribution {
 fn ratio_fit(input: &Side, output: &Side) -> Option<LocalFit> {
     let (denominator, numerator) = (input.model.fit, output.model.fit);
     let response = numerator.response / denominator.response;
-    let (mut noise_gain, mut residual_power, mut freedom) = (0.0, 0.0, 0.0);
-    let window = &output.window;
-    for j in (0..window.len()).filter(|j| window.input[*j].norm_sqr() > 0.0) {
-        let weight = window.root_weight[j] * window.root_weight[j];
-        let bin = contribution(input, output, response, j);
-        noise_gain += weight * bin.error.norm_sqr();
-        residual_power += bin.residual.norm_sqr();
-        freedom += weight * bin.freedom;
-    }
-    noise_gain /= denominator.response.norm_sqr();
-    let valid = noise_gain.is_finite() && residual_power.is_finite() && freedom > 0.0;
+    let sum = Contribution::over_bins(input, output, response);
+    let noise_gain = sum.noise_gain / denominator.response.norm_sqr();
+    let valid = noise_gain.is_finite() && sum.residual_power.is_finite() && sum.freedom > 0.0;
     valid.then_some(LocalFit {
         response,
         noise_gain,
-        residual_power,
-        freedom,
+        residual_power: sum.residual_power,
+        freedom: sum.freedom,
         ..numerator
     })
 }
 
-fn contribution(input: &Side, output: &Side, ratio: Complex<f64>, j: usize) -> Contribution {
-    let (x, t) = (input.response(j), output.response(j));
-    let s = -t + 1.0;
-    let (input, output) = (&input.model.linear, &output.model.linear);
-    Contribution {
-        error: output.gradient[j] * s + ratio * input.gradient[j] * x,
-        residual: output.residual[j] - t / x * input.residual[j],
-        freedom: 1.0 - (s * output.leverage[j] + t * input.leverage[j]).re,
+impl Contribution {
+    /// The sum over the bins that have a reference.
+    fn over_bins(input: &Side, output: &Side, ratio: Complex<f64>) -> Contribution {
+        let reference = &output.window.input;
+        let mut sum = Contribution::default();
+        for j in (0..reference.len()).filter(|j| reference[*j].norm_sqr() > 0.0) {
+            let bin = Contribution::of_bin(input, output, ratio, j);
+            sum.noise_gain += bin.noise_gain;
+            sum.residual_power += bin.residual_power;
+            sum.freedom += bin.freedom;
+        }
+        sum
+    }
+
+    fn of_bin(input: &Side, output: &Side, ratio: Complex<f64>, j: usize) -> Contribution {
+        let weight = output.window.root_weight[j] * output.window.root_weight[j];
+        let (x, t) = (input.response(j), output.response(j));
+        let s = -t + 1.0;
+        let (input, output) = (&input.model.linear, &output.model.linear);
+        let error = output.gradient[j] * s + ratio * input.gradient[j] * x;
+        let residual = output.residual[j] - t / x * input.residual[j];
+        let leverage = (s * output.leverage[j] + t * input.leverage[j]).re;
+        Contribution {
+            noise_gain: weight * error.norm_sqr(),
+            residual_power: residual.norm_sqr(),
+            freedom: weight * (1.0 - leverage),
+        }
     }
 }

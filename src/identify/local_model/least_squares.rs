@@ -25,8 +25,22 @@ pub(super) fn solve(
     mut columns: Vec<Vec<Complex<f64>>>,
     mut right: Vec<Complex<f64>>,
 ) -> Option<LeastSquares> {
+    let upper = orthogonalize(&mut columns, &mut right)?;
+    Some(LeastSquares {
+        solution: back_substitution(&upper),
+        residual: right,
+        gradient: gradient(&columns, &upper),
+        leverage: leverage(&columns),
+    })
+}
+
+/// Replaces the columns by Q and the right side by the residual. Returns R of columns = Q R, row by row, with Q* right as its
+/// last column.
+fn orthogonalize(
+    columns: &mut [Vec<Complex<f64>>],
+    right: &mut [Complex<f64>],
+) -> Option<Vec<Vec<Complex<f64>>>> {
     let count = columns.len();
-    // R of columns = Q R, row by row, with Q* right as its last column.
     let mut upper = vec![vec![Complex::default(); count + 1]; count];
     for d in 0..count {
         let (done, rest) = columns.split_at_mut(d + 1);
@@ -36,14 +50,9 @@ pub(super) fn solve(
         for (e, column) in rest.iter_mut().enumerate() {
             upper[d][d + 1 + e] = subtract_projection(q, column);
         }
-        upper[d][count] = subtract_projection(q, &mut right);
+        upper[d][count] = subtract_projection(q, right);
     }
-    Some(LeastSquares {
-        solution: back_substitution(&upper),
-        residual: right,
-        gradient: gradient(&columns, &upper),
-        leverage: leverage(&columns),
-    })
+    Some(upper)
 }
 
 /// Scales a column to length 1 and returns its length; `None` if too little remains beside the part removed before.
@@ -93,8 +102,9 @@ fn gradient(q: &[Vec<Complex<f64>>], upper: &[Vec<Complex<f64>>]) -> Vec<Complex
         };
         row[d] = (one - known) / upper[d][d];
     }
-    let entry = |j: usize| row.iter().zip(q).map(|(v, q)| v * q[j].conj()).sum();
-    (0..q[0].len()).map(entry).collect()
+    (0..q[0].len())
+        .map(|j| row.iter().zip(q).map(|(v, q)| v * q[j].conj()).sum())
+        .collect()
 }
 
 fn leverage(q: &[Vec<Complex<f64>>]) -> Vec<f64> {

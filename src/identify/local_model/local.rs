@@ -85,14 +85,12 @@ fn estimates(
     positions: &[f64],
     settings: &EstimatorSettings,
 ) -> Vec<Option<FrfPoint>> {
-    let h1 = || h1(spectra, positions, settings);
-    let h2 = || h2(spectra, positions, settings);
     match settings.estimator {
-        Estimator::H1 => h1(),
-        Estimator::H2 => h2(),
-        Estimator::Hv => h1()
+        Estimator::H1 => h1(spectra, positions, settings),
+        Estimator::H2 => h2(spectra, positions, settings),
+        Estimator::Hv => h1(spectra, positions, settings)
             .into_iter()
-            .zip(h2())
+            .zip(h2(spectra, positions, settings))
             .map(|(h1, h2)| Some(hv(h1?, h2?)))
             .collect(),
     }
@@ -131,25 +129,30 @@ fn point(
     spectra: &impl Spectra,
     position: f64,
     settings: &EstimatorSettings,
-    floor: &NoiseFloor,
+    floor: &NoiseFloor<'_>,
 ) -> Option<FrfPoint> {
     let half_width = settings.half_width(position, spectra.bin_hz());
-    let fit = spectra
-        .fit(position, half_width, settings)
-        .filter(|fit| fit.encloses_input)?;
+    let fit = spectra.fit(position, half_width, settings)?;
+    if !fit.encloses_input {
+        return None;
+    }
     let wider = spectra.fit(position, 2.0 * half_width, settings)?;
-    // The bias grows with the square of the half-width, or with its fourth power.
-    let bias_ratio = if settings.curve == LocalModel::Constant {
-        3.0
-    } else {
-        15.0
-    };
-    let bias = (wider.response - fit.response) / bias_ratio;
+    let bias = (wider.response - fit.response) / bias_ratio(settings.curve);
     Some(FrfPoint {
         frequency_hz: position * spectra.bin_hz(),
         response: fit.response,
         coherence: fit.coherence,
-        variance: floor.power(position, half_width) * fit.noise_gain + bias.norm_sqr(),
+        variance: floor.power(position) * fit.noise_gain + bias.norm_sqr(),
         resolution_hz: fit.bandwidth_bins * spectra.bin_hz(),
     })
+}
+
+/// Change of the estimate with twice the half-width over its bias, which grows with the square of the half-width or with its
+/// fourth power.
+fn bias_ratio(model: LocalModel) -> f64 {
+    if model == LocalModel::Constant {
+        3.0
+    } else {
+        15.0
+    }
 }

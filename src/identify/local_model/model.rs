@@ -53,10 +53,9 @@ pub(super) fn fit(window: &Window, settings: &EstimatorSettings) -> Option<Fitte
     if settings.curve != LocalModel::Rational || degree < 2 {
         return Some(polynomial);
     }
-    let rational = rational(window, transient, &polynomial.fit);
-    let significant =
-        |rational: &FittedModel| f_statistic(&polynomial.fit, &rational.fit) > SIGNIFICANT_F;
-    Some(rational.filter(significant).unwrap_or(polynomial))
+    let rational = rational(window, transient, &polynomial.fit)
+        .filter(|rational| f_statistic(&polynomial.fit, &rational.fit) > SIGNIFICANT_F);
+    Some(rational.unwrap_or(polynomial))
 }
 
 /// Fisher's F: the power explained by the pole over that of the remaining noise.
@@ -148,31 +147,29 @@ fn linearized(
 ) -> Option<LeastSquares> {
     let inverse = inverse_denominator(window, pole)?;
     let mut columns = window.numerators(2, transient, &inverse);
-    let model: Vec<Complex<f64>> = (0..window.len())
-        .map(|j| {
-            columns
-                .iter()
-                .zip(numerator)
-                .map(|(column, b)| column[j] * b)
-                .sum()
-        })
-        .collect();
-    columns.push(
-        (0..model.len())
-            .map(|j| -model[j] * inverse[j] * window.x[j])
-            .collect(),
-    );
+    let model = combination(&columns, numerator);
+    let by_pole = (0..model.len()).map(|j| -model[j] * inverse[j] * window.x[j]);
+    columns.push(by_pole.collect());
     let error = (0..model.len())
         .map(|j| window.output[j] * window.root_weight[j] - model[j])
         .collect();
     least_squares::solve(columns, error)
 }
 
+/// sum over i of `column_i` b_i.
+fn combination(columns: &[Vec<Complex<f64>>], b: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let rows = columns.first().map_or(0, Vec::len);
+    (0..rows)
+        .map(|j| columns.iter().zip(b).map(|(column, b)| column[j] * b).sum())
+        .collect()
+}
+
 /// 1/(1 + a x) at each bin; `None` if the pole is at one.
 fn inverse_denominator(window: &Window, a: Complex<f64>) -> Option<Vec<Complex<f64>>> {
-    let inverse = |x: &f64| {
-        let denominator = a * *x + 1.0;
-        (denominator.norm() > MIN_POLE_DISTANCE * a.norm()).then(|| denominator.inv())
-    };
-    window.x.iter().map(inverse).collect()
+    let denominators = window.x.iter().map(|x| a * *x + 1.0);
+    denominators
+        .map(|denominator| {
+            (denominator.norm() > MIN_POLE_DISTANCE * a.norm()).then(|| denominator.inv())
+        })
+        .collect()
 }

@@ -49,15 +49,16 @@ impl RecordSpectra {
 
     /// The spectra from output to input, at the bins that have input.
     pub(super) fn swapped(&self) -> Self {
-        let excited = |(u, y): (&Complex<f64>, &Complex<f64>)| {
+        let bins = self.input.iter().zip(&self.output);
+        let excited = bins.map(|(u, y)| {
             if u.norm_sqr() > 0.0 {
                 *y
             } else {
                 Complex::default()
             }
-        };
+        });
         Self {
-            input: self.input.iter().zip(&self.output).map(excited).collect(),
+            input: excited.collect(),
             output: self.input.clone(),
             bin_hz: self.bin_hz,
         }

@@ -41,25 +41,19 @@ impl Window {
 
     /// Whether there is input in the middle, or on both sides of it: no estimate beyond the outermost excited bin.
     pub(super) fn encloses_input(&self) -> bool {
-        let excited = || {
-            self.x
-                .iter()
-                .zip(&self.input)
-                .filter(|(_, u)| u.norm_sqr() > 0.0)
-                .map(|(x, _)| *x)
-        };
-        excited().any(|x| x <= 0.0) && excited().any(|x| x >= 0.0)
+        self.excited_x().any(|x| x <= 0.0) && self.excited_x().any(|x| x >= 0.0)
+    }
+
+    /// The distances of the bins that have input.
+    fn excited_x(&self) -> impl Iterator<Item = f64> {
+        let excited = self.x.iter().zip(&self.input);
+        excited.filter(|(_, u)| u.norm_sqr() > 0.0).map(|(x, _)| *x)
     }
 
     /// The ratio of the output's power that the model explains; 0 without output.
     pub(super) fn coherence(&self, residual_power: f64) -> f64 {
-        let weighted = |(y, root): (&Complex<f64>, &f64)| y.norm_sqr() * root * root;
-        let power: f64 = self
-            .output
-            .iter()
-            .zip(&self.root_weight)
-            .map(weighted)
-            .sum();
+        let output = self.output.iter().zip(&self.root_weight);
+        let power: f64 = output.map(|(y, root)| y.norm_sqr() * root * root).sum();
         if power > 0.0 {
             1.0 - residual_power / power
         } else {
@@ -70,11 +64,11 @@ impl Window {
     /// The highest degree for which more than twice as many bins are excited as there are unknowns.
     pub(super) fn degree(&self, model: LocalModel, transient: bool) -> usize {
         let max_degree = if model == LocalModel::Constant { 0 } else { 2 };
-        let excited = self.input.iter().filter(|u| u.norm_sqr() > 0.0).count();
-        let unknowns = |degree: usize| (degree + 1) * if transient { 2 } else { 1 };
+        let excited = self.excited_x().count();
+        let polynomials = if transient { 2 } else { 1 };
         (1..=max_degree)
             .rev()
-            .find(|degree| excited > 2 * unknowns(*degree))
+            .find(|degree| excited > 2 * (degree + 1) * polynomials)
             .unwrap_or(0)
     }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::Complex;
 
+use super::measurement_chain::Nodes;
 use super::parameters::ModalParameters;
 use super::solution::{Problem, Solution};
 use crate::identify::FrfDatum;
@@ -29,36 +30,59 @@ const MAX_DELAYS: f64 = 2000.0;
 /// Modes that would decrease chi^2, the best first, one for each candidate frequency, and a free body if there is none.
 pub(super) fn candidates(problem: Problem<'_>, solution: &Solution) -> Vec<ModalTerm> {
     let ModalParameters { modes, delay_s, .. } = &solution.parameters;
-    let nodes = problem.chain.nodes(*delay_s, problem.data);
-    let evaluated = |term: ModalTerm| {
-        let response = problem
-            .chain
-            .mode(term.omega_rad_s, term.damping_ratio, &nodes);
-        let (decrease, residue_per_kg) = projection(solution, problem.data, &response, 0.0);
-        (
-            decrease,
-            ModalTerm {
-                residue_per_kg,
-                ..term
-            },
-        )
+    let trials = Trials {
+        problem,
+        solution,
+        nodes: problem.chain.nodes(*delay_s, problem.data),
     };
-    let mut found: Vec<(f64, ModalTerm)> = Vec::new();
-    for index in largest_residuals(solution, problem.data) {
-        let omega_rad_s = problem.data[index].omega_rad_s();
-        let term = |damping_ratio| ModalTerm {
-            omega_rad_s,
-            damping_ratio,
-            residue_per_kg: 0.0,
-        };
-        let tried = DAMPING_RATIOS.map(|damping_ratio| evaluated(term(damping_ratio)));
-        found.extend(tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)));
-    }
+    let mut ranked: Vec<(f64, ModalTerm)> = largest_residuals(solution, problem.data)
+        .into_iter()
+        .filter_map(|index| trials.best_damping(problem.data[index].omega_rad_s()))
+        .collect();
     if modes.iter().all(|mode| mode.omega_rad_s > 0.0) {
-        found.push(evaluated(FREE_BODY));
+        ranked.push(trials.with_best_residue(FREE_BODY));
     }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found.into_iter().map(|(_, term)| term).collect()
+    best_first(ranked)
+}
+
+/// Modes added to a solution on trial.
+struct Trials<'a> {
+    problem: Problem<'a>,
+    solution: &'a Solution,
+    nodes: Nodes,
+}
+
+impl Trials<'_> {
+    /// The mode at a frequency with the damping ratio that decreases chi^2 most, and that decrease.
+    fn best_damping(&self, omega_rad_s: f64) -> Option<(f64, ModalTerm)> {
+        let trials = DAMPING_RATIOS.map(|damping_ratio| {
+            self.with_best_residue(ModalTerm {
+                omega_rad_s,
+                damping_ratio,
+                residue_per_kg: 0.0,
+            })
+        });
+        trials.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// A mode with its best residue, and the decrease of chi^2.
+    fn with_best_residue(&self, term: ModalTerm) -> (f64, ModalTerm) {
+        let chain = self.problem.chain;
+        let response = chain.mode(term.omega_rad_s, term.damping_ratio, &self.nodes);
+        let (decrease, residue_per_kg) =
+            projection(self.solution, self.problem.data, &response, 0.0);
+        let term = ModalTerm {
+            residue_per_kg,
+            ..term
+        };
+        (decrease, term)
+    }
+}
+
+/// Start values without their decreases of chi^2, the largest decrease first.
+fn best_first<T>(mut ranked: Vec<(f64, T)>) -> Vec<T> {
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.into_iter().map(|(_, start)| start).collect()
 }
 
 /// Start values for a first mode: the delays that decrease chi^2 most, each with its best residue.
@@ -67,32 +91,20 @@ pub(super) fn first_mode_starts(
     solution: &Solution,
     term: ModalTerm,
 ) -> Vec<ModalParameters> {
-    let nodes = problem.chain.nodes(0.0, problem.data);
-    let response = problem
-        .chain
-        .mode(term.omega_rad_s, term.damping_ratio, &nodes);
-    let start = |delay_s: f64| {
-        let (decrease, residue_per_kg) = projection(solution, problem.data, &response, delay_s);
-        let modes = vec![ModalTerm {
+    let Problem { chain, data } = problem;
+    let nodes = chain.nodes(0.0, data);
+    let response = chain.mode(term.omega_rad_s, term.damping_ratio, &nodes);
+    let starts = delays_s(data, term).map(|delay_s| {
+        let (decrease, residue_per_kg) = projection(solution, data, &response, delay_s);
+        let term = ModalTerm {
             residue_per_kg,
             ..term
-        }];
-        (
-            decrease,
-            ModalParameters {
-                modes,
-                delay_s,
-                ..ModalParameters::default()
-            },
-        )
-    };
-    let mut starts: Vec<(f64, ModalParameters)> = delays_s(problem.data, term).map(start).collect();
-    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        };
+        (decrease, ModalParameters::one_mode(term, delay_s))
+    });
+    let mut starts = best_first(starts.collect());
+    starts.truncate(TRIALS);
     starts
-        .into_iter()
-        .take(TRIALS)
-        .map(|(_, start)| start)
-        .collect()
 }
 
 /// Delays in seconds from minus a quarter to plus half a period of a mode.
@@ -107,22 +119,29 @@ fn delays_s(data: &[FrfDatum], term: ModalTerm) -> impl Iterator<Item = f64> {
 
 /// The data with the largest excess over the noise in each part of the band, the largest first.
 fn largest_residuals(solution: &Solution, data: &[FrfDatum]) -> Vec<usize> {
-    let without_model = solution.parameters.modes.is_empty();
-    let excess = |b: &usize| match without_model {
-        // Without a model, the largest velocity.
-        true => (data[*b].response * data[*b].frequency_hz).norm_sqr(),
-        false => solution.residual[*b].norm_sqr() / data[*b].variance,
-    };
+    let excess = excess_over_noise(solution, data);
     let size = data.len().div_ceil(BAND_PARTS);
     let parts = (0..data.len())
         .step_by(size)
         .map(|low| low..(low + size).min(data.len()));
     let mut largest: Vec<usize> = parts
-        .filter_map(|part| part.max_by(|a, b| excess(a).total_cmp(&excess(b))))
+        .filter_map(|part| part.max_by(|a, b| excess[*a].total_cmp(&excess[*b])))
         .collect();
-    largest.sort_by(|a, b| excess(b).total_cmp(&excess(a)));
+    largest.sort_by(|a, b| excess[*b].total_cmp(&excess[*a]));
     largest.truncate(MAX_FREQUENCIES);
     largest
+}
+
+/// The power of the residual over that of the noise for each datum; without a model, the squared velocity.
+fn excess_over_noise(solution: &Solution, data: &[FrfDatum]) -> Vec<f64> {
+    if solution.parameters.modes.is_empty() {
+        let velocities = data.iter().map(|datum| datum.response * datum.frequency_hz);
+        return velocities.map(|velocity| velocity.norm_sqr()).collect();
+    }
+    let residuals = solution.residual.iter().zip(data);
+    residuals
+        .map(|(residual, datum)| residual.norm_sqr() / datum.variance)
+        .collect()
 }
 
 /// The decrease of chi^2 by a response with a delay of `delay_s` and its best real factor, and that factor.

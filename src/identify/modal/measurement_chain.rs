@@ -19,8 +19,11 @@ pub enum MeasurementChain {
     Direct,
 }
 
-/// The frequencies at which the model of each datum is evaluated: two that have the datum's first three moments, or one.
-pub(super) struct Nodes(Vec<(Node, Option<Node>)>);
+/// The frequencies at which the model of each datum is evaluated.
+pub(super) struct Nodes(Vec<DatumNodes>);
+
+/// Two frequencies that have the first three moments of a datum, or one.
+struct DatumNodes(Node, Option<Node>);
 
 struct Node {
     s: Complex<f64>,
@@ -39,6 +42,31 @@ impl Node {
             delay: unit_phasor(-omega_rad_s * delay_s),
         }
     }
+
+    /// A response at this frequency, with the delay.
+    fn delayed(&self, response: impl Fn(&Node) -> Complex<f64>) -> Complex<f64> {
+        response(self) * self.delay
+    }
+}
+
+impl DatumNodes {
+    fn new(datum: &FrfDatum, period_s: f64, delay_s: f64) -> DatumNodes {
+        let (frequency_hz, spread_hz) = (datum.frequency_hz, datum.spread_hz);
+        if spread_hz == 0.0 {
+            return DatumNodes(Node::new(frequency_hz, period_s, delay_s), None);
+        }
+        let [low, high] = [frequency_hz - spread_hz, frequency_hz + spread_hz]
+            .map(|frequency_hz| Node::new(frequency_hz, period_s, delay_s));
+        DatumNodes(low, Some(high))
+    }
+
+    /// The mean of a response over the datum, with the delay.
+    fn mean(&self, response: impl Fn(&Node) -> Complex<f64>) -> Complex<f64> {
+        match &self.1 {
+            Some(other) => (self.0.delayed(&response) + other.delayed(&response)) * 0.5,
+            None => self.0.delayed(response),
+        }
+    }
 }
 
 /// exp(j angle).
@@ -50,12 +78,7 @@ fn unit_phasor(angle: f64) -> Complex<f64> {
 impl Nodes {
     /// The mean of a response over each datum, with the delay.
     fn mean(&self, response: impl Fn(&Node) -> Complex<f64>) -> Vec<Complex<f64>> {
-        let delayed = |node: &Node| response(node) * node.delay;
-        let mean = |(one, other): &(Node, Option<Node>)| match other {
-            Some(other) => (delayed(one) + delayed(other)) * 0.5,
-            None => delayed(one),
-        };
-        self.0.iter().map(mean).collect()
+        self.0.iter().map(|nodes| nodes.mean(&response)).collect()
     }
 }
 
@@ -67,19 +90,28 @@ impl MeasurementChain {
 
     /// The nodes of `data` for a model with the delay `delay_s`.
     pub(super) fn nodes(&self, delay_s: f64, data: &[FrfDatum]) -> Nodes {
-        let period_s = match self {
+        let period_s = self.period_s();
+        let nodes = data
+            .iter()
+            .map(|datum| DatumNodes::new(datum, period_s, delay_s));
+        Nodes(nodes.collect())
+    }
+
+    /// One node at each frequency.
+    pub(super) fn nodes_at(&self, delay_s: f64, frequency_hz: &[f64]) -> Nodes {
+        let period_s = self.period_s();
+        let nodes = frequency_hz
+            .iter()
+            .map(|frequency_hz| DatumNodes(Node::new(*frequency_hz, period_s, delay_s), None));
+        Nodes(nodes.collect())
+    }
+
+    /// Sampling period; 0 without sampling.
+    fn period_s(&self) -> f64 {
+        match self {
             MeasurementChain::Bench(settings) => settings.period_s,
             MeasurementChain::Direct => 0.0,
-        };
-        let node = |frequency_hz: f64| Node::new(frequency_hz, period_s, delay_s);
-        let nodes = |datum: &FrfDatum| match datum.spread_hz {
-            0.0 => (node(datum.frequency_hz), None),
-            spread_hz => (
-                node(datum.frequency_hz - spread_hz),
-                Some(node(datum.frequency_hz + spread_hz)),
-            ),
-        };
-        Nodes(data.iter().map(nodes).collect())
+        }
     }
 
     /// The response of a mode of residue 1 for each datum.

@@ -18,8 +18,10 @@ pub(super) fn merged(data: &[FrfDatum], model: &ModalParameters) -> Vec<FrfDatum
     let mut rest = data;
     while let Some(first) = rest.first() {
         let width_hz = max_width_hz(first, model);
-        let within = |datum: &&FrfDatum| datum.frequency_hz - first.frequency_hz <= width_hz;
-        let (group, remainder) = rest.split_at(rest.iter().take_while(within).count());
+        let within = rest
+            .iter()
+            .take_while(|datum| datum.frequency_hz - first.frequency_hz <= width_hz);
+        let (group, remainder) = rest.split_at(within.count());
         merged.push(mean(group));
         rest = remainder;
     }
@@ -42,24 +44,22 @@ fn pole(mode: &ModalTerm) -> Complex<f64> {
 
 /// The mean of some data, weighted with the inverse of their variances.
 fn mean(data: &[FrfDatum]) -> FrfDatum {
-    let weight: f64 = data.iter().map(|datum| 1.0 / datum.variance).sum();
-    let mean = |of: &dyn Fn(&FrfDatum) -> f64| {
-        data.iter()
-            .map(|datum| of(datum) / datum.variance)
-            .sum::<f64>()
-            / weight
-    };
-    let frequency_hz = mean(&|datum| datum.frequency_hz);
-    let square = |datum: &FrfDatum| {
+    let weight = weighted_sum(data, |_| 1.0);
+    let frequency_hz = weighted_sum(data, |datum| datum.frequency_hz) / weight;
+    let square = weighted_sum(data, |datum| {
         (datum.frequency_hz - frequency_hz).powi(2) + datum.spread_hz * datum.spread_hz
-    };
+    });
+    let re = weighted_sum(data, |datum| datum.response.re);
+    let im = weighted_sum(data, |datum| datum.response.im);
     FrfDatum {
         frequency_hz,
-        spread_hz: mean(&square).sqrt(),
-        response: Complex::new(
-            mean(&|datum| datum.response.re),
-            mean(&|datum| datum.response.im),
-        ),
+        spread_hz: (square / weight).sqrt(),
+        response: Complex::new(re / weight, im / weight),
         variance: 1.0 / weight,
     }
+}
+
+/// The sum of a value over its variance.
+fn weighted_sum(data: &[FrfDatum], value: impl Fn(&FrfDatum) -> f64) -> f64 {
+    data.iter().map(|datum| value(datum) / datum.variance).sum()
 }

@@ -34,6 +34,7 @@ pub(crate) use parameters::Parameter;
 pub use search::ModelOrder;
 
 use crate::identify::FrfDatum;
+use crate::identify::mean::mean_around;
 pub use crate::identify::{Estimate, SIGMAS_95};
 use merge::merged;
 use prune::pruned;
@@ -77,59 +78,53 @@ pub fn fit_with_progress(
     progress: &mut Progress<'_>,
 ) -> Result<ModalFit, FitError> {
     let [first, .., last] = data else {
-        return Err(FitError::TooFew {
-            frequencies: data.len(),
-        });
+        return Err(too_few(data));
     };
-    let band_hz = (first.frequency_hz, last.frequency_hz);
+    let (low_hz, high_hz) = (first.frequency_hz, last.frequency_hz);
     let orders = search::orders(Problem { chain, data }, &mut |done| {
         progress(SEARCH_PROGRESS * done)
     })?;
-    let best = orders.last().ok_or(FitError::NoMode {
-        low_hz: band_hz.0,
-        high_hz: band_hz.1,
-    })?;
+    let best = orders.last().ok_or(FitError::NoMode { low_hz, high_hz })?;
     report(progress, SEARCH_PROGRESS)?;
-    let mut start = best.parameters.clone();
-    start
-        .modes
-        .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
-    let data = &merged(data, &start);
-    if 2 * data.len() <= start.free().len() {
-        return Err(FitError::TooFew {
-            frequencies: data.len(),
-        });
-    }
-    let fit = final_fit(Problem { chain, data }, start)?;
+    let fit = ModalFit {
+        band_hz: (low_hz, high_hz),
+        ..final_fit(Problem { chain, data }, best.parameters.clone())?
+    };
     report(progress, 1.0)?;
-    Ok(ModalFit {
-        orders,
-        band_hz,
-        ..fit
-    })
+    Ok(ModalFit { orders, ..fit })
 }
 
-/// The fit of the needed modes, with the residual as noise.
+fn too_few(data: &[FrfDatum]) -> FitError {
+    FitError::TooFew {
+        frequencies: data.len(),
+    }
+}
+
+/// The fit of the needed modes, with the residual as noise; without orders and band.
 fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
+    let start = start.slowest_first();
+    let data = &merged(problem.data, &start);
+    if 2 * data.len() <= start.free().len() {
+        return Err(too_few(data));
+    }
+    let problem = Problem { data, ..problem };
     let start = pruned(problem, start);
     let parameters = start.free().len();
     let by_estimator = Solution::new(problem, start.clone());
-    let data = with_residual_noise(&by_estimator, problem.data, parameters);
+    let noisy = &with_residual_noise(&by_estimator, data, parameters);
     let solution = refine(
         Problem {
-            data: &data,
+            data: noisy,
             ..problem
         },
         start,
         0.0,
     );
     let modes = solution.parameters.modes.len();
-    let covariance = solution
-        .covariance(&data)
-        .ok_or(FitError::Undetermined { modes })?;
+    let undetermined = FitError::Undetermined { modes };
     Ok(ModalFit {
-        covariance,
-        chi2_per_freedom: by_estimator.chi2 / (2 * problem.data.len() - parameters) as f64,
+        covariance: solution.covariance(noisy).ok_or(undetermined)?,
+        chi2_per_freedom: by_estimator.chi2 / (2 * data.len() - parameters) as f64,
         orders: Vec::new(),
         parameters: solution.parameters,
         band_hz: (0.0, 0.0),
@@ -143,13 +138,10 @@ fn with_residual_noise(solution: &Solution, data: &[FrfDatum], parameters: usize
     let ratio: Vec<f64> = residual
         .map(|(e, datum)| e.norm_sqr() / datum.variance / freedom)
         .collect();
-    let with_noise = |(b, datum): (usize, &FrfDatum)| {
-        let near = &ratio[b.saturating_sub(NOISE_REACH)..(b + NOISE_REACH + 1).min(ratio.len())];
-        let mean = near.iter().sum::<f64>() / near.len() as f64;
-        FrfDatum {
-            variance: datum.variance * mean,
-            ..*datum
-        }
-    };
-    data.iter().enumerate().map(with_noise).collect()
+    let data = data.iter().enumerate();
+    data.map(|(b, datum)| FrfDatum {
+        variance: datum.variance * mean_around(&ratio, b, NOISE_REACH),
+        ..*datum
+    })
+    .collect()
 }

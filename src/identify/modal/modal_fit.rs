@@ -4,7 +4,6 @@ use nalgebra::{Complex, DMatrix};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
-use crate::identify::FrfDatum;
 use crate::model::plant::Sign;
 use crate::model::zeros::ModalTerm;
 
@@ -83,17 +82,16 @@ pub struct UncertainPole {
 impl ModalFit {
     /// The modes with their standard deviations, slowest first.
     pub fn modes(&self) -> Vec<FittedMode> {
-        let fitted = |(k, term): (usize, &ModalTerm)| FittedMode {
+        let modes = self.parameters.modes.iter().enumerate();
+        modes.map(|(k, term)| self.mode(k, term)).collect()
+    }
+
+    fn mode(&self, k: usize, term: &ModalTerm) -> FittedMode {
+        FittedMode {
             omega_rad_s: self.estimate(term.omega_rad_s, Parameter::Frequency(k)),
             damping_ratio: self.estimate(term.damping_ratio, Parameter::Damping(k)),
             residue_per_kg: self.estimate(term.residue_per_kg, Parameter::Residue(k)),
-        };
-        self.parameters
-            .modes
-            .iter()
-            .enumerate()
-            .map(fitted)
-            .collect()
+        }
     }
 
     /// The delay beyond that of the measurement chain, in seconds.
@@ -120,14 +118,7 @@ impl ModalFit {
     /// The response of the fit through `chain`, its delay included, at frequencies in hertz, in the unit of the fitted data
     /// (m/A through a bench, m/N directly).
     pub fn response(&self, chain: &MeasurementChain, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
-        let datum = |frequency_hz: &f64| FrfDatum {
-            frequency_hz: *frequency_hz,
-            spread_hz: 0.0,
-            response: Complex::new(0.0, 0.0),
-            variance: 1.0,
-        };
-        let points: Vec<FrfDatum> = frequency_hz.iter().map(datum).collect();
-        let nodes = chain.nodes(self.parameters.delay_s, &points);
+        let nodes = chain.nodes_at(self.parameters.delay_s, frequency_hz);
         let mut sum = chain.constant(&nodes);
         sum.iter_mut()
             .for_each(|h| *h *= self.parameters.remainder_m_per_n);
@@ -156,11 +147,13 @@ impl ModalFit {
         let indices = self
             .index(Parameter::Frequency(k))
             .zip(self.index(Parameter::Damping(k)));
-        let pole = |(s, derivatives)| UncertainPole {
-            s,
-            covariance: self.pole_covariance(indices, derivatives),
-        };
-        poles_with_derivatives(term).into_iter().map(pole).collect()
+        let poles = poles_with_derivatives(term).into_iter();
+        poles
+            .map(|(s, derivatives)| UncertainPole {
+                s,
+                covariance: self.pole_covariance(indices, derivatives),
+            })
+            .collect()
     }
 
     /// J cov J^T of a pair of parameters; zero if they are not free.
@@ -173,14 +166,14 @@ impl ModalFit {
             return [[0.0; 2]; 2];
         };
         let at = [omega, damping];
-        let product = |a: usize, b: usize| -> f64 {
-            let term = |i: usize, j: usize| {
-                derivatives[a][i] * self.covariance[(at[i], at[j])] * derivatives[b][j]
-            };
-            term(0, 0) + term(0, 1) + term(1, 0) + term(1, 1)
-        };
-        [0, 1].map(|a| [0, 1].map(|b| product(a, b)))
+        let covariance = at.map(|i| at.map(|j| self.covariance[(i, j)]));
+        derivatives.map(|a| derivatives.map(|b| quadratic_form(a, covariance, b)))
     }
+}
+
+/// a^T C b.
+fn quadratic_form(a: [f64; 2], c: [[f64; 2]; 2], b: [f64; 2]) -> f64 {
+    a[0] * c[0][0] * b[0] + a[0] * c[0][1] * b[1] + a[1] * c[1][0] * b[0] + a[1] * c[1][1] * b[1]
 }
 
 /// Each pole of a mode with d(Re s, Im s)/d(w, zeta).
@@ -191,11 +184,13 @@ fn poles_with_derivatives(term: &ModalTerm) -> Vec<(Complex<f64>, [[f64; 2]; 2])
         let derivatives = [[-zeta, -w], [root, -w * zeta / root]];
         return vec![(Complex::new(-zeta * w, w * root), derivatives)];
     }
+    vec![real_pole(w, zeta, 1.0), real_pole(w, zeta, -1.0)]
+}
+
+/// One of the two real poles of an overdamped mode: +1 for the slower one, -1 for the faster one.
+fn real_pole(w: f64, zeta: f64, sign: f64) -> (Complex<f64>, [[f64; 2]; 2]) {
     let root = (zeta * zeta - 1.0).sqrt();
-    let real = |sign: f64| {
-        let re_per_w = -zeta + sign * root;
-        let derivatives = [[re_per_w, w * (-1.0 + sign * zeta / root)], [0.0, 0.0]];
-        (Complex::new(w * re_per_w, 0.0), derivatives)
-    };
-    vec![real(1.0), real(-1.0)]
+    let re_per_w = -zeta + sign * root;
+    let derivatives = [[re_per_w, w * (-1.0 + sign * zeta / root)], [0.0, 0.0]];
+    (Complex::new(w * re_per_w, 0.0), derivatives)
 }

@@ -29,23 +29,20 @@ impl NormalEquations {
         residual: Complex<f64>,
         root_weight: f64,
     ) {
-        let Self {
-            matrix,
-            right,
-            re,
-            im,
-        } = self;
-        for ((re, im), derivative) in re.iter_mut().zip(&mut *im).zip(derivatives) {
+        let rows = self.re.iter_mut().zip(&mut self.im);
+        for ((re, im), derivative) in rows.zip(derivatives) {
             (*re, *im) = (derivative.re * root_weight, derivative.im * root_weight);
         }
-        let residual = residual * root_weight;
+        self.add_row(residual * root_weight);
+    }
+
+    /// Adds the products of the current row.
+    fn add_row(&mut self, residual: Complex<f64>) {
+        let (re, im) = (&self.re, &self.im);
         // The matrix is stored column by column.
-        for (i, column) in matrix
-            .as_mut_slice()
-            .chunks_exact_mut(derivatives.len())
-            .enumerate()
-        {
-            right[i] += re[i] * residual.re + im[i] * residual.im;
+        let columns = self.matrix.as_mut_slice().chunks_exact_mut(re.len());
+        for (i, column) in columns.enumerate() {
+            self.right[i] += re[i] * residual.re + im[i] * residual.im;
             for ((sum, r), m) in column[i..].iter_mut().zip(&re[i..]).zip(&im[i..]) {
                 *sum += re[i] * r + im[i] * m;
             }
@@ -81,10 +78,14 @@ impl NormalEquations {
 
     /// The decrease of the sum of squares by a step, if the model were linear: 2 b x - x A x.
     pub(super) fn predicted_decrease(&self, step: &DVector<f64>) -> f64 {
-        let n = step.len();
-        let row = |i: usize| (0..n).map(|j| self.entry(i, j) * step[j]).sum::<f64>();
-        (0..n)
-            .map(|i| step[i] * (2.0 * self.right[i] - row(i)))
+        (0..step.len())
+            .map(|i| step[i] * (2.0 * self.right[i] - self.row_times(i, step)))
             .sum()
+    }
+
+    /// Row `i` of the matrix times a vector.
+    fn row_times(&self, i: usize, vector: &DVector<f64>) -> f64 {
+        let products = vector.iter().enumerate();
+        products.map(|(j, x)| self.entry(i, j) * x).sum()
     }
 }

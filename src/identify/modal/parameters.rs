@@ -45,6 +45,28 @@ impl Parameter {
 }
 
 impl ModalParameters {
+    /// One mode and a delay.
+    pub(super) fn one_mode(mode: ModalTerm, delay_s: f64) -> ModalParameters {
+        ModalParameters {
+            modes: vec![mode],
+            remainder_m_per_n: 0.0,
+            delay_s,
+        }
+    }
+
+    /// The parameters with the slowest mode first.
+    pub(super) fn slowest_first(mut self) -> ModalParameters {
+        self.modes
+            .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+        self
+    }
+
+    /// The parameters with one more mode.
+    pub(super) fn with_mode(mut self, mode: ModalTerm) -> ModalParameters {
+        self.modes.push(mode);
+        self
+    }
+
     /// The free parameters, in the order of a covariance.
     pub(crate) fn free(&self) -> Vec<Parameter> {
         let mut free = Vec::new();
@@ -72,22 +94,24 @@ impl ModalParameters {
     pub(super) fn moved(&self, free: &[Parameter], step: &DVector<f64>) -> ModalParameters {
         let mut next = self.clone();
         for (parameter, step) in free.iter().zip(step.iter()) {
-            match *parameter {
-                Parameter::Frequency(k) => {
-                    next.modes[k].omega_rad_s *= factor(*step, MAX_FREQUENCY_STEP)
-                }
-                Parameter::Damping(k) => {
-                    let damping_ratio =
-                        self.modes[k].damping_ratio * factor(*step, MAX_DAMPING_STEP);
-                    next.modes[k].damping_ratio =
-                        damping_ratio.clamp(DAMPING_RATIO.0, DAMPING_RATIO.1);
-                }
-                Parameter::Residue(k) => next.modes[k].residue_per_kg += step,
-                Parameter::Remainder => next.remainder_m_per_n += step,
-                Parameter::Delay => next.delay_s += step,
-            }
+            next.change(*parameter, *step);
         }
         next
+    }
+
+    fn change(&mut self, parameter: Parameter, step: f64) {
+        match parameter {
+            Parameter::Frequency(k) => {
+                self.modes[k].omega_rad_s *= factor(step, MAX_FREQUENCY_STEP)
+            }
+            Parameter::Damping(k) => {
+                let ratio = self.modes[k].damping_ratio * factor(step, MAX_DAMPING_STEP);
+                self.modes[k].damping_ratio = ratio.clamp(DAMPING_RATIO.0, DAMPING_RATIO.1);
+            }
+            Parameter::Residue(k) => self.modes[k].residue_per_kg += step,
+            Parameter::Remainder => self.remainder_m_per_n += step,
+            Parameter::Delay => self.delay_s += step,
+        }
     }
 }
 

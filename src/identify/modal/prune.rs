@@ -39,20 +39,12 @@ fn with_one_mode_below(problem: Problem<'_>, solution: Solution) -> Solution {
     if below.len() < 2 {
         return solution;
     }
-    let one = ModalTerm {
-        omega_rad_s: BELOW_BAND.0 * low_rad_s,
-        damping_ratio: BELOW_BAND.1,
-        residue_per_kg: below.iter().map(|mode| mode.residue_per_kg).sum(),
+    let modes = [combined(&below, low_rad_s)].into_iter().chain(above);
+    let start = ModalParameters {
+        modes: modes.collect(),
+        ..solution.parameters.clone()
     };
-    let modes = [one].into_iter().chain(above).collect();
-    let next = refine(
-        problem,
-        ModalParameters {
-            modes,
-            ..solution.parameters.clone()
-        },
-        0.0,
-    );
+    let next = refine(problem, start, 0.0);
     let removed = (below.len() - 1) as f64;
     let limit = removed * problem.significant_decrease() * problem.misfit(solution.chi2);
     if (next.chi2 - solution.chi2) / limit <= 1.0 {
@@ -62,22 +54,34 @@ fn with_one_mode_below(problem: Problem<'_>, solution: Solution) -> Solution {
     }
 }
 
+/// Start value of one mode in place of several below the lowest frequency of the data.
+fn combined(below: &[ModalTerm], low_rad_s: f64) -> ModalTerm {
+    ModalTerm {
+        omega_rad_s: BELOW_BAND.0 * low_rad_s,
+        damping_ratio: BELOW_BAND.1,
+        residue_per_kg: below.iter().map(|mode| mode.residue_per_kg).sum(),
+    }
+}
+
 /// The mode whose residue is the smallest multiple of its standard deviation, if that is uncertain. If the data do not even
 /// determine the parameters, the mode of smallest residue.
 fn least_certain(problem: Problem<'_>, solution: &Solution) -> Option<usize> {
-    let modes = &solution.parameters.modes;
-    let size = |k: &usize| modes[*k].residue_per_kg.abs();
-    let indices = 0..modes.len();
+    let modes = solution.parameters.modes.iter();
+    let sizes: Vec<f64> = modes.map(|mode| mode.residue_per_kg.abs()).collect();
     let Some(covariance) = solution.covariance(problem.data) else {
-        return indices.min_by(|a, b| size(a).total_cmp(&size(b)));
+        return index_of_smallest(&sizes);
     };
     let free = solution.parameters.free();
-    let sigmas = |k: &usize| {
-        let index = free
-            .iter()
-            .position(|parameter| *parameter == Parameter::Residue(*k));
-        index.map_or(f64::INFINITY, |i| size(k) / covariance[(i, i)].sqrt())
-    };
-    let least = indices.min_by(|a, b| sigmas(a).total_cmp(&sigmas(b)))?;
-    (sigmas(&least) < CERTAIN_SIGMAS).then_some(least)
+    // One residue for each mode, in the order of the modes.
+    let residues = (0..free.len()).filter(|i| matches!(free[*i], Parameter::Residue(_)));
+    let sigmas: Vec<f64> = sizes
+        .iter()
+        .zip(residues)
+        .map(|(size, i)| size / covariance[(i, i)].sqrt())
+        .collect();
+    index_of_smallest(&sigmas).filter(|least| sigmas[*least] < CERTAIN_SIGMAS)
+}
+
+fn index_of_smallest(values: &[f64]) -> Option<usize> {
+    (0..values.len()).min_by(|a, b| values[*a].total_cmp(&values[*b]))
 }

@@ -64,15 +64,17 @@ impl<'a> Iteration<'a> {
         }
     }
 
+    /// The damping of a parameter; 0 where the model is linear in it.
+    fn damping_of(&self, parameter: Parameter) -> f64 {
+        if parameter.is_linear() {
+            0.0
+        } else {
+            self.damping.value
+        }
+    }
+
     fn step(&mut self) -> ControlFlow<()> {
-        let damping = |i: usize| {
-            if self.free[i].is_linear() {
-                0.0
-            } else {
-                self.damping.value
-            }
-        };
-        let Some(step) = self.normal.solve(damping) else {
+        let Some(step) = self.normal.solve(|i| self.damping_of(self.free[i])) else {
             return ControlFlow::Break(());
         };
         let moved = self.best.parameters.moved(&self.free, &step);

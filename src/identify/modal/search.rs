@@ -85,28 +85,52 @@ pub(super) fn orders(
     problem: Problem<'_>,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<ModelOrder>, FitError> {
-    let (mut orders, mut parameters, mut done) = (Vec::new(), ModalParameters::default(), 0.0);
+    let mut search = Search {
+        orders: Vec::new(),
+        parameters: ModalParameters::default(),
+        done: 0.0,
+        progress,
+    };
     for stage in &STAGES {
-        let data = stage.data(problem.data, &parameters);
-        let problem = Problem {
-            data: &data,
-            ..problem
-        };
-        let mut solution = refine(problem, parameters, stage.tolerance);
+        search.run(stage, problem)?;
+    }
+    Ok(search.orders)
+}
+
+/// The state of the search between two stages.
+struct Search<'a, 'p> {
+    /// The orders found so far.
+    orders: Vec<ModelOrder>,
+    /// Result of the stage before.
+    parameters: ModalParameters,
+    /// Progress at the end of the stage before.
+    done: f64,
+    progress: &'a mut Progress<'p>,
+}
+
+impl Search<'_, '_> {
+    /// Adds modes, with the errors of a stage, as long as they are significant.
+    fn run(&mut self, stage: &Stage, problem: Problem<'_>) -> Result<(), FitError> {
+        let data = &stage.data(problem.data, &self.parameters);
+        let problem = Problem { data, ..problem };
+        let start = std::mem::take(&mut self.parameters);
+        let mut solution = refine(problem, start, stage.tolerance);
         let first_misfit = problem.misfit(solution.chi2);
         while solution.parameters.modes.len() < MAX_MODES {
             let fraction = stage_progress(first_misfit, problem.misfit(solution.chi2));
-            report(progress, done + (stage.progress - done) * fraction)?;
+            let done = self.done + (stage.progress - self.done) * fraction;
+            report(self.progress, done)?;
             let Some(next) = with_another_mode(problem, &solution, stage.tolerance) else {
                 break;
             };
-            orders.push(order(problem, &next, evidence(problem, &solution, &next)));
+            let evidence = evidence(problem, &solution, &next);
+            self.orders.push(order(problem, &next, evidence));
             solution = next;
         }
-        parameters = solution.parameters;
-        done = stage.progress;
+        self.parameters = solution.parameters;
+        self.done = stage.progress;
+        Ok(())
     }
-    Ok(orders)
 }
 
 /// Progress of a stage, 0 to 1, by how far the misfit has fallen towards 1 on a logarithmic scale.
@@ -121,17 +145,24 @@ fn stage_progress(first_misfit: f64, misfit: f64) -> f64 {
 impl Stage {
     /// The data of the stage, merged once modes are known.
     fn data(&self, data: &[FrfDatum], known: &ModalParameters) -> Vec<FrfDatum> {
-        let square = self.relative_error * self.relative_error;
-        let with_error = |datum: &FrfDatum| FrfDatum {
-            variance: datum.variance + square * datum.response.norm_sqr(),
-            ..*datum
-        };
         let data = if known.modes.is_empty() {
             data.to_vec()
         } else {
             merged(data, known)
         };
-        data.iter().step_by(self.every).map(with_error).collect()
+        data.iter()
+            .step_by(self.every)
+            .map(|datum| self.with_error(datum))
+            .collect()
+    }
+
+    /// The datum with the relative error of the stage added to its variance.
+    fn with_error(&self, datum: &FrfDatum) -> FrfDatum {
+        let square = self.relative_error * self.relative_error;
+        FrfDatum {
+            variance: datum.variance + square * datum.response.norm_sqr(),
+            ..*datum
+        }
     }
 }
 
@@ -158,12 +189,10 @@ fn with_another_mode(
         return first_mode(problem, solution, tolerance).filter(significant);
     }
     let candidates = candidates(problem, solution).into_iter().take(TRIALS);
-    let fitted = candidates.map(|term| {
-        let mut start = solution.parameters.clone();
-        start.modes.push(term);
-        refine(problem, start, tolerance)
-    });
-    fitted.into_iter().find(significant)
+    candidates
+        .map(|mode| solution.parameters.clone().with_mode(mode))
+        .map(|start| refine(problem, start, tolerance))
+        .find(significant)
 }
 
 /// The best solution with one mode, a free body included. All others build on it, so that all candidates are fitted.

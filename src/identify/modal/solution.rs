@@ -11,7 +11,6 @@ use super::measurement_chain::{MeasurementChain, log_derivatives};
 use super::normal_equations::NormalEquations;
 use super::parameters::{ModalParameters, Parameter};
 use crate::identify::FrfDatum;
-use crate::model::zeros::ModalTerm;
 
 /// The data of a fit and the chain through which they were measured.
 #[derive(Clone, Copy)]
@@ -68,11 +67,14 @@ impl Solution {
     }
 
     fn components(problem: Problem<'_>, parameters: ModalParameters) -> Solution {
-        let nodes = problem.chain.nodes(parameters.delay_s, problem.data);
-        let mode = |m: &ModalTerm| problem.chain.mode(m.omega_rad_s, m.damping_ratio, &nodes);
+        let chain = problem.chain;
+        let nodes = chain.nodes(parameters.delay_s, problem.data);
+        let modes = parameters.modes.iter();
         Solution {
-            modes: parameters.modes.iter().map(mode).collect(),
-            constant: problem.chain.constant(&nodes),
+            modes: modes
+                .map(|mode| chain.mode(mode.omega_rad_s, mode.damping_ratio, &nodes))
+                .collect(),
+            constant: chain.constant(&nodes),
             parameters,
             residual: Vec::new(),
             chi2: f64::NAN,
@@ -154,9 +156,12 @@ impl Solution {
         let free = self.parameters.free();
         let (scale, unit) = self.normal_equations(data).scaled()?;
         let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
-        let natural = |i: usize| scale[i] * self.logarithm_scale(free[i]);
+        let factors = free.iter().zip(scale.iter());
+        let factors: Vec<f64> = factors
+            .map(|(parameter, scale)| scale * self.logarithm_scale(*parameter))
+            .collect();
         Some(DMatrix::from_fn(free.len(), free.len(), |i, j| {
-            inverse[(i, j)] * natural(i) * natural(j)
+            inverse[(i, j)] * factors[i] * factors[j]
         }))
     }
 

@@ -13,6 +13,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::identify::FrfDatum;
+use crate::identify::mean::mean_around;
 
 /// Lines to either side.
 const REACH: usize = 8;
@@ -36,25 +37,21 @@ pub fn with_distortion(data: &[FrfDatum]) -> Vec<FrfDatum> {
     let relative_power: Vec<f64> = (0..data.len())
         .map(|k| roughness(data, k) / data[k].response.norm_sqr())
         .collect();
-    let with_distortion = |(k, datum): (usize, &FrfDatum)| {
-        let near = &relative_power[k.saturating_sub(REACH)..(k + REACH + 1).min(data.len())];
-        let mean = near.iter().sum::<f64>() / near.len() as f64;
+    let data = data.iter().enumerate();
+    data.map(|(k, datum)| {
+        let distortion = mean_around(&relative_power, k, REACH) * datum.response.norm_sqr();
         // A response of zero makes 0/0, for which max() returns the noise.
-        let variance = datum.variance.max(mean * datum.response.norm_sqr());
+        let variance = datum.variance.max(distortion);
         FrfDatum { variance, ..*datum }
-    };
-    data.iter().enumerate().map(with_distortion).collect()
+    })
+    .collect()
 }
 
 /// The residual power of the local model around a line, per degree of freedom.
 fn roughness(data: &[FrfDatum], line: usize) -> f64 {
     let low = line.saturating_sub(REACH).min(data.len() - LINES);
     let near = &data[low..low + LINES];
-    let span_hz = near[LINES - 1].frequency_hz - near[0].frequency_hz;
-    let distance = |datum: &FrfDatum| {
-        2.0 * REACH as f64 * (datum.frequency_hz - data[line].frequency_hz) / span_hz
-    };
-    let x: Vec<f64> = near.iter().map(distance).collect();
+    let x = distances(near, data[line].frequency_hz);
     let mut denominator = vec![Complex::new(1.0, 0.0); LINES];
     let mut residual_power = f64::INFINITY;
     for _ in 0..FITS {
@@ -62,13 +59,25 @@ fn roughness(data: &[FrfDatum], line: usize) -> f64 {
             break;
         };
         denominator = x.iter().map(|x| limited(model[3] * *x + 1.0)).collect();
-        let value =
-            |k: usize| (model[0] + model[1] * x[k] + model[2] * (x[k] * x[k])) / denominator[k];
         residual_power = (0..LINES)
-            .map(|k| (near[k].response - value(k)).norm_sqr())
+            .map(|k| near[k].response - numerator(&model, x[k]) / denominator[k])
+            .map(|residual| residual.norm_sqr())
             .sum();
     }
     residual_power / (LINES - PARAMETERS) as f64
+}
+
+/// x of each line: its distance from a frequency in mean distances of the lines.
+fn distances(near: &[FrfDatum], frequency_hz: f64) -> Vec<f64> {
+    let span_hz = near[LINES - 1].frequency_hz - near[0].frequency_hz;
+    near.iter()
+        .map(|datum| 2.0 * REACH as f64 * (datum.frequency_hz - frequency_hz) / span_hz)
+        .collect()
+}
+
+/// a + b x + c x^2.
+fn numerator(model: &DVector<Complex<f64>>, x: f64) -> Complex<f64> {
+    model[0] + model[1] * x + model[2] * (x * x)
 }
 
 /// a, b, c, d of the local model, with 1/`denominator` as the weight of each line.
@@ -93,18 +102,18 @@ fn solve_scaled(
     matrix: &DMatrix<Complex<f64>>,
     right: &DVector<Complex<f64>>,
 ) -> Option<DVector<Complex<f64>>> {
-    let size: Vec<f64> = matrix
-        .column_iter()
+    let columns = matrix.column_iter();
+    let size: Vec<f64> = columns
         .map(|column| column.norm().max(f64::MIN_POSITIVE))
         .collect();
     let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |k, column| {
         matrix[(k, column)] / size[column]
     });
-    let finite = scaled
-        .iter()
-        .chain(right.iter())
-        .all(|entry| entry.re.is_finite() && entry.im.is_finite());
-    let solved = finite.then(|| scaled.svd(true, true).solve(right, DEPENDENT).ok())??;
+    let mut entries = scaled.iter().chain(right.iter());
+    if !entries.all(|entry| entry.is_finite()) {
+        return None;
+    }
+    let solved = scaled.svd(true, true).solve(right, DEPENDENT).ok()?;
     Some(DVector::from_fn(size.len(), |column, _| {
         solved[column] / size[column]
     }))

@@ -29,6 +29,8 @@
 //! A disturbance at exactly a line (mains, with periods of whole seconds) also repeats in every period and counts as distortion;
 //! in the probability, one line weighs no more than ln(level).
 
+use nalgebra::Complex;
+
 use super::periodic::{Line, ROUNDING, Repetition, excited, lines, mean, variance_of_mean};
 use crate::identify::{IdentifyError, Signals};
 
@@ -101,27 +103,28 @@ struct Scale {
 
 impl Scale {
     fn new(lines: &[Line], rate_hz: f64, period: usize) -> Scale {
-        let max = |of: fn(&Line) -> f64| lines.iter().map(of).fold(0.0, f64::max);
-        let max_output = max(|line| mean(&line.output).norm());
+        let max_input = max_amplitude(lines.iter().map(|line| &line.input));
+        let max_output = max_amplitude(lines.iter().map(|line| &line.output));
         Scale {
             line_hz: rate_hz / period as f64,
             square: 2.0 / (period as f64 * period as f64),
             periods: lines.first().map_or(0, |line| line.output.len()),
-            max_input: max(|line| mean(&line.input).norm()),
+            max_input,
             rounding: (ROUNDING * max_output).powi(2).max(f64::MIN_POSITIVE),
         }
     }
 
     /// The levels of the omitted lines that are odd (1) or even (0).
     fn omitted(&self, lines: &[Line], parity: usize) -> Vec<LineLevel> {
-        let omitted = |line: &&Line| {
-            line.number % 2 == parity && mean(&line.input).norm() <= OMITTED_RATIO * self.max_input
-        };
         lines
             .iter()
-            .filter(omitted)
+            .filter(|line| line.number % 2 == parity && self.is_omitted(line))
             .map(|line| self.level(line))
             .collect()
+    }
+
+    fn is_omitted(&self, line: &Line) -> bool {
+        mean(&line.input).norm() <= OMITTED_RATIO * self.max_input
     }
 
     fn level(&self, line: &Line) -> LineLevel {
@@ -138,6 +141,11 @@ impl Scale {
             surprisal: freedom * libm::log1p(power / (freedom * (of_mean + self.rounding))),
         }
     }
+}
+
+/// The largest magnitude of the mean over the periods.
+fn max_amplitude<'a>(lines: impl Iterator<Item = &'a Vec<Complex<f64>>>) -> f64 {
+    lines.map(|line| mean(line).norm()).fold(0.0, f64::max)
 }
 
 impl Harmonics {
@@ -170,6 +178,7 @@ pub fn noise_probability(lines: &[LineLevel]) -> f64 {
     if !x.is_finite() {
         return 0.0;
     }
-    let term = |j: usize| libm::exp(j as f64 * libm::log(x) - x - libm::lgamma(j as f64 + 1.0));
-    (0..lines.len()).map(term).sum::<f64>().min(1.0)
+    let indices = (0..lines.len()).map(|j| j as f64);
+    let terms = indices.map(|j| libm::exp(j * libm::log(x) - x - libm::lgamma(j + 1.0)));
+    terms.sum::<f64>().min(1.0)
 }

@@ -45,6 +45,17 @@ impl Cause {
             Cause::None => "none",
         }
     }
+
+    /// What reduces the loss.
+    fn remedy(self) -> &'static str {
+        match self {
+            Cause::Nonlinearity => {
+                "a smaller amplitude reduces the distortion, a longer run does not, and odd lines alone keep even distortion out of the response"
+            }
+            Cause::Noise => "a longer run or a larger amplitude reduces the noise",
+            Cause::None => "both are negligible",
+        }
+    }
 }
 
 /// Noise and distortion in a band. Ratios are powers over that of the output.
@@ -132,11 +143,12 @@ impl Linearity {
         if !self.whole.is_odd_detected() {
             return data.to_vec();
         }
-        let with_odd = |datum: &FrfDatum| FrfDatum {
-            variance: datum.variance + self.odd_variance(datum.frequency_hz),
-            ..*datum
-        };
-        data.iter().map(with_odd).collect()
+        data.iter()
+            .map(|datum| FrfDatum {
+                variance: datum.variance + self.odd_variance(datum.frequency_hz),
+                ..*datum
+            })
+            .collect()
     }
 
     /// E|error of H|^2 by odd distortion at an excited line, in (m/A)^2.
@@ -156,22 +168,18 @@ fn detected(by_noise_alone: Option<f64>) -> bool {
 impl BandLinearity {
     /// Noise and distortion at some of the excited lines.
     fn new(harmonics: &Harmonics, excited: &[LineLevel]) -> BandLinearity {
-        let frequency_hz = |line: Option<&LineLevel>| line.map_or(0.0, |line| line.frequency_hz);
-        let band_hz = (frequency_hz(excited.first()), frequency_hz(excited.last()));
-        let probabilities =
-            [&harmonics.odd, &harmonics.even].map(|lines| probability_in_band(lines, band_hz));
-        let mut sums = Sums::default();
+        let kinds = [&harmonics.odd, &harmonics.even];
+        let band_hz = band_hz(excited);
+        let mut sums = Sums {
+            probabilities: kinds.map(|lines| probability_in_band(lines, band_hz)),
+            ..Sums::default()
+        };
         for line in excited {
-            let distortion_m2 = [&harmonics.odd, &harmonics.even]
-                .map(|lines| harmonics.around_m2(lines, line.frequency_hz));
-            sums.add(
-                harmonics.without_noise_m2(line),
-                line.noise_m2,
-                distortion_m2,
-                probabilities,
-            );
+            let distortion_m2 = kinds.map(|lines| harmonics.around_m2(lines, line.frequency_hz));
+            let output_m2 = harmonics.without_noise_m2(line);
+            sums.add(output_m2, line.noise_m2, distortion_m2);
         }
-        sums.band(band_hz, excited.len(), probabilities)
+        sums.band(band_hz)
     }
 
     /// Whether there is odd distortion, with a probability of false alarm of 0.1 %.
@@ -186,36 +194,42 @@ impl BandLinearity {
 
     /// The cause of the lost coherence in words, with the remedy.
     pub fn description(&self) -> String {
-        let coherence = self.coherence;
-        let (noise, distortion) = (
-            loss(self.missing_by_noise),
-            loss(self.missing_by_distortion),
-        );
+        let noise = loss(self.missing_by_noise);
+        let distortion = loss(self.missing_by_distortion);
         let kinds = self.kinds();
-        match self.cause {
-            Cause::Nonlinearity => format!(
-                "coherence {coherence:.5}: {distortion} lost to nonlinear distortion ({kinds}), {noise} to noise; a smaller amplitude reduces the distortion, a longer run does not, and odd lines alone keep even distortion out of the response"
-            ),
-            Cause::Noise => format!(
-                "coherence {coherence:.5}: {noise} lost to noise, {distortion} to nonlinear distortion ({kinds}); a longer run or a larger amplitude reduces the noise"
-            ),
-            Cause::None => format!(
-                "coherence {coherence:.5}: {noise} lost to noise, {distortion} to nonlinear distortion ({kinds}); both are negligible"
-            ),
-        }
+        let losses = match self.cause {
+            Cause::Nonlinearity => {
+                format!("{distortion} lost to nonlinear distortion ({kinds}), {noise} to noise")
+            }
+            Cause::Noise | Cause::None => {
+                format!("{noise} lost to noise, {distortion} to nonlinear distortion ({kinds})")
+            }
+        };
+        let remedy = self.cause.remedy();
+        format!("coherence {:.5}: {losses}; {remedy}", self.coherence)
     }
 
     fn kinds(&self) -> String {
-        let kind = |name: &str, by_noise_alone: Option<f64>| match by_noise_alone {
-            Some(_) if detected(by_noise_alone) => format!("{name} detected"),
-            Some(_) => format!("{name} not significant"),
-            None => format!("{name} not measured"),
-        };
-        format!(
-            "{}, {}",
-            kind("odd", self.odd_by_noise_alone),
-            kind("even", self.even_by_noise_alone)
-        )
+        let odd = significance(self.odd_by_noise_alone);
+        let even = significance(self.even_by_noise_alone);
+        format!("odd {odd}, even {even}")
+    }
+}
+
+/// Whether distortion is detected, by the probability of noise alone.
+fn significance(by_noise_alone: Option<f64>) -> &'static str {
+    match by_noise_alone {
+        Some(_) if detected(by_noise_alone) => "detected",
+        Some(_) => "not significant",
+        None => "not measured",
+    }
+}
+
+/// Lowest and highest frequency of some lines in hertz; 0 without lines.
+fn band_hz(lines: &[LineLevel]) -> (f64, f64) {
+    match lines {
+        [] => (0.0, 0.0),
+        [first, ..] => (first.frequency_hz, lines[lines.len() - 1].frequency_hz),
     }
 }
 
@@ -257,14 +271,17 @@ fn octave(lines: &[LineLevel]) -> usize {
 
 /// The probability that noise alone gives as much distortion at those of `lines` that are in a band; `None` without lines.
 fn probability_in_band(lines: &[LineLevel], (low_hz, high_hz): (f64, f64)) -> Option<f64> {
-    let first_above = |hz: f64| lines.partition_point(|line| line.frequency_hz < hz);
-    (!lines.is_empty())
-        .then(|| noise_probability(&lines[first_above(low_hz)..first_above(high_hz)]))
+    let [low, high] =
+        [low_hz, high_hz].map(|hz| lines.partition_point(|line| line.frequency_hz < hz));
+    (!lines.is_empty()).then(|| noise_probability(&lines[low..high]))
 }
 
 /// Sums over excited lines; pairs are odd and even distortion.
 #[derive(Default)]
 struct Sums {
+    lines: usize,
+    /// Probabilities that noise alone gives as much distortion in the band.
+    probabilities: [Option<f64>; 2],
     output_m2: f64,
     noise_m2: f64,
     distortion_m2: [f64; 2],
@@ -273,65 +290,72 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(
-        &mut self,
-        output_m2: f64,
-        noise_m2: f64,
-        distortion_m2: [f64; 2],
-        probabilities: [Option<f64>; 2],
-    ) {
-        let significant_m2 = [0, 1].map(|k| {
-            if detected(probabilities[k]) {
+    fn add(&mut self, output_m2: f64, noise_m2: f64, distortion_m2: [f64; 2]) {
+        let significant_m2 = self.significant(distortion_m2);
+        let total_m2 = output_m2.max(0.0) + noise_m2 + significant_m2[0] + significant_m2[1];
+        self.lines += 1;
+        self.output_m2 += output_m2;
+        self.noise_m2 += noise_m2;
+        self.lost_to_noise += part(noise_m2, total_m2);
+        for k in 0..2 {
+            self.distortion_m2[k] += distortion_m2[k];
+            self.lost_to_distortion[k] += part(significant_m2[k], total_m2);
+        }
+    }
+
+    /// The powers of distortion where it is detected, 0 elsewhere.
+    fn significant(&self, distortion_m2: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| {
+            if detected(self.probabilities[k]) {
                 distortion_m2[k].max(0.0)
             } else {
                 0.0
             }
-        });
-        let total_m2 = output_m2.max(0.0) + noise_m2 + significant_m2[0] + significant_m2[1];
-        let part = |power_m2: f64| {
-            if total_m2 > 0.0 {
-                power_m2 / total_m2
-            } else {
-                0.0
-            }
-        };
-        self.output_m2 += output_m2;
-        self.noise_m2 += noise_m2;
-        self.lost_to_noise += part(noise_m2);
-        for k in 0..2 {
-            self.distortion_m2[k] += distortion_m2[k];
-            self.lost_to_distortion[k] += part(significant_m2[k]);
-        }
+        })
     }
 
-    fn band(
-        &self,
-        (low_hz, high_hz): (f64, f64),
-        lines: usize,
-        probabilities: [Option<f64>; 2],
-    ) -> BandLinearity {
-        let count = lines.max(1) as f64;
-        let ratio = |power_m2: f64| power_m2 / self.output_m2.max(f64::MIN_POSITIVE);
-        let distortion = |k: usize| probabilities[k].map(|_| ratio(self.distortion_m2[k]));
+    /// A power over that of the output.
+    fn over_output(&self, power_m2: f64) -> f64 {
+        power_m2 / self.output_m2.max(f64::MIN_POSITIVE)
+    }
+
+    /// Odd (0) or even (1) distortion over the output, if it was measured.
+    fn distortion_ratio(&self, k: usize) -> Option<f64> {
+        self.probabilities[k]?;
+        Some(self.over_output(self.distortion_m2[k]))
+    }
+
+    fn band(&self, (low_hz, high_hz): (f64, f64)) -> BandLinearity {
+        let count = self.lines.max(1) as f64;
         let missing_by_noise = self.lost_to_noise / count;
         let [missing_by_odd, missing_by_even] = self.lost_to_distortion.map(|lost| lost / count);
         let missing_by_distortion = missing_by_odd + missing_by_even;
+        let [odd_by_noise_alone, even_by_noise_alone] = self.probabilities;
         BandLinearity {
             low_hz,
             high_hz,
-            lines,
+            lines: self.lines,
             cause: cause(missing_by_noise, missing_by_distortion),
-            noise_ratio: ratio(self.noise_m2),
-            odd_distortion_ratio: distortion(0),
-            even_distortion_ratio: distortion(1),
-            odd_by_noise_alone: probabilities[0],
-            even_by_noise_alone: probabilities[1],
+            noise_ratio: self.over_output(self.noise_m2),
+            odd_distortion_ratio: self.distortion_ratio(0),
+            even_distortion_ratio: self.distortion_ratio(1),
+            odd_by_noise_alone,
+            even_by_noise_alone,
             coherence: 1.0 - missing_by_noise - missing_by_distortion,
             missing_by_noise,
             missing_by_distortion,
             missing_by_odd,
             missing_by_even,
         }
+    }
+}
+
+/// The part of a total; 0 of nothing.
+fn part(power_m2: f64, total_m2: f64) -> f64 {
+    if total_m2 > 0.0 {
+        power_m2 / total_m2
+    } else {
+        0.0
     }
 }
 

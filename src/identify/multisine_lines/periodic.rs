@@ -151,12 +151,8 @@ fn spectra(
 
 fn without_drift(samples: &[f64], start: usize, period: usize) -> Vec<f64> {
     let slope = drift(samples, start, period) / period as f64;
-    let subtract = |(n, x): (usize, &f64)| x - slope * n as f64;
-    samples[start..start + period]
-        .iter()
-        .enumerate()
-        .map(subtract)
-        .collect()
+    let samples = samples[start..start + period].iter().enumerate();
+    samples.map(|(n, x)| x - slope * n as f64).collect()
 }
 
 /// The drift of a signal over the period from `start` on: the mean of `x[n + period] - x[n]` for n around `start`, as far to
@@ -182,13 +178,10 @@ pub(super) struct Line {
 
 impl Line {
     fn new(number: usize, input: &[Vec<Complex<f64>>], output: &[Vec<Complex<f64>>]) -> Line {
-        let line = |spectra: &[Vec<Complex<f64>>]| {
-            spectra.iter().map(|spectrum| spectrum[number]).collect()
-        };
         Line {
             number,
-            input: line(input),
-            output: line(output),
+            input: input.iter().map(|spectrum| spectrum[number]).collect(),
+            output: output.iter().map(|spectrum| spectrum[number]).collect(),
         }
     }
 
@@ -210,7 +203,6 @@ impl Line {
 
     /// |sum Y conj(U)|^2 / (sum |U|^2 sum |Y|^2) over the periods.
     fn coherence(&self) -> f64 {
-        let power = |line: &[Complex<f64>]| line.iter().map(|x| x.norm_sqr()).sum::<f64>();
         let cross: Complex<f64> = self
             .output
             .iter()
@@ -224,6 +216,11 @@ impl Line {
             0.0
         }
     }
+}
+
+/// The sum of the squared magnitudes.
+fn power(values: &[Complex<f64>]) -> f64 {
+    values.iter().map(|x| x.norm_sqr()).sum()
 }
 
 pub(super) fn mean(values: &[Complex<f64>]) -> Complex<f64> {

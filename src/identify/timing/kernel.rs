@@ -21,10 +21,10 @@ static KERNEL: LazyLock<Vec<f64>> = LazyLock::new(|| {
 pub(super) fn weights_at(position: f64) -> impl Iterator<Item = (i64, f64)> {
     let floor = position.floor();
     let (fraction, before) = (position - floor, floor as i64);
-    let offsets = 1 - HALF_WIDTH..=HALF_WIDTH;
-    let weight = move |offset: i64| interpolated((fraction - offset as f64).abs());
-    let sum: f64 = offsets.clone().map(weight).sum();
-    offsets.map(move |offset| (before + offset, weight(offset) / sum))
+    let weights = (1 - HALF_WIDTH..=HALF_WIDTH)
+        .map(move |offset| (offset, interpolated((fraction - offset as f64).abs())));
+    let sum: f64 = weights.clone().map(|(_, weight)| weight).sum();
+    weights.map(move |(offset, weight)| (before + offset, weight / sum))
 }
 
 /// The kernel at a distance, between the entries of its table.

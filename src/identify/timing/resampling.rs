@@ -56,12 +56,11 @@ impl Readings {
         if !(spacing_s > 0.0 && spacing_s.is_finite()) {
             return None;
         }
-        let step_s = if spacing_s < SAME_SPACING * period_s {
-            period_s
+        let (from_s, step_s) = if spacing_s < SAME_SPACING * period_s {
+            (start_s, period_s)
         } else {
-            spacing_s
+            (first_s, spacing_s)
         };
-        let from_s = if step_s == period_s { start_s } else { first_s };
         let points = ((last_s - from_s) / step_s).round().max(0.0) as usize + 1;
         Some(Grid {
             from_s,
@@ -101,12 +100,13 @@ impl Grid {
         let nearest = readings.nearest(&grid);
         grid.values = nearest.iter().map(|(_, position_m)| *position_m).collect();
         for _ in 0..ITERATIONS {
-            let error = |(time_s, position_m): &(f64, f64)| position_m - grid.at(*time_s);
-            let errors: Vec<f64> = nearest.iter().map(error).collect();
-            grid.values
-                .iter_mut()
-                .zip(&errors)
-                .for_each(|(value, error)| *value += error);
+            let errors: Vec<f64> = nearest
+                .iter()
+                .map(|(time_s, position_m)| position_m - grid.at(*time_s))
+                .collect();
+            for (value, error) in grid.values.iter_mut().zip(&errors) {
+                *value += error;
+            }
         }
         grid
     }
@@ -114,9 +114,8 @@ impl Grid {
     /// The interpolation at a time; the outermost values continue beyond the ends.
     fn at(&self, time_s: f64) -> f64 {
         let last = self.values.len() as i64 - 1;
-        let value = |index: i64| self.values[index.clamp(0, last) as usize];
         weights_at((time_s - self.from_s) / self.step_s)
-            .map(|(index, weight)| weight * value(index))
+            .map(|(index, weight)| weight * self.values[index.clamp(0, last) as usize])
             .sum()
     }
 }
