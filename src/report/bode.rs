@@ -42,17 +42,23 @@ pub fn bode_svg(
     let mut lines = trace::lines(traces)?;
     // Stable: measured traces first, so that models lie on top.
     lines.sort_by_key(|line| line.measured.is_none());
-    let frequencies = frequency_range(&lines);
     let mut charts = vec![magnitude(unit, &lines)?, phase(&lines)];
     charts.extend(coherence(&lines));
-    let last = charts.len() - 1;
-    let row = |(k, chart): (usize, Chart)| {
-        let x = Scale::logarithmic("Frequency (Hz)").within(frequencies.0, frequencies.1);
-        let x = if k == last { x } else { x.unnumbered() };
-        Row::new(HEIGHTS[k], vec![Chart { x, ..chart }])
-    };
-    let rows: Vec<Row> = charts.into_iter().enumerate().map(row).collect();
-    sheet_svg(title, subtitle, &rows)
+    let x = Scale::frequency(frequency_range(&lines));
+    sheet_svg(title, subtitle, &rows(charts, &x))
+}
+
+/// The charts below each other over one axis, numbered below the last chart.
+fn rows(charts: Vec<Chart>, x: &Scale) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (chart, height) in charts.into_iter().zip(HEIGHTS) {
+        let x = x.clone().unnumbered();
+        rows.push(Row::new(height, vec![Chart { x, ..chart }]));
+    }
+    if let Some(last) = rows.last_mut() {
+        last.charts[0].x = x.clone();
+    }
+    rows
 }
 
 fn panel(y: Scale) -> Chart {
@@ -94,16 +100,14 @@ fn coherence(lines: &[Line]) -> Option<Chart> {
 }
 
 fn coherence_points(line: &Line, coherence: &[f64]) -> Vec<SeriesPoint> {
-    let point = |(point, y): (SeriesPoint, &f64)| SeriesPoint {
-        y: *y,
-        band: (*y, *y),
-        faint: false,
-        ..point
-    };
-    line.magnitude_points()
-        .into_iter()
-        .zip(coherence)
-        .map(point)
+    let points = line.magnitude_points().into_iter().zip(coherence);
+    points
+        .map(|(point, y)| SeriesPoint {
+            y: *y,
+            band: (*y, *y),
+            faint: false,
+            ..point
+        })
         .collect()
 }
 
@@ -138,30 +142,26 @@ fn frequency_range(lines: &[Line]) -> (f64, f64) {
 
 /// Of the magnitudes that are certain, or of all where none is, with a margin, and a decade at least.
 fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
-    let logs = |all: bool| {
-        let visible = lines
+    let logs = [false, true].into_iter().find_map(|all| {
+        let magnitudes = lines
             .iter()
-            .flat_map(move |line| visible(line, &line.magnitude, all));
-        range(
-            visible
-                .filter(|magnitude| *magnitude > 0.0)
-                .map(libm::log10),
-        )
-    };
-    let (low, high) = with_margin(logs(false).or_else(|| logs(true))?, LEAST_DECADES);
+            .flat_map(|line| visible(line, &line.magnitude, all));
+        let positive = magnitudes.filter(|magnitude| *magnitude > 0.0);
+        range(positive.map(libm::log10))
+    });
+    let (low, high) = with_margin(logs?, LEAST_DECADES);
     Some((libm::pow(10.0, low), libm::pow(10.0, high)))
 }
 
 /// Of the phases that are certain, likewise, and half a turn at least.
 fn phase_range(lines: &[Line]) -> (f64, f64) {
-    let phases = |all: bool| {
+    let phases = [false, true].into_iter().find_map(|all| {
         range(
             lines
                 .iter()
                 .flat_map(|line| visible(line, &line.phase_deg, all)),
         )
-    };
-    let phases = phases(false).or_else(|| phases(true));
+    });
     with_margin(phases.unwrap_or((0.0, 0.0)), LEAST_DEGREES)
 }
 

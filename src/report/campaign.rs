@@ -4,17 +4,26 @@ use super::chart::{Chart, Mark, Pen, Row, Scale, Symbol, colours, sheet_svg};
 use super::error::ReportError;
 use colours::{BLUE, Colour, GREEN, INK, PAPER, VERMILION};
 
-use crate::experiment::campaign::{CHI2_95, Evaluation, LikelihoodStep, Offset, ends};
+use crate::experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
 use crate::identify::verdict::Cnmp;
 use crate::model::plant::PlantError;
 use crate::model::zeros::cnmp_map;
 
 /// Number of cells of the map along the asymmetries.
 const COLUMNS: usize = 161;
-/// With CNMP zeros.
-const WITH: Colour = Colour(244, 196, 160);
-/// With CNMP zeros only without damping.
-const UNDAMPED: Colour = Colour(252, 234, 218);
+/// Cells without CNMP zeros, with CNMP zeros only without damping, and with CNMP zeros.
+const CELL_COLOURS: [(&str, Colour); 3] = [
+    ("", PAPER),
+    ("CNMP zeros without damping only", Colour(252, 234, 218)),
+    ("CNMP zeros", Colour(244, 196, 160)),
+];
+
+/// How the verdicts are drawn.
+const VERDICTS: [(Cnmp, Colour, Symbol); 3] = [
+    (Cnmp::Detected, VERMILION, Symbol::Dot),
+    (Cnmp::Excluded, BLUE, Symbol::Ring),
+    (Cnmp::Undecided, INK, Symbol::Cross),
+];
 
 /// Why there is no picture.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -50,23 +59,18 @@ fn map(evaluation: &Evaluation<'_>, heading: &str, offset: f64) -> Result<Chart,
     let x = Scale::linear("Intended mass asymmetry (%)").within(left, right);
     let y = Scale::linear("Operating point (% of L)").within(low, high);
     let mut chart = Chart::new(heading, x, y).mark(cells(evaluation, offset)?);
-    for (cnmp, colour, symbol) in [
-        (Cnmp::Detected, VERMILION, Symbol::Dot),
-        (Cnmp::Excluded, BLUE, Symbol::Ring),
-        (Cnmp::Undecided, INK, Symbol::Cross),
-    ] {
+    for (cnmp, colour, symbol) in VERDICTS {
         chart = chart.points(cnmp.name(), colour, symbol, dots(evaluation, cnmp));
     }
-    if let Some(best) = &evaluation.recommendation {
-        let (low, high) = ends(&evaluation.grid.operating_points);
-        let at = 100.0 * best.asymmetry;
-        chart = chart.line(
-            "recommended",
-            Pen::dashed(GREEN),
-            vec![(at, 100.0 * low), (at, 100.0 * high)],
-        );
-    }
-    Ok(chart)
+    Ok(match &evaluation.recommendation {
+        Some(best) => {
+            let x = 100.0 * best.asymmetry;
+            let (low, high) = ends(&evaluation.grid.operating_points);
+            let line = vec![(x, 100.0 * low), (x, 100.0 * high)];
+            chart.line("recommended", Pen::dashed(GREEN), line)
+        }
+        None => chart,
+    })
 }
 
 /// The points with a verdict, in per cent.
@@ -84,23 +88,37 @@ fn cells(evaluation: &Evaluation<'_>, offset: f64) -> Result<Mark, PictureError>
     let [(low, high), _] = frame(evaluation);
     let at = |column: f64| low + (high - low) * column / COLUMNS as f64;
     let shifted: Vec<f64> = (0..COLUMNS).map(|k| at(k as f64 + 0.5) + offset).collect();
-    let region = &evaluation.region;
-    let undamped = cnmp_map(evaluation.stage, &region.operating_points, &shifted, 1)?;
-    let cell = |row: usize, column: usize| match region.contains(row, shifted[column]) {
-        true => 2,
-        false => usize::from(undamped[row][column] > 0),
-    };
-    let row = |row: usize| (0..COLUMNS).map(|column| cell(row, column)).collect();
+    let operating_points = &evaluation.region.operating_points;
+    let undamped = cnmp_map(evaluation.stage, operating_points, &shifted, 1)?;
+    let rows = undamped.iter().enumerate();
+    let rows = rows.map(|(row, pairs)| cell_row(evaluation, row, &shifted, pairs));
     Ok(Mark::Cells {
         x: (0..=COLUMNS).map(|k| 100.0 * at(k as f64)).collect(),
-        y: edges(&region.operating_points),
-        rows: (0..undamped.len()).map(row).collect(),
-        colours: vec![
-            (String::new(), PAPER),
-            ("CNMP zeros without damping only".into(), UNDAMPED),
-            ("CNMP zeros".into(), WITH),
-        ],
+        y: edges(operating_points),
+        rows: rows.collect(),
+        colours: CELL_COLOURS
+            .map(|(name, colour)| (name.into(), colour))
+            .to_vec(),
     })
+}
+
+/// Colours of a row of cells, from the asymmetries in their middle and their numbers of CNMP pairs without damping.
+fn cell_row(
+    evaluation: &Evaluation<'_>,
+    row: usize,
+    asymmetries: &[f64],
+    undamped_pairs: &[u8],
+) -> Vec<usize> {
+    let cells = asymmetries.iter().zip(undamped_pairs);
+    cells
+        .map(|(asymmetry, pairs)| {
+            if evaluation.region.contains(row, *asymmetry) {
+                2
+            } else {
+                usize::from(*pairs > 0)
+            }
+        })
+        .collect()
 }
 
 /// Ends of both axes, ratios: the asymmetries of the grid with a margin, the operating points of the map.
@@ -146,11 +164,10 @@ fn likelihood(offset: &Offset) -> Chart {
 fn likelihood_curve(offset: &Offset) -> Vec<(f64, f64)> {
     let likelihoods = offset.steps.iter().map(|step| step.log_likelihood);
     let highest = likelihoods.fold(f64::NEG_INFINITY, f64::max);
-    let corners = |step: &LikelihoodStep| {
-        let level = step.log_likelihood - highest;
-        [step.from, step.to].map(|offset| (100.0 * offset, level))
-    };
-    offset.steps.iter().flat_map(corners).collect()
+    let steps = offset.steps.iter();
+    steps
+        .flat_map(|step| [step.from, step.to].map(|at| (100.0 * at, step.log_likelihood - highest)))
+        .collect()
 }
 
 fn interval(offset: &Offset, bottom: f64) -> Mark {

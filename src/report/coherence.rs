@@ -14,16 +14,12 @@ const HEIGHT: f64 = 250.0;
 /// When the response is empty or invalid: see [`ReportError`].
 pub fn coherence_svg(frf: &Frf, title: &str, subtitle: &str) -> Result<String, ReportError> {
     trace::lines(&[Trace::measured("coherence", frf)])?;
-    let coherence = Scale::linear("Coherence (ratio)").within(0.0, 1.05);
+    let explained = Scale::linear("Coherence (ratio)").within(0.0, 1.05);
     let rest = Scale::logarithmic("1 − coherence (ratio)");
+    let rest_heading = "Part of the output power that the input does not explain";
     let charts = [
-        chart("", coherence, frf, |coherence| coherence),
-        chart(
-            "Part of the output power that the input does not explain",
-            rest,
-            frf,
-            |coherence| 1.0 - coherence,
-        ),
+        chart("", explained, frf, |coherence| coherence),
+        chart(rest_heading, rest, frf, |coherence| 1.0 - coherence),
     ];
     let rows = charts.map(|chart| Row::new(HEIGHT, vec![chart]));
     sheet_svg(title, subtitle, &rows)
@@ -31,15 +27,9 @@ pub fn coherence_svg(frf: &Frf, title: &str, subtitle: &str) -> Result<String, R
 
 fn chart(heading: &str, y: Scale, frf: &Frf, value: fn(f64) -> f64) -> Chart {
     let pen = Pen::solid(BLUE).width(1.2);
-    Chart::new(heading, frequency_scale(frf), y).line("", pen, points(frf, value))
-}
-
-fn frequency_scale(frf: &Frf) -> Scale {
-    let scale = Scale::logarithmic("Frequency (Hz)");
-    match (frf.frequency_hz.first(), frf.frequency_hz.last()) {
-        (Some(&first), Some(&last)) if first < last => scale.within(first, last),
-        _ => scale,
-    }
+    let ends = frf.frequency_hz.first().zip(frf.frequency_hz.last());
+    let x = Scale::frequency(ends.map_or((0.0, 0.0), |(first, last)| (*first, *last)));
+    Chart::new(heading, x, y).line("", pen, points(frf, value))
 }
 
 fn points(frf: &Frf, value: fn(f64) -> f64) -> Vec<(f64, f64)> {

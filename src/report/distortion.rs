@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::chart::colours::{BLUE, GREEN, GREY, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use crate::identify::harmonics::LineLevel;
+use crate::identify::harmonics::{Harmonics, LineLevel};
 
 /// Largest number of points of an averaged line.
 const COLUMNS: f64 = 120.0;
@@ -19,6 +19,17 @@ pub struct DistortionLevels<'a> {
     pub even: &'a [LineLevel],
     /// Number of averaged periods.
     pub periods: usize,
+}
+
+impl<'a> From<&'a Harmonics> for DistortionLevels<'a> {
+    fn from(harmonics: &'a Harmonics) -> Self {
+        DistortionLevels {
+            output: &harmonics.excited,
+            odd: &harmonics.odd,
+            even: &harmonics.even,
+            periods: harmonics.periods,
+        }
+    }
 }
 
 impl DistortionLevels<'_> {
@@ -42,48 +53,23 @@ pub fn distortion_svg(
     let (Some(first), Some(last)) = (levels.output.first(), levels.output.last()) else {
         return Err(ReportError::NoTrace);
     };
-    let (low, high) = (first.frequency_hz, last.frequency_hz);
-    let frequency = Scale::logarithmic("Frequency (Hz)");
-    let frequency = if low < high {
-        frequency.within(low, high)
-    } else {
-        frequency
-    };
-    let chart = Chart::new(
-        "",
-        frequency,
-        Scale::logarithmic("Displacement per line, RMS (m)"),
-    );
-    sheet_svg(
-        title,
-        subtitle,
-        &[Row::new(420.0, vec![with_levels(chart, levels)])],
-    )
+    let x = Scale::frequency((first.frequency_hz, last.frequency_hz));
+    let y = Scale::logarithmic("Displacement per line, RMS (m)");
+    let chart = with_levels(Chart::new("", x, y), levels);
+    sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart])])
 }
 
 fn with_levels(chart: Chart, levels: &DistortionLevels<'_>) -> Chart {
+    let output = levels.output.iter();
+    let output = rms(output.map(|level| (level.frequency_hz, level.power_m2)));
     let periods = levels.periods.max(1) as f64;
     let noise = averaged(&levels.all(), |level| level.noise_m2 / periods);
-    let power = |level: &LineLevel| level.power_m2;
-    let output = rms(levels
-        .output
-        .iter()
-        .map(|level| (level.frequency_hz, level.power_m2)));
+    let [odd, even] = [levels.odd, levels.even].map(|lines| averaged(lines, |line| line.power_m2));
     chart
         .line("excited lines", Pen::solid(BLUE).width(1.2), output)
         .line("noise of the mean", Pen::solid(GREY), noise)
-        .points(
-            "odd lines, not excited",
-            VERMILION,
-            Symbol::Cross,
-            averaged(levels.odd, power),
-        )
-        .points(
-            "even lines, not excited",
-            GREEN,
-            Symbol::Ring,
-            averaged(levels.even, power),
-        )
+        .points("odd lines, not excited", VERMILION, Symbol::Cross, odd)
+        .points("even lines, not excited", GREEN, Symbol::Ring, even)
 }
 
 /// RMS over all lines within the same column of ln f.
@@ -91,17 +77,29 @@ fn averaged(levels: &[LineLevel], power: impl Fn(&LineLevel) -> f64) -> Vec<(f64
     let (Some(first), Some(last)) = (levels.first(), levels.last()) else {
         return Vec::new();
     };
-    let position = |level: &LineLevel| libm::log(level.frequency_hz / first.frequency_hz);
-    let width = position(last) / COLUMNS;
-    let column = |level: &LineLevel| {
-        if width > 0.0 {
-            (position(level) / width).floor()
+    let columns = Columns {
+        first_hz: first.frequency_hz,
+        width: libm::log(last.frequency_hz / first.frequency_hz) / COLUMNS,
+    };
+    let near = levels.chunk_by(|a, b| columns.of(a) == columns.of(b));
+    rms(near.map(|near| (mean(near, |level| level.frequency_hz), mean(near, &power))))
+}
+
+/// Columns of equal width in ln f.
+struct Columns {
+    first_hz: f64,
+    width: f64,
+}
+
+impl Columns {
+    /// The number of the column of a line.
+    fn of(&self, level: &LineLevel) -> f64 {
+        if self.width > 0.0 {
+            (libm::log(level.frequency_hz / self.first_hz) / self.width).floor()
         } else {
             0.0
         }
-    };
-    let columns = levels.chunk_by(|a, b| column(a) == column(b));
-    rms(columns.map(|near| (mean(near, |level| level.frequency_hz), mean(near, &power))))
+    }
 }
 
 fn mean(levels: &[LineLevel], value: impl Fn(&LineLevel) -> f64) -> f64 {

@@ -25,9 +25,9 @@ impl Ellipse {
     pub fn of_95_percent([[a, b], [_, d]]: [[f64; 2]; 2]) -> Option<Ellipse> {
         let (mean, half) = (0.5 * (a + d), 0.5 * (a - d));
         let radius = libm::hypot(half, b);
-        let half_axis = |variance: f64| SIGMAS_95_PLANE * variance.max(0.0).sqrt();
+        let variances = [mean + radius, mean - radius];
         let ellipse = Ellipse {
-            half_axes: [half_axis(mean + radius), half_axis(mean - radius)],
+            half_axes: variances.map(|variance| SIGMAS_95_PLANE * variance.max(0.0).sqrt()),
             angle_rad: 0.5 * libm::atan2(b, half),
         };
         let finite = ellipse.half_axes[0].is_finite() && ellipse.angle_rad.is_finite();
@@ -37,15 +37,16 @@ impl Ellipse {
     /// The closed outline about a centre.
     pub fn outline(&self, (x, y): (f64, f64)) -> Vec<(f64, f64)> {
         let (sin, cos) = libm::sincos(self.angle_rad);
-        let turned = |(along, across): (f64, f64)| {
-            (
-                x + along * cos - across * sin,
-                y + along * sin + across * cos,
-            )
-        };
         let [long, short] = self.half_axes;
         let unit = closed_circle(ELLIPSE_CORNERS).into_iter();
-        unit.map(|(along, across)| turned((long * along, short * across)))
+        let upright = unit.map(|(along, across)| (long * along, short * across));
+        upright
+            .map(|(along, across)| {
+                (
+                    x + along * cos - across * sin,
+                    y + along * sin + across * cos,
+                )
+            })
             .collect()
     }
 }
@@ -59,9 +60,9 @@ pub fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
 
 /// Points of the unit circle; the last is the first.
 fn closed_circle(corners: usize) -> Vec<(f64, f64)> {
-    let angle = |k: usize| TAU * (k % corners) as f64 / corners as f64;
-    (0..=corners)
-        .map(|k| (libm::cos(angle(k)), libm::sin(angle(k))))
+    let angles = (0..=corners).map(|k| TAU * (k % corners) as f64 / corners as f64);
+    angles
+        .map(|angle| (libm::cos(angle), libm::sin(angle)))
         .collect()
 }
 

@@ -74,8 +74,10 @@ pub fn picture(svg: &str, description: &str, caption: &str) -> String {
 
 /// A table. The rows are HTML: see [`row`].
 pub fn table(header: &[&str], rows: &str) -> String {
-    let cell = |cell: &&str| format!("<th>{}</th>", escaped(cell));
-    let header: String = header.iter().map(cell).collect();
+    let header = header.iter();
+    let header: String = header
+        .map(|cell| format!("<th>{}</th>", escaped(cell)))
+        .collect();
     format!(
         "<div class=\"wide\"><table>\n<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n"
     )
@@ -83,17 +85,19 @@ pub fn table(header: &[&str], rows: &str) -> String {
 
 /// A row of a table.
 pub fn row(cells: &[String]) -> String {
-    let cell = |cell: &String| format!("<td class=\"n\">{}</td>", escaped(cell));
-    let cells: String = cells.iter().map(cell).collect();
+    let cells = cells.iter();
+    let cells: String = cells
+        .map(|cell| format!("<td class=\"n\">{}</td>", escaped(cell)))
+        .collect();
     format!("<tr>{cells}</tr>\n")
 }
 
 /// A list of names and values.
 pub fn facts(pairs: &[(String, String)]) -> String {
-    let pair = |(name, value): &(String, String)| {
-        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value))
-    };
-    let pairs: String = pairs.iter().map(pair).collect();
+    let pairs = pairs.iter();
+    let pairs: String = pairs
+        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value)))
+        .collect();
     format!("<dl>\n{pairs}</dl>\n")
 }
 

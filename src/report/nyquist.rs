@@ -31,12 +31,8 @@ pub fn nyquist_svg(
     subtitle: &str,
 ) -> Result<String, ReportError> {
     let lines = trace::lines(traces)?;
-    let mut charts = vec![nyquist(
-        unit,
-        "All frequencies",
-        &lines,
-        (0.0, f64::INFINITY),
-    )];
+    let all_hz = (0.0, f64::INFINITY);
+    let mut charts = vec![nyquist(unit, "All frequencies", &lines, all_hz)];
     if let Some((low, high)) = part_hz {
         let heading = format!("{low:.1} to {high:.1} Hz");
         charts.push(nyquist(unit, &heading, &lines, (low, high)));
@@ -49,8 +45,9 @@ fn nyquist(unit: Unit, heading: &str, lines: &[Line], band_hz: (f64, f64)) -> Ch
         Unit::MetresPerAmpere => (" (µm/A)", MICRO),
         Unit::Bare => ("", 1.0),
     };
-    let scale = |part: &str| Scale::linear(&format!("{part} part of H{name}"));
-    let mut chart = Chart::new(heading, scale("Real"), scale("Imaginary")).equal();
+    let x = Scale::linear(&format!("Real part of H{name}"));
+    let y = Scale::linear(&format!("Imaginary part of H{name}"));
+    let mut chart = Chart::new(heading, x, y).equal();
     for line in lines {
         let indices = within(line, band_hz);
         if let Some(frf) = line.measured {
@@ -70,32 +67,31 @@ fn within(line: &Line, (low, high): (f64, f64)) -> Vec<usize> {
 
 /// Circles of confidence that are visible and do not hide each other.
 fn circles(mut chart: Chart, line: &Line, frf: &Frf, indices: &[usize], factor: f64) -> Chart {
-    let largest = indices
-        .iter()
-        .map(|k| line.magnitude[*k])
-        .fold(0.0, f64::max);
-    let mut centres: Vec<Complex<f64>> = Vec::new();
-    for &k in indices
-        .iter()
-        .step_by(indices.len().div_ceil(CIRCLES).max(1))
-    {
-        let (centre, radius) = (frf.response[k], SIGMAS_95_PLANE * frf.magnitude_sigma[k]);
-        let free = centres
-            .iter()
-            .all(|other| (centre - other).norm() >= radius);
-        if radius > VISIBLE * largest && is_known(frf, k) && free {
-            let name = if centres.is_empty() {
-                "95 % circles"
-            } else {
-                ""
-            };
-            let outline =
-                ellipse::circle((centre.re * factor, centre.im * factor), factor * radius);
-            chart = chart.area(name, line.pen.colour, STRENGTH, outline);
-            centres.push(centre);
-        }
+    let mut name = "95 % circles";
+    for (centre, radius) in visible_circles(line, frf, indices) {
+        let outline = ellipse::circle((centre.re * factor, centre.im * factor), factor * radius);
+        chart = chart.area(name, line.pen.colour, STRENGTH, outline);
+        name = "";
     }
     chart
+}
+
+/// Centres and radii.
+fn visible_circles(line: &Line, frf: &Frf, indices: &[usize]) -> Vec<(Complex<f64>, f64)> {
+    let magnitudes = indices.iter().map(|k| line.magnitude[*k]);
+    let min_radius = VISIBLE * magnitudes.fold(0.0, f64::max);
+    let step = indices.len().div_ceil(CIRCLES).max(1);
+    let mut circles: Vec<(Complex<f64>, f64)> = Vec::new();
+    for &k in indices.iter().step_by(step) {
+        let (centre, radius) = (frf.response[k], SIGMAS_95_PLANE * frf.magnitude_sigma[k]);
+        let is_free = circles
+            .iter()
+            .all(|(other, _)| (centre - other).norm() >= radius);
+        if radius > min_radius && is_known(frf, k) && is_free {
+            circles.push((centre, radius));
+        }
+    }
+    circles
 }
 
 /// The curve, with gaps where frequencies, or magnitudes above the noise, are missing.

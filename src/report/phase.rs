@@ -11,14 +11,15 @@ const COMPARED_RATIO: f64 = 10.0;
 pub fn unwrapped_deg(wrapped_deg: &[f64], trusted: &[bool]) -> Vec<f64> {
     let first = trusted.iter().position(|trusted| *trusted).unwrap_or(0);
     let mut last = wrapped_deg.get(first).copied().unwrap_or(0.0);
-    let follow = |(phase, trusted): (&f64, &bool)| {
-        let unwrapped = closest(*phase, last);
+    let mut unwrapped = Vec::with_capacity(wrapped_deg.len());
+    for (phase, trusted) in wrapped_deg.iter().zip(trusted) {
+        let phase = closest(*phase, last);
         if *trusted {
-            last = unwrapped;
+            last = phase;
         }
-        unwrapped
-    };
-    wrapped_deg.iter().zip(trusted).map(follow).collect()
+        unwrapped.push(phase);
+    }
+    unwrapped
 }
 
 /// The phase plus the whole turns that bring it closest to another.
@@ -31,19 +32,25 @@ pub fn closest(phase_deg: f64, to_deg: f64) -> f64 {
 /// Both are (frequency, phase) with rising frequencies. 0 if they have no frequency in common. Only the lowest decade
 /// decides, since two different responses, such as S and T, may differ by turns above it.
 pub fn offset_deg(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> f64 {
-    let common = curve
+    let differences = differences_deg(curve, reference);
+    let lowest = differences.first().map_or(0.0, |first| first.0);
+    let compared = differences
         .iter()
-        .filter_map(|(frequency, phase)| Some((*frequency, at(reference, *frequency)? - phase)));
-    let common: Vec<(f64, f64)> = common.collect();
-    let highest = common.first().map_or(0.0, |first| COMPARED_RATIO * first.0);
-    let compared = common.iter().filter(|(frequency, _)| *frequency <= highest);
+        .take_while(|(frequency, _)| *frequency <= COMPARED_RATIO * lowest);
     let mut turns: Vec<f64> = compared
         .map(|(_, difference)| (difference / TURN_DEG).round())
         .collect();
     turns.sort_by(f64::total_cmp);
-    turns
-        .get(turns.len() / 2)
-        .map_or(0.0, |median| median * TURN_DEG)
+    let median = turns.get(turns.len() / 2);
+    median.map_or(0.0, |turns| turns * TURN_DEG)
+}
+
+/// The common frequencies, and the reference minus the curve there.
+fn differences_deg(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let points = curve.iter();
+    points
+        .filter_map(|(frequency, phase)| Some((*frequency, at(reference, *frequency)? - phase)))
+        .collect()
 }
 
 /// A curve at a frequency within its range: the last point at or below it.

@@ -78,6 +78,20 @@ impl UncertainPoint {
         (re.0..=re.1).contains(&self.s.re) && (im.0..=im.1).contains(&self.s.im)
     }
 
+    fn is_oscillating(&self) -> bool {
+        -self.s.re <= OSCILLATING * self.s.norm()
+    }
+
+    fn has_ellipse(&self) -> bool {
+        self.sigma(0) > 0.0 && Ellipse::of_95_percent(self.covariance).is_some()
+    }
+
+    /// Half-widths of the 95 % ellipse in real and imaginary part; that of a real zero is a circle.
+    fn half_widths(&self) -> (f64, f64) {
+        let [re, im] = [0, 1].map(|part| SIGMAS_95_PLANE * self.sigma(part));
+        (re, if im > 0.0 { im } else { re })
+    }
+
     fn colour(&self) -> Colour {
         if self.s.re > 0.0 { VERMILION } else { BLUE }
     }
@@ -87,26 +101,19 @@ impl PoleZeroMap {
     /// The two neighbouring poles that are closest to each other for their frequency, among those that count: their
     /// imaginary parts in rad/s.
     pub fn close_pair(&self) -> Option<(f64, f64)> {
-        let counts = |pole: &&UncertainPoint| pole.s.im > 0.0 && pole.s.norm() <= self.up_to_rad_s;
-        let mut im: Vec<f64> = self
+        let counted = self
             .poles
             .iter()
-            .filter(counts)
-            .map(|pole| pole.s.im)
-            .collect();
+            .filter(|pole| pole.s.im > 0.0 && pole.s.norm() <= self.up_to_rad_s);
+        let mut im: Vec<f64> = counted.map(|pole| pole.s.im).collect();
         im.sort_by(f64::total_cmp);
         let pairs = im.windows(2).map(|pair| (pair[0], pair[1]));
         pairs.min_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)))
     }
 
     fn whole(&self) -> Chart {
-        let oscillates = |pole: &&UncertainPoint| -pole.s.re <= OSCILLATING * pole.s.norm();
-        let visible: Vec<_> = self
-            .poles
-            .iter()
-            .filter(oscillates)
-            .chain(&self.zeros)
-            .collect();
+        let oscillating = self.poles.iter().filter(|pole| pole.is_oscillating());
+        let visible: Vec<_> = oscillating.chain(&self.zeros).collect();
         let highest = visible.iter().map(|point| point.s.im).fold(0.0, f64::max);
         let window = (span(&visible, 0.15), (0.0, 1.08 * highest.max(1.0)));
         let all = self.poles.iter().chain(&self.zeros).chain(&self.others);
@@ -114,7 +121,7 @@ impl PoleZeroMap {
             0 => "Upper half of the s-plane".into(),
             n => format!("Upper half of the s-plane; {n} more outside"),
         };
-        self.with_points(plane(&heading, window), true)
+        self.with_points(plane(&heading, window), NAMES)
     }
 
     /// The surroundings of the closest pair, with the intervals of the poles.
@@ -126,49 +133,50 @@ impl PoleZeroMap {
         let visible: Vec<_> = all
             .filter(|point| (im.0..=im.1).contains(&point.s.im))
             .collect();
-        let heading = format!(
-            "The closest modes, {:.2} and {:.2} Hz, enlarged",
-            low / TAU,
-            high / TAU
-        );
+        let [low_hz, high_hz] = [low / TAU, high / TAU];
+        let heading = format!("The closest modes, {low_hz:.2} and {high_hz:.2} Hz, enlarged");
         let chart = plane(&heading, (span(&visible, 0.3), im));
         let chart = self.poles.iter().fold(chart, with_intervals);
-        Some(self.with_points(chart, false))
+        Some(self.with_points(chart, Names::default()))
     }
 
     /// Poles, and zeros with their ellipses.
-    fn with_points(&self, mut chart: Chart, named: bool) -> Chart {
-        let name = |text: &'static str| if named { text } else { "" };
-        chart = chart.points(name("pole"), INK, Symbol::Cross, places(&self.poles));
+    fn with_points(&self, chart: Chart, names: Names) -> Chart {
+        let mut chart = chart.points(names.pole, INK, Symbol::Cross, places(&self.poles));
         if !self.others.is_empty() {
-            let others = places(&self.others);
-            chart = chart.points(
-                name("zero, not part of the verdict"),
-                GREY,
-                Symbol::Ring,
-                others,
-            );
+            chart = chart.points(names.other, GREY, Symbol::Ring, places(&self.others));
         }
         let (right, left): (Vec<UncertainPoint>, _) =
             self.zeros.iter().partition(|zero| zero.s.re > 0.0);
-        chart = with_zeros(chart, name("zero left of the axis"), &left);
-        with_zeros(chart, name("zero right of the axis"), &right)
+        chart = with_zeros(chart, names.left, &left);
+        with_zeros(chart, names.right, &right)
     }
 
     /// Zeros that have an ellipse, nearest to the axis first.
     fn enlarged(&self) -> Vec<Chart> {
-        let has_ellipse = |zero: &&UncertainPoint| {
-            zero.sigma(0) > 0.0 && Ellipse::of_95_percent(zero.covariance).is_some()
-        };
-        let mut zeros: Vec<&UncertainPoint> = self.zeros.iter().filter(has_ellipse).collect();
+        let with_ellipse = self.zeros.iter().filter(|zero| zero.has_ellipse());
+        let mut zeros: Vec<&UncertainPoint> = with_ellipse.collect();
         zeros.sort_by(|a, b| a.sigmas_from_axis().total_cmp(&b.sigmas_from_axis()));
-        zeros
-            .into_iter()
-            .take(ENLARGED)
-            .map(enlarged_zero)
-            .collect()
+        zeros.truncate(ENLARGED);
+        zeros.into_iter().map(enlarged_zero).collect()
     }
 }
+
+/// Names in the legend; empty names have no entry.
+#[derive(Clone, Copy, Default)]
+struct Names {
+    pole: &'static str,
+    other: &'static str,
+    left: &'static str,
+    right: &'static str,
+}
+
+const NAMES: Names = Names {
+    pole: "pole",
+    other: "zero, not part of the verdict",
+    left: "zero left of the axis",
+    right: "zero right of the axis",
+};
 
 fn with_zeros(mut chart: Chart, name: &str, zeros: &[UncertainPoint]) -> Chart {
     let Some(first) = zeros.first() else {
@@ -182,9 +190,7 @@ fn with_zeros(mut chart: Chart, name: &str, zeros: &[UncertainPoint]) -> Chart {
 
 /// One zero. The axes show real and imaginary part minus the zero itself, so that their numbers stay short.
 fn enlarged_zero(zero: &UncertainPoint) -> Chart {
-    let half = |part: usize| SIGMAS_95_PLANE * zero.sigma(part);
-    let re = half(0);
-    let im = if half(1) > 0.0 { half(1) } else { re };
+    let (re, im) = zero.half_widths();
     let with_axis = zero.s.re.abs() <= AXIS_WITHIN * re;
     let axis = if with_axis { -zero.s.re } else { 0.0 };
     let x = ((-re).min(axis) - ROOM * re, re.max(axis) + ROOM * re);

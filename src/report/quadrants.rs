@@ -17,6 +17,8 @@ const UNIT_CIRCLE: Ellipse = Ellipse {
     half_axes: [1.0, 1.0],
     angle_rad: 0.0,
 };
+const ORIGIN: (f64, f64) = (0.0, 0.0);
+const THIN: Pen = Pen::solid(GREY).width(0.8);
 const NUMERALS: [&str; 4] = ["I", "II", "III", "IV"];
 /// Signs of the components along u and v in the quadrants.
 const SIGNS: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
@@ -40,62 +42,79 @@ pub fn quadrants_svg(
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
-    let chart = |(k, panel): (usize, &QuadrantPanel)| chart(panel, k == 0);
-    let charts = panels.iter().enumerate().map(chart).collect();
-    sheet_svg(title, subtitle, &[Row::new(HEIGHT, charts)])
+    let charts = panels.iter().enumerate();
+    let charts = charts.map(|(k, panel)| chart(panel, &Names::new(k == 0)));
+    sheet_svg(title, subtitle, &[Row::new(HEIGHT, charts.collect())])
 }
 
-fn chart(panel: &QuadrantPanel, with_legend: bool) -> Chart {
+/// Names in the legend. Only the first chart has one: empty names have no entry.
+#[derive(Default)]
+struct Names {
+    sector: &'static str,
+    shape: &'static str,
+    actuator: &'static str,
+    probe: &'static str,
+}
+
+impl Names {
+    fn new(with_legend: bool) -> Names {
+        if !with_legend {
+            return Names::default();
+        }
+        Names {
+            sector: "a probe here makes the signs alternate",
+            shape: "mode shape φ",
+            actuator: "actuator",
+            probe: "probe",
+        }
+    }
+}
+
+fn chart(panel: &QuadrantPanel, names: &Names) -> Chart {
     let picture = &panel.picture;
-    let name = |name: &'static str| if with_legend { name } else { "" };
     let x = Scale::blank("").within(X_RANGE.0, X_RANGE.1).unnumbered();
     let y = Scale::blank("").within(Y_RANGE.0, Y_RANGE.1);
     let mut chart = Chart::new(&panel.title, x, y).equal();
     if let Some(quadrant) = picture.avoid() {
         let sector = sector(picture.shapes, quadrant);
-        chart = chart.area(
-            name("a probe here makes the signs alternate"),
-            ALTERNATING,
-            0.13,
-            sector,
-        );
+        chart = chart.area(names.sector, ALTERNATING, 0.13, sector);
     }
-    chart = chart.line(
-        "",
-        Pen::solid(GREY).width(0.8),
-        UNIT_CIRCLE.outline((0.0, 0.0)),
-    );
-    chart = with_shapes(chart, picture.shapes, name("mode shape φ"));
-    let length = longest(picture).max(f64::MIN_POSITIVE);
-    for (vector, colour, vector_name) in [
-        (picture.actuator, VERMILION, "actuator"),
-        (picture.sensor, BLUE, "probe"),
-    ] {
-        let tip = picture.in_frame(vector).map(|component| component / length);
-        chart = chart.arrow(
-            name(vector_name),
-            Pen::solid(colour).width(2.2),
-            (0.0, 0.0),
-            tip.into(),
-        );
-    }
+    chart = chart.line("", THIN, UNIT_CIRCLE.outline(ORIGIN));
+    chart = with_shape(chart, picture.shapes, "φu", names.shape);
+    let [u, v] = picture.shapes;
+    chart = with_shape(chart, [v, u], "φv", "");
+    chart = with_numerals(chart, [u, v]);
+    chart = with_vectors(chart, picture, names);
     with_captions(chart, picture)
 }
 
-/// The shapes u and v, the line across each, and the numbers of the quadrants.
-fn with_shapes(mut chart: Chart, [u, v]: [[f64; 2]; 2], name: &str) -> Chart {
-    let thin = Pen::solid(GREY).width(0.8);
-    for (text, name, shape, across) in [("φu", name, u, v), ("φv", "", v, u)] {
-        let ends = [-1.0, 1.0].map(|side| (side * across[0], side * across[1]));
-        chart = chart.line("", thin, ends.to_vec());
-        chart = chart.arrow(name, thin, (0.0, 0.0), (1.07 * shape[0], 1.07 * shape[1]));
-        chart = chart.text((1.17 * shape[0], 1.17 * shape[1]), (0.0, 0.0), text);
-    }
-    for (signs, numeral) in SIGNS.iter().zip(NUMERALS) {
-        let middle = combination(u, v, 0.51 * signs.0, 0.51 * signs.1);
-        chart = chart.text(middle, (0.0, 0.0), numeral);
-    }
+/// The vectors of actuator and probe, the longer one up to the circle.
+fn with_vectors(chart: Chart, picture: &QuadrantDiagram, names: &Names) -> Chart {
+    let length = longest(picture).max(f64::MIN_POSITIVE);
+    let [actuator, sensor] = [picture.actuator, picture.sensor]
+        .map(|vector| picture.in_frame(vector).map(|component| component / length));
+    let [red, blue] = [VERMILION, BLUE].map(|colour| Pen::solid(colour).width(2.2));
     chart
+        .arrow(names.actuator, red, ORIGIN, actuator.into())
+        .arrow(names.probe, blue, ORIGIN, sensor.into())
+}
+
+/// A mode shape, and the line along the other shape, which separates the quadrants.
+fn with_shape(chart: Chart, [shape, across]: [[f64; 2]; 2], text: &str, name: &str) -> Chart {
+    let ends = [-1.0, 1.0].map(|side| (side * across[0], side * across[1]));
+    chart
+        .line("", THIN, ends.to_vec())
+        .arrow(name, THIN, ORIGIN, (1.07 * shape[0], 1.07 * shape[1]))
+        .text((1.17 * shape[0], 1.17 * shape[1]), (0.0, 0.0), text)
+}
+
+/// The numbers of the quadrants.
+fn with_numerals(chart: Chart, [u, v]: [[f64; 2]; 2]) -> Chart {
+    let quadrants = SIGNS.iter().zip(NUMERALS);
+    quadrants.fold(chart, |chart, (signs, numeral)| {
+        let middle = combination(u, v, 0.51 * signs.0, 0.51 * signs.1);
+        chart.text(middle, (0.0, 0.0), numeral)
+    })
 }
 
 fn with_captions(chart: Chart, picture: &QuadrantDiagram) -> Chart {
@@ -106,23 +125,24 @@ fn with_captions(chart: Chart, picture: &QuadrantDiagram) -> Chart {
 }
 
 fn captions(picture: &QuadrantDiagram) -> Vec<String> {
-    let place = |quadrant: Option<usize>| match quadrant {
-        Some(quadrant) => format!("in {}", NUMERALS[quadrant - 1]),
-        None => "on a line".into(),
-    };
     let [actuator, probe] = picture.quadrants().map(place);
     let turn_deg = (picture.turn_rad().to_degrees() * 10.0).round() / 10.0 + 0.0;
+    let radius = longest(picture);
     let mut lines = vec![format!("actuator {actuator}, probe {probe}")];
     lines.extend(sign_captions(picture.signs()));
-    lines.push(format!(
-        "circle: {:.3} of the vector length",
-        longest(picture)
-    ));
+    lines.push(format!("circle: {radius:.3} of the vector length"));
     lines.push(format!("shapes turned by {turn_deg:+.1}°"));
     lines
         .iter()
         .map(|line| line.replace('-', "\u{2212}"))
         .collect()
+}
+
+fn place(quadrant: Option<usize>) -> String {
+    match quadrant {
+        Some(quadrant) => format!("in {}", NUMERALS[quadrant - 1]),
+        None => "on a line".into(),
+    }
 }
 
 fn sign_captions(signs: Option<[char; 3]>) -> Vec<String> {
@@ -153,11 +173,9 @@ fn combination(u: [f64; 2], v: [f64; 2], a: f64, b: f64) -> (f64, f64) {
 /// A quarter of the disc.
 fn sector([u, v]: [[f64; 2]; 2], quadrant: usize) -> Vec<(f64, f64)> {
     let (a, b) = SIGNS[quadrant - 1];
-    let point = |step: i32| {
-        let (sine, cosine) = libm::sincos(f64::from(step) * core::f64::consts::FRAC_PI_2 / 24.0);
-        combination(u, v, a * cosine, b * sine)
-    };
-    core::iter::once((0.0, 0.0))
-        .chain((0..=24).map(point))
-        .collect()
+    let angles = (0..=24).map(|step| f64::from(step) * core::f64::consts::FRAC_PI_2 / 24.0);
+    let arc = angles
+        .map(libm::sincos)
+        .map(|(sine, cosine)| combination(u, v, a * cosine, b * sine));
+    core::iter::once(ORIGIN).chain(arc).collect()
 }

@@ -17,12 +17,12 @@ pub struct OrderedMode {
     pub damping_ratio: f64,
 }
 
-/// What of a mode was present at the order before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What of a mode was present at the order before; more is greater.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Persistence {
-    FrequencyAndDamping,
-    Frequency,
     New,
+    Frequency,
+    FrequencyAndDamping,
 }
 
 const KINDS: [(Persistence, &str, Colour, Symbol); 3] = [
@@ -47,17 +47,29 @@ const KINDS: [(Persistence, &str, Colour, Symbol); 3] = [
 ];
 
 fn persistence(mode: &OrderedMode, before: &[OrderedMode]) -> Persistence {
-    let close = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * b.abs();
-    let same = |old: &&OrderedMode| close(mode.frequency_hz, old.frequency_hz, FREQUENCY_CHANGE);
-    let damped = |old: &OrderedMode| close(mode.damping_ratio, old.damping_ratio, DAMPING_CHANGE);
-    let mut matches = before.iter().filter(same).peekable();
-    if matches.peek().is_none() {
-        Persistence::New
-    } else if matches.any(damped) {
-        Persistence::FrequencyAndDamping
-    } else {
-        Persistence::Frequency
+    let same_frequency = before.iter().filter(|old| mode.has_frequency_of(old));
+    let persistences = same_frequency.map(|old| {
+        if mode.has_damping_of(old) {
+            Persistence::FrequencyAndDamping
+        } else {
+            Persistence::Frequency
+        }
+    });
+    persistences.max().unwrap_or(Persistence::New)
+}
+
+impl OrderedMode {
+    fn has_frequency_of(&self, other: &OrderedMode) -> bool {
+        is_close(self.frequency_hz, other.frequency_hz, FREQUENCY_CHANGE)
     }
+
+    fn has_damping_of(&self, other: &OrderedMode) -> bool {
+        is_close(self.damping_ratio, other.damping_ratio, DAMPING_CHANGE)
+    }
+}
+
+fn is_close(a: f64, b: f64, ratio: f64) -> bool {
+    (a - b).abs() <= ratio * b.abs()
 }
 
 /// The chart as an SVG document: the modes of each order over frequency, and vertical lines at the modes of the fit.
@@ -83,23 +95,16 @@ fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Ch
     let x = Scale::logarithmic("Frequency (Hz)").within(low_end_hz(orders, band_hz), band_hz.1);
     let y = Scale::linear("Order (number of modes)").within(0.0, highest);
     let mut chart = Chart::new("", x, y);
-    for (k, f) in fit_hz.iter().enumerate() {
-        let name = if k == 0 {
-            format!("the {} modes of the fit", fit_hz.len())
-        } else {
-            String::new()
-        };
-        chart = chart.line(
-            &name,
-            Pen::dashed(GREY).thin(),
-            vec![(*f, 0.0), (*f, highest)],
-        );
+    let mut name = format!("the {} modes of the fit", fit_hz.len());
+    for f in fit_hz {
+        let line = vec![(*f, 0.0), (*f, highest)];
+        chart = chart.line(&name, Pen::dashed(GREY).thin(), line);
+        name.clear();
     }
-    KINDS
-        .into_iter()
-        .fold(chart, |chart, (kind, name, colour, symbol)| {
-            chart.points(name, colour, symbol, places(orders, kind))
-        })
+    for (kind, name, colour, symbol) in KINDS {
+        chart = chart.points(name, colour, symbol, places(orders, kind));
+    }
+    chart
 }
 
 /// Half of the lowest oscillating mode, or the lower end of the band where that is higher.

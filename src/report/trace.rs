@@ -45,7 +45,7 @@ impl<'a> Trace<'a> {
     }
 
     pub(super) fn is_measured(&self) -> bool {
-        matches!(self.curve, Curve::Measured(_))
+        self.curve.measured().is_some()
     }
 }
 
@@ -61,6 +61,27 @@ pub enum Curve<'a> {
         /// Response in the unit of the plot.
         response: &'a [Complex<f64>],
     },
+}
+
+impl<'a> Curve<'a> {
+    /// The response, if it is measured.
+    fn measured(&self) -> Option<&'a Frf> {
+        match *self {
+            Curve::Measured(frf) => Some(frf),
+            Curve::Model { .. } => None,
+        }
+    }
+
+    /// Frequencies and response.
+    fn columns(&self) -> (&'a [f64], &'a [Complex<f64>]) {
+        match *self {
+            Curve::Measured(frf) => (&frf.frequency_hz, &frf.response),
+            Curve::Model {
+                frequency_hz,
+                response,
+            } => (frequency_hz, response),
+        }
+    }
 }
 
 /// A response ready to be plotted, with one entry a frequency in every column.
@@ -97,17 +118,14 @@ pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportErr
 /// A pen for each trace. Models are dashed where something measured lies below them.
 fn pens(traces: &[Trace]) -> Vec<Pen> {
     let any_measured = traces.iter().any(Trace::is_measured);
-    let (mut measured, mut models) = (0, 0);
-    let mut pen = |trace: &Trace| {
-        let count = if trace.is_measured() {
-            &mut measured
-        } else {
-            &mut models
-        };
-        *count += 1;
-        numbered_pen(trace.is_measured(), *count - 1, any_measured)
-    };
-    traces.iter().map(&mut pen).collect()
+    let mut pens = Vec::new();
+    for (k, trace) in traces.iter().enumerate() {
+        let measured = trace.is_measured();
+        let before = traces[..k].iter();
+        let index = before.filter(|other| other.is_measured() == measured);
+        pens.push(numbered_pen(measured, index.count(), any_measured));
+    }
+    pens
 }
 
 fn numbered_pen(measured: bool, index: usize, any_measured: bool) -> Pen {
@@ -131,19 +149,12 @@ fn numbered_pen(measured: bool, index: usize, any_measured: bool) -> Pen {
 impl<'a> Line<'a> {
     fn new(trace: &Trace<'a>, pen: Pen) -> Result<Self, ReportError> {
         check(trace)?;
-        let (frequency_hz, response, measured) = match trace.curve {
-            Curve::Measured(frf) => (&frf.frequency_hz[..], &frf.response[..], Some(frf)),
-            Curve::Model {
-                frequency_hz,
-                response,
-            } => (frequency_hz, response, None),
-        };
+        let measured = trace.curve.measured();
+        let (frequency_hz, response) = trace.curve.columns();
         let magnitude: Vec<f64> = response.iter().map(|h| h.norm()).collect();
         let trusted = above_sigmas(&magnitude, measured, TRUSTED_SIGMAS);
-        let wrapped: Vec<f64> = response
-            .iter()
-            .map(|h| wrapped_phase_rad(*h).to_degrees())
-            .collect();
+        let phases = response.iter().map(|h| wrapped_phase_rad(*h).to_degrees());
+        let wrapped: Vec<f64> = phases.collect();
         Ok(Self {
             name: trace.name,
             pen,
@@ -159,28 +170,35 @@ impl<'a> Line<'a> {
 
     /// The magnitude with its band.
     pub fn magnitude_points(&self) -> Vec<SeriesPoint> {
-        let sigma = |frf: &Frf, k: usize| frf.magnitude_sigma[k];
-        self.points(&self.magnitude, sigma)
+        self.points(&self.magnitude, |frf, k| frf.magnitude_sigma[k])
     }
 
     /// The phase in degrees with its band.
     pub fn phase_points(&self) -> Vec<SeriesPoint> {
-        let sigma = |frf: &Frf, k: usize| frf.phase_sigma_rad[k].to_degrees();
-        self.points(&self.phase_deg, sigma)
+        self.points(&self.phase_deg, |frf, k| {
+            frf.phase_sigma_rad[k].to_degrees()
+        })
     }
 
-    fn points(&self, values: &[f64], sigma: impl Fn(&Frf, usize) -> f64) -> Vec<SeriesPoint> {
-        let point = |(k, y): (usize, &f64)| {
-            let half = BAND_SIGMAS * self.measured.map_or(0.0, |frf| sigma(frf, k));
-            SeriesPoint {
-                x: self.frequency_hz[k],
-                y: *y,
-                band: (y - half, y + half),
-                faint: !self.certain[k],
-                starts: k == 0 || self.measured.is_some_and(|frf| has_gap_before(frf, k)),
-            }
-        };
-        values.iter().enumerate().map(point).collect()
+    fn points(&self, values: &[f64], sigma: fn(&Frf, usize) -> f64) -> Vec<SeriesPoint> {
+        let values = values.iter().enumerate();
+        values
+            .map(|(k, y)| {
+                let sigma = self.measured.map_or(0.0, |frf| sigma(frf, k));
+                self.point(k, *y, BAND_SIGMAS * sigma)
+            })
+            .collect()
+    }
+
+    /// A value at a frequency, with the half-width of its band.
+    fn point(&self, k: usize, y: f64, half_width: f64) -> SeriesPoint {
+        SeriesPoint {
+            x: self.frequency_hz[k],
+            y,
+            band: (y - half_width, y + half_width),
+            faint: !self.certain[k],
+            starts: k == 0 || self.measured.is_some_and(|frf| has_gap_before(frf, k)),
+        }
     }
 
     /// The points (frequency, phase) that are known well.
@@ -197,9 +215,12 @@ impl<'a> Line<'a> {
 
 /// Which magnitudes are above so many of their sigmas; all of a model.
 fn above_sigmas(magnitude: &[f64], measured: Option<&Frf>, sigmas: f64) -> Vec<bool> {
-    let sigma = |k: usize| measured.map_or(0.0, |frf| frf.magnitude_sigma[k]);
-    let above = |(k, magnitude): (usize, &f64)| *magnitude > sigmas * sigma(k);
-    magnitude.iter().enumerate().map(above).collect()
+    let magnitude = magnitude.iter().enumerate();
+    magnitude
+        .map(|(k, magnitude)| {
+            *magnitude > sigmas * measured.map_or(0.0, |frf| frf.magnitude_sigma[k])
+        })
+        .collect()
 }
 
 /// Whether a gap lies between a measured frequency and the one before it.
@@ -213,8 +234,10 @@ pub(super) fn has_gap_before(frf: &Frf, k: usize) -> bool {
 
 /// Moves every line to the turn of the one that starts at the lowest frequency.
 fn align_phases(lines: &mut [Line]) {
-    let by_start = |a: &&Line, b: &&Line| a.frequency_hz[0].total_cmp(&b.frequency_hz[0]);
-    let Some(reference) = lines.iter().min_by(by_start).map(Line::trusted_phases) else {
+    let lowest = lines
+        .iter()
+        .min_by(|a, b| a.frequency_hz[0].total_cmp(&b.frequency_hz[0]));
+    let Some(reference) = lowest.map(Line::trusted_phases) else {
         return;
     };
     for line in lines {
@@ -224,33 +247,21 @@ fn align_phases(lines: &mut [Line]) {
 }
 
 fn check(trace: &Trace) -> Result<(), ReportError> {
-    match trace.curve {
-        Curve::Model {
-            frequency_hz,
-            response,
-        } => {
-            check_columns(trace.name, frequency_hz, &[response.len()])?;
-            check_finite(trace.name, frequency_hz, |k| response[k].norm().is_finite())
-        }
-        Curve::Measured(frf) => {
-            let columns = [
-                &frf.coherence,
-                &frf.magnitude_sigma,
-                &frf.phase_sigma_rad,
-                &frf.resolution_hz,
-            ];
-            let lengths = columns.map(Vec::len);
-            check_columns(
-                trace.name,
-                &frf.frequency_hz,
-                &[&lengths[..], &[frf.response.len()]].concat(),
-            )?;
-            let finite = |k: usize| columns.iter().all(|column| column[k].is_finite());
-            check_finite(trace.name, &frf.frequency_hz, |k| {
-                frf.response[k].norm().is_finite() && finite(k)
-            })
-        }
-    }
+    let (frequency_hz, response) = trace.curve.columns();
+    let columns = trace.curve.measured().map_or_else(Vec::new, |frf| {
+        vec![
+            &frf.coherence,
+            &frf.magnitude_sigma,
+            &frf.phase_sigma_rad,
+            &frf.resolution_hz,
+        ]
+    });
+    let mut lengths: Vec<usize> = columns.iter().map(|column| column.len()).collect();
+    lengths.push(response.len());
+    check_columns(trace.name, frequency_hz, &lengths)?;
+    check_finite(trace.name, frequency_hz, |k| {
+        response[k].norm().is_finite() && columns.iter().all(|column| column[k].is_finite())
+    })
 }
 
 fn check_columns(name: &str, frequency_hz: &[f64], columns: &[usize]) -> Result<(), ReportError> {
@@ -267,23 +278,14 @@ fn check_columns(name: &str, frequency_hz: &[f64], columns: &[usize]) -> Result<
 }
 
 fn check_rising(name: String, frequency_hz: &[f64]) -> Result<(), ReportError> {
-    let before = |index: usize| {
-        if index == 0 {
-            0.0
-        } else {
-            frequency_hz[index - 1]
+    let mut before = 0.0;
+    for (index, &value) in frequency_hz.iter().enumerate() {
+        if !(value.is_finite() && value > before) {
+            return Err(ReportError::Frequency { name, index, value });
         }
-    };
-    let rises =
-        |index: usize| frequency_hz[index].is_finite() && frequency_hz[index] > before(index);
-    match (0..frequency_hz.len()).find(|index| !rises(*index)) {
-        Some(index) => Err(ReportError::Frequency {
-            name,
-            index,
-            value: frequency_hz[index],
-        }),
-        None => Ok(()),
+        before = value;
     }
+    Ok(())
 }
 
 fn check_finite(

@@ -95,19 +95,21 @@ impl Axis {
         if decades < 0.7 {
             return self.linear_ticks(nice_step((self.high - self.low) / 7.0));
         }
-        let labelled = |digit, _| digit == 1 || (decades < 3.0 && (digit == 2 || digit == 5));
-        self.decade_ticks(labelled, |value, _, _| plain(value))
+        self.decade_ticks(|Decimal { digit, value, .. }| {
+            let labelled = digit == 1 || (decades < 3.0 && (digit == 2 || digit == 5));
+            labelled.then(|| plain(value))
+        })
     }
 
     /// Ticks with powers of ten: one label for each decade, or fewer where there are too many decades.
     fn magnitude_ticks(&self) -> Vec<Tick> {
         let decades = self.decades();
         let every = (decades / 8.0).ceil().max(1.0) as i32;
-        let labelled = |digit, power: i32| {
+        self.decade_ticks(|Decimal { digit, power, .. }| {
             let decade = digit == 1 && power.rem_euclid(every) == 0;
-            decade || (decades < 2.0 && (digit == 2 || digit == 5))
-        };
-        self.decade_ticks(labelled, |_, digit, power| power_of_ten(digit, power))
+            let labelled = decade || (decades < 2.0 && (digit == 2 || digit == 5));
+            labelled.then(|| power_of_ten(digit, power))
+        })
     }
 
     /// Ticks at multiples of 30 degrees within half a turn, otherwise of 90, 180, 360 ... degrees.
@@ -125,33 +127,48 @@ impl Axis {
         let first = (self.low / step - 1e-9).ceil() as i64;
         let last = (self.high / step + 1e-9).floor() as i64;
         let values = (first..=last).map(|k| k as f64 * step);
-        let tick = |value| Tick {
-            value,
-            label: Some(plain(value)),
-        };
-        values.map(tick).collect()
+        values
+            .map(|value| Tick {
+                value,
+                label: Some(plain(value)),
+            })
+            .collect()
     }
 
     fn decades(&self) -> f64 {
         libm::log10(self.high / self.low)
     }
 
-    fn decade_ticks(
-        &self,
-        labelled: impl Fn(i32, i32) -> bool,
-        label: impl Fn(f64, i32, i32) -> String,
-    ) -> Vec<Tick> {
+    /// Ticks at 1 to 9 times each power of ten.
+    fn decade_ticks(&self, label: impl Fn(Decimal) -> Option<String>) -> Vec<Tick> {
         let powers = libm::log10(self.low).floor() as i32..=libm::log10(self.high).ceil() as i32;
-        let all = powers.flat_map(|power| (1..=9).map(move |digit| (digit, power)));
-        let tick = |(digit, power): (i32, i32)| {
-            let value = f64::from(digit) * libm::pow(10.0, f64::from(power));
-            let label = labelled(digit, power).then(|| label(value, digit, power));
-            Tick { value, label }
-        };
+        let all = powers.flat_map(|power| (1..=9).map(move |digit| Decimal::new(digit, power)));
         let within = self.low * (1.0 - 1e-9)..=self.high * (1.0 + 1e-9);
-        all.map(tick)
-            .filter(|tick| within.contains(&tick.value))
+        all.filter(|decimal| within.contains(&decimal.value))
+            .map(|decimal| Tick {
+                value: decimal.value,
+                label: label(decimal),
+            })
             .collect()
+    }
+}
+
+/// A digit times a power of ten.
+#[derive(Clone, Copy)]
+struct Decimal {
+    digit: i32,
+    power: i32,
+    value: f64,
+}
+
+impl Decimal {
+    fn new(digit: i32, power: i32) -> Decimal {
+        let value = f64::from(digit) * libm::pow(10.0, f64::from(power));
+        Decimal {
+            digit,
+            power,
+            value,
+        }
     }
 }
 
@@ -169,8 +186,10 @@ impl Tick {
 fn nice_step(step: f64) -> f64 {
     let power = libm::pow(10.0, libm::log10(step).floor());
     let steps = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power);
-    let fits = |nice: &f64| *nice >= step * (1.0 - 1e-9);
-    steps.into_iter().find(fits).unwrap_or(step)
+    let mut fitting = steps
+        .into_iter()
+        .filter(|nice| *nice >= step * (1.0 - 1e-9));
+    fitting.next().unwrap_or(step)
 }
 
 /// A number without the noise of binary fractions: 0.3, not 0.30000000000000004.

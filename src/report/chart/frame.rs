@@ -27,9 +27,8 @@ impl Frame {
     }
 
     pub fn contains(&self, (x, y): (f64, f64)) -> bool {
-        let within =
-            |value: f64, low: f64, high: f64| value >= low - SLACK && value <= high + SLACK;
-        within(x, self.left, self.right) && within(y, self.top, self.bottom)
+        (self.left - SLACK..=self.right + SLACK).contains(&x)
+            && (self.top - SLACK..=self.bottom + SLACK).contains(&y)
     }
 
     /// The nearest point of the frame.
@@ -71,7 +70,7 @@ impl Frame {
             (dy, self.bottom - from.1),
         ];
         let (enters, leaves) = inside(sides)?;
-        // Of ends far away the sum is rounded: the nearest point of the frame corrects it.
+        // The sum is rounded if an end is far away: the nearest point of the frame corrects it.
         let at = |t: f64| self.nearest((from.0 + t * dx, from.1 + t * dy));
         let start = if enters > 0.0 { at(enters) } else { from };
         let end = if leaves < 1.0 { at(leaves) } else { to };
@@ -124,8 +123,7 @@ fn simplified(points: &[(f64, f64)]) -> Points {
 
 /// The point between two others that is farthest from their segment, if it is visibly beside it.
 fn farthest(points: &[(f64, f64)], from: usize, to: usize) -> Option<usize> {
-    let beside = |k: usize| distance(points[k], points[from], points[to]);
-    let distances = (from + 1..to).map(|k| (k, beside(k)));
+    let distances = (from + 1..to).map(|k| (k, distance(points[k], points[from], points[to])));
     let far = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (far.1 > INVISIBLE).then_some(far.0)
 }

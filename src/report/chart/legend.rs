@@ -1,8 +1,9 @@
 //! The legend of a chart: one entry for each named mark.
 
-use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
+use plotters::style::{Color, RGBAColor};
 
+use super::Points;
 use super::canvas::{Canvas, TextStyle, rectangle};
 use super::colours::{Colour, INK};
 use super::header::{CHARACTER, TEXT_SIZE};
@@ -58,41 +59,36 @@ impl Legend {
     }
 }
 
-/// The entries of a mark.
+/// The entries of a mark: one for each name that is not empty.
 fn entries(mark: &Mark) -> Vec<Entry> {
-    let named: Vec<(&String, Sample)> = match mark {
-        Mark::Line { name, pen, .. } => vec![(name, Sample::Line(*pen))],
-        Mark::Series {
-            name, pen, dots, ..
-        } if *dots => vec![(name, Sample::Band(*pen))],
-        Mark::Series { name, pen, .. } => vec![(name, Sample::Line(*pen))],
-        Mark::Arrow { name, pen, .. } => vec![(name, Sample::Arrow(*pen))],
-        Mark::Points {
-            name,
-            colour,
-            symbol,
-            ..
-        } => vec![(name, Sample::Point(*colour, *symbol))],
-        Mark::Area {
-            name,
-            colour,
-            strength,
-            ..
-        } => vec![(name, Sample::Area(*colour, *strength))],
-        Mark::Cells { colours, .. } => colours.iter().map(cell_sample).collect(),
-        Mark::Text { .. } => Vec::new(),
-    };
-    let named = named.into_iter().filter(|(name, _)| !name.is_empty());
-    named
-        .map(|(name, sample)| Entry {
-            name: name.clone(),
+    let samples = samples(mark).into_iter().zip(mark.names());
+    samples
+        .filter(|(_, name)| !name.is_empty())
+        .map(|(sample, name)| Entry {
+            name: name.into(),
             sample,
         })
         .collect()
 }
 
-fn cell_sample((name, colour): &(String, Colour)) -> (&String, Sample) {
-    (name, Sample::Area(*colour, 1.0))
+/// A sample for each name of a mark.
+fn samples(mark: &Mark) -> Vec<Sample> {
+    let sample = match mark {
+        Mark::Series { pen, dots, .. } if *dots => Sample::Band(*pen),
+        Mark::Line { pen, .. } | Mark::Series { pen, .. } => Sample::Line(*pen),
+        Mark::Arrow { pen, .. } => Sample::Arrow(*pen),
+        Mark::Points { colour, symbol, .. } => Sample::Point(*colour, *symbol),
+        Mark::Area {
+            colour, strength, ..
+        } => Sample::Area(*colour, *strength),
+        Mark::Cells { colours, .. } => return colours.iter().map(cell_sample).collect(),
+        Mark::Text { .. } => return Vec::new(),
+    };
+    vec![sample]
+}
+
+fn cell_sample((_, colour): &(String, Colour)) -> Sample {
+    Sample::Area(*colour, 1.0)
 }
 
 /// Where entries of these widths begin: side by side, in a new row where the right edge is reached.
@@ -130,11 +126,12 @@ impl Sample {
         middle: f64,
     ) -> Result<(), ReportError> {
         let ends = [(left, middle), (right, middle)];
-        let box_of = |left: f64| rectangle((left, middle - 6.0), (right, middle + 6.0));
+        let (top, lower_right) = (middle - 6.0, (right, middle + 6.0));
         match *self {
             Sample::Line(pen) => draw_line(canvas, pen, &ends),
             Sample::Band(pen) => {
-                canvas.area(&box_of(left), pen.colour.mix(BAND))?;
+                let band = rectangle((left, top), lower_right);
+                canvas.area(&band, pen.colour.mix(BAND))?;
                 draw_line(canvas, pen, &ends)
             }
             Sample::Arrow(pen) => draw_arrow(canvas, pen, ends[0], ends[1]),
@@ -142,13 +139,18 @@ impl Sample {
                 draw_symbol(canvas, colour, symbol, (right - 8.0, middle))
             }
             Sample::Area(colour, strength) => {
-                let mut outline = box_of(left + 6.0);
-                canvas.area(&outline, colour.mix(strength))?;
-                outline.push(outline[0]);
-                canvas.line(&outline, INK.into(), 0.5)
+                let outline = rectangle((left + 6.0, top), lower_right);
+                draw_box(canvas, outline, colour.mix(strength))
             }
         }
     }
+}
+
+/// A filled box with a fine outline.
+fn draw_box(canvas: &Canvas, mut outline: Points, colour: RGBAColor) -> Result<(), ReportError> {
+    canvas.area(&outline, colour)?;
+    outline.push(outline[0]);
+    canvas.line(&outline, INK.into(), 0.5)
 }
 
 fn draw_line(canvas: &Canvas, pen: Pen, ends: &[(f64, f64)]) -> Result<(), ReportError> {

@@ -173,6 +173,19 @@ impl Mark {
         matches!(self, Mark::Cells { .. } | Mark::Area { .. })
     }
 
+    /// Names for the legend; some may be empty.
+    pub(super) fn names(&self) -> Vec<&str> {
+        match self {
+            Mark::Line { name, .. }
+            | Mark::Series { name, .. }
+            | Mark::Arrow { name, .. }
+            | Mark::Points { name, .. }
+            | Mark::Area { name, .. } => vec![name],
+            Mark::Cells { colours, .. } => colours.iter().map(|(name, _)| name.as_str()).collect(),
+            Mark::Text { .. } => Vec::new(),
+        }
+    }
+
     /// The points that the axes have to cover.
     pub(super) fn extent(&self) -> Vec<(f64, f64)> {
         match self {
@@ -190,6 +203,6 @@ impl Mark {
 fn corners(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     let first = x.first().zip(y.first());
     let last = x.last().zip(y.last());
-    let corner = |(x, y): (&f64, &f64)| (*x, *y);
-    first.into_iter().chain(last).map(corner).collect()
+    let corners = first.into_iter().chain(last);
+    corners.map(|(x, y)| (*x, *y)).collect()
 }

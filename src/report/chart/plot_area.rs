@@ -48,26 +48,16 @@ impl PlotArea {
         self.draw_grid(canvas, &x_ticks, &y_ticks, false)?;
         self.draw_grid(canvas, &x_ticks, &y_ticks, true)?;
         self.draw_frame(canvas)?;
-        let Frame {
-            left, top, bottom, ..
-        } = self.frame;
         for tick in &y_ticks {
-            draw_number(
-                canvas,
-                tick,
-                (left - 6.0, self.y.pixel(tick.value)),
-                NUMBER_LEFT,
-            )?;
+            let at = (self.frame.left - 6.0, self.y.pixel(tick.value));
+            draw_number(canvas, tick, at, NUMBER_LEFT)?;
         }
         for tick in &x_ticks {
-            draw_number(
-                canvas,
-                tick,
-                (self.x.pixel(tick.value), bottom + 6.0),
-                NUMBER_BELOW,
-            )?;
+            let at = (self.x.pixel(tick.value), self.frame.bottom + 6.0);
+            draw_number(canvas, tick, at, NUMBER_BELOW)?;
         }
-        canvas.text(&y.label, (left - LABEL_LEFT, (top + bottom) / 2.0), LABEL)
+        let middle = (self.frame.top + self.frame.bottom) / 2.0;
+        canvas.text(&y.label, (self.frame.left - LABEL_LEFT, middle), LABEL)
     }
 
     fn draw_grid(
@@ -82,32 +72,22 @@ impl PlotArea {
         } else {
             (FINE_GRID, 0.6)
         };
-        let Frame {
-            left,
-            right,
-            top,
-            bottom,
-        } = self.frame;
+        let frame = self.frame;
         for tick in x.iter().filter(|tick| tick.label.is_some() == labelled) {
             let x = self.x.pixel(tick.value);
-            canvas.line(&[(x, top), (x, bottom)], colour.into(), width)?;
+            canvas.line(&[(x, frame.top), (x, frame.bottom)], colour.into(), width)?;
         }
         for tick in y.iter().filter(|tick| tick.label.is_some() == labelled) {
             let y = self.y.pixel(tick.value);
-            canvas.line(&[(left, y), (right, y)], colour.into(), width)?;
+            canvas.line(&[(frame.left, y), (frame.right, y)], colour.into(), width)?;
         }
         Ok(())
     }
 
     fn draw_frame(&self, canvas: &Canvas) -> Result<(), ReportError> {
-        let Frame {
-            left,
-            right,
-            top,
-            bottom,
-        } = self.frame;
-        let mut outline = rectangle((left, top), (right, bottom));
-        outline.extend([(left, top), (right, top)]);
+        let frame = self.frame;
+        let mut outline = rectangle((frame.left, frame.top), (frame.right, frame.bottom));
+        outline.extend([(frame.left, frame.top), (frame.right, frame.top)]);
         canvas.line(&outline, FRAME.into(), 0.8)
     }
 
@@ -169,17 +149,25 @@ impl PlotArea {
     ) -> Result<(), ReportError> {
         for part in self.frame.clipped(&self.places(points)) {
             draw_stroke(canvas, pen, 1.0, &part)?;
-            let heads = if directed {
-                arrow_heads(&part)
-            } else {
-                Vec::new()
-            };
-            let inside = |head: &&Points| head.iter().all(|corner| self.frame.contains(*corner));
-            for head in heads.iter().filter(inside) {
-                canvas.area(head, pen.colour.into())?;
+            if directed {
+                self.draw_arrow_heads(canvas, pen, &part)?;
             }
         }
         Ok(())
+    }
+
+    /// Arrow heads along a line, where they are wholly inside the frame.
+    fn draw_arrow_heads(
+        &self,
+        canvas: &Canvas,
+        pen: Pen,
+        points: &[(f64, f64)],
+    ) -> Result<(), ReportError> {
+        let heads = arrow_heads(points);
+        let mut inside = heads
+            .iter()
+            .filter(|head| head.iter().all(|corner| self.frame.contains(*corner)));
+        inside.try_for_each(|head| canvas.area(head, pen.colour.into()))
     }
 
     fn draw_series(
@@ -198,12 +186,8 @@ impl PlotArea {
         for piece in series::pieces(&columns) {
             draw_stroke(canvas, pen, opacity(piece.faint), &piece.points)?;
         }
-        draw_dots(
-            canvas,
-            pen.colour,
-            &samples,
-            dots && samples.len() < FEW_POINTS,
-        )
+        let all = dots && samples.len() < FEW_POINTS;
+        draw_dots(canvas, pen.colour, &samples, all)
     }
 
     fn sample(&self, point: &SeriesPoint) -> Sample {
@@ -288,22 +272,18 @@ impl PlotArea {
         if at.0.is_nan() || at.1.is_nan() {
             return Ok(());
         }
-        let Frame {
-            left,
-            right,
-            top,
-            bottom,
-        } = self.frame;
+        let frame = self.frame;
         let half_width = 0.5 * CHARACTER * TEXT_SIZE * text.chars().count() as f64 + 3.0;
         let half_height = 0.6 * TEXT_SIZE + 2.0;
-        let x = moved_between(at.0 + offset.0, left + half_width, right - half_width);
-        let y = moved_between(at.1 + offset.1, top + half_height, bottom - half_height);
+        let x = moved_inside(at.0 + offset.0, (frame.left, frame.right), half_width);
+        let y = moved_inside(at.1 + offset.1, (frame.top, frame.bottom), half_height);
         canvas.text(text, (x, y), TEXT.colour(colour))
     }
 }
 
-/// The nearest value between two limits; the middle where they exclude each other.
-fn moved_between(value: f64, low: f64, high: f64) -> f64 {
+/// The nearest value at least `distance` inside two ends; the middle where there is none.
+fn moved_inside(value: f64, ends: (f64, f64), distance: f64) -> f64 {
+    let (low, high) = (ends.0 + distance, ends.1 - distance);
     if low < high {
         value.clamp(low, high)
     } else {
@@ -346,10 +326,11 @@ fn draw_dots(
     samples: &[Sample],
     all: bool,
 ) -> Result<(), ReportError> {
-    let next_starts = |k: usize| samples.get(k + 1).is_none_or(|next| next.starts);
-    let alone = |k: usize| samples[k].starts && next_starts(k);
-    for (_, sample) in samples.iter().enumerate().filter(|(k, _)| all || alone(*k)) {
-        canvas.dot(sample.at, DOT, colour.mix(opacity(sample.faint)))?;
+    for (k, sample) in samples.iter().enumerate() {
+        let next_starts = samples.get(k + 1).is_none_or(|next| next.starts);
+        if all || (sample.starts && next_starts) {
+            canvas.dot(sample.at, DOT, colour.mix(opacity(sample.faint)))?;
+        }
     }
     Ok(())
 }
@@ -385,19 +366,24 @@ fn arrow_head(from: (f64, f64), to: (f64, f64), length: f64, slope: f64) -> Opti
 fn arrow_heads(points: &[(f64, f64)]) -> Vec<Points> {
     let (mut since_last, mut heads) = (0.55 * ARROW_SPACING, Vec::new());
     for pair in points.windows(2) {
-        let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
-        let length = libm::hypot(dx, dy);
+        let length = libm::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
         since_last += length;
         if since_last > ARROW_SPACING && length > 0.0 {
-            let (ux, uy) = (dx / length * ARROW_LENGTH, dy / length * ARROW_LENGTH);
-            let middle = (pair[0].0 + 0.5 * dx, pair[0].1 + 0.5 * dy);
-            let start = (middle.0 - ux, middle.1 - uy);
-            let tip = (middle.0 + 0.5 * ux, middle.1 + 0.5 * uy);
-            heads.extend(arrow_head(start, tip, ARROW_LENGTH, 0.5));
+            heads.extend(middle_arrow_head(pair[0], pair[1], length));
             since_last = 0.0;
         }
     }
     heads
+}
+
+/// An arrow head in the middle of a segment of given length.
+fn middle_arrow_head(from: (f64, f64), to: (f64, f64), length: f64) -> Option<Points> {
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let (ux, uy) = (dx / length * ARROW_LENGTH, dy / length * ARROW_LENGTH);
+    let middle = (from.0 + 0.5 * dx, from.1 + 0.5 * dy);
+    let start = (middle.0 - ux, middle.1 - uy);
+    let tip = (middle.0 + 0.5 * ux, middle.1 + 0.5 * uy);
+    arrow_head(start, tip, ARROW_LENGTH, 0.5)
 }
 
 pub(super) fn draw_symbol(

@@ -46,6 +46,16 @@ impl Scale {
         Scale::new(label, ScaleKind::Logarithmic)
     }
 
+    /// A logarithmic axis of frequencies in hertz, with these ends if the lower one is below the upper one.
+    pub fn frequency((low_hz, high_hz): (f64, f64)) -> Scale {
+        let scale = Scale::logarithmic("Frequency (Hz)");
+        if low_hz < high_hz {
+            scale.within(low_hz, high_hz)
+        } else {
+            scale
+        }
+    }
+
     /// A linear axis in degrees.
     pub fn degrees(label: &str) -> Scale {
         Scale::new(label, ScaleKind::Degrees)

@@ -35,8 +35,10 @@ pub(super) struct Piece {
 
 /// The samples by pixel column.
 pub(super) fn columns(samples: &[Sample]) -> Vec<Column> {
-    let same_column = |a: &Sample, b: &Sample| a.at.0.floor() == b.at.0.floor() && !b.starts;
-    samples.chunk_by(same_column).map(column).collect()
+    samples
+        .chunk_by(|a, b| a.at.0.floor() == b.at.0.floor() && !b.starts)
+        .map(column)
+        .collect()
 }
 
 fn column(samples: &[Sample]) -> Column {
@@ -129,8 +131,9 @@ fn dashed(points: &[(f64, f64)], on: f64, off: f64) -> Vec<Points> {
     let total = lengths.last().copied().unwrap_or(0.0);
     let starts = (0..).map(|k| f64::from(k) * (on + off));
     let starts = starts.take_while(|start| *start < total);
-    let dash = |start: f64| part(points, &lengths, start, (start + on).min(total));
-    starts.map(dash).collect()
+    starts
+        .map(|start| part(points, &lengths, start, (start + on).min(total)))
+        .collect()
 }
 
 /// Length of a line from its beginning to each of its points.

@@ -40,8 +40,26 @@ impl Row {
         Row { height, charts }
     }
 
-    fn is_numbered(&self) -> bool {
-        self.charts.iter().any(|chart| chart.x.numbered)
+    /// Pixels below the frames.
+    fn space_below(&self) -> f64 {
+        if self.charts.iter().any(|chart| chart.x.numbered) {
+            BELOW
+        } else {
+            BELOW_UNNUMBERED
+        }
+    }
+
+    /// Left and right edge of each frame.
+    fn edges(&self) -> Vec<(f64, f64)> {
+        let width = WIDTH / self.charts.len() as f64;
+        (0..self.charts.len())
+            .map(|k| {
+                (
+                    k as f64 * width + BESIDE.0,
+                    (k + 1) as f64 * width - BESIDE.1,
+                )
+            })
+            .collect()
     }
 }
 
@@ -68,37 +86,23 @@ pub fn sheet_svg(title: &str, subtitle: &str, rows: &[Row]) -> Result<String, Re
 
 /// The cells of a row from `top` on, which becomes its lower end.
 fn cells_of<'a>(row: &'a Row, top: &mut f64) -> Vec<Cell<'a>> {
-    let width = WIDTH / row.charts.len() as f64;
-    let edges = |k: usize| {
-        (
-            k as f64 * width + BESIDE.0,
-            (k + 1) as f64 * width - BESIDE.1,
-        )
-    };
-    let charts = row.charts.iter().enumerate();
+    let charts = row.charts.iter().zip(row.edges());
     let heads: Vec<Head> = charts
-        .map(|(k, chart)| Head::new(chart, edges(k), *top))
+        .map(|(chart, edges)| Head::new(chart, edges, *top))
         .collect();
-    let frame_top = heads
-        .iter()
-        .map(|head| head.legend.bottom + 4.0)
-        .fold(*top, f64::max);
+    let lower_ends = heads.iter().map(|head| head.legend.bottom + 4.0);
+    let frame_top = lower_ends.fold(*top, f64::max);
     let bottom = frame_top + row.height;
-    *top = bottom
-        + if row.is_numbered() {
-            BELOW
-        } else {
-            BELOW_UNNUMBERED
-        };
-    let frame = |(left, right)| Frame {
+    *top = bottom + row.space_below();
+    let frames = row.edges().into_iter().map(|(left, right)| Frame {
         left,
         right,
         top: frame_top,
         bottom,
-    };
-    let heads = heads.into_iter().enumerate();
-    heads
-        .map(|(k, head)| Cell::new(&row.charts[k], head, frame(edges(k))))
+    });
+    let cells = row.charts.iter().zip(heads).zip(frames);
+    cells
+        .map(|((chart, head), frame)| Cell::new(chart, head, frame))
         .collect()
 }
 
@@ -138,21 +142,15 @@ impl<'a> Cell<'a> {
         // Areas first: they would cover the curves.
         let (areas, others): (Vec<_>, Vec<_>) =
             self.chart.marks.iter().partition(|mark| mark.is_area());
-        let marks = areas.into_iter().chain(others);
-        marks
-            .into_iter()
-            .try_for_each(|mark| self.area.draw_mark(canvas, mark))?;
+        let mut marks = areas.into_iter().chain(others);
+        marks.try_for_each(|mark| self.area.draw_mark(canvas, mark))?;
         if !self.chart.x.numbered {
             return Ok(());
         }
-        let Frame {
-            left,
-            right,
-            bottom,
-            ..
-        } = self.area.frame;
-        let middle = ((left + right) / 2.0, bottom + BELOW - 8.0);
-        canvas.text(&self.chart.x.label, middle, AXIS_LABEL)
+        let frame = self.area.frame;
+        let middle = (frame.left + frame.right) / 2.0;
+        let below = (middle, frame.bottom + BELOW - 8.0);
+        canvas.text(&self.chart.x.label, below, AXIS_LABEL)
     }
 }
 

@@ -10,7 +10,6 @@ use crate::identify::linearity::Linearity;
 use crate::identify::modal::MeasurementChain;
 use crate::identify::{Frf, Unit};
 use crate::recording::Recording;
-use crate::recording::messages::Timing;
 use crate::report::html::{escaped, facts, row, section};
 use crate::report::number::angular_frequency;
 use crate::report::{DistortionLevels, ReportError, Trace, bode_svg, distortion_svg};
@@ -28,6 +27,11 @@ const METADATA: [&str; 10] = [
     "amplifier",
     "probe",
 ];
+
+const SENSITIVITY_CAPTION: &str = "S from reference to error and T from reference to displacement. The peak of S is the inverse \
+    of the modulus margin.";
+const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, the predicted one the smallest of all \
+    crossings. ± is the 95 % confidence interval.";
 
 /// An analysed run.
 #[derive(Clone, Debug)]
@@ -129,11 +133,9 @@ impl<'a> BenchRun<'a> {
     }
 
     fn sensitivity_plot(&self, closed: &ClosedResponses) -> Result<Plot, ReportError> {
-        let by_model = |of: fn(Complex<f64>) -> Complex<f64>| {
-            closed.model_loop.iter().map(|l| of(*l)).collect()
-        };
-        let sensitivity: Vec<_> = by_model(|l| (l + 1.0).inv());
-        let complementary: Vec<_> = by_model(|l| l / (l + 1.0));
+        let model_loop = closed.model_loop.iter();
+        let (sensitivity, complementary): (Vec<_>, Vec<_>) =
+            model_loop.map(|l| ((l + 1.0).inv(), l / (l + 1.0))).unzip();
         let traces = [
             Trace::measured("S measured", &closed.sensitivity),
             Trace::measured("T measured", &closed.complementary),
@@ -143,9 +145,7 @@ impl<'a> BenchRun<'a> {
         Ok(Plot {
             kind: PlotKind::Sensitivity,
             heading: "Sensitivities",
-            caption: "S from reference to error and T from reference to displacement. The peak of S is the inverse of the \
-                      modulus margin."
-                .into(),
+            caption: SENSITIVITY_CAPTION.into(),
             svg: self.loop_bode(&traces)?,
         })
     }
@@ -156,46 +156,35 @@ impl<'a> BenchRun<'a> {
     }
 
     fn distortion_plot(&self, linearity: &Linearity) -> Result<Plot, ReportError> {
-        let harmonics = &linearity.harmonics;
-        let periods = harmonics.periods;
-        let levels = DistortionLevels {
-            output: &harmonics.excited,
-            odd: &harmonics.odd,
-            even: &harmonics.even,
-            periods,
-        };
-        let caption = format!(
-            "RMS of the displacement at each line, mean of {periods} periods: excited lines, and odd and even lines that are not \
-             excited, averaged over neighbours. Without distortion the latter lie on the noise of the mean. {}.",
-            linearity.why
-        );
         let subtitle = self.subtitle("displacement by frequency");
+        let levels = DistortionLevels::from(&linearity.harmonics);
         Ok(Plot {
             kind: PlotKind::Linearity,
             heading: "Distortion and noise",
-            caption,
+            caption: distortion_caption(linearity),
             svg: distortion_svg(&levels, &self.title, &subtitle)?,
         })
     }
 
     /// How the loop was scheduled, and what it recorded.
     fn scheduling(&self) -> String {
-        let recording = self.recording;
         let metadata = METADATA.map(|name| (label(name), self.metadata(name).to_string()));
+        let mut pairs = metadata.to_vec();
+        pairs.retain(|(_, text)| !text.is_empty());
+        pairs.extend(self.counts());
+        pairs.extend(self.lateness());
+        section("The loop", &facts(&pairs))
+    }
+
+    fn counts(&self) -> [(String, String); 4] {
+        let recording = self.recording;
         let counts = [
             ("Ticks", recording.tick_count()),
             ("Overruns", recording.overruns()),
             ("Lost records", recording.lost_records()),
             ("Missing ticks filled in", self.analysis.filled_ticks),
         ];
-        let counts = counts.map(|(name, count)| (name.to_string(), count.to_string()));
-        let mut pairs: Vec<_> = metadata
-            .into_iter()
-            .filter(|(_, text)| !text.is_empty())
-            .collect();
-        pairs.extend(counts);
-        pairs.extend(self.lateness());
-        section("The loop", &facts(&pairs))
+        counts.map(|(name, count)| (name.to_string(), count.to_string()))
     }
 
     /// The largest wake-up latency and computation time; none at virtual pace, which has no clock.
@@ -203,18 +192,12 @@ impl<'a> BenchRun<'a> {
         if self.metadata("pace") == "virtual" {
             return Vec::new();
         }
-        let timings = self.recording.timings();
-        let largest = |of: fn(&Timing) -> u64| timings.iter().map(of).max().unwrap_or(0);
-        let us = |ns: u64| Some(format!("{:.1} µs", ns as f64 / 1e3));
+        let timings = self.recording.timings().iter();
+        let latencies = timings.clone().map(|timing| timing.lateness_max_ns);
+        let computations = timings.map(|timing| timing.compute_max_ns);
         named([
-            (
-                "Largest wake-up latency",
-                us(largest(|timing| timing.lateness_max_ns)),
-            ),
-            (
-                "Longest computation",
-                us(largest(|timing| timing.compute_max_ns)),
-            ),
+            ("Largest wake-up latency", Some(largest_us(latencies))),
+            ("Longest computation", Some(largest_us(computations))),
         ])
     }
 
@@ -228,6 +211,19 @@ impl<'a> BenchRun<'a> {
         );
         section("Configuration", &details)
     }
+}
+
+/// The largest of some times in microseconds.
+fn largest_us(times_ns: impl Iterator<Item = u64>) -> String {
+    format!("{:.1} µs", times_ns.max().unwrap_or(0) as f64 / 1e3)
+}
+
+fn distortion_caption(linearity: &Linearity) -> String {
+    let (periods, why) = (linearity.harmonics.periods, &linearity.why);
+    format!(
+        "RMS of the displacement at each line, mean of {periods} periods: excited lines, and odd and even lines that are not \
+         excited, averaged over neighbours. Without distortion the latter lie on the noise of the mean. {why}."
+    )
 }
 
 fn model_trace<'a>(name: &'a str, frf: &'a Frf, response: &'a [Complex<f64>]) -> Trace<'a> {
@@ -254,43 +250,42 @@ fn evidence(analysis: &Analysis) -> Vec<(String, String)> {
 
 /// Measured and predicted margins of the closed loop.
 fn margins(closed: &ClosedResponses) -> String {
-    let (measured, predicted) = (&closed.margins, &closed.predicted);
-    let or_none = |text: Option<String>| text.unwrap_or_else(|| "none in the band".into());
-    let crossover = |omega: Option<f64>| or_none(omega.map(angular_frequency));
-    let degrees = |text: Option<String>| or_none(text.map(|text| format!("{text} deg")));
     let rows = [
-        row(&[
-            "Crossover".into(),
-            crossover(measured.crossover_rad_s),
-            crossover(predicted.crossover_rad_s),
-        ]),
-        row(&[
-            "Phase margin".into(),
-            degrees(
-                measured
-                    .phase_margin_deg
-                    .map(|margin| with_interval(margin, 1.0)),
-            ),
-            degrees(
-                predicted
-                    .phase_margin_deg
-                    .map(|margin| format!("{margin:.2}")),
-            ),
-        ]),
-        row(&[
-            "Modulus margin".into(),
-            with_interval(measured.modulus_margin, 1.0),
-            format!("{:.4}", predicted.modulus_margin),
-        ]),
+        crossovers(closed),
+        phase_margins(closed),
+        modulus_margins(closed),
     ];
-    let text = "The measured phase margin is that at the crossover, the predicted one the smallest of all crossings. ± is the \
-                95 % confidence interval.";
-    table_section(
-        "The closed loop",
-        text,
-        &["", "Measured", "By the model"],
-        &rows.concat(),
-    )
+    let header = ["", "Measured", "By the model"];
+    table_section("The closed loop", MARGINS_NOTE, &header, &rows.concat())
+}
+
+fn crossovers(closed: &ClosedResponses) -> String {
+    let [measured, predicted] = [
+        closed.margins.crossover_rad_s,
+        closed.predicted.crossover_rad_s,
+    ]
+    .map(|omega_rad_s| or_none(omega_rad_s.map(angular_frequency)));
+    row(&["Crossover".into(), measured, predicted])
+}
+
+fn phase_margins(closed: &ClosedResponses) -> String {
+    let measured = closed.margins.phase_margin_deg;
+    let measured = measured.map(|margin| format!("{} deg", with_interval(margin, 1.0)));
+    let predicted = closed.predicted.phase_margin_deg;
+    let predicted = predicted.map(|margin| format!("{margin:.2} deg"));
+    row(&["Phase margin".into(), or_none(measured), or_none(predicted)])
+}
+
+fn modulus_margins(closed: &ClosedResponses) -> String {
+    row(&[
+        "Modulus margin".into(),
+        with_interval(closed.margins.modulus_margin, 1.0),
+        format!("{:.4}", closed.predicted.modulus_margin),
+    ])
+}
+
+fn or_none(text: Option<String>) -> String {
+    text.unwrap_or_else(|| "none in the band".into())
 }
 
 /// `memory_locked` as `Memory locked`.

@@ -16,6 +16,15 @@ use crate::report::{
 /// The part of a Nyquist plot around two close modes extends by so many of their distances to either side.
 const AROUND: f64 = 1.5;
 
+const BODE_CAPTION: &str = "Magnitude, phase and coherence: measured with a band of two sigma, the model of the configuration \
+    and the fit of modes, where they exist. The line is faint where the band reaches zero magnitude.";
+const COHERENCE_CAPTION: &str = "The part of the output power that the input explains. Below: 1 − coherence, which is due to \
+    noise, leakage and nonlinearity.";
+const NYQUIST_CAPTION: &str = "The response in the complex plane, where its magnitude exceeds two sigma; on the right the \
+    closest modes. Circles are 95 % confidence regions. Delay, hold and amplifier turn the curve clockwise with frequency.";
+const STABILITY_CAPTION: &str = "The modes at each model order that the fit visited. A mode of the stage persists from one \
+    order to the next; a mode of noise or of the search moves. The first orders are fitted with larger tolerances.";
+
 /// The kinds of plots. Pole-zero map and stability chart need modes, loop and sensitivity a closed loop, and the
 /// distortion needs a multisine with lines that are not excited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -132,10 +141,13 @@ fn bode(report: &RecordReport<'_>, responses: &Responses<'_>) -> Result<Plot, Re
     Ok(Plot {
         kind: PlotKind::Bode,
         heading: "Frequency response",
-        caption: "Magnitude, phase and coherence: measured with a band of two sigma, the model of the configuration and the \
-                  fit of modes, where they exist. The line is faint where the band reaches zero magnitude."
-            .into(),
-        svg: bode_svg(report.unit, &responses.traces(), &report.title, &report.subtitle)?,
+        caption: BODE_CAPTION.into(),
+        svg: bode_svg(
+            report.unit,
+            &responses.traces(),
+            &report.title,
+            &report.subtitle,
+        )?,
     })
 }
 
@@ -143,9 +155,7 @@ fn coherence(report: &RecordReport<'_>) -> Result<Plot, ReportError> {
     Ok(Plot {
         kind: PlotKind::Coherence,
         heading: "Coherence",
-        caption: "The part of the output power that the input explains. Below: 1 − coherence, which is due to noise, leakage \
-                  and nonlinearity."
-            .into(),
+        caption: COHERENCE_CAPTION.into(),
         svg: coherence_svg(report.frf, &report.title, &report.subtitle)?,
     })
 }
@@ -160,9 +170,7 @@ fn nyquist(
     Ok(Plot {
         kind: PlotKind::Nyquist,
         heading: "Nyquist plot",
-        caption: "The response in the complex plane, where its magnitude exceeds two sigma; on the right the closest modes. \
-                  Circles are 95 % confidence regions. Delay, hold and amplifier turn the curve clockwise with frequency."
-            .into(),
+        caption: NYQUIST_CAPTION.into(),
         svg: nyquist_svg(report.unit, &traces, part_hz, title, subtitle)?,
     })
 }
@@ -202,35 +210,38 @@ fn zero(zero: &UncertainZero) -> UncertainPoint {
 }
 
 fn pole_zero(report: &RecordReport<'_>, map: &PoleZeroMap) -> Result<Plot, ReportError> {
-    let limit = map.up_to_rad_s;
-    let caption = format!(
-        "Poles and zeros of the fit, with damping, above the real axis; hold, amplifier and delays are not included. Ellipses \
-         are 95 % confidence regions of zeros, bars 95 % confidence intervals of poles. The verdict uses those below {limit:.0} \
-         rad/s ({:.1} Hz). Zeros of the verdict are enlarged below, those nearest to the axis first.",
-        limit / TAU
-    );
     Ok(Plot {
         kind: PlotKind::PoleZero,
         heading: "Poles and zeros",
-        caption,
+        caption: pole_zero_caption(map.up_to_rad_s),
         svg: pole_zero_svg(map, &report.title, &report.subtitle)?,
     })
 }
 
+fn pole_zero_caption(limit_rad_s: f64) -> String {
+    format!(
+        "Poles and zeros of the fit, with damping, above the real axis; hold, amplifier and delays are not included. Ellipses \
+         are 95 % confidence regions of zeros, bars 95 % confidence intervals of poles. The verdict uses those below \
+         {limit_rad_s:.0} rad/s ({:.1} Hz). Zeros of the verdict are enlarged below, those nearest to the axis first.",
+        limit_rad_s / TAU
+    )
+}
+
 fn stability(report: &RecordReport<'_>, fit: &ModalFit) -> Result<Plot, ReportError> {
-    let modes = |order: &ModelOrder| order.parameters.modes.iter().map(ordered_mode).collect();
-    let orders: Vec<Vec<OrderedMode>> = fit.orders.iter().map(modes).collect();
+    let orders: Vec<Vec<OrderedMode>> = fit.orders.iter().map(ordered_modes).collect();
     let fit_modes = fit.parameters.modes.iter();
     let fit_hz: Vec<f64> = fit_modes.map(|term| term.omega_rad_s / TAU).collect();
     let (title, subtitle) = (&report.title, &report.subtitle);
     Ok(Plot {
         kind: PlotKind::Stability,
         heading: "Stability chart",
-        caption: "The modes at each model order that the fit visited. A mode of the stage persists from one order to the next; \
-                  a mode of noise or of the search moves. The first orders are fitted with larger tolerances."
-            .into(),
+        caption: STABILITY_CAPTION.into(),
         svg: stability_svg(&orders, &fit_hz, fit.band_hz, title, subtitle)?,
     })
+}
+
+fn ordered_modes(order: &ModelOrder) -> Vec<OrderedMode> {
+    order.parameters.modes.iter().map(ordered_mode).collect()
 }
 
 fn ordered_mode(term: &ModalTerm) -> OrderedMode {
