@@ -118,7 +118,21 @@ impl Limits {
         setting: &'static str,
     ) -> Result<(), ExcitationError> {
         self.check_current(extremes.current_a, setting)?;
-        let (slew_a_per_s, limit_a_per_s) = (extremes.slew_a_per_s, self.slew_a_per_s);
+        self.check_slew(extremes.slew_a_per_s, setting)?;
+        self.check_heat(extremes.thermal_current_a, setting)?;
+        if extremes.travel_m > self.travel_m {
+            return Err(ExcitationError::Travel {
+                travel_um: extremes.travel_m * 1e6,
+                frequency_hz,
+                limit_um: self.travel_m * 1e6,
+                setting,
+            });
+        }
+        Ok(())
+    }
+
+    fn check_slew(&self, slew_a_per_s: f64, setting: &'static str) -> Result<(), ExcitationError> {
+        let limit_a_per_s = self.slew_a_per_s;
         if slew_a_per_s > limit_a_per_s {
             return Err(ExcitationError::Slew {
                 slew_a_per_s,
@@ -126,19 +140,15 @@ impl Limits {
                 setting,
             });
         }
-        let (thermal_a, limit_a) = (extremes.thermal_current_a, self.continuous_current_a);
+        Ok(())
+    }
+
+    fn check_heat(&self, thermal_a: f64, setting: &'static str) -> Result<(), ExcitationError> {
+        let limit_a = self.continuous_current_a;
         if thermal_a > limit_a {
             return Err(ExcitationError::Heat {
                 thermal_a,
                 limit_a,
-                setting,
-            });
-        }
-        if extremes.travel_m > self.travel_m {
-            return Err(ExcitationError::Travel {
-                travel_um: extremes.travel_m * 1e6,
-                frequency_hz,
-                limit_um: self.travel_m * 1e6,
                 setting,
             });
         }
@@ -204,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_interlocks_would_trip_is_refused_with_the_figures() {
+    fn rejects_excitation_beyond_the_interlocks_with_the_figures() {
         let travel_m = checked(&|_| {}).unwrap().travel_m;
         assert!(
             (300e-6..900e-6).contains(&travel_m),
@@ -238,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_is_refused_where_it_would_trip_and_told_what_to_lower() {
+    fn rejection_of_every_kind_names_the_setting_to_lower() {
         let with = |kind: ExcitationKind, current_a: f64| {
             move |config: &mut Config| {
                 (config.excitation.kind, config.excitations.prbs.amplitude_a) = (kind, current_a);
@@ -272,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_multisine_whose_lines_differ_too_much_is_refused() {
+    fn rejects_multisine_whose_lines_differ_too_much() {
         let steep = |config: &mut Config| {
             config.excitation.kind = ExcitationKind::Multisine;
             let point = |frequency_hz, current_a| AmplitudePoint {

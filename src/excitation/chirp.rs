@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn the_measured_frequency_ends_at_the_stop_frequency() {
+    fn frequency_ends_at_the_stop_frequency() {
         for sweep in [Sweep::Linear, Sweep::Logarithmic] {
             for (start_hz, stop_hz) in [(5.0, 400.0), (300.0, 20.0)] {
                 let chirp = Chirp::new(&settings(sweep, start_hz, stop_hz), PERIOD_S);
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_quiet_before_and_after_fades_and_has_no_mean() {
+    fn is_zero_before_and_after_fades_and_has_zero_mean() {
         for sweep in [Sweep::Linear, Sweep::Logarithmic] {
             let chirp = Chirp::new(&settings(sweep, 1.0, 400.0), PERIOD_S);
             let signal = samples(&chirp);
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_amplitude_follows_its_points() {
+    fn amplitude_follows_its_points() {
         let mut s = settings(Sweep::Logarithmic, 1.0, 400.0);
         s.amplitude = vec![
             AmplitudePoint {

@@ -79,6 +79,15 @@ impl RunningExtremes {
     }
 
     fn push(&mut self, command_a: f64, position_m: f64) {
+        self.push_command(command_a);
+        if position_m.abs() > self.extremes.travel_m {
+            self.extremes.travel_m = position_m.abs();
+            self.extremes.travel_tick = self.ticks;
+        }
+        self.ticks += 1;
+    }
+
+    fn push_command(&mut self, command_a: f64) {
         let extremes = &mut self.extremes;
         let slew_a_per_s = (command_a - self.before_a).abs() / self.period_s;
         extremes.current_a = extremes.current_a.max(command_a.abs());
@@ -87,9 +96,5 @@ impl RunningExtremes {
         self.square_a2 += command_a * command_a;
         self.heat_a2 += self.cooling * (command_a * command_a - self.heat_a2);
         extremes.thermal_current_a = extremes.thermal_current_a.max(self.heat_a2.sqrt());
-        if position_m.abs() > extremes.travel_m {
-            (extremes.travel_m, extremes.travel_tick) = (position_m.abs(), self.ticks);
-        }
-        self.ticks += 1;
     }
 }

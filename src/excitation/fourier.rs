@@ -1,4 +1,4 @@
-//! A Fourier transform that gives the same bits on every machine: a replay must make the same multisine again.
+//! A Fourier transform that gives the same bits on every machine: a replay must generate the same multisine.
 //!
 //! The transforms of the crates choose their kernel by the processor and take their twiddle factors from the platform's libm.
 //! This one does neither; it is executed a few times before a run.
@@ -21,13 +21,7 @@ pub(super) fn transform(x: &mut [Complex<f64>]) {
     let turns: Vec<Complex<f64>> = (0..n / 2)
         .map(|k| turn(2.0 * PI * k as f64 / n as f64))
         .collect();
-    let shift = usize::BITS - n.trailing_zeros();
-    for k in 0..n {
-        let other = k.reverse_bits() >> shift;
-        if other > k {
-            x.swap(k, other);
-        }
-    }
+    reverse_bits(x);
     let mut half = 1;
     while half < n {
         let stride = n / (2 * half);
@@ -42,33 +36,55 @@ pub(super) fn transform(x: &mut [Complex<f64>]) {
     }
 }
 
+/// Moves each element to the place whose index has the bits of its own index in reverse order.
+fn reverse_bits(x: &mut [Complex<f64>]) {
+    let shift = usize::BITS - x.len().trailing_zeros();
+    for k in 0..x.len() {
+        let other = k.reverse_bits() >> shift;
+        if other > k {
+            x.swap(k, other);
+        }
+    }
+}
+
 /// The samples of sum over k of Re(`lines[k]` exp(2 pi i k n / N)) for n = 0 .. N, any N.
 pub(super) fn samples(lines: &[Complex<f64>], n: usize) -> Vec<f64> {
     if n == 0 {
         return Vec::new();
     }
-    // exp(i pi k^2/N); k^2 counts modulo 2 N, exactly.
-    let chirp = |k: usize| turn(PI * ((k as u128 * k as u128) % (2 * n as u128)) as f64 / n as f64);
     let length = (n + lines.len()).next_power_of_two();
     let mut a = vec![Complex::new(0.0, 0.0); length];
     let mut b = a.clone();
     for (k, line) in lines.iter().enumerate() {
-        a[k] = line * chirp(k);
+        a[k] = line * chirp(k, n);
     }
     for (k, b) in b.iter_mut().enumerate().take(n) {
-        *b = chirp(k).conj();
+        *b = chirp(k, n).conj();
     }
     for k in 1..lines.len() {
-        b[length - k] = chirp(k).conj();
+        b[length - k] = chirp(k, n).conj();
     }
+    let product = convolution(a, b);
+    (0..n)
+        .map(|k| (product[k].conj() * chirp(k, n)).re / length as f64)
+        .collect()
+}
+
+/// exp(i pi k^2/N); k^2 modulo 2 N, exactly.
+fn chirp(k: usize, n: usize) -> Complex<f64> {
+    turn(PI * ((k as u128 * k as u128) % (2 * n as u128)) as f64 / n as f64)
+}
+
+/// The conjugate of the cyclic convolution of two sequences, times their length: the inverse of a transform is the conjugate of
+/// the transform of the conjugate, over the length.
+fn convolution(mut a: Vec<Complex<f64>>, mut b: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
     transform(&mut a);
     transform(&mut b);
-    // The inverse of a transform is its conjugate's conjugate over its length.
-    let mut product: Vec<Complex<f64>> = a.iter().zip(&b).map(|(a, b)| (a * b).conj()).collect();
-    transform(&mut product);
-    (0..n)
-        .map(|k| (product[k].conj() * chirp(k)).re / length as f64)
-        .collect()
+    for (a, b) in a.iter_mut().zip(&b) {
+        *a = (*a * b).conj();
+    }
+    transform(&mut a);
+    a
 }
 
 /// exp(i angle).
@@ -88,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_the_sum_of_the_lines_whatever_the_length() {
+    fn samples_are_the_sum_of_the_lines_for_any_length() {
         for (count, n) in [(1, 1), (3, 7), (12, 25), (40, 100), (30, 64), (50, 127)] {
             let lines = lines(count);
             for (at, sample) in samples(&lines, n).into_iter().enumerate() {
@@ -106,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_keeps_the_power_and_takes_no_length_that_it_cannot() {
+    fn transform_preserves_the_power() {
         let mut x = lines(64);
         let power = |x: &[Complex<f64>]| x.iter().map(|x| x.norm_sqr()).sum::<f64>();
         let before = power(&x);

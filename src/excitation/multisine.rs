@@ -1,4 +1,4 @@
-//! Many sines at once, each a whole number of turns a period.
+//! Many sines at once, each with a whole number of cycles in a period.
 //!
 //! ```text
 //!  u(n) = sum over lines k of a_k cos(2 pi k n/N + phi_k)        a_k in the shape of A(k rate/N), max |u| = largest A in the band
@@ -28,18 +28,18 @@ use crate::util::finding::Finding;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MultisineSettings {
-    /// Length of a period in seconds, rounded to ticks: lines stand at multiples of one over it.
+    /// Length of a period in seconds, rounded to ticks; the lines are the multiples of its inverse.
     #[schemars(range(min = 0.01, max = 1000.0))]
     pub period_s: f64,
-    /// Periods that are measured; the last shows the drift of the one before it.
+    /// Measured periods; the last one measures the drift of the one before it.
     #[schemars(range(min = 5, max = 100000))]
     pub periods: u32,
-    /// Periods before them, in which it fades in and the stage settles.
+    /// Periods before the measured ones, in which the signal fades in and the stage settles.
     #[schemars(range(min = 1, max = 1000))]
     pub settle_periods: u32,
     /// Which lines are excited.
     pub lines: Lines,
-    /// Seed of the phases, and of the lines left out.
+    /// Seed of the phases, and of the omitted lines.
     #[schemars(range(min = 0, max = 9223372036854775807i64))]
     pub seed: u64,
 }
@@ -48,11 +48,11 @@ pub struct MultisineSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Lines {
-    /// All of the band.
+    /// All lines of the band.
     Full,
-    /// The odd ones: even distortion falls between them.
+    /// Odd lines: even distortion appears at the even lines only.
     Odd,
-    /// The odd ones but one in four, drawn at random in each group: odd distortion shows there.
+    /// Odd lines except one in each group of four, chosen at random: odd distortion appears there.
     OddRandom,
 }
 
@@ -103,13 +103,13 @@ impl ExcitationDesign for MultisineSettings {
 
 /// A periodic analysis ignores lines below a hundredth of the largest; half of that is kept clear.
 const MAX_SPAN: f64 = 50.0;
-/// Odd lines a group, of which one is left out.
+/// Odd lines in a group, of which one is omitted.
 const GROUP: usize = 4;
 /// Rounds of clipping.
 const ROUNDS: u32 = 100;
-/// The signal is clipped at the first part of its peak, in the end at the second.
+/// Clipping level over the peak, in the first and in the last round.
 const CLIP: (f64, f64) = (0.5, 0.97);
-/// Samples to a turn of the fastest line while its phases are sought: peaks between them are 4 % higher at most.
+/// Samples in a period of the fastest line while the phases are optimised: peaks between samples are at most 4 % higher.
 const OVERSAMPLING: usize = 8;
 
 /// The multisine of the settings.
@@ -118,9 +118,10 @@ fn multisine(settings: &MultisineSettings, shared: &SharedSettings<'_>) -> Perio
     let line_hz = shared.rate_hz / length as f64;
     let (low_hz, high_hz) = shared.chirp.band_hz();
     let amplitude = AmplitudeCurve::of_current(&shared.chirp.amplitude);
-    let lines = lines(settings, within(low_hz, high_hz, line_hz, length));
-    let amplitude_a = |k: usize| amplitude.at(libm::log(k as f64 * line_hz));
-    let weighted: Vec<(usize, f64)> = lines.into_iter().map(|k| (k, amplitude_a(k))).collect();
+    let lines = lines(settings, within(low_hz, high_hz, line_hz, length)).into_iter();
+    let weighted: Vec<(usize, f64)> = lines
+        .map(|k| (k, amplitude.at(libm::log(k as f64 * line_hz))))
+        .collect();
     let mut table = table(&weighted, settings.seed, length);
     scale_peak(&mut table, amplitude.range(low_hz, high_hz).1);
     Periodic::new(shared, table, settings.settle_periods, settings.periods)
@@ -133,7 +134,7 @@ fn scale_peak(table: &mut [f64], peak_a: f64) {
     table.iter_mut().for_each(|u| *u *= scale);
 }
 
-/// The lines of the band below half the rate; one that is a limit up to rounding counts.
+/// The lines of the band below half the rate; a limit that equals a line except for rounding includes that line.
 fn within(low_hz: f64, high_hz: f64, line_hz: f64, length: usize) -> RangeInclusive<usize> {
     let low = libm::ceil(low_hz / line_hz - 1e-6).max(1.0) as usize;
     low..=(libm::floor(high_hz / line_hz + 1e-6) as usize).min((length - 1) / 2)
@@ -149,7 +150,7 @@ fn lines(settings: &MultisineSettings, band: RangeInclusive<usize>) -> Vec<usize
     }
 }
 
-/// Leaves out one line of each complete group, at random.
+/// Omits one line of each complete group, at random.
 fn without_one_a_group(odd: &[usize], seed: u64) -> Vec<usize> {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut kept = Vec::with_capacity(odd.len());
@@ -176,7 +177,7 @@ fn table(lines: &[(usize, f64)], seed: u64, length: usize) -> Vec<f64> {
     samples(&spectrum, length)
 }
 
-/// exp(i phi) of each line, by which the peak of the sum is low.
+/// exp(i phi) of each line, optimised for a low peak of the sum.
 fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
     let mut phases = random_phases(lines.len(), seed);
     let last = lines.last().map_or(0, |(k, _)| *k);
@@ -187,12 +188,16 @@ fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
         if peak < lowest {
             (best, lowest) = (phases.clone(), peak);
         }
-        let ratio = CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS);
-        clip(&mut signal, peak * ratio);
+        clip(&mut signal, peak * clip_ratio(round));
         transform(&mut signal);
         take_phases(lines, &signal, &mut phases);
     }
     best
+}
+
+/// Clipping level of a round over the peak.
+fn clip_ratio(round: u32) -> f64 {
+    CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS)
 }
 
 fn random_phases(count: usize, seed: u64) -> Vec<Complex<f64>> {
@@ -281,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_flat_one_has_its_lines_alike_nothing_else_and_half_the_crest_of_random_phases() {
+    fn flat_multisine_has_equal_lines_and_half_the_crest_factor_of_random_phases() {
         for seed in 1..=8 {
             let multisine = built(&config(Lines::Full, seed, &FLAT));
             let table = multisine.table();
@@ -325,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_left_out_are_zero_even_ones_and_one_in_each_group_of_four_odd_ones() {
+    fn omitted_lines_are_zero() {
         for (lines, left) in [(Lines::Odd, 100), (Lines::OddRandom, 75)] {
             let amplitudes = amplitudes(built(&config(lines, 5, &FLAT)).table());
             let excited: Vec<usize> = (0..amplitudes.len())
@@ -356,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_seed_is_the_same_current_and_another_is_another() {
+    fn current_depends_on_the_seed() {
         let at = |seed: u64, tick: u64| {
             built(&config(Lines::Full, seed, &FLAT))
                 .current_a(tick)
@@ -367,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn a_band_without_a_line_is_no_current_and_no_panic() {
+    fn band_without_lines_gives_zero_current() {
         let mut config = config(Lines::Full, 1, &FLAT);
         (config.chirp.start_hz, config.chirp.stop_hz) = (20.2, 20.8);
         assert!(built(&config).table().iter().all(|u| *u == 0.0));

@@ -1,4 +1,4 @@
-//! A table of one period, run over and over.
+//! A table of one period, repeated.
 //!
 //! ```text
 //!  quiet | fade in, settle | measured periods | fade out | quiet
@@ -26,7 +26,7 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    /// `table` over and over, with the quiet and the fades of `[chirp]`.
+    /// `table` repeated, with the quiet and the fades of `[chirp]`.
     pub(super) fn new(
         shared: &SharedSettings<'_>,
         table: Vec<f64>,
@@ -100,7 +100,7 @@ mod tests {
     use crate::config::{Source, load};
 
     #[test]
-    fn it_fades_in_within_the_settling_and_out_after_the_last_period_and_repeats_between() {
+    fn fades_in_while_settling_repeats_and_fades_out_after_the_last_period() {
         let mut config = load(&Source::default()).unwrap();
         let chirp = &mut config.chirp;
         (

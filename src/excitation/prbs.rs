@@ -19,19 +19,19 @@ use crate::util::finding::Finding;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrbsSettings {
-    /// Cells n of the shift register: 2^n - 1 steps a period.
+    /// Cells n of the shift register; a period has 2^n - 1 steps.
     #[schemars(range(min = 7, max = 20))]
     pub order: u32,
-    /// Ticks a step.
+    /// Ticks per step.
     #[schemars(range(min = 1, max = 1000))]
     pub clock_divider: u32,
     /// Current in amperes, to both sides.
     #[schemars(range(min = 1e-9, max = 1000.0))]
     pub amplitude_a: f64,
-    /// Periods that are measured; the last shows the drift of the one before it.
+    /// Measured periods; the last one measures the drift of the one before it.
     #[schemars(range(min = 5, max = 100000))]
     pub periods: u32,
-    /// Periods before them, in which it fades in and the stage settles.
+    /// Periods before the measured ones, in which the signal fades in and the stage settles.
     #[schemars(range(min = 1, max = 1000))]
     pub settle_periods: u32,
 }
@@ -132,16 +132,15 @@ fn sequence(settings: &PrbsSettings) -> Vec<bool> {
     let order = settings.order.clamp(7, 20);
     let taps = TAPS[(order - 7) as usize];
     let length = (1u32 << order) - 1;
-    let mut register = length;
-    let mut step = || {
-        let output = register >> (order - 1) & 1 == 1;
-        let fed = taps
+    let (mut register, mut output) = (length, Vec::new());
+    for _ in 0..length {
+        output.push(register >> (order - 1) & 1 == 1);
+        let feedback = taps
             .iter()
             .fold(0, |sum, tap| sum ^ (register >> (tap - 1) & 1));
-        register = (register << 1 | fed) & length;
-        output
-    };
-    (0..length).map(|_| step()).collect()
+        register = (register << 1 | feedback) & length;
+    }
+    output
 }
 
 #[cfg(test)]
@@ -172,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn its_autocorrelation_has_two_values() {
+    fn autocorrelation_has_two_values() {
         for order in 7..=11 {
             let bits: Vec<i64> = built(&settings(order, 1))
                 .table()
@@ -195,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn its_spectrum_is_flat_at_every_order() {
+    fn spectrum_is_flat_at_every_order() {
         for order in 7..=20 {
             let table = built(&settings(order, 1)).table().to_vec();
             // The transform of the autocorrelation: L + 1 at every line but 0, where the one step more of + leaves 1.
@@ -215,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_of_several_ticks_gives_the_spectrum_of_a_hold() {
+    fn step_of_several_ticks_gives_the_spectrum_of_a_hold() {
         let (order, divider) = (9, 3);
         let table = built(&settings(order, divider)).table().to_vec();
         let length = f64::from((1u32 << order) - 1);

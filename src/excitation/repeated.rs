@@ -57,7 +57,7 @@ mod tests {
     use crate::excitation::Chirp;
 
     #[test]
-    fn every_repetition_is_the_chirp_bit_for_bit_and_then_there_is_nothing() {
+    fn every_repetition_is_the_chirp_bit_for_bit() {
         let mut settings = load(&Source::default()).unwrap().chirp;
         (
             settings.duration_s,

@@ -11,9 +11,9 @@ use super::amplitude::AmplitudePoint;
 use super::limits::Limits;
 use crate::util::units::rad_s;
 
-/// Points that an amplitude may have.
+/// Largest number of points of an amplitude curve.
 pub const MOST_POINTS: usize = 64;
-/// Distance in ln A that a curve through fewer points may have.
+/// Largest deviation in ln A of the simplified curve.
 const CLOSE: f64 = 0.01;
 
 /// Limits of the current of a sine.
@@ -41,6 +41,16 @@ impl CurrentLimit {
     fn at_a(&self, frequency_hz: f64) -> f64 {
         self.current_a.min(self.slew_a_per_s / rad_s(frequency_hz))
     }
+
+    /// The amplitude that moves the stage by `travel_m` where the response has this gain, up to the limit.
+    fn amplitude_a(&self, frequency_hz: f64, gain: f64, travel_m: f64) -> f64 {
+        let limit_a = self.at_a(frequency_hz);
+        if gain > 0.0 {
+            limit_a.min(travel_m / gain)
+        } else {
+            limit_a
+        }
+    }
 }
 
 /// The amplitude that moves the stage by `travel_m`, up to `limit`. `response` is (frequency in hertz, |G| in metres per
@@ -52,19 +62,11 @@ pub fn shaped_amplitude(
     limit: CurrentLimit,
     span: f64,
 ) -> Vec<AmplitudePoint> {
-    let wanted = |(frequency_hz, gain): &(f64, f64)| {
-        let limit_a = limit.at_a(*frequency_hz);
-        let by_travel_a = if *gain > 0.0 {
-            travel_m / gain
-        } else {
-            limit_a
-        };
-        (
-            libm::log(*frequency_hz),
-            libm::log(limit_a.min(by_travel_a)),
-        )
-    };
-    let mut curve: Vec<(f64, f64)> = response.iter().map(wanted).collect();
+    let response = response.iter();
+    let mut curve: Vec<(f64, f64)> = response
+        .map(|(f, gain)| (*f, limit.amplitude_a(*f, *gain, travel_m)))
+        .map(|(frequency_hz, current_a)| (libm::log(frequency_hz), libm::log(current_a)))
+        .collect();
     let least = curve.iter().map(|(_, a)| *a).fold(f64::INFINITY, f64::min);
     let highest = least + libm::log(span);
     curve.iter_mut().for_each(|(_, a)| *a = a.min(highest));
@@ -76,29 +78,27 @@ pub fn shaped_amplitude(
     points.collect()
 }
 
-/// The curve by few of its points, lowered to where they lie nowhere above it.
+/// The curve through a few of its points, lowered so that it lies nowhere above the original.
 fn simplified(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let [first, .., last] = curve else {
         return curve.to_vec();
     };
     let mut kept = vec![*first, *last];
     while kept.len() < MOST_POINTS {
-        let far = |(_, off): &(usize, f64)| off.abs();
-        let worst = off(curve, &kept)
-            .enumerate()
-            .max_by(|a, b| far(a).total_cmp(&far(b)));
-        let Some((index, _)) = worst.filter(|(_, off)| off.abs() > CLOSE) else {
+        let errors = deviations(curve, &kept).map(f64::abs).enumerate();
+        let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, _)) = worst.filter(|(_, error)| *error > CLOSE) else {
             break;
         };
         let place = kept.partition_point(|(f, _)| *f < curve[index].0);
         kept.insert(place, curve[index]);
     }
-    let above = off(curve, &kept).fold(0.0, f64::max);
+    let above = deviations(curve, &kept).fold(0.0, f64::max);
     kept.iter().map(|(f, a)| (*f, a - above)).collect()
 }
 
 /// By how much the lines through `kept` lie above each point of the curve.
-fn off(curve: &[(f64, f64)], kept: &[(f64, f64)]) -> impl Iterator<Item = f64> {
+fn deviations(curve: &[(f64, f64)], kept: &[(f64, f64)]) -> impl Iterator<Item = f64> {
     curve.iter().map(|(f, a)| {
         let after = kept
             .partition_point(|(at, _)| at <= f)
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn the_displacement_is_alike_where_the_current_suffices_and_the_current_full_where_not() {
+    fn displacement_is_constant_up_to_the_limit_of_the_current() {
         let points = shaped_amplitude(&response(), 100e-6, CAP, f64::INFINITY);
         assert!(
             (10..=MOST_POINTS).contains(&points.len()),
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_is_no_more_times_the_least_than_asked_for() {
+    fn ratio_of_largest_to_smallest_amplitude_is_the_span() {
         let points = shaped_amplitude(&response(), 100e-6, CAP, 50.0);
         let least = points
             .iter()
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_response_of_noise_or_of_zero_still_gives_few_sound_points() {
+    fn noisy_or_zero_response_gives_a_valid_curve() {
         let noisy: Vec<(f64, f64)> = (1..3000)
             .map(|k| (f64::from(k), 1e-6 * (1.0 + f64::from(k * k % 97))))
             .collect();

@@ -8,7 +8,7 @@
 //!                        |____|
 //! ```
 
-use super::waveform::Excitation;
+use super::waveform::{Excitation, ticks};
 
 /// Levels and times of a staircase.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct StaircaseSteps {
     pub amplitude_a: f64,
     /// Levels on either side of zero.
     pub levels: u32,
-    /// Time in seconds from a level to the next.
+    /// Time in seconds of the ramp from one level to the next.
     pub ramp_s: f64,
     /// Time in seconds for the stage to come to rest.
     pub settle_s: f64,
@@ -37,20 +37,22 @@ pub struct Staircase {
 impl Staircase {
     /// The staircase for a loop of this period.
     pub fn new(settings: &StaircaseSteps, period_s: f64) -> Staircase {
-        let ticks = |seconds: f64| libm::round(seconds / period_s).max(1.0) as u64;
         let n = i64::from(settings.levels);
         let steps = (0..=n).chain((-n..n).rev()).chain(-n + 1..=0);
+        let times_s = [settings.ramp_s, settings.settle_s, settings.average_s];
+        let [ramp_ticks, settle_ticks, average_ticks] =
+            times_s.map(|time_s| ticks(time_s, period_s).max(1));
         Staircase {
             levels_a: steps
                 .map(|step| settings.amplitude_a * step as f64 / n as f64)
                 .collect(),
-            ramp_ticks: ticks(settings.ramp_s),
-            settle_ticks: ticks(settings.settle_s),
-            average_ticks: ticks(settings.average_s),
+            ramp_ticks,
+            settle_ticks,
+            average_ticks,
         }
     }
 
-    /// The level in whose average the tick counts, if it counts in one.
+    /// The level whose average includes the tick, if there is one.
     pub fn level(&self, tick: u64) -> Option<usize> {
         let within = tick % self.level_ticks();
         let level = (tick / self.level_ticks()) as usize;
@@ -109,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_up_and_down_on_both_sides_and_ends_at_zero() {
+    fn levels_rise_and_fall_on_both_sides_and_end_at_zero() {
         let levels = staircase().levels_a().to_vec();
         assert_eq!(levels, [0.0, 0.2, 0.4, 0.2, 0.0, -0.2, -0.4, -0.2, 0.0]);
     }

@@ -7,7 +7,7 @@
 //!  sine j + 1                                      \~~~/~~~~~|======measured======|
 //! ```
 //!
-//! Six blocks of m ticks are measured, each a whole number q of periods: f = q rate/m, next to the required frequency. One
+//! Six blocks of m ticks are measured, each a whole number q of periods: f = q rate/m, close to the requested frequency. One
 //! sine fades out while the next one fades in, by the same cosine, so that the sum has no step.
 
 use std::f64::consts::TAU;
@@ -41,15 +41,12 @@ pub struct SteppedSineSettings {
 const BLOCKS_PER_SINE: f64 = 6.0;
 
 impl SteppedSineSettings {
-    /// The frequencies asked for in hertz; what fits whole ticks is next to them.
+    /// The requested frequencies in hertz; the excited ones are rounded to blocks of whole ticks.
     pub fn frequencies_hz(&self, start_hz: f64, stop_hz: f64) -> Vec<f64> {
         let last = f64::from(self.count.max(2) - 1);
-        let at = |share: f64| match self.spacing {
-            Spacing::Linear => start_hz + (stop_hz - start_hz) * share,
-            Spacing::Logarithmic => start_hz * libm::pow(stop_hz / start_hz, share),
-        };
-        (0..self.count.max(2))
-            .map(|k| at(f64::from(k) / last))
+        let shares = (0..self.count.max(2)).map(|k| f64::from(k) / last);
+        shares
+            .map(|share| self.spacing.between(start_hz, stop_hz, share))
             .collect()
     }
 }
@@ -64,13 +61,26 @@ pub enum Spacing {
     Logarithmic,
 }
 
-impl ExcitationDesign for SteppedSineSettings {
-    fn describe(&self, shared: &SharedSettings<'_>) -> String {
-        let spacing = match self.spacing {
+impl Spacing {
+    fn name(self) -> &'static str {
+        match self {
             Spacing::Linear => "linear",
             Spacing::Logarithmic => "logarithmic",
-        };
-        let (count, band) = (self.count, shared.band());
+        }
+    }
+
+    /// The frequency at a share, 0 to 1, of the way between two frequencies.
+    fn between(self, start_hz: f64, stop_hz: f64, share: f64) -> f64 {
+        match self {
+            Spacing::Linear => start_hz + (stop_hz - start_hz) * share,
+            Spacing::Logarithmic => start_hz * libm::pow(stop_hz / start_hz, share),
+        }
+    }
+}
+
+impl ExcitationDesign for SteppedSineSettings {
+    fn describe(&self, shared: &SharedSettings<'_>) -> String {
+        let (count, band, spacing) = (self.count, shared.band(), self.spacing.name());
         format!("stepped sine, {count} frequencies, {band}, {spacing}")
     }
 
@@ -96,7 +106,7 @@ impl ExcitationDesign for SteppedSineSettings {
     }
 }
 
-/// Ticks of a block at least.
+/// Smallest number of ticks in a block.
 const LEAST_BLOCK: f64 = 16.0;
 
 /// Sines one after the other, with quiet before and after.
@@ -113,8 +123,9 @@ struct SteppedSine {
 #[derive(Clone, Copy, Debug)]
 struct Sine {
     amplitude_a: f64,
-    /// Periods a block, and ticks.
+    /// Periods in a block.
     turns: u64,
+    /// Ticks in a block.
     block: u64,
     /// Tick at which it begins to fade in.
     start: u64,
@@ -140,55 +151,75 @@ impl Sine {
 impl SteppedSine {
     /// The sines of the settings.
     fn new(settings: &SteppedSineSettings, shared: &SharedSettings<'_>) -> SteppedSine {
-        let (chirp, rate_hz) = (shared.chirp, shared.rate_hz);
-        let start_tick = shared.ticks(chirp.quiet_before_s);
+        let chirp = shared.chirp;
         let settle_ticks = shared.ticks(settings.settle_s).max(2);
-        let amplitude = AmplitudeCurve::of_current(&chirp.amplitude);
-        let least_s = settings.measure_s / BLOCKS_PER_SINE;
-        let mut sines: Vec<Sine> = Vec::new();
-        for frequency_hz in settings.frequencies_hz(chirp.start_hz, chirp.stop_hz) {
-            let (turns, block) = block(frequency_hz, least_s, rate_hz);
-            let before = sines.last();
-            sines.push(Sine {
-                amplitude_a: amplitude.at(libm::log(frequency_hz)),
-                turns,
-                block,
-                start: before.map_or(start_tick, |before| before.end(settle_ticks)),
-            });
-        }
-        SteppedSine {
-            sines,
-            rate_hz,
+        let mut stepped = SteppedSine {
+            sines: Vec::new(),
+            rate_hz: shared.rate_hz,
             fade_ticks: settle_ticks / 2,
             settle_ticks,
-            start_tick,
+            start_tick: shared.ticks(chirp.quiet_before_s),
             quiet_after_ticks: shared.ticks(chirp.quiet_after_s),
+        };
+        let amplitude = AmplitudeCurve::of_current(&chirp.amplitude);
+        let min_block_s = settings.measure_s / BLOCKS_PER_SINE;
+        for frequency_hz in settings.frequencies_hz(chirp.start_hz, chirp.stop_hz) {
+            let amplitude_a = amplitude.at(libm::log(frequency_hz));
+            stepped.append(frequency_hz, amplitude_a, min_block_s);
         }
+        stepped
+    }
+
+    /// Appends a sine, which begins at the end of the measured blocks of the one before.
+    fn append(&mut self, frequency_hz: f64, amplitude_a: f64, min_block_s: f64) {
+        let (turns, block) = block(frequency_hz, min_block_s, self.rate_hz);
+        self.sines.push(Sine {
+            amplitude_a,
+            turns,
+            block,
+            start: self.measured_end(),
+        });
+    }
+
+    /// End of the last measured block.
+    fn measured_end(&self) -> u64 {
+        let last = self.sines.last();
+        last.map_or(self.start_tick, |last| last.end(self.settle_ticks))
     }
 
     /// End of the last fade.
     fn end(&self) -> u64 {
-        self.sines.last().map_or(self.start_tick, |last| {
-            last.end(self.settle_ticks) + self.fade_ticks
-        })
+        if self.sines.is_empty() {
+            self.start_tick
+        } else {
+            self.measured_end() + self.fade_ticks
+        }
+    }
+
+    /// The current of a sine at a tick, times a share; 0 without a share.
+    fn shared_current_a(&self, sine: Option<&Sine>, tick: u64, share: f64) -> f64 {
+        match sine {
+            Some(sine) if share > 0.0 => share * sine.current_a(tick, self.settle_ticks),
+            _ => 0.0,
+        }
     }
 
     /// The sine that runs or fades in at a tick, with the one before it.
     fn at(&self, tick: u64) -> (Option<&Sine>, Option<&Sine>) {
-        let after = self.sines.partition_point(|sine| sine.start <= tick);
-        let sine = |back: usize| after.checked_sub(back).and_then(|i| self.sines.get(i));
-        match sine(1) {
+        let begun = self.sines.partition_point(|sine| sine.start <= tick);
+        let mut latest_first = self.sines[..begun].iter().rev();
+        match latest_first.next() {
             Some(last) if tick >= last.end(self.settle_ticks) => (None, Some(last)),
-            now => (now, sine(2)),
+            now => (now, latest_first.next()),
         }
     }
 }
 
-/// Whole turns q and ticks m of a block of `least_s` at least, whose frequency q rate/m is next to the one asked for.
+/// Whole turns q and ticks m of a block that lasts at least `least_s`; its frequency q rate/m is nearest to the requested one.
 fn block(frequency_hz: f64, least_s: f64, rate_hz: f64) -> (u64, u64) {
     let turns = libm::ceil(frequency_hz * least_s.max(LEAST_BLOCK / rate_hz) - 1e-9).max(1.0);
     let block = libm::round(turns * rate_hz / frequency_hz).max(LEAST_BLOCK) as u64;
-    // Next to half the rate the nearest would be that itself, which has no phase.
+    // Close to half the rate, the nearest frequency would be half the rate itself, which has no phase.
     ((turns as u64).min((block - 1) / 2), block)
 }
 
@@ -199,12 +230,8 @@ impl Excitation for SteppedSine {
             || before.map_or(0, |b| b.end(self.settle_ticks)),
             |sine| sine.start,
         );
-        let come = fade(tick.saturating_sub(begun) as f64, self.fade_ticks as f64);
-        let of = |sine: Option<&Sine>, share: f64| {
-            sine.filter(|_| share > 0.0)
-                .map_or(0.0, |sine| share * sine.current_a(tick, self.settle_ticks))
-        };
-        of(now, come) + of(before, 1.0 - come)
+        let share = fade(tick.saturating_sub(begun) as f64, self.fade_ticks as f64);
+        self.shared_current_a(now, tick, share) + self.shared_current_a(before, tick, 1.0 - share)
     }
 
     fn active(&self, tick: u64) -> bool {
@@ -223,13 +250,14 @@ impl Excitation for SteppedSine {
     }
 
     fn pattern(&self) -> Pattern {
-        let window = |sine: &Sine| Window {
+        let sines = self.sines.iter();
+        let windows = sines.map(|sine| Window {
             start: (sine.start + self.settle_ticks) as usize,
             period: sine.block as usize,
             turns: sine.turns as usize,
             periods: BLOCKS_PER_SINE as usize,
-        };
-        Pattern::Stepped(self.sines.iter().map(window).collect())
+        });
+        Pattern::Stepped(windows.collect())
     }
 }
 
@@ -282,7 +310,7 @@ mod tests {
         ] {
             let config = config(spacing, start_hz, stop_hz);
             let sines = built(&config);
-            for (window, asked_hz) in windows(&sines).iter().zip(
+            for (window, requested_hz) in windows(&sines).iter().zip(
                 config
                     .excitations
                     .stepped_sine
@@ -291,22 +319,22 @@ mod tests {
                 let frequency_hz = window.turns as f64 * 5000.0 / window.period as f64;
                 // The nearest whole number of ticks is half a tick off at most.
                 assert!(
-                    (frequency_hz / asked_hz - 1.0).abs() <= 0.51 / window.period as f64,
-                    "{frequency_hz} {asked_hz}"
+                    (frequency_hz / requested_hz - 1.0).abs() <= 0.51 / window.period as f64,
+                    "{frequency_hz} {requested_hz}"
                 );
                 assert!(
                     window.periods == 6
                         && (window.period * window.periods) as f64 >= 0.2 * 5000.0 - 6.0
                 );
                 // 0.2 A (10 Hz/f) between 10 and 100 Hz.
-                let amplitude_a = 0.2 * 10.0 / asked_hz.clamp(10.0, 100.0);
+                let amplitude_a = 0.2 * 10.0 / requested_hz.clamp(10.0, 100.0);
                 for n in 0..window.period * window.periods {
                     let turns = (n * window.turns % window.period) as f64 / window.period as f64;
                     let expected_a = amplitude_a * (TAU * turns).sin();
                     let current_a = sines.current_a((window.start + n) as u64);
                     assert!(
                         (current_a - expected_a).abs() < 1e-12 * amplitude_a.max(0.1),
-                        "{asked_hz} Hz, tick {n}"
+                        "{requested_hz} Hz, tick {n}"
                     );
                 }
             }
@@ -314,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn it_jumps_nowhere_and_rises_from_zero_and_falls_back_to_it() {
+    fn has_no_steps_and_starts_and_ends_at_zero() {
         let sines = built(&config(Spacing::Logarithmic, 20.0, 200.0));
         let signal: Vec<f64> = (0..sines.ticks())
             .map(|tick| sines.current_a(tick))
@@ -338,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_at_their_limits_make_no_panic() {
+    fn settings_at_their_limits_do_not_panic() {
         let mut config = config(Spacing::Linear, 2499.0, 1e-4);
         (
             config.excitations.stepped_sine.settle_s,

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::amplitude::{AmplitudeCurve, AmplitudePoint, fade};
 use super::waveform::ticks;
 
-/// How a sweep's frequency runs over time.
+/// How the frequency of a sweep changes over time.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum,
 )]
@@ -56,7 +56,7 @@ pub struct ChirpSettings {
     /// Length of the cosine fade at the end, in seconds.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub fade_out_s: f64,
-    /// How often the chirp, its quiet included, is run; the analysis takes their mean.
+    /// Number of repetitions of the chirp, quiet included; the analysis uses their mean.
     #[serde(default = "once")]
     #[schemars(range(min = 1, max = 10000))]
     pub repetitions: u32,
@@ -66,7 +66,7 @@ pub struct ChirpSettings {
 }
 
 impl ChirpSettings {
-    /// The band in hertz, lowest and highest frequency, whichever way the sweep runs.
+    /// Lowest and highest frequency in hertz, in either direction of the sweep.
     pub fn band_hz(&self) -> (f64, f64) {
         (
             self.start_hz.min(self.stop_hz),

@@ -45,42 +45,49 @@ struct Table {
 
 impl Table {
     fn parse(path: &str, text: &str, period_s: f64) -> Result<Table, ReferenceError> {
-        let wrong = |line: usize, why: String| ReferenceError::Line {
-            path: path.into(),
-            line,
-            why,
-        };
-        let mut points: Vec<(f64, f64)> = Vec::new();
-        for (index, line) in text
-            .lines()
-            .enumerate()
-            .filter(|(_, line)| !line.trim().is_empty())
-        {
-            if index == 0 && line.trim() == "time_s,reference_m" {
-                continue;
-            }
-            let point = point(line)
-                .ok_or_else(|| wrong(index + 1, format!("`{line}` is not two finite numbers")))?;
-            if points.last().is_some_and(|before| before.0 >= point.0) {
-                return Err(wrong(
-                    index + 1,
-                    format!("the time {} s does not rise", point.0),
-                ));
-            }
-            points.push(point);
-        }
-        if points.is_empty() {
-            Err(wrong(1, "there is no point".into()))
-        } else {
-            Ok(Table { points, period_s })
+        match points(text) {
+            Ok(points) => Ok(Table { points, period_s }),
+            Err((line, why)) => Err(ReferenceError::Line {
+                path: path.into(),
+                line,
+                why,
+            }),
         }
     }
 }
 
+/// The points of a file; for an invalid one, the number of the line and what is wrong with it.
+fn points(text: &str) -> Result<Vec<(f64, f64)>, (usize, String)> {
+    let mut points = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        let is_header = number == 1 && line.trim() == "time_s,reference_m";
+        if !is_header && !line.trim().is_empty() {
+            push_point(line, &mut points).map_err(|why| (number, why))?;
+        }
+    }
+    if points.is_empty() {
+        Err((1, "there is no point".into()))
+    } else {
+        Ok(points)
+    }
+}
+
+fn push_point(line: &str, points: &mut Vec<(f64, f64)>) -> Result<(), String> {
+    let point = point(line).ok_or_else(|| format!("`{line}` is not two finite numbers"))?;
+    if points.last().is_some_and(|before| before.0 >= point.0) {
+        return Err(format!("the time {} s does not rise", point.0));
+    }
+    points.push(point);
+    Ok(())
+}
+
 fn point(line: &str) -> Option<(f64, f64)> {
     let (time, value) = line.split_once(',')?;
-    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
-    Some((number(time)?, number(value)?))
+    Some((finite_number(time)?, finite_number(value)?))
+}
+
+fn finite_number(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|x: &f64| x.is_finite())
 }
 
 impl Reference for Table {

@@ -24,6 +24,22 @@ pub struct SweptReference {
 }
 
 impl SweptReference {
+    fn check_travel(&self, soft_limit_m: f64) -> Option<Finding> {
+        let amplitudes_m = self.amplitude.iter().map(|point| point.amplitude_m);
+        let largest_m = amplitudes_m.fold(self.travel_m, f64::max);
+        let what = format!(
+            "reaches {largest_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m)"
+        );
+        (largest_m > soft_limit_m).then(|| Finding::new("control.reference", what))
+    }
+
+    fn check_rising(&self) -> Option<Finding> {
+        let mut pairs = self.amplitude.windows(2);
+        let rising = pairs.all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
+        let what = "has frequencies that do not rise from point to point";
+        (!rising).then(|| Finding::new("control.reference.amplitude", what))
+    }
+
     /// The sweep in metres.
     pub fn sweep(&self, context: &ReferenceContext<'_>) -> SweptSine {
         let amplitude = AmplitudeCurve::of_travel(&self.amplitude);
@@ -45,21 +61,8 @@ impl ReferenceDesign for SweptReference {
     }
 
     fn check(&self, soft_limit_m: f64, _rate_hz: f64) -> Vec<Finding> {
-        let amplitudes_m = self.amplitude.iter().map(|point| point.amplitude_m);
-        let largest_m = amplitudes_m.fold(self.travel_m, f64::max);
-        let mut findings = Vec::new();
-        if largest_m > soft_limit_m {
-            let what = format!(
-                "reaches {largest_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m)"
-            );
-            findings.push(Finding::new("control.reference", what));
-        }
-        let mut pairs = self.amplitude.windows(2);
-        if !pairs.all(|pair| pair[0].frequency_hz < pair[1].frequency_hz) {
-            let what = "has frequencies that do not rise from point to point";
-            findings.push(Finding::new("control.reference.amplitude", what));
-        }
-        findings
+        let travel = self.check_travel(soft_limit_m);
+        travel.into_iter().chain(self.check_rising()).collect()
     }
 
     fn can_identify(&self) -> bool {
