@@ -123,7 +123,7 @@ fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
 }
 
 #[test]
-fn the_residues_agree_at_the_motor_and_differ_at_the_load() {
+fn residues_have_equal_signs_at_the_motor_and_opposite_signs_at_the_load() {
     let Some(path) = data() else { return };
     let (motor, load) = (
         side(&path, "motor_angle_rad"),

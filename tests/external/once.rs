@@ -24,7 +24,7 @@ fn step(state: (f64, f64), (hz, zeta, residue): (f64, f64, f64), force: f64) -> 
 }
 
 #[test]
-fn a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold() {
+fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     let force = |n: usize| {
         let t = n as f64 / RATE_HZ - 1.0;
         let sweep = (std::f64::consts::TAU * (5.0 * t + 0.5 * 15.0 * t * t)).sin();
@@ -67,10 +67,10 @@ fn a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold() {
     );
 }
 
-/// The stage of [`a_sweep_between_rests_shows_the_modes_and_half_a_sample_of_hold`] by another excitation: an impulse, whose answer
+/// The stage of [`sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold`] by another excitation: an impulse, whose answer
 /// of each mode is a closed form.
 #[test]
-fn a_record_gets_the_pictures_and_the_page_that_a_run_gets() {
+fn external_record_gets_the_same_plots_and_page_as_a_run() {
     let struck = |n: usize| if n == 100 { RATE_HZ } else { 0.0 };
     let input_a: Vec<f64> = (0..20_000).map(struck).collect();
     let ring = |t: f64| -> f64 {

@@ -19,7 +19,7 @@ fn lines(step: usize) -> Vec<usize> {
 }
 
 #[test]
-fn the_response_is_exact_in_spite_of_drift_and_of_a_first_period_that_settles() {
+fn response_is_exact_despite_drift_and_a_settling_first_period() {
     let mut signals = multisine(&lines(1), 8, 3e-3, 0.0, 1);
     signals.output_m[..PERIOD]
         .iter_mut()
@@ -38,7 +38,7 @@ fn the_response_is_exact_in_spite_of_drift_and_of_a_first_period_that_settles() 
 }
 
 #[test]
-fn only_excited_lines_are_told() {
+fn reports_excited_lines_only() {
     let periods = estimate(&multisine(&lines(5), 6, 0.0, 1e-7, 2), BAND_HZ, whole(0)).unwrap();
     let hz: Vec<f64> = lines(5).iter().map(|f| *f as f64).collect();
     assert_eq!(periods.frf.frequency_hz, hz);
@@ -46,7 +46,7 @@ fn only_excited_lines_are_told() {
 }
 
 #[test]
-fn the_errors_are_as_large_as_they_say() {
+fn errors_match_their_standard_deviations() {
     let (mut ratio, mut count) = (0.0, 0.0);
     for seed in 0..20 {
         let periods = estimate(
@@ -67,7 +67,7 @@ fn the_errors_are_as_large_as_they_say() {
 }
 
 #[test]
-fn response_and_variance_are_those_of_numpy() {
+fn response_and_variance_equal_numpy() {
     let signals = multisine(&lines(3), 7, 1e-3, 1e-6, 3);
     let rows: String = signals
         .input_a
@@ -104,7 +104,7 @@ fn response_and_variance_are_those_of_numpy() {
 }
 
 #[test]
-fn periods_that_are_none_are_refused() {
+fn rejects_invalid_periods() {
     let signals = multisine(&lines(1), 8, 0.0, 1e-7, 4);
     let refused =
         |period, skip| estimate(&signals, BAND_HZ, Repetition { period, skip }).unwrap_err();

@@ -36,7 +36,7 @@ fn with_line(number: usize, change: impl Fn(&str) -> String) -> String {
 }
 
 #[test]
-fn options_that_do_not_go_with_the_file_are_refused() {
+fn rejects_options_that_do_not_match_the_file() {
     for (more, words) in [
         (
             "",
@@ -76,7 +76,7 @@ fn options_that_do_not_go_with_the_file_are_refused() {
 }
 
 #[test]
-fn data_that_are_no_record_fail_with_their_place() {
+fn rejects_invalid_data_with_their_place() {
     let gap = with_line(40, |_| String::new());
     let lines: Vec<String> = good().lines().map(String::from).collect();
     let still = |u: &str, y: &str| {
@@ -154,7 +154,7 @@ fn data_that_are_no_record_fail_with_their_place() {
 }
 
 #[test]
-fn other_marks_between_columns_and_a_rate_instead_of_times_do_as_well() {
+fn accepts_other_separators_and_a_rate_instead_of_times() {
     for mark in [";", "\t"] {
         let bench = Bench::new();
         bench.write("data.csv", good().replace(',', mark));
@@ -173,7 +173,7 @@ fn other_marks_between_columns_and_a_rate_instead_of_times_do_as_well() {
 }
 
 #[test]
-fn swapped_channels_are_undecided_and_told() {
+fn swapped_channels_give_an_undecided_verdict_with_the_reason() {
     let bench = Bench::new();
     bench.write("data.csv", good());
     let swapped = "identify data.csv --input position_m --output force_n --time time_s --period 1000 --band 5:200";
@@ -188,7 +188,7 @@ fn swapped_channels_are_undecided_and_told() {
 }
 
 #[test]
-fn an_output_that_has_nothing_to_do_with_the_input_is_undecided_and_told() {
+fn unrelated_output_gives_an_undecided_verdict_with_the_reason() {
     let mut normal = normal(9);
     let noise = |normal: &mut dyn FnMut() -> f64| (0..8000).map(|_| normal()).collect();
     let signals = Signals {

@@ -9,7 +9,7 @@ use crate::synthetic::{frf_data, stage, term};
 const QUIET_M_PER_N: f64 = 1e-9;
 
 #[test]
-fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
+fn finds_exactly_the_modes_of_a_close_pair_with_their_signs() {
     for (ratio, opposite) in [(1.043, -1.0), (1.02, -1.0), (1.02, 1.0), (1.01, -1.0)] {
         let (low, high) = (
             term(82.0, 0.004, -0.03),
@@ -51,7 +51,7 @@ fn all_modes_of_a_close_pair_are_found_with_their_signs_and_no_other() {
 }
 
 #[test]
-fn a_delay_of_many_milliseconds_is_told_apart_from_the_modes() {
+fn separates_a_delay_of_many_milliseconds_from_the_modes() {
     for delay_s in [0.0, 1e-4, 1.7e-3, 6e-3, -2e-3] {
         let fit = fit(
             &frf_data(&stage(), delay_s, QUIET_M_PER_N, 5),
@@ -69,7 +69,7 @@ fn a_delay_of_many_milliseconds_is_told_apart_from_the_modes() {
 }
 
 #[test]
-fn a_mode_below_the_noise_is_not_claimed() {
+fn does_not_report_a_mode_below_the_noise() {
     // At its peak the second mode answers 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, a twentieth of the noise of a block.
     let truth = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 1e-7)];
     for seed in 0..20 {
@@ -84,7 +84,7 @@ fn a_mode_below_the_noise_is_not_claimed() {
 }
 
 #[test]
-fn a_free_body_with_a_flexible_mode_is_one_double_integrator_and_one_mode() {
+fn free_body_with_flexible_mode_gives_one_double_integrator_and_one_mode() {
     let truth = [term(0.0, 0.0, 2.0), term(48.0, 0.01, -1.2)];
     let fit = fit(
         &frf_data(&truth, 0.0, QUIET_M_PER_N, 8),
@@ -104,7 +104,7 @@ fn a_free_body_with_a_flexible_mode_is_one_double_integrator_and_one_mode() {
 }
 
 #[test]
-fn noise_alone_and_too_few_frequencies_are_refused() {
+fn rejects_noise_alone_and_too_few_frequencies() {
     let noise: Vec<FrfDatum> = frf_data(&[], 0.0, 1e-6, 4);
     assert!(
         matches!(

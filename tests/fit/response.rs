@@ -31,7 +31,7 @@ fn term(omega_rad_s: f64, damping_ratio: f64, residue_per_kg: f64) -> ModalTerm 
 }
 
 #[test]
-fn the_response_is_the_sum_of_modes_and_remainder_late() {
+fn response_is_the_delayed_sum_of_modes_and_remainder() {
     let modes = vec![
         term(184.0, 0.009, 0.47),
         term(516.0, 0.004, -0.03),
@@ -60,7 +60,7 @@ fn the_response_is_the_sum_of_modes_and_remainder_late() {
 }
 
 #[test]
-fn a_pole_and_its_covariance_are_those_of_frequency_and_damping() {
+fn pole_and_covariance_follow_from_frequency_and_damping() {
     let mut covariance = DMatrix::zeros(5, 5);
     (covariance[(0, 0)], covariance[(1, 1)]) = (4e-4, 9e-10);
     let fit = fit(vec![term(500.0, 0.6, 1.0)], covariance);
@@ -88,7 +88,7 @@ fn a_pole_and_its_covariance_are_those_of_frequency_and_damping() {
 }
 
 #[test]
-fn beyond_critical_damping_a_mode_has_two_real_poles_and_a_free_body_one_at_zero() {
+fn overdamped_mode_has_two_real_poles_and_a_free_body_one_at_zero() {
     let fit = fit(
         vec![term(0.0, 0.0, 1.0), term(100.0, 1.25, 1.0)],
         DMatrix::identity(6, 6),

@@ -39,7 +39,7 @@ fn swept(sets: &[&str]) -> Analysis {
 const CARRIED: f64 = 0.0025;
 
 #[test]
-fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_within_1_percent() {
+fn closed_loop_plant_equals_the_rig_and_the_open_loop_within_1_percent() {
     let (closed, plain) = (swept(&[]), config(&[]));
     let open = analysed(&plain, &plain).frf;
     let rig = LoopPlant::with_mean_age(
@@ -85,7 +85,7 @@ fn the_plant_under_the_fast_controller_is_that_of_the_rig_and_of_an_open_loop_wi
 }
 
 #[test]
-fn its_modes_zeros_and_margins_are_told_as_well() {
+fn closed_loop_record_gives_modes_zeros_and_margins() {
     let closed = swept(&[]);
     let modes = closed.fit.as_ref().expect("modes").modes();
     // The model of the thesis at 8 % and +10 %: tests/identify/stage.rs has them from masses and beams.
@@ -129,7 +129,7 @@ fn its_modes_zeros_and_margins_are_told_as_well() {
 /// By the plan from the model the stage moves no further than asked for (and by what the floor does), and the command no more
 /// than by the amplitude of `[chirp]`.
 #[test]
-fn a_planned_sweep_keeps_travel_and_current() {
+fn planned_sweep_stays_within_travel_and_current() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 10e-6 }";
     let plan = Plan::control(config(&[set, "chirp.duration_s=40"])).expect("a plan");
     let ReferenceSettings::Chirp(SweptReference { amplitude, .. }) = &plan.config.control.reference
@@ -168,7 +168,7 @@ fn a_planned_sweep_keeps_travel_and_current() {
 
 /// The slow controller answers next to nothing of a reference at 450 Hz: to use up the chirp's current there it would take 60 m.
 #[test]
-fn a_planned_sweep_is_read_back_from_its_recording_whatever_the_controller() {
+fn planned_sweep_is_read_from_its_recording_for_any_controller() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
     let sets = [
         set,
@@ -201,7 +201,7 @@ fn a_planned_sweep_is_read_back_from_its_recording_whatever_the_controller() {
 }
 
 #[test]
-fn a_sweep_that_would_trip_an_interlock_is_refused_before_anything_moves() {
+fn rejects_sweep_beyond_an_interlock_before_any_motion() {
     let point = |set: &str| {
         format!("control.reference={{ kind = \"chirp\", travel_m = 1e-6, amplitude = [{set}] }}")
     };
@@ -227,7 +227,7 @@ fn a_sweep_that_would_trip_an_interlock_is_refused_before_anything_moves() {
 }
 
 #[test]
-fn a_loop_whose_reference_did_not_sweep_is_refused_with_the_remedy() {
+fn rejects_loop_without_swept_reference_with_the_remedy() {
     let plan = Plan::control(config(&["control.duration_s=1"])).expect("a plan");
     let error = simulated::analysed(&plan, &plan.config)
         .unwrap_err()
@@ -240,7 +240,7 @@ fn a_loop_whose_reference_did_not_sweep_is_refused_with_the_remedy() {
 
 /// What was recorded before it closed is of no loop: neither command nor reference.
 #[test]
-fn a_loop_that_never_closed_shows_nothing() {
+fn loop_that_never_closed_gives_no_response() {
     let swept = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
     // A third of the soft limit: one reading in 370 lies beyond it, of 2500 before the loop closes.
     let sets = [

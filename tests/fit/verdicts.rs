@@ -9,7 +9,7 @@ use crate::identified::{analysed, config, truth};
 use crate::synthetic::{frf_data, stage, term};
 
 #[test]
-fn a_chain_that_answers_later_than_believed_is_never_taken_for_cnmp_zeros() {
+fn unknown_delay_is_never_mistaken_for_cnmp_zeros() {
     for extra_s in [2e-4, 1e-3, 4e-3] {
         let sets = [
             "plant.operating_point_m=0.0032",
@@ -63,7 +63,7 @@ fn judged_by(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict 
 }
 
 #[test]
-fn what_is_not_a_number_is_never_sure() {
+fn verdict_from_non_finite_numbers_is_undecided() {
     let frf_data = frf_data(&stage(), 0.0, 1e-9, 12);
     let good = fit(&frf_data, &MeasurementChain::Direct).expect("modes");
     assert_eq!(judged_by(&good, &frf_data, 3).cnmp, Cnmp::Detected);
@@ -92,7 +92,7 @@ fn what_is_not_a_number_is_never_sure() {
 }
 
 #[test]
-fn the_words_of_an_undecided_verdict_name_what_is_missing() {
+fn reason_of_an_undecided_verdict_names_what_is_missing() {
     assert_eq!(judged(&stage(), 1e-9, 3).cnmp, Cnmp::Detected);
     let unseen = judged(&stage(), 1e-9, 4);
     assert!(
@@ -109,7 +109,7 @@ fn the_words_of_an_undecided_verdict_name_what_is_missing() {
 }
 
 #[test]
-fn where_the_zeros_touch_the_axis_nothing_is_said() {
+fn verdict_is_undecided_for_zeros_on_the_imaginary_axis() {
     // The asymmetry of the default stage at 8 % of L for which a damped zero is on the axis lies between 0 and 2 %.
     let structure = |d: f64| {
         let sets = [

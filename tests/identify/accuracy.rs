@@ -35,8 +35,7 @@ fn assert_close(frf: &Frf, plant: &SampledPlant) {
 }
 
 #[test]
-fn without_noise_the_estimate_is_the_sampled_plant_within_a_tenth_of_a_percent_and_0_06_degrees_resonances_included()
- {
+fn noiseless_estimate_equals_the_sampled_plant_at_resonances_too() {
     let signals = stage::clean_run();
     let start = std::time::Instant::now();
     let frf = estimate(&signals);
@@ -50,7 +49,7 @@ fn without_noise_the_estimate_is_the_sampled_plant_within_a_tenth_of_a_percent_a
 }
 
 #[test]
-fn what_a_parabola_takes_off_a_peak_is_within_two_sigma_even_without_noise() {
+fn bias_of_a_parabola_at_a_peak_is_within_two_sigma_without_noise() {
     let settings = EstimatorSettings {
         curve: LocalModel::Polynomial,
         ..EstimatorSettings::default()
@@ -69,7 +68,7 @@ fn what_a_parabola_takes_off_a_peak_is_within_two_sigma_even_without_noise() {
 }
 
 #[test]
-fn frequencies_rise_through_the_band_in_steps_no_wider_than_the_resolution() {
+fn frequencies_rise_in_steps_up_to_the_resolution() {
     let settings = EstimatorSettings {
         curve: LocalModel::Polynomial,
         ..EstimatorSettings::default()
@@ -89,8 +88,7 @@ fn frequencies_rise_through_the_band_in_steps_no_wider_than_the_resolution() {
 }
 
 #[test]
-fn an_offset_of_a_millimetre_and_a_drift_of_five_micrometres_leave_the_estimate_within_its_bounds()
-{
+fn offset_and_drift_leave_the_estimate_within_its_bounds() {
     assert_close(
         &estimate(&with_drift(stage::clean_run())),
         &SampledPlant::stage(),
@@ -100,7 +98,7 @@ fn an_offset_of_a_millimetre_and_a_drift_of_five_micrometres_leave_the_estimate_
 /// Left in, the drift makes 5/(2 pi f) um s, 0.8 um s at 1 Hz, against 0.006 um s of probe noise: sigma a hundred times
 /// as large.
 #[test]
-fn an_offset_of_a_millimetre_and_a_drift_of_five_micrometres_leave_sigma_as_it_is() {
+fn offset_and_drift_do_not_change_sigma() {
     let still = stage::with_noise(&stage::clean_run(), 2);
     let (still, drifting) = (estimate(&still), estimate(&with_drift(still.clone())));
     for (k, f) in still.frequency_hz.iter().enumerate() {
@@ -123,7 +121,7 @@ fn with_drift(mut signals: Signals) -> Signals {
 /// A push of 0.5 A on top of the chirp gives bin 0 of the input more energy than any other. As there is no quiet to
 /// know the offset from, bin 0 of the output is nothing but the mean that was taken off.
 #[test]
-fn an_offset_of_the_probe_moves_no_estimate_down_to_the_first_bin() {
+fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     let chirp = stage::chirp_of(20.0, 0.0, 0.2);
     let turn = std::f64::consts::TAU / chirp.len() as f64;
     let push = |k: usize| 0.25 - 0.25 * (turn * k as f64).cos();
@@ -148,7 +146,7 @@ fn an_offset_of_the_probe_moves_no_estimate_down_to_the_first_bin() {
 
 /// 599,999 is odd, 99,991 a prime.
 #[test]
-fn a_record_of_any_length_will_do() {
+fn accepts_records_of_any_length() {
     let signals = stage::clean_run();
     let cut = |from: usize, samples: usize| Signals {
         rate_hz: signals.rate_hz,

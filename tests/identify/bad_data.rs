@@ -32,13 +32,13 @@ fn assert_says(error: &IdentifyError, parts: &[&str]) {
 }
 
 #[test]
-fn the_signals_that_these_tests_spoil_are_good_before() {
+fn accepts_the_unchanged_signals() {
     assert!(local::estimate(&good(), (10.0, 400.0), &EstimatorSettings::default()).is_ok());
     assert!(welch::estimate(&good(), (70.0, 400.0), 16, Estimator::H1).is_ok());
 }
 
 #[test]
-fn an_output_that_never_moves_is_refused() {
+fn rejects_constant_output() {
     let signals = Signals {
         output_m: vec![1.25e-3; 200],
         ..good()
@@ -50,7 +50,7 @@ fn an_output_that_never_moves_is_refused() {
 }
 
 #[test]
-fn an_input_that_never_moves_is_refused() {
+fn rejects_constant_input() {
     let signals = Signals {
         input_a: vec![0.0; 200],
         ..good()
@@ -62,7 +62,7 @@ fn an_input_that_never_moves_is_refused() {
 }
 
 #[test]
-fn a_single_sample_is_refused() {
+fn rejects_a_single_sample() {
     let signals = Signals {
         input_a: vec![1.0],
         output_m: vec![1e-4],
@@ -75,7 +75,7 @@ fn a_single_sample_is_refused() {
 }
 
 #[test]
-fn columns_of_different_lengths_are_refused() {
+fn rejects_columns_of_different_lengths() {
     let signals = Signals {
         output_m: vec![0.0; 199],
         ..good()
@@ -87,7 +87,7 @@ fn columns_of_different_lengths_are_refused() {
 }
 
 #[test]
-fn a_sample_that_is_not_a_number_is_refused_with_its_column_and_index() {
+fn rejects_samples_that_are_not_finite_with_column_and_index() {
     let mut signals = good();
     signals.output_m[37] = f64::NAN;
     assert_says(
@@ -102,7 +102,7 @@ fn a_sample_that_is_not_a_number_is_refused_with_its_column_and_index() {
 }
 
 #[test]
-fn a_band_beyond_the_nyquist_frequency_is_refused_with_the_limit() {
+fn rejects_band_beyond_the_nyquist_frequency_with_the_limit() {
     assert_says(
         &refusal(&good(), (10.0, 501.0)),
         &[
@@ -114,13 +114,13 @@ fn a_band_beyond_the_nyquist_frequency_is_refused_with_the_limit() {
 }
 
 #[test]
-fn a_band_up_to_the_nyquist_frequency_itself_is_taken() {
+fn accepts_band_up_to_the_nyquist_frequency() {
     let frf = local::estimate(&good(), (10.0, 500.0), &EstimatorSettings::default()).unwrap();
     assert_eq!(frf.frequency_hz.last(), Some(&495.0));
 }
 
 #[test]
-fn a_band_that_is_upside_down_or_no_number_is_refused() {
+fn rejects_inverted_and_non_finite_bands() {
     for band_hz in [
         (400.0, 10.0),
         (10.0, 10.0),
@@ -134,7 +134,7 @@ fn a_band_that_is_upside_down_or_no_number_is_refused() {
 }
 
 #[test]
-fn a_band_between_two_bins_is_refused_with_their_distance() {
+fn rejects_band_between_two_bins_with_their_distance() {
     let error = local::estimate(&good(), (11.0, 14.0), &EstimatorSettings::default()).unwrap_err();
     assert_says(
         &error,
@@ -145,7 +145,7 @@ fn a_band_between_two_bins_is_refused_with_their_distance() {
 }
 
 #[test]
-fn a_rate_that_is_none_is_refused() {
+fn rejects_invalid_sampling_rate() {
     for rate_hz in [0.0, -5000.0, f64::NAN, f64::INFINITY] {
         assert_says(
             &refusal(&Signals { rate_hz, ..good() }, (10.0, 400.0)),
@@ -155,7 +155,7 @@ fn a_rate_that_is_none_is_refused() {
 }
 
 #[test]
-fn settings_out_of_bounds_are_refused_with_name_value_and_bounds() {
+fn rejects_settings_out_of_bounds_with_name_value_and_bounds() {
     let wide = EstimatorSettings {
         resolution_ratio: 0.2,
         ..EstimatorSettings::default()
@@ -183,7 +183,7 @@ fn settings_out_of_bounds_are_refused_with_name_value_and_bounds() {
 }
 
 #[test]
-fn a_single_segment_knows_no_noise_and_is_refused_with_the_length_it_takes() {
+fn rejects_a_single_segment_with_the_required_length() {
     assert_says(
         &welch::estimate(&good(), (10.0, 400.0), 150, Estimator::H1).unwrap_err(),
         &["200 samples", "at least 225"],

@@ -41,7 +41,7 @@ fn off_at_peaks(frf: &Frf) -> f64 {
 
 /// The neighbourhood reaches 0.8 Hz to either side, zeta f0 is 0.26 Hz: a constant is a mean over the whole peak.
 #[test]
-fn of_ten_seconds_a_pole_in_the_curve_tells_the_peaks_to_half_a_percent_and_nothing_else_does() {
+fn only_the_rational_model_resolves_the_peaks_of_a_ten_second_record() {
     let off = |curve| {
         off_at_peaks(&local::estimate(&ten_seconds(), (10.0, 120.0), &settings(curve)).unwrap())
     };
@@ -60,7 +60,7 @@ fn of_ten_seconds_a_pole_in_the_curve_tells_the_peaks_to_half_a_percent_and_noth
 }
 
 #[test]
-fn of_ten_seconds_with_the_noise_of_the_stage_the_peaks_are_within_two_sigma_nine_times_in_ten() {
+fn peaks_of_a_noisy_ten_second_record_are_within_two_sigma() {
     let (clean, plant) = (ten_seconds(), SampledPlant::stage());
     let (mut held, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
     for seed in 1..=40 {
@@ -91,7 +91,7 @@ fn of_ten_seconds_with_the_noise_of_the_stage_the_peaks_are_within_two_sigma_nin
 
 /// The pole costs noise: where the response is smooth it must not be there. Fisher's test lets one in a thousand pass.
 #[test]
-fn where_no_mode_stands_the_rational_curve_is_the_parabola() {
+fn rational_model_equals_the_parabola_away_from_modes() {
     let mut dice = Dice::new(8);
     let input_a: Vec<f64> = (0..20_000).map(|_| dice.normal()).collect();
     let output_m = input_a
@@ -116,8 +116,7 @@ fn where_no_mode_stands_the_rational_curve_is_the_parabola() {
 }
 
 #[test]
-fn a_logarithmic_grid_has_so_many_frequencies_at_one_ratio_from_the_first_to_the_last_of_the_band()
-{
+fn logarithmic_grid_covers_the_band_at_a_constant_ratio() {
     let settings = EstimatorSettings {
         frequencies: Some(2000),
         ..EstimatorSettings::default()
@@ -143,7 +142,7 @@ fn a_logarithmic_grid_has_so_many_frequencies_at_one_ratio_from_the_first_to_the
 
 /// 4/3 of a half-width is the noise bandwidth of cos^2; the chirp's ripple makes 5 %.
 #[test]
-fn half_widths_are_those_of_the_list_on_straight_lines_between_its_points() {
+fn half_widths_are_interpolated_between_the_points_of_the_list() {
     let point = |frequency_hz, half_width_hz| ResolutionPoint {
         frequency_hz,
         half_width_hz,
@@ -170,7 +169,7 @@ fn half_widths_are_those_of_the_list_on_straight_lines_between_its_points() {
 }
 
 #[test]
-fn a_list_of_half_widths_whose_frequencies_do_not_rise_is_refused() {
+fn rejects_half_widths_whose_frequencies_do_not_rise() {
     let point = ResolutionPoint {
         frequency_hz: 10.0,
         half_width_hz: 0.5,
@@ -189,7 +188,7 @@ fn a_list_of_half_widths_whose_frequencies_do_not_rise_is_refused() {
 /// Twenty seconds out of the middle of sixty of white noise: what rings on from before, and beyond the end, leaks all along the
 /// band.
 #[test]
-fn of_a_record_in_motion_at_both_ends_the_transient_is_told_from_the_response() {
+fn separates_the_transient_of_a_record_in_motion_at_both_ends() {
     let mut dice = Dice::new(6);
     let input_a: Vec<f64> = (0..300_000).map(|_| 0.1 * dice.normal()).collect();
     let plant = SampledPlant::stage();

@@ -19,7 +19,7 @@ fn frf(responses: &[(f64, f64)]) -> Frf {
 }
 
 #[test]
-fn the_file_has_the_header_of_the_contract_and_one_row_a_frequency() {
+fn file_has_the_documented_header_and_one_row_per_frequency() {
     let text = frf_csv::to_string(&frf(&[(0.0, -2e-4), (1e-4, 0.0)]), METRES_PER_AMPERE);
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
@@ -40,7 +40,7 @@ fn the_file_has_the_header_of_the_contract_and_one_row_a_frequency() {
 }
 
 #[test]
-fn phases_are_wrapped_to_180_degrees_of_which_only_the_positive_one_is_written() {
+fn phases_are_wrapped_to_above_minus_180_up_to_180_degrees() {
     let text = frf_csv::to_string(
         &frf(&[(-1e-4, -0.0), (-1e-4, 0.0), (-1e-4, -1e-9), (1e-4, 0.0)]),
         METRES_PER_AMPERE,
@@ -55,7 +55,7 @@ fn phases_are_wrapped_to_180_degrees_of_which_only_the_positive_one_is_written()
 }
 
 #[test]
-fn a_measured_response_comes_back_from_its_file_as_it_was() {
+fn measured_response_is_unchanged_after_writing_and_reading() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("frf.csv");
     let signals = stage::with_noise(&stage::clean_run(), 1);
@@ -91,7 +91,7 @@ fn replaces_an_existing_file_as_a_whole() {
 }
 
 #[test]
-fn a_file_of_other_columns_or_with_a_broken_row_is_refused_with_its_line() {
+fn rejects_other_columns_and_invalid_rows_with_their_line() {
     let error = frf_csv::from_str("frequency_hz,magnitude\n1,2\n").unwrap_err();
     assert!(
         error.to_string().contains("frequency_hz,magnitude_m_per_a"),
@@ -112,7 +112,7 @@ fn a_file_of_other_columns_or_with_a_broken_row_is_refused_with_its_line() {
 
 /// A quarter of a turn at the first frequency.
 #[test]
-fn a_delay_taken_out_turns_phases_and_nothing_else() {
+fn removing_a_delay_changes_phases_only() {
     let late = frf(&[(0.0, -2e-4), (1e-4, 0.0)]);
     let delay_s = 0.25 / late.frequency_hz[0];
     let earlier = late.without_delay(delay_s);

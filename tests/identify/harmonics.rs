@@ -141,7 +141,7 @@ fn by_products(line: usize, order: usize, coefficient: f64) -> f64 {
 }
 
 #[test]
-fn second_and_third_order_products_come_out_by_their_closed_form_and_each_at_its_own_lines() {
+fn second_and_third_order_products_equal_their_closed_form_at_even_and_odd_lines() {
     let (a, b) = (1e-3, 2e-5);
     let (mut odd, mut even) = (0.0, 0.0);
     let seeds = 300;

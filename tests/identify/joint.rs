@@ -80,7 +80,7 @@ fn swept(t: f64) -> f64 {
 }
 
 #[test]
-fn without_noise_plant_loop_and_sensitivities_are_those_of_the_loop() {
+fn noiseless_plant_loop_and_sensitivities_equal_the_model() {
     let joint = estimate(&run(0.0, 1), BAND_HZ, &EstimatorSettings::default()).unwrap();
     let one = Complex::new(1.0, 0.0);
     for (name, frf, truth) in [
@@ -104,7 +104,7 @@ fn without_noise_plant_loop_and_sensitivities_are_those_of_the_loop() {
 /// Right below the resonance, where |L| is near 1, with noise of the size of the reference in a bin, H1 from command to position
 /// leans from P to -1/C; the instrument does not.
 #[test]
-fn noise_that_the_controller_answers_does_not_bias_the_plant() {
+fn noise_fed_back_by_the_controller_does_not_bias_the_plant() {
     let (frequency_hz, seeds) = (19.5, 60);
     let (mut joint_mean, mut direct_mean) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
     let mut squares = 0.0;
@@ -135,7 +135,7 @@ fn noise_that_the_controller_answers_does_not_bias_the_plant() {
 }
 
 #[test]
-fn bands_of_95_percent_hold_the_truth_in_93_to_97_percent() {
+fn confidence_intervals_contain_the_truth_in_93_to_97_percent() {
     let (mut inside, mut all) = (0, 0);
     for seed in 100..300 {
         let joint = estimate(&run(1e-3, seed), BAND_HZ, &EstimatorSettings::default()).unwrap();
@@ -154,7 +154,7 @@ fn bands_of_95_percent_hold_the_truth_in_93_to_97_percent() {
 }
 
 #[test]
-fn a_reference_that_never_moves_is_refused() {
+fn rejects_constant_reference() {
     let mut signals = run(1e-3, 3);
     signals.reference_m.fill(0.0);
     let error = estimate(&signals, BAND_HZ, &EstimatorSettings::default()).unwrap_err();

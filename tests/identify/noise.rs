@@ -7,7 +7,7 @@ fn estimate(signals: &Signals, band_hz: (f64, f64)) -> Frf {
 }
 
 #[test]
-fn sigma_is_below_one_percent_from_1_to_200_hz_and_is_not_zero() {
+fn sigma_is_above_zero_and_below_one_percent_from_1_to_200_hz() {
     let frf = estimate(&stage::with_noise(&stage::clean_run(), 3), (1.0, 200.0));
     for (k, f) in frf.frequency_hz.iter().enumerate() {
         let relative = frf.magnitude_sigma[k] / frf.response[k].norm();
@@ -21,7 +21,7 @@ fn sigma_is_below_one_percent_from_1_to_200_hz_and_is_not_zero() {
 }
 
 #[test]
-fn an_output_of_nothing_but_noise_is_called_so() {
+fn output_of_noise_has_no_coherence() {
     let input_a = stage::chirp_of(20.0, 1.0, 2.0);
     let mut dice = Dice::new(9);
     let output_m = input_a.iter().map(|_| 1e-6 * dice.normal()).collect();
@@ -77,7 +77,7 @@ fn band_of_cosines() -> Signals {
 }
 
 #[test]
-fn where_the_input_is_dead_no_number_is_made_up() {
+fn gives_no_estimate_without_input() {
     let frf = estimate(&band_of_cosines(), (1.0, 2000.0));
     assert_eq!(
         (frf.frequency_hz[0], frf.frequency_hz[frf.len() - 1]),
@@ -94,7 +94,7 @@ fn where_the_input_is_dead_no_number_is_made_up() {
 }
 
 #[test]
-fn a_band_in_which_the_input_is_dead_is_an_error_that_names_it() {
+fn rejects_band_without_input_with_its_limits() {
     let error = local::estimate(
         &band_of_cosines(),
         (100.0, 200.0),

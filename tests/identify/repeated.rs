@@ -65,7 +65,7 @@ fn held(seeds: u64, noise_a: f64, noise_m: f64) -> [f64; 2] {
 
 /// 580 bins of 0.1 Hz, 11 to an estimate, and 40 seeds: 2,100 independent ones, 0.5 %.
 #[test]
-fn bands_of_95_percent_of_the_mean_of_repetitions_hold_the_truth_as_often() {
+fn confidence_intervals_of_the_mean_of_repetitions_contain_the_truth() {
     let held = held(40, 0.0, 1e-6);
     println!("{held:?}");
     assert!(
@@ -75,7 +75,7 @@ fn bands_of_95_percent_of_the_mean_of_repetitions_hold_the_truth_as_often() {
 }
 
 #[test]
-fn noise_on_the_measured_input_is_in_the_bands_as_well() {
+fn confidence_intervals_include_noise_of_the_measured_input() {
     // Its own power is a ten thousandth of the chirp's: no bias to speak of.
     let held = held(40, 2e-3, 1e-9);
     println!("{held:?}");
@@ -87,7 +87,7 @@ fn noise_on_the_measured_input_is_in_the_bands_as_well() {
 
 /// One over the square root of five is 0.447; sigma of one record is known to a tenth, its mean over the band far better.
 #[test]
-fn the_mean_of_five_has_the_sigma_of_one_over_the_square_root_of_five() {
+fn sigma_falls_with_the_square_root_of_the_number_of_repetitions() {
     let all = repetitions(7, 0.0, 1e-6);
     let length = once().len();
     let first = Signals {
@@ -110,7 +110,7 @@ fn the_mean_of_five_has_the_sigma_of_one_over_the_square_root_of_five() {
 }
 
 #[test]
-fn what_is_left_after_the_last_whole_repetition_is_left_out() {
+fn omits_samples_after_the_last_whole_repetition() {
     let mut all = repetitions(7, 0.0, 1e-6);
     let whole = estimate(&all);
     all.input_a.extend([1.0; 100]);
@@ -119,7 +119,7 @@ fn what_is_left_after_the_last_whole_repetition_is_left_out() {
 }
 
 #[test]
-fn the_mean_is_over_whole_repetitions() {
+fn mean_is_over_whole_repetitions() {
     let samples: Vec<f64> = (0..11).map(f64::from).collect();
     let signals = Signals {
         rate_hz: 1.0,

@@ -81,7 +81,7 @@ fn over_seeds(
 /// One estimate has some 11 bins: a sigma of sqrt(0.05/11) = 7 %; so many independent ones in ten records are 4,900/11 10 =
 /// 4,400: 0.1 %. Four of that.
 #[test]
-fn the_bias_is_that_of_the_closed_form_on_whichever_side_the_noise_is() {
+fn bias_of_each_estimator_equals_the_closed_form_for_input_and_output_noise() {
     let bias = |estimator, on_input: f64, on_output: f64| match estimator {
         Estimator::H1 => 1.0 / (1.0 + on_input),
         Estimator::H2 => 1.0 + on_output,
@@ -105,7 +105,7 @@ fn the_bias_is_that_of_the_closed_form_on_whichever_side_the_noise_is() {
 /// The unbiased estimate of each case. 4,400 independent ones: a standard deviation of 0.3 %. Sigma of the magnitude of Hv is
 /// 1.05 times too large: 96 % in place of 95.
 #[test]
-fn bands_of_95_percent_hold_the_truth_as_often_for_each_estimator_where_it_is_unbiased() {
+fn confidence_intervals_of_each_unbiased_estimator_contain_the_truth() {
     for (name, estimate) in every_way() {
         for (estimator, on_input, on_output) in [
             (Estimator::H1, 0.0, NOISE),
@@ -124,7 +124,7 @@ fn bands_of_95_percent_hold_the_truth_as_often_for_each_estimator_where_it_is_un
 
 /// H1/H2 is the coherence; rounding is of sums of hundreds of terms.
 #[test]
-fn the_magnitudes_rise_from_h1_through_hv_to_h2_by_the_coherence() {
+fn magnitudes_of_h1_hv_and_h2_differ_by_the_coherence() {
     for (name, estimate) in
         [("constant", every_way()), ("welch", every_way())].map(|(name, ways)| {
             (
@@ -163,7 +163,7 @@ fn the_magnitudes_rise_from_h1_through_hv_to_h2_by_the_coherence() {
 
 /// Rounding of 1e-16 of each sample, over the least bin of a white spectrum, is below 1e-12.
 #[test]
-fn without_noise_all_are_the_same() {
+fn all_estimators_agree_without_noise() {
     for (name, estimate) in every_way() {
         for estimator in ALL {
             let frf = estimate(&signals(4, 0.0, 0.0), estimator).unwrap();

@@ -46,18 +46,17 @@ fn assert_equals_scipy(signals: &Signals, segment: usize) {
 }
 
 #[test]
-fn welch_spectra_are_those_of_scipy_to_1e_9_for_an_even_segment() {
+fn welch_spectra_equal_scipy_for_an_even_segment() {
     assert_equals_scipy(&noisy_run(20_000, 40e-9), 1024);
 }
 
 #[test]
-fn welch_spectra_are_those_of_scipy_to_1e_9_for_an_odd_segment_and_a_record_that_it_does_not_divide()
- {
+fn welch_spectra_equal_scipy_for_an_odd_segment_and_a_partial_last_segment() {
     assert_equals_scipy(&noisy_run(7_777, 40e-9), 375);
 }
 
 #[test]
-fn the_stage_of_these_tests_is_the_stage_of_the_thesis_as_scipy_discretises_it() {
+fn simulated_stage_equals_the_discretisation_by_scipy() {
     let Some(modes) = python::numbers("stage.py", &["modes"], "") else {
         return;
     };
@@ -86,7 +85,7 @@ fn the_stage_of_these_tests_is_the_stage_of_the_thesis_as_scipy_discretises_it()
 
 /// A flat plant, so that segments leak nothing: what is left is noise, which sigma must describe.
 #[test]
-fn the_error_of_welch_is_within_2_sigma_in_about_95_percent_of_the_bins() {
+fn error_of_welch_is_within_two_sigma_in_95_percent_of_the_bins() {
     let mut dice = Dice::new(5);
     let input_a: Vec<f64> = (0..200_000).map(|_| dice.normal()).collect();
     let output_m = input_a
