@@ -68,11 +68,11 @@ pub enum ExcitationError {
         "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; lines below 1/{max_span} of the largest cannot be distinguished from lines that are not excited: raise the smallest or lower the largest"
     )]
     Span {
-        /// The least amplitude within the band.
+        /// The smallest amplitude within the band.
         least_a: f64,
-        /// The largest.
+        /// The largest amplitude within the band.
         most_a: f64,
-        /// The largest ratio of both.
+        /// The largest allowed ratio of the two.
         max_span: f64,
     },
 }

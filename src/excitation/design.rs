@@ -36,7 +36,7 @@ impl SharedSettings<'_> {
     }
 }
 
-/// Length of an excitation with its quiet, and the setting that decides it.
+/// Length of an excitation including quiet, and the setting that determines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Length {
     /// Length in ticks.

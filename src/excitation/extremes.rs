@@ -40,7 +40,7 @@ impl Extremes {
         Extremes::over(signals, limits)
     }
 
-    /// Of command (A) and position (m), one pair a tick.
+    /// The extremes of commands (A) and positions (m), one pair for each tick.
     pub fn over(signals: impl Iterator<Item = (f64, f64)>, limits: &Limits) -> Extremes {
         let period_s = limits.period_s;
         let mut running = RunningExtremes::new(limits);

@@ -1,13 +1,14 @@
-//! What drives the stage: excitations in amperes for identification, references in metres for the closed loop.
+//! Excitations in amperes for identification, and references in metres for the closed loop.
 //!
 //! ```text
 //!  [excitation] kind -> ExcitationDesign (settings) -> Excitation -> extremes by the model, refused beyond the limits
 //!  [control.reference] kind -> ReferenceDesign (settings) -> Reference
 //! ```
 //!
-//! All are functions of the tick number alone, made before the run, so that a run can be repeated and replayed. The settings
-//! of a kind stand in its own file; a new excitation is one file and one line in `kinds.rs`, a new reference one file and one
-//! line in `reference/mod.rs`. A program that uses this library can run its own [`Excitation`] or [`Reference`] without either.
+//! Each is a function of the tick number alone and is built before the run, so that a run can be repeated and replayed. The
+//! settings of a kind are in its own file. A new excitation is one file and one line in `kinds.rs`; a new reference is one file
+//! and one line in `reference/mod.rs`. A program that uses this library can run its own [`Excitation`] or [`Reference`] without
+//! either.
 
 mod amplitude;
 mod check;

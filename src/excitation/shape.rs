@@ -4,8 +4,8 @@
 //!  A(f) = min(travel / |G(f)|, limit(f))
 //! ```
 //!
-//! Resonances stay below the interlocks, and zeros get the largest current. The curve is simplified to few points, joined by
-//! straight lines on logarithmic axes, that nowhere lie above it.
+//! At resonances the travel stays within the interlocks, and at zeros the current is the largest. The curve is simplified to a
+//! few points, joined by straight lines on logarithmic axes that nowhere lie above it.
 
 use super::amplitude::AmplitudePoint;
 use super::limits::Limits;
@@ -26,7 +26,7 @@ pub struct CurrentLimit {
 }
 
 impl CurrentLimit {
-    /// A ratio of what motor and amplifier allow; a sine of the continuous current has sqrt 2 times its amplitude.
+    /// The limits of motor and amplifier times a ratio. A sine with the continuous current as RMS has sqrt 2 times its amplitude.
     pub fn new(limits: &Limits, ratio: f64) -> CurrentLimit {
         let continuous_a = std::f64::consts::SQRT_2 * limits.continuous_current_a;
         let current_a = continuous_a

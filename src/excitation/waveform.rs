@@ -1,4 +1,4 @@
-//! The seams of this module: a current over time, a reference over time.
+//! The traits of this module: a current over time, and a reference over time.
 
 /// A current over time, as a function of the tick alone: so that a run can be repeated and replayed.
 ///
@@ -27,12 +27,12 @@ pub trait Excitation: Send {
     /// Length in ticks, quiet included. *In the tick.*
     fn ticks(&self) -> u64;
 
-    /// Whether the tick belongs to the excitation proper, not to the quiet before or after. *In the tick.*
+    /// Whether the tick belongs to the excitation itself, not to the quiet before or after. *In the tick.*
     fn active(&self, tick: u64) -> bool {
         tick < self.ticks()
     }
 
-    /// The frequency in hertz that is excited at a tick, if it is a single one.
+    /// The frequency in hertz that is excited at a tick, if there is only one.
     fn frequency_at_hz(&self, _tick: u64) -> Option<f64> {
         None
     }
@@ -65,19 +65,19 @@ impl<E: Excitation + ?Sized> Excitation for Box<E> {
     }
 }
 
-/// How an excitation repeats; all counts in ticks of it.
+/// How an excitation repeats; lengths are in ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pattern {
-    /// Not at all: from rest to rest.
+    /// Once, from rest to rest.
     Once,
-    /// From rest to rest, several times.
+    /// Several times, each from rest to rest.
     Repeated {
         /// Ticks of one repetition.
         period: usize,
         /// Number of repetitions.
         count: usize,
     },
-    /// Without a pause.
+    /// Periodic, without rest between the periods.
     Periodic {
         /// Start of the first period.
         start: usize,
@@ -85,7 +85,7 @@ pub enum Pattern {
         period: usize,
         /// Periods in which the stage settles.
         skip: usize,
-        /// Periods after these.
+        /// Periods after the settling.
         periods: usize,
     },
     /// One sine after the other, each alone in its window.

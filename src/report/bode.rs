@@ -9,8 +9,9 @@ use crate::identify::Unit;
 const HEIGHTS: [f64; 3] = [320.0, 243.0, 132.0];
 /// Part of an axis left free above and below the curves.
 const MARGIN: f64 = 0.06;
-/// Least height of the magnitude axis in decades, and of the phase axis in degrees.
+/// Smallest height of the magnitude axis in decades.
 const LEAST_DECADES: f64 = 1.0;
+/// Smallest height of the phase axis in degrees.
 const LEAST_DEGREES: f64 = 180.0;
 
 /// The Bode plot of some responses, as an SVG document.
@@ -127,7 +128,7 @@ fn legend_name(line: &Line) -> String {
     }
 }
 
-/// Of all lines; a single frequency gets a third of an octave to either side.
+/// The range of all frequencies; a single frequency gets a third of an octave to either side.
 fn frequency_range(lines: &[Line]) -> (f64, f64) {
     let frequencies = lines
         .iter()
@@ -140,7 +141,7 @@ fn frequency_range(lines: &[Line]) -> (f64, f64) {
     }
 }
 
-/// Of the magnitudes that are certain, or of all where none is, with a margin, and a decade at least.
+/// The range of the magnitudes that are certain, or of all if none is certain, with a margin: at least a decade.
 fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
     let logs = [false, true].into_iter().find_map(|all| {
         let magnitudes = lines
@@ -153,7 +154,7 @@ fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
     Some((libm::pow(10.0, low), libm::pow(10.0, high)))
 }
 
-/// Of the phases that are certain, likewise, and half a turn at least.
+/// The range of the phases, likewise: at least half a turn.
 fn phase_range(lines: &[Line]) -> (f64, f64) {
     let phases = [false, true].into_iter().find_map(|all| {
         range(
@@ -180,7 +181,7 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// Widened by the margin, and about its middle to the least width.
+/// A range, widened about its middle to the least width and by the margin.
 fn with_margin((low, high): (f64, f64), least: f64) -> (f64, f64) {
     let half = (high - low).max(least) * (0.5 + MARGIN);
     let middle = (low + high) / 2.0;

@@ -61,7 +61,7 @@ pub fn note(text: &str) -> String {
     format!("<p class=\"quiet\">{}</p>\n", escaped(text))
 }
 
-/// An SVG with a description for readers who do not see it, and a caption.
+/// An SVG with a description for screen readers, and a caption.
 pub fn picture(svg: &str, description: &str, caption: &str) -> String {
     let labelled = format!("<svg role=\"img\" aria-label=\"{}\" ", escaped(description));
     let svg = svg.replacen("<svg ", &labelled, 1);

@@ -1,4 +1,4 @@
-//! Numbers for people: as many digits as their error allows.
+//! Numbers in text, with as many digits as their error allows.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ pub fn decimals(error: f64) -> usize {
     (1.0 - libm::log10(error).floor()).clamp(0.0, 12.0) as usize
 }
 
-/// A number with a true minus sign.
+/// A number with a typographic minus sign.
 pub fn plain(value: f64, digits: usize) -> String {
     format!("{value:.digits$}").replace('-', "\u{2212}")
 }
@@ -30,7 +30,7 @@ pub fn angular_frequency(omega_rad_s: f64) -> String {
     format!("{omega_rad_s:.2} rad/s ({:.3} Hz)", omega_rad_s / TAU)
 }
 
-/// A probability in percent. Close to 0 and 1 it is given as a bound, as the tails of the distribution are not known better.
+/// A probability in percent. Close to 0 and 1 it is given as a bound, as the tails of the distribution are not known exactly.
 pub fn percent(probability: f64) -> String {
     match probability {
         p if p < 1e-4 => "below 0.01 %".into(),

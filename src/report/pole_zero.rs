@@ -13,11 +13,11 @@ use crate::identify::modal::SIGMAS_95;
 
 /// Largest number of enlarged zeros: those nearest to the imaginary axis in sigmas.
 const ENLARGED: usize = 3;
-/// Beyond every frame, in rad/s.
+/// Ends of the line that marks the imaginary axis, beyond any frame, in rad/s.
 const FAR: f64 = 1e9;
 /// Part of the half-width of an enlarged ellipse left free beside it.
 const ROOM: f64 = 0.45;
-/// An enlarged zero is shown with the imaginary axis if it is closer to it than so many half-widths of its ellipse.
+/// An enlarged zero is shown with the imaginary axis if its distance from it is at most this multiple of the ellipse's half-width.
 const AXIS_WITHIN: f64 = 6.0;
 /// Poles of a larger damping ratio do not widen the frame.
 const OSCILLATING: f64 = 0.2;

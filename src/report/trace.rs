@@ -8,7 +8,7 @@ use crate::identify::{Frf, wrapped_phase_rad};
 
 /// Half-width of the band in sigmas; smaller magnitudes are drawn faint.
 pub(super) const BAND_SIGMAS: f64 = 2.0;
-/// Smallest magnitude in sigmas whose phase decides about turns: it is known to 0.25 rad.
+/// Smallest magnitude in sigmas whose phase is used for unwrapping: it is known to 0.25 rad.
 const TRUSTED_SIGMAS: f64 = 4.0;
 /// Measured frequencies further apart than this many resolutions have a gap between them.
 const GAP_RESOLUTIONS: f64 = 2.0;
@@ -95,7 +95,7 @@ pub(super) struct Line<'a> {
     pub phase_deg: Vec<f64>,
     /// Whether the band of the magnitude excludes 0.
     pub certain: Vec<bool>,
-    /// Whether the phase is known well enough to decide about turns.
+    /// Whether the phase is known well enough to be used for unwrapping.
     trusted: Vec<bool>,
     pub measured: Option<&'a Frf>,
 }
@@ -213,7 +213,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Which magnitudes are above so many of their sigmas; all of a model.
+/// Which magnitudes are above a multiple of their sigmas; all magnitudes of a model are.
 fn above_sigmas(magnitude: &[f64], measured: Option<&Frf>, sigmas: f64) -> Vec<bool> {
     let magnitude = magnitude.iter().enumerate();
     magnitude

@@ -1,4 +1,4 @@
-//! Signals of other hands: a CSV with named columns, periodic or not, in any units.
+//! External records: a CSV with named columns, periodic or not, in any units.
 
 use bench_test_support::program;
 use bench_test_support::python;

@@ -1,4 +1,4 @@
-//! A two-mass bench measured by others, 20 periods of a multisine (`../shared/data/README.md`; `BENCH_SHARED_DATA` names another
+//! An external record of a two-mass bench, 20 periods of a multisine (`../shared/data/README.md`; `BENCH_SHARED_DATA` names another
 //! folder): antiresonance, resonance, damping and signs, beside the fit of an independent program to the same file.
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::program::{Bench, number};
 use crate::python;
 
-/// The file, or, on standard error, that it is missing.
+/// The file; if it is missing, a message on standard error.
 fn data() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     let folder = std::env::var_os("BENCH_SHARED_DATA").map_or(beside, PathBuf::from);
@@ -23,7 +23,7 @@ fn data() -> Option<PathBuf> {
 }
 
 struct Side {
-    /// Of the JSON object, those whose residue is a fifth of the largest: the others stand for distortion.
+    /// The modes of the JSON object whose residue is at least a fifth of the largest: the others fit distortion.
     modes: Vec<Value>,
     answer: Value,
     frf: Vec<Vec<f64>>,
@@ -63,7 +63,7 @@ impl Side {
         self.frf.iter().find(|row| row[0] == hz).expect("a line")[1]
     }
 
-    /// Where between two frequencies |H| is least, or with -1 greatest.
+    /// The frequency between two others where |H| is smallest, or with -1 largest.
     fn least(&self, from_hz: f64, to_hz: f64, sign: f64) -> f64 {
         let within = self
             .frf
@@ -81,7 +81,7 @@ fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
     let (rigid, flexible) = (&side.modes[0], &side.modes[1]);
     assert!(
         number(&rigid["frequency_hz"]) < 6.0,
-        "a body on no spring, but for its friction: {rigid}"
+        "a free body with friction: {rigid}"
     );
     assert_eq!(
         (rigid["sign"].as_str(), flexible["sign"].as_str()),
@@ -94,8 +94,8 @@ fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
     let Some(theirs) = python::numbers("motor_bench.py", &[&text, output], "") else {
         return;
     };
-    // Friction and play, which no sum of modes has, lead both programs astray as their weights have it; both count what is left as
-    // noise. Of eight differences one is beyond 3 of their sigma once in fifty.
+    // Friction and play are not described by a sum of modes. They bias both programs differently, by their weights; both treat the residual as
+    // noise. One of eight differences exceeds 3 sigma once in fifty.
     let ours = [
         (rigid, "residue"),
         (flexible, "frequency_hz"),
@@ -129,7 +129,7 @@ fn residues_have_equal_signs_at_the_motor_and_opposite_signs_at_the_load() {
         side(&path, "motor_angle_rad"),
         side(&path, "load_angle_rad"),
     );
-    // From the periodic average of others in the data's README, in three digits.
+    // From the periodic average in the README of the data, with three digits.
     for (side, hz, expected) in [
         (&motor, 40.0, 1.03e-3),
         (&load, 40.0, 2.25e-3),
@@ -174,7 +174,7 @@ fn residues_have_equal_signs_at_the_motor_and_opposite_signs_at_the_load() {
         );
         assert_eq!(side.answer["periods"], 17);
         assert_eq!(side.answer["frequencies"], 240);
-        // Friction and play are hundreds of times above the noise of 17 periods: it is told, and no verdict given.
+        // Friction and play are hundreds of times above the noise of 17 periods: the verdict is undecided, with the reason.
         assert!(number(&side.answer["fit_chi2_per_freedom"]) > 10.0);
         assert_eq!(side.answer["cnmp"], "undecided");
         assert!(

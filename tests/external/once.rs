@@ -6,7 +6,7 @@ use crate::signals::{STAGE, csv};
 
 const RATE_HZ: f64 = 1000.0;
 
-/// The step of a mode under a force that holds, by Runge and Kutta's fourth order in eight parts.
+/// One sample of a mode under a held force, by eight steps of the fourth-order Runge-Kutta method.
 fn step(state: (f64, f64), (hz, zeta, residue): (f64, f64, f64), force: f64) -> (f64, f64) {
     let (w, h) = (std::f64::consts::TAU * hz, 1.0 / RATE_HZ / 8.0);
     let slope = |(x, v): (f64, f64)| (v, residue * force - 2.0 * zeta * w * v - w * w * x);
@@ -39,7 +39,7 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
             .iter_mut()
             .zip(STAGE)
             .for_each(|(state, mode)| *state = step(*state, mode, *force));
-        // Below 1e-7 the bend of sin(x)/x over the band stands out of the noise, and is fitted with a mode of its own.
+        // Below 1e-7 the curvature of sin(x)/x over the band exceeds the noise, and is fitted by another mode.
         position + 3e-7 * normal()
     });
     let signals = Signals {
@@ -54,7 +54,7 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     let modes = answer["modes"].as_array().expect("modes");
     assert_eq!(modes.len(), 2, "{answer}");
     for (mode, (hz, zeta, residue)) in modes.iter().zip(STAGE) {
-        // A force that holds is its samples half a sample late, and sin(x)/x of x = pi f/rate smaller: 1.3 % at 90 Hz.
+        // A held force lags its samples by half a sample and is smaller by sin(x)/x with x = pi f/rate: 1.3 % at 90 Hz.
         near("frequency", number(&mode["frequency_hz"]), hz, 1e-3 * hz);
         near("damping", number(&mode["damping_ratio"]), zeta, 0.03 * zeta);
         near("residue", number(&mode["residue"]), residue, 0.03 * residue);
@@ -67,8 +67,8 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     );
 }
 
-/// The stage of [`sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold`] by another excitation: an impulse, whose answer
-/// of each mode is a closed form.
+/// The stage of [`sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold`] with another excitation: an impulse, to which the response
+/// of each mode is known in closed form.
 #[test]
 fn external_record_gets_the_same_plots_and_page_as_a_run() {
     let struck = |n: usize| if n == 100 { RATE_HZ } else { 0.0 };
@@ -128,5 +128,5 @@ fn external_record_gets_the_same_plots_and_page_as_a_run() {
         "the verdict first, the pictures after the modes: {places:?}"
     );
     let elsewhere = page.matches("://").count() - page.matches("http://www.w3.org").count();
-    assert_eq!(elsewhere, 0, "nothing from elsewhere");
+    assert_eq!(elsewhere, 0, "no external references");
 }

@@ -1,4 +1,4 @@
-//! Averages over periods: exact, and as sure as they say.
+//! Averages over periods: exact without noise, with correct standard deviations.
 use bench::identify::IdentifyError;
 use bench::identify::periodic::{Repetition, estimate};
 
@@ -91,7 +91,7 @@ fn response_and_variance_equal_numpy() {
     for (row, block) in theirs.iter().zip(&ours) {
         let off =
             (block.response.re - row[1]).hypot(block.response.im - row[2]) / row[1].hypot(row[2]);
-        // FFTs of other hands differ by roundings of the largest line, 1e3 times the smallest.
+        // Two FFT libraries differ by roundings of the largest line, 1e3 times the smallest.
         assert!(
             block.frequency_hz == row[0] && off < 1e-9,
             "{row:?}: {block:?}"

@@ -1,4 +1,4 @@
-//! What cannot be analysed is refused with its place; what cannot be trusted is undecided.
+//! Records that cannot be analysed are rejected with the place of the error; unreliable ones give an undecided verdict.
 use bench::identify::Signals;
 
 use crate::program::{Answer, Bench};
@@ -6,7 +6,7 @@ use crate::signals::{csv, multisine, normal};
 
 const ASKED: &str = "identify data.csv --input force_n --output position_m";
 
-/// The answer to `data.csv`.
+/// The error message for `data.csv`.
 fn asked(text: impl AsRef<[u8]>, more: &str) -> Answer {
     let bench = Bench::new();
     bench.write("data.csv", text);
@@ -23,7 +23,7 @@ fn good() -> String {
     csv(&multisine(&(5..=200).collect::<Vec<_>>(), 7, 0.0, 1e-8, 1))
 }
 
-/// The good file with one of its lines changed.
+/// The valid file with one line changed.
 fn with_line(number: usize, change: impl Fn(&str) -> String) -> String {
     let line = |(k, line): (usize, &str)| {
         if k + 1 == number {

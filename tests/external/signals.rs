@@ -1,16 +1,16 @@
-//! Signals by closed form: what a sum of modes answers to a multisine, with drift and noise.
+//! Signals in closed form: the response of a sum of modes to a multisine, with drift and noise.
 use std::f64::consts::TAU;
 
 use bench::identify::Signals;
 use nalgebra::Complex;
 
-/// Samples a period, and a second.
+/// Samples per period, and per second.
 pub const PERIOD: usize = 1000;
 
 /// Modes: hertz, damping ratio, residue.
 pub const STAGE: [(f64, f64, f64); 2] = [(40.0, 0.02, 1.0), (90.0, 0.02, 0.6)];
 
-/// Numbers of mean 0 and variance 1, near enough normal: sums of twelve.
+/// Approximately normal numbers of mean 0 and variance 1: sums of twelve.
 pub fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1;
     let mut uniform = move || {

@@ -1,4 +1,4 @@
-//! From a response to modes with their errors, and from these to a verdict.
+//! Modes with their standard deviations from a response, and the verdict from the modes.
 
 mod modes;
 mod response;

@@ -1,11 +1,11 @@
-//! Which modes there are.
+//! Number, frequencies and signs of the modes that a fit finds.
 use bench::identify::FrfDatum;
 use bench::identify::modal::{FitError, MeasurementChain, fit};
 use nalgebra::Complex;
 
 use crate::synthetic::{frf_data, stage, term};
 
-/// Some thousandth of what the stage answers above its modes.
+/// Noise of about a thousandth of the response above the modes.
 const QUIET_M_PER_N: f64 = 1e-9;
 
 #[test]
@@ -27,7 +27,7 @@ fn finds_exactly_the_modes_of_a_close_pair_with_their_signs() {
             let off = |estimate: bench::identify::modal::Estimate, truth: f64| {
                 (estimate.value - truth).abs() / estimate.sigma
             };
-            // Nine numbers of a normal distribution: beyond 5 sigma once in 200,000.
+            // Nine normally distributed numbers: one exceeds 5 sigma once in 200,000.
             assert!(
                 off(mode.omega_rad_s, truth.omega_rad_s) < 5.0,
                 "{ratio}: {mode:?}"
@@ -70,7 +70,7 @@ fn separates_a_delay_of_many_milliseconds_from_the_modes() {
 
 #[test]
 fn does_not_report_a_mode_below_the_noise() {
-    // At its peak the second mode answers 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, a twentieth of the noise of a block.
+    // The peak of the second mode is 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, a twentieth of the noise of a block.
     let truth = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 1e-7)];
     for seed in 0..20 {
         let modes = fit(

@@ -1,4 +1,4 @@
-//! A stage under the fast controller shows its plant, its loop, its modes and its zeros, as in open loop.
+//! Identification of a stage in closed loop with the fast controller: plant, loop, modes and zeros as in open loop.
 use std::f64::consts::TAU;
 
 use bench::config::{Config, ReferenceSettings, Source, load};
@@ -13,7 +13,7 @@ use bench::rt::arming::State;
 use crate::identified::analysed;
 use crate::simulated;
 
-/// The default stage at its 5 kHz.
+/// The default stage at 5 kHz.
 fn config(sets: &[&str]) -> Config {
     let sets = sets.iter().map(|set| set.to_string()).collect();
     load(&Source {
@@ -35,7 +35,7 @@ fn swept(sets: &[&str]) -> Analysis {
     simulated::analysed(&plan, &plan.config).expect("an analysis")
 }
 
-/// The data carry a frequency whose sigma is below this part of the response: errors below 4 sigma are then below 1 %.
+/// A frequency is compared if its sigma is below this part of the response: errors below 4 sigma are then below 1 %.
 const CARRIED: f64 = 0.0025;
 
 #[test]
@@ -114,7 +114,7 @@ fn closed_loop_record_gives_modes_zeros_and_margins() {
         around.margins.modulus_margin,
         around.predicted.modulus_margin,
     );
-    // 0.42 +- 0.0007; the unmodelled modes, of which the prediction knows nothing, take a thousandth of it.
+    // 0.42 +- 0.0007; the unmodelled modes, which the prediction does not contain, reduce it by a thousandth.
     assert!(
         measured.sigma < 0.005 && (measured.value - predicted).abs() < 4.0 * measured.sigma + 2e-3,
         "{measured:?}"
@@ -126,8 +126,8 @@ fn closed_loop_record_gives_modes_zeros_and_margins() {
     );
 }
 
-/// By the plan from the model the stage moves no further than asked for (and by what the floor does), and the command no more
-/// than by the amplitude of `[chirp]`.
+/// With the plan from the model, the stage moves at most by the requested travel (plus floor vibration), and the command is at most
+/// the amplitude of `[chirp]`.
 #[test]
 fn planned_sweep_stays_within_travel_and_current() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 10e-6 }";
@@ -166,7 +166,7 @@ fn planned_sweep_stays_within_travel_and_current() {
     );
 }
 
-/// The slow controller answers next to nothing of a reference at 450 Hz: to use up the chirp's current there it would take 60 m.
+/// The slow controller hardly follows a reference at 450 Hz: an amplitude of 60 m would be needed for the chirp's current there.
 #[test]
 fn planned_sweep_is_read_from_its_recording_for_any_controller() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
@@ -181,7 +181,7 @@ fn planned_sweep_is_read_from_its_recording_for_any_controller() {
     else {
         panic!()
     };
-    // No reference that a person gives may reach beyond the soft limit of 0.9 mm; where the loop follows it is the travel.
+    // A reference given by the operator must stay within the soft limit of 0.9 mm; where the loop follows, it is the travel.
     let largest_m = amplitude
         .iter()
         .map(|point| point.amplitude_m)
@@ -210,7 +210,7 @@ fn rejects_sweep_beyond_an_interlock_before_any_motion() {
             "{ frequency_hz = 1.0, amplitude_m = 800e-6 }",
             "the motor's peak current",
         ),
-        // 600 um ask for 4 A at standstill, the motor stands 2.3.
+        // A static displacement of 600 um needs 4 A; the motor allows 2.3 A.
         (
             "{ frequency_hz = 30.0, amplitude_m = 600e-6 }, { frequency_hz = 60.0, amplitude_m = 1e-6 }",
             "thermal current",
@@ -238,7 +238,7 @@ fn rejects_loop_without_swept_reference_with_the_remedy() {
     );
 }
 
-/// What was recorded before it closed is of no loop: neither command nor reference.
+/// A recording that ends before the loop closed has neither command nor reference.
 #[test]
 fn loop_that_never_closed_gives_no_response() {
     let swept = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";

@@ -1,4 +1,4 @@
-//! Verdicts on the simulated stage: never a wrong one, and few that say nothing.
+//! Verdicts on the simulated stage: none is wrong, and few are undecided.
 use bench::identify::FrfDatum;
 use bench::identify::modal::{MeasurementChain, ModalFit, fit};
 use bench::identify::verdict::{Cnmp, Verdict, VerdictInput, verdict};
@@ -29,7 +29,7 @@ fn unknown_delay_is_never_mistaken_for_cnmp_zeros() {
             analysis.verdict
         );
         let delay = analysis.fit.expect("modes").delay_s();
-        // The delay put in, but for what a chain of 1 kHz folds back, which a delay turns the other way.
+        // The added delay, except for aliases of the 1 kHz chain, whose phase a delay turns the other way.
         assert!(
             (delay.value - extra_s).abs() < 1e-6 + 0.02 * extra_s,
             "{extra_s}: {delay:?}"
@@ -74,7 +74,7 @@ fn verdict_from_non_finite_numbers_is_undecided() {
     for fit in [unknown, misfit] {
         assert_eq!(judged_by(&fit, &frf_data, 3).cnmp, Cnmp::Undecided);
     }
-    // A response of nothing has no phase, and no logarithm of its magnitude.
+    // A response of zero has neither a phase nor a logarithm of its magnitude.
     let mut dead = frf_data.clone();
     let valley = dead
         .iter()
@@ -82,7 +82,7 @@ fn verdict_from_non_finite_numbers_is_undecided() {
         .expect("in the band");
     dead[valley].response = Complex::new(0.0, 0.0);
     assert_eq!(judged_by(&good, &dead, 3).cnmp, Cnmp::Undecided);
-    // The same of a stage without CNMP zeros, which half a turn of nothing must not exclude.
+    // The same for a stage without CNMP zeros: an undefined phase must not lead to `excluded`.
     let calm = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
     let mut frf_data = crate::synthetic::frf_data(&calm, 0.0, 1e-9, 12);
     let fit = fit(&frf_data, &MeasurementChain::Direct).expect("modes");

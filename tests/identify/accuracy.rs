@@ -13,7 +13,7 @@ fn estimate(signals: &Signals) -> Frf {
     local::estimate(signals, BAND_HZ, &EstimatorSettings::default()).unwrap()
 }
 
-/// Everywhere within 0.1 % and 0.06 degrees of the plant.
+/// The estimate is within 0.1 % and 0.06 degrees of the plant at all frequencies.
 ///
 /// A single mode is in the curve, exactly. Where three stand within 2.2 Hz (281.4, 282.0, 283.6 Hz, zeta = 0.005) the other two
 /// leave, beyond a parabola, some x^4 of theirs: x = 0.7 Hz/1.4 Hz, and 0.027 x^4 = 0.17 % of a third of the response. As
@@ -95,8 +95,8 @@ fn offset_and_drift_leave_the_estimate_within_its_bounds() {
     );
 }
 
-/// Left in, the drift makes 5/(2 pi f) um s, 0.8 um s at 1 Hz, against 0.006 um s of probe noise: sigma a hundred times
-/// as large.
+/// Without correction the drift adds 5/(2 pi f) um s, 0.8 um s at 1 Hz, against 0.006 um s of probe noise: sigma would be a hundred times
+/// larger.
 #[test]
 fn offset_and_drift_do_not_change_sigma() {
     let still = stage::with_noise(&stage::clean_run(), 2);
@@ -118,8 +118,8 @@ fn with_drift(mut signals: Signals) -> Signals {
     signals
 }
 
-/// A push of 0.5 A on top of the chirp gives bin 0 of the input more energy than any other. As there is no quiet to
-/// know the offset from, bin 0 of the output is nothing but the mean that was taken off.
+/// An offset of 0.5 A added to the chirp gives bin 0 of the input more energy than any other bin. The record has no quiet
+/// interval from which the offset could be known, so that bin 0 of the output only holds the subtracted mean.
 #[test]
 fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     let chirp = stage::chirp_of(20.0, 0.0, 0.2);
@@ -136,7 +136,7 @@ fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     let frf = local::estimate(&signals, (0.0, 10.0), &EstimatorSettings::default()).unwrap();
     assert!((frf.frequency_hz[0] - 1.0 / 20.2).abs() < 1e-12);
     for (f, h) in frf.frequency_hz.iter().zip(&frf.response) {
-        // Curvature over 16 bins of 0.05 Hz is (0.8/29)^2, and a parabola has it.
+        // The curvature over 16 bins of 0.05 Hz is (0.8/29)^2, which a parabola follows.
         assert!(
             (h / plant.response(*f) - 1.0).norm() < 0.01,
             "{h} at {f} Hz"

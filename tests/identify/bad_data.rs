@@ -1,7 +1,7 @@
 use bench::identify::{Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use proptest::prelude::*;
 
-/// Fit for any estimator.
+/// Signals that any estimator can process.
 fn good() -> Signals {
     let input_a: Vec<f64> = (0..200).map(|k| f64::from(k * k % 17) - 8.0).collect();
     let output_m = input_a.iter().map(|u| 1e-4 * u).collect();
@@ -15,7 +15,7 @@ fn good() -> Signals {
 fn refusal(signals: &Signals, band_hz: (f64, f64)) -> IdentifyError {
     let local = local::estimate(signals, band_hz, &EstimatorSettings::default()).unwrap_err();
     let welch = welch::estimate(signals, band_hz, 16, Estimator::H1).unwrap_err();
-    // Both say the same, but for the distance of their bins.
+    // Both messages agree, except for the distance of the bins.
     assert_eq!(
         std::mem::discriminant(&local),
         std::mem::discriminant(&welch),
@@ -190,7 +190,7 @@ fn rejects_a_single_segment_with_the_required_length() {
     );
 }
 
-/// Values of all kinds, most of them ordinary.
+/// Values of all kinds, most of them valid.
 fn sample() -> impl Strategy<Value = f64> {
     prop_oneof![
         20 => -1.0..1.0,

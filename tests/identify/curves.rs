@@ -1,4 +1,4 @@
-//! What the shape of the curves, their resolution and their grid do.
+//! Effects of the local model, the resolution and the frequency grid.
 
 use bench::identify::{EstimatorSettings, Frf, LocalModel, ResolutionPoint, Signals, local};
 
@@ -25,7 +25,7 @@ fn ten_seconds() -> Signals {
     }
 }
 
-/// The greatest relative error within a half-power width of the peaks.
+/// The largest relative error within a half-power width of the peaks.
 fn off_at_peaks(frf: &Frf) -> f64 {
     let plant = SampledPlant::stage();
     let near = |f: &f64| PEAKS_HZ.iter().any(|peak| (f / peak - 1.0).abs() < 0.008);
@@ -89,7 +89,7 @@ fn peaks_of_a_noisy_ten_second_record_are_within_two_sigma() {
     assert!(worst < 0.02, "{worst}");
 }
 
-/// The pole costs noise: where the response is smooth it must not be there. Fisher's test lets one in a thousand pass.
+/// The pole increases the variance, so it must not be used where the response is smooth. Fisher's test accepts it once in a thousand.
 #[test]
 fn rational_model_equals_the_parabola_away_from_modes() {
     let mut dice = Dice::new(8);
@@ -130,7 +130,7 @@ fn logarithmic_grid_covers_the_band_at_a_constant_ratio() {
             "{f} Hz is number {k}"
         );
     }
-    // Between bins as on them.
+    // The frequencies need not be those of bins.
     let plant = SampledPlant::stage();
     let off = frf
         .frequency_hz
@@ -185,7 +185,7 @@ fn rejects_half_widths_whose_frequencies_do_not_rise() {
     );
 }
 
-/// Twenty seconds out of the middle of sixty of white noise: what rings on from before, and beyond the end, leaks all along the
+/// Twenty seconds from the middle of sixty seconds of white noise: the transients at both ends leak over the whole
 /// band.
 #[test]
 fn separates_the_transient_of_a_record_in_motion_at_both_ends() {

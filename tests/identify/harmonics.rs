@@ -28,7 +28,7 @@ fn normal(random: &mut Pcg64) -> f64 {
     radius * (std::f64::consts::TAU * uniform(random)).cos()
 }
 
-/// Odd lines up to [`LAST`], the third of each four left out.
+/// Odd lines up to [`LAST`] without the third of each four.
 fn excited_lines() -> Vec<usize> {
     (1..=LAST)
         .step_by(2)
@@ -161,8 +161,8 @@ fn second_and_third_order_products_equal_their_closed_form_at_even_and_odd_lines
         .map(|k| by_products(k, 3, b))
         .sum();
     let expected_even: f64 = (2..=LAST).step_by(2).map(|k| by_products(k, 2, a)).sum();
-    // A line's power is that of a sum of many phases, its sigma its mean, and that of all lines no larger were they one: 1/sqrt(300) =
-    // 5.8 %, of which three.
+    // The power of a line is that of a sum of many random phases: its sigma equals its mean. Over 300 seeds: 1/sqrt(300) =
+    // 5.8 %; the bound is three sigma.
     for (name, found, expected) in [("odd", odd, expected_odd), ("even", even, expected_even)] {
         let ratio = found / f64::from(seeds as u32) / expected;
         assert!((0.827..1.173).contains(&ratio), "{name}: {ratio}");
@@ -181,7 +181,7 @@ fn detects_even_distortion_at_even_lines_and_odd_at_odd_lines() {
             noise_probability(&harmonics.odd),
             noise_probability(&harmonics.even),
         );
-        // Found by far; where it is not, noise explains it: once in a thousand it would not.
+        // Existing distortion is found with a large margin; otherwise noise alone explains the lines, except once in a thousand.
         assert_eq!(by_odd < 1e-9, odd, "{terms:?}: {by_odd}");
         assert_eq!(by_even < 1e-9, even, "{terms:?}: {by_even}");
         assert!(
@@ -210,7 +210,7 @@ fn noise_alone_gives_the_stated_rate_of_false_alarms() {
             .collect();
         level += high.iter().sum::<f64>() / high.len() as f64;
     }
-    // 400 probabilities: 40 below 0.1, of which sigma is 6; three of these. Below 0.001 are 0.4; five and more come once in
+    // 400 probabilities: 40 are below 0.1, with a sigma of 6; the bound is three sigma. 0.4 are below 0.001; five or more occur once in
     // 16,000 times.
     assert!((22..=58).contains(&below[0]) && below[1] < 5, "{below:?}");
     // White noise of variance 1e-4 a sample is 2 x 1e-4/500 a line; 200 seeds x 29 lines x 5 degrees: 0.6 %, three of them. What is

@@ -1,4 +1,4 @@
-//! Identification under control, on a loop written apart from the library: y = P u + v, u = C (r - y).
+//! Identification in closed loop, with a loop that is independent of the library: y = P u + v, u = C (r - y).
 
 use bench::identify::joint::{LoopSignals, estimate};
 use bench::identify::{EstimatorSettings, Signals, local};
@@ -102,7 +102,7 @@ fn noiseless_plant_loop_and_sensitivities_equal_the_model() {
 }
 
 /// Right below the resonance, where |L| is near 1, with noise of the size of the reference in a bin, H1 from command to position
-/// leans from P to -1/C; the instrument does not.
+/// is biased from P towards -1/C; the estimate with the reference as instrument is not.
 #[test]
 fn noise_fed_back_by_the_controller_does_not_bias_the_plant() {
     let (frequency_hz, seeds) = (19.5, 60);
@@ -122,7 +122,7 @@ fn noise_fed_back_by_the_controller_does_not_bias_the_plant() {
         squares += (ratio - 1.0).norm_sqr() / seeds as f64;
         direct_mean += direct.response[at] / plant(direct.frequency_hz[at]) / seeds as f64;
     }
-    // The mean of 60 scatters by the root of the squares' mean over 60: three times that.
+    // Standard error of the mean of 60 values; the bound is three times that.
     let room = 3.0 * (squares / seeds as f64).sqrt();
     assert!(
         (joint_mean - 1.0).norm() < room && room < 0.15,
@@ -130,7 +130,7 @@ fn noise_fed_back_by_the_controller_does_not_bias_the_plant() {
     );
     assert!(
         (direct_mean - 1.0).norm() > 2.0 * room,
-        "the case shows nothing: {direct_mean}"
+        "H1 has no bias here: {direct_mean}"
     );
 }
 

@@ -1,4 +1,4 @@
-//! What the identification room promises, against analytic plants and against scipy.
+//! The estimators of frequency responses, against analytic plants and against scipy.
 
 mod accuracy;
 mod bad_data;

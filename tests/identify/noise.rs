@@ -38,11 +38,8 @@ fn output_of_noise_has_no_coherence() {
         .filter(|k| frf.response[*k].norm() > 4.0 * frf.magnitude_sigma[*k])
         .count() as f64;
     // |H| is Rayleigh's then: beyond 4 sigma once in exp(8) = 3000, and somewhat more with sigma itself known to 15 %.
-    assert!(
-        beyond / count < 0.01,
-        "{beyond} of {count} seem to be a response"
-    );
-    // The share of the output that any fit of 16/3 bins explains by chance: 3/16, and less with more bins.
+    assert!(beyond / count < 0.01, "{beyond} of {count} exceed 4 sigma");
+    // The share of the output that a fit explains by chance: 3/16, and less with more bins.
     let coherence = frf.coherence.iter().sum::<f64>() / count;
     assert!(
         (0.05..0.2).contains(&coherence),
@@ -55,7 +52,7 @@ fn output_of_noise_has_no_coherence() {
     );
 }
 
-/// Whole cycles only, of 20 to 40 Hz, in one second: the bins outside are exactly dead.
+/// Only whole cycles, of 20 to 40 Hz, in one second: the bins outside have exactly no input.
 fn band_of_cosines() -> Signals {
     let mut dice = Dice::new(4);
     let cosines = |k: usize| {

@@ -18,7 +18,7 @@ fn once() -> Signals {
     }
 }
 
-/// The same over and over, with white noise on either side.
+/// The chirp repeated, with white noise on input and output.
 fn repetitions(seed: u64, noise_a: f64, noise_m: f64) -> Signals {
     let (once, mut dice) = (once(), Dice::new(seed));
     let mut noisy = |samples: &[f64], noise: f64| -> Vec<f64> {
@@ -76,7 +76,7 @@ fn confidence_intervals_of_the_mean_of_repetitions_contain_the_truth() {
 
 #[test]
 fn confidence_intervals_include_noise_of_the_measured_input() {
-    // Its own power is a ten thousandth of the chirp's: no bias to speak of.
+    // The power of the noise is a ten thousandth of that of the chirp: the bias is negligible.
     let held = held(40, 2e-3, 1e-9);
     println!("{held:?}");
     assert!(
@@ -126,7 +126,7 @@ fn mean_is_over_whole_repetitions() {
         input_a: samples.clone(),
         output_m: samples,
     };
-    // 0 to 3, 4 to 7; 8 to 10 is no whole one.
+    // Samples 0 to 3 and 4 to 7; 8 to 10 are not a whole repetition.
     assert_eq!(repeated::mean(&signals, 4, 3).input_a, [2.0, 3.0, 4.0, 5.0]);
     assert_eq!(
         repeated::mean(&signals, 4, 1).output_m,
@@ -135,7 +135,7 @@ fn mean_is_over_whole_repetitions() {
     assert_eq!(
         repeated::mean(&signals, 20, 1).len(),
         11,
-        "what is not whole is left as it is"
+        "a record without a whole repetition is unchanged"
     );
     assert_eq!(repeated::mean(&signals, 0, 1).len(), 11);
 }

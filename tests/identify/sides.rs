@@ -1,4 +1,4 @@
-//! H1, H2 and Hv: noise on the output, on the input, on both.
+//! H1, H2 and Hv with noise on the output, on the input and on both.
 
 use bench::identify::{
     Estimator, EstimatorSettings, Frf, IdentifyError, LocalModel, Signals, local, welch,
@@ -16,7 +16,7 @@ const ALL: [Estimator; 3] = [Estimator::H1, Estimator::H2, Estimator::Hv];
 
 type Estimate = dyn Fn(&Signals, Estimator) -> Result<Frf, IdentifyError>;
 
-/// White input through a gain: no leakage, no curvature. Noise of so much of the signal's power on either side.
+/// White input through a gain: no leakage, no curvature. Noise on input and output with a given ratio of the signal's power.
 fn signals(seed: u64, on_input: f64, on_output: f64) -> Signals {
     let mut dice = Dice::new(seed);
     let truth: Vec<f64> = (0..10_000).map(|_| dice.normal()).collect();

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use crate::python;
 use crate::stage::{self, Dice, SampledPlant};
 
-/// White input through the stage, with probe noise: every bin of every spectrum has something in it.
+/// White input through the stage, with probe noise: every bin of every spectrum has energy.
 fn noisy_run(samples: usize, noise_m: f64) -> Signals {
     let mut dice = Dice::new(11);
     let input_a: Vec<f64> = (0..samples).map(|_| 0.3 * dice.normal() + 0.05).collect();
@@ -61,7 +61,7 @@ fn simulated_stage_equals_the_discretisation_by_scipy() {
         return;
     };
     for (row, (omega, residue, damping)) in modes.iter().zip(stage::MODES) {
-        // The residue of the first mode is a difference of terms 1e5 times as great: 1e-16 / 1e-5, and some.
+        // The residue of the first mode is a difference of terms 1e5 times larger: some 1e-16 / 1e-5.
         assert!(
             (row[0] / omega - 1.0).abs() < 1e-9
                 && (row[1] - residue).abs() < 1e-10
@@ -83,7 +83,7 @@ fn simulated_stage_equals_the_discretisation_by_scipy() {
     }
 }
 
-/// A flat plant, so that segments leak nothing: what is left is noise, which sigma must describe.
+/// A flat plant, so that segments have no leakage: the error is noise, which sigma must describe.
 #[test]
 fn error_of_welch_is_within_two_sigma_in_95_percent_of_the_bins() {
     let mut dice = Dice::new(5);

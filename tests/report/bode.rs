@@ -34,7 +34,7 @@ fn assert_shows(svg: &str, expected: &[&str]) {
     }
 }
 
-/// No text is cut off by the page or overlaps another, no curve leaves the page, all coordinates are finite.
+/// Checks that no text is cut off or overlaps another text, that no curve leaves the page, and that all coordinates are finite.
 fn assert_tidy(svg: &str) {
     let (width, height) = svg::page_size(svg);
     let words = svg::words(svg);

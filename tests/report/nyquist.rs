@@ -31,7 +31,7 @@ fn draws_overlapping_confidence_circles_once() {
         ..flat()
     };
     assert_eq!(circles(&still), 1, "more would hide the curve");
-    // A hundred around the origin, of which every second may have one: 0.126 of their magnitude apart. Radii are 2.45 sigma: 0.049.
+    // A hundred points around the origin, of which every second can have a circle: they are 0.126 apart, with radii of 2.45 sigma = 0.049.
     let response = (0..100)
         .map(|k| Complex::from_polar(1.5e-4, TAU * f64::from(k) / 100.0))
         .collect();

@@ -19,7 +19,7 @@ fn unwraps_a_rising_phase() {
 
 #[test]
 fn noise_in_a_deep_notch_adds_no_turn() {
-    // Followed point by point, 120, -120 and 0 would go round once.
+    // Unwrapped point by point, 120, -120 and 0 would add one turn.
     let wrapped = [-10.0, -10.0, 120.0, -120.0, -15.0, -15.0];
     let trusted = [true, true, false, false, true, true];
     assert_eq!(unwrapped_deg(&wrapped, &trusted)[4..], [-15.0, -15.0]);
@@ -42,7 +42,7 @@ fn moves_a_curve_to_the_turn_of_another() {
         offset_deg(&[(10.0, 160.0), (15.0, 100.0), (20.0, 20.0)], &reference),
         -360.0
     );
-    // One stray point does not decide, and where nothing overlaps nothing moves.
+    // A single outlier does not decide. Without common frequencies the curve is not moved.
     assert_eq!(
         offset_deg(&[(10.0, 520.0), (11.0, -190.0), (12.0, -200.0)], &reference),
         0.0

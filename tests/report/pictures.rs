@@ -21,7 +21,7 @@ pub fn frequencies(from_hz: f64, to_hz: f64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The whole run on the stage, with its noise.
+/// A full run on the simulated stage, with noise.
 pub fn measured() -> Frf {
     let signals = stage::with_noise(&stage::clean_run(), 1);
     local::estimate(&signals, (0.5, 450.0), &EstimatorSettings::default()).unwrap()

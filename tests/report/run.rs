@@ -1,4 +1,4 @@
-//! Plots and page of a run, made by the program.
+//! Plots and page of a run, written by the program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -246,7 +246,7 @@ fn page_starts_with_verdict_and_reason_and_contains_all_sections() {
     assert_eq!(
         page.matches("<tr><td").count(),
         modes + zeros,
-        "a row a mode and a zero"
+        "one row for each mode and zero"
     );
     for text in ["virtual", "CNMP", "±", "prefers-color-scheme:dark"] {
         at(text);

@@ -61,7 +61,7 @@ impl TextBlock {
     }
 }
 
-/// Lines of at most `most` characters, broken between words, or within a word that is longer than a line.
+/// Lines of at most `most` characters, broken between words; a word that is longer than a line is broken as well.
 fn wrapped(text: &str, most: usize) -> Vec<String> {
     text.lines()
         .flat_map(|line| wrapped_line(line, most))

@@ -13,7 +13,7 @@ use crate::report::{
     nyquist_svg, pole_zero_svg, stability_svg,
 };
 
-/// The part of a Nyquist plot around two close modes extends by so many of their distances to either side.
+/// The part of a Nyquist plot around two close modes extends by this multiple of their distance to either side.
 const AROUND: f64 = 1.5;
 
 const BODE_CAPTION: &str = "Magnitude, phase and coherence: measured with a band of two sigma, the model of the configuration \
