@@ -62,15 +62,18 @@ fn map(evaluation: &Evaluation<'_>, heading: &str, offset: f64) -> Result<Chart,
     for (cnmp, colour, symbol) in VERDICTS {
         chart = chart.points(cnmp.name(), colour, symbol, dots(evaluation, cnmp));
     }
-    Ok(match &evaluation.recommendation {
-        Some(best) => {
-            let x = 100.0 * best.asymmetry;
-            let (low, high) = ends(&evaluation.grid.operating_points);
-            let line = vec![(x, 100.0 * low), (x, 100.0 * high)];
-            chart.line("recommended", Pen::dashed(GREEN), line)
-        }
-        None => chart,
-    })
+    Ok(with_recommendation(chart, evaluation))
+}
+
+/// The recommended asymmetry, if there is one.
+fn with_recommendation(chart: Chart, evaluation: &Evaluation<'_>) -> Chart {
+    let Some(best) = &evaluation.recommendation else {
+        return chart;
+    };
+    let x = 100.0 * best.asymmetry;
+    let (low, high) = ends(&evaluation.grid.operating_points);
+    let line = vec![(x, 100.0 * low), (x, 100.0 * high)];
+    chart.line("recommended", Pen::dashed(GREEN), line)
 }
 
 /// The points with a verdict, in per cent.

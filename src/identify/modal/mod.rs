@@ -108,7 +108,12 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
         return Err(too_few(data));
     }
     let problem = Problem { data, ..problem };
-    let start = pruned(problem, start);
+    with_covariance(problem, pruned(problem, start))
+}
+
+/// The fit of given modes with its covariance; the residual counts as noise.
+fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
+    let data = problem.data;
     let parameters = start.free().len();
     let by_estimator = Solution::new(problem, start.clone());
     let noisy = &with_residual_noise(&by_estimator, data, parameters);
