@@ -32,7 +32,7 @@ const TICKS_PER_REPORT: usize = 1 << 15;
 /// The analysis of a recorded excitation.
 #[derive(Clone, Debug)]
 pub struct Analysis {
-    /// The frequency response from the set-point of the amplifier (A) to the probe (m). It includes hold, amplifier, plant,
+    /// The frequency response from the commanded current (A) to the measured position (m). It includes hold, amplifier, plant,
     /// delays, and the mean age of the readings; differences of their ages are corrected.
     pub frf: Frf,
     /// The response of the model at the same frequencies, for readings of the mean age.
