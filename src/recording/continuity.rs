@@ -1,56 +1,54 @@
-//! Which ticks are missing between those that are there, and why. Writer and reader count by the same rule.
+//! The missing ticks between the recorded ones. Writer and reader count them by the same rule.
 
 use crate::rt::record::{Event, EventKind, TickRecord};
 
-/// Ticks missing between two neighbouring records.
+/// Missing ticks between two successive records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
     /// The last tick before the gap.
     pub after_tick: u64,
-    /// The first tick behind it.
+    /// The first tick after the gap.
     pub before_tick: u64,
-    /// Ticks the loop says it missed: overruns.
+    /// Ticks that the loop missed, as it reported: overruns.
     pub missed: u64,
-    /// Ticks nobody answers for: records lost.
+    /// The other ticks: their records were lost.
     pub lost: u64,
 }
 
-/// A tick number that is not above the one before it.
+/// A tick number that is not larger than the previous one, which is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NotAbove(pub u64);
 
-/// A running account of ticks, overruns and losses.
+/// Counts of ticks, overruns and losses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Continuity {
     first_and_last: Option<(u64, u64)>,
     ticks: u64,
     overruns: u64,
     lost_in_gaps: u64,
-    lost_announced: u64,
+    lost_reported: u64,
 }
 
 impl Continuity {
-    /// Takes in the next tick; returns the gap before it, if there is one.
+    /// Counts the next tick; returns the gap before it, if there is one.
     pub(super) fn tick(&mut self, record: &TickRecord) -> Result<Option<Gap>, NotAbove> {
         let gap = match self.first_and_last {
             Some((_, last)) if record.tick <= last => return Err(NotAbove(last)),
             Some((_, last)) => gap(last, record),
             None => None,
         };
-        self.first_and_last = Some((
-            self.first_and_last.map_or(record.tick, |(first, _)| first),
-            record.tick,
-        ));
+        let first = self.first_tick().unwrap_or(record.tick);
+        self.first_and_last = Some((first, record.tick));
         self.ticks += 1;
         self.overruns += u64::from(record.missed_ticks);
         self.lost_in_gaps += gap.map_or(0, |g| g.lost);
         Ok(gap)
     }
 
-    /// Takes in an event: the loop announces what it could not hand over.
+    /// Counts the records that the loop reports as lost.
     pub(super) fn event(&mut self, event: &Event) {
         if let EventKind::Lost { records } = event.kind {
-            self.lost_announced = self.lost_announced.saturating_add(records);
+            self.lost_reported = self.lost_reported.saturating_add(records);
         }
     }
 
@@ -66,15 +64,15 @@ impl Continuity {
         self.first_and_last.map(|(_, last)| last)
     }
 
-    /// Scheduled ticks that passed unserved, as the loop counts them.
+    /// Scheduled ticks that were not served, as the loop counts them.
     pub(super) fn overruns(&self) -> u64 {
         self.overruns
     }
 
-    /// Records lost. The same loss shows as a gap and is announced by the loop, so the larger count stands: gaps alone
-    /// do not see lost events or a lost end, announcements alone could be lost themselves.
+    /// Lost records. A loss causes a gap and is reported by the loop, so the larger count is used: lost events and records lost
+    /// at the end cause no gap, and a report may itself be lost.
     pub(super) fn lost_records(&self) -> u64 {
-        self.lost_in_gaps.max(self.lost_announced)
+        self.lost_in_gaps.max(self.lost_reported)
     }
 }
 

@@ -1,14 +1,14 @@
-//! One number that says whether two runs were the same bit for bit.
+//! A digest that is equal for two runs that are equal bit for bit.
 
 /// A running 64-bit hash of messages: for each 8 bytes `w`, `h = (rotate_left(h, 5) ^ w) * K` modulo 2^64.
 ///
-/// Each step is one-to-one in `h` and in `w`, so two sequences that differ in a single word never share a digest. It is
-/// no protection against forgery. The definition is fixed: digests of different versions and machines compare.
+/// Each step is one-to-one in `h` and in `w`, so two sequences that differ in a single word never have the same digest. It does
+/// not protect against forgery. The definition is fixed: digests of different versions and machines can be compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Digest(u64);
 
 impl Digest {
-    /// Takes in one message: its channel and length, then its bytes, the last word filled up with zeros.
+    /// Adds a message: its channel and length, then its bytes, with the last word padded with zeros.
     pub(super) fn add(&mut self, channel: u8, message: &[u8]) {
         self.word(u64::from(channel) << 56 ^ message.len() as u64);
         let (words, rest) = message.as_chunks::<8>();
@@ -24,7 +24,7 @@ impl Digest {
     }
 
     fn word(&mut self, word: u64) {
-        // K is odd: multiplication by it can be undone, nothing is forgotten.
+        // K is odd, so the multiplication is invertible.
         self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(0x517c_c1b7_2722_0a95);
     }
 }

@@ -1,4 +1,5 @@
-//! Conversion of the events of the loop to messages of `/event` and back, without loss.
+//! Conversion of the events of the loop to messages of `/event` and back, without loss. The digest of a run includes the texts:
+//! they must not change between versions.
 
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
@@ -6,15 +7,17 @@ use crate::rt::record::{Event, EventKind, RequestKind};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
-        let mut message = match event.kind {
+        let message = match event.kind {
             EventKind::Request(kind) => of_request(kind),
             EventKind::State { from, to } => of_state(from, to),
             EventKind::Trip(trip) => of_trip(trip),
             EventKind::Completed => message("completed", "the program came to its end".into()),
             EventKind::Lost { records } => of_lost(records),
         };
-        message.tick = event.tick;
-        message
+        Message {
+            tick: event.tick,
+            ..message
+        }
     }
 }
 
@@ -36,11 +39,11 @@ fn of_request(kind: RequestKind) -> Message {
 }
 
 fn of_state(from: State, to: State) -> Message {
-    let text = format!("{} -> {}", from.name(), to.name());
+    let (from, to) = (from.name(), to.name());
     Message {
-        from: from.name().into(),
-        to: to.name().into(),
-        ..message("state", text)
+        from: from.into(),
+        to: to.into(),
+        ..message("state", format!("{from} -> {to}"))
     }
 }
 
@@ -110,43 +113,39 @@ fn state(field: &'static str, name: &str) -> Result<State, UnknownValue> {
     found.ok_or_else(|| unknown(field, name))
 }
 
+/// Trips with a value and a limit; [`Trip::reason`] identifies them.
+const TRIPS: [fn(f64, f64) -> Trip; 9] = [
+    |position_m, limit_m| Trip::Travel {
+        position_m,
+        limit_m,
+    },
+    |command_a, limit_a| Trip::PeakCurrent { command_a, limit_a },
+    |thermal_a, limit_a| Trip::ContinuousCurrent { thermal_a, limit_a },
+    |_, _| Trip::CommandNotFinite,
+    |_, _| Trip::ProbeInvalid,
+    |age_s, limit_s| Trip::ProbeStale { age_s, limit_s },
+    |unchanged_s, limit_s| Trip::ProbeStuck {
+        unchanged_s,
+        limit_s,
+    },
+    |actual_a, command_a| Trip::CurrentNotFollowed {
+        actual_a,
+        command_a,
+    },
+    // Exact: every u32 is a double.
+    |count, limit| Trip::Overruns {
+        count: count as u32,
+        limit: limit as u32,
+    },
+];
+
 fn trip(message: &Message) -> Result<Trip, UnknownValue> {
-    let &Message {
-        value, limit, code, ..
-    } = message;
-    Ok(match message.reason.as_str() {
-        "travel" => Trip::Travel {
-            position_m: value,
-            limit_m: limit,
-        },
-        "peak_current" => Trip::PeakCurrent {
-            command_a: value,
-            limit_a: limit,
-        },
-        "continuous_current" => Trip::ContinuousCurrent {
-            thermal_a: value,
-            limit_a: limit,
-        },
-        "command_not_finite" => Trip::CommandNotFinite,
-        "probe_invalid" => Trip::ProbeInvalid,
-        "probe_stale" => Trip::ProbeStale {
-            age_s: value,
-            limit_s: limit,
-        },
-        "probe_stuck" => Trip::ProbeStuck {
-            unchanged_s: value,
-            limit_s: limit,
-        },
-        "current_not_followed" => Trip::CurrentNotFollowed {
-            actual_a: value,
-            command_a: limit,
-        },
-        // Counts were u32 and come back whole: every u32 is a double.
-        "overruns" => Trip::Overruns {
-            count: value as u32,
-            limit: limit as u32,
-        },
-        "amplifier" => Trip::Amplifier { code, words: None },
-        other => return Err(unknown("reason", other)),
-    })
+    let amplifier = Trip::Amplifier {
+        code: message.code,
+        words: None,
+    };
+    let trips = TRIPS.iter().map(|trip| trip(message.value, message.limit));
+    let mut trips = trips.chain([amplifier]);
+    let trip = trips.find(|trip| trip.reason() == message.reason);
+    trip.ok_or_else(|| unknown("reason", &message.reason))
 }

@@ -1,32 +1,32 @@
-//! Recordings: everything a run did, in one MCAP file that any viewer opens.
+//! Recordings: everything that happened in a run, in one MCAP file that any viewer opens.
 //!
 //! ```text
-//!  rt loop --Published--> ring --> thread --> writer --> FILE.mcap --> reader --> identify, replay, report
-//!                        (wait-free)          |                        |
-//!                                             +-- messages, schema ----+
-//!                                             +-- continuity, digest --+
+//!  rt loop --LoopMessage--> ring --> thread --> writer --> FILE.mcap --> reader --> identify, replay, report
+//!                          (wait-free)          |                        |
+//!                                               +-- messages, schema ----+
+//!                                               +-- continuity, digest --+
 //! ```
 //!
-//! | module | does |
+//! | module | contents |
 //! |---|---|
 //! | [`messages`], [`schema`] | the protobuf messages of the channels `/loop`, `/event`, `/timing` and their description |
-//! | `writer` | [`Recorder`]: makes the file, writes ticks and events, sums up each second, finishes with results |
-//! | `thread` | [`spawn`]: the recorder on a thread of its own, which a full disk does not stop |
-//! | `walk` | goes through a file and hands out only what its checks vouch for |
-//! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, accounts for gaps, streams [`Ticks`] |
-//! | `recover` | [`recover()`]: what can be trusted of a cut or damaged file, as a complete one |
+//! | `writer` | [`Recorder`]: creates the file, writes ticks and events, summarises each second, adds the results |
+//! | `thread` | [`spawn`]: the recorder on its own thread, which a full disk does not stop |
+//! | `walk` | reads a file record by record and returns only checked data |
+//! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, counts gaps, streams [`Ticks`] |
+//! | `recover` | [`recover()`]: copies the readable part of a cut-off or damaged file to a complete one |
 //!
-//! # What a reader may rely on
+//! # Guarantees for a reader
 //!
 //! * A recording is never overwritten.
-//! * Every tick between the first and the last is there, or its absence is counted: as an overrun if the loop says so,
-//!   else as lost.
-//! * A double comes back with every bit, -0.0 and NaN included.
-//! * Nothing that was altered on the way is handed out: a chunk's CRC is checked before its first message, an
-//!   attachment's before its use, and messages of a channel are numbered, so a chunk that vanished is noticed. In a
-//!   complete file the CRC over the whole data section stands above all that. A file that ends early is read up to the
-//!   cut and says that it is cut; only its metadata record then has no CRC.
-//! * Time in a recording is scheduled time since the loop began: two runs in virtual pace have the same bytes in all
+//! * Every tick between the first and the last is in the file, or its absence is counted: as an overrun if the loop reported
+//!   it, otherwise as lost.
+//! * Every double is read back bit for bit, including -0.0 and NaN.
+//! * Changed data are never returned. The CRC of a chunk is checked before its first message, the CRC of an attachment before
+//!   its use. The messages of a channel are numbered, so a missing chunk is detected. In a complete file a CRC covers the
+//!   whole data section as well. A file that ends early is read up to its end and reported as cut off; only its metadata
+//!   record then has no CRC.
+//! * Times in a recording are scheduled times since the loop began: two runs at virtual pace have the same bytes in all
 //!   three channels.
 
 mod continuity;

@@ -1,4 +1,4 @@
-//! Opens recordings, complete or cut off, and says what they hold.
+//! Opens recordings, complete or cut off.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -26,19 +26,19 @@ pub struct StoredAttachment {
     pub data: Vec<u8>,
 }
 
-/// Where a recording that is not complete stops being readable.
+/// The end of the readable part of a recording that is not complete.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Cut {
-    /// Number of bytes that could be read.
+    /// The file is readable up to this byte.
     pub at_byte: u64,
     /// Size of the file.
     pub of_bytes: u64,
-    /// The reason.
+    /// What is wrong there.
     pub why: String,
 }
 
-/// A recording that was gone through once from end to end: every check has passed, everything but the ticks is in
-/// memory, the ticks can be streamed as often as wanted.
+/// A recording that was read once from begin to end. All checks have passed, everything except the ticks is in memory, and the
+/// ticks can be streamed any number of times.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -46,7 +46,7 @@ pub struct Recording {
     found: Found,
 }
 
-/// What going through the file has shown.
+/// The contents of the file, without the ticks.
 #[derive(Debug, Default)]
 struct Found {
     metadata: BTreeMap<String, String>,
@@ -59,13 +59,12 @@ struct Found {
 }
 
 impl Recording {
-    /// Opens a recording. A file that ends early is read up to there, see [`Recording::truncated`]; one that was altered
-    /// is refused.
+    /// Opens a recording. A file that ends early is read up to its end, see [`Recording::truncated`]; a damaged file is refused.
     pub fn open(path: &Path) -> Result<Recording, RecordingError> {
         Recording::read(path, false)
     }
 
-    /// As [`Recording::open`], but what stands before the first damage is handed out as of a recording cut off there.
+    /// As [`Recording::open`], but a damaged file is treated as cut off at the first damage.
     pub fn salvage(path: &Path) -> Result<Recording, RecordingError> {
         Recording::read(path, true)
     }
@@ -83,7 +82,7 @@ impl Recording {
         let cut = stop
             .map(|stop| judge(path, stop, walk.offset, &found, salvage))
             .transpose()?;
-        refuse_without_ticks(path, &walk.contents, &found, cut.is_some())?;
+        require_ticks(path, &walk.contents, &found, cut.is_some())?;
         Ok(Recording {
             path: path.into(),
             cut,
@@ -96,28 +95,28 @@ impl Recording {
         &self.path
     }
 
-    /// Whether the file ends before its recording was finished.
+    /// Whether the recording was not finished.
     pub fn truncated(&self) -> bool {
         self.cut.is_some()
     }
 
-    /// Where and why the file stops being readable, of a truncated one.
+    /// The end of the readable part, if the recording was not finished.
     pub fn cut(&self) -> Option<&Cut> {
         self.cut.as_ref()
     }
 
-    /// The effective configuration of the run, as it was attached at its start.
+    /// The effective configuration of the run.
     pub fn config_toml(&self) -> Option<&str> {
         self.attachment(CONFIG_ATTACHMENT)
             .and_then(|a| std::str::from_utf8(&a.data).ok())
     }
 
-    /// Program version, host, scheduling, `period_ns` and what else the run said of itself.
+    /// Version of the program, host, scheduling, `period_ns` and other properties of the run.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.found.metadata
     }
 
-    /// Period of the loop, if the recording says so.
+    /// Period of the loop, if it is recorded.
     pub fn period_ns(&self) -> Option<u64> {
         self.found.metadata.get("period_ns")?.parse().ok()
     }
@@ -142,7 +141,7 @@ impl Recording {
         &self.found.timings
     }
 
-    /// How many ticks there are.
+    /// Number of recorded ticks.
     pub fn tick_count(&self) -> u64 {
         self.found.account.ticks()
     }
@@ -162,12 +161,12 @@ impl Recording {
         &self.found.gaps
     }
 
-    /// Scheduled ticks that passed unserved.
+    /// Scheduled ticks that were not served.
     pub fn overruns(&self) -> u64 {
         self.found.account.overruns()
     }
 
-    /// Records lost on the way from the loop into the file (not those behind a cut).
+    /// Records that were lost between loop and file, without those after a cut.
     pub fn lost_records(&self) -> u64 {
         self.found.account.lost_records()
     }
@@ -177,7 +176,7 @@ impl Recording {
         self.found.digest.value()
     }
 
-    /// Streams the ticks; no more than a chunk of them is in memory.
+    /// Streams the ticks, with one chunk at a time in memory.
     pub fn ticks(&self) -> Result<Ticks, RecordingError> {
         Ok(Ticks::of(self.published()?))
     }
@@ -235,15 +234,23 @@ impl Found {
 
 fn open(path: &Path) -> Result<File, RecordingError> {
     File::open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => RecordingError::Missing { path: path.into() },
-        _ => RecordingError::Read {
-            path: path.into(),
-            source,
-        },
+        io::ErrorKind::NotFound => refused(path, MISSING),
+        _ => RecordingError::read(path, source),
     })
 }
 
-/// Whether a walk that stopped early still leaves a recording to work with.
+const MISSING: &str = "no such file; check the name; recordings are in the folder recordings/ unless --out named another";
+
+const NOT_MCAP: &str = "not an MCAP file; give a recording made by bench (*.mcap)";
+
+fn refused(path: &Path, why: impl Into<String>) -> RecordingError {
+    RecordingError::Refused {
+        path: path.into(),
+        why: why.into(),
+    }
+}
+
+/// The cut at which a walk ended early, or why the file cannot be used.
 fn judge(
     path: &Path,
     stop: Stop,
@@ -251,31 +258,29 @@ fn judge(
     found: &Found,
     salvage: bool,
 ) -> Result<Cut, RecordingError> {
-    let path = path.to_path_buf();
-    let of_bytes = path.metadata().map_or(at_byte, |m| m.len());
-    match stop {
-        Stop::Cut => Ok(Cut {
-            at_byte,
-            of_bytes,
-            why: "the file ends there".into(),
-        }),
-        Stop::Damaged(why) if salvage => Ok(Cut {
-            at_byte,
-            of_bytes,
-            why,
-        }),
-        Stop::Damaged(what) => Err(RecordingError::Damaged {
-            path,
-            at_byte,
-            ticks: found.account.ticks(),
-            what,
-        }),
-        Stop::NotMcap => Err(RecordingError::NotMcap { path }),
-        Stop::Read(source) => Err(RecordingError::Read { path, source }),
-    }
+    let why = match stop {
+        Stop::Cut => "the file ends there".into(),
+        Stop::Damaged(why) if salvage => why,
+        Stop::Damaged(what) => {
+            return Err(RecordingError::Damaged {
+                path: path.into(),
+                at_byte,
+                ticks: found.account.ticks(),
+                what,
+            });
+        }
+        Stop::NotMcap => return Err(refused(path, NOT_MCAP)),
+        Stop::Read(source) => return Err(RecordingError::read(path, source)),
+    };
+    Ok(Cut {
+        at_byte,
+        of_bytes: path.metadata().map_or(at_byte, |m| m.len()),
+        why,
+    })
 }
 
-fn refuse_without_ticks(
+/// Refuses a file of another program, and a recording without ticks.
+fn require_ticks(
     path: &Path,
     contents: &Contents,
     found: &Found,
@@ -284,24 +289,25 @@ fn refuse_without_ticks(
     if found.account.ticks() > 0 {
         return Ok(());
     }
-    let path = path.to_path_buf();
-    if contents.has_loop() || (cut && contents.channels.is_empty()) {
-        let state = if cut {
-            "it was cut off before its first half second was written"
-        } else {
-            "it is complete"
-        };
-        return Err(RecordingError::Empty { path, state });
+    if !contents.has_loop() && !(cut && contents.channels.is_empty()) {
+        return Err(refused(path, of_another_program(contents)));
     }
-    let names: Vec<_> = contents
-        .channels
-        .values()
+    let state = match cut {
+        true => "it was cut off before its first half second was written",
+        false => "it is complete",
+    };
+    let why = format!("the recording holds no ticks ({state}): the loop did not run; record again");
+    Err(refused(path, why))
+}
+
+fn of_another_program(contents: &Contents) -> String {
+    let channels = contents.channels.values();
+    let names: Vec<_> = channels
         .map(|(topic, schema)| format!("{topic} of {schema}"))
         .collect();
-    let found = if names.is_empty() {
-        "it has no channels".into()
-    } else {
-        format!("it has {}", names.join(", "))
+    let found = match names.is_empty() {
+        true => "it has no channels".into(),
+        false => format!("it has {}", names.join(", ")),
     };
-    Err(RecordingError::Foreign { path, found })
+    format!("an MCAP file without bench's channel /loop ({found}); give a recording made by bench")
 }

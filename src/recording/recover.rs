@@ -1,22 +1,22 @@
-//! Makes a complete recording of what can be trusted in a cut or damaged one.
+//! Copies the readable part of a cut-off or damaged recording to a complete one.
 
 use std::path::Path;
 
 use super::reader::{Cut, Recording};
 use super::{CONFIG_ATTACHMENT, Header, Recorder, RecordingError, Totals};
 
-/// What was saved, and what not.
+/// The result of a recovery.
 #[derive(Debug)]
 pub struct Recovered {
-    /// What the new recording holds.
+    /// Counts of the new recording.
     pub totals: Totals,
-    /// Where the old one could no longer be read; `None` if it was complete.
+    /// The end of the readable part of the old recording; `None` if it was complete.
     pub cut: Option<Cut>,
 }
 
-/// Writes everything of `from` that stands before its cut or its first damage into the new file `to`: the same
-/// messages, byte for byte, the configuration, the metadata (with an entry `recovered` that tells of the cut) and the
-/// attachments. `from` is not touched.
+/// Copies everything in `from` before its cut or its first damage to the new file `to`: the messages, byte for byte, the
+/// configuration, the metadata (with an additional entry `recovered` that describes the cut) and the attachments. `from` is
+/// not changed.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
     let old = Recording::salvage(from)?;
     let mut new = Recorder::create(to, &header(&old))?;

@@ -9,13 +9,13 @@ use super::walk::{Part, Stop, Walk};
 use super::{RecordingError, Topic};
 use crate::rt::record::{Event, LoopMessage, TickRecord};
 
-/// Ticks and events of a recording, read as they are asked for.
+/// Ticks and events of a recording, read on demand.
 pub(super) struct Stream {
     path: PathBuf,
     walk: Walk,
     chunk: Vec<LoopMessage>,
     next: usize,
-    /// How many there are still to come, by the first reading.
+    /// Number of entries still to be returned, as counted when the file was opened.
     left: u64,
 }
 
@@ -47,7 +47,7 @@ impl Stream {
         }
     }
 
-    /// Fills `chunk` anew. An error behind some good records is met again after them, if they are not the last wanted.
+    /// Reads the next chunk. An error after some good records occurs again at the next call, if more records are needed.
     fn read_chunk(&mut self) -> Result<(), RecordingError> {
         self.chunk.clear();
         self.next = 0;
@@ -62,21 +62,17 @@ impl Stream {
         match stepped {
             Ok(true) => Ok(()),
             _ if !self.chunk.is_empty() => Ok(()),
-            Err(Stop::Read(source)) => Err(RecordingError::Read {
-                path: self.path.clone(),
-                source,
-            }),
+            Err(Stop::Read(source)) => Err(RecordingError::read(&self.path, source)),
             _ => Err(self.changed()),
         }
     }
 
     fn changed(&self) -> RecordingError {
-        let what = "the file was changed since it was opened".into();
         RecordingError::Damaged {
             path: self.path.clone(),
             at_byte: self.walk.offset,
             ticks: 0,
-            what,
+            what: "the file was changed since it was opened".into(),
         }
     }
 }
@@ -104,7 +100,7 @@ impl Iterator for Ticks {
     }
 }
 
-/// The loop's own record of a message on `/loop` or `/event`.
+/// The record of the loop in a message on `/loop` or `/event`.
 pub(super) fn published(topic: Topic, data: &[u8]) -> Result<LoopMessage, String> {
     if topic == Topic::Loop {
         let message: messages::Loop = decode(data)?;
@@ -118,7 +114,7 @@ pub(super) fn published(topic: Topic, data: &[u8]) -> Result<LoopMessage, String
         .map_err(|e| e.to_string())
 }
 
-/// A message of its bytes.
+/// Decodes a message.
 pub(super) fn decode<M: Message + Default>(data: &[u8]) -> Result<M, String> {
     M::decode(data).map_err(|e| e.to_string())
 }

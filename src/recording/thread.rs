@@ -1,4 +1,4 @@
-//! The recorder's own thread, between the loop's ring and the disk.
+//! The thread of the recorder, between the ring of the loop and the disk.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -10,14 +10,14 @@ use rtrb::Consumer;
 use super::{Recorder, RecordingError};
 use crate::rt::record::LoopMessage;
 
-/// How long the thread rests when the ring is empty: a few ticks at 5 kHz, so the ring hardly fills, and an idle recorder
-/// costs next to nothing.
+/// Pause of the thread when the ring is empty: 5 ticks at 5 kHz, so the ring stays nearly empty and an idle recorder needs
+/// almost no processor time.
 const REST: Duration = Duration::from_millis(1);
 
-/// The thread's nice value.
+/// Nice value of the thread.
 const NICE: libc::c_int = 15;
 
-/// What a supervisor may look at while the recorder runs.
+/// The state of a running recorder, for a supervisor.
 #[derive(Debug, Default)]
 pub struct Health {
     written: AtomicU64,
@@ -26,24 +26,24 @@ pub struct Health {
 }
 
 impl Health {
-    /// Records (ticks and events) taken from the ring and written; the last half second of them may still be in the
-    /// open chunk, which a failure takes with it.
+    /// Records (ticks and events) that were taken from the ring and written. The last half second of them may still be in the
+    /// open chunk, which is lost in a failure.
     pub fn written(&self) -> u64 {
         self.written.load(Ordering::Relaxed)
     }
 
-    /// Records taken from the ring after writing had failed: they are in no file.
+    /// Records that were taken from the ring after writing had failed. They are in no file.
     pub fn thrown_away(&self) -> u64 {
         self.thrown_away.load(Ordering::Relaxed)
     }
 
-    /// Writing has failed; the run should be stopped. [`RecorderHandle::join`] says why.
+    /// Whether writing has failed: the run should be stopped. [`RecorderHandle::join`] returns the reason.
     pub fn failed(&self) -> bool {
         self.failed.load(Ordering::Acquire)
     }
 }
 
-/// The running thread.
+/// A running recorder.
 #[derive(Debug)]
 pub struct RecorderHandle {
     thread: JoinHandle<Result<Recorder, RecordingError>>,
@@ -51,36 +51,36 @@ pub struct RecorderHandle {
 }
 
 impl RecorderHandle {
-    /// Counters to look at from any thread, also after [`RecorderHandle::join`].
+    /// The state, for any thread, also after [`RecorderHandle::join`].
     pub fn health(&self) -> Arc<Health> {
         Arc::clone(&self.health)
     }
 
-    /// Waits until the loop has dropped its end of the ring and everything in it is written. The recorder is given back
-    /// to be finished with the results; if writing failed, the error instead.
+    /// Waits until the loop has dropped its end of the ring and everything in it is written. Returns the recorder, to which the
+    /// results can be added; fails if writing failed.
     pub fn join(self) -> Result<Recorder, RecordingError> {
         self.thread.join().unwrap_or_else(|_| {
             Err(RecordingError::Thread {
-                what: "died of a panic".into(),
+                what: "panicked".into(),
             })
         })
     }
 }
 
-/// Starts the thread. It inherits scheduling policy and processor from its maker: call this from an ordinary thread,
-/// before any of it is made real-time. It ends when the producer is dropped and the ring is empty.
+/// Starts the thread. It inherits scheduling policy and processor from the calling thread, which therefore must not be a
+/// real-time thread. It ends when the producer is dropped and the ring is empty.
 ///
-/// If writing fails (a full disk), the thread keeps emptying the ring, so that the loop never notices, counts what it
-/// throws away and says so in [`Health`] at once.
+/// If writing fails (for example because the disk is full), the thread continues to empty the ring, so that the loop is not
+/// affected. It counts the lost records and reports the failure in [`Health`] at once.
 pub fn spawn(
     recorder: Recorder,
     ring: Consumer<LoopMessage>,
 ) -> Result<RecorderHandle, RecordingError> {
     let health = Arc::new(Health::default());
-    let seen = Arc::clone(&health);
+    let shared = Arc::clone(&health);
     let thread = std::thread::Builder::new()
         .name("bench-recorder".into())
-        .spawn(move || run(recorder, ring, &seen))
+        .spawn(move || run(recorder, ring, &shared))
         .map_err(|e| RecordingError::Thread {
             what: format!("could not be started ({e})"),
         })?;
@@ -96,7 +96,7 @@ fn run(
     yield_to_others();
     let mut outcome = Ok(());
     loop {
-        // Asked before emptying: what was pushed before the producer went is in the ring by then.
+        // Read before the ring is emptied: everything that was pushed before the producer was dropped is then in the ring.
         let ended = ring.is_abandoned();
         while let Ok(published) = ring.pop() {
             take(&published, &mut recorder, &mut outcome, health);
@@ -108,8 +108,8 @@ fn run(
     }
 }
 
-/// Packing a chunk takes milliseconds, and the ring waits for seconds: whatever else runs, the kernel's own work between a
-/// serial port and its reader above all, comes first. Best effort.
+/// Lowers the priority of this thread, if possible. Compressing a chunk takes milliseconds, while the ring holds seconds:
+/// everything else is more urgent, above all the work of the kernel between a serial port and its reader.
 #[allow(unsafe_code, reason = "setpriority has no safe wrapper")]
 fn yield_to_others() {
     // SAFETY: no memory is touched; 0 is the calling thread, and raising its nice value is always permitted.

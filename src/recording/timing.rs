@@ -1,4 +1,4 @@
-//! How late the loop woke and how long it computed, each second and over the whole run.
+//! Lateness and compute time of the loop, for each second and for the whole run.
 
 use hdrhistogram::Histogram;
 use serde::Serialize;
@@ -9,8 +9,8 @@ use crate::rt::record::TickRecord;
 
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// Quantiles of a duration in nanoseconds. `max_ns` is exact; the others are exact below 2048 ns and at most 0.1 %
-/// above the true quantile beyond (three significant digits); 10 s and more count as 10 s.
+/// Quantiles of a duration in nanoseconds. `max_ns` is exact. The others are exact below 2048 ns and otherwise at most 0.1 %
+/// above the true quantile (three significant digits); durations above 10 s count as 10 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Quantiles {
     /// Median.
@@ -27,7 +27,7 @@ pub struct Quantiles {
     pub max_ns: u64,
 }
 
-/// A histogram whose memory is claimed once.
+/// A histogram that allocates only when it is created.
 struct Spread {
     histogram: Histogram<u64>,
     max_ns: u64,
@@ -35,7 +35,7 @@ struct Spread {
 
 impl Spread {
     fn new() -> Spread {
-        // Creation fails only for bounds out of order or more than five digits.
+        // Fails only if the bounds are not in order, or for more than five digits.
         let histogram =
             Histogram::new_with_bounds(1, 10 * SECOND_NS, 3).expect("constant bounds are in order");
         Spread {
@@ -65,8 +65,8 @@ impl Spread {
     }
 }
 
-/// Lateness and compute time (done - woke) together. Lateness is woke - due: a tick that passed unserved was due a period
-/// earlier, so the tick that is served in its place is late by all periods missed.
+/// Lateness (woke - due) and compute time (done - woke). A tick that is served in place of missed ones was due with the first
+/// of them, so it is late by all missed periods.
 struct Pair {
     lateness: Spread,
     compute: Spread,
@@ -82,16 +82,17 @@ impl Pair {
 
     fn add(&mut self, tick: &TickRecord, period_ns: u64) {
         let missed_ns = u64::from(tick.missed_ticks).saturating_mul(period_ns);
-        self.lateness.add(
-            tick.woke_ns
-                .saturating_add(missed_ns)
-                .saturating_sub(tick.scheduled_ns),
-        );
+        let late_ns = tick.woke_ns.saturating_add(missed_ns);
+        self.lateness.add(late_ns.saturating_sub(tick.scheduled_ns));
         self.compute.add(tick.done_ns.saturating_sub(tick.woke_ns));
+    }
+
+    fn quantiles(&self) -> (Quantiles, Quantiles) {
+        (self.lateness.quantiles(), self.compute.quantiles())
     }
 }
 
-/// The second under way.
+/// The current second.
 struct Second {
     number: u64,
     first_tick: u64,
@@ -99,7 +100,7 @@ struct Second {
     ticks: u64,
 }
 
-/// Makes a [`Timing`] of every second of scheduled time in which there are ticks, and the quantiles of all.
+/// Summarises every second of scheduled time that contains ticks as a [`Timing`], and all ticks as quantiles.
 pub(super) struct Tally {
     period_ns: u64,
     second: Option<Second>,
@@ -121,14 +122,14 @@ impl Tally {
         }
     }
 
-    /// Whether `tick` belongs to a later second than the one under way, which is then to be closed first.
+    /// Whether `tick` belongs to a later second than the current one, which must then be closed first.
     pub(super) fn is_over(&self, tick: &TickRecord) -> bool {
         self.second
             .as_ref()
             .is_some_and(|s| s.number != tick.scheduled_ns / SECOND_NS)
     }
 
-    /// Takes in a tick.
+    /// Adds a tick.
     pub(super) fn add(&mut self, tick: &TickRecord) {
         self.within.add(tick, self.period_ns);
         self.all.add(tick, self.period_ns);
@@ -143,7 +144,7 @@ impl Tally {
         second.ticks += 1;
     }
 
-    /// Ends the second under way: its summary, and the scheduled time of its last tick. `account` stands at that tick.
+    /// Ends the current second; returns the scheduled time of its last tick, and its summary. `account` includes that tick.
     pub(super) fn close(&mut self, account: &Continuity) -> Option<(u64, Timing)> {
         let second = self.second.take()?;
         let timing = Timing {
@@ -160,14 +161,11 @@ impl Tally {
 
     /// Lateness and compute time of all ticks so far.
     pub(super) fn totals(&self) -> (Quantiles, Quantiles) {
-        (self.all.lateness.quantiles(), self.all.compute.quantiles())
+        self.all.quantiles()
     }
 
     fn summary(&self, second: &Second) -> Timing {
-        let (late, compute) = (
-            self.within.lateness.quantiles(),
-            self.within.compute.quantiles(),
-        );
+        let (late, compute) = self.within.quantiles();
         Timing {
             first_tick: second.first_tick,
             last_tick: second.last.tick,

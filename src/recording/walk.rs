@@ -1,29 +1,29 @@
-//! Goes through an MCAP file record by record and hands out only what its checks have vouched for.
+//! Reads an MCAP file record by record and returns only checked data.
 //!
-//! What `mcap` checks when asked, and is asked for here: a chunk's CRC over its uncompressed content *before* the first
-//! message leaves it, an attachment's CRC, the CRC from the beginning of the file to the end of the data section, the
-//! CRC of the summary, the magic bytes at both ends. A CRC field of zero means *not checked* to `mcap`; for chunks and
-//! attachments that is refused here. What `mcap` does not check and this module does: that a channel's messages are
-//! numbered without a gap, and the few lengths on which `mcap` would panic.
+//! The options of `mcap` select these checks: the CRC of the uncompressed content of a chunk *before* its first message, the CRC
+//! of an attachment, the CRC from the begin of the file to the end of the data section, the CRC of the summary, and the magic
+//! bytes at both ends. For `mcap`, a CRC field of zero means *not checked*; this module refuses it for chunks and attachments.
+//! This module also checks that the messages of a channel are numbered without a gap, and some lengths with which `mcap` would
+//! panic.
 
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read};
 
-use mcap::records::{Metadata, Record, op};
+use mcap::records::{Channel, Metadata, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 
 use super::{Topic, error};
 
-/// Bytes asked of the system at a time.
+/// Bytes that are read at a time.
 const READ_BYTES: usize = 64 << 10;
-/// No record of a recording is larger; a larger one is a damaged length, for which no memory is claimed.
+/// Largest record. A larger length is damaged, and no memory is allocated for it.
 const RECORD_BYTES: usize = 256 << 20;
-/// As above, of a chunk after decompression: memory that is claimed on the word of its header.
+/// Largest chunk after decompression; its header states how much memory is allocated.
 const CHUNK_BYTES: usize = 64 << 20;
 
-/// Something in the file that can be trusted.
+/// A checked part of the file.
 pub(super) enum Part<'a> {
     Message {
         topic: Topic,
@@ -37,16 +37,16 @@ pub(super) enum Part<'a> {
     Metadata(Metadata),
 }
 
-/// Who receives the parts; what it refuses is damage.
+/// Receives the parts. An error means that the part is damaged.
 pub(super) type Take<'a> = dyn FnMut(Part<'_>) -> Result<(), String> + 'a;
 
 /// Why a walk ended before the end of a complete file.
 pub(super) enum Stop {
     /// The file ends early.
     Cut,
-    /// Something is wrong with its bytes.
+    /// The content is damaged.
     Damaged(String),
-    /// It is no MCAP file.
+    /// It is not an MCAP file.
     NotMcap,
     /// It cannot be read.
     Read(io::Error),
@@ -57,12 +57,12 @@ pub(super) struct Walk {
     file: File,
     reader: LinearReader,
     bytes_read: u64,
-    /// Where the record under way begins.
+    /// Begin of the current record.
     pub(super) offset: u64,
     pub(super) contents: Contents,
 }
 
-/// What the records seen so far have defined.
+/// The definitions in the records so far.
 #[derive(Default)]
 pub(super) struct Contents {
     schemas: BTreeMap<u16, String>,
@@ -91,7 +91,7 @@ impl Walk {
         }
     }
 
-    /// Goes one record on (a whole chunk at a time); `false` at the end of a complete file.
+    /// Reads one record (a whole chunk at a time); `false` at the end of a complete file.
     pub(super) fn step(&mut self, take: &mut Take) -> Result<bool, Stop> {
         while let Some(event) = self.reader.next_event() {
             match event {
@@ -110,7 +110,9 @@ impl Walk {
         if self.contents.data_ended {
             Ok(false)
         } else {
-            Err(Stop::Damaged("the end of its data is not marked".into()))
+            Err(Stop::Damaged(
+                "the end of the data section is missing".into(),
+            ))
         }
     }
 
@@ -144,12 +146,12 @@ impl Contents {
     fn record(&mut self, opcode: u8, data: &[u8], take: &mut Take) -> Result<(), String> {
         match opcode {
             op::DATA_END => self.data_ended = true,
-            _ if self.data_ended => {} // the summary repeats what came before
+            _ if self.data_ended => {} // the summary repeats earlier records
             op::CHUNK => self.chunk(data, take)?,
             op::ATTACHMENT => attachment(data, take)?,
             op::METADATA => metadata(data, take)?,
             op::MESSAGE => {
-                return Err("a message outside of the chunks, where no CRC covers it".into());
+                return Err("a message outside of the chunks, without a CRC".into());
             }
             op::SCHEMA | op::CHANNEL => self.define(opcode, data)?,
             _ => {} // indexes, and what a later version of MCAP may add
@@ -157,7 +159,7 @@ impl Contents {
         Ok(())
     }
 
-    /// Takes a chunk apart with a reader of its own, which checks the CRC before it yields a record.
+    /// Reads a chunk with a separate reader, which checks the CRC before it returns a record.
     fn chunk(&mut self, chunk: &[u8], take: &mut Take) -> Result<(), String> {
         vet_chunk(chunk)?;
         let mut reader = chunk_reader(chunk);
@@ -168,7 +170,7 @@ impl Contents {
                     data,
                 } => self.message(data, take)?,
                 LinearReadEvent::Record { opcode, data } => self.define(opcode, data)?,
-                LinearReadEvent::ReadRequest(_) => reader.notify_read(0), // all of it was given: this is its end
+                LinearReadEvent::ReadRequest(_) => reader.notify_read(0), // the end of the chunk
             }
         }
         Ok(())
@@ -180,30 +182,29 @@ impl Contents {
         }
         match parse_record(opcode, data).map_err(|e| error::why(&e))? {
             Record::Schema { header, .. } => drop(self.schemas.insert(header.id, header.name)),
-            Record::Channel(channel) => {
-                let schema = self
-                    .schemas
-                    .get(&channel.schema_id)
-                    .cloned()
-                    .unwrap_or_default();
-                let ours = |t: &Topic| t.name() == channel.topic && t.schema_name() == schema;
-                self.topics
-                    .extend(Topic::ALL.into_iter().find(ours).map(|t| (channel.id, t)));
-                self.channels.insert(channel.id, (channel.topic, schema));
-            }
+            Record::Channel(channel) => self.add_channel(channel),
             _ => {}
         }
         Ok(())
     }
 
-    /// A message is its channel (u16), its number there (u32), two times (u64) and its data.
+    fn add_channel(&mut self, channel: Channel) {
+        let schema = self.schemas.get(&channel.schema_id);
+        let schema = schema.cloned().unwrap_or_default();
+        let is_same = |t: &Topic| t.name() == channel.topic && t.schema_name() == schema;
+        let topic = Topic::ALL.into_iter().find(is_same);
+        self.topics.extend(topic.map(|topic| (channel.id, topic)));
+        self.channels.insert(channel.id, (channel.topic, schema));
+    }
+
+    /// A message consists of its channel (u16), its number in the channel (u32), two times (u64) and its data.
     fn message(&mut self, message: &[u8], take: &mut Take) -> Result<(), String> {
         let Some((header, data)) = message.split_first_chunk::<22>() else {
             return Err("a message without a header".into());
         };
         let [c0, c1, n0, n1, n2, n3, ..] = *header;
         let Some(&topic) = self.topics.get(&u16::from_le_bytes([c0, c1])) else {
-            return Ok(()); // of another program's channel
+            return Ok(()); // a channel of another program
         };
         self.count(topic, u32::from_le_bytes([n0, n1, n2, n3]))?;
         take(Part::Message { topic, data })
@@ -221,7 +222,7 @@ impl Contents {
         ))
     }
 
-    /// Whether the channel with the ticks is there.
+    /// Whether the file has the channel with the ticks.
     pub(super) fn has_loop(&self) -> bool {
         self.topics.values().any(|t| *t == Topic::Loop)
     }
@@ -242,12 +243,12 @@ fn chunk_reader(chunk: &[u8]) -> LinearReader {
     reader
 }
 
-/// Refuses what `mcap` would take unchecked (no CRC) or panic at (a length beyond the end of an uncompressed chunk).
+/// Refuses a chunk that `mcap` would not check (no CRC) or would panic at (a length beyond the end of an uncompressed chunk).
 fn vet_chunk(chunk: &[u8]) -> Result<(), String> {
     let Record::Chunk { header, data } =
         parse_record(op::CHUNK, chunk).map_err(|e| error::why(&e))?
     else {
-        return Err("a chunk that is none".into());
+        return Err("a chunk with the content of another record".into());
     };
     match header.compression.as_str() {
         _ if header.uncompressed_crc == 0 => Err("a chunk without a CRC".into()),
@@ -256,17 +257,15 @@ fn vet_chunk(chunk: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Whether `records` is a row of (opcode, length u64, content) to its very end.
+/// Whether `records` is a sequence of (opcode, length u64, content) without a rest.
 fn is_framed(mut records: &[u8]) -> bool {
     while let Some((head, rest)) = records.split_first_chunk::<9>() {
         let [_, length @ ..] = *head;
-        match usize::try_from(u64::from_le_bytes(length))
-            .ok()
-            .and_then(|n| rest.get(n..))
-        {
-            Some(next) => records = next,
-            None => return false,
-        }
+        let length = usize::try_from(u64::from_le_bytes(length)).ok();
+        let Some(next) = length.and_then(|length| rest.get(length..)) else {
+            return false;
+        };
+        records = next;
     }
     records.is_empty()
 }
@@ -286,8 +285,8 @@ fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
     }
 }
 
-/// Two times (u64), name and media type (each with its length u32), the length of the content (u64), the content, a CRC
-/// (u32): `mcap` panics where the record ends between the length and the CRC.
+/// An attachment consists of two times (u64), name and media type (each with its length u32), the length of the content (u64),
+/// the content, and a CRC (u32). `mcap` panics if the record ends between the length and the CRC.
 fn attachment_is_framed(record: &[u8]) -> bool {
     let after_string = |rest: &[u8]| {
         let (length, text) = rest.split_first_chunk::<4>()?;

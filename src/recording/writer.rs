@@ -19,49 +19,50 @@ use super::timing::{Quantiles, Tally};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
 use crate::rt::record::{Event, LoopMessage, TickRecord};
 
-/// A chunk is closed and handed to the operating system at every multiple of this scheduled time, whatever the rate:
-/// what dies with the process is half a second at most. At 5 kHz a chunk holds 2500 ticks, some 260 kB before
-/// compression; shorter chunks would compress worse and swell the index.
+/// A chunk is closed and written at every multiple of this scheduled time, at any rate: if the process is killed, at most half
+/// a second is lost. At 5 kHz a chunk holds 2500 ticks, about 260 kB before compression. Shorter chunks would compress less
+/// and enlarge the index.
 const CHUNK_NS: u64 = 500_000_000;
 
-/// A chunk is also closed when it holds this much, so that no rate and no flood of events makes it grow without bound.
+/// A chunk is also closed at this size, so that its size is limited at any rate and with any number of events.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// What is known of a run before its first tick. The system has it before [`Recorder::create`] returns, so that a recording
-/// cut off anywhere still tells what was measured.
+/// What is known about a run before its first tick. It is written before [`Recorder::create`] returns, so that even a recording
+/// that is cut off later contains it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Header {
     /// The whole effective configuration.
     pub config_toml: String,
-    /// Period of the loop, from which an event gets its time.
+    /// Period of the loop, which gives the time of an event.
     pub period_ns: u64,
-    /// The program's version, the host, how the loop is scheduled, when it began.
+    /// Version of the program, host, scheduling of the loop, and begin of the run.
     pub metadata: BTreeMap<String, String>,
 }
 
-/// What a finished recording holds.
+/// Counts and timing of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Totals {
     /// The file.
     pub path: PathBuf,
-    /// Ticks recorded.
+    /// Recorded ticks.
     pub ticks: u64,
-    /// Events recorded.
+    /// Recorded events.
     pub events: u64,
     /// Number of the first tick, if there is one.
     pub first_tick: Option<u64>,
     /// Number of the last tick, if there is one.
     pub last_tick: Option<u64>,
-    /// Scheduled ticks that passed unserved.
+    /// Scheduled ticks that were not served.
     pub overruns: u64,
-    /// Records lost on the way from the loop: the larger of what the loop announced and what gaps in the tick numbers
-    /// show.
+    /// Lost records: the larger of the number that the loop reported and the number by the gaps in the tick numbers.
     pub lost_records: u64,
-    /// Woke - due; a tick in whose place others were missed was due before them.
+    /// Time at which the loop woke up minus time at which the tick was due; a tick that replaces missed ones was due with the
+    /// first of them.
     pub lateness: Quantiles,
-    /// Done - woke.
+    /// Time from waking up to the written command.
     pub compute: Quantiles,
-    /// Two runs are bit for bit the same in `/loop` and `/event` if and (but for one chance in 2^64) only if these are.
+    /// Equal for two runs whose messages on `/loop` and `/event` are equal bit for bit. Two different runs have the same digest
+    /// with a probability of 2^-64.
     pub loop_digest: u64,
 }
 
@@ -69,7 +70,7 @@ pub struct Totals {
 pub struct Recorder {
     path: PathBuf,
     mcap: mcap::Writer<NoSeek<BufWriter<Box<dyn Write + Send>>>>,
-    /// Ids of the channels, in the order of [`Topic::ALL`].
+    /// Numbers of the channels, in the order of [`Topic::ALL`].
     channels: [u16; 3],
     /// Messages written on each.
     written: [u64; 3],
@@ -82,19 +83,21 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Makes the file and writes everything of `header` to it. A file that exists is never touched.
+    /// Creates the file and writes `header` to it. An existing file is never changed.
     pub fn create(path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
-            _ => RecordingError::Create {
+            _ => RecordingError::File {
                 path: path.into(),
+                action: "create",
                 source,
+                remedy: "check that its directory exists and may be written to",
             },
         })?;
         Recorder::over(Box::new(file), path, header)
     }
 
-    /// Records to any place that takes bytes; `path` only names it in messages.
+    /// Records to any writer; `path` is its name in messages.
     pub fn over(
         out: Box<dyn Write + Send>,
         path: &Path,
@@ -123,7 +126,7 @@ impl Recorder {
         })
     }
 
-    /// Writes what the loop published. After an error the recording is cut off; nothing more can be written.
+    /// Writes a message of the loop. After an error the recording is cut off, and nothing more can be written.
     pub fn record(&mut self, published: &LoopMessage) -> Result<(), RecordingError> {
         match published {
             LoopMessage::Tick(tick) => self.tick(tick),
@@ -147,15 +150,15 @@ impl Recorder {
         written.map_err(|source| self.failed(source))
     }
 
-    /// Says what is in the file after the last tick, which is readable from now on: results can be computed from it
-    /// before they are added.
+    /// Writes everything that is still in memory and returns the counts. The file is then readable, so that results can be
+    /// computed from it before they are added.
     pub fn complete(&mut self) -> Result<Totals, RecordingError> {
         self.close_second()?;
         self.mcap.flush().map_err(|source| self.failed(source))?;
         Ok(self.totals())
     }
 
-    /// Adds results as (name, media type, content), completes the file and says what is in it.
+    /// Adds results as (name, media type, content), completes the file and returns the counts.
     pub fn finish(mut self, attachments: &[(&str, &str, &[u8])]) -> Result<Totals, RecordingError> {
         self.close_second()?;
         let written = self.write_end(attachments);
@@ -211,7 +214,7 @@ impl Recorder {
         message: &impl Message,
     ) -> Result<(), RecordingError> {
         self.encoded.clear();
-        // A Vec takes any length: `encode_raw` is `encode` without asking for the length first.
+        // Like `encode`, without the check of the capacity: a Vec grows.
         message.encode_raw(&mut self.encoded);
         let header = self.next_header(topic, log_time);
         self.mcap
@@ -223,7 +226,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Messages of a channel are numbered without a gap: a chunk that vanishes from a file is noticed.
+    /// Messages of a channel are numbered without a gap, so that a missing chunk is detected.
     fn next_header(&mut self, topic: Topic, log_time: u64) -> MessageHeader {
         let count = &mut self.written[topic as usize];
         let sequence = *count as u32;
@@ -268,8 +271,8 @@ impl Recorder {
     }
 }
 
-/// Whole chunks are put together in memory and appended, never sought back into: a cut file has no half-made chunk
-/// before its last one.
+/// Chunks are completed in memory and appended to the file without seeking, so that only the last chunk of a cut file can be
+/// incomplete.
 fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))
