@@ -107,22 +107,30 @@ fn a_wrong_type_is_refused_with_what_is_there_and_what_belongs_there() {
             "mine.toml line 2",
             "`loop.rate_hz`",
             "true",
-            "a number belongs",
+            "a number is expected",
         ],
     );
     refused_file(
         "title = 3\n",
-        &["mine.toml line 1", "`title`", "is 3", "a string belongs"],
+        &[
+            "mine.toml line 1",
+            "`title`",
+            "is 3",
+            "a string is expected",
+        ],
     );
     refused_set(
         "loop.computing_delay_periods=1.5",
-        &["is 1.5", "an integer belongs"],
+        &["is 1.5", "an integer is expected"],
     );
     refused_set(
         "chirp.amplitude=3",
-        &["`chirp.amplitude`", "is 3", "an array belongs"],
+        &["`chirp.amplitude`", "is 3", "an array is expected"],
     );
-    refused_set("plant.mass_asymmetry=yes", &["\"yes\"", "a number belongs"]);
+    refused_set(
+        "plant.mass_asymmetry=yes",
+        &["\"yes\"", "a number is expected"],
+    );
 }
 
 #[test]
@@ -383,7 +391,7 @@ fn a_controller_file_is_checked_like_a_configuration() {
         ),
         (
             section("kind = \"gain\"\ngain_a_per_um = true"),
-            &["line 4", "true", "a number belongs"],
+            &["line 4", "true", "a number is expected"],
         ),
         (
             section("kind = \"gain\"\ngain_a_per_um = nan"),

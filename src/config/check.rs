@@ -11,237 +11,233 @@ use crate::util::finding::Finding;
 use crate::util::nearest::nearest;
 use crate::util::quantity::{Dimension, Quantity};
 
-/// All that is wrong with `value`.
+/// The errors in `value`.
 pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
-    let mut findings = Findings(Vec::new());
-    node(schema, schema, value, "", &mut findings);
-    findings.0
+    let mut checker = Checker {
+        root: schema,
+        findings: Vec::new(),
+    };
+    checker.node(schema, value, "");
+    checker.findings
 }
 
-/// Whether a number belongs at `path` of `value`.
+/// Whether the schema expects a number at `path` of `value`.
 pub(super) fn wants_number(schema: &Json, value: &Value, path: &str) -> bool {
-    keywords_at(schema, value, path).is_some_and(|keywords| is(&keywords, "number"))
+    keywords_at(schema, value, path).is_some_and(|keywords| keywords.is("number"))
 }
 
 /// The range of a number at `path` of `value`.
 pub(super) fn range_at(schema: &Json, value: &Value, path: &str) -> Option<RangeInclusive<f64>> {
     let keywords = keywords_at(schema, value, path)?;
-    let limit = |key: &str| keywords.get(key).and_then(Json::as_f64);
-    Some(limit("minimum")?..=limit("maximum")?)
+    Some(keywords.number("minimum")?..=keywords.number("maximum")?)
 }
 
-/// The keywords of the schema for what is at `path` of `value`.
-fn keywords_at(schema: &Json, value: &Value, path: &str) -> Option<Map<String, Json>> {
-    let mut keywords = flatten(schema, schema);
+/// The keywords of the schema for the entry at `path` of `value`.
+fn keywords_at(schema: &Json, value: &Value, path: &str) -> Option<Keywords> {
+    let mut keywords = Keywords::of(schema, schema);
     let mut value = value;
     for part in path.split('.') {
-        if let Some(variants) = keywords.get("oneOf").and_then(Json::as_array) {
+        if let Some(variants) = keywords.list("oneOf") {
             let tag = variants.iter().find_map(tag_of)?;
-            keywords = flatten(schema, chosen(variants, &tag, value)?);
+            keywords = Keywords::of(schema, chosen(variants, &tag, value)?);
         }
-        let index = part.parse::<usize>().ok();
-        let property = keywords.get("properties").and_then(|all| all.get(part));
-        let named = keywords.get("additionalProperties");
-        let item = index.and_then(|_| keywords.get("items"));
-        let inner = property.or(item).or(named)?.clone();
-        keywords = flatten(schema, &inner);
-        let entry = value.get(part);
-        value = entry.or_else(|| value.get(index?))?;
+        keywords = Keywords::of(schema, keywords.inner(part)?);
+        let index = || part.parse::<usize>().ok();
+        value = value.get(part).or_else(|| value.get(index()?))?;
     }
     Some(keywords)
 }
 
-struct Findings(Vec<Finding>);
+/// The keywords of a schema, together with those of the schema that it refers to.
+struct Keywords(Map<String, Json>);
 
-impl Findings {
-    fn add(&mut self, path: &str, what: String) {
-        self.0.push(Finding::new(path, what));
+impl Keywords {
+    fn of(root: &Json, schema: &Json) -> Keywords {
+        let mut keywords = schema.as_object().cloned().unwrap_or_default();
+        let reference = schema.get("$ref").and_then(Json::as_str);
+        let target = reference.and_then(|path| root.pointer(path.strip_prefix('#')?));
+        for (key, value) in target
+            .map(|target| Keywords::of(root, target).0)
+            .into_iter()
+            .flatten()
+        {
+            match (keywords.get_mut(&key), value) {
+                (Some(Json::Object(mine)), Json::Object(theirs)) => mine.extend(theirs),
+                (Some(Json::Array(mine)), Json::Array(theirs)) => mine.extend(theirs),
+                (Some(_), _) => {}
+                (None, value) => drop(keywords.insert(key, value)),
+            }
+        }
+        Keywords(keywords)
     }
 
-    fn lacks(&mut self, path: &str, what: String) {
-        self.0.push(Finding {
+    /// The schema of the entry `part` of a table or an array.
+    fn inner(&self, part: &str) -> Option<&Json> {
+        let property = self.0.get("properties").and_then(|all| all.get(part));
+        let is_index = part.parse::<usize>().is_ok();
+        let item = self.0.get("items").filter(|_| is_index);
+        property.or(item).or(self.0.get("additionalProperties"))
+    }
+
+    /// Whether a value of this type is allowed.
+    fn is(&self, kind: &str) -> bool {
+        match self.0.get("type") {
+            Some(Json::String(one)) => one == kind,
+            Some(Json::Array(several)) => several.iter().any(|one| one == kind),
+            _ => false,
+        }
+    }
+
+    fn number(&self, key: &str) -> Option<f64> {
+        self.0.get(key)?.as_f64()
+    }
+
+    fn list(&self, key: &str) -> Option<&Vec<Json>> {
+        self.0.get(key)?.as_array()
+    }
+
+    /// The strings in a list; none if there is no list.
+    fn words(&self, key: &str) -> Vec<&str> {
+        let list = self.list(key).into_iter().flatten();
+        list.filter_map(Json::as_str).collect()
+    }
+}
+
+struct Checker<'a> {
+    root: &'a Json,
+    findings: Vec<Finding>,
+}
+
+impl Checker<'_> {
+    fn add(&mut self, path: &str, what: String) {
+        self.findings.push(Finding::new(path, what));
+    }
+
+    fn add_missing(&mut self, path: &str, what: String) {
+        self.findings.push(Finding {
             path: path.to_string(),
             what,
             missing: true,
         });
     }
-}
 
-fn node(root: &Json, schema: &Json, value: &Value, path: &str, out: &mut Findings) {
-    let keywords = flatten(root, schema);
-    if let Some(variants) = keywords.get("oneOf").and_then(Json::as_array) {
-        return variant(root, variants, value, path, out);
-    }
-    match value {
-        Value::Table(entries) if is(&keywords, "object") => {
-            table(root, &keywords, entries, path, out)
+    fn node(&mut self, schema: &Json, value: &Value, path: &str) {
+        let keywords = Keywords::of(self.root, schema);
+        if let Some(variants) = keywords.list("oneOf") {
+            return self.variant(variants, value, path);
         }
-        Value::Array(items) if is(&keywords, "array") => array(root, &keywords, items, path, out),
-        Value::Integer(n) if is(&keywords, "integer") || is(&keywords, "number") => {
-            range(&keywords, *n as f64, path, out);
+        match value {
+            Value::Table(entries) if keywords.is("object") => self.table(&keywords, entries, path),
+            Value::Array(items) if keywords.is("array") => self.array(&keywords, items, path),
+            Value::Integer(n) if keywords.is("integer") || keywords.is("number") => {
+                self.range(&keywords, *n as f64, path);
+            }
+            Value::Float(x) if keywords.is("number") => self.range(&keywords, *x, path),
+            Value::String(word) if keywords.is("string") => self.text(&keywords, word, path),
+            Value::Boolean(_) if keywords.is("boolean") => {}
+            other => self.add(path, wrong_type(&keywords, other, path)),
         }
-        Value::Float(x) if is(&keywords, "number") => range(&keywords, *x, path, out),
-        Value::String(word) if is(&keywords, "string") => text(&keywords, word, path, out),
-        Value::Boolean(_) if is(&keywords, "boolean") => {}
-        other => out.add(path, wrong_type(&keywords, other, path)),
     }
-}
 
-/// The keywords of a node together with those of what it refers to.
-fn flatten(root: &Json, schema: &Json) -> Map<String, Json> {
-    let mut keywords = schema.as_object().cloned().unwrap_or_default();
-    let target = schema
-        .get("$ref")
-        .and_then(Json::as_str)
-        .and_then(|r| root.pointer(r.strip_prefix('#')?));
-    for (key, value) in target
-        .map(|target| flatten(root, target))
-        .unwrap_or_default()
-    {
-        match (keywords.get_mut(&key), value) {
-            (Some(Json::Object(mine)), Json::Object(theirs)) => mine.extend(theirs),
-            (Some(Json::Array(mine)), Json::Array(theirs)) => mine.extend(theirs),
-            (Some(_), _) => {}
-            (None, value) => {
-                keywords.insert(key, value);
+    /// One of several tables that a constant tag distinguishes, or one of several words.
+    fn variant(&mut self, variants: &[Json], value: &Value, path: &str) {
+        let Some(tag) = variants.iter().find_map(tag_of) else {
+            let words: Vec<&str> = variants.iter().filter_map(constant).collect();
+            if !value.as_str().is_some_and(|word| words.contains(&word)) {
+                self.add(path, not_one_of(&value.to_string(), &words));
+            }
+            return;
+        };
+        match chosen(variants, &tag, value) {
+            Some(chosen) => self.node(chosen, value, path),
+            None => self.tag(variants, &tag, value, path),
+        }
+    }
+
+    /// The tag is missing or unknown.
+    fn tag(&mut self, variants: &[Json], tag: &str, value: &Value, path: &str) {
+        let words = variants.iter().map(|v| constant(&v["properties"][tag]));
+        let words: Vec<&str> = words.flatten().collect();
+        let path = join(path, tag);
+        match value.get(tag) {
+            Some(given) => self.add(&path, not_one_of(&given.to_string(), &words)),
+            None => self.add_missing(&path, not_one_of("missing", &words)),
+        }
+    }
+
+    fn table(&mut self, keywords: &Keywords, entries: &Table, path: &str) {
+        let none = Map::new();
+        let properties = keywords.0.get("properties").and_then(Json::as_object);
+        let properties = properties.unwrap_or(&none);
+        // One schema for all entries of a table whose keys the user chooses.
+        let any_key = keywords.0.get("additionalProperties");
+        let any_key = any_key.filter(|schema| schema.is_object());
+        for (key, value) in entries {
+            match properties.get(key).or(any_key) {
+                Some(schema) => self.node(schema, value, &join(path, key)),
+                None => self.add(&join(path, key), unknown_key(path, key, properties)),
             }
         }
-    }
-    keywords
-}
-
-/// One of several tables told apart by a constant tag, or one of several words.
-fn variant(root: &Json, variants: &[Json], value: &Value, path: &str, out: &mut Findings) {
-    let Some(tag) = variants.iter().find_map(tag_of) else {
-        let words: Vec<&str> = variants.iter().filter_map(constant).collect();
-        if !value.as_str().is_some_and(|word| words.contains(&word)) {
-            out.add(path, not_one_of(&value.to_string(), &words));
-        }
-        return;
-    };
-    match chosen(variants, &tag, value) {
-        Some(chosen) => node(root, chosen, value, path, out),
-        None => {
-            let words: Vec<&str> = variants
-                .iter()
-                .filter_map(|v| constant(&v["properties"][&tag]))
-                .collect();
-            match value.get(&tag) {
-                Some(given) => out.add(&join(path, &tag), not_one_of(&given.to_string(), &words)),
-                None => out.lacks(&join(path, &tag), not_one_of("missing", &words)),
-            }
+        let required = keywords.words("required").into_iter();
+        for key in required.filter(|key| !entries.contains_key(*key)) {
+            let what = "is missing; this kind of table needs it".into();
+            self.add_missing(&join(path, key), what);
         }
     }
-}
 
-/// The variant that the tag of a table names.
-fn chosen<'a>(variants: &'a [Json], tag: &str, value: &Value) -> Option<&'a Json> {
-    let word = value.get(tag)?.as_str()?;
-    let named = |variant: &&Json| constant(&variant["properties"][tag]) == Some(word);
-    variants.iter().find(named)
-}
-
-fn table(
-    root: &Json,
-    keywords: &Map<String, Json>,
-    entries: &Table,
-    path: &str,
-    out: &mut Findings,
-) {
-    let none = Map::new();
-    let properties = keywords
-        .get("properties")
-        .and_then(Json::as_object)
-        .unwrap_or(&none);
-    // A table of entries with names of the user's own has one schema for all of them.
-    let named = keywords
-        .get("additionalProperties")
-        .filter(|schema| schema.is_object());
-    for (key, value) in entries {
-        match properties.get(key).or(named) {
-            Some(schema) => node(root, schema, value, &join(path, key), out),
-            None => unknown_key(path, key, properties, out),
-        }
-    }
-    let required = keywords
-        .get("required")
-        .and_then(Json::as_array)
-        .into_iter()
-        .flatten();
-    for key in required
-        .filter_map(Json::as_str)
-        .filter(|key| !entries.contains_key(*key))
-    {
-        out.lacks(
-            &join(path, key),
-            "is missing; this kind of table needs it".into(),
+    fn array(&mut self, keywords: &Keywords, items: &[Value], path: &str) {
+        let limit = |key| keywords.0.get(key).and_then(Json::as_u64);
+        let (min, max) = (
+            limit("minItems").unwrap_or(0),
+            limit("maxItems").unwrap_or(u64::MAX),
         );
-    }
-}
-
-fn array(
-    root: &Json,
-    keywords: &Map<String, Json>,
-    items: &[Value],
-    path: &str,
-    out: &mut Findings,
-) {
-    let least = keywords.get("minItems").and_then(Json::as_u64).unwrap_or(0);
-    let most = keywords
-        .get("maxItems")
-        .and_then(Json::as_u64)
-        .unwrap_or(u64::MAX);
-    if !(least..=most).contains(&(items.len() as u64)) {
-        out.add(
-            path,
-            format!("has {} entries; {least} to {most} are allowed", items.len()),
-        );
-    }
-    for (index, item) in items.iter().enumerate() {
-        if let Some(schema) = keywords.get("items") {
-            node(root, schema, item, &join(path, &index.to_string()), out);
+        let count = items.len() as u64;
+        if !(min..=max).contains(&count) {
+            self.add(
+                path,
+                format!("has {count} entries; {min} to {max} are allowed"),
+            );
+        }
+        let Some(schema) = keywords.0.get("items") else {
+            return;
+        };
+        for (index, item) in items.iter().enumerate() {
+            self.node(schema, item, &join(path, &index.to_string()));
         }
     }
-}
 
-fn range(keywords: &Map<String, Json>, x: f64, path: &str, out: &mut Findings) {
-    let limit = |key: &str| keywords.get(key).and_then(Json::as_f64);
-    let (low, high) = (limit("minimum"), limit("maximum"));
-    if !x.is_finite() || low.is_some_and(|low| x < low) || high.is_some_and(|high| x > high) {
+    fn range(&mut self, keywords: &Keywords, x: f64, path: &str) {
+        let (min, max) = (keywords.number("minimum"), keywords.number("maximum"));
+        let is_inside = min.is_none_or(|min| x >= min) && max.is_none_or(|max| x <= max);
+        if x.is_finite() && is_inside {
+            return;
+        }
         let bound = |b: Option<f64>| b.map_or("any".to_string(), |b| format!("{b}"));
         let dimension = Dimension::of_key(path);
         let (is, unit) = (dimension.display(x), dimension.si_unit());
-        let allowed = format!("{} to {} {unit}", bound(low), bound(high));
-        out.add(path, format!("is {is}; allowed is {}", allowed.trim_end()));
+        let allowed = format!("{} to {} {unit}", bound(min), bound(max));
+        self.add(path, format!("is {is}; allowed is {}", allowed.trim_end()));
+    }
+
+    fn text(&mut self, keywords: &Keywords, word: &str, path: &str) {
+        let words = keywords.words("enum");
+        if !words.is_empty() && !words.contains(&word) {
+            self.add(path, not_one_of(&format!("{word:?}"), &words));
+        }
     }
 }
 
-fn text(keywords: &Map<String, Json>, word: &str, path: &str, out: &mut Findings) {
-    let words: Vec<&str> = keywords
-        .get("enum")
-        .and_then(Json::as_array)
-        .into_iter()
-        .flatten()
-        .filter_map(Json::as_str)
-        .collect();
-    if !words.is_empty() && !words.contains(&word) {
-        out.add(path, not_one_of(&format!("{word:?}"), &words));
-    }
+/// The variant with the tag of a table.
+fn chosen<'a>(variants: &'a [Json], tag: &str, value: &Value) -> Option<&'a Json> {
+    let word = value.get(tag)?.as_str()?;
+    let mut variants = variants.iter();
+    variants.find(|variant| constant(&variant["properties"][tag]) == Some(word))
 }
 
 pub(super) fn join(path: &str, key: &str) -> String {
-    if path.is_empty() {
-        key.to_string()
-    } else {
-        format!("{path}.{key}")
-    }
-}
-
-fn is(keywords: &Map<String, Json>, kind: &str) -> bool {
-    match keywords.get("type") {
-        Some(Json::String(one)) => one == kind,
-        Some(Json::Array(several)) => several.iter().any(|one| one == kind),
-        _ => false,
+    match path.is_empty() {
+        true => key.to_string(),
+        false => format!("{path}.{key}"),
     }
 }
 
@@ -249,55 +245,52 @@ fn constant(schema: &Json) -> Option<&str> {
     schema.get("const").and_then(Json::as_str)
 }
 
-/// The property that holds a constant in this variant.
+/// The property of a variant with a constant.
 fn tag_of(variant: &Json) -> Option<String> {
-    let properties = variant.get("properties")?.as_object()?;
-    properties
-        .iter()
-        .find(|(_, schema)| constant(schema).is_some())
-        .map(|(key, _)| key.clone())
+    let mut properties = variant.get("properties")?.as_object()?.iter();
+    let (key, _) = properties.find(|(_, schema)| constant(schema).is_some())?;
+    Some(key.clone())
 }
 
-fn unknown_key(path: &str, key: &str, properties: &Map<String, Json>, out: &mut Findings) {
-    let path = join(path, key);
-    let nearest = nearest(key, properties.keys().map(String::as_str));
-    let what = match (new_name(&path), nearest) {
-        (Some(new), _) => format!("is an earlier name; it is called `{new}` now"),
-        (None, Some(nearest)) => format!("is not a setting; the nearest is `{nearest}`"),
-        (None, None) => "is not a setting; this table has none".into(),
-    };
-    out.add(&path, what);
+fn unknown_key(table: &str, key: &str, properties: &Map<String, Json>) -> String {
+    if let Some(new) = new_name(&join(table, key)) {
+        return format!("is an earlier name; it is called `{new}` now");
+    }
+    match nearest(key, properties.keys().map(String::as_str)) {
+        Some(nearest) => format!("is not a setting; the nearest is `{nearest}`"),
+        None => "is not a setting; this table has none".into(),
+    }
 }
 
 fn not_one_of(given: &str, words: &[&str]) -> String {
-    format!("is {given}; allowed is {}", words.join(", "))
+    format!("is {given}; choose one of {}", words.join(", "))
 }
 
-fn wrong_type(keywords: &Map<String, Json>, given: &Value, path: &str) -> String {
-    let wanted = ["number", "integer", "string", "boolean", "array", "object"]
-        .into_iter()
-        .find(|t| is(keywords, t));
-    let wanted = wanted.map_or(
-        "something else",
-        |t| if t == "object" { "table" } else { t },
-    );
+/// The types in the schema, with an article.
+const TYPES: [(&str, &str); 6] = [
+    ("number", "a number"),
+    ("integer", "an integer"),
+    ("string", "a string"),
+    ("boolean", "a boolean"),
+    ("array", "an array"),
+    ("object", "a table"),
+];
+
+fn wrong_type(keywords: &Keywords, given: &Value, path: &str) -> String {
+    let wanted = TYPES.into_iter().find(|(kind, _)| keywords.is(kind));
+    let (kind, wanted) = wanted.unwrap_or(("", "another type"));
     let quantity: Option<Quantity> = given.as_str().and_then(|text| text.parse().ok());
-    match quantity.filter(|_| wanted == "number") {
-        Some(quantity) => {
-            let si = quantity.si(Dimension::of_key(path));
-            let remedy = si.map_or_else(|error| error.to_string(), |x| format!("write {x}"));
-            format!("is the text {given}, not a number; settings are in SI units: {remedy}")
-        }
-        None => {
-            let article = if wanted.starts_with(['a', 'i']) {
-                "an"
-            } else {
-                "a"
-            };
-            format!(
-                "is {given}, {} where {article} {wanted} belongs",
-                given.type_str()
-            )
-        }
+    match quantity.filter(|_| kind == "number") {
+        Some(quantity) => text_for_number(given, &quantity, path),
+        None => format!(
+            "is {given}, of the type {}; {wanted} is expected",
+            given.type_str()
+        ),
     }
+}
+
+fn text_for_number(given: &Value, quantity: &Quantity, path: &str) -> String {
+    let si = quantity.si(Dimension::of_key(path));
+    let remedy = si.map_or_else(|error| error.to_string(), |x| format!("write {x}"));
+    format!("is the text {given}, not a number; settings are in SI units: {remedy}")
 }

@@ -9,18 +9,18 @@ use crate::excitation::ReferenceSettings;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ControlSettings {
-    /// `fast`, `slow`, or the path of a TOML file with sections.
+    /// Name of a controller (`fast`, `slow`, ...), or the path of a TOML file with sections.
     pub controller: String,
     /// A loop with a smaller modulus margin (1/max|S|), or an unstable one, is refused; 0 refuses none.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_modulus_margin: f64,
-    /// Zero current before the loop closes, in seconds; the mean position over it is the rest position, from which the reference counts.
+    /// Time with zero current before the loop closes, in seconds. The mean position over this time is the rest position; the reference is relative to it.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub settle_s: f64,
-    /// Length of the run after the loop closed, in seconds.
+    /// Duration of the run after the loop has closed, in seconds.
     #[schemars(range(min = 0.001, max = 1000000.0))]
     pub duration_s: f64,
-    /// Seconds after the last change of the reference from which on the steady state is measured.
+    /// Time from the last change of the reference to the begin of the steady state, in seconds.
     #[schemars(range(min = 0.0, max = 1000000.0))]
     pub steady_after_s: f64,
     /// The reference.

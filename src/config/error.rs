@@ -5,23 +5,23 @@ use std::path::PathBuf;
 /// A configuration that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
-    /// Neither a profile nor a file.
+    /// The name is neither that of a profile or controller nor that of a file.
     #[error("no {what} and no file has the name `{name}`; \
-        {}give a file with its path", if known.is_empty() { String::new() } else { format!("there are {known}; ") })]
+        {}give the path of a file", if known.is_empty() { String::new() } else { format!("choose one of {known}, or ") })]
     NotFound {
         /// Profile or controller.
         what: &'static str,
-        /// What was asked for.
+        /// The given name.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: String,
     },
-    /// The file is there but cannot be read.
-    #[error("cannot read {path}: {why}")]
+    /// The file exists but cannot be read.
+    #[error("cannot read {path}: {why}; check that it is a file and that you may read it")]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's words.
+        /// The error of the operating system.
         why: String,
     },
     /// The text is not TOML.
@@ -41,7 +41,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// The file, line or option that is wrong; of several the first.
+    /// The file, line or option of the first error.
     pub fn place(&self) -> Option<String> {
         match self {
             ConfigError::NotFound { name, .. } => Some(name.clone()),

@@ -5,16 +5,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::excitation::ExcitationKind;
 
-/// Which excitation `bench chirp` uses. `[chirp]` holds band, quiet before and after, fades and amplitude over frequency of
-/// all kinds.
+/// The choice of the excitation of `bench chirp`. Band, quiet times, fades and amplitude over frequency of all kinds are in
+/// `[chirp]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExcitationSettings {
-    /// Which kind.
+    /// Kind of the excitation.
     pub kind: ExcitationKind,
 }
 
-/// What `bench chirp --shape` aims at.
+/// The target of `bench chirp --shape`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeSettings {
@@ -22,7 +22,7 @@ pub struct ShapeSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-12, max = 1.0))]
     pub travel_m: Option<f64>,
-    /// Share of what motor and amplifier allow that the current may have.
+    /// Largest current, as a ratio of the current that motor and amplifier allow.
     #[schemars(range(min = 0.001, max = 1.0))]
     pub current_ratio: f64,
 }

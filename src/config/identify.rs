@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum IdentifySettings {
-    /// By smooth curves through neighbouring frequencies of the transform of the whole record: no leakage where it begins and
-    /// ends at rest.
+    /// Local models, fitted to neighbouring frequencies of the transform of the whole record. There is no leakage if the record
+    /// begins and ends at rest.
     Local(EstimatorSettings),
-    /// Over segments in time (Welch): Hann windows, half overlapped.
+    /// Averages over segments of time (Welch), with Hann windows and an overlap of one half.
     Welch {
-        /// Length of a segment in seconds.
+        /// Duration of a segment in seconds.
         #[schemars(range(min = 0.001, max = 100000.0))]
         segment_s: f64,
-        /// Which signal has noise.
+        /// The signal with noise.
         #[serde(default)]
         estimator: Estimator,
     },
 }
 
-/// The local estimator: resolution, grid, and shape of the curves.
+/// The local estimator: resolution, frequencies, and local model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EstimatorSettings {
@@ -31,21 +31,21 @@ pub struct EstimatorSettings {
     /// Smallest half-width in bins of the record's transform.
     #[schemars(range(min = 2, max = 10000))]
     pub min_half_width_bins: usize,
-    /// Half-width over frequency in place of the ratio, in rising order: straight lines on logarithmic axes, constant outside.
+    /// Half-width over frequency, instead of the ratio, in rising order: straight lines on logarithmic axes, constant outside.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 64))]
     pub resolution: Vec<ResolutionPoint>,
-    /// So many frequencies, evenly on a logarithmic axis; without it they are half of a half-width apart.
+    /// Number of frequencies, evenly spaced on a logarithmic axis; if absent, their distance is half of the half-width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 2, max = 1000000))]
     pub frequencies: Option<usize>,
-    /// The shape of the response within a neighbourhood.
+    /// The model of the response within a neighbourhood.
     #[serde(default)]
     pub curve: LocalModel,
-    /// Which signal has noise.
+    /// The signal with noise.
     #[serde(default)]
     pub estimator: Estimator,
-    /// Whether the record begins or ends in motion: what that leaves in the transform is then estimated with the response.
+    /// Whether the record begins or ends in motion: the transient in the transform is then estimated together with the response.
     #[serde(default)]
     pub transient: bool,
 }
@@ -86,28 +86,28 @@ pub struct ResolutionPoint {
     pub half_width_hz: f64,
 }
 
-/// What shape a response is given within a neighbourhood of frequencies.
+/// The model of the response within a neighbourhood of frequencies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LocalModel {
-    /// A constant: the weighted mean. Its bias grows with the square of the half-width.
+    /// A constant, the weighted mean. The bias grows with the square of the half-width.
     Constant,
-    /// A parabola: bias of the fourth power.
+    /// A parabola. The bias grows with the fourth power of the half-width.
     Polynomial,
-    /// A parabola over a straight line, a pole, where the data call for one; else a parabola.
+    /// A parabola divided by a straight line, which is a pole, if the data require one; otherwise a parabola.
     #[default]
     Rational,
 }
 
-/// Which signal has noise, and so which estimate of H is without bias.
+/// The signal with noise, which decides which estimate of H has no bias.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {
-    /// The output: what a bench has, whose command is known exactly.
+    /// The output. This is the case on a bench, where the command is known exactly.
     #[default]
     H1,
     /// The input.
     H2,
-    /// Both, in the same ratio to the signal: the geometric mean of H1 and H2.
+    /// Both signals, with the same ratio of noise to signal: the geometric mean of H1 and H2.
     Hv,
 }

@@ -1,4 +1,4 @@
-//! What trips.
+//! Limits of the interlocks.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,25 +7,25 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InterlockSettings {
-    /// Travel in either direction, in metres.
+    /// Largest travel in either direction, in metres.
     #[schemars(range(min = 1e-9, max = 1.0))]
     pub soft_limit_m: f64,
     /// Largest age of a reading in seconds.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub probe_stale_s: f64,
-    /// Longest time in seconds for which a reading may not change while the current does.
+    /// Longest time in seconds for which the reading may stay constant while the current changes.
     #[schemars(range(min = 1e-4, max = 100.0))]
     pub probe_stuck_s: f64,
-    /// The change of current in amperes that a reading must answer.
+    /// Change of the current in amperes after which the reading must change.
     #[schemars(range(min = 1e-6, max = 1000.0))]
     pub probe_stuck_current_a: f64,
-    /// How far the current that the amplifier measures may lie from the commands, in amperes.
+    /// Largest difference between the current that the amplifier measures and the command, in amperes.
     #[schemars(range(min = 1e-6, max = 1000.0))]
     pub current_error_a: f64,
-    /// Over how long a time in seconds; longer than the amplifier's status is late.
+    /// Longest duration of a larger difference, in seconds; it must exceed the delay of the amplifier's status.
     #[schemars(range(min = 1e-4, max = 100.0))]
     pub current_error_s: f64,
-    /// Ticks that may be missed within one second.
+    /// Largest number of missed ticks within one second.
     #[schemars(range(min = 0, max = 1000000))]
     pub overruns_per_s: u32,
 }

@@ -1,8 +1,10 @@
-//! Layers of TOML, the later one over the earlier ones.
+//! Layers of TOML; a later layer overrides the earlier ones.
 
 use toml::{Table, Value};
 
 use super::ConfigError;
+use super::place::line_of;
+use super::profiles::EmbeddedFile;
 
 /// One layer of settings, with the text it came from.
 pub(super) struct Layer {
@@ -15,6 +17,11 @@ impl Layer {
     /// The name of the layer of all `--set`.
     pub const SETS: &str = "--set";
 
+    /// An embedded profile.
+    pub fn embedded(profile: EmbeddedFile) -> Result<Layer, ConfigError> {
+        Layer::parse(format!("profile {}", profile.name), profile.text.into())
+    }
+
     pub fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
         match text.parse::<Table>() {
             Ok(table) => Ok(Layer { name, text, table }),
@@ -23,6 +30,15 @@ impl Layer {
                 why: e.to_string(),
             }),
         }
+    }
+
+    /// Name of the layer and line of `path`, if the layer sets it.
+    pub fn place(&self, path: &str) -> Option<String> {
+        let line = line_of(&self.text, path)?;
+        Some(match self.name.as_str() {
+            Layer::SETS => self.name.clone(),
+            name => format!("{name} line {line}"),
+        })
     }
 }
 
@@ -38,7 +54,7 @@ pub(super) fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> b
     }
 }
 
-/// Tables of another `kind` or `model` have other keys: the new one replaces the old one.
+/// Whether two tables have the same `kind` and `model`. Tables of different kinds have different keys and are not merged.
 pub(super) fn same_kind(old: &Table, new: &Table) -> bool {
     ["kind", "model"]
         .iter()

@@ -12,13 +12,12 @@ use super::layer::{Layer, lay, same_kind};
 use super::overrides::{
     OptionSetting, convert_quantities, in_terms_of_option, options_table, sets,
 };
-use super::place::line_of;
 use super::profiles::{self, EmbeddedFile};
 use super::purpose::Purpose;
 use super::{Config, renamed, schema};
 use crate::util::finding::Finding;
 
-/// A profile or file, and single settings over it.
+/// A profile or file, and single settings that override it.
 ///
 /// ```
 /// use bench::config::{Source, load};
@@ -32,11 +31,11 @@ use crate::util::finding::Finding;
 pub struct Source {
     /// A profile's name or the path of a TOML file; the default profile if absent.
     pub config: Option<String>,
-    /// `KEY=VALUE`, the later one wins.
+    /// `KEY=VALUE`; a later entry overrides an earlier one.
     pub sets: Vec<String>,
     /// Settings that command-line options stand for, over all of `sets`.
     pub options: Vec<OptionSetting>,
-    /// Its use.
+    /// Purpose of the configuration.
     pub purpose: Purpose,
 }
 
@@ -45,7 +44,7 @@ pub fn load(source: &Source) -> Result<Config, ConfigError> {
     checked(&layers(source)?, &source.options, source.purpose)
 }
 
-/// Tables that recordings of earlier versions lack, which ran a chirp: they are those of the default profile.
+/// Tables that recordings of earlier versions lack. Those versions ran a chirp, so the tables of the default profile apply.
 const LATER: [&str; 6] = [
     "excitation",
     "multisine",
@@ -55,11 +54,11 @@ const LATER: [&str; 6] = [
     "campaign",
 ];
 
-/// The configuration that travels with a recording: whole, over nothing but the tables that are newer than it may be.
+/// The configuration in a recording. It is complete, except for tables that its version may not have had.
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
     if let Some(base) = profiles::find(profiles::PROFILES, profiles::DEFAULT) {
-        let mut base = Layer::parse(format!("profile {}", base.name), base.text.to_string())?;
+        let mut base = Layer::embedded(base)?;
         base.table.retain(|key, _| LATER.contains(&key));
         layers.push(base);
     }
@@ -75,16 +74,9 @@ fn checked(
     purpose: Purpose,
 ) -> Result<Config, ConfigError> {
     let schema = schema();
-    let mut merged = Table::new();
-    for layer in layers {
-        lay(&mut merged, &layer.table, same_kind);
-    }
-    lay(&mut merged, &options_table(options), same_kind);
-    let sets = layers.last().filter(|layer| layer.name == Layer::SETS);
-    let findings = sets.map(|sets| convert_quantities(&schema, &sets.table, &mut merged));
-    let merged = Value::Table(merged);
+    let (merged, findings) = merge(&schema, layers, options);
     let refuse = |findings| refuse(layers, options, findings, &schema, &merged);
-    refuse(findings.unwrap_or_default())?;
+    refuse(findings)?;
     refuse(check::check(&schema, &merged))?;
     let typed: Result<Config, toml::de::Error> = merged.clone().try_into();
     let config = typed.map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
@@ -92,19 +84,33 @@ fn checked(
     Ok(config)
 }
 
+/// All layers and options as one tree, and the errors in the quantities of `--set`.
+fn merge(schema: &Json, layers: &[Layer], options: &[OptionSetting]) -> (Value, Vec<Finding>) {
+    let mut merged = Table::new();
+    for layer in layers {
+        lay(&mut merged, &layer.table, same_kind);
+    }
+    lay(&mut merged, &options_table(options), same_kind);
+    let sets = layers.last().filter(|layer| layer.name == Layer::SETS);
+    let findings = sets.map(|sets| convert_quantities(schema, &sets.table, &mut merged));
+    (Value::Table(merged), findings.unwrap_or_default())
+}
+
 /// Checks a configuration that was changed after it was loaded.
 pub(crate) fn validate(config: &Config) -> Result<(), ConfigError> {
     let value = Value::try_from(config).map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
     let mut findings = check::check(&schema(), &value);
     findings.extend(cross_checks(config, Purpose::Model));
-    let lines: Vec<String> = findings
+    let lines = findings
         .iter()
-        .map(|f| format!("  `{}` {}", f.path, f.what))
-        .collect();
-    if lines.is_empty() {
-        Ok(())
-    } else {
-        Err(ConfigError::Refused(lines))
+        .map(|f| format!("  `{}` {}", f.path, f.what));
+    refuse_lines(lines.collect())
+}
+
+fn refuse_lines(lines: Vec<String>) -> Result<(), ConfigError> {
+    match lines.is_empty() {
+        true => Ok(()),
+        false => Err(ConfigError::Refused(lines)),
     }
 }
 
@@ -124,57 +130,35 @@ fn refuse(
     let mut lines: Vec<String> = findings.iter().map(line).collect();
     // One option may stand for several settings.
     lines.dedup();
-    match lines.is_empty() {
-        true => Ok(()),
-        false => Err(ConfigError::Refused(lines)),
-    }
+    refuse_lines(lines)
 }
 
-/// The last layer that sets `path`, with the line; or the last layer that sets something around it.
+/// The last layer that sets `path`, with the line; or the last layer that sets a table around it.
 fn place(layers: &[Layer], path: &str) -> String {
     let mut path = path;
     loop {
-        for layer in layers.iter().rev() {
-            if let Some(line) = line_of(&layer.text, path) {
-                return if layer.name == Layer::SETS {
-                    layer.name.clone()
-                } else {
-                    format!("{} line {line}", layer.name)
-                };
-            }
+        if let Some(place) = layers.iter().rev().find_map(|layer| layer.place(path)) {
+            return place;
         }
         match path.rsplit_once('.') {
             Some((outer, _)) => path = outer,
-            None => {
-                return layers
-                    .last()
-                    .map_or("the configuration".into(), |layer| layer.name.clone());
-            }
+            None => break,
         }
     }
+    let last = layers.last();
+    last.map_or("the configuration".into(), |layer| layer.name.clone())
 }
 
 fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
     let embedded = |name: &str| profiles::find(profiles::PROFILES, name);
-    let mut layers = Vec::new();
-    if let Some(base) = embedded(profiles::DEFAULT) {
-        layers.push(Layer::parse(
-            format!("profile {}", base.name),
-            base.text.to_string(),
-        )?);
-    }
-    match source.config.as_deref() {
-        None | Some(profiles::DEFAULT) => {}
-        Some(name) => match embedded(name) {
-            Some(profile) => layers.push(Layer::parse(
-                format!("profile {name}"),
-                profile.text.to_string(),
-            )?),
-            None => layers.push(Layer::parse(
-                name.to_string(),
-                read(name, profiles::PROFILES, "profile")?,
-            )?),
-        },
+    let base = embedded(profiles::DEFAULT).into_iter();
+    let mut layers: Vec<Layer> = base.map(Layer::embedded).collect::<Result<_, _>>()?;
+    let name = source.config.as_deref();
+    if let Some(name) = name.filter(|name| *name != profiles::DEFAULT) {
+        layers.push(match embedded(name) {
+            Some(profile) => Layer::embedded(profile)?,
+            None => Layer::parse(name.into(), read(name, profiles::PROFILES, "profile")?)?,
+        });
     }
     if !source.sets.is_empty() {
         layers.push(sets(&source.sets)?);
@@ -183,10 +167,9 @@ fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
 }
 
 fn read(name: &str, known: &[EmbeddedFile], what: &'static str) -> Result<String, ConfigError> {
-    let folder = if what == "controller" {
-        "controllers"
-    } else {
-        ""
+    let folder = match what {
+        "controller" => "controllers",
+        _ => "",
     };
     let own = profiles::own(name, folder);
     let path = own.as_deref().unwrap_or(Path::new(name));
@@ -220,7 +203,7 @@ pub(crate) fn text_of_file(name: &str, what: &'static str) -> Result<String, Con
     read(name, &[], what)
 }
 
-/// TOML of a type of its own, checked against the type's schema.
+/// Parses TOML of any type and checks it against the schema of the type.
 pub(crate) fn typed<T>(name: &str, text: &str) -> Result<T, ConfigError>
 where
     T: serde::de::DeserializeOwned + schemars::JsonSchema,

@@ -1,16 +1,16 @@
 //! Typed settings in SI units.
 //!
 //! ```text
-//!  stage.toml  <-  profile or file  <-  --set KEY=VALUE     three layers of TOML, the later one wins
+//!  stage.toml  <-  profile or file  <-  --set KEY=VALUE     three layers of TOML, a later one overrides earlier ones
 //!        \______________ merge ______________/
 //!                          |  check: keys, types and ranges against the schema made from the types
 //!                          |  deserialise: serde
 //!                          v  cross-checks between settings
-//!                       Config                              immutable from here on
+//!                       Config                              does not change during a run
 //! ```
 //!
-//! The types are the only description: the schema (`bench config schema`), the ranges that are enforced and the
-//! documentation of each key come from them; the values come from `bench-config/stage.toml`.
+//! The types define everything about a key: the schema (`bench config schema`), the range and the documentation are made from
+//! them. The default values are in `bench-config/stage.toml`.
 
 mod calibration;
 mod campaign;

@@ -1,5 +1,7 @@
 //! Settings made on the command line: `--set KEY=VALUE`, and options that stand for settings.
 
+use std::ops::RangeInclusive;
+
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
@@ -37,27 +39,31 @@ impl OptionSetting {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
-    /// `; did you mean 8mm?` for a number typed without a unit that is allowed with one.
+    /// `; did you mean 8mm?` for a number without a unit that would be allowed with one.
     fn hint(&self, path: &str, schema: &Json, merged: &Value) -> String {
-        let typed = self.option.rsplit(' ').next();
-        let number = typed.and_then(|text| text.parse::<f64>().ok());
-        let allowed = check::range_at(schema, merged, path);
-        let (Some(number), Some(allowed)) = (number, allowed) else {
+        let number = self.option.rsplit(' ').next();
+        let number = number.and_then(|text| text.parse::<f64>().ok());
+        let (Some(number), Some(allowed)) = (number, check::range_at(schema, merged, path)) else {
             return String::new();
         };
         if allowed.contains(&number) {
             return String::new();
         }
-        let mut readings = Dimension::of_key(path).other_readings(number, &allowed);
-        if path == Quantity::OPERATING_POINT && number.abs() <= 100.0 {
-            readings.insert(0, format!("{number}%"));
-        }
-        readings.truncate(2);
-        match readings.is_empty() {
-            true => String::new(),
-            false => format!("; did you mean {}?", readings.join(" or ")),
+        match readings(number, path, &allowed).as_slice() {
+            [] => String::new(),
+            readings => format!("; did you mean {}?", readings.join(" or ")),
         }
     }
+}
+
+/// Up to two quantities with units that the user may have meant.
+fn readings(number: f64, path: &str, allowed: &RangeInclusive<f64>) -> Vec<String> {
+    let mut readings = Dimension::of_key(path).other_readings(number, allowed);
+    if path == Quantity::OPERATING_POINT && number.abs() <= 100.0 {
+        readings.insert(0, format!("{number}%"));
+    }
+    readings.truncate(2);
+    readings
 }
 
 /// The settings of the options as a layer.
@@ -69,7 +75,7 @@ pub(super) fn options_table(options: &[OptionSetting]) -> Table {
     table
 }
 
-/// What is wrong with a setting in terms of the option that made it, if one did.
+/// The error of a setting in terms of the option that made the setting, if there is one.
 pub(super) fn in_terms_of_option(
     options: &[OptionSetting],
     finding: &Finding,
@@ -109,12 +115,10 @@ fn key_and_value(set: &str) -> Result<(&str, Value), &'static str> {
     if key.split('.').any(str::is_empty) {
         return Err("the key has an empty part");
     }
-    let parsed = format!("value = {text}").parse::<Table>().ok();
-    let parsed = parsed.and_then(|mut table| table.remove("value"));
-    Ok((
-        key,
-        parsed.unwrap_or_else(|| Value::String(text.trim_matches('"').into())),
-    ))
+    let table = format!("value = {text}").parse::<Table>().ok();
+    let value = table.and_then(|mut table| table.remove("value"));
+    let value = value.unwrap_or_else(|| text.trim_matches('"').into());
+    Ok((key, value))
 }
 
 fn lay_at(table: &mut Table, key: &str, value: Value) {
@@ -126,15 +130,15 @@ fn lay_at(table: &mut Table, key: &str, value: Value) {
     }
 }
 
-/// Turns the quantities with units among the values of `--set` into numbers, where a number belongs.
+/// Converts the quantities with units among the values of `--set` to numbers, if a number is expected.
 pub(super) fn convert_quantities(schema: &Json, sets: &Table, merged: &mut Table) -> Vec<Finding> {
     let mut texts = Vec::new();
     collect_texts(sets, "", &mut texts);
+    let tree = Value::Table(merged.clone());
+    texts.retain(|(path, _)| check::wants_number(schema, &tree, path));
     let mut findings = Vec::new();
     for (path, text) in texts {
-        let is_number = check::wants_number(schema, &Value::Table(merged.clone()), &path);
-        let quantity: Option<Quantity> = text.parse().ok();
-        let Some(quantity) = quantity.filter(|_| is_number) else {
+        let Ok(quantity) = text.parse::<Quantity>() else {
             continue;
         };
         match quantity.for_setting(&path, beam_length_m(merged)) {

@@ -1,37 +1,46 @@
-//! Where a key stands in a text.
+//! The line of a key in a text.
 
+use std::iter::Peekable;
+
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The line (from 1) of the dotted `path` in `text`, or of the innermost table on the way that is there.
+/// The line (from 1) of the dotted `path` in `text`, or of the innermost table of the path that exists.
 pub(super) fn line_of(text: &str, path: &str) -> Option<usize> {
     let document = DeTable::parse(text).ok()?;
     let mut table = document.get_ref();
     let mut found = None;
     let mut parts = path.split('.').peekable();
     while let Some(part) = parts.next() {
-        let (key, value) = table
-            .iter()
-            .find(|(key, _)| key.get_ref().as_ref() == part)?;
-        found = Some(key.span().start);
-        let mut value = value.get_ref();
-        while let DeValue::Array(items) = value {
-            let Some(item) = parts
-                .peek()
-                .and_then(|n| n.parse::<usize>().ok())
-                .and_then(|n| items.get(n))
-            else {
-                break;
-            };
-            parts.next();
-            found = Some(item.span().start);
-            value = item.get_ref();
-        }
+        let mut entries = table.iter();
+        let (key, value) = entries.find(|(key, _)| key.get_ref().as_ref() == part)?;
+        let (start, value) = item(value, &mut parts).unwrap_or((key.span().start, value.get_ref()));
+        found = Some(start);
         match value {
             DeValue::Table(inner) => table = inner,
             _ => break,
         }
     }
     found.map(|offset| 1 + text[..offset.min(text.len())].matches('\n').count())
+}
+
+/// The item of an array that the next parts of a path name, with its offset.
+fn item<'v, 'p>(
+    value: &'v Spanned<DeValue<'v>>,
+    parts: &mut Peekable<impl Iterator<Item = &'p str>>,
+) -> Option<(usize, &'v DeValue<'v>)> {
+    let mut found = None;
+    let mut value = value.get_ref();
+    while let DeValue::Array(items) = value {
+        let index = parts.peek().and_then(|part| part.parse::<usize>().ok());
+        let Some(item) = index.and_then(|index| items.get(index)) else {
+            break;
+        };
+        parts.next();
+        value = item.get_ref();
+        found = Some((item.span().start, value));
+    }
+    found
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ pub struct EmbeddedFile {
     pub text: &'static str,
 }
 
-/// The profile below all others.
+/// The profile that all others are laid over.
 pub const DEFAULT: &str = "stage";
 
 /// Embeds files of a folder of `bench-config/`, each by its name.
@@ -24,11 +24,11 @@ macro_rules! embedded {
     };
 }
 
-/// All profiles. A new one is one file and its name.
+/// All embedded profiles. To add one, add its file and its name here.
 pub const PROFILES: &[EmbeddedFile] =
     embedded!("": "stage", "chapter2", "xy", "three-mass", "four-mass", "lab");
 
-/// All controllers. A new one is one file and its name.
+/// All embedded controllers. To add one, add its file and its name here.
 pub const CONTROLLERS: &[EmbeddedFile] =
     embedded!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass");
 
@@ -39,10 +39,8 @@ pub fn find(list: &[EmbeddedFile], name: &str) -> Option<EmbeddedFile> {
 
 /// The names of a list, for messages.
 pub fn names(list: &[EmbeddedFile]) -> String {
-    list.iter()
-        .map(|entry| entry.name)
-        .collect::<Vec<_>>()
-        .join(", ")
+    let names: Vec<&str> = list.iter().map(|entry| entry.name).collect();
+    names.join(", ")
 }
 
 /// Folders of own profiles: `bench-config` where the program runs, and `bench` in the user's configuration folder. Own
@@ -62,24 +60,24 @@ pub fn own_folders() -> Vec<PathBuf> {
 pub fn own(name: &str, kind: &str) -> Option<PathBuf> {
     // A path is not a name.
     let is_name = Path::new(name).file_name().is_some_and(|file| file == name);
-    let files = own_folders()
-        .into_iter()
-        .map(|folder| folder.join(kind).join(format!("{name}.toml")));
-    files.into_iter().find(|file| is_name && file.is_file())
+    let folders = own_folders().into_iter().filter(|_| is_name);
+    let mut files = folders.map(|folder| folder.join(kind).join(format!("{name}.toml")));
+    files.find(|file| file.is_file())
 }
 
 /// Names and files of all own profiles.
 pub fn own_profiles() -> Vec<(String, PathBuf)> {
-    let mut found = Vec::new();
-    for folder in own_folders() {
-        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        let files = entries
-            .map(|entry| entry.path())
-            .filter(|path| path.is_file());
-        let files = files.filter(|path| path.extension().is_some_and(|end| end == "toml"));
-        let named = files.filter_map(|path| Some((path.file_stem()?.to_str()?.to_string(), path)));
-        found.extend(named);
-    }
-    found.sort();
-    found
+    let folders = own_folders().into_iter();
+    let mut profiles: Vec<_> = folders.flat_map(|folder| profiles_in(&folder)).collect();
+    profiles.sort();
+    profiles
+}
+
+fn profiles_in(folder: &Path) -> Vec<(String, PathBuf)> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    let files =
+        paths.filter(|path| path.is_file() && path.extension().is_some_and(|e| e == "toml"));
+    let named = files.filter_map(|path| Some((path.file_stem()?.to_str()?.to_string(), path)));
+    named.collect()
 }

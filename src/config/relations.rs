@@ -11,7 +11,7 @@ pub(super) fn plant(config: &Config) -> Vec<Finding> {
     {
         let model = config.plant.model();
         let what = format!(
-            "is \"quadratic\", which is simulated for the model `sr4dof` alone, not for `{model}`; take \"linear\""
+            "is \"quadratic\", which is simulated only for the model `sr4dof`, not for `{model}`; use \"linear\""
         );
         findings.push(Finding::new("sim.geometry", what));
     }
@@ -19,8 +19,8 @@ pub(super) fn plant(config: &Config) -> Vec<Finding> {
     findings
 }
 
-/// Least m2/m3 - 1 of the simulated stage: the least that `plant.mass_asymmetry` may be.
-const LEAST_ASYMMETRY: f64 = -0.9;
+/// Smallest m2/m3 - 1 of the simulated stage: the lower limit of `plant.mass_asymmetry`.
+const MIN_ASYMMETRY: f64 = -0.9;
 
 fn asymmetry_offset(config: &Config) -> Option<Finding> {
     let offset = config.sim.asymmetry_offset;
@@ -30,7 +30,7 @@ fn asymmetry_offset(config: &Config) -> Option<Finding> {
         return (offset != 0.0).then(|| Finding::new("sim.asymmetry_offset", what));
     };
     let what = format!(
-        "is {offset}, which with plant.mass_asymmetry = {asymmetry} is below {LEAST_ASYMMETRY}: too little is left of m2"
+        "is {offset}, which together with plant.mass_asymmetry = {asymmetry} is below {MIN_ASYMMETRY}: m2 would be too small"
     );
-    (asymmetry + offset < LEAST_ASYMMETRY).then(|| Finding::new("sim.asymmetry_offset", what))
+    (asymmetry + offset < MIN_ASYMMETRY).then(|| Finding::new("sim.asymmetry_offset", what))
 }

@@ -1,4 +1,4 @@
-//! Motor, amplifier and probe; what device stands behind an interface is in [`super::devices`].
+//! Motor, amplifier and probe. The devices behind amplifier and probe are in [`super::devices`].
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,10 +12,10 @@ pub struct MotorSettings {
     /// Force constant in newtons per ampere; positive current gives positive force.
     #[schemars(range(min = 1e-6, max = 1e4))]
     pub force_constant_n_per_a: f64,
-    /// Peak force in newtons: a command beyond it trips.
+    /// Peak force in newtons: a larger command trips.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub peak_force_n: f64,
-    /// Continuous force in newtons: the thermal current may not exceed it.
+    /// Continuous force in newtons, which limits the thermal current.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub continuous_force_n: f64,
     /// Thermal time constant of the winding in seconds.
@@ -35,7 +35,7 @@ impl MotorSettings {
     }
 }
 
-/// The current amplifier: the current follows the limited command through a first order lag.
+/// The current amplifier: the current follows the limited command with a first-order lag.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AmplifierSettings {
@@ -48,11 +48,11 @@ pub struct AmplifierSettings {
     /// Largest change of the current's set-point in amperes per second.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub slew_limit_a_per_s: f64,
-    /// From the moment a command is due to the moment its set-point acts, in seconds: bus and drive. Whole periods of
-    /// computing stand in `loop.computing_delay_periods`, the current loop's own lag in `bandwidth_hz`.
+    /// Delay of bus and drive: from the time at which a command is due to the time at which its set-point takes effect, in seconds.
+    /// The computing delay is in `loop.computing_delay_periods`, the lag of the current loop in `bandwidth_hz`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub latency_s: f64,
-    /// What stands behind the interface.
+    /// The device.
     pub device: AmplifierDevice,
 }
 
@@ -60,20 +60,20 @@ pub struct AmplifierSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSettings {
-    /// Full range in metres; readings go from minus to plus half of it.
+    /// Full range in metres; readings are between minus half and plus half of it.
     #[schemars(range(min = 1e-9, max = 1.0))]
     pub range_m: f64,
-    /// Readings that arrive in a second, by a clock of the probe's own; absent if each tick has a reading of its very moment.
+    /// Readings per second, by the clock of the probe; absent if each tick has a reading of the same time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 1e6))]
     pub rate_hz: Option<f64>,
-    /// From a measurement to the moment the probe could tell it (filters, computing), in seconds.
+    /// Delay inside the probe (filters, computing), in seconds.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub latency_s: f64,
-    /// From that moment to the arrival of the whole reading (request, line), in seconds.
+    /// Delay of the transmission (request, line) until the whole reading has arrived, in seconds.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub transport_s: f64,
-    /// What stands behind the interface.
+    /// The device.
     pub device: ProbeDevice,
 }
 

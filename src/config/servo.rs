@@ -10,13 +10,13 @@ pub struct LoopSettings {
     /// Servo rate in ticks per second.
     #[schemars(range(min = 1.0, max = 100000.0))]
     pub rate_hz: f64,
-    /// Whole periods between a measurement and the moment its command acts.
+    /// Whole periods from a measurement to the time at which its command takes effect.
     #[schemars(range(min = 0, max = 8))]
     pub computing_delay_periods: u32,
-    /// SCHED_FIFO priority of the loop's thread in real time.
+    /// SCHED_FIFO priority of the thread of the loop, at real-time pace.
     #[schemars(range(min = 1, max = 98))]
     pub priority: i32,
-    /// Processor to bind the loop's thread to; left to the scheduler if absent.
+    /// Processor to which the thread of the loop is bound; if absent, the scheduler chooses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 1023))]
     pub cpu: Option<usize>,

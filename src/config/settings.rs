@@ -1,5 +1,5 @@
-//! All settings. The range of each stands at its type and nowhere else; a flattened table excludes `deny_unknown_fields`, so
-//! that the schema refuses unknown tables.
+//! All settings. The range of each setting is defined at its type only. `deny_unknown_fields` cannot be used with a flattened
+//! table, so the schema refuses unknown tables.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use crate::excitation::{
     ChirpSettings, ChosenExcitation, ExcitationTables, Limits, SharedSettings,
 };
 
-/// Everything a run depends on.
+/// All settings of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(title = "bench configuration", extend("additionalProperties" = false))]
 pub struct Config {
@@ -27,7 +27,7 @@ pub struct Config {
     /// The real-time loop.
     #[serde(rename = "loop")]
     pub servo: LoopSettings,
-    /// The mechanics.
+    /// The model of the mechanics.
     pub plant: PlantSettings,
     /// The voice coil motor.
     pub motor: MotorSettings,
@@ -39,14 +39,14 @@ pub struct Config {
     pub interlock: InterlockSettings,
     /// The simulated rig.
     pub sim: SimSettings,
-    /// Which excitation `bench chirp` uses.
+    /// The choice of the excitation of `bench chirp`.
     pub excitation: ExcitationSettings,
-    /// The chirp; and band, quiet, fades and amplitude over frequency of every excitation.
+    /// The chirp, and band, quiet times, fades and amplitude over frequency of every excitation.
     pub chirp: ChirpSettings,
     /// The tables of the other excitations.
     #[serde(flatten)]
     pub excitations: ExcitationTables,
-    /// What `bench chirp --shape` aims at.
+    /// The target of `bench chirp --shape`.
     pub shape: ShapeSettings,
     /// How the frequency response is estimated.
     pub identify: IdentifySettings,
@@ -81,7 +81,7 @@ impl Config {
         )
     }
 
-    /// What an excitation must keep within.
+    /// The limits of an excitation.
     pub fn excitation_limits(&self) -> Limits {
         Limits {
             travel_m: self.interlock.soft_limit_m,

@@ -1,36 +1,35 @@
-//! The simulated rig beyond the plant's model.
+//! Properties of the simulated rig that are not in the model of the plant.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the simulated stage obeys its constraints.
+/// The constraints of the simulated stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Geometry {
-    /// Linearised about the operating point, as the model is.
+    /// Linearised at the operating point, as in the model.
     #[default]
     Linear,
-    /// As they are, x_i - x_j = -0.6 (y_i - y_j)^2/L: the response depends on the amplitude. Plant `sr4dof` only.
+    /// Quadratic, x_i - x_j = -0.6 (y_i - y_j)^2/L: the response depends on the amplitude. Only for the plant `sr4dof`.
     Quadratic,
 }
 
-/// The simulated rig beyond the plant's model.
+/// Properties of the simulated rig that are not in the model of the plant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimSettings {
     /// The constraints of the simulated stage, linearised or not.
     #[serde(default)]
     pub geometry: Geometry,
-    /// Mass asymmetry m2/m3 - 1 of the simulated stage in addition to `plant.mass_asymmetry`, unknown to the analysis:
-    /// an
-    /// initial asymmetry by manufacture (section 5.2.2). Plant `sr4dof` only.
+    /// Mass asymmetry m2/m3 - 1 of the simulated stage in addition to `plant.mass_asymmetry`: an initial asymmetry by manufacture
+    /// (section 5.2.2) that the analysis does not know. Only for the plant `sr4dof`.
     #[serde(default)]
     #[schemars(range(min = -0.5, max = 0.5))]
     pub asymmetry_offset: f64,
-    /// Seed of noise and disturbance.
+    /// Seed of noise and disturbances.
     #[schemars(range(min = 0, max = 9223372036854775807i64))]
     pub seed: u64,
-    /// White noise of the probe, RMS a reading, in metres.
+    /// RMS of the white noise of a reading, in metres.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub probe_noise_rms_m: f64,
     /// Quantisation of the probe in metres; 0 for none.
@@ -45,13 +44,13 @@ pub struct SimSettings {
     /// Damping of the stop in newton-seconds per metre.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub stop_damping_n_s_per_m: f64,
-    /// Modes of the rig that the plant's model leaves out.
+    /// Modes of the rig that are not in the model of the plant.
     pub unmodelled: Vec<UnmodelledMode>,
-    /// Lines of the floor's acceleration in X.
+    /// Lines of the acceleration of the floor in X.
     pub floor: Vec<FloorLine>,
 }
 
-/// A mode of the rig that the plant's model leaves out.
+/// A mode of the rig that is not in the model of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UnmodelledMode {
@@ -66,14 +65,14 @@ pub struct UnmodelledMode {
     pub residue_per_kg: f64,
 }
 
-/// White noise through the band-pass 2 zeta w s/(s^2 + 2 zeta w s + w^2), scaled to an RMS acceleration.
+/// White noise filtered by the band-pass 2 zeta w s/(s^2 + 2 zeta w s + w^2) and scaled to an RMS acceleration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FloorLine {
     /// Centre frequency in hertz.
     #[schemars(range(min = 0.01, max = 1e5))]
     pub frequency_hz: f64,
-    /// Damping ratio: the line's full width at half power is 2 zeta times its frequency.
+    /// Damping ratio zeta: the full width of the line at half power is 2 zeta times its frequency.
     #[schemars(range(min = 1e-4, max = 0.99))]
     pub damping_ratio: f64,
     /// RMS of the line in m/s^2.
