@@ -28,16 +28,14 @@ pub(super) fn examine(amplifier: &AmplifierSettings, servo: &LoopSettings, repor
             let settings = drive_settings(device, requirements);
             examine_load(bus_load::of_drive(&settings), report);
             if let Some(host) = open_bus(&device.interface, device.bit_rate, report) {
-                let maximum_ratio = device.maximum_current_ratio;
-                examine_canopen_drive(&host, &settings, maximum_ratio, report);
+                examine_canopen_drive(&host, &settings, device.maximum_current_ratio, report);
             }
         }
         AmplifierDevice::Vesc(device) => {
-            let bit_rate = device.bit_rate;
-            examine_load(bus_load::of_vesc(servo.rate_hz, bit_rate), report);
-            if let Some(host) = open_bus(&device.interface, bit_rate, report) {
-                let settings = driver_settings(device, requirements);
-                examine_vesc(&host, &settings, bit_rate, report);
+            let settings = driver_settings(device, requirements);
+            examine_load(bus_load::of_vesc(servo.rate_hz, device.bit_rate), report);
+            if let Some(host) = open_bus(&device.interface, device.bit_rate, report) {
+                examine_vesc(&host, &settings, device.bit_rate, report);
             }
         }
     }

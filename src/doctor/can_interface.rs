@@ -1,4 +1,4 @@
-//! The CAN interface: does it exist, is it up, at the configured bit rate, and without errors?
+//! The CAN interface: whether it exists, is up at the configured bit rate, and has no errors.
 
 use std::path::Path;
 
@@ -96,25 +96,24 @@ fn absent(facts: &InterfaceFacts) -> Finding {
         true => "this machine has no CAN interface".into(),
         false => format!("the CAN interfaces are {}", facts.others.join(", ")),
     };
-    if let Link::Unreadable(why) = &facts.link {
-        let remedy = format!("`ip -details link show {name}` may show more");
-        let what = format!("the state of {name} cannot be read: {why}");
-        return Subject::CanInterface.failure(what, remedy);
-    }
-    let what = match facts.link {
+    let what = match &facts.link {
+        Link::Unreadable(why) => {
+            let what = format!("the state of {name} cannot be read: {why}");
+            let remedy = format!("`ip -details link show {name}` may show more");
+            return Subject::CanInterface.failure(what, remedy);
+        }
         Link::NotCan => format!("{name} is not a CAN interface; {others}"),
         _ => format!("{name} does not exist; {others}"),
     };
-    let remedy = "connect the adapter and load its driver (`dmesg` names it), or correct amplifier.device.interface";
-    Subject::CanInterface.failure(what, remedy)
+    Subject::CanInterface.failure(what, ABSENT_REMEDY)
 }
+
+const ABSENT_REMEDY: &str = "connect the adapter and load its driver (`dmesg` names it), or correct amplifier.device.interface";
 
 fn judge(facts: &InterfaceFacts, interface: &Interface) -> Vec<Finding> {
     let name = &facts.name;
-    let up = format!(
-        "`ip link set {name} up type can bitrate {}`",
-        facts.bit_rate
-    );
+    let bits_per_s = facts.bit_rate;
+    let up = format!("`ip link set {name} up type can bitrate {bits_per_s}`");
     if !interface.is_up {
         let remedy = format!("{up} (a virtual one: `ip link set {name} up`)");
         return vec![Subject::CanInterface.failure(format!("{name} is down"), remedy)];
@@ -142,22 +141,24 @@ fn bit_rate(facts: &InterfaceFacts, interface: &Interface, restart: &str) -> Fin
         ),
         None => Subject::CanInterface.note(
             format!("{name} is up and virtual: it has no bit rate and no wire"),
-            "for rehearsals only; for a real bus name its interface in amplifier.device.interface",
+            "for rehearsals only; for a real bus, set amplifier.device.interface to its interface",
         ),
     }
 }
 
+/// The remedy for errors on the bus.
+pub(super) const CHECK_BUS: &str =
+    "check cable, termination (120 ohms at both ends), bit rate, and the supply of the drive";
+
 fn controller_state(name: &str, interface: &Interface, restart: &str) -> Option<Finding> {
     let state = interface.state?;
     let what = format!("the controller of {name} is in state {state}");
-    let check =
-        "check cable, termination (120 ohms at both ends), bit rate, and the supply of the drive";
     Some(if !interface.is_healthy {
-        Subject::CanState.failure(what, format!("{check}; then {restart}"))
+        Subject::CanState.failure(what, format!("{CHECK_BUS}; then {restart}"))
     } else if state == "error active" {
         Subject::CanState.ok(what)
     } else {
-        Subject::CanState.warning(what, check)
+        Subject::CanState.warning(what, CHECK_BUS)
     })
 }
 

@@ -10,6 +10,7 @@ use bench_hal::can::frame::{CanFrame, Id};
 use bench_hal::can::{heartbeat, nmt, sync, vesc};
 use serde::Serialize;
 
+use super::can_interface::CHECK_BUS;
 use super::finding::{Finding, Subject};
 
 /// What was received.
@@ -139,12 +140,8 @@ impl BusTraffic {
 pub fn findings(traffic: &BusTraffic, node: u8, bit_rate: u32) -> Vec<Finding> {
     let mut findings = vec![nodes(traffic, bit_rate)];
     findings.extend(traffic.conditions.iter().filter_map(|c| condition(*c)));
-    findings.extend(
-        traffic
-            .emergencies
-            .iter()
-            .map(|(from, e)| emergency(*from, e)),
-    );
+    let emergencies = traffic.emergencies.iter();
+    findings.extend(emergencies.map(|(from, e)| emergency(*from, e)));
     findings.extend(other_master(traffic, node));
     findings
 }
@@ -198,11 +195,9 @@ fn condition(condition: Condition) -> Option<Finding> {
         Condition::Noise => "errors on the wire",
         Condition::Active => return None,
     };
-    let remedy =
-        "check cable, termination (120 ohms at both ends), bit rate, and the supply of the drive";
     Some(match condition {
-        Condition::BusOff | Condition::Passive => Subject::CanState.failure(what, remedy),
-        _ => Subject::CanState.warning(what, remedy),
+        Condition::BusOff | Condition::Passive => Subject::CanState.failure(what, CHECK_BUS),
+        _ => Subject::CanState.warning(what, CHECK_BUS),
     })
 }
 

@@ -1,15 +1,16 @@
-//! The CANopen drive: is it the configured one, and does it accept the configured run?
+//! The CANopen drive: whether it is the configured one and accepts the configured run.
 
 use bench_hal::can::cia402::{CYCLIC_TORQUE, REMOTE, State};
 use bench_hal::can::drive::{ABORT_CONNECTION, DriveSettings, Inspection};
 use bench_hal::can::emcy;
 use bench_hal::can::scale::{Reference, Scale};
+use bench_hal::can::sdo::Address;
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
 
 const DRIVE: Subject = Subject::Drive;
-/// The device profile of drives, in the lower half of 0x1000.
+/// The device profile of drives, in the lower 16 bits of 0x1000.
 const DRIVE_PROFILE: u32 = 402;
 /// Half the resolution of 0x6075 and 0x6072. The driver refuses larger differences.
 const TOLERANCE: f64 = 0.5e-3;
@@ -76,21 +77,25 @@ fn identity(inspection: &Inspection, settings: &DriveSettings) -> Finding {
     let name = inspection.name.as_deref().unwrap_or("without a name");
     let actual = fields.map(|(field, actual, _)| format!("{field} {}", hexadecimal(actual)));
     let what = format!("node {} is {name}: {}", settings.node, actual.join(", "));
-    let differs = |(_, actual, expected): &&(_, Option<u32>, Option<u32>)| {
-        expected.is_some() && actual != expected
-    };
-    if let Some((field, _, expected)) = fields.iter().find(differs) {
-        let expected = hexadecimal(*expected);
-        return DRIVE.failure(
-            format!("{what}; the configuration states {field} {expected}"),
-            "connect the right drive, or correct amplifier.device.identity",
-        );
+    if let Some(difference) = identity_difference(fields) {
+        let remedy = "connect the right drive, or correct amplifier.device.identity";
+        return DRIVE.failure(format!("{what}; {difference}"), remedy);
     }
     if vendor.is_none() {
         let what = format!("{what}; every CANopen node must report its vendor");
         return DRIVE.failure(what, "check that this is a CANopen drive");
     }
     DRIVE.ok(what)
+}
+
+/// The first configured field (name, actual value, configured value) that the drive reports differently.
+fn identity_difference(fields: [(&str, Option<u32>, Option<u32>); 4]) -> Option<String> {
+    let mut fields = fields.into_iter();
+    let differs =
+        |&(_, actual, expected): &(_, _, Option<u32>)| expected.is_some() && actual != expected;
+    let (field, _, expected) = fields.find(differs)?;
+    let expected = hexadecimal(expected);
+    Some(format!("the configuration states {field} {expected}"))
 }
 
 fn hexadecimal(number: Option<u32>) -> String {
@@ -108,22 +113,21 @@ fn profile(device_type: u32) -> Option<Finding> {
 }
 
 fn rated_current(actual_a: Option<f64>, settings: &DriveSettings) -> Finding {
-    let configured_a = settings.rated_current_a;
-    match actual_a {
-        Some(actual_a) if (actual_a - configured_a).abs() < TOLERANCE => {
-            DRIVE.ok(format!("rated current {actual_a} A, as configured"))
-        }
-        Some(actual_a) => DRIVE.failure(
-            format!(
-                "the rated current (0x6075) is {actual_a} A, the configuration states {configured_a} A: every current would be wrong"
-            ),
-            "correct amplifier.device.rated_current_a, or the drive with its commissioning program",
-        ),
-        None => DRIVE.failure(
-            format!("node {} does not report its rated current (0x6075)", settings.node),
-            "commission its motor first: the scale of the current depends on it",
-        ),
+    let (node, configured_a) = (settings.node, settings.rated_current_a);
+    let Some(actual_a) = actual_a else {
+        let what = format!("node {node} does not report its rated current (0x6075)");
+        let remedy = "commission its motor first: the scale of the current depends on it";
+        return DRIVE.failure(what, remedy);
+    };
+    if (actual_a - configured_a).abs() < TOLERANCE {
+        return DRIVE.ok(format!("rated current {actual_a} A, as configured"));
     }
+    DRIVE.failure(
+        format!(
+            "the rated current (0x6075) is {actual_a} A, the configuration states {configured_a} A: every current would be wrong"
+        ),
+        "correct amplifier.device.rated_current_a, or the drive with its commissioning program",
+    )
 }
 
 /// The resolution of the current and its limit.
@@ -140,17 +144,18 @@ fn resolution(
             Err(finding) => return Some(finding),
         },
     };
-    let limit_a = settings.current_limit_a;
-    Some(match Scale::new(reference_a, limit_a) {
-        Some(scale) => DRIVE.ok(format!(
-            "a count is {:.3} mA, the limit is {limit_a} A",
-            scale.step_a() * 1e3
-        )),
-        None => DRIVE.failure(
-            format!("a count is {reference_a} mA, more than the limit of {limit_a} A"),
-            "raise amplifier.current_limit_a",
-        ),
-    })
+    Some(count(reference_a, settings.current_limit_a))
+}
+
+fn count(reference_a: f64, limit_a: f64) -> Finding {
+    let Some(scale) = Scale::new(reference_a, limit_a) else {
+        let what = format!("a count is {reference_a} mA, more than the limit of {limit_a} A");
+        return DRIVE.failure(what, "raise amplifier.current_limit_a");
+    };
+    let count_ma = scale.step_a() * 1e3;
+    DRIVE.ok(format!(
+        "a count is {count_ma:.3} mA, the limit is {limit_a} A"
+    ))
 }
 
 /// The maximum that the target refers to, as a ratio of the rated current.
@@ -177,34 +182,35 @@ fn mode(supported: Option<u32>, settings: &DriveSettings) -> Finding {
     };
     match settings.mode.choose(supported) {
         Some(CYCLIC_TORQUE) => DRIVE.ok("mode of a run: cyclic synchronous torque (10)"),
-        Some(mode) => DRIVE.ok(format!("mode of a run: profile torque ({mode}), with its slope")),
+        Some(mode) => DRIVE.ok(format!(
+            "mode of a run: profile torque ({mode}), with its slope"
+        )),
         None => DRIVE.failure(
             format!("the drive has none of the configured modes (0x6502 is 0x{supported:08X})"),
-            "set amplifier.device.mode to one that it has: bit 9 is cyclic synchronous torque, bit 3 profile torque",
+            MODE_REMEDY,
         ),
     }
 }
 
+const MODE_REMEDY: &str = "set amplifier.device.mode to a mode of the drive: bit 9 is cyclic synchronous torque, bit 3 profile torque";
+
 /// Without these objects the drive does not stop when communication is lost.
 fn missing_objects(inspection: &Inspection, settings: &DriveSettings) -> Option<Finding> {
-    let needs_abort_connection = settings.abort_connection.is_some();
-    let missing: Vec<String> = inspection
-        .missing_objects
-        .iter()
-        .filter(|address| needs_abort_connection || **address != ABORT_CONNECTION)
-        .map(|address| address.to_string())
-        .collect();
+    let is_needed =
+        |address: &Address| settings.abort_connection.is_some() || *address != ABORT_CONNECTION;
+    let missing = inspection.missing_objects.iter();
+    let missing = missing.filter(|address| is_needed(address));
+    let missing: Vec<String> = missing.map(|address| address.to_string()).collect();
     if missing.is_empty() {
         return None;
     }
     let missing = missing.join(", ");
-    let remedy = "choose a drive that monitors its master; if only 0x6007 is missing, unplug the bus to verify that \
-                  the drive stops, then set amplifier.device.on_communication_loss = \"own_reaction\"";
-    Some(DRIVE.failure(
-        format!("the drive lacks {missing}: it would not stop when communication is lost"),
-        remedy,
-    ))
+    let what = format!("the drive lacks {missing}: it would not stop when communication is lost");
+    Some(DRIVE.failure(what, MISSING_OBJECTS_REMEDY))
 }
+
+const MISSING_OBJECTS_REMEDY: &str = "choose a drive that monitors its master; if only 0x6007 is missing, unplug the bus \
+    to verify that the drive stops, then set amplifier.device.on_communication_loss = \"own_reaction\"";
 
 fn state(statusword: Option<u16>) -> Vec<Finding> {
     let Some(statusword) = statusword else {
@@ -223,31 +229,45 @@ fn state(statusword: Option<u16>) -> Vec<Finding> {
 }
 
 fn power_state(statusword: u16) -> Finding {
-    let what = |state: &str| format!("state {state} (statusword 0x{statusword:04X})");
-    let fault = "remove the cause (see error register and past errors), then clear the fault with the drive's own \
-                 program or by switching its supply off and on";
-    match State::decode(statusword) {
-        Some(State::SwitchOnDisabled) => DRIVE.ok(what("switch on disabled")),
-        Some(State::ReadyToSwitchOn) => DRIVE.ok(what("ready to switch on")),
-        Some(State::SwitchedOn) => DRIVE.ok(what("switched on, without current")),
-        Some(State::NotReadyToSwitchOn) => DRIVE.warning(
-            what("not ready to switch on: it is starting"),
-            "wait, and check the supply of its power stage",
-        ),
-        Some(State::OperationEnabled) => DRIVE.warning(
-            what("operation enabled, by another program"),
-            "end the program that drives it; a run would switch it off first",
-        ),
-        Some(State::QuickStopActive) => DRIVE.warning(
-            what("quick stop"),
-            "find out what stopped it; a run would switch it off first",
-        ),
-        Some(State::FaultReactionActive) => DRIVE.failure(what("fault reaction"), fault),
-        Some(State::Fault) => DRIVE.failure(what("FAULT"), fault),
-        None => DRIVE.failure(
-            what("undefined by CiA 402"),
-            "check that this is a drive (CiA 402)",
-        ),
+    let state = State::decode(statusword);
+    let what = format!(
+        "state {} (statusword 0x{statusword:04X})",
+        state_text(state)
+    );
+    match state {
+        Some(State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn) => {
+            DRIVE.ok(what)
+        }
+        Some(State::NotReadyToSwitchOn) => {
+            DRIVE.warning(what, "wait, and check the supply of its power stage")
+        }
+        Some(State::OperationEnabled) => {
+            let remedy = "end the program that drives it; a run would switch it off first";
+            DRIVE.warning(what, remedy)
+        }
+        Some(State::QuickStopActive) => {
+            let remedy = "find out what stopped it; a run would switch it off first";
+            DRIVE.warning(what, remedy)
+        }
+        Some(State::FaultReactionActive | State::Fault) => DRIVE.failure(what, FAULT_REMEDY),
+        None => DRIVE.failure(what, "check that this is a drive (CiA 402)"),
+    }
+}
+
+const FAULT_REMEDY: &str = "remove the cause (see error register and past errors), then clear the fault with the program of \
+    the drive or by switching its supply off and on";
+
+fn state_text(state: Option<State>) -> &'static str {
+    match state {
+        Some(State::SwitchOnDisabled) => "switch on disabled",
+        Some(State::ReadyToSwitchOn) => "ready to switch on",
+        Some(State::SwitchedOn) => "switched on, without current",
+        Some(State::NotReadyToSwitchOn) => "not ready to switch on, the drive is starting",
+        Some(State::OperationEnabled) => "operation enabled, by another program",
+        Some(State::QuickStopActive) => "quick stop",
+        Some(State::FaultReactionActive) => "fault reaction",
+        Some(State::Fault) => "FAULT",
+        None => "undefined by CiA 402",
     }
 }
 

@@ -30,38 +30,56 @@ impl Severity {
     }
 }
 
-/// What was examined.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(into = "&'static str")]
-#[allow(missing_docs, reason = "the names say it")]
-pub enum Subject {
-    Configuration,
-    /// What concerns `bench chirp` only.
-    Chirp,
-    /// What concerns `bench control` only.
-    Control,
-    Kernel,
-    Clock,
-    Processors,
-    Throttling,
-    Loop,
-    Scheduler,
-    Memory,
-    Processor,
-    Lateness,
-    BusLoad,
-    CanKernel,
-    CanInterface,
-    CanState,
-    CanErrors,
-    CanRestart,
-    CanQueue,
-    CanNodes,
-    Drive,
-    Vesc,
-    SerialPort,
-    Readings,
-    Recordings,
+/// Defines the subjects, each with its name in the text output and in JSON.
+macro_rules! subjects {
+    ($($(#[$doc:meta])* $variant:ident = $name:literal,)+) => {
+        /// What was examined.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+        #[serde(into = "&'static str")]
+        #[allow(missing_docs, reason = "the names say it")]
+        pub enum Subject {
+            $($(#[$doc])* $variant,)+
+        }
+
+        impl Subject {
+            /// The name in the text output and in JSON.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Subject::$variant => $name,)+
+                }
+            }
+        }
+    };
+}
+
+subjects! {
+    Configuration = "configuration",
+    /// Only for `bench chirp`.
+    Chirp = "chirp",
+    /// Only for `bench control`.
+    Control = "control",
+    Kernel = "kernel",
+    Clock = "clock",
+    Processors = "processors",
+    Throttling = "throttling",
+    Loop = "loop",
+    Scheduler = "scheduler",
+    Memory = "memory",
+    Processor = "processor",
+    Lateness = "lateness",
+    BusLoad = "bus load",
+    CanKernel = "CAN kernel",
+    CanInterface = "CAN interface",
+    CanState = "CAN state",
+    CanErrors = "CAN errors",
+    CanRestart = "CAN restart",
+    CanQueue = "CAN queue",
+    CanNodes = "CAN nodes",
+    Drive = "drive",
+    Vesc = "VESC",
+    SerialPort = "serial port",
+    Readings = "readings",
+    Recordings = "recordings",
 }
 
 impl From<Subject> for &'static str {
@@ -71,37 +89,6 @@ impl From<Subject> for &'static str {
 }
 
 impl Subject {
-    /// The name in the text output and in JSON.
-    pub fn name(self) -> &'static str {
-        match self {
-            Subject::Configuration => "configuration",
-            Subject::Chirp => "chirp",
-            Subject::Control => "control",
-            Subject::Kernel => "kernel",
-            Subject::Clock => "clock",
-            Subject::Processors => "processors",
-            Subject::Throttling => "throttling",
-            Subject::Loop => "loop",
-            Subject::Scheduler => "scheduler",
-            Subject::Memory => "memory",
-            Subject::Processor => "processor",
-            Subject::Lateness => "lateness",
-            Subject::BusLoad => "bus load",
-            Subject::CanKernel => "CAN kernel",
-            Subject::CanInterface => "CAN interface",
-            Subject::CanState => "CAN state",
-            Subject::CanErrors => "CAN errors",
-            Subject::CanRestart => "CAN restart",
-            Subject::CanQueue => "CAN queue",
-            Subject::CanNodes => "CAN nodes",
-            Subject::Drive => "drive",
-            Subject::Vesc => "VESC",
-            Subject::SerialPort => "serial port",
-            Subject::Readings => "readings",
-            Subject::Recordings => "recordings",
-        }
-    }
-
     /// As it should be.
     pub fn ok(self, what: impl Into<String>) -> Finding {
         Finding::new(self, Severity::Ok, what, None)

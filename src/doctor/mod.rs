@@ -1,4 +1,4 @@
-//! `bench doctor`: could the configured runs start, and what could impair them? Nothing is moved.
+//! `bench doctor`: checks whether the configured runs could start, and what could impair them. Nothing is moved.
 //!
 //! ```text
 //!  system         kernel, clock, governor             \
@@ -54,9 +54,7 @@ pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
         false => Pace::Realtime,
     };
     let mut report = Report::default();
-    report.extend([runs::kinds(config)]);
-    report.extend(runs::findings(checks, config.control.min_modulus_margin));
-    report.figures.control = checks.control.as_ref().ok().cloned();
+    examine_configuration(config, checks, &mut report);
     examine_system(config, pace, &mut report);
     amplifier::examine(&config.amplifier, &config.servo, &mut report);
     examine_probe(config, &mut report);
@@ -65,6 +63,12 @@ pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
     report.figures.recordings = Some(space.figures());
     report.conclude();
     report
+}
+
+fn examine_configuration(config: &Config, checks: &RunChecks, report: &mut Report) {
+    report.extend([runs::kinds(config)]);
+    report.extend(runs::findings(checks, config.control.min_modulus_margin));
+    report.figures.control = checks.control.as_ref().ok().cloned();
 }
 
 fn examine_system(config: &Config, pace: Pace, report: &mut Report) {

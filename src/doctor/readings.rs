@@ -168,10 +168,20 @@ pub fn findings(
 }
 
 fn no_reading(readings: &Readings) -> Finding {
-    let (what, remedy) = if readings.out_of_range_looks > 0 {
+    let (what, remedy) = cause_without_reading(readings);
+    let what = format!(
+        "{what}: {} bytes, {} of them damaged, {} missing answers, {} faults",
+        readings.bytes, readings.damaged_bytes, readings.timeouts, readings.faults
+    );
+    Subject::Readings.failure(what, remedy)
+}
+
+/// Why there is no reading, with the remedy.
+fn cause_without_reading(readings: &Readings) -> (&'static str, &'static str) {
+    if readings.out_of_range_looks > 0 {
         (
             "the target is outside the probe's range",
-            "move probe or stage until the probe's own display shows a value",
+            "move probe or stage until the display of the probe shows a value",
         )
     } else if readings.bytes == 0 {
         (
@@ -181,19 +191,14 @@ fn no_reading(readings: &Readings) -> Finding {
     } else if readings.faults > 0 {
         (
             "the probe reports that it cannot measure",
-            "see its own display: target, cable, controller",
+            "see the display of the probe: target, cable, controller",
         )
     } else {
         (
             "bytes are received, but no reading",
             "check baud rate, parity and protocol in probe.device",
         )
-    };
-    let what = format!(
-        "{what}: {} bytes, {} of them damaged, {} missing answers, {} faults",
-        readings.bytes, readings.damaged_bytes, readings.timeouts, readings.faults
-    );
-    Subject::Readings.failure(what, remedy)
+    }
 }
 
 fn validity(readings: &Readings) -> Option<Finding> {
@@ -232,16 +237,18 @@ fn age(readings: &Readings, probe: &ProbeSettings, stale_s: f64) -> Finding {
         milliseconds(expected_s),
         milliseconds(stale_s)
     );
-    let remedy = "correct probe.latency_s, transport_s and rate_hz; low latency of the adapter and an idle machine reduce the age";
     if readings.age_max_s > stale_s {
-        let remedy = format!("{remedy}; or raise interlock.probe_stale_s if the loop allows it");
+        let remedy =
+            format!("{AGE_REMEDY}; or raise interlock.probe_stale_s if the loop allows it");
         Subject::Readings.failure(what, remedy)
     } else if readings.age_mean_s > 1.2 * expected_s {
-        Subject::Readings.warning(what, remedy)
+        Subject::Readings.warning(what, AGE_REMEDY)
     } else {
         Subject::Readings.ok(what)
     }
 }
+
+const AGE_REMEDY: &str = "correct probe.latency_s, transport_s and rate_hz; low latency of the adapter and an idle machine reduce the age";
 
 fn milliseconds(seconds: f64) -> String {
     format!("{:.2} ms", seconds * 1e3)
@@ -280,18 +287,16 @@ fn length(metres: f64) -> String {
 }
 
 fn damage(readings: &Readings) -> Finding {
-    let Readings {
-        gaps,
-        damaged_bytes,
-        timeouts,
-        faults,
-        watched_s,
-        ..
-    } = readings;
     let what = format!(
-        "within {watched_s:.1} s: {gaps} missing readings, {damaged_bytes} damaged bytes, {timeouts} missing answers, {faults} faults"
+        "within {:.1} s: {} missing readings, {} damaged bytes, {} missing answers, {} faults",
+        readings.watched_s,
+        readings.gaps,
+        readings.damaged_bytes,
+        readings.timeouts,
+        readings.faults
     );
-    if gaps + damaged_bytes + timeouts + faults == 0 {
+    let total = readings.gaps + readings.damaged_bytes + readings.timeouts + readings.faults;
+    if total == 0 {
         return Subject::Readings.ok(what);
     }
     let remedy =

@@ -1,4 +1,4 @@
-//! The folder for recordings: is it writable, and is there enough space for a run? Nothing is created in it.
+//! The folder for recordings: whether it is writable and has enough space for a run. Nothing is created in it.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ pub struct SpaceFacts {
     pub existing: PathBuf,
     /// Whether that is a folder.
     pub is_folder: bool,
-    /// Why it is not writable.
+    /// Why it is not writable, if it is not.
     pub not_writable: Option<String>,
     /// Free space in bytes.
     pub free_bytes: Option<u64>,

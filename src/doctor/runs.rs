@@ -1,4 +1,4 @@
-//! The commands' own checks of the configuration: would `bench chirp` and `bench control` accept it?
+//! The checks of the commands: whether `bench chirp` and `bench control` accept the configuration.
 
 use super::finding::{Finding, Subject};
 use crate::config::Config;
@@ -6,7 +6,7 @@ use crate::control::Margins;
 use crate::excitation::Excitation;
 use crate::rig::devices;
 
-/// The results of the commands' own checks.
+/// The results of the checks of the commands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunChecks {
     /// The travel in metres that `bench chirp` predicts, or why it refuses.
@@ -15,7 +15,7 @@ pub struct RunChecks {
     pub control: Result<Margins, String>,
 }
 
-/// Ticks of the longer run.
+/// Number of ticks of the longer one of both runs.
 pub fn longest_ticks(config: &Config) -> u64 {
     let control_s = config.control.settle_s + config.control.duration_s;
     let control_ticks = (control_s * config.servo.rate_hz).ceil() as u64;
@@ -73,7 +73,7 @@ fn judge_margins(margins: &Margins, min_modulus_margin: f64) -> Finding {
     Subject::Control.ok(format!("modulus margin {margin:.3} by the model; {limit}"))
 }
 
-/// The texts of the commands end with the remedy, if there is one.
+/// A refusal of a command, whose text ends with the remedy, if there is one.
 fn refused(subject: Subject, why: &str, default_remedy: &str) -> Finding {
     let finding = subject.refused(&why.trim_end_matches("; nothing was moved"));
     let remedy = finding.remedy.unwrap_or_else(|| default_remedy.to_string());

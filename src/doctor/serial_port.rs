@@ -1,5 +1,4 @@
-//! The serial port of the probe: does it exist, may it be opened, which process uses it, and which line settings did it
-//! accept?
+//! The serial port of the probe: whether it exists and may be opened, which process uses it, and which line settings it accepted.
 
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
@@ -137,16 +136,22 @@ pub fn finding(facts: &PortFacts) -> Finding {
         return no_permission(facts, device);
     }
     let what = format!("{path} exists, and {} may open it", facts.user);
+    match permanent_link(facts, device) {
+        None => PORT.ok(what),
+        Some(link) => {
+            let link = link.display();
+            let remedy =
+                format!("{link} keeps its name when the adapters are connected in another order");
+            PORT.note(what, remedy)
+        }
+    }
+}
+
+/// A link to the device by the name of the adapter, if the configuration does not use it.
+fn permanent_link<'a>(facts: &'a PortFacts, device: &Path) -> Option<&'a Path> {
     let mut links = facts.by_id.iter();
-    let link = links.find(|(link, target)| target == device && *link != facts.path);
-    let Some((link, _)) = link else {
-        return PORT.ok(what);
-    };
-    let remedy = format!(
-        "{} keeps its name when the adapters are connected in another order",
-        link.display()
-    );
-    PORT.note(what, remedy)
+    let (link, _) = links.find(|(link, target)| target == device && *link != facts.path)?;
+    Some(link)
 }
 
 fn existing_ports(facts: &PortFacts) -> String {
@@ -167,22 +172,28 @@ fn no_permission(facts: &PortFacts, device: &Path) -> Finding {
         device.display(),
         facts.groups.join(", ")
     );
+    PORT.failure(what, permission_remedy(facts, device))
+}
+
+fn permission_remedy(facts: &PortFacts, device: &Path) -> String {
+    let PortFacts { group, user, .. } = facts;
+    let group_may_open = facts.mode & 0o060 == 0o060 && group != "root";
     // The group of root would grant more than a port.
-    let group_for_port = if group == "root" { "dialout" } else { group };
-    let group_may_open = mode & 0o060 == 0o060 && group != "root";
-    let by_group = if group_may_open && !facts.groups.contains(group) {
-        format!("`sudo usermod -aG {group} {user}` and log in again")
-    } else {
-        format!(
-            "`sudo chgrp {group_for_port} {0} && sudo chmod g+rw {0}`, with {user} in {group_for_port}",
+    let new_group = if group == "root" { "dialout" } else { group };
+    let by_group = match group_may_open && !facts.groups.contains(group) {
+        true => format!("`sudo usermod -aG {group} {user}` and log in again"),
+        false => format!(
+            "`sudo chgrp {new_group} {0} && sudo chmod g+rw {0}`, with {user} in {new_group}",
             device.display()
-        )
+        ),
     };
-    let by_rule = facts.usb.as_ref().map_or(String::new(), |usb| {
-        let rule = usb.rule(group_for_port);
-        format!("; or add this line to /etc/udev/rules.d/70-bench.rules and reconnect the adapter: {rule}")
-    });
-    PORT.failure(what, by_group + &by_rule)
+    let Some(usb) = &facts.usb else {
+        return by_group;
+    };
+    let rule = usb.rule(new_group);
+    format!(
+        "{by_group}; or add this line to /etc/udev/rules.d/70-bench.rules and reconnect the adapter: {rule}"
+    )
 }
 
 /// Why the probe could not be opened.
@@ -196,17 +207,18 @@ pub fn refusal(error: &ProbeError, facts: &PortFacts) -> Finding {
         None => &facts.holders,
     };
     if pids.is_empty() {
-        return PORT.failure(
-            format!("{path} is used by another process"),
-            format!("`sudo fuser {path}` names it; end it first: two readers would lose bytes to each other"),
-        );
+        let what = format!("{path} is used by another process");
+        let remedy = format!("`sudo fuser {path}` shows it; end it first: {TWO_READERS}");
+        return PORT.failure(what, remedy);
     }
     let names: Vec<String> = pids.iter().map(process_name).collect();
     PORT.failure(
         format!("{path} is used by {}", names.join(", ")),
-        "wait for its end, or end it: two readers would lose bytes to each other",
+        format!("wait for its end, or end it: {TWO_READERS}"),
     )
 }
+
+const TWO_READERS: &str = "with two readers each of them would lose bytes";
 
 fn process_name(pid: &u32) -> String {
     match read_line(format!("/proc/{pid}/comm")) {

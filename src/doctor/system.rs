@@ -1,4 +1,4 @@
-//! Kernel, clock and processors, as far as they affect the timing of the loop.
+//! Properties of kernel, clock and processors that affect the timing of the loop.
 
 use std::path::Path;
 
@@ -118,7 +118,7 @@ fn governor(facts: &SystemFacts) -> Finding {
     }
 }
 
-/// A loop that sleeps in every tick never uses up the default share of 95 %.
+/// A loop that sleeps in every tick never reaches the default limit of 95 %.
 fn throttling(facts: &SystemFacts) -> Finding {
     let (Some(runtime_us), Some(period_us)) = (facts.rt_runtime_us, facts.rt_period_us) else {
         return Subject::Throttling.ok("this kernel does not limit real-time threads");

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Subject};
 use crate::config::LoopSettings;
-use crate::rt::clock::{Clock, Realtime};
+use crate::rt::clock::{Clock, Realtime, TickTiming};
 use crate::rt::publisher::Publisher;
 use crate::rt::thread::{Pace, Scheduling, become_realtime};
 
@@ -67,7 +67,6 @@ pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
 }
 
 fn measure(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
-    let period_ns = settings.period_s() * 1e9;
     let ticks = (settings.rate_hz * DURATION.as_secs_f64()).ceil() as u64;
     let mut late_ns: Vec<u64> = Vec::with_capacity(ticks as usize);
     let publisher = Publisher::new(RingBuffer::new(1).0);
@@ -75,14 +74,19 @@ fn measure(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
     let (mut number, mut missed) = (0, 0);
     while number < ticks {
         let timing = clock.wait(number, &publisher);
-        let missed_ns = (f64::from(timing.missed) * period_ns) as u64;
-        let woke_late_ns = timing.woke_ns.saturating_sub(timing.tick.scheduled_ns);
-        late_ns.push(woke_late_ns + missed_ns);
+        late_ns.push(lateness_ns(&timing, settings.period_s()));
         missed += u64::from(timing.missed);
         number = timing.tick.number + 1;
     }
     late_ns.sort_unstable();
     Lateness::of(&late_ns, missed, settings.rate_hz, scheduling)
+}
+
+/// Lateness of a tick. A tick that replaces missed ones was due with the first of them.
+fn lateness_ns(timing: &TickTiming, period_s: f64) -> u64 {
+    let missed_ns = (f64::from(timing.missed) * (period_s * 1e9)) as u64;
+    let woke_late_ns = timing.woke_ns.saturating_sub(timing.tick.scheduled_ns);
+    woke_late_ns + missed_ns
 }
 
 /// The `q` quantile of ascending nanoseconds, in seconds.
@@ -128,8 +132,6 @@ impl Lateness {
 
 /// Judges the lateness. A tick that is late by more than a period is missed; too many of them within one second trip.
 pub fn finding(lateness: &Lateness, overruns_per_s: u32, pace: Pace) -> Finding {
-    let remedy = "grant real-time scheduling, give the loop a processor of its own (loop.cpu, isolcpus=), \
-                  end other programs, or lower loop.rate_hz";
     let what = lateness.text();
     let is_late = lateness.missed > 0 || lateness.max_s > 1.0 / lateness.rate_hz;
     match pace {
@@ -137,15 +139,18 @@ pub fn finding(lateness: &Lateness, overruns_per_s: u32, pace: Pace) -> Finding 
         Pace::Realtime if lateness.missed > u64::from(overruns_per_s) => {
             let what =
                 format!("{what}; the interlock trips on more than {overruns_per_s} per second");
-            Subject::Lateness.failure(what, remedy)
+            Subject::Lateness.failure(what, REMEDY)
         }
-        Pace::Realtime => Subject::Lateness.warning(what, remedy),
+        Pace::Realtime => Subject::Lateness.warning(what, REMEDY),
         Pace::Virtual => {
-            let remedy = format!("none at virtual pace; before --pace realtime: {remedy}");
+            let remedy = format!("none at virtual pace; before --pace realtime: {REMEDY}");
             Subject::Lateness.note(what, remedy)
         }
     }
 }
+
+const REMEDY: &str = "grant real-time scheduling, give the loop a processor of its own (loop.cpu, isolcpus=), \
+    end other programs, or lower loop.rate_hz";
 
 #[cfg(test)]
 mod tests {
