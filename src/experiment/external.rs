@@ -1,7 +1,5 @@
 //! The analysis of external signals, from force to displacement or similar quantities, without a model.
 
-use nalgebra::Complex;
-
 use super::analysis::judge;
 use super::analysis_error::AnalysisError;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
@@ -105,13 +103,13 @@ fn fit_of_periods(data: &[FrfDatum]) -> Result<ModalFit, FitError> {
 fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum]) -> f64 {
     let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
     let fitted = fit.response(&CHAIN, &frequency_hz);
-    let square = |(datum, h): (&FrfDatum, &Complex<f64>)| {
-        2.0 * (datum.response - h).norm_sqr() / datum.variance
-    };
-    let freedom = (2 * data.len())
-        .saturating_sub(fit.covariance.nrows())
-        .max(1);
-    data.iter().zip(&fitted).map(square).sum::<f64>() / freedom as f64
+    let squares = data
+        .iter()
+        .zip(&fitted)
+        .map(|(datum, h)| 2.0 * (datum.response - h).norm_sqr() / datum.variance);
+    let parameters = fit.covariance.nrows();
+    let freedom = (2 * data.len()).saturating_sub(parameters).max(1);
+    squares.sum::<f64>() / freedom as f64
 }
 
 /// The reason, if the signals cannot be input and output of a mechanical system.
@@ -132,17 +130,20 @@ fn inverse_fits(data: &[FrfDatum], fit: &Result<ModalFit, FitError>) -> Option<S
     if fit.as_ref().is_ok_and(describes) {
         return None;
     }
-    let inverse = |datum: &FrfDatum| FrfDatum {
+    let mut inverse: Vec<FrfDatum> = data.iter().map(inverse_datum).collect();
+    inverse.retain(|datum| datum.variance.is_normal());
+    let inverse_fit = modal::fit(&inverse, &CHAIN).ok()?;
+    describes(&inverse_fit).then(|| SWAPPED.into())
+}
+
+const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output: input and output are swapped (--input, --output)";
+
+fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
+    FrfDatum {
         response: datum.response.inv(),
         variance: datum.variance / datum.response.norm_sqr().powi(2),
         ..*datum
-    };
-    let mut inverse: Vec<FrfDatum> = data.iter().map(inverse).collect();
-    inverse.retain(|datum| datum.variance.is_normal());
-    let inverse_fit = modal::fit(&inverse, &CHAIN).ok()?;
-    describes(&inverse_fit).then(|| {
-        "modes describe the response from output to input, but not that from input to output: input and output are swapped (--input, --output)".into()
-    })
+    }
 }
 
 fn incoherent(frf: &Frf) -> Option<String> {

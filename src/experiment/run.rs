@@ -133,10 +133,7 @@ fn create_recording(
         period_ns: libm::round(plan.config.servo.period_s() * 1e9) as u64,
         metadata: metadata(plan, pace, scheduling),
     };
-    std::fs::create_dir_all(folder).map_err(|e| RunError::Folder {
-        folder: folder.into(),
-        why: e.to_string(),
-    })?;
+    create_folder(folder)?;
     let path = file_name::recording(folder, &plan.label(), SystemTime::now());
     let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
     for (name, media_type, text) in plan.attachments() {
@@ -144,6 +141,13 @@ fn create_recording(
         attached.map_err(RunError::Create)?;
     }
     Ok(recorder)
+}
+
+fn create_folder(folder: &Path) -> Result<(), RunError> {
+    std::fs::create_dir_all(folder).map_err(|e| RunError::Folder {
+        folder: folder.into(),
+        why: e.to_string(),
+    })
 }
 
 fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String, String> {

@@ -59,8 +59,9 @@ impl Setup {
             tracing::warn!("{note}");
         }
         if self.clear_fault {
-            let failed = |e| ExperimentError::Failed(format!("amplifier: {e}; nothing was moved"));
-            opened.rig.reset_fault().map_err(failed)?;
+            opened.rig.reset_fault().map_err(|error| {
+                ExperimentError::Failed(format!("amplifier: {error}; nothing was moved"))
+            })?;
         }
         Ok(opened)
     }

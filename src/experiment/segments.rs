@@ -69,11 +69,11 @@ fn periodic_lines(
 /// The data with the mean variance of neighbouring lines. The scatter of a few periods alone is occasionally far too small,
 /// and a fit would then take such a line for a mode.
 fn with_mean_variance(data: &[FrfDatum]) -> Vec<FrfDatum> {
-    let with_mean = |k: usize| FrfDatum {
+    let with_mean = data.iter().enumerate().map(|(k, datum)| FrfDatum {
         variance: mean_variance(data, k),
-        ..data[k]
-    };
-    (0..data.len()).map(with_mean).collect()
+        ..*datum
+    });
+    with_mean.collect()
 }
 
 fn mean_variance(data: &[FrfDatum], k: usize) -> f64 {
@@ -118,14 +118,22 @@ fn stepped(
 /// The complete windows with their frequencies, rising; an upward and a downward sweep give the same order.
 fn rising_windows<'a>(signals: &Signals, windows: &'a [Window]) -> Vec<(f64, &'a Window)> {
     // The last window of a run that was stopped is not complete.
-    let end = |window: &Window| window.start + window.period * window.periods;
     let complete = windows.iter().filter(|w| end(w) <= signals.len());
-    let hz = |window: &Window| window.turns as f64 * signals.rate_hz / window.period as f64;
-    let mut rising: Vec<(f64, &Window)> = complete.map(|window| (hz(window), window)).collect();
+    let with_frequency = complete.map(|window| (frequency_hz(window, signals.rate_hz), window));
+    let mut rising: Vec<(f64, &Window)> = with_frequency.collect();
     rising.sort_by(|a, b| a.0.total_cmp(&b.0));
     // Different sines may have the same frequency once their periods are whole ticks.
     rising.dedup_by(|a, b| a.0 <= b.0);
     rising
+}
+
+/// The tick after a window.
+fn end(window: &Window) -> usize {
+    window.start + window.period * window.periods
+}
+
+fn frequency_hz(window: &Window, rate_hz: f64) -> f64 {
+    window.turns as f64 * rate_hz / window.period as f64
 }
 
 fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods, IdentifyError> {

@@ -3,7 +3,7 @@
 use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
 use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
-use crate::excitation::{Extremes, ReferenceContext, SweptReference, TravelPoint};
+use crate::excitation::{Extremes, ReferenceContext, SweptReference};
 use crate::model::plant::LoopPlant;
 use crate::rig::simulated;
 
@@ -18,18 +18,11 @@ pub(super) fn planned(
         return Ok((config, None));
     };
     let closed_loop = closed_loop(&config, controller)?;
-    let swept = SweptReference {
-        amplitude: match swept.amplitude.is_empty() {
-            true => amplitudes(swept.travel_m, &config, &closed_loop),
-            false => swept.amplitude.clone(),
-        },
-        travel_m: swept.travel_m,
-    };
+    let swept = with_amplitudes(swept, &config, &closed_loop);
     config.control.reference = ReferenceSettings::Chirp(swept.clone());
     // Values that are not allowed could not be read back from the recording.
     validate(&config)?;
-    let extremes = predicted_extremes(&swept, &config, &closed_loop);
-    match extremes {
+    match predicted_extremes(&swept, &config, &closed_loop) {
         // A smaller current would not help.
         Err(_) if !closed_loop.margins().stable => Err(PlanError::Unstable),
         extremes => Ok((config, Some(extremes?))),
@@ -45,13 +38,24 @@ fn closed_loop(config: &Config, controller: &ControllerText) -> Result<ClosedLoo
     Ok(closed_loop)
 }
 
-fn amplitudes(travel_m: f64, config: &Config, closed_loop: &ClosedLoop) -> Vec<TravelPoint> {
+/// The reference with its own amplitudes or, if it has none, with those by the model.
+fn with_amplitudes(
+    swept: &SweptReference,
+    config: &Config,
+    closed_loop: &ClosedLoop,
+) -> SweptReference {
+    if !swept.amplitude.is_empty() {
+        return swept.clone();
+    }
     let limits = SweptLimits {
         chirp: &config.chirp,
-        travel_m,
+        travel_m: swept.travel_m,
         reference_m: config.interlock.soft_limit_m,
     };
-    swept_reference_amplitudes(closed_loop, &limits)
+    SweptReference {
+        amplitude: swept_reference_amplitudes(closed_loop, &limits),
+        travel_m: swept.travel_m,
+    }
 }
 
 /// The extremes of the run by the linear model, checked against every interlock.

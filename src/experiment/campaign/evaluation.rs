@@ -139,19 +139,20 @@ fn compared<'a>(
     region: &Region,
 ) -> Result<Vec<ComparedPoint<'a>>, PlantError> {
     let pairs = cnmp_map(stage, &grid.operating_points, &grid.asymmetries, 1)?;
-    let compare = |(point, result): &'a (GridPoint, PointResult)| {
+    let points = done.iter().map(|(point, result)| {
         let asymmetry = grid.asymmetries[point.column];
-        let is_wrong = |one| disagreeing(region, &[one], simulated_offset) > 0;
+        let judgement = judgement(grid, *point, result);
         ComparedPoint {
             operating_point: grid.operating_points[point.row],
             asymmetry,
             result,
             model_pairs: pairs[point.row][point.column],
             model_pairs_damped: u8::from(region.contains(point.row, asymmetry)),
-            is_wrong: judgement(grid, *point, result).is_some_and(is_wrong),
+            is_wrong: judgement
+                .is_some_and(|one| disagreeing(region, &[one], simulated_offset) > 0),
         }
-    };
-    Ok(done.iter().map(compare).collect())
+    });
+    Ok(points.collect())
 }
 
 /// The whole mass steps from low to high, as asymmetries.
@@ -179,7 +180,7 @@ fn map_rows(grid: &Grid, tolerances: Tolerances) -> Vec<f64> {
 
 /// Smallest and largest value.
 pub fn ends(values: &[f64]) -> (f64, f64) {
-    let start = (f64::INFINITY, f64::NEG_INFINITY);
-    let wider = |(low, high): (f64, f64), x: &f64| (low.min(*x), high.max(*x));
-    values.iter().fold(start, wider)
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (low, high)
 }

@@ -28,8 +28,10 @@ impl Region {
         operating_points: &[f64],
         searched: [f64; 2],
     ) -> Result<Region, PlantError> {
-        let row = |&point: &f64| bands(searched, |asymmetry| has_pairs(stage, point, asymmetry));
-        let bands = operating_points.iter().map(row).collect::<Result<_, _>>()?;
+        let rows = operating_points.iter();
+        let rows =
+            rows.map(|&point| bands(searched, |asymmetry| has_pairs(stage, point, asymmetry)));
+        let bands = rows.collect::<Result<_, _>>()?;
         Ok(Region {
             operating_points: operating_points.into(),
             bands,

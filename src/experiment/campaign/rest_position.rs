@@ -28,17 +28,12 @@ pub struct RestPosition {
 impl RestPosition {
     /// The rest position in a recording. Refuses a recording with fewer than twenty valid readings.
     pub fn of(recording: &Recording, name: &str) -> Result<RestPosition, CampaignError> {
-        let failed = |why: String| CampaignError::RestPosition {
-            recording: name.to_string(),
-            why,
-        };
-        let readings = valid_readings(recording).map_err(|e| failed(e.to_string()))?;
-        let needed = SEGMENTS * MIN_READINGS;
-        if readings.len() < needed {
-            let found = readings.len();
-            return Err(failed(format!(
-                "{found} valid readings, {needed} are needed"
-            )));
+        let readings = valid_readings(recording);
+        let readings = readings.map_err(|error| refused(name, error.to_string()))?;
+        let (found, needed) = (readings.len(), SEGMENTS * MIN_READINGS);
+        if found < needed {
+            let why = format!("{found} valid readings, {needed} are needed");
+            return Err(refused(name, why));
         }
         let (mean_m, scatter_m) = scatter(&readings);
         Ok(RestPosition {
@@ -46,6 +41,13 @@ impl RestPosition {
             sigma_m: scatter_m / (SEGMENTS as f64).sqrt(),
             recording: name.to_string(),
         })
+    }
+}
+
+fn refused(recording: &str, why: String) -> CampaignError {
+    CampaignError::RestPosition {
+        recording: recording.to_string(),
+        why,
     }
 }
 
