@@ -48,17 +48,18 @@ pub(super) fn text(outputs: &AnalysisOutputs) -> String {
         0 => String::new(),
         ticks => format!(", {ticks} missing ticks interpolated"),
     };
+    let response = response_text(frf_csv, outputs.frequencies, coherence);
     let closed = outputs.closed.as_ref().map(loop_output::text);
     let linearity = outputs.linearity.as_ref().map(linearity_output::line);
-    format!(
-        "{}{filled}\n{}{}{}{}{}",
-        response_text(frf_csv, outputs.frequencies, coherence),
+    [
+        format!("{response}{filled}\n"),
         closed.unwrap_or_default(),
         delay_text(outputs),
         linearity.unwrap_or_default(),
         pages_text(&outputs.pages),
-        modal_output::text(&outputs.summary)
-    )
+        modal_output::text(&outputs.summary),
+    ]
+    .concat()
 }
 
 /// The file of a response and its size.

@@ -15,7 +15,9 @@ use super::table::wrap;
 use crate::config::{Config, Purpose};
 use crate::experiment::calibration::{self, CalibrationPlan};
 use crate::experiment::{RunSummary, Runner};
-use crate::rig::calibration::{AmplifierCalibration, Calibration, ChainCalibration};
+use crate::rig::calibration::{
+    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
+};
 use crate::util::progress::Progress;
 use crate::util::quantity::Current;
 
@@ -133,11 +135,15 @@ fn text(report: &Report, config: &Config) -> String {
         return format!("{run}  no calibration: {why}\n");
     };
     let file = report.calibration_file.as_deref().unwrap_or_default();
-    let (probe, chain) = (&c.probe, chain_text(&c.chain));
+    let device = &c.amplifier.device;
+    let (amplifier, probe) = (current_text(&c.amplifier), probe_text(&c.probe));
+    let chain = chain_text(&c.chain);
+    format!("{run}  amplifier     {device} ({amplifier})\n{probe}{chain}  calibration   {file}\n")
+}
+
+fn probe_text(probe: &ProbeCalibration) -> String {
     format!(
-        "{run}  amplifier     {} ({})\n  probe         {}\n                gain {:+.5}, offset {:+.3} um, noise {:.4} um RMS\n{chain}  calibration   {file}\n",
-        c.amplifier.device,
-        current_text(&c.amplifier),
+        "  probe         {}\n                gain {:+.5}, offset {:+.3} um, noise {:.4} um RMS\n",
         probe.device,
         probe.gain,
         probe.offset_m * 1e6,

@@ -177,14 +177,19 @@ fn config(args: &Args) -> Result<Config, CliError> {
             "--operating-point and --asymmetry set what a campaign varies: leave them out, or use `bench chirp`".into(),
         ));
     }
-    let mut bench = args.bench.clone();
+    let config = at_rate_of_thesis(&args.bench).load(Purpose::Chirp, &[])?;
+    check_mode(args, &config)?;
+    Ok(config)
+}
+
+/// The default profile at the rate of section 5.2.2, unless another rate is set.
+fn at_rate_of_thesis(bench: &BenchOptions) -> BenchOptions {
+    let mut bench = bench.clone();
     let is_rate = |set: &String| set.trim_start().starts_with("loop.rate_hz");
     if bench.profile() == profiles::DEFAULT && !bench.sets.iter().any(is_rate) {
         bench.sets.splice(0..0, RATE.map(String::from));
     }
-    let config = bench.load(Purpose::Chirp, &[])?;
-    check_mode(args, &config)?;
-    Ok(config)
+    bench
 }
 
 const NO_TERMINAL: &str = "the configuration names devices: an operator must load the stage for each point of a campaign, and \

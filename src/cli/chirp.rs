@@ -98,19 +98,24 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         print_result(args.bench.json, &plan, plan_output::text)?;
         return Ok(Outcome::Done);
     }
+    measure(args, &config, expected)
+}
+
+/// Runs the excitation and analyses its recording.
+fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, CliError> {
     if !args.bench.json {
-        print_text(&plan_text(&config, &expected))?;
+        print_text(&plan_text(config, &expected))?;
     }
     let mut run = args.run.run(&Plan::chirp(config.clone()), "chirp")?;
     let summary = RunSummary::of(&mut run)?;
-    let made = outputs(&summary, &run.path, &config)?;
+    let made = outputs(&summary, &run.path, config)?;
     let report = Report {
         run: summary,
         expected_travel_m: expected.travel_m,
         expected,
         made,
     };
-    let text = run_text(&report.run, &config) + &analysis_output::text(&report.made);
+    let text = run_text(&report.run, config) + &analysis_output::text(&report.made);
     close(run, &report, args.bench.json, &text)?;
     Ok(outcome(&report.run, &report.made))
 }
@@ -164,22 +169,30 @@ fn plan_text(config: &Config, expected: &Extremes) -> String {
     wrap(&plan, 0) + &unmodelled_text(config)
 }
 
-/// Modes of the simulated stage that the model of the plant does not have.
+/// A note on the modes of the simulated stage that the model of the plant does not have.
 fn unmodelled_text(config: &Config) -> String {
-    let (low_hz, high_hz) = config.chirp.band_hz();
-    let frequencies = config.sim.unmodelled.iter().map(|mode| mode.frequency_hz);
-    let mut inside: Vec<f64> = frequencies
-        .filter(|hz| (low_hz..=high_hz).contains(hz))
-        .collect();
-    inside.sort_by(f64::total_cmp);
-    let (Some(lowest), Some(highest), true) =
-        (inside.first(), inside.last(), devices::is_simulated(config))
-    else {
+    let unmodelled_hz = unmodelled_hz(config);
+    let (Some(lowest), Some(highest)) = (unmodelled_hz.first(), unmodelled_hz.last()) else {
         return String::new();
     };
-    let count = inside.len();
+    let count = unmodelled_hz.len();
     let text = format!(
         "the simulated stage has {count} modes from {lowest} to {highest} Hz that are not part of the model (sim.unmodelled); the analysis finds them as well"
     );
     labelled("note", &text)
+}
+
+/// Frequencies of these modes in the band, rising.
+fn unmodelled_hz(config: &Config) -> Vec<f64> {
+    if !devices::is_simulated(config) {
+        return Vec::new();
+    }
+    let (low_hz, high_hz) = config.chirp.band_hz();
+    let modes = config.sim.unmodelled.iter();
+    let frequencies = modes.map(|mode| mode.frequency_hz);
+    let mut inside: Vec<f64> = frequencies
+        .filter(|hz| (low_hz..=high_hz).contains(hz))
+        .collect();
+    inside.sort_by(f64::total_cmp);
+    inside
 }

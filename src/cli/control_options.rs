@@ -24,6 +24,11 @@ const SPEED: (&str, f64) = ("speed_m_per_s", 1e-4);
 /// Start of a step or ramp after the loop is closed.
 const START: (&str, f64) = ("at_s", 0.2);
 
+const AMPLITUDE_KEY: &str = "control.reference.amplitude_m";
+const TRAVEL_KEY: &str = "control.reference.travel_m";
+const FREQUENCY_KEY: &str = "control.reference.frequency_hz";
+const SPEED_KEY: &str = "control.reference.speed_m_per_s";
+
 /// The loop and its reference.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = what_happens_without_options())]
@@ -151,16 +156,14 @@ impl Args {
         let mut settings = self.choice.settings();
         settings.extend(self.reference.as_ref().map(Reference::setting));
         let (amplitude_key, duration_key) = match self.kind() {
-            Some(ReferenceKind::Chirp) => ("control.reference.travel_m", "chirp.duration_s"),
-            _ => ("control.reference.amplitude_m", "control.duration_s"),
+            Some(ReferenceKind::Chirp) => (TRAVEL_KEY, "chirp.duration_s"),
+            _ => (AMPLITUDE_KEY, "control.duration_s"),
         };
-        let frequency_key = "control.reference.frequency_hz";
-        let speed_key = "control.reference.speed_m_per_s";
         let options = [
             given(amplitude_key, "--amplitude", self.amplitude.as_ref()),
             given(duration_key, "--duration", self.duration.as_ref()),
-            given(frequency_key, "--frequency", self.frequency.as_ref()),
-            given(speed_key, "--speed", self.speed.as_ref()),
+            given(FREQUENCY_KEY, "--frequency", self.frequency.as_ref()),
+            given(SPEED_KEY, "--speed", self.speed.as_ref()),
         ];
         settings.extend(options.into_iter().flatten());
         Ok(settings)

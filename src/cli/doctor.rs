@@ -1,5 +1,6 @@
 //! `bench doctor`: whether the configured runs could start. There is no motion.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
@@ -132,24 +133,24 @@ fn loop_margins(config: &Config) -> Result<Margins, CliError> {
 /// The options of this command as options of the runs.
 fn same_options(args: &Args) -> String {
     let bench = &args.bench;
-    let sets = bench.sets.iter().map(|set| ("--set", Some(set.clone())));
-    let folder = (args.out.as_path() != Path::new(OUT)).then(|| args.out.display().to_string());
-    let point = bench.operating_point.as_ref().map(ToString::to_string);
-    let asymmetry = bench.asymmetry.as_ref().map(ToString::to_string);
-    let seed = bench.seed.map(|seed| seed.to_string());
-    let options = [("--config", bench.config.clone())]
-        .into_iter()
-        .chain(sets)
-        .chain([
-            ("--operating-point", point),
-            ("--asymmetry", asymmetry),
-            ("--seed", seed),
-            ("--out", folder),
-        ]);
-    let given = options.filter_map(|(flag, value)| Some((flag, value?)));
-    given
-        .map(|(flag, value)| format!(" {flag} {}", shell_quoted(&value)))
-        .collect()
+    let folder = (args.out.as_path() != Path::new(OUT)).then(|| args.out.display());
+    let sets = bench.sets.iter().map(|set| option("--set", Some(set)));
+    [
+        option("--config", bench.config.as_ref()),
+        sets.collect(),
+        option("--operating-point", bench.operating_point.as_ref()),
+        option("--asymmetry", bench.asymmetry.as_ref()),
+        option("--seed", bench.seed),
+        option("--out", folder),
+    ]
+    .concat()
+}
+
+/// An option as typed, with a space before it; empty if it is not given.
+fn option(flag: &str, value: Option<impl Display>) -> String {
+    value.map_or(String::new(), |value| {
+        format!(" {flag} {}", shell_quoted(&value.to_string()))
+    })
 }
 
 /// Quoted for a shell, if necessary.

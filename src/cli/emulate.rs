@@ -98,15 +98,13 @@ impl Args {
 
     /// Refuses options of a device that is not emulated, and invalid values.
     fn check(&self) -> Result<(), CliError> {
-        let no_probe = !self.emulates(EmulatedDevice::Probe);
-        let no_amplifier = !self.emulates(EmulatedDevice::Amplifier);
         let has_probe_options =
             self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
-        if no_probe && has_probe_options {
+        if has_probe_options && !self.emulates(EmulatedDevice::Probe) {
             let what = "--port, --pty and --measuring-rate need the device `probe`";
             return Err(CliError::Usage(what.into()));
         }
-        if no_amplifier && self.interface.is_some() {
+        if self.interface.is_some() && !self.emulates(EmulatedDevice::Amplifier) {
             let what = "--interface needs the device `amplifier`";
             return Err(CliError::Usage(what.into()));
         }

@@ -226,25 +226,30 @@ impl Report {
     }
 
     fn text(&self) -> String {
-        let Report {
-            recording,
-            ticks,
-            input,
-            output,
-            ..
-        } = self;
+        let (input, output) = (&self.input, &self.output);
+        let coherence = self.coherence_median.unwrap_or(0.0);
+        let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
+        format!(
+            "{}{}\n{}  residues   in `{output}` per `{input}` and s^2, in place of 1/kg below\n  fit        reduced chi-square {chi2:.3}\n{}",
+            self.record_text(),
+            response_text(&self.frf_csv, self.frequencies, coherence),
+            pages_text(&self.pages),
+            modal_output::text(&self.summary)
+        )
+    }
+
+    fn record_text(&self) -> String {
         let periods = match self.periods {
             Some(count) => format!("             {count} periods averaged\n"),
             None => String::new(),
         };
-        let coherence = self.coherence_median.unwrap_or(0.0);
-        let response = response_text(&self.frf_csv, self.frequencies, coherence);
-        let pages = pages_text(&self.pages);
-        let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         format!(
-            "  record     {recording}\n             {ticks} samples at {} from `{input}` to `{output}`\n{periods}{response}\n{pages}  residues   in `{output}` per `{input}` and s^2, in place of 1/kg below\n  fit        reduced chi-square {chi2:.3}\n{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{periods}",
+            self.recording,
+            self.ticks,
             hertz(self.rate_hz),
-            modal_output::text(&self.summary)
+            self.input,
+            self.output
         )
     }
 }

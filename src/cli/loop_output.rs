@@ -5,18 +5,24 @@ use crate::report::run_pages::LoopOutputs;
 
 /// The files of the responses, and the measured margins beside those of the model.
 pub(super) fn text(outputs: &LoopOutputs) -> String {
-    let crossover = outputs
-        .crossover_rad_s
-        .map_or_else(|| "none in the band".into(), angular_frequency);
+    format!(
+        "  loop       {}\n  S          {}\n  T          {}\n  measured   {}\n",
+        outputs.loop_csv,
+        outputs.sensitivity_csv,
+        outputs.complementary_csv,
+        margins_text(outputs)
+    )
+}
+
+fn margins_text(outputs: &LoopOutputs) -> String {
+    let crossover = outputs.crossover_rad_s.map(angular_frequency);
+    let crossover = crossover.unwrap_or("none in the band".into());
     let phase_margin = match (outputs.phase_margin_deg, outputs.phase_margin_sigma_deg) {
         (Some(deg), Some(sigma_deg)) => format!("{deg:.2} ± {:.2} deg", 2.0 * sigma_deg),
         _ => "none".into(),
     };
     format!(
-        "  loop       {}\n  S          {}\n  T          {}\n  measured   crossover {crossover}, phase margin {phase_margin},\n             modulus margin {:.4} ± {:.4} (by the model {:.4})\n",
-        outputs.loop_csv,
-        outputs.sensitivity_csv,
-        outputs.complementary_csv,
+        "crossover {crossover}, phase margin {phase_margin},\n             modulus margin {:.4} ± {:.4} (by the model {:.4})",
         outputs.modulus_margin,
         2.0 * outputs.modulus_margin_sigma,
         outputs.predicted_modulus_margin

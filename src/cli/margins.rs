@@ -55,20 +55,20 @@ pub(super) struct Pole {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
     let closed_loop = closed_loop(&config)?;
-    let (margins, poles, delay_s) = match args.continuous {
-        true => {
-            let margins = closed_loop.continuous_margins()?;
-            (margins, closed_loop.continuous_poles(), 0.0)
-        }
-        false => {
-            let delay_s = closed_loop.plant().delay_s();
-            (closed_loop.margins(), closed_loop.poles(), delay_s)
-        }
+    let (margins, poles) = match args.continuous {
+        true => (
+            closed_loop.continuous_margins()?,
+            closed_loop.continuous_poles(),
+        ),
+        false => (closed_loop.margins(), closed_loop.poles()),
     };
     let report = Report {
         margins: margins_json(&margins)?,
         poles: pole_list(&poles, &config),
-        delay_s,
+        delay_s: match args.continuous {
+            true => 0.0,
+            false => closed_loop.plant().delay_s(),
+        },
     };
     print_result(args.bench.json, &report, |report| {
         text(&config, &margins, &report.poles)
@@ -149,7 +149,7 @@ pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Resu
     };
     let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
     Err(CliError::Margin(format!(
-        "with the {name} controller at {rate_hz} Hz {found}, at least {least} is asked for (control.min_modulus_margin)"
+        "with the {name} controller at {rate_hz} Hz {found}, at least {least} is required (control.min_modulus_margin)"
     )))
 }
 
@@ -203,17 +203,23 @@ fn unstable_text(poles: &[Pole]) -> String {
 }
 
 fn margin_lines(margins: &Margins) -> String {
-    let or_none = |text: Option<String>| text.unwrap_or("none".into());
-    let crossover = margins.crossover_rad_s.map(angular_frequency);
-    let phase = margins.phase_margin_deg.map(|deg| format!("{deg:.2} deg"));
-    let gain = margins.gain_margin_db.map(|db| format!("{db:.2} dB"));
-    let bandwidth = margins.sensitivity_bandwidth_rad_s.map(angular_frequency);
+    let degrees = |deg: f64| format!("{deg:.2} deg");
+    let decibels = |db: f64| format!("{db:.2} dB");
     let (modulus, peak_db) = (margins.modulus_margin, margins.sensitivity_peak_db);
-    format!(
-        "  stable\n  crossover              {}\n  phase margin           {}\n  gain margin            {}\n  modulus margin         {modulus:.4} (peak of S {peak_db:.2} dB)\n  sensitivity bandwidth  {}\n",
-        or_none(crossover),
-        or_none(phase),
-        or_none(gain),
-        or_none(bandwidth),
-    )
+    let modulus = format!("{modulus:.4} (peak of S {peak_db:.2} dB)");
+    let bandwidth = margins.sensitivity_bandwidth_rad_s;
+    let lines = [
+        ("crossover", margins.crossover_rad_s.map(angular_frequency)),
+        ("phase margin", margins.phase_margin_deg.map(degrees)),
+        ("gain margin", margins.gain_margin_db.map(decibels)),
+        ("modulus margin", Some(modulus)),
+        ("sensitivity bandwidth", bandwidth.map(angular_frequency)),
+    ];
+    let lines = lines.map(|(name, value)| margin_line(name, value));
+    format!("  stable\n{}", lines.concat())
+}
+
+fn margin_line(name: &str, value: Option<String>) -> String {
+    let value = value.unwrap_or("none".into());
+    format!("  {name:<23}{value}\n")
 }

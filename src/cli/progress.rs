@@ -96,14 +96,14 @@ mod tests {
 
     #[test]
     fn shows_no_remaining_time_before_the_first_step() {
-        let seen = |done, total, seconds| Snapshot {
+        let after = |done, total, seconds| Snapshot {
             stage: "figures",
             done,
             total,
             elapsed: Duration::from_secs(seconds),
         };
-        assert_eq!(times(&seen(0, 10, 7)), "7 s");
-        assert_eq!(times(&seen(5, 10, 7)), "7 s, 7 s left");
-        assert_eq!(times(&seen(9, 10, 600)), "10 min, 66 s left");
+        assert_eq!(times(&after(0, 10, 7)), "7 s");
+        assert_eq!(times(&after(5, 10, 7)), "7 s, 7 s left");
+        assert_eq!(times(&after(9, 10, 600)), "10 min, 66 s left");
     }
 }

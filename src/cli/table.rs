@@ -63,7 +63,7 @@ fn row(line: &[String], widths: &[usize], columns: &[usize]) -> String {
     padded.collect::<Vec<_>>().join(GAP) + "\n"
 }
 
-/// Text in lines of at most 80 columns, each indented by `indent`. A word longer than a line keeps a line of its own.
+/// Text in lines of at most 80 columns, each indented by `indent`. A word longer than a line stands alone on its line.
 pub(super) fn wrap(text: &str, indent: usize) -> String {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

@@ -24,7 +24,6 @@ impl FromStr for ValueRange {
         let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
             return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
         };
-        let ratio = |text: &str| si::<OfRatio>(text).map_err(|e| e.to_string());
         let (from, to, count) = (ratio(from)?, ratio(to)?, count_of(count)?);
         if from == to {
             return Err(format!(
@@ -35,6 +34,10 @@ impl FromStr for ValueRange {
         let inner = (0..count - 1).map(|k| from + (to - from) * k as f64 / last);
         Ok(ValueRange(inner.chain([to]).collect()))
     }
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    si::<OfRatio>(text).map_err(|e| e.to_string())
 }
 
 fn count_of(text: &str) -> Result<usize, String> {

@@ -673,7 +673,7 @@ fn each_plant_has_a_controller_and_rejects_the_fast_one() {
             "--slow",
             &[
                 "slow controller",
-                "at least 0.3 is asked for",
+                "at least 0.3 is required",
                 "--controller FILE",
                 "nothing was moved",
             ],

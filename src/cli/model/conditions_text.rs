@@ -61,9 +61,8 @@ fn explanation_text(here: &Explanation) -> String {
 }
 
 fn assumptions_text(assumptions: &Assumptions) -> String {
-    let mode_r = assumptions
-        .mode_r
-        .map_or("-".into(), |mode| mode.to_string());
+    let mode_r = assumptions.mode_r.map(|mode| mode.to_string());
+    let mode_r = mode_r.unwrap_or("-".into());
     let damping = format!(
         "A4-2: damping ratio {:.4}, {} of half the gap",
         assumptions.damping_ratio,

@@ -140,19 +140,18 @@ fn text(report: &Report) -> String {
         false => "without damping, one of each pair s, -s",
     };
     let title = format!("{}: zeros {which}, over {}", report.profile, report.vary);
-    let changes: String = report.changes.iter().map(change_text).collect();
-    let conclusion = if !report.changes.is_empty() {
-        changes
-    } else if report.tracks.iter().all(Track::is_constant) {
-        format!("the zeros do not depend on {}\n", report.vary)
-    } else {
-        "the kinds of the zeros do not change\n".into()
-    };
-    format!(
-        "{}\n{}\n{conclusion}",
-        wrap(&title, 0),
-        tracks_table(report)
-    )
+    let (tracks, changes) = (tracks_table(report), changes_text(report));
+    format!("{}\n{tracks}\n{changes}", wrap(&title, 0))
+}
+
+fn changes_text(report: &Report) -> String {
+    if !report.changes.is_empty() {
+        return report.changes.iter().map(change_text).collect();
+    }
+    match report.tracks.iter().all(Track::is_constant) {
+        true => format!("the zeros do not depend on {}\n", report.vary),
+        false => "the kinds of the zeros do not change\n".into(),
+    }
 }
 
 fn tracks_table(report: &Report) -> String {

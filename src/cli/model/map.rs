@@ -63,11 +63,12 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     print_result(args.bench.json, &report, |report| text(report, profile))
 }
 
-/// The plant, found valid at the ends of both grids.
+const FIXED: &str = "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
+
+/// The settings of the plant. Refuses grids whose ends are invalid.
 fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
     if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
-        let what = "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
-        return Err(CliError::Usage(what.into()));
+        return Err(CliError::Usage(FIXED.into()));
     }
     let settings = sr4dof(args, &[])?;
     let (points, asymmetries) = (args.operating_points.ends(), args.asymmetries.ends());

@@ -58,10 +58,8 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let response = StepResponse::new(&sum);
     let features = response.initial();
     let end_s = args.duration.unwrap_or(features.window_s);
-    args.table.write(|| {
-        let times_s = linspace(0.0, end_s, args.count as usize);
-        Column::of_rows(names(&sum), times_s.map(|t| row(&response, t)))
-    })?;
+    args.table
+        .write(|| columns(&sum, &response, end_s, args.count as usize))?;
     let report = report(args, &sum, &response, features)?;
     print_result(args.bench.json, &report, |report| {
         text(report) + &args.table.files_text("  response           ")
@@ -75,6 +73,11 @@ fn check_duration(duration_s: Option<f64>) -> Result<(), CliError> {
         ))),
         _ => Ok(()),
     }
+}
+
+fn columns(sum: &ModalSum, response: &StepResponse, end_s: f64, count: usize) -> Vec<Column> {
+    let times_s = linspace(0.0, end_s, count);
+    Column::of_rows(names(sum), times_s.map(|t| row(response, t)))
 }
 
 fn names(sum: &ModalSum) -> Vec<String> {
