@@ -36,7 +36,7 @@ macro_rules! excitations {
             }
         }
 
-        /// The tables of the kinds, beside `[chirp]`.
+        /// The tables of all kinds except `[chirp]`.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         pub struct ExcitationTables {
             $($(#[$doc])* $(#[$attribute])* pub $table: $settings,)*

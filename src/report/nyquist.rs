@@ -17,7 +17,7 @@ const VISIBLE: f64 = 0.004;
 const STRENGTH: f64 = 0.13;
 const MICRO: f64 = 1e6;
 
-/// The Nyquist plot as an SVG document: all frequencies, in µm/A or as they are in another unit, and beside them a part of
+/// The Nyquist plot as an SVG document: all frequencies, in µm/A or in the unit of the columns, and beside them a part of
 /// the frequencies in hertz. Circles are 95 % confidence regions. Magnitudes below two sigma are left out, as their
 /// direction is unknown.
 ///

@@ -6,7 +6,7 @@ use super::chart::{Chart, Pen, Row, Scale, sheet_svg};
 use super::ellipse::Ellipse;
 use crate::model::veering::QuadrantDiagram;
 
-/// Height of a chart in pixels, and the values that it shows around the unit circle; captions stand below the circle.
+/// Height of a chart in pixels, and the values that it shows around the unit circle; the captions are below the circle.
 const HEIGHT: f64 = 365.0;
 const X_RANGE: (f64, f64) = (-1.25, 1.25);
 const Y_RANGE: (f64, f64) = (-2.62, 1.3);

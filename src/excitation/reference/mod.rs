@@ -55,7 +55,7 @@ references! {
     /// A sine that starts at zero.
     Sine(SineReference),
     /// The sweep of `[chirp]` with its quiets, in metres: for identification in closed loop. The run lasts as long as the
-    /// sweep, whatever `control.duration_s` says.
+    /// sweep; `control.duration_s` is not used.
     Chirp(SweptReference),
     /// A CSV file with the columns `time_s,reference_m`; straight lines between its points.
     File(FileReference),

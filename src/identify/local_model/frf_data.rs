@@ -1,7 +1,7 @@
 //! The response without smoothing: independent data for a parametric fit.
 //!
 //! The record is divided into blocks of neighbouring bins. The response of a block, `H = sum Y conj(R) / sum U conj(R)` (with
-//! the input U itself as instrument R in open loop), is the mean of H over its bins, weighted with U conj(R), whatever the
+//! the input U itself as instrument R in open loop), is the mean of H over its bins, weighted with U conj(R), for any
 //! shape of H. Its variance is `S sum |R|^2 / |sum U conj(R)|^2`, where S, the power of the noise in a bin, follows from the
 //! residuals of local rational models. (The residual about a mean would count the top of a resonance as noise, and the fit
 //! would trust the data beside the resonance too much.) A model is compared with the mean of its values at f -+ spread, which

@@ -55,7 +55,7 @@ fn orthogonalize(
     Some(upper)
 }
 
-/// Scales a column to length 1 and returns its length; `None` if too little remains beside the part removed before.
+/// Scales a column to length 1 and returns its length; `None` if it is too small compared with the part that was removed.
 fn normalize(column: &mut [Complex<f64>], removed: f64) -> Option<f64> {
     let remaining: f64 = column.iter().map(|x| x.norm_sqr()).sum();
     let independent = remaining > DEPENDENT_RATIO * DEPENDENT_RATIO * (remaining + removed);

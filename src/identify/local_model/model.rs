@@ -12,7 +12,7 @@
 //! method (LRM; T. McKelvey, G. Guerin, IFAC SYSID 2012; E. Geerardyn, T. Oomen, J. Schoukens, IFAC World Congress 2014; R.
 //! Pintelon, J. Schoukens, System Identification, 2nd ed., chapter 7). Near a lightly damped mode 1/(1 + a x) is its pole,
 //! and the remaining response is smooth. With a transient, T = t0 + t1 x + t2 x^2 (over the same denominator) is added to H U:
-//! the effect of the states at the begin and at the end of the record.
+//! the effect of the states at the beginning and at the end of the record.
 //!
 //! The rational model is found by reweighted linear fits of (1 + a x) Y = B U (C. K. Sanathanan, J. Koerner, IEEE Trans.
 //! Autom. Control 8 (1963) 56), which noise in Y biases; Gauss-Newton steps on Y - B U/(1 + a x) remove that bias. The

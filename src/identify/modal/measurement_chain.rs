@@ -10,7 +10,7 @@ use crate::model::zeros::ModalTerm;
 /// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
 const FAR_RAD_S: f64 = 1e6;
 
-/// What lies between set-point and reading beside the mechanics.
+/// What lies between set-point and reading, except the mechanics.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeasurementChain {
     /// Hold, motor, amplifier and delays of a bench; input in amperes. Exact, aliasing included.

@@ -117,9 +117,10 @@ impl Search<'_, '_> {
         let mut solution = refine(problem, start, stage.tolerance);
         let first_misfit = problem.misfit(solution.chi2);
         while solution.parameters.modes.len() < MAX_MODES {
-            let fraction = stage_progress(first_misfit, problem.misfit(solution.chi2));
-            let done = self.done + (stage.progress - self.done) * fraction;
-            report(self.progress, done)?;
+            self.report(
+                stage,
+                stage_progress(first_misfit, problem.misfit(solution.chi2)),
+            )?;
             let Some(next) = with_another_mode(problem, &solution, stage.tolerance) else {
                 break;
             };
@@ -130,6 +131,12 @@ impl Search<'_, '_> {
         self.parameters = solution.parameters;
         self.done = stage.progress;
         Ok(())
+    }
+
+    /// Reports the progress of a stage, 0 to 1, as progress of the search.
+    fn report(&mut self, stage: &Stage, fraction: f64) -> Result<(), FitError> {
+        let done = self.done + (stage.progress - self.done) * fraction;
+        report(self.progress, done)
     }
 }
 

@@ -4,8 +4,8 @@
 //! distortion O_k and E_k as measured at the omitted lines around it,
 //!
 //! ```text
-//!  noise ratio = sum N_k / sum X_k                                          likewise for distortion: of the power of the band
-//!  coherence lost to noise = mean of N_k / (X_k + N_k + O_k + E_k)          likewise for distortion: line by line
+//!  noise ratio = sum N_k / sum X_k                                          distortion ratios with O_k and E_k in place of N_k
+//!  coherence lost to noise = mean of N_k / (X_k + N_k + O_k + E_k)          likewise for distortion
 //! ```
 //!
 //! The losses and the mean coherence add up to 1. A chirp, or a multisine of all lines, loses as much coherence. Odd lines alone

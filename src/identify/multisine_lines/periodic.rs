@@ -9,9 +9,9 @@
 //! ed., section 2.5). What the plant repeats in every period, distortion included, is not noise here: a model that does not
 //! describe it has a reduced chi-square above 1. With P periods, chi-square is (P - 1)/(P - 2) times too high.
 //!
-//! **Drift.** A free body wanders. A step of d from the end of a period to its begin adds d/(2 pi f) times the rate to every
+//! **Drift.** A free body drifts. A step of d from the end of a period to its beginning adds d/(2 pi f) times the rate to every
 //! line. A straight line by least squares does not remove it: it also fits the excitation, and leaves a saw-tooth that repeats
-//! in every period. The difference of samples one period apart does not contain the excitation: its mean around the begin of a
+//! in every period. The difference of samples one period apart does not contain the excitation: its mean around the start of a
 //! period is d, and d n/N is subtracted. Therefore the last period only serves to measure the drift of the one before it.
 
 use nalgebra::Complex;
@@ -24,7 +24,7 @@ use crate::identify::{Frf, FrfDatum, FrfPoint, IdentifyError, Signals, band};
 const MIN_PERIODS: usize = 4;
 /// Smallest number of samples in a period.
 const MIN_PERIOD: usize = 8;
-/// The drift is averaged over this part of a period to either side of its begin.
+/// The drift is averaged over 1/DRIFT_PART of a period to either side of the start of the period.
 const DRIFT_PART: usize = 100;
 /// A line below this ratio of the largest amplitude in the band is not excited.
 const EXCITED_RATIO: f64 = 0.01;
@@ -38,7 +38,7 @@ pub(super) const ROUNDING: f64 = 1e-12;
 pub struct Repetition {
     /// Samples in a period.
     pub period: usize,
-    /// Periods at the begin of the record to omit, in which the plant settles.
+    /// Periods at the beginning of the record to omit, in which the plant settles.
     pub skip: usize,
 }
 

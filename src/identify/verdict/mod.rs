@@ -3,7 +3,7 @@
 //! Three criteria must agree:
 //!
 //! 1. the zeros of the fit, each with its probability of lying in the right half plane;
-//! 2. the signs of the residues: two close modes of opposite signs beside a remainder are necessary for CNMP zeros between
+//! 2. the signs of the residues: two close modes of opposite signs, and a remainder, are necessary for CNMP zeros between
 //!    them (sections 3.2.2 and 3.2.4);
 //! 3. the phase drop beyond Bode's relation, independent of the modes: each CNMP pair adds one turn of lag ([`phase_drop()`]).
 //!

@@ -121,7 +121,7 @@ fn simplified(points: &[(f64, f64)]) -> Points {
     kept.into_iter().map(|k| points[k]).collect()
 }
 
-/// The point between two others that is farthest from their segment, if it is visibly beside it.
+/// The point between two others that is farthest from their segment, if the distance is visible.
 fn farthest(points: &[(f64, f64)], from: usize, to: usize) -> Option<usize> {
     let distances = (from + 1..to).map(|k| (k, distance(points[k], points[from], points[to])));
     let far = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;

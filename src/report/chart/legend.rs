@@ -31,7 +31,7 @@ struct Entry {
     sample: Sample,
 }
 
-/// What stands in front of a name.
+/// The sample in front of a name.
 enum Sample {
     Line(Pen),
     Band(Pen),

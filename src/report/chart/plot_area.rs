@@ -319,7 +319,7 @@ fn draw_stroke(
         .try_for_each(|dash| canvas.line(dash, pen.colour.mix(opacity), pen.width))
 }
 
-/// Dots at all points, or at those that stand alone between gaps.
+/// Dots at all points, or at single points between gaps.
 fn draw_dots(
     canvas: &Canvas,
     colour: Colour,

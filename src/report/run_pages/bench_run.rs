@@ -39,7 +39,7 @@ pub struct BenchRun<'a> {
     /// Its analysis.
     pub(super) analysis: &'a Analysis,
     recording: &'a Recording,
-    /// What lies between set-point and reading beside the mechanics.
+    /// What lies between set-point and reading, except the mechanics.
     chain: MeasurementChain,
     /// Title of the configuration.
     title: String,
