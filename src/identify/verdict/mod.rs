@@ -37,9 +37,9 @@ const SIGNIFICANT_POWER: f64 = 20.0;
 /// A residue with a larger probability of the opposite sign has no certain sign.
 const WRONG_SIGN_PROBABILITY: f64 = 1e-3;
 
-const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes";
+const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; excite more, or for longer";
 const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
-const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; look at the plot, and excite more";
+const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and excite more";
 
 /// Whether there are CNMP zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -162,7 +162,7 @@ fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
     let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
     (!good).then(|| {
         format!(
-            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the stage is not the sum of modes that was fitted; excite less, so that it stays linear, or look at the plot where they differ"
+            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes; excite less, so that the stage stays linear, or find in the Bode plot where response and fit differ"
         )
     })
 }
