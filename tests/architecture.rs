@@ -9,7 +9,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library; a module imports only from those that stand before it. The settings of plants and excitations
 /// live with what they set, and `config` composes them: so `model::plant` stands before `config`, the rest of `model` after it.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 14] = [
     "util",
     "model::plant",
     "excitation",
@@ -23,7 +23,6 @@ const ORDER: [&str; 15] = [
     "experiment",
     "report",
     "doctor",
-    "daemon",
     "cli",
 ];
 
