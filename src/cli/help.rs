@@ -9,7 +9,7 @@ use crate::util::quantity::Dimension;
 
 /// Where the terms of the help texts are explained.
 pub(super) const GLOSSARY: &str =
-    "docs/glossary.md explains the terms: CNMP zeros, residues, signs, operating point.";
+    "docs/glossary.md explains the terms: CNMP zeros, residues, operating point.";
 
 /// `TEXT [default: KEY of the profile; 0.1 Hz in "stage"]`, with the value of the default profile.
 pub(super) fn with_setting(text: &str, key: &str) -> String {

@@ -161,12 +161,19 @@ fn chain_text(config: &Config) -> String {
         false => String::new(),
     };
     format!(
-        "{} Hz, hold, {} period(s) of computing delay, amplifier of {} Hz{latency}{}",
+        "{} Hz, hold, {} of computing delay, amplifier of {} Hz{latency}{}",
         servo.rate_hz,
-        servo.computing_delay_periods,
+        periods_text(servo.computing_delay_periods),
         amplifier.bandwidth_hz,
         probe_text(&config.probe)
     )
+}
+
+fn periods_text(count: u32) -> String {
+    match count {
+        1 => "1 period".into(),
+        count => format!("{count} periods"),
+    }
 }
 
 fn probe_text(probe: &ProbeSettings) -> String {
