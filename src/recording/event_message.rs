@@ -142,7 +142,7 @@ const TRIPS: [fn(f64, f64) -> Trip; 9] = [
 fn trip(message: &Message) -> Result<Trip, UnknownValue> {
     let amplifier = Trip::Amplifier {
         code: message.code,
-        words: None,
+        text: None,
     };
     let trips = TRIPS.iter().map(|trip| trip(message.value, message.limit));
     let mut trips = trips.chain([amplifier]);

@@ -1,4 +1,4 @@
-//! The two paces of the loop, virtual and real time. The pace is the only difference between a study and a rig.
+//! The two clocks of the loop, virtual and real time. The clock is the only difference between a simulation and a rig.
 
 use bench_hal::Tick;
 use nix::sys::time::TimeSpec;
@@ -38,8 +38,8 @@ fn tick(number: u64, period_s: f64) -> Tick {
     }
 }
 
-/// Ticks back to back, as fast as the machine can; every tick begins and ends when it is due. Waits for room in the ring, so
-/// that no record is lost.
+/// Ticks in immediate succession: each begins and ends at its scheduled time. The clock waits for room in the ring, so that no
+/// record is lost.
 #[derive(Clone, Copy, Debug)]
 pub struct Virtual {
     /// Length of a tick in seconds.
@@ -66,7 +66,7 @@ impl Clock for Virtual {
     fn restart(&mut self, _number: u64) {}
 }
 
-/// By the system's monotonic clock, slept for in absolute time.
+/// Ticks at absolute times of the monotonic clock of the system.
 #[derive(Clone, Copy, Debug)]
 pub struct Realtime {
     period_s: f64,
@@ -97,20 +97,22 @@ fn monotonic_ns() -> i128 {
     })
 }
 
+/// Sleeps until the monotonic clock reaches `until_ns`. A signal may end a sleep early; then it sleeps again.
+fn sleep_until(until_ns: i128) {
+    const SECOND_NS: i128 = 1_000_000_000;
+    let until = TimeSpec::new((until_ns / SECOND_NS) as i64, (until_ns % SECOND_NS) as i64);
+    let clock = ClockId::CLOCK_MONOTONIC;
+    while monotonic_ns() < until_ns {
+        let _ = clock_nanosleep(clock, ClockNanosleepFlags::TIMER_ABSTIME, &until);
+    }
+}
+
 impl Clock for Realtime {
-    fn wait(&mut self, number: u64, _outlet: &Publisher) -> TickTiming {
-        let due = self.origin_ns + i128::from(tick(number, self.period_s).scheduled_ns);
-        let until = TimeSpec::new((due / 1_000_000_000) as i64, (due % 1_000_000_000) as i64);
-        // A signal may end the sleep early: sleep on until the time has come.
-        while monotonic_ns() < due {
-            let _ = clock_nanosleep(
-                ClockId::CLOCK_MONOTONIC,
-                ClockNanosleepFlags::TIMER_ABSTIME,
-                &until,
-            );
-        }
+    fn wait(&mut self, number: u64, _publisher: &Publisher) -> TickTiming {
+        let due_ns = tick(number, self.period_s).scheduled_ns;
+        sleep_until(self.origin_ns + i128::from(due_ns));
         let woke_ns = self.elapsed_ns().max(0) as u64;
-        let late_ns = woke_ns.saturating_sub(tick(number, self.period_s).scheduled_ns);
+        let late_ns = woke_ns.saturating_sub(due_ns);
         let missed = (late_ns as f64 * 1e-9 / self.period_s) as u32;
         TickTiming {
             tick: tick(number + u64::from(missed), self.period_s),

@@ -1,28 +1,46 @@
 //! Following error of the current: does the current that the amplifier measures follow the commands?
 //!
-//! A drive that takes no more set-points keeps its last current and may report no fault. The measured current shows it: over
-//! a window it must stay within the commands of this window and the one before, and move where the commands moved much.
+//! A drive that no longer takes set-points keeps its last current, and may report no fault. The measured current reveals it:
+//! over a window it must stay within the commands of this window and the previous one, and it must move if the commands moved
+//! considerably.
 
 use bench_hal::Tick;
 
 use super::arming::Trip;
 
-/// A constant current is an error once the commands have moved by this many tolerances.
+/// A constant measured current is an error if the commands moved by more than this multiple of the tolerance.
 const MOVED: f64 = 4.0;
 
 /// Lowest and highest current in amperes.
 #[derive(Clone, Copy, Debug)]
-struct Band(f64, f64);
+struct Band {
+    lowest_a: f64,
+    highest_a: f64,
+}
 
 impl Band {
-    const NONE: Band = Band(f64::INFINITY, f64::NEG_INFINITY);
+    const NONE: Band = Band {
+        lowest_a: f64::INFINITY,
+        highest_a: f64::NEG_INFINITY,
+    };
+    const ZERO: Band = Band {
+        lowest_a: 0.0,
+        highest_a: 0.0,
+    };
 
     fn with(self, current_a: f64) -> Band {
-        Band(self.0.min(current_a), self.1.max(current_a))
+        Band {
+            lowest_a: self.lowest_a.min(current_a),
+            highest_a: self.highest_a.max(current_a),
+        }
+    }
+
+    fn with_band(self, other: Band) -> Band {
+        self.with(other.lowest_a).with(other.highest_a)
     }
 
     fn width(self) -> f64 {
-        self.1 - self.0
+        self.highest_a - self.lowest_a
     }
 }
 
@@ -38,16 +56,15 @@ pub(super) struct FollowingError {
 }
 
 impl FollowingError {
-    /// Currents may differ by `error_a` over a window.
+    /// A check with the tolerance `error_a`, in windows of `window_ns`.
     pub(super) fn new(error_a: f64, window_ns: u64) -> Self {
-        let (before, commanded, measured) = (Band(0.0, 0.0), Band::NONE, Band::NONE);
         FollowingError {
             error_a,
             window_ns,
             began_ns: None,
-            before,
-            commanded,
-            measured,
+            before: Band::ZERO,
+            commanded: Band::NONE,
+            measured: Band::NONE,
         }
     }
 
@@ -56,7 +73,7 @@ impl FollowingError {
         *self = FollowingError::new(self.error_a, self.window_ns);
     }
 
-    /// Takes the command of the last tick and the current measured since; checks at the end of each window.
+    /// Adds the command of the previous tick and the current measured since. Checks at the end of each window.
     pub(super) fn check(&mut self, command_a: f64, actual_a: f64, now: Tick) -> Result<(), Trip> {
         let began_ns = *self.began_ns.get_or_insert(now.scheduled_ns);
         self.commanded = self.commanded.with(command_a);
@@ -71,26 +88,27 @@ impl FollowingError {
         checked
     }
 
+    /// A measured current beyond the commands is compared with the nearest one; a constant current with the highest.
     fn check_window(&self) -> Result<(), Trip> {
-        let asked = self.before.with(self.commanded.0).with(self.commanded.1);
-        let not_followed = |actual_a, command_a| {
-            Err(Trip::CurrentNotFollowed {
-                actual_a,
-                command_a,
-            })
+        let (measured, asked) = (self.measured, self.before.with_band(self.commanded));
+        let (actual_a, command_a) = if measured.lowest_a < asked.lowest_a - self.error_a {
+            (measured.lowest_a, asked.lowest_a)
+        } else if measured.highest_a > asked.highest_a + self.error_a {
+            (measured.highest_a, asked.highest_a)
+        } else if self.stands_still() {
+            (measured.highest_a, self.commanded.highest_a)
+        } else {
+            return Ok(());
         };
-        let stands_still =
-            self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a;
-        match self.measured {
-            Band(lowest_a, _) if lowest_a < asked.0 - self.error_a => {
-                not_followed(lowest_a, asked.0)
-            }
-            Band(_, highest_a) if highest_a > asked.1 + self.error_a => {
-                not_followed(highest_a, asked.1)
-            }
-            Band(_, highest_a) if stands_still => not_followed(highest_a, self.commanded.1),
-            _ => Ok(()),
-        }
+        Err(Trip::CurrentNotFollowed {
+            actual_a,
+            command_a,
+        })
+    }
+
+    /// Whether the commands moved and the current did not.
+    fn stands_still(&self) -> bool {
+        self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a
     }
 }
 

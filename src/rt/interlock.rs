@@ -1,7 +1,7 @@
-//! The interlocks: below every controller, they check every reading first and every command last.
+//! The interlocks. They check every reading before the control law sees it, and every command after the control law.
 //!
-//! The arming machine latches a trip; the functions here only check a reading, a tick or a command. A command that is not
-//! finite is a trip, not a value to clamp.
+//! The functions here check a reading, a tick or a command; the arming machine latches the trip. A command that is not finite
+//! is a trip; it is not limited.
 
 use std::collections::VecDeque;
 
@@ -14,19 +14,26 @@ use crate::config::{InterlockSettings, LoopSettings, MotorSettings};
 /// The limits, and the state that their checks need.
 #[derive(Clone, Debug)]
 pub struct Interlocks {
-    soft_limit_m: f64,
-    peak_current_a: f64,
-    continuous_current_a: f64,
-    cooling: f64,
-    stale_ns: u64,
-    stuck_ns: u64,
-    stuck_current_a: f64,
-    overruns_per_s: u32,
+    limits: Limits,
     thermal_a2: f64,
     last_command_a: f64,
     fresh: Freshness,
     overruns: Overruns,
     following: FollowingError,
+}
+
+/// The limits of the configuration.
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    soft_limit_m: f64,
+    peak_current_a: f64,
+    continuous_current_a: f64,
+    /// Sampling period over the thermal time constant of the motor.
+    cooling: f64,
+    stale_ns: u64,
+    stuck_ns: u64,
+    stuck_current_a: f64,
+    overruns_per_s: u32,
 }
 
 /// The missed ticks within the last second. Its memory is allocated once: a second has no more entries than ticks, and
@@ -38,7 +45,7 @@ struct Overruns {
     count: u64,
 }
 
-/// Since when the probe returns the same reading.
+/// Since when the probe has returned the same sequence number and the same position.
 #[derive(Clone, Copy, Debug, Default)]
 struct Freshness {
     sequence: Option<u64>,
@@ -52,89 +59,85 @@ struct Freshness {
 impl Interlocks {
     /// Interlocks with a cold motor.
     pub fn new(settings: &InterlockSettings, motor: &MotorSettings, servo: &LoopSettings) -> Self {
+        let window_ns = nanoseconds(settings.current_error_s);
         Interlocks {
-            soft_limit_m: settings.soft_limit_m,
-            peak_current_a: motor.peak_current_a(),
-            continuous_current_a: motor.continuous_current_a(),
-            cooling: servo.period_s() / motor.thermal_time_constant_s,
-            stale_ns: nanoseconds(settings.probe_stale_s),
-            stuck_ns: nanoseconds(settings.probe_stuck_s),
-            stuck_current_a: settings.probe_stuck_current_a,
-            overruns_per_s: settings.overruns_per_s,
+            limits: Limits {
+                soft_limit_m: settings.soft_limit_m,
+                peak_current_a: motor.peak_current_a(),
+                continuous_current_a: motor.continuous_current_a(),
+                cooling: servo.period_s() / motor.thermal_time_constant_s,
+                stale_ns: nanoseconds(settings.probe_stale_s),
+                stuck_ns: nanoseconds(settings.probe_stuck_s),
+                stuck_current_a: settings.probe_stuck_current_a,
+                overruns_per_s: settings.overruns_per_s,
+            },
             thermal_a2: 0.0,
             last_command_a: 0.0,
             fresh: Freshness::default(),
-            following: FollowingError::new(
-                settings.current_error_a,
-                nanoseconds(settings.current_error_s),
-            ),
+            following: FollowingError::new(settings.current_error_a, window_ns),
             overruns: Overruns::new(settings.overruns_per_s, servo.rate_hz),
         }
     }
 
     /// Checks a reading. *In the tick.*
     pub fn check_reading(&mut self, reading: &Reading, now: Tick) -> Result<(), Trip> {
-        let stuck = self.follow(reading, now);
+        self.fresh.update(reading, self.last_command_a, now);
         if reading.validity != Validity::Valid || !reading.position_m.is_finite() {
             return Err(Trip::ProbeInvalid);
         }
-        let age_ns = reading
-            .age_ns
-            .max(now.scheduled_ns.saturating_sub(self.fresh.sequence_ns));
-        if age_ns > self.stale_ns {
-            return Err(Trip::ProbeStale {
-                age_s: seconds(age_ns),
-                limit_s: seconds(self.stale_ns),
-            });
-        }
-        if reading.position_m.abs() > self.soft_limit_m {
+        self.check_age(reading, now)?;
+        let limit_m = self.limits.soft_limit_m;
+        let position_m = reading.position_m;
+        if position_m.abs() > limit_m {
             return Err(Trip::Travel {
-                position_m: reading.position_m,
-                limit_m: self.soft_limit_m,
+                position_m,
+                limit_m,
             });
         }
-        stuck
+        self.check_stuck(now)
     }
 
-    /// Remembers when sequence and position last changed, and how far the current moved since.
-    fn follow(&mut self, reading: &Reading, now: Tick) -> Result<(), Trip> {
-        let fresh = &mut self.fresh;
-        let first = fresh.sequence.is_none();
-        if fresh.sequence != Some(reading.sequence) {
-            (fresh.sequence, fresh.sequence_ns) = (Some(reading.sequence), now.scheduled_ns);
+    fn check_age(&self, reading: &Reading, now: Tick) -> Result<(), Trip> {
+        let limit_ns = self.limits.stale_ns;
+        let unchanged_ns = now.scheduled_ns.saturating_sub(self.fresh.sequence_ns);
+        match reading.age_ns.max(unchanged_ns) {
+            age_ns if age_ns > limit_ns => Err(Trip::ProbeStale {
+                age_s: seconds(age_ns),
+                limit_s: seconds(limit_ns),
+            }),
+            _ => Ok(()),
         }
-        if first || fresh.position_m.to_bits() != reading.position_m.to_bits() {
-            (fresh.position_m, fresh.position_ns) = (reading.position_m, now.scheduled_ns);
-            (fresh.lowest_a, fresh.highest_a) = (self.last_command_a, self.last_command_a);
-        }
-        (fresh.lowest_a, fresh.highest_a) = (
-            fresh.lowest_a.min(self.last_command_a),
-            fresh.highest_a.max(self.last_command_a),
-        );
-        let unchanged_ns = now.scheduled_ns.saturating_sub(fresh.position_ns);
-        if unchanged_ns > self.stuck_ns && fresh.highest_a - fresh.lowest_a > self.stuck_current_a {
+    }
+
+    fn check_stuck(&self, now: Tick) -> Result<(), Trip> {
+        let Limits {
+            stuck_ns,
+            stuck_current_a,
+            ..
+        } = self.limits;
+        let unchanged_ns = now.scheduled_ns.saturating_sub(self.fresh.position_ns);
+        let moved_a = self.fresh.highest_a - self.fresh.lowest_a;
+        if unchanged_ns > stuck_ns && moved_a > stuck_current_a {
             return Err(Trip::ProbeStuck {
                 unchanged_s: seconds(unchanged_ns),
-                limit_s: seconds(self.stuck_ns),
+                limit_s: seconds(stuck_ns),
             });
         }
         Ok(())
     }
 
-    /// Checks how many ticks were missed within the last second. The last current flowed through them. *In the tick.*
+    /// Checks how many ticks were missed within the last second. During them the last current kept flowing. *In the tick.*
     pub fn check_timing(&mut self, missed: u32, now: Tick) -> Result<(), Trip> {
         if missed == 0 {
             return Ok(());
         }
         self.heat(self.last_command_a, f64::from(missed));
         let count = self.overruns.add(missed, now.scheduled_ns);
-        if count > self.overruns_per_s {
-            return Err(Trip::Overruns {
-                count,
-                limit: self.overruns_per_s,
-            });
+        let limit = self.limits.overruns_per_s;
+        match count > limit {
+            true => Err(Trip::Overruns { count, limit }),
+            false => Ok(()),
         }
-        Ok(())
     }
 
     /// Checks whether the current that the amplifier measures follows the commands. `None`, where it measures none or is off,
@@ -149,28 +152,29 @@ impl Interlocks {
         }
     }
 
-    /// Checks a command before it goes out. Integrates the motor's heat, thermal' = (i^2 - thermal)/tau. *In the tick.*
+    /// Checks a command before it is sent. The thermal model of the motor is thermal' = (i^2 - thermal)/tau. *In the tick.*
     pub fn check_command(&mut self, command_a: f64) -> Result<(), Trip> {
         if !command_a.is_finite() {
             return Err(Trip::CommandNotFinite);
         }
-        if command_a.abs() > self.peak_current_a {
+        if command_a.abs() > self.limits.peak_current_a {
             return Err(Trip::PeakCurrent {
                 command_a,
-                limit_a: self.peak_current_a,
+                limit_a: self.limits.peak_current_a,
             });
         }
-        let thermal_a2 = self.thermal_a2 + self.cooling * (command_a * command_a - self.thermal_a2);
-        if thermal_a2 > self.continuous_current_a * self.continuous_current_a {
+        let thermal_a2 =
+            self.thermal_a2 + self.limits.cooling * (command_a * command_a - self.thermal_a2);
+        if thermal_a2 > self.limits.continuous_current_a * self.limits.continuous_current_a {
             return Err(Trip::ContinuousCurrent {
                 thermal_a: thermal_a2.sqrt(),
-                limit_a: self.continuous_current_a,
+                limit_a: self.limits.continuous_current_a,
             });
         }
         Ok(())
     }
 
-    /// Takes the current that flows from this tick on. *In the tick.*
+    /// Notes the current that flows from this tick on. *In the tick.*
     pub fn note(&mut self, command_a: f64) {
         self.heat(command_a, 1.0);
         self.last_command_a = command_a;
@@ -178,7 +182,23 @@ impl Interlocks {
 
     fn heat(&mut self, current_a: f64, periods: f64) {
         self.thermal_a2 +=
-            (self.cooling * periods).min(1.0) * (current_a * current_a - self.thermal_a2);
+            (self.limits.cooling * periods).min(1.0) * (current_a * current_a - self.thermal_a2);
+    }
+}
+
+impl Freshness {
+    /// Notes when sequence and position last changed, and the range of the commands since the position changed.
+    fn update(&mut self, reading: &Reading, command_a: f64, now: Tick) {
+        let is_first = self.sequence.is_none();
+        if self.sequence != Some(reading.sequence) {
+            (self.sequence, self.sequence_ns) = (Some(reading.sequence), now.scheduled_ns);
+        }
+        if is_first || self.position_m.to_bits() != reading.position_m.to_bits() {
+            (self.position_m, self.position_ns) = (reading.position_m, now.scheduled_ns);
+            (self.lowest_a, self.highest_a) = (command_a, command_a);
+        }
+        self.lowest_a = self.lowest_a.min(command_a);
+        self.highest_a = self.highest_a.max(command_a);
     }
 }
 

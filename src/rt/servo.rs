@@ -13,14 +13,14 @@ use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
 use super::record::{EventKind, REQUESTS_PER_TICK, RequestKind, TickRecord, flag};
 
-/// The driver returned a current that is not finite.
+/// The current is unknown if the driver returns a value that is not finite.
 const NOT_FINITE: DeviceError = DeviceError {
-    what: "the driver does not say which current it gives",
+    what: "the driver returned a current that is not finite",
     remedy: "this is a fault of the driver; please report it",
     code: 0,
 };
 
-/// A request to the loop, taken at a tick boundary. Its content is complete and immutable.
+/// A request to the loop, taken at the start of a tick. Its content is complete and immutable.
 pub enum Request {
     /// Enable the amplifier.
     Arm,
@@ -94,10 +94,10 @@ impl Servo {
         }
     }
 
-    /// One tick: allocates nothing, takes no lock, prints nothing, makes no system call but those of clock and devices.
+    /// One tick. It does not allocate, lock or print; its only system calls are those of the clock and of the devices.
     ///
-    /// A tick that takes [`Request::Arm`] or [`Request::Clear`] calls `enable` or `reset_fault`, which may take their time:
-    /// the current is zero then, and the caller restarts the schedule (see [`Servo::took_slow_request`]).
+    /// A tick that takes [`Request::Arm`] or [`Request::Clear`] calls `enable` or `reset_fault`. These may block; the current
+    /// is zero meanwhile, and the caller restarts the schedule afterwards (see [`Servo::took_slow_request`]).
     pub fn tick(&mut self, timing: &TickTiming, clock: &impl Clock) {
         let now = timing.tick;
         self.take_requests(now.number);
@@ -106,7 +106,8 @@ impl Servo {
         let decision = self.decide(&reading, checked, now.number); // decide
         self.write(decision.requested_a, now.number); // write
         let done_ns = clock.now_ns(now);
-        self.publish(timing, done_ns, &reading, &decision); // publish
+        let record = self.record(timing, done_ns, &reading, &decision);
+        self.connections.publisher.record(record); // publish
         self.finish_run(now.number);
     }
 
@@ -118,7 +119,7 @@ impl Servo {
         match self.rig.status() {
             AmplifierStatus::Fault(code) => Err(Trip::Amplifier {
                 code: i64::from(code),
-                words: self.rig.explain(code),
+                text: self.rig.explain(code),
             }),
             _ => missed.and(reading).and(current),
         }
@@ -139,7 +140,7 @@ impl Servo {
         }
     }
 
-    /// The request passes the interlocks and goes out, or everything goes off.
+    /// Commands the requested current if the interlocks allow it; otherwise switches everything off.
     fn write(&mut self, requested_a: f64, tick: u64) {
         self.applied_a = 0.0;
         if self.is_on() {
@@ -155,22 +156,20 @@ impl Servo {
     fn command(&mut self, requested_a: f64) -> Result<f64, Trip> {
         self.interlocks.check_command(requested_a)?;
         let given_a = self.rig.command(requested_a)?;
-        // The current is unknown if the driver returns a value that is not finite.
-        if given_a.is_finite() {
-            Ok(given_a)
-        } else {
-            Err(Trip::from(NOT_FINITE))
+        match given_a.is_finite() {
+            true => Ok(given_a),
+            false => Err(NOT_FINITE.into()),
         }
     }
 
-    fn publish(
-        &mut self,
+    fn record(
+        &self,
         timing: &TickTiming,
         done_ns: u64,
         reading: &Reading,
         decision: &Decision,
-    ) {
-        let record = TickRecord {
+    ) -> TickRecord {
+        TickRecord {
             tick: timing.tick.number,
             scheduled_ns: timing.tick.scheduled_ns,
             woke_ns: timing.woke_ns,
@@ -186,23 +185,19 @@ impl Servo {
             state: self.state,
             flags: self.flags(timing, reading, decision),
             missed_ticks: timing.missed,
-        };
-        self.connections.publisher.record(record);
+        }
     }
 
     fn flags(&self, timing: &TickTiming, reading: &Reading, decision: &Decision) -> u32 {
         let limited = self.applied_a.to_bits() != decision.requested_a.to_bits();
-        let tick = timing.tick.number;
-        let tripped = self.trip.is_some_and(|(_, at)| at == tick);
-        let flags = [
-            (decision.active, flag::ACTIVE),
-            (limited, flag::LIMITED),
-            (timing.missed > 0, flag::OVERRUN),
-            (reading.validity != Validity::Valid, flag::INVALID),
-            (tripped, flag::TRIPPED),
-        ];
-        let set = flags.iter().filter(|(is_set, _)| *is_set);
-        set.fold(0, |flags, (_, flag)| flags | flag)
+        let tripped = self
+            .trip
+            .is_some_and(|(_, tick)| tick == timing.tick.number);
+        flag::ACTIVE * u32::from(decision.active)
+            | flag::LIMITED * u32::from(limited)
+            | flag::OVERRUN * u32::from(timing.missed > 0)
+            | flag::INVALID * u32::from(reading.validity != Validity::Valid)
+            | flag::TRIPPED * u32::from(tripped)
     }
 
     fn finish_run(&mut self, tick: u64) {
@@ -235,8 +230,8 @@ impl Servo {
         }
     }
 
-    /// Enables the amplifier, which may take its time at zero current; the schedule restarts afterwards. A request that
-    /// changes no state does not restart the schedule: in the middle of a run that would hide a late tick.
+    /// Enables the amplifier. This may block, at zero current, so the schedule restarts afterwards. A request that changes no
+    /// state does not restart the schedule: during a run that would hide a late tick.
     fn arm(&mut self, tick: u64) {
         if self.state.after(Transition::Arm).is_none() {
             return;
@@ -248,7 +243,7 @@ impl Servo {
         }
     }
 
-    /// Clears the fault of the amplifier as well; the trip stays as long as that fails.
+    /// Clears the fault of the amplifier, then the trip. If the amplifier keeps its fault, the trip remains.
     fn clear(&mut self, tick: u64) {
         if self.state.after(Transition::Clear).is_none() {
             return;
@@ -310,12 +305,12 @@ impl Servo {
         std::mem::take(&mut self.took_slow_request)
     }
 
-    /// Armed or running: the amplifier is enabled.
+    /// Whether the loop is armed or running, with the amplifier enabled.
     fn is_on(&self) -> bool {
         matches!(self.state, State::Armed | State::Running)
     }
 
-    /// Neither armed nor running.
+    /// Whether the loop is neither armed nor running.
     pub fn is_off(&self) -> bool {
         !self.is_on()
     }
@@ -330,7 +325,7 @@ impl Servo {
         self.completed
     }
 
-    /// The way to the recorder.
+    /// The connection to the recorder.
     pub fn publisher(&self) -> &Publisher {
         &self.connections.publisher
     }

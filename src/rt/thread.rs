@@ -1,5 +1,5 @@
-//! The loop's own thread: memory locked, a real-time scheduler, a processor of its own. If the system refuses one of these,
-//! the loop runs all the same and reports it.
+//! The thread of the loop: locked memory, a real-time scheduler and a processor of its own. If the system refuses one of
+//! these, the loop still runs, and the refusal is reported with its remedy.
 
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
@@ -33,7 +33,7 @@ impl Pace {
     }
 }
 
-/// How the loop was scheduled: beside every timing figure.
+/// How the loop was scheduled. It is reported with every timing figure.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Scheduling {
     /// `SCHED_FIFO 80`, `SCHED_OTHER`.
@@ -88,17 +88,15 @@ pub fn prepare(
     let settings = settings.clone();
     let (start, started) = channel();
     let (report, reported) = channel();
-    let body = move || {
-        let _ = report.send(pace.schedule(&settings));
+    let builder = std::thread::Builder::new().name("bench-loop".into());
+    let thread = builder.spawn(move || {
+        let _ = report.send(pace.schedule(&settings)); // without a receiver nobody starts the loop
         match started.recv() {
             Ok(()) => pace.run(servo, settings.period_s(), tail_ticks),
             Err(_) => LoopOutcome::default(),
         }
-    };
-    let builder = std::thread::Builder::new().name("bench-loop".into());
-    let thread = builder.spawn(body)?;
-    let ended = |_| std::io::Error::other("the loop's thread ended before it began");
-    let scheduling = reported.recv().map_err(ended)?;
+    })?;
+    let scheduling = reported.recv().map_err(std::io::Error::other)?;
     Ok(PreparedLoop {
         thread,
         start,
@@ -148,27 +146,33 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutc
 /// Requests all system settings that prevent interruptions of the calling thread, which is the thread of the loop.
 pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
     let mut scheduling = Scheduling::default();
-    scheduling.memory_locked = scheduling.ask(
-        "locking memory",
-        mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE),
-        "raise `memlock` in /etc/security/limits.conf or give the program CAP_IPC_LOCK",
-    );
-    let is_fifo = scheduling.ask(
-        "SCHED_FIFO",
-        set_fifo(settings.priority),
-        "raise `rtprio` in /etc/security/limits.conf or give the program CAP_SYS_NICE",
-    );
-    let remedy = "choose a processor this process may use in loop.cpu";
-    let cpu = settings.cpu;
-    scheduling.cpu = cpu.filter(|&cpu| scheduling.ask("binding to a processor", bind(cpu), remedy));
-    scheduling.policy = match is_fifo {
-        true => format!("SCHED_FIFO {}", settings.priority),
-        false => "SCHED_OTHER".into(),
-    };
+    scheduling.lock_memory();
+    scheduling.set_policy(settings.priority);
+    scheduling.set_cpu(settings.cpu);
     scheduling
 }
 
 impl Scheduling {
+    fn lock_memory(&mut self) {
+        let locked = mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE);
+        let remedy =
+            "raise `memlock` in /etc/security/limits.conf or give the program CAP_IPC_LOCK";
+        self.memory_locked = self.ask("locking memory", locked, remedy);
+    }
+
+    fn set_policy(&mut self, priority: i32) {
+        let remedy = "raise `rtprio` in /etc/security/limits.conf or give the program CAP_SYS_NICE";
+        self.policy = match self.ask("SCHED_FIFO", set_fifo(priority), remedy) {
+            true => format!("SCHED_FIFO {priority}"),
+            false => "SCHED_OTHER".into(),
+        };
+    }
+
+    fn set_cpu(&mut self, cpu: Option<usize>) {
+        let remedy = "choose a processor this process may use in loop.cpu";
+        self.cpu = cpu.filter(|&cpu| self.ask("binding to a processor", bind(cpu), remedy));
+    }
+
     /// Whether the system granted what was asked for; a refusal is noted with its remedy.
     fn ask(&mut self, what: &str, result: nix::Result<()>, remedy: &str) -> bool {
         let refused = result.map_err(|error| format!("{what}: {error}; {remedy}"));

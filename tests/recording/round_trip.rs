@@ -114,7 +114,7 @@ fn every_kind_of_event_comes_back_unchanged_and_in_order() {
         },
         Trip::Amplifier {
             code: i64::MIN,
-            words: None,
+            text: None,
         },
     ];
     let states = [
