@@ -1,0 +1,264 @@
+//! The CANopen driver with the emulated drive: every fault in every state.
+use super::*;
+
+/// A fault, and what must follow from it.
+struct Case {
+    word: &'static str,
+    /// While the amplifier is in use, the loop trips within this number of ticks, with this code.
+    found: (u64, u32),
+    /// The current is zero within this number of ticks.
+    zero: u64,
+    /// Arming is refused with this code if the fault existed before; `None`: a drive that is off does not show the fault.
+    armed_into: Option<u32>,
+}
+
+const fn case(word: &'static str, found: (u64, u32), zero: u64, armed_into: Option<u32>) -> Case {
+    Case {
+        word,
+        found,
+        zero,
+        armed_into,
+    }
+}
+
+/// A status frame arrives every 2 ms, and up to a tick passes until the loop reads it.
+const STATUS: u64 = 3;
+/// No status frame for 20 ms.
+const SILENCE: u64 = 22;
+
+/// The table of `hal/README.md` in ticks of a millisecond.
+const CASES: [Case; 12] = [
+    case(
+        "amplifier.silence",
+        (SILENCE, STATUS_LOST),
+        SILENCE + SWITCH_OFF,
+        Some(HEARTBEAT_LOST),
+    ),
+    case(
+        "amplifier.late=200ms",
+        (SILENCE, STATUS_LOST),
+        SILENCE + SWITCH_OFF,
+        Some(HEARTBEAT_LOST),
+    ),
+    case(
+        "amplifier.unplugged",
+        (SILENCE, STATUS_LOST),
+        UNHEARD,
+        Some(HEARTBEAT_LOST),
+    ),
+    case(
+        "amplifier.short-frames",
+        (STATUS, MALFORMED),
+        STATUS + SWITCH_OFF,
+        Some(MALFORMED),
+    ),
+    case(
+        "amplifier.senseless-status",
+        (STATUS, MALFORMED),
+        STATUS + SWITCH_OFF,
+        Some(NOT_REMOTE),
+    ),
+    case(
+        "amplifier.target-ignored",
+        (STATUS, TARGET_IGNORED),
+        0,
+        Some(TARGET_IGNORED),
+    ),
+    case("amplifier.switches-off", (STATUS, SWITCHED_OFF), 0, None),
+    case(
+        "amplifier.fault=0x2310",
+        (FRAME, EMERGENCY + 0x2310),
+        0,
+        Some(EMERGENCY + 0x2310),
+    ),
+    case(
+        "amplifier.emergency=0x4210",
+        (FRAME, EMERGENCY + 0x4210),
+        FRAME + SWITCH_OFF,
+        None,
+    ),
+    case("amplifier.reset", (FRAME, RESTARTED), 0, Some(RESTARTED)),
+    case(
+        "amplifier.bus-off",
+        (FRAME, BUS_OFF),
+        UNHEARD,
+        Some(BUS_OFF),
+    ),
+    case(INTERFACE_DOWN, (FRAME, BUS_DOWN), UNHEARD, Some(BUS_DOWN)),
+];
+
+#[test]
+fn without_faults_nothing_trips_and_runs_complete() {
+    for run in [Run::Chirp, Run::Control] {
+        let mut lab = Lab::new();
+        lab.run_until_current_flows(run);
+        lab.bench.run(1000);
+        assert_eq!(lab.bench.trips(), []);
+        assert_eq!(lab.bench.state(), State::Running);
+        lab.next_run_completes();
+    }
+}
+
+#[test]
+fn during_a_run_every_fault_ends_the_current_in_time_and_is_recorded_and_the_next_run_completes() {
+    for run in [Run::Chirp, Run::Control] {
+        for case in &CASES {
+            let mut lab = Lab::new();
+            lab.run_until_current_flows(run);
+            let begin = lab.last_tick();
+            lab.begin(case.word);
+            let zero = lab.ticks_with_current(AFTER);
+            assert!(
+                zero <= case.zero,
+                "{}: current for {zero} ticks, {} are allowed",
+                case.word,
+                case.zero
+            );
+            assert!(
+                !lab.drive.is_enabled(),
+                "{}: {}",
+                case.word,
+                lab.drive.state()
+            );
+            lab.trips_naming(case.found.1, begin..=begin + case.found.0);
+            match run {
+                Run::Chirp => lab.next_run_completes(),
+                Run::Control => lab.next_program_completes(),
+            }
+        }
+    }
+}
+
+#[test]
+fn armed_every_fault_switches_the_amplifier_off_in_time() {
+    for case in &CASES {
+        let mut lab = Lab::new();
+        lab.arm();
+        let begin = lab.last_tick();
+        lab.begin(case.word);
+        let off = lab.ticks_enabled(AFTER);
+        let allowed = case.zero.max(case.found.0 + SWITCH_OFF);
+        assert!(
+            off <= allowed,
+            "{}: enabled for {off} ticks, {allowed} are allowed",
+            case.word
+        );
+        lab.trips_naming(case.found.1, begin..=begin + case.found.0);
+        lab.next_run_completes();
+    }
+}
+
+#[test]
+fn disarmed_a_fault_gives_no_current_and_prevents_arming() {
+    for case in &CASES {
+        let mut lab = Lab::new();
+        lab.bench.run(50);
+        lab.begin(case.word);
+        assert_eq!(lab.ticks_enabled(AFTER), 0, "{}", case.word);
+        assert_eq!(lab.bench.state(), State::Disarmed);
+        let begin = lab.last_tick();
+        lab.bench.order(Request::Arm);
+        lab.bench
+            .order(Request::Start(program(&lab.config, Run::Chirp)));
+        // The run begins with 50 ms at zero current: the fault is found before a current flows.
+        assert_eq!(lab.ticks_with_current(50), 0, "{}", case.word);
+        match case.armed_into {
+            Some(code) => {
+                lab.trips_naming(code, begin..=begin + 40);
+                assert_eq!(
+                    lab.ticks_enabled(AFTER),
+                    0,
+                    "{}: {}",
+                    case.word,
+                    lab.drive.state()
+                );
+            }
+            None => assert_eq!(lab.bench.trips(), [], "{}", case.word),
+        }
+        lab.next_run_completes();
+    }
+}
+
+#[test]
+fn the_same_fault_is_the_same_run_bit_for_bit() {
+    let run = || {
+        let mut lab = Lab::new();
+        lab.run_until_current_flows(Run::Control);
+        lab.begin("amplifier.silence");
+        lab.bench.run(AFTER);
+        lab.bench
+            .all
+            .iter()
+            .map(|published| format!("{published:?}"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn a_drive_that_ignores_set_points_is_stopped_by_nmt_and_one_that_ignores_nmt_by_the_lost_heartbeat()
+ {
+    // After 70 ms without confirmation and a repeat of 10 ms: NMT stop; 70 ms later the drive detects the lost heartbeat.
+    for (word, off) in [
+        ("amplifier.set-points-ignored", 85),
+        ("amplifier.orders-ignored", 175),
+    ] {
+        let mut lab = Lab::new();
+        lab.run_until_current_flows(Run::Chirp);
+        lab.begin(word);
+        lab.bench.order(Request::Stop);
+        let zero = lab.ticks_with_current(AFTER);
+        assert!(
+            (60..=off).contains(&zero),
+            "{word}: current for {zero} ticks"
+        );
+        assert!(!lab.drive.is_enabled());
+        lab.bench.order(Request::Arm);
+        lab.bench.run(1);
+        let at = lab.last_tick();
+        lab.trips_naming(STILL_ENABLED, at..=at);
+        lab.next_run_completes();
+    }
+}
+
+#[test]
+fn a_drive_that_keeps_its_last_current_during_a_run_is_detected_by_its_measured_current() {
+    for run in [Run::Chirp, Run::Control] {
+        let mut lab = Lab::new();
+        lab.run_until_current_flows(run);
+        lab.ask("amplifier.set-points-ignored");
+        let asked = lab.last_tick();
+        // Two windows of 50 ms at 1 kHz, the status's 2 ms, and the time until commands differ by 0.1 A; then off by NMT.
+        let flowed = lab.ticks_with_current(1500);
+        let (trip, tick) = lab.trip().expect("it trips");
+        assert!(
+            matches!(trip, Trip::CurrentNotFollowed { .. }),
+            "{run:?}: {trip:?}"
+        );
+        assert!(
+            tick - asked <= 1000 && flowed <= tick - asked + 85,
+            "{run:?}: {} ticks, {flowed}",
+            tick - asked
+        );
+    }
+}
+
+#[test]
+fn a_loop_that_ends_unexpectedly_leaves_no_current() {
+    let mut lab = Lab::new();
+    lab.run_until_current_flows(Run::Control);
+    let Lab {
+        bench,
+        drive,
+        world,
+        ..
+    } = lab;
+    assert!(matches!(bench.all.last(), Some(LoopMessage::Tick(_))));
+    drop(bench);
+    world.sleep(Duration::from_millis(2));
+    assert!(
+        drive.current_a() == 0.0 && !drive.is_enabled(),
+        "{}",
+        drive.state()
+    );
+}

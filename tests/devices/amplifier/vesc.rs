@@ -1,0 +1,39 @@
+//! The VESC driver with the emulated VESC: every fault in every state.
+use super::*;
+
+/// A VESC, whose codes are 1: silent, 2: bus-off, 3: interface down. STATUS arrives every 20 ms, and its loss is detected after
+/// 100 ms; the VESC itself detects the loss of commands after 500 ms.
+const VESC: &str =
+    "amplifier.device={ kind = \"vesc\", interface = \"can0\", bit_rate = 500000, node = 23 }";
+
+#[test]
+fn a_vesc_loses_its_current_in_time_with_every_fault_in_every_state_and_runs_again() {
+    let cases = [
+        ("amplifier.silence", (122, 1), 122 + SWITCH_OFF),
+        ("amplifier.short-frames", (122, 1), 122 + SWITCH_OFF),
+        ("amplifier.late=400ms", (122, 1), 122 + SWITCH_OFF),
+        ("amplifier.unplugged", (122, 1), 502),
+        ("amplifier.bus-off", (FRAME, 2), 502),
+        (INTERFACE_DOWN, (FRAME, 3), 502),
+    ];
+    for (word, (found, code), zero) in cases {
+        for run in [None, Some(Run::Chirp), Some(Run::Control)] {
+            let mut lab = Lab::of(config(&[VESC]));
+            match run {
+                Some(run) => lab.run_until_current_flows(run),
+                None => lab.arm(),
+            }
+            let begin = lab.last_tick();
+            lab.begin(word);
+            let ticks = lab.ticks_with_current(600);
+            assert!(
+                ticks <= zero,
+                "{word}: current for {ticks} ticks, {zero} are allowed"
+            );
+            lab.trips_naming(code, begin..=begin + found);
+            lab.end();
+            lab.bench.run(200); // delayed frames arrive
+            lab.next_run_completes();
+        }
+    }
+}

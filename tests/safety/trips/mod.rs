@@ -1,0 +1,238 @@
+//! Every reason to trip, from both sides of its limit.
+mod amplifier;
+mod current;
+mod probe;
+
+use bench::config::Config;
+use bench::rt::arming::{State, Trip};
+use bench::rt::record::{EventKind, flag};
+use bench::rt::servo::Request;
+use bench_hal::Validity;
+
+use crate::faulty_rig::Fault;
+use crate::rig::{Bench, Told, says, stage};
+
+/// When faults begin, unless a test says otherwise.
+const AT: u64 = 100;
+/// Ticks watched after a trip: a tenth of a second.
+const AFTER: u64 = 500;
+/// A current that disturbs no interlock, but is none.
+const SOME_A: f64 = 0.1;
+
+fn nothing_trips(bench: &mut Bench, ticks: u64) {
+    bench.run(ticks);
+    assert_eq!(bench.trips(), [], "nothing may trip inside the limits");
+    let last = bench.tick();
+    assert!(
+        last.state == State::Running && last.command_a != 0.0,
+        "the run goes on: {last:?}"
+    );
+}
+
+/// Runs up to the tick `at` with current and without a trip, through it, and on: there it must trip.
+fn trips(bench: &mut Bench, at: u64, reason: &str) -> Trip {
+    nothing_trips(bench, at - 1);
+    bench.run(1 + AFTER);
+    prove_that_it_is_off(bench, at, reason)
+}
+
+/// What every trip promises, whatever its reason.
+fn prove_that_it_is_off(bench: &Bench, at: u64, reason: &str) -> Trip {
+    let record = bench.ticks().at(at);
+    assert_eq!(
+        record.command_a.to_bits(),
+        0,
+        "no current in the tick of the trip: {record:?}"
+    );
+    assert_eq!(
+        (record.state, record.flags & flag::TRIPPED),
+        (State::Tripped, flag::TRIPPED),
+        "{record:?}"
+    );
+    assert!(
+        bench
+            .ticks()
+            .iter()
+            .all(|r| (r.flags & flag::TRIPPED != 0) == (r.tick == at)),
+        "one tick is flagged"
+    );
+    assert!(
+        bench
+            .ticks()
+            .iter()
+            .filter(|r| r.tick >= at)
+            .all(|r| r.command_a.to_bits() == 0)
+    );
+
+    let told = bench.told();
+    let taken = |told: &Told| matches!(told, Told::Command { current_a, refused: false } if *current_a != 0.0);
+    assert!(
+        !told.iter().any(|(tick, told)| *tick >= at && taken(told)),
+        "a current went out in or after the trip"
+    );
+    let in_tick: Vec<Told> = told
+        .iter()
+        .filter(|(tick, _)| *tick == at)
+        .map(|(_, told)| *told)
+        .collect();
+    assert_eq!(
+        in_tick.last(),
+        Some(&Told::Disable),
+        "disabled in the tick of the trip: {in_tick:?}"
+    );
+    assert!(
+        !told
+            .iter()
+            .any(|(tick, told)| *tick > at && *told != Told::Disable),
+        "left alone after it"
+    );
+    assert!(!bench.is_on());
+
+    assert_eq!(bench.trips().len(), 1, "{:?}", bench.trips());
+    let EventKind::Trip(trip) = bench.trips()[0].kind else {
+        unreachable!()
+    };
+    assert_eq!(
+        (trip.reason(), bench.trips()[0].tick),
+        (reason, at),
+        "{trip:?}"
+    );
+    let tripped = |e: &bench::rt::record::Event| {
+        e.tick == at
+            && matches!(
+                e.kind,
+                EventKind::State {
+                    from: State::Armed | State::Running,
+                    to: State::Tripped
+                }
+            )
+    };
+    assert_eq!(bench.events().iter().filter(|e| tripped(e)).count(), 1);
+    assert_eq!(bench.servo().last_trip(), Some((trip, at)));
+    bench.prove_that_the_recording_is_complete(at, reason);
+    trip
+}
+
+/// The tick of the first trip, every tick being late by so many; none within 40 s is a failure.
+fn first_trip(bench: &mut Bench, missed: u32) -> u64 {
+    for _ in 0..200_000 {
+        bench.late_tick(missed);
+        if let Some(trip) = bench.trips().first() {
+            return trip.tick;
+        }
+        bench.all.drain(..bench.all.len().saturating_sub(8));
+    }
+    panic!("nothing trips");
+}
+
+fn constant() -> Box<dyn bench::rt::program::Program> {
+    says(|_| SOME_A)
+}
+
+#[test]
+fn as_many_missed_ticks_as_allowed_in_a_second_run_on_and_one_more_trips() {
+    let config = stage();
+    assert_eq!(config.interlock.overruns_per_s, 50);
+    for (missed, beyond) in [(vec![50], 51), (vec![20, 20, 10], 1)] {
+        let late = |bench: &mut Bench| {
+            for missed in &missed {
+                bench.late_tick(*missed);
+            }
+        };
+        let mut bench = Bench::running(&config, &[], constant());
+        bench.run(AT);
+        late(&mut bench);
+        nothing_trips(&mut bench, 10);
+        let mut bench = Bench::running(&config, &[], constant());
+        bench.run(AT);
+        if missed.len() > 1 {
+            late(&mut bench);
+        }
+        let at = bench.late_tick(beyond).tick;
+        bench.run(AFTER);
+        let trip = prove_that_it_is_off(&bench, at, "overruns");
+        assert_eq!(
+            trip,
+            Trip::Overruns {
+                count: 51,
+                limit: 50
+            }
+        );
+    }
+}
+
+#[test]
+fn overruns_are_counted_over_any_second_wherever_it_begins() {
+    let config = stage();
+    // 30 ticks missed every 0.6 s: at most two such moments lie within a second, 60 ticks.
+    let mut bench = Bench::running(&config, &[], constant());
+    bench.run(AT);
+    bench.late_tick(30);
+    bench.run(2999 - 30);
+    let at = bench.late_tick(30).tick;
+    bench.run(AFTER);
+    prove_that_it_is_off(&bench, at, "overruns");
+    // One, then 49 after 0.9 s, then 49 more 0.2 s later: within the last second there are 98.
+    let mut bench = Bench::running(&config, &[], constant());
+    bench.run(AT);
+    bench.late_tick(1);
+    bench.run(4500);
+    bench.late_tick(49);
+    bench.run(1000);
+    let at = bench.late_tick(49).tick;
+    bench.run(AFTER);
+    let trip = prove_that_it_is_off(&bench, at, "overruns");
+    assert_eq!(
+        trip,
+        Trip::Overruns {
+            count: 98,
+            limit: 50
+        }
+    );
+    // 25 every 0.505 s: never more than two such moments, 50 ticks, within one second.
+    let mut bench = Bench::running(&config, &[], constant());
+    for _ in 0..20 {
+        bench.late_tick(25);
+        bench.run(2500);
+    }
+    assert_eq!(bench.trips(), []);
+}
+
+#[test]
+fn an_armed_loop_without_a_program_trips_as_a_running_one() {
+    let cases = [
+        (Fault::Says(Validity::Faulty), "probe_invalid"),
+        (Fault::At(0.00095), "travel"),
+        (Fault::Old(2_000_000), "probe_stale"),
+        (Fault::Faulted(1), "amplifier"),
+        (Fault::Refuses(2), "amplifier"),
+    ];
+    for (fault, reason) in cases {
+        let mut bench = Bench::still(&stage(), &[(AT..AT + 1, fault)]);
+        bench.order(Request::Arm);
+        bench.run(AT);
+        assert_eq!(bench.state(), State::Armed);
+        bench.run(1 + AFTER);
+        prove_that_it_is_off(&bench, AT, reason);
+    }
+}
+
+#[test]
+fn a_disarmed_loop_reads_and_records_whatever_the_probe_says_and_does_not_trip() {
+    let faults = [
+        (10..20, Fault::Says(Validity::Missing)),
+        (30..40, Fault::At(0.00095)),
+        (50..60, Fault::Faulted(1)),
+    ];
+    let mut bench = Bench::still(&stage(), &faults);
+    bench.run(AT);
+    assert_eq!((bench.events(), bench.told()), (Vec::new(), Vec::new()));
+    assert_eq!(
+        bench
+            .ticks()
+            .iter()
+            .filter(|r| r.flags & flag::INVALID != 0)
+            .count(),
+        10
+    );
+}

@@ -1,0 +1,140 @@
+//! Trips by the reading: travel, validity, age, and a position that does not change.
+use super::*;
+
+#[test]
+fn travel_up_to_the_soft_limit_runs_on_and_one_bit_beyond_it_trips() {
+    let config = stage();
+    for side in [1.0, -1.0] {
+        let limit_m = config.interlock.soft_limit_m;
+        let faults = [(AT..AT + 200, Fault::At(side * limit_m))];
+        nothing_trips(&mut Bench::running(&config, &faults, constant()), AT + 400);
+        let beyond_m = side * limit_m.next_up();
+        let mut bench = Bench::running(&config, &[(AT..AT + 1, Fault::At(beyond_m))], constant());
+        let trip = trips(&mut bench, AT, "travel");
+        assert_eq!(
+            trip,
+            Trip::Travel {
+                position_m: beyond_m,
+                limit_m
+            }
+        );
+    }
+}
+
+#[test]
+fn a_reading_that_is_not_valid_trips_whatever_its_position() {
+    for validity in [Validity::OutOfRange, Validity::Faulty, Validity::Missing] {
+        let mut bench =
+            Bench::running(&stage(), &[(AT..AT + 1, Fault::Says(validity))], constant());
+        trips(&mut bench, AT, "probe_invalid");
+        let record = bench.ticks().at(AT);
+        assert_eq!(
+            (record.validity, record.flags & flag::INVALID),
+            (validity, flag::INVALID)
+        );
+    }
+    for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut bench = Bench::running(&stage(), &[(AT..AT + 1, Fault::At(nonsense))], constant());
+        trips(&mut bench, AT, "probe_invalid");
+    }
+    nothing_trips(
+        &mut Bench::running(
+            &stage(),
+            &[(AT..AT + 1, Fault::Says(Validity::Valid))],
+            constant(),
+        ),
+        AT + 10,
+    );
+}
+
+#[test]
+fn a_reading_as_old_as_allowed_is_used_and_one_nanosecond_older_trips() {
+    // interlock.probe_stale_s = 1 ms.
+    let config = stage();
+    assert_eq!(config.interlock.probe_stale_s, 0.001);
+    nothing_trips(
+        &mut Bench::running(&config, &[(AT..AT + 50, Fault::Old(1_000_000))], constant()),
+        AT + 100,
+    );
+    let faults = [(AT..AT + 1, Fault::Old(1_000_001))];
+    let trip = trips(
+        &mut Bench::running(&config, &faults, constant()),
+        AT,
+        "probe_stale",
+    );
+    let Trip::ProbeStale { age_s, limit_s } = trip else {
+        panic!("{trip:?}")
+    };
+    assert!(
+        (age_s - 0.001000001).abs() < 1e-15 && (limit_s - 0.001).abs() < 1e-15,
+        "{trip:?}"
+    );
+}
+
+#[test]
+fn a_probe_that_repeats_its_last_measurement_trips_when_that_is_too_old_whatever_age_it_claims() {
+    // Last new measurement at tick 99; 1 ms are five ticks of 0.2 ms: tick 104 is the last that may use it.
+    let config = stage();
+    nothing_trips(
+        &mut Bench::running(&config, &[(AT..AT + 5, Fault::Frozen)], constant()),
+        AT + 100,
+    );
+    let trip = trips(
+        &mut Bench::running(&config, &[(AT..AT + 50, Fault::Frozen)], constant()),
+        AT + 5,
+        "probe_stale",
+    );
+    let Trip::ProbeStale { age_s, .. } = trip else {
+        panic!("{trip:?}")
+    };
+    assert!((age_s - 0.0012).abs() < 1e-12, "six ticks old: {trip:?}");
+}
+
+/// A current that steps from one to another in the middle of the time that a probe may be stuck.
+fn stepping(from_a: f64, to_a: f64) -> Box<dyn bench::rt::program::Program> {
+    says(move |tick| if tick < AT + 50 { from_a } else { to_a })
+}
+
+#[test]
+fn a_position_that_does_not_move_while_the_current_does_trips_after_the_time_allowed() {
+    // interlock: 0.1 s are 500 ticks; the last change is seen at tick 99, so tick 599 is within and tick 600 beyond.
+    let mut config = stage();
+    assert_eq!(config.interlock.probe_stuck_s, 0.1);
+    config.interlock.probe_stuck_current_a = 0.25;
+    let stuck = |ticks: u64| [(AT..AT + ticks, Fault::Stuck)];
+    nothing_trips(
+        &mut Bench::running(&config, &stuck(500), stepping(SOME_A, 0.5)),
+        AT + 1000,
+    );
+    let trip = trips(
+        &mut Bench::running(&config, &stuck(1000), stepping(SOME_A, 0.5)),
+        AT + 500,
+        "probe_stuck",
+    );
+    let Trip::ProbeStuck {
+        unchanged_s,
+        limit_s,
+    } = trip
+    else {
+        panic!("{trip:?}")
+    };
+    assert!(
+        (unchanged_s - 0.1002).abs() < 1e-12 && (limit_s - 0.1).abs() < 1e-12,
+        "{trip:?}"
+    );
+    // Changes of 0.25 A are exact in binary: at the limit nothing trips, one bit beyond it does.
+    nothing_trips(
+        &mut Bench::running(&config, &stuck(1000), stepping(0.25, 0.5)),
+        AT + 1500,
+    );
+    trips(
+        &mut Bench::running(&config, &stuck(1000), stepping(0.25, 0.5f64.next_up())),
+        AT + 500,
+        "probe_stuck",
+    );
+    trips(
+        &mut Bench::running(&config, &stuck(1000), stepping(0.125, -0.25)),
+        AT + 500,
+        "probe_stuck",
+    );
+}
