@@ -1,16 +1,16 @@
 //! `bench emulate` as a program: what it serves, reports and refuses. (The amplifier needs a CAN interface; it is tested in the
 //! emulated machine of `.ci/vm`.)
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::config::{Config, Source, load};
+use bench::config::{Source, load};
 use bench_hal::serial::SerialProbe;
 use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
 
-/// How long a test waits for what must come: a guard against waiting for ever, no figure of merit.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// A test that waits longer than this has failed.
+const LIMIT: Duration = Duration::from_secs(60);
 
 fn bench(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
@@ -28,12 +28,12 @@ fn refusal(arguments: &[&str]) -> String {
         stdout,
         stderr,
     } = bench(arguments).output().expect("it runs");
-    let said = String::from_utf8_lossy(&stderr).into_owned();
+    let message = String::from_utf8_lossy(&stderr).into_owned();
     assert!(
         status.code() == Some(2) && stdout.is_empty(),
-        "{arguments:?}: {status:?} {said}"
+        "{arguments:?}: {status:?} {message}"
     );
-    said
+    message
 }
 
 /// `bench emulate probe` with a link, a log, and commands on its standard input; killed if a test ends early.
@@ -66,10 +66,10 @@ impl Device {
         self.folder.path().join("probe")
     }
 
-    fn until(&self, what: &str, mut pleases: impl FnMut() -> bool) {
-        let begun = Instant::now();
-        while !pleases() {
-            assert!(begun.elapsed() < PATIENCE, "never {what}: {:?}", self.log());
+    fn until(&self, what: &str, mut condition: impl FnMut() -> bool) {
+        let start = Instant::now();
+        while !condition() {
+            assert!(start.elapsed() < LIMIT, "never {what}: {:?}", self.log());
             std::thread::sleep(Duration::from_millis(2));
         }
     }
@@ -81,7 +81,7 @@ impl Device {
             .collect()
     }
 
-    fn order(&mut self, line: &str) {
+    fn send(&mut self, line: &str) {
         let stdin = self.child().stdin.as_mut().expect("piped");
         writeln!(stdin, "{line}").expect("it listens");
     }
@@ -111,7 +111,32 @@ impl Device {
 
     /// A reader of the served probe, as `bench control` would open it.
     fn reader(&self) -> SerialProbe {
-        open(&config(&self.link(), self.folder.path()))
+        self.reader_with(&[])
+    }
+
+    /// A reader with further settings.
+    fn reader_with(&self, sets: &[String]) -> SerialProbe {
+        let (port, locks) = (self.link(), self.folder.path());
+        let line = [
+            format!("probe.device.line.port={port:?}"),
+            format!("probe.device.line.lock_folder={locks:?}"),
+        ];
+        let config = load(&Source {
+            config: Some("lab".into()),
+            sets: [sets, &line].concat(),
+            ..Source::default()
+        })
+        .expect("the settings are valid");
+        bench::rig::devices::probe::open(&config.probe, config.servo.priority)
+            .expect("the probe is served")
+    }
+
+    fn faults(&self) -> Vec<String> {
+        let log = self.log();
+        let faults = log.iter().filter(|entry| entry["what"] == "fault");
+        faults
+            .map(|entry| entry["text"].as_str().expect("a text").to_string())
+            .collect()
     }
 }
 
@@ -124,38 +149,20 @@ impl Drop for Device {
     }
 }
 
-fn config(port: &Path, locks: &Path) -> Config {
-    let sets = vec![
-        format!("probe.device.line.port={port:?}"),
-        format!("probe.device.line.lock_folder={locks:?}"),
-    ];
-    load(&Source {
-        config: Some("lab".into()),
-        sets,
-        ..Source::default()
-    })
-    .expect("the settings are valid")
-}
-
-fn until(probe: &mut SerialProbe, what: &str, pleases: impl Fn(&Reading) -> bool) -> Reading {
-    let begun = Instant::now();
+fn until(probe: &mut SerialProbe, what: &str, condition: impl Fn(&Reading) -> bool) -> Reading {
+    let start = Instant::now();
     loop {
         let reading = probe.latest(Tick::default());
-        if pleases(&reading) {
+        if condition(&reading) {
             return reading;
         }
         assert!(
-            begun.elapsed() < PATIENCE,
+            start.elapsed() < LIMIT,
             "never {what}: {reading:?} {:?}",
             probe.statistics()
         );
         std::thread::sleep(Duration::from_millis(1));
     }
-}
-
-fn open(config: &Config) -> SerialProbe {
-    bench::rig::devices::probe::open(&config.probe, config.servo.priority)
-        .expect("the probe is served")
 }
 
 fn is_at_rest(reading: &Reading) -> bool {
@@ -178,19 +185,7 @@ fn every_protocol_is_served_and_read_in_metres_of_the_stage() {
     for probe in [optoncdt, ascii] {
         let set = format!("probe.device={probe}");
         let device = Device::start(&["--set", &set]);
-        let (port, locks) = (device.link(), device.folder.path());
-        let sets = [
-            set,
-            format!("probe.device.line.port={port:?}"),
-            format!("probe.device.line.lock_folder={locks:?}"),
-        ];
-        let config = load(&Source {
-            config: Some("lab".into()),
-            sets: sets.to_vec(),
-            ..Source::default()
-        });
-        let mut reader = open(&config.expect("valid"));
-        until(&mut reader, "at rest", is_at_rest);
+        until(&mut device.reader_with(&[set]), "at rest", is_at_rest);
     }
 }
 
@@ -199,35 +194,22 @@ fn planned_and_typed_faults_take_effect_and_are_logged() {
     let mut device = Device::start(&["--fault", "probe.out-of-range@0..0.2"]);
     let mut reader = device.reader();
     until(&mut reader, "at rest", is_at_rest);
-    device.order("fault out-of-range");
+    device.send("fault out-of-range");
     until(&mut reader, "out of range", |reading| {
         reading.validity == Validity::OutOfRange
     });
-    device.order("fault nonsense");
-    device.order("fault none");
+    device.send("fault nonsense");
+    device.send("fault none");
     until(&mut reader, "at rest", is_at_rest);
-    device.order("quit");
+    device.send("quit");
     let summary = device.end();
     assert_eq!(summary["faults"], 2);
     assert!(
         summary["measurements"].as_u64() > Some(0) && summary["bytes_sent"].as_u64() > Some(0),
         "{summary}"
     );
-    let told: Vec<(String, String)> = device
-        .log()
-        .iter()
-        .map(|entry| {
-            let text = |key: &str| entry[key].as_str().unwrap_or_default().to_string();
-            (text("what"), text("text"))
-        })
-        .collect();
-    let faults: Vec<&str> = told
-        .iter()
-        .filter(|(what, _)| what == "fault")
-        .map(|(_, text)| text.as_str())
-        .collect();
     assert_eq!(
-        faults,
+        device.faults(),
         [
             "probe.out-of-range",
             "end of probe.out-of-range",
@@ -235,9 +217,11 @@ fn planned_and_typed_faults_take_effect_and_are_logged() {
             "none"
         ]
     );
+    let first = &device.log()[0];
+    let place = first["text"].as_str().expect("a text");
     assert!(
-        told[0].0 == "serving" && told[0].1.contains("capancdt on /dev/pts/"),
-        "{told:?}"
+        first["what"] == "serving" && place.contains("capancdt on /dev/pts/"),
+        "{first}"
     );
     assert!(
         device
@@ -277,105 +261,47 @@ fn prints_the_path_of_the_terminal_without_a_link() {
     assert!(line.contains("capancdt on /dev/pts/"), "{line}");
 }
 
+/// The refusal of `bench emulate` with these options.
+fn emulate_refusal(options: &str) -> String {
+    let arguments: Vec<&str> = ["emulate"]
+        .into_iter()
+        .chain(options.split_whitespace())
+        .collect();
+    refusal(&arguments)
+}
+
 #[test]
 fn rejects_invalid_options_before_serving() {
-    let missing = refusal(&[
-        "emulate",
-        "amplifier",
-        "--config",
-        "lab",
-        "--interface",
-        "no-such-can",
-    ]);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let existing = folder.path().join("existing");
+    std::fs::write(&existing, "").expect("a file");
+    let with_existing = format!("probe --config lab --pty {}", existing.display());
+    let cases = [
+        ("probe", "--config lab"),
+        ("", "amplifier|probe"),
+        ("stage --config lab", "amplifier"),
+        ("probe --config lab --port /dev/ttyNONE9", "no such port"),
+        ("probe --config lab --interface vcan0", "amplifier"),
+        ("probe --config lab --measuring-rate 0", "above zero"),
+        ("probe --config lab --fault probe.stuck", "KIND@FROM..TO"),
+        ("probe --config lab --fault probe.x@1", "there is no fault"),
+        (
+            "probe --config lab --fault amplifier.reset@1",
+            "no amplifier",
+        ),
+        (
+            "probe --config lab --log /nonexistent/log",
+            "/nonexistent/log",
+        ),
+        (&with_existing, "it exists"),
+    ];
+    for (options, reason) in cases {
+        let message = emulate_refusal(options);
+        assert!(message.contains(reason), "{options}: {message}");
+    }
+    let missing = emulate_refusal("amplifier --config lab --interface no-such-can");
     assert!(
         missing.contains("no-such-can") && missing.contains("vcan0"),
         "{missing}"
-    );
-    assert!(refusal(&["emulate", "probe"]).contains("--config lab"));
-    assert!(refusal(&["emulate"]).contains("amplifier|probe"));
-    assert!(refusal(&["emulate", "stage", "--config", "lab"]).contains("amplifier"));
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--port",
-            "/dev/ttyNONE9"
-        ])
-        .contains("no such port")
-    );
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--interface",
-            "vcan0"
-        ])
-        .contains("amplifier")
-    );
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--measuring-rate",
-            "0"
-        ])
-        .contains("above zero")
-    );
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--fault",
-            "probe.stuck"
-        ])
-        .contains("KIND@FROM..TO")
-    );
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--fault",
-            "probe.x@1"
-        ])
-        .contains("there is no fault")
-    );
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--fault",
-            "amplifier.reset@1"
-        ])
-        .contains("no amplifier")
-    );
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let taken = folder.path().join("taken");
-    std::fs::write(&taken, "").expect("a file");
-    let taken = taken.to_str().expect("text");
-    assert!(
-        refusal(&["emulate", "probe", "--config", "lab", "--pty", taken]).contains("it exists")
-    );
-    assert!(
-        refusal(&[
-            "emulate",
-            "probe",
-            "--config",
-            "lab",
-            "--log",
-            "/nonexistent/log"
-        ])
-        .contains("/nonexistent/log")
     );
 }

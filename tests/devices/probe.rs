@@ -19,9 +19,9 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
 use crate::rig::Bench;
 
 const PERIOD: Duration = Duration::from_millis(5);
-/// Ticks in which a fault must have tripped, a current must flow: a few times the longest time in the settings below.
+/// Number of ticks within which a fault must trip and a current must flow: several times the longest time in the settings below.
 const TICKS: u64 = 2000;
-/// How long a test waits for what must come: a guard against waiting for ever, no figure of merit.
+/// A test that waits longer than this has failed.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Lines of text, two millimetres to either side: a damaged byte spoils the line, and a jump of a millimetre is in range.
@@ -36,7 +36,7 @@ fn ascii(folder: &std::path::Path) -> String {
     )
 }
 
-/// The profile `lab`, slow and patient.
+/// The profile `lab` with a slow loop and long time limits.
 fn config(folder: &std::path::Path) -> Config {
     let controller = folder.join("slow.toml");
     // 154 um/A below the first mode: crossover at 1.5 rad/s, far below everything that moves.
@@ -119,11 +119,11 @@ impl CurrentAmplifier for Straight {
 enum Pace {
     /// With every reading.
     Readings,
-    /// After every period, for there are none.
+    /// After every period, because there are no readings.
     Time,
 }
 
-/// The loop with the serial driver, an acting probe at the other end, and the stage between both.
+/// The loop with the serial driver, the emulated probe at the other end, and the stage between both.
 struct Table {
     bench: Bench,
     watch: StatisticsHandle,
@@ -218,7 +218,7 @@ impl Table {
         probe.inject(fault);
     }
 
-    /// The fault begins; whether readings go on coming decides who sets the pace.
+    /// The fault begins. The pace depends on whether readings still arrive.
     fn begin(&mut self, word: &str) {
         let silent = ["probe.silence", "probe.corrupt", LATE, HANG_UP];
         self.pace = if silent.contains(&word) {
@@ -241,7 +241,7 @@ impl Table {
         plan.program().expect("a program")
     }
 
-    /// Leads the loop into a state; a running one until a current flows.
+    /// Brings the loop into a state; runs until a current flows.
     fn enter(&mut self, state: StateOf) {
         if state == StateOf::Disarmed {
             return;
@@ -260,7 +260,7 @@ impl Table {
         }
     }
 
-    /// A person who has not noticed anything goes on to the next state: current would flow.
+    /// An operator who has not noticed the fault goes on to the next state, in which current would flow.
     fn go_on(&mut self, state: StateOf) {
         if state == StateOf::Disarmed {
             self.bench.order(Request::Arm);
@@ -309,7 +309,7 @@ impl Table {
             .prove_that_the_recording_is_complete(trip.tick, reason);
     }
 
-    /// The cause is removed, a person clears the trip, and a run of the loop goes on without another.
+    /// The cause is removed, the operator clears the trip, and the next run continues without a trip.
     fn next_run_is_clean(&mut self) {
         self.ask("probe.none");
         self.pace = Pace::Readings;
@@ -351,12 +351,12 @@ const STATES: [StateOf; 4] = [
     StateOf::Control,
 ];
 
-/// Later than any reading may be.
+/// A delay longer than the permitted age of a reading.
 const LATE: &str = "probe.late=9s";
 /// Not a fault of the probe: its cable.
 const HANG_UP: &str = "the terminal is closed";
 
-/// In each state, all at once: they mostly wait.
+/// Runs the test in each state, concurrently because it mostly waits.
 fn in_each_state(test: impl Fn(&mut Table, StateOf) + Sync) {
     std::thread::scope(|scope| {
         for state in STATES {
@@ -431,7 +431,7 @@ fn a_probe_that_restarts_is_read_on_without_a_trip() {
 }
 
 #[test]
-fn a_closed_terminal_trips_and_is_said_and_the_probe_is_opened_anew() {
+fn a_closed_terminal_trips_and_is_reported_and_the_probe_can_be_opened_again() {
     in_each_state(|table, state| {
         table.begin(HANG_UP);
         table.go_on(state);
