@@ -1,8 +1,8 @@
-"""Checks what tests/rehearsal/inside.sh left: the chirp against the pure simulation, and every way of ending a run.
+"""Checks the results of tests/rehearsal/inside.sh: the chirp against the simulation, and each way in which a run can end.
 
     python3 tests/rehearsal/check.py FOLDER PROGRAM
 
-FOLDER holds the reports, PROGRAM is `bench`, which simulates the same chain for comparison.
+FOLDER contains the reports. PROGRAM is `bench`, which simulates the same chain for comparison.
 """
 
 import csv
@@ -39,7 +39,7 @@ def journal(name):
 
 
 def recording(name):
-    """Ticks and events, read by packages of other hands."""
+    """Ticks and events, read by independent packages."""
     path = folder / report(name)["recording"]
     with open(path, "rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
@@ -65,8 +65,8 @@ def compare_with_simulation():
     must(numbers == list(range(numbers[0], numbers[0] + len(numbers))), "every tick is in the recording")
     must(any(tick.HasField("actual_a") and tick.actual_a != 0 for tick in ticks), "with the current the drive measures")
     f, real = frf(folder / chirp["frf_csv"])
-    # One number is fitted, which only measurement can tell: the delay of the real chain. It is fitted in the simulation, not
-    # by turning the phase, since what sampling folds back turns otherwise.
+    # The delay of the real chain is fitted, because only a measurement gives it. It is changed in the simulation, not by a
+    # rotation of the phase, because aliased components rotate differently.
     delay_s = 0.0008
     for _ in range(3):
         g, pure = simulate(delay_s)
@@ -93,9 +93,10 @@ def simulate(delay_s):
 
 
 def compare_under_control():
-    """The plant with the loop closed beside the open loop's, away from the modes, whose peaks the average of the latter lowers.
+    """Compares the plant measured in closed loop with that of the open loop, outside of the modes, whose peaks the averaging of
+    the open-loop estimate lowers.
 
-    From run to run the readings of a probe with a clock of its own are younger or older: one delay is fitted.
+    The probe has its own clock, so the age of its readings differs between runs: one delay is fitted.
     """
     swept = report("swept")
     must(code("swept") in (0, 3) and swept["outcome"] == "completed", "the sweep under control completes")
@@ -114,13 +115,13 @@ def compare_under_control():
 
 
 def current_off(name):
-    """The acting amplifier ends without current, its power stage off."""
+    """The emulated amplifier ends without current, with its power stage off."""
     last = [entry for entry in journal(name) if entry["device"] == "amplifier"][-1]
     must(last["current_a"] == 0.0 and not last["enabled"], f"{name}: zero current, power stage off")
 
 
 def goes_on(name, what):
-    """A run that completes; a tick or two may be missed while the emulated kernel makes or buries another process."""
+    """A run that completes. Up to three ticks may be missed while the emulated kernel creates or ends another process."""
     must(code(name) in (0, 3) and report(name)["outcome"] == "completed" and report(name)["overruns"] <= 3, f"{name}: {what}")
 
 
@@ -128,7 +129,7 @@ def whole(name, outcome, reason=None, words=()):
     ticks, events = recording(name)
     run = report(name)
     must(run["outcome"] == outcome and run["lost_records"] == 0, f"{name}: {outcome}, nothing lost")
-    must(ticks[-1].command_a == 0.0, f"{name}: the recording is whole and ends with no current")
+    must(ticks[-1].command_a == 0.0, f"{name}: the recording is complete and ends without current")
     if reason:
         trip = [event for event in events if event.kind == "trip"]
         must(len(trip) == 1 and trip[0].reason == reason, f"{name}: the recording names {reason}")
@@ -137,7 +138,7 @@ def whole(name, outcome, reason=None, words=()):
 
 
 def fault_to_zero(name):
-    """From the drive's fault to zero current, by the device's own log; and from the trip to zero, in ticks."""
+    """No command is recorded from the tick of the trip on."""
     ticks, events = recording(name)
     trip = next(event for event in events if event.kind == "trip")
     after = [tick for tick in ticks if tick.tick >= trip.tick]
@@ -153,7 +154,7 @@ compare_under_control()
 print("a second bench")
 second = (folder / "second.err").read_text()
 holder = (folder / "control.pid").read_text().strip()
-must(code("second") == 2 and holder in second and "nothing was moved" in second, f"is refused, with the process {holder}")
+must(code("second") == 2 and holder in second and "nothing was moved" in second, f"is refused and names process {holder}")
 print("closed loop")
 goes_on("control", "completes")
 whole("control", "completed")

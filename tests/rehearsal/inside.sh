@@ -1,6 +1,6 @@
 #!/bin/sh
-# What happens inside the emulated machine: the whole bench over vcan0 and a terminal, once well and then with everything
-# that can go wrong. $1 is the program, $2 a folder for what is found. Everything runs in memory: a file of the host would
+# The rehearsal inside the virtual machine: the complete program over vcan0 and a terminal, first without faults, then with each
+# way in which a run can end. $1 is the program, $2 a folder for the results. All files are in memory: a file of the host would
 # make the machine wait, and its clock leaps while it waits.
 set -u
 out=$2
@@ -8,7 +8,7 @@ here=$(dirname "$0")
 mkdir -p /tmp/bench && cp "$1" /tmp/bench/bench && cp "$here"/*.toml /tmp/bench/ && cd /tmp/bench || exit 1
 ip link add vcan0 type vcan && ip link set vcan0 up || exit 1
 
-# run NAME ARGUMENT...: a run of the bench; its report, its words and its exit code under that name.
+# run NAME ARGUMENT...: a run of the bench; report, messages and exit code are stored under this name.
 run() {
   name=$1
   shift
