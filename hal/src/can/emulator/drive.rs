@@ -349,5 +349,4 @@ impl EmulatedAmplifier for EmulatedDrive {
 }
 
 #[cfg(test)]
-#[path = "drive_tests.rs"]
 mod tests;
