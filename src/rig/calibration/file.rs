@@ -125,28 +125,49 @@ pub fn load_calibration(
     };
     let text = config::text_of_file(file, "calibration")?;
     let calibration: Calibration = config::typed(file, &text)?;
-    let defects = [
-        (
-            expired(file, &calibration, settings.valid_days, now)?,
-            settings.when_expired,
-            "calibration.when_expired",
-        ),
-        (
-            other_device(&calibration, amplifier, probe),
-            settings.when_other_devices,
-            "calibration.when_other_devices",
-        ),
-    ];
-    let mut warnings = Vec::new();
-    for (defect, reaction, setting) in defects {
-        let Some(why) = defect else { continue };
-        if reaction == OnInvalidCalibration::Refuse {
-            let file = file.clone();
-            return Err(CalibrationError::Unfit { file, why, setting });
+    let expired = Check {
+        file,
+        setting: "calibration.when_expired",
+        reaction: settings.when_expired,
+        defect: expired(file, &calibration, settings.valid_days, now)?,
+    };
+    let other_device = Check {
+        file,
+        setting: "calibration.when_other_devices",
+        reaction: settings.when_other_devices,
+        defect: other_device(&calibration, amplifier, probe),
+    };
+    let warnings = [expired.warning()?, other_device.warning()?];
+    Ok(Some((
+        calibration,
+        warnings.into_iter().flatten().collect(),
+    )))
+}
+
+/// A check of a calibration, and the configured reaction to a defect.
+struct Check<'a> {
+    file: &'a str,
+    setting: &'static str,
+    reaction: OnInvalidCalibration,
+    defect: Option<String>,
+}
+
+impl Check<'_> {
+    /// The warning for a defect, if there is one; the error if the calibration is refused.
+    fn warning(self) -> Result<Option<String>, CalibrationError> {
+        let (file, setting) = (self.file, self.setting);
+        match (self.defect, self.reaction) {
+            (None, _) => Ok(None),
+            (Some(why), OnInvalidCalibration::Warn) => {
+                Ok(Some(format!("calibration {file}: {why}")))
+            }
+            (Some(why), OnInvalidCalibration::Refuse) => Err(CalibrationError::Unfit {
+                file: file.into(),
+                why,
+                setting,
+            }),
         }
-        warnings.push(format!("calibration {file}: {why}"));
     }
-    Ok(Some((calibration, warnings)))
 }
 
 fn expired(
@@ -155,17 +176,19 @@ fn expired(
     valid_days: f64,
     now: SystemTime,
 ) -> Result<Option<String>, CalibrationError> {
-    let made = humantime::parse_rfc3339(&calibration.made).map_err(|_| CalibrationError::Date {
-        file: file.to_string(),
-        made: calibration.made.clone(),
+    let made = &calibration.made;
+    let made = humantime::parse_rfc3339(made).map_err(|_| CalibrationError::Date {
+        file: file.into(),
+        made: made.clone(),
     })?;
     let age = now.duration_since(made).unwrap_or(Duration::ZERO);
     let days = age.as_secs_f64() / 86_400.0;
     if days <= valid_days {
         return Ok(None);
     }
-    let limit = format!("calibration.valid_days is {valid_days}");
-    Ok(Some(format!("it was made {days:.0} days ago, {limit}")))
+    Ok(Some(format!(
+        "it was made {days:.0} days ago, calibration.valid_days is {valid_days}"
+    )))
 }
 
 fn other_device(calibration: &Calibration, amplifier: &str, probe: &str) -> Option<String> {

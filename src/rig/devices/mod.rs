@@ -15,7 +15,7 @@ pub mod vesc;
 
 use std::time::{Duration, Instant};
 
-use bench_hal::serial::{SerialProbe, StatisticsHandle};
+use bench_hal::serial::{Note, SerialProbe, StatisticsHandle};
 use bench_hal::{Devices, DisplacementProbe, Rig, Tick, Validity};
 
 use crate::config::{AmplifierDevice, Config, ProbeDevice};
@@ -119,17 +119,13 @@ pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
     check_kinds(config)?;
     let mut probe = probe::open(&config.probe, config.servo.priority)?;
     let (amplifier, amplifier_identity) = amplifier::open(&config.amplifier, &config.servo)?;
-    let notes = probe.notes().iter();
-    let notes = notes.map(|note| format!("{}; {}", note.what, note.remedy));
-    let notes = notes.collect();
-    let watch = probe.statistics_handle();
     wait_for_reading(&mut probe)?;
     Ok(OpenRig {
-        rig: Box::new(Devices { amplifier, probe }),
         amplifier: amplifier_identity,
         probe: probe::identity(&config.probe.device),
-        notes,
-        watch: Some(watch),
+        notes: probe.notes().iter().map(Note::to_string).collect(),
+        watch: Some(probe.statistics_handle()),
+        rig: Box::new(Devices { amplifier, probe }),
     })
 }
 

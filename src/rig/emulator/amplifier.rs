@@ -14,6 +14,7 @@ use super::fault::AmplifierFault;
 use super::stage::{Stage, seconds};
 use super::{EmulatedDevice, EmulatorError};
 use crate::config::AmplifierDevice;
+use crate::rig::devices::amplifier::CanAddress;
 use crate::util::thread_priority::device_thread_setup;
 
 /// Serves an emulated amplifier; dropping it takes the amplifier from the bus.
@@ -59,11 +60,9 @@ impl AmplifierCounters {
         let magnitude_bits = device.current_a().abs().to_bits();
         self.largest_a_bits.fetch_max(magnitude_bits, Relaxed);
         if device.is_enabled() {
+            // Fails after the first time, which remains stored.
             let now_ns = frames.now_ns.max(1);
-            // Only the first time is stored.
-            let _ = self
-                .enabled_ns
-                .compare_exchange(0, now_ns, Relaxed, Relaxed);
+            let _ = (self.enabled_ns).compare_exchange(0, now_ns, Relaxed, Relaxed);
         }
     }
 }
@@ -78,14 +77,8 @@ impl AmplifierServer {
         start: Instant,
     ) -> Result<AmplifierServer, EmulatorError> {
         let can = device.can().ok_or_else(simulated)?.address();
-        let interface = can.interface;
-        let port = SocketPort::open(interface, can.bit_rate)?;
-        // The driver, which may run on the same computer, has another claim.
-        let claim = Claim::new(&format!("{interface}/device"), can.node);
-        let claim = claim.map_err(|holder| EmulatorError::NodeInUse {
-            interface: interface.into(),
-            holder,
-        })?;
+        let port = SocketPort::open(can.interface, can.bit_rate)?;
+        let claim = claim(can)?;
         let host = SystemHost::since(port, start).prepared(device_thread_setup(loop_priority));
         let server = AmplifierServer::start(device, Arc::new(host), stage, log)?;
         Ok(AmplifierServer {
@@ -105,12 +98,8 @@ impl AmplifierServer {
         let counters = Arc::<AmplifierCounters>::default();
         let observer = observer(stage, log, Arc::clone(&counters));
         let task = AmplifierTask::start_observed(&*host, Arc::clone(&emulated), observer);
-        let task = task.map_err(|source| EmulatorError::Thread {
-            device: EmulatedDevice::Amplifier,
-            source,
-        })?;
         Ok(AmplifierServer {
-            _task: task,
+            _task: task.map_err(no_thread)?,
             device: emulated,
             host,
             counters,
@@ -172,6 +161,21 @@ impl AmplifierServer {
 fn simulated() -> EmulatorError {
     let device = EmulatedDevice::Amplifier;
     EmulatorError::Simulated { device }
+}
+
+fn no_thread(source: std::io::Error) -> EmulatorError {
+    let device = EmulatedDevice::Amplifier;
+    EmulatorError::Thread { device, source }
+}
+
+/// Claims the device. The driver, which may run on the same computer, claims the node under another name.
+fn claim(can: CanAddress<'_>) -> Result<Claim, EmulatorError> {
+    let interface = can.interface;
+    let claim = Claim::new(&format!("{interface}/device"), can.node);
+    claim.map_err(|holder| EmulatorError::NodeInUse {
+        interface: interface.into(),
+        holder,
+    })
 }
 
 /// Connects the device to the stage: its current moves the stage, the current that flows is what it measures, and its changes

@@ -4,8 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
-use bench_hal::can::emulator::DeviceFault;
-use bench_hal::serial::emulator::Fault;
+use bench_hal::serial::emulator::{Fault, LineCounts};
 use serde::Serialize;
 
 use super::event_log::{EventLog, LogEntry, LogEvent};
@@ -38,7 +37,7 @@ pub struct Emulator {
 }
 
 /// Totals of a rehearsal.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Summary {
     /// Length in seconds.
     pub duration_s: f64,
@@ -126,8 +125,7 @@ impl Emulator {
         let Some(probe) = &self.probe else { return };
         self.write(EmulatedDevice::Probe, LogEvent::Serving, probe_place(probe));
         for note in probe.notes() {
-            let text = format!("{}; {}", note.what, note.remedy);
-            self.write(EmulatedDevice::Probe, LogEvent::Note, text);
+            self.write(EmulatedDevice::Probe, LogEvent::Note, note.to_string());
         }
     }
 
@@ -177,34 +175,18 @@ impl Emulator {
         self.check(request)?;
         let fault = request.fault;
         self.faults += u64::from(fault != fault.end());
-        let device = match fault {
-            EmulatedFault::Probe(_) => EmulatedDevice::Probe,
-            _ => EmulatedDevice::Amplifier,
+        self.write(fault.device(), LogEvent::Fault, request.text.clone());
+        let (probe_fault, amplifier_fault) = match fault {
+            EmulatedFault::Probe(fault) => (Some(fault), None),
+            EmulatedFault::Amplifier(fault) => (None, Some(fault)),
+            EmulatedFault::None => (Some(Fault::None), Some(AmplifierFault::NONE)),
         };
-        self.write(device, LogEvent::Fault, request.text.clone());
-        match fault {
-            EmulatedFault::Amplifier(fault) => self.inject_amplifier(fault),
-            EmulatedFault::Probe(fault) => {
-                self.inject_probe(fault);
-                Ok(())
-            }
-            EmulatedFault::None => {
-                self.inject_probe(Fault::None);
-                self.inject_amplifier(AmplifierFault::Device(DeviceFault::None))
-            }
-        }
-    }
-
-    fn inject_amplifier(&self, fault: AmplifierFault) -> Result<(), EmulatorError> {
-        match &self.amplifier {
-            Some(amplifier) => amplifier.inject(fault),
-            None => Ok(()),
-        }
-    }
-
-    fn inject_probe(&self, fault: Fault) {
-        if let Some(probe) = &self.probe {
+        if let (Some(probe), Some(fault)) = (&self.probe, probe_fault) {
             probe.inject(fault);
+        }
+        match (&self.amplifier, amplifier_fault) {
+            (Some(amplifier), Some(fault)) => amplifier.inject(fault),
+            _ => Ok(()),
         }
     }
 
@@ -236,23 +218,37 @@ impl Emulator {
 
     /// The totals so far.
     pub fn summary(&self) -> Summary {
-        let amplifier = self.amplifier.as_ref();
-        let frames = amplifier.map(AmplifierServer::counters);
-        let line = self.probe.as_ref().map(ProbeServer::counts);
-        Summary {
+        let mut summary = Summary {
             duration_s: self.time_s(),
-            frames_received: frames.map_or(0, |frames| frames.received.load(Relaxed)),
-            frames_sent: frames.map_or(0, |frames| frames.sent.load(Relaxed)),
-            largest_current_a: frames.map_or(0.0, |frames| frames.largest_a()),
-            current_a: amplifier.map_or(0.0, AmplifierServer::current_a),
-            enabled_s: self.enabled_s(),
-            state: amplifier.map(AmplifierServer::state),
-            measurements: line.map_or(0, |line| line.measurements.load(Relaxed)),
-            bytes_received: line.map_or(0, |line| line.received.load(Relaxed)),
-            bytes_sent: line.map_or(0, |line| line.sent.load(Relaxed)),
             position_m: self.stage.position_m(self.now_ns()),
             faults: self.faults,
+            ..Summary::default()
+        };
+        if let Some(amplifier) = &self.amplifier {
+            summary.add_amplifier(amplifier);
         }
+        if let Some(probe) = &self.probe {
+            summary.add_line(probe.counts());
+        }
+        summary
+    }
+}
+
+impl Summary {
+    fn add_amplifier(&mut self, amplifier: &AmplifierServer) {
+        let counters = amplifier.counters();
+        self.frames_received = counters.received.load(Relaxed);
+        self.frames_sent = counters.sent.load(Relaxed);
+        self.largest_current_a = counters.largest_a();
+        self.enabled_s = counters.enabled_s();
+        self.current_a = amplifier.current_a();
+        self.state = Some(amplifier.state());
+    }
+
+    fn add_line(&mut self, counts: &LineCounts) {
+        self.measurements = counts.measurements.load(Relaxed);
+        self.bytes_received = counts.received.load(Relaxed);
+        self.bytes_sent = counts.sent.load(Relaxed);
     }
 }
 

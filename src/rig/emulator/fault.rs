@@ -206,7 +206,20 @@ impl FaultKind {
     }
 }
 
+impl AmplifierFault {
+    /// The amplifier works correctly again.
+    pub(super) const NONE: AmplifierFault = AmplifierFault::Device(DeviceFault::None);
+}
+
 impl EmulatedFault {
+    /// The device under which the log shows this fault.
+    pub(super) fn device(self) -> EmulatedDevice {
+        match self {
+            EmulatedFault::Probe(_) => EmulatedDevice::Probe,
+            _ => EmulatedDevice::Amplifier,
+        }
+    }
+
     /// What ends this fault.
     pub fn end(self) -> EmulatedFault {
         match self {

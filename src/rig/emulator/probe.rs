@@ -28,6 +28,16 @@ pub enum ProbeEndpoint {
     Port(PathBuf),
 }
 
+impl ProbeEndpoint {
+    /// The link to `terminal`, if one is wanted.
+    fn link_to(&self, terminal: &Path) -> Result<Option<Link>, EmulatorError> {
+        match self {
+            ProbeEndpoint::Terminal(Some(path)) => Link::new(path, terminal).map(Some),
+            _ => Ok(None),
+        }
+    }
+}
+
 /// Serves an emulated probe; dropping it closes the line.
 pub struct ProbeServer {
     task: ProbeTask,
@@ -49,27 +59,17 @@ impl ProbeServer {
         now_ns: impl Fn() -> u64 + Send + 'static,
     ) -> Result<ProbeServer, EmulatorError> {
         let serial = config.probe.device.serial().ok_or_else(simulated)?;
-        let rate_hz = match rate_hz {
-            Some(rate_hz) => rate_hz,
-            None => measuring_rate_hz(&config.probe)?,
-        };
-        let device: SharedProbe =
-            Arc::new(Mutex::new(EmulatedProbe::new(&*serial.protocol, rate_hz)?));
+        let rate_hz = rate_hz.map_or_else(|| measuring_rate_hz(&config.probe), Ok)?;
+        let probe = EmulatedProbe::new(&*serial.protocol, rate_hz)?;
+        let device: SharedProbe = Arc::new(Mutex::new(probe));
         let (line, notes) = open_line(serial.line, endpoint)?;
         let place = line.path().to_owned();
-        let link = match endpoint {
-            ProbeEndpoint::Terminal(Some(path)) => Some(Link::new(path, &place)?),
-            _ => None,
-        };
+        let link = endpoint.link_to(&place)?;
         let measure = measurement(Sensor::new(&config.sim), serial.mounting, stage);
         let setup = device_thread_setup(config.servo.priority);
         let task = ProbeTask::start(line, Arc::clone(&device), now_ns, measure, setup);
-        let task = task.map_err(|source| EmulatorError::Thread {
-            device: EmulatedDevice::Probe,
-            source,
-        })?;
         Ok(ProbeServer {
-            task,
+            task: task.map_err(no_thread)?,
             device,
             place,
             notes,
@@ -126,18 +126,21 @@ fn simulated() -> EmulatorError {
     EmulatorError::Simulated { device }
 }
 
+fn no_thread(source: std::io::Error) -> EmulatorError {
+    let device = EmulatedDevice::Probe;
+    EmulatorError::Thread { device, source }
+}
+
 /// The rate of the configured readings; a polled probe measures somewhat faster.
 fn measuring_rate_hz(probe: &ProbeSettings) -> Result<f64, SerialError> {
     let readings_hz = probe.rate_hz.unwrap_or(STREAM_HZ);
-    let serial = probe.device.serial();
-    let is_polled = match serial {
+    let is_polled = match probe.device.serial() {
         Some(serial) => serial.protocol.decoder()?.request().is_some(),
         None => false,
     };
-    Ok(if is_polled {
-        MEASUREMENTS_PER_ANSWER * readings_hz
-    } else {
-        readings_hz
+    Ok(match is_polled {
+        true => MEASUREMENTS_PER_ANSWER * readings_hz,
+        false => readings_hz,
     })
 }
 
