@@ -78,7 +78,7 @@ pub fn examine_canopen_drive(
     let Some(traffic) = listen(host, LISTEN, node, settings.bit_rate, report) else {
         return;
     };
-    match inspect(host, node, settings.sdo_timeout) {
+    match inspect(host, node, settings.times.sdo_timeout) {
         Ok(inspection) => {
             report.extend(drive::findings(&inspection, settings, maximum_ratio));
             report.figures.drive = Some(drive::figures(&inspection));

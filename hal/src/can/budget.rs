@@ -1,8 +1,8 @@
-//! What fits on the bus: frame lengths with the worst bit stuffing, and the load of a set-point exchange.
+//! The load of the bus: frame lengths with the worst-case bit stuffing, and the traffic of a set-point exchange.
 //!
 //! A base frame of n bytes has 34 + 8n bits that may be stuffed (start, identifier, RTR, IDE, r0, length, data, CRC)
-//! and 13 that may not (CRC delimiter, ACK, ACK delimiter, end, pause). Stuffing adds at worst one bit after five, then
-//! one after every four, since a stuff bit may begin the next run (Davis, Burns, Bril, Lukkien 2007, eq. 2):
+//! and 13 that may not (CRC delimiter, ACK, ACK delimiter, end of frame, interframe space). In the worst case stuffing adds one
+//! bit after five bits, then one after every four, because a stuff bit may begin the next run (Davis, Burns, Bril, Lukkien 2007, eq. 2):
 //!
 //! ```text
 //! base       47 + 8n + floor((33 + 8n) / 4)        0 bytes: 55 bits, 4 bytes: 95 bits, 8 bytes: 135 bits
@@ -14,12 +14,12 @@
 
 use thiserror::Error;
 
-/// Bits of a base frame of `bytes` bytes with the worst stuffing, pause included.
+/// Bits of a base frame of `bytes` bytes with worst-case stuffing and the interframe space.
 pub const fn base_frame_bits(bytes: u32) -> u32 {
     47 + 8 * bytes + (33 + 8 * bytes) / 4
 }
 
-/// Bits of an extended frame of `bytes` bytes with the worst stuffing, pause included.
+/// Bits of an extended frame of `bytes` bytes with worst-case stuffing and the interframe space.
 pub const fn extended_frame_bits(bytes: u32) -> u32 {
     67 + 8 * bytes + (53 + 8 * bytes) / 4
 }
@@ -34,30 +34,30 @@ const HEARTBEAT_BITS: u32 = base_frame_bits(1);
 /// How set-points are exchanged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exchange {
-    /// A set-point each tick, taken by the drive when it comes; status frames in their own time.
+    /// A set-point in each tick, which takes effect when the drive receives it. Status frames are independent of the ticks.
     Asynchronous {
-        /// Status frames in a second, at most.
+        /// Largest number of status frames per second.
         status_hz: f64,
     },
-    /// A set-point and a SYNC each tick; the drive takes its set-point at the SYNC and answers every n-th.
+    /// A set-point and a SYNC in each tick. The set-point takes effect at the SYNC; the drive answers every n-th SYNC.
     Synchronous {
-        /// A status frame after every so many SYNCs, 1 to 240.
+        /// Number of SYNCs per status frame, 1 to 240.
         status_every: u8,
     },
 }
 
-/// What shall go over the bus.
+/// The traffic of a configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Traffic {
     /// Bit rate, in bit/s.
     pub bit_rate: u32,
-    /// Set-points in a second.
+    /// Set-points per second.
     pub rate_hz: f64,
-    /// How they are exchanged.
+    /// The exchange of the set-points.
     pub exchange: Exchange,
-    /// Heartbeats in a second, both ends together.
+    /// Heartbeats per second of both sides together.
     pub heartbeat_hz: f64,
-    /// The largest load that is accepted, as a fraction of the bit rate: what is left is for SDO, emergencies, repeats.
+    /// Largest permitted load as a fraction of the bit rate. The rest is reserved for SDO, emergencies and repeated frames.
     pub load_limit: f64,
 }
 
@@ -68,9 +68,9 @@ pub struct Traffic {
      {load_percent:.1} %; {limit_percent:.0} % is the limit, which allows {highest_hz:.0} Hz: {remedy}"
 )]
 pub struct BudgetError {
-    /// The exchange in words.
+    /// Description of the exchange.
     pub what: &'static str,
-    /// Wanted set-points in a second.
+    /// Configured set-points per second.
     pub rate_hz: f64,
     /// Time of the frames of one tick, in microseconds.
     pub frames_us: f64,
@@ -78,18 +78,18 @@ pub struct BudgetError {
     pub period_us: f64,
     /// Bit rate, in bit/s.
     pub bit_rate: u32,
-    /// Load that would result.
+    /// Resulting load.
     pub load_percent: f64,
-    /// Load that is accepted.
+    /// Permitted load.
     pub limit_percent: f64,
-    /// The rate that would fit.
+    /// The highest rate within the limit.
     pub highest_hz: f64,
     /// What to change.
     pub remedy: &'static str,
 }
 
 impl Traffic {
-    /// Bits of the frames of one tick, in the mean.
+    /// Mean number of bits per tick.
     fn bits_per_tick(&self) -> f64 {
         match self.exchange {
             Exchange::Asynchronous { .. } => f64::from(PDO_BITS),
@@ -100,8 +100,8 @@ impl Traffic {
         }
     }
 
-    /// Bits in a second that do not depend on the rate.
-    fn bits_beside(&self) -> f64 {
+    /// Bits per second that do not depend on the rate.
+    fn fixed_bits_per_s(&self) -> f64 {
         let status_hz = match self.exchange {
             Exchange::Asynchronous { status_hz } => status_hz,
             Exchange::Synchronous { .. } => 0.0,
@@ -109,18 +109,18 @@ impl Traffic {
         status_hz * f64::from(PDO_BITS) + self.heartbeat_hz * f64::from(HEARTBEAT_BITS)
     }
 
-    /// The load as a fraction of the bit rate, at worst.
+    /// The worst-case load as a fraction of the bit rate.
     pub fn load(&self) -> f64 {
-        (self.rate_hz * self.bits_per_tick() + self.bits_beside()) / f64::from(self.bit_rate)
+        (self.rate_hz * self.bits_per_tick() + self.fixed_bits_per_s()) / f64::from(self.bit_rate)
     }
 
-    /// The highest rate within the limit, in hertz; 0 if the rest fills the bus already.
+    /// The highest rate within the limit, in hertz; 0 if the other traffic alone exceeds the limit.
     pub fn highest_rate_hz(&self) -> f64 {
-        let left = self.load_limit * f64::from(self.bit_rate) - self.bits_beside();
+        let left = self.load_limit * f64::from(self.bit_rate) - self.fixed_bits_per_s();
         (left / self.bits_per_tick()).max(0.0)
     }
 
-    /// The load, or why the bus cannot carry it, with the figures. What is not a number does not fit.
+    /// The load, or an error with all figures if it exceeds the limit or is not a number.
     pub fn check(&self) -> Result<f64, BudgetError> {
         let load = self.load();
         if load <= self.load_limit {
@@ -138,7 +138,7 @@ impl Traffic {
             ),
             Exchange::Synchronous { .. } => (
                 "an exchange with SYNC",
-                "take asynchronous set-points, ask for status less often, or lower the rate",
+                "use asynchronous set-points, request the status less often, or lower the rate",
             ),
         };
         BudgetError {
@@ -208,14 +208,14 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_the_figures() {
+    fn rejects_excessive_load_with_the_figures() {
         let refused = traffic(5000.0, Exchange::Synchronous { status_every: 1 })
             .check()
             .unwrap_err();
         assert_eq!(
             refused.to_string(),
             "an exchange with SYNC at 5000 Hz needs 245 us of the 200 us of a tick and loads the bus of 1000000 bit/s to \
-             122.5 %; 100 % is the limit, which allows 4082 Hz: take asynchronous set-points, ask for status less often, or \
+             122.5 %; 100 % is the limit, which allows 4082 Hz: use asynchronous set-points, request the status less often, or \
              lower the rate"
         );
         assert!(
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn status_and_heartbeats_count() {
+    fn load_includes_status_and_heartbeats() {
         // 1000 * (55 + 95 + 95 / 5) + 20 * 65 bits; 65 = 47 + 8 + floor(41 / 4).
         let mut five = traffic(1000.0, Exchange::Synchronous { status_every: 5 });
         five.heartbeat_hz = 20.0;

@@ -18,10 +18,11 @@
 //!                   <- 5 disable operation --
 //! ```
 //!
-//! Current flows in OperationEnabled (and, braking, in QuickStopActive and FaultReactionActive). 9 and 10 are `disable
-//! voltage`: the shortest way to no current, and the one this crate takes. 15 is taken only when a person asks.
+//! Current flows in OperationEnabled, and for braking in QuickStopActive and FaultReactionActive. The drivers switch the current
+//! off by `disable voltage`, transitions 9 and 10, because it is the fastest way. They use transition 15 only on request of the
+//! operator.
 //!
-//! Statusword 0x6041: the state stands under mask 0x4F or 0x6F. Controlword 0x6040: 0x06 shutdown, 0x07 switch on or
+//! Statusword 0x6041: the state is in the bits of mask 0x4F or 0x6F. Controlword 0x6040: 0x06 shutdown, 0x07 switch on or
 //! disable operation, 0x0F enable operation, 0x02 quick stop, 0x00 disable voltage, rising bit 7 fault reset.
 
 /// Controlword: disable voltage (7, 9, 10, 12).
@@ -30,14 +31,14 @@ pub const DISABLE_VOLTAGE: u16 = 0x00;
 pub const SHUTDOWN: u16 = 0x06;
 /// Controlword: switch on (3), disable operation (5).
 pub const SWITCH_ON: u16 = 0x07;
-/// Controlword: enable operation (4), and stay there.
+/// Controlword: enable operation (4); also the controlword of every set-point.
 pub const ENABLE_OPERATION: u16 = 0x0F;
 /// Controlword: quick stop (11).
 pub const QUICK_STOP: u16 = 0x02;
 /// Controlword: fault reset (15), on the rising edge of this bit.
 pub const FAULT_RESET: u16 = 0x80;
 
-/// Statusword, bit 9: the drive listens to its controlword.
+/// Statusword, bit 9: the drive accepts its controlword.
 pub const REMOTE: u16 = 1 << 9;
 /// Statusword, bit 12, in cyclic synchronous torque: the drive follows the target.
 pub const FOLLOWS_TARGET: u16 = 1 << 12;
@@ -50,7 +51,7 @@ pub const CYCLIC_TORQUE: i8 = 10;
 /// State of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Starting.
+    /// The drive initialises.
     NotReadyToSwitchOn,
     /// Waiting for `shutdown`.
     SwitchOnDisabled,
@@ -69,7 +70,7 @@ pub enum State {
 }
 
 impl State {
-    /// Reads a statusword: mask 0x4F tells four states, mask 0x6F the others; `None` for what the standard leaves out.
+    /// Decodes a statusword: mask 0x4F identifies four states, mask 0x6F the others. `None` for values without a state.
     pub const fn decode(statusword: u16) -> Option<State> {
         match (statusword & 0x4F, statusword & 0x6F) {
             (0x00, _) => Some(State::NotReadyToSwitchOn),
@@ -84,7 +85,7 @@ impl State {
         }
     }
 
-    /// The name, as CiA 402 has it.
+    /// The name in CiA 402.
     pub const fn name(self) -> &'static str {
         match self {
             State::NotReadyToSwitchOn => "not ready to switch on",
@@ -98,7 +99,7 @@ impl State {
         }
     }
 
-    /// The state's bits of a statusword.
+    /// The bits of this state in a statusword.
     pub const fn bits(self) -> u16 {
         match self {
             State::NotReadyToSwitchOn => 0x00,
@@ -112,7 +113,7 @@ impl State {
         }
     }
 
-    /// The controlword of the next step towards OperationEnabled; `None` where only time or a person helps.
+    /// The controlword of the next step towards OperationEnabled; `None` if a controlword cannot leave this state.
     pub const fn towards_enabled(self) -> Option<u16> {
         match self {
             State::SwitchOnDisabled => Some(SHUTDOWN),
@@ -123,8 +124,8 @@ impl State {
         }
     }
 
-    /// The controlword of the next single step back; `None` where the drive is off already. [`DISABLE_VOLTAGE`] takes
-    /// all steps at once.
+    /// The controlword of the next single step towards off; `None` if the drive is off already. [`DISABLE_VOLTAGE`] takes all
+    /// steps at once.
     pub const fn towards_disabled(self) -> Option<u16> {
         match self {
             State::OperationEnabled => Some(SWITCH_ON),
@@ -137,7 +138,12 @@ impl State {
         }
     }
 
-    /// Whether the power stage is certainly without current.
+    /// Whether the drive has a fault.
+    pub const fn is_fault(self) -> bool {
+        matches!(self, State::Fault | State::FaultReactionActive)
+    }
+
+    /// Whether the power stage certainly gives no current.
     pub const fn is_off(self) -> bool {
         !matches!(
             self,
@@ -146,7 +152,7 @@ impl State {
     }
 }
 
-/// What a controlword orders (CiA 402-2, table 5). Fault reset is an edge and stands apart.
+/// The command in a controlword (CiA 402-2, table 5), apart from fault reset, which is an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// 0xxx x110
@@ -162,7 +168,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Reads a controlword; `None` while bit 7 is set.
+    /// Decodes a controlword; `None` while bit 7 is set.
     pub const fn decode(controlword: u16) -> Option<Command> {
         match controlword & 0x8F {
             word if word & 0x80 != 0 => None,
@@ -194,10 +200,10 @@ mod tests {
     fn statuswords_are_read_under_their_masks() {
         for state in ALL {
             assert_eq!(State::decode(state.bits()), Some(state));
-            // Bits 4, 7 and 8 to 15 say other things.
+            // Bits 4, 7 and 8 to 15 have other meanings.
             assert_eq!(State::decode(state.bits() | 0xFF90), Some(state));
         }
-        // Mask 0x4F leaves bit 5 (quick stop) open for the four states it tells.
+        // Mask 0x4F ignores bit 5 (quick stop).
         assert_eq!(State::decode(0x60), Some(State::SwitchOnDisabled));
         assert_eq!(State::decode(0x28), Some(State::Fault));
         assert_eq!(State::decode(0x2F), Some(State::FaultReactionActive));
@@ -214,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn no_statusword_but_0x27_means_current() {
+    fn only_0x27_is_operation_enabled() {
         for word in 0..=u16::MAX {
             let enabled = State::decode(word) == Some(State::OperationEnabled);
             assert_eq!(enabled, word & 0x6F == 0x27);
@@ -252,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_never_left_by_the_way_up() {
+    fn enabling_and_disabling_never_reset_a_fault() {
         assert_eq!(State::Fault.towards_enabled(), None);
         assert!(
             ALL.iter()

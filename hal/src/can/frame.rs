@@ -1,4 +1,4 @@
-//! One CAN frame, apart from any socket.
+//! A CAN frame, independent of sockets.
 
 /// A CAN identifier: 11 bits (base format) or 29 bits (extended format).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -8,7 +8,7 @@ pub struct Id {
 }
 
 impl Id {
-    /// An 11-bit identifier; higher bits are dropped.
+    /// An 11-bit identifier; higher bits are ignored.
     pub const fn standard(raw: u16) -> Id {
         Id {
             raw: raw as u32 & 0x7FF,
@@ -16,7 +16,7 @@ impl Id {
         }
     }
 
-    /// A 29-bit identifier; higher bits are dropped.
+    /// A 29-bit identifier; higher bits are ignored.
     pub const fn extended(raw: u32) -> Id {
         Id {
             raw: raw & 0x1FFF_FFFF,
@@ -44,9 +44,9 @@ pub struct CanFrame {
 }
 
 impl CanFrame {
-    /// A frame of `N` bytes; more than eight do not compile.
+    /// A frame of `N` bytes, at most eight; this is checked at compile time.
     pub const fn new<const N: usize>(id: Id, bytes: [u8; N]) -> CanFrame {
-        const { assert!(N <= 8, "a CAN frame holds eight bytes") };
+        const { assert!(N <= 8, "a CAN frame has at most eight bytes") };
         let mut data = [0; 8];
         let mut at = 0;
         while at < N {
@@ -60,7 +60,7 @@ impl CanFrame {
         }
     }
 
-    /// A frame of as many bytes as `bytes` has, `None` if they are more than eight.
+    /// A frame with `bytes`; `None` if there are more than eight.
     pub fn from_slice(id: Id, bytes: &[u8]) -> Option<CanFrame> {
         let mut data = [0; 8];
         data.get_mut(..bytes.len())?.copy_from_slice(bytes);

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! 0x700 + node   [state]      0 boot-up, 4 stopped, 5 operational, 0x7F pre-operational
-//! 0x1017         u16, ms      producer time of a node, 0 = none
-//! 0x1016 sub n   u32          consumer entry: node << 16 | time in ms; monitoring begins with the first heartbeat heard
+//! 0x1017         u16, ms      heartbeat period of a node, 0 = none
+//! 0x1016 sub n   u32          consumer entry: node << 16 | time in ms; monitoring begins with the first heartbeat received
 //! ```
 
 use super::frame::{CanFrame, Id};
@@ -19,7 +19,7 @@ pub const fn frame(node: u8, state: State) -> CanFrame {
     CanFrame::new(cob_id(node), [state as u8])
 }
 
-/// Reads a heartbeat: one byte, a known state.
+/// Decodes a heartbeat: one byte with a known state.
 pub fn decode(data: &[u8]) -> Option<State> {
     match data {
         &[state] => State::decode(state),
@@ -27,12 +27,12 @@ pub fn decode(data: &[u8]) -> Option<State> {
     }
 }
 
-/// The entry of 0x1016 that watches `node`: `node << 16 | milliseconds`.
+/// The entry of 0x1016 that monitors `node`: `node << 16 | milliseconds`.
 pub const fn consumer_entry(node: u8, timeout_ms: u16) -> u32 {
     (node as u32) << 16 | timeout_ms as u32
 }
 
-/// The watched node and its time in milliseconds; `None` for an unused entry.
+/// The monitored node and its time limit in milliseconds; `None` for an unused entry.
 pub fn monitored(entry: u32) -> Option<(u8, u16)> {
     let (node, timeout_ms) = ((entry >> 16) as u8, entry as u16);
     ((1..=127).contains(&node) && timeout_ms > 0).then_some((node, timeout_ms))
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn consumer_entries_carry_node_and_time() {
+    fn consumer_entries_contain_node_and_time() {
         assert_eq!(consumer_entry(0x7F, 100), 0x007F_0064);
         assert_eq!(monitored(0x007F_0064), Some((0x7F, 100)));
         assert_eq!(monitored(0), None);

@@ -13,13 +13,13 @@
 //!
 //! | failure of | detected by | by |
 //! |---|---|---|
-//! | the loop (no more set-points) | the service thread | [`drive::DriveSettings::command_timeout`] |
+//! | the loop (no more set-points) | the service thread | [`drive::DriveTimes::command_timeout`] |
 //! | this process | the drive | its heartbeat consumer (0x1016) and abort connection option (0x6007) |
 //! | the drive's processor, its power | the service thread | heartbeat, boot-up message |
 //! | the drive's power stage | the service thread | EMCY, statusword |
 //! | the bus, the adapter | both ends | error frames here, heartbeat there |
 //!
-//! A successful write is no evidence, because SocketCAN accepts frames in bus-off. Only received frames are.
+//! A successful write is no evidence of a working bus, because SocketCAN accepts frames in bus-off. Received frames are.
 
 pub mod budget;
 pub mod bus;

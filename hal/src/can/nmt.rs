@@ -1,4 +1,4 @@
-//! Network management (CiA 301, 7.2.8): which nodes talk.
+//! Network management (CiA 301, 7.2.8): the communication state of the nodes.
 //!
 //! ```text
 //! 0x000   [command, node]     node 0: all
@@ -15,13 +15,13 @@ use super::frame::{CanFrame, Id};
 /// COB-ID of NMT commands.
 pub const COB_ID: Id = Id::standard(0x000);
 
-/// An order of the NMT master.
+/// A command of the NMT master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Command {
-    /// Enter operational: PDO flow.
+    /// Enter operational: PDOs are exchanged.
     Start = 0x01,
-    /// Enter stopped: only the heartbeat is left.
+    /// Enter stopped: only NMT and the heartbeat remain.
     Stop = 0x02,
     /// Enter pre-operational: SDO only.
     EnterPreOperational = 0x80,
@@ -32,12 +32,12 @@ pub enum Command {
 }
 
 impl Command {
-    /// The frame that gives this order to `node`, 0 for all.
+    /// The frame with this command to `node`; 0 addresses all nodes.
     pub const fn frame(self, node: u8) -> CanFrame {
         CanFrame::new(COB_ID, [self as u8, node])
     }
 
-    /// Reads `[command, node]`: the order and whom it is for (0: all).
+    /// Decodes `[command, node]`; node 0 addresses all nodes.
     pub fn decode(data: &[u8]) -> Option<(Command, u8)> {
         let &[command, node] = data else { return None };
         let all = [
@@ -53,13 +53,13 @@ impl Command {
     }
 }
 
-/// The state of a node, as its heartbeat tells it.
+/// The state of a node in its heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
-    /// Just started: the boot-up message.
+    /// The boot-up message after a start.
     BootUp = 0x00,
-    /// Only heartbeat and NMT.
+    /// Only NMT and heartbeat work.
     Stopped = 0x04,
     /// Everything works.
     Operational = 0x05,
@@ -68,7 +68,7 @@ pub enum State {
 }
 
 impl State {
-    /// From the byte of a heartbeat. Bit 7 toggles in the older node guarding and is not part of the state.
+    /// Decodes the byte of a heartbeat. Bit 7 toggles in the older node guarding and is not part of the state.
     pub const fn decode(byte: u8) -> Option<State> {
         match byte & 0x7F {
             0x00 => Some(State::BootUp),
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn orders_are_the_bytes_of_the_standard() {
+    fn commands_have_the_bytes_of_the_standard() {
         let bytes: Vec<Vec<u8>> = [
             Command::Start,
             Command::Stop,

@@ -1,4 +1,4 @@
-//! Objects of CiA 301 and CiA 402 that drive and driver use.
+//! Objects of CiA 301 and CiA 402 that the driver and the emulated drive use.
 
 use super::sdo::Address;
 

@@ -1,4 +1,4 @@
-//! Process data objects (CiA 301, 7.2.2 and 7.5.2.35 ff.): the cyclic frames, and how they are laid out.
+//! Process data objects (CiA 301, 7.2.2 and 7.5.2.35 ff.): the cyclic frames and their layout.
 //!
 //! ```text
 //! RPDO n (to the node)     0x100 + 0x100 n + node    parameters 0x1400 + n-1    mapping 0x1600 + n-1
@@ -6,8 +6,8 @@
 //!
 //! parameters   sub 1  COB-ID u32, bit 31: off, bit 30: no remote frames, bits 10..0: identifier
 //!              sub 2  transmission type u8: 0 to 240 with SYNC (n: every n-th), 254 and 255 asynchronous
-//!              sub 3  inhibit time u16, 100 us: shortest distance of two frames
-//!              sub 5  event timer u16, ms: longest distance of two frames
+//!              sub 3  inhibit time u16, in 100 us: shortest time between two frames
+//!              sub 5  event timer u16, in ms: longest time between two frames
 //! mapping      sub 0  count u8; sub 1 .. 8  index << 16 | sub << 8 | bits
 //! ```
 //!
@@ -19,9 +19,9 @@ use super::sdo::Address;
 
 /// Bit 31 of the COB-ID: the PDO is off.
 pub const OFF: u32 = 1 << 31;
-/// Bit 30 of the COB-ID: no remote frames. A node's own setting is kept.
+/// Bit 30 of the COB-ID: no remote frames. The setting of the node is preserved.
 pub const NO_REMOTE: u32 = 1 << 30;
-/// Transmission type: the node decides, by its profile.
+/// Transmission type: asynchronous, according to the profile of the device.
 pub const ASYNCHRONOUS: u8 = 255;
 
 /// One entry of a mapping: `index << 16 | sub << 8 | bits`.
@@ -34,18 +34,18 @@ impl Mapped {
         Mapped((address.index as u32) << 16 | (address.sub as u32) << 8 | bits as u32)
     }
 
-    /// Where the object is.
+    /// The address of the object.
     pub const fn address(self) -> Address {
         Address::new((self.0 >> 16) as u16, (self.0 >> 8) as u8)
     }
 
-    /// How many bits it has.
+    /// The number of bits.
     pub const fn bits(self) -> u8 {
         self.0 as u8
     }
 }
 
-/// From whose point of view: the node's.
+/// The direction as seen from the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// The node receives: set-points.
@@ -72,7 +72,7 @@ pub const fn parameters(direction: Direction, number: u8) -> u16 {
     base + number as u16 - 1
 }
 
-/// A PDO as it shall be.
+/// The configuration of a PDO.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pdo {
     /// To or from the node.
@@ -81,24 +81,24 @@ pub struct Pdo {
     pub number: u8,
     /// The node, from 1 to 127.
     pub node: u8,
-    /// What it carries, in order.
+    /// The mapped objects, in order.
     pub entries: Vec<Mapped>,
-    /// When it is sent or taken.
+    /// Transmission type: when it is sent or takes effect.
     pub transmission: u8,
-    /// Shortest distance of two frames in 100 us; `None` leaves the node's own.
+    /// Inhibit time in 100 us; `None` leaves that of the node.
     pub inhibit_100us: Option<u16>,
-    /// Longest distance of two frames in ms; `None` leaves the node's own.
+    /// Event timer in ms; `None` leaves that of the node.
     pub event_timer_ms: Option<u16>,
 }
 
-/// A value of an object: the number and how many bytes it has.
+/// The value of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Value {
-    /// Where.
+    /// The object.
     pub address: Address,
-    /// The number, unsigned.
+    /// The value as an unsigned number.
     pub number: u32,
-    /// One, two or four.
+    /// Its length: one, two or four.
     pub bytes: usize,
 }
 
@@ -112,17 +112,25 @@ impl Value {
     }
 }
 
+/// The unsigned number with these bytes, little endian.
+pub(super) fn number_of(bytes: &[u8]) -> u32 {
+    bytes
+        .iter()
+        .rev()
+        .fold(0, |number, byte| number << 8 | u32::from(*byte))
+}
+
 impl Pdo {
     fn parameters(&self) -> u16 {
         parameters(self.direction, self.number)
     }
 
-    /// Where the COB-ID stands.
+    /// The address of the COB-ID.
     pub fn cob_id_address(&self) -> Address {
         Address::new(self.parameters(), 1)
     }
 
-    /// What to write, in order. `cob_id_now` is what stands in [`Pdo::cob_id_address`].
+    /// The values to write, in order. `cob_id_now` is the present value of [`Pdo::cob_id_address`].
     pub fn sequence(&self, cob_id_now: u32) -> Vec<Value> {
         let on = cob_id(self.direction, self.number, self.node).raw() | cob_id_now & NO_REMOTE;
         let off = Value::new(self.parameters(), 1, on | OFF, 4);
@@ -134,7 +142,7 @@ impl Pdo {
             .collect()
     }
 
-    /// Entries, count, transmission type and times: what must read back as written.
+    /// Entries, count, transmission type and times: the values that are read back for verification.
     pub fn layout(&self) -> Vec<Value> {
         let (parameters, mapping) = (self.parameters(), self.parameters() + 0x200);
         let entries = (1..)
@@ -142,17 +150,11 @@ impl Pdo {
             .map(|(sub, entry)| Value::new(mapping, sub, entry.0, 4));
         let count = Value::new(mapping, 0, self.entries.len() as u32, 1);
         let transmission = Value::new(parameters, 2, u32::from(self.transmission), 1);
-        let inhibit = self
-            .inhibit_100us
-            .map(|time| Value::new(parameters, 3, u32::from(time), 2));
-        let timer = self
-            .event_timer_ms
-            .map(|time| Value::new(parameters, 5, u32::from(time), 2));
-        entries
-            .chain([count, transmission])
-            .chain(inhibit)
-            .chain(timer)
-            .collect()
+        let times = [(3, self.inhibit_100us), (5, self.event_timer_ms)];
+        let times = times
+            .into_iter()
+            .filter_map(|(sub, time)| Some(Value::new(parameters, sub, u32::from(time?), 2)));
+        entries.chain([count, transmission]).chain(times).collect()
     }
 }
 
@@ -162,7 +164,7 @@ pub const fn pack(word: u16, value: i16) -> [u8; 4] {
     [a, b, c, d]
 }
 
-/// Reads what [`pack`] wrote; `None` unless there are exactly four bytes.
+/// The inverse of [`pack`]; `None` unless there are exactly four bytes.
 pub fn unpack(data: &[u8]) -> Option<(u16, i16)> {
     let &[a, b, c, d] = data else { return None };
     Some((u16::from_le_bytes([a, b]), i16::from_le_bytes([c, d])))

@@ -1,14 +1,14 @@
 //! Amperes and the counts of a drive: per mille of a reference current.
 //!
 //! Target 0x6071 and actual value 0x6077 are i16 in per mille of rated torque (CiA 402-2); for a motor whose force is
-//! proportional to its current that is per mille of rated current 0x6075. Some drives refer them to the maximum 0x6072,
-//! itself per mille of rated. One count of a 4 A drive is 4 mA: what is asked for and what flows differ, and the second
-//! is what a recording must hold.
+//! proportional to its current this is per mille of rated current 0x6075. Some drives refer them to the maximum 0x6072, which is
+//! itself in per mille of rated. One count of a 4 A drive is 4 mA. The resulting current therefore differs from the requested
+//! one, and a recording must contain the resulting one.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What 1000 counts of the target are.
+/// The current that 1000 counts of the target stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
@@ -34,22 +34,22 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// 1000 counts are `reference_a`; commands beyond `limit_a` are limited. `None` unless both are positive and finite
-    /// and the limit is at least one count.
+    /// A scale in which 1000 counts are `reference_a`, limited to +-`limit_a`. `None` unless both are positive and finite, and the
+    /// limit is at least one count.
     pub fn new(reference_a: f64, limit_a: f64) -> Option<Scale> {
-        let sound =
+        let is_valid =
             reference_a.is_finite() && reference_a > 0.0 && limit_a.is_finite() && limit_a > 0.0;
-        // Rounded down but for the last bits of the division, so the limit is never exceeded.
+        // Rounded down, so that the limit is not exceeded; 1e-9 compensates for the rounding of the division.
         let limit = (limit_a / reference_a * 1000.0 + 1e-9).floor();
-        (sound && limit >= 1.0).then_some(Scale {
+        (is_valid && limit >= 1.0).then_some(Scale {
             reference_a,
             limit: limit.min(f64::from(i16::MAX)) as i16,
         })
     }
 
-    /// The nearest count within the limit. Not a number is zero current.
+    /// The nearest count within the limit; 0 if `current_a` is not a number.
     pub fn counts(&self, current_a: f64) -> i16 {
-        let counts = (current_a / self.reference_a * 1000.0).round() as i16; // saturates; not a number becomes 0
+        let counts = (current_a / self.reference_a * 1000.0).round() as i16; // `as` saturates and turns NaN into 0
         counts.clamp(-self.limit, self.limit)
     }
 
@@ -70,7 +70,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn senseless_scales_are_refused() {
+    fn rejects_invalid_scales() {
         for (reference_a, limit_a) in [
             (0.0, 1.0),
             (-1.0, 1.0),
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_is_no_current() {
+    fn nan_is_zero_current() {
         let scale = Scale::new(4.0, 4.0).unwrap();
         assert_eq!(scale.counts(f64::NAN), 0);
         assert_eq!(

@@ -40,10 +40,26 @@ pub fn status_current(data: &[u8]) -> Option<i16> {
 pub struct VescSettings {
     /// Node number.
     pub node: u8,
-    /// Commands beyond this are limited, in amperes.
+    /// Limit of the commands, in amperes.
     pub current_limit_a: f64,
-    /// The VESC is lost after this time without STATUS.
+    /// Without STATUS for this time the VESC is lost.
     pub status_timeout: Duration,
+}
+
+impl VescSettings {
+    fn check(&self) -> Result<(), String> {
+        let limit_a = self.current_limit_a;
+        match limit_a > 0.0 && limit_a <= 1000.0 {
+            true => Ok(()),
+            false => Err(format!(
+                "current_limit_a = {limit_a} is invalid: expected above 0, at most 1000"
+            )),
+        }
+    }
+}
+
+fn text_of(error: impl ToString) -> String {
+    error.to_string()
 }
 
 const SILENT: u32 = 1;
@@ -52,36 +68,43 @@ const BUS_FAILED: u32 = 3;
 const NOT_ARMED: u32 = 4;
 const NOT_SENT: u32 = 5;
 
-const fn text(code: u32) -> FaultText {
-    let (what, remedy) = match code {
-        SILENT => (
-            "the VESC sends no STATUS",
-            "check its power and cable, and that CAN status 1 is on in VESC Tool",
-        ),
-        BUS_OFF => (
-            "the CAN bus is off or passive",
-            "check cable, termination and bit rate, then clear the fault",
-        ),
-        BUS_FAILED => (
-            "the CAN interface failed",
-            "`ip link set IFACE up`, then clear the fault",
-        ),
-        NOT_ARMED => ("the VESC is not enabled", "arm first"),
-        NOT_SENT => (
-            "a command could not be sent",
-            "check that the VESC is on the bus; lower the rate",
-        ),
-        _ => ("unknown fault", "please report the code"),
-    };
+/// Code, meaning and remedy of each fault.
+const FAULTS: [(u32, &str, &str); 5] = [
+    (
+        SILENT,
+        "the VESC sends no STATUS",
+        "check its power and cable, and that CAN status 1 is on in VESC Tool",
+    ),
+    (
+        BUS_OFF,
+        "the CAN bus is off or passive",
+        "check cable, termination and bit rate, then clear the fault",
+    ),
+    (
+        BUS_FAILED,
+        "the CAN interface failed",
+        "`ip link set IFACE up`, then clear the fault",
+    ),
+    (NOT_ARMED, "the VESC is not enabled", "arm first"),
+    (
+        NOT_SENT,
+        "a command could not be sent",
+        "check that the VESC is on the bus; lower the rate",
+    ),
+];
+
+fn text(code: u32) -> FaultText {
+    let fault = FAULTS.iter().find(|(known, ..)| *known == code);
+    let &(_, what, remedy) = fault.unwrap_or(&(0, "unknown fault", "please report the code"));
     FaultText { what, remedy }
 }
 
-const fn error(code: u32) -> DeviceError {
+fn error(code: u32) -> DeviceError {
     let FaultText { what, remedy } = text(code);
     DeviceError {
         what,
         remedy,
-        code: code as i64,
+        code: code.into(),
     }
 }
 
@@ -115,29 +138,19 @@ pub struct Vesc {
 impl Vesc {
     /// Claims the VESC and starts to monitor its STATUS.
     pub fn open(settings: VescSettings, host: Box<dyn Host>) -> Result<Vesc, String> {
-        let limit_a = settings.current_limit_a;
-        if !(limit_a > 0.0 && limit_a <= 1000.0) {
-            return Err(format!(
-                "current_limit_a = {limit_a} is invalid: expected above 0, at most 1000"
-            ));
-        }
-        let claim = host.claim(settings.node).map_err(|held| held.to_string())?;
+        settings.check()?;
+        let claim = host.claim(settings.node).map_err(text_of)?;
         let status = [status_id(settings.node)];
-        let bus = host.endpoint(&status).map_err(|error| error.to_string())?;
-        let watched = host.endpoint(&status).map_err(|error| error.to_string())?;
+        let bus = host.endpoint(&status).map_err(text_of)?;
         let shared = Arc::new(Shared::default());
-        let timeout_ns = settings.status_timeout.as_nanos() as u64;
         let watch = Watch {
-            bus: watched,
+            bus: host.endpoint(&status).map_err(text_of)?,
             shared: Arc::clone(&shared),
-            timeout_ns,
+            timeout_ns: settings.status_timeout.as_nanos() as u64,
             heard_ns: host.now_ns(),
         };
-        let running = host
-            .start("can-vesc", Box::new(watch))
-            .map_err(|error| error.to_string())?;
         Ok(Vesc {
-            _watch: running,
+            _watch: host.start("can-vesc", Box::new(watch)).map_err(text_of)?,
             bus,
             host,
             shared,

@@ -37,7 +37,7 @@ fn an_adapter_pulled_out_is_a_fault_the_drive_stops_by_itself_and_starting_anew_
         (text.what, text.remedy),
         (
             "the CAN interface is gone",
-            "plug the adapter in, then start anew"
+            "connect the adapter, then start the program again"
         )
     );
     let Rig { drive, far_end } = rig;

@@ -35,7 +35,7 @@ fn a_drive_on_another_card_runs_and_the_cards_tell_bit_rate_state_and_error_coun
 
     let refused = SocketPort::open("can0", 500_000).unwrap_err().to_string();
     assert!(
-        refused.contains("can0 runs at 1000000 bit/s, the configuration says 500000"),
+        refused.contains("can0 runs at 1000000 bit/s, 500000 is configured"),
         "{refused}"
     );
 }

@@ -14,7 +14,7 @@ fn a_name_that_no_interface_has_is_refused_with_the_name_and_how_to_find_the_rig
     let refused = refusal("can77");
     assert!(refused.starts_with("CAN interface can77: "), "{refused}");
     assert!(
-        refused.ends_with("`ip link show type can` lists what there is"),
+        refused.ends_with("`ip link show type can` lists the interfaces"),
         "{refused}"
     );
 }

@@ -29,7 +29,7 @@ fn a_process_that_is_killed_is_missed_by_the_drive_and_leaves_the_node_free() {
 
     let refused = refusal(&vcan.name, settings());
     let holder = format!(
-        "node 5 is driven by process {} already; end that first",
+        "node 5 is already in use by process {}; end that first",
         child.id()
     );
     assert!(refused.starts_with(&holder), "{refused}");

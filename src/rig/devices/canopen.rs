@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use bench_hal::can::budget::Exchange;
 use bench_hal::can::bus::Host;
-use bench_hal::can::drive::{CanopenDrive, DriveSettings};
+use bench_hal::can::drive::{CanopenDrive, DriveSettings, DriveTimes};
 use bench_hal::can::emulator::{EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings};
 use bench_hal::can::scale::Reference;
 
 use super::amplifier::{AmplifierError, CanAddress, CanAmplifier, OpenAmplifier, Requirements};
-use crate::config::{CanopenSettings, ExchangeSettings, OnCommunicationLoss};
+use crate::config::{CanopenSettings, CanopenTimeouts, ExchangeSettings, OnCommunicationLoss};
 
 impl CanAmplifier for CanopenSettings {
     fn address(&self) -> CanAddress<'_> {
@@ -60,8 +60,6 @@ fn identity_text(identity: [Option<u32>; 4]) -> String {
 
 /// The settings of the driver. Its `check()` refuses them if they are invalid.
 pub fn drive_settings(device: &CanopenSettings, requirements: Requirements) -> DriveSettings {
-    let seconds = Duration::from_secs_f64;
-    let times = &device.times;
     let settings = DriveSettings {
         node: device.node,
         own_node: device.own_node,
@@ -76,6 +74,17 @@ pub fn drive_settings(device: &CanopenSettings, requirements: Requirements) -> D
         current_limit_a: requirements.current_limit_a,
         identity: device.identity,
         abort_connection: abort_connection(device.on_communication_loss),
+        times: drive_times(&device.times),
+    };
+    DriveSettings {
+        exchange: exchange(device.exchange, &settings),
+        ..settings
+    }
+}
+
+fn drive_times(times: &CanopenTimeouts) -> DriveTimes {
+    let seconds = Duration::from_secs_f64;
+    DriveTimes {
         heartbeat_period: seconds(times.heartbeat_s),
         heartbeat_timeout: seconds(times.heartbeat_lost_s),
         own_heartbeat_period: seconds(times.own_heartbeat_s),
@@ -84,11 +93,6 @@ pub fn drive_settings(device: &CanopenSettings, requirements: Requirements) -> D
         command_timeout: seconds(times.command_lost_s),
         sdo_timeout: seconds(times.sdo_s),
         state_timeout: seconds(times.state_s),
-    };
-    let exchange = exchange(device.exchange, &settings);
-    DriveSettings {
-        exchange,
-        ..settings
     }
 }
 
@@ -124,16 +128,9 @@ fn exchange(wanted: ExchangeSettings, settings: &DriveSettings) -> Exchange {
 /// A drive that fits the configuration in everything that it states.
 fn emulated_settings(device: &CanopenSettings) -> EmulatedDriveSettings {
     let default = EmulatedDriveSettings::default();
-    let [vendor, product, revision, serial] = default.identity;
-    let expected = &device.identity;
     EmulatedDriveSettings {
         node: device.node,
-        identity: [
-            expected.vendor.unwrap_or(vendor),
-            expected.product.unwrap_or(product),
-            expected.revision.unwrap_or(revision),
-            expected.serial.unwrap_or(serial),
-        ],
+        identity: device.identity.or(default.identity),
         rated_current_ma: (device.rated_current_a * 1e3).round() as u32,
         maximum_per_mille: (device.maximum_current_ratio * 1e3).round() as u16,
         reference: device.target_reference,

@@ -122,7 +122,7 @@ impl AmplifierServer {
             AmplifierFault::Device(fault) => self.device().inject(fault),
             AmplifierFault::BusOff => {
                 self.device().inject(DeviceFault::Unplugged);
-                self.host.tell(Condition::BusOff)?;
+                self.host.inject_condition(Condition::BusOff)?;
             }
         }
         Ok(())

@@ -1,9 +1,9 @@
 //! Claims a node for one process.
 //!
-//! The claim is a listening socket with an abstract name, `bench-can/IFACE/NODE`. The kernel gives it to one process of
-//! a network namespace, which is where a CAN interface lives too, whoever the user is; it vanishes with the process,
-//! however that ends; and it tells the holder's process number (SO_PEERCRED). A file would need a place that all users
-//! may write to, and tells the number only as long as nobody else writes it.
+//! The claim is a listening socket with the abstract name `bench-can/IFACE/NODE`. The kernel permits one such socket per network
+//! namespace, for all users; a CAN interface belongs to a network namespace as well. The socket disappears when the process ends
+//! for any reason, and it identifies the process that holds it (SO_PEERCRED). A lock file would need a folder that all users can
+//! write to, and its content would not be reliable.
 
 use std::num::NonZeroU32;
 use std::os::linux::net::SocketAddrExt;
@@ -14,15 +14,15 @@ use thiserror::Error;
 
 /// Another process uses the node.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error("node {node} is driven by {} already; end that first{}, or choose another node", who(*pid), kill(*pid))]
+#[error("node {node} is already in use by {}; end that first{}, or choose another node", process(*pid), kill(*pid))]
 pub struct NodeInUse {
     /// The node.
     pub node: u8,
-    /// The process, if it can be found out.
+    /// The process, if it is known.
     pub pid: Option<NonZeroU32>,
 }
 
-fn who(pid: Option<NonZeroU32>) -> String {
+fn process(pid: Option<NonZeroU32>) -> String {
     pid.map_or_else(
         || "another process".to_owned(),
         |pid| format!("process {pid}"),
@@ -33,7 +33,7 @@ fn kill(pid: Option<NonZeroU32>) -> String {
     pid.map_or_else(String::new, |pid| format!(" (`kill {pid}`)"))
 }
 
-/// Claims a node until it is dropped.
+/// The claim of a node; dropping it releases the node.
 #[derive(Debug)]
 pub struct Claim(#[allow(dead_code, reason = "held, not read")] Option<UnixListener>);
 
@@ -43,7 +43,7 @@ impl Claim {
         Claim(None)
     }
 
-    /// Claims `node` on `interface`. The error names the process that has it.
+    /// Claims `node` on `interface`. The error names the process that holds it.
     pub fn new(interface: &str, node: u8) -> Result<Claim, NodeInUse> {
         let name = format!("bench-can/{interface}/{node}");
         let address =
@@ -60,7 +60,7 @@ impl Claim {
 
 /// The process that listens under `name`.
 fn holder(name: &str) -> nix::Result<Option<NonZeroU32>> {
-    let flags = SockFlag::SOCK_CLOEXEC | SockFlag::SOCK_NONBLOCK; // a full queue of callers must not make us wait
+    let flags = SockFlag::SOCK_CLOEXEC | SockFlag::SOCK_NONBLOCK; // `connect` must not wait if the queue of the socket is full
     let socket = socket::socket(AddressFamily::Unix, SockType::Stream, flags, None)?;
     let fd = std::os::fd::AsRawFd::as_raw_fd(&socket);
     socket::connect(fd, &UnixAddr::new_abstract(name.as_bytes())?)?;
@@ -81,7 +81,7 @@ mod tests {
         let first = Claim::new(&interface, 5).unwrap();
         let held = Claim::new(&interface, 5).unwrap_err();
         let text = format!(
-            "node 5 is driven by process {me} already; end that first (`kill {me}`), or choose another node"
+            "node 5 is already in use by process {me}; end that first (`kill {me}`), or choose another node"
         );
         assert_eq!((held.node, held.to_string()), (5, text));
         assert!(Claim::new(&interface, 6).is_ok(), "another node is free");
@@ -90,9 +90,9 @@ mod tests {
     }
 
     #[test]
-    fn unknown_process_is_not_offered_to_kill() {
+    fn suggests_no_kill_for_an_unknown_process() {
         let text =
-            "node 5 is driven by another process already; end that first, or choose another node";
+            "node 5 is already in use by another process; end that first, or choose another node";
         assert_eq!(NodeInUse { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller
     }
 }

@@ -10,9 +10,9 @@
 pub enum Condition {
     /// The controller has left the bus: nothing is sent, although writes succeed.
     BusOff,
-    /// 128 or more errors: the controller may no longer mark errors of others.
+    /// 128 or more errors: the controller may no longer signal errors to other nodes.
     Passive,
-    /// Frames were lost, here or in the controller.
+    /// Frames were lost in the controller or in the host.
     Overflow,
     /// 96 or more errors.
     Warning,
@@ -20,7 +20,7 @@ pub enum Condition {
     NoAcknowledge,
     /// Error active again: normal operation.
     Active,
-    /// A single error on the wire; the controller repeats the frame.
+    /// A single error on the bus; the controller repeats the frame.
     Noise,
 }
 
@@ -31,7 +31,7 @@ const BUS_ERROR: u32 = 0x080;
 const RESTARTED: u32 = 0x100;
 
 impl Condition {
-    /// Reads the class bits and data of an error frame.
+    /// Decodes the class bits and data of an error frame.
     pub fn decode(class: u32, data: &[u8]) -> Condition {
         let controller = if class & CONTROLLER != 0 {
             data.get(1).copied().unwrap_or(0)
@@ -51,7 +51,7 @@ impl Condition {
 }
 
 impl Condition {
-    /// Class bits and data of an error frame that says so.
+    /// Class bits and data of an error frame with this condition.
     pub fn encode(self) -> (u32, [u8; 8]) {
         let controller = |bits: u8| (CONTROLLER, [0, bits, 0, 0, 0, 0, 0, 0]);
         match self {
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(
             Condition::decode(0x004, &[]),
             Condition::Noise,
-            "short data says nothing"
+            "the byte is missing"
         );
     }
 

@@ -1,7 +1,7 @@
 //! The state of a CAN interface, read from the kernel by netlink.
 
 use socketcan::CanInterface;
-use socketcan::nl::CanState;
+use socketcan::nl::{CanState, InterfaceDetails};
 use thiserror::Error;
 
 /// State of an interface.
@@ -11,7 +11,7 @@ pub struct Interface {
     pub is_up: bool,
     /// Bit rate in bit/s; `None` for a virtual interface, which has none.
     pub bit_rate: Option<u32>,
-    /// State of the controller in words; `None` for a virtual interface.
+    /// Name of the state of the controller; `None` for a virtual interface.
     pub state: Option<&'static str>,
     /// Whether the controller takes part in the bus (error active or warning); true for a virtual interface.
     pub is_healthy: bool,
@@ -23,44 +23,43 @@ pub struct Interface {
 
 /// The state of the interface could not be read.
 #[derive(Debug, Error)]
-#[error("CAN interface {name}: {cause}; `ip link show type can` lists what there is")]
+#[error("CAN interface {name}: {cause}; `ip link show type can` lists the interfaces")]
 pub struct InterfaceError {
-    /// Its name.
+    /// The name of the interface.
     pub name: String,
-    /// What the system said.
+    /// The message of the system.
     pub cause: String,
 }
 
 impl Interface {
     /// Reads the state of interface `name`.
     pub fn read(name: &str) -> Result<Interface, InterfaceError> {
-        let error = |cause: String| InterfaceError {
+        let details = details(name).map_err(|cause| InterfaceError {
             name: name.to_owned(),
             cause,
-        };
-        let interface = CanInterface::open(name).map_err(|cause| error(cause.to_string()))?;
-        if !is_can(name) {
-            return Err(error(
-                "this is another kind of network interface".to_owned(),
-            ));
-        }
-        let details = interface
-            .details()
-            .map_err(|cause| error(cause.to_string()))?;
+        })?;
         let can = details.can;
         Ok(Interface {
             is_up: details.is_up,
             bit_rate: can.bit_timing.map(|timing| timing.bitrate),
-            state: can.state.map(words),
-            is_healthy: can.state.is_none_or(|state| {
-                matches!(state, CanState::ErrorActive | CanState::ErrorWarning)
-            }),
-            error_counters: can
-                .berr_counter
-                .map(|counter| (counter.txerr, counter.rxerr)),
+            state: can.state.map(state_name),
+            is_healthy: can.state.is_none_or(is_healthy),
+            error_counters: can.berr_counter.map(|count| (count.txerr, count.rxerr)),
             restart_ms: can.restart_ms,
         })
     }
+}
+
+fn details(name: &str) -> Result<InterfaceDetails, String> {
+    let interface = CanInterface::open(name).map_err(|error| error.to_string())?;
+    match is_can(name) {
+        true => interface.details().map_err(|error| error.to_string()),
+        false => Err("this is another kind of network interface".into()),
+    }
+}
+
+fn is_healthy(state: CanState) -> bool {
+    matches!(state, CanState::ErrorActive | CanState::ErrorWarning)
 }
 
 /// Whether the hardware type of the interface is CAN, ARPHRD_CAN of `linux/if_arp.h`.
@@ -69,7 +68,7 @@ fn is_can(name: &str) -> bool {
     kind.is_ok_and(|kind| kind.trim() == "280")
 }
 
-fn words(state: CanState) -> &'static str {
+fn state_name(state: CanState) -> &'static str {
     match state {
         CanState::ErrorActive => "error active",
         CanState::ErrorWarning => "error warning",

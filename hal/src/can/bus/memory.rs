@@ -8,7 +8,7 @@ use super::super::frame::{CanFrame, Id};
 use super::{BusError, BusEvent, CanBus, Condition, Port};
 
 /// Largest number of events that wait at an endpoint; further ones are lost, as in a socket that is not read.
-const LONGEST_QUEUE: usize = 10_000;
+const QUEUE_MAX: usize = 10_000;
 
 /// A bus; clones are the same bus.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +49,7 @@ impl MemoryBus {
     }
 
     /// Sends a condition to all endpoints, as their controllers would do.
-    pub fn tell(&self, condition: Condition) {
+    pub fn inject_condition(&self, condition: Condition) {
         for mailbox in &lock(&self.wire).mailboxes {
             mailbox.put(BusEvent::Condition(condition));
         }
@@ -70,7 +70,7 @@ impl MemoryBus {
             .iter()
             .filter(|mailbox| !Arc::ptr_eq(mailbox, from));
         others
-            .filter(|mailbox| mailbox.hears(frame.id()))
+            .filter(|mailbox| mailbox.accepts(frame.id()))
             .for_each(|mailbox| mailbox.put(BusEvent::Frame(*frame)));
         Ok(())
     }
@@ -81,20 +81,20 @@ impl Port for MemoryBus {
         Ok(Box::new(self.connect(ids)))
     }
 
-    fn tell(&self, condition: Condition) -> Result<(), BusError> {
-        MemoryBus::tell(self, condition);
+    fn inject_condition(&self, condition: Condition) -> Result<(), BusError> {
+        MemoryBus::inject_condition(self, condition);
         Ok(())
     }
 }
 
 impl Mailbox {
-    fn hears(&self, id: Id) -> bool {
+    fn accepts(&self, id: Id) -> bool {
         self.ids.is_empty() || self.ids.contains(&id)
     }
 
     fn put(&self, event: BusEvent) {
         let mut queue = lock(&self.queue);
-        if queue.len() < LONGEST_QUEUE {
+        if queue.len() < QUEUE_MAX {
             queue.push_back(event);
             self.arrived.notify_one();
         }

@@ -91,7 +91,7 @@ pub trait Port: Send + Sync {
     }
 
     /// Sends a condition to every endpoint as if its controller had detected it, for rehearsals. Not supported by every bus.
-    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+    fn inject_condition(&self, condition: Condition) -> Result<(), BusError> {
         let _ = condition;
         Err(BusError::Other(libc::EOPNOTSUPP))
     }

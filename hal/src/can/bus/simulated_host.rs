@@ -14,7 +14,7 @@ use super::{
 
 const STEP_NS: u64 = 100_000;
 
-/// Tasks with what stops them.
+/// Each task with its stop flag.
 type Tasks = Vec<(Arc<AtomicBool>, Box<dyn Task>)>;
 
 /// A host with a simulated clock; clones share bus and clock.
@@ -36,22 +36,22 @@ impl SimulatedHost {
         &self.shared.bus
     }
 
-    /// One step of time, then of each task. The tasks are taken out meanwhile, so a task may sleep.
+    /// Advances the time by one step, then each task. The tasks are removed from the list meanwhile, so that a task may sleep.
     fn advance(&self, deadline_ns: u64) {
         let now_ns = self.now_ns();
         let next_ns = deadline_ns.min(now_ns + STEP_NS).max(now_ns);
         self.shared.now_ns.store(next_ns, Ordering::Release);
         let mut tasks = std::mem::take(&mut *self.tasks());
         tasks.retain_mut(|(stop, task)| {
-            let goes_on = !stop.load(Ordering::Acquire);
-            if goes_on {
-                let _ = task.step(&|| self.now_ns(), Duration::ZERO); // an error only makes a real host pause
+            let continues = !stop.load(Ordering::Acquire);
+            if continues {
+                let _ = task.step(&|| self.now_ns(), Duration::ZERO); // a pause after an error is needed in real time only
             }
-            goes_on
+            continues
         });
-        let mut kept = self.tasks();
-        tasks.append(&mut kept);
-        *kept = tasks;
+        let mut started = self.tasks(); // by the tasks themselves
+        tasks.append(&mut started);
+        *started = tasks;
     }
 
     fn tasks(&self) -> std::sync::MutexGuard<'_, Tasks> {
@@ -64,14 +64,14 @@ impl SimulatedHost {
 
 impl Port for SimulatedHost {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
-        Ok(Box::new(WorldEndpoint {
-            world: self.clone(),
+        Ok(Box::new(SimulatedEndpoint {
+            host: self.clone(),
             inner: self.shared.bus.connect(ids),
         }))
     }
 
-    fn tell(&self, condition: Condition) -> Result<(), BusError> {
-        Port::tell(self.bus(), condition)
+    fn inject_condition(&self, condition: Condition) -> Result<(), BusError> {
+        Port::inject_condition(self.bus(), condition)
     }
 }
 
@@ -94,24 +94,21 @@ impl Host for SimulatedHost {
     }
 }
 
-struct WorldEndpoint {
-    world: SimulatedHost,
+struct SimulatedEndpoint {
+    host: SimulatedHost,
     inner: MemoryEndpoint,
 }
 
-impl CanBus for WorldEndpoint {
+impl CanBus for SimulatedEndpoint {
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
         self.inner.send(frame)
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {
-        let deadline_ns = self
-            .world
-            .now_ns()
-            .saturating_add(timeout.as_nanos() as u64);
+        let deadline_ns = self.host.now_ns().saturating_add(timeout.as_nanos() as u64);
         loop {
             match self.inner.receive(Duration::ZERO)? {
-                None if self.world.now_ns() < deadline_ns => self.world.advance(deadline_ns),
+                None if self.host.now_ns() < deadline_ns => self.host.advance(deadline_ns),
                 event => return Ok(event),
             }
         }

@@ -17,14 +17,14 @@ use super::{
 #[derive(Clone, Debug)]
 pub struct SocketPort {
     interface: String,
-    /// A virtual interface has no controller and no wire: what is written to it only comes back to other sockets.
+    /// A virtual interface has no controller and no bus: frames only reach other sockets of this computer.
     is_virtual: bool,
 }
 
-/// An interface that cannot be used as it is.
+/// An interface that cannot be used in its present state.
 #[derive(Debug, Error)]
 pub enum PortError {
-    /// It is not there, or cannot be asked.
+    /// It does not exist, or its state cannot be read.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
     /// It is down.
@@ -39,14 +39,14 @@ pub enum PortError {
     },
     /// It runs at another bit rate than configured.
     #[error(
-        "CAN interface {name} runs at {have} bit/s, the configuration says {want}; `ip link set {name} down` and `ip link set {name} up type can bitrate {want}`, or change the configuration"
+        "CAN interface {name} runs at {have} bit/s, {want} is configured; `ip link set {name} down` and `ip link set {name} up type can bitrate {want}`, or change the configuration"
     )]
     BitRate {
         /// Its name.
         name: String,
-        /// What it has, in bit/s.
+        /// Its bit rate, in bit/s.
         have: u32,
-        /// What is configured, in bit/s.
+        /// The configured bit rate, in bit/s.
         want: u32,
     },
     /// Its controller does not take part in the bus.
@@ -102,8 +102,8 @@ impl Port for SocketPort {
         Claim::new(&self.interface, node)
     }
 
-    /// On a virtual interface only: to a wire an error frame would go out as a data frame.
-    fn tell(&self, condition: Condition) -> Result<(), BusError> {
+    /// On a virtual interface only: on a real bus the error frame would be sent as a data frame.
+    fn inject_condition(&self, condition: Condition) -> Result<(), BusError> {
         if !self.is_virtual {
             return Err(BusError::Other(libc::EOPNOTSUPP));
         }
@@ -150,14 +150,14 @@ impl CanBus for SocketEndpoint {
         };
         match read {
             Ok(raw) => Ok(from_socketcan(&raw)),
-            Err(error) if is_nothing(&error) => Ok(None),
+            Err(error) if is_no_frame(&error) => Ok(None),
             Err(error) => Err(BusError::from_io(&error)),
         }
     }
 }
 
-/// No frame in time is no error.
-fn is_nothing(error: &std::io::Error) -> bool {
+/// Whether no frame arrived in time, which is not an error.
+fn is_no_frame(error: &std::io::Error) -> bool {
     use std::io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), WouldBlock | TimedOut | Interrupted)
 }
@@ -172,7 +172,7 @@ fn to_socketcan(frame: &CanFrame) -> Option<CanDataFrame> {
     CanDataFrame::new(id, frame.data())
 }
 
-/// Remote frames are dropped: nobody here answers them.
+/// Remote frames are ignored.
 fn from_socketcan(raw: &Raw) -> Option<BusEvent> {
     match raw {
         Raw::Data(data) => {
@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_survive_the_way_to_socketcan_and_back() {
+    fn conversion_to_socketcan_and_back_preserves_frames() {
         for id in [
             Id::standard(0x7FF),
             Id::standard(5),
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interface_that_is_not_there_is_named() {
+    fn names_a_missing_interface() {
         let error = SocketPort::open("no-such-can", 1_000_000)
             .unwrap_err()
             .to_string();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_network_interface_of_another_kind_is_refused_as_such() {
+    fn rejects_a_network_interface_of_another_kind() {
         let error = SocketPort::open("lo", 1_000_000).unwrap_err().to_string();
         assert!(
             error.starts_with("CAN interface lo: this is another kind of network interface"),

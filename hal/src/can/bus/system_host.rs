@@ -23,7 +23,7 @@ impl<P: Port> SystemHost<P> {
         SystemHost::since(port, Instant::now())
     }
 
-    /// The clock was 0 at `start`, for hosts that share a clock.
+    /// The clock was 0 at `start`; hosts with the same `start` share a clock.
     pub fn since(port: P, start: Instant) -> SystemHost<P> {
         SystemHost {
             port,
@@ -54,8 +54,8 @@ impl<P: Port> Port for SystemHost<P> {
         self.port.claim(node)
     }
 
-    fn tell(&self, condition: Condition) -> Result<(), BusError> {
-        self.port.tell(condition)
+    fn inject_condition(&self, condition: Condition) -> Result<(), BusError> {
+        self.port.inject_condition(condition)
     }
 }
 
@@ -70,24 +70,18 @@ impl<P: Port> Host for SystemHost<P> {
 
     fn start(&self, name: &str, mut task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
         let mut running = TaskHandle::default();
-        let (stop, start, prepare) = (
-            Arc::clone(&running.stop),
-            self.start,
-            Arc::clone(&self.prepare),
-        );
-        let work = move || {
+        let (stop, start) = (Arc::clone(&running.stop), self.start);
+        let prepare = Arc::clone(&self.prepare);
+        let builder = std::thread::Builder::new().name(name.to_owned());
+        let thread = builder.spawn(move || {
             prepare();
             while !stop.load(Ordering::Acquire) {
                 if task.step(&|| since_ns(start), WAIT).is_err() {
-                    std::thread::sleep(WAIT); // a dead interface answers at once: do not burn the processor
+                    std::thread::sleep(WAIT); // an interface that is down fails without waiting
                 }
             }
-        };
-        running.thread = Some(
-            std::thread::Builder::new()
-                .name(name.to_owned())
-                .spawn(work)?,
-        );
+        });
+        running.thread = Some(thread?);
         Ok(running)
     }
 }

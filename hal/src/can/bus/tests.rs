@@ -15,7 +15,7 @@ fn endpoints_hear_the_others_but_not_themselves() {
     assert_eq!(b.receive(Duration::ZERO), Ok(Some(BusEvent::Frame(FRAME))));
     assert_eq!(a.receive(Duration::ZERO), Ok(None));
     assert_eq!(deaf.receive(Duration::ZERO), Ok(None));
-    bus.tell(Condition::BusOff);
+    bus.inject_condition(Condition::BusOff);
     assert_eq!(
         deaf.receive(Duration::ZERO),
         Ok(Some(BusEvent::Condition(Condition::BusOff))),

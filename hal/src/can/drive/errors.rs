@@ -1,4 +1,4 @@
-//! Errors when a drive is opened.
+//! Errors while a drive is being opened.
 
 use thiserror::Error;
 
@@ -98,7 +98,7 @@ pub enum OpenError {
     },
     /// The drive lacks an object without which it would not stop when this program ends.
     #[error(
-        "node {node} cannot be configured to stop when the heartbeat of this program is lost: {cause}; if the drive stops by itself (prove it by unplugging the bus), leave abort_connection unset"
+        "node {node} cannot be configured to stop when the heartbeat of this program is lost: {cause}; if the drive stops by itself (disconnect the bus to verify it), leave abort_connection unset"
     )]
     NoStop {
         /// The node.

@@ -14,23 +14,19 @@ use crate::{DeviceError, FaultText};
 
 /// Emergency messages: the code of the drive is added.
 pub const EMERGENCY: u32 = 0x0001_0000;
-const COMMUNICATION: u32 = 0x0002_0000;
-const POWER: u32 = 0x0003_0000;
-const BUS: u32 = 0x0004_0000;
-const PROGRAM: u32 = 0x0005_0000;
 /// No heartbeat of the drive.
 pub const HEARTBEAT_LOST: u32 = 0x0002_0001;
 /// The drive restarted by itself.
 pub const RESTARTED: u32 = 0x0002_0002;
 /// The drive left NMT operational.
 pub const NOT_OPERATIONAL: u32 = 0x0002_0003;
-/// A frame of the drive has not the configured layout.
+/// A frame of the drive does not have the configured layout.
 pub const MALFORMED: u32 = 0x0002_0004;
 /// The drive did not accept its configuration again.
 pub const NOT_CONFIGURED: u32 = 0x0002_0005;
 /// State Fault without an emergency message.
 pub const DRIVE_FAULT: u32 = 0x0003_0001;
-/// Operation is no longer enabled without a command.
+/// The drive switched itself off.
 pub const SWITCHED_OFF: u32 = 0x0003_0002;
 /// The drive does not follow its target (bit 12 of the statusword).
 pub const TARGET_IGNORED: u32 = 0x0003_0003;
@@ -65,140 +61,139 @@ pub const NOT_ARMED: u32 = 0x0005_0003;
 /// A command that is not finite.
 pub const NOT_FINITE: u32 = 0x0005_0004;
 
+/// Code, meaning and remedy of every fault except emergency messages.
+const FAULTS: [(u32, &str, &str); 23] = [
+    // Communication with the drive.
+    (
+        HEARTBEAT_LOST,
+        "the drive's heartbeat is lost",
+        "check the drive's power and the CAN cable, then clear the fault",
+    ),
+    (
+        RESTARTED,
+        "the drive restarted by itself",
+        "check its supply for dips, then clear the fault; this configures the drive again",
+    ),
+    (
+        NOT_OPERATIONAL,
+        "the drive left the NMT state operational",
+        "look for another NMT master on the bus, then clear the fault",
+    ),
+    (
+        MALFORMED,
+        "a frame of the drive does not have the configured layout",
+        "look for a second node with the same number, then clear the fault",
+    ),
+    (
+        NOT_CONFIGURED,
+        "the drive did not accept its configuration again",
+        "open the drive again: the error names the object",
+    ),
+    // Power stage of the drive.
+    (
+        DRIVE_FAULT,
+        "the drive is in Fault and sent no emergency message",
+        "read the drive's display or its error history 0x1003, remove the cause, then clear the fault",
+    ),
+    (
+        SWITCHED_OFF,
+        "the drive switched itself off",
+        "check its enable input and its supply, then clear the fault",
+    ),
+    (
+        TARGET_IGNORED,
+        "the drive does not follow its target (bit 12 of the statusword)",
+        "check limits, limit switches and the mode of operation in the drive, then clear the fault",
+    ),
+    (
+        STATUS_LOST,
+        "the drive sends no status frames",
+        "check the bus load, then clear the fault",
+    ),
+    (
+        NOT_ENABLED,
+        "the drive did not reach Operation Enabled in time",
+        "check its power stage supply and its enable input",
+    ),
+    (
+        NOT_REMOTE,
+        "the drive does not accept commands over CAN (bit 9 of the statusword)",
+        "switch the drive from local to remote, and close its commissioning program",
+    ),
+    (
+        FAULT_REMAINS,
+        "the drive stays in Fault after the reset",
+        "remove the cause first: read the drive's display or its error history 0x1003",
+    ),
+    // Bus.
+    (
+        BUS_OFF,
+        "the CAN controller is in bus-off",
+        "check cable, termination and bit rate; `ip link set IFACE down` and up again, then clear the fault",
+    ),
+    (
+        BUS_PASSIVE,
+        "the CAN controller is error passive",
+        "check cable, termination and bit rate, then clear the fault",
+    ),
+    (
+        BUS_DOWN,
+        "the CAN interface is down",
+        "`ip link set IFACE up`, then clear the fault",
+    ),
+    (
+        BUS_GONE,
+        "the CAN interface is gone",
+        "connect the adapter, then start the program again",
+    ),
+    (
+        OVERFLOW,
+        "received CAN frames were lost",
+        "lower the traffic on the bus, then clear the fault",
+    ),
+    (
+        QUEUE_FULL,
+        "the transmit queue of the CAN interface is full",
+        "check that the drive is on the bus; lower the rate",
+    ),
+    (
+        BUS_FAILED,
+        "the CAN interface failed",
+        "read the kernel's messages (dmesg), then clear the fault",
+    ),
+    // This program.
+    (
+        COMMANDS_STOPPED,
+        "the loop sent no more commands and the drive was switched off",
+        "look for overruns; the limit is the setting command_timeout",
+    ),
+    (
+        STILL_ENABLED,
+        "the drive did not confirm that it is off; it was stopped by NMT and the heartbeat of this program ended",
+        "disconnect the drive's power, find the cause, then clear the fault",
+    ),
+    (NOT_ARMED, "the drive is not enabled", "arm first"),
+    (
+        NOT_FINITE,
+        "the commanded current is not a finite number",
+        "this is a fault of the program; please report it",
+    ),
+];
+
 /// Meaning and remedy of a code.
-pub const fn fault_text(code: u32) -> FaultText {
-    let (what, remedy) = match code & 0xFFFF_0000 {
-        EMERGENCY => (
-            emcy::text(code as u16),
-            "the drive reports this in an emergency message; remove the cause, then clear the fault",
-        ),
-        COMMUNICATION => communication_fault(code),
-        POWER => power_fault(code),
-        BUS => bus_fault(code),
-        PROGRAM => program_fault(code),
-        _ => UNKNOWN,
-    };
+pub fn fault_text(code: u32) -> FaultText {
+    if code & 0xFFFF_0000 == EMERGENCY {
+        return FaultText {
+            what: emcy::text(code as u16),
+            remedy: "the drive reports this in an emergency message; remove the cause, then clear the fault",
+        };
+    }
+    let fault = FAULTS.iter().find(|(known, ..)| *known == code);
+    let (what, remedy) = fault.map_or(UNKNOWN, |&(_, what, remedy)| (what, remedy));
     FaultText { what, remedy }
 }
 
 const UNKNOWN: (&str, &str) = ("unknown fault", "please report the code");
-
-/// Faults of the communication with the drive.
-const fn communication_fault(code: u32) -> (&'static str, &'static str) {
-    match code {
-        HEARTBEAT_LOST => (
-            "the drive's heartbeat is lost",
-            "check the drive's power and the CAN cable, then clear the fault",
-        ),
-        RESTARTED => (
-            "the drive restarted by itself",
-            "check its supply for dips, then clear the fault; this configures the drive again",
-        ),
-        NOT_OPERATIONAL => (
-            "the drive left the NMT state operational",
-            "look for another NMT master on the bus, then clear the fault",
-        ),
-        MALFORMED => (
-            "a frame of the drive has not the configured layout",
-            "look for a second node with the same number, then clear the fault",
-        ),
-        NOT_CONFIGURED => (
-            "the drive did not accept its configuration again",
-            "open the drive again: the error names the object",
-        ),
-        _ => UNKNOWN,
-    }
-}
-
-/// Faults of the power stage of the drive.
-const fn power_fault(code: u32) -> (&'static str, &'static str) {
-    match code {
-        DRIVE_FAULT => (
-            "the drive is in Fault and sent no emergency message",
-            "read the drive's display or its error history 0x1003, remove the cause, then clear the fault",
-        ),
-        SWITCHED_OFF => (
-            "the drive switched itself off",
-            "check its enable input and its supply, then clear the fault",
-        ),
-        TARGET_IGNORED => (
-            "the drive does not follow its target (bit 12 of the statusword)",
-            "check limits, limit switches and the mode of operation in the drive, then clear the fault",
-        ),
-        STATUS_LOST => (
-            "the drive sends no status frames",
-            "check the bus load, then clear the fault",
-        ),
-        NOT_ENABLED => (
-            "the drive did not reach Operation Enabled in time",
-            "check its power stage supply and its enable input",
-        ),
-        NOT_REMOTE => (
-            "the drive does not accept commands over CAN (bit 9 of the statusword)",
-            "switch the drive from local to remote, and close its commissioning program",
-        ),
-        FAULT_REMAINS => (
-            "the drive stays in Fault after the reset",
-            "remove the cause first: read the drive's display or its error history 0x1003",
-        ),
-        _ => UNKNOWN,
-    }
-}
-
-/// Faults of the bus.
-const fn bus_fault(code: u32) -> (&'static str, &'static str) {
-    match code {
-        BUS_OFF => (
-            "the CAN controller is in bus-off",
-            "check cable, termination and bit rate; `ip link set IFACE down` and up again, then clear the fault",
-        ),
-        BUS_PASSIVE => (
-            "the CAN controller is error passive",
-            "check cable, termination and bit rate, then clear the fault",
-        ),
-        BUS_DOWN => (
-            "the CAN interface is down",
-            "`ip link set IFACE up`, then clear the fault",
-        ),
-        BUS_GONE => (
-            "the CAN interface is gone",
-            "plug the adapter in, then start anew",
-        ),
-        OVERFLOW => (
-            "received CAN frames were lost",
-            "lower the traffic on the bus, then clear the fault",
-        ),
-        QUEUE_FULL => (
-            "the transmit queue of the CAN interface is full",
-            "check that the drive is on the bus; lower the rate",
-        ),
-        BUS_FAILED => (
-            "the CAN interface failed",
-            "read the kernel's messages (dmesg), then clear the fault",
-        ),
-        _ => UNKNOWN,
-    }
-}
-
-/// Faults of this program.
-const fn program_fault(code: u32) -> (&'static str, &'static str) {
-    match code {
-        COMMANDS_STOPPED => (
-            "the loop sent no more commands and the drive was switched off",
-            "look for overruns; the limit is the setting command_timeout",
-        ),
-        STILL_ENABLED => (
-            "the drive did not confirm that it is off; it was stopped by NMT and the heartbeat of this program ended",
-            "cut the drive's power, find the cause, then clear the fault",
-        ),
-        NOT_ARMED => ("the drive is not enabled", "arm first"),
-        NOT_FINITE => (
-            "the commanded current is not a number",
-            "this is an error of the program; please report it",
-        ),
-        _ => UNKNOWN,
-    }
-}
 
 /// Whether `code` describes the same fault as `first` more precisely: an emergency message after the state Fault; an interface
 /// that is gone, because it goes down first when the adapter is unplugged.
@@ -210,8 +205,8 @@ pub(super) const fn explains(code: u32, first: u32) -> bool {
     }
 }
 
-/// A fault as an error of a call.
-pub(super) const fn device_error(code: u32) -> DeviceError {
+/// The error of a call that fails with this fault.
+pub(super) fn device_error(code: u32) -> DeviceError {
     let FaultText { what, remedy } = fault_text(code);
     DeviceError {
         what,
@@ -248,39 +243,12 @@ mod tests {
 
     #[test]
     fn every_code_has_its_own_text() {
-        let codes = [
-            HEARTBEAT_LOST,
-            RESTARTED,
-            NOT_OPERATIONAL,
-            MALFORMED,
-            NOT_CONFIGURED,
-            DRIVE_FAULT,
-            SWITCHED_OFF,
-            TARGET_IGNORED,
-            STATUS_LOST,
-            NOT_ENABLED,
-            NOT_REMOTE,
-            FAULT_REMAINS,
-            BUS_OFF,
-            BUS_PASSIVE,
-            BUS_DOWN,
-            BUS_GONE,
-            OVERFLOW,
-            QUEUE_FULL,
-            BUS_FAILED,
-            COMMANDS_STOPPED,
-            STILL_ENABLED,
-            NOT_ARMED,
-            NOT_FINITE,
-        ];
-        let whats: std::collections::HashSet<_> =
-            codes.iter().map(|code| fault_text(*code).what).collect();
-        assert_eq!(whats.len(), codes.len());
-        assert!(
-            codes
-                .iter()
-                .all(|code| fault_text(*code).what != "unknown fault")
-        );
+        let whats: std::collections::HashSet<_> = FAULTS
+            .iter()
+            .map(|(code, ..)| fault_text(*code).what)
+            .collect();
+        assert_eq!(whats.len(), FAULTS.len());
+        assert!(!whats.contains("unknown fault"));
         assert_eq!(fault_text(EMERGENCY + 0x4210).what, "drive too hot");
         assert_eq!(fault_text(0x0009_0000).what, "unknown fault");
     }

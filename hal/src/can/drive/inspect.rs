@@ -60,17 +60,23 @@ pub fn inspect(host: &dyn Host, node: u8, timeout: Duration) -> Result<Inspectio
         node,
         timeout,
     };
+    let device_type = if_present(channel.read_u32(DEVICE_TYPE))?;
+    let identity = read_identity(channel)?;
+    let name = if_present(channel.read(DEVICE_NAME))?;
+    let error_register = if_present(channel.read_u8(ERROR_REGISTER))?;
+    let statusword = if_present(channel.read_u16(STATUSWORD))?;
+    let modes = if_present(channel.read_u32(SUPPORTED_MODES))?;
+    let rated_ma = if_present(channel.read_u32(RATED_CURRENT))?;
+    let maximum_per_mille = if_present(channel.read_u16(MAXIMUM))?;
     Ok(Inspection {
-        device_type: if_present(channel.read_u32(DEVICE_TYPE))?,
-        identity: read_identity(channel)?,
-        name: if_present(channel.read(DEVICE_NAME))?.map(text),
-        error_register: if_present(channel.read_u8(ERROR_REGISTER))?,
-        statusword: if_present(channel.read_u16(STATUSWORD))?,
-        modes: if_present(channel.read_u32(SUPPORTED_MODES))?,
-        rated_current_a: if_present(channel.read_u32(RATED_CURRENT))?
-            .map(|milliamperes| f64::from(milliamperes) * 1e-3),
-        maximum_current_ratio: if_present(channel.read_u16(MAXIMUM))?
-            .map(|per_mille| f64::from(per_mille) * 1e-3),
+        device_type,
+        identity,
+        name: name.map(text),
+        error_register,
+        statusword,
+        modes,
+        rated_current_a: rated_ma.map(|rated_ma| f64::from(rated_ma) * 1e-3),
+        maximum_current_ratio: maximum_per_mille.map(|ratio| f64::from(ratio) * 1e-3),
         past_errors: read_past_errors(channel)?,
         missing_objects: find_missing_objects(channel)?,
     })

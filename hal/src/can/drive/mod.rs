@@ -8,9 +8,9 @@
 //!   ==================================== bus ==================================
 //! ```
 //!
-//! Both threads have a connection of their own with filters of their own. Health is what comes in, never the result of
-//! a write. The drive watches our heartbeat, which the service sends only as long as it has no reason to want the drive
-//! silent; so whichever of loop, process, cable and drive fails, somebody is left who stops the current.
+//! Each thread has its own connection to the bus, with its own filters. The state of the drive is judged by received frames,
+//! never by the result of a write. The drive monitors the heartbeat of this program. The service thread ends this heartbeat if
+//! the drive does not confirm that it is off. Thus the current is stopped whichever part fails: loop, process, cable or drive.
 
 mod errors;
 pub mod faults;
@@ -28,7 +28,7 @@ use std::time::Duration;
 pub use errors::OpenError;
 pub use faults::fault_text;
 pub use inspect::{ABORT_CONNECTION, Inspection, REQUIRED_OBJECTS, inspect};
-pub use settings::{DriveSettings, ExpectedIdentity, TorqueMode};
+pub use settings::{DriveSettings, DriveTimes, ExpectedIdentity, TorqueMode};
 
 use self::monitor::{Monitor, heard_ids, set_point};
 use self::service::Service;
@@ -36,31 +36,29 @@ use self::setup::{Configured, Setup};
 use self::shared::{Intent, Shared};
 use super::budget::Exchange;
 use super::bus::{CanBus, Claim, Host, TaskHandle};
-use super::cia402::{CYCLIC_TORQUE, DISABLE_VOLTAGE, ENABLE_OPERATION, State};
-use super::scale::Scale;
-use super::sdo::{Address, Channel, answer_id};
+use super::cia402::{CYCLIC_TORQUE, DISABLE_VOLTAGE, ENABLE_OPERATION};
+use super::objects::HEARTBEAT_CONSUMER;
+use super::sdo::{Channel, answer_id};
 use super::{nmt, sync};
 use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
 
-/// Time between looks at the drive while it changes its state.
+/// Time between checks of the state of the drive while it changes.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// A CANopen drive in torque mode. See the module for who watches whom.
+/// A CANopen drive in torque mode. The module documentation describes how it is monitored.
 pub struct CanopenDrive {
     service: TaskHandle, // first, so that it ends before the claim does
     bus: Box<dyn CanBus>,
     host: Box<dyn Host>,
     shared: Arc<Shared>,
     settings: DriveSettings,
-    scale: Scale,
-    mode: i8,
-    identity: [Option<u32>; 4],
+    configured: Configured,
     last_error: Option<OpenError>,
     _claim: Claim,
 }
 
 impl CanopenDrive {
-    /// Claims the node, configures the drive and verifies what it took. Afterwards it is operational and off.
+    /// Claims the node, configures the drive and verifies the configuration. Afterwards the drive is operational and off.
     pub fn open(settings: DriveSettings, host: Box<dyn Host>) -> Result<CanopenDrive, OpenError> {
         settings.check()?;
         let node = settings.node;
@@ -70,27 +68,19 @@ impl CanopenDrive {
         let configured = configure(&settings, bus.as_mut(), host.as_ref())?;
         let shared = Arc::new(Shared::default());
         let monitor = Monitor::new(&settings, Arc::clone(&shared), host.now_ns());
-        let task = Box::new(Service {
+        let service = Service {
             bus: watched,
             monitor,
-        });
-        let service = host.start("can-service", task).map_err(OpenError::Thread)?;
-        let Configured {
-            scale,
-            mode,
-            identity,
-        } = configured;
-        let last_error = None;
+        };
+        let service = host.start("can-service", Box::new(service));
         let mut drive = CanopenDrive {
-            service,
+            service: service.map_err(OpenError::Thread)?,
             bus,
             host,
             shared,
             settings,
-            scale,
-            mode,
-            identity,
-            last_error,
+            configured,
+            last_error: None,
             _claim: claim,
         };
         drive.shared.set_restarted(false);
@@ -98,52 +88,55 @@ impl CanopenDrive {
         Ok(drive)
     }
 
-    /// Mode of operation in force: 10 cyclic synchronous torque, 4 profile torque.
+    /// The active mode of operation: 10 is cyclic synchronous torque, 4 is profile torque.
     pub fn mode(&self) -> i8 {
-        self.mode
+        self.configured.mode
     }
 
-    /// Vendor, product, revision and serial number (0x1018), as far as the drive says.
+    /// Vendor, product, revision and serial number (0x1018), as far as the drive has them.
     pub fn identity(&self) -> [Option<u32>; 4] {
-        self.identity
+        self.configured.identity
     }
 
     /// The smallest step of the current, in amperes.
     pub fn step_a(&self) -> f64 {
-        self.scale.step_a()
+        self.configured.scale.step_a()
     }
 
-    /// Why the drive did not take its configuration again, in full; [`DeviceError`] has room for static text only.
+    /// Why the drive did not accept its configuration again. It complements [`DeviceError`], which has static text only.
     pub fn last_error(&self) -> Option<&OpenError> {
         self.last_error.as_ref()
     }
 
-    /// NMT start, and wait until the drive's heartbeat says operational.
+    /// Sends NMT start and waits until the heartbeat of the drive reports operational.
     fn start(&mut self) -> Result<(), OpenError> {
-        self.shared.set_must_follow(self.mode == CYCLIC_TORQUE);
+        self.shared
+            .set_must_follow(self.configured.mode == CYCLIC_TORQUE);
         self.bus
             .send(&nmt::Command::Start.frame(self.settings.node))?;
-        let operational = |shared: &Shared| shared.nmt() == Some(nmt::State::Operational);
-        if self.wait_for(self.settings.state_timeout, operational) {
+        let timeout = self.settings.times.state_timeout;
+        if self.wait_for(timeout, Shared::is_operational) {
             return Ok(());
         }
-        let (node, timeout) = (self.settings.node, self.settings.state_timeout);
         Err(OpenError::NotOperational {
-            node,
+            node: self.settings.node,
             timeout_ms: timeout.as_millis(),
         })
     }
 
-    /// Everything that a restart or another master has undone.
+    /// Restores the configuration after a restart of the drive or the intervention of another master.
     fn configure_again(&mut self) -> Result<(), OpenError> {
         self.shared.set_restarted(false);
         self.shared.forget_nmt();
         let configured = configure(&self.settings, self.bus.as_mut(), self.host.as_ref())?;
-        (self.scale, self.mode) = (configured.scale, configured.mode);
+        self.configured = Configured {
+            identity: self.configured.identity,
+            ..configured
+        };
         self.start()
     }
 
-    /// Looks until `condition` holds, `false` if it does not within `limit`.
+    /// Waits until `condition` holds; `false` if it does not within `limit`.
     fn wait_for(&self, limit: Duration, condition: impl Fn(&Shared) -> bool) -> bool {
         let deadline_ns = self.host.now_ns().saturating_add(limit.as_nanos() as u64);
         while !condition(&self.shared) {
@@ -158,19 +151,16 @@ impl CanopenDrive {
     fn deadline_ns(&self) -> u64 {
         self.host
             .now_ns()
-            .saturating_add(self.settings.state_timeout.as_nanos() as u64)
+            .saturating_add(self.settings.times.state_timeout.as_nanos() as u64)
     }
 
-    /// One set-point, with SYNC if the exchange has it. *In the tick.*
+    /// Sends a set-point, and SYNC if the exchange is synchronous. *In the tick.*
     fn exchange(&mut self, controlword: u16, target: i16) -> Result<(), DeviceError> {
         let frame = set_point(self.settings.node, controlword, target);
-        let sent = self
-            .bus
-            .send(&frame)
-            .and_then(|()| match self.settings.exchange {
-                Exchange::Asynchronous { .. } => Ok(()),
-                Exchange::Synchronous { .. } => self.bus.send(&sync::FRAME),
-            });
+        let mut sent = self.bus.send(&frame);
+        if sent.is_ok() && matches!(self.settings.exchange, Exchange::Synchronous { .. }) {
+            sent = self.bus.send(&sync::FRAME);
+        }
         sent.map_err(|error| faults::device_error(faults::of_bus_error(error)))
     }
 
@@ -181,18 +171,15 @@ impl CanopenDrive {
         }
     }
 
-    /// Off, no longer watched by the drive, pre-operational.
+    /// Switches the drive off, ends its monitoring of the heartbeat, and enters pre-operational.
     fn leave_in_order(&mut self) {
         self.disable();
-        let settled =
-            |shared: &Shared| shared.state().is_none_or(State::is_off) || shared.fault() != 0;
-        let is_off = self.wait_for(self.settings.state_timeout, settled);
+        let is_off = self.wait_for(self.settings.times.state_timeout, Shared::has_settled);
         if is_off && self.shared.fault() == 0 {
             let mut channel = channel(&self.settings, self.bus.as_mut(), self.host.as_ref());
-            let _ = channel.write(Address::new(0x1016, 1), &[0; 4]); // else it will miss us and say so: no harm
-            let _ = self
-                .bus
-                .send(&nmt::Command::EnterPreOperational.frame(self.settings.node));
+            let _ = channel.write(HEARTBEAT_CONSUMER, &[0; 4]); // if it fails, the drive only reports a lost heartbeat
+            let stop = nmt::Command::EnterPreOperational.frame(self.settings.node);
+            let _ = self.bus.send(&stop); // the drive is off already
         }
     }
 }
@@ -206,7 +193,7 @@ fn channel<'a>(
         bus,
         host,
         node: settings.node,
-        timeout: settings.sdo_timeout,
+        timeout: settings.times.sdo_timeout,
     }
 }
 
@@ -225,7 +212,7 @@ fn configure(
 impl CurrentAmplifier for CanopenDrive {
     fn enable(&mut self) -> Result<(), DeviceError> {
         self.no_fault()?;
-        if self.shared.nmt() != Some(nmt::State::Operational) {
+        if !self.shared.is_operational() {
             return Err(faults::device_error(faults::NOT_OPERATIONAL));
         }
         self.shared.set_intent(Intent::Enabling);
@@ -245,10 +232,10 @@ impl CurrentAmplifier for CanopenDrive {
         if !current_a.is_finite() {
             return Err(faults::device_error(faults::NOT_FINITE));
         }
-        let counts = self.scale.counts(current_a);
+        let counts = self.configured.scale.counts(current_a);
         self.exchange(ENABLE_OPERATION, counts)?;
         self.shared.note_command();
-        Ok(self.scale.amperes(counts))
+        Ok(self.configured.scale.amperes(counts))
     }
 
     fn disable(&mut self) {
@@ -265,9 +252,8 @@ impl CurrentAmplifier for CanopenDrive {
     }
 
     fn actual_current_a(&self) -> Option<f64> {
-        self.shared
-            .actual()
-            .map(|counts| self.scale.amperes(counts))
+        let counts = self.shared.actual()?;
+        Some(self.configured.scale.amperes(counts))
     }
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
@@ -284,7 +270,7 @@ impl CurrentAmplifier for CanopenDrive {
             self.shared.latch(if before == 0 { code } else { before });
             faults::device_error(code)
         })?;
-        self.host.sleep(self.settings.heartbeat_timeout); // a cause that persists shows within this time
+        self.host.sleep(self.settings.times.heartbeat_timeout); // a cause that persists shows within this time
         self.no_fault()
     }
 

@@ -1,9 +1,11 @@
 //! Monitors the drive: received frames become status and faults, and determines the frames to send. Without bus and clock.
 //!
 //! ```text
-//!  heartbeat, EMCY, status frame, error frame --handle--> fault latched, the first is kept
-//!  time --poll--> heartbeat of this program | heartbeat, status or commands overdue: fault | after a fault or disable:
-//!                 `disable voltage` until the drive confirms, then NMT stop and no more heartbeats, so that the drive stops itself
+//!  heartbeat, EMCY, status frame, error frame --handle--> fault; the first one is latched
+//!  time --poll--> heartbeat of this program
+//!                 heartbeat, status or commands overdue: fault
+//!                 after a fault or disable: `disable voltage` until the drive confirms; after the time limit NMT stop and no
+//!                 more heartbeats, so that the drive stops by itself
 //! ```
 
 use std::sync::Arc;
@@ -59,6 +61,20 @@ struct OnWatch {
     last_command_ns: u64,
 }
 
+impl OnWatch {
+    /// Notes the present number of commands.
+    fn update(&mut self, commands: u32, now_ns: u64) {
+        if commands != self.commands {
+            (self.commands, self.last_command_ns) = (commands, now_ns);
+            self.first_command_ns = self.first_command_ns.or(Some(now_ns));
+        }
+    }
+}
+
+fn ns(time: Duration) -> u64 {
+    time.as_nanos() as u64
+}
+
 #[derive(Debug)]
 pub(super) struct Monitor {
     shared: Arc<Shared>,
@@ -82,17 +98,17 @@ pub(super) struct Monitor {
 
 impl Monitor {
     pub(super) fn new(settings: &DriveSettings, shared: Arc<Shared>, now_ns: u64) -> Monitor {
-        let ns = |time: Duration| time.as_nanos() as u64;
+        let times = &settings.times;
         Monitor {
             shared,
             node: settings.node,
             own_node: settings.own_node,
             is_synchronous: matches!(settings.exchange, Exchange::Synchronous { .. }),
-            heartbeat_timeout_ns: ns(settings.heartbeat_timeout),
-            own_period_ns: ns(settings.own_heartbeat_period),
-            status_timeout_ns: ns(settings.status_timeout),
-            command_timeout_ns: ns(settings.command_timeout),
-            off_timeout_ns: ns(settings.own_heartbeat_timeout).max(3 * REPEAT_NS),
+            heartbeat_timeout_ns: ns(times.heartbeat_timeout),
+            own_period_ns: ns(times.own_heartbeat_period),
+            status_timeout_ns: ns(times.status_timeout),
+            command_timeout_ns: ns(times.command_timeout),
+            off_timeout_ns: ns(times.own_heartbeat_timeout).max(3 * REPEAT_NS),
             heard_ns: now_ns,
             own_due_ns: now_ns,
             status_ns: now_ns,
@@ -104,7 +120,7 @@ impl Monitor {
         }
     }
 
-    /// The bus cannot be read.
+    /// Latches an error of the bus.
     pub(super) fn fail(&mut self, error: BusError) {
         self.shared.latch(faults::of_bus_error(error));
     }
@@ -112,23 +128,21 @@ impl Monitor {
     /// Processes an event of the bus.
     pub(super) fn handle(&mut self, event: &BusEvent, now_ns: u64) {
         match event {
-            BusEvent::Condition(condition) => {
-                if let Some(code) = faults::of_condition(*condition) {
-                    self.shared.latch(code);
-                }
-            }
-            BusEvent::Frame(frame) if frame.id() == heartbeat::cob_id(self.node) => {
-                self.heartbeat(frame, now_ns)
-            }
-            BusEvent::Frame(frame) if frame.id() == emcy::cob_id(self.node) => {
-                self.emergency(frame)
-            }
-            BusEvent::Frame(frame)
-                if frame.id() == pdo::cob_id(Direction::Transmit, 1, self.node) =>
-            {
-                self.status(frame, now_ns)
-            }
-            BusEvent::Frame(_) => {}
+            BusEvent::Condition(condition) => faults::of_condition(*condition)
+                .into_iter()
+                .for_each(|code| self.shared.latch(code)),
+            BusEvent::Frame(frame) => self.handle_frame(frame, now_ns),
+        }
+    }
+
+    fn handle_frame(&mut self, frame: &CanFrame, now_ns: u64) {
+        let [heartbeat, emergency, status] = heard_ids(self.node);
+        if frame.id() == heartbeat {
+            self.heartbeat(frame, now_ns);
+        } else if frame.id() == emergency {
+            self.emergency(frame);
+        } else if frame.id() == status {
+            self.status(frame, now_ns);
         }
     }
 
@@ -169,18 +183,21 @@ impl Monitor {
         };
         self.status_ns = now_ns;
         self.shared.set_status(statusword, actual);
-        match (State::decode(statusword), self.shared.intent()) {
-            (_, Intent::Resetting) => {}
-            (Some(State::Fault | State::FaultReactionActive), _) => {
-                self.shared.latch(self.drive_fault())
-            }
-            (None, Intent::On) => self.shared.latch(faults::MALFORMED),
-            (Some(State::OperationEnabled), Intent::On) if self.shared.follows() => {}
-            (Some(State::OperationEnabled), Intent::On) => {
-                self.shared.latch(faults::TARGET_IGNORED)
-            }
-            (Some(_), Intent::On) => self.shared.latch(faults::SWITCHED_OFF),
-            _ => {}
+        if let Some(code) = self.status_fault(State::decode(statusword)) {
+            self.shared.latch(code);
+        }
+    }
+
+    /// The fault that a status frame shows; while a fault is being reset it shows none.
+    fn status_fault(&self, state: Option<State>) -> Option<u32> {
+        match (state, self.shared.intent()) {
+            (_, Intent::Resetting) => None,
+            (Some(State::Fault | State::FaultReactionActive), _) => Some(self.drive_fault()),
+            (None, Intent::On) => Some(faults::MALFORMED),
+            (Some(State::OperationEnabled), Intent::On) if self.shared.follows() => None,
+            (Some(State::OperationEnabled), Intent::On) => Some(faults::TARGET_IGNORED),
+            (Some(_), Intent::On) => Some(faults::SWITCHED_OFF),
+            _ => None,
         }
     }
 
@@ -205,7 +222,7 @@ impl Monitor {
         }
         self.follow_intent(now_ns);
         self.watch_commands(now_ns);
-        self.follow_intent(now_ns); // a fault that was just found switches off immediately
+        self.follow_intent(now_ns); // a new fault switches off immediately
         self.ensure_off(now_ns, send);
         self.sync_while_idle(now_ns, send);
         self.send_heartbeat(now_ns, send);
@@ -224,45 +241,35 @@ impl Monitor {
         }
         let was_in_use = self.intent.is_in_use() || uses != self.uses;
         (self.intent, self.uses) = (intent, uses);
-        let commands = self.shared.commands();
         self.on = (intent == Intent::On).then_some(OnWatch {
             since_ns: now_ns,
-            commands,
+            commands: self.shared.commands(),
             first_command_ns: None,
             last_command_ns: now_ns,
         });
-        let status_count = self.shared.status_count();
-        let watch = OffWatch {
+        self.off = (intent == Intent::Off && was_in_use).then_some(OffWatch {
             since_ns: now_ns,
             repeat_ns: now_ns,
-            status_count,
+            status_count: self.shared.status_count(),
             escalated: false,
-        };
-        self.off = (intent == Intent::Off && was_in_use).then_some(watch);
+        });
     }
 
+    /// Checks that commands and status frames arrive in time while commands are followed.
     fn watch_commands(&mut self, now_ns: u64) {
-        let commands = self.shared.commands();
         let Some(on) = &mut self.on else { return };
-        if commands != on.commands {
-            (on.commands, on.last_command_ns) = (commands, now_ns);
-            on.first_command_ns = on.first_command_ns.or(Some(now_ns));
-        }
-        if on.first_command_ns.is_some()
-            && now_ns.saturating_sub(on.last_command_ns) > self.command_timeout_ns
-        {
+        on.update(self.shared.commands(), now_ns);
+        let without_command_ns = now_ns.saturating_sub(on.last_command_ns);
+        if on.first_command_ns.is_some() && without_command_ns > self.command_timeout_ns {
             self.shared.latch(faults::COMMANDS_STOPPED);
         }
         // A synchronous drive answers SYNCs, which begin with the first command.
-        let since_ns = if self.is_synchronous {
-            on.first_command_ns
-        } else {
-            Some(on.since_ns)
+        let since_ns = match self.is_synchronous {
+            true => on.first_command_ns,
+            false => Some(on.since_ns),
         };
-        let overdue = |since_ns: u64| {
-            now_ns.saturating_sub(since_ns.max(self.status_ns)) > self.status_timeout_ns
-        };
-        if since_ns.is_some_and(overdue) {
+        let Some(since_ns) = since_ns else { return };
+        if now_ns.saturating_sub(since_ns.max(self.status_ns)) > self.status_timeout_ns {
             self.shared.latch(faults::STATUS_LOST);
         }
     }

@@ -1,12 +1,12 @@
-//! The monitor on a bus.
+//! The service thread: connects the monitor to a bus.
 
 use std::time::Duration;
 
-use super::super::bus::{BusError, BusEvent, CanBus, Task};
+use super::super::bus::{BusError, CanBus, Task};
 use super::monitor::Monitor;
 
-/// Events taken in one step, so that a flooded bus cannot keep our heartbeat from going out.
-const MOST_EVENTS: usize = 256;
+/// Largest number of events per step, so that the heartbeat is sent on a flooded bus as well.
+const EVENTS_MAX: usize = 256;
 
 pub(super) struct Service {
     pub(super) bus: Box<dyn CanBus>,
@@ -14,12 +14,12 @@ pub(super) struct Service {
 }
 
 impl Service {
-    fn take(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
-        let mut event: Option<BusEvent> = self.bus.receive(wait)?;
-        for _ in 0..MOST_EVENTS {
-            let Some(came) = event else { break };
-            self.monitor.handle(&came, now_ns());
-            event = self.bus.receive(Duration::ZERO)?;
+    fn receive(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
+        let mut next = self.bus.receive(wait)?;
+        for _ in 0..EVENTS_MAX {
+            let Some(event) = next else { break };
+            self.monitor.handle(&event, now_ns());
+            next = self.bus.receive(Duration::ZERO)?;
         }
         Ok(())
     }
@@ -27,15 +27,15 @@ impl Service {
 
 impl Task for Service {
     fn step(&mut self, now_ns: &dyn Fn() -> u64, wait: Duration) -> Result<(), BusError> {
-        let taken = self.take(now_ns, wait);
-        if let Err(error) = taken {
+        let received = self.receive(now_ns, wait);
+        if let Err(error) = received {
             self.monitor.fail(error);
         }
         let bus = &mut self.bus;
-        // A frame that does not go out needs no notice here: what it should have caused is watched.
+        // An error of `send` is not reported here: the monitor notices that the frame had no effect.
         self.monitor.poll(now_ns(), &mut |frame| {
             let _ = bus.send(&frame);
         });
-        taken
+        received
     }
 }

@@ -1,4 +1,4 @@
-//! What is configured of a drive.
+//! Settings of a CANopen drive.
 
 use std::time::Duration;
 
@@ -10,11 +10,11 @@ use super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
 use super::super::scale::Reference;
 use super::errors::OpenError;
 
-/// Which mode of operation the drive shall run in.
+/// The mode of operation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TorqueMode {
-    /// Cyclic synchronous torque if the drive has it, else profile torque.
+    /// Cyclic synchronous torque if the drive supports it, otherwise profile torque.
     #[default]
     CyclicElseProfile,
     /// Cyclic synchronous torque (10).
@@ -24,7 +24,7 @@ pub enum TorqueMode {
 }
 
 impl TorqueMode {
-    /// The mode for a drive with the supported modes of 0x6502 (bit n-1: mode n), if there is one.
+    /// The mode to use with a drive that has the `supported` modes of 0x6502 (bit n-1 is mode n), if there is one.
     pub fn choose(self, supported: u32) -> Option<i8> {
         let candidates: &[i8] = match self {
             TorqueMode::CyclicElseProfile => &[CYCLIC_TORQUE, PROFILE_TORQUE],
@@ -38,7 +38,7 @@ impl TorqueMode {
     }
 }
 
-/// What the identity object 0x1018 must say; `None` is not checked.
+/// Expected values of the identity object 0x1018; `None` is not checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedIdentity {
@@ -56,51 +56,66 @@ pub struct ExpectedIdentity {
     pub serial: Option<u32>,
 }
 
-/// What is configured of a drive.
+impl ExpectedIdentity {
+    /// Vendor, product, revision and serial number: the expected values, or those of `other` where nothing is expected.
+    pub fn or(&self, other: [u32; 4]) -> [u32; 4] {
+        let expected = [self.vendor, self.product, self.revision, self.serial];
+        std::array::from_fn(|field| expected[field].unwrap_or(other[field]))
+    }
+}
+
+/// Settings of a CANopen drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveSettings {
     /// Node number of the drive, 1 to 127.
     pub node: u8,
-    /// Our node number, 1 to 127, whose heartbeat the drive watches.
+    /// Node number of this program, 1 to 127. The drive monitors the heartbeat of this node.
     pub own_node: u8,
     /// Bit rate of the bus, in bit/s.
     pub bit_rate: u32,
-    /// Commands in a second.
+    /// Set-points per second.
     pub rate_hz: f64,
-    /// Set-points as they come or with SYNC.
+    /// Set-points with or without SYNC.
     pub exchange: Exchange,
-    /// Largest load of the bus, as a fraction.
+    /// Largest permitted load of the bus, as a fraction.
     pub load_limit: f64,
     /// Mode of operation.
     pub mode: TorqueMode,
-    /// Slope 0x6087 in profile torque, per mille of rated a second; the largest that the drive takes.
+    /// Slope 0x6087 in profile torque, in per mille of the rated torque per second.
     pub torque_slope: u32,
-    /// What 1000 counts of the target are.
+    /// The current that 1000 counts of the target stand for.
     pub reference: Reference,
     /// Rated current of the drive (0x6075), in amperes.
     pub rated_current_a: f64,
-    /// Commands beyond this are limited, in amperes.
+    /// Limit of the commands, in amperes.
     pub current_limit_a: f64,
-    /// Who the drive must be.
+    /// Expected identity of the drive.
     pub identity: ExpectedIdentity,
-    /// Reaction of the drive to a lost connection (0x6007): 1 fault, 2 disable voltage, 3 quick stop. `None` leaves
-    /// the drive's own reaction, for drives without this object: prove by unplugging the bus that it stops.
+    /// Reaction of the drive to a lost connection (0x6007): 1 fault, 2 disable voltage, 3 quick stop. `None` leaves the drive's
+    /// own reaction, for drives without this object; then disconnect the bus once to verify that the drive stops.
     pub abort_connection: Option<i16>,
+    /// Periods and time limits.
+    pub times: DriveTimes,
+}
+
+/// Periods and time limits of a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveTimes {
     /// Time between heartbeats of the drive.
     pub heartbeat_period: Duration,
-    /// The drive is lost after this time without heartbeat.
+    /// Without a heartbeat for this time the drive is lost.
     pub heartbeat_timeout: Duration,
-    /// Time between our heartbeats.
+    /// Time between heartbeats of this program.
     pub own_heartbeat_period: Duration,
-    /// The drive stops after this time without ours.
+    /// Without a heartbeat of this program for this time the drive stops.
     pub own_heartbeat_timeout: Duration,
-    /// While enabled, the drive is lost after this time without a status frame.
+    /// Without a status frame for this time an enabled drive is lost.
     pub status_timeout: Duration,
-    /// While enabled, the drive is switched off after this time without a command.
+    /// Without a command for this time an enabled drive is switched off.
     pub command_timeout: Duration,
-    /// Limit for each answer to an SDO request.
+    /// Time limit of each answer to an SDO request.
     pub sdo_timeout: Duration,
-    /// Limit for a change of state: enable, disable, reset.
+    /// Time limit of a change of state: enable, disable, reset.
     pub state_timeout: Duration,
 }
 
@@ -120,6 +135,14 @@ impl Default for DriveSettings {
             current_limit_a: 4.0,
             identity: ExpectedIdentity::default(),
             abort_connection: Some(2),
+            times: DriveTimes::default(),
+        }
+    }
+}
+
+impl Default for DriveTimes {
+    fn default() -> Self {
+        DriveTimes {
             heartbeat_period: Duration::from_millis(20),
             heartbeat_timeout: Duration::from_millis(70),
             own_heartbeat_period: Duration::from_millis(20),
@@ -132,115 +155,114 @@ impl Default for DriveSettings {
     }
 }
 
-/// A time as a count of milliseconds.
-pub(super) fn milliseconds(time: Duration) -> u16 {
-    u16::try_from(time.as_millis()).unwrap_or(u16::MAX)
+fn refuse(name: &'static str, value: impl ToString, limit: &'static str) -> Result<(), OpenError> {
+    let value = value.to_string();
+    Err(OpenError::Setting { name, value, limit })
 }
 
-impl DriveSettings {
-    /// What goes over the bus.
-    pub fn traffic(&self) -> Traffic {
-        let beats = |period: Duration| 1.0 / period.as_secs_f64();
-        Traffic {
-            bit_rate: self.bit_rate,
-            rate_hz: self.rate_hz,
-            exchange: self.exchange,
-            heartbeat_hz: beats(self.heartbeat_period) + beats(self.own_heartbeat_period),
-            load_limit: self.load_limit,
-        }
-    }
-
-    /// Refuses what cannot be, with value and limit.
-    pub fn check(&self) -> Result<(), OpenError> {
-        let refuse = |name, value: String, limit| Err(OpenError::Setting { name, value, limit });
-        if !(1..=127).contains(&self.node) {
-            return refuse("node", self.node.to_string(), "1 to 127");
-        }
-        if !(1..=127).contains(&self.own_node) || self.own_node == self.node {
-            return refuse(
-                "own_node",
-                self.own_node.to_string(),
-                "1 to 127, and not that of the drive",
-            );
-        }
-        self.check_exchange()?;
-        self.check_times()?;
-        self.traffic().check()?;
-        Ok(())
-    }
-
-    fn check_exchange(&self) -> Result<(), OpenError> {
-        let refuse = |name, value: String, limit| Err(OpenError::Setting { name, value, limit });
-        match self.exchange {
-            Exchange::Asynchronous { status_hz } if !(1.0..=1000.0).contains(&status_hz) => refuse(
-                "status_hz",
-                status_hz.to_string(),
-                "1 to 1000 Hz, since a drive's event timer counts milliseconds",
-            ),
-            Exchange::Synchronous { status_every } if !(1..=240).contains(&status_every) => {
-                refuse("status_every", status_every.to_string(), "1 to 240")
-            }
-            _ if !(1.0..=1e6).contains(&self.rate_hz) => {
-                refuse("rate_hz", self.rate_hz.to_string(), "1 to 1000000 Hz")
-            }
-            _ if !(self.load_limit > 0.0 && self.load_limit <= 1.0) => refuse(
-                "load_limit",
-                self.load_limit.to_string(),
-                "above 0, at most 1",
-            ),
-            _ => Ok(()),
-        }
-    }
-
-    fn check_times(&self) -> Result<(), OpenError> {
+impl DriveTimes {
+    /// The heartbeats have times of 16 bits in milliseconds.
+    fn check_range(&self) -> Result<(), OpenError> {
         let times = [
             ("heartbeat_period", self.heartbeat_period),
             ("heartbeat_timeout", self.heartbeat_timeout),
             ("own_heartbeat_period", self.own_heartbeat_period),
             ("own_heartbeat_timeout", self.own_heartbeat_timeout),
         ];
-        let unfit =
-            |time: &Duration| time.as_millis() == 0 || time.as_millis() > u128::from(u16::MAX);
-        if let Some((name, time)) = times.iter().find(|(_, time)| unfit(time)) {
-            return Err(OpenError::Setting {
-                name,
-                value: format!("{time:?}"),
-                limit: "1 ms to 65.535 s",
-            });
+        for (name, time) in times {
+            if !(1..=u128::from(u16::MAX)).contains(&time.as_millis()) {
+                return refuse(name, format!("{time:?}"), "1 ms to 65.535 s");
+            }
         }
-        let twice = "at least twice the period, or one late heartbeat is a fault";
-        let timeouts = [
-            (
-                "heartbeat_timeout",
-                self.heartbeat_period,
-                self.heartbeat_timeout,
-            ),
-            (
-                "own_heartbeat_timeout",
-                self.own_heartbeat_period,
-                self.own_heartbeat_timeout,
-            ),
-            ("status_timeout", self.status_period(), self.status_timeout),
-            (
-                "command_timeout",
-                Duration::from_secs_f64(1.0 / self.rate_hz),
-                self.command_timeout,
-            ),
-        ];
-        match timeouts
-            .iter()
-            .find(|(_, period, timeout)| *timeout < 2 * *period)
-        {
-            Some((name, _, timeout)) => Err(OpenError::Setting {
-                name,
-                value: format!("{timeout:?}"),
-                limit: twice,
-            }),
-            None => Ok(()),
+        Ok(())
+    }
+}
+
+/// A time in milliseconds, limited to 16 bits.
+pub(super) fn milliseconds(time: Duration) -> u16 {
+    u16::try_from(time.as_millis()).unwrap_or(u16::MAX)
+}
+
+impl DriveSettings {
+    /// The frames that this configuration sends over the bus.
+    pub fn traffic(&self) -> Traffic {
+        let periods = [self.times.heartbeat_period, self.times.own_heartbeat_period];
+        Traffic {
+            bit_rate: self.bit_rate,
+            rate_hz: self.rate_hz,
+            exchange: self.exchange,
+            heartbeat_hz: periods
+                .map(|period| 1.0 / period.as_secs_f64())
+                .iter()
+                .sum(),
+            load_limit: self.load_limit,
         }
     }
 
-    /// Time between status frames: in whole milliseconds where the drive's timer makes it.
+    /// Refuses invalid settings. The error states value and limit.
+    pub fn check(&self) -> Result<(), OpenError> {
+        self.check_nodes()?;
+        self.check_exchange()?;
+        self.times.check_range()?;
+        self.check_timeouts()?;
+        self.traffic().check()?;
+        Ok(())
+    }
+
+    fn check_nodes(&self) -> Result<(), OpenError> {
+        if !(1..=127).contains(&self.node) {
+            return refuse("node", self.node, "1 to 127");
+        }
+        if !(1..=127).contains(&self.own_node) || self.own_node == self.node {
+            let limit = "1 to 127, and not that of the drive";
+            return refuse("own_node", self.own_node, limit);
+        }
+        Ok(())
+    }
+
+    fn check_exchange(&self) -> Result<(), OpenError> {
+        match self.exchange {
+            Exchange::Asynchronous { status_hz } if !(1.0..=1000.0).contains(&status_hz) => {
+                let limit = "1 to 1000 Hz, since a drive's event timer counts milliseconds";
+                refuse("status_hz", status_hz, limit)
+            }
+            Exchange::Synchronous { status_every } if !(1..=240).contains(&status_every) => {
+                refuse("status_every", status_every, "1 to 240")
+            }
+            _ if !(1.0..=1e6).contains(&self.rate_hz) => {
+                refuse("rate_hz", self.rate_hz, "1 to 1000000 Hz")
+            }
+            _ if !(self.load_limit > 0.0 && self.load_limit <= 1.0) => {
+                refuse("load_limit", self.load_limit, "above 0, at most 1")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Each time limit must be at least twice the period that it monitors.
+    fn check_timeouts(&self) -> Result<(), OpenError> {
+        let t = &self.times;
+        let command_period = Duration::from_secs_f64(1.0 / self.rate_hz);
+        let monitored = [
+            ("heartbeat_timeout", t.heartbeat_timeout, t.heartbeat_period),
+            (
+                "own_heartbeat_timeout",
+                t.own_heartbeat_timeout,
+                t.own_heartbeat_period,
+            ),
+            ("status_timeout", t.status_timeout, self.status_period()),
+            ("command_timeout", t.command_timeout, command_period),
+        ];
+        for (name, timeout, period) in monitored {
+            if timeout < 2 * period {
+                let limit = "at least twice the period, or one late frame is a fault";
+                return refuse(name, format!("{timeout:?}"), limit);
+            }
+        }
+        Ok(())
+    }
+
+    /// Time between status frames; in whole milliseconds if a timer of the drive determines it.
     pub(super) fn status_period(&self) -> Duration {
         match self.exchange {
             Exchange::Asynchronous { status_hz } => {
@@ -264,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_that_cannot_be_are_refused_with_value_and_limit() {
+    fn rejects_invalid_settings_with_value_and_limit() {
         assert!(DriveSettings::default().check().is_ok());
         assert_eq!(
             refusal(|s| s.node = 0),
@@ -272,10 +294,12 @@ mod tests {
         );
         assert!(refusal(|s| s.own_node = 5).contains("not that of the drive"));
         assert!(
-            refusal(|s| s.heartbeat_timeout = Duration::from_millis(30))
+            refusal(|s| s.times.heartbeat_timeout = Duration::from_millis(30))
                 .contains("at least twice the period")
         );
-        assert!(refusal(|s| s.own_heartbeat_period = Duration::ZERO).contains("1 ms to 65.535 s"));
+        assert!(
+            refusal(|s| s.times.own_heartbeat_period = Duration::ZERO).contains("1 ms to 65.535 s")
+        );
         assert!(
             refusal(|s| s.exchange = Exchange::Synchronous { status_every: 0 })
                 .contains("1 to 240")
@@ -292,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn cyclic_torque_comes_first_and_profile_torque_is_the_fallback() {
+    fn prefers_cyclic_torque_and_falls_back_to_profile_torque() {
         let (profile, cyclic) = (1 << 3, 1 << 9);
         assert_eq!(
             TorqueMode::CyclicElseProfile.choose(profile | cyclic),

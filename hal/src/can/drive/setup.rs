@@ -8,7 +8,7 @@ use super::super::objects::{
     ABORT_CONNECTION, ACTUAL, CONTROLWORD, HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, MAXIMUM, MODE,
     MODE_DISPLAY, RATED_CURRENT, SLOPE, STATUSWORD, SUPPORTED_MODES, TARGET, identity,
 };
-use super::super::pdo::{ASYNCHRONOUS, Direction, Mapped, OFF, Pdo, Value, parameters};
+use super::super::pdo::{ASYNCHRONOUS, Direction, Mapped, OFF, Pdo, Value, number_of, parameters};
 use super::super::scale::{Reference, Scale};
 use super::super::sdo::{Address, Channel, SdoError};
 use super::super::{heartbeat, nmt};
@@ -89,21 +89,26 @@ impl Setup<'_> {
         self.put(TARGET, 0, 2)
     }
 
-    /// Checks the rated current, to the resolution of 0x6075, and returns the scale of the target.
-    fn scale(&mut self) -> Result<Scale, OpenError> {
+    /// The rated current of the drive, which must agree with the configuration to the resolution of 0x6075.
+    fn check_rated_current(&mut self) -> Result<f64, OpenError> {
         let (node, want_a) = (self.settings.node, self.settings.rated_current_a);
         let have_a = f64::from(self.channel.read_u32(RATED_CURRENT)?) * 1e-3;
-        let agrees = (have_a - want_a).abs() < 0.5e-3;
-        if !agrees {
-            return Err(OpenError::RatedCurrent {
-                node,
-                have_a,
-                want_a,
-            });
+        if (have_a - want_a).abs() < 0.5e-3 {
+            return Ok(have_a);
         }
+        Err(OpenError::RatedCurrent {
+            node,
+            have_a,
+            want_a,
+        })
+    }
+
+    /// The scale of the target.
+    fn scale(&mut self) -> Result<Scale, OpenError> {
+        let rated_a = self.check_rated_current()?;
         let reference_a = match self.settings.reference {
-            Reference::Rated => have_a,
-            Reference::Maximum => have_a * f64::from(self.channel.read_u16(MAXIMUM)?) * 1e-3,
+            Reference::Rated => rated_a,
+            Reference::Maximum => rated_a * f64::from(self.channel.read_u16(MAXIMUM)?) * 1e-3,
         };
         let limit_a = self.settings.current_limit_a;
         Scale::new(reference_a, limit_a).ok_or_else(|| OpenError::Setting {
@@ -115,18 +120,26 @@ impl Setup<'_> {
 
     /// Heartbeats in both directions, and the reaction of the drive to a lost heartbeat.
     fn configure_heartbeats(&mut self) -> Result<(), OpenError> {
-        let (settings, node) = (self.settings, self.settings.node);
-        let producer_ms = milliseconds(settings.heartbeat_period);
-        let timeout_ms = milliseconds(settings.own_heartbeat_timeout);
-        let consumer = heartbeat::consumer_entry(settings.own_node, timeout_ms);
-        self.put(HEARTBEAT_PRODUCER, u32::from(producer_ms), 2)?;
-        self.put(HEARTBEAT_CONSUMER, consumer, 4)
-            .map_err(|error| no_stop(node, error))?;
-        match settings.abort_connection {
-            Some(option) => self
-                .put(ABORT_CONNECTION, u32::from(option as u16), 2)
-                .map_err(|error| no_stop(node, error)),
+        let times = &self.settings.times;
+        let period_ms = milliseconds(times.heartbeat_period);
+        let timeout_ms = milliseconds(times.own_heartbeat_timeout);
+        let consumer = heartbeat::consumer_entry(self.settings.own_node, timeout_ms);
+        self.put(HEARTBEAT_PRODUCER, u32::from(period_ms), 2)?;
+        self.put_stop(HEARTBEAT_CONSUMER, consumer, 4)?;
+        match self.settings.abort_connection {
+            Some(option) => self.put_stop(ABORT_CONNECTION, u32::from(option as u16), 2),
             None => Ok(()),
+        }
+    }
+
+    /// Writes an object without which the drive would not stop when the heartbeat is lost.
+    fn put_stop(&mut self, address: Address, number: u32, bytes: usize) -> Result<(), OpenError> {
+        match self.put(address, number, bytes) {
+            Err(OpenError::Sdo(cause)) if cause.means_absent() => Err(OpenError::NoStop {
+                node: self.settings.node,
+                cause,
+            }),
+            result => result,
         }
     }
 
@@ -234,7 +247,7 @@ impl Setup<'_> {
     /// Waits until the mode is active; some drives need some time to change it.
     fn wait_for_mode(&mut self, want: i8) -> Result<i8, OpenError> {
         let host = self.channel.host;
-        let deadline_ns = host.now_ns() + self.settings.state_timeout.as_nanos() as u64;
+        let deadline_ns = host.now_ns() + self.settings.times.state_timeout.as_nanos() as u64;
         loop {
             let have = self.channel.read_u8(MODE_DISPLAY)? as i8;
             if have == want {
@@ -276,8 +289,7 @@ impl Setup<'_> {
                 want: value.bytes,
             }));
         }
-        let number = |number, byte: &u8| number << 8 | u32::from(*byte);
-        let have = bytes.iter().rev().fold(0, number);
+        let have = number_of(&bytes);
         if have == want {
             return Ok(());
         }
@@ -287,13 +299,5 @@ impl Setup<'_> {
             have,
             want,
         })
-    }
-}
-
-/// If the drive lacks the object, it would not stop when the heartbeat is lost.
-fn no_stop(node: u8, error: OpenError) -> OpenError {
-    match error {
-        OpenError::Sdo(cause) if cause.means_absent() => OpenError::NoStop { node, cause },
-        other => other,
     }
 }

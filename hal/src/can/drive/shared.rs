@@ -1,4 +1,4 @@
-//! State that is shared by the tick and the service thread: atomics, no locks.
+//! State that the tick and the service thread share, in atomics, without locks.
 
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32, Ordering};
 
@@ -11,16 +11,16 @@ use super::super::nmt;
 pub(super) enum Intent {
     /// No current.
     Off = 0,
-    /// On the way to Operation Enabled; target zero.
+    /// The drive is being enabled; the target is zero.
     Enabling = 1,
-    /// Observer commands.
+    /// The drive follows commands.
     On = 2,
-    /// A person acknowledges a fault: no current, and the fault is looked at anew at the end.
+    /// The operator acknowledges a fault. There is no current; faults are checked again at the end.
     Resetting = 3,
 }
 
 impl Intent {
-    /// Whether current may flow, or is about to.
+    /// Whether current may flow now, or as soon as the drive is enabled.
     pub(super) const fn is_in_use(self) -> bool {
         matches!(self, Intent::Enabling | Intent::On)
     }
@@ -29,30 +29,30 @@ impl Intent {
 /// No statusword, or no actual current, is known.
 const UNKNOWN: u32 = u32::MAX;
 
-/// One writer each, unless said otherwise.
+/// Each field has one writer, unless stated otherwise. The caller is the thread of the loop.
 #[derive(Debug)]
 pub(super) struct Shared {
     /// Written by the caller.
     intent: AtomicU8,
-    /// Counts how often the drive was taken into use, so that the service misses none, however short. By the caller.
+    /// How often the drive was enabled, so that the service also notices a short use. Written by the caller.
     uses: AtomicU32,
-    /// Commands sent, by the caller.
+    /// Number of commands sent. Written by the caller.
     commands: AtomicU32,
-    /// The first fault since the last reset, 0 if there is none. Set by both, cleared by the caller.
+    /// The first fault since the last reset, 0 if there is none. Written by both, cleared by the caller.
     fault: AtomicU32,
-    /// From the service.
+    /// The statusword, or `UNKNOWN`. Written by the service.
     status: AtomicU32,
-    /// Counts status frames.
+    /// Number of status frames.
     status_count: AtomicU32,
-    /// In counts; `i32::MAX` if unknown.
+    /// Actual current in counts; `i32::MAX` if unknown.
     actual: AtomicI32,
-    /// Last heartbeat's state.
+    /// State in the last heartbeat; `u8::MAX` if unknown.
     nmt: AtomicU8,
     /// Whether the drive restarted since it was configured. Set by the service, cleared by the caller.
     restarted: AtomicBool,
-    /// Whether bit 12 must be set while enabled. Written by the caller when the mode is chosen.
+    /// Whether bit 12 of the statusword must be set while enabled. Written by the caller when the mode is chosen.
     must_follow: AtomicBool,
-    /// Code of the last emergency message, 0 if it is gone.
+    /// Code of the last emergency message, 0 if its cause is removed.
     emergency: AtomicU32,
 }
 
@@ -107,12 +107,12 @@ impl Shared {
         self.fault.load(Ordering::Acquire)
     }
 
-    /// Keeps the first fault, but for a code that says more exactly what the first one was.
+    /// Stores the first fault. A later code replaces it only if it describes the same fault more precisely.
     pub(super) fn latch(&self, code: u32) {
-        let kept = self
+        let stored = self
             .fault
             .compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire);
-        if kept.is_err_and(|first| super::faults::explains(code, first)) {
+        if stored.is_err_and(|first| super::faults::explains(code, first)) {
             self.fault.store(code, Ordering::Release);
         }
     }
@@ -121,7 +121,7 @@ impl Shared {
         self.fault.store(0, Ordering::Release);
     }
 
-    /// The statusword, if one has come since the drive became operational.
+    /// The statusword, if one was received since the drive became operational.
     pub(super) fn statusword(&self) -> Option<u16> {
         u16::try_from(self.status.load(Ordering::Acquire)).ok()
     }
@@ -130,7 +130,7 @@ impl Shared {
         self.statusword().and_then(State::decode)
     }
 
-    /// Whether the drive follows the target, where it says so.
+    /// Whether the drive follows the target; always true in a mode that does not report it.
     pub(super) fn follows(&self) -> bool {
         let bit = self
             .statusword()
@@ -152,7 +152,7 @@ impl Shared {
         self.status_count.fetch_add(1, Ordering::Release);
     }
 
-    /// Status frames flow no more: what they said is past.
+    /// Discards the last status: the drive no longer sends status frames.
     pub(super) fn forget_status(&self) {
         self.status.store(UNKNOWN, Ordering::Release);
         self.actual.store(i32::MAX, Ordering::Release);
@@ -167,6 +167,16 @@ impl Shared {
             u8::MAX => None,
             byte => nmt::State::decode(byte),
         }
+    }
+
+    /// Whether the last heartbeat reports operational.
+    pub(super) fn is_operational(&self) -> bool {
+        self.nmt() == Some(nmt::State::Operational)
+    }
+
+    /// Whether the drive is off, or there is nothing more to wait for: its state is unknown, or there is a fault.
+    pub(super) fn has_settled(&self) -> bool {
+        self.state().is_none_or(State::is_off) || self.fault() != 0
     }
 
     pub(super) fn set_nmt(&self, state: nmt::State) {

@@ -1,12 +1,11 @@
-//! The drive's way up to Operation Enabled, and out of Fault.
+//! Transitions of the drive: to Operation Enabled, and out of Fault.
 
 use super::super::cia402::{DISABLE_VOLTAGE, FAULT_RESET, REMOTE, State};
-use super::super::nmt;
 use super::{CanopenDrive, LOOK, faults};
 use crate::DeviceError;
 
 impl CanopenDrive {
-    /// Step by step up to Operation Enabled, with zero target all the way.
+    /// Enables the drive step by step; the target is zero.
     pub(super) fn climb(&mut self) -> Result<(), DeviceError> {
         let deadline_ns = self.deadline_ns();
         loop {
@@ -18,8 +17,9 @@ impl CanopenDrive {
             if self.host.now_ns() >= deadline_ns {
                 return Err(faults::device_error(self.why_not_enabled()));
             }
-            let next = state.map_or(Some(DISABLE_VOLTAGE), State::towards_enabled);
-            next.map_or(Ok(()), |controlword| self.exchange(controlword, 0))?;
+            if let Some(controlword) = state.map_or(Some(DISABLE_VOLTAGE), State::towards_enabled) {
+                self.exchange(controlword, 0)?;
+            }
             self.host.sleep(LOOK);
         }
     }
@@ -33,11 +33,10 @@ impl CanopenDrive {
         }
     }
 
-    /// Makes the drive fit to be enabled again: configured, alive, out of Fault. The code of what prevents it.
+    /// Prepares the drive to be enabled again: it is configured, sends its status, and has left Fault. The error is a fault code.
     pub(super) fn acknowledge(&mut self) -> Result<(), u32> {
         self.wait_for_fresh_heartbeat();
-        let is_operational = self.shared.nmt() == Some(nmt::State::Operational);
-        if self.shared.restarted() || !is_operational {
+        if self.shared.restarted() || !self.shared.is_operational() {
             self.configure_again().map_err(|error| {
                 self.last_error = Some(error);
                 faults::NOT_CONFIGURED
@@ -47,41 +46,38 @@ impl CanopenDrive {
         self.leave_fault()
     }
 
-    /// What the last heartbeat said may be past: the drive missed ours, or was stopped, and has not said so yet. None
-    /// may come; what that means is the caller's business.
+    /// Waits for a heartbeat that is newer than this call. The last one may be outdated, if the drive lost the heartbeat of this
+    /// program or was stopped meanwhile. The caller checks whether one arrived.
     fn wait_for_fresh_heartbeat(&self) {
         self.shared.forget_nmt();
-        self.wait_for(self.settings.heartbeat_timeout, |shared| {
+        self.wait_for(self.settings.times.heartbeat_timeout, |shared| {
             shared.nmt().is_some()
         });
     }
 
-    /// A status frame that was sent after this call began: the drive and the bus are alive now.
+    /// Waits for a status frame that is newer than this call. It shows that drive and bus work.
     fn wait_for_fresh_status(&mut self) -> Result<(), u32> {
         let (deadline_ns, before) = (self.deadline_ns(), self.shared.status_count());
         while self.shared.status_count() == before || self.shared.state().is_none() {
             if self.host.now_ns() >= deadline_ns {
                 return Err(faults::STATUS_LOST);
             }
-            let _ = self.exchange(DISABLE_VOLTAGE, 0); // the answer is what counts
+            let _ = self.exchange(DISABLE_VOLTAGE, 0); // only the status frame matters
             self.host.sleep(LOOK);
         }
         Ok(())
     }
 
-    /// Rising edges of the reset bit until the drive has left Fault.
+    /// Sends rising edges of the reset bit until the drive has left Fault.
     fn leave_fault(&mut self) -> Result<(), u32> {
         let deadline_ns = self.deadline_ns();
         let pause = LOOK.max(2 * self.settings.status_period());
-        while matches!(
-            self.shared.state(),
-            None | Some(State::Fault | State::FaultReactionActive)
-        ) {
+        while self.shared.state().is_none_or(State::is_fault) {
             if self.host.now_ns() >= deadline_ns {
                 return Err(faults::FAULT_REMAINS);
             }
             for controlword in [DISABLE_VOLTAGE, FAULT_RESET, FAULT_RESET, DISABLE_VOLTAGE] {
-                let _ = self.exchange(controlword, 0); // twice with SYNC: taken at one, answered at the next
+                let _ = self.exchange(controlword, 0); // sent twice: with SYNC a command applies at one SYNC and is answered at the next
                 self.host.sleep(pause);
             }
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::super::objects as object;
-use super::super::pdo::{Mapped, OFF};
+use super::super::pdo::{Mapped, OFF, number_of};
 use super::super::sdo::{AbortCode, Address, Dictionary};
 
 /// Access to an object by SDO and PDO.
@@ -64,15 +64,9 @@ impl ObjectDictionary {
 
     /// The unsigned number at `address`, 0 if it does not exist.
     pub fn number(&self, address: Address) -> u32 {
-        let value = self
-            .objects
-            .get(&address)
-            .map_or(&[][..], |object| &object.value);
-        value
-            .iter()
-            .take(4)
-            .rev()
-            .fold(0, |number, byte| number << 8 | u32::from(*byte))
+        let object = self.objects.get(&address);
+        let value = object.map_or(&[][..], |object| &object.value);
+        number_of(value.get(..4).unwrap_or(value))
     }
 
     /// Sets a number, without the checks of an SDO.
@@ -113,18 +107,17 @@ impl ObjectDictionary {
             }
             (0x1600..=0x1603 | 0x1A00..=0x1A03, 0) => self.check_count(address, number),
             (0x1600..=0x1603 | 0x1A00..=0x1A03, _) => self.check_entry(address, Mapped(number)),
-            _ if address == object::MODE => {
-                let bit = (number as i8)
-                    .checked_sub(1)
-                    .and_then(|bit| 1u32.checked_shl(bit as u32))
-                    .unwrap_or(0);
-                let supported = self.number(object::SUPPORTED_MODES) & bit != 0;
-                if number == 0 || supported {
-                    Ok(())
-                } else {
-                    Err(AbortCode::VALUE)
-                }
-            }
+            _ if address == object::MODE && number != 0 => self.check_mode(number as i8),
+            _ => Ok(()),
+        }
+    }
+
+    /// Bit n-1 of 0x6502 is mode n.
+    fn check_mode(&self, mode: i8) -> Result<(), AbortCode> {
+        let bit = mode.checked_sub(1).map(|bit| 1u32.checked_shl(bit as u32));
+        let bit = bit.flatten().unwrap_or(0);
+        match self.number(object::SUPPORTED_MODES) & bit {
+            0 => Err(AbortCode::VALUE),
             _ => Ok(()),
         }
     }
@@ -198,21 +191,14 @@ impl Dictionary for ObjectDictionary {
         let Some(object) = self.objects.get(&address) else {
             return Err(AbortCode::NO_OBJECT);
         };
-        let is_text = object.is_text;
         if matches!(object.access, Access::Read | Access::MappedRead) {
             return Err(AbortCode::READ_ONLY);
         }
-        if !is_text {
+        if !object.is_text {
             if before.len() != value.len() {
                 return Err(AbortCode::LENGTH);
             }
-            self.check(
-                address,
-                value
-                    .iter()
-                    .rev()
-                    .fold(0, |number, byte| number << 8 | u32::from(*byte)),
-            )?;
+            self.check(address, number_of(value))?;
         }
         if let Some(object) = self.objects.get_mut(&address) {
             object.value = value.to_vec();

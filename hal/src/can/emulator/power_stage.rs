@@ -93,27 +93,31 @@ impl PowerStage {
     }
 }
 
+/// The transitions by command, with their numbers in CiA 402.
+#[rustfmt::skip]
+const TRANSITIONS: [(State, Command, State); 14] = [
+    (State::SwitchOnDisabled, Command::Shutdown,        State::ReadyToSwitchOn),  // 2
+    (State::ReadyToSwitchOn,  Command::SwitchOn,        State::SwitchedOn),       // 3
+    (State::SwitchedOn,       Command::EnableOperation, State::OperationEnabled), // 4
+    (State::ReadyToSwitchOn,  Command::EnableOperation, State::OperationEnabled), // 3 and 4
+    (State::OperationEnabled, Command::SwitchOn,        State::SwitchedOn),       // 5
+    (State::SwitchedOn,       Command::Shutdown,        State::ReadyToSwitchOn),  // 6
+    (State::ReadyToSwitchOn,  Command::DisableVoltage,  State::SwitchOnDisabled), // 7
+    (State::ReadyToSwitchOn,  Command::QuickStop,       State::SwitchOnDisabled), // 7
+    (State::OperationEnabled, Command::Shutdown,        State::ReadyToSwitchOn),  // 8
+    (State::OperationEnabled, Command::DisableVoltage,  State::SwitchOnDisabled), // 9
+    (State::SwitchedOn,       Command::DisableVoltage,  State::SwitchOnDisabled), // 10
+    (State::SwitchedOn,       Command::QuickStop,       State::SwitchOnDisabled), // 10
+    (State::OperationEnabled, Command::QuickStop,       State::QuickStopActive),  // 11
+    (State::QuickStopActive,  Command::DisableVoltage,  State::SwitchOnDisabled), // 12
+];
+
 /// The state after a command; a command without a transition is ignored.
-const fn next(state: State, command: Command) -> State {
-    match (state, command) {
-        (State::SwitchOnDisabled, Command::Shutdown) => State::ReadyToSwitchOn, // 2
-        (State::ReadyToSwitchOn, Command::SwitchOn) => State::SwitchedOn,       // 3
-        (State::SwitchedOn, Command::EnableOperation) => State::OperationEnabled, // 4
-        (State::ReadyToSwitchOn, Command::EnableOperation) => State::OperationEnabled, // 3 and 4
-        (State::OperationEnabled, Command::SwitchOn) => State::SwitchedOn,      // 5
-        (State::SwitchedOn, Command::Shutdown) => State::ReadyToSwitchOn,       // 6
-        (State::ReadyToSwitchOn, Command::DisableVoltage | Command::QuickStop) => {
-            State::SwitchOnDisabled
-        } // 7
-        (State::OperationEnabled, Command::Shutdown) => State::ReadyToSwitchOn, // 8
-        (State::OperationEnabled, Command::DisableVoltage) => State::SwitchOnDisabled, // 9
-        (State::SwitchedOn, Command::DisableVoltage | Command::QuickStop) => {
-            State::SwitchOnDisabled
-        } // 10
-        (State::OperationEnabled, Command::QuickStop) => State::QuickStopActive, // 11
-        (State::QuickStopActive, Command::DisableVoltage) => State::SwitchOnDisabled, // 12
-        (state, _) => state,
-    }
+fn next(state: State, command: Command) -> State {
+    let transition = TRANSITIONS
+        .iter()
+        .find(|(from, with, _)| (*from, *with) == (state, command));
+    transition.map_or(state, |(_, _, to)| *to)
 }
 
 #[cfg(test)]

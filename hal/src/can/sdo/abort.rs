@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Why one side gave up a transfer.
+/// The reason why one side aborted a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct AbortCode(pub u32);
 
@@ -34,51 +34,53 @@ impl AbortCode {
     /// Not in the present state of the device.
     pub const STATE: AbortCode = AbortCode(0x0800_0022);
 
-    /// Whether the object is simply not there, so an optional feature is missing.
+    /// Whether the object does not exist: the node lacks an optional feature.
     pub fn means_absent(self) -> bool {
         self == AbortCode::NO_OBJECT || self == AbortCode::NO_SUB_INDEX
     }
 
     /// The meaning of the code.
-    pub const fn text(self) -> &'static str {
-        match self.0 {
-            0x0503_0000 => "toggle bit not alternated",
-            0x0504_0000 => "SDO protocol timed out",
-            0x0504_0001 => "command specifier not valid or unknown",
-            0x0504_0002 => "invalid block size",
-            0x0504_0003 => "invalid sequence number",
-            0x0504_0004 => "CRC error",
-            0x0504_0005 => "out of memory",
-            0x0601_0000 => "unsupported access to an object",
-            0x0601_0001 => "attempt to read a write-only object",
-            0x0601_0002 => "attempt to write a read-only object",
-            0x0602_0000 => "object does not exist in the object dictionary",
-            0x0604_0041 => "object cannot be mapped to the PDO",
-            0x0604_0042 => "the mapped objects would exceed the length of the PDO",
-            0x0604_0043 => "general parameter incompatibility",
-            0x0604_0047 => "general internal incompatibility in the device",
-            0x0606_0000 => "access failed due to a hardware error",
-            0x0607_0010 => "data type does not match, length of service parameter does not match",
-            0x0607_0012 => "data type does not match, length of service parameter too high",
-            0x0607_0013 => "data type does not match, length of service parameter too low",
-            0x0609_0011 => "sub-index does not exist",
-            0x0609_0030 => "invalid value for parameter",
-            0x0609_0031 => "value of parameter written too high",
-            0x0609_0032 => "value of parameter written too low",
-            0x0609_0036 => "maximum value is less than minimum value",
-            0x060A_0023 => "resource not available: SDO connection",
-            0x0800_0000 => "general error",
-            0x0800_0020 => "data cannot be transferred or stored to the application",
-            0x0800_0021 => "data cannot be transferred or stored because of local control",
-            0x0800_0022 => {
-                "data cannot be transferred or stored because of the present device state"
-            }
-            0x0800_0023 => "no object dictionary is present, or its dynamic generation failed",
-            0x0800_0024 => "no data available",
-            _ => "abort code unknown to CiA 301",
-        }
+    pub fn text(self) -> &'static str {
+        let known = TEXTS.iter().find(|(code, _)| *code == self.0);
+        known.map_or("abort code unknown to CiA 301", |(_, text)| text)
     }
 }
+
+/// The codes of CiA 301, table 22.
+#[rustfmt::skip]
+const TEXTS: [(u32, &str); 31] = [
+    (0x0503_0000, "toggle bit not alternated"),
+    (0x0504_0000, "SDO protocol timed out"),
+    (0x0504_0001, "command specifier not valid or unknown"),
+    (0x0504_0002, "invalid block size"),
+    (0x0504_0003, "invalid sequence number"),
+    (0x0504_0004, "CRC error"),
+    (0x0504_0005, "out of memory"),
+    (0x0601_0000, "unsupported access to an object"),
+    (0x0601_0001, "attempt to read a write-only object"),
+    (0x0601_0002, "attempt to write a read-only object"),
+    (0x0602_0000, "object does not exist in the object dictionary"),
+    (0x0604_0041, "object cannot be mapped to the PDO"),
+    (0x0604_0042, "the mapped objects would exceed the length of the PDO"),
+    (0x0604_0043, "general parameter incompatibility"),
+    (0x0604_0047, "general internal incompatibility in the device"),
+    (0x0606_0000, "access failed due to a hardware error"),
+    (0x0607_0010, "data type does not match, length of service parameter does not match"),
+    (0x0607_0012, "data type does not match, length of service parameter too high"),
+    (0x0607_0013, "data type does not match, length of service parameter too low"),
+    (0x0609_0011, "sub-index does not exist"),
+    (0x0609_0030, "invalid value for parameter"),
+    (0x0609_0031, "value of parameter written too high"),
+    (0x0609_0032, "value of parameter written too low"),
+    (0x0609_0036, "maximum value is less than minimum value"),
+    (0x060A_0023, "resource not available: SDO connection"),
+    (0x0800_0000, "general error"),
+    (0x0800_0020, "data cannot be transferred or stored to the application"),
+    (0x0800_0021, "data cannot be transferred or stored because of local control"),
+    (0x0800_0022, "data cannot be transferred or stored because of the present device state"),
+    (0x0800_0023, "no object dictionary is present, or its dynamic generation failed"),
+    (0x0800_0024, "no data available"),
+];
 
 impl fmt::Display for AbortCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -125,7 +127,7 @@ mod tests {
         assert_eq!(
             AbortCode::NO_OBJECT.to_string(),
             "0x06020000 object does not exist in the object dictionary",
-            "a person reads number and text"
+            "number and text"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! Transfers over a bus, one after the other, with a time limit for each answer.
+//! Successive transfers over a bus, with a time limit for each answer.
 
 use std::time::Duration;
 
@@ -11,26 +11,26 @@ use super::{AbortCode, Address, Client, Failure, Progress, answer_id, request_id
 /// A transfer that failed.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum SdoError {
-    /// The node said no.
+    /// The node aborted the transfer.
     #[error("node {node} refuses {address}: {code}")]
     Aborted {
-        /// Which node.
+        /// The node.
         node: u8,
-        /// Which object.
+        /// The object.
         address: Address,
-        /// Why.
+        /// The abort code.
         code: AbortCode,
     },
-    /// The node broke the protocol.
+    /// The node violated the protocol.
     #[error(
-        "node {node} answers {address} against the rules: {code}; look for a second node with the same number"
+        "node {node} violates the SDO protocol for {address}: {code}; look for a second node with the same number"
     )]
     Protocol {
-        /// Which node.
+        /// The node.
         node: u8,
-        /// Which object.
+        /// The object.
         address: Address,
-        /// Which rule.
+        /// The violated rule.
         code: AbortCode,
     },
     /// The node did not answer.
@@ -38,32 +38,34 @@ pub enum SdoError {
         "node {node} did not answer to {address} within {timeout_ms} ms; check its power, node number, bit rate and the bus termination"
     )]
     Timeout {
-        /// Which node.
+        /// The node.
         node: u8,
-        /// Which object.
+        /// The object.
         address: Address,
         /// The limit, in milliseconds.
         timeout_ms: u128,
     },
-    /// A value has another length than its object should have.
-    #[error("node {node} gives {have} bytes for {address}, expected {want}")]
+    /// The value of an object has the wrong length.
+    #[error(
+        "node {node} sent {have} bytes for {address}, expected {want}; check the type of the drive"
+    )]
     Length {
-        /// Which node.
+        /// The node.
         node: u8,
-        /// Which object.
+        /// The object.
         address: Address,
         /// Bytes received.
         have: usize,
         /// Bytes expected.
         want: usize,
     },
-    /// The bus itself failed.
+    /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
 }
 
 impl SdoError {
-    /// Whether the node missing_objects the object.
+    /// Whether the node does not have the object.
     pub fn means_absent(&self) -> bool {
         matches!(self, SdoError::Aborted { code, .. } if code.means_absent())
     }
@@ -71,13 +73,13 @@ impl SdoError {
 
 /// The SDO connection to one node. `bus` must receive [`answer_id`] of the node.
 pub struct Channel<'a> {
-    /// Where frames go.
+    /// The bus.
     pub bus: &'a mut dyn CanBus,
-    /// Whose clock it is.
+    /// The host, for its clock.
     pub host: &'a dyn Host,
     /// The node.
     pub node: u8,
-    /// Limit for each answer.
+    /// Time limit of each answer.
     pub timeout: Duration,
 }
 
@@ -127,7 +129,7 @@ impl Channel<'_> {
         first: [u8; 8],
         address: Address,
     ) -> Result<Vec<u8>, SdoError> {
-        self.forget_earlier_answers()?;
+        self.discard_earlier_answers()?;
         self.send(first)?;
         let mut deadline_ns = self.deadline_ns();
         loop {
@@ -146,33 +148,34 @@ impl Channel<'_> {
                 }
                 Progress::Done(data) => return Ok(data),
                 Progress::Ignored => {}
-                Progress::Failed(failure, farewell) => {
-                    return Err(self.fail(failure, farewell, address));
+                Progress::Failed(failure, abort) => {
+                    return Err(self.fail(failure, abort, address));
                 }
             }
         }
     }
 
-    fn fail(&mut self, failure: Failure, farewell: Option<[u8; 8]>, address: Address) -> SdoError {
-        if let Some(bytes) = farewell {
-            let _ = self.send(bytes); // the transfer has failed already; the node's own time limit ends it there
+    fn fail(&mut self, failure: Failure, abort: Option<[u8; 8]>, address: Address) -> SdoError {
+        let node = self.node;
+        if let Some(bytes) = abort {
+            let _ = self.send(bytes); // the transfer has failed already; if this is lost, the node times out
         }
         match failure {
             Failure::Aborted(code) => SdoError::Aborted {
-                node: self.node,
+                node,
                 address,
                 code,
             },
             Failure::Protocol(code) => SdoError::Protocol {
-                node: self.node,
+                node,
                 address,
                 code,
             },
         }
     }
 
-    /// Drops what waits: answers that came after their time limit. Bounded, since a mad node may send for ever.
-    fn forget_earlier_answers(&mut self) -> Result<(), SdoError> {
+    /// Discards answers that arrived after their time limit. Their number is limited, because a faulty node may send without end.
+    fn discard_earlier_answers(&mut self) -> Result<(), SdoError> {
         for _ in 0..1000 {
             if self.bus.receive(Duration::ZERO)?.is_none() {
                 break;

@@ -1,11 +1,11 @@
-//! The reading and writing side of a transfer, without a socket or a clock.
+//! The client of a transfer, without socket and clock.
 
 use super::{AbortCode, Address, Answer, Part, Request, Start};
 
-/// Longest transfer taken, in bytes: a node that sends segments for ever is given up.
+/// Longest permitted transfer in bytes, so that the transfer ends if a node sends segments without end.
 const LONGEST: usize = 4096;
 
-/// One transfer. The caller sends what it is told to, hands in what comes from the node, and keeps the time.
+/// One transfer. The caller sends the returned bytes, passes the data of the node, and monitors the time.
 ///
 /// ```
 /// use bench_hal::can::sdo::{Address, Answer, Client, Part, Progress, Start};
@@ -23,131 +23,116 @@ pub struct Client {
 
 #[derive(Debug)]
 enum State {
-    /// The upload was asked for.
-    Asked,
-    /// Segments come in.
-    Reading {
-        data: Vec<u8>,
-        size: Option<u32>,
-        toggle: bool,
-    },
-    /// The download was begun; what is left goes in segments.
-    Began { data: Vec<u8>, expedited: bool },
-    /// Segments go out; `sent` bytes so far, the segment with `toggle` awaits its answer.
-    Writing {
-        data: Vec<u8>,
-        sent: usize,
-        toggle: bool,
-    },
-    /// Over.
+    /// The upload was requested.
+    Requested,
+    /// Segments are being received.
+    Reading(Upload),
+    /// The download was started.
+    Started(Download),
+    /// A segment was sent; its answer is awaited.
+    Writing(Download),
+    /// The transfer has ended.
     Finished,
 }
 
-/// What to do after an answer.
+/// A segmented upload.
+#[derive(Debug)]
+struct Upload {
+    data: Vec<u8>,
+    size: Option<u32>,
+    toggle: bool,
+}
+
+/// A download; `toggle` is that of the segment whose answer is awaited, `sent` the number of bytes sent in segments.
+#[derive(Debug)]
+struct Download {
+    data: Vec<u8>,
+    is_expedited: bool,
+    sent: usize,
+    toggle: bool,
+}
+
+/// The next step after an answer.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// Send these eight bytes and wait for the next answer.
+    /// Send these eight bytes, then wait for the next answer.
     Send([u8; 8]),
-    /// Over: the bytes read, empty after writing.
+    /// The transfer is complete: the bytes read, or no bytes after writing.
     Done(Vec<u8>),
-    /// Not for this transfer, for example the late answer to an earlier one. Wait on.
+    /// The data do not belong to this transfer, for example a late answer to an earlier one. Keep waiting.
     Ignored,
-    /// Over without success; send the bytes if there are any, so that the server gives up too.
+    /// The transfer failed. Send the bytes, if there are any, so that the server aborts it, too.
     Failed(Failure, Option<[u8; 8]>),
 }
 
 /// Why a transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// The node gave up.
+    /// The node aborted the transfer.
     Aborted(AbortCode),
-    /// The node broke the protocol; it was told this.
+    /// The node violated the protocol; the transfer is aborted with this code.
     Protocol(AbortCode),
 }
 
 impl Client {
-    /// Begins to read; send the bytes.
+    /// Starts reading; the bytes are to be sent.
     pub fn upload(address: Address) -> (Client, [u8; 8]) {
         (
             Client {
                 address,
-                state: State::Asked,
+                state: State::Requested,
             },
             Request::Upload(address).encode(),
         )
     }
 
-    /// Begins to write; send the bytes. One to four bytes go expedited, all else in segments.
+    /// Starts writing; the bytes are to be sent. One to four bytes are sent expedited, others in segments.
     pub fn download(address: Address, data: &[u8]) -> (Client, [u8; 8]) {
-        let expedited = (1..=4).contains(&data.len());
-        let start = match expedited {
+        let is_expedited = (1..=4).contains(&data.len());
+        let start = match is_expedited {
             true => Start::Expedited(Part::new(data)),
             false => Start::Segmented(Some(data.len() as u32)),
         };
-        let state = State::Began {
+        let state = State::Started(Download {
             data: data.to_vec(),
-            expedited,
-        };
+            is_expedited,
+            sent: 0,
+            toggle: false,
+        });
         (
             Client { address, state },
             Request::Download(address, start).encode(),
         )
     }
 
-    /// Gives up because no answer came in time: the bytes to send.
+    /// Aborts the transfer after a timeout; the bytes are to be sent.
     pub fn time_out(&mut self) -> [u8; 8] {
         self.state = State::Finished;
         Request::Abort(self.address, AbortCode::TIMEOUT).encode()
     }
 
-    /// Takes what came from the node.
+    /// Processes data from the node.
     pub fn answer(&mut self, data: &[u8]) -> Progress {
         let Some(answer) = Answer::decode(data) else {
             return Progress::Ignored;
         };
-        match (std::mem::replace(&mut self.state, State::Finished), answer) {
+        let state = std::mem::replace(&mut self.state, State::Finished);
+        match (state, answer) {
             (State::Finished, _) => Progress::Ignored,
             (_, Answer::Abort(address, code)) if address == self.address => {
                 Progress::Failed(Failure::Aborted(code), None)
             }
-            (State::Asked, Answer::Uploaded(address, start)) if address == self.address => {
+            (State::Requested, Answer::Uploaded(address, start)) if address == self.address => {
                 self.begin_reading(start)
             }
-            (
-                State::Reading { data, size, toggle },
-                Answer::UploadedSegment {
-                    toggle: theirs,
-                    last,
-                    part,
-                },
-            ) => {
-                if toggle != theirs {
-                    return self.protest(AbortCode::TOGGLE);
-                }
-                self.read_on(data, size, toggle, last, part)
+            (State::Started(download), Answer::Downloaded(address)) if address == self.address => {
+                self.write_segment(download)
             }
-            (State::Began { data, expedited }, Answer::Downloaded(address))
-                if address == self.address =>
-            {
-                if expedited {
-                    Progress::Done(Vec::new())
-                } else {
-                    self.write_on(data, 0, false)
-                }
+            (State::Reading(upload), Answer::UploadedSegment { toggle, last, part }) => {
+                self.read_segment(upload, toggle, last, part)
             }
-            (
-                State::Writing { data, sent, toggle },
-                Answer::DownloadedSegment { toggle: theirs },
-            ) => {
-                if toggle != theirs {
-                    return self.protest(AbortCode::TOGGLE);
-                }
-                let done = sent >= data.len();
-                if done {
-                    Progress::Done(Vec::new())
-                } else {
-                    self.write_on(data, sent, !toggle)
-                }
+            (State::Writing(download), Answer::DownloadedSegment { toggle }) => {
+                self.continue_writing(download, toggle)
             }
             (state, _) => {
                 self.state = state;
@@ -156,7 +141,7 @@ impl Client {
         }
     }
 
-    fn protest(&self, code: AbortCode) -> Progress {
+    fn abort(&self, code: AbortCode) -> Progress {
         Progress::Failed(
             Failure::Protocol(code),
             Some(Request::Abort(self.address, code).encode()),
@@ -167,50 +152,69 @@ impl Client {
         match start {
             Start::Expedited(part) => Progress::Done(part.bytes().to_vec()),
             Start::Segmented(Some(size)) if size as usize > LONGEST => {
-                self.protest(AbortCode::MEMORY)
+                self.abort(AbortCode::MEMORY)
             }
             Start::Segmented(size) => {
-                self.state = State::Reading {
-                    data: Vec::new(),
+                let data = Vec::new();
+                self.request_segment(Upload {
+                    data,
                     size,
                     toggle: false,
-                };
-                Progress::Send(Request::UploadSegment { toggle: false }.encode())
+                })
             }
         }
     }
 
-    fn read_on(
+    fn request_segment(&mut self, upload: Upload) -> Progress {
+        let toggle = upload.toggle;
+        self.state = State::Reading(upload);
+        Progress::Send(Request::UploadSegment { toggle }.encode())
+    }
+
+    fn read_segment(
         &mut self,
-        mut data: Vec<u8>,
-        size: Option<u32>,
+        mut upload: Upload,
         toggle: bool,
         last: bool,
         part: Part,
     ) -> Progress {
-        data.extend_from_slice(part.bytes());
-        if data.len() > LONGEST {
-            return self.protest(AbortCode::MEMORY);
+        if toggle != upload.toggle {
+            return self.abort(AbortCode::TOGGLE);
+        }
+        upload.data.extend_from_slice(part.bytes());
+        if upload.data.len() > LONGEST {
+            return self.abort(AbortCode::MEMORY);
         }
         if !last {
-            self.state = State::Reading {
-                data,
-                size,
-                toggle: !toggle,
-            };
-            return Progress::Send(Request::UploadSegment { toggle: !toggle }.encode());
+            upload.toggle = !toggle;
+            return self.request_segment(upload);
         }
-        match size {
-            Some(size) if size as usize != data.len() => self.protest(AbortCode::LENGTH),
-            _ => Progress::Done(data),
+        match upload.size {
+            Some(size) if size as usize != upload.data.len() => self.abort(AbortCode::LENGTH),
+            _ => Progress::Done(upload.data),
         }
     }
 
-    fn write_on(&mut self, data: Vec<u8>, sent: usize, toggle: bool) -> Progress {
-        let part = Part::new(data.get(sent..).unwrap_or_default());
-        let sent = sent + part.bytes().len();
-        let last = sent >= data.len();
-        self.state = State::Writing { data, sent, toggle };
+    fn continue_writing(&mut self, mut download: Download, toggle: bool) -> Progress {
+        if toggle != download.toggle {
+            return self.abort(AbortCode::TOGGLE);
+        }
+        if download.sent >= download.data.len() {
+            return Progress::Done(Vec::new());
+        }
+        download.toggle = !toggle;
+        self.write_segment(download)
+    }
+
+    /// Sends the next segment; an expedited transfer is complete.
+    fn write_segment(&mut self, mut download: Download) -> Progress {
+        if download.is_expedited {
+            return Progress::Done(Vec::new());
+        }
+        let part = Part::new(download.data.get(download.sent..).unwrap_or_default());
+        download.sent += part.bytes().len();
+        let (toggle, last) = (download.toggle, download.sent >= download.data.len());
+        self.state = State::Writing(download);
         Progress::Send(Request::DownloadSegment { toggle, last, part }.encode())
     }
 }

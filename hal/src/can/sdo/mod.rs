@@ -13,8 +13,8 @@
 //! e expedited, s size indicated, n unused bytes (of 4 or of 7), t toggles from 0, c last segment
 //! ```
 //!
-//! Expedited transfers carry up to 4 bytes in the first frame; longer ones follow in segments. Block transfer is not
-//! used: a server answers it with an abort.
+//! An expedited transfer has up to 4 bytes in the first frame; longer data follow in segments. Block transfer is not used: the
+//! server aborts it.
 
 mod abort;
 mod channel;
@@ -38,7 +38,7 @@ pub const fn answer_id(node: u8) -> Id {
     Id::standard(0x580 + (node & 0x7F) as u16)
 }
 
-/// Where in the object dictionary.
+/// Address of an object in the object dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
     /// Index, 0x0000 to 0xFFFF.
@@ -87,62 +87,62 @@ impl Part {
     }
 }
 
-/// How a transfer begins.
+/// The start of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// All data is here: 1 to 4 bytes.
+    /// Expedited: all data, 1 to 4 bytes.
     Expedited(Part),
-    /// Segments follow; the size in bytes, if it was told.
+    /// Segments follow; the size in bytes, if it is indicated.
     Segmented(Option<u32>),
 }
 
-/// What either side says; `CLIENT` or server decides which bits mean what.
+/// A request of the client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Begin to write.
+    /// Starts writing.
     Download(Address, Start),
-    /// Write on.
+    /// Writes the next segment.
     DownloadSegment {
-        /// Alternates, from false.
+        /// The toggle bit; it alternates and starts with false.
         toggle: bool,
-        /// No more segments follow.
+        /// Whether this is the last segment.
         last: bool,
         /// The data.
         part: Part,
     },
-    /// Begin to read.
+    /// Starts reading.
     Upload(Address),
-    /// Read on.
+    /// Reads the next segment.
     UploadSegment {
-        /// Alternates, from false.
+        /// The toggle bit; it alternates and starts with false.
         toggle: bool,
     },
-    /// Give up.
+    /// Aborts the transfer.
     Abort(Address, AbortCode),
 }
 
-/// What the server answers.
+/// An answer of the server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// Writing began, and is done if it was expedited.
+    /// Writing has started; an expedited transfer is complete.
     Downloaded(Address),
-    /// A segment was taken.
+    /// A segment was received.
     DownloadedSegment {
-        /// That of the request.
+        /// The toggle bit of the request.
         toggle: bool,
     },
-    /// Reading began, and is done if it is expedited.
+    /// Reading has started; an expedited transfer is complete.
     Uploaded(Address, Start),
     /// A segment.
     UploadedSegment {
-        /// That of the request.
+        /// The toggle bit of the request.
         toggle: bool,
-        /// No more segments follow.
+        /// Whether this is the last segment.
         last: bool,
         /// The data.
         part: Part,
     },
-    /// Give up.
+    /// Aborts the transfer.
     Abort(Address, AbortCode),
 }
 
@@ -171,7 +171,7 @@ fn word_of(frame: [u8; 8]) -> u32 {
     u32::from_le_bytes([frame[4], frame[5], frame[6], frame[7]])
 }
 
-/// Start of a transfer with the command bits 7 to 5 of `specifier`. An expedited part is 1 to 4 bytes.
+/// Encodes the start of a transfer; `specifier` has the command bits 7 to 5. An expedited part has 1 to 4 bytes.
 fn encode_start(specifier: u8, address: Address, start: Start) -> [u8; 8] {
     match start {
         Start::Expedited(part) => {
@@ -233,7 +233,7 @@ impl Request {
         }
     }
 
-    /// Reads eight bytes; `None` if there are not eight or the command is unknown (block transfer, 7).
+    /// Decodes eight bytes; `None` if there are not eight or the command is unknown (block transfer, 7).
     pub fn decode(data: &[u8]) -> Option<Request> {
         let frame: [u8; 8] = data.try_into().ok()?;
         let (toggle, last, part) = decode_segment(frame);
@@ -262,7 +262,7 @@ impl Answer {
         }
     }
 
-    /// Reads eight bytes; `None` if there are not eight or the command is unknown.
+    /// Decodes eight bytes; `None` if there are not eight or the command is unknown.
     pub fn decode(data: &[u8]) -> Option<Answer> {
         let frame: [u8; 8] = data.try_into().ok()?;
         let (toggle, last, part) = decode_segment(frame);

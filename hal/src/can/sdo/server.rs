@@ -1,15 +1,15 @@
-//! The answering side of transfers: one at a time, as CiA 301 asks of a default SDO.
+//! The server of transfers: one transfer at a time, as CiA 301 requires of the default SDO.
 
 use super::{AbortCode, Address, Answer, Part, Request, Start};
 
-/// Longest value taken, in bytes.
+/// Longest permitted value in bytes.
 const LONGEST: usize = 4096;
 
-/// What a server reads from and writes to.
+/// The object dictionary of a server.
 pub trait Dictionary {
-    /// The value, little endian.
+    /// Reads a value, little endian.
     fn read(&self, address: Address) -> Result<Vec<u8>, AbortCode>;
-    /// Takes a value, little endian.
+    /// Writes a value, little endian.
     fn write(&mut self, address: Address, value: &[u8]) -> Result<(), AbortCode>;
 }
 
@@ -33,7 +33,7 @@ enum Kind {
 }
 
 impl Server {
-    /// The answer to a request, if it deserves one. A new request ends an unfinished transfer.
+    /// The answer to a request; `None` for an abort and for a frame of wrong length. A new request ends an unfinished transfer.
     pub fn answer(&mut self, request: &[u8], dictionary: &mut impl Dictionary) -> Option<[u8; 8]> {
         if request.len() != 8 {
             return None;
@@ -61,7 +61,7 @@ impl Server {
         })
     }
 
-    /// The address of the transfer under way, zero if there is none.
+    /// The address of the current transfer, zero if there is none.
     fn address(&self) -> Address {
         self.transfer
             .as_ref()
@@ -162,7 +162,7 @@ impl Server {
         Ok(Answer::DownloadedSegment { toggle })
     }
 
-    /// The transfer under way, if the segment has the expected toggle bit, which is then turned.
+    /// The current transfer, if the segment has the expected toggle bit. The bit is then inverted.
     fn continued(&mut self, toggle: bool) -> Result<&mut Transfer, (Address, AbortCode)> {
         let Some(transfer) = &mut self.transfer else {
             return Err((Address::new(0, 0), AbortCode::COMMAND));

@@ -93,7 +93,9 @@ fn a_silent_vesc_and_a_dead_bus_are_faults_until_cleared() {
         (SILENT, |rig| rig.inject(DeviceFault::Mute)),
         (SILENT, |rig| rig.inject(DeviceFault::ShortFrames)),
         (SILENT, |rig| rig.inject(DeviceFault::Late(200))),
-        (BUS_OFF, |rig| rig.world.bus().tell(Condition::BusOff)),
+        (BUS_OFF, |rig| {
+            rig.world.bus().inject_condition(Condition::BusOff)
+        }),
     ];
     for (code, fail) in ways {
         let mut rig = rig();

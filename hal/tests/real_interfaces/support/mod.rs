@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use bench_hal::can::bus::{Host, Port, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::cia402::State;
-use bench_hal::can::drive::{CanopenDrive, DriveSettings, OpenError};
+use bench_hal::can::drive::{CanopenDrive, DriveSettings, DriveTimes, OpenError};
 use bench_hal::can::emulator::{
     AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
 };
@@ -25,12 +25,15 @@ const HANGS: Duration = Duration::from_secs(30);
 pub fn settings() -> DriveSettings {
     let ms = Duration::from_millis;
     DriveSettings {
-        heartbeat_timeout: ms(800),
-        own_heartbeat_timeout: ms(600),
-        status_timeout: ms(400),
-        command_timeout: ms(400),
-        sdo_timeout: ms(3000),
-        state_timeout: ms(5000),
+        times: DriveTimes {
+            heartbeat_timeout: ms(800),
+            own_heartbeat_timeout: ms(600),
+            status_timeout: ms(400),
+            command_timeout: ms(400),
+            sdo_timeout: ms(3000),
+            state_timeout: ms(5000),
+            ..DriveTimes::default()
+        },
         ..DriveSettings::default()
     }
 }

@@ -165,7 +165,7 @@ fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
         ..EmulatedDriveSettings::default()
     };
     let refused = refusal(DriveSettings::default(), device.clone());
-    assert!(refused.contains("prove it by unplugging"), "{refused}");
+    assert!(refused.contains("disconnect the bus to verify it"), "{refused}");
     assert!(
         open(
             DriveSettings {

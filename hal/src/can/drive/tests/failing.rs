@@ -140,7 +140,10 @@ fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
 fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat_said() {
     // The drive misses us 40 ms after the last heartbeat (up to 20 ms old) it heard; we miss its own after 70 ms.
     let settings = DriveSettings {
-        own_heartbeat_timeout: Duration::from_millis(40),
+        times: DriveTimes {
+            own_heartbeat_timeout: Duration::from_millis(40),
+            ..DriveTimes::default()
+        },
         ..DriveSettings::default()
     };
     let mut rig = open(settings, EmulatedDriveSettings::default()).unwrap();
@@ -179,10 +182,10 @@ fn conditions_of_the_bus_are_faults() {
     ];
     for (condition, code) in cases {
         let mut rig = running(ASYNCHRONOUS);
-        rig.world.bus().tell(Condition::Warning);
-        rig.world.bus().tell(Condition::Noise);
+        rig.world.bus().inject_condition(Condition::Warning);
+        rig.world.bus().inject_condition(Condition::Noise);
         assert_eq!(rig.run_ms(1.0, 5), 5, "a warning is no fault");
-        rig.world.bus().tell(condition);
+        rig.world.bus().inject_condition(condition);
         finds(&mut rig, code, 1);
         recovers(&mut rig);
     }

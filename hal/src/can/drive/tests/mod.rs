@@ -8,9 +8,11 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use super::super::bus::{Host, SimulatedHost};
+use super::super::cia402::State;
 use super::super::emulator::{
     AmplifierTask, EmulatedAmplifier, EmulatedDrive, EmulatedDriveSettings,
 };
+use super::super::sdo::Address;
 use super::*;
 
 /// Driver and simulated drive on one bus.
