@@ -1,4 +1,4 @@
-//! Troubles of the bus as a kernel driver tells them: slcan, with an adapter that says what a test wants.
+//! Errors of the bus as a kernel driver reports them: slcan, with an adapter that the test controls.
 
 use std::time::Duration;
 
@@ -24,11 +24,10 @@ fn condition(bus: &mut dyn CanBus) -> Condition {
 
 /// One test, since there is one adapter: the parts build upon each other.
 #[test]
-fn warning_is_no_fault_bus_off_latches_one_with_its_remedy_and_after_down_and_up_clearing_suffices()
-{
+fn bus_off_is_a_fault_with_remedy_and_can_be_cleared_after_a_restart_of_the_interface() {
     let adapter = Adapter::new();
     let name = adapter.name.clone();
-    let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // nobody's: conditions only
+    let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // an unused identifier: conditions only
     let mut rig = Rig::new(&name, &SystemHost::new(adapter.far_side()), settings()).enabled();
 
     adapter.says("sw096000");

@@ -7,8 +7,7 @@ use crate::support::vcan::Vcan;
 use crate::support::{Rig, host, open, settings};
 
 #[test]
-fn an_interface_set_down_is_a_fault_the_drive_stops_by_itself_and_with_the_interface_up_clearing_suffices()
- {
+fn the_drive_stops_when_the_interface_is_down_and_the_fault_can_be_cleared_when_it_is_up() {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     vcan.set_up(false);
@@ -27,7 +26,7 @@ fn an_interface_set_down_is_a_fault_the_drive_stops_by_itself_and_with_the_inter
 }
 
 #[test]
-fn an_adapter_pulled_out_is_a_fault_the_drive_stops_by_itself_and_starting_anew_works() {
+fn the_drive_stops_when_the_adapter_is_removed_and_can_be_opened_again() {
     let mut vcan = Vcan::up();
     let mut rig = vcan.running();
     vcan.unplug();

@@ -21,7 +21,7 @@ fn command_until(drive: &mut CanopenDrive, current_a: f64, other: &mut PythonDri
     });
 }
 
-/// Up, both directions of current, and what the drive says comes back.
+/// Enables the drive, commands both directions of current, and compares the reported current.
 fn runs(drive: &mut CanopenDrive, other: &mut PythonDrive) {
     drive.enable().unwrap();
     assert_eq!(other.shows(), "27 0 OPERATIONAL");
@@ -35,7 +35,7 @@ fn runs(drive: &mut CanopenDrive, other: &mut PythonDrive) {
     assert_eq!(drive.status(), AmplifierStatus::Enabled);
 }
 
-/// A fault of the drive is told, and cleared by a person.
+/// A fault of the drive is reported, and cleared by the operator.
 fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
     other.fails(0x4210);
     command_until(drive, 1.0, other, "08 0 OPERATIONAL");
@@ -52,8 +52,7 @@ fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
 }
 
 #[test]
-fn a_drive_of_other_hands_is_brought_up_runs_both_ways_fails_with_its_words_is_cleared_and_left_off()
- {
+fn an_independent_drive_is_enabled_runs_reports_its_fault_is_cleared_and_left_off() {
     let vcan = Vcan::up();
     let mut other = PythonDrive::new(&vcan.name);
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
@@ -86,8 +85,7 @@ fn a_drive_of_other_hands_is_brought_up_runs_both_ways_fails_with_its_words_is_c
 }
 
 #[test]
-fn a_master_of_other_hands_finds_configures_and_runs_the_simulated_drive_which_misses_it_when_it_falls_silent()
- {
+fn an_independent_master_runs_the_emulated_drive_which_detects_the_loss_of_its_heartbeat() {
     let vcan = Vcan::up();
     let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let output = script("canopen_master.py", &vcan.name).output().unwrap();

@@ -1,4 +1,4 @@
-//! Every misbehaviour of a drive, over a real socket: found, no current, and usable again when a person clears it.
+//! Every fault of a drive, over a real socket: detected, no current, and usable again after the operator clears it.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ fn is_found_and_cleared(misbehaviour: DeviceFault, code: u32) {
 }
 
 #[test]
-fn a_fault_of_the_drive_is_told_in_the_words_of_its_emergency_message() {
+fn a_fault_of_the_drive_is_reported_with_its_emergency_message() {
     is_found_and_cleared(DeviceFault::Drive(0x4210), faults::EMERGENCY + 0x4210);
     let text = fault_text(faults::EMERGENCY + 0x4210);
     assert_eq!(text.what, "drive too hot");
@@ -35,7 +35,7 @@ fn a_fault_of_the_drive_is_told_in_the_words_of_its_emergency_message() {
 }
 
 #[test]
-fn a_drive_that_only_sends_an_emergency_message_is_found() {
+fn detects_an_emergency_message_without_a_change_of_state() {
     is_found_and_cleared(
         DeviceFault::EmergencyOnly(0x2310),
         faults::EMERGENCY + 0x2310,
@@ -43,42 +43,42 @@ fn a_drive_that_only_sends_an_emergency_message_is_found() {
 }
 
 #[test]
-fn a_mute_drive_is_found() {
+fn detects_a_silent_drive() {
     is_found_and_cleared(DeviceFault::Mute, faults::STATUS_LOST);
 }
 
 #[test]
-fn an_unplugged_drive_is_found_and_switches_itself_off() {
+fn detects_a_disconnected_drive_which_switches_itself_off() {
     is_found_and_cleared(DeviceFault::Unplugged, faults::STATUS_LOST);
 }
 
 #[test]
-fn frames_of_a_wrong_length_are_found() {
+fn detects_frames_of_a_wrong_length() {
     is_found_and_cleared(DeviceFault::ShortFrames, faults::MALFORMED);
 }
 
 #[test]
-fn a_statusword_that_no_state_has_is_found() {
+fn detects_a_statusword_without_a_state() {
     is_found_and_cleared(DeviceFault::InvalidStatusword, faults::MALFORMED);
 }
 
 #[test]
-fn a_drive_that_does_not_follow_its_target_is_found() {
+fn detects_a_drive_that_does_not_follow_its_target() {
     is_found_and_cleared(DeviceFault::TargetIgnored, faults::TARGET_IGNORED);
 }
 
 #[test]
-fn a_drive_that_switches_itself_off_is_found() {
+fn detects_a_drive_that_switches_itself_off() {
     is_found_and_cleared(DeviceFault::SwitchesOff, faults::SWITCHED_OFF);
 }
 
 #[test]
-fn a_drive_that_restarts_is_found_and_configured_again_when_cleared() {
+fn detects_a_restart_and_configures_the_drive_again_when_cleared() {
     is_found_and_cleared(DeviceFault::Reset, faults::RESTARTED);
 }
 
 #[test]
-fn a_drive_whose_answers_are_late_is_found() {
+fn detects_a_drive_with_late_frames() {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     let late = Duration::from_millis(700); // longer than status_timeout
@@ -90,7 +90,7 @@ fn a_drive_whose_answers_are_late_is_found() {
 }
 
 #[test]
-fn a_drive_that_does_not_obey_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
+fn a_drive_that_ignores_disable_is_stopped_by_nmt_or_by_the_lost_heartbeat() {
     for misbehaviour in [DeviceFault::SetPointsIgnored, DeviceFault::CommandsIgnored] {
         let vcan = Vcan::up();
         let mut rig = vcan.running();
@@ -108,7 +108,7 @@ fn a_drive_that_does_not_obey_disable_is_stopped_by_nmt_and_one_that_ignores_tha
 }
 
 #[test]
-fn a_loop_that_stops_commanding_is_switched_off() {
+fn switches_off_when_the_loop_sends_no_commands() {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     let code = i64::from(faults::COMMANDS_STOPPED);

@@ -1,4 +1,4 @@
-//! What the kernel says of an interface, and what a person is told of one that cannot be used.
+//! The state of an interface as the kernel reports it, and the errors for one that cannot be used.
 
 use bench_hal::can::bus::{Interface, SocketPort};
 
@@ -10,7 +10,7 @@ fn refusal(name: &str) -> String {
 }
 
 #[test]
-fn a_name_that_no_interface_has_is_refused_with_the_name_and_how_to_find_the_right_one() {
+fn rejects_an_unknown_interface_and_says_how_to_list_them() {
     let refused = refusal("can77");
     assert!(refused.starts_with("CAN interface can77: "), "{refused}");
     assert!(
@@ -20,7 +20,7 @@ fn a_name_that_no_interface_has_is_refused_with_the_name_and_how_to_find_the_rig
 }
 
 #[test]
-fn an_interface_that_is_down_is_refused_with_the_command_that_brings_it_up() {
+fn rejects_an_interface_that_is_down_with_the_command_to_bring_it_up() {
     let vcan = Vcan::down();
     let name = &vcan.name;
     let remedy = format!(

@@ -14,8 +14,7 @@ use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, Rig, host, refusal, settings, wait_for};
 
 #[test]
-fn a_drive_is_brought_up_follows_quantised_currents_says_what_it_measures_and_goes_to_zero_when_disabled()
- {
+fn a_drive_is_enabled_follows_quantised_currents_reports_its_current_and_is_disabled() {
     for exchange in [
         Exchange::Asynchronous { status_hz: 500.0 },
         Exchange::Synchronous { status_every: 1 },
@@ -53,7 +52,7 @@ fn a_drive_is_brought_up_follows_quantised_currents_says_what_it_measures_and_go
 }
 
 #[test]
-fn closing_leaves_the_drive_off_pre_operational_and_not_watching() {
+fn closing_leaves_the_drive_off_pre_operational_and_without_heartbeat_monitoring() {
     let vcan = Vcan::up();
     let Rig { drive, far_end } = vcan.running();
     drop(drive);
@@ -66,7 +65,7 @@ fn closing_leaves_the_drive_off_pre_operational_and_not_watching() {
 }
 
 #[test]
-fn a_drive_says_who_it_is_and_another_than_configured_is_refused() {
+fn reads_the_identity_and_rejects_another_drive_than_the_configured_one() {
     let vcan = Vcan::up();
     let _far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(3)).unwrap();
@@ -97,7 +96,7 @@ fn a_drive_says_who_it_is_and_another_than_configured_is_refused() {
 }
 
 #[test]
-fn an_endpoint_hears_exactly_its_identifiers_in_exactly_their_format() {
+fn an_endpoint_receives_only_its_identifiers_in_their_format() {
     let vcan = Vcan::up();
     let host = host(&vcan.name);
     let (mut all, ids) = (

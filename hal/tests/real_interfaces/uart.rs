@@ -112,7 +112,7 @@ fn reads(probe: &mut SerialProbe, more: u64) {
     });
 }
 
-/// Whether the chip was told to make and to check even parity.
+/// Whether the chip is set to generate and check even parity.
 fn is_even(path: &str) -> bool {
     let flags = tcgetattr(std::fs::File::open(path).unwrap())
         .unwrap()

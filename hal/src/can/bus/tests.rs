@@ -4,7 +4,7 @@ const ID: Id = Id::standard(0x123);
 const FRAME: CanFrame = CanFrame::new(ID, [1, 2]);
 
 #[test]
-fn endpoints_hear_the_others_but_not_themselves() {
+fn endpoints_receive_the_frames_of_others_only() {
     let bus = MemoryBus::default();
     let (mut a, mut b, mut deaf) = (
         bus.connect(&[]),
@@ -26,7 +26,7 @@ fn endpoints_hear_the_others_but_not_themselves() {
     assert_eq!(b.receive(Duration::ZERO), Err(BusError::Down));
 }
 
-/// Answers each frame with its own, and says once what time it was.
+/// Answers each frame, and reports the time once.
 struct Echo(Box<dyn CanBus>);
 
 impl Task for Echo {
@@ -65,10 +65,10 @@ fn a_task_answers_on_a_thread() {
 }
 
 #[test]
-fn a_task_answers_in_virtual_time() {
+fn a_task_answers_in_simulated_time() {
     let world = SimulatedHost::default();
     echoes(&world);
-    // One step of 100 us to the answer, then 20 ms of waiting in vain.
+    // One step of 100 us until the answer, then 20 ms without a frame.
     assert_eq!(world.now_ns(), 20_100_000);
     world.sleep(Duration::from_secs(3600));
     assert_eq!(world.now_ns(), 3_600_020_100_000);

@@ -4,7 +4,7 @@
 //!   loop's thread   enable  command  disable  status        service thread
 //!        |            |        |        |       ^             |  (monitor)
 //!        |  SDO   set-points, NMT       |       |  atomics    |  status, EMCY, heartbeat, error frames
-//!        v            v        v        v       +-------------+  our heartbeat, `disable voltage`
+//!        v            v        v        v       +-------------+  heartbeat, `disable voltage`
 //!   ==================================== bus ==================================
 //! ```
 //!

@@ -107,7 +107,7 @@ fn a_repeated_toggle_bit_aborts_on_both_sides() {
 }
 
 #[test]
-fn a_transfer_of_another_length_than_announced_is_refused() {
+fn rejects_a_transfer_with_another_length_than_indicated() {
     let (mut client, _) = Client::upload(NAME);
     client.answer(&Answer::Uploaded(NAME, Start::Segmented(Some(9))).encode());
     let short = Answer::UploadedSegment {
@@ -139,7 +139,7 @@ fn a_transfer_of_another_length_than_announced_is_refused() {
 }
 
 #[test]
-fn aborts_and_foreign_answers_are_told_apart() {
+fn distinguishes_aborts_from_answers_to_other_requests() {
     let (mut client, _) = Client::upload(NAME);
     let foreign = Address::new(0x6041, 0);
     assert_eq!(
@@ -160,7 +160,7 @@ fn aborts_and_foreign_answers_are_told_apart() {
 }
 
 #[test]
-fn an_endless_upload_is_given_up() {
+fn aborts_an_endless_upload() {
     let (mut client, _) = Client::upload(NAME);
     client.answer(&Answer::Uploaded(NAME, Start::Segmented(None)).encode());
     let mut toggle = false;
@@ -185,7 +185,7 @@ fn an_endless_upload_is_given_up() {
 }
 
 #[test]
-fn block_transfer_is_refused_in_words() {
+fn rejects_block_transfer_with_an_abort_code() {
     let answer = Server::default()
         .answer(&[0xC2, 0x08, 0x10, 0, 0, 0, 0, 0], &mut Values::default())
         .unwrap();

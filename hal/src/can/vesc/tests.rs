@@ -57,7 +57,7 @@ fn fifty_one_amperes_to_node_23_are_the_bytes_of_the_documentation() {
 }
 
 #[test]
-fn a_vesc_follows_and_tells_its_current() {
+fn a_vesc_follows_commands_and_reports_its_current() {
     let mut rig = rig();
     assert_eq!(
         rig.vesc.command(1.0).unwrap_err().code,
@@ -87,7 +87,7 @@ fn a_vesc_follows_and_tells_its_current() {
 }
 
 #[test]
-fn a_silent_vesc_and_a_dead_bus_are_faults_until_cleared() {
+fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
     type Way = (u32, fn(&Rig));
     let ways: [Way; 4] = [
         (SILENT, |rig| rig.inject(DeviceFault::Mute)),
@@ -136,7 +136,7 @@ fn a_vesc_that_no_longer_hears_us_lets_go_by_itself() {
 }
 
 #[test]
-fn a_loop_that_stands_still_ends_with_no_current() {
+fn without_commands_the_current_ends() {
     let mut rig = rig();
     rig.vesc.enable().unwrap();
     rig.vesc.command(2.0).unwrap();

@@ -129,7 +129,7 @@ impl FarSide {
     fn pass_on(&self, line: &str) {
         let frame = parse(line).filter(|_| !self.is_off.load(Ordering::Acquire));
         if let (Some(frame), Some(node)) = (frame, &*self.node.lock().unwrap()) {
-            let _ = node.send(frame); // nobody may be there
+            let _ = node.send(frame); // there may be no receiver
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A drive and its simulated counterpart on real interfaces, and waiting for what they do.
+//! The driver and the emulated drive on real interfaces, and functions that wait for them.
 
 pub mod adapter;
 pub mod python;
@@ -18,10 +18,10 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier};
 
 pub const BIT_RATE: u32 = 1_000_000;
 
-/// Nothing takes so long, even in an emulated machine; only a test that hangs meets it.
-const HANGS: Duration = Duration::from_secs(30);
+/// A test that waits longer than this has failed.
+const LIMIT: Duration = Duration::from_secs(30);
 
-/// The default but for the time limits: the emulated machine may stand still for a tenth of a second.
+/// The default with longer time limits: the emulated machine may stop for a tenth of a second.
 pub fn settings() -> DriveSettings {
     let ms = Duration::from_millis;
     DriveSettings {
@@ -58,7 +58,7 @@ pub fn refusal(name: &str, settings: DriveSettings) -> String {
 pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !condition() {
-        assert!(begun.elapsed() < HANGS, "never: {what}");
+        assert!(begun.elapsed() < LIMIT, "never: {what}");
         std::thread::sleep(Duration::from_millis(2));
     }
 }
@@ -137,7 +137,7 @@ impl Rig {
         });
     }
 
-    /// Commanded so, the drive gives the current, and says so itself.
+    /// The drive gives the commanded current and reports it.
     pub fn gives(&mut self, wanted_a: f64, given_a: f64) {
         assert_eq!(self.drive.command(wanted_a), Ok(given_a));
         let near = |current_a: f64| (current_a - given_a).abs() < 1e-9;
@@ -175,7 +175,7 @@ impl Rig {
         code
     }
 
-    /// With the cause gone: cleared by a person, off, and enabled only when asked.
+    /// After the cause is removed: the operator clears the fault; the drive is off, and is enabled only on request.
     pub fn recovers(&mut self) {
         self.far_end.device().inject(DeviceFault::None);
         self.drive

@@ -5,7 +5,7 @@ use super::super::super::scale::Reference;
 use super::*;
 
 #[test]
-fn a_drive_comes_up_follows_quantised_currents_and_goes_down() {
+fn a_drive_is_enabled_follows_quantised_currents_and_is_disabled() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = rig(exchange);
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
@@ -58,7 +58,7 @@ fn synchronous_set_points_take_effect_with_their_sync() {
 }
 
 #[test]
-fn the_drive_is_told_to_watch_us_and_to_switch_off() {
+fn configures_heartbeat_monitoring_and_its_reaction() {
     let rig = rig(ASYNCHRONOUS);
     let device = rig.device();
     assert_eq!(
@@ -80,7 +80,7 @@ fn the_drive_is_told_to_watch_us_and_to_switch_off() {
 }
 
 #[test]
-fn profile_torque_is_the_fallback() {
+fn uses_profile_torque_without_cyclic_torque() {
     let device = EmulatedDriveSettings {
         modes: 1 << (PROFILE_TORQUE - 1),
         ..EmulatedDriveSettings::default()
@@ -106,7 +106,7 @@ fn profile_torque_is_the_fallback() {
 }
 
 #[test]
-fn a_target_in_per_mille_of_the_maximum_is_scaled_so() {
+fn scales_a_target_in_per_mille_of_the_maximum() {
     // 0x6072 = 1500 per mille of 4 A: 1000 counts are 6 A, one count 6 mA.
     let settings = DriveSettings {
         reference: Reference::Maximum,
@@ -126,7 +126,7 @@ fn a_target_in_per_mille_of_the_maximum_is_scaled_so() {
 }
 
 #[test]
-fn another_drive_than_configured_is_refused() {
+fn rejects_another_drive_than_the_configured_one() {
     let with = |identity| DriveSettings {
         identity,
         ..DriveSettings::default()
@@ -159,7 +159,7 @@ fn another_drive_than_configured_is_refused() {
 }
 
 #[test]
-fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
+fn rejects_a_drive_without_a_reaction_to_a_lost_heartbeat_unless_configured() {
     let device = EmulatedDriveSettings {
         missing_objects: vec![Address::new(0x6007, 0)],
         ..EmulatedDriveSettings::default()
@@ -188,7 +188,7 @@ fn a_drive_that_cannot_be_told_to_stop_is_refused_unless_that_is_configured() {
 }
 
 #[test]
-fn a_drive_without_a_timer_for_its_status_is_refused_with_sync_as_the_way_out() {
+fn rejects_a_drive_without_a_status_timer_and_suggests_sync() {
     for sub in [3, 5] {
         let device = EmulatedDriveSettings {
             missing_objects: vec![Address::new(0x1800, sub)],
@@ -232,7 +232,7 @@ fn optional_objects_may_be_missing() {
 }
 
 #[test]
-fn silence_on_the_bus_is_told_with_what_to_check() {
+fn a_missing_answer_is_reported_with_what_to_check() {
     let error = CanopenDrive::open(DriveSettings::default(), Box::new(SimulatedHost::default()))
         .err()
         .unwrap();
@@ -243,7 +243,7 @@ fn silence_on_the_bus_is_told_with_what_to_check() {
 }
 
 #[test]
-fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
+fn inspection_reads_the_identity_and_writes_nothing() {
     let world = SimulatedHost::default();
     let device = Arc::new(Mutex::new(EmulatedDrive::new(
         EmulatedDriveSettings::default(),
@@ -275,7 +275,7 @@ fn a_drive_looked_at_tells_who_it_is_and_does_not_move() {
 }
 
 #[test]
-fn a_drive_looked_at_tells_which_objects_it_lacks() {
+fn inspection_reports_missing_objects() {
     let world = SimulatedHost::default();
     let missing_objects = vec![
         Address::new(0x6007, 0),
@@ -295,7 +295,7 @@ fn a_drive_looked_at_tells_which_objects_it_lacks() {
 }
 
 #[test]
-fn closing_leaves_the_drive_off_and_not_watching() {
+fn closing_leaves_the_drive_off_and_without_heartbeat_monitoring() {
     let Rig {
         mut drive,
         world,

@@ -1,4 +1,4 @@
-//! Every fault: found in the time that the settings state, current zero, and usable again when a person clears it.
+//! Every fault: detected within the time in the settings, current zero, and usable again after the operator clears it.
 
 use super::super::super::bus::{BusError, Condition};
 use super::super::super::emulator::DeviceFault;
@@ -13,7 +13,7 @@ fn running(exchange: Exchange) -> Rig {
     rig
 }
 
-/// The fault is found within `most_ms`, the current is zero within 3 ms more and stays so whatever the loop does.
+/// The fault is detected within `most_ms`. The current is zero within 3 ms more and remains zero, whatever the loop does.
 fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
     let found_ms = rig.run_ms(1.0, most_ms + 1);
     assert_eq!(
@@ -50,7 +50,7 @@ fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
     assert_eq!(rig.device_current_a(), 0.0);
 }
 
-/// After the cause is gone: cleared by a person, off, and enabled again only when asked.
+/// After the cause is removed: the operator clears the fault; the drive is off, and is enabled only on request.
 fn recovers(rig: &mut Rig) {
     rig.device().inject(DeviceFault::None);
     rig.sleep_ms(50);
@@ -68,7 +68,7 @@ fn recovers(rig: &mut Rig) {
 const STATUS_MS: u32 = 3;
 
 #[test]
-fn faults_of_the_drive_are_found_with_the_next_status_frame() {
+fn detects_faults_of_the_drive_with_the_next_status_frame() {
     let cases = [
         (DeviceFault::Drive(0x2310), faults::EMERGENCY + 0x2310),
         (
@@ -92,7 +92,7 @@ fn faults_of_the_drive_are_found_with_the_next_status_frame() {
 }
 
 #[test]
-fn a_silent_drive_is_found_by_its_missing_status() {
+fn detects_a_silent_drive_by_its_missing_status() {
     // 20 ms without status; the drive still hears, so it is switched off.
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
@@ -103,7 +103,7 @@ fn a_silent_drive_is_found_by_its_missing_status() {
 }
 
 #[test]
-fn a_silent_drive_is_found_by_its_missing_heartbeat_while_it_is_off() {
+fn detects_a_silent_drive_that_is_off_by_its_missing_heartbeat() {
     let mut rig = rig(ASYNCHRONOUS);
     rig.device().inject(DeviceFault::Mute);
     rig.sleep_ms(48);
@@ -121,7 +121,7 @@ fn a_silent_drive_is_found_by_its_missing_heartbeat_while_it_is_off() {
 }
 
 #[test]
-fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
+fn a_disconnected_drive_switches_itself_off_without_the_heartbeat() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.device().inject(DeviceFault::Unplugged);
@@ -130,15 +130,15 @@ fn an_unplugged_drive_switches_itself_off_because_it_no_longer_hears_us() {
             rig.drive.status(),
             AmplifierStatus::Fault(faults::STATUS_LOST)
         );
-        rig.sleep_ms(71); // 70 ms after the last heartbeat heard, whatever we do
+        rig.sleep_ms(71); // 70 ms after the last heartbeat received, whatever the driver does
         assert_eq!(rig.device_current_a(), 0.0);
         recovers(&mut rig);
     }
 }
 
 #[test]
-fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat_said() {
-    // The drive misses us 40 ms after the last heartbeat (up to 20 ms old) it heard; we miss its own after 70 ms.
+fn a_fault_is_cleared_when_the_drive_is_back_although_its_last_heartbeat_is_outdated() {
+    // The drive detects the loss 40 ms after the last heartbeat (up to 20 ms old) it received; the driver after 70 ms.
     let settings = DriveSettings {
         times: DriveTimes {
             own_heartbeat_timeout: Duration::from_millis(40),
@@ -155,7 +155,7 @@ fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat
     assert_eq!(
         rig.drive.shared.nmt(),
         Some(nmt::State::Operational),
-        "as far as we know"
+        "according to its last heartbeat"
     );
     rig.device().inject(DeviceFault::None);
     rig.drive
@@ -165,7 +165,7 @@ fn a_fault_is_cleared_at_once_when_the_drive_is_back_whatever_its_last_heartbeat
 }
 
 #[test]
-fn late_answers_are_found_by_the_gap_that_they_leave() {
+fn detects_late_frames_by_their_gap() {
     let mut rig = running(ASYNCHRONOUS);
     rig.device().inject(DeviceFault::Late(200));
     finds(&mut rig, faults::STATUS_LOST, 22);
@@ -206,7 +206,7 @@ fn an_interface_that_goes_down_is_a_fault_and_the_drive_stops_by_itself() {
 }
 
 #[test]
-fn an_adapter_that_is_pulled_out_is_gone_though_it_goes_down_first() {
+fn a_removed_adapter_is_reported_as_gone_although_it_goes_down_first() {
     let shared = Arc::new(Shared::default());
     let mut monitor = Monitor::new(&DriveSettings::default(), Arc::clone(&shared), 0);
     monitor.fail(BusError::Down);
@@ -221,9 +221,9 @@ fn an_adapter_that_is_pulled_out_is_gone_though_it_goes_down_first() {
 }
 
 #[test]
-fn a_killed_process_is_missed_by_the_drive() {
+fn the_drive_stops_after_the_process_is_killed() {
     let mut rig = running(ASYNCHRONOUS);
-    // SIGKILL: no thread of ours runs on, nothing is sent any more.
+    // SIGKILL: no thread of the driver runs, nothing is sent.
     rig.drive.service = TaskHandle::default();
     rig.sleep_ms(48);
     assert_eq!(
@@ -252,7 +252,7 @@ fn a_killed_process_is_missed_by_the_drive() {
 }
 
 #[test]
-fn a_loop_that_stops_commanding_is_switched_off() {
+fn switches_off_when_the_loop_sends_no_commands() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.sleep_ms(18);
@@ -272,7 +272,7 @@ fn a_loop_that_stops_commanding_is_switched_off() {
 }
 
 #[test]
-fn disable_acts_at_once_and_without_the_service() {
+fn disable_acts_immediately_and_without_the_service() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.drive.service = TaskHandle::default(); // as if its thread hung
@@ -283,7 +283,7 @@ fn disable_acts_at_once_and_without_the_service() {
 }
 
 #[test]
-fn a_disable_that_was_lost_is_repeated() {
+fn repeats_a_lost_disable() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.device().inject(DeviceFault::SetPointsIgnored);
@@ -301,7 +301,7 @@ fn a_disable_that_was_lost_is_repeated() {
 }
 
 #[test]
-fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_our_silence() {
+fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_nmt_by_the_lost_heartbeat() {
     for (misbehaviour, most_ms) in [
         (DeviceFault::SetPointsIgnored, 85),
         (DeviceFault::CommandsIgnored, 175),
@@ -314,7 +314,7 @@ fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_o
             (rig.device_current_a(), rig.drive.status()),
             (1.0, AmplifierStatus::Disabled)
         );
-        // 70 ms unconfirmed (+ one repeat of 10 ms): NMT stop; 70 ms later the drive misses our heartbeat.
+        // 70 ms unconfirmed (+ one repeat of 10 ms): NMT stop; 70 ms later the drive detects the lost heartbeat.
         rig.sleep_ms(most_ms - 60);
         assert_eq!(rig.device_current_a(), 0.0, "{misbehaviour:?}");
         assert_eq!(
@@ -326,7 +326,7 @@ fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_that_by_o
 }
 
 #[test]
-fn a_command_that_is_not_a_number_never_reaches_the_drive() {
+fn a_command_that_is_not_finite_is_not_sent() {
     let mut rig = running(ASYNCHRONOUS);
     for nonsense in [f64::NAN, f64::INFINITY] {
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The driver against the simulated drive, in virtual time.
+//! The driver with the emulated drive, in simulated time.
 
 mod any_frames;
 mod bring_up;
@@ -15,7 +15,7 @@ use super::super::emulator::{
 use super::super::sdo::Address;
 use super::*;
 
-/// Driver and simulated drive on one bus.
+/// Driver and emulated drive on one bus.
 struct Rig {
     drive: CanopenDrive,
     world: SimulatedHost,

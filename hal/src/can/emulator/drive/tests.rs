@@ -12,7 +12,7 @@ fn booted() -> EmulatedDrive {
     assert_eq!(
         out.first(),
         Some(&CanFrame::new(heartbeat::cob_id(5), [0])),
-        "the first word is the boot-up message"
+        "the first frame is the boot-up message"
     );
     device
 }
@@ -81,7 +81,7 @@ fn current_flows_only_with_operation_enabled() {
 }
 
 #[test]
-fn the_rules_of_pdo_mapping_are_kept() {
+fn enforces_the_rules_of_pdo_mapping() {
     let mut device = booted();
     let word = Mapped::new(Address::new(0x6071, 0), 16).0.to_le_bytes();
     assert_eq!(
@@ -128,7 +128,7 @@ fn the_rules_of_pdo_mapping_are_kept() {
 }
 
 #[test]
-fn objects_are_refused_in_the_words_of_cia_301() {
+fn rejects_accesses_with_the_abort_codes_of_cia_301() {
     let mut device = booted();
     assert_eq!(
         write(&mut device, 0x1018, 1, &[0; 4]),
@@ -159,7 +159,7 @@ fn objects_are_refused_in_the_words_of_cia_301() {
 }
 
 #[test]
-fn a_heartbeat_once_heard_is_missed_and_the_drive_switches_off() {
+fn switches_off_when_a_monitored_heartbeat_is_lost() {
     let mut device = operational();
     write(
         &mut device,
@@ -177,7 +177,7 @@ fn a_heartbeat_once_heard_is_missed_and_the_drive_switches_off() {
     assert_eq!(
         device.current_a(),
         1.0,
-        "nobody was heard yet, nobody is missed"
+        "monitoring begins with the first heartbeat"
     );
     send(&mut device, heartbeat::frame(0x7F, nmt::State::Operational));
     device.poll(1_050_000_000, &mut out);
@@ -211,7 +211,7 @@ fn synchronous_set_points_wait_for_sync() {
 }
 
 #[test]
-fn set_points_are_taken_in_operational_only_and_not_if_too_short() {
+fn applies_set_points_in_operational_only_and_rejects_short_ones() {
     let mut device = operational();
     let id = layout::cob_id(Direction::Receive, 1, 5);
     let out = send(&mut device, CanFrame::new(id, [SHUTDOWN as u8, 0, 0]));
@@ -228,7 +228,7 @@ fn set_points_are_taken_in_operational_only_and_not_if_too_short() {
 }
 
 #[test]
-fn a_note_of_any_length_is_kept() {
+fn stores_a_text_of_any_length() {
     let mut device = booted();
     let address = Address::new(0x2000, 0);
     assert_eq!(
