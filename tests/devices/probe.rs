@@ -37,14 +37,14 @@ fn ascii(folder: &std::path::Path) -> String {
 }
 
 /// The profile `lab` with a slow loop and long time limits.
-fn config(folder: &std::path::Path) -> Config {
+fn config(folder: &std::path::Path, stale_s: f64) -> Config {
     let controller = folder.join("slow.toml");
     // 154 um/A below the first mode: crossover at 1.5 rad/s, far below everything that moves.
     let text = "title = \"slow\"\n[[section]]\nkind = \"integrator\"\ngain_a_per_um = 0.01\n";
     std::fs::write(&controller, text).expect("a file");
     let sets = [
         "loop.rate_hz=200".into(),
-        "interlock.probe_stale_s=1.0".into(),
+        format!("interlock.probe_stale_s={stale_s}"),
         "interlock.probe_stuck_s=1.5".into(),
         "interlock.probe_stuck_current_a=0.1".into(),
         "interlock.overruns_per_s=1000000".into(),
@@ -138,9 +138,9 @@ struct Table {
 }
 
 impl Table {
-    fn new() -> Table {
+    fn new(stale_s: f64) -> Table {
         let folder = Arc::new(tempfile::tempdir().expect("a temporary folder"));
-        let (config, start) = (config(folder.path()), Instant::now());
+        let (config, start) = (config(folder.path(), stale_s), Instant::now());
         let stage = Stage::new(&config).expect("a stage");
         Table::around(config, stage, start, folder)
     }
@@ -351,18 +351,22 @@ const STATES: [StateOf; 4] = [
     StateOf::Control,
 ];
 
+/// Permitted age of a reading in the tests of old readings. A suspended thread must not reach it.
+const STALE_S: f64 = 3.0;
+/// Permitted age in the other tests, so that a slow machine causes no trip.
+const NEVER_STALE_S: f64 = 10.0;
 /// A delay longer than the permitted age of a reading.
 const LATE: &str = "probe.late=9s";
 /// Not a fault of the probe: its cable.
 const HANG_UP: &str = "the terminal is closed";
 
 /// Runs the test in each state, concurrently because it mostly waits.
-fn in_each_state(test: impl Fn(&mut Table, StateOf) + Sync) {
+fn in_each_state(stale_s: f64, test: impl Fn(&mut Table, StateOf) + Sync) {
     std::thread::scope(|scope| {
         for state in STATES {
             let test = &test;
             scope.spawn(move || {
-                let mut table = Table::new();
+                let mut table = Table::new(stale_s);
                 table.enter(state);
                 test(&mut table, state);
             });
@@ -371,7 +375,11 @@ fn in_each_state(test: impl Fn(&mut Table, StateOf) + Sync) {
 }
 
 fn trips_and_runs_again(word: &str, reason: &str) {
-    in_each_state(|table, state| {
+    let stale_s = match reason {
+        "probe_stale" => STALE_S,
+        _ => NEVER_STALE_S,
+    };
+    in_each_state(stale_s, |table, state| {
         table.begin(word);
         if state == StateOf::Disarmed {
             table.run(20);
@@ -415,7 +423,7 @@ fn a_target_out_of_range_trips_as_invalid() {
 
 #[test]
 fn a_probe_that_restarts_is_read_on_without_a_trip() {
-    in_each_state(|table, state| {
+    in_each_state(NEVER_STALE_S, |table, state| {
         table.begin("probe.reset");
         table.run(50);
         assert_eq!(table.bench.trips(), []);
@@ -432,7 +440,7 @@ fn a_probe_that_restarts_is_read_on_without_a_trip() {
 
 #[test]
 fn a_closed_terminal_trips_and_is_reported_and_the_probe_can_be_opened_again() {
-    in_each_state(|table, state| {
+    in_each_state(NEVER_STALE_S, |table, state| {
         table.begin(HANG_UP);
         table.go_on(state);
         table.trips("probe_invalid");
