@@ -165,7 +165,10 @@ fn rejects_a_drive_without_a_reaction_to_a_lost_heartbeat_unless_configured() {
         ..EmulatedDriveSettings::default()
     };
     let refused = refusal(DriveSettings::default(), device.clone());
-    assert!(refused.contains("disconnect the bus to verify it"), "{refused}");
+    assert!(
+        refused.contains("disconnect the bus to verify it"),
+        "{refused}"
+    );
     assert!(
         open(
             DriveSettings {
