@@ -2,8 +2,10 @@
 //!
 //! It takes minutes of processor time: `cargo test --features statistical --test statistical`. `.ci/run` runs it.
 
+mod estimators;
 mod fit_intervals;
 mod frf_bias_and_coverage;
 mod frf_noise;
+mod joint_estimate;
 mod modes;
 mod verdicts;

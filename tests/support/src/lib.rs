@@ -1,6 +1,8 @@
 //! What the integration tests share: running the program, external references in python, rigs, records.
 
 pub mod faulty_rig;
+pub mod feedback_loop;
+pub mod gain_in_noise;
 pub mod identified;
 pub mod loop_rig;
 pub mod program;

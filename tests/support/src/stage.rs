@@ -2,6 +2,7 @@
 //! noise. Written apart from everything in the library.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 use bench::identify::Signals;
 use nalgebra::Complex;
@@ -165,15 +166,18 @@ fn interpolated(points: &[(f64, f64)], x: f64) -> f64 {
     y0 * (y1 / y0).powf((x / x0).ln() / (x1 / x0).ln())
 }
 
-/// A run without any noise.
+/// A run without any noise, simulated once in each test binary.
 pub fn clean_run() -> Signals {
-    let input_a = chirp();
-    let output_m = SampledPlant::stage().simulate(&input_a);
-    Signals {
-        rate_hz: RATE_HZ,
-        input_a,
-        output_m,
-    }
+    static RUN: LazyLock<Signals> = LazyLock::new(|| {
+        let input_a = chirp();
+        let output_m = SampledPlant::stage().simulate(&input_a);
+        Signals {
+            rate_hz: RATE_HZ,
+            input_a,
+            output_m,
+        }
+    });
+    RUN.clone()
 }
 
 /// The noise of the built stage: a probe of 40 nm RMS, read in steps of 30 nm, on a floor that shakes it by 20 nm RMS
