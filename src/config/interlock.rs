@@ -19,10 +19,11 @@ pub struct InterlockSettings {
     /// Change of the current in amperes after which the reading must change.
     #[schemars(range(min = 1e-6, max = 1000.0))]
     pub probe_stuck_current_a: f64,
-    /// Largest difference between the current that the amplifier measures and the command, in amperes.
+    /// Largest distance of the measured current from the range of the commands, in amperes.
     #[schemars(range(min = 1e-6, max = 1000.0))]
     pub current_error_a: f64,
-    /// Longest duration of a larger difference, in seconds; it must exceed the delay of the amplifier's status.
+    /// Length of the window over which commands and measured currents are compared, in seconds; it must exceed the delay of the
+    /// amplifier's status.
     #[schemars(range(min = 1e-4, max = 100.0))]
     pub current_error_s: f64,
     /// Largest number of missed ticks within one second.
