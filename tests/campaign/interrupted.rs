@@ -183,10 +183,7 @@ fn refuses_a_folder_of_something_else_and_does_not_change_it() {
             "campaign --config lab",
             "standard input is not a terminal; start it in a terminal, or add --simulate",
         ),
-        (
-            "campaign --config xy",
-            "which the model `xy` does not have both",
-        ),
+        ("campaign --config xy", "the model `xy` does not have both"),
         ("campaign --asymmetry 2%", "set what a campaign varies"),
         (
             "campaign --operating-points 0%:200%:3",
@@ -206,7 +203,7 @@ fn refuses_a_folder_of_something_else_and_does_not_change_it() {
         ),
         (
             "chirp --asymmetry -0.8 --set sim.asymmetry_offset=-0.2",
-            "too little is left of m2",
+            "m2 would be too small",
         ),
     ] {
         let answer = bench.run(arguments);
