@@ -7,6 +7,7 @@ use bench::report::phase::unwrapped_deg;
 use bench::report::{Chart, Pen, Scale, Symbol};
 
 /// A named response over frequency.
+#[derive(Clone)]
 pub(crate) struct Curve {
     /// For the legend.
     pub name: String,

@@ -3,11 +3,11 @@
 use super::super::bode::{Curve, bode, critical, nyquist, origin};
 use super::super::content::signed;
 use super::super::model::{ModeOf, Model, geometric, kinds, response};
-use super::super::plane::{Part, changes, locus, plane, tracks};
+use super::super::plane::{Part, changes, locus, places, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
 use bench::control::{self, ControllerText, continuous_response};
-use bench::model::zeros::{Crossing, LocusPlane, ModalSum};
+use bench::model::zeros::{Crossing, Locus, LocusPlane, ModalSum};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale, Symbol};
 
@@ -28,80 +28,78 @@ fn ratios() -> Vec<f64> {
 }
 
 pub(in super::super) fn fig_3_9(_: &Runs) -> Result<Content, FigureError> {
-    let cases = [
-        ("a", 2.0),
-        ("b", -0.5),
-        ("c", -0.85),
-        ("d", -1.2),
-        ("e", -2.0),
-        ("f", 0.5),
-    ];
-    let mut content = Content::new("Locus of the zeros as αv grows from 0, with a constant ratio αu/αv: solid for αv > 0 (the root locus of T), dashed for αv < 0 (the complementary one). First quadrant; the other three mirror it.")
+    let mut content = Content::new("Locus of the zeros as αv grows from 0 with a constant ratio αu/αv: solid for αv > 0 (the root locus of T), dashed for αv < 0 (the complementary root locus). First quadrant; the other three are its mirror images.")
         .setting("Eq. (3-7); αR = 1 and |αv| from 1e-4 to 1e4, which is the same as αv = ±1 and αR from 1e4 to 1e-4")
         .assumed("wu = 0.9, wv = 1.1 rad/s and six ratios αu/αv, one in each range between −∞, −(wv/wu)^2 = −1.49, −1, −(wu/wv)^2 = −0.67, 0 and one more");
     let mut charts = Vec::new();
-    let mut meetings = 0;
-    for (letter, ratio) in cases {
-        let mut chart = plane(
-            &format!("({letter}) αu/αv = {}", signed(ratio, 2)),
-            (0.0, 2.0),
-            (0.0, 2.0),
-        );
-        for (sign, name, pen) in [
+    let mut is_confined = true;
+    for (letter, ratio) in RATIOS_3_9 {
+        let name = signed(ratio, 2);
+        let heading = format!("({letter}) αu/αv = {name}");
+        let mut chart = plane(&heading, (0.0, 2.0), (0.0, 2.0));
+        for (sign, legend, pen) in [
             (1.0, "αv > 0", Pen::solid(VERMILION)),
             (-1.0, "αv < 0", Pen::dashed(BLUE)),
         ] {
             let model = pair(ratio * sign, sign);
             let locus = locus(&model.varied(KEY)?, LocusPlane::Undamped, &ratios())?;
-            let complex = locus.changes.iter().any(|change| {
-                change.after.contains("CMP-CNMP") || change.before.contains("CMP-CNMP")
-            });
-            meetings += usize::from(complex && !(sign * ratio < 0.0 && sign > 0.0));
-            chart = changes(tracks(chart, name, pen, &locus, Part::Quadrant), &locus);
-            if complex {
-                let text: Vec<String> = locus
-                    .changes
-                    .iter()
-                    .filter(|c| matches!(c.crossing, Crossing::ImaginaryAxis | Crossing::RealAxis))
-                    .map(|c| {
-                        format!(
-                            "αv = {} at {}",
-                            signed(sign / c.value, 4),
-                            signed(c.s.norm(), 4)
-                        )
-                    })
-                    .collect();
-                content = content.compare(Comparison::unprinted(
-                    &format!("({letter}) zeros meet, αu/αv = {}", signed(ratio, 2)),
-                    text.join("; "),
-                ));
-                content = content.command(model.command(
-                    "model locus",
-                    &format!("--vary {KEY} --from 1e4 --to 1e-4 --count 1001"),
-                ));
+            chart = changes(tracks(chart, legend, pen, &locus, Part::Quadrant), &locus);
+            if has_complex_zeros(&locus) {
+                is_confined &= ratio < 0.0 && sign > 0.0;
+                let what = format!("({letter}) zeros meet, αu/αv = {name}");
+                let range = format!("--vary {KEY} --from 1e4 --to 1e-4 --count 1001");
+                content = content
+                    .compare(Comparison::unprinted(&what, meetings(&locus, sign)))
+                    .command(model.command("model locus", &range));
             }
         }
-        charts.push(chart.points(
-            "poles",
-            INK,
-            Symbol::Cross,
-            vec![(0.0, 0.9), (0.0, 1.1), (0.0, 0.0)],
-        ));
+        charts.push(chart.points("poles", INK, Symbol::Cross, POLES_3_9.to_vec()));
     }
-    let rest = charts.split_off(3);
+    let computed = match is_confined {
+        true => "in no other case",
+        false => "in other cases too",
+    };
+    let expected = "only where αu < 0 and αv > 0";
+    let second = charts.split_off(3);
     Ok(content
         .row(280.0, charts)
-        .row(280.0, rest)
+        .row(280.0, second)
         .compare(Comparison::holds(
             "CMP-CNMP zeros",
-            "only where αu < 0 and αv > 0",
-            meetings == 0,
-            if meetings == 0 {
-                "in no other case"
-            } else {
-                "in others too"
-            },
+            expected,
+            is_confined,
+            computed,
         )))
+}
+
+/// Letter and αu/αv of each locus of Fig 3-9.
+const RATIOS_3_9: [(&str, f64); 6] = [
+    ("a", 2.0),
+    ("b", -0.5),
+    ("c", -0.85),
+    ("d", -1.2),
+    ("e", -2.0),
+    ("f", 0.5),
+];
+const POLES_3_9: [(f64, f64); 3] = [(0.0, 0.9), (0.0, 1.1), (0.0, 0.0)];
+
+fn has_complex_zeros(locus: &Locus) -> bool {
+    let mut kinds = locus.changes.iter().flat_map(|c| [&c.before, &c.after]);
+    kinds.any(|kinds| kinds.contains("CMP-CNMP"))
+}
+
+/// The values of αv at which zeros meet, with the zeros.
+fn meetings(locus: &Locus, sign: f64) -> String {
+    let changes = locus.changes.iter();
+    let meetings =
+        changes.filter(|c| matches!(c.crossing, Crossing::ImaginaryAxis | Crossing::RealAxis));
+    let texts: Vec<String> = meetings
+        .map(|c| {
+            let (value, size) = (signed(sign / c.value, 4), signed(c.s.norm(), 4));
+            format!("αv = {value} at {size}")
+        })
+        .collect();
+    texts.join("; ")
 }
 
 pub(in super::super) fn fig_3_10(_: &Runs) -> Result<Content, FigureError> {
@@ -266,126 +264,131 @@ fn model_3_9(size: f64) -> Model {
     ])
 }
 
+/// Sizes of the residues in the Bode plot and the step response of Fig 3-12, and the printed zeros.
+const CASES_3_12: [(f64, Colour, &str); 3] = [
+    (0.01, BLUE, "dual MMP"),
+    (5.0, GREEN, "CMP-CNMP"),
+    (21.0, VERMILION, "dual RMP-RNMP"),
+];
+/// Sizes of the residues in the migration of the zeros and the beginning of the step response.
+const SIZES_3_12: [(f64, Colour); 5] = [
+    (0.5, BLUE),
+    (5.0, GREEN),
+    (10.0, PURPLE),
+    (15.0, ORANGE),
+    (21.0, VERMILION),
+];
+
+fn bode_3_12() -> Result<(Chart, Chart), FigureError> {
+    let curve = |(size, colour, _): (f64, Colour, &str)| {
+        let points = response(&eq_3_9(size)?, 0.3, 50.0)?;
+        Ok(Curve::new(
+            &format!("α0 = {size}"),
+            Pen::solid(colour),
+            points,
+        ))
+    };
+    let curves = CASES_3_12.into_iter().map(curve);
+    let curves = curves.collect::<Result<Vec<_>, FigureError>>()?;
+    Ok(bode("(a) Bode plot", W, "|G| (m/N)", &curves))
+}
+
+/// Adds the step responses of Eq. (3-9) for some sizes of the residues.
+fn steps_3_9(
+    mut chart: Chart,
+    sizes: impl IntoIterator<Item = (f64, Colour)>,
+    seconds: f64,
+    count: usize,
+) -> Result<Chart, FigureError> {
+    for (size, colour) in sizes {
+        let points = step(&eq_3_9(size)?, seconds, count);
+        chart = chart.line(&format!("α0 = {size}"), Pen::solid(colour), points);
+    }
+    Ok(chart)
+}
+
+fn migration_3_12(locus: &Locus) -> Result<Chart, FigureError> {
+    let heading = "(c) Migration of the zeros, mode R as a double integrator";
+    let map = plane(heading, (-34.0, 34.0), (-2.0, 18.0));
+    let map = tracks(map, "zeros", Pen::solid(INK), locus, Part::Upper);
+    let mut map = changes(map, locus);
+    for (size, colour) in SIZES_3_12 {
+        let zeros = places(&equal_pair(size)?.undamped_zeros()?);
+        map = map.points(&format!("α0 = {size}"), colour, Symbol::Ring, zeros);
+    }
+    Ok(map)
+}
+
+/// Zero crossings and reversals at the beginning of each step response.
+fn compare_beginnings(mut content: Content) -> Result<Content, FigureError> {
+    for (size, _) in SIZES_3_12 {
+        let start = initial(&eq_3_9(size)?);
+        let early = start.zero_crossings_s.iter().filter(|t| **t < 0.6).count();
+        let reversals = start.reversals_s.len();
+        let end = signed(start.initial_s, 2);
+        content = content.compare(Comparison::unprinted(
+            &format!("beginning, α0 = {size}"),
+            format!("{early} zero crossings, {reversals} reversals of direction before {end} s"),
+        ));
+    }
+    Ok(content)
+}
+
+/// α01 and α02 of section 3.2.4 by the locus over αR, of which they are the reciprocal.
+fn compare_break_points(content: Content, locus: &Locus) -> Content {
+    let at = |crossing| {
+        let change = locus
+            .changes
+            .iter()
+            .find(|change| change.crossing == crossing);
+        change.map_or(f64::NAN, |change| 1.0 / change.value)
+    };
+    let (imaginary, real) = (at(Crossing::ImaginaryAxis), at(Crossing::RealAxis));
+    let a01 = "α01 = (wv − wu)/(wv + wu), at the imaginary axis";
+    let a02 = "α02 = (wv + wu)/(wv − wu), at the real axis";
+    content
+        .compare(
+            Comparison::within(a01, 1.0 / 21.0, 6, imaginary, "", 1e-9)
+                .remark("the printed sign is wrong; compared: the locus with the formula"),
+        )
+        .compare(
+            Comparison::within(a02, 21.0, 0, real, "", 1e-6)
+                .remark("compared: the locus with the formula"),
+        )
+}
+
 pub(in super::super) fn fig_3_12(_: &Runs) -> Result<Content, FigureError> {
-    let cases = [
-        (0.01, BLUE, "dual MMP"),
-        (5.0, GREEN, "CMP-CNMP"),
-        (21.0, VERMILION, "dual RMP-RNMP"),
-    ];
     let mut content = Content::new("A slow mode R and two close modes with growing residues: Bode plot, step response, migration of the zeros, and the beginning of the step response.")
         .setting("Eq. (3-9); αu = −α0, αv = α0 (printed as αu = α0), α0 = 0.01, 5 and 21 1/kg");
-    let mut curves = Vec::new();
-    let mut steps = step_chart("(b) Step response", 10.0);
-    for (size, colour, expected) in cases {
-        let sum = eq_3_9(size)?;
-        curves.push(Curve::new(
-            &format!("α0 = {size}"),
-            Pen::solid(colour),
-            response(&sum, 0.3, 50.0)?,
-        ));
-        steps = steps.line(
-            &format!("α0 = {size}"),
-            Pen::solid(colour),
-            step(&sum, 10.0, 3001),
-        );
+    for (size, _, expected) in CASES_3_12 {
+        let zeros = kinds(&eq_3_9(size)?.undamped_zeros()?);
         content = content
             .compare(Comparison::words(
                 &format!("zeros, α0 = {size}"),
                 expected,
-                &kinds(&sum.undamped_zeros()?),
+                &zeros,
             ))
             .command(model_3_9(size).command("model step", ""));
     }
-    let (gain, phase) = bode("(a) Bode plot", W, "|G| (m/N)", &curves);
-    // α0 over αR = 1, with mode R as a double integrator: α01 and α02 of section 3.2.4.
+    let (gain, phase) = bode_3_12()?;
+    let cases = CASES_3_12.map(|(size, colour, _)| (size, colour));
+    let steps = steps_3_9(step_chart("(b) Step response", 10.0), cases, 10.0, 3001)?;
+    let starts = zero_line(step_chart("(d) Beginning of the step response", 0.5));
+    let starts = steps_3_9(starts, SIZES_3_12, 0.5, 501)?;
+    // α0 over αR = 1, with mode R as a double integrator.
     let model = Model::modes(&[
         ModeOf("R", 0.0, 1.0, 0.0),
         ModeOf("u", 10.0, -1.0, 0.0),
         ModeOf("v", 11.0, 1.0, 0.0),
     ]);
-    let locus_of = locus(
-        &model.varied(KEY)?,
-        LocusPlane::Undamped,
-        &geometric(1e3, 1e-3, 141),
-    )?;
-    let places = |size: f64| {
-        Ok::<_, FigureError>(super::super::plane::places(
-            &equal_pair(size)?.undamped_zeros()?,
-        ))
-    };
-    let mut map = plane(
-        "(c) Migration of the zeros, mode R as a double integrator",
-        (-34.0, 34.0),
-        (-2.0, 18.0),
-    );
-    map = changes(
-        tracks(map, "zeros", Pen::solid(INK), &locus_of, Part::Upper),
-        &locus_of,
-    );
-    let sizes = [
-        (0.5, BLUE),
-        (5.0, GREEN),
-        (10.0, PURPLE),
-        (15.0, ORANGE),
-        (21.0, VERMILION),
-    ];
-    let mut starts = zero_line(step_chart("(d) Beginning of the step response", 0.5));
-    for (size, colour) in sizes {
-        map = map.points(&format!("α0 = {size}"), colour, Symbol::Ring, places(size)?);
-        let sum = eq_3_9(size)?;
-        starts = starts.line(
-            &format!("α0 = {size}"),
-            Pen::solid(colour),
-            step(&sum, 0.5, 501),
-        );
-        let start = initial(&sum);
-        let early = start.zero_crossings_s.iter().filter(|t| **t < 0.6).count();
-        content = content.compare(Comparison::unprinted(
-            &format!("beginning, α0 = {size}"),
-            format!(
-                "{early} zero crossings, {} reversals of direction before {} s",
-                start.reversals_s.len(),
-                signed(start.initial_s, 2)
-            ),
-        ));
-    }
-    let breaks = |crossing| {
-        locus_of
-            .changes
-            .iter()
-            .find(|change| change.crossing == crossing)
-            .map_or(f64::NAN, |change| 1.0 / change.value)
-    };
-    Ok(content
+    let residues = geometric(1e3, 1e-3, 141);
+    let locus = locus(&model.varied(KEY)?, LocusPlane::Undamped, &residues)?;
+    let content = compare_break_points(compare_beginnings(content)?, &locus)
         .row(220.0, [gain, steps])
         .row(190.0, [phase, starts])
-        .row(300.0, [map])
-        .compare(
-            Comparison::within(
-                "α01 = (wv − wu)/(wv + wu), at the imaginary axis",
-                1.0 / 21.0,
-                6,
-                breaks(Crossing::ImaginaryAxis),
-                "",
-                1e-9,
-            )
-            .remark("the printed sign is flipped; the locus against the formula"),
-        )
-        .compare(
-            Comparison::within(
-                "α02 = (wv + wu)/(wv − wu), at the real axis",
-                21.0,
-                0,
-                breaks(Crossing::RealAxis),
-                "",
-                1e-6,
-            )
-            .remark("the locus against the formula"),
-        )
-        .command(model.command(
-            "model locus",
-            &format!("--vary {KEY} --from 1e3 --to 1e-3 --count 1001"),
-        )))
+        .row(300.0, [migration_3_12(&locus)?]);
+    let range = format!("--vary {KEY} --from 1e3 --to 1e-3 --count 1001");
+    Ok(content.command(model.command("model locus", &range)))
 }
 
 pub(in super::super) fn fig_3_13(_: &Runs) -> Result<Content, FigureError> {
@@ -458,96 +461,112 @@ fn controller(gain: f64, pair: Option<(f64, f64, f64)>) -> String {
     )
 }
 
-/// Name, file of the controller, size of the residues, additional zeros and poles, colour.
-type Case = (
-    &'static str,
-    &'static str,
-    f64,
-    Option<(f64, f64, f64)>,
-    Colour,
-);
+/// A loop of Fig 3-14.
+struct Loop {
+    name: &'static str,
+    /// File of the controller.
+    file: &'static str,
+    /// Size of the residues of u and v in 1/kg.
+    size: f64,
+    /// Additional zeros, poles and their damping ratio.
+    pair: Option<(f64, f64, f64)>,
+    colour: Colour,
+}
+
+/// Damping ratio of modes u and v and of the additional pair.
+const ZETA_3_14: f64 = 0.01;
+
+const LOOPS_3_14: [Loop; 3] = [
+    Loop {
+        name: "Dual MMP",
+        file: "3-14a.controller.toml",
+        size: 0.3,
+        pair: None,
+        colour: BLUE,
+    },
+    Loop {
+        name: "CMP-CNMP",
+        file: "3-14b.controller.toml",
+        size: 1.65,
+        pair: None,
+        colour: VERMILION,
+    },
+    Loop {
+        name: "Dual MMP, with an additional pole-zero pair",
+        file: "3-14c.controller.toml",
+        size: 0.3,
+        pair: Some((11.0, 13.0, ZETA_3_14)),
+        colour: GREEN,
+    },
+];
+
+impl Loop {
+    fn model(&self) -> Model {
+        Model::modes(&[
+            ModeOf("R", 0.0, 7.98, 0.0),
+            ModeOf("u", 10.0, -self.size, ZETA_3_14),
+            ModeOf("v", 12.0, self.size, ZETA_3_14),
+        ])
+        .set("motor.force_constant_n_per_a=1.0")
+    }
+
+    fn controller(&self) -> String {
+        controller(13.7 / 1.82, self.pair)
+    }
+
+    /// L.
+    fn curve(&self) -> Result<Curve, FigureError> {
+        let (sum, text) = (self.model().sum()?, self.controller());
+        let name = self.file.into();
+        let sections = ControllerText { name, text }.sections(5000.0)?;
+        let features = [10.0, 12.0, 11.0, 13.0].map(|w| (w, ZETA_3_14));
+        let frequencies = control::grid(1.5, 200.0, &features).into_iter();
+        let points = frequencies.map(|w| {
+            let s = nalgebra::Complex::new(0.0, w);
+            (w, sum.response(s) * continuous_response(&sections, s))
+        });
+        Ok(Curve::new("L", Pen::solid(self.colour), points.collect()))
+    }
+
+    /// The Nyquist plot; for the additional pair also its part near -1.
+    fn charts(&self, curve: &Curve) -> Vec<Chart> {
+        let high = curve.points.iter().filter(|(w, _)| *w > 8.0);
+        let size = high.map(|(_, l)| l.norm()).fold(1.4, f64::max);
+        let near = self.pair.map(|_| polar("the same near −1", curve, 1.5));
+        let whole = polar(self.name, curve, size);
+        std::iter::once(whole).chain(near).collect()
+    }
+
+    fn compare(&self, content: Content, curve: &Curve) -> Result<Content, FigureError> {
+        let model = self.model();
+        let distances = curve.points.iter().map(|(_, l)| (l + 1.0).norm());
+        let least = signed(distances.fold(f64::INFINITY, f64::min), 3);
+        let zeros = kinds(&model.sum()?.undamped_zeros()?);
+        let options = format!("--continuous --controller {}", self.file);
+        Ok(content
+            .compare(Comparison::unprinted(
+                self.name,
+                format!("{zeros}; least |1 + L| {least}"),
+            ))
+            .file(self.file, &self.controller())
+            .command(model.command("margins", &options)))
+    }
+}
+
+fn polar(heading: &str, curve: &Curve, size: f64) -> Chart {
+    let (re, im) = ((-size, size), (-1.05 * size, 1.05 * size));
+    critical(nyquist(heading, re, im, "L")).directed("", curve.pen, curve.polar())
+}
 
 pub(in super::super) fn fig_3_14(_: &Runs) -> Result<Content, FigureError> {
-    let zeta = 0.01;
-    let cases: [Case; 3] = [
-        ("Dual MMP", "3-14a.controller.toml", 0.3, None, BLUE),
-        ("CMP-CNMP", "3-14b.controller.toml", 1.65, None, VERMILION),
-        (
-            "Dual MMP, with an additional pole-zero pair",
-            "3-14c.controller.toml",
-            0.3,
-            Some((11.0, 13.0, zeta)),
-            GREEN,
-        ),
-    ];
-    let mut content = Content::new("Nyquist plots of open loops, plant and lead: with two circles of opposite directions one grows towards −1; an additional pair of zeros and poles turns them into one direction.")
+    let mut content = Content::new("Nyquist plots of open loops, plant and lead. With two circles in opposite directions one of them grows towards −1; an additional pair of zeros and poles turns both into the same direction.")
         .setting("plant of Eq. (6-3)")
         .assumed("the controllers, which the thesis does not print: the lead of Eq. (6-4) with a crossover near 4 rad/s; αR = 7.98, αv = −αu = 0.3 (dual MMP) and 1.65 1/kg (CMP-CNMP), wu = 10, wv = 12 rad/s, damping ratio 0.01; additional zeros at 11, poles at 13 rad/s");
     let mut charts = Vec::new();
-    for (name, file, size, pair, colour) in cases {
-        let text = controller(13.7 / 1.82, pair);
-        let model = Model::modes(&[
-            ModeOf("R", 0.0, 7.98, 0.0),
-            ModeOf("u", 10.0, -size, zeta),
-            ModeOf("v", 12.0, size, zeta),
-        ])
-        .set("motor.force_constant_n_per_a=1.0");
-        let sum = model.sum()?;
-        let sections = ControllerText {
-            name: file.into(),
-            text: text.clone(),
-        }
-        .sections(5000.0)?;
-        let features = [(10.0, zeta), (12.0, zeta), (11.0, zeta), (13.0, zeta)];
-        let at = |w: f64| {
-            let s = nalgebra::Complex::new(0.0, w);
-            (w, sum.response(s) * continuous_response(&sections, s))
-        };
-        let curve = Curve::new(
-            "L",
-            Pen::solid(colour),
-            control::grid(1.5, 200.0, &features)
-                .into_iter()
-                .map(at)
-                .collect(),
-        );
-        let size = curve
-            .points
-            .iter()
-            .filter(|(w, _)| *w > 8.0)
-            .map(|(_, l)| l.norm())
-            .fold(1.4, f64::max);
-        let polar = |heading: &str, size: f64| {
-            critical(nyquist(
-                heading,
-                (-size, size),
-                (-1.05 * size, 1.05 * size),
-                "L",
-            ))
-            .directed("", curve.pen, curve.polar())
-        };
-        charts.push(polar(name, size));
-        if pair.is_some() {
-            charts.push(polar("the same near −1", 1.5));
-        }
-        content = content
-            .compare(Comparison::unprinted(
-                name,
-                format!(
-                    "{}; least |1 + L| {}",
-                    kinds(&sum.undamped_zeros()?),
-                    signed(
-                        curve
-                            .points
-                            .iter()
-                            .map(|(_, l)| (l + 1.0).norm())
-                            .fold(f64::INFINITY, f64::min),
-                        3
-                    )
-                ),
-            ))
-            .file(file, &text)
-            .command(model.command("margins", &format!("--continuous --controller {file}")));
+    for one in &LOOPS_3_14 {
+        let curve = one.curve()?;
+        charts.extend(one.charts(&curve));
+        content = one.compare(content, &curve)?;
     }
     let second = charts.split_off(2);
     Ok(content.row(380.0, charts).row(380.0, second))

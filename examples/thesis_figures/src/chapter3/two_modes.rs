@@ -108,9 +108,27 @@ pub(in super::super) fn fig_3_8(_: &Runs) -> Result<Content, FigureError> {
     migration(5.0, &segments, content)
 }
 
-pub(in super::super) fn fig_3_3(_: &Runs) -> Result<Content, FigureError> {
+/// The sizes of a double integrator and of a mode with their sum, and the phase of the sum, with the frequency of the zero.
+fn decomposed(heading: &str, residue: f64) -> Result<((Chart, Chart), f64), FigureError> {
     let over = dense(1.0, 100.0, &[10.0]);
-    let mut content = Content::new("A double integrator u and a mode v, in phase and out of phase: sizes of both and of their sum G, and the phase of G. Where both have one size and opposite signs there is a pair of MMP zeros.")
+    let damped = sum(&[(0.0, 0.0, 1.0), (10.0, 0.001, residue)])?;
+    let g = Curve::new("G", Pen::solid(INK), response(&damped, 1.0, 100.0)?);
+    let (gain, phase) = bode(heading, W, "Size (m/N)", &[g]);
+    let zeros = sum(&[(0.0, 0.0, 1.0), (10.0, 0.0, residue)])?.undamped_zeros()?;
+    let mut upper = zeros
+        .iter()
+        .filter(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0);
+    let zero = upper.next().map_or(f64::NAN, |zero| zero.s.im);
+    let y = gain.y.clone().within(1e-6, 1e2);
+    let gain = Chart { y, ..gain }
+        .line("mode u", Pen::dashed(BLUE), part(0.0, 1.0, &over))
+        .line("mode v", Pen::dashed(VERMILION), part(10.0, residue, &over))
+        .points("MMP zeros", GREEN, Symbol::Ring, part(0.0, 1.0, &[zero]));
+    Ok(((gain, phase), zero))
+}
+
+pub(in super::super) fn fig_3_3(_: &Runs) -> Result<Content, FigureError> {
+    let mut content = Content::new("A double integrator u and a mode v, in phase and out of phase: sizes of both and of their sum G, and the phase of G. Where both have the same size and opposite signs there is a pair of MMP zeros.")
         .setting("Eq. (3-3)")
         .assumed("αu = 1 1/kg, wv = 10 rad/s, αv = 0.5 (a) and −0.5 1/kg (b); the sum with a damping ratio of 0.001 in mode v");
     let (mut gains, mut phases) = (Vec::new(), Vec::new());
@@ -118,42 +136,19 @@ pub(in super::super) fn fig_3_3(_: &Runs) -> Result<Content, FigureError> {
         ("(a) In phase", 0.5, "(0, wv)"),
         ("(b) Out of phase", -0.5, "(wv, ∞)"),
     ] {
-        let damped = sum(&[(0.0, 0.0, 1.0), (10.0, 0.001, residue)])?;
-        let g = Curve::new("G", Pen::solid(INK), response(&damped, 1.0, 100.0)?);
-        let (gain, phase) = bode(heading, W, "Size (m/N)", &[g]);
-        let undamped = sum(&[(0.0, 0.0, 1.0), (10.0, 0.0, residue)])?;
-        let zeros = undamped.undamped_zeros()?;
-        let zero = zeros
-            .iter()
-            .find(|zero| zero.kind == ZeroKind::Mmp && zero.s.im > 0.0)
-            .map_or(f64::NAN, |zero| zero.s.im);
-        let both = part(0.0, 1.0, &[zero]);
-        let gain = Chart {
-            y: gain.y.clone().within(1e-6, 1e2),
-            ..gain
-        }
-        .line("mode u", Pen::dashed(BLUE), part(0.0, 1.0, &over))
-        .line("mode v", Pen::dashed(VERMILION), part(10.0, residue, &over))
-        .points("MMP zeros", GREEN, Symbol::Ring, both);
+        let ((gain, phase), zero) = decomposed(heading, residue)?;
         gains.push(gain);
         phases.push(phase);
-        let inside = if zero < 10.0 { "(0, wv)" } else { "(wv, ∞)" };
+        let found = if zero < 10.0 { "(0, wv)" } else { "(wv, ∞)" };
+        let what = format!("MMP zeros, αv = {}", signed(residue, 1));
+        let remark = format!("at {} rad/s", signed(zero, 4));
+        let model = Model::modes(&[
+            ModeOf("u", 0.0, 1.0, 0.0),
+            ModeOf("v", 10.0, residue, 0.001),
+        ]);
         content = content
-            .compare(
-                Comparison::words(
-                    &format!("MMP zeros, αv = {}", signed(residue, 1)),
-                    place,
-                    inside,
-                )
-                .remark(&format!("at {} rad/s", signed(zero, 4))),
-            )
-            .command(
-                Model::modes(&[
-                    ModeOf("u", 0.0, 1.0, 0.0),
-                    ModeOf("v", 10.0, residue, 0.001),
-                ])
-                .command("model modes", ""),
-            );
+            .compare(Comparison::words(&what, place, found).remark(&remark))
+            .command(model.command("model modes", ""));
     }
     Ok(content.row(240.0, gains).row(150.0, phases))
 }
@@ -220,86 +215,113 @@ fn eq_3_4(residue: f64) -> Result<ModalSum, FigureError> {
     sum(&[(1.0, 0.001, 1.0), (10.0, 0.001, residue)])
 }
 
-pub(in super::super) fn fig_3_5(_: &Runs) -> Result<Content, FigureError> {
-    let mut content = Content::new(
-        "The MMP and the RMP-RNMP case: Bode plots, step responses, and the beginning of these.",
-    )
-    .setting("Eq. (3-4) with αv = −0.5 and −5 1/kg, damping ratio 0.001");
-    let (mut gains, mut phases, mut steps, mut starts) =
-        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (letters, residue, colour, end, undershoot) in [
-        (["a", "c"], -0.5, BLUE, 180.0, "no"),
-        (["b", "d"], -5.0, VERMILION, 360.0, "yes"),
-    ] {
-        let sum = eq_3_4(residue)?;
-        let curve = Curve::new("G", Pen::solid(colour), response(&sum, 0.1, 100.0)?);
-        let last = curve.phase_deg().last().map_or(f64::NAN, |point| point.1);
+/// One column of Fig 3-5.
+struct Column {
+    /// Letters of the Bode plot and of the step response.
+    letters: [char; 2],
+    residue: f64,
+    colour: Colour,
+    /// Printed phase lag at high frequency in degrees.
+    lag_deg: f64,
+    /// Printed: whether there is initial undershoot.
+    undershoot: &'static str,
+}
+
+const COLUMNS_3_5: [Column; 2] = [
+    Column {
+        letters: ['a', 'c'],
+        residue: -0.5,
+        colour: BLUE,
+        lag_deg: 180.0,
+        undershoot: "no",
+    },
+    Column {
+        letters: ['b', 'd'],
+        residue: -5.0,
+        colour: VERMILION,
+        lag_deg: 360.0,
+        undershoot: "yes",
+    },
+];
+
+impl Column {
+    fn name(&self) -> String {
+        format!("αv = {}", signed(self.residue, 1))
+    }
+
+    fn curve(&self) -> Result<Curve, FigureError> {
+        let points = response(&eq_3_4(self.residue)?, 0.1, 100.0)?;
+        Ok(Curve::new("G", Pen::solid(self.colour), points))
+    }
+
+    /// Gain, phase, step response, and its beginning.
+    fn charts(&self) -> Result<[Chart; 4], FigureError> {
+        let (sum, pen, name) = (eq_3_4(self.residue)?, Pen::solid(self.colour), self.name());
+        let [first, second] = self.letters;
         let (gain, phase) = bode(
-            &format!("({}) αv = {}", letters[0], signed(residue, 1)),
+            &format!("({first}) {name}"),
             W,
             "|G| (m/N)",
-            &[curve],
+            &[self.curve()?],
         );
-        gains.push(gain);
-        phases.push(phase);
-        steps.push(
-            step_chart(
-                &format!(
-                    "({}) Step response, αv = {}",
-                    letters[1],
-                    signed(residue, 1)
-                ),
-                10.0,
-            )
-            .line("", Pen::solid(colour), step(&sum, 10.0, 2001)),
+        let whole = step_chart(&format!("({second}) Step response, {name}"), 10.0);
+        let start = zero_line(step_chart(&format!("({second}) its beginning"), 0.6));
+        Ok([
+            gain,
+            phase,
+            whole.line("", pen, step(&sum, 10.0, 2001)),
+            start.line("", pen, step(&sum, 0.6, 601)),
+        ])
+    }
+
+    fn compare(&self, content: Content) -> Result<Content, FigureError> {
+        let (sum, name) = (eq_3_4(self.residue)?, self.name());
+        let last = self
+            .curve()?
+            .phase_deg()
+            .last()
+            .map_or(f64::NAN, |point| point.1);
+        let has_undershoot = initial(&sum).has_undershoot();
+        let found = if has_undershoot { "yes" } else { "no" };
+        let (phase, undershoot) = (
+            format!("phase at high frequency, {name}"),
+            format!("initial undershoot, {name}"),
         );
-        starts.push(
-            zero_line(step_chart(&format!("({}) its beginning", letters[1]), 0.6)).line(
-                "",
-                Pen::solid(colour),
-                step(&sum, 0.6, 601),
-            ),
-        );
-        let seen = if initial(&sum).has_undershoot() {
-            "yes"
-        } else {
-            "no"
-        };
-        let at = format!("αv = {}", signed(residue, 1));
-        content = content
+        let model = Model::modes(&[
+            ModeOf("u", 1.0, 1.0, 0.001),
+            ModeOf("v", 10.0, self.residue, 0.001),
+        ]);
+        Ok(content
             .compare(
-                Comparison::within(
-                    &format!("phase at high frequency, {at}"),
-                    -end,
-                    0,
-                    last,
-                    "deg",
-                    1.0,
-                )
-                .remark("at 100 rad/s, with damping"),
+                Comparison::within(&phase, -self.lag_deg, 0, last, "deg", 1.0)
+                    .remark("at 100 rad/s, with damping"),
             )
-            .compare(Comparison::words(
-                &format!("initial undershoot, {at}"),
-                undershoot,
-                seen,
-            ))
+            .compare(Comparison::words(&undershoot, self.undershoot, found))
             .compare(Comparison::unprinted(
-                &format!("zeros, {at}"),
+                &format!("zeros, {name}"),
                 kinds(&sum.undamped_zeros()?),
             ))
-            .command(
-                Model::modes(&[
-                    ModeOf("u", 1.0, 1.0, 0.001),
-                    ModeOf("v", 10.0, residue, 0.001),
-                ])
-                .command("model step", ""),
-            );
+            .command(model.command("model step", "")))
     }
-    Ok(content
-        .row(200.0, gains)
-        .row(140.0, phases)
-        .row(180.0, steps)
-        .row(160.0, starts))
+}
+
+pub(in super::super) fn fig_3_5(_: &Runs) -> Result<Content, FigureError> {
+    let mut content = Content::new(
+        "The MMP and the RMP-RNMP case: Bode plots, step responses, and their beginning.",
+    )
+    .setting("Eq. (3-4) with αv = −0.5 and −5 1/kg, damping ratio 0.001");
+    let mut rows: [Vec<Chart>; 4] = Default::default();
+    for column in &COLUMNS_3_5 {
+        for (row, chart) in rows.iter_mut().zip(column.charts()?) {
+            row.push(chart);
+        }
+        content = column.compare(content)?;
+    }
+    let heights = [200.0, 140.0, 180.0, 160.0];
+    Ok(heights
+        .into_iter()
+        .zip(rows)
+        .fold(content, |content, (height, row)| content.row(height, row)))
 }
 
 pub(in super::super) fn fig_3_6(_: &Runs) -> Result<Content, FigureError> {

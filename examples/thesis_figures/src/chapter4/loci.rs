@@ -63,6 +63,19 @@ fn drawn(chart: Chart, name: &str, pen: Pen, pair: &Pair, scale: (f64, f64)) -> 
         .line("", pen, scaled(&pair.fast))
 }
 
+/// The veering point, which is printed for ρ = 0.01 alone.
+fn compare_place(rho: f64, pair: &Pair) -> Comparison {
+    if rho == 0.01 {
+        let what = "veering point at ρ = 0.01 (section 4.4.1: close to 0.02)";
+        return Comparison::number(what, 0.02, 2, pair.value, "N/m");
+    }
+    let (value, omega) = (signed(pair.value, 5), signed(pair.omega_rad_s, 4));
+    Comparison::unprinted(
+        &format!("closest point, ρ = {rho}"),
+        format!("k = {value} N/m, {omega} rad/s"),
+    )
+}
+
 pub(crate) fn fig_4_1(_: &Runs) -> Result<Content, FigureError> {
     let values = even(0.0, 0.03, 121);
     let mut chart = Chart::new(
@@ -73,7 +86,11 @@ pub(crate) fn fig_4_1(_: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("Loci of the two close modes of three masses over the stiffness that couples them. (a) is a drawing of the model: ground –kb– mb, mb –k1– mu, mb –k2– mv, mu –k– mv.")
         .setting("profile three-mass with mb = 50 kg, k1 = k2 = kb = 1 N/m, mu = 1 kg, mv = 1 + ρ kg")
         .assumed("values of ρ between the printed ends of 0 and 0.01: 0.005");
-    for (rho, colour) in [(0.0, INK), (0.005, BLUE), (0.01, VERMILION)] {
+    for (rho, colour, expected) in [
+        (0.0, INK, "crossing"),
+        (0.005, BLUE, "veering"),
+        (0.01, VERMILION, "veering"),
+    ] {
         let model = Model::profile("three-mass")
             .set("plant.nodes.b.mass_kg=50.0")
             .set(&format!("plant.nodes.v.mass_kg={:?}", 1.0 + rho));
@@ -85,34 +102,15 @@ pub(crate) fn fig_4_1(_: &Runs) -> Result<Content, FigureError> {
             &pair,
             (1.0, 1.0),
         );
-        let expected = if rho == 0.0 { "crossing" } else { "veering" };
+        let range = format!("--vary {K} --from 0 --to 0.03 --modes 2,3");
         content = content
             .compare(Comparison::words(
                 &format!("loci at ρ = {rho}"),
                 expected,
                 pair.meeting,
             ))
-            .command(model.command(
-                "model veering",
-                &format!("--vary {K} --from 0 --to 0.03 --modes 2,3"),
-            ));
-        content = content.compare(match rho == 0.01 {
-            true => Comparison::number(
-                "veering point at ρ = 0.01 (section 4.4.1: close to 0.02)",
-                0.02,
-                2,
-                pair.value,
-                "N/m",
-            ),
-            false => Comparison::unprinted(
-                &format!("where, ρ = {rho}"),
-                format!(
-                    "k = {} N/m, {} rad/s",
-                    signed(pair.value, 5),
-                    signed(pair.omega_rad_s, 4)
-                ),
-            ),
-        });
+            .command(model.command("model veering", &range))
+            .compare(compare_place(rho, &pair));
     }
     Ok(content.row(340.0, [chart]))
 }

@@ -8,7 +8,7 @@ use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, step};
 use nalgebra::Complex;
 
-use bench::control::{self, ClosedLoop, ControllerText};
+use bench::control::{self, ClosedLoop, ControllerText, Margins};
 use bench::model::zeros::sign_sequence;
 use bench::report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale};
@@ -97,74 +97,103 @@ fn spread(values: &[f64]) -> f64 {
     high - low
 }
 
+/// Damping ratios of the plant in Fig 6-2; the second is that of the open loop and the step.
+const DAMPINGS_6_2: [f64; 3] = [0.001, 0.01, 0.05];
+const FILE_6_2: &str = "6-2.controller.toml";
+
+fn loops_6_2() -> Result<Vec<(Curve, ClosedLoop)>, FigureError> {
+    let pens = [
+        Pen::dashed(COLOURS[0]),
+        Pen::solid(COLOURS[1]),
+        Pen::dashed(COLOURS[2]),
+    ];
+    let cases = DAMPINGS_6_2.into_iter().zip(pens);
+    cases
+        .map(|(zeta, pen)| {
+            let of = closed_loop(&eq_6_1(zeta), FILE_6_2, Some(EQ_6_2))?;
+            let curve = Curve::new(&format!("ζ = {zeta}"), pen, open(&of, 0.1, 100.0));
+            Ok((curve, of))
+        })
+        .collect()
+}
+
+/// The largest |T| at the resonance in dB.
+fn resonance_peak_db(t: &Curve) -> f64 {
+    let high = t.points.iter().filter(|(w, _)| *w > 5.0);
+    let peak = high.map(|(_, t)| t.norm()).fold(0.0, f64::max);
+    20.0 * peak.log10()
+}
+
+fn compare_6_2(
+    content: Content,
+    loops: &[(Curve, ClosedLoop)],
+    closed: &[Curve],
+) -> Result<Content, FigureError> {
+    let margins = loops.iter().map(|(_, of)| of.continuous_margins());
+    let margins = margins.collect::<Result<Vec<_>, _>>()?;
+    let crossover = margins[1].crossover_rad_s.unwrap_or(f64::NAN) / 10.0;
+    let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
+    let peaks: Vec<f64> = closed.iter().map(resonance_peak_db).collect();
+    let is_closer = peaks.windows(2).all(|pair| pair[0].abs() < pair[1].abs());
+    Ok(content
+        .compare(Comparison::within(
+            "crossover as a ratio of the first resonance",
+            0.1,
+            1,
+            crossover,
+            "",
+            0.05,
+        ))
+        .compare(
+            Comparison::holds(
+                "modulus margin with damping 0.001, 0.01, 0.05",
+                "unchanged regardless of the damping ratio",
+                spread(&moduli) < 0.02,
+                &listed(&moduli, 3),
+            )
+            .remark("equal within 0.02: the circle of the resonance grows away from -1"),
+        )
+        .compare(Comparison::holds(
+            "peak of |T| at the resonance with damping 0.001, 0.01, 0.05, in dB",
+            "the smaller the damping, the closer to 0 dB",
+            is_closer,
+            &listed(&peaks, 2),
+        )))
+}
+
 pub(in super::super) fn fig_6_2(_: &Runs) -> Result<Content, FigureError> {
-    let dampings = [0.001, 0.01, 0.05];
-    let file = "6-2.controller.toml";
-    let loops = dampings
+    let loops = loops_6_2()?;
+    let closed = loops
         .iter()
-        .map(|zeta| closed_loop(&eq_6_1(*zeta), file, Some(EQ_6_2)))
-        .collect::<Result<Vec<_>, _>>()?;
-    let pen = |k: usize| {
-        if k == 1 {
-            Pen::solid(COLOURS[k])
-        } else {
-            Pen::dashed(COLOURS[k])
-        }
-    };
-    let name = |k: usize| format!("ζ = {}", dampings[k]);
-    let ls: Vec<Curve> = loops
-        .iter()
-        .enumerate()
-        .map(|(k, of)| Curve::new(&name(k), pen(k), open(of, 0.1, 100.0)))
-        .collect();
-    let ts: Vec<Curve> = ls
-        .iter()
-        .map(|l| Curve::new(&l.name, l.pen, closed(&l.points)))
-        .collect();
-    let (a, a_phase) = bode("(a) Open loop L = P C", W, "|L|", &ls[1..2]);
-    let (c, c_phase) = bode("(c) Closed loop T = L/(1 + L)", W, "|T|", &ts);
-    let b = ls.iter().fold(
-        critical(nyquist(
-            "(b) Nyquist plot of L",
-            (-1.6, 3.4),
-            (-2.5, 2.5),
-            "L",
-        )),
-        |chart, l| chart.directed(&l.name, l.pen, l.polar()),
-    );
+        .map(|(l, _)| Curve::new(&l.name, l.pen, closed(&l.points)));
+    let closed: Vec<Curve> = closed.collect();
+    let (l, of) = &loops[1];
+    let (a, a_phase) = bode("(a) Open loop L = P C", W, "|L|", std::slice::from_ref(l));
+    let (c, c_phase) = bode("(c) Closed loop T = L/(1 + L)", W, "|T|", &closed);
+    let mut b = critical(nyquist(
+        "(b) Nyquist plot of L",
+        (-1.6, 3.4),
+        (-2.5, 2.5),
+        "L",
+    ));
+    for (l, _) in &loops {
+        b = b.directed(&l.name, l.pen, l.polar());
+    }
     let d = Chart::new(
         "(d) Step response of T",
         Scale::linear("Time (s)").within(0.0, 12.0),
         Scale::linear("Position/step (1)"),
     )
-    .line("ζ = 0.01", pen(1), step(&loops[1], 12.0));
-    let margins: Vec<_> = loops
-        .iter()
-        .map(ClosedLoop::continuous_margins)
-        .collect::<Result<_, _>>()?;
-    let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
-    let peaks: Vec<f64> = ts
-        .iter()
-        .map(|t| {
-            t.points
-                .iter()
-                .filter(|(w, _)| *w > 5.0)
-                .map(|(_, t)| t.norm())
-                .fold(0.0, f64::max)
-        })
-        .collect();
-    let decibels: Vec<f64> = peaks.iter().map(|peak| 20.0 * peak.log10()).collect();
-    Ok(Content::new("A controller with a bandwidth below the first resonance: open loop, Nyquist plot with three damping ratios of the plant, closed loop and its step response.")
-        .setting("plant of Eq. (6-1), w = 10 rad/s, damping ratio 0.01 where no other is named; controller of Eq. (6-2); continuous time, the step sampled at 5 kHz")
+    .line(&l.name, l.pen, step(of, 12.0));
+    let content = Content::new("A controller with a bandwidth below the first resonance: open loop, Nyquist plot with three damping ratios of the plant, closed loop and its step response.")
+        .setting("plant of Eq. (6-1), w = 10 rad/s, damping ratio 0.01 unless another is named; controller of Eq. (6-2); continuous time, the step sampled at 5 kHz")
         .assumed("damping ratios of the other two curves: 0.001 and 0.05")
         .row(190.0, [a, c])
         .row(160.0, [a_phase, c_phase])
-        .row(400.0, [b, d])
-        .compare(Comparison::within("crossover as a ratio of the first resonance", 0.1, 1, margins[1].crossover_rad_s.unwrap_or(f64::NAN) / 10.0, "", 0.05))
-        .compare(Comparison::holds("modulus margin with damping 0.001, 0.01, 0.05", "unchanged regardless of the damping ratio", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02: the circle of the resonance grows away from -1"))
-        .compare(Comparison::holds("peak of |T| at the resonance with damping 0.001, 0.01, 0.05, in dB", "the smaller the damping, the closer to 0 dB", decibels[0].abs() < decibels[1].abs() && decibels[1].abs() < decibels[2].abs(), &listed(&decibels, 2)))
-        .file(file, EQ_6_2)
-        .command(margins_command(&eq_6_1(0.01), file)))
+        .row(400.0, [b, d]);
+    Ok(compare_6_2(content, &loops, &closed)?
+        .file(FILE_6_2, EQ_6_2)
+        .command(margins_command(&eq_6_1(0.01), FILE_6_2)))
 }
 
 /// Bode plot, poles and zeros, and Nyquist plot of a plant of Eq. (6-3).
@@ -288,30 +317,37 @@ pub(in super::super) fn fig_6_5(_: &Runs) -> Result<Content, FigureError> {
         .command(plant.model.command("model modes", "")))
 }
 
-pub(in super::super) fn fig_6_4(_: &Runs) -> Result<Content, FigureError> {
-    let (file, text) = ("6-4.controller.toml", eq_6_4());
-    let dampings = [0.0005, 0.001, 0.002, 0.01];
+fn bode_of_notch() -> Result<(Chart, Chart), FigureError> {
     let notch = ControllerText {
         name: "notch".into(),
         text: format!("title = \"notch\"\n{}", notch()),
-    }
-    .sections(5000.0)?;
-    let at = |w: f64| (w, notch[0].response(Complex::new(0.0, w)));
-    let of_notch = control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)])
-        .into_iter()
-        .map(at);
-    let (gain, phase) = bode(
-        "(a) Notch of Eq. (6-4)",
-        W,
-        "Magnitude (1)",
-        &[Curve::new("", Pen::solid(BLUE), of_notch.collect())],
-    );
-    let mut wide = critical(nyquist(
-        "(b) Nyquist plot of L, with four damping ratios of the plant",
-        (-14.0, 14.0),
-        (-14.0, 14.0),
-        "L",
-    ));
+    };
+    let notch = notch.sections(5000.0)?;
+    let frequencies = control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)]).into_iter();
+    let points = frequencies.map(|w| (w, notch[0].response(Complex::new(0.0, w))));
+    let curve = Curve::new("", Pen::solid(BLUE), points.collect());
+    Ok(bode("(a) Notch of Eq. (6-4)", W, "Magnitude (1)", &[curve]))
+}
+
+fn compare_6_4(content: Content, margins: &[Margins]) -> Content {
+    let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
+    let crossover = margins[1].crossover_rad_s.unwrap_or(f64::NAN);
+    let is_stable = margins.iter().all(|m| m.stable);
+    let stability = match is_stable {
+        true => "stable with all four",
+        false => "unstable",
+    };
+    content
+        .compare(Comparison::within("crossover (printed: around 4)", 4.0, 0, crossover, "rad/s", 0.5))
+        .compare(Comparison::within("modulus margin (printed: around 0.5)", 0.5, 1, moduli[1], "", 0.05).remark("with Eq. (6-4) exactly as printed; the thesis gives crossover and margin as round figures"))
+        .compare(Comparison::holds("modulus margin with damping 0.0005, 0.001, 0.002, 0.01", "unchanged", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02"))
+        .compare(Comparison::holds("closed loop", "stable", is_stable, stability))
+}
+
+pub(in super::super) fn fig_6_4(_: &Runs) -> Result<Content, FigureError> {
+    let (file, text) = ("6-4.controller.toml", eq_6_4());
+    let heading = "(b) Nyquist plot of L, with four damping ratios of the plant";
+    let mut wide = critical(nyquist(heading, (-14.0, 14.0), (-14.0, 14.0), "L"));
     let mut near = critical(nyquist(
         "(b) the same near −1",
         (-2.2, 1.2),
@@ -319,104 +355,110 @@ pub(in super::super) fn fig_6_4(_: &Runs) -> Result<Content, FigureError> {
         "L",
     ));
     let mut margins = Vec::new();
-    for (k, zeta) in dampings.iter().enumerate() {
-        let of = closed_loop(&eq_6_3(-1.65, 1.52, *zeta), file, Some(&text))?;
+    for (zeta, colour) in [0.0005, 0.001, 0.002, 0.01].into_iter().zip(COLOURS) {
+        let of = closed_loop(&eq_6_3(-1.65, 1.52, zeta), file, Some(&text))?;
         let l = Curve::new(
             &format!("ζ = {zeta}"),
-            Pen::solid(COLOURS[k]),
+            Pen::solid(colour),
             open(&of, 1.0, 200.0),
         );
         wide = wide.directed(&l.name, l.pen, l.polar());
         near = near.directed("", l.pen, l.polar());
         margins.push(of.continuous_margins()?);
     }
-    let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
-    Ok(Content::new("The notch between the two modes, and the open loop with the controller of Eq. (6-4): the circles grow away from -1, however light the damping.")
+    let (gain, phase) = bode_of_notch()?;
+    let content = Content::new("The notch between the two modes, and the open loop with the controller of Eq. (6-4): the circles grow away from -1, however light the damping.")
         .setting(format!("{}; controller of Eq. (6-4)", plant_settings(-1.65, 1.52)))
         .assumed("damping ratios of the plant: 0.0005, 0.001, 0.002, 0.01")
         .row(150.0, [gain, phase])
-        .row(430.0, [wide, near])
-        .compare(Comparison::within("crossover (printed: around 4)", 4.0, 0, margins[1].crossover_rad_s.unwrap_or(f64::NAN), "rad/s", 0.5))
-        .compare(Comparison::within("modulus margin (printed: around 0.5)", 0.5, 1, moduli[1], "", 0.05).remark("with Eq. (6-4) exactly as printed; the thesis gives crossover and margin as round figures"))
-        .compare(Comparison::holds("modulus margin with damping 0.0005, 0.001, 0.002, 0.01", "unchanged", spread(&moduli) < 0.02, &listed(&moduli, 3)).remark("equal within 0.02"))
-        .compare(Comparison::holds("closed loop", "stable", margins.iter().all(|m| m.stable), if margins.iter().all(|m| m.stable) { "stable with all four" } else { "unstable" }))
+        .row(430.0, [wide, near]);
+    Ok(compare_6_4(content, &margins)
         .file(file, &text)
         .command(margins_command(&eq_6_3(-1.65, 1.52, 0.001), file)))
 }
 
-pub(in super::super) fn fig_6_6(_: &Runs) -> Result<Content, FigureError> {
-    let model = eq_6_3(1.65, -1.52, 0.001);
-    let cases = [
-        (0.001, "6-6a.controller.toml", BLUE),
-        (0.01, "6-6c.controller.toml", VERMILION),
-    ];
-    let mut content = Content::new("The loop with non-alternating signs and an additional pole-zero pair: as lightly damped as the plant's modes (a, b), and with ten times the damping (c, d).")
-        .setting(format!("{}; controller of Eq. (6-5)", plant_settings(1.65, -1.52)));
-    let mut charts = Vec::new();
-    let mut loops: Vec<(f64, ClosedLoop)> = Vec::new();
-    for (zeta, file, colour) in cases {
-        let text = eq_6_5(zeta);
-        let of = closed_loop(&model, file, Some(&text))?;
-        let l = Curve::new(
-            &format!("L, ζ = {zeta}"),
-            Pen::solid(colour),
-            open(&of, 1.0, 100.0),
-        );
-        charts.push((
-            bode(
-                &format!("({}) Bode plot of L", if zeta < 0.005 { "a" } else { "c" }),
-                W,
-                "|L|",
-                std::slice::from_ref(&l),
-            ),
-            l,
-        ));
-        content = content
-            .file(file, &text)
-            .command(margins_command(&model, file));
-        loops.push((zeta, of));
-    }
-    let [(a, la), (c, lc)] = charts
-        .try_into()
-        .map_err(|_| FigureError::Run("two cases".into()))?;
-    let near = |heading: &str, l: &Curve| {
-        critical(nyquist(heading, (-2.6, 1.4), (-2.0, 2.0), "L")).directed("", l.pen, l.polar())
-    };
-    let between = |of: &ClosedLoop| {
-        let l = of.continuous_loop(9.0).map_or(f64::NAN, |l| l.arg());
-        -360.0 + l.to_degrees().rem_euclid(360.0)
-    };
-    let margins: Vec<_> = loops
-        .iter()
-        .map(|(_, of)| of.continuous_margins())
-        .collect::<Result<_, _>>()?;
-    Ok(content
-        .row(190.0, [a.0, c.0])
-        .row(170.0, [a.1, c.1])
-        .row(420.0, [near("(b) Nyquist plot near −1, ζ = 0.001", &la), near("(d) Nyquist plot near −1, ζ = 0.01", &lc)])
-        .compare(Comparison::within(
-            "phase at which the resonances start and end, ζ = 0.001 (at 9 rad/s; printed: about)",
-            -135.0,
-            0,
-            between(&loops[0].1),
-            "deg",
-            5.0,
-        ))
-        .compare(Comparison::holds(
-            "ζ = 0.001",
-            "all circles grow away from -1",
-            margins[0].stable,
-            &verdict(&margins[0]),
-        ))
-        .compare(Comparison::holds(
-            "ζ = 0.01",
-            "a stability problem: the circle of mode v cannot be turned to a safe place",
-            !margins[1].stable || margins[1].modulus_margin < 0.5 * margins[0].modulus_margin,
-            &verdict(&margins[1]),
-        ).remark("with the printed numbers the loop stays stable, but the circle of mode v has turned towards -1 and the modulus margin falls")))
+/// The loop of Fig 6-6 with one damping ratio of the additional pair.
+struct PairLoop {
+    file: &'static str,
+    text: String,
+    of: ClosedLoop,
+    l: Curve,
 }
 
-fn verdict(margins: &bench::control::Margins) -> String {
+impl PairLoop {
+    fn new(
+        model: &Model,
+        zeta: f64,
+        file: &'static str,
+        colour: Colour,
+    ) -> Result<PairLoop, FigureError> {
+        let text = eq_6_5(zeta);
+        let of = closed_loop(model, file, Some(&text))?;
+        let name = format!("L, ζ = {zeta}");
+        let l = Curve::new(&name, Pen::solid(colour), open(&of, 1.0, 100.0));
+        Ok(PairLoop { file, text, of, l })
+    }
+
+    fn bode(&self, heading: &str) -> (Chart, Chart) {
+        bode(heading, W, "|L|", std::slice::from_ref(&self.l))
+    }
+
+    fn near(&self, heading: &str) -> Chart {
+        let chart = critical(nyquist(heading, (-2.6, 1.4), (-2.0, 2.0), "L"));
+        chart.directed("", self.l.pen, self.l.polar())
+    }
+
+    /// Phase in degrees, from -360 to 0, between the first mode and the resonances.
+    fn phase_between_deg(&self) -> f64 {
+        let l = self.of.continuous_loop(9.0).map_or(f64::NAN, |l| l.arg());
+        -360.0 + l.to_degrees().rem_euclid(360.0)
+    }
+}
+
+pub(in super::super) fn fig_6_6(_: &Runs) -> Result<Content, FigureError> {
+    let model = eq_6_3(1.65, -1.52, 0.001);
+    let light = PairLoop::new(&model, 0.001, "6-6a.controller.toml", BLUE)?;
+    let damped = PairLoop::new(&model, 0.01, "6-6c.controller.toml", VERMILION)?;
+    let (a, c) = (
+        light.bode("(a) Bode plot of L"),
+        damped.bode("(c) Bode plot of L"),
+    );
+    let b = light.near("(b) Nyquist plot near −1, ζ = 0.001");
+    let d = damped.near("(d) Nyquist plot near −1, ζ = 0.01");
+    let mut content = Content::new("The loop with non-alternating signs and an additional pole-zero pair: as lightly damped as the plant's modes (a, b), and with ten times the damping (c, d).")
+        .setting(format!("{}; controller of Eq. (6-5)", plant_settings(1.65, -1.52)));
+    for one in [&light, &damped] {
+        content = content
+            .file(one.file, &one.text)
+            .command(margins_command(&model, one.file));
+    }
+    let content = content
+        .row(190.0, [a.0, c.0])
+        .row(170.0, [a.1, c.1])
+        .row(420.0, [b, d]);
+    compare_6_6(content, &light, &damped)
+}
+
+fn compare_6_6(
+    content: Content,
+    light: &PairLoop,
+    damped: &PairLoop,
+) -> Result<Content, FigureError> {
+    let (safe, near) = (
+        light.of.continuous_margins()?,
+        damped.of.continuous_margins()?,
+    );
+    let is_problem = !near.stable || near.modulus_margin < 0.5 * safe.modulus_margin;
+    let phase =
+        "phase at which the resonances start and end, ζ = 0.001 (at 9 rad/s; printed: about)";
+    Ok(content
+        .compare(Comparison::within(phase, -135.0, 0, light.phase_between_deg(), "deg", 5.0))
+        .compare(Comparison::holds("ζ = 0.001", "all circles grow away from -1", safe.stable, &verdict(&safe)))
+        .compare(Comparison::holds("ζ = 0.01", "a stability problem: the circle of mode v cannot be turned to a safe place", is_problem, &verdict(&near))
+            .remark("with the printed numbers the loop stays stable, but the circle of mode v has turned towards -1 and the modulus margin falls")))
+}
+
+fn verdict(margins: &Margins) -> String {
     let stable = if margins.stable { "stable" } else { "unstable" };
     format!(
         "{stable}, modulus margin {}",

@@ -9,8 +9,8 @@ use super::super::model::{Model, kinds, response};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, sensitivity, step};
 use bench::control::{ControllerText, Margins, continuous_response, step_metrics};
-use bench::model::zeros::sign_sequence;
-use bench::report::colours::{BLUE, GREEN, INK, PURPLE, VERMILION};
+use bench::model::zeros::{cnmp_pairs, sign_sequence, undamped_zeros};
+use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
 
 const W: &str = "Frequency (rad/s)";
@@ -178,102 +178,107 @@ pub(in super::super) fn fig_6_10(_: &Runs) -> Result<Content, FigureError> {
     loop_figure(Which::Fast, "Eq. (6-7)")
 }
 
+/// G of the stage in um/N around the two close modes.
+fn close_modes_curve(point: f64, asymmetry: f64, colour: Colour) -> Result<Curve, FigureError> {
+    let sum = Model::stage().at(point, asymmetry).sum()?;
+    let points = response(&sum, 420.0, 700.0)?.into_iter();
+    let points = points.map(|(w, g)| (w, g * UM)).collect();
+    let name = format!("{:.0} % of L", 100.0 * point);
+    Ok(Curve::new(&name, Pen::solid(colour), points))
+}
+
+/// Signs of the residues and CMP-CNMP zeros at 8 % of L.
+fn compare_asymmetry(
+    content: Content,
+    asymmetry: f64,
+    signs: &str,
+    expected: &str,
+) -> Result<Content, FigureError> {
+    let model = Model::stage().at(0.08, asymmetry);
+    let has_cnmp = cnmp_pairs(&undamped_zeros(&model.structure()?)?) > 0;
+    let found = if has_cnmp { "observed" } else { "eliminated" };
+    let at = format!("at asymmetry {} %", signed(100.0 * asymmetry, 0));
+    let computed = sign_sequence(&model.modal()?);
+    let zeros = format!("CMP-CNMP zeros {at}, 8 % of L");
+    Ok(content
+        .compare(Comparison::words(
+            &format!("signs of the residues {at}"),
+            signs,
+            &computed,
+        ))
+        .compare(Comparison::words(&zeros, expected, found))
+        .command(model.command("model modes", "")))
+}
+
 pub(in super::super) fn fig_6_9(_: &Runs) -> Result<Content, FigureError> {
-    let points = [
-        (0.02, GREEN),
-        (0.04, PURPLE),
-        (0.06, BLUE),
-        (0.08, VERMILION),
-    ];
     let mut content = Content::new("The two close modes as the operating point moves from 2 to 8 % of L, with a positive and a negative mass asymmetry.")
         .setting("profile stage, model without hold and delay")
         .assumed("asymmetries of +10 % and -10 %, operating points of 2, 4, 6 and 8 % of L");
     let (mut gains, mut phases) = (Vec::new(), Vec::new());
-    for (heading, asymmetry, signs) in [
-        ("(a) Asymmetry +10 %", 0.1, "+-+"),
-        ("(b) Asymmetry −10 %", -0.1, "++-"),
+    for (heading, asymmetry, signs, expected) in [
+        ("(a) Asymmetry +10 %", 0.1, "+-+", "observed"),
+        ("(b) Asymmetry −10 %", -0.1, "++-", "eliminated"),
     ] {
-        let curve = |(point, colour): &(f64, _)| {
-            let sum = Model::stage().at(*point, asymmetry).sum()?;
-            let points = response(&sum, 420.0, 700.0)?
-                .into_iter()
-                .map(|(w, g)| (w, g * UM))
-                .collect();
-            Ok(Curve::new(
-                &format!("{:.0} % of L", 100.0 * point),
-                Pen::solid(*colour),
-                points,
-            ))
-        };
-        let curves = points
-            .iter()
-            .map(curve)
-            .collect::<Result<Vec<_>, FigureError>>()?;
+        let points = [
+            (0.02, GREEN),
+            (0.04, PURPLE),
+            (0.06, BLUE),
+            (0.08, VERMILION),
+        ]
+        .into_iter();
+        let curves = points.map(|(point, colour)| close_modes_curve(point, asymmetry, colour));
+        let curves = curves.collect::<Result<Vec<_>, _>>()?;
         let (gain, phase) = bode(heading, W, "|G| (µm/N)", &curves);
         gains.push(gain);
         phases.push(phase);
-        let model = Model::stage().at(0.08, asymmetry);
-        let cnmp = bench::model::zeros::cnmp_pairs(&bench::model::zeros::undamped_zeros(
-            &model.structure()?,
-        )?);
-        let at = format!("at asymmetry {} %", signed(100.0 * asymmetry, 0));
-        let expected = if asymmetry > 0.0 {
-            "observed"
-        } else {
-            "eliminated"
-        };
-        content = content
-            .compare(Comparison::words(
-                &format!("signs of the residues {at}"),
-                signs,
-                &sign_sequence(&model.modal()?),
-            ))
-            .compare(Comparison::words(
-                &format!("CMP-CNMP zeros {at}, 8 % of L"),
-                expected,
-                if cnmp > 0 { "observed" } else { "eliminated" },
-            ))
-            .command(model.command("model modes", ""));
+        content = compare_asymmetry(content, asymmetry, signs, expected)?;
     }
     Ok(content.row(240.0, gains).row(200.0, phases))
 }
 
+/// The least |T| below the crossover, in dB.
+fn dip_db(t: &Curve) -> f64 {
+    let inside = t.points.iter().filter(|(w, _)| (20.0..180.0).contains(w));
+    20.0 * inside
+        .map(|(_, t)| t.norm())
+        .fold(f64::INFINITY, f64::min)
+        .log10()
+}
+
+fn compare_settling(
+    content: Content,
+    which: Which,
+    printed_s: f64,
+    period_s: f64,
+    course: &[(f64, f64)],
+) -> Content {
+    let positions: Vec<f64> = course.iter().map(|point| point.1).collect();
+    let settled = step_metrics(&positions, 1.0, period_s).settling_time_s;
+    let what = format!("settling time, {}", which.name());
+    content
+        .compare(Comparison::number(&what, printed_s, 4, settled.unwrap_or(f64::NAN), "s").remark("to 2 % of the step; it depends on how much of the first mode still rings, whose frequency is 183.9 rad/s here and 179 there"))
+        .command(Model::stage().command("control", &format!("--{}", which.name())))
+}
+
 pub(in super::super) fn fig_6_11(_: &Runs) -> Result<Content, FigureError> {
-    let model = Model::stage();
-    let (mut curves, mut steps) = (Vec::new(), Vec::new());
     let mut content = Content::new("Closed loop of the slow and of the fast controller by the model: transfer function from the reference, and its step response.")
         .setting("profile stage, asymmetry +10 %, operating point 8 % of L; (a) in continuous time; (b) as the loop at 5 kHz runs it, with hold, delay and amplifier");
-    for (which, settling) in [(Which::Slow, 0.1663), (Which::Fast, 0.0858)] {
-        let of = closed_loop(&model, which.name(), None)?;
-        curves.push(Curve::new(
-            which.name(),
-            pen(which),
-            closed(&open(&of, 1.0, 3000.0)),
-        ));
-        let course = step(&of, 0.4);
-        let positions: Vec<f64> = course.iter().map(|point| point.1).collect();
-        let figures = step_metrics(&positions, 1.0, of.plant().period_s());
-        let computed = figures.settling_time_s.unwrap_or(f64::NAN);
-        content = content
-            .compare(Comparison::number(&format!("settling time, {}", which.name()), settling, 4, computed, "s").remark("to 2 % of the step; it depends on how much of the first mode still rings, whose frequency is 183.9 rad/s here and 179 there"))
-            .command(model.command("control", &format!("--{}", which.name())));
-        steps.push((which, course));
-    }
-    let dip = curves[1]
-        .points
-        .iter()
-        .filter(|(w, _)| (20.0..180.0).contains(w))
-        .map(|(_, t)| t.norm())
-        .fold(f64::INFINITY, f64::min);
-    let (a, a_phase) = bode("(a) Closed loop T = L/(1 + L)", W, "|T|", &curves);
-    let b = steps.into_iter().fold(
-        Chart::new(
-            "(b) Step response",
-            Scale::linear("Time (s)").within(0.0, 0.4),
-            Scale::linear("Position/step (1)"),
-        ),
-        |chart, (which, course)| chart.line(which.name(), pen(which), course),
+    let mut b = Chart::new(
+        "(b) Step response",
+        Scale::linear("Time (s)").within(0.0, 0.4),
+        Scale::linear("Position/step (1)"),
     );
+    let mut curves = Vec::new();
+    for (which, settling_s) in [(Which::Slow, 0.1663), (Which::Fast, 0.0858)] {
+        let of = closed_loop(&Model::stage(), which.name(), None)?;
+        let t = closed(&open(&of, 1.0, 3000.0));
+        curves.push(Curve::new(which.name(), pen(which), t));
+        let course = step(&of, 0.4);
+        content = compare_settling(content, which, settling_s, of.plant().period_s(), &course);
+        b = b.line(which.name(), pen(which), course);
+    }
+    let dip_db = dip_db(&curves[1]);
+    let (a, a_phase) = bode("(a) Closed loop T = L/(1 + L)", W, "|T|", &curves);
     Ok(content
         .row(230.0, [a])
         .row(180.0, [a_phase])
@@ -281,8 +286,8 @@ pub(in super::super) fn fig_6_11(_: &Runs) -> Result<Content, FigureError> {
         .compare(Comparison::holds(
             "|T| of the fast controller below its crossover",
             "below 0 dB in a certain region",
-            dip < 1.0,
-            &format!("down to {} dB", signed(20.0 * dip.log10(), 2)),
+            dip_db < 0.0,
+            &format!("down to {} dB", signed(dip_db, 2)),
         )))
 }
 
@@ -324,82 +329,120 @@ fn measured_margins(l: &Curve) -> Option<(f64, f64)> {
     ))
 }
 
-pub(in super::super) fn fig_6_12(runs: &Runs) -> Result<Content, FigureError> {
-    let mut content = Content::new("Slow and fast control with the measured response of the stage and the ideal controllers: open loops, their Nyquist plots, closed loops and sensitivities; by the model for comparison.")
-        .setting(format!("asymmetry +10 %, operating point 8 % of L; plant {RIG}; controllers of Eqs. (6-6) and (6-7) in continuous time, as in the thesis; model without hold, delay and amplifier"));
-    let (mut bodes, mut polar, mut ts, mut ss) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (which, letters) in [(Which::Slow, ["a", "b"]), (Which::Fast, ["c", "d"])] {
+/// A loop of Fig 6-12: with the measured plant and with the model.
+struct MeasuredLoop {
+    which: Which,
+    measured: Curve,
+    model: Curve,
+    /// Of the model, in continuous time.
+    margins: Margins,
+}
+
+impl MeasuredLoop {
+    fn new(runs: &Runs, which: Which) -> Result<MeasuredLoop, FigureError> {
         let of = closed_loop(&Model::stage(), which.name(), None)?;
-        let model = Curve::new("model", Pen::dashed(INK).thin(), open(&of, 6.0, 2500.0));
-        let l = measured_loop(runs, which)?.part(6.0, 2500.0);
-        let (crossover, phase) = measured_margins(&l).unwrap_or((f64::NAN, f64::NAN));
-        let smallest = l
-            .points
-            .iter()
-            .map(|(_, l)| (l + 1.0).norm())
-            .fold(f64::INFINITY, f64::min);
-        polar.push(
-            critical(nyquist(
-                &format!("({}) Nyquist plot, {}", letters[1], which.name()),
-                (-2.5, 2.5),
-                (-2.5, 2.5),
-                "L",
-            ))
-            .line("measured plant", l.pen, l.polar())
-            .line("model", model.pen, model.polar()),
-        );
-        ts.push(Curve::new(&l.name, l.pen, closed(&l.points)));
-        ss.push(Curve::new(&l.name, l.pen, sensitivity(&l.points)));
-        bodes.push(bode(
-            &format!("({}) Open loop, {}", letters[0], which.name()),
+        Ok(MeasuredLoop {
+            which,
+            measured: measured_loop(runs, which)?.part(6.0, 2500.0),
+            model: Curve::new("model", Pen::dashed(INK).thin(), open(&of, 6.0, 2500.0)),
+            margins: of.continuous_margins()?,
+        })
+    }
+
+    fn bode(&self, letter: char) -> (Chart, Chart) {
+        let heading = format!("({letter}) Open loop, {}", self.which.name());
+        bode(
+            &heading,
             W,
             "|L|",
-            &[l, model],
-        ));
-        content = with_margins(
-            content,
-            which,
-            &of.continuous_margins()?,
-            &format!(", {} controller, model", which.name()),
+            &[self.measured.clone(), self.model.clone()],
         )
-        .compare(
-            Comparison::unprinted(
-                &format!("{} controller, measured plant", which.name()),
-                format!(
-                    "crossover {} rad/s, phase margin {} deg, least |1 + L| {}",
-                    signed(crossover, 1),
-                    signed(phase, 1),
-                    signed(smallest, 3)
+    }
+
+    fn polar(&self, letter: char) -> Chart {
+        let heading = format!("({letter}) Nyquist plot, {}", self.which.name());
+        let (l, model) = (&self.measured, &self.model);
+        critical(nyquist(&heading, (-2.5, 2.5), (-2.5, 2.5), "L"))
+            .line("measured plant", l.pen, l.polar())
+            .line("model", model.pen, model.polar())
+    }
+
+    /// T of the measured plant.
+    fn closed(&self) -> Curve {
+        Curve::new(
+            &self.measured.name,
+            self.measured.pen,
+            closed(&self.measured.points),
+        )
+    }
+
+    /// S of the measured plant.
+    fn sensitivity(&self) -> Curve {
+        Curve::new(
+            &self.measured.name,
+            self.measured.pen,
+            sensitivity(&self.measured.points),
+        )
+    }
+
+    fn compare(&self, content: Content) -> Content {
+        let controller = self.which.name();
+        let (crossover, phase) = measured_margins(&self.measured).unwrap_or((f64::NAN, f64::NAN));
+        let distances = self.measured.points.iter().map(|(_, l)| (l + 1.0).norm());
+        let least = distances.fold(f64::INFINITY, f64::min);
+        let (crossover, phase) = (signed(crossover, 1), signed(phase, 1));
+        let measured = format!(
+            "crossover {crossover} rad/s, phase margin {phase} deg, least |1 + L| {}",
+            signed(least, 3)
+        );
+        let of = format!(", {controller} controller, model");
+        with_margins(content, self.which, &self.margins, &of)
+            .compare(
+                Comparison::unprinted(
+                    &format!("{controller} controller, measured plant"),
+                    measured,
+                )
+                .remark(
+                    "the measured plant contains hold, computing delay and current loop: 0.46 ms",
                 ),
             )
-            .remark("the measured plant has hold, computing delay and current loop in it: 0.46 ms"),
-        )
-        .command(Model::stage().command("margins", &format!("--{} --continuous", which.name())))
-        .command(Model::stage().command("margins", &format!("--{}", which.name())));
+            .command(Model::stage().command("margins", &format!("--{controller} --continuous")))
+            .command(Model::stage().command("margins", &format!("--{controller}")))
     }
-    let [(a, a_phase), (c, c_phase)] = bodes
-        .try_into()
-        .map_err(|_| FigureError::Run("two loops".into()))?;
-    let (e, _) = bode("(e) Closed loop T", W, "|T|", &ts);
-    let (f, _) = bode("(f) Sensitivity S", W, "|S|", &ss);
-    let low = |curve: &Curve| {
-        curve
-            .points
-            .iter()
-            .find(|(w, _)| *w >= 10.0)
-            .map_or(f64::NAN, |(_, s)| s.norm())
-    };
-    let (slow, fast) = (low(&ss[0]), low(&ss[1]));
+}
+
+/// The size of a curve at 10 rad/s.
+fn size_at_10_rad_s(curve: &Curve) -> f64 {
+    let point = curve.points.iter().find(|(w, _)| *w >= 10.0);
+    point.map_or(f64::NAN, |(_, s)| s.norm())
+}
+
+pub(in super::super) fn fig_6_12(runs: &Runs) -> Result<Content, FigureError> {
+    let content = Content::new("Slow and fast control with the measured response of the stage and the ideal controllers: open loops, their Nyquist plots, closed loops and sensitivities; by the model for comparison.")
+        .setting(format!("asymmetry +10 %, operating point 8 % of L; plant {RIG}; controllers of Eqs. (6-6) and (6-7) in continuous time, as in the thesis; model without hold, delay and amplifier"));
+    let slow = MeasuredLoop::new(runs, Which::Slow)?;
+    let fast = MeasuredLoop::new(runs, Which::Fast)?;
+    let content = fast.compare(slow.compare(content));
+    let ((a, a_phase), (c, c_phase)) = (slow.bode('a'), fast.bode('c'));
+    let (e, _) = bode(
+        "(e) Closed loop T",
+        W,
+        "|T|",
+        &[slow.closed(), fast.closed()],
+    );
+    let sensitivities = [slow.sensitivity(), fast.sensitivity()];
+    let (f, _) = bode("(f) Sensitivity S", W, "|S|", &sensitivities);
+    let [low, lower] = sensitivities.each_ref().map(size_at_10_rad_s);
     Ok(content
         .row(220.0, [a, c])
         .row(180.0, [a_phase, c_phase])
-        .row(420.0, polar)
+        .row(420.0, [slow.polar('b'), fast.polar('d')])
         .row(240.0, [e, f])
         .compare(Comparison::holds(
             "|S| at 10 rad/s, slow and fast",
             "the fast controller rejects disturbance better at low frequency",
-            fast < slow,
-            &format!("{} and {}", signed(slow, 3), signed(fast, 3)),
+            lower < low,
+            &format!("{} and {}", signed(low, 3), signed(lower, 3)),
         ))
         .command("bench chirp"))
 }
@@ -450,11 +493,67 @@ fn density(closed: &Closed) -> Vec<(f64, f64)> {
         .collect()
 }
 
+fn add_step(chart: Chart, which: Which, run: &Closed) -> Chart {
+    let points = run.course.iter().map(|(t, y)| (t - 0.2, y * UM));
+    let points = points.filter(|(t, _)| *t < 0.5).collect();
+    chart.line(which.name(), pen(which), points)
+}
+
+fn add_density(chart: Chart, which: Which, held: &Closed) -> Chart {
+    let outline = density(held);
+    let base = [(outline[outline.len() - 1].0, 0.0), (outline[0].0, 0.0)];
+    let area = Mark::Area {
+        name: String::new(),
+        colour: pen(which).colour,
+        strength: 0.15,
+        outline: outline.iter().copied().chain(base).collect(),
+    };
+    chart.mark(area).line(which.name(), pen(which), outline)
+}
+
+/// Sigma of the positioning error with the printed one in micrometres.
+fn sigma(what: &str, printed_um: f64, held: &Closed, remark: &str) -> Comparison {
+    let computed_um = held.measured.steady_state_sigma_m * UM;
+    Comparison::within(what, printed_um, 3, computed_um, "µm", 0.003).remark(remark)
+}
+
+/// Settling time of a step and sigma of the steady state with the printed ones.
+fn compare_runs(
+    content: Content,
+    controller: &str,
+    (printed_s, run): (f64, &Closed),
+    (printed_um, held): (f64, &Closed),
+) -> Content {
+    let settled = run.measured.step.and_then(|step| step.settling_time_s);
+    let settled = settled.unwrap_or(f64::NAN);
+    let what = format!("sigma in the steady state, {controller}");
+    let hold = format!("--{controller} --reference hold --duration {HOLD_S:.0}");
+    content
+        .compare(
+            Comparison::number(
+                &format!("settling time, {controller}"),
+                printed_s,
+                4,
+                settled,
+                "s",
+            )
+            .remark("one run with noise, to 2 % of the step; the first mode still rings then"),
+        )
+        .compare(sigma(
+            &what,
+            printed_um,
+            held,
+            "by one run of 60 s; from run to run it differs by up to 0.003 µm (six seeds)",
+        ))
+        .command(Model::stage().command("control", &format!("--{controller}")))
+        .command(Model::stage().command("control", &hold))
+}
+
 pub(in super::super) fn fig_6_13(runs: &Runs) -> Result<Content, FigureError> {
     let mut content = Content::new("Closed-loop runs of the simulated rig: step response of both controllers, and the distribution of the positioning error in the steady state. Bars have the width of the probe's quantisation, 0.030 µm.")
         .setting(format!("asymmetry +10 %, operating point 8 % of L; {RIG}"))
         .setting(format!("steady state over {HOLD_S} s at 5 kHz; the thesis: 16,000 points, which it calls 3 s (3 s are 15,000)"))
-        .assumed("floor vibration: two lines chosen so that the steady states have the printed sigmas; the thesis does not say what disturbs its stage");
+        .assumed("floor vibration: two lines chosen so that the steady states have the printed sigmas; the thesis does not state what disturbs its stage");
     let mut a = Chart::new(
         "(a) Step response",
         Scale::linear("Time after the step (s)").within(-0.02, 0.4),
@@ -465,84 +564,19 @@ pub(in super::super) fn fig_6_13(runs: &Runs) -> Result<Content, FigureError> {
         Scale::linear("Error (µm)").within(-0.25, 0.25),
         Scale::linear("Probability density (1/µm)"),
     );
-    for (which, settling, sigma) in [(Which::Slow, 0.1663, 0.066), (Which::Fast, 0.0858, 0.050)] {
-        let run = runs.step(which)?;
-        a = a.line(
-            which.name(),
-            pen(which),
-            run.course
-                .iter()
-                .map(|(t, y)| (t - 0.2, y * UM))
-                .filter(|(t, _)| *t < 0.5)
-                .collect(),
-        );
-        let held = hold(runs, which, None)?;
-        let outline = density(&held);
-        let area = outline
-            .iter()
-            .copied()
-            .chain([(outline[outline.len() - 1].0, 0.0), (outline[0].0, 0.0)])
-            .collect();
-        b = b
-            .mark(Mark::Area {
-                name: String::new(),
-                colour: pen(which).colour,
-                strength: 0.15,
-                outline: area,
-            })
-            .line(which.name(), pen(which), outline);
-        let settled = run
-            .measured
-            .step
-            .and_then(|step| step.settling_time_s)
-            .unwrap_or(f64::NAN);
-        let controller = which.name();
-        content = content
-            .compare(
-                Comparison::number(
-                    &format!("settling time, {controller}"),
-                    settling,
-                    4,
-                    settled,
-                    "s",
-                )
-                .remark("one run with noise, to 2 % of the step; the first mode still rings then"),
-            )
-            .compare(
-                Comparison::within(
-                    &format!("sigma in the steady state, {controller}"),
-                    sigma,
-                    3,
-                    held.measured.steady_state_sigma_m * UM,
-                    "µm",
-                    0.003,
-                )
-                .remark(
-                    "by one run of 60 s; from run to run it differs by up to 0.003 µm (six seeds)",
-                ),
-            )
-            .command(Model::stage().command("control", &format!("--{controller}")))
-            .command(Model::stage().command(
-                "control",
-                &format!("--{controller} --reference hold --duration {HOLD_S:.0}"),
-            ));
+    for (which, settling_s, sigma_um) in
+        [(Which::Slow, 0.1663, 0.066), (Which::Fast, 0.0858, 0.050)]
+    {
+        let (run, held) = (runs.step(which)?, hold(runs, which, None)?);
+        a = add_step(a, which, &run);
+        b = add_density(b, which, &held);
+        content = compare_runs(content, which.name(), (settling_s, &run), (sigma_um, &held));
     }
     let centre = hold(runs, Which::Fast, Some(0.0))?;
+    let what = "sigma in the steady state, fast, operating point 0";
+    let options = format!("--fast --reference hold --duration {HOLD_S:.0} --operating-point 0%");
     Ok(content
         .row(280.0, [a, b])
-        .compare(
-            Comparison::within(
-                "sigma in the steady state, fast, operating point 0",
-                0.048,
-                3,
-                centre.measured.steady_state_sigma_m * UM,
-                "µm",
-                0.003,
-            )
-            .remark("by one run of 60 s"),
-        )
-        .command(Model::stage().command(
-            "control",
-            &format!("--fast --reference hold --duration {HOLD_S:.0} --operating-point 0%"),
-        )))
+        .compare(sigma(what, 0.048, &centre, "by one run of 60 s"))
+        .command(Model::stage().command("control", &options)))
 }
