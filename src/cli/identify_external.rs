@@ -51,7 +51,7 @@ pub(super) struct ExternalOptions {
     /// Number of periods to skip at the beginning, while the plant settles
     #[arg(long, value_name = "N", requires = "period")]
     skip_periods: Option<usize>,
-    /// Frequency band to analyse, in hertz: 11:250. Without it: all frequencies up to half of the sampling rate
+    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: all frequencies up to half of the sampling rate]
     #[arg(
         long,
         value_name = "LOW:HIGH",
