@@ -155,10 +155,10 @@ mod tests {
     #[test]
     fn timing_of_a_real_time_run_fits_80_columns() {
         let slow = Quantiles {
-            p50_ns: 9_999_999_999,
-            p99_ns: 9_999_999_999,
-            p9999_ns: 9_999_999_999,
-            max_ns: 9_999_999_999,
+            p50_ns: 9_999_999_900,
+            p99_ns: 9_999_999_900,
+            p9999_ns: 9_999_999_900,
+            max_ns: 9_999_999_900,
         };
         let timing = TimingSummary {
             pace: Pace::Realtime,

@@ -29,7 +29,7 @@ pub enum PlanError {
     )]
     Unstable,
     /// The recording lacks a part of the plan.
-    #[error("the recording has no {0}: it was not made by a run of bench")]
+    #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
     Missing(&'static str),
     /// The configuration cannot be written as TOML.
     #[error("the configuration cannot be written as TOML: {0}")]

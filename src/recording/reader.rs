@@ -289,7 +289,8 @@ fn require_ticks(
     if found.account.ticks() > 0 {
         return Ok(());
     }
-    if !contents.has_loop() && !(cut && contents.channels.is_empty()) {
+    let cut_at_its_start = cut && contents.channels.is_empty();
+    if !contents.has_loop() && !cut_at_its_start {
         return Err(refused(path, of_another_program(contents)));
     }
     let state = match cut {

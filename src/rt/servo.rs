@@ -193,11 +193,11 @@ impl Servo {
         let tripped = self
             .trip
             .is_some_and(|(_, tick)| tick == timing.tick.number);
-        flag::ACTIVE * u32::from(decision.active)
-            | flag::LIMITED * u32::from(limited)
-            | flag::OVERRUN * u32::from(timing.missed > 0)
-            | flag::INVALID * u32::from(reading.validity != Validity::Valid)
-            | flag::TRIPPED * u32::from(tripped)
+        (flag::ACTIVE * u32::from(decision.active))
+            | (flag::LIMITED * u32::from(limited))
+            | (flag::OVERRUN * u32::from(timing.missed > 0))
+            | (flag::INVALID * u32::from(reading.validity != Validity::Valid))
+            | (flag::TRIPPED * u32::from(tripped))
     }
 
     fn finish_run(&mut self, tick: u64) {

@@ -115,7 +115,7 @@ fn backlash_and_a_bent_probe_are_refused_with_their_figures() {
     .expect_err("hysteresis")
     .to_string();
     assert!(
-        back.contains("up and down") && back.contains("0.01 is allowed"),
+        back.contains("between rising and falling current") && back.contains("0.01 is allowed"),
         "{back}"
     );
     let mut generous = config.clone();

@@ -38,6 +38,12 @@ fn ascii(folder: &std::path::Path) -> String {
 
 /// The profile `lab` with a slow loop and long time limits.
 fn config(folder: &std::path::Path, stale_s: f64) -> Config {
+    // A test of one interlock must not reach the other one.
+    let stuck_s = if stale_s < NEVER_STALE_S {
+        2.0 * stale_s
+    } else {
+        1.5
+    };
     let controller = folder.join("slow.toml");
     // 154 um/A below the first mode: crossover at 1.5 rad/s, far below everything that moves.
     let text = "title = \"slow\"\n[[section]]\nkind = \"integrator\"\ngain_a_per_um = 0.01\n";
@@ -45,7 +51,7 @@ fn config(folder: &std::path::Path, stale_s: f64) -> Config {
     let sets = [
         "loop.rate_hz=200".into(),
         format!("interlock.probe_stale_s={stale_s}"),
-        "interlock.probe_stuck_s=1.5".into(),
+        format!("interlock.probe_stuck_s={stuck_s}"),
         "interlock.probe_stuck_current_a=0.1".into(),
         "interlock.overruns_per_s=1000000".into(),
         "probe.rate_hz=200".into(),

@@ -207,7 +207,7 @@ fn help_fits_80_columns_and_shows_kinds_and_defaults() {
         assert!(help(command).contains("docs/glossary.md"), "{command}");
     }
     let control = help("control").replace('\n', " ");
-    assert!(control.contains("step of 50 um at 0.2 s"), "{control}");
+    assert!(control.contains("step of 50 um, 0.2 s after"), "{control}");
 }
 
 #[test]

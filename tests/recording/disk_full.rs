@@ -50,7 +50,9 @@ fn a_disk_that_is_full_from_the_start_is_told_at_once_with_a_remedy() {
     );
     let text = refused.to_string();
     assert!(
-        text.contains("full.mcap") && text.contains("No space left") && text.contains("free space"),
+        text.contains("full.mcap")
+            && text.contains("No space left")
+            && text.contains("free some space"),
         "{text}"
     );
 }

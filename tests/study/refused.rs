@@ -28,7 +28,14 @@ fn rejects_invalid_tolerances() {
         ("plant.beam_length_m", &["KEY=uniform:LOW:HIGH"]),
         ("plant.beam_length_m=1%", &["KEY=+-LIMIT"]),
         ("plant.beam_length_m=uniform:x:y", &["`x` is not a number"]),
-        ("plant.beam_length_m=uniform:1um:-1um", &["empty tolerance"]),
+        (
+            "plant.beam_length_m=uniform:1um:-1um",
+            &[
+                "plant.beam_length_m",
+                "is empty",
+                "lower and a higher limit",
+            ],
+        ),
         ("plant.beam_length_m=normal:0", &["above zero"]),
         ("plant.youngs_modulus_pa=+-1mm", &["a length in m", "Pa"]),
         // Of a ratio, a percentage is of 1.

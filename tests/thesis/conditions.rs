@@ -415,11 +415,11 @@ fn rejects_plants_without_two_modes_places_or_ground() {
         ),
         (
             format!("conditions --config free.toml {vary}"),
-            "hang on no spring to ground",
+            "have no spring to ground",
         ),
         (
             format!("placement --config free.toml {vary}"),
-            "hang on no spring to ground",
+            "have no spring to ground",
         ),
         (
             "placement --config sum.toml --vary plant.modes.u.omega_rad_s --from 100 --to 120"

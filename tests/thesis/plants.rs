@@ -559,7 +559,7 @@ fn rejects_invalid_matrices_where_they_are_needed() {
         .is_refused(&["free body", "static compliance"]);
     bench
         .run("chirp --config xy --set sim.geometry=quadratic")
-        .is_refused(&["`sim.geometry`", "`sr4dof` alone", "`xy`"]);
+        .is_refused(&["`sim.geometry`", "only for the model `sr4dof`", "`xy`"]);
 }
 
 #[test]

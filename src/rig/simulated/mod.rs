@@ -6,6 +6,7 @@
 //! transcendental function comes from the `libm` crate, and no library selects code by the processor.
 
 mod actual_model;
+mod drive;
 mod floor;
 mod live;
 mod noise;

@@ -1,6 +1,6 @@
 //! The plant with constraints that are not linearised.
 
-use super::stage::Drive;
+use super::drive::Drive;
 use crate::config::PlantSettings;
 use crate::model::plant::{
     Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build,

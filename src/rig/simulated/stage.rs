@@ -4,6 +4,7 @@
 //! quadratic geometry the plant is a [`NonlinearPlant`], solved in fine steps, and only the unmodelled modes are linear.
 
 use super::actual_model::{actual_plant, modes, unmodelled_modes};
+use super::drive::Drive;
 use super::floor::Line;
 use super::noise::Gaussian;
 use super::nonlinear_plant::NonlinearPlant;
@@ -32,27 +33,6 @@ impl MotionState {
         let bend_m =
             3.0 * rise_m - 2.0 * start_m - end_m + share * (start_m + end_m - 2.0 * rise_m);
         self.position_m + share * (start_m + share * bend_m)
-    }
-}
-
-/// Amplifier and motor.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Drive {
-    /// Bandwidth of the current loop in hertz.
-    pub(super) bandwidth_hz: f64,
-    /// Force constant of the motor in newtons per ampere.
-    pub(super) force_constant_n_per_a: f64,
-}
-
-impl Drive {
-    /// Modes behind this drive, sampled with a period.
-    fn sampled(self, modes: &[Mode], period_s: f64) -> DiscretePlant {
-        DiscretePlant::new(
-            modes,
-            self.bandwidth_hz,
-            self.force_constant_n_per_a,
-            period_s,
-        )
     }
 }
 

@@ -568,9 +568,9 @@ pub(in super::super) fn fig_6_13(runs: &Runs) -> Result<Content, FigureError> {
         [(Which::Slow, 0.1663, 0.066), (Which::Fast, 0.0858, 0.050)]
     {
         let (run, held) = (runs.step(which)?, hold(runs, which, None)?);
-        a = add_step(a, which, &run);
+        a = add_step(a, which, run);
         b = add_density(b, which, &held);
-        content = compare_runs(content, which.name(), (settling_s, &run), (sigma_um, &held));
+        content = compare_runs(content, which.name(), (settling_s, run), (sigma_um, &held));
     }
     let centre = hold(runs, Which::Fast, Some(0.0))?;
     let what = "sigma in the steady state, fast, operating point 0";
