@@ -8,7 +8,7 @@ use crate::stage::Dice;
 
 pub const RATE_HZ: f64 = 1000.0;
 pub const BAND_HZ: (f64, f64) = (2.0, 300.0);
-/// A resonance at 20 Hz with 2 % of damping, of static gain 1 after one tick: y[k] = a1 y[k-1] + a2 y[k-2] + b u[k-1].
+/// A resonance at 20 Hz with 2 % of damping, of static gain 1 after one tick: `y[k] = a1 y[k-1] + a2 y[k-2] + b u[k-1]`.
 pub const POLE: (f64, f64) = (20.0, 0.02);
 /// u = KP e + KI T sum e
 const KP: f64 = 0.05;
