@@ -80,15 +80,25 @@ fn died(_: RecvError) -> RunError {
 #[cfg(test)]
 #[allow(unsafe_code, reason = "the tests raise signals")]
 mod tests {
+    use std::sync::{Mutex, MutexGuard, PoisonError};
+
     use super::*;
+
+    /// Held by each test: a raised signal reaches every listener of the process, also that of a test beside it.
+    fn one_at_a_time() -> MutexGuard<'static, ()> {
+        static LISTENERS: Mutex<()> = Mutex::new(());
+        LISTENERS.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 
     #[test]
     fn work_that_ends_gives_its_result() {
+        let _alone = one_at_a_time();
         assert_eq!(abandon_on_signal(|| 7).unwrap(), Some(7));
     }
 
     #[test]
     fn ctrl_c_and_sigterm_end_the_wait_and_not_the_process() {
+        let _alone = one_at_a_time();
         for number in [libc::SIGINT, libc::SIGTERM] {
             let (release, held) = std::sync::mpsc::channel::<()>();
             let outcome = abandon_on_signal(move || {
@@ -103,6 +113,7 @@ mod tests {
 
     #[test]
     fn ctrl_c_and_sigterm_set_the_flag_and_wait_for_the_work() {
+        let _alone = one_at_a_time();
         for number in [libc::SIGINT, libc::SIGTERM] {
             let ended = stop_on_signal(|stop| {
                 // SAFETY: no memory is touched; the handlers were installed before this thread began.
@@ -119,6 +130,7 @@ mod tests {
 
     #[test]
     fn work_that_panics_is_an_error() {
+        let _alone = one_at_a_time();
         let outcome = abandon_on_signal(|| std::panic::panic_any("no one's fault"));
         assert!(outcome.unwrap_err().to_string().contains("panic"));
     }
