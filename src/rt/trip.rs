@@ -79,184 +79,142 @@ impl From<DeviceError> for Trip {
     }
 }
 
-/// Name and remedy of a kind of trip.
-struct Kind {
-    /// The short reason used in JSON and recordings.
-    reason: &'static str,
-    /// What the operator can do.
-    remedy: &'static str,
-}
-
-const TRAVEL: Kind = Kind {
-    reason: "travel",
-    remedy: "check the loop's margins and the amplitude; the limit is interlock.soft_limit_m",
-};
-const PEAK_CURRENT: Kind = Kind {
-    reason: "peak_current",
-    remedy: "check the loop's margins; the limit is motor.peak_force_n over the force constant",
-};
-const CONTINUOUS_CURRENT: Kind = Kind {
-    reason: "continuous_current",
-    remedy: "let the motor cool, lower amplitude or duration",
-};
-const COMMAND_NOT_FINITE: Kind = Kind {
-    reason: "command_not_finite",
-    remedy: "check the controller and its reference",
-};
-const PROBE_INVALID: Kind = Kind {
-    reason: "probe_invalid",
-    remedy: "check the probe's cable, target and range",
-};
-const PROBE_STALE: Kind = Kind {
-    reason: "probe_stale",
-    remedy: "check the probe's rate and connection; the limit is interlock.probe_stale_s",
-};
-const PROBE_STUCK: Kind = Kind {
-    reason: "probe_stuck",
-    remedy: "check the probe and the motor's connection; the limit is interlock.probe_stuck_s",
-};
-const CURRENT_NOT_FOLLOWED: Kind = Kind {
-    reason: "current_not_followed",
-    remedy: "check that the drive takes set-points (its mode, another master on the bus); \
-             the limits are interlock.current_error_a and current_error_s",
-};
-const OVERRUNS: Kind = Kind {
-    reason: "overruns",
-    remedy: "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s",
-};
-const AMPLIFIER: Kind = Kind {
-    reason: "amplifier",
-    remedy: "look up the code in the amplifier's manual, clear its fault, start again",
-};
-
 impl Trip {
-    fn kind(&self) -> Kind {
+    /// Short reason and remedy.
+    fn reason_and_remedy(&self) -> (&'static str, &'static str) {
         match self {
-            Trip::Travel { .. } => TRAVEL,
-            Trip::PeakCurrent { .. } => PEAK_CURRENT,
-            Trip::ContinuousCurrent { .. } => CONTINUOUS_CURRENT,
-            Trip::CommandNotFinite => COMMAND_NOT_FINITE,
-            Trip::ProbeInvalid => PROBE_INVALID,
-            Trip::ProbeStale { .. } => PROBE_STALE,
-            Trip::ProbeStuck { .. } => PROBE_STUCK,
-            Trip::CurrentNotFollowed { .. } => CURRENT_NOT_FOLLOWED,
-            Trip::Overruns { .. } => OVERRUNS,
-            Trip::Amplifier { .. } => AMPLIFIER,
+            Trip::Travel { .. } => (
+                "travel",
+                "check the loop's margins and the amplitude; the limit is interlock.soft_limit_m",
+            ),
+            Trip::PeakCurrent { .. } => (
+                "peak_current",
+                "check the loop's margins; the limit is motor.peak_force_n over the force constant",
+            ),
+            Trip::ContinuousCurrent { .. } => (
+                "continuous_current",
+                "let the motor cool, lower amplitude or duration",
+            ),
+            Trip::CommandNotFinite => (
+                "command_not_finite",
+                "check the controller and its reference",
+            ),
+            Trip::ProbeInvalid => ("probe_invalid", "check the probe's cable, target and range"),
+            Trip::ProbeStale { .. } => (
+                "probe_stale",
+                "check the probe's rate and connection; the limit is interlock.probe_stale_s",
+            ),
+            Trip::ProbeStuck { .. } => (
+                "probe_stuck",
+                "check the probe and the motor's connection; the limit is interlock.probe_stuck_s",
+            ),
+            Trip::CurrentNotFollowed { .. } => (
+                "current_not_followed",
+                "check that the drive takes set-points (its mode, another master on the bus); \
+                 the limits are interlock.current_error_a and current_error_s",
+            ),
+            Trip::Overruns { .. } => (
+                "overruns",
+                "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s",
+            ),
+            Trip::Amplifier { text, .. } => {
+                const UNKNOWN: &str =
+                    "look up the code in the amplifier's manual, clear its fault, start again";
+                ("amplifier", text.map_or(UNKNOWN, |text| text.remedy))
+            }
         }
     }
 
     /// The short reason used in JSON and recordings.
     pub fn reason(&self) -> &'static str {
-        self.kind().reason
+        self.reason_and_remedy().0
     }
 
     /// What the operator can do about it.
     pub fn remedy(&self) -> &'static str {
-        match self {
-            Trip::Amplifier {
-                text: Some(text), ..
-            } => text.remedy,
-            _ => self.kind().remedy,
-        }
+        self.reason_and_remedy().1
     }
 
-    /// The value that crossed the limit, and the limit, where there are such.
+    /// The value that crossed the limit, and the limit; `None` for a reason without a limit.
     pub fn value_and_limit(&self) -> Option<(f64, f64)> {
-        use Trip::*;
         match *self {
-            Travel {
-                position_m: value,
-                limit_m: limit,
-            }
-            | PeakCurrent {
-                command_a: value,
-                limit_a: limit,
-            }
-            | ContinuousCurrent {
-                thermal_a: value,
-                limit_a: limit,
-            }
-            | ProbeStale {
-                age_s: value,
-                limit_s: limit,
-            }
-            | ProbeStuck {
-                unchanged_s: value,
-                limit_s: limit,
-            }
-            | CurrentNotFollowed {
-                actual_a: value,
-                command_a: limit,
-            } => Some((value, limit)),
-            Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
-            CommandNotFinite | ProbeInvalid | Amplifier { .. } => None,
-        }
-    }
-
-    fn fmt_reading(&self, f: &mut fmt::Formatter<'_>, value: f64, limit: f64) -> fmt::Result {
-        let (value_ms, limit_ms) = (value * 1e3, limit * 1e3);
-        let (value_um, limit_um) = (value * 1e6, limit * 1e6);
-        match self {
-            Trip::Travel { .. } => write!(
-                f,
-                "travel: {value_um:.1} um is beyond the soft limit of {limit_um:.1} um"
-            ),
-            Trip::ProbeStale { .. } => write!(
-                f,
-                "the probe's reading is {value_ms:.3} ms old, {limit_ms:.3} ms are allowed"
-            ),
-            Trip::ProbeStuck { .. } => write!(
-                f,
-                "the probe's reading did not move for {value_ms:.1} ms ({limit_ms:.1} ms are allowed) while the current did"
-            ),
-            _ => f.write_str("the probe's reading was not valid"),
-        }
-    }
-
-    fn fmt_current(&self, f: &mut fmt::Formatter<'_>, value_a: f64, limit_a: f64) -> fmt::Result {
-        match self {
-            Trip::PeakCurrent { .. } => write!(
-                f,
-                "peak current: a command of {value_a:.3} A is beyond {limit_a:.3} A"
-            ),
-            Trip::ContinuousCurrent { .. } => write!(
-                f,
-                "continuous current: the motor's thermal current {value_a:.3} A is beyond {limit_a:.3} A"
-            ),
-            Trip::CurrentNotFollowed { .. } => write!(
-                f,
-                "the amplifier measures {value_a:.3} A; the nearest commanded current is {limit_a:.3} A"
-            ),
-            _ => f.write_str("the command was not a finite number"),
+            Trip::Travel {
+                position_m,
+                limit_m,
+            } => Some((position_m, limit_m)),
+            Trip::PeakCurrent { command_a, limit_a } => Some((command_a, limit_a)),
+            Trip::ContinuousCurrent { thermal_a, limit_a } => Some((thermal_a, limit_a)),
+            Trip::ProbeStale { age_s, limit_s } => Some((age_s, limit_s)),
+            Trip::ProbeStuck {
+                unchanged_s,
+                limit_s,
+            } => Some((unchanged_s, limit_s)),
+            Trip::CurrentNotFollowed {
+                actual_a,
+                command_a,
+            } => Some((actual_a, command_a)),
+            Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
+            Trip::CommandNotFinite | Trip::ProbeInvalid | Trip::Amplifier { .. } => None,
         }
     }
 }
 
 impl fmt::Display for Trip {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use Trip::*;
-        let (value, limit) = self.value_and_limit().unwrap_or_default();
-        match self {
-            Travel { .. } | ProbeInvalid | ProbeStale { .. } | ProbeStuck { .. } => {
-                self.fmt_reading(f, value, limit)
-            }
-            PeakCurrent { .. } | ContinuousCurrent { .. } => self.fmt_current(f, value, limit),
-            CommandNotFinite | CurrentNotFollowed { .. } => self.fmt_current(f, value, limit),
-            Overruns { .. } => write!(
+        match *self {
+            Trip::Travel {
+                position_m,
+                limit_m,
+            } => write!(
                 f,
-                "{value} ticks missed within a second, {limit} are allowed"
+                "travel: {:.1} um is beyond the soft limit of {:.1} um",
+                position_m * 1e6,
+                limit_m * 1e6
             ),
-            Amplifier { code, text } => fmt_fault(f, *code, *text),
+            Trip::PeakCurrent { command_a, limit_a } => write!(
+                f,
+                "peak current: a command of {command_a:.3} A is beyond {limit_a:.3} A"
+            ),
+            Trip::ContinuousCurrent { thermal_a, limit_a } => write!(
+                f,
+                "continuous current: the motor's thermal current {thermal_a:.3} A is beyond {limit_a:.3} A"
+            ),
+            Trip::CommandNotFinite => f.write_str("the command was not a finite number"),
+            Trip::ProbeInvalid => f.write_str("the probe's reading was not valid"),
+            Trip::ProbeStale { age_s, limit_s } => write!(
+                f,
+                "the probe's reading is {:.3} ms old, {:.3} ms are allowed",
+                age_s * 1e3,
+                limit_s * 1e3
+            ),
+            Trip::ProbeStuck {
+                unchanged_s,
+                limit_s,
+            } => write!(
+                f,
+                "the probe's reading did not move for {:.1} ms ({:.1} ms are allowed) while the current did",
+                unchanged_s * 1e3,
+                limit_s * 1e3
+            ),
+            Trip::CurrentNotFollowed {
+                actual_a,
+                command_a,
+            } => write!(
+                f,
+                "the amplifier measures {actual_a:.3} A; the nearest commanded current is {command_a:.3} A"
+            ),
+            Trip::Overruns { count, limit } => write!(
+                f,
+                "{count} ticks missed within a second, {limit} are allowed"
+            ),
+            Trip::Amplifier {
+                code,
+                text: Some(text),
+            } => write!(f, "amplifier: {} (code {code})", text.what),
+            Trip::Amplifier { code, text: None } => write!(
+                f,
+                "the amplifier reported a fault or refused a command (code {code})"
+            ),
         }
-    }
-}
-
-fn fmt_fault(f: &mut fmt::Formatter<'_>, code: i64, text: Option<FaultText>) -> fmt::Result {
-    match text {
-        Some(text) => write!(f, "amplifier: {} (code {code})", text.what),
-        None => write!(
-            f,
-            "the amplifier reported a fault or refused a command (code {code})"
-        ),
     }
 }
