@@ -53,7 +53,7 @@ fn check_and_control(c: &mut Criterion) {
             let checked = interlocks.check_reading(black_box(&reading), now);
             let command_a = controller.update(&mut state, -reading.position_m);
             let passed = interlocks.check_command(command_a);
-            interlocks.note(command_a);
+            interlocks.record_current(command_a);
             black_box((checked.is_ok(), passed.is_ok(), command_a))
         });
     });

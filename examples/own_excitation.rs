@@ -70,7 +70,7 @@ fn run(config: &Config) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Erro
         let requested_a = program.decide(&input).requested_a;
         interlocks.check_command(requested_a).map_err(refused)?;
         let command_a = rig.command(requested_a)?;
-        interlocks.note(command_a);
+        interlocks.record_current(command_a);
         positions_m.push(reading.position_m);
         commands_a.push(command_a);
     }

@@ -50,14 +50,14 @@ mod tests {
     const TEXT: &str = "a = 1\n[b]\nc = 2\n[[d]]\ne = 1\n[[d]]\ne = 2\n";
 
     #[test]
-    fn the_line_of_a_key_is_that_of_the_file() {
+    fn finds_the_line_of_a_key() {
         assert_eq!(line_of(TEXT, "a"), Some(1));
         assert_eq!(line_of(TEXT, "b.c"), Some(3));
         assert_eq!(line_of(TEXT, "d.1.e"), Some(7));
     }
 
     #[test]
-    fn a_key_that_is_not_there_has_no_line() {
+    fn missing_key_has_no_line() {
         assert_eq!(line_of(TEXT, "z"), None);
         assert_eq!(line_of(TEXT, "b.z"), None);
         assert_eq!(line_of("not toml [", "a"), None);

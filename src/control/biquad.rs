@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn update_is_the_difference_equation_of_the_docstring() {
+    fn update_matches_the_difference_equation() {
         let input: Vec<f64> = (0..50)
             .map(|k| f64::sin(k as f64) + 0.1 * k as f64)
             .collect();
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_is_the_transform_of_the_impulse_response() {
+    fn response_is_the_transform_of_the_impulse_response() {
         let impulse = std::iter::once(1.0).chain(std::iter::repeat_n(0.0, 399));
         let response = outputs(&section(), impulse);
         for angle in POINTS {
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn the_state_space_has_the_same_response() {
+    fn state_space_has_the_same_response() {
         let (a, b, c, d) = section().state_space();
         for angle in POINTS {
             let z = Complex::new(f64::cos(angle), f64::sin(angle));

@@ -212,7 +212,7 @@ mod tests {
     use super::*;
     use crate::doctor::Severity::{self, Failure, Note, Ok, Warning};
 
-    fn sound() -> Interface {
+    fn healthy() -> Interface {
         Interface {
             is_up: true,
             bit_rate: Some(1_000_000),
@@ -244,16 +244,16 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_interface_is_ok() {
-        assert_eq!(not_ok(&found(sound())), []);
-        assert_eq!(found(sound()).len(), 5);
+    fn a_healthy_interface_is_ok() {
+        assert_eq!(not_ok(&found(healthy())), []);
+        assert_eq!(found(healthy()).len(), 5);
     }
 
     #[test]
     fn each_defect_of_an_interface_has_its_severity() {
         let mut cases: Vec<(Interface, Vec<(Subject, Severity)>)> = Vec::new();
         let mut case = |change: fn(&mut Interface), expected: &[(Subject, Severity)]| {
-            let mut interface = sound();
+            let mut interface = healthy();
             change(&mut interface);
             cases.push((interface, expected.to_vec()));
         };
@@ -289,11 +289,11 @@ mod tests {
 
     #[test]
     fn remedies_name_the_interface_and_the_bit_rate() {
-        let mut down = sound();
+        let mut down = healthy();
         down.is_up = false;
         let remedy = found(down)[0].remedy.clone().unwrap();
         assert!(remedy.starts_with("`ip link set can0 up type can bitrate 1000000`"));
-        let mut slow = sound();
+        let mut slow = healthy();
         slow.bit_rate = Some(500_000);
         assert_eq!(
             found(slow)[0].what,
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_queue_may_be_too_short_or_too_long() {
+    fn detects_too_short_and_too_long_queues() {
         let severity = |length| queue("can0", length).severity;
         assert_eq!(
             [2, 4, 10, 100, 1000].map(severity),

@@ -301,7 +301,7 @@ mod tests {
     use crate::doctor::Severity::{self, Failure, Note, Warning};
     use bench_hal::can::drive::{ExpectedIdentity, REQUIRED_OBJECTS, TorqueMode};
 
-    fn sound() -> Inspection {
+    fn healthy() -> Inspection {
         Inspection {
             device_type: Some(0x0002_0192),
             name: Some("a drive".into()),
@@ -335,9 +335,9 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_drive_is_ok() {
-        assert_eq!(not_ok(&sound(), &DriveSettings::default()), []);
-        let found = findings(&sound(), &maximum_reference(), 1.5);
+    fn a_healthy_drive_is_ok() {
+        assert_eq!(not_ok(&healthy(), &DriveSettings::default()), []);
+        let found = findings(&healthy(), &maximum_reference(), 1.5);
         let expected = "a count is 6.000 mA, the limit is 4 A";
         assert!(found.iter().any(|f| f.what == expected), "{found:?}");
     }
@@ -393,7 +393,7 @@ mod tests {
             (|i| i.identity = [None; 4], Failure, "vendor"),
         ];
         for (change, severity, text) in cases {
-            let mut inspection = sound();
+            let mut inspection = healthy();
             change(&mut inspection);
             let found = not_ok(&inspection, &DriveSettings::default());
             assert_eq!(found.len(), 1, "{inspection:?}: {found:?}");
@@ -420,7 +420,7 @@ mod tests {
             (vendor, "states vendor 0x00000007"),
             (serial, "states serial 0x00000004"),
         ] {
-            let found = not_ok(&sound(), &with(identity));
+            let found = not_ok(&healthy(), &with(identity));
             assert_eq!(found.len(), 1);
             assert!(
                 found[0].0 == Failure && found[0].1.contains(text),
@@ -432,12 +432,12 @@ mod tests {
             serial: Some(3),
             ..ExpectedIdentity::default()
         };
-        assert_eq!(not_ok(&sound(), &with(same)), []);
+        assert_eq!(not_ok(&healthy(), &with(same)), []);
     }
 
     #[test]
     fn objects_are_required_only_if_the_settings_need_them() {
-        let mut inspection = sound();
+        let mut inspection = healthy();
         let own_reaction = settings(|s| s.abort_connection = None);
         inspection.missing_objects = vec![ABORT_CONNECTION];
         assert_eq!(not_ok(&inspection, &own_reaction), []);
@@ -447,16 +447,16 @@ mod tests {
 
     #[test]
     fn maximum_and_mode_must_fit_the_settings() {
-        let mut inspection = sound();
+        let mut inspection = healthy();
         inspection.maximum_current_ratio = None;
         assert_eq!(not_ok(&inspection, &maximum_reference())[0].0, Failure);
         inspection.maximum_current_ratio = Some(2.0);
         assert_eq!(not_ok(&inspection, &maximum_reference())[0].0, Warning);
-        let mut inspection = sound();
+        let mut inspection = healthy();
         inspection.modes = Some(1 << 3);
         let cyclic = settings(|s| s.mode = TorqueMode::Cyclic);
         assert_eq!(not_ok(&inspection, &cyclic)[0].0, Failure);
         let tiny = settings(|s| s.current_limit_a = 0.001);
-        assert!(not_ok(&sound(), &tiny)[0].1.contains("a count is 4 mA"));
+        assert!(not_ok(&healthy(), &tiny)[0].1.contains("a count is 4 mA"));
     }
 }

@@ -318,7 +318,7 @@ mod tests {
         load(&source).unwrap()
     }
 
-    fn sound() -> Readings {
+    fn healthy() -> Readings {
         Readings {
             watched_s: 1.0,
             came: true,
@@ -345,8 +345,8 @@ mod tests {
     }
 
     #[test]
-    fn sound_readings_are_ok() {
-        assert_eq!(not_ok(&sound()), []);
+    fn healthy_readings_are_ok() {
+        assert_eq!(not_ok(&healthy()), []);
         let expected = "noise 40.0 nm RMS, if the stage is at rest";
         assert_eq!(noise(40e-9).what, expected);
     }
@@ -399,7 +399,7 @@ mod tests {
             (|r| r.damaged_bytes = 7, Warning, "7 damaged bytes"),
         ];
         for (change, severity, text) in cases {
-            let mut readings = sound();
+            let mut readings = healthy();
             change(&mut readings);
             let found = not_ok(&readings);
             assert_eq!(found.len(), 1, "{readings:?}: {found:?}");
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_the_deviation_of_readings_each_counted_once() {
+    fn noise_is_the_deviation_of_distinct_readings() {
         let mut samples = Samples::default();
         let mut add = |sequence, position_m, validity| {
             samples.add(&Reading {

@@ -115,7 +115,7 @@ mod tests {
     use super::*;
     use crate::doctor::Severity;
 
-    fn sound() -> SpaceFacts {
+    fn healthy() -> SpaceFacts {
         SpaceFacts {
             folder: "recordings".into(),
             existing: "/data".into(),
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn each_defect_has_its_severity() {
         let severity = |change: fn(&mut SpaceFacts)| {
-            let mut facts = sound();
+            let mut facts = healthy();
             change(&mut facts);
             let finding = finding(&facts);
             assert_eq!(finding.remedy.is_some(), finding.severity != Severity::Ok);

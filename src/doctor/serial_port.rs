@@ -258,7 +258,7 @@ mod tests {
     use super::*;
     use crate::doctor::Severity::{Failure, Note as Noted, Ok, Warning};
 
-    fn sound() -> PortFacts {
+    fn healthy() -> PortFacts {
         PortFacts {
             path: "/dev/ttyUSB0".into(),
             device: Some("/dev/ttyUSB0".into()),
@@ -290,7 +290,7 @@ mod tests {
         let found = only(&PortFacts {
             may_open: false,
             usb: usb(None),
-            ..sound()
+            ..healthy()
         });
         assert_eq!(found.severity, Failure);
         assert_eq!(
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_port_without_group_access_needs_other_permission_bits() {
+    fn suggests_permission_bits_for_a_port_without_group_access() {
         let remedy = |group: &str, groups: &[&str], mode| {
             let groups = groups.iter().map(|group| group.to_string()).collect();
             let facts = PortFacts {
@@ -319,7 +319,7 @@ mod tests {
                 group: group.into(),
                 groups,
                 mode,
-                ..sound()
+                ..healthy()
             };
             only(&facts).remedy.unwrap()
         };
@@ -336,7 +336,7 @@ mod tests {
     fn a_missing_port_is_reported_with_the_permanent_names() {
         let missing = PortFacts {
             device: None,
-            ..sound()
+            ..healthy()
         };
         let found = only(&missing);
         assert_eq!(
@@ -357,7 +357,7 @@ mod tests {
         let by_id = vec![("/dev/serial/by-id/usb-FTDI".into(), "/dev/ttyUSB0".into())];
         let found = only(&PortFacts {
             by_id: by_id.clone(),
-            ..sound()
+            ..healthy()
         });
         assert_eq!(found.severity, Noted);
         let path = "/dev/serial/by-id/usb-FTDI".into();
@@ -365,7 +365,7 @@ mod tests {
             only(&PortFacts {
                 by_id,
                 path,
-                ..sound()
+                ..healthy()
             })
             .severity,
             Ok
@@ -373,7 +373,7 @@ mod tests {
         assert_eq!(
             only(&PortFacts {
                 is_character_device: false,
-                ..sound()
+                ..healthy()
             })
             .severity,
             Failure
@@ -389,7 +389,7 @@ mod tests {
             })
         };
         assert!(
-            refusal(&held(Some(999_999_999)), &sound())
+            refusal(&held(Some(999_999_999)), &healthy())
                 .what
                 .ends_with("used by process 999999999")
         );
@@ -398,7 +398,7 @@ mod tests {
             &held(None),
             &PortFacts {
                 holders: vec![me],
-                ..sound()
+                ..healthy()
             },
         );
         assert!(
@@ -407,7 +407,7 @@ mod tests {
             found.what
         );
         assert!(
-            refusal(&held(None), &sound())
+            refusal(&held(None), &healthy())
                 .remedy
                 .unwrap()
                 .contains("sudo fuser /dev/ttyUSB0")
@@ -416,7 +416,7 @@ mod tests {
             path: "/dev/ttyUSB0".into(),
         });
         assert_eq!(
-            refusal(&other, &sound()).what,
+            refusal(&other, &healthy()).what,
             "/dev/ttyUSB0: permission denied"
         );
     }
@@ -429,7 +429,7 @@ mod tests {
             let found = opened(
                 &PortFacts {
                     usb: usb(ms),
-                    ..sound()
+                    ..healthy()
                 },
                 &line,
                 &[],
@@ -446,6 +446,6 @@ mod tests {
             what: "no low latency: EPERM".into(),
             remedy: "ask root",
         };
-        assert_eq!(opened(&sound(), &line, &[note])[1].severity, Noted);
+        assert_eq!(opened(&healthy(), &line, &[note])[1].severity, Noted);
     }
 }

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use crate::doctor::Severity;
 
-    fn sound() -> SystemFacts {
+    fn healthy() -> SystemFacts {
         SystemFacts {
             release: "6.12".into(),
             preemption: "PREEMPT_RT".into(),
@@ -161,14 +161,14 @@ mod tests {
     }
 
     fn changed(change: fn(&mut SystemFacts)) -> SystemFacts {
-        let mut facts = sound();
+        let mut facts = healthy();
         change(&mut facts);
         facts
     }
 
     #[test]
-    fn a_sound_system_is_ok() {
-        assert_eq!(not_ok(&sound(), Pace::Realtime), []);
+    fn a_healthy_system_is_ok() {
+        assert_eq!(not_ok(&healthy(), Pace::Realtime), []);
         let unscaled = changed(|f| (f.governors, f.rt_runtime_us) = (vec![], Some(-1)));
         assert_eq!(not_ok(&unscaled, Pace::Realtime), []);
         let unlimited = changed(|f| f.rt_runtime_us = None);
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn each_defect_is_one_finding_and_a_note_at_virtual_pace() {
         let mixed = || vec!["performance".to_string(), "schedutil".into()];
-        let mut several = sound();
+        let mut several = healthy();
         several.governors = mixed();
         let cases = [
             (

@@ -146,12 +146,12 @@ fn lines(settings: &MultisineSettings, band: RangeInclusive<usize>) -> Vec<usize
     match settings.lines {
         Lines::Full => band.collect(),
         Lines::Odd => odd.collect(),
-        Lines::OddRandom => without_one_a_group(&odd.collect::<Vec<_>>(), settings.seed),
+        Lines::OddRandom => omit_one_line_per_group(&odd.collect::<Vec<_>>(), settings.seed),
     }
 }
 
 /// Omits one line of each complete group, at random.
-fn without_one_a_group(odd: &[usize], seed: u64) -> Vec<usize> {
+fn omit_one_line_per_group(odd: &[usize], seed: u64) -> Vec<usize> {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut kept = Vec::with_capacity(odd.len());
     for group in odd.chunks(GROUP) {

@@ -18,7 +18,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_that_is_taken_gets_a_number() {
+    fn an_existing_name_gets_a_number() {
         let folder = tempfile::tempdir().unwrap();
         let at = SystemTime::UNIX_EPOCH;
         let first = recording(folder.path(), "chirp", at);

@@ -48,7 +48,7 @@ pub(super) fn segments(
             };
             periodic_lines(&whole, band_hz, repetition)
         }
-        Pattern::Stepped(windows) => stepped(&signals, windows, band_hz),
+        Pattern::Stepped(windows) => estimate_stepped_sine(&signals, windows, band_hz),
     }
 }
 
@@ -92,7 +92,7 @@ fn part(signals: &Signals, start: usize, length: usize) -> Signals {
 }
 
 /// Estimates each sine from its periods.
-fn stepped(
+fn estimate_stepped_sine(
     signals: &Signals,
     windows: &[Window],
     (low_hz, high_hz): (f64, f64),

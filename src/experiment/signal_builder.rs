@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thousandth_of_all_ticks_is_filled_in_and_no_more_however_short_the_gaps() {
+    fn interpolates_at_most_a_thousandth_of_all_ticks() {
         // Of 9990 that are there, 9 may be missing: one a thousand, the last at 8500, or a gap of nine.
         let nine =
             gathered(10_000, |tick| tick % 1000 == 500 && tick < 9000).expect("nine are few");

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn work_that_ends_gives_its_result() {
+    fn returns_the_result_of_finished_work() {
         let _alone = one_at_a_time();
         assert_eq!(abandon_on_signal(|| 7).unwrap(), Some(7));
     }

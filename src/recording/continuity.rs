@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn consecutive_ticks_have_no_gap_wherever_they_begin() {
+    fn consecutive_ticks_have_no_gap_from_any_first_tick() {
         let (account, gaps) = follow(&[(7, 0), (8, 0), (9, 0)]);
         assert_eq!(
             (account.ticks(), account.overruns(), account.lost_records()),
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_the_loop_answers_for_is_an_overrun_and_not_a_loss() {
+    fn gap_reported_by_loop_counts_as_overrun() {
         let (account, gaps) = follow(&[(0, 0), (4, 3)]);
         assert_eq!((account.overruns(), account.lost_records()), (3, 0));
         assert_eq!(
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_loop_does_not_answer_for_is_lost() {
+    fn gap_not_reported_by_loop_counts_as_lost() {
         let (account, gaps) = follow(&[(0, 0), (4, 1), (10, 0)]);
         assert_eq!((account.overruns(), account.lost_records()), (1, 2 + 5));
         assert_eq!(
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_that_is_announced_and_seen_counts_once() {
+    fn loss_that_is_reported_and_visible_counts_once() {
         let (mut account, _) = follow(&[(0, 0), (6, 0)]);
         account.event(&Event {
             tick: 6,

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_bytes_on_another_channel_are_another_digest() {
+    fn digest_depends_on_the_channel() {
         let (mut a, mut b) = (Digest::default(), Digest::default());
         a.add(1, b"bytes");
         b.add(2, b"bytes");

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn averages_are_root_mean_squares_without_lines_of_no_power() {
+    fn rms_averages_omit_lines_without_power() {
         let level = |frequency_hz: f64, power_m2: f64| LineLevel {
             frequency_hz,
             input_a2: 1.0,

@@ -8,13 +8,13 @@ const COMPARED_RATIO: f64 = 10.0;
 ///
 /// A phase that is not trusted is placed near its neighbours, but those after it do not follow it: noise in a deep
 /// anti-resonance adds no turns. The first trusted phase stays in (-180, 180]: a plant with a positive DC gain starts near 0.
-pub fn unwrapped_deg(wrapped_deg: &[f64], trusted: &[bool]) -> Vec<f64> {
-    let first = trusted.iter().position(|trusted| *trusted).unwrap_or(0);
+pub fn unwrapped_deg(wrapped_deg: &[f64], valid: &[bool]) -> Vec<f64> {
+    let first = valid.iter().position(|valid| *valid).unwrap_or(0);
     let mut last = wrapped_deg.get(first).copied().unwrap_or(0.0);
     let mut unwrapped = Vec::with_capacity(wrapped_deg.len());
-    for (phase, trusted) in wrapped_deg.iter().zip(trusted) {
+    for (phase, valid) in wrapped_deg.iter().zip(valid) {
         let phase = closest(*phase, last);
-        if *trusted {
+        if *valid {
             last = phase;
         }
         unwrapped.push(phase);

@@ -9,7 +9,7 @@ use crate::identify::{Frf, wrapped_phase_rad};
 /// Half-width of the band in sigmas; smaller magnitudes are drawn faint.
 pub(super) const BAND_SIGMAS: f64 = 2.0;
 /// Smallest magnitude in sigmas whose phase is used for unwrapping: it is known to 0.25 rad.
-const TRUSTED_SIGMAS: f64 = 4.0;
+const VALID_PHASE_SIGMAS: f64 = 4.0;
 /// Measured frequencies further apart than this many resolutions have a gap between them.
 const GAP_RESOLUTIONS: f64 = 2.0;
 /// Colours of measured responses, and of models.
@@ -96,7 +96,7 @@ pub(super) struct Line<'a> {
     /// Whether the band of the magnitude excludes 0.
     pub certain: Vec<bool>,
     /// Whether the phase is known well enough to be used for unwrapping.
-    trusted: Vec<bool>,
+    valid: Vec<bool>,
     pub measured: Option<&'a Frf>,
 }
 
@@ -152,7 +152,7 @@ impl<'a> Line<'a> {
         let measured = trace.curve.measured();
         let (frequency_hz, response) = trace.curve.columns();
         let magnitude: Vec<f64> = response.iter().map(|h| h.norm()).collect();
-        let trusted = above_sigmas(&magnitude, measured, TRUSTED_SIGMAS);
+        let valid = above_sigmas(&magnitude, measured, VALID_PHASE_SIGMAS);
         let phases = response.iter().map(|h| wrapped_phase_rad(*h).to_degrees());
         let wrapped: Vec<f64> = phases.collect();
         Ok(Self {
@@ -161,9 +161,9 @@ impl<'a> Line<'a> {
             frequency_hz,
             response,
             certain: above_sigmas(&magnitude, measured, BAND_SIGMAS),
-            phase_deg: phase::unwrapped_deg(&wrapped, &trusted),
+            phase_deg: phase::unwrapped_deg(&wrapped, &valid),
             magnitude,
-            trusted,
+            valid,
             measured,
         })
     }
@@ -202,14 +202,14 @@ impl<'a> Line<'a> {
     }
 
     /// The points (frequency, phase) that are known well.
-    fn trusted_phases(&self) -> Vec<(f64, f64)> {
+    fn valid_phases(&self) -> Vec<(f64, f64)> {
         let points = self
             .frequency_hz
             .iter()
             .copied()
             .zip(self.phase_deg.iter().copied());
-        let trusted = points.zip(&self.trusted).filter(|(_, trusted)| **trusted);
-        trusted.map(|(point, _)| point).collect()
+        let valid = points.zip(&self.valid).filter(|(_, valid)| **valid);
+        valid.map(|(point, _)| point).collect()
     }
 }
 
@@ -237,11 +237,11 @@ fn align_phases(lines: &mut [Line]) {
     let lowest = lines
         .iter()
         .min_by(|a, b| a.frequency_hz[0].total_cmp(&b.frequency_hz[0]));
-    let Some(reference) = lowest.map(Line::trusted_phases) else {
+    let Some(reference) = lowest.map(Line::valid_phases) else {
         return;
     };
     for line in lines {
-        let offset = phase::offset_deg(&line.trusted_phases(), &reference);
+        let offset = phase::offset_deg(&line.valid_phases(), &reference);
         line.phase_deg.iter_mut().for_each(|phase| *phase += offset);
     }
 }

@@ -95,7 +95,7 @@ impl FollowingError {
             (measured.lowest_a, asked.lowest_a)
         } else if measured.highest_a > asked.highest_a + self.error_a {
             (measured.highest_a, asked.highest_a)
-        } else if self.stands_still() {
+        } else if self.is_constant() {
             (measured.highest_a, self.commanded.highest_a)
         } else {
             return Ok(());
@@ -107,7 +107,7 @@ impl FollowingError {
     }
 
     /// Whether the commands moved and the current did not.
-    fn stands_still(&self) -> bool {
+    fn is_constant(&self) -> bool {
         self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a
     }
 }

@@ -175,7 +175,7 @@ impl Interlocks {
     }
 
     /// Notes the current that flows from this tick on. *In the tick.*
-    pub fn note(&mut self, command_a: f64) {
+    pub fn record_current(&mut self, command_a: f64) {
         self.heat(command_a, 1.0);
         self.last_command_a = command_a;
     }

@@ -149,7 +149,7 @@ impl Servo {
                 Err(trip) => self.trip(trip, tick),
             }
         }
-        self.interlocks.note(self.applied_a);
+        self.interlocks.record_current(self.applied_a);
     }
 
     /// The current that the amplifier gives for a request.

@@ -157,12 +157,12 @@ impl Scheduling {
         let locked = mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE);
         let remedy =
             "raise `memlock` in /etc/security/limits.conf or give the program CAP_IPC_LOCK";
-        self.memory_locked = self.ask("locking memory", locked, remedy);
+        self.memory_locked = self.granted("locking memory", locked, remedy);
     }
 
     fn set_policy(&mut self, priority: i32) {
         let remedy = "raise `rtprio` in /etc/security/limits.conf or give the program CAP_SYS_NICE";
-        self.policy = match self.ask("SCHED_FIFO", set_fifo(priority), remedy) {
+        self.policy = match self.granted("SCHED_FIFO", set_fifo(priority), remedy) {
             true => format!("SCHED_FIFO {priority}"),
             false => "SCHED_OTHER".into(),
         };
@@ -170,11 +170,11 @@ impl Scheduling {
 
     fn set_cpu(&mut self, cpu: Option<usize>) {
         let remedy = "choose a processor this process may use in loop.cpu";
-        self.cpu = cpu.filter(|&cpu| self.ask("binding to a processor", bind(cpu), remedy));
+        self.cpu = cpu.filter(|&cpu| self.granted("binding to a processor", bind(cpu), remedy));
     }
 
     /// Whether the system granted what was asked for; a refusal is noted with its remedy.
-    fn ask(&mut self, what: &str, result: nix::Result<()>, remedy: &str) -> bool {
+    fn granted(&mut self, what: &str, result: nix::Result<()>, remedy: &str) -> bool {
         let refused = result.map_err(|error| format!("{what}: {error}; {remedy}"));
         let granted = refused.is_ok();
         self.refused.extend(refused.err());

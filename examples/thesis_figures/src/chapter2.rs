@@ -447,7 +447,7 @@ fn elements_chart(heading: &str, mode: usize, all: &[CloseLoci]) -> Chart {
 fn compare_crossing(content: Content, loci: &CloseLoci) -> Content {
     let (percent, hertz) = loci.place();
     content
-        .compare(Comparison::words("at asymmetry 0 the loci are", "crossing", loci.meeting.0))
+        .compare(Comparison::text("at asymmetry 0 the loci are", "crossing", loci.meeting.0))
         .compare(Comparison::number("crossing", 6.6, 1, percent, "% of L"))
         .compare(Comparison::number("its frequency", 153.0, 0, hertz, "Hz").remark("0.58 Hz below the printed round figure, with the masses that give all eight frequencies of Table 2-2"))
 }
@@ -457,7 +457,7 @@ fn compare_veering(content: Content, loci: &CloseLoci) -> Content {
     let name = &loci.name;
     let place = format!("{} % of L, {} Hz", signed(percent, 3), signed(hertz, 2));
     content
-        .compare(Comparison::words(
+        .compare(Comparison::text(
             &format!("at {name} the loci are"),
             "veering",
             loci.meeting.0,

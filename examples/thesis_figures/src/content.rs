@@ -156,7 +156,7 @@ impl Comparison {
     }
 
     /// Text: a kind of zeros, a sequence of signs.
-    pub fn words(what: &str, printed: &str, computed: &str) -> Comparison {
+    pub fn text(what: &str, printed: &str, computed: &str) -> Comparison {
         let same = printed == computed;
         Comparison {
             what: what.into(),
@@ -175,7 +175,7 @@ impl Comparison {
 
     /// A statement of the thesis, whether it holds, and the computed evidence.
     pub fn holds(what: &str, printed: &str, holds: bool, computed: &str) -> Comparison {
-        let words = Comparison::words(what, "", "");
+        let words = Comparison::text(what, "", "");
         Comparison {
             printed: printed.into(),
             computed: computed.into(),
@@ -191,7 +191,7 @@ impl Comparison {
 
     /// A value that the thesis does not print.
     pub fn unprinted(what: &str, computed: impl Into<String>) -> Comparison {
-        let words = Comparison::words(what, "", "");
+        let words = Comparison::text(what, "", "");
         let (printed, difference) = ("not printed".into(), String::new());
         Comparison {
             printed,

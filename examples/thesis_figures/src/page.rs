@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn escapes_the_special_characters_of_html() {
-        let row = comparison(&Comparison::words("|S| < 1 & more", "<b>", "<b>"));
+        let row = comparison(&Comparison::text("|S| < 1 & more", "<b>", "<b>"));
         assert!(row.contains("|S| &lt; 1 &amp; more") && !row.contains("<b>"));
     }
 }

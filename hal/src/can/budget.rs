@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn the_closed_forms_count_the_bits() {
+    fn formulas_match_the_counted_bits() {
         for bytes in 0..=8 {
             assert_eq!(base_frame_bits(bytes), stuffed(34 + 8 * bytes) + 13);
             assert_eq!(extended_frame_bits(bytes), stuffed(54 + 8 * bytes) + 13);

@@ -197,7 +197,7 @@ mod tests {
     ];
 
     #[test]
-    fn statuswords_are_read_under_their_masks() {
+    fn decodes_statuswords_with_their_masks() {
         for state in ALL {
             assert_eq!(State::decode(state.bits()), Some(state));
             // Bits 4, 7 and 8 to 15 have other meanings.
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn controlwords_are_those_of_the_standard() {
+    fn controlwords_match_cia_402() {
         let words = [
             SHUTDOWN,
             SWITCH_ON,

@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_emergency_carries_code_register_and_vendor_bytes() {
+    fn emergency_contains_code_register_and_vendor_bytes() {
         // The bytes for over-current at the output of node 5, error register generic + current.
         let emergency = Emergency {
             code: 0x2310,

@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn identifiers_keep_their_width() {
+    fn identifiers_preserve_their_format() {
         assert_eq!(Id::standard(0xFFFF).raw(), 0x7FF);
         assert_eq!(Id::extended(u32::MAX).raw(), 0x1FFF_FFFF);
         assert_ne!(

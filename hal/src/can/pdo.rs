@@ -121,30 +121,30 @@ pub(super) fn number_of(bytes: &[u8]) -> u32 {
 }
 
 impl Pdo {
-    fn parameters(&self) -> u16 {
+    fn parameter_index(&self) -> u16 {
         parameters(self.direction, self.number)
     }
 
     /// The address of the COB-ID.
     pub fn cob_id_address(&self) -> Address {
-        Address::new(self.parameters(), 1)
+        Address::new(self.parameter_index(), 1)
     }
 
     /// The values to write, in order. `cob_id_now` is the present value of [`Pdo::cob_id_address`].
     pub fn sequence(&self, cob_id_now: u32) -> Vec<Value> {
         let on = cob_id(self.direction, self.number, self.node).raw() | cob_id_now & NO_REMOTE;
-        let off = Value::new(self.parameters(), 1, on | OFF, 4);
-        let clear = Value::new(self.parameters() + 0x200, 0, 0, 1);
+        let off = Value::new(self.parameter_index(), 1, on | OFF, 4);
+        let clear = Value::new(self.parameter_index() + 0x200, 0, 0, 1);
         [off, clear]
             .into_iter()
             .chain(self.layout())
-            .chain([Value::new(self.parameters(), 1, on, 4)])
+            .chain([Value::new(self.parameter_index(), 1, on, 4)])
             .collect()
     }
 
     /// Entries, count, transmission type and times: the values that are read back for verification.
     pub fn layout(&self) -> Vec<Value> {
-        let (parameters, mapping) = (self.parameters(), self.parameters() + 0x200);
+        let (parameters, mapping) = (self.parameter_index(), self.parameter_index() + 0x200);
         let entries = (1..)
             .zip(&self.entries)
             .map(|(sub, entry)| Value::new(mapping, sub, entry.0, 4));

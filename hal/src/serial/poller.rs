@@ -222,7 +222,7 @@ mod tests {
     };
 
     /// An poller after the silence at the start, with a request at 1000.
-    fn asked() -> Poller {
+    fn poller_with_request() -> Poller {
         let mut poller = Poller::with_times(TIMES, 0);
         assert_eq!(poller.next_action(999), Action::Listen { until_ns: 1000 });
         assert_eq!(poller.next_action(1000), Action::Send);
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn polls_at_the_interval_and_dates_the_answer_by_its_request() {
-        let mut poller = asked();
+        let mut poller = poller_with_request();
         assert!(poller.received(1200));
         assert_eq!(poller.answered(1, 1200), Some(1000));
         assert_eq!(poller.next_action(1999), Action::Listen { until_ns: 2000 });
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn repeats_the_request_when_the_line_is_quiet_after_a_damaged_answer() {
-        let mut poller = asked();
+        let mut poller = poller_with_request();
         assert!(poller.received(1100) && poller.received(1150));
         assert_eq!(poller.next_action(1249), Action::Listen { until_ns: 1250 });
         assert_eq!(poller.next_action(1250), Action::Send);
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn repeats_the_request_after_a_timeout() {
-        let mut poller = asked();
+        let mut poller = poller_with_request();
         assert_eq!(poller.next_action(1499), Action::Listen { until_ns: 1500 });
         assert_eq!(poller.next_action(1500), Action::TimedOut);
         assert_eq!(poller.next_action(1500), Action::Send);
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn dates_an_answer_after_timeouts_by_the_first_unanswered_request_and_waits_for_silence() {
-        let mut poller = asked();
+        let mut poller = poller_with_request();
         for now_ns in [1500, 2000] {
             assert_eq!(poller.next_action(now_ns), Action::TimedOut);
             poller.sent(now_ns);
@@ -283,14 +283,14 @@ mod tests {
 
     #[test]
     fn two_answers_to_one_request_have_unknown_age() {
-        let mut poller = asked();
+        let mut poller = poller_with_request();
         assert_eq!(poller.answered(2, 1100), None);
         assert_eq!(poller.next_action(2099), Action::Listen { until_ns: 2100 });
     }
 
     #[test]
     fn ignores_bytes_without_a_request() {
-        let mut poller = asked();
+        let mut poller = poller_with_request();
         assert_eq!(poller.answered(1, 1200), Some(1000));
         assert!(!poller.received(1300));
         assert_eq!(poller.answered(1, 1300), None);
@@ -300,38 +300,38 @@ mod tests {
         /// However late a probe answers, and however late the reader looks: no answer counts as asked for after it was.
         #[test]
         fn never_assigns_an_answer_to_a_later_request(
-            late_ns in 0u64..5000, jitter_ns in vec(0u64..400, 1..20), kept_ns in vec(0u64..2000, 1..20), rarely in 1usize..30,
+            late_ns in 0u64..5000, jitter_ns in vec(0u64..400, 1..20), suspended_ns in vec(0u64..2000, 1..20), rarely in 1usize..30,
         ) {
-            let (mut poller, mut now_ns, mut believed) = (Poller::with_times(TIMES, 0), 0, 0);
-            let mut on_the_way: Vec<(u64, u64)> = Vec::new(); // sent, arrives
+            let (mut poller, mut now_ns, mut used) = (Poller::with_times(TIMES, 0), 0, 0);
+            let mut in_transit: Vec<(u64, u64)> = Vec::new(); // sent, arrives
             let mut requests = 0;
             for turn in 0..2000 {
-                let (arrived, later): (Vec<_>, Vec<_>) = on_the_way.iter().partition(|(_, arrives_ns)| *arrives_ns <= now_ns);
+                let (arrived, later): (Vec<_>, Vec<_>) = in_transit.iter().partition(|(_, arrives_ns)| *arrives_ns <= now_ns);
                 if let Some((sent_ns, _)) = arrived.last() {
                     let asked_ns = poller.received(now_ns).then(|| poller.answered(arrived.len() as u32, now_ns)).flatten();
                     prop_assert!(asked_ns.is_none_or(|asked_ns| asked_ns <= *sent_ns), "{:?} for {}", asked_ns, sent_ns);
-                    believed += u32::from(asked_ns.is_some());
-                    on_the_way = later;
+                    used += u32::from(asked_ns.is_some());
+                    in_transit = later;
                 } else {
                     match poller.next_action(now_ns) {
                         Action::Send => {
                             poller.sent(now_ns);
-                            let last_ns = on_the_way.last().map_or(0, |(_, arrives_ns)| *arrives_ns);
+                            let last_ns = in_transit.last().map_or(0, |(_, arrives_ns)| *arrives_ns);
                             let arrives_ns = last_ns.max(now_ns + late_ns + jitter_ns[requests % jitter_ns.len()]);
-                            on_the_way.push((now_ns, arrives_ns));
+                            in_transit.push((now_ns, arrives_ns));
                             requests += 1;
                         }
                         Action::TimedOut => {}
                         Action::Listen { until_ns } => {
-                            let next_ns = on_the_way.first().map_or(until_ns, |(_, arrives_ns)| until_ns.min(*arrives_ns));
+                            let next_ns = in_transit.first().map_or(until_ns, |(_, arrives_ns)| until_ns.min(*arrives_ns));
                             now_ns = next_ns.max(now_ns);
                         }
                     }
                 }
-                now_ns += 1 + if turn % rarely == 0 { kept_ns[turn % kept_ns.len()] } else { 0 };
+                now_ns += 1 + if turn % rarely == 0 { suspended_ns[turn % suspended_ns.len()] } else { 0 };
             }
             // A reader that is kept away may find two answers at once, every time: then it believes none.
-            prop_assert!(believed > 0 || kept_ns.iter().any(|kept_ns| *kept_ns > 50));
+            prop_assert!(used > 0 || suspended_ns.iter().any(|suspended_ns| *suspended_ns > 50));
         }
     }
 }

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_law_is_the_difference_equation_of_its_matrices() {
+    fn law_follows_the_difference_equation_of_its_matrices() {
         let biquad = Biquad::new([0.25, 0.0, 0.0], [1.0, -0.5, 0.0]);
         let mut state = BiquadState::default();
         let mut running = law().law(1e-3);

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_are_found_at_any_begin_and_end() {
+    fn finds_bands_anywhere_in_the_range() {
         let within =
             |bands: [[f64; 2]; 2]| move |x: f64| Ok(bands.iter().any(|[a, b]| x >= *a && x < *b));
         let near = |found: &[[f64; 2]], expected: &[[f64; 2]]| {

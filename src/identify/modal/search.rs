@@ -15,7 +15,7 @@ use crate::identify::FrfDatum;
 const MAX_MODES: usize = 24;
 
 /// One stage of the search.
-struct Stage {
+struct Pass {
     /// Error as a ratio of H that is added to the noise.
     relative_error: f64,
     /// Every n-th datum is used. A mode of 0.2 % damping spans eight data of 0.05 % width.
@@ -27,20 +27,20 @@ struct Stage {
 }
 
 /// The stages, from coarse to fine.
-const STAGES: [Stage; 3] = [
-    Stage {
+const PASSES: [Pass; 3] = [
+    Pass {
         relative_error: 0.03,
         every: 4,
         tolerance: 1e-2,
         progress: 0.2,
     },
-    Stage {
+    Pass {
         relative_error: 0.003,
         every: 1,
         tolerance: 1e-3,
         progress: 0.5,
     },
-    Stage {
+    Pass {
         relative_error: 0.0,
         every: 1,
         tolerance: 1e-7,
@@ -91,8 +91,8 @@ pub(super) fn orders(
         done: 0.0,
         progress,
     };
-    for stage in &STAGES {
-        search.run(stage, problem)?;
+    for pass in &PASSES {
+        search.run(pass, problem)?;
     }
     Ok(search.orders)
 }
@@ -110,18 +110,18 @@ struct Search<'a, 'p> {
 
 impl Search<'_, '_> {
     /// Adds modes, with the errors of a stage, as long as they are significant.
-    fn run(&mut self, stage: &Stage, problem: Problem<'_>) -> Result<(), FitError> {
-        let data = &stage.data(problem.data, &self.parameters);
+    fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
+        let data = &pass.data(problem.data, &self.parameters);
         let problem = Problem { data, ..problem };
         let start = std::mem::take(&mut self.parameters);
-        let mut solution = refine(problem, start, stage.tolerance);
+        let mut solution = refine(problem, start, pass.tolerance);
         let first_misfit = problem.misfit(solution.chi2);
         while solution.parameters.modes.len() < MAX_MODES {
             self.report(
-                stage,
-                stage_progress(first_misfit, problem.misfit(solution.chi2)),
+                pass,
+                pass_progress(first_misfit, problem.misfit(solution.chi2)),
             )?;
-            let Some(next) = with_another_mode(problem, &solution, stage.tolerance) else {
+            let Some(next) = with_another_mode(problem, &solution, pass.tolerance) else {
                 break;
             };
             let evidence = evidence(problem, &solution, &next);
@@ -129,19 +129,19 @@ impl Search<'_, '_> {
             solution = next;
         }
         self.parameters = solution.parameters;
-        self.done = stage.progress;
+        self.done = pass.progress;
         Ok(())
     }
 
     /// Reports the progress of a stage, 0 to 1, as progress of the search.
-    fn report(&mut self, stage: &Stage, fraction: f64) -> Result<(), FitError> {
-        let done = self.done + (stage.progress - self.done) * fraction;
+    fn report(&mut self, pass: &Pass, fraction: f64) -> Result<(), FitError> {
+        let done = self.done + (pass.progress - self.done) * fraction;
         report(self.progress, done)
     }
 }
 
 /// Progress of a stage, 0 to 1, by how far the misfit has fallen towards 1 on a logarithmic scale.
-fn stage_progress(first_misfit: f64, misfit: f64) -> f64 {
+fn pass_progress(first_misfit: f64, misfit: f64) -> f64 {
     if first_misfit > 1.0 {
         (1.0 - misfit.ln() / first_misfit.ln()).clamp(0.0, 1.0)
     } else {
@@ -149,7 +149,7 @@ fn stage_progress(first_misfit: f64, misfit: f64) -> f64 {
     }
 }
 
-impl Stage {
+impl Pass {
     /// The data of the stage, merged once modes are known.
     fn data(&self, data: &[FrfDatum], known: &ModalParameters) -> Vec<FrfDatum> {
         let data = if known.modes.is_empty() {

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn regular_times_change_nothing_and_whole_periods_shift() {
+    fn regular_times_are_unchanged_and_whole_periods_shift() {
         let set_a: Vec<f64> = (0..200)
             .map(|k| {
                 if k < 150 {

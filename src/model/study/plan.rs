@@ -165,8 +165,8 @@ impl Plan {
 
     fn drawn(&self, bits: &mut Pcg64) -> Drawn {
         let drawn = self.varied.iter().map(|one| {
-            let numbers = [uniform(bits), uniform(bits)];
-            let (deviation, rank) = one.deviation.drawn(numbers);
+            let pair = [uniform(bits), uniform(bits)];
+            let (deviation, rank) = one.deviation.drawn(pair);
             (one.nominal + deviation, rank)
         });
         let (values, ranks) = drawn.unzip();
@@ -197,7 +197,7 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
     let settings = settings(plant);
     let mut varied: Vec<Varied> = Vec::new();
     for tolerance in tolerances {
-        for (key, nominal) in numbers(tolerance, &settings)? {
+        for (key, nominal) in matching_settings(tolerance, &settings)? {
             if varied.iter().any(|one| one.key == *key) {
                 let why = format!("`{key}` varies already; name each setting once");
                 return Err(tolerance.wrong(why));
@@ -226,23 +226,23 @@ fn check_count(varied: usize) -> Result<(), StudyError> {
 }
 
 /// The numeric settings that a tolerance applies to, with their values.
-fn numbers<'a>(
+fn matching_settings<'a>(
     tolerance: &Tolerance,
     settings: &'a [(String, Value)],
 ) -> Result<Vec<(&'a String, f64)>, StudyError> {
     let quantities = settings.iter().filter(|(_, value)| value.is_f64());
-    let numbers: Vec<(&String, f64)> = quantities
+    let matching_settings: Vec<(&String, f64)> = quantities
         .filter(|(key, _)| tolerance.matches(key))
         .filter_map(|(key, value)| Some((key, value.as_f64()?)))
         .collect();
-    match numbers.is_empty() {
-        true => Err(tolerance.wrong(no_numbers(tolerance, settings))),
-        false => Ok(numbers),
+    match matching_settings.is_empty() {
+        true => Err(tolerance.wrong(no_matching_setting(tolerance, settings))),
+        false => Ok(matching_settings),
     }
 }
 
 /// The reason why a tolerance applies to no numeric setting.
-fn no_numbers(tolerance: &Tolerance, settings: &[(String, Value)]) -> String {
+fn no_matching_setting(tolerance: &Tolerance, settings: &[(String, Value)]) -> String {
     let mut keys = settings.iter().map(|(key, _)| key.as_str());
     let pattern = tolerance.pattern();
     if let Some(key) = keys.clone().find(|key| tolerance.matches(key)) {

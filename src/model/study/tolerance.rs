@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_star_stands_for_part_of_one_name() {
+    fn a_star_matches_part_of_one_name() {
         let tolerance: Tolerance = "plant.*.s*=+-1".parse().unwrap();
         for (key, good) in [
             ("plant.a.s", true),
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_tolerance_is_refused_with_the_text() {
+    fn rejects_invalid_tolerance() {
         for text in [
             "k",
             "k=",
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tolerance_that_means_nothing_for_its_setting_is_refused() {
+    fn rejects_tolerance_without_effect_or_with_a_wrong_unit() {
         for (text, word) in [
             ("k=uniform:1:1", "empty"),
             ("k=uniform:2:1", "empty"),

@@ -175,7 +175,7 @@ impl ModesAt {
     /// These modes in the order and with the signs of those before.
     pub(super) fn following(mut self, before: &ModesAt) -> ModesAt {
         self.align_equal_modes(before);
-        let places = partners(before, &self);
+        let places = continuations(before, &self);
         let mass = before.mean_mass(&self);
         let mut shapes = self.shapes.select_columns(&places);
         for (index, mut shape) in shapes.column_iter_mut().enumerate() {
@@ -247,9 +247,9 @@ fn largest_rows(matrix: &DMatrix<f64>, count: usize) -> Vec<usize> {
 }
 
 /// For each mode before the index of its continuation: the most similar pairs first.
-fn partners(before: &ModesAt, after: &ModesAt) -> Vec<usize> {
+fn continuations(before: &ModesAt, after: &ModesAt) -> Vec<usize> {
     let n = before.count();
-    let partners = assign(n, n, |i, j| -before.mac(i, after, j));
-    let places = partners.into_iter().enumerate();
+    let continuations = assign(n, n, |i, j| -before.mac(i, after, j));
+    let places = continuations.into_iter().enumerate();
     places.map(|(i, place)| place.unwrap_or(i)).collect()
 }

@@ -117,7 +117,7 @@ impl<'a> Path<'a> {
     /// Tries actuator and probe at each value. `None` where some value has no response at all.
     fn trial(&self, ports: &[Ports]) -> Result<Option<Trial>, PlantError> {
         let mut values = self.modes.iter().zip(ports);
-        if values.any(|(at, ports)| is_silent(at, ports)) {
+        if values.any(|(at, ports)| has_no_response(at, ports)) {
             return Ok(None);
         }
         let values = self.modes.iter().zip(ports);
@@ -154,7 +154,7 @@ impl<'a> Path<'a> {
     }
 }
 
-fn is_silent(at: &ModesAt, [force, sensor]: &Ports) -> bool {
+fn has_no_response(at: &ModesAt, [force, sensor]: &Ports) -> bool {
     let terms = at.terms(force, sensor);
     terms.iter().all(|term| term.residue_per_kg == 0.0)
 }

@@ -176,7 +176,7 @@ impl<'a> Interval<'a> {
 
     /// P4-2, P4-2x and P4-2y on this side.
     pub fn propositions(&self) -> [Proposition; 3] {
-        let (alternating, close) = (self.alternating(), self.close());
+        let (alternating, close) = (self.condition_c4_1(), self.condition_c4_3());
         let beyond = self.best("C4-4", |sample| Some(c4_4(&sample.modes?)));
         let dual = self.best("C4-4y", |sample| Some(c4_4y(&sample.modes?, &sample.zeros)));
         [
@@ -210,13 +210,13 @@ impl<'a> Interval<'a> {
     }
 
     /// C4-1 next to the veering point, where the interval begins.
-    fn alternating(&self) -> Condition {
+    fn condition_c4_1(&self) -> Condition {
         let modes = self.next.and_then(|sample| sample.modes);
         modes.map_or(failed("C4-1", 0.0), |modes| c4_1(&modes))
     }
 
     /// C4-3 at the veering point.
-    fn close(&self) -> Condition {
+    fn condition_c4_3(&self) -> Condition {
         c4_3(self.meeting, self.closest.modes.as_ref())
     }
 

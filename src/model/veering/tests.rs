@@ -100,7 +100,7 @@ fn grid() -> Vec<f64> {
 /// Number of predictions of a proposition, and of wrong ones by Eq. (4-1) and by the plant.
 #[derive(Debug, Default)]
 struct Tally {
-    asked: usize,
+    predictions: usize,
     appear: usize,
     absent: usize,
     wrong_by_equation: usize,
@@ -109,7 +109,7 @@ struct Tally {
 
 impl Tally {
     fn add(&mut self, proposition: &Proposition) {
-        self.asked += 1;
+        self.predictions += 1;
         self.appear += usize::from(proposition.predicted == Prediction::Appear);
         self.absent += usize::from(proposition.predicted == Prediction::Absent);
         self.wrong_by_equation += usize::from(
@@ -163,7 +163,7 @@ fn p4_1_holds_for_random_sums_and_c4_2_implies_c4_1() {
     }
     assert_eq!(tally.wrong_by_equation, 0, "{tally:?}");
     assert!(
-        tally.appear > 500 && tally.absent > 10_000 && tally.asked > 19_990,
+        tally.appear > 500 && tally.absent > 10_000 && tally.predictions > 19_990,
         "{tally:?}"
     );
 }
@@ -244,7 +244,7 @@ fn as_printed(trajectory: &Trajectory) -> [Prediction; 3] {
 
 #[test]
 fn premises_as_printed_are_wrong_for_some_systems() {
-    let (mut dice, mut asked, mut wrong) = (Dice::new(3), [0; 3], [0; 3]);
+    let (mut dice, mut predictions, mut wrong) = (Dice::new(3), [0; 3], [0; 3]);
     for _ in 0..2000 {
         let trajectory = System::with_double_integrator(&mut dice).trajectory();
         let quartet = trajectory
@@ -252,7 +252,7 @@ fn premises_as_printed_are_wrong_for_some_systems() {
             .iter()
             .any(|sample| sample.equation == Some(ZeroConfiguration::Quartet));
         for (which, predicted) in as_printed(&trajectory).into_iter().enumerate() {
-            asked[which] += usize::from(predicted == Prediction::Appear);
+            predictions[which] += usize::from(predicted == Prediction::Appear);
             wrong[which] += usize::from(predicted.is_contradicted_by(quartet));
             // "Only if" is right: where zeros are, P4-1 has C4-1 and C4-4 at that value.
             assert!(predicted != Prediction::Absent || !quartet);
@@ -260,8 +260,8 @@ fn premises_as_printed_are_wrong_for_some_systems() {
     }
     // Of some 700 systems that P4-2 is sure of, and 400 of P4-2y, 40: their residues turn on the way.
     assert!(
-        asked[0] > 500 && asked[1] == asked[0] && asked[2] > 250,
-        "{asked:?}"
+        predictions[0] > 500 && predictions[1] == predictions[0] && predictions[2] > 250,
+        "{predictions:?}"
     );
     assert!(
         wrong.iter().all(|wrong| (20..80).contains(wrong)),
@@ -324,15 +324,15 @@ fn near_the_upper_limit(trajectory: &Trajectory) -> (usize, usize, f64) {
     let apart = on_grid.filter_map(|sample| Some((sample.modes?, p4_1(sample)?)));
     apart.fold(
         (0, 0, 0.0),
-        |(asked, wrong, furthest): (usize, usize, f64), (modes, p)| {
+        |(predictions, wrong, furthest): (usize, usize, f64), (modes, p)| {
             let c = c4_2(&modes);
             if !c4_1(&modes).holds || 2.0 * c.figure < c.limits[0] + c.limits[1] {
-                return (asked, wrong, furthest);
+                return (predictions, wrong, furthest);
             }
             let over = c.margin.abs() / modes.remainder.integrator_ratio;
             let is_wrong = p.predicted.is_contradicted_by(p.plant);
             (
-                asked + 1,
+                predictions + 1,
                 wrong + usize::from(is_wrong),
                 if is_wrong {
                     furthest.max(over)
@@ -353,8 +353,8 @@ fn p4_1_errs_by_less_than_the_integrator_ratio() {
             (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
         for _ in 0..300 {
             let trajectory = with_held_modes(&mut dice, below, above).trajectory();
-            let (asked, wrong, furthest) = near_the_upper_limit(&trajectory);
-            sum = (sum.0 + asked, sum.1 + wrong, sum.2.max(furthest));
+            let (predictions, wrong, furthest) = near_the_upper_limit(&trajectory);
+            sum = (sum.0 + predictions, sum.1 + wrong, sum.2.max(furthest));
             for side in [Side::Before, Side::After] {
                 let all = Interval::of(&trajectory, side).propositions();
                 tallies

@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn several_modes_together_act_as_an_abstract_one() {
+    fn several_modes_together_dominate_as_di_or_dc() {
         // Above both resonances neither R nor u alone turns v's sign: u + v and R + v are positive at infinity, all three
         // are not. -2.5 + 2 > ... the sums of residues decide: R + v = -0.5, u + v = -0.5, R + u + v = 1.5.
         assert_eq!(

@@ -59,7 +59,10 @@ pub(super) fn page(
     size: (f64, f64),
     draw: impl FnOnce(&Canvas) -> Result<(), ReportError>,
 ) -> Result<String, ReportError> {
-    let (width, height) = (units(size.0) as u32, units(size.1) as u32);
+    let (width, height) = (
+        to_drawing_units(size.0) as u32,
+        to_drawing_units(size.1) as u32,
+    );
     let mut svg = String::new();
     {
         let backend = SVGBackend::with_string(&mut svg, (width, height));
@@ -84,13 +87,13 @@ impl Canvas<'_> {
         colour: RGBAColor,
         width: f64,
     ) -> Result<(), ReportError> {
-        let style = colour.stroke_width(units(width) as u32);
-        let path = PathElement::new(in_units(points), style);
+        let style = colour.stroke_width(to_drawing_units(width) as u32);
+        let path = PathElement::new(points_in_drawing_units(points), style);
         self.0.draw(&path).map_err(failed)
     }
 
     pub fn area(&self, points: &[(f64, f64)], colour: RGBAColor) -> Result<(), ReportError> {
-        let polygon = Polygon::new(in_units(points), colour.filled());
+        let polygon = Polygon::new(points_in_drawing_units(points), colour.filled());
         self.0.draw(&polygon).map_err(failed)
     }
 
@@ -100,7 +103,7 @@ impl Canvas<'_> {
         radius: f64,
         colour: RGBAColor,
     ) -> Result<(), ReportError> {
-        let circle = Circle::new(at(centre), units(radius), colour.filled());
+        let circle = Circle::new(at(centre), to_drawing_units(radius), colour.filled());
         self.0.draw(&circle).map_err(failed)
     }
 
@@ -111,8 +114,8 @@ impl Canvas<'_> {
         colour: Colour,
         width: f64,
     ) -> Result<(), ReportError> {
-        let style = colour.stroke_width(units(width) as u32);
-        let circle = Circle::new(at(centre), units(radius), style);
+        let style = colour.stroke_width(to_drawing_units(width) as u32);
+        let circle = Circle::new(at(centre), to_drawing_units(radius), style);
         self.0.draw(&circle).map_err(failed)
     }
 
@@ -143,15 +146,15 @@ impl Canvas<'_> {
     }
 }
 
-fn units(pixels: f64) -> i32 {
+fn to_drawing_units(pixels: f64) -> i32 {
     (pixels * UNITS).round() as i32
 }
 
 fn at((x, y): (f64, f64)) -> (i32, i32) {
-    (units(x), units(y))
+    (to_drawing_units(x), to_drawing_units(y))
 }
 
-fn in_units(points: &[(f64, f64)]) -> Vec<(i32, i32)> {
+fn points_in_drawing_units(points: &[(f64, f64)]) -> Vec<(i32, i32)> {
     points.iter().map(|point| at(*point)).collect()
 }
 

@@ -24,7 +24,7 @@ pub const GREY: Colour = Colour(140, 140, 140);
 pub const PAPER: Colour = Colour(255, 255, 255);
 
 /// Text of secondary importance.
-pub(super) const QUIET_INK: Colour = Colour(95, 95, 95);
+pub(super) const SECONDARY_INK: Colour = Colour(95, 95, 95);
 /// The frame of a chart.
 pub(super) const FRAME: Colour = Colour(90, 90, 90);
 /// Grid lines with a number.
@@ -36,7 +36,7 @@ pub(super) const FINE_GRID: Colour = Colour(234, 234, 234);
 const DARK: [(Colour, Colour); 8] = [
     (PAPER, Colour(22, 24, 27)),
     (INK, Colour(230, 230, 230)),
-    (QUIET_INK, Colour(168, 168, 168)),
+    (SECONDARY_INK, Colour(168, 168, 168)),
     (FRAME, Colour(150, 156, 164)),
     (GRID, Colour(62, 67, 74)),
     (FINE_GRID, Colour(38, 42, 47)),

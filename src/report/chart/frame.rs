@@ -163,7 +163,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn draws_only_inside_and_misses_no_inner_point_by_a_pixel(
+        fn clips_to_the_frame_and_keeps_inner_points_within_a_pixel(
             points in prop::collection::vec((-50.0..150.0f64, -50.0..100.0f64), 2..40),
         ) {
             let parts = FRAME.clipped(&points);

@@ -3,7 +3,7 @@
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::canvas::{Canvas, TextStyle};
-use super::colours::QUIET_INK;
+use super::colours::SECONDARY_INK;
 use crate::report::ReportError;
 
 pub(super) const TEXT_SIZE: f64 = 12.5;
@@ -13,7 +13,7 @@ const BOLD_CHARACTER: f64 = 0.63;
 const LINE_HEIGHT: f64 = 1.4;
 
 const TITLE: TextStyle = TextStyle::new(17.0, HPos::Left, VPos::Top).bold();
-const SUBTITLE: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Left, VPos::Top).colour(QUIET_INK);
+const SUBTITLE: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Left, VPos::Top).colour(SECONDARY_INK);
 
 /// Lines of text, laid out below each other.
 pub(super) struct TextBlock {

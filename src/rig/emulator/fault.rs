@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_is_a_different_fault_and_stands_in_the_help() {
+    fn every_kind_is_a_different_fault_and_is_listed_in_the_help() {
         let faults: Vec<EmulatedFault> = KINDS.map(|k| parse(k.name).expect(k.name)).to_vec();
         for (index, fault) in faults.iter().enumerate() {
             assert!(!faults[..index].contains(fault), "{}", KINDS[index].name);

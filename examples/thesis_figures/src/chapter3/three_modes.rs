@@ -202,12 +202,12 @@ pub(in super::super) fn fig_3_11(_: &Runs) -> Result<Content, FigureError> {
             .line("", pen, part(11.0, size, &over));
         let sum = equal_pair(size)?;
         content = content
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("sequence, α0 = {size}"),
                 printed,
                 &sequence(&sum)?,
             ))
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("zeros, α0 = {size}"),
                 expected,
                 &kinds(&sum.undamped_zeros()?),
@@ -363,7 +363,7 @@ pub(in super::super) fn fig_3_12(_: &Runs) -> Result<Content, FigureError> {
     for (size, _, expected) in CASES_3_12 {
         let zeros = kinds(&eq_3_9(size)?.undamped_zeros()?);
         content = content
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("zeros, α0 = {size}"),
                 expected,
                 &zeros,
@@ -425,7 +425,7 @@ pub(in super::super) fn fig_3_13(_: &Runs) -> Result<Content, FigureError> {
         // Between the resonances, where both modes add: the corner.
         let corner = sum.response(nalgebra::Complex::new(0.0, 10.5)).re;
         content = content
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("corner beside the origin, {name}"),
                 expected,
                 if corner < 0.0 { "left" } else { "right" },

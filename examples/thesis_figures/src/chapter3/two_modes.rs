@@ -61,7 +61,7 @@ fn migration(omega_u: f64, segments: &[Segment], content: Content) -> Result<Con
         };
         let computed = varied.sum(middle)?.undamped_zeros()?;
         content = content.compare(
-            Comparison::words(&format!("zeros in {name}"), expected, &kinds(&computed))
+            Comparison::text(&format!("zeros in {name}"), expected, &kinds(&computed))
                 .remark(&format!("computed at αv = {}", signed(middle, 2))),
         );
     }
@@ -147,7 +147,7 @@ pub(in super::super) fn fig_3_3(_: &Runs) -> Result<Content, FigureError> {
             ModeOf("v", 10.0, residue, 0.001),
         ]);
         content = content
-            .compare(Comparison::words(&what, place, found).remark(&remark))
+            .compare(Comparison::text(&what, place, found).remark(&remark))
             .command(model.command("model modes", ""));
     }
     Ok(content.row(240.0, gains).row(150.0, phases))
@@ -192,12 +192,12 @@ pub(in super::super) fn fig_3_4(_: &Runs) -> Result<Content, FigureError> {
     {
         let sum = sum(&[(0.0, 0.0, 1.0), (10.0, 0.0, residue)])?;
         content = content
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("sequence, αv = {}", signed(residue, 1)),
                 printed,
                 &sequence(&sum)?,
             ))
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("zeros, αv = {}", signed(residue, 1)),
                 expected,
                 &kinds(&sum.undamped_zeros()?),
@@ -296,7 +296,7 @@ impl Column {
                 Comparison::within(&phase, -self.lag_deg, 0, last, "deg", 1.0)
                     .remark("at 100 rad/s, with damping"),
             )
-            .compare(Comparison::words(&undershoot, self.undershoot, found))
+            .compare(Comparison::text(&undershoot, self.undershoot, found))
             .compare(Comparison::unprinted(
                 &format!("zeros, {name}"),
                 kinds(&sum.undamped_zeros()?),
@@ -350,8 +350,8 @@ pub(in super::super) fn fig_3_6(_: &Runs) -> Result<Content, FigureError> {
         .setting("Eq. (3-3)")
         .assumed("αu = 1 1/kg, wv = 10 rad/s, αv = −0.5 and −5 1/kg; damping ratio 0.1 of mode v, so that circle and offset are seen at one scale")
         .row(400.0, [a, b])
-        .compare(Comparison::words("the circle ends beside the origin, MMP", "left", side(end_a)))
-        .compare(Comparison::words("the circle ends beside the origin, RMP-RNMP", "right", side(end_b)))
+        .compare(Comparison::text("the circle ends beside the origin, MMP", "left", side(end_a)))
+        .compare(Comparison::text("the circle ends beside the origin, RMP-RNMP", "right", side(end_b)))
         .compare(Comparison::number("phase drop, MMP", 0.0, 0, phase_drop_deg(&zeros(-0.5)?), "deg"))
         .compare(Comparison::number("phase drop, RMP-RNMP", 180.0, 0, phase_drop_deg(&zeros(-5.0)?), "deg"))
         .command(Model::modes(&[ModeOf("u", 0.0, 1.0, 0.0), ModeOf("v", 10.0, -0.5, 0.1)]).command("model modes", ""))

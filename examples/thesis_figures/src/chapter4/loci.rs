@@ -104,7 +104,7 @@ pub(crate) fn fig_4_1(_: &Runs) -> Result<Content, FigureError> {
         );
         let range = format!("--vary {K} --from 0 --to 0.03 --modes 2,3");
         content = content
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("loci at ρ = {rho}"),
                 expected,
                 pair.meeting,
@@ -132,7 +132,7 @@ pub(crate) fn fig_4_7(_: &Runs) -> Result<Content, FigureError> {
         let name = format!("asymmetry {} %", signed(100.0 * asymmetry, 0));
         chart = drawn(chart, &name, pen, &pair, (100.0 / L, 1.0 / TAU));
         content = content
-            .compare(Comparison::words(&name, expected, pair.meeting))
+            .compare(Comparison::text(&name, expected, pair.meeting))
             .compare(Comparison::unprinted(
                 &format!("where, {name}"),
                 format!(
@@ -161,7 +161,7 @@ pub(crate) fn fig_4_9(_: &Runs) -> Result<Content, FigureError> {
         .setting("profile four-mass")
         .assumed("k23 from 0 to 300 N/m")
         .row(340.0, [drawn(chart, "modes of m2 and m3", Pen::solid(VERMILION), &pair, (1.0, 1.0))])
-        .compare(Comparison::words("the loci are", "veering", pair.meeting).remark("the printed masses and springs are symmetric (1 with 4, 2 with 3), and the two modes of different symmetry: they cross, the special case of veering of section 4.1"))
+        .compare(Comparison::text("the loci are", "veering", pair.meeting).remark("the printed masses and springs are symmetric (1 with 4, 2 with 3), and the two modes of different symmetry: they cross, the special case of veering of section 4.1"))
         .compare(Comparison::unprinted("veering point", format!("k23 = {} N/m, {} rad/s", signed(pair.value, 2), signed(pair.omega_rad_s, 4))))
         .command(model.command("model veering", &format!("--vary {K23} --from 0 --to 300"))))
 }

@@ -187,12 +187,12 @@ pub(crate) fn fig_4_4(_: &Runs) -> Result<Content, FigureError> {
             ModeOf("v", fast, 0.02, 0.0),
         ]);
         content = content
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("{heading}: sequence"),
                 printed,
                 &sequence,
             ))
-            .compare(Comparison::words(
+            .compare(Comparison::text(
                 &format!("{heading}: zeros"),
                 expected,
                 &zeros,

@@ -289,8 +289,8 @@ pub(in super::super) fn fig_6_3(_: &Runs) -> Result<Content, FigureError> {
         .row(180.0, [plant.bode.0, plant.map])
         .row(180.0, [plant.bode.1, plant.corner])
         .row(400.0, [plant.whole, d])
-        .compare(Comparison::words("signs of the residues", "+-+", &plant.signs))
-        .compare(Comparison::words("zeros without damping", "CMP-CNMP", &plant.kinds))
+        .compare(Comparison::text("signs of the residues", "+-+", &plant.signs))
+        .compare(Comparison::text("zeros without damping", "CMP-CNMP", &plant.kinds))
         .command(plant.model.command("model modes", "")))
 }
 
@@ -312,7 +312,7 @@ pub(in super::super) fn fig_6_5(_: &Runs) -> Result<Content, FigureError> {
         .row(180.0, [plant.bode.0, plant.map])
         .row(180.0, [plant.bode.1, plant.corner])
         .row(400.0, [plant.whole, d])
-        .compare(Comparison::words("signs of the residues", "++-", &plant.signs))
+        .compare(Comparison::text("signs of the residues", "++-", &plant.signs))
         .compare(Comparison::holds("zeros without damping", "no CMP-CNMP zeros", !plant.kinds.contains("CMP-CNMP"), &plant.kinds))
         .command(plant.model.command("model modes", "")))
 }

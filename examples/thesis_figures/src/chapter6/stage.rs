@@ -103,8 +103,8 @@ pub(in super::super) fn fig_6_7(runs: &Runs) -> Result<Content, FigureError> {
         .compare(Comparison::number("damping ratio of mode u", 0.004, 3, u.damping_ratio, ""))
         .compare(Comparison::number("damping ratio of mode v", 0.004, 3, v.damping_ratio, ""))
         .compare(Comparison::holds("close modes", "around 500 rad/s", near_500, &close).remark("within 10 %"))
-        .compare(Comparison::words("zeros of the close modes, without damping", "CMP-CNMP", &kinds(&sum.undamped_zeros()?).replace("MMP + ", "")))
-        .compare(Comparison::words("signs of the residues", "+-+", &sign_sequence(&modal)))
+        .compare(Comparison::text("zeros of the close modes, without damping", "CMP-CNMP", &kinds(&sum.undamped_zeros()?).replace("MMP + ", "")))
+        .compare(Comparison::text("signs of the residues", "+-+", &sign_sequence(&modal)))
         .command("bench chirp")
         .command(model.command("model modes", "")))
 }
@@ -201,12 +201,12 @@ fn compare_asymmetry(
     let computed = sign_sequence(&model.modal()?);
     let zeros = format!("CMP-CNMP zeros {at}, 8 % of L");
     Ok(content
-        .compare(Comparison::words(
+        .compare(Comparison::text(
             &format!("signs of the residues {at}"),
             signs,
             &computed,
         ))
-        .compare(Comparison::words(&zeros, expected, found))
+        .compare(Comparison::text(&zeros, expected, found))
         .command(model.command("model modes", "")))
 }
 

@@ -30,7 +30,7 @@ pub use faults::fault_text;
 pub use inspect::{ABORT_CONNECTION, Inspection, REQUIRED_OBJECTS, inspect};
 pub use settings::{DriveSettings, DriveTimes, ExpectedIdentity, TorqueMode};
 
-use self::monitor::{Monitor, heard_ids, set_point};
+use self::monitor::{Monitor, received_ids, set_point};
 use self::service::Service;
 use self::setup::{Configured, Setup};
 use self::shared::{Intent, Shared};
@@ -43,7 +43,7 @@ use super::{nmt, sync};
 use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
 
 /// Time between checks of the state of the drive while it changes.
-const LOOK: Duration = Duration::from_millis(2);
+const STATE_POLL: Duration = Duration::from_millis(2);
 
 /// A CANopen drive in torque mode. The module documentation describes how it is monitored.
 pub struct CanopenDrive {
@@ -64,7 +64,7 @@ impl CanopenDrive {
         let node = settings.node;
         let claim = host.claim(node)?;
         let mut bus = host.endpoint(&[answer_id(node)])?;
-        let watched = host.endpoint(&heard_ids(node))?;
+        let watched = host.endpoint(&received_ids(node))?;
         let configured = configure(&settings, bus.as_mut(), host.as_ref())?;
         let shared = Arc::new(Shared::default());
         let monitor = Monitor::new(&settings, Arc::clone(&shared), host.now_ns());
@@ -143,7 +143,7 @@ impl CanopenDrive {
             if self.host.now_ns() >= deadline_ns {
                 return false;
             }
-            self.host.sleep(LOOK);
+            self.host.sleep(STATE_POLL);
         }
         true
     }
@@ -216,7 +216,7 @@ impl CurrentAmplifier for CanopenDrive {
             return Err(faults::device_error(faults::NOT_OPERATIONAL));
         }
         self.shared.set_intent(Intent::Enabling);
-        let reached = self.climb();
+        let reached = self.enable_stepwise();
         match reached {
             Ok(()) => self.shared.set_intent(Intent::On),
             Err(_) => self.disable(),

@@ -27,7 +27,7 @@ const REPEAT_NS: u64 = 10_000_000;
 const IDLE_SYNC_NS: u64 = 20_000_000;
 
 /// The identifiers that the monitor receives: those that a drive sends without request.
-pub(super) fn heard_ids(node: u8) -> [Id; 3] {
+pub(super) fn received_ids(node: u8) -> [Id; 3] {
     [
         heartbeat::cob_id(node),
         emcy::cob_id(node),
@@ -136,7 +136,7 @@ impl Monitor {
     }
 
     fn handle_frame(&mut self, frame: &CanFrame, now_ns: u64) {
-        let [heartbeat, emergency, status] = heard_ids(self.node);
+        let [heartbeat, emergency, status] = received_ids(self.node);
         if frame.id() == heartbeat {
             self.heartbeat(frame, now_ns);
         } else if frame.id() == emergency {

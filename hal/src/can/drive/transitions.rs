@@ -1,12 +1,12 @@
 //! Transitions of the drive: to Operation Enabled, and out of Fault.
 
 use super::super::cia402::{DISABLE_VOLTAGE, FAULT_RESET, REMOTE, State};
-use super::{CanopenDrive, LOOK, faults};
+use super::{CanopenDrive, STATE_POLL, faults};
 use crate::DeviceError;
 
 impl CanopenDrive {
     /// Enables the drive step by step; the target is zero.
-    pub(super) fn climb(&mut self) -> Result<(), DeviceError> {
+    pub(super) fn enable_stepwise(&mut self) -> Result<(), DeviceError> {
         let deadline_ns = self.deadline_ns();
         loop {
             self.no_fault()?;
@@ -20,7 +20,7 @@ impl CanopenDrive {
             if let Some(controlword) = state.map_or(Some(DISABLE_VOLTAGE), State::towards_enabled) {
                 self.exchange(controlword, 0)?;
             }
-            self.host.sleep(LOOK);
+            self.host.sleep(STATE_POLL);
         }
     }
 
@@ -63,7 +63,7 @@ impl CanopenDrive {
                 return Err(faults::STATUS_LOST);
             }
             let _ = self.exchange(DISABLE_VOLTAGE, 0); // only the status frame matters
-            self.host.sleep(LOOK);
+            self.host.sleep(STATE_POLL);
         }
         Ok(())
     }
@@ -71,7 +71,7 @@ impl CanopenDrive {
     /// Sends rising edges of the reset bit until the drive has left Fault.
     fn leave_fault(&mut self) -> Result<(), u32> {
         let deadline_ns = self.deadline_ns();
-        let pause = LOOK.max(2 * self.settings.status_period());
+        let pause = STATE_POLL.max(2 * self.settings.status_period());
         while self.shared.state().is_none_or(State::is_fault) {
             if self.host.now_ns() >= deadline_ns {
                 return Err(faults::FAULT_REMAINS);

@@ -72,7 +72,7 @@ impl Pdos {
             let is_cyclic = pdo.is_on && pdo.is_synchronous() && pdo.transmission > 0;
             if is_cyclic && sent.syncs >= u32::from(pdo.transmission) {
                 sent.syncs = 0;
-                frames.extend(sent.note(pack(&pdo, objects), now_ns));
+                frames.extend(sent.record_sent(pack(&pdo, objects), now_ns));
             }
         }
         frames
@@ -88,7 +88,7 @@ impl Pdos {
             }
             let frame = pack(&pdo, objects);
             if sent.is_due(&pdo, frame, now_ns) {
-                frames.extend(sent.note(frame, now_ns));
+                frames.extend(sent.record_sent(frame, now_ns));
             }
         }
         frames
@@ -106,7 +106,7 @@ impl Sent {
     }
 
     /// Notes that `frame` is sent now; without a mapping there is no frame.
-    fn note(&mut self, frame: Option<CanFrame>, now_ns: u64) -> Option<CanFrame> {
+    fn record_sent(&mut self, frame: Option<CanFrame>, now_ns: u64) -> Option<CanFrame> {
         if frame.is_some() {
             self.time_ns = Some(now_ns);
             self.frame = frame;

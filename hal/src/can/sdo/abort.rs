@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_thirty_one_codes_of_cia_301_have_a_text_of_their_own() {
+    fn each_of_the_31_codes_of_cia_301_has_its_own_text() {
         let known: Vec<u32> = [
             (0x0503_0000, 0..=0),
             (0x0504_0000, 0..=5),

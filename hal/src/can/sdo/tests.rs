@@ -197,7 +197,7 @@ fn rejects_block_transfer_with_an_abort_code() {
 
 proptest! {
     #[test]
-    fn what_is_written_is_read_back_in_the_fewest_frames(data in proptest::collection::vec(any::<u8>(), 0..200)) {
+    fn download_needs_the_minimum_of_frames_and_upload_returns_the_data(data in proptest::collection::vec(any::<u8>(), 0..200)) {
         let mut values = Values::default();
         let (client, first) = Client::download(NAME, &data);
         let (end, frames) = run(client, first, &mut values);
@@ -209,7 +209,7 @@ proptest! {
     }
 
     #[test]
-    fn requests_and_answers_survive_their_codec(bytes in any::<[u8; 8]>()) {
+    fn decoding_inverts_encoding(bytes in any::<[u8; 8]>()) {
         if let Some(request) = Request::decode(&bytes) {
             prop_assert_eq!(Request::decode(&request.encode()), Some(request));
         }
@@ -219,7 +219,7 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_in_any_order_panic(
+    fn random_frames_do_not_panic(
         frames in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..9), 0..60),
         writing in any::<bool>(),
     ) {

@@ -88,8 +88,8 @@ fn a_vesc_follows_commands_and_reports_its_current() {
 
 #[test]
 fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
-    type Way = (u32, fn(&Rig));
-    let ways: [Way; 4] = [
+    type FaultCase = (u32, fn(&Rig));
+    let cases: [FaultCase; 4] = [
         (SILENT, |rig| rig.inject(DeviceFault::Mute)),
         (SILENT, |rig| rig.inject(DeviceFault::ShortFrames)),
         (SILENT, |rig| rig.inject(DeviceFault::Late(200))),
@@ -97,7 +97,7 @@ fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
             rig.world.bus().inject_condition(Condition::BusOff)
         }),
     ];
-    for (code, fail) in ways {
+    for (code, fail) in cases {
         let mut rig = rig();
         rig.vesc.enable().unwrap();
         rig.vesc.command(1.0).unwrap();
@@ -120,7 +120,7 @@ fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
 }
 
 #[test]
-fn a_vesc_that_no_longer_hears_us_lets_go_by_itself() {
+fn vesc_releases_the_motor_after_loss_of_commands() {
     let mut rig = rig();
     rig.vesc.enable().unwrap();
     rig.vesc.command(1.0).unwrap();
@@ -136,7 +136,7 @@ fn a_vesc_that_no_longer_hears_us_lets_go_by_itself() {
 }
 
 #[test]
-fn without_commands_the_current_ends() {
+fn current_is_zero_after_the_command_timeout() {
     let mut rig = rig();
     rig.vesc.enable().unwrap();
     rig.vesc.command(2.0).unwrap();
@@ -148,7 +148,7 @@ fn without_commands_the_current_ends() {
 
 proptest! {
     #[test]
-    fn no_frame_panics_the_watch(frames in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..9), 0..50)) {
+    fn random_frames_do_not_panic(frames in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..9), 0..50)) {
         let world = SimulatedHost::default();
         let vesc = Vesc::open(SETTINGS, Box::new(world.clone())).unwrap();
         let mut bus = world.endpoint(&[]).unwrap();

@@ -37,7 +37,7 @@ fn any_event() -> impl Strategy<Value = BusEvent> {
 proptest! {
     /// The monitor: no panic; the only set-point it ever sends is zero current without voltage; a fault stays.
     #[test]
-    fn the_monitor_stands_any_events(
+    fn monitor_survives_random_events(
         events in proptest::collection::vec((any_event(), 0u64..30_000_000), 1..200), on in any::<bool>(),
     ) {
         let shared = Arc::new(Shared::default());
@@ -61,7 +61,7 @@ proptest! {
 
     /// The simulated drive: no panic, and current only in Operation Enabled.
     #[test]
-    fn the_simulated_drive_stands_any_frames(
+    fn emulated_drive_survives_random_frames(
         frames in proptest::collection::vec((any_frame(), 0u64..30_000_000), 1..200),
     ) {
         let mut device = EmulatedDrive::new(EmulatedDriveSettings::default());
@@ -82,7 +82,7 @@ proptest! {
     /// Both together with a babbler on the bus: no panic, a status that is never wrong about being enabled for long, and
     /// when the babbler is gone and the drive unplugged, no current.
     #[test]
-    fn driver_and_drive_stand_a_babbler(frames in proptest::collection::vec(any_frame(), 1..60)) {
+    fn driver_and_drive_survive_a_babbling_node(frames in proptest::collection::vec(any_frame(), 1..60)) {
         let mut rig = rig(ASYNCHRONOUS);
         let _ = rig.drive.enable();
         let mut babbler = rig.world.endpoint(&[]).unwrap();

@@ -5,7 +5,7 @@ use super::super::super::scale::Reference;
 use super::*;
 
 #[test]
-fn a_drive_is_enabled_follows_quantised_currents_and_is_disabled() {
+fn enables_follows_quantised_currents_and_disables() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = rig(exchange);
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
@@ -126,7 +126,7 @@ fn scales_a_target_in_per_mille_of_the_maximum() {
 }
 
 #[test]
-fn rejects_another_drive_than_the_configured_one() {
+fn rejects_drive_with_unexpected_identity() {
     let with = |identity| DriveSettings {
         identity,
         ..DriveSettings::default()

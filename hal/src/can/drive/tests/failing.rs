@@ -14,7 +14,7 @@ fn running(exchange: Exchange) -> Rig {
 }
 
 /// The fault is detected within `most_ms`. The current is zero within 3 ms more and remains zero, whatever the loop does.
-fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
+fn assert_detected(rig: &mut Rig, code: u32, most_ms: u32) {
     let found_ms = rig.run_ms(1.0, most_ms + 1);
     assert_eq!(
         rig.drive.status(),
@@ -51,7 +51,7 @@ fn finds(rig: &mut Rig, code: u32, most_ms: u32) {
 }
 
 /// After the cause is removed: the operator clears the fault; the drive is off, and is enabled only on request.
-fn recovers(rig: &mut Rig) {
+fn assert_recovers(rig: &mut Rig) {
     rig.device().inject(DeviceFault::None);
     rig.sleep_ms(50);
     rig.drive
@@ -85,8 +85,8 @@ fn detects_faults_of_the_drive_with_the_next_status_frame() {
         for (misbehaviour, code) in cases {
             let mut rig = running(exchange);
             rig.device().inject(misbehaviour);
-            finds(&mut rig, code, STATUS_MS);
-            recovers(&mut rig);
+            assert_detected(&mut rig, code, STATUS_MS);
+            assert_recovers(&mut rig);
         }
     }
 }
@@ -97,8 +97,8 @@ fn detects_a_silent_drive_by_its_missing_status() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.device().inject(DeviceFault::Mute);
-        finds(&mut rig, faults::STATUS_LOST, 22);
-        recovers(&mut rig);
+        assert_detected(&mut rig, faults::STATUS_LOST, 22);
+        assert_recovers(&mut rig);
     }
 }
 
@@ -117,7 +117,7 @@ fn detects_a_silent_drive_that_is_off_by_its_missing_heartbeat() {
         rig.drive.status(),
         AmplifierStatus::Fault(faults::HEARTBEAT_LOST)
     );
-    recovers(&mut rig);
+    assert_recovers(&mut rig);
 }
 
 #[test]
@@ -132,12 +132,12 @@ fn a_disconnected_drive_switches_itself_off_without_the_heartbeat() {
         );
         rig.sleep_ms(71); // 70 ms after the last heartbeat received, whatever the driver does
         assert_eq!(rig.device_current_a(), 0.0);
-        recovers(&mut rig);
+        assert_recovers(&mut rig);
     }
 }
 
 #[test]
-fn a_fault_is_cleared_when_the_drive_is_back_although_its_last_heartbeat_is_outdated() {
+fn clears_fault_after_reconnection_although_the_last_heartbeat_is_outdated() {
     // The drive detects the loss 40 ms after the last heartbeat (up to 20 ms old) it received; the driver after 70 ms.
     let settings = DriveSettings {
         times: DriveTimes {
@@ -161,16 +161,16 @@ fn a_fault_is_cleared_when_the_drive_is_back_although_its_last_heartbeat_is_outd
     rig.drive
         .reset_fault()
         .unwrap_or_else(|error| panic!("{error}"));
-    recovers(&mut rig);
+    assert_recovers(&mut rig);
 }
 
 #[test]
 fn detects_late_frames_by_their_gap() {
     let mut rig = running(ASYNCHRONOUS);
     rig.device().inject(DeviceFault::Late(200));
-    finds(&mut rig, faults::STATUS_LOST, 22);
+    assert_detected(&mut rig, faults::STATUS_LOST, 22);
     rig.sleep_ms(400);
-    recovers(&mut rig);
+    assert_recovers(&mut rig);
 }
 
 #[test]
@@ -186,8 +186,8 @@ fn conditions_of_the_bus_are_faults() {
         rig.world.bus().inject_condition(Condition::Noise);
         assert_eq!(rig.run_ms(1.0, 5), 5, "a warning is no fault");
         rig.world.bus().inject_condition(condition);
-        finds(&mut rig, code, 1);
-        recovers(&mut rig);
+        assert_detected(&mut rig, code, 1);
+        assert_recovers(&mut rig);
     }
 }
 
@@ -202,7 +202,7 @@ fn an_interface_that_goes_down_is_a_fault_and_the_drive_stops_by_itself() {
     assert!(rig.drive.reset_fault().is_err(), "still down");
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_DOWN));
     rig.world.bus().set_down(false);
-    recovers(&mut rig);
+    assert_recovers(&mut rig);
 }
 
 #[test]
@@ -267,7 +267,7 @@ fn switches_off_when_the_loop_sends_no_commands() {
             rig.drive.status(),
             AmplifierStatus::Fault(faults::COMMANDS_STOPPED)
         );
-        recovers(&mut rig);
+        assert_recovers(&mut rig);
     }
 }
 
@@ -321,7 +321,7 @@ fn a_drive_that_ignores_disable_is_stopped_by_nmt_and_one_that_ignores_nmt_by_th
             rig.drive.status(),
             AmplifierStatus::Fault(faults::STILL_ENABLED)
         );
-        recovers(&mut rig);
+        assert_recovers(&mut rig);
     }
 }
 
@@ -362,7 +362,7 @@ fn a_fault_that_persists_is_not_cleared() {
         AmplifierStatus::Fault(faults::EMERGENCY + 0x3220),
         "the cause, not the attempt"
     );
-    recovers(&mut rig);
+    assert_recovers(&mut rig);
 }
 
 #[test]
@@ -390,5 +390,5 @@ fn a_drive_in_fault_at_opening_is_opened_but_not_reset() {
     );
     assert!(rig.drive.enable().is_err());
     assert_eq!(rig.device().power_state(), State::Fault);
-    recovers(&mut rig);
+    assert_recovers(&mut rig);
 }
