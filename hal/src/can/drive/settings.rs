@@ -155,9 +155,9 @@ impl Default for DriveTimes {
     }
 }
 
-fn refuse(name: &'static str, value: impl ToString, limit: &'static str) -> Result<(), OpenError> {
+fn invalid_setting(name: &'static str, value: impl ToString, limit: &'static str) -> OpenError {
     let value = value.to_string();
-    Err(OpenError::Setting { name, value, limit })
+    OpenError::Setting { name, value, limit }
 }
 
 impl DriveTimes {
@@ -171,7 +171,11 @@ impl DriveTimes {
         ];
         for (name, time) in times {
             if !(1..=u128::from(u16::MAX)).contains(&time.as_millis()) {
-                return refuse(name, format!("{time:?}"), "1 ms to 65.535 s");
+                return Err(invalid_setting(
+                    name,
+                    format!("{time:?}"),
+                    "1 ms to 65.535 s",
+                ));
             }
         }
         Ok(())
@@ -211,11 +215,11 @@ impl DriveSettings {
 
     fn check_nodes(&self) -> Result<(), OpenError> {
         if !(1..=127).contains(&self.node) {
-            return refuse("node", self.node, "1 to 127");
+            return Err(invalid_setting("node", self.node, "1 to 127"));
         }
         if !(1..=127).contains(&self.own_node) || self.own_node == self.node {
             let limit = "1 to 127, and not that of the drive";
-            return refuse("own_node", self.own_node, limit);
+            return Err(invalid_setting("own_node", self.own_node, limit));
         }
         Ok(())
     }
@@ -224,17 +228,19 @@ impl DriveSettings {
         match self.exchange {
             Exchange::Asynchronous { status_hz } if !(1.0..=1000.0).contains(&status_hz) => {
                 let limit = "1 to 1000 Hz, since a drive's event timer counts milliseconds";
-                refuse("status_hz", status_hz, limit)
+                Err(invalid_setting("status_hz", status_hz, limit))
             }
             Exchange::Synchronous { status_every } if !(1..=240).contains(&status_every) => {
-                refuse("status_every", status_every, "1 to 240")
+                Err(invalid_setting("status_every", status_every, "1 to 240"))
             }
             _ if !(1.0..=1e6).contains(&self.rate_hz) => {
-                refuse("rate_hz", self.rate_hz, "1 to 1000000 Hz")
+                Err(invalid_setting("rate_hz", self.rate_hz, "1 to 1000000 Hz"))
             }
-            _ if !(self.load_limit > 0.0 && self.load_limit <= 1.0) => {
-                refuse("load_limit", self.load_limit, "above 0, at most 1")
-            }
+            _ if !(self.load_limit > 0.0 && self.load_limit <= 1.0) => Err(invalid_setting(
+                "load_limit",
+                self.load_limit,
+                "above 0, at most 1",
+            )),
             _ => Ok(()),
         }
     }
@@ -256,7 +262,7 @@ impl DriveSettings {
         for (name, timeout, period) in monitored {
             if timeout < 2 * period {
                 let limit = "at least twice the period, or one late frame is a fault";
-                return refuse(name, format!("{timeout:?}"), limit);
+                return Err(invalid_setting(name, format!("{timeout:?}"), limit));
             }
         }
         Ok(())
