@@ -1,6 +1,6 @@
-//! What the analysis of a default chirp costs, 600,500 ticks: `cargo bench --bench identify` prints the time of Welch's
-//! estimator, of the local one, and of all that `bench chirp` makes of them, modes and verdict included.
-//! `benches/welch_scipy.py` measures scipy's csd on as many samples beside the first.
+//! Benchmark of the analysis of a default chirp with 600,500 ticks: `cargo bench --bench identify` prints the time of
+//! Welch's estimator, of the local one, and of the whole analysis of `bench chirp`, including modes and verdict.
+//! `benches/welch_scipy.py` measures scipy's csd with as many samples, for comparison.
 
 use bench_test_support::unrecorded;
 
@@ -13,7 +13,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 /// Samples of a segment.
 const SEGMENT: usize = 16_384;
 const BAND_HZ: (f64, f64) = (0.1, 500.0);
-/// Of a logarithmic grid.
+/// Number of frequencies of the logarithmic grid.
 const FREQUENCIES: usize = 2000;
 
 fn config() -> Config {

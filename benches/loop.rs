@@ -1,7 +1,7 @@
-//! What a tick costs. `cargo bench --bench loop` prints the time of one tick, and of the whole command.
+//! Benchmark of a tick: `cargo bench --bench loop` prints the time of one tick, and of the whole command.
 //!
-//! Figures asked for: below 250 ns for interlocks and fast controller alone, below 1 us with the simulated rig and the
-//! record, below 2 s for `bench chirp` as a whole (120 s at 5 kHz, analysis and plot included).
+//! Required: below 250 ns for interlocks and fast controller alone, below 1 us with the simulated rig and the record,
+//! below 2 s for `bench chirp` as a whole (120 s at 5 kHz, analysis and plot included).
 
 use std::hint::black_box;
 use std::process::Command;
@@ -125,7 +125,7 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     (start.elapsed(), ticks)
 }
 
-/// The command as a person types it.
+/// The whole command, as typed.
 fn whole_command(c: &mut Criterion) {
     let mut group = c.benchmark_group("command");
     group

@@ -1,5 +1,6 @@
-//! What a CNMP map costs: `cargo bench --bench map` prints the time of a map of 1000 x 1000 points on one thread and on two;
-//! microseconds a point are seconds a map. `benches/map_numpy.py` measures numpy's batched pencil beside it.
+//! Benchmark of a CNMP map: `cargo bench --bench map` prints the time of a map of 1000 x 1000 points on one thread
+//! and on two; the time per map in seconds is the time per point in microseconds. `benches/map_numpy.py` measures
+//! numpy's batched pencil, for comparison.
 
 use bench::config::{PlantSettings, Source, Sr4dofSettings, load};
 use bench::model::zeros::cnmp_map;

@@ -1,4 +1,5 @@
-//! What recording costs: `cargo bench --bench recording` prints ticks a second, written, opened (all checks) and read.
+//! Benchmark of recordings: `cargo bench --bench recording` prints ticks per second, written, opened (all checks) and
+//! read.
 
 use std::path::Path;
 use std::time::Duration;

@@ -39,7 +39,7 @@ impl ControlLaw for StateFeedback {
     }
 }
 
-/// 50 um, half a second after the loop closes.
+/// A step of 50 um, 0.5 s after the loop closes.
 struct Step;
 
 impl Reference for Step {

@@ -15,7 +15,7 @@
 //! | [`reset_fault`](CurrentAmplifier::reset_fault) | in the tick that takes the request to clear a trip | yes | yes |
 //!
 //! "May block: no" excludes locks, sleeping, printing, and waiting for a device. A system call that returns at once, such as a
-//! write to a non-blocking socket, is permitted. A slow device is read by a thread of its own; `latest` returns the newest
+//! write to a non-blocking socket, is permitted. A slow device is read by its own thread; `latest` returns the newest
 //! value with its age.
 //!
 //! `enable` and `reset_fault` may block until the time limit of the driver. The amplifier gives no current meanwhile, no tick

@@ -21,7 +21,7 @@ impl From<OutputError> for CliError {
 /// Steps of the progress of an analysis.
 const STEPS: u64 = 1000;
 
-/// Analyses a recording and writes its files beside a path, under its name.
+/// Analyses a recording and writes the result files into the folder of `beside`, with names that begin with its name.
 pub(super) fn analyse_and_write(
     recording: &Recording,
     config: &Config,

@@ -170,7 +170,7 @@ fn draw(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<Pat
     Ok(path)
 }
 
-/// The configuration of the campaign, without what the grid varies.
+/// The configuration of the campaign, without the settings that the grid varies.
 fn config(args: &Args) -> Result<Config, CliError> {
     if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
         return Err(CliError::Usage(

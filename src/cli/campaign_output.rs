@@ -37,7 +37,7 @@ struct Agreement {
     decided: usize,
     contradicted_as_configured: usize,
     contradicted_with_offset: Option<usize>,
-    /// With the stage that was simulated, including `sim.asymmetry_offset`: none should disagree.
+    /// Disagreement with the simulated stage, including `sim.asymmetry_offset`; 0 is expected.
     contradicted_as_simulated: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Options of `bench control`, and the settings that they stand for.
+//! Options of `bench control`, and the settings that they make.
 
 use std::path::Path;
 
@@ -88,7 +88,7 @@ enum ReferenceKind {
     Chirp,
 }
 
-/// What follows `--reference`.
+/// The value of `--reference`.
 #[derive(Clone, Debug)]
 enum Reference {
     Kind(ReferenceKind),
@@ -150,7 +150,7 @@ fn reference(text: &str) -> Result<Reference, String> {
 }
 
 impl Args {
-    /// The settings that the options stand for.
+    /// The settings that the options make.
     pub fn settings(&self) -> Result<Vec<OptionSetting>, CliError> {
         self.refuse_unused()?;
         let mut settings = self.choice.settings();

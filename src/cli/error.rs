@@ -200,7 +200,7 @@ impl ErrorReport {
         ErrorReport::new(message.trim_end().into(), ErrorKind::Usage, place)
     }
 
-    /// Messages say first what is wrong and, after a semicolon, what to do.
+    /// Takes the text after the first `; ` of the message as the remedy.
     fn new(message: String, kind: ErrorKind, place: Option<String>) -> ErrorReport {
         let remedy = message
             .split_once("; ")

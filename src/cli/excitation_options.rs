@@ -53,7 +53,7 @@ impl ExcitationOptions {
     }
 }
 
-/// A failure of the model stands alone; every other one is a wrong `--shape`.
+/// Errors of the model are returned unchanged; every other error names the option `--shape`.
 fn refused(source: &ResponseSource, error: AmplitudePlanError) -> CliError {
     match error {
         AmplitudePlanError::Model(error) => error.into(),

@@ -16,7 +16,8 @@ use crate::identify::periodic::Repetition;
 use crate::report::run_pages::{ExternalRecord, ModalSummary, PageFiles, write_frf};
 use crate::util::quantity::{Frequency, OfFrequency, Time, si};
 
-/// Largest difference of a period in seconds from a whole number of samples; leakage needs a thousand times more.
+/// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
+/// a thousand times larger.
 const WHOLE_SAMPLES: f64 = 1e-3;
 
 /// What the columns of a CSV mean.
@@ -153,7 +154,7 @@ impl ExternalOptions {
     }
 }
 
-/// The period in samples. A bare number is a number of samples; seconds must make a whole number.
+/// The period in samples. A number without a unit is in samples; a time must be a multiple of the sampling period.
 fn period_samples(text: &str, rate_hz: f64) -> Option<usize> {
     let samples: f64 = match text.parse() {
         Ok(samples) => samples,

@@ -25,7 +25,7 @@ use crate::report::run_pages::AnalysisOutputs;
 use crate::util::progress::Progress;
 use crate::util::quantity::Ratio;
 
-/// Odd lines, one in four left out.
+/// Odd lines, one of each group of four omitted.
 const LINES: [(&str, &str); 2] = [
     ("excitation.kind", "multisine"),
     ("multisine.lines", "odd_random"),

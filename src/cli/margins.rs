@@ -153,7 +153,7 @@ pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Resu
     )))
 }
 
-/// Rates and delays of the chain in words.
+/// Rates and delays of the signal path as text.
 fn chain_text(config: &Config) -> String {
     let (servo, amplifier) = (&config.servo, &config.amplifier);
     let latency = match amplifier.latency_s > 0.0 {

@@ -1,4 +1,4 @@
-//! Standard output carries results, standard error everything else.
+//! Results go to standard output, everything else to standard error.
 
 use std::io::Write;
 

@@ -1,9 +1,9 @@
-//! What an excitation would do, as text.
+//! The plan of an excitation as text.
 
 use crate::excitation::AmplitudePoint;
 use crate::experiment::ExcitationPlan;
 
-/// Extremes beside their limits, and the amplitude over frequency.
+/// Extremes with their limits, and the amplitude over frequency.
 pub(super) fn text(plan: &ExcitationPlan) -> String {
     let (expected, limits) = (&plan.expected, &plan.limits);
     let amplitude: String = plan.amplitude.iter().map(amplitude_line).collect();

@@ -1,8 +1,8 @@
 //! Text for a terminal: tables, wrapped sentences, labelled lines, at most 80 columns wide.
 
-/// Columns of a line at most.
+/// Largest width of a line, in columns.
 const WIDTH: usize = 80;
-/// Between two columns of a table.
+/// The gap between two columns of a table.
 const GAP: &str = "  ";
 /// Width of the label of a labelled line.
 const LABEL: usize = 13;
@@ -63,7 +63,7 @@ fn row(line: &[String], widths: &[usize], columns: &[usize]) -> String {
     padded.collect::<Vec<_>>().join(GAP) + "\n"
 }
 
-/// Text in lines of at most 80 columns, each indented by `indent`. A word longer than a line stands alone on its line.
+/// Text in lines of at most 80 columns, each indented by `indent`. A word longer than a line has its own line.
 pub(super) fn wrap(text: &str, indent: usize) -> String {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

@@ -54,7 +54,7 @@ impl CalibrateSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScaleBy {
-    /// None: the scale of the probe is trusted, and a calibration corrects only its sign and offset.
+    /// None: the scale of the probe is assumed to be correct, and a calibration corrects only its sign and offset.
     Nothing,
     /// The static compliance of the model: a calibration corrects the scale as well.
     Model,

@@ -20,7 +20,7 @@ pub struct ControlSettings {
     /// Duration of the run after the loop has closed, in seconds.
     #[schemars(range(min = 0.001, max = 1000000.0))]
     pub duration_s: f64,
-    /// Time from the last change of the reference to the begin of the steady state, in seconds.
+    /// Time from the last change of the reference to the beginning of the steady state, in seconds.
     #[schemars(range(min = 0.0, max = 1000000.0))]
     pub steady_after_s: f64,
     /// The reference.

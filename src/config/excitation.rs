@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::excitation::ExcitationKind;
 
-/// The choice of the excitation of `bench chirp`. Band, quiet times, fades and amplitude over frequency of all kinds are in
-/// `[chirp]`.
+/// The choice of the excitation of `bench chirp`. Band, rest times, fades and amplitude over frequency of all kinds
+/// are in `[chirp]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExcitationSettings {

@@ -42,7 +42,8 @@ impl Layer {
     }
 }
 
-/// Lays `over` upon `base`: tables that `joins` accepts are merged key by key, everything else replaces the old value.
+/// Merges `over` into `base`: tables that `joins` accepts are merged key by key; everything else replaces the old
+/// value.
 pub(super) fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
     for (key, value) in over {
         match (base.get_mut(key), value) {

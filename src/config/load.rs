@@ -33,7 +33,7 @@ pub struct Source {
     pub config: Option<String>,
     /// `KEY=VALUE`; a later entry overrides an earlier one.
     pub sets: Vec<String>,
-    /// Settings that command-line options stand for, over all of `sets`.
+    /// Settings made by command-line options, over all of `sets`.
     pub options: Vec<OptionSetting>,
     /// Purpose of the configuration.
     pub purpose: Purpose,
@@ -128,7 +128,7 @@ fn refuse(
         })
     };
     let mut lines: Vec<String> = findings.iter().map(line).collect();
-    // One option may stand for several settings.
+    // One option may make several settings.
     lines.dedup();
     refuse_lines(lines)
 }

@@ -1,4 +1,4 @@
-//! Settings made on the command line: `--set KEY=VALUE`, and options that stand for settings.
+//! Settings made on the command line: `--set KEY=VALUE`, and options that set settings.
 
 use std::ops::RangeInclusive;
 
@@ -11,7 +11,7 @@ use super::layer::{Layer, lay};
 use crate::util::finding::Finding;
 use crate::util::quantity::{Dimension, Quantity};
 
-/// A setting that a command-line option stands for. Errors name the option as typed, not the setting.
+/// A setting that a command-line option sets. Errors name the option as typed, not the setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OptionSetting {
     key: String,

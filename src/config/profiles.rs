@@ -11,7 +11,7 @@ pub struct EmbeddedFile {
     pub text: &'static str,
 }
 
-/// The profile that all others are laid over.
+/// The profile that is the base of all others.
 pub const DEFAULT: &str = "stage";
 
 /// Embeds files of a folder of `bench-config/`, each by its name.

@@ -41,7 +41,7 @@ pub struct Config {
     pub sim: SimSettings,
     /// The choice of the excitation of `bench chirp`.
     pub excitation: ExcitationSettings,
-    /// The chirp, and band, quiet times, fades and amplitude over frequency of every excitation.
+    /// The chirp; also the band, rest times, fades and amplitude over frequency of every excitation.
     pub chirp: ChirpSettings,
     /// The tables of the other excitations.
     #[serde(flatten)]

@@ -22,7 +22,7 @@ pub struct SimSettings {
     #[serde(default)]
     pub geometry: Geometry,
     /// Mass asymmetry m2/m3 - 1 of the simulated stage in addition to `plant.mass_asymmetry`: an initial asymmetry by manufacture
-    /// (section 5.2.2) that the analysis does not know. Only for the plant `sr4dof`.
+    /// (section 5.2.2) that is unknown to the analysis. Only for the plant `sr4dof`.
     #[serde(default)]
     #[schemars(range(min = -0.5, max = 0.5))]
     pub asymmetry_offset: f64,

@@ -10,7 +10,7 @@ use super::{ControllerError, Section};
 use crate::model::plant::{LoopPlant, Mode};
 use crate::util::units::UM_PER_M;
 
-/// Everything that decides the margins of a loop.
+/// A closed loop, for the computation of its responses, poles, margins and step.
 pub struct ClosedLoop {
     modes: Vec<Mode>,
     force_constant_n_per_a: f64,
@@ -58,8 +58,8 @@ impl ClosedLoop {
         self.plant.response(omega_rad_s) * self.linear.response(self.z(omega_rad_s))
     }
 
-    /// L = P C in continuous time, without hold, delay and amplifier; `None` for a law that was not designed as
-    /// continuous sections.
+    /// L = P C in continuous time, without hold, delay and amplifier; `None` for a law that was not designed as a
+    /// cascade of continuous sections.
     pub fn continuous_loop(&self, omega_rad_s: f64) -> Option<Complex<f64>> {
         let sections = self.design.sections()?;
         Some(self.continuous_response(sections, omega_rad_s))
@@ -112,7 +112,8 @@ impl ClosedLoop {
             .collect()
     }
 
-    /// The same with the command in amperes of each tick before its reading.
+    /// Command in amperes and reading in metres of each tick of [`simulate`](Self::simulate). The reading is the one
+    /// that follows the command.
     pub fn signals(
         &self,
         ticks: usize,

@@ -12,7 +12,7 @@ use crate::util::units::UM_PER_M;
 /// ```
 /// use bench::control::{Controller, Section};
 ///
-/// // A gain of 2 A/um: 10 nm of error ask for 20 mA.
+/// // A gain of 2 A/um: an error of 10 nm gives a command of 20 mA.
 /// let gain = Section { numerator: [2.0, 0.0, 0.0], denominator: [1.0, 0.0, 0.0], prewarp_rad_s: None };
 /// let controller = Controller::new(&[gain], 1e-3);
 /// let mut state = controller.at_rest();
@@ -41,7 +41,7 @@ impl Controller {
         ControllerState(vec![BiquadState::default(); self.sections.len()])
     }
 
-    /// The command in amperes for the error r - y in metres. *In the tick.*
+    /// The command in amperes for the error r - y in metres. Runs in the tick: must not allocate or block.
     pub fn update(&self, state: &mut ControllerState, error_m: f64) -> f64 {
         let sections = self.sections.iter().zip(&mut state.0);
         sections.fold(error_m * UM_PER_M, |x, (section, state)| {

@@ -16,7 +16,7 @@ use crate::config::{self, ConfigError, profiles};
 pub struct ControllerFile {
     /// Title of the controller.
     pub title: String,
-    /// The cascade, first to last. One section at least carries the gain in amperes per micrometre.
+    /// The cascade, first to last. At least one section contains the gain in amperes per micrometre.
     #[schemars(length(min = 1, max = 32))]
     pub section: Vec<SectionSettings>,
 }
@@ -86,7 +86,7 @@ pub enum SectionSettings {
         /// zp.
         #[schemars(range(min = -10.0, max = 10.0))]
         poles_damping_ratio: f64,
-        /// Where the discrete section is exact, in rad/s.
+        /// Frequency in rad/s at which the discrete section has exactly the continuous response.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 1e-3, max = 1e6))]
         prewarp_rad_s: Option<f64>,
@@ -99,7 +99,7 @@ pub enum SectionSettings {
         /// Of the denominator: one to three numbers.
         #[schemars(length(min = 1, max = 3))]
         denominator: Vec<f64>,
-        /// Where the discrete section is exact, in rad/s.
+        /// Frequency in rad/s at which the discrete section has exactly the continuous response.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 1e-3, max = 1e6))]
         prewarp_rad_s: Option<f64>,
@@ -136,7 +136,7 @@ pub enum ControllerError {
         /// Half the servo rate.
         limit_rad_s: f64,
     },
-    /// A law whose settings contradict each other or the servo rate.
+    /// A law whose settings are inconsistent with each other or with the servo rate.
     #[error("{name}: `law` {why}")]
     Law {
         /// The controller.

@@ -12,12 +12,12 @@ pub struct LawInput {
     pub reference_m: f64,
     /// Measured position y in metres, in the coordinate of the probe.
     pub position_m: f64,
-    /// Current in amperes that the amplifier really gave for the previous tick: after the interlocks, quantised and
-    /// limited. An observer takes this one and not its own request.
+    /// Current in amperes that the amplifier actually gave for the previous tick: after the interlocks, quantised and
+    /// limited. An observer must use this value, not its own request.
     pub applied_a: f64,
 }
 
-/// A control law in the loop: one command a tick.
+/// A control law in the loop: one command per tick.
 ///
 /// Sign convention: positive current moves the stage in the positive direction, so that u = C (r - y) has a positive gain.
 /// `update` runs in the tick: it must not allocate, lock, print or wait. A request that is not finite trips the interlocks.
@@ -39,11 +39,11 @@ pub struct LawInput {
 /// assert_eq!(Proportional(1e4).update(&input), 1e4 * 3e-6);
 /// ```
 pub trait ControlLaw: Send {
-    /// Discards the state. The stage rests at `rest_m` with zero current, and the loop closes in this tick.
-    /// *In the tick.*
+    /// Discards the state. The stage rests at `rest_m` with zero current, and the loop closes in this tick. Runs in
+    /// the tick: must not allocate or block.
     fn reset(&mut self, rest_m: f64);
 
-    /// The request in amperes. *In the tick.*
+    /// The request in amperes. Runs in the tick: must not allocate or block.
     fn update(&mut self, input: &LawInput) -> f64;
 
     /// The law as a linear system, if it is one. Stability and margins are computed from it; a law without it is **not
@@ -53,7 +53,7 @@ pub trait ControlLaw: Send {
     }
 }
 
-/// The feedback path of a linear law, u = -C(z) y at zero reference, with the requested current as the applied one.
+/// The feedback path of a linear law, u = -C(z) y at zero reference, if the applied current equals the requested one.
 pub trait LinearLaw: Send + Sync {
     /// x+ = A x + B e, u = C x + D e with e = -y in metres and u in amperes.
     fn state_space(&self) -> StateSpace;

@@ -22,9 +22,9 @@ pub struct Crossing {
 pub struct Margins {
     /// Lowest frequency at which |L| falls through 1.
     pub crossover_rad_s: Option<f64>,
-    /// Smallest over all crossings.
+    /// Phase margin of smallest magnitude over all crossings of |L| = 1, in degrees.
     pub phase_margin_deg: Option<f64>,
-    /// Smallest over all phase crossings.
+    /// Smallest gain margin over all phase crossover frequencies, in dB.
     pub gain_margin_db: Option<f64>,
     /// 1/max |S|: the distance of L from -1.
     pub modulus_margin: f64,
@@ -32,11 +32,11 @@ pub struct Margins {
     pub sensitivity_peak_db: f64,
     /// Lowest frequency at which |S| rises through 1/sqrt(2).
     pub sensitivity_bandwidth_rad_s: Option<f64>,
-    /// From the poles of the closed loop.
+    /// Whether all poles of the closed loop are stable.
     pub stable: bool,
     /// All crossings of |L| = 1.
     pub crossings: Vec<Crossing>,
-    /// True if sampling, delay and amplifier are left out.
+    /// Whether sampling, delay and amplifier are neglected.
     pub continuous: bool,
 }
 
@@ -144,7 +144,7 @@ fn smallest(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// Where a value is not below its neighbours.
+/// Indices of the values that are not below their neighbours.
 fn local_maxima(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
     (1..values.len().saturating_sub(1))
         .filter(|&i| values[i] >= values[i - 1] && values[i] >= values[i + 1])
@@ -244,7 +244,7 @@ mod tests {
         };
         let found = margins(&l, &grid(1.0, 1e4, &[(w0, zeta)]), true, true);
         assert_eq!(found.crossings.len(), 2, "{:?}", found.crossings);
-        // |L| = 1 at w^2 = w0^2 (1 +- 0.01) but for the damping.
+        // L| = 1 at w^2 = w0^2 (1 +- 0.01), except for the effect of the damping.
         assert!((found.crossings[0].rad_s - w0 * 0.99f64.sqrt()).abs() < 1e-3);
         assert!((found.crossings[1].rad_s - w0 * 1.01f64.sqrt()).abs() < 1e-3);
     }

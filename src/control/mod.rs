@@ -1,7 +1,8 @@
 //! Control laws and their margins.
 //!
-//! A controller is a cascade of first and second order sections from its TOML file to the loop, never a polynomial: as one
-//! 8th order polynomial at 5 kHz the fast controller cannot be discretised in double precision.
+//! A controller remains a cascade of first and second order sections from its TOML file to the loop, and is never
+//! expanded to a polynomial: as one 8th order polynomial at 5 kHz the fast controller cannot be discretised in double
+//! precision.
 //!
 //! ```text
 //!  file -> Section (continuous) -> Biquad (Tustin, section by section) -> SectionController --+
@@ -13,7 +14,7 @@
 //! ```
 //!
 //! Sign convention: u = C (r - y). Positive current moves the stage in the positive direction, so C has positive gain.
-//! Coefficients are immutable and stand apart from state.
+//! Coefficients are immutable and separate from the state.
 
 mod biquad;
 mod closed_loop;

@@ -38,7 +38,7 @@ pub enum SectionError {
         /// Imaginary part.
         im_rad_s: f64,
     },
-    /// A coefficient that is not finite, or a denominator of zeros.
+    /// A coefficient that is not finite, or a denominator whose coefficients are all 0.
     #[error("has a denominator of zeros or a coefficient that is not finite")]
     Degenerate,
 }
@@ -180,7 +180,8 @@ mod tests {
 
     #[test]
     fn section_of_lower_order_has_no_mode_at_half_the_sampling_rate() {
-        // A common factor (z + 1) of numerator and denominator would ring at -1, +1, -1, ... for ever after an impulse.
+        // A common factor (z + 1) of numerator and denominator would continue as -1, +1, -1, ... without end after an
+        // impulse.
         let gain = section([0.3, 0.0, 0.0], [1.5, 0.0, 0.0]);
         let pole = section([893.0, 0.0, 0.0], [893.0, 1.0, 0.0]);
         for (h, expected) in [(gain, 0.2), (pole, 1.0)] {
@@ -188,7 +189,7 @@ mod tests {
             let response: Vec<f64> = (0..2000)
                 .map(|k| biquad.update(&mut state, if k == 0 { 1.0 } else { 0.0 }))
                 .collect();
-            // The pole's memory after 2000 ticks is exp(-893 * 0.4), 1e-155 of the first sample.
+            // The response of the pole after 2000 ticks is exp(-893 * 0.4) = 1e-155 of the first sample.
             assert!(
                 (response.iter().sum::<f64>() - expected).abs() < 1e-12
                     && response[1999].abs() < 1e-100

@@ -13,7 +13,7 @@ use crate::config::{ChirpSettings, TravelPoint};
 use crate::excitation::AmplitudeCurve;
 use crate::util::units::rad_s;
 
-/// Points over the band; a configuration holds 64.
+/// Number of points over the band; a configuration allows up to 64.
 const POINTS: usize = 48;
 /// Frequencies at which the loop is evaluated between two points.
 const BETWEEN: usize = 32;

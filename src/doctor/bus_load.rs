@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn a_drive_at_1_khz_with_sync_and_100_heartbeats_a_second_loads_1_mbit_to_20_percent() {
-        // SYNC 55, set-point 95, status 95/2 bits a tick; 2 * 50 heartbeats of 65 bits: 197500 + 6500 bits/s.
+        // SYNC 55, set-point 95, status 95/2 bits per tick; 2 * 50 heartbeats of 65 bits: 197500 + 6500 bits/s.
         let exchange = Exchange::Synchronous { status_every: 2 };
         let (load, finding) = of_drive(&DriveSettings {
             exchange,
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn a_vesc_beyond_the_capacity_of_the_bus_is_a_failure() {
-        // 67 + 32 + floor(85 / 4) = 120 bits a set-point, 160 a STATUS: 5 kHz on 500 kbit/s are 121.6 %.
+        // 67 + 32 + floor(85 / 4) = 120 bits per set-point, 160 bits per STATUS: 5 kHz on 500 kbit/s are 121.6 %.
         let (load, finding) = of_vesc(5000.0, 500_000);
         assert!((load.load - 1.216).abs() < 1e-9, "{load:?}");
         assert_eq!(finding.severity, Severity::Failure);

@@ -79,7 +79,7 @@ fn can_interfaces(net: &Path) -> Vec<String> {
     names
 }
 
-/// Judges the facts. With a failure among the findings nothing can be sent.
+/// Evaluates the facts. With a failure among the findings nothing can be sent.
 pub fn findings(facts: &InterfaceFacts) -> Vec<Finding> {
     if let Err(error) = &facts.kernel {
         return vec![Subject::CanKernel.refused(error)];

@@ -136,7 +136,7 @@ impl BusTraffic {
     }
 }
 
-/// Judges the traffic for a run with `node`, which no other process of this program uses.
+/// Evaluates the traffic for a run with `node`, which no other process of this program uses.
 pub fn findings(traffic: &BusTraffic, node: u8, bit_rate: u32) -> Vec<Finding> {
     let mut findings = vec![nodes(traffic, bit_rate)];
     findings.extend(traffic.conditions.iter().filter_map(|c| condition(*c)));

@@ -47,7 +47,7 @@ pub fn figures(inspection: &Inspection) -> DriveFigures {
     }
 }
 
-/// Judges an inspection for a run with these settings; `maximum_ratio` is the configured value of 0x6072.
+/// Evaluates an inspection for a run with these settings; `maximum_ratio` is the configured value of 0x6072.
 pub fn findings(
     inspection: &Inspection,
     settings: &DriveSettings,

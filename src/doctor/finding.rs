@@ -36,7 +36,7 @@ macro_rules! subjects {
         /// What was examined.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
         #[serde(into = "&'static str")]
-        #[allow(missing_docs, reason = "the names say it")]
+        #[allow(missing_docs, reason = "the names of the variants are self-explanatory")]
         pub enum Subject {
             $($(#[$doc])* $variant,)+
         }

@@ -1,4 +1,4 @@
-//! The readings of the probe during one second, as the loop sees them: the newest reading and its age.
+//! The readings of the probe during one second, as the loop receives them: the newest reading and its age.
 
 use std::time::{Duration, Instant};
 
@@ -147,7 +147,7 @@ fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (squares.sum::<f64>() / count).sqrt())
 }
 
-/// Judges the figures for a run.
+/// Evaluates the figures for a run.
 pub fn findings(
     readings: &Readings,
     probe: &ProbeSettings,

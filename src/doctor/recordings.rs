@@ -69,7 +69,7 @@ impl SpaceFacts {
     }
 }
 
-/// Judges the facts.
+/// Evaluates the facts.
 pub fn finding(facts: &SpaceFacts) -> Finding {
     let existing = facts.existing.display();
     if !facts.is_folder {

@@ -37,7 +37,7 @@ pub fn kinds(config: &Config) -> Finding {
     }
 }
 
-/// Judges the checks; `min_modulus_margin` is the configured limit.
+/// Evaluates the checks; `min_modulus_margin` is the configured limit.
 pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
     let chirp = match &checks.chirp {
         Ok(travel_m) => Subject::Chirp.ok(format!("predicted travel {:.0} um", travel_m * 1e6)),

@@ -1,4 +1,4 @@
-//! The privileges of the loop's thread: real-time priority, locked memory, a processor of its own.
+//! The privileges of the loop's thread: real-time priority, locked memory, its own processor.
 
 use caps::{CapSet, Capability, has_cap};
 use nix::sched::{CpuSet, sched_getaffinity};
@@ -53,7 +53,7 @@ fn allowed_processors() -> Vec<usize> {
     (0..CpuSet::count()).filter(is_allowed).collect()
 }
 
-/// Judges the facts for a loop at this pace. A run starts without the privileges and reports that.
+/// Evaluates the facts for a loop at this pace. A run starts without the privileges and reports that.
 pub fn findings(facts: &SchedulerFacts, pace: Pace) -> Vec<Finding> {
     let limit = severity_limit(pace);
     let findings = [Some(priority(facts)), Some(memory(facts)), processor(facts)];

@@ -122,7 +122,7 @@ fn has_open(pid: u32, device: &Path) -> bool {
     files.any(|file| std::fs::read_link(file.path()).is_ok_and(|open| open == device))
 }
 
-/// Judges the facts.
+/// Evaluates the facts.
 pub fn finding(facts: &PortFacts) -> Finding {
     let path = facts.path.display();
     let Some(device) = &facts.device else {

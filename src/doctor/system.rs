@@ -70,7 +70,7 @@ fn governors(folder: &Path) -> Vec<String> {
     governors
 }
 
-/// Judges the facts for a loop at this pace.
+/// Evaluates the facts for a loop at this pace.
 pub fn findings(facts: &SystemFacts, pace: Pace) -> [Finding; 4] {
     let limit = severity_limit(pace);
     let findings = [

@@ -130,7 +130,7 @@ impl Lateness {
     }
 }
 
-/// Judges the lateness. A tick that is late by more than a period is missed; too many of them within one second trip.
+/// Evaluates the lateness. A tick that is late by more than a period is missed; too many of them within one second trip.
 pub fn finding(lateness: &Lateness, overruns_per_s: u32, pace: Pace) -> Finding {
     let what = lateness.text();
     let is_late = lateness.missed > 0 || lateness.max_s > 1.0 / lateness.rate_hz;

@@ -8,7 +8,7 @@ use super::finding::{Finding, Subject};
 /// A current above this, without a command, is reported, in units of 0.1 A.
 const STRAY_CURRENT: u16 = 2;
 
-/// Judges what was received from the configured VESC.
+/// Evaluates the STATUS frames of the configured VESC.
 pub fn findings(traffic: &BusTraffic, settings: &VescSettings) -> Vec<Finding> {
     let node = settings.node;
     let Some(&(count, tenths)) = traffic.vescs.get(&node) else {

@@ -37,12 +37,12 @@ pub struct AmplitudeCurve {
 }
 
 impl AmplitudeCurve {
-    /// In amperes, through points of rising frequency.
+    /// A curve in amperes, through points of rising frequency.
     pub fn of_current(points: &[AmplitudePoint]) -> AmplitudeCurve {
         AmplitudeCurve::new(points.iter().map(|p| (p.frequency_hz, p.current_a)))
     }
 
-    /// In metres, through points of rising frequency.
+    /// A curve in metres, through points of rising frequency.
     pub fn of_travel(points: &[TravelPoint]) -> AmplitudeCurve {
         AmplitudeCurve::new(points.iter().map(|p| (p.frequency_hz, p.amplitude_m)))
     }
@@ -54,7 +54,8 @@ impl AmplitudeCurve {
         }
     }
 
-    /// The amplitude at the logarithm of a frequency in hertz; 0 without a point.
+    /// The amplitude at `ln_frequency`, the natural logarithm of the frequency in hertz; 0 if the curve has no
+    /// points.
     pub fn at(&self, ln_frequency: f64) -> f64 {
         let after = self
             .points

@@ -56,7 +56,7 @@ pub enum ExcitationError {
     Travel {
         /// Largest travel by the model.
         travel_um: f64,
-        /// The frequency that is excited then, if it is a single one.
+        /// The frequency that is excited at this time, if there is only one.
         frequency_hz: Option<f64>,
         /// The soft limit.
         limit_um: f64,

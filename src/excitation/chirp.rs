@@ -6,7 +6,7 @@ use super::repeated::Repeated;
 use super::sweep::{ChirpSettings, Sweep, SweptSine};
 use super::waveform::Excitation;
 
-/// A chirp with quiet before and after, in amperes.
+/// A chirp with zero current before and after, in amperes.
 #[derive(Clone, Debug)]
 pub struct Chirp(SweptSine);
 
@@ -116,7 +116,7 @@ mod tests {
             .collect()
     }
 
-    /// Zero crossings between two times, counted on the signal itself: two a period.
+    /// Zero crossings per second between two times, counted in the signal itself: two per period.
     fn crossings_per_second(chirp: &Chirp, from_s: f64, to_s: f64) -> f64 {
         let signal = samples(chirp);
         let part = &signal[(from_s / PERIOD_S) as usize..(to_s / PERIOD_S) as usize];
@@ -166,9 +166,10 @@ mod tests {
                     .chain(&signal[signal.len() - quiet..])
                     .all(|u| *u == 0.0)
             );
-            // 50,000 numbers below 0.5, each rounded at 1e-16.
+            // 50,000 numbers below 0.5, each with a rounding error of 1e-16.
             assert!(signal.iter().sum::<f64>().abs() < 1e-11);
-            // At the ends the envelope is (pi n/(2 N))^2 of the amplitude n samples in, N = 2500 to a fade.
+            // At the ends the envelope is (pi n/(2 N))^2 of the amplitude n samples from the end, with N = 2500
+            // samples per fade.
             let (first, last) = (
                 signal[quiet + 1].abs(),
                 signal[signal.len() - quiet - 1].abs(),

@@ -1,11 +1,11 @@
-//! What is known of an excitation from its settings, before it is built.
+//! Properties of an excitation that follow from its settings alone (length, limits).
 
 use super::Excitation;
 use super::sweep::ChirpSettings;
 use crate::util::finding::Finding;
 
-/// The settings that every kind of excitation shares: band, quiet, fades and amplitude over frequency in `[chirp]`, and the
-/// servo rate.
+/// The settings that every kind of excitation shares: band, rest times, fades and amplitude over frequency in
+/// `[chirp]`, and the servo rate.
 #[derive(Clone, Copy, Debug)]
 pub struct SharedSettings<'a> {
     /// `[chirp]`.
@@ -25,18 +25,18 @@ impl SharedSettings<'_> {
         libm::round(seconds * self.rate_hz) as u64
     }
 
-    /// Quiet before and after, in seconds.
+    /// Zero current before and after, in seconds.
     pub fn quiet_s(&self) -> f64 {
         self.chirp.quiet_before_s + self.chirp.quiet_after_s
     }
 
-    /// The band in words.
+    /// The band as text.
     pub fn band(&self) -> String {
         format!("{} to {} Hz", self.chirp.start_hz, self.chirp.stop_hz)
     }
 }
 
-/// Length of an excitation including quiet, and the setting that determines it.
+/// Length of an excitation including the zero current before and after, and the setting that determines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Length {
     /// Length in ticks.
@@ -47,9 +47,9 @@ pub struct Length {
     pub value: f64,
 }
 
-/// The settings of one kind of excitation. Everything that the program does differently for a kind is asked here.
+/// The settings of one kind of excitation. This trait provides all properties in which the kinds differ.
 pub trait ExcitationDesign {
-    /// Kind, band and length in words.
+    /// Kind, band and length as text.
     fn describe(&self, shared: &SharedSettings<'_>) -> String;
 
     /// Its length, computed without building it.
@@ -104,7 +104,7 @@ impl ChosenExcitation<'_> {
         self.design.build(&self.shared)
     }
 
-    /// Kind, band and length in words.
+    /// Kind, band and length as text.
     pub fn describe(&self) -> String {
         self.design.describe(&self.shared)
     }

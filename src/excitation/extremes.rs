@@ -15,13 +15,13 @@ pub struct Extremes {
     pub travel_tick: u64,
     /// Largest current in amperes.
     pub current_a: f64,
-    /// RMS of the current in amperes over the whole run, quiet included.
+    /// RMS of the current in amperes over the whole run, including the zero current before and after.
     pub rms_current_a: f64,
     /// Largest thermal current in amperes.
     pub thermal_current_a: f64,
     /// Largest change of the current in amperes per second.
     pub slew_a_per_s: f64,
-    /// Length of the run in seconds, quiet included.
+    /// Length of the run in seconds, including the zero current before and after.
     pub duration_s: f64,
 }
 

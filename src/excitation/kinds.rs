@@ -9,8 +9,8 @@ use super::multisine::MultisineSettings;
 use super::prbs::PrbsSettings;
 use super::stepped_sine::SteppedSineSettings;
 
-/// Declares the kinds that have a table of settings: `/// words, Kind(#[attributes] table: Settings)`, where the table of the
-/// configuration has the name of the kind in snake case.
+/// Declares the kinds that have a table of settings: `/// documentation, Kind(#[attributes] table: Settings)`, where
+/// the table of the configuration has the name of the kind in snake case.
 macro_rules! excitations {
     ($($(#[$doc:meta])* $kind:ident($(#[$attribute:meta])* $table:ident: $settings:ty)),* $(,)?) => {
         /// The kinds of excitation.

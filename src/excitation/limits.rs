@@ -1,6 +1,6 @@
 //! The limits of motor, amplifier and stage for an excitation.
 
-/// What an excitation must keep within.
+/// Limits that an excitation must not exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Travel in metres to either side.

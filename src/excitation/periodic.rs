@@ -15,7 +15,7 @@ use super::waveform::{Excitation, Pattern};
 /// A periodic excitation.
 #[derive(Clone, Debug)]
 pub struct Periodic {
-    /// One period in amperes, one number a tick.
+    /// One period in amperes, one number per tick.
     table: Vec<f64>,
     start_tick: u64,
     settle_periods: u64,
@@ -26,7 +26,7 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    /// `table` repeated, with the quiet and the fades of `[chirp]`.
+    /// `table` repeated, with the zero current before and after and the fades of `[chirp]`.
     pub(super) fn new(
         shared: &SharedSettings<'_>,
         table: Vec<f64>,
@@ -112,7 +112,7 @@ mod tests {
         let table: Vec<f64> = (0..200).map(|n| libm::sin(f64::from(n))).collect();
         let shared = config.chosen_excitation().shared;
         let periodic = Periodic::new(&shared, table.clone(), 2, 5);
-        // At 5 kHz: 100 ticks of quiet, 7 periods, 50 ticks of fade, 200 of quiet.
+        // At 5 kHz: 100 ticks of zero current, 7 periods, 50 ticks of fade, 200 of zero current.
         assert_eq!(periodic.ticks(), 100 + 1400 + 50 + 200);
         assert_eq!(
             periodic.pattern(),
@@ -128,12 +128,12 @@ mod tests {
             assert_eq!(periodic.active(tick), active, "{tick}");
             match tick {
                 0..=100 | 1550.. => assert_eq!(current_a, 0.0, "{tick}"),
-                // From half of the settling on.
+                // The fade-in ends after half of the settling periods (tick 300).
                 300..=1500 => assert_eq!(current_a, table[(tick as usize - 100) % 200], "{tick}"),
                 _ => assert!(current_a.abs() < 1.0, "{tick}"),
             }
         }
-        // The fades begin and end with (pi/2 n/N)^2: N = 200 and 50.
+        // The fades begin and end with (pi/2 n/N)^2, N = 200 and 50 ticks.
         assert!(periodic.current_a(101).abs() < 7e-5 && periodic.current_a(1549).abs() < 1e-3);
     }
 }

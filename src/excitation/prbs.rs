@@ -5,7 +5,7 @@
 //!  sum over k of u(k) u(k + m) = a^2 (L, m = 0; -1 elsewhere)            L = 2^n - 1
 //! ```
 //!
-//! So its spectrum is flat but for the hold of d ticks, with its first zero at rate/d.
+//! Therefore its spectrum is flat, except for the effect of the hold of d ticks, which has its first zero at rate/d.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -112,7 +112,7 @@ const TAPS: [&[u32]; 14] = [
     &[20, 17],
 ];
 
-/// The sequence of the settings.
+/// Builds the periodic excitation from the settings: each bit is held for `clock_divider` ticks.
 fn prbs(settings: &PrbsSettings, shared: &SharedSettings<'_>) -> Periodic {
     let ticks_a_step = settings.clock_divider.max(1) as usize;
     let mut table = Vec::new();
@@ -197,7 +197,8 @@ mod tests {
     fn spectrum_is_flat_at_every_order() {
         for order in 7..=20 {
             let table = built(&settings(order, 1)).table().to_vec();
-            // The transform of the autocorrelation: L + 1 at every line but 0, where the one step more of + leaves 1.
+            // The transform of the autocorrelation is L + 1 at every line except line 0. There it is 1, because the
+            // sequence has one + step more than - steps.
             let (length, powers) = (table.len() as f64, powers(&table));
             assert!(
                 (powers[0] / 0.25 - 1.0).abs() < 1e-6,

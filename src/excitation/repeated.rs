@@ -1,4 +1,4 @@
-//! An excitation with its quiet, several times.
+//! An excitation, including its zero current before and after, several times.
 
 use super::waveform::{Excitation, Pattern};
 

@@ -21,7 +21,7 @@ const CLOSE: f64 = 0.01;
 pub struct CurrentLimit {
     /// Amplitude in amperes at any frequency.
     pub current_a: f64,
-    /// Change in amperes per second: A <= this/(2 pi f).
+    /// Largest change in amperes per second: A <= slew_a_per_s/(2 pi f).
     pub slew_a_per_s: f64,
 }
 
@@ -147,7 +147,8 @@ mod tests {
                 2f64.min(4000.0 / (std::f64::consts::TAU * f)),
             );
             let wanted_a = cap_a.min(100e-6 / gain);
-            // Never above, by rounding of a logarithm; below by twice what the simplification may miss.
+            // The current exceeds the wanted value only by rounding; it is below by at most twice the tolerance of
+            // the simplification.
             let ratio = current_a / wanted_a;
             assert!(
                 (0.9..=1.0 + 1e-9).contains(&ratio),
@@ -155,7 +156,8 @@ mod tests {
             );
         }
         let at = |f: f64| amplitude.at(f.ln());
-        // At the resonance Q = 55.6, less by 1 - (30/80)^2: 4.77 mm/A and 21 mA; at the zero all that there is.
+        // At the resonance Q = 55.6, reduced by 1 - (30/80)^2: 4.77 mm/A and 21 mA; at the antiresonance nearly the
+        // limit of 2 A.
         assert!(
             (0.019..0.0212).contains(&at(30.0)) && at(80.0) > 1.8,
             "{} {}",

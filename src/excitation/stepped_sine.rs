@@ -28,11 +28,11 @@ pub struct SteppedSineSettings {
     pub count: u32,
     /// How they are spaced.
     pub spacing: Spacing,
-    /// Time in seconds for which each sine runs before it is measured; over the first half it takes the place of the one
-    /// before.
+    /// Settling time of each sine in seconds before it is measured; over the first half it replaces the previous
+    /// sine.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub settle_s: f64,
-    /// Least time in seconds for which each is measured: six blocks of whole periods, the last of which shows the drift.
+    /// Smallest measuring time of each sine in seconds: six blocks of whole periods; the last block shows the drift.
     #[schemars(range(min = 0.001, max = 10000.0))]
     pub measure_s: f64,
 }
@@ -109,7 +109,7 @@ impl ExcitationDesign for SteppedSineSettings {
 /// Smallest number of ticks in a block.
 const LEAST_BLOCK: f64 = 16.0;
 
-/// Sines one after the other, with quiet before and after.
+/// Sines one after the other, with zero current before and after.
 #[derive(Clone, Debug)]
 struct SteppedSine {
     sines: Vec<Sine>,
@@ -196,7 +196,7 @@ impl SteppedSine {
         }
     }
 
-    /// The current of a sine at a tick, times a share; 0 without a share.
+    /// The current of a sine at a tick, times `share`; 0 without a sine.
     fn shared_current_a(&self, sine: Option<&Sine>, tick: u64, share: f64) -> f64 {
         match sine {
             Some(sine) if share > 0.0 => share * sine.current_a(tick, self.settle_ticks),
@@ -317,7 +317,7 @@ mod tests {
                     .frequencies_hz(start_hz, stop_hz),
             ) {
                 let frequency_hz = window.turns as f64 * 5000.0 / window.period as f64;
-                // The nearest whole number of ticks is half a tick off at most.
+                // The nearest whole number of ticks deviates by half a tick at most.
                 assert!(
                     (frequency_hz / requested_hz - 1.0).abs() <= 0.51 / window.period as f64,
                     "{frequency_hz} {requested_hz}"

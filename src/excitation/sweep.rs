@@ -6,8 +6,8 @@
 //!  logarithmic  f = f0 exp(k t), k = ln(f1/f0)/T      phi = 2 pi f0 (exp(k t) - 1)/k
 //! ```
 //!
-//! (sin(2 pi f(t) t) would end at 2 f1 - f0.) e(t) is the cosine fade at both ends, A the amplitude over frequency, and m the
-//! constant that makes the sum over all ticks zero, so that neither motor nor stage is left with an impulse.
+//! (sin(2 pi f(t) t) would end at 2 f1 - f0.) e(t) is the cosine fade at both ends, A the amplitude over frequency,
+//! and m the constant that makes the sum over all ticks zero, so that the net impulse on motor and stage is zero.
 
 use std::f64::consts::TAU;
 
@@ -56,7 +56,7 @@ pub struct ChirpSettings {
     /// Length of the cosine fade at the end, in seconds.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub fade_out_s: f64,
-    /// Number of repetitions of the chirp, quiet included; the analysis uses their mean.
+    /// Number of repetitions of the chirp, including the zero current before and after; the analysis uses their mean.
     #[serde(default = "once")]
     #[schemars(range(min = 1, max = 10000))]
     pub repetitions: u32,
@@ -79,7 +79,7 @@ fn once() -> u32 {
     1
 }
 
-/// A sweep with quiet before and after, in the unit of its amplitude.
+/// A sweep with zeros before and after, in the unit of its amplitude.
 #[derive(Clone, Debug)]
 pub struct SweptSine {
     settings: ChirpSettings,
@@ -120,7 +120,8 @@ impl SweptSine {
         if weight > 0.0 { sum / weight } else { 0.0 }
     }
 
-    /// The value at a tick, counted from the start of the quiet before. *In the tick.*
+    /// The value at a tick, counted from the start of the zeros before the sweep. Runs in the tick: must not allocate
+    /// or block.
     pub fn at(&self, tick: u64) -> f64 {
         if !self.active(tick) {
             return 0.0;
@@ -129,12 +130,13 @@ impl SweptSine {
         envelope * (sine - self.mean)
     }
 
-    /// Whether the tick lies in the sweep, not in the quiet before or after. *In the tick.*
+    /// Whether the tick lies in the sweep, not in the zeros before or after. Runs in the tick: must not allocate or
+    /// block.
     pub fn active(&self, tick: u64) -> bool {
         (self.start_tick..self.start_tick + self.sweep_ticks).contains(&tick)
     }
 
-    /// Length in ticks, quiet included.
+    /// Length in ticks, including the zeros before and after.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
@@ -147,7 +149,7 @@ impl SweptSine {
         }
     }
 
-    /// The instantaneous frequency in hertz at a tick; in the quiet, that of the nearer end.
+    /// The instantaneous frequency in hertz at a tick; before and after the sweep, the one of the nearer end.
     pub fn frequency_at_hz(&self, tick: u64) -> f64 {
         let time_s = tick.saturating_sub(self.start_tick) as f64 * self.period_s;
         self.frequency_hz(time_s.min(self.settings.duration_s))

@@ -1,6 +1,6 @@
 //! The traits of this module: a current over time, and a reference over time.
 
-/// A current over time, as a function of the tick alone: so that a run can be repeated and replayed.
+/// A current as a function of the tick alone, so that a run can be repeated and replayed.
 ///
 /// ```
 /// use bench::excitation::Excitation;
@@ -21,13 +21,14 @@
 /// // bench::rt::program::Excite(Pulse) is the program that runs it.
 /// ```
 pub trait Excitation: Send {
-    /// Amperes at a tick of the excitation, counted from 0. *In the tick.*
+    /// The current in amperes; `tick` counts from 0. Called in the tick: must not allocate or block.
     fn current_a(&self, tick: u64) -> f64;
 
-    /// Length in ticks, quiet included. *In the tick.*
+    /// Length in ticks, including the zero current before and after. Called in the tick: must not allocate or block.
     fn ticks(&self) -> u64;
 
-    /// Whether the tick belongs to the excitation itself, not to the quiet before or after. *In the tick.*
+    /// Whether the tick belongs to the excitation itself, not to the zero current before or after. Called in the
+    /// tick: must not allocate or block.
     fn active(&self, tick: u64) -> bool {
         tick < self.ticks()
     }
@@ -107,7 +108,8 @@ pub struct Window {
 
 /// A reference over time, from the tick at which the loop closes.
 pub trait Reference: Send {
-    /// Metres relative to the rest position, at a tick counted from 0. *In the tick.*
+    /// The reference in metres, relative to the rest position; `tick` counts from 0. Called in the tick: must not
+    /// allocate or block.
     fn at_m(&self, tick: u64) -> f64;
 }
 

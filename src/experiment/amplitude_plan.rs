@@ -76,7 +76,7 @@ pub enum AmplitudePlanError {
     Model(#[from] ExperimentError),
 }
 
-/// Plans the amplitude from the model if the excitation asks for it: a stepped sine does.
+/// Plans the amplitude from the model if the excitation requires it, as a stepped sine does.
 ///
 /// # Errors
 /// If the model cannot be analysed.

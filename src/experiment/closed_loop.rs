@@ -16,7 +16,7 @@ use crate::identify::modal::Estimate;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::recording::Recording;
 
-/// Estimates plant and loop, with the reference as instrument.
+/// Estimates plant and loop by the instrumental-variable method, with the reference as the instrument.
 pub(super) fn estimate_loop(
     signals: &LoopSignals,
     band_hz: (f64, f64),

@@ -1,14 +1,14 @@
-//! What an excitation would do, beside the limits of the bench.
+//! The plan of an excitation: its predicted extremes and the limits of the bench.
 
 use serde::Serialize;
 
 use crate::config::Config;
 use crate::excitation::{AmplitudePoint, Extremes};
 
-/// What an excitation would do by the model.
+/// The plan of an excitation, predicted by the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExcitationPlan {
-    /// Kind, band and length in words.
+    /// Kind, band and length as text.
     pub excitation: String,
     /// Its extremes by the model.
     pub expected: Extremes,

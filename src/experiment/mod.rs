@@ -1,4 +1,4 @@
-//! Runs of the bench, from arming to the complete recording, and what is made of them.
+//! Runs of the bench, from arming to the complete recording, and the analysis of the recordings.
 //!
 //! ```text
 //!  Plan (config -> program, texts)  ->  run: loop thread + recorder thread, tokio supervising from outside  ->  Run

@@ -63,7 +63,7 @@ pub struct Plan {
     pub controller: Option<ControllerText>,
     /// The calibration in use.
     pub calibration: Option<String>,
-    /// Which devices, for the recording's metadata.
+    /// Descriptions of the devices, for the metadata of the recording.
     pub devices: Vec<(&'static str, String)>,
     /// Extremes of a swept reference by the model.
     pub predicted_extremes: Option<Extremes>,

@@ -24,7 +24,8 @@ pub(super) struct RecordedRig {
     status: AmplifierStatus,
 }
 
-/// What a [`RecordedRig`] does next. The rig takes each entry within the tick for which it is pushed.
+/// The queues that determine the next actions of a [`RecordedRig`]. The rig takes each entry within the tick for
+/// which it is pushed.
 pub(super) struct RigFeed {
     /// The tick.
     pub(super) ticks: Producer<RecordedTick>,
@@ -97,7 +98,8 @@ impl CurrentAmplifier for RecordedRig {
         self.clears.pop().map_err(|_| REFUSED)
     }
 
-    /// After a fault the loop asks no program for a command. If there was a command, it was the command that failed.
+    /// After a fault the loop does not request a command from the program. If the record contains a command, this
+    /// command failed.
     fn status(&self) -> AmplifierStatus {
         let record = &self.now.record;
         let has_command = record.requested_a.to_bits() | record.reference_m.to_bits() != 0

@@ -1,7 +1,8 @@
 //! Replays the recorded probe readings through the same loop.
 //!
-//! Rig and clock are those of the recording: every reading, every time and every request at its tick. The loop must then
-//! decide the same, bit for bit. The recorded trips contain what the amplifier did.
+//! Rig and clock are those of the recording: they return every reading, every time and every request at its tick. The
+//! decisions of the loop must then be equal, bit for bit. The behaviour of the amplifier follows from the recorded
+//! trips.
 
 use std::iter::Peekable;
 

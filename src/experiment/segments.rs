@@ -91,7 +91,7 @@ fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     }
 }
 
-/// Estimates each sine from its periods.
+/// Estimates the response at each sine from its periods.
 fn estimate_stepped_sine(
     signals: &Signals,
     windows: &[Window],

@@ -173,7 +173,7 @@ impl SignalBuilder {
     }
 }
 
-/// The currents at the median time. A current whose time is not known (NaN) is treated as if it came then.
+/// The currents at the median time. A current whose time is not known (NaN) is treated as if it took effect then.
 fn aligned_currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
     let mut known: Vec<f64> = late.iter().copied().filter(|late| !late.is_nan()).collect();
     known.sort_by(f64::total_cmp);
@@ -221,7 +221,8 @@ mod tests {
 
     #[test]
     fn interpolates_at_most_a_thousandth_of_all_ticks() {
-        // Of 9990 that are there, 9 may be missing: one a thousand, the last at 8500, or a gap of nine.
+        // 9990 recorded ticks allow 9 missing ones: here one per thousand, the last at tick 8500; then one gap of
+        // nine.
         let nine =
             gathered(10_000, |tick| tick % 1000 == 500 && tick < 9000).expect("nine are few");
         assert_eq!(nine.filled_ticks, 9);

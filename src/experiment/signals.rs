@@ -10,7 +10,7 @@ use super::run_error::RunError;
 
 const START: &str = "start the analysis";
 
-/// Receives interrupt (Ctrl-C) and terminate, from now on for the whole process.
+/// Installs process-wide handlers for SIGINT (Ctrl-C) and SIGTERM.
 pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
     Ok((
         signal(SignalKind::interrupt())?,

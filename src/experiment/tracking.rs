@@ -41,7 +41,7 @@ pub fn tracking_metrics(
 struct TrackingMeter {
     /// The last change of the reference.
     last_change: u64,
-    /// Begin of the steady state.
+    /// Beginning of the steady state.
     steady: u64,
     /// Ticks with the loop closed.
     active: u64,

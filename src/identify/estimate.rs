@@ -1,6 +1,6 @@
 //! A number with its standard deviation.
 
-/// Standard deviations to either side of the mean that hold 95 % of a normal distribution.
+/// Standard deviations to either side of the mean that contain 95 % of a normal distribution.
 pub const SIGMAS_95: f64 = 1.959_963_984_540_054;
 
 /// A number with its standard deviation.

@@ -1,4 +1,4 @@
-//! External records: CSV files with a header that names the columns, one sample a line.
+//! External records: CSV files with a header that names the columns, one sample per line.
 //!
 //! Columns are separated by commas, semicolons or tabs, whichever is most frequent in the first line. Input and output may have
 //! any units: these replace the amperes and metres of [`Signals`], and a residue is output per input per second squared.

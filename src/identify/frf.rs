@@ -16,7 +16,7 @@ pub enum Unit {
     Bare,
 }
 
-/// A measured frequency response. All columns have one entry a frequency; frequencies rise; every entry is finite.
+/// A measured frequency response. All columns have one entry per frequency; frequencies rise; every entry is finite.
 ///
 /// A frequency at which the input had no energy is omitted.
 ///

@@ -1,7 +1,7 @@
 //! Frequency response functions as CSV files.
 //!
-//! One row a frequency. Phases are wrapped to (-180, 180] degrees; a lag is negative. Numbers are written with as many
-//! digits as reading back the same number needs.
+//! One row per frequency. Phases are wrapped to (-180, 180] degrees; a lag is negative. Numbers are written with
+//! enough digits to read back the same value.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -9,12 +9,12 @@ use super::mean::mean;
 const MIN_SAMPLES: usize = 64;
 /// Squares and sums of samples up to this magnitude stay finite.
 const MAX_SAMPLE: f64 = 1e100;
-/// The input is quiet while it stays below this ratio of its peak.
+/// The input counts as zero while it stays below this ratio of its peak.
 const QUIET_RATIO: f64 = 1e-6;
-/// A shorter quiet interval does not give the rest position well enough.
+/// A shorter interval of zero input does not determine the rest position accurately enough.
 const MIN_QUIET_S: f64 = 0.25;
 
-/// Input and output of one run: one sample a tick, the same tick at the same index.
+/// Input and output of one run: one sample per tick, the same tick at the same index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signals {
     /// Ticks per second.
@@ -84,10 +84,11 @@ impl Signals {
 
     /// The output minus the straight line through its rest positions before and after the excitation, in metres.
     ///
-    /// An FFT treats the record as one period of a periodic signal. A constant offset of the probe stays in bin 0, which
-    /// no estimate uses. A drift of d metres over the record is a step from the last sample to the first; it adds
-    /// d/(2 pi f) metre seconds at every frequency. The quiet interval before the excitation and the second half of the
-    /// one after it (when the stage has rung out) give d. Without both intervals only the mean is subtracted.
+    /// An FFT treats the record as one period of a periodic signal. A constant offset of the probe stays in bin 0,
+    /// which no estimate uses. A drift of d metres over the record is a step from the last sample to the first; it
+    /// adds d/(2 pi f) metre seconds at every frequency. d follows from the interval of zero input before the
+    /// excitation and from the second half of the one after it (when the stage has rung out). Without both intervals
+    /// only the mean is subtracted.
     pub(super) fn output_without_drift_m(&self) -> Vec<f64> {
         let (offset, slope) = self.drift();
         let output_m = self.output_m.iter().enumerate();
@@ -111,7 +112,7 @@ impl Signals {
         }
     }
 
-    /// The quiet interval before the excitation and the second half of the one after it.
+    /// The interval of zero input before the excitation and the second half of the one after it.
     fn quiet_intervals(&self) -> (Range<usize>, Range<usize>) {
         let peak = self
             .input_a

@@ -68,7 +68,7 @@ pub enum RecordingError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// Begin of the first damaged record.
+        /// Start of the first damaged record.
         at_byte: u64,
         /// Ticks before it.
         ticks: u64,

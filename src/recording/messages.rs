@@ -80,7 +80,7 @@ messages! {
         field "1" (uint64) tick,
         /// Scheduled time since the loop started.
         field "2" (uint64) scheduled_ns,
-        /// Begin of the tick.
+        /// Start of the tick.
         field "3" (uint64) woke_ns,
         /// Time at which the command was written.
         field "4" (uint64) done_ns,

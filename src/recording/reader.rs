@@ -37,8 +37,8 @@ pub struct Cut {
     pub why: String,
 }
 
-/// A recording that was read once from begin to end. All checks have passed, everything except the ticks is in memory, and the
-/// ticks can be streamed any number of times.
+/// A recording that was read once from start to end. All checks have passed, everything except the ticks is in
+/// memory, and the ticks can be streamed any number of times.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,

@@ -51,7 +51,7 @@ mod tests {
         assert_eq!(crc32fast::hash(&schema), 0xab15_8d29);
     }
 
-    /// A message with every field set, by its field numbers on the wire: (number, wire type), by a reader of its own.
+    /// A message with every field set, by its field numbers on the wire: (number, wire type), with an independent reader.
     fn wire(mut bytes: &[u8]) -> Vec<(i32, u8)> {
         let mut fields = Vec::new();
         while !bytes.is_empty() {

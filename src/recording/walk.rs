@@ -1,7 +1,7 @@
 //! Reads an MCAP file record by record and returns only checked data.
 //!
 //! The options of `mcap` select these checks: the CRC of the uncompressed content of a chunk *before* its first message, the CRC
-//! of an attachment, the CRC from the begin of the file to the end of the data section, the CRC of the summary, and the magic
+//! of an attachment, the CRC from the start of the file to the end of the data section, the CRC of the summary, and the magic
 //! bytes at both ends. For `mcap`, a CRC field of zero means *not checked*; this module refuses it for chunks and attachments.
 //! This module also checks that the messages of a channel are numbered without a gap, and some lengths with which `mcap` would
 //! panic.
@@ -57,7 +57,7 @@ pub(super) struct Walk {
     file: File,
     reader: LinearReader,
     bytes_read: u64,
-    /// Begin of the current record.
+    /// Start of the current record.
     pub(super) offset: u64,
     pub(super) contents: Contents,
 }

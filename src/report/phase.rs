@@ -4,10 +4,11 @@ const TURN_DEG: f64 = 360.0;
 /// Offsets are determined within this ratio of the lowest common frequency.
 const COMPARED_RATIO: f64 = 10.0;
 
-/// Unwrapped phases in degrees: each the value closest to the trusted one before it, plus whole turns.
+/// Unwrapped phases in degrees: each the value closest to the valid one before it, plus whole turns.
 ///
-/// A phase that is not trusted is placed near its neighbours, but those after it do not follow it: noise in a deep
-/// anti-resonance adds no turns. The first trusted phase stays in (-180, 180]: a plant with a positive DC gain starts near 0.
+/// A phase that is not valid (too noisy) is placed near its neighbours, but those after it do not follow it: noise in
+/// a deep anti-resonance adds no turns. The first valid phase stays in (-180, 180]: a plant with a positive DC gain
+/// starts near 0.
 pub fn unwrapped_deg(wrapped_deg: &[f64], valid: &[bool]) -> Vec<f64> {
     let first = valid.iter().position(|valid| *valid).unwrap_or(0);
     let mut last = wrapped_deg.get(first).copied().unwrap_or(0.0);

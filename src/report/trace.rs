@@ -84,7 +84,7 @@ impl<'a> Curve<'a> {
     }
 }
 
-/// A response ready to be plotted, with one entry a frequency in every column.
+/// A response ready to be plotted, with one entry per frequency in every column.
 pub(super) struct Line<'a> {
     pub name: &'a str,
     pub pen: Pen,
@@ -201,7 +201,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// The points (frequency, phase) that are known well.
+    /// The points (frequency, phase) whose phase is valid.
     fn valid_phases(&self) -> Vec<(f64, f64)> {
         let points = self
             .frequency_hz

@@ -35,7 +35,7 @@ pub enum State {
 pub enum Transition {
     /// The amplifier was enabled.
     Arm,
-    /// A program was handed over.
+    /// A program was passed to the loop.
     Start,
     /// The program ended, or the operator stopped it.
     Stop,

@@ -23,7 +23,7 @@ pub trait Clock {
     /// the number of missed ticks.
     fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming;
 
-    /// Nanoseconds since the loop started, read within `tick`. *In the tick.*
+    /// Nanoseconds since the loop started, read within `tick`. Runs in the tick: must not allocate or block.
     fn now_ns(&self, tick: Tick) -> u64;
 
     /// Restarts the schedule: the tick `number` is due one period from now.

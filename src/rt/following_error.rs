@@ -1,4 +1,4 @@
-//! Following error of the current: does the current that the amplifier measures follow the commands?
+//! Following error of the current: whether the measured current follows the commands.
 //!
 //! A drive that no longer takes set-points keeps its last current, and may report no fault. The measured current reveals it:
 //! over a window it must stay within the commands of this window and the previous one, and it must move if the commands moved
@@ -106,7 +106,7 @@ impl FollowingError {
         })
     }
 
-    /// Whether the commands moved and the current did not.
+    /// Whether the measured current was constant although the commands changed.
     fn is_constant(&self) -> bool {
         self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a
     }
@@ -163,7 +163,8 @@ mod tests {
                 .expect("it stands still");
             assert!((1000..=1150).contains(&found), "{hz} Hz: {found}");
         }
-        // The commands go to zero and stay there: outside of what was asked for in the last two windows.
+        // The commands go to zero and stay there: the measured current is outside the commands of the last two
+        // windows.
         let found = first_trip(5_000, |tick| if tick < 1000 { 0.5 } else { 0.0 }, |_| 0.5);
         assert!(
             found.is_some_and(|tick| (1000..=1151).contains(&tick)),

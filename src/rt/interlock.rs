@@ -1,4 +1,4 @@
-//! The interlocks. They check every reading before the control law sees it, and every command after the control law.
+//! The interlocks. They check every reading before the control law receives it, and every command after the control law.
 //!
 //! The functions here check a reading, a tick or a command; the arming machine latches the trip. A command that is not finite
 //! is a trip; it is not limited.
@@ -79,7 +79,7 @@ impl Interlocks {
         }
     }
 
-    /// Checks a reading. *In the tick.*
+    /// Checks a reading. Runs in the tick: must not allocate or block.
     pub fn check_reading(&mut self, reading: &Reading, now: Tick) -> Result<(), Trip> {
         self.fresh.update(reading, self.last_command_a, now);
         if reading.validity != Validity::Valid || !reading.position_m.is_finite() {
@@ -126,7 +126,8 @@ impl Interlocks {
         Ok(())
     }
 
-    /// Checks how many ticks were missed within the last second. During them the last current kept flowing. *In the tick.*
+    /// Checks how many ticks were missed within the last second. During them the last current kept flowing. Runs in
+    /// the tick: must not allocate or block.
     pub fn check_timing(&mut self, missed: u32, now: Tick) -> Result<(), Trip> {
         if missed == 0 {
             return Ok(());
@@ -140,8 +141,8 @@ impl Interlocks {
         }
     }
 
-    /// Checks whether the current that the amplifier measures follows the commands. `None`, where it measures none or is off,
-    /// resets the check. *In the tick.*
+    /// Checks whether the current that the amplifier measures follows the commands. `None`, where it measures none or
+    /// is off, resets the check. Runs in the tick: must not allocate or block.
     pub fn check_current(&mut self, actual_a: Option<f64>, now: Tick) -> Result<(), Trip> {
         match actual_a {
             Some(actual_a) => self.following.check(self.last_command_a, actual_a, now),
@@ -152,7 +153,8 @@ impl Interlocks {
         }
     }
 
-    /// Checks a command before it is sent. The thermal model of the motor is thermal' = (i^2 - thermal)/tau. *In the tick.*
+    /// Checks a command before it is sent. The thermal model of the motor is thermal' = (i^2 - thermal)/tau. Runs in
+    /// the tick: must not allocate or block.
     pub fn check_command(&mut self, command_a: f64) -> Result<(), Trip> {
         if !command_a.is_finite() {
             return Err(Trip::CommandNotFinite);
@@ -174,7 +176,7 @@ impl Interlocks {
         Ok(())
     }
 
-    /// Notes the current that flows from this tick on. *In the tick.*
+    /// Stores the current that flows from this tick on. Runs in the tick: must not allocate or block.
     pub fn record_current(&mut self, command_a: f64) {
         self.heat(command_a, 1.0);
         self.last_command_a = command_a;
@@ -187,7 +189,7 @@ impl Interlocks {
 }
 
 impl Freshness {
-    /// Notes when sequence and position last changed, and the range of the commands since the position changed.
+    /// Updates when sequence and position last changed, and the range of the commands since the position changed.
     fn update(&mut self, reading: &Reading, command_a: f64, now: Tick) {
         let is_first = self.sequence.is_none();
         if self.sequence != Some(reading.sequence) {

@@ -1,6 +1,6 @@
 //! What the loop runs: an excitation, or a control law with a reference.
 //!
-//! A program is made before the run and handed over whole. Its decisions depend on the tick of its run and the signals of
+//! A program is made before the run and passed to the loop as a whole. Its decisions depend on the tick of its run and the signals of
 //! [`ProgramInput`] alone, so that a recording can be replayed.
 
 use crate::control::{ControlLaw, LawInput};
@@ -24,20 +24,20 @@ pub struct Decision {
     pub reference_m: f64,
     /// The requested current in amperes.
     pub requested_a: f64,
-    /// Whether the excitation is on or the loop closed: neither quiet before nor after.
+    /// Whether the excitation is on or the loop closed: false in the zero-current intervals before and after.
     pub active: bool,
 }
 
-/// Decides one command a tick.
+/// Decides one command per tick.
 pub trait Program: Send {
-    /// The command of this tick. *In the tick.*
+    /// The command of this tick. Called in the tick: must not allocate or block.
     fn decide(&mut self, input: &ProgramInput) -> Decision;
 
-    /// Length of the run in ticks. *In the tick.*
+    /// Length of the run in ticks. Called in the tick: must not allocate or block.
     fn ticks(&self) -> u64;
 }
 
-/// Drives the motor with an excitation, whatever the position.
+/// Drives the motor with an excitation, independently of the position.
 pub struct Excite<E>(
     /// The excitation.
     pub E,
@@ -57,7 +57,8 @@ impl<E: Excitation> Program for Excite<E> {
     }
 }
 
-/// Rests at zero current for a while, then closes the loop where the stage rests: r = rest position + reference.
+/// Applies zero current for the settling time, then closes the loop where the stage rests: r = rest position +
+/// reference.
 ///
 /// The start is bumpless: the rest position is the mean over the rest, the law starts from rest, and the reference is
 /// relative to the rest position. No earlier set-point and no offset of the probe makes the stage jump.
@@ -70,7 +71,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// A run of `settle_ticks` at rest (one at least) and `closed_ticks` with the loop closed.
+    /// A run of `settle_ticks` (at least one) at rest, followed by `closed_ticks` in closed loop.
     pub fn new(
         law: Box<dyn ControlLaw>,
         reference: Box<dyn Reference>,

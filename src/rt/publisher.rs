@@ -12,9 +12,9 @@ pub struct Publisher {
     unreported: u64,
 }
 
-/// Slots that a tick can need at most: three events a request (an arm request whose amplifier does not enable makes four, but
-/// needs a clear request before the next one, which makes two), a trip and its state, the end of the program and its state,
-/// the record, and the count of lost records.
+/// Slots that a tick can need at most: three events per request (an arm request whose amplifier does not enable makes
+/// four, but needs a clear request before the next one, which makes two), a trip and its state, the end of the
+/// program and its state, the record, and the count of lost records.
 pub const SLOTS_PER_TICK: usize = 3 * REQUESTS_PER_TICK + 6;
 
 impl Publisher {
@@ -42,7 +42,7 @@ impl Publisher {
         self.lost
     }
 
-    /// The signals of a tick. *In the tick.*
+    /// Publishes the signals of a tick. Runs in the tick: must not allocate or block.
     pub fn record(&mut self, record: TickRecord) {
         if self.unreported > 0 && self.ring.slots() >= 2 {
             let lost = Event {
@@ -57,7 +57,7 @@ impl Publisher {
         self.push(LoopMessage::Tick(record));
     }
 
-    /// A change. *In the tick.*
+    /// Publishes a change. Runs in the tick: must not allocate or block.
     pub fn event(&mut self, tick: u64, kind: EventKind) {
         self.push(LoopMessage::Event(Event { tick, kind }));
     }

@@ -1,4 +1,4 @@
-//! What the loop publishes: one [`TickRecord`] a tick and an [`Event`] at every change. Plain copies without
+//! What the loop publishes: one [`TickRecord`] per tick and an [`Event`] at every change. Plain copies without
 //! allocation, so that they can leave the tick through a wait-free ring.
 
 use bench_hal::Validity;
@@ -42,11 +42,12 @@ pub struct TickRecord {
 
 /// Bits of [`TickRecord::flags`].
 pub mod flag {
-    /// The program was running and the loop closed (or the excitation on): neither quiet before nor quiet after.
+    /// The program was running and the loop closed (or the excitation on): not in the zero-current intervals before
+    /// and after.
     pub const ACTIVE: u32 = 1;
     /// The amplifier gives another current than requested.
     pub const LIMITED: u32 = 2;
-    /// This tick began more than one period late; `missed_ticks` says how many were lost.
+    /// This tick began more than one period late; `missed_ticks` is the number of lost ticks.
     pub const OVERRUN: u32 = 4;
     /// The reading was not valid.
     pub const INVALID: u32 = 8;

@@ -292,7 +292,7 @@ impl Servo {
         self.connections.publisher.event(tick, kind);
     }
 
-    /// Hands a program over to be freed outside the loop. Without room in the ring its memory is leaked, not freed here.
+    /// Passes a program on to be freed outside the loop. Without room in the ring its memory is leaked, not freed here.
     fn retire(&mut self, program: Option<Box<dyn Program>>) {
         let Some(program) = program else { return };
         if let Err(rtrb::PushError::Full(program)) = self.connections.retired.push(program) {

@@ -1,4 +1,4 @@
-//! The thread of the loop: locked memory, a real-time scheduler and a processor of its own. If the system refuses one of
+//! The thread of the loop: locked memory, a real-time scheduler and its own processor. If the system refuses one of
 //! these, the loop still runs, and the refusal is reported with its remedy.
 
 use std::sync::mpsc::{Sender, channel};
@@ -72,7 +72,7 @@ impl PreparedLoop {
 
     /// Starts the loop. Without this call it ends before its first tick.
     pub fn begin(self) -> JoinHandle<LoopOutcome> {
-        // If the thread has died, joining it returns the reason.
+        // If the thread has panicked, joining it returns the reason.
         let _ = self.start.send(());
         self.thread
     }
@@ -90,7 +90,7 @@ pub fn prepare(
     let (report, reported) = channel();
     let builder = std::thread::Builder::new().name("bench-loop".into());
     let thread = builder.spawn(move || {
-        let _ = report.send(pace.schedule(&settings)); // without a receiver nobody starts the loop
+        let _ = report.send(pace.schedule(&settings)); // without a receiver the loop is not started
         match started.recv() {
             Ok(()) => pace.run(servo, settings.period_s(), tail_ticks),
             Err(_) => LoopOutcome::default(),
@@ -173,7 +173,7 @@ impl Scheduling {
         self.cpu = cpu.filter(|&cpu| self.granted("binding to a processor", bind(cpu), remedy));
     }
 
-    /// Whether the system granted what was asked for; a refusal is noted with its remedy.
+    /// Whether the system granted a request; a refusal is recorded with its remedy.
     fn granted(&mut self, what: &str, result: nix::Result<()>, remedy: &str) -> bool {
         let refused = result.map_err(|error| format!("{what}: {error}; {remedy}"));
         let granted = refused.is_ok();

@@ -22,7 +22,7 @@ pub enum FileAction {
     Create,
     /// Opening.
     Open,
-    /// Asking for the lock.
+    /// Requesting the lock.
     Lock,
     /// Working on it: another process holds the lock.
     Use,
@@ -56,12 +56,12 @@ pub struct FileError {
     pub action: FileAction,
     /// The file or folder.
     pub path: String,
-    /// The reason, in the words of the operating system.
+    /// The reason, as reported by the operating system.
     pub cause: String,
 }
 
 impl FileError {
-    /// The failure of one step.
+    /// The error of one file operation.
     pub fn new(action: FileAction, path: &Path, cause: &impl fmt::Display) -> FileError {
         FileError {
             action,

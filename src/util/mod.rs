@@ -1,4 +1,4 @@
-//! Small helpers without a subject of their own.
+//! Small helpers that several modules use.
 
 pub mod atomic_file;
 pub mod checkpoint;

@@ -1,4 +1,4 @@
-//! How far a piece of work is: written by the work, read by whoever shows it.
+//! Progress of a task: written by the task, read by the display.
 //!
 //! ```
 //! use bench::util::progress::Progress;
@@ -6,14 +6,14 @@
 //! let progress = Progress::default();
 //! progress.begin("fitting", 20);
 //! progress.advance(5);
-//! let seen = progress.snapshot();
-//! assert_eq!((seen.stage, seen.done, seen.total), ("fitting", 5, 20));
+//! let now = progress.snapshot();
+//! assert_eq!((now.stage, now.done, now.total), ("fitting", 5, 20));
 //! ```
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How far a piece of work is. Clones share their state.
+/// Progress of a task. Clones share their state.
 #[derive(Clone, Debug)]
 pub struct Progress(Arc<Mutex<State>>);
 
@@ -32,7 +32,7 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// Of a stage whose length is not known yet.
+    /// Progress of a stage whose number of steps is not known yet.
     pub fn new(stage: &'static str) -> Progress {
         Progress(Arc::new(Mutex::new(State {
             stage,
@@ -79,7 +79,7 @@ impl Progress {
     }
 }
 
-/// The state of a piece of work at a moment.
+/// The progress of a task at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Snapshot {
     /// What is being done.

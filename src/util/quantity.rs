@@ -19,7 +19,7 @@ use std::marker::PhantomData;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// What a quantity measures.
+/// Dimension of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// Metres.
@@ -50,7 +50,7 @@ pub enum Dimension {
     Ratio,
 }
 
-/// Units that can be typed, and what one of each is in SI units. The first of a dimension is its SI unit.
+/// Units that can be typed, each with its value in SI units. The first of a dimension is its SI unit.
 const UNITS: &[(&str, Dimension, f64)] = &[
     ("m", Dimension::Length, 1.0),
     ("mm", Dimension::Length, 1e-3),
@@ -83,7 +83,7 @@ const UNITS: &[(&str, Dimension, f64)] = &[
     ("GPa", Dimension::Pressure, 1e9),
 ];
 
-/// The last words of a setting's key, and the dimension of its value. The first match counts.
+/// Suffixes of the keys of settings, with the dimension of their values. The first match counts.
 const KEY_SUFFIXES: &[(&str, Dimension)] = &[
     ("_n_per_m", Dimension::Stiffness),
     ("_n_per_a", Dimension::Other("N/A")),
@@ -130,8 +130,8 @@ impl Dimension {
         format!("{si} {}", self.si_unit()).trim_end().to_string()
     }
 
-    /// What a bare number may have been meant as, if it is allowed with another unit: `8mm` for 8 where 0.5 m is the
-    /// most.
+    /// Suggestions for a number without a unit that is out of range: the units with which it would be in range, as
+    /// `8mm` for 8 where 0.5 m is the largest value.
     pub fn other_readings(self, number: f64, allowed: &RangeInclusive<f64>) -> Vec<String> {
         let units = self.units().filter(|(_, scale)| *scale != 1.0);
         let readings = units.filter(|(_, scale)| allowed.contains(&(number * scale)));

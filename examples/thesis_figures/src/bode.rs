@@ -37,7 +37,7 @@ impl Curve {
         self
     }
 
-    /// A range of it, to its very ends; its phase goes on from below.
+    /// The part of the curve between two frequencies, both included; its phase continues from lower frequencies.
     pub fn part(&self, low: f64, high: f64) -> Curve {
         let inside = |w: f64| (low..=high).contains(&w);
         let mut points: Vec<_> = self
@@ -115,7 +115,7 @@ impl Curve {
     }
 }
 
-/// Magnitude and phase, for two rows; the names stand in the legend of the first.
+/// Magnitude and phase, for two rows; the names are in the legend of the first.
 pub(crate) fn bode(
     heading: &str,
     frequency: &str,
@@ -172,14 +172,14 @@ pub(crate) fn nyquist(heading: &str, re: (f64, f64), im: (f64, f64), what: &str)
     .line("", Pen::solid(GREY).thin(), vec![(0.0, low), (0.0, high)])
 }
 
-/// With the critical point and the unit circle.
+/// Adds the critical point and the unit circle.
 pub(crate) fn critical(chart: Chart) -> Chart {
     chart
         .line("|L| = 1", Pen::dotted(GREY), circle((0.0, 0.0), 1.0))
         .points("−1", VERMILION, Symbol::Cross, vec![(-1.0, 0.0)])
 }
 
-/// The origin, where the corner between two resonance circles may lie on either side.
+/// Adds the origin, because the corner between two resonance circles may lie on either side of it.
 pub(crate) fn origin(chart: Chart) -> Chart {
     chart.points("origin", INK, Symbol::Dot, vec![(0.0, 0.0)])
 }

@@ -1,4 +1,4 @@
-//! Chapter 1: what a zero in the right half plane costs.
+//! Chapter 1: limits due to a zero in the right half plane.
 
 use nalgebra::Complex;
 
@@ -10,12 +10,13 @@ use bench::model::zeros::{bandwidth_rad_s, guaranteed_peak, opening_angle};
 use bench::report::colours::{BLUE, GREEN, GREY, INK, VERMILION};
 use bench::report::{Chart, Mark, Pen, Symbol};
 
-/// The circle of all zeros that see the band up to w0 under an angle: centre w0/tan Theta, radius w0/sin Theta.
+/// The circle of all zeros at which the band up to w0 subtends an angle Theta: centre w0/tan Theta, radius w0/sin
+/// Theta.
 fn circle_of(omega_0: f64, angle: f64) -> (f64, f64) {
     (omega_0 / angle.tan(), omega_0 / angle.sin())
 }
 
-/// A zero on that circle, seen from its centre at a direction.
+/// A zero on that circle, at a direction from its centre.
 fn on_circle(omega_0: f64, angle: f64, direction_deg: f64) -> Complex<f64> {
     let (centre, radius) = circle_of(omega_0, angle);
     Complex::new(centre, 0.0) + Complex::from_polar(radius, direction_deg.to_radians())

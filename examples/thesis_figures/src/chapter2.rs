@@ -429,7 +429,7 @@ fn loci_chart(all: &[CloseLoci]) -> Chart {
     chart
 }
 
-/// y2 (solid) and y3 (dashed) of a mode; the legend stands at the first loci.
+/// y2 (solid) and y3 (dashed) of a mode; only the first loci have an entry in the legend.
 fn elements_chart(heading: &str, mode: usize, all: &[CloseLoci]) -> Chart {
     let mut chart = Chart::new(
         heading,

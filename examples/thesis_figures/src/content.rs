@@ -1,13 +1,13 @@
-//! What a figure shows.
+//! The content of a figure.
 
 use serde::Serialize;
 
 use bench::report::{Chart, Row};
 
-/// A figure or a table: charts, and what stands below them.
+/// A figure or a table: charts, and the text below them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Content {
-    /// What is drawn, in words.
+    /// Description of what is drawn.
     pub drawn: String,
     /// Profile, settings and equations.
     pub settings: Vec<String>,
@@ -90,7 +90,7 @@ pub struct Comparison {
     pub printed: String,
     /// As computed, with its unit.
     pub computed: String,
-    /// Computed minus printed, or in words.
+    /// Computed minus printed, or a text.
     pub difference: String,
     /// Largest difference that agrees: half of the last printed digit unless the remark says otherwise.
     pub tolerance: Option<f64>,

@@ -40,7 +40,7 @@ pub enum FigureError {
     /// Its recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Its recording carries no response.
+    /// Its recording contains no response.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     /// A computation or run did not give what the figure needs.

@@ -1,4 +1,4 @@
-//! Computes the figures and tables of the thesis: one SVG a figure and one page of HTML.
+//! Computes the figures and tables of the thesis: one SVG per figure and one page of HTML.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};

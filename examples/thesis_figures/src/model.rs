@@ -45,13 +45,13 @@ impl Model {
         ))
     }
 
-    /// With one setting more, KEY=VALUE.
+    /// Adds a setting, KEY=VALUE.
     pub fn set(mut self, set: &str) -> Model {
         self.sets.push(set.into());
         self
     }
 
-    /// At an operating point (ratio of the beam length of 47.5 mm) and a mass asymmetry (ratio).
+    /// Sets the operating point (ratio of the beam length of 47.5 mm) and the mass asymmetry (ratio).
     pub fn at(self, operating_point: f64, asymmetry: f64) -> Model {
         let point_m = operating_point * 0.0475;
         self.set(&format!("plant.operating_point_m={point_m:?}"))
@@ -97,7 +97,7 @@ impl Model {
         Ok(ModalModel::of(&self.structure()?)?)
     }
 
-    /// The modes that show.
+    /// The sum of the modes that can be observed.
     pub fn sum(&self) -> Result<ModalSum, FigureError> {
         Ok(ModalSum::visible(&self.modal()?)?)
     }
@@ -131,7 +131,7 @@ impl Varied {
         Ok(plant::build(&settings)?)
     }
 
-    /// The modes that show at a value.
+    /// The sum of the modes that can be observed, at a value.
     pub fn sum(&self, value: f64) -> Result<ModalSum, FigureError> {
         Ok(ModalSum::visible(&ModalModel::of(
             &self.structure(value)?,
@@ -139,7 +139,7 @@ impl Varied {
     }
 }
 
-/// Values at equal distances, both ends among them; `count` is two at least.
+/// Values at equal distances, both ends among them; `count` is at least two.
 pub(crate) fn even(from: f64, to: f64, count: usize) -> Vec<f64> {
     let last = (count - 1) as f64;
     (0..count)
@@ -194,7 +194,7 @@ pub(crate) fn response(
     Ok(frequencies(sum, low, high)?.into_iter().map(at).collect())
 }
 
-/// Zeros without damping in words: kinds by pairs and quartets.
+/// Zeros without damping as text: kinds by pairs and quartets.
 pub(crate) fn kinds(zeros: &[Zero]) -> String {
     bench::model::zeros::ZeroCounts::of(zeros).to_string()
 }

@@ -10,7 +10,7 @@ use bench::model::zeros::{
 use bench::report::colours::{BLUE, Colour, GREY, INK};
 use bench::report::{Chart, Mark, Pen, Scale, Symbol};
 
-/// Beyond every frame.
+/// A coordinate beyond every frame.
 const FAR: f64 = 1e9;
 
 /// A chart of the plane of s in rad/s, with its imaginary and real axis.
@@ -69,8 +69,8 @@ pub(crate) fn locus(
     })
 }
 
-/// Follows zeros again with more values: close to where they meet, beside which they run as the root of the distance, and
-/// where they move far from one value to the next.
+/// Follows zeros again with more values: close to where they meet, because they move there with the square root of
+/// the distance, and where they move far from one value to the next.
 pub(crate) fn follow(
     plane: LocusPlane,
     values: &[f64],
@@ -99,7 +99,7 @@ pub(crate) fn follow(
 
 /// Rounds of refinement.
 const REFINEMENTS: usize = 3;
-/// A zero may move by so much of its magnitude from one value to the next.
+/// Largest motion of a zero from one value to the next, as a ratio of its magnitude.
 const STRIDE: f64 = 0.03;
 
 /// Values to both sides of a meeting, nearer and nearer.
@@ -167,7 +167,7 @@ pub(crate) fn tracks(mut chart: Chart, name: &str, pen: Pen, locus: &Locus, part
     chart
 }
 
-/// A track as it is seen: without damping one of a pair s, -s stands for both.
+/// A track as it is drawn: without damping, one zero of a pair s, -s represents both.
 fn views(track: &[Option<Complex<f64>>], part: Part) -> Vec<Vec<(f64, f64)>> {
     let seen = |of: fn(Complex<f64>) -> (f64, f64)| {
         track

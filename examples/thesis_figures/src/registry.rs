@@ -25,7 +25,7 @@ pub struct Entry {
 pub enum Make {
     /// By this function.
     Draw(fn(&Runs) -> Result<Content, FigureError>),
-    /// It cannot be computed, and this is why.
+    /// It cannot be computed, for this reason.
     Not(&'static str),
 }
 

@@ -127,7 +127,7 @@ fn drop_deg(settings: XySettings) -> Result<f64, FigureError> {
     )?)?))
 }
 
-/// The next of all orders of eight things, in alphabetical order; `false` after the last.
+/// The next permutation of eight indices in lexicographic order; `false` after the last.
 fn next_order(order: &mut [usize; 8]) -> bool {
     let Some(from) = (0..7).rev().find(|&k| order[k] < order[k + 1]) else {
         return false;
@@ -141,7 +141,7 @@ fn next_order(order: &mut [usize; 8]) -> bool {
     true
 }
 
-/// The first labelling, in alphabetical order, with which all rows have their phase drops.
+/// The first labelling, in lexicographic order, with which all rows have their phase drops.
 fn labelling(base: &XySettings) -> Result<[usize; 8], FigureError> {
     let mut labels = [0, 1, 2, 3, 4, 5, 6, 7];
     loop {

@@ -13,7 +13,7 @@ pub struct Emergency {
     pub code: u16,
     /// Object 0x1001, see [`register_names`].
     pub register: u8,
-    /// Bytes of the vendor; the manual of the drive describes them.
+    /// Manufacturer-specific error code (5 bytes), described in the manual of the drive.
     pub vendor: [u8; 5],
 }
 
@@ -23,7 +23,7 @@ pub const fn cob_id(node: u8) -> Id {
 }
 
 impl Emergency {
-    /// The frame with which `node` sends it.
+    /// The CAN frame of this emergency message, sent by `node`.
     pub const fn frame(&self, node: u8) -> CanFrame {
         let [low, high] = self.code.to_le_bytes();
         let v = self.vendor;

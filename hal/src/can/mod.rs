@@ -19,7 +19,8 @@
 //! | the drive's power stage | the service thread | EMCY, statusword |
 //! | the bus, the adapter | both ends | error frames here, heartbeat there |
 //!
-//! A successful write is no evidence of a working bus, because SocketCAN accepts frames in bus-off. Received frames are.
+//! A successful write is no evidence of a working bus, because SocketCAN accepts frames in bus-off. Only received
+//! frames are evidence.
 
 pub mod budget;
 pub mod bus;

@@ -221,7 +221,7 @@ mod tests {
         quiet_ns: 100,
     };
 
-    /// An poller after the silence at the start, with a request at 1000.
+    /// A poller after the initial silence, with a request sent at 1000 ns.
     fn poller_with_request() -> Poller {
         let mut poller = Poller::with_times(TIMES, 0);
         assert_eq!(poller.next_action(999), Action::Listen { until_ns: 1000 });
@@ -297,7 +297,8 @@ mod tests {
     }
 
     proptest! {
-        /// However late a probe answers, and however late the reader looks: no answer counts as asked for after it was.
+        /// For all delays of probe and reader: an answer is never assigned to a request later than the one it
+        /// answers.
         #[test]
         fn never_assigns_an_answer_to_a_later_request(
             late_ns in 0u64..5000, jitter_ns in vec(0u64..400, 1..20), suspended_ns in vec(0u64..2000, 1..20), rarely in 1usize..30,
@@ -330,7 +331,7 @@ mod tests {
                 }
                 now_ns += 1 + if turn % rarely == 0 { suspended_ns[turn % suspended_ns.len()] } else { 0 };
             }
-            // A reader that is kept away may find two answers at once, every time: then it believes none.
+            // If the reader is suspended, it may receive two answers at once every time; it then uses none of them.
             prop_assert!(used > 0 || suspended_ns.iter().any(|suspended_ns| *suspended_ns > 50));
         }
     }

@@ -19,10 +19,10 @@ use super::note::Note;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Parity {
-    /// 8N1: ten bits a character.
+    /// 8N1: ten bits per character.
     #[default]
     None,
-    /// 8E1: eleven bits a character.
+    /// 8E1: eleven bits per character.
     Even,
 }
 
@@ -189,7 +189,8 @@ fn is_pseudo_terminal(device: &Path) -> bool {
         .is_ok_and(|device| (136..=143).contains(&libc::major(device.st_rdev())))
 }
 
-/// A pseudo terminal accepts even parity silently and reads back none: a note. On other ports this is an error.
+/// Compares the parity of the port with the setting. A pseudo terminal accepts even parity but always reads back no
+/// parity: this gives a note. On other ports a difference is an error.
 fn check_parity(
     settings: &PortSettings,
     got: serialport::Parity,

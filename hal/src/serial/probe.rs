@@ -46,7 +46,7 @@ impl ProbeSettings {
     }
 }
 
-/// A displacement probe on a serial port, read by a thread of its own. Dropping it ends the thread and closes the port.
+/// A displacement probe on a serial port, read by its own thread. Dropping it ends the thread and closes the port.
 ///
 /// ```no_run
 /// use std::sync::Arc;

@@ -13,11 +13,11 @@ pub struct Statistics {
     pub bytes: u64,
     /// Measurements decoded, including those out of range and those with an error of the probe.
     pub values: u64,
-    /// Of the values: passed to the loop.
+    /// Values passed to the loop.
     pub published: u64,
-    /// Of the values: not published, because a newer one arrived with them.
+    /// Values not published, because a newer one arrived with them.
     pub superseded: u64,
-    /// Of the values: not published, because their age is unknown.
+    /// Values not published, because their age is unknown.
     pub unknown_age: u64,
     /// Measurements that were made, according to the probe's counter, but did not arrive.
     pub gaps: u64,

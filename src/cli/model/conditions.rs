@@ -68,7 +68,8 @@ fn conditions(args: &Args) -> Result<ConditionsReport, CliError> {
     ))
 }
 
-/// Value of the setting for which the conditions are listed: as asked, or the setting's own if it is in the range, or the veering point.
+/// Value of the setting for which the conditions are listed: the option `--at`, or the configured value if it is in
+/// the range, or the veering point.
 fn explained(args: &Args, trajectory: &Trajectory) -> Result<f64, CliError> {
     let samples = &trajectory.samples;
     let (first, last) = (samples[0].value, samples[samples.len() - 1].value);

@@ -43,7 +43,7 @@ impl SweepArgs {
         Ok(linspace(from, to, self.count as usize).collect())
     }
 
-    /// A value as typed in `option`, read as those of the range are.
+    /// Parses the value of `option`, in the same notation as --from and --to.
     pub fn value(&self, option: &str, text: &str) -> Result<f64, CliError> {
         self.number(&self.bench.load(Purpose::Model, &[])?, option, text)
     }

@@ -26,11 +26,11 @@ pub struct StateSpaceLaw {
     /// A, row by row.
     #[schemars(length(min = 1, max = 32))]
     pub a: Vec<Vec<f64>>,
-    /// Br, one number a state, per metre.
+    /// Br in 1/m, one number per state.
     pub b_reference: Vec<f64>,
-    /// By, one number a state, per metre.
+    /// By in 1/m, one number per state.
     pub b_position: Vec<f64>,
-    /// C in amperes, one number a state.
+    /// C in amperes, one number per state.
     pub c: Vec<f64>,
     /// Dr in amperes per metre.
     #[serde(default)]
@@ -59,7 +59,7 @@ impl ControlLawSettings for StateSpaceLaw {
 }
 
 impl StateSpaceLaw {
-    /// A row of A or a vector that has not one number a state: its name and its length.
+    /// Name and length of a row of A, or of a vector, whose length is not the number of states.
     fn wrong_size(&self) -> Option<(&'static str, usize)> {
         let vectors = [
             ("b_reference", self.b_reference.len()),

@@ -9,11 +9,11 @@ use super::law::ControlDesign;
 
 /// Settings of a control law in a controller file.
 trait ControlLawSettings: ControlDesign {
-    /// Refuses settings that contradict each other or the servo rate; the text follows the key `law`.
+    /// Refuses settings that are inconsistent with each other or with the servo rate; the text follows the key `law`.
     fn check(&self, rate_hz: f64) -> Result<(), String>;
 }
 
-/// Declares the module of each law, and the enum of their settings: `/// words, Kind(module::Settings)`.
+/// Declares the module of each law, and the enum of their settings: `/// documentation, Kind(module::Settings)`.
 macro_rules! control_laws {
     ($($(#[$doc:meta])* $kind:ident($module:ident::$settings:ident)),* $(,)?) => {
         $(mod $module; pub use $module::$settings;)*
@@ -26,7 +26,7 @@ macro_rules! control_laws {
         }
 
         impl LawSettings {
-            /// Refuses settings that contradict each other or the servo rate.
+            /// Refuses settings that are inconsistent with each other or with the servo rate.
             pub(super) fn check(&self, rate_hz: f64) -> Result<(), String> {
                 match self { $(LawSettings::$kind(settings) => settings.check(rate_hz),)* }
             }

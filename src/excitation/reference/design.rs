@@ -1,4 +1,4 @@
-//! What is known of a reference from its settings, before it is built.
+//! Properties of a reference that follow from its settings alone.
 
 use crate::excitation::sweep::ChirpSettings;
 use crate::excitation::waveform::{Reference, ticks};
@@ -31,12 +31,12 @@ pub struct StepOfReference {
     pub at_s: f64,
 }
 
-/// The settings of one kind of reference. Everything that the program does differently for a kind is asked here.
+/// The settings of one kind of reference. This trait provides all properties in which the kinds differ.
 pub trait ReferenceDesign {
     /// Name of the kind, as in `control.reference.kind`.
     fn name(&self) -> &'static str;
 
-    /// Kind and values in words.
+    /// Kind and values as text.
     fn describe(&self) -> String;
 
     /// The reference.
@@ -72,7 +72,7 @@ pub trait ReferenceDesign {
         None
     }
 
-    /// The text of that file: it travels with a recording.
+    /// The text of this file, which is stored in the recording.
     fn text(&self) -> Result<Option<String>, ReferenceError> {
         let Some(path) = self.path() else {
             return Ok(None);

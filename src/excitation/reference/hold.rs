@@ -1,4 +1,4 @@
-//! The reference that stays where the loop closed.
+//! A constant reference: the rest position at which the loop closed.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

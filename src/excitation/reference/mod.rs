@@ -21,7 +21,7 @@ pub use sine::SineReference;
 pub use step::StepReference;
 pub use swept::SweptReference;
 
-/// Declares the kinds of reference: `/// words, Kind(Settings)`.
+/// Declares the kinds of reference: `/// documentation, Kind(Settings)`.
 macro_rules! references {
     ($($(#[$doc:meta])* $kind:ident($settings:ty)),* $(,)?) => {
         /// A reference, relative to the rest position at which the loop closes; zero before its start.
@@ -46,16 +46,16 @@ macro_rules! references {
 }
 
 references! {
-    /// Stay where the loop closed.
+    /// Constant: the position at which the loop closed.
     Hold(HoldReference),
     /// A step.
     Step(StepReference),
-    /// From 0 to a height at a constant speed, then stay.
+    /// From 0 to a height at a constant speed, then constant.
     Ramp(RampReference),
     /// A sine that starts at zero.
     Sine(SineReference),
-    /// The sweep of `[chirp]` with its quiets, in metres: for identification in closed loop. The run lasts as long as the
-    /// sweep; `control.duration_s` is not used.
+    /// The sweep of `[chirp]` in metres, with its rest before and after: for identification in closed loop. The run
+    /// lasts as long as the sweep; `control.duration_s` is not used.
     Chirp(SweptReference),
     /// A CSV file with the columns `time_s,reference_m`; straight lines between its points.
     File(FileReference),

@@ -13,8 +13,8 @@ use crate::util::finding::Finding;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweptReference {
-    /// Amplitude over frequency: straight lines on logarithmic axes, constant outside. Without a point it is planned from
-    /// the model: the command has the amplitude of `[chirp]` where the stage moves by no more than `travel_m`.
+    /// Amplitude over frequency: straight lines on logarithmic axes, constant outside. Without points it is planned
+    /// from the model: the command has the amplitude of `[chirp]` where the stage moves by no more than `travel_m`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 64))]
     pub amplitude: Vec<TravelPoint>,

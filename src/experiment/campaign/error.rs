@@ -36,7 +36,7 @@ pub enum CampaignError {
         /// What was found.
         why: String,
     },
-    /// A quiet run without a rest position.
+    /// A zero-current run without a rest position.
     #[error(
         "{recording} does not contain a rest position: {why}; check the probe with `bench doctor`"
     )]

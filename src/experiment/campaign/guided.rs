@@ -54,7 +54,7 @@ pub trait Operator {
 
 /// The rig whose stage the operator loads.
 pub trait LoadedRig {
-    /// Measures the rest position in a quiet run; `None` if the run was stopped.
+    /// Measures the rest position in a run with zero current; `None` if the run was stopped.
     fn rest_position(&mut self) -> Result<Option<RestPosition>, CampaignError>;
     /// Makes a chirp at a point; `None` if the run was stopped.
     fn measure(&mut self, point: GridPoint) -> Result<Option<PointResult>, CampaignError>;

@@ -76,7 +76,7 @@ pub struct LoadCheck {
     pub load: Load,
     /// The rest position, relative to that of the unloaded stage.
     pub rest: LengthCheck,
-    /// The quiet run in which it was measured.
+    /// The recording of the zero-current run in which it was measured.
     pub rest_recording: String,
     /// The displacement in Y that the operator measured.
     pub read: Option<LengthCheck>,

@@ -1,7 +1,7 @@
 //! The initial asymmetry of the stage, in addition to the intended one (section 5.2.2 found -2 %).
 //!
-//! With an offset d the model predicts at a point of intended asymmetry D what it predicts at D + d. Of n verdicts, k
-//! disagree. Each verdict is wrong with the same unknown probability p:
+//! The offset d shifts the asymmetry: a point with the intended asymmetry D has the actual asymmetry D + d. Of n
+//! verdicts, k disagree with the model at D + d. Each verdict is wrong with the same unknown probability p:
 //!
 //! ```text
 //!  log L(d) = max over p of k ln p + (n - k) ln(1 - p),   1/(2n) <= p <= 1/2

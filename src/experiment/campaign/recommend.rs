@@ -69,7 +69,7 @@ fn is_near_detection(judgements: &[Judgement], asymmetry: f64, tolerances: Toler
     detections.any(|one| (one.asymmetry - asymmetry).abs() <= tolerances.asymmetry)
 }
 
-/// The better one has the larger distance; of equal distances the smaller asymmetry.
+/// Orders recommendations: a larger distance is better; at equal distance, the smaller |asymmetry|.
 fn compare(a: &Recommendation, b: &Recommendation) -> Ordering {
     let distance = |one: &Recommendation| one.distance_tolerances.unwrap_or(f64::INFINITY);
     let by_distance = distance(a).total_cmp(&distance(b));

@@ -14,7 +14,7 @@ const BISECTIONS: usize = 20;
 pub struct Region {
     /// Y1o/L, ratios.
     pub operating_points: Vec<f64>,
-    /// For each operating point the bands of asymmetries with CNMP zeros, rising: begin and end of each band.
+    /// For each operating point the bands of asymmetries with CNMP zeros, rising: start and end of each band.
     pub bands: Vec<Vec<[f64; 2]>>,
     /// The searched range of asymmetries. A band that reaches an end of the range has no border there.
     pub searched: [f64; 2],
@@ -62,7 +62,8 @@ fn has_pairs(stage: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<bool,
     Ok(cnmp_pairs(&damped_zeros(&plant)?) > 0)
 }
 
-/// The bands in which `has` holds. They are found by steps, and by bisection of each step in which `has` changes.
+/// The intervals in which `has` is true. The range is sampled in steps of [`STEP`]; each change of `has` is located
+/// by bisection.
 fn bands(
     [low, high]: [f64; 2],
     has: impl Fn(f64) -> Result<bool, PlantError>,

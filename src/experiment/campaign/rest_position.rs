@@ -13,7 +13,7 @@ const SEGMENTS: usize = 10;
 /// Smallest number of readings in a segment.
 const MIN_READINGS: usize = 2;
 
-/// The mean of the probe over the active part of a quiet run.
+/// The mean of the probe over the active part of a run with zero current.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RestPosition {
@@ -95,7 +95,8 @@ mod tests {
             let sign = |k| if segment(k) % 2 == 0 { 1.0 } else { -1.0 };
             let readings: Vec<f64> = (0..count).map(sign).collect();
             let (mean, scatter) = scatter(&readings);
-            // Ten means of size 1 about 0: sqrt(10/9). Five segments of either sign differ by five readings at most.
+            // Ten means of +1 or -1 have the standard deviation sqrt(10/9). Segments of both signs differ by at most
+            // five readings.
             assert!(
                 (scatter - (10.0_f64 / 9.0).sqrt()).abs() < 1e-12,
                 "{count}: {scatter}"

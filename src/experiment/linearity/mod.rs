@@ -146,7 +146,7 @@ mod tests {
         };
         let why = |runs: &[Vec<FittedMode>]| compare_modes(runs, true).why;
         let both = vec![mode(29.0), mode(82.0)];
-        // 90 Hz is not matched with 82 Hz: nothing shifts, but nothing is known about that mode.
+        // 90 Hz is not matched with 82 Hz: no shift is detected, but the mode is missing at one amplitude.
         let missing = why(&[both.clone(), vec![mode(29.0), mode(90.0)]]);
         assert!(
             missing.starts_with("no mode shifts")

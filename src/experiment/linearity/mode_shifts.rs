@@ -146,7 +146,8 @@ mod tests {
         ];
         let modes = modes_over_amplitude(&runs);
         assert_eq!(modes.len(), 2);
-        // sigma of a difference is 1.41e-3; twelve figures are compared, |z| < 3.34 is chance: 4.7e-3.
+        // Relative sigma of a difference: sqrt(2) 1e-3 = 1.41e-3. With 12 comparisons the threshold is |z| = 3.34,
+        // that is 4.7e-3.
         assert!(!modes[0].shifts(), "1.7e-3: {:?}", modes[0]);
         assert!(modes[1].frequency_shifts, "8e-3");
         assert!(modes[1].damping_shifts, "7.5e-3");
@@ -210,7 +211,8 @@ mod tests {
                     .any(|mode| mode.shifts())
             })
             .count();
-        // At most 20, somewhat less as figures share the first run; a sigma of 4.5, of which three. Half of it at least.
+        // Expected: at most 20 (1 %), slightly fewer because all comparisons share the first run. Sigma is 4.5: the
+        // upper bound is 20 + 3 sigma; the lower bound is 4.
         assert!((4..=33).contains(&shifted), "{shifted} of 2000");
     }
 }

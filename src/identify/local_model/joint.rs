@@ -40,7 +40,7 @@ use crate::identify::fft::RealFft;
 use crate::identify::signals::check_lengths;
 use crate::identify::{EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, band};
 
-/// Reference, command and position of a closed loop: one sample a tick.
+/// Reference, command and position of a closed loop: one sample per tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopSignals {
     /// Command and position.

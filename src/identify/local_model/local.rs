@@ -9,18 +9,19 @@
 //! parabola by 0.027 (rho/zeta)^4: 2 % and 0.4 % at zeta = 0.004 and rho = 0.0025. The rational model contains the pole; its
 //! bias is that of other modes nearby: 0.06 % for modes of 281.4, 282.0 and 283.6 Hz with zeta = 0.005.
 //!
-//! **Confidence.** The residual e = Y - H U holds the noise, less the part that the model has fitted. With X the columns of
-//! the model (linearized about its parameters), W the weights, A = X* W X and B = X* W^2 X,
+//! **Confidence.** The residual e = Y - H U contains the noise, reduced by the part that the model has fitted. With X
+//! the columns of the model (linearized about its parameters), W the weights, A = X* W X and B = X* W^2 X,
 //!
 //! ```text
 //! E sum w |e|^2 = S (sum w - tr A^-1 B),     E|error of H|^2 = S (A^-1 B A^-1)_00
 //! ```
 //!
-//! S, the power of the noise around a bin, is the sum of w |e|^2 over the sum of these brackets, over neighbourhoods one
-//! half-width apart, weighted over two half-widths to either side. These are some 20 complex degrees of freedom: sigma itself
-//! has a deviation of 11 %, and +-1.96 sigma contain the truth in 94.3 % of all cases instead of 95 % (Student's t of 40). The
-//! noise is only assumed to change little over that neighbourhood. A narrower line of noise (floor vibration at 5 Hz in a
-//! record of ten seconds, for example) is spread over it, and sigma is too small on the line: record longer.
+//! S, the power of the noise around a bin, is the sum of w |e|^2 over the sum of these brackets, over neighbourhoods
+//! one half-width apart, weighted over two half-widths to either side. These are some 20 complex degrees of freedom:
+//! sigma itself has a deviation of 11 %, and +-1.96 sigma contain the true value in 94.3 % of all cases instead of 95
+//! % (Student's t of 40). The noise is only assumed to change little over that neighbourhood. A narrower line of
+//! noise (floor vibration at 5 Hz in a record of ten seconds, for example) is spread over it, and sigma is too small
+//! on the line; a longer record reduces this error.
 //!
 //! The bias of a parabola grows as h^4, so that an estimate H' with twice the half-width shows it as (H' - H)/15 (of a constant
 //! as h^2: /3); its square is added to the variance. It matters at peaks only: elsewhere the noise is larger.

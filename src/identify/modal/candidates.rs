@@ -12,7 +12,7 @@ use crate::model::zeros::ModalTerm;
 const DAMPING_RATIOS: [f64; 4] = [0.002, 0.006, 0.02, 0.06];
 /// The band is divided into this many parts, each with one candidate frequency.
 const BAND_PARTS: usize = 48;
-/// Of the candidate frequencies, only the ones of largest residual are used.
+/// Largest number of candidate frequencies: those with the largest residuals are used.
 const MAX_FREQUENCIES: usize = 6;
 /// Number of candidates that are fitted, the best first.
 pub(super) const TRIALS: usize = 3;

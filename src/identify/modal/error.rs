@@ -35,12 +35,12 @@ pub enum FitError {
         /// Number of modes found.
         modes: usize,
     },
-    /// The receiver of the progress cancelled the fit.
+    /// The progress callback cancelled the fit.
     #[error("the fit was cancelled")]
     Cancelled,
 }
 
-/// Reports progress; an error if the receiver cancels.
+/// Reports progress; an error if the callback cancels.
 pub(super) fn report(progress: &mut Progress<'_>, fraction: f64) -> Result<(), FitError> {
     match progress(fraction) {
         ControlFlow::Continue(()) => Ok(()),

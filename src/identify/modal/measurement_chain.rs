@@ -10,12 +10,12 @@ use crate::model::zeros::ModalTerm;
 /// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
 const FAR_RAD_S: f64 = 1e6;
 
-/// What lies between set-point and reading, except the mechanics.
+/// The signal path between set-point and reading, without the mechanics.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeasurementChain {
     /// Hold, motor, amplifier and delays of a bench; input in amperes. Exact, aliasing included.
     Bench(SignalPath),
-    /// Nothing: input in newtons, or in a unit that takes its place.
+    /// No chain: the input is a force in newtons, or another input unit.
     Direct,
 }
 

@@ -10,7 +10,7 @@ use crate::model::zeros::ModalTerm;
 /// The modes that fit a response.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalFit {
-    /// The parameters, slowest mode first.
+    /// The parameters, lowest frequency first.
     pub parameters: ModalParameters,
     /// Covariance of w (rad/s), zeta, r (1/kg) of each mode (of a free body r alone), of R (m/N) and tau (s), in that order.
     pub covariance: DMatrix<f64>,
@@ -80,7 +80,7 @@ pub struct UncertainPole {
 }
 
 impl ModalFit {
-    /// The modes with their standard deviations, slowest first.
+    /// The modes with their standard deviations, lowest frequency first.
     pub fn modes(&self) -> Vec<FittedMode> {
         let modes = self.parameters.modes.iter().enumerate();
         modes.map(|(k, term)| self.mode(k, term)).collect()
@@ -131,7 +131,7 @@ impl ModalFit {
         sum
     }
 
-    /// The poles, slowest mode first: one of a mode below critical damping, both of one above, which are real.
+    /// The poles, lowest frequency first: one of a mode below critical damping, both of one above, which are real.
     ///
     /// ```text
     /// s = -zeta w + j w sqrt(1 - zeta^2)             covariance J cov(w, zeta) J^T, J the derivatives of (Re s, Im s)

@@ -54,7 +54,7 @@ impl ModalParameters {
         }
     }
 
-    /// The parameters with the slowest mode first.
+    /// The parameters with the lowest frequency first.
     pub(super) fn slowest_first(mut self) -> ModalParameters {
         self.modes
             .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));

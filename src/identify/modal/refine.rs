@@ -43,7 +43,7 @@ struct Iteration<'a> {
     problem: Problem<'a>,
     free: Vec<Parameter>,
     best: Solution,
-    /// Of a step from the best solution.
+    /// Normal equations of a step from the best solution.
     normal: NormalEquations,
     damping: Damping,
     tolerance: f64,

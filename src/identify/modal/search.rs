@@ -14,7 +14,7 @@ use crate::identify::FrfDatum;
 /// Largest number of modes.
 const MAX_MODES: usize = 24;
 
-/// One stage of the search.
+/// One pass of the search.
 struct Pass {
     /// Error as a ratio of H that is added to the noise.
     relative_error: f64,
@@ -22,11 +22,11 @@ struct Pass {
     every: usize,
     /// See [`refine`].
     tolerance: f64,
-    /// Progress of the search at the end of the stage.
+    /// Progress of the search at the end of the pass.
     progress: f64,
 }
 
-/// The stages, from coarse to fine.
+/// The passes, from coarse to fine.
 const PASSES: [Pass; 3] = [
     Pass {
         relative_error: 0.03,
@@ -53,7 +53,7 @@ const PASSES: [Pass; 3] = [
 pub struct ModelOrder {
     /// The parameters.
     pub parameters: ModalParameters,
-    /// Reduced chi-square with the errors of the stage that found this order.
+    /// Reduced chi-square with the errors of the pass that found this order.
     pub chi2_per_freedom: f64,
     /// Decrease of chi^2 by the last mode, over the smallest significant decrease.
     pub evidence: f64,
@@ -97,19 +97,19 @@ pub(super) fn orders(
     Ok(search.orders)
 }
 
-/// The state of the search between two stages.
+/// The state of the search between two passes.
 struct Search<'a, 'p> {
     /// The orders found so far.
     orders: Vec<ModelOrder>,
-    /// Result of the stage before.
+    /// Result of the pass before.
     parameters: ModalParameters,
-    /// Progress at the end of the stage before.
+    /// Progress at the end of the pass before.
     done: f64,
     progress: &'a mut Progress<'p>,
 }
 
 impl Search<'_, '_> {
-    /// Adds modes, with the errors of a stage, as long as they are significant.
+    /// Adds modes, with the errors of a pass, as long as they are significant.
     fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let problem = Problem { data, ..problem };
@@ -133,14 +133,14 @@ impl Search<'_, '_> {
         Ok(())
     }
 
-    /// Reports the progress of a stage, 0 to 1, as progress of the search.
+    /// Reports the progress of a pass, 0 to 1, as progress of the search.
     fn report(&mut self, pass: &Pass, fraction: f64) -> Result<(), FitError> {
         let done = self.done + (pass.progress - self.done) * fraction;
         report(self.progress, done)
     }
 }
 
-/// Progress of a stage, 0 to 1, by how far the misfit has fallen towards 1 on a logarithmic scale.
+/// Progress of a pass, 0 to 1: how far the misfit has fallen towards 1, on a logarithmic scale.
 fn pass_progress(first_misfit: f64, misfit: f64) -> f64 {
     if first_misfit > 1.0 {
         (1.0 - misfit.ln() / first_misfit.ln()).clamp(0.0, 1.0)
@@ -150,7 +150,7 @@ fn pass_progress(first_misfit: f64, misfit: f64) -> f64 {
 }
 
 impl Pass {
-    /// The data of the stage, merged once modes are known.
+    /// The data of the pass, merged once modes are known.
     fn data(&self, data: &[FrfDatum], known: &ModalParameters) -> Vec<FrfDatum> {
         let data = if known.modes.is_empty() {
             data.to_vec()
@@ -163,7 +163,7 @@ impl Pass {
             .collect()
     }
 
-    /// The datum with the relative error of the stage added to its variance.
+    /// The datum with the relative model error of this pass added to its variance.
     fn with_error(&self, datum: &FrfDatum) -> FrfDatum {
         let square = self.relative_error * self.relative_error;
         FrfDatum {

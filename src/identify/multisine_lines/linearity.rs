@@ -192,7 +192,7 @@ impl BandLinearity {
         detected(self.even_by_noise_alone)
     }
 
-    /// The cause of the lost coherence in words, with the remedy.
+    /// The cause of the lost coherence as text, with the remedy.
     pub fn description(&self) -> String {
         let noise = loss(self.missing_by_noise);
         let distortion = loss(self.missing_by_distortion);
@@ -350,7 +350,7 @@ impl Sums {
     }
 }
 
-/// The part of a total; 0 of nothing.
+/// power_m2/total_m2; 0 if the total is 0.
 fn part(power_m2: f64, total_m2: f64) -> f64 {
     if total_m2 > 0.0 {
         power_m2 / total_m2

@@ -47,7 +47,7 @@ pub struct Repetition {
 pub struct Periods {
     /// The response at the excited lines; the resolution is the distance of the lines.
     pub frf: Frf,
-    /// The same for a fit, one datum a line.
+    /// The same for a fit, one datum per line.
     pub frf_data: Vec<FrfDatum>,
     /// Number of averaged periods.
     pub count: usize,

@@ -1,4 +1,4 @@
-//! Readings and set-points of irregular times, resampled to the regular ticks of a loop.
+//! Readings and set-points at irregular times, resampled to the regular ticks of a loop.
 
 mod kernel;
 pub mod resampling;

@@ -1,6 +1,6 @@
-//! Readings of irregular times, resampled to the regular ticks of a loop.
+//! Readings at irregular times, resampled to the regular ticks of a loop.
 //!
-//! A probe with a clock of its own is read at ages that change from tick to tick. If one age is assumed for all, the readings
+//! A probe with its own clock is read at ages that change from tick to tick. If one age is assumed for all, the readings
 //! have an error of w (age - mean) times the signal: with a probe of 650 Hz in a loop of 1 kHz the response at 150 Hz is a
 //! third too small. The ages are recorded, so the error can be corrected:
 //!

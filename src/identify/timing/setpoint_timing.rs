@@ -1,4 +1,4 @@
-//! Set-points of irregular times, replaced by set-points of regular times with the same effect.
+//! Set-points at irregular times, replaced by set-points at regular times with the same effect.
 //!
 //! A held current is a sum of steps, one at each set-point, and a step is the integral of an impulse. Therefore the steps are
 //! moved as impulses are resampled: with D_k the step of tick k, which came l_k periods after its regular time,
@@ -12,8 +12,8 @@
 
 use super::kernel::weights_at;
 
-/// The regular set-points that replace `set_a`, from rest. Set-point k came `late_periods[k]` periods after its regular time.
-/// Both slices have the same length.
+/// Resamples the set-points `set_a` to the tick times. Set-point k took effect `late_periods[k]` periods after tick
+/// k; the current before the first one is 0 A. Both slices have the same length.
 pub fn at_regular_times(set_a: &[f64], late_periods: &[f64]) -> Vec<f64> {
     let mut steps_a = vec![0.0; set_a.len()];
     let mut before_a = 0.0;
@@ -29,8 +29,8 @@ pub fn at_regular_times(set_a: &[f64], late_periods: &[f64]) -> Vec<f64> {
     steps_a
 }
 
-/// Distributes a step at `position` over the ticks. What falls before the first tick is added to it, what falls beyond the last
-/// is dropped.
+/// Distributes a step at `position` over the ticks. The part before the first tick is added to it, the part after the
+/// last tick is dropped.
 fn add_step(steps_a: &mut [f64], step_a: f64, position: f64) {
     if step_a == 0.0 {
         return;

@@ -1,4 +1,5 @@
-//! Has this stage complex non-minimum phase (CNMP) zeros? "detected", "excluded" or "undecided", with the reasons.
+//! Verdict on complex non-minimum phase (CNMP) zeros of a stage: "detected", "excluded" or "undecided", with the
+//! reasons.
 //!
 //! Three criteria must agree:
 //!

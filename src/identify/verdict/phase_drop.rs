@@ -26,9 +26,9 @@ pub struct PhaseDrop {
     pub deviation_deg: f64,
 }
 
-/// Beyond the band the magnitude continues with the slope of this interval of ln w at its ends ...
+/// Length in ln w of the interval at each end of the band whose slope extrapolates the magnitude beyond the band.
 const END_INTERVAL: f64 = 0.6;
-/// ... between frequencies this far apart in ln w.
+/// Distance in ln w of the frequencies between which a slope is computed.
 const SLOPE_INTERVAL: f64 = 0.15;
 
 /// The phase drop of `response` between two of its frequencies, given by index. Frequencies rise, responses are not zero.
@@ -179,7 +179,8 @@ mod tests {
             (vec![zero(5.0, 524.0), zero(5.0, 534.0)], 4),
         ] {
             let drop = drop_over_zeros(&zeros);
-            // The slopes at the ends of the band replace the rest of it: an error of some degrees.
+            // Outside the band the magnitude is extrapolated by its slope at the band limits; this causes an error of
+            // some degrees.
             assert!(
                 drop.half_turns == half_turns && drop.deviation_deg < 20.0,
                 "{zeros:?}: {drop:?}"

@@ -50,7 +50,7 @@ impl Serialize for UncertainZero {
     }
 }
 
-/// The zeros of a fit with damping, slowest first.
+/// The zeros of a fit with damping, lowest frequency first.
 ///
 /// # Errors
 /// When the zeros cannot be computed.

@@ -8,7 +8,7 @@ use super::linear_algebra::modes;
 use super::{PlantError, Structure};
 use crate::util::finding::Finding;
 
-/// A coefficient with less than this ratio of the damping is zero but for rounding.
+/// A coefficient with less than this ratio of the damping is zero except for rounding.
 const ROUNDING_RATIO: f64 = 1e-9;
 
 /// Damping, proportional to mass and stiffness or the same in every mode.

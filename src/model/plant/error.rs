@@ -14,7 +14,7 @@ pub enum PlantError {
         /// The eigenvalue problem.
         what: &'static str,
     },
-    /// A rigid-body or buckling mode where the settings announce none.
+    /// A rigid-body or buckling mode that the settings do not declare.
     #[error(
         "the eigenvalue of mode {number}, {eigenvalue_rad2_s2:.3e} rad^2/s^2, is negative or, compared with that of \
          the fastest mode, zero within rounding errors: no spring supports the stage in that direction, \

@@ -9,7 +9,8 @@ const MAX_ITERATIONS: usize = 10_000;
 /// A root of a pencil is infinite where its reciprocal is below this ratio of the largest.
 const INFINITE_RATIO: f64 = 1e-12;
 
-/// Solves K v = w2 M v with V^T M V = I, slowest first. Returns the values w2 and V, whose columns belong to them.
+/// Solves K v = w2 M v, normalised to V^T M V = I. Returns the eigenvalues w2 in ascending order and the eigenvectors
+/// as the columns of V.
 pub(super) fn modes(
     mass: &DMatrix<f64>,
     stiffness: &DMatrix<f64>,

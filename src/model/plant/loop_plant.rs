@@ -1,11 +1,11 @@
-//! The plant between a command and the reading of its effect, as a control loop sees it once a period.
+//! The plant between a command and the reading of its effect, as a control loop samples it once per period.
 //!
 //! ```text
 //!  command of tick k --delay--> hold --> amplifier --> modes --> probe measures --age--> reading of tick k
 //! ```
 //!
 //! *Delay* is the computing delay in whole periods plus the latency of bus and drive. *Age* is the time from measurement to
-//! use: latency and transport of the probe, and, for a probe with a clock of its own, up to its own period. Between hold and
+//! use: latency and transport of the probe, and, for a probe with its own clock, up to its own period. Between hold and
 //! sampler only the sum of both matters, d = n T + r with 0 <= r < T, and
 //!
 //! ```text
@@ -41,7 +41,7 @@ pub struct SignalPath {
 }
 
 impl SignalPath {
-    /// Evenly spread delays of a probe with a clock of its own, from the least delay on; the least delay alone without one.
+    /// Evenly spread delays of a probe with its own clock, from the least delay on; the least delay alone without one.
     pub fn delays_of_probe_s(least_s: f64, probe_period_s: Option<f64>) -> Vec<f64> {
         let Some(period_s) = probe_period_s else {
             return vec![least_s];
@@ -83,7 +83,7 @@ struct Tap {
     setpoint: f64,
 }
 
-/// State of a [`LoopPlant`]: that of the plant, and the readings under way by the tick of their arrival.
+/// State of a [`LoopPlant`]: the state of the plant, and the delayed readings, indexed by the tick of their arrival.
 #[derive(Clone, Debug)]
 pub struct LoopPlantState {
     plant: PlantState,
@@ -96,12 +96,12 @@ impl LoopPlant {
         LoopPlant::of(&path.into(), modes)
     }
 
-    /// The same with the mean age of all readings: without the roll-off of a free-running probe.
+    /// As [`LoopPlant::new`], with the mean age of all readings: without the roll-off of a free-running probe.
     pub fn with_mean_age(path: impl Into<SignalPath>, modes: &[Mode]) -> LoopPlant {
         LoopPlant::of(&path.into().with_mean_age(), modes)
     }
 
-    /// The same from a path that is kept.
+    /// As [`LoopPlant::new`], from a borrowed path.
     pub fn of(path: &SignalPath, modes: &[Mode]) -> LoopPlant {
         let held = path.discrete(modes, path.period_s);
         let share = 1.0 / path.delays_s.len() as f64;
@@ -376,8 +376,9 @@ mod tests {
                     chain.response(omega_rad_s),
                     by_aliases(&config, omega_rad_s),
                 );
-                // The midpoint rule errs by (w Tp)^2/(24 64^2) = 4e-4 at 2800 rad/s and 2.3 ms; as much again of the aliases,
-                // which weigh more where the hold's own roll-off (w Tp near 2 pi) leaves little of the first harmonic.
+                // The midpoint rule errs by (w Tp)^2/(24 64^2) = 4e-4 at 2800 rad/s and 2.3 ms. The aliases add as
+                // much again; they have more weight where the roll-off of the hold (w Tp near 2 pi) attenuates the
+                // first harmonic.
                 assert!(
                     (ours / exact - 1.0).norm() < 8e-4,
                     "{sets:?} at {omega_rad_s}: {ours} for {exact}"

@@ -42,7 +42,7 @@ pub struct NodeSettings {
     #[serde(default)]
     #[schemars(range(min = -1e6, max = 1e6))]
     pub actuator: f64,
-    /// Displacement at the probe per metre of its own.
+    /// Displacement at the probe per metre of displacement of this mass.
     #[serde(default)]
     #[schemars(range(min = -1e6, max = 1e6))]
     pub sensor: f64,
@@ -75,7 +75,7 @@ impl LumpedSettings {
         row
     }
 
-    /// d of a spring. A name that is no node is ground: any other was refused with the configuration.
+    /// d of a spring. A name that is not a node is ground; the configuration check has rejected all other names.
     fn elongation(&self, spring: &SpringSettings) -> Vec<f64> {
         let mut along = vec![0.0; self.nodes.len()];
         for (end, sign) in spring.between.iter().zip([1.0, -1.0]) {

@@ -144,7 +144,7 @@ fn frequency_rad_s(
     }
 }
 
-/// A structure as the sum of its modes, slowest first.
+/// A structure as the sum of its modes, lowest frequency first.
 ///
 /// ```
 /// use bench::config::{Source, load};

@@ -22,7 +22,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::{PlantError, PlantSettings, Sr4dofSettings, Structure, build};
 
-/// Stiffness of the four parallelograms across their beams, in that of one.
+/// Stiffness of the four parallelograms across their beams, as a multiple of the stiffness of one.
 #[rustfmt::skip]
 const BENDING: Matrix4<f64> = Matrix4::new(
     0.0, 0.0, 0.0, 0.0,
@@ -129,9 +129,9 @@ impl QuadraticSr4dof {
         }
     }
 
-    /// Advances the state by `step_s` with the classical Runge-Kutta method of fourth order. `force_n` is the actuator's
-    /// force in newtons at start, middle and end. The phase of a mode w errs by (w h)^5/120 a step h, its amplitude by
-    /// (w h)^6/144.
+    /// Advances the state by `step_s` with the classical Runge-Kutta method of fourth order. `force_n` is the
+    /// actuator's force in newtons at start, middle and end. Per step h, the phase of a mode w errs by (w h)^5/120,
+    /// its amplitude by (w h)^6/144.
     pub fn step(
         &self,
         state: &mut QuadraticState,
@@ -165,7 +165,8 @@ impl QuadraticSr4dof {
     fn acceleration(&self, state: &QuadraticState, load: Load) -> Vector4<f64> {
         let motions = self.motions(state);
         let force = self.force(state, &motions, load);
-        // Positive definite for any finite z, as `straight` is. A state that is not finite stays so and shows at the probe.
+        // Positive definite for any finite z, as `straight` is. A state that is not finite remains so and appears in
+        // the reading.
         self.mass(&motions)
             .cholesky()
             .map_or(Vector4::from_element(f64::NAN), |factor| {
@@ -304,7 +305,8 @@ mod tests {
                 force -= &linear.stiffness * vector(&state.place)
                     + &linear.damping * vector(&state.rate);
                 let expected = &inverse * force;
-                // Beyond the linear part are squares of 1e-9 m, 1e-7 of it over the 4 mm of Y1o; 1e-5 leaves room for stiff axes.
+                // The nonlinear part is quadratic: for a motion of 1e-9 m and Y1o = 4 mm it is 1e-7 of the linear
+                // part. The tolerance of 1e-5 allows for stiff axes.
                 assert!(
                     (vector(&ours) - &expected).amax() <= 1e-5 * expected.amax(),
                     "{ours} {expected}"
@@ -333,7 +335,8 @@ mod tests {
             (left - 1.0).abs() < 5e-9 && least > 1.0 - 5e-9,
             "{left} {least}"
         );
-        // The motion is far from linear: x4 bends by c (3 mm)^2 = 0.11 mm beside its 0.5 mm.
+        // The motion is strongly nonlinear: the quadratic part of x4 is c (3 mm)^2 = 0.11 mm, its whole motion 0.5
+        // mm.
         assert!(state.place.amax() > 1e-4);
     }
 
@@ -352,7 +355,8 @@ mod tests {
         };
         let exact = after(6400);
         let (coarse, fine) = ((after(100) - exact).norm(), (after(200) - exact).norm());
-        // Fourth order is 16; the next term of the series shifts it by some per cent at 0.1 rad a step.
+        // Fourth order gives a ratio of 16; the next term of the series changes it by some per cent at 0.1 rad per
+        // step.
         assert!((14.0..18.0).contains(&(coarse / fine)), "{}", coarse / fine);
     }
 }

@@ -270,8 +270,8 @@ mod tests {
             // Ten sums of products, each rounded: some 1e-15 of the largest element.
             prop_assert!((&ours.mass - mass).amax() <= 1e-14 * mass.amax());
             prop_assert!((&ours.stiffness - stiffness).amax() <= 1e-14 * stiffness.amax());
-            // The general method of the XY stage gives the same matrices. The static force that holds Y1o has no component
-            // in X, so that linearising first or last is the same.
+            // The general method of the XY stage gives the same matrices. The static force that holds Y1o has no
+            // component in X, so the order of linearisation does not matter.
             let (mass, stiffness, geometric) = by_parallelograms(&s);
             prop_assert!((ours.mass - &mass).amax() <= 1e-14 * mass.amax());
             prop_assert!((ours.stiffness - &stiffness).amax() <= 1e-14 * stiffness.amax());

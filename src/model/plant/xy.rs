@@ -63,7 +63,7 @@ pub struct XySettings {
     /// Nominal mass of a secondary stage in kilograms.
     #[schemars(range(min = 1e-6, max = 1000.0))]
     pub secondary_stage_mass_kg: f64,
-    /// What each secondary stage has beyond the nominal mass, as a ratio of it.
+    /// Deviation of each secondary mass from the nominal mass, as a ratio of it.
     pub secondary_mass_deviation: SecondaryMassDeviation,
     /// On which side of their anchors the secondary stages gT and gB sit.
     pub layout: XyLayout,

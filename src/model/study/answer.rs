@@ -10,7 +10,8 @@ use crate::util::numeric::wilson_interval;
 const EXAMPLES: usize = 5;
 /// Interactions that are reported, the strongest first.
 const INTERACTIONS: usize = 10;
-/// A difference counts above so many of its standard deviations, an interaction above so many of its noise.
+/// A difference is significant above this multiple of its standard deviation, an interaction above this multiple of
+/// its noise.
 const SIGNIFICANT: f64 = 4.0;
 
 /// The answer of a study, or of one shard of it.
@@ -48,9 +49,9 @@ pub struct NotAnalysed {
 /// The probability of each number of pairs, and the settings that decide whether there are any.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Counted {
-    /// From no pair to the largest number found, three at least.
+    /// From no pair to the largest number found, at least three.
     pub probabilities: Vec<Probability>,
-    /// Of one pair or more.
+    /// Probability of one pair or more.
     pub any: Probability,
     /// Sum of the shares that the settings explain alone; `null` with too few draws.
     pub share_alone: Option<f64>,

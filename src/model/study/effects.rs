@@ -1,4 +1,4 @@
-//! The settings that decide whether there are CNMP pairs: shares of the variance of the answer, yes or no.
+//! The settings that decide whether there are CNMP pairs: shares of the variance of this binary outcome.
 //!
 //! With Y = 1 for a draw with pairs and 0 for one without, Var Y = p (1 - p). The share of a setting X (Sobol's first-order
 //! index) and that of the interaction of two settings beyond their own (second-order) are
@@ -57,7 +57,7 @@ impl Cell {
         }
     }
 
-    /// Of a probability in this class.
+    /// Standard deviation of the probability in this class.
     pub fn sigma(&self) -> f64 {
         let p = self.probability();
         (p * (1.0 - p) / self.all as f64).sqrt()
@@ -81,7 +81,7 @@ pub(super) struct Effects {
 }
 
 impl Effects {
-    /// For a number of settings and of draws.
+    /// An empty table for this number of settings and of draws.
     pub fn new(settings: usize, draws: u64) -> Effects {
         let classes = 2 * ((draws as f64 / DRAWS_IN_PAIR_CLASS).sqrt() / 2.0) as usize;
         let pair_classes = classes.clamp(*PAIR_CLASSES.start(), *PAIR_CLASSES.end());
@@ -170,7 +170,7 @@ fn interaction(cells: &[Cell], n: usize) -> Option<Share> {
     Some(spread.share(beyond, ((n - 1) * (n - 1)) as f64))
 }
 
-/// Sums of squares of a yes or no over classes.
+/// Analysis of variance of a binary outcome: sums of squares over classes.
 struct Spread {
     draws: f64,
     total: f64,
@@ -252,21 +252,21 @@ mod tests {
         //
         // x > 1/2 decides alone.
         are(|x| x[0] > 0.5, [1.0, 0.0, 0.0], [0.0; 3], 0.005);
-        // Two signs alike: neither of the two alone, both together all.
+        // Pairs if both settings have the same sign: each setting alone explains nothing, both together everything.
         are(
             |x| (x[0] > 0.5) == (x[1] > 0.5),
             [0.0; 3],
             [1.0, 0.0, 0.0],
             0.005,
         );
-        // x + y > 1: E[Y|x] = x, of variance 1/12, of 1/4; the interaction takes the rest.
+        // x + y > 1: E[Y|x] = x has the variance 1/12, of a total of 1/4; the rest is the interaction.
         are(
             |x| x[0] + x[1] > 1.0,
             [1.0 / 3.0, 1.0 / 3.0, 0.0],
             [1.0 / 3.0, 0.0, 0.0],
             0.04,
         );
-        // x > 5/6 and y > 1/2: the edge of a class of 18, but of none of 28.
+        // x > 5/6 and y > 1/2: 5/6 is a class border with 18 classes, but not with 28.
         let (a, b) = (1.0 / 6.0, 0.5);
         let singles = share_of_and(a, b);
         are(
@@ -291,7 +291,7 @@ mod tests {
     fn shares_without_an_effect_are_zero_within_their_noise() {
         let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
         for seed in 1..=20 {
-            // The last number decides, and is not among the ones looked at.
+            // The outcome depends on the last number only, which is not among the evaluated ones.
             let effects = effects(seed, 5, |x| x[4] > 0.7);
             let found = (0..4).map(|i| effects.single(i)).chain(
                 effects
@@ -315,7 +315,8 @@ mod tests {
         let [low, middle, high] = effects.thirds(0).map(|cell| cell.probability());
         assert!((low - 0.5).abs() < 0.03 && middle == 0.0 && high == 0.0);
         let [same, opposite] = effects.halves([0, 1]).map(|cell| cell.probability());
-        // A third of all x with half of all y are all in the lower halves: 1/6 of all, 1/3 of the half of all there.
+        // The draws with pairs have x in the lower third and y in the lower half: 1/6 of all draws, and 1/3 of those
+        // in which both settings lie in the same half.
         assert!(
             (same - 1.0 / 3.0).abs() < 0.03 && opposite == 0.0,
             "{same} {opposite}"

@@ -321,8 +321,9 @@ mod tests {
         let product =
             |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / N as f64;
         for (i, a) in here.iter().enumerate() {
-            // Of a uniform rank: mean 0, variance 1/12; of N of them the mean has a sigma of sqrt(1/12/N), a product of two
-            // 1/12/sqrt(N), the variance sqrt(1/80 - 1/144)/sqrt(N). Five of them.
+            // A uniform rank has the mean 0 (after subtracting 1/2) and the variance 1/12. For N ranks, sigma of the
+            // mean is sqrt(1/12/N), of a product of two ranks 1/12/sqrt(N), of the variance sqrt(1/80 -
+            // 1/144)/sqrt(N). The tolerance is 5 sigma.
             let (root, ones) = ((N as f64).sqrt(), vec![1.0; N]);
             assert!(product(a, &ones).abs() < 5.0 * (1.0 / 12.0f64).sqrt() / root);
             assert!(

@@ -59,7 +59,7 @@ impl Deviation {
 /// The settings that deviate, and the distribution: `KEY=uniform:LOW:HIGH`, `KEY=normal:SIGMA`, or `KEY=+-LIMIT` for a uniform one.
 ///
 /// The deviation is added to the nominal value. A percentage of an operating point is of the beam length, of a ratio of 1,
-/// and of any other setting of its nominal value. `*` in the key stands for any part of a name between dots.
+/// and of any other setting of its nominal value. `*` in the key matches any part of a name between dots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
     text: String,
@@ -198,7 +198,7 @@ impl Tolerance {
     }
 }
 
-/// Whether `text` is `pattern`, in which a `*` stands for any characters.
+/// Whether `text` is `pattern`, in which a `*` matches any characters.
 fn glob(pattern: &str, text: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == text,
@@ -304,7 +304,7 @@ mod tests {
                 "{drawn:?}"
             );
         }
-        // Ten roundings of 1e-16 beside the largest number there is below 1.
+        // Ten roundings of 1e-16 at the largest number below 1.
         assert_eq!(normal.drawn([1.0 - f64::EPSILON / 2.0, 0.0]).0, 12.0);
     }
 }

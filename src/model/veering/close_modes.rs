@@ -11,8 +11,9 @@
 //!   aR = -w0^2 (sum over the others of ri/(wi^2 - w0^2))
 //! ```
 //!
-//! which is the residue of mode R where both assumptions hold, and that of the modes' sum to first order in the gap where
-//! they do not: within a band as narrow as that between two close modes the others are little more than one number.
+//! which is the residue of mode R where both assumptions hold. Where they do not, it is that of the sum of the modes
+//! to first order in the gap: within the narrow band between two close modes, the response of the others is nearly
+//! constant.
 //! [`Remainder`] quantifies how far each assumption holds.
 
 use crate::model::plant::PlantError;
@@ -149,7 +150,7 @@ impl<'a> Others<'a> {
         -omega_rad_s * omega_rad_s * self.part(omega_rad_s)
     }
 
-    /// The sum of all but one of them at a frequency, over the part of that one.
+    /// Ratio of the response of all other modes to the response of `term` at `omega_rad_s`.
     fn ratio_to(&self, term: &ModalTerm, omega_rad_s: f64) -> f64 {
         let part = term.part(omega_rad_s);
         ((self.part(omega_rad_s) - part) / part).abs()

@@ -1,4 +1,5 @@
-//! Curve veering (section 4.1): two eigenvalue loci that approach each other as a setting varies, and part or cross.
+//! Curve veering (section 4.1): two eigenvalue loci that approach each other as a setting varies, and diverge again
+//! or cross.
 //!
 //! Modes are followed by their shapes, not by their order: a mode at one value continues as the mode at the next with the
 //! largest modal assurance criterion, weighted with the mean M of the two values,
@@ -18,7 +19,7 @@ use crate::model::plant::{PlantError, Structure};
 
 /// Steps below this ratio of the range are not halved any more.
 const SMALLEST_STEP: f64 = 1e-12;
-/// Ratio of the range at which the basis of modes is taken that are equal at the first value.
+/// For modes that are equal at the first value, the basis is taken at this ratio of the range.
 const FIRST_LOOK: f64 = 1e-3;
 /// A mode with less than this ratio of the largest residue, at all values, cannot be observed.
 const OBSERVED_RATIO: f64 = 1e-9;
@@ -31,7 +32,7 @@ pub enum Meeting {
     /// The frequencies are equal to rounding: mode crossing.
     #[serde(rename = "crossing")]
     Crossing,
-    /// They approach each other and part: curve veering.
+    /// They approach each other and diverge again: curve veering.
     #[serde(rename = "veering")]
     Veering,
     /// They are closest at an end of the range: their behaviour beyond is unknown.
@@ -59,7 +60,7 @@ impl Meeting {
     }
 }
 
-/// The modes over a setting, each followed from its place at the first value (slowest first).
+/// The modes over a setting, each identified by its position at the first value, in order of frequency.
 #[derive(Clone, Debug)]
 pub struct Loci<F> {
     at: F,
@@ -353,7 +354,7 @@ mod tests {
         let mut loci = Loci::follow(&grid(1.0, 9.0, 9), oscillators(0.1)).unwrap();
         let (meeting, at) = loci.meeting([0, 1]).unwrap();
         assert_eq!((meeting, at.value), (Meeting::AtTheEnd, 1.0));
-        // Equal at the first value: of all bases there, the shapes that the modes have beside it.
+        // The modes are equal at the first value: the basis is that of the modes at the next value.
         let mut loci = Loci::follow(&grid(0.0, 9.0, 9), oscillators(0.0)).unwrap();
         let (meeting, at) = loci.meeting([0, 1]).unwrap();
         assert_eq!(

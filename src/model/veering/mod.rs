@@ -1,4 +1,5 @@
-//! Two modes of close frequencies (Chapter 4): loci that approach each other as a setting varies, and part or cross.
+//! Two modes of close frequencies (Chapter 4): loci that approach each other as a setting varies, and diverge again
+//! or cross.
 //!
 //! ```text
 //!  Structure -> loci, veering point -> close modes (Eq. 4-1) -> conditions C4-1 to C4-4y -> propositions P4-1 to P4-2y

@@ -9,9 +9,9 @@ use crate::util::numeric::assign;
 
 /// Eigenvalues have an error of some 1e-15 of the largest: two that differ by less than this ratio of it are equal.
 const EQUAL_RATIO: f64 = 1e-12;
-/// Ten times the contribution of one mode to another's gain by rounding.
+/// Rounding error of a modal gain that is caused by another mode, times ten.
 const ROUNDED_GAIN: f64 = 1e-14;
-/// A MAC above this leaves no other partner.
+/// A MAC above this value identifies a mode uniquely.
 const CLEAR_MAC: f64 = 0.5;
 
 /// All modes at one value of the setting. An index denotes the same mode at every value.
@@ -21,7 +21,8 @@ pub struct ModesAt {
     pub value: f64,
     /// Undamped natural frequencies.
     pub omega_rad_s: Vec<f64>,
-    /// Shapes of unit modal mass, one a column, degrees of freedom x modes; signs are continuous from value to value.
+    /// Shapes of unit modal mass, one per column, degrees of freedom x modes; signs are continuous from value to
+    /// value.
     pub(super) shapes: DMatrix<f64>,
     structure: Structure,
 }
@@ -109,8 +110,8 @@ impl ModesAt {
         (0..gains.len()).map(rounded).collect()
     }
 
-    /// Rounding of a gain: a shape contains of each other one some 1e-15 of the largest eigenvalue over the distance
-    /// between the two eigenvalues.
+    /// Rounding error of a modal gain: each shape contains other shapes with a relative amplitude of about 1e-15
+    /// w_max^2/|w_i^2 - w_j^2|.
     fn rounding(&self, gains: &[f64], i: usize) -> f64 {
         let largest = self.largest_square();
         let parts = gains.iter().enumerate().map(|(j, gain)| {
@@ -194,7 +195,7 @@ impl ModesAt {
         }
     }
 
-    /// Turns the basis of each group of equal modes (slowest first, as computed) to the nearest modes before.
+    /// Turns the basis of each group of equal modes (in order of frequency, as computed) to the nearest modes before.
     fn align_equal_modes(&mut self, before: &ModesAt) {
         let mut first = 0;
         while first < self.count() {
@@ -220,7 +221,7 @@ impl ModesAt {
         }
     }
 
-    /// Whether these modes clearly continue as those: each by its shape, and none changes its order with another.
+    /// Whether each mode has a clear continuation in `next` by its shape, and no two modes change their order.
     pub(super) fn leads_to(&self, next: &ModesAt) -> bool {
         let n = self.count();
         let keeps_order = |i: usize, j: usize| self.order(i, j) * next.order(i, j) >= 0.0;

@@ -13,7 +13,7 @@ const TOO_FEW: &str =
 const NO_MEETING: &str =
     "no two modes veer or cross inside the range; move --from or --to, or vary another setting";
 
-/// The two modes from 0: those `asked` for by their numbers from 1, or the closest.
+/// Indices of two modes, from 0: those with the numbers `asked`, from 1, or the closest pair.
 pub fn close_pair<E, F>(asked: &[usize], loci: &Loci<F>) -> Result<[usize; 2], PairError>
 where
     E: From<PlantError>,
@@ -32,7 +32,7 @@ where
     }
 }
 
-/// The two modes asked for, or the first that meet inside the range.
+/// The two requested modes, or the first pair that meets inside the range.
 pub fn meeting_pair<E, F>(asked: &[usize], loci: &Loci<F>) -> Result<[usize; 2], PairError>
 where
     E: From<PlantError>,

@@ -184,12 +184,13 @@ struct Tried {
     /// Those with a response, best first.
     placements: Vec<Placement>,
     without_response: usize,
-    /// Those whose zeros do not converge: nearly all at infinity, as for a force in Y and a probe in X.
+    /// Number of placements whose zeros do not converge: nearly all zeros are at infinity, as for a force in Y and a
+    /// probe in X.
     not_computed: usize,
 }
 
 impl Tried {
-    /// The best placement of some with at least so large a remainder.
+    /// The best placement that satisfies `of` and has at least this remainder.
     fn best(&self, least_per_kg: f64, of: impl Fn(&Placement) -> bool) -> Option<Placement> {
         let mut measured = self
             .placements
@@ -327,7 +328,7 @@ fn name_of(chosen: &Chosen, places: &[Vec<Port>], own: &[Ports], which: usize) -
 /// The present placement among all others.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlacementReport {
-    /// Numbers of the modes from 1, slowest first at the first value.
+    /// Mode numbers, counted from 1 in order of frequency at the first value of the setting.
     pub modes: [usize; 2],
     /// The behaviour of the two where they are closest.
     pub meeting: Meeting,

@@ -1,4 +1,4 @@
-//! The propositions of section 4.2.3: the prediction of their premises beside the computed zeros.
+//! The propositions of section 4.2.3: the prediction from their premises, compared with the computed zeros.
 //!
 //! | proposition | here | as printed |
 //! |---|---|---|
@@ -7,20 +7,21 @@
 //! | P4-2x: under C4-3, CMP-CNMP zeros if and only if C4-1 and C4-4 | exact for Eq. (4-1) on the *interval* around the veering point where C4-1 holds | over the whole range "only if" needs C4-1 somewhere, "if" needs it up to the veering point: no single reading gives both |
 //! | P4-2y: C4-3 and C4-4y give a value with CMP-CNMP zeros | exact for Eq. (4-1), if au and av keep their signs from psi_0 to the veering point; sufficient, not necessary | "C4-4y implies C4-1" holds at psi_0, not between: the same gap as in P4-2 |
 //!
-//! The proof of P4-2 in this reading: b2-hat (in the direction of av) is above |b21-hat| at psi_0, below |b22-hat| at the
-//! veering point, and between the two nothing jumps, as residues and frequencies are continuous and au av < 0 keeps
-//! |b21-hat| < |b22-hat|. Either b2-hat is between the two at one end, or it passes from above |b22-hat| to below it, and
-//! just below it is between them.
+//! The proof of P4-2 in this reading: b2-hat (in the direction of av) is above |b21-hat| at psi_0 and below |b22-hat|
+//! at the veering point. All three are continuous between the two, because residues and frequencies are, and au av <
+//! 0 keeps |b21-hat| < |b22-hat|. Either b2-hat is between the two at one end, or it passes from above |b22-hat| to
+//! below it, and just below it is between them.
 //!
-//! The premises as printed, with signs at one value only, are wrong for 40 of some 700 random systems of Eq. (4-1) for which
-//! P4-2 predicts zeros, and for 40 of 400 of P4-2y; read as here, for none (`tests.rs`). P4-2 and P4-2y are not necessary: fixed
-//! frequencies and other residues give zeros without any veering.
+//! With the premises as printed (signs at one value only), predictions for random systems of Eq. (4-1) are wrong: 40
+//! of about 700 by P4-2, and 40 of 400 by P4-2y. With the reading used here there are no wrong predictions
+//! (`tests.rs`). P4-2 and P4-2y are not necessary: fixed frequencies and other residues give zeros without any
+//! veering.
 //!
-//! A plant is not Eq. (4-1). Its own zeros are reported beside those of the equation. Where the two differ, Assumptions A4-4
-//! and A4-5 do not hold well enough; [`super::Remainder`] quantifies by how much. Towards b22-hat, where zeros
-//! meet between the modes, P4-1 errs at no larger margin than A4-5's ratio. Towards b21-hat they meet outside, where the
-//! other modes are arbitrary, and no local figure bounds the error. P4-2y needs neither assumption: two zeros between two
-//! neighbouring poles whose residues keep their signs can leave only by meeting.
+//! A plant is not Eq. (4-1). Its own zeros are reported with those of the equation. Where the two differ, Assumptions
+//! A4-4 and A4-5 do not hold well enough; [`super::Remainder`] quantifies by how much. Near b22-hat, where zeros meet
+//! between the modes, P4-1 errs only at margins up to the ratio of A4-5. Near b21-hat they meet outside, where the
+//! other modes are arbitrary, and no local quantity bounds the error. P4-2y needs neither assumption: two zeros
+//! between two neighbouring poles whose residues keep their signs can leave only by meeting.
 
 use serde::Serialize;
 
@@ -40,7 +41,7 @@ pub enum Prediction {
 }
 
 impl Prediction {
-    /// In a word.
+    /// Name of the prediction in JSON and text.
     pub fn name(self) -> &'static str {
         match self {
             Prediction::Appear => "appear",

@@ -14,9 +14,9 @@
 //! vector q is M^-1 q, its components are q^T phi for shapes of unit modal mass, the signs are the same, and the product of
 //! two components *is* the residue of Eq. (4-15). Lengths are ratios to the whole vector: 1 lies wholly in the plane.
 //!
-//! The frame is that of the two shapes where they are closest. As the setting varies, phi_u and phi_v turn in it by an
-//! angle, and the lines with them; b and c are constant as far as the plane is. The one diagram at the veering point therefore
-//! predicts the signs before and after it: au + av = b . c is constant, and the signs alternate where
+//! The frame is that of the two shapes where they are closest. As the setting varies, phi_u and phi_v turn in it by
+//! an angle, and the lines with them; b and c are constant as long as the plane is. The one diagram at the veering
+//! point therefore predicts the signs before and after it: au + av = b . c is constant, and the signs alternate where
 //!
 //! ```text
 //!   -sign(aR) cos(2 t - t_b - t_c) > |cos(t_b - t_c)|       t, t_b, t_c: angles of phi_u, b, c

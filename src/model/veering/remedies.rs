@@ -36,7 +36,7 @@ fn on_signs(modes: &CloseModes) -> String {
     }
 }
 
-/// As factors on wv^2 - wu^2 with unchanged residues.
+/// The changes of the gap, as factors on wv^2 - wu^2 with unchanged residues.
 fn on_gap(modes: &CloseModes) -> String {
     let condition = c4_2(modes);
     let (figure, [low, high]) = (condition.figure, condition.limits);

@@ -11,7 +11,7 @@ use crate::util::units::hz;
 /// The veering point of two modes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VeeringPoint {
-    /// Numbers of the modes from 1, slowest first at the first value.
+    /// Mode numbers, counted from 1 in order of frequency at the first value of the setting.
     pub modes: [usize; 2],
     /// The behaviour of the two where they are closest.
     pub meeting: Meeting,

@@ -1,4 +1,5 @@
-//! The propositions compared with the zeros of random systems: how often the premises hold, and whether the conclusion does.
+//! The propositions compared with the zeros of random systems: how often the premises hold, and whether the
+//! conclusion holds.
 
 use nalgebra::{DMatrix, DVector};
 use rand_core::Rng;
@@ -22,7 +23,7 @@ impl Dice {
         low + (high - low) * ((self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64)
     }
 
-    /// Of either sign, sizes even in their logarithm.
+    /// A number of random sign, with a magnitude between `low` and `high` that is uniform in its logarithm.
     fn spread(&mut self, low: f64, high: f64) -> f64 {
         let size = self.uniform(low.ln(), high.ln()).exp();
         if self.uniform(-1.0, 1.0) < 0.0 {
@@ -33,7 +34,7 @@ impl Dice {
     }
 }
 
-/// Two oscillators k + d and k - d joined by c, and beside them further masses on springs of their own, 0 for none.
+/// Two oscillators k + d and k - d joined by c, and further masses, each on its own spring (0: no spring).
 #[derive(Clone, Debug)]
 struct System {
     coupling: f64,
@@ -43,7 +44,7 @@ struct System {
 }
 
 impl System {
-    /// In the setting of Eq. (4-1): the third mass is free.
+    /// A system of the form of Eq. (4-1): the third mass is free.
     fn with_double_integrator(dice: &mut Dice) -> System {
         let residue = dice.spread(0.05, 300.0);
         let mut pair = || dice.uniform(-1.0, 1.0);
@@ -92,7 +93,7 @@ impl System {
     }
 }
 
-/// Without a value at d = 0, and not symmetric about it.
+/// Values of d, without 0 and not symmetric about 0.
 fn grid() -> Vec<f64> {
     (0..25).map(|k| -5.0 + 11.0 * f64::from(k) / 24.0).collect()
 }
@@ -156,7 +157,7 @@ fn p4_1_holds_for_random_sums_and_c4_2_implies_c4_1() {
             alternating.holds || !between.holds,
             "C4-2 without C4-1: {modes:?}"
         );
-        // Nearer to a critical value two zeros are one to the root of the rounding.
+        // Closer to a critical value, the distance of two zeros is below the square root of the rounding.
         if between.margin.abs() > 1e-9 {
             tally.add(&proposition);
         }
@@ -173,7 +174,7 @@ fn p4_2_p4_2x_and_p4_2y_hold_for_random_systems_of_eq_4_1() {
     let (mut dice, mut tallies) = (Dice::new(2), <[Tally; 3]>::default());
     for index in 0..2000 {
         let mut system = System::with_double_integrator(&mut dice);
-        // Every tenth crosses.
+        // Every tenth system is uncoupled: its modes cross.
         system.coupling *= f64::from(u8::from(index % 10 != 0));
         let trajectory = system.trajectory();
         assert_eq!(
@@ -197,7 +198,7 @@ fn p4_2_p4_2x_and_p4_2y_hold_for_random_systems_of_eq_4_1() {
             }
         }
     }
-    // Of 4000 sides the premises hold on 7 %, 7 % and 4 %: a third less would be beyond ten sigma.
+    // The premises hold on 7 %, 7 % and 4 % of 4000 sides: a third less would be a deviation of more than ten sigma.
     let [p4_2, p4_2x, p4_2y] = tallies;
     assert!(
         p4_2.appear > 180 && p4_2x.appear > 180 && p4_2y.appear > 90,
@@ -258,7 +259,8 @@ fn premises_as_printed_are_wrong_for_some_systems() {
             assert!(predicted != Prediction::Absent || !quartet);
         }
     }
-    // Of some 700 systems that P4-2 is sure of, and 400 of P4-2y, 40: their residues turn on the way.
+    // P4-2 as printed is wrong for 40 of about 700 systems, P4-2y for 40 of 400, because residues change sign between
+    // psi_0 and the veering point.
     assert!(
         predictions[0] > 500 && predictions[1] == predictions[0] && predictions[2] > 250,
         "{predictions:?}"
@@ -303,7 +305,7 @@ fn zeros_may_appear_without_veering() {
     }
 }
 
-/// Two oscillators, a mode R held at `wr` and one more far above, each seen with a random residue.
+/// Two oscillators, a mode R on a spring and one more mode far above, each with a random sensor gain.
 fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
     let mut system = System::with_double_integrator(dice);
     system.others = vec![below * below, above * above];
@@ -314,8 +316,9 @@ fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
     system
 }
 
-/// What P4-1 says of a plant, at the values of the grid where b2-hat is nearer to b22-hat than to b21-hat: how many are
-/// asked, how many wrong, and for the wrong ones the largest margin over A4-5's ratio.
+/// Predictions of P4-1 for a plant, at the values of the grid where b2-hat is nearer to b22-hat than to b21-hat:
+/// their number, the number of wrong ones, and for the wrong ones the largest ratio of the margin to the ratio of
+/// A4-5.
 fn near_the_upper_limit(trajectory: &Trajectory) -> (usize, usize, f64) {
     let on_grid = trajectory
         .samples
@@ -346,8 +349,9 @@ fn near_the_upper_limit(trajectory: &Trajectory) -> (usize, usize, f64) {
 
 #[test]
 fn p4_1_errs_by_less_than_the_integrator_ratio() {
-    // Dual MMP zeros and their meeting lie between the modes, where the remainder is known to that ratio, and b22-hat is
-    // where they meet. Of b21-hat this says nothing: zeros meet there outside, where the remainder may be anything.
+    // Dual MMP zeros meet between the modes at b22-hat; there the remainder is known with the accuracy of the ratio
+    // of A4-5. This does not apply at b21-hat, where zeros meet outside the interval between the modes and the
+    // remainder is arbitrary.
     for (below, above) in [(0.5, 300.0), (2.0, 50.0), (4.0, 25.0), (6.0, 16.0)] {
         let (mut dice, mut sum, mut tallies) =
             (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
@@ -376,7 +380,7 @@ fn p4_1_errs_by_less_than_the_integrator_ratio() {
             p4_2y.wrong_by_plant == 0 && p4_2y.appear > 8,
             "{below} {above}: {p4_2y:?}"
         );
-        // P4-2x errs where the others have a quartet of their own with the two: beyond b21-hat.
+        // P4-2x is wrong where the other modes form a quartet with the two: beyond b21-hat.
         assert!(
             p4_2x.wrong_by_plant < p4_2x.absent / 30 && p4_2x.absent > 400,
             "{below} {above}: {p4_2x:?}"

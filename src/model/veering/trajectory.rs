@@ -109,7 +109,7 @@ impl Sample {
     }
 }
 
-/// The other modes that are not silent.
+/// The other modes that can be observed.
 fn observed_beside(terms: &[ModalTerm], pair: [usize; 2]) -> impl Iterator<Item = &ModalTerm> {
     let sizes = terms.iter().map(|term| term.residue_per_kg.abs());
     let least = SILENT_RATIO * sizes.fold(0.0, f64::max);

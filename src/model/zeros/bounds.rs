@@ -1,7 +1,7 @@
 //! Limits that a zero in the right half plane sets to every controller: Eqs. (1-1) to (1-3).
 //!
-//! If loop and closed loop are stable and |S(jw)| < alpha < 1 for all w < w0, a zero z = x + jy with x > 0 forces
-//! max |S| > (1/alpha)^(Theta/(pi - Theta)), where Theta is the angle at which z sees the interval from -j w0 to j w0.
+//! If loop and closed loop are stable and |S(jw)| < alpha < 1 for all w < w0, a zero z = x + jy with x > 0 forces max
+//! |S| > (1/alpha)^(Theta/(pi - Theta)), where Theta is the angle that the interval from -j w0 to j w0 subtends at z.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -58,14 +58,15 @@ pub struct Bound {
     pub zero: Zero,
     /// The largest w0 in rad/s below which |S| < alpha is possible without passing the peak, or the bandwidth demanded.
     pub bandwidth_rad_s: f64,
-    /// The angle Theta at which the zero sees that band, in degrees.
+    /// The angle Theta that this band subtends at the zero, in degrees.
     pub opening_angle_deg: f64,
     /// The peak of |S| that Eq. (1-3) guarantees.
     pub sensitivity_peak: f64,
 }
 
 impl Bound {
-    /// The bounds of all zeros in the right half plane, one a pair, the narrowest band first; `alpha` between 0 and 1.
+    /// The bounds of all zeros in the right half plane, one per pair, the narrowest band first; `alpha` between 0 and
+    /// 1.
     pub fn of(zeros: &[Zero], alpha: f64, demand: Demand) -> Vec<Bound> {
         let right = zeros
             .iter()
@@ -101,7 +102,7 @@ mod tests {
 
     #[test]
     fn opening_angle_of_a_circle_about_the_origin_is_a_right_angle() {
-        // Fig 1-3a: |z| = w0, wherever on the circle; then the power is 1 and the peak 1/alpha.
+        // Fig 1-3a: |z| = w0, at any point of the circle; then the power is 1 and the peak 1/alpha.
         for angle in [0.0, 0.5, 1.5] {
             let z = Complex::from_polar(7.0, angle);
             assert!((opening_angle(z, 7.0) - FRAC_PI_2).abs() < 1e-14);
@@ -120,7 +121,7 @@ mod tests {
             falling.windows(2).all(|pair| pair[0] < pair[1]),
             "{falling:?}"
         );
-        // On the real axis the half angle is seen by w0/x.
+        // On the real axis, tan(Theta/2) = w0/x.
         assert!((falling[0] - (PI / 12.0).tan()).abs() < 1e-15);
     }
 
@@ -129,7 +130,8 @@ mod tests {
         fn bandwidth_and_angle_are_inverse(re in -3.0..3.0f64, im in -3.0..3.0f64, angle in 0.001..3.13f64) {
             let z = Complex::new(10f64.powf(re), 10f64.powf(im));
             let back = opening_angle(z, bandwidth_rad_s(z, angle));
-            // Near a zero close to the axis the angle turns over within x/y of the frequency: rounding times y/x.
+            // For a zero close to the imaginary axis, the angle changes within x/y of the frequency: the rounding is
+            // multiplied by y/x.
             prop_assert!((back - angle).abs() < 1e-14 * (1.0 + z.im / z.re), "{back} for {angle}");
         }
 

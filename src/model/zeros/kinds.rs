@@ -148,7 +148,7 @@ pub fn phase_drop_deg(zeros: &[Zero]) -> f64 {
     180.0 * right as f64
 }
 
-/// Zeros of the structure without its damping, slowest first.
+/// Zeros of the structure without its damping, lowest frequency first.
 ///
 /// ```
 /// use bench::config::{Source, load};
@@ -163,7 +163,7 @@ pub fn undamped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {
     undamped(&System::from(structure))
 }
 
-/// Zeros of the structure with its damping, slowest first. A zero in the left half plane has the kind of the nearest
+/// Zeros of the structure with its damping, lowest frequency first. A zero in the left half plane has the kind of the nearest
 /// undamped zero.
 pub fn damped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {
     damped(&System::from(structure))

@@ -20,11 +20,11 @@ use crate::model::plant::{PlantError, PlantSettings, Sr4dofSettings, undamped};
 
 /// The sign of the discriminant is decisive above this ratio to the sum of the sizes of its terms ([`Bounded`]).
 ///
-/// Rounding: an entry of A or B is exact to 8 roundings of its size, a coefficient, a sum of up to 12 products of three,
-/// to 3 x 8 + 2 + 11, the discriminant, of degree 4, to 4 x 37 + 8 = 156: 2e-14. The pencil calls a pair real up to a ratio
-/// of imaginary part to size of 1e-7, and its own rounding separates two equal values by that much: the square of their
-/// distance, 4e-14 of the terms, must be decided there too. 1e-9 is well above both, and leaves to the pencil pairs closer
-/// than some 3e-5 of their size.
+/// Rounding: an entry of A or B is exact to 8 roundings of its size, a coefficient, a sum of up to 12 products of
+/// three, to 3 x 8 + 2 + 11, the discriminant, of degree 4, to 4 x 37 + 8 = 156: 2e-14. The pencil treats a pair as
+/// real up to a ratio of imaginary part to size of 1e-7, and its own rounding separates two equal values by that
+/// much: the square of their distance, 4e-14 of the terms, must be decided there too. 1e-9 is well above both; pairs
+/// closer than some 3e-5 of their size are decided by the pencil.
 const DECISIVE_RATIO: f64 = 1e-9;
 
 /// CNMP pairs of the zeros without damping, one row for each operating point (ratios Y1o/L), in it one for each mass

@@ -4,18 +4,18 @@
 //!
 //! | definition | reading |
 //! |---|---|
-//! | (1) | At a zero of G on the imaginary axis a mode takes over whose part has the sign of G above the zero. |
-//! | (2) | Of several such modes those take over that would do so alone, beside all modes that are no candidates, between the same two resonances. If that leaves several or none: the largest part, or `[DI]` beyond the last resonance. |
-//! | (3) | Without a zero of G a mode takes over at its own resonance only, where its part has no limit. A double integrator resonates at 0, a constant at infinity. |
+//! | (1) | At a zero of G on the imaginary axis, a mode becomes dominant whose part has the sign of G above the zero. |
+//! | (2) | Among several candidates, those become dominant of which each alone, together with all modes that are not candidates, gives a zero with the same change of sign between the same two resonances. If that leaves several or none: the largest part, or `[DI]` beyond the last resonance. |
+//! | (3) | Without a zero of G, a mode becomes dominant only at its own resonance, where its part has no limit. A double integrator resonates at 0, a constant at infinity. |
 //! | (4) | The same mode twice counts once. |
-//! | (5) | Below the first event the mode that resonates there dominates. If the event is a zero of G, the modes dominate that have the sign of G before it, by (2) with frequency reversed: one of them, or `[DC]` / `[-DC]`. |
+//! | (5) | Below the first event, the mode that resonates there dominates. If the event is a zero of G, the modes dominate that have the sign of G before it, by (2) with frequency reversed: one of them, or `[DC]` / `[-DC]`. |
 
 use std::fmt;
 
 use super::{ModalSum, ModalTerm, ZeroKind};
 use crate::model::plant::{ModalModel, PlantError, Sign};
 
-/// The signs of the modes that can be observed, slowest first: `+-+`.
+/// The signs of the modes that can be observed, lowest frequency first: `+-+`.
 pub fn sign_sequence(modal: &ModalModel) -> String {
     let signs = modal.signs().into_iter();
     signs
@@ -35,7 +35,7 @@ pub fn dominant_sequence(modal: &ModalModel) -> Result<String, PlantError> {
 /// A mode, or several together, that dominates a range of frequencies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dominant {
-    /// A mode, by its index among those with a residue, slowest first.
+    /// A mode, by its index among those with a residue, lowest frequency first.
     Mode(usize),
     /// The constant R.
     Constant,
@@ -227,7 +227,7 @@ impl Range {
     }
 }
 
-/// The parts that may take over at a crossing.
+/// The parts that may become dominant at a crossing.
 struct Takeover {
     /// Candidates of definition (1).
     candidates: Vec<Part>,
@@ -251,7 +251,7 @@ impl Takeover {
         Ok(Takeover { candidates, able })
     }
 
-    /// The only part that can take over, if it is one.
+    /// The only part that can become dominant, if there is exactly one.
     fn only(&self) -> Option<Part> {
         match (self.candidates.as_slice(), self.able.as_slice()) {
             ([one], _) | (_, [one]) => Some(*one),
@@ -271,7 +271,8 @@ impl Takeover {
     }
 }
 
-/// Whether one candidate, alone with the rest, crosses in the same sense between the same resonances.
+/// Whether one candidate, together with `rest` alone, gives a zero with the same change of sign between the same
+/// resonances.
 fn crosses_alone(
     sum: &ModalSum,
     crossing: &Crossing,
@@ -365,18 +366,20 @@ mod tests {
 
     #[test]
     fn several_modes_together_dominate_as_di_or_dc() {
-        // Above both resonances neither R nor u alone turns v's sign: u + v and R + v are positive at infinity, all three
-        // are not. -2.5 + 2 > ... the sums of residues decide: R + v = -0.5, u + v = -0.5, R + u + v = 1.5.
+        // G is positive just above the resonance of v. For w -> infinity, G(jw) = -(sum of residues)/w^2: R + v =
+        // -0.5 and u + v = -0.5 keep G positive, R + u + v = 1.5 makes it negative. So neither R nor u alone changes
+        // the sign, only both together: [DI].
         assert_eq!(
             sequence(&[(0.0, 2.0), (1.0, 2.0), (2.0, -2.5)], 0.0),
             "[R]-[u]-[v]-[DI]"
         );
-        // With a larger residue R does so alone.
+        // With R = 4, R + v = 1.5 makes G negative: R alone changes the sign.
         assert_eq!(
             sequence(&[(0.0, 4.0), (1.0, 2.0), (2.0, -2.5)], 0.0),
             "[R]-[u]-[v]-[R]"
         );
-        // Table 3-4: at low frequency v and R are each too small to hold the sign against u.
+        // Table 3-4: at w = 0 the parts are u = 1, v = -0.7 and R = -0.8. Neither v nor R alone makes G negative,
+        // only both together: [-DC].
         assert_eq!(
             sequence(&[(1.0, 1.0), (2.0, -2.8)], -0.8),
             "[-DC]-[u]-[v]-[R]"

@@ -17,7 +17,7 @@ use crate::util::numeric::bisect;
 
 /// Samples in the shortest period.
 const SAMPLES_PER_PERIOD: f64 = 64.0;
-/// Halvings of the first sampling step, for features that are over early.
+/// Number of times the first sampling step is halved, to resolve features at the beginning of the response.
 const EARLY_HALVINGS: i32 = 24;
 
 /// The response of a plant to a step of 1 N.

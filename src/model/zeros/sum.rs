@@ -1,7 +1,7 @@
-//! A transfer function as the sum of its modes and, perhaps, a constant:
+//! A transfer function as the sum of its modes and optionally a constant:
 //! G(s) = R + sum of r_i/(s^2 + 2 zeta_i w_i s + w_i^2) (Eqs. 3-2, 3-6, 3-10, 3-11 with beta = 0).
 //!
-//! A mode of w = 0 is a double integrator r/s^2. The constant stands for a mode far above all others.
+//! A mode of w = 0 is a double integrator r/s^2. The constant represents a mode far above all others.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -53,7 +53,7 @@ impl From<&Mode> for ModalTerm {
     }
 }
 
-/// The sum, slowest mode first.
+/// The sum, lowest frequency first.
 ///
 /// ```
 /// use bench::model::zeros::{ModalSum, ModalTerm, ZeroCounts};
@@ -93,7 +93,7 @@ impl ModalSum {
         ModalSum::new(terms.collect(), 0.0)
     }
 
-    /// The modes with a residue, slowest first.
+    /// The modes with a residue, lowest frequency first.
     pub fn terms(&self) -> &[ModalTerm] {
         &self.terms
     }
@@ -124,18 +124,18 @@ impl ModalSum {
         parts.sum::<Complex<f64>>() + self.constant_m_per_n
     }
 
-    /// Zeros without damping, slowest first.
+    /// Zeros without damping, lowest frequency first.
     pub fn undamped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
         self.zeros_by(kinds::undamped)
     }
 
-    /// Zeros with damping, slowest first.
+    /// Zeros with damping, lowest frequency first.
     pub fn damped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
         self.zeros_by(kinds::damped)
     }
 
-    /// The zeros of unit masses on springs, one a mode, with the root of its residue as force and sensor gain, beside the
-    /// constant.
+    /// Computes the zeros of an equivalent system: one unit mass on a spring per mode, with sqrt(|residue|) as force
+    /// and sensor gain and the sign of the residue on the force gain, plus the constant.
     fn zeros_by(
         &self,
         zeros: fn(&System) -> Result<Vec<Zero>, PlantError>,
@@ -163,7 +163,7 @@ impl ModalSum {
     }
 }
 
-/// The root of a residue's size.
+/// The square root of the magnitude of a residue.
 fn root(term: &ModalTerm) -> f64 {
     term.residue_per_kg.abs().sqrt()
 }

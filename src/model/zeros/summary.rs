@@ -56,7 +56,7 @@ pub struct PlantSummary {
     pub mass_asymmetry: Option<f64>,
     /// Names of the coordinates of a shape.
     pub coordinates: Vec<String>,
-    /// The modes, slowest first.
+    /// The modes, lowest frequency first.
     pub modes: Vec<ModeSummary>,
     /// The zeros without damping.
     pub zeros: Vec<Zero>,

@@ -1,12 +1,12 @@
 //! Tables 3-1 to 3-4: from the signs and the sequence of dominant modes to the kinds of the zeros, without computing one.
 //!
-//! Signs are those of the modes along frequency (Assumption A3-6: the slowest is positive; a plant whose slowest mode is
-//! negative is read with all signs reversed). A pattern is the meaning of the printed sequence in all cases. In these rows it
-//! is wider than the printed words, and the kinds are the printed ones in all of them:
+//! Signs are those of the modes along frequency (Assumption A3-6: the slowest is positive; a plant whose slowest mode
+//! is negative is read with all signs reversed). A pattern contains all sequences that a printed row stands for. In
+//! these rows it is wider than printed; the kinds are the printed ones in all cases:
 //!
 //! | row | printed | also | reason |
 //! |---|---|---|---|
-//! | 3-3, 5 | `[R]-[u]-[v]-[u]-[DI]` | `[R]` at the end | where aR > \|au\| mode R takes over alone: it is a double integrator |
+//! | 3-3, 5 | `[R]-[u]-[v]-[u]-[DI]` | `[R]` at the end | where aR > \|au\| mode R dominates alone: it is a double integrator |
 //! | 3-3, 7 | `[Ru]-[v]-[DI]` | `[R]`, `[u]` at the end | where one of them outweighs v alone, definition (2b) names it |
 //! | 3-3, 8 and 9 | `[R]-[uv]...` | `[R]` between u and v | the zero between u and v is R's where R outweighs v there |
 //! | 3-4, 4 | `[DC]-[v]-[u]-[v]-[R]` | `[R]` at the start | where R > \|av\|/wv^2 the constant alone holds the sign |

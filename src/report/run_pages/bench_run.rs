@@ -39,7 +39,7 @@ pub struct BenchRun<'a> {
     /// Its analysis.
     pub(super) analysis: &'a Analysis,
     recording: &'a Recording,
-    /// What lies between set-point and reading, except the mechanics.
+    /// The signal path between set-point and reading, without the mechanics.
     chain: MeasurementChain,
     /// Title of the configuration.
     title: String,

@@ -43,7 +43,7 @@ pub struct RecordReport<'a> {
     pub frf: &'a Frf,
     /// The response of the model at the same frequencies, if there is a model.
     pub model: Option<&'a [Complex<f64>]>,
-    /// What lies between set-point and reading, except the mechanics.
+    /// The signal path between set-point and reading, without the mechanics.
     pub chain: MeasurementChain,
     /// The fitted modes, if the fit succeeded.
     pub fit: Option<&'a ModalFit>,

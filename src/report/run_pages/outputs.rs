@@ -57,7 +57,8 @@ impl Default for PageFiles {
 }
 
 impl PageFiles {
-    /// Draws a record and writes its plots and its page beside a path, under its name.
+    /// Draws a record and writes its plots and its page into the folder of `beside`, with names that begin with its
+    /// stem.
     ///
     /// # Errors
     /// When a plot cannot be drawn, or a file cannot be written.
@@ -92,7 +93,8 @@ fn write_text(
     Ok(path.display().to_string())
 }
 
-/// Writes an FRF beside a path, under its name; `magnitude` names its magnitude column.
+/// Writes an FRF into the folder of `beside`, with a name that begins with its stem; `magnitude` names its magnitude
+/// column.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -107,10 +109,10 @@ pub fn write_frf(
     Ok(path.display().to_string())
 }
 
-/// Modes, zeros and verdict; the names are a contract.
+/// Modes, zeros and verdict; the names in JSON must not change.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModalSummary {
-    /// The modes, slowest first.
+    /// The modes, lowest frequency first.
     pub modes: Vec<FittedMode>,
     /// Zeros of the fit, with damping, in the band of the verdict; of a conjugate pair the one above the real axis.
     pub zeros: Vec<UncertainZero>,
@@ -149,7 +151,7 @@ impl ModalSummary {
     }
 }
 
-/// Responses and margins of a closed loop; the names are a contract.
+/// Responses and margins of a closed loop; the names in JSON must not change.
 #[derive(Clone, Debug, Serialize)]
 pub struct LoopOutputs {
     /// L = P C, from error to reading.
@@ -200,7 +202,8 @@ pub enum AnalysisStatus {
     Cancelled,
 }
 
-/// The files and the numbers of an analysed run; `None` where there is no response. The names are a contract.
+/// The files and the numbers of an analysed run; `None` where there is no response. The names in JSON must not
+/// change.
 #[derive(Clone, Debug, Serialize)]
 pub struct AnalysisOutputs {
     /// Whether the run was analysed.
@@ -237,7 +240,7 @@ pub struct AnalysisOutputs {
 }
 
 impl AnalysisOutputs {
-    /// Writes the files of an analysed run beside a path, under its name.
+    /// Writes the files of an analysed run into the folder of `beside`, with names that begin with its stem.
     ///
     /// # Errors
     /// When a plot cannot be drawn, or a file cannot be written.

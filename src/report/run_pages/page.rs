@@ -47,7 +47,7 @@ fn verdict(report: &RecordReport<'_>) -> String {
     )
 }
 
-/// The figures that every verdict rests on.
+/// The figures that support every verdict.
 fn evidence(report: &RecordReport<'_>) -> Vec<(String, String)> {
     let limit = format!("{:.1} Hz", report.judged_up_to_rad_s / TAU);
     let chi2 = report.fit.map(|fit| format!("{:.3}", fit.chi2_per_freedom));

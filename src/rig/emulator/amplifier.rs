@@ -138,7 +138,7 @@ impl AmplifierServer {
         self.device().is_enabled()
     }
 
-    /// State of the power stage, in words.
+    /// Name of the state of the power stage.
     pub fn state(&self) -> &'static str {
         self.device().state()
     }

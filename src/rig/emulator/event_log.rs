@@ -102,7 +102,7 @@ impl EventLog {
     }
 }
 
-/// Detects the begin and the end of a current.
+/// Detects the beginning and the end of a current.
 ///
 /// A run crosses zero current often. So while the power stage is enabled, the current counts as ended only after it has been
 /// zero for [`CurrentMonitor::OFF_NS`].

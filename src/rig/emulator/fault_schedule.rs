@@ -47,7 +47,7 @@ impl std::str::FromStr for PlannedFault {
     }
 }
 
-/// The fault's text, its begin and its end.
+/// The fault's text, its start and its end.
 fn split(text: &str) -> Option<(&str, f64, Option<f64>)> {
     let (fault, times) = text.split_once('@')?;
     let Some((from, to)) = times.split_once("..") else {

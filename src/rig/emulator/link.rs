@@ -39,7 +39,7 @@ impl Drop for Link {
     fn drop(&mut self) {
         let is_ours = std::fs::read_link(&self.path).is_ok_and(|target| target == self.target);
         if is_ours {
-            let _ = std::fs::remove_file(&self.path); // somebody else may have removed it
+            let _ = std::fs::remove_file(&self.path); // it may have been removed already
         }
     }
 }

@@ -91,7 +91,7 @@ mod tests {
                 .map(|(a, b)| a * b)
                 .sum::<f64>()
                 / power;
-            // 400 s again: 0.7 % standard deviation in a correlation; four allowed.
+            // 400 s again: the standard deviation of a correlation is 0.7 %; the tolerance is four of them.
             assert!((ours - exact).abs() < 0.03, "lag {lag}: {ours} for {exact}");
         }
     }

@@ -1,5 +1,5 @@
 //! The simulated rig: an amplifier with limits, resolution and latency, a stage with unmodelled modes, mechanical stop and
-//! floor motion, and a probe with noise, quantisation, range, delay and a clock of its own. It implements the traits of
+//! floor motion, and a probe with noise, quantisation, range, delay and its own clock. It implements the traits of
 //! [`bench_hal`], so the loop drives it as it drives real devices.
 //!
 //! The same seed and settings give bit-identical readings on every x86-64 and ARM machine: the order of sums is fixed, every

@@ -51,7 +51,8 @@ mod tests {
         let mut stream = Gaussian::new(7, 0);
         let numbers: Vec<f64> = (0..N).map(|_| stream.next()).collect();
         let moment = |p: i32| numbers.iter().map(|x| x.powi(p)).sum::<f64>() / N as f64;
-        // Moments 0, 1, 0, 3; their standard deviations over N numbers are sqrt((1, 2, 15, 96)/N); five of them allowed.
+        // Expected moments 0, 1, 0, 3 with standard deviations sqrt((1, 2, 15, 96)/N) over N numbers; the tolerance
+        // is 5 sigma.
         for (p, expected, variance) in
             [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)]
         {

@@ -1,4 +1,4 @@
-//! The simulated probe: noise, quantisation, range, a clock of its own, and delayed readings.
+//! The simulated probe: noise, quantisation, range, its own clock, and delayed readings.
 
 use std::collections::VecDeque;
 

@@ -36,7 +36,7 @@ impl MotionState {
     }
 }
 
-/// The lines of the floor's acceleration; the noise of each is a stream of its own.
+/// The lines of the floor's acceleration; the noise of each has its own random stream.
 fn floor_lines(sim: &SimSettings, period_s: f64) -> Vec<Line> {
     let streams = (1..).map(|stream| Gaussian::new(sim.seed, stream));
     let lines = sim.floor.iter().zip(streams);

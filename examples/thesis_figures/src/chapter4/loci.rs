@@ -29,7 +29,7 @@ fn pair(
     let mut loci = Loci::follow(values, |value| varied.structure(value))?;
     let modes = modes.or(loci.closest_pair()).unwrap_or([0, 1]);
     let (meeting, at) = loci.meeting(modes)?;
-    // Modes are followed by their shape; the picture has them by frequency, as the thesis draws them.
+    // Modes are followed by their shape; the picture shows them by frequency, as in the thesis.
     let sorted = |at: &ModesAt| {
         let (a, b) = (at.omega_rad_s[modes[0]], at.omega_rad_s[modes[1]]);
         (a.min(b), a.max(b))

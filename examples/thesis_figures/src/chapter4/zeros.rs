@@ -1,4 +1,4 @@
-//! Where zeros leave the imaginary axis and come back, beside the Bode plots at both ends.
+//! Values at which zeros leave the imaginary axis and return, with the Bode plots at both ends.
 
 use super::super::bode::{Curve, bode};
 use super::super::content::signed;
@@ -89,7 +89,7 @@ impl Study<'_> {
     }
 }
 
-/// Where zeros leave and come back to the imaginary axis.
+/// Values at which zeros leave the imaginary axis and return to it.
 fn axis_changes(locus: &Locus) -> Vec<f64> {
     locus
         .changes
@@ -177,7 +177,7 @@ pub(crate) fn fig_4_8(_: &Runs) -> Result<Content, FigureError> {
         .iter()
         .map(|value| signed(100.0 * value / L, 3))
         .collect();
-    // The Y mode, which does not show, has a pair of zeros of its own.
+    // The Y mode, which cannot be observed, has its own pair of zeros.
     let shown = |kinds: String| match kinds.as_str() {
         "3 x MMP" => "dual MMP".to_string(),
         other => other.replace("MMP + ", ""),

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::super::frame::{CanFrame, Id};
 use super::{BusError, BusEvent, CanBus, Condition, Port};
 
-/// Largest number of events that wait at an endpoint; further ones are lost, as in a socket that is not read.
+/// Largest number of events in the queue of an endpoint; further ones are lost, as in a socket that is not read.
 const QUEUE_MAX: usize = 10_000;
 
 /// A bus; clones are the same bus.

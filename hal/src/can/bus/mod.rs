@@ -97,7 +97,7 @@ pub trait Port: Send + Sync {
     }
 }
 
-/// Work in a thread beside the loop.
+/// A task that runs in its own thread, in parallel with the loop.
 pub trait Task: Send {
     /// Processes received events, waiting up to `wait` for the first, then does what is due. `now_ns` is the clock of the host.
     /// After an error the host pauses before the next step.
@@ -109,7 +109,7 @@ pub trait Host: Port {
     /// Time since a fixed moment, in nanoseconds.
     fn now_ns(&self) -> u64;
 
-    /// Waits. Not called by methods that must not block.
+    /// Blocks the caller for `time`; must not be called in the tick.
     fn sleep(&self, time: Duration);
 
     /// Runs a task until the handle is dropped.

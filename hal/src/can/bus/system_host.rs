@@ -18,12 +18,12 @@ pub struct SystemHost<P> {
 }
 
 impl<P: Port> SystemHost<P> {
-    /// The clock starts at 0 now.
+    /// A host whose clock is 0 at this call.
     pub fn new(port: P) -> SystemHost<P> {
         SystemHost::since(port, Instant::now())
     }
 
-    /// The clock was 0 at `start`; hosts with the same `start` share a clock.
+    /// A host whose clock was 0 at `start`; hosts with the same `start` share a clock.
     pub fn since(port: P, start: Instant) -> SystemHost<P> {
         SystemHost {
             port,

@@ -154,7 +154,7 @@ impl CanopenDrive {
             .saturating_add(self.settings.times.state_timeout.as_nanos() as u64)
     }
 
-    /// Sends a set-point, and SYNC if the exchange is synchronous. *In the tick.*
+    /// Sends a set-point, and SYNC if the exchange is synchronous. Called in the tick: must not allocate or block.
     fn exchange(&mut self, controlword: u16, target: i16) -> Result<(), DeviceError> {
         let frame = set_point(self.settings.node, controlword, target);
         let mut sent = self.bus.send(&frame);

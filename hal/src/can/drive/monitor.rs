@@ -62,7 +62,7 @@ struct OnWatch {
 }
 
 impl OnWatch {
-    /// Notes the present number of commands.
+    /// Stores the present number of commands.
     fn update(&mut self, commands: u32, now_ns: u64) {
         if commands != self.commands {
             (self.commands, self.last_command_ns) = (commands, now_ns);

@@ -105,7 +105,7 @@ impl Sent {
         is_changed || is_timed
     }
 
-    /// Notes that `frame` is sent now; without a mapping there is no frame.
+    /// Stores `frame` as sent now; without a mapping there is no frame.
     fn record_sent(&mut self, frame: Option<CanFrame>, now_ns: u64) -> Option<CanFrame> {
         if frame.is_some() {
             self.time_ns = Some(now_ns);

@@ -35,7 +35,7 @@ fn run(mut client: Client, first: [u8; 8], values: &mut Values) -> (Progress, us
 
 #[test]
 fn expedited_frames_are_the_bytes_of_the_standard() {
-    // Worked by hand from the bit table of CiA 301, 7.2.4.3: 001 0 00 1 1 = 0x23 for four bytes, 0x2B for two, 0x2F for one.
+    // Computed by hand from the bit table of CiA 301, 7.2.4.3: 001 0 00 1 1 = 0x23 for four bytes, 0x2B for two, 0x2F for one.
     let address = Address::new(0x1017, 0);
     let download = |data: &[u8]| Client::download(address, data).1;
     assert_eq!(

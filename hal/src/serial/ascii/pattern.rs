@@ -52,7 +52,7 @@ impl Decimal {
         self.digits as f64 / 10f64.powi(self.decimals)
     }
 
-    /// Reads `text`; `None` unless all of it is one number.
+    /// Parses `text` as one number; `None` if it contains anything else.
     pub(super) fn read(text: &[u8]) -> Option<Self> {
         let (is_negative, unsigned) = split_sign(skip_spaces(text))?;
         let mut parts = unsigned.splitn(2, |byte| *byte == b'.');
@@ -174,7 +174,7 @@ impl Pattern {
         rest.is_empty().then_some(fields)
     }
 
-    /// The line with `value` and `code` in place of the fields. `None` if `value` has not the required width.
+    /// The line with `value` and `code` in place of the fields. `None` if `value` does not have the required width.
     pub(super) fn write(&self, value: &str, code: i64) -> Option<Vec<u8>> {
         let mut line = Vec::new();
         for piece in &self.pieces {

@@ -56,7 +56,7 @@ impl FaultInjector {
         };
     }
 
-    /// The position that is measured at `position_m`.
+    /// The measured position for the true position `position_m`, with the active fault applied.
     pub(super) fn measure(&mut self, position_m: f64, out_of_range_m: f64) -> f64 {
         self.measurements = self.measurements.wrapping_add(1);
         match self.fault {

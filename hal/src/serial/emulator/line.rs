@@ -12,7 +12,7 @@ use crate::serial::ioctl;
 use crate::serial::note::Note;
 use crate::serial::port::{Port, PortSettings, is_no_data};
 
-/// If more bytes than this are waiting in the terminal, nobody reads it.
+/// If more bytes than this are waiting in the terminal, it is not being read.
 const UNREAD_MAX: u32 = 2048;
 /// How long a write may wait for space.
 const WRITE_WAIT: Duration = Duration::from_millis(5);
@@ -122,7 +122,8 @@ impl Line {
         Ok(count)
     }
 
-    /// Bytes that nobody reads are lost, as on a wire.
+    /// Writes `bytes` to the line. On a pseudo terminal all unread bytes are discarded if more than [`UNREAD_MAX`] of
+    /// them wait; bytes that do not fit within [`WRITE_WAIT`] are lost.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let written = match &mut self.end {
             End::Port(port) => port.write(bytes, WRITE_WAIT),

@@ -5,7 +5,7 @@ use super::responder::Responder;
 use crate::serial::error::{SerialError, positive};
 use crate::serial::protocol::Protocol;
 
-/// An emulated probe: measures at a fixed rate, answers by its protocol, and misbehaves on request.
+/// An emulated probe: measures at a fixed rate, answers by its protocol, and shows injected faults.
 ///
 /// A slow caller does not reduce the rate: each call takes all measurements that became due since the previous call, at
 /// the given position.
@@ -56,7 +56,7 @@ impl EmulatedProbe {
         self.sampler.next_ns
     }
 
-    /// Makes the probe misbehave until another fault is injected. [`Fault::Reset`] happens once.
+    /// Injects a fault, which replaces the previous one. [`Fault::Reset`] acts once.
     pub fn inject_fault(&mut self, fault: Fault) {
         if fault == Fault::Reset {
             self.responder.restart();

@@ -27,8 +27,8 @@ impl LocusPlane {
         }
     }
 
-    /// The zeros s of a track, continuous: each of the two roots that is nearer to the one before, at first the right or
-    /// upper one.
+    /// The zeros s of a track, continuous: of the two roots, the one nearer to the previous zero; at first the right
+    /// or upper one.
     pub(super) fn places(self, track: &[Point]) -> Vec<Option<Complex<f64>>> {
         let mut last: Option<Complex<f64>> = None;
         let mut places = Vec::new();

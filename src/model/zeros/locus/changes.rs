@@ -26,7 +26,7 @@ pub enum Crossing {
 }
 
 impl Crossing {
-    /// In words.
+    /// Name of the place in the output.
     pub fn name(self) -> &'static str {
         match self {
             Crossing::ImaginaryAxis => "imaginary axis",

@@ -1,4 +1,4 @@
-//! Anything may come over a bus, in any order.
+//! Tests with random frames in random order.
 
 use proptest::prelude::*;
 
@@ -12,7 +12,7 @@ fn any_condition() -> impl Strategy<Value = Condition> {
     (0u32..0x200, any::<[u8; 8]>()).prop_map(|(class, data)| Condition::decode(class, &data))
 }
 
-/// Frames of the identifiers that matter, most of them, with any content.
+/// Frames with random content; most of them have an identifier that driver or drive uses.
 fn any_frame() -> impl Strategy<Value = CanFrame> {
     let ids = prop_oneof![
         Just(0x000u16),
@@ -35,7 +35,8 @@ fn any_event() -> impl Strategy<Value = BusEvent> {
 }
 
 proptest! {
-    /// The monitor: no panic; the only set-point it ever sends is zero current without voltage; a fault stays.
+    /// The monitor does not panic. The only set-point that it sends is zero current with the voltage disabled. A
+    /// fault stays latched.
     #[test]
     fn monitor_survives_random_events(
         events in proptest::collection::vec((any_event(), 0u64..30_000_000), 1..200), on in any::<bool>(),
@@ -59,7 +60,7 @@ proptest! {
         }
     }
 
-    /// The simulated drive: no panic, and current only in Operation Enabled.
+    /// The emulated drive does not panic, and gives current only in Operation Enabled.
     #[test]
     fn emulated_drive_survives_random_frames(
         frames in proptest::collection::vec((any_frame(), 0u64..30_000_000), 1..200),
@@ -79,8 +80,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Both together with a babbler on the bus: no panic, a status that is never wrong about being enabled for long, and
-    /// when the babbler is gone and the drive unplugged, no current.
+    /// Driver and emulated drive do not panic while another node sends random frames. After this node is removed and
+    /// the drive is unplugged, the driver reports a fault.
     #[test]
     fn driver_and_drive_survive_a_babbling_node(frames in proptest::collection::vec(any_frame(), 1..60)) {
         let mut rig = rig(ASYNCHRONOUS);
@@ -99,7 +100,7 @@ proptest! {
     }
 }
 
-/// 10 million random frames into the monitor, the simulated drive (with its SDO server) and an SDO client.
+/// Feeds 10 million random frames to the monitor, the emulated drive with its SDO server, and an SDO client.
 #[test]
 fn ten_million_random_frames_do_not_panic() {
     let shared = Arc::new(Shared::default());

@@ -1,4 +1,4 @@
-//! From power-on to current and back, and everything that is refused on the way.
+//! Tests: from power-on to current and back, and the drives and settings that are rejected.
 
 use super::super::super::cia402::PROFILE_TORQUE;
 use super::super::super::scale::Reference;

@@ -4,7 +4,7 @@ use super::super::super::bus::{BusError, Condition};
 use super::super::super::emulator::DeviceFault;
 use super::*;
 
-/// Enabled, 1 A flowing for 50 ms.
+/// A rig that is enabled and has commanded 1 A for 50 ms.
 fn running(exchange: Exchange) -> Rig {
     let mut rig = rig(exchange);
     rig.drive.enable().unwrap();
@@ -13,7 +13,8 @@ fn running(exchange: Exchange) -> Rig {
     rig
 }
 
-/// The fault is detected within `most_ms`. The current is zero within 3 ms more and remains zero, whatever the loop does.
+/// Asserts that the fault is detected within `most_ms`, and that the current is zero within 3 ms more and remains
+/// zero, whatever the loop does.
 fn assert_detected(rig: &mut Rig, code: u32, most_ms: u32) {
     let found_ms = rig.run_ms(1.0, most_ms + 1);
     assert_eq!(
@@ -50,7 +51,8 @@ fn assert_detected(rig: &mut Rig, code: u32, most_ms: u32) {
     assert_eq!(rig.device_current_a(), 0.0);
 }
 
-/// After the cause is removed: the operator clears the fault; the drive is off, and is enabled only on request.
+/// Asserts that the operator can clear the fault after its cause is removed: the drive is then off, and is enabled
+/// only on request.
 fn assert_recovers(rig: &mut Rig) {
     rig.device().inject(DeviceFault::None);
     rig.sleep_ms(50);
@@ -93,7 +95,7 @@ fn detects_faults_of_the_drive_with_the_next_status_frame() {
 
 #[test]
 fn detects_a_silent_drive_by_its_missing_status() {
-    // 20 ms without status; the drive still hears, so it is switched off.
+    // 20 ms without status. The drive still receives, so it is switched off.
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
         rig.device().inject(DeviceFault::Mute);
@@ -275,7 +277,7 @@ fn switches_off_when_the_loop_sends_no_commands() {
 fn disable_acts_immediately_and_without_the_service() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
-        rig.drive.service = TaskHandle::default(); // as if its thread hung
+        rig.drive.service = TaskHandle::default(); // as if its thread were blocked
         rig.drive.disable();
         rig.world.sleep(Duration::from_micros(200)); // two steps of the bus
         assert_eq!(rig.device_current_a(), 0.0, "{exchange:?}");
@@ -359,7 +361,7 @@ fn a_fault_that_persists_is_not_cleared() {
     let mut rig = running(ASYNCHRONOUS);
     rig.device().inject(DeviceFault::Drive(0x3220));
     rig.sleep_ms(5);
-    rig.device().inject(DeviceFault::SetPointsIgnored); // it does not hear the reset
+    rig.device().inject(DeviceFault::SetPointsIgnored); // the drive does not receive the reset
     assert_eq!(
         rig.drive.reset_fault().unwrap_err().code,
         i64::from(faults::FAULT_REMAINS)

@@ -50,7 +50,7 @@ fn rig(exchange: Exchange) -> Rig {
     .unwrap()
 }
 
-/// Why it did not open.
+/// The error of opening the drive.
 fn refusal(settings: DriveSettings, device: EmulatedDriveSettings) -> String {
     match open(settings, device) {
         Ok(_) => panic!("this must not open"),
@@ -67,7 +67,8 @@ impl Rig {
         self.device().current_a()
     }
 
-    /// A loop at 1 kHz that commands `current_a`, as long as the amplifier has no fault. The milliseconds it ran.
+    /// Runs a loop at 1 kHz that commands `current_a`, until the amplifier has a fault or `most_ms` are over. Returns
+    /// the milliseconds it ran.
     fn run_ms(&mut self, current_a: f64, most_ms: u32) -> u32 {
         for ms in 0..most_ms {
             if matches!(self.drive.status(), AmplifierStatus::Fault(_)) {
