@@ -1,4 +1,4 @@
-//! Options of `bench control`, and the settings that they make.
+//! Options of `bench control`, and the settings that they change.
 
 use std::path::Path;
 
@@ -150,7 +150,7 @@ fn reference(text: &str) -> Result<Reference, String> {
 }
 
 impl Args {
-    /// The settings that the options make.
+    /// The settings that the options change.
     pub fn settings(&self) -> Result<Vec<OptionSetting>, CliError> {
         self.refuse_unused()?;
         let mut settings = self.choice.settings();

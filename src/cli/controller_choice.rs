@@ -19,7 +19,7 @@ pub(super) struct ControllerChoice {
 }
 
 impl ControllerChoice {
-    /// The setting that the choice makes.
+    /// The setting that the choice changes.
     pub fn settings(&self) -> Vec<OptionSetting> {
         let (name, option) = match (self.fast, self.slow, &self.controller) {
             (true, _, _) => ("fast", "--fast".to_string()),

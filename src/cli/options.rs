@@ -1,4 +1,4 @@
-//! The options that all commands on a bench share, and the settings that they make.
+//! The options that all commands on a bench share, and the settings that they change.
 
 use clap::Args;
 
@@ -38,7 +38,7 @@ impl BenchOptions {
             .unwrap_or(crate::config::profiles::DEFAULT)
     }
 
-    /// The effective configuration; `more` are settings that the command's own options make.
+    /// The effective configuration; `more` are those of the command's own options.
     pub fn load(&self, purpose: Purpose, more: &[OptionSetting]) -> Result<Config, CliError> {
         let mut source = Source {
             config: self.config.clone(),
@@ -82,7 +82,7 @@ impl BenchOptions {
     }
 }
 
-/// The setting `key` that `option` makes with a quantity, if it is given.
+/// The setting `key` with the quantity of `option`, if it is given.
 pub(super) fn given<D>(
     key: &str,
     option: &str,

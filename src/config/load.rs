@@ -128,7 +128,7 @@ fn refuse(
         })
     };
     let mut lines: Vec<String> = findings.iter().map(line).collect();
-    // One option may make several settings.
+    // One option may set several settings.
     lines.dedup();
     refuse_lines(lines)
 }

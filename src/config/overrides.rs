@@ -1,4 +1,4 @@
-//! Settings made on the command line: `--set KEY=VALUE`, and options that set settings.
+//! Settings made on the command line: `--set KEY=VALUE`, and the options for single settings.
 
 use std::ops::RangeInclusive;
 

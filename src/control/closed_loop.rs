@@ -112,8 +112,8 @@ impl ClosedLoop {
             .collect()
     }
 
-    /// Command in amperes and reading in metres of each tick of [`simulate`](Self::simulate). The reading is the one
-    /// that follows the command.
+    /// Command in amperes and reading in metres of each tick of [`simulate`](Self::simulate). The reading is taken
+    /// before the command.
     pub fn signals(
         &self,
         ticks: usize,

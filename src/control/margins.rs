@@ -244,7 +244,7 @@ mod tests {
         };
         let found = margins(&l, &grid(1.0, 1e4, &[(w0, zeta)]), true, true);
         assert_eq!(found.crossings.len(), 2, "{:?}", found.crossings);
-        // L| = 1 at w^2 = w0^2 (1 +- 0.01), except for the effect of the damping.
+        // |L| = 1 at w^2 = w0^2 (1 +- 0.01), except for the effect of the damping.
         assert!((found.crossings[0].rad_s - w0 * 0.99f64.sqrt()).abs() < 1e-3);
         assert!((found.crossings[1].rad_s - w0 * 1.01f64.sqrt()).abs() < 1e-3);
     }

@@ -28,8 +28,8 @@ pub struct SteppedSineSettings {
     pub count: u32,
     /// How they are spaced.
     pub spacing: Spacing,
-    /// Settling time of each sine in seconds before it is measured; over the first half it replaces the previous
-    /// sine.
+    /// Settling time of each sine in seconds, before it is measured. In the first half of it the previous sine fades
+    /// out while this one fades in.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub settle_s: f64,
     /// Smallest measuring time of each sine in seconds: six blocks of whole periods; the last block shows the drift.

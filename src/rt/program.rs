@@ -1,7 +1,7 @@
 //! What the loop runs: an excitation, or a control law with a reference.
 //!
-//! A program is made before the run and passed to the loop as a whole. Its decisions depend on the tick of its run and the signals of
-//! [`ProgramInput`] alone, so that a recording can be replayed.
+//! A program is made before the run and passed to the loop as a whole. Its decisions depend on the tick of its run and
+//! the signals of [`ProgramInput`] alone, so that a recording can be replayed.
 
 use crate::control::{ControlLaw, LawInput};
 use crate::excitation::{Excitation, Reference};

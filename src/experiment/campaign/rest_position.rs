@@ -95,8 +95,8 @@ mod tests {
             let sign = |k| if segment(k) % 2 == 0 { 1.0 } else { -1.0 };
             let readings: Vec<f64> = (0..count).map(sign).collect();
             let (mean, scatter) = scatter(&readings);
-            // Ten means of +1 or -1 have the standard deviation sqrt(10/9). Segments of both signs differ by at most
-            // five readings.
+            // Ten means of +1 or -1 have the standard deviation sqrt(10/9). The numbers of readings
+            // in the segments of either sign differ by at most five.
             assert!(
                 (scatter - (10.0_f64 / 9.0).sqrt()).abs() < 1e-12,
                 "{count}: {scatter}"

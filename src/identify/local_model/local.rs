@@ -18,8 +18,8 @@
 //!
 //! S, the power of the noise around a bin, is the sum of w |e|^2 over the sum of these brackets, over neighbourhoods
 //! one half-width apart, weighted over two half-widths to either side. These are some 20 complex degrees of freedom:
-//! sigma itself has a deviation of 11 %, and +-1.96 sigma contain the true value in 94.3 % of all cases instead of 95
-//! % (Student's t of 40). The noise is only assumed to change little over that neighbourhood. A narrower line of
+//! sigma itself has a deviation of 11 %, and +-1.96 sigma contain the true value in 94.3 % of all cases instead of
+//! 95 % (Student's t of 40). The noise is only assumed to change little over that neighbourhood. A narrower line of
 //! noise (floor vibration at 5 Hz in a record of ten seconds, for example) is spread over it, and sigma is too small
 //! on the line; a longer record reduces this error.
 //!

@@ -335,8 +335,8 @@ mod tests {
             (left - 1.0).abs() < 5e-9 && least > 1.0 - 5e-9,
             "{left} {least}"
         );
-        // The motion is strongly nonlinear: the quadratic part of x4 is c (3 mm)^2 = 0.11 mm, its whole motion 0.5
-        // mm.
+        // The motion is strongly nonlinear: the parallelogram between stages 1 and 2 shortens by c (3 mm)^2 = 0.11 mm,
+        // compared with x1 = 0.5 mm.
         assert!(state.place.amax() > 1e-4);
     }
 

@@ -8,8 +8,8 @@
 //! | P4-2y: C4-3 and C4-4y give a value with CMP-CNMP zeros | exact for Eq. (4-1), if au and av keep their signs from psi_0 to the veering point; sufficient, not necessary | "C4-4y implies C4-1" holds at psi_0, not between: the same gap as in P4-2 |
 //!
 //! The proof of P4-2 in this reading: b2-hat (in the direction of av) is above |b21-hat| at psi_0 and below |b22-hat|
-//! at the veering point. All three are continuous between the two, because residues and frequencies are, and au av <
-//! 0 keeps |b21-hat| < |b22-hat|. Either b2-hat is between the two at one end, or it passes from above |b22-hat| to
+//! at the veering point. All three are continuous between the two, because residues and frequencies are, and
+//! au av < 0 keeps |b21-hat| < |b22-hat|. Either b2-hat is between the two at one end, or it passes from above |b22-hat| to
 //! below it, and just below it is between them.
 //!
 //! With the premises as printed (signs at one value only), predictions for random systems of Eq. (4-1) are wrong: 40

@@ -1,7 +1,7 @@
 //! Limits that a zero in the right half plane sets to every controller: Eqs. (1-1) to (1-3).
 //!
-//! If loop and closed loop are stable and |S(jw)| < alpha < 1 for all w < w0, a zero z = x + jy with x > 0 forces max
-//! |S| > (1/alpha)^(Theta/(pi - Theta)), where Theta is the angle that the interval from -j w0 to j w0 subtends at z.
+//! If loop and closed loop are stable and |S(jw)| < alpha < 1 for all w < w0, a zero z = x + jy with x > 0 forces
+//! max |S| > (1/alpha)^(Theta/(pi - Theta)), where Theta is the angle that the interval from -j w0 to j w0 subtends at z.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -65,8 +65,8 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// The bounds of all zeros in the right half plane, one per pair, the narrowest band first; `alpha` between 0 and
-    /// 1.
+    /// The bounds of all zeros in the right half plane, one per pair, the narrowest band first; `alpha` between
+    /// 0 and 1.
     pub fn of(zeros: &[Zero], alpha: f64, demand: Demand) -> Vec<Bound> {
         let right = zeros
             .iter()

@@ -366,8 +366,8 @@ mod tests {
 
     #[test]
     fn several_modes_together_dominate_as_di_or_dc() {
-        // G is positive just above the resonance of v. For w -> infinity, G(jw) = -(sum of residues)/w^2: R + v =
-        // -0.5 and u + v = -0.5 keep G positive, R + u + v = 1.5 makes it negative. So neither R nor u alone changes
+        // G is positive just above the resonance of v. For w -> infinity, G(jw) = -(sum of residues)/w^2: R + v = -0.5
+        // and u + v = -0.5 keep G positive, R + u + v = 1.5 makes it negative. So neither R nor u alone changes
         // the sign, only both together: [DI].
         assert_eq!(
             sequence(&[(0.0, 2.0), (1.0, 2.0), (2.0, -2.5)], 0.0),
