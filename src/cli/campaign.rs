@@ -142,11 +142,15 @@ fn measure_guided(
 ) -> Result<(), CliError> {
     let mut operator = TerminalOperator::new(stop, config.plant.beam_length_m())?;
     let tolerance = tolerances.operating_point;
-    Ok(campaign.run_guided(&mut operator, tolerance, &mut run_shown)?)
+    Ok(campaign.run_guided(&mut operator, tolerance, &mut run_with_progress)?)
 }
 
 /// Runs a plan with progress on a terminal.
-fn run_shown(setup: Setup, plan: &Plan, phase: &'static str) -> Result<Run, ExperimentError> {
+fn run_with_progress(
+    setup: Setup,
+    plan: &Plan,
+    phase: &'static str,
+) -> Result<Run, ExperimentError> {
     let progress = Progress::new(phase);
     let _line = ProgressLine::show(&progress);
     Runner { setup, progress }.run(plan, phase)

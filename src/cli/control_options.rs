@@ -31,7 +31,7 @@ const SPEED_KEY: &str = "control.reference.speed_m_per_s";
 
 /// The loop and its reference.
 #[derive(Clone, Debug, clap::Args)]
-#[command(after_help = what_happens_without_options())]
+#[command(after_help = defaults_help())]
 pub(super) struct Args {
     #[command(flatten)]
     pub bench: BenchOptions,
@@ -66,7 +66,7 @@ fn duration_help() -> String {
     format!("{closed}; for a chirp: length of the sweep [default: chirp.duration_s; {sweep}]")
 }
 
-fn what_happens_without_options() -> String {
+fn defaults_help() -> String {
     let value = |key| default_value(key).unwrap_or_default();
     format!(
         "Without options, in the profile `stage`: {} controller; reference: {} of {}, {} after the loop is closed; the loop is closed for {}.",

@@ -50,7 +50,7 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    if args.table.is_meant(&args.recording) {
+    if args.table.selects_csv(&args.recording) {
         return identify_external::run(
             &args.recording,
             args.out.as_deref(),

@@ -91,7 +91,7 @@ struct Report {
 
 impl ExternalOptions {
     /// Whether a file is to be read as a CSV: by the options, or by its name.
-    pub(super) fn is_meant(&self, path: &Path) -> bool {
+    pub(super) fn selects_csv(&self, path: &Path) -> bool {
         self.input.is_some()
             || path
                 .extension()

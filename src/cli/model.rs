@@ -96,6 +96,6 @@ fn meeting_text(point: &VeeringPoint) -> String {
 }
 
 /// At most 25 of some rows, evenly spread. JSON and files contain all rows.
-fn screenful<T>(rows: &[T]) -> impl Iterator<Item = &T> {
+fn evenly_spread_rows<T>(rows: &[T]) -> impl Iterator<Item = &T> {
     rows.iter().step_by(rows.len().div_ceil(25).max(1))
 }

@@ -22,7 +22,7 @@ pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
 }
 
 /// Whether the schema expects a number at `path` of `value`.
-pub(super) fn wants_number(schema: &Json, value: &Value, path: &str) -> bool {
+pub(super) fn expects_number(schema: &Json, value: &Value, path: &str) -> bool {
     keywords_at(schema, value, path).is_some_and(|keywords| keywords.is("number"))
 }
 

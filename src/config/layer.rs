@@ -44,10 +44,12 @@ impl Layer {
 
 /// Merges `over` into `base`: tables that `joins` accepts are merged key by key; everything else replaces the old
 /// value.
-pub(super) fn lay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
+pub(super) fn overlay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
     for (key, value) in over {
         match (base.get_mut(key), value) {
-            (Some(Value::Table(old)), Value::Table(new)) if joins(old, new) => lay(old, new, joins),
+            (Some(Value::Table(old)), Value::Table(new)) if joins(old, new) => {
+                overlay(old, new, joins)
+            }
             _ => {
                 base.insert(key.clone(), value.clone());
             }

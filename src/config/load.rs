@@ -8,7 +8,7 @@ use toml::{Table, Value};
 use super::check;
 use super::cross_checks::cross_checks;
 use super::error::ConfigError;
-use super::layer::{Layer, lay, same_kind};
+use super::layer::{Layer, overlay, same_kind};
 use super::overrides::{
     OptionSetting, convert_quantities, in_terms_of_option, options_table, sets,
 };
@@ -45,7 +45,7 @@ pub fn load(source: &Source) -> Result<Config, ConfigError> {
 }
 
 /// Tables that recordings of earlier versions lack. Those versions ran a chirp, so the tables of the default profile apply.
-const LATER: [&str; 6] = [
+const LATER_TABLES: [&str; 6] = [
     "excitation",
     "multisine",
     "stepped_sine",
@@ -59,7 +59,7 @@ pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
     if let Some(base) = profiles::find(profiles::PROFILES, profiles::DEFAULT) {
         let mut base = Layer::embedded(base)?;
-        base.table.retain(|key, _| LATER.contains(&key));
+        base.table.retain(|key, _| LATER_TABLES.contains(&key));
         layers.push(base);
     }
     let mut recorded = Layer::parse(name.to_string(), text.to_string())?;
@@ -88,9 +88,9 @@ fn checked(
 fn merge(schema: &Json, layers: &[Layer], options: &[OptionSetting]) -> (Value, Vec<Finding>) {
     let mut merged = Table::new();
     for layer in layers {
-        lay(&mut merged, &layer.table, same_kind);
+        overlay(&mut merged, &layer.table, same_kind);
     }
-    lay(&mut merged, &options_table(options), same_kind);
+    overlay(&mut merged, &options_table(options), same_kind);
     let sets = layers.last().filter(|layer| layer.name == Layer::SETS);
     let findings = sets.map(|sets| convert_quantities(schema, &sets.table, &mut merged));
     (Value::Table(merged), findings.unwrap_or_default())

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::ConfigError;
 use super::check;
-use super::layer::{Layer, lay};
+use super::layer::{Layer, overlay};
 use crate::util::finding::Finding;
 use crate::util::quantity::{Dimension, Quantity};
 
@@ -70,7 +70,7 @@ fn readings(number: f64, path: &str, allowed: &RangeInclusive<f64>) -> Vec<Strin
 pub(super) fn options_table(options: &[OptionSetting]) -> Table {
     let mut table = Table::new();
     for option in options {
-        lay_at(&mut table, &option.key, option.value.clone());
+        overlay_at(&mut table, &option.key, option.value.clone());
     }
     table
 }
@@ -98,7 +98,7 @@ pub(super) fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
             place: format!("--set {set}"),
             why: why.into(),
         })?;
-        lay_at(&mut table, key, value);
+        overlay_at(&mut table, key, value);
     }
     let text = toml::to_string(&table).unwrap_or_default();
     Ok(Layer {
@@ -121,12 +121,12 @@ fn key_and_value(set: &str) -> Result<(&str, Value), &'static str> {
     Ok((key, value))
 }
 
-fn lay_at(table: &mut Table, key: &str, value: Value) {
+fn overlay_at(table: &mut Table, key: &str, value: Value) {
     let nested = key.rsplit('.').fold(value, |inner, part| {
         Value::Table(Table::from_iter([(part.to_string(), inner)]))
     });
     if let Value::Table(nested) = nested {
-        lay(table, &nested, |_, _| true);
+        overlay(table, &nested, |_, _| true);
     }
 }
 
@@ -135,14 +135,14 @@ pub(super) fn convert_quantities(schema: &Json, sets: &Table, merged: &mut Table
     let mut texts = Vec::new();
     collect_texts(sets, "", &mut texts);
     let tree = Value::Table(merged.clone());
-    texts.retain(|(path, _)| check::wants_number(schema, &tree, path));
+    texts.retain(|(path, _)| check::expects_number(schema, &tree, path));
     let mut findings = Vec::new();
     for (path, text) in texts {
         let Ok(quantity) = text.parse::<Quantity>() else {
             continue;
         };
         match quantity.for_setting(&path, beam_length_m(merged)) {
-            Ok(si) => lay_at(merged, &path, Value::Float(si)),
+            Ok(si) => overlay_at(merged, &path, Value::Float(si)),
             Err(error) => findings.push(Finding::new(&path, format!("cannot be set: {error}"))),
         }
     }

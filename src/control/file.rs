@@ -176,7 +176,7 @@ impl ControllerText {
 
     /// The control law, checked for a servo rate.
     pub fn design(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
-        if !self.names_a_law() {
+        if !self.has_law() {
             return Ok(Box::new(self.sections(rate_hz)?));
         }
         let file: LawFile = config::typed(&self.name, &self.text)?;
@@ -190,7 +190,7 @@ impl ControllerText {
 
     /// The sections of a controller that is a cascade, checked for a servo rate.
     pub fn sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
-        if self.names_a_law() {
+        if self.has_law() {
             return Err(ControllerError::NotSections);
         }
         let file: ControllerFile = config::typed(&self.name, &self.text)?;
@@ -200,7 +200,7 @@ impl ControllerText {
             .collect()
     }
 
-    fn names_a_law(&self) -> bool {
+    fn has_law(&self) -> bool {
         let table = self.text.parse::<toml::Table>();
         table.is_ok_and(|table| table.contains_key("law"))
     }

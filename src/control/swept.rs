@@ -16,7 +16,7 @@ use crate::util::units::rad_s;
 /// Number of points over the band; a configuration allows up to 64.
 const POINTS: usize = 48;
 /// Frequencies at which the loop is evaluated between two points.
-const BETWEEN: usize = 32;
+const FREQUENCIES_BETWEEN_POINTS: usize = 32;
 
 /// Limits of a swept reference.
 #[derive(Clone, Debug)]
@@ -52,8 +52,8 @@ const STEP: f64 = 1.0 / (POINTS - 1) as f64;
 
 /// Places in the band from the point before to the point after, as ratios of the band.
 fn neighbourhood(point: usize) -> impl Iterator<Item = f64> {
-    (0..=2 * BETWEEN)
-        .map(move |j| (point as f64 - 1.0 + j as f64 / BETWEEN as f64) * STEP)
+    (0..=2 * FREQUENCIES_BETWEEN_POINTS)
+        .map(move |j| (point as f64 - 1.0 + j as f64 / FREQUENCIES_BETWEEN_POINTS as f64) * STEP)
         .map(|x| x.clamp(0.0, 1.0))
 }
 

@@ -44,7 +44,7 @@ pub use reference::{
     FileReference, HoldReference, RampReference, ReferenceContext, ReferenceDesign, ReferenceError,
     ReferenceSettings, SineReference, StepOfReference, StepReference, SweptReference,
 };
-pub use shape::{CurrentLimit, MOST_POINTS, shaped_amplitude};
+pub use shape::{CurrentLimit, MAX_POINTS, shaped_amplitude};
 pub use staircase::{Staircase, StaircaseSteps};
 pub use stepped_sine::{Spacing, SteppedSineSettings};
 pub use sweep::{ChirpSettings, Sweep, SweptSine};

@@ -108,7 +108,7 @@ const GROUP: usize = 4;
 /// Rounds of clipping.
 const ROUNDS: u32 = 100;
 /// Clipping level over the peak, in the first and in the last round.
-const CLIP: (f64, f64) = (0.5, 0.97);
+const CLIP_RATIOS: (f64, f64) = (0.5, 0.97);
 /// Samples in a period of the fastest line while the phases are optimised: peaks between samples are at most 4 % higher.
 const OVERSAMPLING: usize = 8;
 
@@ -197,7 +197,7 @@ fn phases(lines: &[(usize, f64)], seed: u64) -> Vec<Complex<f64>> {
 
 /// Clipping level of a round over the peak.
 fn clip_ratio(round: u32) -> f64 {
-    CLIP.0 + (CLIP.1 - CLIP.0) * f64::from(round) / f64::from(ROUNDS)
+    CLIP_RATIOS.0 + (CLIP_RATIOS.1 - CLIP_RATIOS.0) * f64::from(round) / f64::from(ROUNDS)
 }
 
 fn random_phases(count: usize, seed: u64) -> Vec<Complex<f64>> {

@@ -12,9 +12,9 @@ use super::limits::Limits;
 use crate::util::units::rad_s;
 
 /// Largest number of points of an amplitude curve.
-pub const MOST_POINTS: usize = 64;
+pub const MAX_POINTS: usize = 64;
 /// Largest deviation in ln A of the simplified curve.
-const CLOSE: f64 = 0.01;
+const MAX_DEVIATION: f64 = 0.01;
 
 /// Limits of the current of a sine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,7 @@ impl CurrentLimit {
 }
 
 /// The amplitude that moves the stage by `travel_m`, up to `limit`. `response` is (frequency in hertz, |G| in metres per
-/// ampere) with rising frequencies; the result has at most [`MOST_POINTS`] points. The largest amplitude is at most `span`
+/// ampere) with rising frequencies; the result has at most [`MAX_POINTS`] points. The largest amplitude is at most `span`
 /// times the smallest one.
 pub fn shaped_amplitude(
     response: &[(f64, f64)],
@@ -84,10 +84,10 @@ fn simplified(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
         return curve.to_vec();
     };
     let mut kept = vec![*first, *last];
-    while kept.len() < MOST_POINTS {
+    while kept.len() < MAX_POINTS {
         let errors = deviations(curve, &kept).map(f64::abs).enumerate();
         let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((index, _)) = worst.filter(|(_, error)| *error > CLOSE) else {
+        let Some((index, _)) = worst.filter(|(_, error)| *error > MAX_DEVIATION) else {
             break;
         };
         let place = kept.partition_point(|(f, _)| *f < curve[index].0);
@@ -136,7 +136,7 @@ mod tests {
     fn displacement_is_constant_up_to_the_limit_of_the_current() {
         let points = shaped_amplitude(&response(), 100e-6, CAP, f64::INFINITY);
         assert!(
-            (10..=MOST_POINTS).contains(&points.len()),
+            (10..=MAX_POINTS).contains(&points.len()),
             "{}",
             points.len()
         );
@@ -187,7 +187,7 @@ mod tests {
             .map(|k| (f64::from(k), 1e-6 * (1.0 + f64::from(k * k % 97))))
             .collect();
         let points = shaped_amplitude(&noisy, 1e-4, CAP, f64::INFINITY);
-        assert_eq!(points.len(), MOST_POINTS);
+        assert_eq!(points.len(), MAX_POINTS);
         assert!(
             points
                 .windows(2)

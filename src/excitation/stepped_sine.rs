@@ -107,7 +107,7 @@ impl ExcitationDesign for SteppedSineSettings {
 }
 
 /// Smallest number of ticks in a block.
-const LEAST_BLOCK: f64 = 16.0;
+const MIN_BLOCK_TICKS: f64 = 16.0;
 
 /// Sines one after the other, with zero current before and after.
 #[derive(Clone, Debug)]
@@ -197,7 +197,7 @@ impl SteppedSine {
     }
 
     /// The current of a sine at a tick, times `share`; 0 without a sine.
-    fn shared_current_a(&self, sine: Option<&Sine>, tick: u64, share: f64) -> f64 {
+    fn scaled_current_a(&self, sine: Option<&Sine>, tick: u64, share: f64) -> f64 {
         match sine {
             Some(sine) if share > 0.0 => share * sine.current_a(tick, self.settle_ticks),
             _ => 0.0,
@@ -217,8 +217,8 @@ impl SteppedSine {
 
 /// Whole turns q and ticks m of a block that lasts at least `least_s`; its frequency q rate/m is nearest to the requested one.
 fn block(frequency_hz: f64, least_s: f64, rate_hz: f64) -> (u64, u64) {
-    let turns = libm::ceil(frequency_hz * least_s.max(LEAST_BLOCK / rate_hz) - 1e-9).max(1.0);
-    let block = libm::round(turns * rate_hz / frequency_hz).max(LEAST_BLOCK) as u64;
+    let turns = libm::ceil(frequency_hz * least_s.max(MIN_BLOCK_TICKS / rate_hz) - 1e-9).max(1.0);
+    let block = libm::round(turns * rate_hz / frequency_hz).max(MIN_BLOCK_TICKS) as u64;
     // Close to half the rate, the nearest frequency would be half the rate itself, which has no phase.
     ((turns as u64).min((block - 1) / 2), block)
 }
@@ -231,7 +231,7 @@ impl Excitation for SteppedSine {
             |sine| sine.start,
         );
         let share = fade(tick.saturating_sub(begun) as f64, self.fade_ticks as f64);
-        self.shared_current_a(now, tick, share) + self.shared_current_a(before, tick, 1.0 - share)
+        self.scaled_current_a(now, tick, share) + self.scaled_current_a(before, tick, 1.0 - share)
     }
 
     fn active(&self, tick: u64) -> bool {

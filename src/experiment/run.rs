@@ -28,7 +28,7 @@ const RING_SLOTS: usize = 1 << 16;
 /// Seconds that are recorded after the motor was switched off.
 const TAIL_S: f64 = 0.1;
 /// Period of the supervisor.
-const BEAT: Duration = Duration::from_millis(5);
+const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
 
 /// A run that has ended; results can still be added to its recording.
 pub struct Run {
@@ -193,7 +193,7 @@ impl PreparedRun {
         };
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
-        let ended = supervisor.watch_over(self.servo_loop, report)?;
+        let ended = supervisor.wait_for_end(self.servo_loop, report)?;
         let recorder = recorder.join()?;
         let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
         Ok(Run {
@@ -216,7 +216,7 @@ struct Supervisor {
 
 impl Supervisor {
     /// Starts the loop and waits for its end.
-    fn watch_over(
+    fn wait_for_end(
         &mut self,
         prepared: PreparedLoop,
         watch: impl FnMut(),
@@ -237,7 +237,7 @@ impl Supervisor {
         (mut interrupt, mut terminate): (Signal, Signal),
         mut watch: impl FnMut(),
     ) {
-        let mut beat = tokio::time::interval(BEAT);
+        let mut beat = tokio::time::interval(SUPERVISION_PERIOD);
         while !thread.is_finished() {
             tokio::select! {
                 _ = beat.tick() => watch(),

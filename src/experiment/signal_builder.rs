@@ -12,7 +12,7 @@ use crate::util::running_stats::RunningStats;
 const FILLED_RATIO: f64 = 1e-3;
 
 /// Times that differ by less than this ratio of a period are treated as equal.
-const SAME: f64 = 1e-3;
+const SAME_TIME_RATIO: f64 = 1e-3;
 
 /// The signals of a run at regular times.
 pub(super) struct RunSignals {
@@ -163,7 +163,7 @@ impl SignalBuilder {
     /// The positions at the mean age; `None` if all ages are equal.
     fn aligned_positions(&self) -> Option<Vec<f64>> {
         let (low_s, high_s) = self.offset_range_s;
-        if (high_s - low_s) * self.rate_hz <= SAME {
+        if (high_s - low_s) * self.rate_hz <= SAME_TIME_RATIO {
             return None;
         }
         let start_s = self.first_s + self.offset_s.mean;
@@ -180,7 +180,7 @@ fn aligned_currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
     let (Some(first), Some(last)) = (known.first(), known.last()) else {
         return input_a;
     };
-    if last - first <= SAME {
+    if last - first <= SAME_TIME_RATIO {
         return input_a;
     }
     let median = known[known.len() / 2];

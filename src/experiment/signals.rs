@@ -30,7 +30,7 @@ pub fn abandon_on_signal<T: Send + 'static>(
         let thread = analysis_thread().spawn(move || drop(sender.send(work())));
         thread.map_err(RunError::system(START))?;
         tokio::select! {
-            result = result => result.map(Some).map_err(died),
+            result = result => result.map(Some).map_err(thread_panicked),
             _ = interrupt.recv() => Ok(None),
             _ = terminate.recv() => Ok(None),
         }
@@ -50,7 +50,7 @@ pub fn stop_on_signal<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Re
             thread.map_err(RunError::system(START))?;
             loop {
                 tokio::select! {
-                    result = &mut result => return result.map_err(died),
+                    result = &mut result => return result.map_err(thread_panicked),
                     _ = interrupt.recv() => stop.store(true, Ordering::Relaxed),
                     _ = terminate.recv() => stop.store(true, Ordering::Relaxed),
                 }
@@ -70,7 +70,7 @@ pub(super) fn runtime() -> std::io::Result<Runtime> {
         .build()
 }
 
-fn died(_: RecvError) -> RunError {
+fn thread_panicked(_: RecvError) -> RunError {
     RunError::System {
         what: "finish the analysis",
         why: "its thread panicked; please report this with the command and its input".into(),

@@ -12,7 +12,7 @@ use crate::rt::record::LoopMessage;
 
 /// Pause of the thread when the ring is empty: 5 ticks at 5 kHz, so the ring stays nearly empty and an idle recorder needs
 /// almost no processor time.
-const REST: Duration = Duration::from_millis(1);
+const IDLE_PAUSE: Duration = Duration::from_millis(1);
 
 /// Nice value of the thread.
 const NICE: libc::c_int = 15;
@@ -93,7 +93,7 @@ fn run(
     health: &Health,
 ) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
-    yield_to_others();
+    lower_priority();
     let mut outcome = Ok(());
     loop {
         // Read before the ring is emptied: everything that was pushed before the producer was dropped is then in the ring.
@@ -104,14 +104,14 @@ fn run(
         if ended {
             return outcome.map(|()| recorder);
         }
-        std::thread::sleep(REST);
+        std::thread::sleep(IDLE_PAUSE);
     }
 }
 
 /// Lowers the priority of this thread, if possible. Compressing a chunk takes milliseconds, while the ring holds seconds:
 /// everything else is more urgent, above all the work of the kernel between a serial port and its reader.
 #[allow(unsafe_code, reason = "setpriority has no safe wrapper")]
-fn yield_to_others() {
+fn lower_priority() {
     // SAFETY: no memory is touched; 0 is the calling thread, and raising its nice value is always permitted.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }

@@ -161,7 +161,7 @@ impl Contents {
 
     /// Reads a chunk with a separate reader, which checks the CRC before it returns a record.
     fn chunk(&mut self, chunk: &[u8], take: &mut Take) -> Result<(), String> {
-        vet_chunk(chunk)?;
+        check_chunk(chunk)?;
         let mut reader = chunk_reader(chunk);
         while let Some(event) = reader.next_event() {
             match event.map_err(|e| error::why(&e))? {
@@ -244,7 +244,7 @@ fn chunk_reader(chunk: &[u8]) -> LinearReader {
 }
 
 /// Refuses a chunk that `mcap` would not check (no CRC) or would panic at (a length beyond the end of an uncompressed chunk).
-fn vet_chunk(chunk: &[u8]) -> Result<(), String> {
+fn check_chunk(chunk: &[u8]) -> Result<(), String> {
     let Record::Chunk { header, data } =
         parse_record(op::CHUNK, chunk).map_err(|e| error::why(&e))?
     else {

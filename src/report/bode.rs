@@ -10,9 +10,9 @@ const HEIGHTS: [f64; 3] = [320.0, 243.0, 132.0];
 /// Part of an axis left free above and below the curves.
 const MARGIN: f64 = 0.06;
 /// Smallest height of the magnitude axis in decades.
-const LEAST_DECADES: f64 = 1.0;
+const MIN_DECADES: f64 = 1.0;
 /// Smallest height of the phase axis in degrees.
-const LEAST_DEGREES: f64 = 180.0;
+const MIN_DEGREES: f64 = 180.0;
 
 /// The Bode plot of some responses, as an SVG document.
 ///
@@ -150,7 +150,7 @@ fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
         let positive = magnitudes.filter(|magnitude| *magnitude > 0.0);
         range(positive.map(libm::log10))
     });
-    let (low, high) = with_margin(logs?, LEAST_DECADES);
+    let (low, high) = with_margin(logs?, MIN_DECADES);
     Some((libm::pow(10.0, low), libm::pow(10.0, high)))
 }
 
@@ -163,7 +163,7 @@ fn phase_range(lines: &[Line]) -> (f64, f64) {
                 .flat_map(|line| visible(line, &line.phase_deg, all)),
         )
     });
-    with_margin(phases.unwrap_or((0.0, 0.0)), LEAST_DEGREES)
+    with_margin(phases.unwrap_or((0.0, 0.0)), MIN_DEGREES)
 }
 
 /// The values that widen an axis: those that are certain, or all.

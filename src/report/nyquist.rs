@@ -14,7 +14,7 @@ const CIRCLES: usize = 90;
 /// Circles smaller than this part of the largest magnitude are invisible and not drawn.
 const VISIBLE: f64 = 0.004;
 /// Opacity of a circle.
-const STRENGTH: f64 = 0.13;
+const OPACITY: f64 = 0.13;
 const MICRO: f64 = 1e6;
 
 /// The Nyquist plot as an SVG document: all frequencies, in µm/A or in the unit of the columns, and beside them a part of
@@ -70,7 +70,7 @@ fn circles(mut chart: Chart, line: &Line, frf: &Frf, indices: &[usize], factor: 
     let mut name = "95 % circles";
     for (centre, radius) in visible_circles(line, frf, indices) {
         let outline = ellipse::circle((centre.re * factor, centre.im * factor), factor * radius);
-        chart = chart.area(name, line.pen.colour, STRENGTH, outline);
+        chart = chart.area(name, line.pen.colour, OPACITY, outline);
         name = "";
     }
     chart

@@ -16,13 +16,13 @@ const ENLARGED: usize = 3;
 /// Ends of the line that marks the imaginary axis, beyond any frame, in rad/s.
 const FAR: f64 = 1e9;
 /// Part of the half-width of an enlarged ellipse left free beside it.
-const ROOM: f64 = 0.45;
+const MARGIN_RATIO: f64 = 0.45;
 /// An enlarged zero is shown with the imaginary axis if its distance from it is at most this multiple of the ellipse's half-width.
 const AXIS_WITHIN: f64 = 6.0;
 /// Poles of a larger damping ratio do not widen the frame.
 const OSCILLATING: f64 = 0.2;
 /// Opacity of an ellipse.
-const STRENGTH: f64 = 0.22;
+const OPACITY: f64 = 0.22;
 
 /// Ranges of real and imaginary part in rad/s.
 type Window = ((f64, f64), (f64, f64));
@@ -193,8 +193,11 @@ fn enlarged_zero(zero: &UncertainPoint) -> Chart {
     let (re, im) = zero.half_widths();
     let with_axis = zero.s.re.abs() <= AXIS_WITHIN * re;
     let axis = if with_axis { -zero.s.re } else { 0.0 };
-    let x = ((-re).min(axis) - ROOM * re, re.max(axis) + ROOM * re);
-    let y = ((1.0 + ROOM) * -im, (1.0 + ROOM) * im);
+    let x = (
+        (-re).min(axis) - MARGIN_RATIO * re,
+        re.max(axis) + MARGIN_RATIO * re,
+    );
+    let y = ((1.0 + MARGIN_RATIO) * -im, (1.0 + MARGIN_RATIO) * im);
     let mut chart = Chart::new(
         &enlarged_heading(zero),
         offset_scale("Real", zero.s.re, re, x),
@@ -242,7 +245,7 @@ fn with_ellipse(chart: Chart, name: &str, zero: &UncertainPoint, origin: Complex
     let outline = ellipse.outline((centre.re, centre.im));
     let pen = Pen::solid(zero.colour()).width(1.0);
     chart
-        .area(name, zero.colour(), STRENGTH, outline.clone())
+        .area(name, zero.colour(), OPACITY, outline.clone())
         .line("", pen, outline)
 }
 

@@ -9,7 +9,7 @@ use bench_hal::Tick;
 use super::arming::Trip;
 
 /// A constant measured current is an error if the commands moved by more than this multiple of the tolerance.
-const MOVED: f64 = 4.0;
+const CHANGE_RATIO: f64 = 4.0;
 
 /// Lowest and highest current in amperes.
 #[derive(Clone, Copy, Debug)]
@@ -108,7 +108,7 @@ impl FollowingError {
 
     /// Whether the measured current was constant although the commands changed.
     fn is_constant(&self) -> bool {
-        self.commanded.width() > MOVED * self.error_a && self.measured.width() < self.error_a
+        self.commanded.width() > CHANGE_RATIO * self.error_a && self.measured.width() < self.error_a
     }
 }
 

@@ -100,7 +100,7 @@ pub(crate) fn follow(
 /// Rounds of refinement.
 const REFINEMENTS: usize = 3;
 /// Largest motion of a zero from one value to the next, as a ratio of its magnitude.
-const STRIDE: f64 = 0.03;
+const MAX_MOTION_RATIO: f64 = 0.03;
 
 /// Values to both sides of a meeting, nearer and nearer.
 fn beside(value: f64, values: &[f64]) -> Vec<f64> {
@@ -119,7 +119,7 @@ fn beside(value: f64, values: &[f64]) -> Vec<f64> {
 fn between(locus: &Locus) -> Vec<f64> {
     let far = |k: &usize| {
         let moved = |track: &Vec<Option<Complex<f64>>>| match (track[*k], track[k + 1]) {
-            (Some(a), Some(b)) => (a - b).norm() > STRIDE * (a.norm() + b.norm()),
+            (Some(a), Some(b)) => (a - b).norm() > MAX_MOTION_RATIO * (a.norm() + b.norm()),
             _ => false,
         };
         locus.tracks.iter().any(moved)

@@ -1,7 +1,7 @@
 //! The text of `bench model conditions`.
 
 use super::super::table::{table, wrap};
-use super::{meeting_text, screenful};
+use super::{evenly_spread_rows, meeting_text};
 use crate::model::veering::conditions::Condition;
 use crate::model::veering::propositions::Proposition;
 use crate::model::veering::report::{
@@ -123,8 +123,8 @@ fn premise_text(condition: &Condition) -> String {
 }
 
 fn rows_text(rows: &[ConditionRow]) -> String {
-    let margins: Vec<Vec<String>> = screenful(rows).map(margin_row).collect();
-    let residues: Vec<Vec<String>> = screenful(rows).map(residue_row).collect();
+    let margins: Vec<Vec<String>> = evenly_spread_rows(rows).map(margin_row).collect();
+    let residues: Vec<Vec<String>> = evenly_spread_rows(rows).map(residue_row).collect();
     format!(
         "margins of C4-1 and C4-2, and the zeros\n{}\nresidues in 1/kg, and b2 between its limits (in the direction of av)\n{}",
         table(

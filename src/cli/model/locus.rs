@@ -7,7 +7,7 @@ use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::output::print_result;
 use super::super::table::{table, wrap};
-use super::screenful;
+use super::evenly_spread_rows;
 use super::sweep::SweepArgs;
 use crate::model::plant::ModalModel;
 use crate::model::zeros::{
@@ -158,7 +158,7 @@ fn tracks_table(report: &Report) -> String {
     let mut header = vec!["value".to_string()];
     header.extend((1..=report.tracks.len()).map(|number| format!("zero {number} rad/s")));
     let places: Vec<usize> = (0..report.values.len()).collect();
-    let rows: Vec<Vec<String>> = screenful(&places)
+    let rows: Vec<Vec<String>> = evenly_spread_rows(&places)
         .map(|&k| {
             let mut row = vec![format!("{:.6}", report.values[k])];
             row.extend(report.tracks.iter().map(|track| place_text(track, k)));

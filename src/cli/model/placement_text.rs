@@ -2,7 +2,7 @@
 
 use super::super::table::{table, wrap};
 use crate::model::veering::QuadrantSummary;
-use crate::model::veering::placement::{LEAST_REMAINDER_RATIO, Placement, PlacementReport, Trial};
+use crate::model::veering::placement::{MIN_REMAINDER_RATIO, Placement, PlacementReport, Trial};
 
 /// Placements that are listed; the JSON has all.
 const LISTED: usize = 16;
@@ -104,7 +104,7 @@ fn numeral(quadrant: Option<usize>, none: &str) -> String {
 fn advice_text(report: &PlacementReport) -> String {
     let head = format!(
         "recommended, of places where aR is at least {:.0} % of its present value",
-        LEAST_REMAINDER_RATIO * 100.0
+        MIN_REMAINDER_RATIO * 100.0
     );
     let advice = [
         ("of all", &report.recommended),

@@ -8,7 +8,7 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::sweep::CloseModesArgs;
-use super::{meeting_text, screenful};
+use super::{evenly_spread_rows, meeting_text};
 use crate::config::Purpose;
 use crate::model::veering::report::{Shares, VeeringReport};
 use crate::model::veering::{Loci, ModesAt, close_pair};
@@ -110,7 +110,7 @@ fn loci_table(report: &VeeringReport) -> String {
     let [u, v] = report.point.modes;
     let frequency = |mode: usize, k: usize| format!("{:.4}", report.frequencies_hz[mode - 1][k]);
     let places: Vec<usize> = (0..report.values.len()).collect();
-    let rows: Vec<Vec<String>> = screenful(&places)
+    let rows: Vec<Vec<String>> = evenly_spread_rows(&places)
         .map(|&k| {
             vec![
                 format!("{:.6}", report.values[k]),

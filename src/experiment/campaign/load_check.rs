@@ -214,7 +214,7 @@ impl ExpectedModes {
         let is_sign_wrong = expected_sign.is_some_and(|expected| expected != sign);
         match is_frequency_off || is_sign_wrong {
             true => Finding::Fails,
-            false if self.proves_the_load(k) => Finding::Holds,
+            false if self.distinguishes_the_load(k) => Finding::Holds,
             false => Finding::CannotTell,
         }
     }
@@ -223,7 +223,7 @@ impl ExpectedModes {
         hz(&self.loaded[k])
     }
 
-    fn proves_the_load(&self, k: usize) -> bool {
+    fn distinguishes_the_load(&self, k: usize) -> bool {
         residue_ratio(&self.unloaded, k) < NEGLIGIBLE_RATIO
             || distance(hz(&self.unloaded[k]), self.expected_hz(k)) > 2.0 * self.tolerance
     }

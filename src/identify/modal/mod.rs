@@ -102,7 +102,7 @@ fn too_few(data: &[FrfDatum]) -> FitError {
 
 /// The fit of the needed modes, with the residual as noise; without orders and band.
 fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
-    let start = start.slowest_first();
+    let start = start.by_rising_frequency();
     let data = &merged(problem.data, &start);
     if 2 * data.len() <= start.free().len() {
         return Err(too_few(data));

@@ -55,7 +55,7 @@ impl ModalParameters {
     }
 
     /// The parameters with the lowest frequency first.
-    pub(super) fn slowest_first(mut self) -> ModalParameters {
+    pub(super) fn by_rising_frequency(mut self) -> ModalParameters {
         self.modes
             .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
         self

@@ -17,7 +17,7 @@ pub(super) fn modes(
 ) -> Result<(DVector<f64>, DMatrix<f64>), PlantError> {
     let singular = PlantError::SingularMass;
     let lower = mass.clone().cholesky().ok_or(singular.clone())?.unpack();
-    let symmetric = whitened(&lower, stiffness).ok_or(singular.clone())?;
+    let symmetric = mass_normalised(&lower, stiffness).ok_or(singular.clone())?;
     let eigen = symmetric
         .try_symmetric_eigen(f64::EPSILON, MAX_ITERATIONS)
         .ok_or(PlantError::NoConvergence { what: "the modes" })?;
@@ -30,7 +30,7 @@ pub(super) fn modes(
 }
 
 /// L^-1 K L^-T, symmetric.
-fn whitened(lower: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+fn mass_normalised(lower: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let half = lower.solve_lower_triangular(stiffness)?;
     let full = lower.solve_lower_triangular(&half.transpose())?;
     Some(0.5 * (&full + full.transpose()))

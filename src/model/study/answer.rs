@@ -12,7 +12,7 @@ const EXAMPLES: usize = 5;
 const INTERACTIONS: usize = 10;
 /// A difference is significant above this multiple of its standard deviation, an interaction above this multiple of
 /// its noise.
-const SIGNIFICANT: f64 = 4.0;
+const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
 /// The answer of a study, or of one shard of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -228,7 +228,7 @@ fn effect(key: &str, index: usize, effects: &Effects) -> Effect {
 fn direction([low, _, high]: &[Cell; 3]) -> char {
     let difference = high.probability() - low.probability();
     let sigma = high.sigma().hypot(low.sigma());
-    match difference.abs() > SIGNIFICANT * sigma {
+    match difference.abs() > SIGNIFICANT_SIGMAS * sigma {
         true if difference > 0.0 => '+',
         true => '-',
         false => '0',
@@ -240,7 +240,7 @@ fn interactions(varied: &[Varied], effects: &Effects) -> Vec<Interaction> {
     let shares = effects.interactions();
     let known = shares.filter_map(|(pair, share)| Some((pair, share?)));
     let mut strongest: Vec<([usize; 2], Share)> = known
-        .filter(|(_, share)| share.value > SIGNIFICANT * share.noise)
+        .filter(|(_, share)| share.value > SIGNIFICANT_SIGMAS * share.noise)
         .collect();
     strongest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
     strongest.truncate(INTERACTIONS);

@@ -27,7 +27,7 @@ const CLASSES: usize = 18;
 const PAIR_CLASSES: std::ops::RangeInclusive<usize> = 4..=32;
 const DRAWS_IN_PAIR_CLASS: f64 = 50.0;
 /// With fewer draws than this in a class there is no estimate.
-const LEAST_IN_CLASS: u64 = 10;
+const MIN_IN_CLASS: u64 = 10;
 
 /// Draws of a class, and those of them with pairs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -181,7 +181,7 @@ struct Spread {
 impl Spread {
     fn of(cells: &[Cell]) -> Option<Spread> {
         let sum = Cell::sum(cells);
-        if sum.all < LEAST_IN_CLASS * cells.len() as u64 || sum.yes == 0 || sum.yes == sum.all {
+        if sum.all < MIN_IN_CLASS * cells.len() as u64 || sum.yes == 0 || sum.yes == sum.all {
             return None;
         }
         let (draws, yes) = (sum.all as f64, sum.yes as f64);

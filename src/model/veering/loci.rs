@@ -20,7 +20,7 @@ use crate::model::plant::{PlantError, Structure};
 /// Steps below this ratio of the range are not halved any more.
 const SMALLEST_STEP: f64 = 1e-12;
 /// For modes that are equal at the first value, the basis is taken at this ratio of the range.
-const FIRST_LOOK: f64 = 1e-3;
+const FIRST_BASIS_RATIO: f64 = 1e-3;
 /// A mode with less than this ratio of the largest residue, at all values, cannot be observed.
 const OBSERVED_RATIO: f64 = 1e-9;
 /// Steps of the golden section: 0.618^80 is 2e-17.
@@ -74,7 +74,7 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         let (from, to) = (values[0], values[values.len() - 1]);
         let mut first = ModesAt::of(at(from)?, from)?;
         if (1..first.count()).any(|next| first.are_equal([next - 1, next])) {
-            let inside = from + FIRST_LOOK * (to - from);
+            let inside = from + FIRST_BASIS_RATIO * (to - from);
             first = first.following(&ModesAt::of(at(inside)?, inside)?);
         }
         let mut loci = Loci {
@@ -116,7 +116,7 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         let before = &self.path[index - 1];
         let (low, high) = (before.value, modes.value);
         let next = modes.clone().following(before);
-        if before.leads_to(&next) || (high - low).abs() <= self.smallest_step {
+        if before.continues_in(&next) || (high - low).abs() <= self.smallest_step {
             self.path.insert(index, next);
             return Ok(index);
         }

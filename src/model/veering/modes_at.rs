@@ -222,7 +222,7 @@ impl ModesAt {
     }
 
     /// Whether each mode has a clear continuation in `next` by its shape, and no two modes change their order.
-    pub(super) fn leads_to(&self, next: &ModesAt) -> bool {
+    pub(super) fn continues_in(&self, next: &ModesAt) -> bool {
         let n = self.count();
         let keeps_order = |i: usize, j: usize| self.order(i, j) * next.order(i, j) >= 0.0;
         (0..n).all(|mode| self.mac(mode, next, mode) > CLEAR_MAC)

@@ -12,7 +12,7 @@ use crate::model::plant::{PlantError, Port, PortWeights};
 use crate::model::zeros::cnmp_pairs;
 
 /// Placements with less than this ratio of the present aR are not recommended: the probe hardly measures the controlled motion.
-pub const LEAST_REMAINDER_RATIO: f64 = 0.1;
+pub const MIN_REMAINDER_RATIO: f64 = 0.1;
 
 /// A placement over a range of values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -359,7 +359,7 @@ impl PlacementReport {
         let diagrams = path.diagrams(&placements.own);
         let [actuator, sensor] = &placements.names;
         let present = here.as_ref().map(|here| here.trial.remainder_per_kg);
-        let least = LEAST_REMAINDER_RATIO * present.unwrap_or(0.0);
+        let least = MIN_REMAINDER_RATIO * present.unwrap_or(0.0);
         Ok(PlacementReport {
             modes: path.pair.map(|mode| mode + 1),
             meeting,

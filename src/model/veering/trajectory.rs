@@ -10,7 +10,7 @@ use crate::model::zeros::{ModalTerm, Zero, ZeroKind, undamped_zeros};
 /// Bisections between two values: a step of the grid over 2^44 is below the rounding of a value.
 const BISECTIONS: usize = 44;
 /// Modes with a residue below this ratio of the largest do not separate zeros from those of the two modes.
-const SILENT_RATIO: f64 = 1e-9;
+const UNOBSERVED_RATIO: f64 = 1e-9;
 
 /// Force and sensor vector: generalised force per newton, and displacement per unit of each degree of freedom.
 pub type Ports = [DVector<f64>; 2];
@@ -112,7 +112,7 @@ impl Sample {
 /// The other modes that can be observed.
 fn observed_beside(terms: &[ModalTerm], pair: [usize; 2]) -> impl Iterator<Item = &ModalTerm> {
     let sizes = terms.iter().map(|term| term.residue_per_kg.abs());
-    let least = SILENT_RATIO * sizes.fold(0.0, f64::max);
+    let least = UNOBSERVED_RATIO * sizes.fold(0.0, f64::max);
     let others = terms.iter().enumerate();
     let others = others.filter(move |(mode, _)| !pair.contains(mode));
     others

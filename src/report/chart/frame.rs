@@ -13,9 +13,9 @@ pub(super) struct Frame {
 }
 
 /// Distance in pixels by which a simplified line may miss a point.
-const INVISIBLE: f64 = 0.15;
+const MAX_LINE_ERROR: f64 = 0.15;
 /// Half a rounding of the page, so that a point on the frame counts as inside.
-const SLACK: f64 = 0.06;
+const HALF_ROUNDING: f64 = 0.06;
 
 impl Frame {
     pub fn width(&self) -> f64 {
@@ -27,8 +27,8 @@ impl Frame {
     }
 
     pub fn contains(&self, (x, y): (f64, f64)) -> bool {
-        (self.left - SLACK..=self.right + SLACK).contains(&x)
-            && (self.top - SLACK..=self.bottom + SLACK).contains(&y)
+        (self.left - HALF_ROUNDING..=self.right + HALF_ROUNDING).contains(&x)
+            && (self.top - HALF_ROUNDING..=self.bottom + HALF_ROUNDING).contains(&y)
     }
 
     /// The nearest point of the frame.
@@ -125,7 +125,7 @@ fn simplified(points: &[(f64, f64)]) -> Points {
 fn farthest(points: &[(f64, f64)], from: usize, to: usize) -> Option<usize> {
     let distances = (from + 1..to).map(|k| (k, distance(points[k], points[from], points[to])));
     let far = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (far.1 > INVISIBLE).then_some(far.0)
+    (far.1 > MAX_LINE_ERROR).then_some(far.0)
 }
 
 /// Distance of a point from the segment between two others.

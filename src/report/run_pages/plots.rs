@@ -14,7 +14,7 @@ use crate::report::{
 };
 
 /// The part of a Nyquist plot around two close modes extends by this multiple of their distance to either side.
-const AROUND: f64 = 1.5;
+const SURROUNDINGS_RATIO: f64 = 1.5;
 
 const BODE_CAPTION: &str = "Magnitude, phase and coherence: measured with a band of two sigma, the model of the configuration \
     and the fit of modes, where they exist. The line is faint where the band reaches zero magnitude.";
@@ -177,7 +177,7 @@ fn nyquist(
 
 /// The frequencies around two close modes, in hertz.
 fn surroundings_hz((low, high): (f64, f64)) -> (f64, f64) {
-    let room = AROUND * (high - low);
+    let room = SURROUNDINGS_RATIO * (high - low);
     ((low - room).max(0.0) / TAU, (high + room) / TAU)
 }
 

@@ -60,7 +60,7 @@ impl MemoryBus {
         lock(&self.wire).is_down = is_down;
     }
 
-    fn carry(&self, frame: &CanFrame, from: &Arc<Mailbox>) -> Result<(), BusError> {
+    fn deliver(&self, frame: &CanFrame, from: &Arc<Mailbox>) -> Result<(), BusError> {
         let wire = lock(&self.wire);
         if wire.is_down {
             return Err(BusError::Down);
@@ -110,7 +110,7 @@ pub struct MemoryEndpoint {
 
 impl CanBus for MemoryEndpoint {
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        self.bus.carry(frame, &self.mailbox)
+        self.bus.deliver(frame, &self.mailbox)
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<BusEvent>, BusError> {

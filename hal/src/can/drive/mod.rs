@@ -127,7 +127,7 @@ impl CanopenDrive {
     /// Restores the configuration after a restart of the drive or the intervention of another master.
     fn configure_again(&mut self) -> Result<(), OpenError> {
         self.shared.set_restarted(false);
-        self.shared.forget_nmt();
+        self.shared.clear_nmt();
         let configured = configure(&self.settings, self.bus.as_mut(), self.host.as_ref())?;
         self.configured = Configured {
             identity: self.configured.identity,
@@ -172,7 +172,7 @@ impl CanopenDrive {
     }
 
     /// Switches the drive off, ends its monitoring of the heartbeat, and enters pre-operational.
-    fn leave_in_order(&mut self) {
+    fn shut_down(&mut self) {
         self.disable();
         let is_off = self.wait_for(self.settings.times.state_timeout, Shared::has_settled);
         if is_off && self.shared.fault() == 0 {
@@ -281,7 +281,7 @@ impl CurrentAmplifier for CanopenDrive {
 
 impl Drop for CanopenDrive {
     fn drop(&mut self) {
-        self.leave_in_order();
+        self.shut_down();
         self.service = TaskHandle::default();
     }
 }

@@ -155,7 +155,7 @@ impl Monitor {
         if state == nmt::State::Operational {
             return;
         }
-        self.shared.forget_status();
+        self.shared.clear_status();
         if state == nmt::State::BootUp {
             self.off = None; // a drive that has just started is off
             self.shared.set_restarted(true);
@@ -217,11 +217,11 @@ impl Monitor {
     pub(super) fn poll(&mut self, now_ns: u64, send: &mut dyn FnMut(CanFrame)) {
         if now_ns.saturating_sub(self.heard_ns) > self.heartbeat_timeout_ns {
             self.shared.latch(faults::HEARTBEAT_LOST);
-            self.shared.forget_nmt();
-            self.shared.forget_status();
+            self.shared.clear_nmt();
+            self.shared.clear_status();
         }
         self.follow_intent(now_ns);
-        self.watch_commands(now_ns);
+        self.check_command_timeouts(now_ns);
         self.follow_intent(now_ns); // a new fault switches off immediately
         self.ensure_off(now_ns, send);
         self.sync_while_idle(now_ns, send);
@@ -256,7 +256,7 @@ impl Monitor {
     }
 
     /// Checks that commands and status frames arrive in time while commands are followed.
-    fn watch_commands(&mut self, now_ns: u64) {
+    fn check_command_timeouts(&mut self, now_ns: u64) {
         let Some(on) = &mut self.on else { return };
         on.update(self.shared.commands(), now_ns);
         let without_command_ns = now_ns.saturating_sub(on.last_command_ns);

@@ -125,15 +125,20 @@ impl Setup<'_> {
         let timeout_ms = milliseconds(times.own_heartbeat_timeout);
         let consumer = heartbeat::consumer_entry(self.settings.own_node, timeout_ms);
         self.put(HEARTBEAT_PRODUCER, u32::from(period_ms), 2)?;
-        self.put_stop(HEARTBEAT_CONSUMER, consumer, 4)?;
+        self.write_stop_object(HEARTBEAT_CONSUMER, consumer, 4)?;
         match self.settings.abort_connection {
-            Some(option) => self.put_stop(ABORT_CONNECTION, u32::from(option as u16), 2),
+            Some(option) => self.write_stop_object(ABORT_CONNECTION, u32::from(option as u16), 2),
             None => Ok(()),
         }
     }
 
     /// Writes an object without which the drive would not stop when the heartbeat is lost.
-    fn put_stop(&mut self, address: Address, number: u32, bytes: usize) -> Result<(), OpenError> {
+    fn write_stop_object(
+        &mut self,
+        address: Address,
+        number: u32,
+        bytes: usize,
+    ) -> Result<(), OpenError> {
         match self.put(address, number, bytes) {
             Err(OpenError::Sdo(cause)) if cause.means_absent() => Err(OpenError::NoStop {
                 node: self.settings.node,

@@ -153,7 +153,7 @@ impl Shared {
     }
 
     /// Discards the last status: the drive no longer sends status frames.
-    pub(super) fn forget_status(&self) {
+    pub(super) fn clear_status(&self) {
         self.status.store(UNKNOWN, Ordering::Release);
         self.actual.store(i32::MAX, Ordering::Release);
     }
@@ -183,7 +183,7 @@ impl Shared {
         self.nmt.store(state as u8, Ordering::Release);
     }
 
-    pub(super) fn forget_nmt(&self) {
+    pub(super) fn clear_nmt(&self) {
         self.nmt.store(u8::MAX, Ordering::Release);
     }
 

@@ -49,7 +49,7 @@ impl CanopenDrive {
     /// Waits for a heartbeat that is newer than this call. The last one may be outdated, if the drive lost the heartbeat of this
     /// program or was stopped meanwhile. The caller checks whether one arrived.
     fn wait_for_fresh_heartbeat(&self) {
-        self.shared.forget_nmt();
+        self.shared.clear_nmt();
         self.wait_for(self.settings.times.heartbeat_timeout, |shared| {
             shared.nmt().is_some()
         });
