@@ -18,11 +18,11 @@ use crate::config::{Purpose, profiles};
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(subcommand)]
-    what: What,
+    what: ConfigCommand,
 }
 
 #[derive(Clone, Debug, Subcommand)]
-enum What {
+enum ConfigCommand {
     /// Print the effective settings as TOML (or JSON)
     Show(BenchOptions),
     /// Check whether the settings are valid
@@ -93,11 +93,11 @@ impl Profile {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
-        What::Show(options) => show(options)?,
-        What::Check(options) => check(options)?,
-        What::Schema => print_json(&crate::config::schema())?,
-        What::Profiles { json } => list_profiles(*json)?,
-        What::Init(args) => init(args)?,
+        ConfigCommand::Show(options) => show(options)?,
+        ConfigCommand::Check(options) => check(options)?,
+        ConfigCommand::Schema => print_json(&crate::config::schema())?,
+        ConfigCommand::Profiles { json } => list_profiles(*json)?,
+        ConfigCommand::Init(args) => init(args)?,
     }
     Ok(Outcome::Done)
 }

@@ -30,11 +30,11 @@ use crate::model::veering::report::VeeringPoint;
 #[command(after_help = GLOSSARY)]
 pub(super) struct Args {
     #[command(subcommand)]
-    what: What,
+    what: ModelCommand,
 }
 
 #[derive(Clone, Debug, Subcommand)]
-enum What {
+enum ModelCommand {
     /// Modes, residues, signs and zeros at one operating point
     Modes(BenchOptions),
     /// The sequence of dominant modes, and the kinds of zeros that follow from it by Tables 3-1 to 3-4
@@ -61,17 +61,17 @@ enum What {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
-        What::Study(args) => return study::run(args),
-        What::Modes(options) => modes::run(options)?,
-        What::Sequence(options) => sequence::run(options)?,
-        What::Locus(args) => locus::run(args)?,
-        What::Map(args) => map::run(args)?,
-        What::Veering(args) => veering::run(args)?,
-        What::Conditions(args) => conditions::run(args)?,
-        What::Placement(args) => placement::run(args)?,
-        What::Bounds(args) => bounds::run(args)?,
-        What::Step(args) => step::run(args)?,
-        What::CriticalDamping(args) => critical_damping::run(args)?,
+        ModelCommand::Study(args) => return study::run(args),
+        ModelCommand::Modes(options) => modes::run(options)?,
+        ModelCommand::Sequence(options) => sequence::run(options)?,
+        ModelCommand::Locus(args) => locus::run(args)?,
+        ModelCommand::Map(args) => map::run(args)?,
+        ModelCommand::Veering(args) => veering::run(args)?,
+        ModelCommand::Conditions(args) => conditions::run(args)?,
+        ModelCommand::Placement(args) => placement::run(args)?,
+        ModelCommand::Bounds(args) => bounds::run(args)?,
+        ModelCommand::Step(args) => step::run(args)?,
+        ModelCommand::CriticalDamping(args) => critical_damping::run(args)?,
     }
     Ok(Outcome::Done)
 }

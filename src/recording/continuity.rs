@@ -17,7 +17,7 @@ pub struct Gap {
 
 /// A tick number that is not larger than the previous one, which is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct NotAbove(pub u64);
+pub(super) struct NotIncreasing(pub u64);
 
 /// Counts of ticks, overruns and losses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,9 +31,9 @@ pub(super) struct Continuity {
 
 impl Continuity {
     /// Counts the next tick; returns the gap before it, if there is one.
-    pub(super) fn tick(&mut self, record: &TickRecord) -> Result<Option<Gap>, NotAbove> {
+    pub(super) fn tick(&mut self, record: &TickRecord) -> Result<Option<Gap>, NotIncreasing> {
         let gap = match self.first_and_last {
-            Some((_, last)) if record.tick <= last => return Err(NotAbove(last)),
+            Some((_, last)) if record.tick <= last => return Err(NotIncreasing(last)),
             Some((_, last)) => gap(last, record),
             None => None,
         };
@@ -186,7 +186,7 @@ mod tests {
                     tick,
                     ..TickRecord::default()
                 }),
-                Err(NotAbove(3))
+                Err(NotIncreasing(3))
             );
         }
         assert_eq!(account.ticks(), 1);

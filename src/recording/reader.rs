@@ -43,12 +43,12 @@ pub struct Cut {
 pub struct Recording {
     path: PathBuf,
     cut: Option<Cut>,
-    found: Found,
+    found: RecordingContents,
 }
 
 /// The contents of the file, without the ticks.
 #[derive(Debug, Default)]
-struct Found {
+struct RecordingContents {
     metadata: BTreeMap<String, String>,
     attachments: Vec<StoredAttachment>,
     events: Vec<Event>,
@@ -71,7 +71,7 @@ impl Recording {
 
     fn read(path: &Path, salvage: bool) -> Result<Recording, RecordingError> {
         let mut walk = Walk::new(open(path)?);
-        let mut found = Found::default();
+        let mut found = RecordingContents::default();
         let stop = loop {
             match walk.step(&mut |part| found.take(part)) {
                 Ok(true) => {}
@@ -188,7 +188,7 @@ impl Recording {
     }
 }
 
-impl Found {
+impl RecordingContents {
     fn take(&mut self, part: Part<'_>) -> Result<(), String> {
         match part {
             Part::Message {
@@ -255,7 +255,7 @@ fn judge(
     path: &Path,
     stop: Stop,
     at_byte: u64,
-    found: &Found,
+    found: &RecordingContents,
     salvage: bool,
 ) -> Result<Cut, RecordingError> {
     let why = match stop {
@@ -283,7 +283,7 @@ fn judge(
 fn require_ticks(
     path: &Path,
     contents: &Contents,
-    found: &Found,
+    found: &RecordingContents,
     cut: bool,
 ) -> Result<(), RecordingError> {
     if found.account.ticks() > 0 {

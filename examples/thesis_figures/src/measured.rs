@@ -17,30 +17,30 @@ use bench::rt::thread::Pace;
 pub struct Runs {
     folder: PathBuf,
     chirp: OnceCell<Analysis>,
-    steps: [OnceCell<Closed>; 2],
+    steps: [OnceCell<ClosedLoopRun>; 2],
 }
 
 /// One of the two controllers of section 6.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Which {
+pub(crate) enum ThesisController {
     /// Eq. (6-6).
     Slow,
     /// Eq. (6-7).
     Fast,
 }
 
-impl Which {
+impl ThesisController {
     pub fn name(self) -> &'static str {
         match self {
-            Which::Slow => "slow",
-            Which::Fast => "fast",
+            ThesisController::Slow => "slow",
+            ThesisController::Fast => "fast",
         }
     }
 }
 
 /// A closed-loop run.
 #[derive(Clone, Debug)]
-pub(crate) struct Closed {
+pub(crate) struct ClosedLoopRun {
     /// Time in seconds after the loop closed, and position in metres relative to the rest position.
     pub course: Vec<(f64, f64)>,
     /// Time and reference, likewise.
@@ -71,7 +71,7 @@ impl Runs {
     }
 
     /// The step of `bench control`.
-    pub(crate) fn step(&self, which: Which) -> Result<&Closed, FigureError> {
+    pub(crate) fn step(&self, which: ThesisController) -> Result<&ClosedLoopRun, FigureError> {
         let cell = &self.steps[which as usize];
         if let Some(known) = cell.get() {
             return Ok(known);
@@ -84,7 +84,7 @@ impl Runs {
     }
 
     /// Any closed-loop run.
-    pub(crate) fn closed(&self, config: Config) -> Result<Closed, FigureError> {
+    pub(crate) fn closed(&self, config: Config) -> Result<ClosedLoopRun, FigureError> {
         let plan = Plan::control(config.clone()).map_err(experiment::RunError::Plan)?;
         let recording = self.run(&plan, "control")?;
         let measured = experiment::tracking_metrics(&recording, &config.control, &config.servo)?;
@@ -113,7 +113,7 @@ impl Runs {
 }
 
 /// The ticks with the loop closed, relative to the rest position before.
-fn closed(ticks: &[TickRecord], period_s: f64, measured: TrackingMetrics) -> Closed {
+fn closed(ticks: &[TickRecord], period_s: f64, measured: TrackingMetrics) -> ClosedLoopRun {
     let active: Vec<&TickRecord> = ticks
         .iter()
         .filter(|tick| tick.flags & flag::ACTIVE != 0)
@@ -129,7 +129,7 @@ fn closed(ticks: &[TickRecord], period_s: f64, measured: TrackingMetrics) -> Clo
             .map(|(k, tick)| (k as f64 * period_s, of(tick) - origin_m))
             .collect()
     };
-    Closed {
+    ClosedLoopRun {
         course: course(|tick| tick.position_m),
         reference: course(|tick| tick.reference_m),
         measured,

@@ -180,7 +180,7 @@ pub struct Placements<'a> {
 
 /// Outcome of all placements.
 #[derive(Default)]
-struct Tried {
+struct PlacementTrials {
     /// Those with a response, best first.
     placements: Vec<Placement>,
     without_response: usize,
@@ -189,7 +189,7 @@ struct Tried {
     not_computed: usize,
 }
 
-impl Tried {
+impl PlacementTrials {
     /// The best placement that satisfies `of` and has at least this remainder.
     fn best(&self, least_per_kg: f64, of: impl Fn(&Placement) -> bool) -> Option<Placement> {
         let mut measured = self
@@ -243,8 +243,8 @@ impl<'a> Placements<'a> {
     }
 
     /// All pairs of places, and the present actuator and probe with all places.
-    fn all(&self) -> Result<Tried, PlantError> {
-        let mut tried = Tried::default();
+    fn all(&self) -> Result<PlacementTrials, PlantError> {
+        let mut tried = PlacementTrials::default();
         for [actuator, sensor] in self.pairs() {
             self.try_pair(actuator, sensor, &mut tried)?;
         }
@@ -272,7 +272,7 @@ impl<'a> Placements<'a> {
         &self,
         actuator: Option<usize>,
         sensor: Option<usize>,
-        tried: &mut Tried,
+        tried: &mut PlacementTrials,
     ) -> Result<(), PlantError> {
         let ports: Vec<Ports> = (0..self.own.len())
             .map(|k| [self.row(k, actuator, 0), self.row(k, sensor, 1)])

@@ -12,11 +12,11 @@ use crate::model::plant::{PlantError, Structure};
 use crate::model::zeros::{ModalTerm, ZeroCounts};
 
 /// Random numbers, the same in every run.
-struct Dice(Pcg64);
+struct RandomNumbers(Pcg64);
 
-impl Dice {
-    fn new(stream: u128) -> Dice {
-        Dice(Pcg64::new(20_240_404, stream))
+impl RandomNumbers {
+    fn new(stream: u128) -> RandomNumbers {
+        RandomNumbers(Pcg64::new(20_240_404, stream))
     }
 
     fn uniform(&mut self, low: f64, high: f64) -> f64 {
@@ -45,12 +45,12 @@ struct System {
 
 impl System {
     /// A system of the form of Eq. (4-1): the third mass is free.
-    fn with_double_integrator(dice: &mut Dice) -> System {
-        let residue = dice.spread(0.05, 300.0);
-        let mut pair = || dice.uniform(-1.0, 1.0);
+    fn with_double_integrator(random: &mut RandomNumbers) -> System {
+        let residue = random.spread(0.05, 300.0);
+        let mut pair = || random.uniform(-1.0, 1.0);
         let (force, sensor) = (vec![pair(), pair(), 1.0], vec![pair(), pair(), residue]);
         System {
-            coupling: dice.spread(1e-3, 2.0),
+            coupling: random.spread(1e-3, 2.0),
             force,
             sensor,
             others: vec![0.0],
@@ -125,12 +125,12 @@ impl Tally {
 
 #[test]
 fn p4_1_holds_for_random_sums_and_c4_2_implies_c4_1() {
-    let (mut dice, mut tally) = (Dice::new(1), Tally::default());
+    let (mut random, mut tally) = (RandomNumbers::new(1), Tally::default());
     for _ in 0..20_000 {
-        let wu = dice.uniform(0.5, 2.0);
-        let wv = wu * (1.0 + dice.uniform(1e-3, 0.5));
+        let wu = random.uniform(0.5, 2.0);
+        let wv = wu * (1.0 + random.uniform(1e-3, 0.5));
         let mut mode =
-            |omega_rad_s, low, high| ModalTerm::undamped(omega_rad_s, dice.spread(low, high));
+            |omega_rad_s, low, high| ModalTerm::undamped(omega_rad_s, random.spread(low, high));
         let terms = [
             mode(0.0, 0.01, 100.0),
             mode(wu, 0.1, 10.0),
@@ -171,9 +171,9 @@ fn p4_1_holds_for_random_sums_and_c4_2_implies_c4_1() {
 
 #[test]
 fn p4_2_p4_2x_and_p4_2y_hold_for_random_systems_of_eq_4_1() {
-    let (mut dice, mut tallies) = (Dice::new(2), <[Tally; 3]>::default());
+    let (mut random, mut tallies) = (RandomNumbers::new(2), <[Tally; 3]>::default());
     for index in 0..2000 {
-        let mut system = System::with_double_integrator(&mut dice);
+        let mut system = System::with_double_integrator(&mut random);
         // Every tenth system is uncoupled: its modes cross.
         system.coupling *= f64::from(u8::from(index % 10 != 0));
         let trajectory = system.trajectory();
@@ -245,9 +245,9 @@ fn as_printed(trajectory: &Trajectory) -> [Prediction; 3] {
 
 #[test]
 fn premises_as_printed_are_wrong_for_some_systems() {
-    let (mut dice, mut predictions, mut wrong) = (Dice::new(3), [0; 3], [0; 3]);
+    let (mut random, mut predictions, mut wrong) = (RandomNumbers::new(3), [0; 3], [0; 3]);
     for _ in 0..2000 {
-        let trajectory = System::with_double_integrator(&mut dice).trajectory();
+        let trajectory = System::with_double_integrator(&mut random).trajectory();
         let quartet = trajectory
             .samples
             .iter()
@@ -306,13 +306,13 @@ fn zeros_may_appear_without_veering() {
 }
 
 /// Two oscillators, a mode R on a spring and one more mode far above, each with a random sensor gain.
-fn with_held_modes(dice: &mut Dice, below: f64, above: f64) -> System {
-    let mut system = System::with_double_integrator(dice);
+fn with_held_modes(random: &mut RandomNumbers, below: f64, above: f64) -> System {
+    let mut system = System::with_double_integrator(random);
     system.others = vec![below * below, above * above];
     system.force.push(1.0);
     system
         .sensor
-        .push(dice.spread(0.05, 300.0) * above * above / 1e4);
+        .push(random.spread(0.05, 300.0) * above * above / 1e4);
     system
 }
 
@@ -353,10 +353,13 @@ fn p4_1_errs_by_less_than_the_integrator_ratio() {
     // of A4-5. This does not apply at b21-hat, where zeros meet outside the interval between the modes and the
     // remainder is arbitrary.
     for (below, above) in [(0.5, 300.0), (2.0, 50.0), (4.0, 25.0), (6.0, 16.0)] {
-        let (mut dice, mut sum, mut tallies) =
-            (Dice::new(4), (0, 0, 0.0f64), <[Tally; 3]>::default());
+        let (mut random, mut sum, mut tallies) = (
+            RandomNumbers::new(4),
+            (0, 0, 0.0f64),
+            <[Tally; 3]>::default(),
+        );
         for _ in 0..300 {
-            let trajectory = with_held_modes(&mut dice, below, above).trajectory();
+            let trajectory = with_held_modes(&mut random, below, above).trajectory();
             let (predictions, wrong, furthest) = near_the_upper_limit(&trajectory);
             sum = (sum.0 + predictions, sum.1 + wrong, sum.2.max(furthest));
             for side in [Side::Before, Side::After] {

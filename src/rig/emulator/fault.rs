@@ -52,12 +52,12 @@ pub enum FaultError {
 /// A kind of fault: its name, the fault, and what happens.
 struct FaultKind {
     name: &'static str,
-    form: Form,
+    form: ValueForm,
     effect: &'static str,
 }
 
 /// Whether a kind of fault has a value.
-enum Form {
+enum ValueForm {
     Fixed(EmulatedFault),
     WithValue {
         default: &'static str,
@@ -65,7 +65,7 @@ enum Form {
     },
 }
 
-const fn kind(name: &'static str, form: Form, effect: &'static str) -> FaultKind {
+const fn kind(name: &'static str, form: ValueForm, effect: &'static str) -> FaultKind {
     FaultKind { name, form, effect }
 }
 
@@ -73,25 +73,25 @@ const fn drive(fault: DeviceFault) -> EmulatedFault {
     EmulatedFault::Amplifier(AmplifierFault::Device(fault))
 }
 
-const fn fixed_drive(fault: DeviceFault) -> Form {
-    Form::Fixed(drive(fault))
+const fn fixed_drive(fault: DeviceFault) -> ValueForm {
+    ValueForm::Fixed(drive(fault))
 }
 
-const fn fixed_probe(fault: Fault) -> Form {
-    Form::Fixed(EmulatedFault::Probe(fault))
+const fn fixed_probe(fault: Fault) -> ValueForm {
+    ValueForm::Fixed(EmulatedFault::Probe(fault))
 }
 
 const fn with_value(
     default: &'static str,
     read: fn(&str) -> Result<EmulatedFault, &'static str>,
-) -> Form {
-    Form::WithValue { default, read }
+) -> ValueForm {
+    ValueForm::WithValue { default, read }
 }
 
 /// All kinds of faults. A new fault is one line here.
 #[rustfmt::skip]
 const KINDS: [FaultKind; 23] = [
-    kind("none", Form::Fixed(EmulatedFault::None), "ends all faults"),
+    kind("none", ValueForm::Fixed(EmulatedFault::None), "ends all faults"),
     kind("amplifier.none", fixed_drive(DeviceFault::None), "ends the fault of the amplifier"),
     kind("amplifier.silence", fixed_drive(DeviceFault::Mute), "sends nothing, but receives"),
     kind("amplifier.unplugged", fixed_drive(DeviceFault::Unplugged), "neither sends nor receives"),
@@ -105,7 +105,7 @@ const KINDS: [FaultKind; 23] = [
     kind("amplifier.switches-off", fixed_drive(DeviceFault::SwitchesOff), "switches itself off without a fault"),
     kind("amplifier.late", with_value("50ms", late_drive), "delays all messages by this time"),
     kind("amplifier.reset", fixed_drive(DeviceFault::Reset), "restarts, as after a loss of power"),
-    kind("amplifier.bus-off", Form::Fixed(EmulatedFault::Amplifier(AmplifierFault::BusOff)), "makes the host report bus-off; no frame passes (virtual interfaces only)"),
+    kind("amplifier.bus-off", ValueForm::Fixed(EmulatedFault::Amplifier(AmplifierFault::BusOff)), "makes the host report bus-off; no frame passes (virtual interfaces only)"),
     kind("probe.none", fixed_probe(Fault::None), "ends the fault of the probe"),
     kind("probe.silence", fixed_probe(Fault::Silence), "sends nothing"),
     kind("probe.corrupt", with_value("1", corrupt), "corrupts every N-th byte (=N)"),
@@ -123,8 +123,8 @@ pub fn help() -> String {
 
 fn help_line(kind: &FaultKind) -> String {
     let usage = match kind.form {
-        Form::Fixed(_) => kind.name.to_string(),
-        Form::WithValue { default, .. } => format!("{}[={default}]", kind.name),
+        ValueForm::Fixed(_) => kind.name.to_string(),
+        ValueForm::WithValue { default, .. } => format!("{}[={default}]", kind.name),
     };
     format!("  {usage:<30} {}\n", kind.effect)
 }
@@ -199,9 +199,9 @@ fn qualified(text: &str, devices: &[EmulatedDevice]) -> String {
 impl FaultKind {
     fn fault(&self, value: Option<&str>) -> Result<EmulatedFault, &'static str> {
         match (&self.form, value) {
-            (Form::Fixed(fault), None) => Ok(*fault),
-            (Form::Fixed(_), Some(_)) => Err("left out: this fault has no value"),
-            (Form::WithValue { default, read }, value) => read(value.unwrap_or(default)),
+            (ValueForm::Fixed(fault), None) => Ok(*fault),
+            (ValueForm::Fixed(_), Some(_)) => Err("left out: this fault has no value"),
+            (ValueForm::WithValue { default, read }, value) => read(value.unwrap_or(default)),
         }
     }
 }

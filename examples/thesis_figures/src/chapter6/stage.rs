@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::super::bode::{Curve, bode, critical, nyquist};
 use super::super::content::signed;
-use super::super::measured::{Closed, Which};
+use super::super::measured::{ClosedLoopRun, ThesisController};
 use super::super::model::{Model, kinds, response};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, sensitivity, step};
@@ -19,17 +19,17 @@ const UM: f64 = 1e6;
 const RIG: &str = "measured on the simulated rig (profile stage, seed 1): amplifier, delay, probe noise, quantisation, floor and the unmodelled modes of Table 5-1";
 
 /// Printed crossover in rad/s and phase margin in degrees.
-fn printed(which: Which) -> (f64, f64) {
+fn printed(which: ThesisController) -> (f64, f64) {
     match which {
-        Which::Slow => (18.0, 70.0),
-        Which::Fast => (287.0, 42.0),
+        ThesisController::Slow => (18.0, 70.0),
+        ThesisController::Fast => (287.0, 42.0),
     }
 }
 
-fn pen(which: Which) -> Pen {
+fn pen(which: ThesisController) -> Pen {
     match which {
-        Which::Slow => Pen::solid(BLUE),
-        Which::Fast => Pen::solid(VERMILION),
+        ThesisController::Slow => Pen::solid(BLUE),
+        ThesisController::Fast => Pen::solid(VERMILION),
     }
 }
 
@@ -109,7 +109,7 @@ pub(in super::super) fn fig_6_7(runs: &Runs) -> Result<Content, FigureError> {
         .command(model.command("model modes", "")))
 }
 
-fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
+fn loop_figure(which: ThesisController, equation: &str) -> Result<Content, FigureError> {
     let model = Model::stage();
     let of = closed_loop(&model, which.name(), None)?;
     let l = Curve::new("", pen(which), open(&of, 1.0, 3000.0));
@@ -137,23 +137,23 @@ fn loop_figure(which: Which, equation: &str) -> Result<Content, FigureError> {
 }
 
 /// Crossover and phase margin, each within half of its last printed digit; 18 and 70 are printed as round figures.
-fn with_margins(content: Content, which: Which, margins: &Margins, of: &str) -> Content {
+fn with_margins(content: Content, which: ThesisController, margins: &Margins, of: &str) -> Content {
     let (crossover, phase) = printed(which);
     let computed = (
         margins.crossover_rad_s.unwrap_or(f64::NAN),
         margins.phase_margin_deg.unwrap_or(f64::NAN),
     );
     let remark = match which {
-        Which::Slow => {
+        ThesisController::Slow => {
             "printed as 10 % of the first resonance, which is 183.9 rad/s here and 179 there"
         }
-        Which::Fast => {
+        ThesisController::Fast => {
             "the first mode, whose frequency is 183.9 rad/s here and 179 there, sets the gain at crossover"
         }
     };
     let phase_remark = match which {
-        Which::Slow => "with the crossover; the printed one is a round figure",
-        Which::Fast => "",
+        ThesisController::Slow => "with the crossover; the printed one is a round figure",
+        ThesisController::Fast => "",
     };
     content
         .compare(
@@ -171,11 +171,11 @@ fn with_margins(content: Content, which: Which, margins: &Margins, of: &str) -> 
 }
 
 pub(in super::super) fn fig_6_8(_: &Runs) -> Result<Content, FigureError> {
-    loop_figure(Which::Slow, "Eq. (6-6)")
+    loop_figure(ThesisController::Slow, "Eq. (6-6)")
 }
 
 pub(in super::super) fn fig_6_10(_: &Runs) -> Result<Content, FigureError> {
-    loop_figure(Which::Fast, "Eq. (6-7)")
+    loop_figure(ThesisController::Fast, "Eq. (6-7)")
 }
 
 /// G of the stage in um/N around the two close modes.
@@ -247,7 +247,7 @@ fn dip_db(t: &Curve) -> f64 {
 
 fn compare_settling(
     content: Content,
-    which: Which,
+    which: ThesisController,
     printed_s: f64,
     period_s: f64,
     course: &[(f64, f64)],
@@ -269,7 +269,10 @@ pub(in super::super) fn fig_6_11(_: &Runs) -> Result<Content, FigureError> {
         Scale::linear("Position/step (1)"),
     );
     let mut curves = Vec::new();
-    for (which, settling_s) in [(Which::Slow, 0.1663), (Which::Fast, 0.0858)] {
+    for (which, settling_s) in [
+        (ThesisController::Slow, 0.1663),
+        (ThesisController::Fast, 0.0858),
+    ] {
         let of = closed_loop(&Model::stage(), which.name(), None)?;
         let t = closed(&open(&of, 1.0, 3000.0));
         curves.push(Curve::new(which.name(), pen(which), t));
@@ -292,7 +295,7 @@ pub(in super::super) fn fig_6_11(_: &Runs) -> Result<Content, FigureError> {
 }
 
 /// L of the measured plant and the ideal controller.
-fn measured_loop(runs: &Runs, which: Which) -> Result<Curve, FigureError> {
+fn measured_loop(runs: &Runs, which: ThesisController) -> Result<Curve, FigureError> {
     let analysis = runs.chirp()?;
     let sections = ControllerText::find(which.name())?.sections(5000.0)?;
     let at = |(f, h): (&f64, &Complex<f64>)| {
@@ -331,7 +334,7 @@ fn measured_margins(l: &Curve) -> Option<(f64, f64)> {
 
 /// A loop of Fig 6-12: with the measured plant and with the model.
 struct MeasuredLoop {
-    which: Which,
+    which: ThesisController,
     measured: Curve,
     model: Curve,
     /// Of the model, in continuous time.
@@ -339,7 +342,7 @@ struct MeasuredLoop {
 }
 
 impl MeasuredLoop {
-    fn new(runs: &Runs, which: Which) -> Result<MeasuredLoop, FigureError> {
+    fn new(runs: &Runs, which: ThesisController) -> Result<MeasuredLoop, FigureError> {
         let of = closed_loop(&Model::stage(), which.name(), None)?;
         Ok(MeasuredLoop {
             which,
@@ -420,8 +423,8 @@ fn size_at_10_rad_s(curve: &Curve) -> f64 {
 pub(in super::super) fn fig_6_12(runs: &Runs) -> Result<Content, FigureError> {
     let content = Content::new("Slow and fast control with the measured response of the stage and the ideal controllers: open loops, their Nyquist plots, closed loops and sensitivities; by the model for comparison.")
         .setting(format!("asymmetry +10 %, operating point 8 % of L; plant {RIG}; controllers of Eqs. (6-6) and (6-7) in continuous time, as in the thesis; model without hold, delay and amplifier"));
-    let slow = MeasuredLoop::new(runs, Which::Slow)?;
-    let fast = MeasuredLoop::new(runs, Which::Fast)?;
+    let slow = MeasuredLoop::new(runs, ThesisController::Slow)?;
+    let fast = MeasuredLoop::new(runs, ThesisController::Fast)?;
     let content = fast.compare(slow.compare(content));
     let ((a, a_phase), (c, c_phase)) = (slow.bode('a'), fast.bode('c'));
     let (e, _) = bode(
@@ -448,7 +451,11 @@ pub(in super::super) fn fig_6_12(runs: &Runs) -> Result<Content, FigureError> {
 }
 
 /// Steady state of `bench control --reference hold`.
-fn hold(runs: &Runs, which: Which, operating_point: Option<f64>) -> Result<Closed, FigureError> {
+fn hold(
+    runs: &Runs,
+    which: ThesisController,
+    operating_point: Option<f64>,
+) -> Result<ClosedLoopRun, FigureError> {
     let model = Model::stage()
         .set(&format!("control.controller={}", which.name()))
         .set("control.reference={kind=\"hold\"}")
@@ -466,7 +473,7 @@ const HOLD_S: f64 = 60.0;
 const BAR_UM: f64 = 0.03;
 
 /// Probability density over the position in micrometres, as the outline of bars of the probe's quantisation.
-fn density(closed: &Closed) -> Vec<(f64, f64)> {
+fn density(closed: &ClosedLoopRun) -> Vec<(f64, f64)> {
     let errors = closed
         .course
         .iter()
@@ -493,13 +500,13 @@ fn density(closed: &Closed) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn add_step(chart: Chart, which: Which, run: &Closed) -> Chart {
+fn add_step(chart: Chart, which: ThesisController, run: &ClosedLoopRun) -> Chart {
     let points = run.course.iter().map(|(t, y)| (t - 0.2, y * UM));
     let points = points.filter(|(t, _)| *t < 0.5).collect();
     chart.line(which.name(), pen(which), points)
 }
 
-fn add_density(chart: Chart, which: Which, held: &Closed) -> Chart {
+fn add_density(chart: Chart, which: ThesisController, held: &ClosedLoopRun) -> Chart {
     let outline = density(held);
     let base = [(outline[outline.len() - 1].0, 0.0), (outline[0].0, 0.0)];
     let area = Mark::Area {
@@ -512,7 +519,7 @@ fn add_density(chart: Chart, which: Which, held: &Closed) -> Chart {
 }
 
 /// Sigma of the positioning error with the printed one in micrometres.
-fn sigma(what: &str, printed_um: f64, held: &Closed, remark: &str) -> Comparison {
+fn sigma(what: &str, printed_um: f64, held: &ClosedLoopRun, remark: &str) -> Comparison {
     let computed_um = held.measured.steady_state_sigma_m * UM;
     Comparison::within(what, printed_um, 3, computed_um, "µm", 0.003).remark(remark)
 }
@@ -521,8 +528,8 @@ fn sigma(what: &str, printed_um: f64, held: &Closed, remark: &str) -> Comparison
 fn compare_runs(
     content: Content,
     controller: &str,
-    (printed_s, run): (f64, &Closed),
-    (printed_um, held): (f64, &Closed),
+    (printed_s, run): (f64, &ClosedLoopRun),
+    (printed_um, held): (f64, &ClosedLoopRun),
 ) -> Content {
     let settled = run.measured.step.and_then(|step| step.settling_time_s);
     let settled = settled.unwrap_or(f64::NAN);
@@ -564,15 +571,16 @@ pub(in super::super) fn fig_6_13(runs: &Runs) -> Result<Content, FigureError> {
         Scale::linear("Error (µm)").within(-0.25, 0.25),
         Scale::linear("Probability density (1/µm)"),
     );
-    for (which, settling_s, sigma_um) in
-        [(Which::Slow, 0.1663, 0.066), (Which::Fast, 0.0858, 0.050)]
-    {
+    for (which, settling_s, sigma_um) in [
+        (ThesisController::Slow, 0.1663, 0.066),
+        (ThesisController::Fast, 0.0858, 0.050),
+    ] {
         let (run, held) = (runs.step(which)?, hold(runs, which, None)?);
         a = add_step(a, which, run);
         b = add_density(b, which, &held);
         content = compare_runs(content, which.name(), (settling_s, run), (sigma_um, &held));
     }
-    let centre = hold(runs, Which::Fast, Some(0.0))?;
+    let centre = hold(runs, ThesisController::Fast, Some(0.0))?;
     let what = "sigma in the steady state, fast, operating point 0";
     let options = format!("--fast --reference hold --duration {HOLD_S:.0} --operating-point 0%");
     Ok(content

@@ -13,12 +13,12 @@ const WRONG_LENGTH: u16 = 0x8210;
 pub(super) struct Pdos {
     /// Synchronous set-points that wait for SYNC.
     waiting: [Option<CanFrame>; 4],
-    sent: [Sent; 4],
+    sent: [SentFrame; 4],
 }
 
 /// What was sent of a transmit PDO.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sent {
+struct SentFrame {
     /// SYNCs since the last frame.
     syncs: u32,
     time_ns: Option<u64>,
@@ -95,7 +95,7 @@ impl Pdos {
     }
 }
 
-impl Sent {
+impl SentFrame {
     fn is_due(&self, pdo: &Parameters, frame: Option<CanFrame>, now_ns: u64) -> bool {
         let elapsed_ns = self
             .time_ns
