@@ -1,0 +1,227 @@
+//! A campaign on a stage that an operator loads: every load is checked, and no check passes without evidence.
+
+mod load_check;
+mod progress;
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
+use bench::config::{Config, Purpose, Source, load};
+use bench::experiment::campaign::{
+    CampaignError, Grid, GridPoint, GuidedCampaign, Load, LoadCheck, LoadedRig, Operator,
+    PointResult, Question, Reply, RestPosition, StageModel, analyse_point, visit_order,
+};
+use bench::experiment::{Plan, run};
+use bench::recording::Recording;
+use bench::rig::simulated::SimulatedRig;
+use bench::rt::thread::Pace;
+use bench_hal::Validity;
+
+use crate::faulty_rig::{Fault, FaultyRig};
+
+/// The shortest chirp that passes over all modes, and the shortest quiet, at 1 kHz.
+const SETS: [&str; 8] = [
+    "loop.rate_hz=1000.0",
+    "chirp.stop_hz=450.0",
+    "chirp.start_hz=5",
+    "chirp.duration_s=8",
+    "chirp.fade_in_s=0.5",
+    "chirp.quiet_after_s=2",
+    "campaign.settle_s=1",
+    "campaign.average_s=0.5",
+];
+
+fn config(more: &[&str]) -> Config {
+    let sets = SETS.iter().chain(more).map(|set| set.to_string()).collect();
+    load(&Source {
+        sets,
+        purpose: Purpose::Chirp,
+        ..Source::default()
+    })
+    .expect("a configuration")
+}
+
+/// The actual load of the stage, and what pulls it in X.
+#[derive(Clone, Copy, Default)]
+struct Really {
+    on: Load,
+    askew_m: f64,
+    /// The probe loses its target during a chirp.
+    blind: bool,
+}
+
+/// What the operator of the script does before an answer.
+type Does = Box<dyn Fn(&mut Really)>;
+
+/// An operator who follows a script; at its end the answer is `stop`.
+struct Scripted<'a> {
+    really: &'a RefCell<Really>,
+    script: VecDeque<(Does, Reply)>,
+    asked: &'a RefCell<Vec<Question>>,
+}
+
+impl Operator for Scripted<'_> {
+    fn ask(&mut self, question: &Question) -> Reply {
+        self.asked.borrow_mut().push(question.clone());
+        let Some((does, reply)) = self.script.pop_front() else {
+            return Reply::Stop;
+        };
+        does(&mut self.really.borrow_mut());
+        reply
+    }
+
+    fn tell(&mut self, _text: &str) {}
+}
+
+/// The simulated stage with the actual load; run, recorded and analysed as devices are.
+struct Simulated<'a> {
+    config: &'a Config,
+    grid: &'a Grid,
+    really: &'a RefCell<Really>,
+    folder: tempfile::TempDir,
+    chirps: usize,
+    kept: Vec<(GridPoint, PointResult)>,
+}
+
+impl Simulated<'_> {
+    /// The rig has the actual load; the plan has the requested one.
+    fn rig(&self, config: &Config, chirps: bool) -> Box<FaultyRig<SimulatedRig>> {
+        let really = *self.really.borrow();
+        let model = StageModel::of(self.config).expect("a stage");
+        let plant = model.loaded_plant(&really.on);
+        let rig = SimulatedRig::new(&Config {
+            plant,
+            ..config.clone()
+        })
+        .expect("a rig");
+        let blind =
+            (really.blind && chirps).then_some((2000..u64::MAX, Fault::Says(Validity::OutOfRange)));
+        let askew = (0..u64::MAX, Fault::Offset(really.askew_m));
+        Box::new(FaultyRig::new(
+            rig,
+            &[askew].into_iter().chain(blind).collect::<Vec<_>>(),
+        ))
+    }
+}
+
+impl LoadedRig for Simulated<'_> {
+    fn rest_position(&mut self) -> Result<Option<RestPosition>, CampaignError> {
+        let plan = Plan::quiet(self.config.clone());
+        let run = run(
+            &plan,
+            self.rig(self.config, false),
+            Pace::Virtual,
+            self.folder.path(),
+            &mut |_, _| {},
+        )
+        .expect("a run");
+        assert!(run.ended.trip.is_none());
+        let path = run.path.clone();
+        run.finish("{}").expect("a file");
+        Ok(Some(RestPosition::of(
+            &Recording::open(&path).expect("a recording"),
+            "rest.mcap",
+        )?))
+    }
+
+    fn measure(&mut self, place: GridPoint) -> Result<Option<PointResult>, CampaignError> {
+        self.chirps += 1;
+        let plan = Plan::chirp(self.grid.config_at(self.config, place)?);
+        let rig = self.rig(&plan.config, true);
+        let mut run = run(
+            &plan,
+            rig,
+            Pace::Virtual,
+            self.folder.path(),
+            &mut |_, _| {},
+        )
+        .expect("a run");
+        let result = analyse_point(&mut run, &plan.config).expect("a recording");
+        Ok(Some(result))
+    }
+
+    fn keep(&mut self, place: GridPoint, point: &PointResult) -> Result<(), CampaignError> {
+        self.kept.push((place, point.clone()));
+        Ok(())
+    }
+}
+
+/// What outcome of a campaign.
+struct Outcome {
+    asked: Vec<Question>,
+    chirps: usize,
+    kept: Vec<(GridPoint, PointResult)>,
+}
+
+impl Outcome {
+    fn check(&self, index: usize) -> &LoadCheck {
+        self.kept[index]
+            .1
+            .load_check
+            .as_ref()
+            .expect("a load check")
+    }
+}
+
+fn campaign(
+    config: &Config,
+    grid: &Grid,
+    places: &[GridPoint],
+    script: Vec<(Does, Reply)>,
+) -> Outcome {
+    let (really, asked) = (RefCell::default(), RefCell::default());
+    let mut operator = Scripted {
+        really: &really,
+        script: script.into(),
+        asked: &asked,
+    };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rig = Simulated {
+        config,
+        grid,
+        really: &really,
+        folder,
+        chirps: 0,
+        kept: Vec::new(),
+    };
+    let mut guided = GuidedCampaign {
+        config,
+        grid,
+        tolerance: 0.002,
+        operator: &mut operator,
+        rig,
+    };
+    guided.run(places).expect("a campaign");
+    let (chirps, kept) = (guided.rig.chirps, guided.rig.kept);
+    Outcome {
+        asked: asked.into_inner(),
+        chirps,
+        kept,
+    }
+}
+
+fn all(grid: &Grid) -> Vec<GridPoint> {
+    visit_order(grid, &grid.points().collect::<Vec<_>>())
+}
+
+fn grid(points: &[f64], asymmetries: &[f64]) -> Grid {
+    Grid::new(points.into(), asymmetries.into(), &config(&[])).expect("a grid")
+}
+
+/// Sets the load of a point.
+fn puts(config: &Config, grid: &Grid, row: usize, column: usize) -> Does {
+    let load = required(config, grid, row, column);
+    Box::new(move |really| really.on = load)
+}
+
+fn required(config: &Config, grid: &Grid, row: usize, column: usize) -> Load {
+    let there = grid.config_at(config, GridPoint { row, column });
+    let there = there.expect("a point");
+    StageModel::of(&there).expect("a stage").required_load()
+}
+
+fn nothing() -> Does {
+    Box::new(|_| {})
+}
+
+const DONE: Reply = Reply::Done(None);
