@@ -1,0 +1,180 @@
+//! Files that cannot be read, written or followed.
+
+use std::path::Path;
+
+use crate::program::{self, Bench};
+
+#[test]
+fn a_chirp_too_long_to_be_analysed_is_refused_at_once() {
+    // 1e5 s at 5 kHz are 5e8 ticks, which would be 37 GB of recording and as much memory to analyse it.
+    let bench = Bench::new();
+    bench
+        .run("chirp --duration 1e5")
+        .is_refused(&["100000 s", "20000000", "shorten"]);
+    bench
+        .run("chirp --duration 1e30")
+        .is_refused(&["--duration 1e30", "0.001 to 100000 s"]);
+    assert_eq!(bench.files(), [""; 0]);
+}
+
+#[test]
+fn the_memory_of_a_run_does_not_grow_with_its_duration() {
+    // A way that trips as it begins, out of eleven days, in a quarter of what one number a tick would take.
+    // `bench margins --fast --asymmetry -10%`: not stable. No amplitude is small enough.
+    let bench = Bench::new();
+    let refused = bench.run("control --fast --reference chirp --asymmetry -10%");
+    refused.is_refused(&["by the model this loop is unstable", "`bench margins`"]);
+    assert_eq!(bench.files(), [""; 0]);
+    let bench = Bench::new();
+    bench.write("far.csv", "0,0\n0.1,0.01\n");
+    let run = format!(
+        "ulimit -v 2000000; exec {} control --fast --reference far.csv --duration 1e6 --json",
+        env!("CARGO_BIN_EXE_bench")
+    );
+    let output = assert_cmd::Command::new("sh")
+        .args(["-c", &run])
+        .current_dir(bench.path(""))
+        .output()
+        .expect("sh");
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{err}");
+    assert!(
+        String::from_utf8_lossy(&output.stdout).contains("\"tripped\""),
+        "{err}"
+    );
+}
+
+#[test]
+fn a_reference_file_that_cannot_be_followed_is_refused_with_its_line() {
+    let cases: &[(&[u8], &[&str])] = &[
+        (b"", &["line 1", "no point"]),
+        (b"time_s,reference_m\n", &["no point"]),
+        (
+            b"time_s,reference_m\n0,0\n0,1e-6\n",
+            &["line 3", "does not rise"],
+        ),
+        (b"0,0\n1,NaN\n", &["line 2", "not two finite numbers"]),
+        (b"0;0\n", &["line 1", "time_s,reference_m"]),
+        (b"\xff\xfe\x00", &["UTF-8"]),
+    ];
+    for (text, words) in cases {
+        let bench = Bench::new();
+        bench.write("way.csv", text);
+        bench
+            .run("control --reference way.csv")
+            .is_refused(&[words, &["way.csv"][..]].concat());
+        assert_eq!(bench.files(), ["way.csv"]);
+    }
+    Bench::new()
+        .run("control --reference .")
+        .is_refused(&["directory"]);
+}
+
+#[test]
+fn a_reference_beyond_the_stage_is_refused_or_ends_in_a_trip() {
+    for options in [
+        "--amplitude 0.91mm",
+        "--amplitude -1m",
+        "--reference sine --amplitude 2mm",
+    ] {
+        let bench = Bench::new();
+        let refused = bench.run(&format!("control --fast {options}"));
+        refused.is_refused(&["--amplitude", "the soft limit of 0.0009 m"]);
+        assert_eq!(bench.files(), [""; 0], "{options}");
+    }
+    let bench = Bench::new();
+    bench.write("far.csv", "0,0\n0.1,1e300\n");
+    let answer = bench.run("control --fast --duration 1 --reference far.csv --json");
+    assert_eq!(
+        (answer.code, &answer.json()["outcome"]),
+        (1, &serde_json::json!("tripped")),
+        "{}",
+        answer.err
+    );
+}
+
+#[test]
+fn what_is_no_recording_is_said_to_be_none() {
+    let bench = Bench::new();
+    bench.write("text.mcap", "not a recording");
+    bench.write("empty.mcap", "");
+    for command in ["identify", "replay", "recover"] {
+        for file in ["text.mcap", "empty.mcap", "nosuch.mcap", "."] {
+            let answer = bench.run(&format!("{command} {file}"));
+            assert!(
+                [1, 2].contains(&answer.code) && answer.out.is_empty(),
+                "{command} {file}: {answer:?}"
+            );
+            assert!(
+                answer.err.contains(file),
+                "{command} {file}: {}",
+                answer.err
+            );
+        }
+    }
+    assert_eq!(bench.files(), ["empty.mcap", "text.mcap"]);
+}
+
+#[test]
+fn everything_works_in_an_empty_folder() {
+    let bench = Bench::new();
+    bench.json("model modes");
+    bench.json("margins");
+    assert_eq!(bench.files(), [""; 0], "looking leaves nothing behind");
+    let control = bench.json("control --duration 0.2");
+    assert_eq!(bench.files(), ["recordings"]);
+    let chirp = bench.json("chirp --duration 6 --start 5 --stop 50 --out elsewhere/deep");
+    for (answer, key) in [
+        (&control, "recording"),
+        (&chirp, "recording"),
+        (&chirp, "frf_csv"),
+        (&chirp, "plot"),
+    ] {
+        assert!(
+            bench.path(answer[key].as_str().expect("a path")).exists(),
+            "{key}"
+        );
+    }
+}
+
+#[test]
+fn two_runs_in_one_second_do_not_overwrite_each_other() {
+    let bench = Bench::new();
+    let names: Vec<String> = (0..4)
+        .map(|_| bench.json("control --duration 0.05")["recording"].to_string())
+        .collect();
+    let mut distinct = names.clone();
+    distinct.sort();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 4, "{names:?}");
+}
+
+#[test]
+fn where_nothing_can_be_written_nothing_moves_and_the_remedy_is_named() {
+    // No one can make a folder in /proc, not even root.
+    let proc = Path::new("/proc");
+    for arguments in ["control --duration 0.1", "chirp --duration 10"] {
+        let answer = program::run_in(proc, arguments.split(' '));
+        assert_eq!(answer.code, 1, "{}", answer.err);
+        assert!(
+            !answer.out.contains("overruns"),
+            "the plan, but no results: {}",
+            answer.out
+        );
+        for word in ["recordings", "--out", "nothing was moved"] {
+            assert!(answer.err.contains(word), "{word}: {}", answer.err);
+        }
+    }
+    assert_eq!(
+        program::run_in(proc, ["margins", "--fast"]).code,
+        0,
+        "what writes nothing works"
+    );
+    let bench = Bench::new();
+    bench.write("taken", "");
+    let answer = bench.run("control --duration 0.1 --out taken");
+    assert!(
+        answer.code == 1 && answer.err.contains("taken"),
+        "{answer:?}"
+    );
+}
