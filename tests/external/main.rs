@@ -4,7 +4,7 @@ use bench_test_support::program;
 use bench_test_support::python;
 
 mod motor_bench;
-mod once;
+mod single_record;
 mod periodic;
 mod refused;
 mod signals;

@@ -9,6 +9,6 @@ mod joint;
 mod noise;
 use bench_test_support::python;
 mod repeated;
-mod sides;
+mod noise_sides;
 use bench_test_support::stage;
 mod welch;
