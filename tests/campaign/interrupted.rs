@@ -1,4 +1,4 @@
-//! An interrupted campaign continues to the same result; foreign files are refused or measured again.
+//! An interrupted campaign continues to the same result; files of another campaign are rejected or measured again.
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use crate::program::Bench;
 const GRID: &str = "campaign --operating-points 2%:8%:4 --asymmetries -5%:10%:3 --out c --threads 2 \
                     --set chirp.start_hz=5 --set chirp.duration_s=8 --set chirp.fade_in_s=0.5 --set chirp.quiet_after_s=2";
 /// Time limit of a wait, not a requirement.
-const PATIENCE: Duration = Duration::from_secs(240);
+const WAIT_LIMIT: Duration = Duration::from_secs(240);
 
 fn start(bench: &Bench) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
@@ -26,37 +26,40 @@ fn start(bench: &Bench) -> Child {
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .expect("it starts")
+        .expect("the program starts")
 }
 
-/// Files of points that are there.
+/// Existing files of points.
 fn points(bench: &Bench) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(bench.path("c/points")) else {
         return Vec::new();
     };
     let paths = entries.map(|entry| entry.expect("an entry").path());
-    let mut whole: Vec<PathBuf> = paths
+    let mut files: Vec<PathBuf> = paths
         .filter(|path| path.extension().is_some_and(|e| e == "json"))
         .collect();
-    whole.sort();
-    whole
+    files.sort();
+    files
 }
 
 /// Sends a signal when three points are finished; returns the exit code and the messages.
 fn interrupted(bench: &Bench, number: i32) -> (Option<i32>, String) {
     let mut child = start(bench);
-    let patience = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + WAIT_LIMIT;
     while points(bench).len() < 3 {
         assert!(
-            child.try_wait().expect("a child of ours").is_none(),
-            "it ended early"
+            child.try_wait().expect("the child process").is_none(),
+            "the program ended before the signal"
         );
-        assert!(Instant::now() < patience, "nothing is written");
+        assert!(
+            Instant::now() < deadline,
+            "three points are not written within {WAIT_LIMIT:?}"
+        );
         std::thread::sleep(Duration::from_millis(10));
     }
-    // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
+    // SAFETY: the child has not been waited for, so its process id is still valid.
     assert_eq!(unsafe { libc::kill(child.id() as libc::pid_t, number) }, 0);
-    let output = child.wait_with_output().expect("a child of ours");
+    let output = child.wait_with_output().expect("the child process");
     (
         output.status.code(),
         String::from_utf8_lossy(&output.stderr).into_owned(),
@@ -67,7 +70,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).expect("a file")).expect("whole JSON")
 }
 
-/// Circles of a colour in a picture, as dots (filled) or rings.
+/// Number of circles with this attribute: dots have a fill, rings a stroke.
 fn circles(svg: &str, attribute: &str) -> usize {
     svg.lines()
         .filter(|line| line.starts_with("<circle") && line.contains(attribute))
@@ -75,7 +78,7 @@ fn circles(svg: &str, attribute: &str) -> usize {
 }
 
 #[test]
-fn an_interrupted_campaign_continues_to_the_same_result() {
+fn interrupted_campaign_continues_to_the_same_result() {
     let whole = Bench::new();
     let answer = whole.run(&format!("{GRID} --json"));
     assert_eq!(answer.code, 0, "{}", answer.err);
@@ -90,9 +93,9 @@ fn an_interrupted_campaign_continues_to_the_same_result() {
     );
     assert_eq!(
         report["agreement"]["contradicted_as_simulated"], 0,
-        "never a wrong verdict: {report}"
+        "wrong verdicts: {report}"
     );
-    // One dot a verdict on each of the maps, of which there are two where an offset is told, and one in the legend.
+    // One dot per verdict on each map, and one in the legend. With an estimated offset there are two maps.
     let (svg, maps) = (
         whole.read("c/campaign.svg"),
         if report["offset"].is_null() { 1 } else { 2 },
@@ -107,29 +110,30 @@ fn an_interrupted_campaign_continues_to_the_same_result() {
     );
 
     for (number, expected) in [(libc::SIGKILL, None), (libc::SIGINT, Some(1))] {
-        let broken = Bench::new();
-        let (code, said) = interrupted(&broken, number);
-        assert_eq!(code, expected, "{said}");
-        let kept = points(&broken);
-        assert!((3..12).contains(&kept.len()), "{kept:?}");
-        kept.iter().for_each(|path| {
+        let stopped = Bench::new();
+        let (code, messages) = interrupted(&stopped, number);
+        assert_eq!(code, expected, "{messages}");
+        let finished = points(&stopped);
+        assert!((3..12).contains(&finished.len()), "{finished:?}");
+        finished.iter().for_each(|path| {
             assert_eq!(
                 json(path),
                 json(&whole.path("c/points").join(path.file_name().unwrap()))
             )
         });
-        let going_on = broken.run(&format!("{GRID} --json"));
+        let continued = stopped.run(&format!("{GRID} --json"));
         assert!(
-            going_on
-                .err
-                .contains(&format!("{} of 12 points are finished already", kept.len())),
+            continued.err.contains(&format!(
+                "{} of 12 points are finished already",
+                finished.len()
+            )),
             "{}",
-            going_on.err
+            continued.err
         );
-        assert_eq!((going_on.code, &going_on.out), (0, &answer.out));
+        assert_eq!((continued.code, &continued.out), (0, &answer.out));
     }
 
-    // A damaged file, or one of another point, does not count: the point is measured again.
+    // If the file of a point is damaged or belongs to another point, the point is measured again.
     let files = points(&whole);
     let text = std::fs::read_to_string(&files[0]).expect("a file");
     std::fs::write(&files[0], &text[..text.len() / 2]).expect("a writable folder");
@@ -144,8 +148,8 @@ fn an_interrupted_campaign_continues_to_the_same_result() {
     }
     assert_eq!((again.code, &again.out), (0, &answer.out));
 
-    // Other settings are refused with the difference.
-    for (arguments, named) in [
+    // Different settings are rejected; the message lists the differences.
+    for (arguments, difference) in [
         (
             format!("{GRID} --seed 7"),
             "`config.sim.seed` is 1 there, 7 here",
@@ -160,13 +164,13 @@ fn an_interrupted_campaign_continues_to_the_same_result() {
             other.code == 2 && other.err.contains("holds a campaign with other settings"),
             "{other:?}"
         );
-        assert!(other.err.contains(named), "{other:?}");
+        assert!(other.err.contains(difference), "{other:?}");
     }
     assert_eq!(points(&whole), files);
 }
 
 #[test]
-fn refuses_a_folder_of_something_else_and_does_not_change_it() {
+fn rejects_folder_of_another_program_and_does_not_change_it() {
     let bench = Bench::new();
     std::fs::create_dir(bench.path("c")).expect("a writable folder");
     for text in ["", "not JSON", "{\"format\": \"bench study 1\"}", "[1, 2]"] {
@@ -178,6 +182,12 @@ fn refuses_a_folder_of_something_else_and_does_not_change_it() {
         );
         assert_eq!(bench.read("c/campaign.json"), text);
     }
+    assert_eq!(bench.files(), ["c"]);
+}
+
+#[test]
+fn rejects_invalid_campaigns_with_the_reason() {
+    let bench = Bench::new();
     for (arguments, words) in [
         (
             "campaign --config lab",
@@ -212,11 +222,11 @@ fn refuses_a_folder_of_something_else_and_does_not_change_it() {
             "{arguments}: {answer:?}"
         );
     }
-    assert_eq!(bench.files(), ["c"]);
+    assert_eq!(bench.files(), [""; 0]);
 }
 
 #[test]
-fn points_of_the_simulated_stage_do_not_count_for_devices() {
+fn rejects_results_of_simulation_for_devices_and_the_reverse() {
     let config = load(&Source::default()).expect("the default profile");
     let grid = Grid::new(vec![0.0, 0.08], vec![0.1], &config).expect("a grid");
     let point = PointResult {
@@ -238,7 +248,7 @@ fn points_of_the_simulated_stage_do_not_count_for_devices() {
             .expect("a point");
         drop(first);
         let error = open(simulated_first)
-            .expect_err("the other stage")
+            .expect_err("the results are of the other kind of stage")
             .to_string();
         assert!(
             error.contains("other settings") && error.contains("`on_devices` is "),
@@ -249,14 +259,14 @@ fn points_of_the_simulated_stage_do_not_count_for_devices() {
 }
 
 #[test]
-fn the_simulated_stage_has_the_offset_and_the_model_does_not() {
+fn asymmetry_offset_applies_to_the_simulated_stage_and_not_to_the_model() {
     let bench = Bench::new();
     let short = "--set chirp.duration_s=8 --set chirp.start_hz=5 --set chirp.fade_in_s=0.5 --set chirp.quiet_after_s=1";
     let digest = |more: &str| bench.json(&format!("chirp {short} {more}"))["loop_digest"].clone();
-    // 0.125 - 0.125 is 0 without rounding: the very same stage.
-    let made = digest("--asymmetry 0.125 --set sim.asymmetry_offset=-0.125");
-    assert_eq!(made, digest("--asymmetry 0"));
-    assert_ne!(made, digest("--asymmetry 0.125"));
+    // 0.125 - 0.125 is 0 without rounding: an identical stage.
+    let with_offset = digest("--asymmetry 0.125 --set sim.asymmetry_offset=-0.125");
+    assert_eq!(with_offset, digest("--asymmetry 0"));
+    assert_ne!(with_offset, digest("--asymmetry 0.125"));
     let model = bench.json("model modes --asymmetry 0.125 --set sim.asymmetry_offset=-0.125");
     assert_eq!(model["mass_asymmetry"], 0.125);
 }

@@ -2,22 +2,24 @@
 
 use bench::experiment::campaign::{Finding, GridPoint, Load, PointResult, Reply};
 
-use super::{DONE, Does, all, campaign, config, grid, nothing, puts, required};
+use super::{Action, DONE, all, campaign, config, grid, no_action, required, set_required};
 
 #[test]
-fn modes_distinguish_the_requested_load_from_none_or_the_check_cannot_tell() {
-    // An unknown asymmetry by manufacture is within the tolerances.
-    for made in ["0.0", "-0.02", "0.02"] {
-        let config = config(&[&format!("sim.asymmetry_offset={made}")]);
+fn load_check_is_inconclusive_unless_modes_differ_from_the_unloaded_stage() {
+    // An unknown asymmetry of the built stage is within the tolerances.
+    for built in ["0.0", "-0.02", "0.02"] {
+        let config = config(&[&format!("sim.asymmetry_offset={built}")]);
         let grid = grid(&[0.0, 0.08], &[0.0, 0.1]);
         let places =
             [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(row, column)| GridPoint { row, column });
         assert_eq!(all(&grid), places);
-        let mut script = vec![(nothing(), DONE)];
-        script.extend(places.map(|place| (puts(&config, &grid, place.row, place.column), DONE)));
+        let mut script = vec![(no_action(), DONE)];
+        script.extend(
+            places.map(|place| (set_required(&config, &grid, place.row, place.column), DONE)),
+        );
         let outcome = campaign(&config, &grid, &places, script);
         assert_eq!(
-            (outcome.kept.len(), outcome.chirps, outcome.asked.len()),
+            (outcome.stored.len(), outcome.chirps, outcome.asked.len()),
             (4, 4, 5),
             "{:?}",
             outcome.asked.last()
@@ -33,14 +35,14 @@ fn modes_distinguish_the_requested_load_from_none_or_the_check_cannot_tell() {
         .enumerate()
         {
             let check = outcome.check(index);
-            assert_eq!(check.finding(), *expected, "{made} {index} {check:?}");
+            assert_eq!(check.finding(), *expected, "{built} {index} {check:?}");
             assert!(!check.confirmed_by_hand && check.read.is_none());
-            // The rest position does not change, which proves nothing about the weight.
+            // The rest position in X is 0 with and without the weight, so that it does not distinguish them.
             assert_eq!(check.rest.finding, Finding::CannotTell, "{check:?}");
             assert_eq!(check.rest.expected_m, 0.0);
             assert!(check.rest.seen_m.abs() < 0.5e-6, "{check:?}");
         }
-        // At 8 % and with 10 % there are R, u and v to look at; u and v tell.
+        // At Y1o = 8 % of L and D = 10 %, R, u and v are compared; u and v differ from those of the unloaded stage.
         let findings: Vec<Finding> = outcome
             .check(2)
             .modes
@@ -63,7 +65,7 @@ fn modes_distinguish_the_requested_load_from_none_or_the_check_cannot_tell() {
 fn asks_again_for_a_missing_weight_or_masses_on_the_wrong_stage() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
     let right = required(&config, &grid, 0, 0);
-    for (wrong, told) in [
+    for (wrong, message) in [
         (
             Load {
                 hung_kg: 0.0,
@@ -78,7 +80,7 @@ fn asks_again_for_a_missing_weight_or_masses_on_the_wrong_stage() {
             },
             "the mode expected at",
         ),
-        // The same frequencies, mirrored: only the signs differ.
+        // Mirrored masses: the same frequencies, only the signs of the residues differ.
         (
             Load {
                 on_m2_kg: 0.0,
@@ -95,20 +97,20 @@ fn asks_again_for_a_missing_weight_or_masses_on_the_wrong_stage() {
             "the mode expected at",
         ),
     ] {
-        let does: Does = Box::new(move |really| really.on = wrong);
+        let set_wrong: Action = Box::new(move |actual| actual.load = wrong);
         let script = vec![
-            (nothing(), DONE),
-            (does, DONE),
-            (puts(&config, &grid, 0, 0), DONE),
+            (no_action(), DONE),
+            (set_wrong, DONE),
+            (set_required(&config, &grid, 0, 0), DONE),
         ];
         let outcome = campaign(&config, &grid, &all(&grid), script);
         assert_eq!(
-            (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+            (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
             (3, 2, 1),
             "{wrong:?}"
         );
         assert!(
-            outcome.asked[2].text.contains(told) && outcome.asked[2].may_confirm,
+            outcome.asked[2].text.contains(message) && outcome.asked[2].may_confirm,
             "{:?}",
             outcome.asked[2]
         );
@@ -125,17 +127,17 @@ fn asks_again_for_a_missing_weight_or_masses_on_the_wrong_stage() {
 }
 
 #[test]
-fn keeps_a_confirmed_load_with_its_failed_checks() {
+fn stores_failed_checks_of_manually_confirmed_load() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
-    // The same chirp is kept that failed: nothing was moved.
+    // The chirp of the failed check is stored: the load did not change since.
     let script = vec![
-        (nothing(), DONE),
-        (nothing(), DONE),
-        (nothing(), Reply::Right),
+        (no_action(), DONE),
+        (no_action(), DONE),
+        (no_action(), Reply::Right),
     ];
     let outcome = campaign(&config, &grid, &all(&grid), script);
     assert_eq!(
-        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
         (3, 1, 1)
     );
     let check = outcome.check(0);
@@ -143,7 +145,7 @@ fn keeps_a_confirmed_load_with_its_failed_checks() {
         check.confirmed_by_hand && check.finding() == Finding::Fails,
         "{check:?}"
     );
-    let json = serde_json::to_value(&outcome.kept[0].1).expect("JSON");
+    let json = serde_json::to_value(&outcome.stored[0].1).expect("JSON");
     assert_eq!(json["load_check"]["confirmed_by_hand"], true);
     assert!(
         json["load_check"]["modes"][1]["expected_hz"].is_f64(),
@@ -159,18 +161,18 @@ fn keeps_a_confirmed_load_with_its_failed_checks() {
 #[test]
 fn confirming_the_rest_position_does_not_confirm_the_modes() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
-    // No load, and something touches the stage: `right` to that does not confirm modes that are not measured yet.
-    let touched: Does = Box::new(|really| really.askew_m = 20e-6);
+    // No load, and something touches the stage: the reply `right` to that does not confirm modes that are not measured yet.
+    let touch: Action = Box::new(|actual| actual.shift_x_m = 20e-6);
     let script = vec![
-        (nothing(), DONE),
-        (touched, DONE),
-        (nothing(), Reply::Right),
-        (puts(&config, &grid, 0, 0), DONE),
-        (nothing(), Reply::Right),
+        (no_action(), DONE),
+        (touch, DONE),
+        (no_action(), Reply::Right),
+        (set_required(&config, &grid, 0, 0), DONE),
+        (no_action(), Reply::Right),
     ];
     let outcome = campaign(&config, &grid, &all(&grid), script);
     assert_eq!(
-        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
         (5, 2, 1),
         "{:?}",
         outcome.asked.last()
@@ -194,15 +196,18 @@ fn confirming_the_rest_position_does_not_confirm_the_modes() {
         "{check:?}"
     );
 
-    let read: (Does, Reply) = (puts(&config, &grid, 0, 0), Reply::Done(Some(3.6e-3)));
+    let read: (Action, Reply) = (
+        set_required(&config, &grid, 0, 0),
+        Reply::Done(Some(3.6e-3)),
+    );
     let outcome = campaign(
         &config,
         &grid,
         &all(&grid),
-        vec![(nothing(), DONE), read, (nothing(), Reply::Right)],
+        vec![(no_action(), DONE), read, (no_action(), Reply::Right)],
     );
     assert_eq!(
-        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
         (3, 1, 1),
         "{:?}",
         outcome.asked.last()
@@ -221,20 +226,24 @@ fn confirming_the_rest_position_does_not_confirm_the_modes() {
 #[test]
 fn reports_a_tripped_chirp_with_its_reason() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
-    let load = puts(&config, &grid, 0, 0);
-    let blind: Does = Box::new(move |really| {
-        load(really);
-        really.blind = true;
+    let set_load = set_required(&config, &grid, 0, 0);
+    let lose_target: Action = Box::new(move |actual| {
+        set_load(actual);
+        actual.loses_target = true;
     });
-    let sees: Does = Box::new(|really| really.blind = false);
+    let restore_target: Action = Box::new(|actual| actual.loses_target = false);
     let outcome = campaign(
         &config,
         &grid,
         &all(&grid),
-        vec![(nothing(), DONE), (blind, DONE), (sees, DONE)],
+        vec![
+            (no_action(), DONE),
+            (lose_target, DONE),
+            (restore_target, DONE),
+        ],
     );
     assert_eq!(
-        (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+        (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
         (3, 2, 1),
         "{:?}",
         outcome.asked.last()
@@ -250,22 +259,22 @@ fn reports_a_tripped_chirp_with_its_reason() {
 #[test]
 fn reports_a_misaligned_cable_and_a_wrong_displacement_before_the_chirp() {
     let (config, grid) = (config(&[]), grid(&[0.08], &[0.1]));
-    // 34 N askew by 0.02 rad are 9.5 um at 72 N/mm, and 2 um may drift.
+    // Limit: 34 N misaligned by 0.02 rad shift the stage by 9.5 um at 72 N/mm; 2 um are allowed for drift.
     for (shift_m, fails) in [(8e-6, false), (-8e-6, false), (20e-6, true), (-20e-6, true)] {
-        let load = puts(&config, &grid, 0, 0);
-        let askew: Does = Box::new(move |really| {
-            load(really);
-            really.askew_m = shift_m;
+        let set_load = set_required(&config, &grid, 0, 0);
+        let misalign: Action = Box::new(move |actual| {
+            set_load(actual);
+            actual.shift_x_m = shift_m;
         });
-        let straight: Does = Box::new(|really| really.askew_m = 0.0);
+        let align: Action = Box::new(|actual| actual.shift_x_m = 0.0);
         let outcome = campaign(
             &config,
             &grid,
             &all(&grid),
-            vec![(nothing(), DONE), (askew, DONE), (straight, DONE)],
+            vec![(no_action(), DONE), (misalign, DONE), (align, DONE)],
         );
         assert_eq!(
-            (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+            (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
             (2 + usize::from(fails), 1, 1),
             "{shift_m}"
         );
@@ -277,7 +286,7 @@ fn reports_a_misaligned_cable_and_a_wrong_displacement_before_the_chirp() {
             );
         }
     }
-    // 8 % of 47.5 mm are 3.8 mm; 0.2 % of it, 95 um, are allowed.
+    // Required: 8 % of L = 47.5 mm, which is 3.8 mm. Tolerance: 0.2 % of L, 95 um.
     for (read_m, fails) in [
         (3.72e-3, false),
         (3.88e-3, false),
@@ -286,13 +295,16 @@ fn reports_a_misaligned_cable_and_a_wrong_displacement_before_the_chirp() {
         (f64::NAN, true),
     ] {
         let script = vec![
-            (nothing(), DONE),
-            (puts(&config, &grid, 0, 0), Reply::Done(Some(read_m))),
-            (nothing(), Reply::Done(Some(3.8e-3))),
+            (no_action(), DONE),
+            (
+                set_required(&config, &grid, 0, 0),
+                Reply::Done(Some(read_m)),
+            ),
+            (no_action(), Reply::Done(Some(3.8e-3))),
         ];
         let outcome = campaign(&config, &grid, &all(&grid), script);
         assert_eq!(
-            (outcome.asked.len(), outcome.chirps, outcome.kept.len()),
+            (outcome.asked.len(), outcome.chirps, outcome.stored.len()),
             (2 + usize::from(fails), 1, 1),
             "{read_m}"
         );

@@ -1,4 +1,5 @@
-//! A campaign on a stage that an operator loads: every load is checked, and no check passes without evidence.
+//! A campaign on a stage that an operator loads: every load is checked, and no check passes without a measurement that distinguishes the
+//! load from none.
 
 mod load_check;
 mod progress;
@@ -19,7 +20,7 @@ use bench_hal::Validity;
 
 use crate::faulty_rig::{Fault, FaultyRig};
 
-/// The shortest chirp that passes over all modes, and the shortest quiet, at 1 kHz.
+/// The shortest chirp over all modes and the shortest quiet intervals, at 1 kHz.
 const SETS: [&str; 8] = [
     "loop.rate_hz=1000.0",
     "chirp.stop_hz=450.0",
@@ -41,65 +42,66 @@ fn config(more: &[&str]) -> Config {
     .expect("a configuration")
 }
 
-/// The actual load of the stage, and what pulls it in X.
+/// The actual load of the stage, and its shift in X.
 #[derive(Clone, Copy, Default)]
-struct Really {
-    on: Load,
-    askew_m: f64,
+struct ActualLoad {
+    load: Load,
+    /// Displacement in X, as of a misaligned cable.
+    shift_x_m: f64,
     /// The probe loses its target during a chirp.
-    blind: bool,
+    loses_target: bool,
 }
 
-/// What the operator of the script does before an answer.
-type Does = Box<dyn Fn(&mut Really)>;
+/// A change of the actual load that the operator makes before an answer.
+type Action = Box<dyn Fn(&mut ActualLoad)>;
 
-/// An operator who follows a script; at its end the answer is `stop`.
+/// An operator who follows a script; after its end every answer is `stop`.
 struct Scripted<'a> {
-    really: &'a RefCell<Really>,
-    script: VecDeque<(Does, Reply)>,
+    actual: &'a RefCell<ActualLoad>,
+    script: VecDeque<(Action, Reply)>,
     asked: &'a RefCell<Vec<Question>>,
 }
 
 impl Operator for Scripted<'_> {
     fn ask(&mut self, question: &Question) -> Reply {
         self.asked.borrow_mut().push(question.clone());
-        let Some((does, reply)) = self.script.pop_front() else {
+        let Some((action, reply)) = self.script.pop_front() else {
             return Reply::Stop;
         };
-        does(&mut self.really.borrow_mut());
+        action(&mut self.actual.borrow_mut());
         reply
     }
 
     fn tell(&mut self, _text: &str) {}
 }
 
-/// The simulated stage with the actual load; run, recorded and analysed as devices are.
+/// The simulated stage with the actual load; it is run, recorded and analysed like devices.
 struct Simulated<'a> {
     config: &'a Config,
     grid: &'a Grid,
-    really: &'a RefCell<Really>,
+    actual: &'a RefCell<ActualLoad>,
     folder: tempfile::TempDir,
     chirps: usize,
-    kept: Vec<(GridPoint, PointResult)>,
+    stored: Vec<(GridPoint, PointResult)>,
 }
 
 impl Simulated<'_> {
     /// The rig has the actual load; the plan has the requested one.
     fn rig(&self, config: &Config, chirps: bool) -> Box<FaultyRig<SimulatedRig>> {
-        let really = *self.really.borrow();
+        let actual = *self.actual.borrow();
         let model = StageModel::of(self.config).expect("a stage");
-        let plant = model.loaded_plant(&really.on);
+        let plant = model.loaded_plant(&actual.load);
         let rig = SimulatedRig::new(&Config {
             plant,
             ..config.clone()
         })
         .expect("a rig");
-        let blind =
-            (really.blind && chirps).then_some((2000..u64::MAX, Fault::Says(Validity::OutOfRange)));
-        let askew = (0..u64::MAX, Fault::Offset(really.askew_m));
+        let lost = (actual.loses_target && chirps)
+            .then_some((2000..u64::MAX, Fault::Says(Validity::OutOfRange)));
+        let shift = (0..u64::MAX, Fault::Offset(actual.shift_x_m));
         Box::new(FaultyRig::new(
             rig,
-            &[askew].into_iter().chain(blind).collect::<Vec<_>>(),
+            &[shift].into_iter().chain(lost).collect::<Vec<_>>(),
         ))
     }
 }
@@ -141,21 +143,21 @@ impl LoadedRig for Simulated<'_> {
     }
 
     fn keep(&mut self, place: GridPoint, point: &PointResult) -> Result<(), CampaignError> {
-        self.kept.push((place, point.clone()));
+        self.stored.push((place, point.clone()));
         Ok(())
     }
 }
 
-/// What outcome of a campaign.
+/// Outcome of a campaign: the questions, the number of chirps and the stored points.
 struct Outcome {
     asked: Vec<Question>,
     chirps: usize,
-    kept: Vec<(GridPoint, PointResult)>,
+    stored: Vec<(GridPoint, PointResult)>,
 }
 
 impl Outcome {
     fn check(&self, index: usize) -> &LoadCheck {
-        self.kept[index]
+        self.stored[index]
             .1
             .load_check
             .as_ref()
@@ -167,11 +169,11 @@ fn campaign(
     config: &Config,
     grid: &Grid,
     places: &[GridPoint],
-    script: Vec<(Does, Reply)>,
+    script: Vec<(Action, Reply)>,
 ) -> Outcome {
-    let (really, asked) = (RefCell::default(), RefCell::default());
+    let (actual, asked) = (RefCell::default(), RefCell::default());
     let mut operator = Scripted {
-        really: &really,
+        actual: &actual,
         script: script.into(),
         asked: &asked,
     };
@@ -179,10 +181,10 @@ fn campaign(
     let rig = Simulated {
         config,
         grid,
-        really: &really,
+        actual: &actual,
         folder,
         chirps: 0,
-        kept: Vec::new(),
+        stored: Vec::new(),
     };
     let mut guided = GuidedCampaign {
         config,
@@ -192,11 +194,11 @@ fn campaign(
         rig,
     };
     guided.run(places).expect("a campaign");
-    let (chirps, kept) = (guided.rig.chirps, guided.rig.kept);
+    let (chirps, stored) = (guided.rig.chirps, guided.rig.stored);
     Outcome {
         asked: asked.into_inner(),
         chirps,
-        kept,
+        stored,
     }
 }
 
@@ -208,19 +210,19 @@ fn grid(points: &[f64], asymmetries: &[f64]) -> Grid {
     Grid::new(points.into(), asymmetries.into(), &config(&[])).expect("a grid")
 }
 
-/// Sets the load of a point.
-fn puts(config: &Config, grid: &Grid, row: usize, column: usize) -> Does {
+/// Sets the required load of a point.
+fn set_required(config: &Config, grid: &Grid, row: usize, column: usize) -> Action {
     let load = required(config, grid, row, column);
-    Box::new(move |really| really.on = load)
+    Box::new(move |actual| actual.load = load)
 }
 
 fn required(config: &Config, grid: &Grid, row: usize, column: usize) -> Load {
-    let there = grid.config_at(config, GridPoint { row, column });
-    let there = there.expect("a point");
-    StageModel::of(&there).expect("a stage").required_load()
+    let config = grid.config_at(config, GridPoint { row, column });
+    let config = config.expect("a point");
+    StageModel::of(&config).expect("a stage").required_load()
 }
 
-fn nothing() -> Does {
+fn no_action() -> Action {
     Box::new(|_| {})
 }
 

@@ -2,20 +2,20 @@
 
 use bench::experiment::campaign::{GridPoint, Reply};
 
-use super::{DONE, all, campaign, config, grid, nothing, puts};
+use super::{DONE, all, campaign, config, grid, no_action, set_required};
 
 #[test]
-fn skipped_points_stay_missing_and_a_stopped_campaign_continues() {
+fn skipped_points_stay_missing_and_stopped_campaign_continues() {
     let (config, grid) = (config(&[]), grid(&[0.0, 0.08], &[0.0]));
     let script = vec![
-        (nothing(), DONE),
-        (nothing(), Reply::Skip),
-        (puts(&config, &grid, 1, 0), DONE),
+        (no_action(), DONE),
+        (no_action(), Reply::Skip),
+        (set_required(&config, &grid, 1, 0), DONE),
     ];
     let outcome = campaign(&config, &grid, &all(&grid), script);
     assert_eq!(
         outcome
-            .kept
+            .stored
             .iter()
             .map(|(place, _)| place.row)
             .collect::<Vec<_>>(),
@@ -29,35 +29,39 @@ fn skipped_points_stay_missing_and_a_stopped_campaign_continues() {
 
     for script in [
         vec![],
-        vec![(nothing(), DONE)],
-        vec![(nothing(), DONE), (nothing(), Reply::Stop)],
+        vec![(no_action(), DONE)],
+        vec![(no_action(), DONE), (no_action(), Reply::Stop)],
     ] {
         let outcome = campaign(&config, &grid, &all(&grid), script);
-        assert_eq!((outcome.kept.len(), outcome.chirps), (0, 0));
+        assert_eq!((outcome.stored.len(), outcome.chirps), (0, 0));
     }
     let first = campaign(
         &config,
         &grid,
         &all(&grid),
-        vec![(nothing(), DONE), (nothing(), DONE)],
+        vec![(no_action(), DONE), (no_action(), DONE)],
     );
     assert_eq!(
-        first.kept.len(),
+        first.stored.len(),
         1,
         "the script ends with `stop` at the second point"
     );
     let missing: Vec<GridPoint> = all(&grid)
         .into_iter()
-        .filter(|place| *place != first.kept[0].0)
+        .filter(|place| *place != first.stored[0].0)
         .collect();
-    let then = campaign(
+    let continued = campaign(
         &config,
         &grid,
         &missing,
-        vec![(nothing(), DONE), (puts(&config, &grid, 1, 0), DONE)],
+        vec![
+            (no_action(), DONE),
+            (set_required(&config, &grid, 1, 0), DONE),
+        ],
     );
     assert_eq!(
-        then.kept
+        continued
+            .stored
             .iter()
             .map(|(place, _)| place.row)
             .collect::<Vec<_>>(),
@@ -65,13 +69,13 @@ fn skipped_points_stay_missing_and_a_stopped_campaign_continues() {
     );
     assert!(
         campaign(&config, &grid, &[], vec![]).asked.is_empty(),
-        "nothing missing, nothing asked"
+        "no point is missing, so that nothing is asked"
     );
 }
 
 #[test]
-fn visit_order_changes_the_weight_once_a_row_and_no_mass_between_rows() {
-    // In any order of the grid's own values.
+fn visit_order_changes_the_weight_once_per_row_and_keeps_the_masses_between_rows() {
+    // The values of the grid are not sorted.
     let grid = grid(&[0.08, 0.0, 0.04], &[0.05, -0.05, 0.0, 0.1]);
     let places = all(&grid);
     assert_eq!(places.len(), 12);
@@ -84,7 +88,7 @@ fn visit_order_changes_the_weight_once_a_row_and_no_mass_between_rows() {
         .map(|place| grid.asymmetries[place.column])
         .collect();
     assert_eq!(weights, [[0.0; 4], [0.04; 4], [0.08; 4]].concat());
-    let up = [-0.05, 0.0, 0.05, 0.1];
-    let down = [0.1, 0.05, 0.0, -0.05];
-    assert_eq!(masses, [up, down, up].concat());
+    let rising = [-0.05, 0.0, 0.05, 0.1];
+    let falling = [0.1, 0.05, 0.0, -0.05];
+    assert_eq!(masses, [rising, falling, rising].concat());
 }
