@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::rig::{KINDS, SILENT, analysed, of_kind, recorded};
 use crate::truth;
 
-/// The response of the rig by another program, at the frequencies of the analysis.
+/// The response of the rig, computed by Python, at the frequencies of the analysis.
 fn true_response(config: &Config, analysis: &Analysis) -> Option<Vec<Complex<f64>>> {
     let config = serde_json::to_value(config).expect("JSON");
     let question =
@@ -26,7 +26,7 @@ fn true_response(config: &Config, analysis: &Analysis) -> Option<Vec<Complex<f64
 }
 
 #[test]
-fn without_noise_the_response_is_the_rigs_but_for_what_the_stage_still_remembers() {
+fn noiseless_frf_matches_rig_except_residual_transient() {
     for kind in KINDS {
         let config = of_kind(kind, &SILENT);
         let analysis = analysed(&config);
@@ -41,8 +41,8 @@ fn without_noise_the_response_is_the_rigs_but_for_what_the_stage_still_remembers
         );
         for (k, truth) in truth.iter().enumerate() {
             let (frequency_hz, measured) = (analysis.frf.frequency_hz[k], analysis.frf.response[k]);
-            // Mode R forgets with 0.62 s: of what the fade leaves in motion, some hundredth, exp(-8) is there after 5 s, and
-            // less on average over the periods; lines at a zero of the response see it the most.
+            // Time constant of mode R: 0.62 s. The fade-in leaves a transient of about 1 %, which decays by exp(-8) within 5 s, to 3e-6;
+            // its average over the periods is smaller. Its relative effect is largest at lines near a zero of the response.
             let relative = (measured - truth).norm() / truth.norm();
             assert!(
                 relative < 1e-3,
@@ -54,7 +54,7 @@ fn without_noise_the_response_is_the_rigs_but_for_what_the_stage_still_remembers
 }
 
 #[test]
-fn with_noise_the_stated_sigmas_hold() {
+fn errors_of_noisy_frf_match_sigma() {
     for kind in KINDS {
         let mut shares = [0.0, 0.0];
         for seed in [1, 2, 3] {
@@ -75,8 +75,9 @@ fn with_noise_the_stated_sigmas_hold() {
             shares[0] += within(1.0);
             shares[1] += within(2.0);
         }
-        // Sigma is the scatter of 7 periods (5 blocks of a sine), 12 (8) degrees of freedom of Student's t: 66.3 (65.3) % within
-        // one, 93.1 (92.0) % within two. 400 lines have a binomial sigma of 2.4 % and 1.3 %; three are allowed.
+        // Sigma is estimated from 7 periods (12 degrees of freedom): Student's t gives 66.3 % within one sigma and 93.1 % within two.
+        // Stepped sine: 5 blocks, 8 degrees of freedom, 65.3 % and 92.0 %. Over 400 lines the standard deviations of these shares are
+        // 2.4 % and 1.3 %; the bounds allow three of them.
         assert!(
             (0.58..0.74).contains(&shares[0]),
             "{}: {} within one sigma",
@@ -93,13 +94,13 @@ fn with_noise_the_stated_sigmas_hold() {
 }
 
 #[test]
-fn modes_r_u_and_v_have_the_signs_of_the_model_and_the_zeros_are_never_excluded() {
+fn modes_r_u_and_v_have_the_signs_of_the_model_and_cnmp_zeros_are_not_excluded() {
     // `bench model modes`: 183.936, 516.657 and 538.999 rad/s.
     let truth_hz = [29.274, 82.228, 85.784];
     for kind in KINDS {
         let analysis = analysed(&of_kind(kind, &[]));
         let modes = analysis.fit.as_ref().expect("modes").modes();
-        // The binary sequence shows the fourth of the model as well, at 22.869 Hz with 6e-6 of R's residue.
+        // The binary sequence also gives the fourth mode of the model, at 22.869 Hz with 6e-6 of R's residue.
         for (truth_hz, sign) in truth_hz.into_iter().zip([1.0, -1.0, 1.0]) {
             let near =
                 |mode: &&FittedMode| (mode.frequency_hz().value / truth_hz - 1.0).abs() < 5e-4;
@@ -114,7 +115,7 @@ fn modes_r_u_and_v_have_the_signs_of_the_model_and_the_zeros_are_never_excluded(
             );
             assert!(mode.sign_error_probability() < 1e-6);
         }
-        // The current of a multisine is put where the response is small; that of the others may not do for a verdict.
+        // A multisine has most current where the response is small. With the other excitations the verdict may be undecided.
         let (cnmp, why) = (analysis.verdict.cnmp, &analysis.verdict.why);
         assert!(
             cnmp != Cnmp::Excluded && (cnmp == Cnmp::Detected || kind.0 != "multisine"),
@@ -125,7 +126,7 @@ fn modes_r_u_and_v_have_the_signs_of_the_model_and_the_zeros_are_never_excluded(
 }
 
 #[test]
-fn a_recording_replays_bit_for_bit_whatever_excited_it() {
+fn recordings_of_all_excitations_replay_bit_for_bit() {
     let short = [
         "chirp.duration_s=6.0",
         "chirp.repetitions=2",

@@ -1,4 +1,4 @@
-//! Noise is told from geometry: by the lines that a multisine leaves out, and by several amplitudes.
+//! Noise and geometric nonlinearity are distinguished by the omitted lines of a multisine and by several amplitudes.
 use bench::experiment::Analysis;
 use bench::identify::linearity::Cause;
 use bench::identify::modal::FittedMode;
@@ -7,28 +7,28 @@ use serde_json::Value;
 use crate::program::{Bench, number};
 use crate::rig::{analysed, of_kind};
 
-/// Odd lines an eighth of a hertz apart from 5 to 200 Hz, one in four left out, 8 periods compared.
-const LEFT_OUT: [&str; 5] = [
+/// Odd lines from 5 to 200 Hz, with a line spacing of 1/8 Hz, one of four omitted; 8 periods are compared.
+const OMITTED_LINES: [&str; 5] = [
     "multisine.lines=odd_random",
     "multisine.period_s=8.0",
     "multisine.periods=9",
     "chirp.start_hz=5.0",
     "chirp.stop_hz=200.0",
 ];
-/// Shaped by hand as `--shape model` does: little where the stage resonates, so that lines are of one order.
+/// An amplitude curve like that of `--shape model`: low at the resonance, so that the displacements of all lines are of the same order.
 const SHAPED: &str = "chirp.amplitude=[{ frequency_hz = 10.0, current_a = 0.6 }, { frequency_hz = 29.3, current_a = 0.06 }, { frequency_hz = 50.0, current_a = 1.2 }, { frequency_hz = 200.0, current_a = 2.4 }]";
-/// At 8 % of the beam length, where the constraints are steepest.
+/// At 8 % of the beam length, where the constraints have the largest slope of the range.
 const OPERATING: &str = "plant.operating_point_m=0.0038";
 
-fn shown(more: &[&str]) -> Analysis {
+fn analysis_with(more: &[&str]) -> Analysis {
     analysed(&of_kind(
-        ("multisine", &LEFT_OUT),
+        ("multisine", &OMITTED_LINES),
         &[&[SHAPED, OPERATING], more].concat(),
     ))
 }
 
 #[test]
-fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_nothing() {
+fn linear_stage_has_no_distortion_and_incoherence_is_noise() {
     for (seed, noise, cause) in [
         ("1", "40e-9", Cause::None),
         ("2", "40e-9", Cause::None),
@@ -38,9 +38,9 @@ fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_not
             format!("sim.seed={seed}"),
             format!("sim.probe_noise_rms_m={noise}"),
         );
-        let linearity = shown(&[&seed, &noise])
+        let linearity = analysis_with(&[&seed, &noise])
             .linearity
-            .expect("lines were left out");
+            .expect("lines were omitted");
         let whole = &linearity.whole;
         assert_eq!(whole.cause, cause, "{}", linearity.why);
         assert!(
@@ -50,8 +50,9 @@ fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_not
         assert_eq!(whole.missing_by_distortion, 0.0);
         for ratio in [whole.odd_distortion_ratio, whole.even_distortion_ratio] {
             let ratio = ratio.expect("omitted lines");
-            // The scatter of an estimate of 0 is the noise of the mean of 8 periods over the root of the lines. Those that hold most of
-            // the noise, at the floor's 8 Hz and at mode R, are ten and more: a third, and three of these.
+            // The true ratio is 0. The standard deviation of its estimate is the noise of the mean of 8 periods divided by the root of
+            // the number of lines. At least ten lines, at the 8 Hz of the floor and at mode R, have most of the noise: 1/8 x 1/3 of
+            // the noise ratio. The bound is three times that.
             assert!(
                 ratio.abs() < whole.noise_ratio / 8.0,
                 "{seed}: {ratio} {}",
@@ -62,21 +63,21 @@ fn a_linear_stage_has_no_distortion_and_what_its_coherence_lacks_is_noise_or_not
 }
 
 #[test]
-fn constraints_as_they_are_make_even_and_odd_distortion_which_is_put_down_to_geometry() {
-    let analysis = shown(&["sim.geometry=quadratic"]);
-    let linearity = analysis.linearity.as_ref().expect("lines were left out");
+fn quadratic_geometry_causes_even_and_odd_distortion() {
+    let analysis = analysis_with(&["sim.geometry=quadratic"]);
+    let linearity = analysis.linearity.as_ref().expect("lines were omitted");
     let whole = &linearity.whole;
     assert!(
         whole.is_even_detected() && whole.is_odd_detected(),
         "{whole:?}"
     );
-    // x_i - x_j has a term in the square of y_i - y_j: even first, at most of the lines.
+    // x_i - x_j contains the square of y_i - y_j, so that even distortion is the larger one.
     assert!(
         whole.missing_by_even > whole.missing_by_odd && whole.missing_by_odd > 0.0,
         "{whole:?}"
     );
     assert_eq!(whole.cause, Cause::Nonlinearity, "{}", linearity.why);
-    // It stays inside of the stops, which are at 1 mm: geometry is all there is.
+    // The stage does not reach its stops at 1 mm: geometry is the only nonlinearity.
     assert!(
         linearity
             .bands
@@ -86,11 +87,11 @@ fn constraints_as_they_are_make_even_and_odd_distortion_which_is_put_down_to_geo
 }
 
 #[test]
-fn odd_distortion_is_an_error_of_the_fit_and_makes_no_modes_whose_sign_is_known() {
+fn odd_distortion_adds_no_significant_modes() {
     // `bench model modes`: R, u, v at 29.274, 82.228 and 85.784 Hz, residues 0.47, -0.032 and 0.021 1/kg.
     let model_hz = [29.274, 82.228, 85.784];
     for geometry in ["sim.geometry=quadratic", "sim.geometry=linear"] {
-        let modes = shown(&[geometry]).fit.expect("modes").modes();
+        let modes = analysis_with(&[geometry]).fit.expect("modes").modes();
         let is = |hz: f64, model_hz: f64| (hz / model_hz - 1.0).abs() < 1e-3;
         let hz = |mode: &FittedMode| mode.frequency_hz().value;
         for model_hz in model_hz {
@@ -104,7 +105,7 @@ fn odd_distortion_is_an_error_of_the_fit_and_makes_no_modes_whose_sign_is_known(
         let others: Vec<_> = below
             .filter(|mode| !model_hz.iter().any(|model_hz| is(hz(mode), *model_hz)))
             .collect();
-        // Where chance leaves a neighbourhood of four lines less distortion than there is, one may come up; it weighs a hundredth of v at most.
+        // If four neighbouring lines underestimate the distortion by chance, one spurious mode may be found; its residue is at most 1 % of v's.
         assert!(others.len() <= 1, "{geometry}: {others:?}");
         assert!(
             others
@@ -116,10 +117,10 @@ fn odd_distortion_is_an_error_of_the_fit_and_makes_no_modes_whose_sign_is_known(
 }
 
 #[test]
-fn a_multisine_of_all_lines_and_a_chirp_say_nothing_of_it() {
-    assert!(shown(&["multisine.lines=full"]).linearity.is_none());
+fn full_multisine_and_chirp_give_no_linearity_result() {
+    assert!(analysis_with(&["multisine.lines=full"]).linearity.is_none());
     assert!(
-        shown(&[
+        analysis_with(&[
             "excitation.kind=chirp",
             "chirp.duration_s=20.0",
             "chirp.fade_in_s=1.0"
@@ -127,48 +128,51 @@ fn a_multisine_of_all_lines_and_a_chirp_say_nothing_of_it() {
         .linearity
         .is_none()
     );
-    let odd = shown(&["multisine.lines=odd"])
+    let odd = analysis_with(&["multisine.lines=odd"])
         .linearity
-        .expect("even lines were left out");
+        .expect("even lines were omitted");
     assert!(odd.whole.odd_by_noise_alone.is_none() && odd.whole.even_by_noise_alone.is_some());
 }
 
 const HERE: &str = "--set loop.rate_hz=1000 --start 5 --stop 200 --set multisine.period_s=8 --set multisine.periods=9 --operating-point 8%";
 
-/// `bench linearity` in an empty folder, and the folder.
+/// The result of `bench linearity` in an empty folder, and the folder.
 fn modes_over_amplitude(options: &str) -> (Value, Bench) {
     let bench = Bench::new();
     (bench.json(&format!("linearity {HERE} {options}")), bench)
 }
 
 #[test]
-fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
+fn modes_of_a_linear_stage_do_not_shift_with_amplitude() {
     let (answer, bench) = modes_over_amplitude("--shape model --scales 1,0.5,2");
     assert_eq!(answer["scales"], serde_json::json!([0.5, 1.0, 2.0]));
     assert_eq!(answer["shifted"], false, "{}", answer["why"]);
     let modes = answer["modes"].as_array().expect("modes");
     assert!(modes.len() >= 3, "{modes:?}");
     for run in 0..3 {
-        let made = &answer["runs"][run];
+        let result = &answer["runs"][run];
         assert_ne!(
-            made["linearity"]["cause"], "nonlinearity",
+            result["linearity"]["cause"], "nonlinearity",
             "{}",
-            made["linearity"]
+            result["linearity"]
         );
         assert!(
-            number(&made["linearity"]["even_by_noise_alone"]) > 1e-3,
+            number(&result["linearity"]["even_by_noise_alone"]) > 1e-3,
             "{}",
-            made["linearity"]
+            result["linearity"]
         );
         assert_eq!(
-            made["linearity"]["bands"].as_array().expect("bands").len(),
+            result["linearity"]["bands"]
+                .as_array()
+                .expect("bands")
+                .len(),
             6,
             "octaves from 5.125 Hz on"
         );
         for file in ["recording", "report", "frf_csv"]
-            .map(|file| &made[file])
+            .map(|file| &result[file])
             .into_iter()
-            .chain([&made["plots"]["linearity"]])
+            .chain([&result["plots"]["linearity"]])
         {
             assert!(
                 bench.path(file.as_str().expect("a path")).exists(),
@@ -178,7 +182,7 @@ fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
         let travel = |run: usize| number(&answer["runs"][run]["expected"]["travel_m"]);
         assert!((travel(run) / travel(0) / [1.0, 2.0, 4.0][run] - 1.0).abs() < 1e-9);
     }
-    // The same recording says the same again.
+    // `bench identify` gives the same linearity result from the recording.
     let recording = answer["runs"][2]["recording"].as_str().expect("a path");
     let again = bench.json(&format!("identify {recording}"));
     assert_eq!(again["linearity"], answer["runs"][2]["linearity"]);
@@ -190,12 +194,13 @@ fn modes_of_a_linear_stage_stay_where_they_are_at_each_amplitude() {
 }
 
 #[test]
-fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift() {
+fn geometric_distortion_and_mode_shifts_grow_with_the_square_of_the_amplitude() {
     let (answer, _) =
         modes_over_amplitude("--shape model --scales 0.5,1,2 --set sim.geometry=quadratic");
     let even = |run: usize| number(&answer["runs"][run]["linearity"]["even_distortion_ratio"]);
-    // Of second order: its amplitude grows with the square, its power over the output's with the square of the amplitude. From a power
-    // that is found with more than 1000 lines, some percent each; higher even orders add at the largest.
+    // Second order: the distortion grows with the square of the amplitude, so that its power relative to that of the output does, too:
+    // by 4 per step. The power comes from more than 1000 lines, with an error of some per cent each; at the largest amplitude higher
+    // even orders add to it.
     for run in [1, 2] {
         let growth = even(run) / even(run - 1);
         assert!(
@@ -211,8 +216,8 @@ fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift
         "{}",
         answer["runs"][2]["linearity"]["why"]
     );
-    // A frequency shifts with the square of the amplitude, as the third order product at its own frequency does: by 4 times from the
-    // second to the third of what it did, less where it began, so (4 - 1)/(1 - 1/4) = 4; errors of some 15 %.
+    // A frequency shifts with the square of the amplitude, like the third-order product at the frequency itself. At the scales 0.5, 1, 2
+    // the shifts are 1/4, 1, 4 times that of scale 1: the ratio of the differences is (4 - 1)/(1 - 1/4) = 4, with errors of some 15 %.
     assert_eq!(answer["shifted"], true);
     let shifting = |mode: &&Value| mode["frequency_shifts"] == true;
     let modes: Vec<&Value> = answer["modes"]
@@ -233,10 +238,10 @@ fn distortion_by_geometry_grows_with_amplitude_as_its_order_says_and_modes_shift
 }
 
 #[test]
-fn a_run_that_trips_ends_the_rest_and_what_it_did_not_show_is_no_sign_of_a_linear_stage() {
+fn trip_ends_session_without_linearity_verdict() {
     let bench = Bench::new();
-    // By the model the stage moves by 477 um, of 500 um that are allowed; the noise reaches 80 um and more. At a fifth all stays
-    // within 200 um.
+    // The model predicts a travel of 477 um; the soft limit is 500 um, and peaks of the noise exceed 80 um. At 0.2 of the amplitude the
+    // readings stay below 200 um.
     let trips = "--shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
                  --set sim.probe_noise_rms_m=2e-5 --scales 0.1,0.2,1,1.01 --json";
     let answer = bench.run(&format!("linearity {HERE} {trips}"));
@@ -257,7 +262,7 @@ fn a_run_that_trips_ends_the_rest_and_what_it_did_not_show_is_no_sign_of_a_linea
     assert!(
         report["why"]
             .as_str()
-            .expect("words")
+            .expect("a text")
             .contains("not every amplitude was run"),
         "{}",
         report["why"]
@@ -265,7 +270,7 @@ fn a_run_that_trips_ends_the_rest_and_what_it_did_not_show_is_no_sign_of_a_linea
 }
 
 #[test]
-fn amplitudes_that_would_cross_an_interlock_or_are_none_are_refused_and_nothing_moves() {
+fn rejects_invalid_scales_and_amplitudes_beyond_an_interlock_before_any_motion() {
     for (options, words) in [
         (
             "--amplitude 0.5 --scales 0.5,1,4",

@@ -1,10 +1,9 @@
-//! Whatever excites the stage, it shows the same stage; and what a plan says, the run does.
+//! All excitations give the same response and modes, and a run matches its plan.
 mod averages;
 mod identified;
 mod linearity;
 mod plans;
-use bench_test_support::program;
 mod rig;
-use bench_test_support::simulated;
-use bench_test_support::truth;
 mod unfinished;
+
+use bench_test_support::{program, simulated, truth};

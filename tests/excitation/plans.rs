@@ -1,4 +1,4 @@
-//! `--plan` and `--shape`: what is foretold happens, and what would trip does not run.
+//! `--plan` and `--shape`: predicted values match the run, and plans that would trip are rejected.
 use serde_json::Value;
 
 use crate::program::{Bench, number};
@@ -6,18 +6,18 @@ use crate::rig::{self, travel_m};
 
 const HERE: &str = "--set loop.rate_hz=1000 --set chirp.stop_hz=400";
 
-/// A plan and the run of it: both answers, and the travel of the run.
+/// The answers of a plan and of its run, and the measured travel of the run.
 fn planned_and_run(options: &str) -> (Value, Value, f64) {
     let bench = Bench::new();
     let plan = bench.json(&format!("chirp {HERE} {options} --plan"));
-    assert_eq!(bench.files(), [""; 0], "a plan leaves nothing behind");
+    assert_eq!(bench.files(), [""; 0], "a plan writes no files");
     let run = bench.json(&format!("chirp {HERE} {options}"));
     let travel_m = travel_m(&bench.path(run["recording"].as_str().expect("a path")));
     (plan, run, travel_m)
 }
 
 #[test]
-fn travel_current_and_duration_are_what_the_run_then_shows() {
+fn predicted_travel_current_and_duration_match_the_run() {
     for options in [
         "--duration 40",
         "--duration 40 --shape model",
@@ -26,17 +26,17 @@ fn travel_current_and_duration_are_what_the_run_then_shows() {
         "--excitation stepped_sine --start 5 --set stepped_sine.count=20",
         "--excitation prbs --set prbs.order=12 --set prbs.clock_divider=1",
     ] {
-        let (plan, run, travelled_m) = planned_and_run(options);
+        let (plan, run, measured_m) = planned_and_run(options);
         let expected = &plan["expected"];
         assert_eq!(expected, &run["expected"], "{options}");
         assert_eq!(run["expected_travel_m"], expected["travel_m"]);
-        // Floor and noise add 0.3 um at their largest; the quadrature of samples is the rig's own.
+        // Floor vibration and noise add at most 0.3 um.
         let travel_m = number(&expected["travel_m"]);
         assert!(
-            (travelled_m - travel_m).abs() < 0.02 * travel_m + 0.5e-6,
-            "{options}: {travelled_m} for {travel_m}"
+            (measured_m - travel_m).abs() < 0.02 * travel_m + 0.5e-6,
+            "{options}: {measured_m} for {travel_m}"
         );
-        // Ticks of the program, and those of the motor going off.
+        // The ticks of the program, and 100 ticks after the motor is switched off.
         let ticks = number(&expected["duration_s"]) * 1000.0;
         assert!(
             (number(&run["ticks"]) - ticks - 100.0).abs() < 1.5,
@@ -60,28 +60,28 @@ fn travel_current_and_duration_are_what_the_run_then_shows() {
 }
 
 #[test]
-fn a_shaped_stepped_sine_moves_the_stage_by_what_is_asked_for_wherever_the_current_suffices() {
-    // By itself, without --shape; 100 um where G is 154 um/A and more: below mode R.
+fn shaped_stepped_sine_reaches_the_requested_travel() {
+    // A stepped sine is shaped without --shape. Below mode R, G is at lowest_a 154 um/A, so that the current suffices for 100 um.
     let options = "--excitation stepped_sine --start 2 --set stepped_sine.count=12 --set shape.travel_m=100e-6 --stop 29";
-    let (plan, _, travelled_m) =
+    let (plan, _, measured_m) =
         planned_and_run(&format!("{options} --set stepped_sine.settle_s=8.0"));
-    // The curve of points lies up to some per cent below the wanted one; one sine comes as the other goes.
-    assert!((85e-6..112e-6).contains(&travelled_m), "{travelled_m}");
+    // The piecewise curve is up to some per cent below the exact one. During a change of frequency two sines overlap.
+    assert!((85e-6..112e-6).contains(&measured_m), "{measured_m}");
     let points = plan["amplitude"].as_array().expect("points");
     assert!(points.len() <= 64 && points.len() > 5, "{}", points.len());
 }
 
 #[test]
-fn an_frf_measured_before_shapes_as_the_model_does() {
+fn shape_from_a_measured_frf_equals_shape_from_the_model() {
     let bench = Bench::new();
     let measured = bench.json(&format!("chirp {HERE} --start 1 --duration 60"));
     let frf = measured["frf_csv"].as_str().expect("a path");
-    let of = |source: &str| {
+    let plan_by = |source: &str| {
         bench.json(&format!(
             "chirp {HERE} --start 1 --duration 60 --shape {source} --plan"
         ))
     };
-    let (by_model, by_frf) = (of("model"), of(frf));
+    let (by_model, by_frf) = (plan_by("model"), plan_by(frf));
     let travel = |plan: &Value| number(&plan["expected"]["travel_m"]);
     assert!(
         (0.9..1.1).contains(&(travel(&by_frf) / travel(&by_model))),
@@ -89,24 +89,24 @@ fn an_frf_measured_before_shapes_as_the_model_does() {
         travel(&by_frf),
         travel(&by_model)
     );
-    let least = |plan: &Value| {
+    let lowest_a = |plan: &Value| {
         let points = plan["amplitude"].as_array().expect("points");
         points
             .iter()
             .map(|p| number(&p["current_a"]))
             .fold(f64::INFINITY, f64::min)
     };
-    // The peak of mode R, of 0.5 Hz, is smeared a little by the estimate.
+    // The estimate lowers and widens the peak of mode R, which is 0.5 Hz wide.
     assert!(
-        (0.8..1.25).contains(&(least(&by_frf) / least(&by_model))),
+        (0.8..1.25).contains(&(lowest_a(&by_frf) / lowest_a(&by_model))),
         "{} {}",
-        least(&by_frf),
-        least(&by_model)
+        lowest_a(&by_frf),
+        lowest_a(&by_model)
     );
 }
 
 #[test]
-fn what_would_cross_an_interlock_is_refused_with_figure_limit_and_remedy_and_nothing_runs() {
+fn rejects_plan_beyond_interlock_with_value_limit_and_remedy() {
     for (options, words) in [
         (
             "--amplitude 0.5",
@@ -165,7 +165,7 @@ fn what_would_cross_an_interlock_is_refused_with_figure_limit_and_remedy_and_not
 }
 
 #[test]
-fn a_recording_of_before_there_were_kinds_is_a_chirp() {
+fn recording_without_excitation_kind_is_a_chirp() {
     let config = rig::config(&[]);
     let mut old: toml::Table = toml::Table::try_from(&config).expect("TOML");
     for table in ["excitation", "multisine", "stepped_sine", "prbs", "shape"] {

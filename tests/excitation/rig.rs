@@ -9,14 +9,14 @@ use crate::simulated;
 
 /// 1 kHz, up to 400 Hz.
 const HERE: [&str; 2] = ["loop.rate_hz=1000", "chirp.stop_hz=400.0"];
-/// Nothing but the plant.
+/// No noise, no quantisation, no floor vibration.
 pub const SILENT: [&str; 3] = [
     "sim.probe_noise_rms_m=0",
     "sim.probe_quantisation_m=0",
     "sim.floor=[]",
 ];
 
-/// Each kind with settings that show the modes of the stage: lines no farther apart than a mode is wide.
+/// Each kind of excitation with settings that resolve the modes of the stage: the line spacing is at most the width of a mode.
 pub const KINDS: [(&str, &[&str]); 3] = [
     ("multisine", &["multisine.periods=8"]),
     (
@@ -52,7 +52,7 @@ pub fn config(sets: &[&str]) -> Config {
     .expect("valid settings")
 }
 
-/// A configuration of a kind with `more`.
+/// The configuration of a kind of excitation, with `more` settings.
 pub fn of_kind((kind, sets): (&str, &[&str]), more: &[&str]) -> Config {
     let kind = format!("excitation.kind={kind}");
     config(&[&[kind.as_str()], sets, more].concat())
@@ -66,7 +66,7 @@ pub fn analysed(config: &Config) -> Analysis {
     simulated::analysed(&Plan::chirp(config.clone()), config).expect("an analysis")
 }
 
-/// The largest displacement that the probe saw, in metres.
+/// The largest measured displacement, in metres.
 pub fn travel_m(path: &Path) -> f64 {
     let recording = Recording::open(path).expect("a recording");
     recording

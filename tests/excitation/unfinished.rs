@@ -1,9 +1,9 @@
-//! A recording whose run did not come to its end is analysed, and nobody can take it for one that did.
+//! Analysis of the recording of an incomplete run: the results state that it is incomplete.
 use serde_json::Value;
 
 use crate::program::Bench;
 
-/// By the model the stage moves by 460 um, of 500 um that are allowed; the noise of the probe reaches some 100 um now and then.
+/// The model predicts a travel of 460 um, and the soft limit is 500 um. Rare peaks of the probe noise reach some 100 um, so that the run trips.
 const TRIPS: &str = "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --operating-point 8% --excitation multisine \
                      --set multisine.period_s=8 --shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
                      --set sim.probe_noise_rms_m=2.3e-5 --json";
@@ -11,58 +11,62 @@ const TRIPS: &str = "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --operat
 fn text(value: &Value) -> &str {
     value
         .as_str()
-        .unwrap_or_else(|| panic!("words, not {value}"))
+        .unwrap_or_else(|| panic!("expected a text, there is {value}"))
 }
 
 #[test]
-fn the_recording_of_a_run_that_tripped_says_so_beside_all_that_it_shows() {
+fn analysis_of_tripped_run_reports_the_trip() {
     let bench = Bench::new();
     let answer = bench.run(TRIPS);
     assert_eq!(answer.code, 1, "{}", answer.err);
-    let ran = answer.json();
-    let told = format!("tripped at tick {}", ran["trip"]["tick"]);
+    let run = answer.json();
+    let trip_text = format!("tripped at tick {}", run["trip"]["tick"]);
     assert!(
-        ran["frf_csv"].is_null() && ran["ticks"].as_u64() > Some(40_000),
-        "half of the ten periods of 8 s: {ran}"
+        run["frf_csv"].is_null() && run["ticks"].as_u64() > Some(40_000),
+        "half of the ten periods of 8 s: {run}"
     );
-    let recording = text(&ran["recording"]);
+    let recording = text(&run["recording"]);
     let answer = bench.run(&format!("identify {recording} --json"));
     assert_eq!(
         answer.code, 3,
-        "done, but not of a whole run: {}",
+        "exit code 3: analysed, but the run is incomplete: {}",
         answer.err
     );
-    let shown = answer.json();
+    let analysed = answer.json();
     assert_eq!(
-        (&shown["outcome"], &shown["trip"]),
-        (&ran["outcome"], &ran["trip"]),
-        "as the run itself told it"
+        (&analysed["outcome"], &analysed["trip"]),
+        (&run["outcome"], &run["trip"]),
+        "the analysis and the run state the same outcome"
     );
-    // Half of the periods show the modes as well as all do: there is a verdict, and it is not to be had without the trip.
-    assert_eq!(shown["cnmp"], "detected", "{}", shown["why"]);
-    assert!(text(&shown["why"]).contains(&told), "{}", shown["why"]);
-    let page = std::fs::read_to_string(bench.path(text(&shown["report"]))).expect("a page");
-    let (said, verdict) = (
-        page.find(&told).expect("on the page"),
+    // Half of the periods suffice for a verdict; the trip is stated with it.
+    assert_eq!(analysed["cnmp"], "detected", "{}", analysed["why"]);
+    assert!(
+        text(&analysed["why"]).contains(&trip_text),
+        "{}",
+        analysed["why"]
+    );
+    let page = std::fs::read_to_string(bench.path(text(&analysed["report"]))).expect("a page");
+    let (trip, verdict) = (
+        page.find(&trip_text).expect("on the page"),
         page.find("<h2>Modes").expect("modes"),
     );
-    assert!(said < verdict, "with the verdict, not after the figures");
+    assert!(trip < verdict, "the trip is stated before the modes");
     let answer = bench.run(&format!("identify {recording}"));
     let unwrapped = answer.out.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        unwrapped.starts_with("tripped: ") && unwrapped.contains(text(&ran["trip"]["remedy"])),
+        unwrapped.starts_with("tripped: ") && unwrapped.contains(text(&run["trip"]["remedy"])),
         "{}",
         answer.out
     );
 }
 
 #[test]
-fn the_recording_of_a_whole_run_says_that_it_is_whole_and_a_cut_one_that_it_is_cut() {
+fn analysis_states_whether_the_recording_is_complete_or_truncated() {
     let bench = Bench::new();
-    let ran = bench.json(
+    let run = bench.json(
         "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --duration 20 --operating-point 8%",
     );
-    let recording = text(&ran["recording"]);
+    let recording = text(&run["recording"]);
     let whole = bench.json(&format!("identify {recording} --out results/again"));
     assert!(
         text(&whole["report"]).starts_with("results/again/")
@@ -70,7 +74,7 @@ fn the_recording_of_a_whole_run_says_that_it_is_whole_and_a_cut_one_that_it_is_c
     );
     assert_eq!(
         (&whole["outcome"], &whole["trip"], &whole["why"]),
-        (&ran["outcome"], &Value::Null, &ran["why"])
+        (&run["outcome"], &Value::Null, &run["why"])
     );
     let bytes = std::fs::read(bench.path(recording)).expect("a recording");
     std::fs::write(bench.path("cut.mcap"), &bytes[..bytes.len() * 3 / 4]).expect("a disk");
@@ -85,9 +89,9 @@ fn the_recording_of_a_whole_run_says_that_it_is_whole_and_a_cut_one_that_it_is_c
 }
 
 #[test]
-fn a_run_whose_recording_carries_no_response_says_where_that_recording_is() {
+fn error_without_response_names_the_recording() {
     let bench = Bench::new();
-    // Steps of 0.1 mm: the probe sees nothing of a nanoampere.
+    // The probe has steps of 0.1 mm: the motion by 1 nA is not measurable.
     let still = "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=1e-4 --set loop.rate_hz=1000 --stop 400";
     let answer = bench.run(&format!(
         "chirp --amplitude 1e-9 --duration 10 {still} --out kept"
