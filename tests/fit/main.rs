@@ -1,4 +1,4 @@
-//! Modes with their standard deviations from a response, and the verdict from the modes.
+//! Fit of modes and their standard deviations to a frequency response, and the verdict from the modes.
 
 mod modes;
 mod response;

@@ -1,43 +1,43 @@
-//! Number, frequencies and signs of the modes that a fit finds.
+//! Number, frequencies and signs of the fitted modes.
 use bench::identify::FrfDatum;
 use bench::identify::modal::{FitError, MeasurementChain, fit};
 use nalgebra::Complex;
 
 use crate::synthetic::{frf_data, stage, term};
 
-/// Noise of about a thousandth of the response above the modes.
-const QUIET_M_PER_N: f64 = 1e-9;
+/// About 0.1 % of the response above the modes.
+const SIGMA_M_PER_N: f64 = 1e-9;
 
 #[test]
 fn finds_exactly_the_modes_of_a_close_pair_with_their_signs() {
-    for (ratio, opposite) in [(1.043, -1.0), (1.02, -1.0), (1.02, 1.0), (1.01, -1.0)] {
+    for (ratio, relative_sign) in [(1.043, -1.0), (1.02, -1.0), (1.02, 1.0), (1.01, -1.0)] {
         let (low, high) = (
             term(82.0, 0.004, -0.03),
-            term(82.0 * ratio, 0.004, -0.02 * opposite),
+            term(82.0 * ratio, 0.004, -0.02 * relative_sign),
         );
         let truth = [term(29.0, 0.009, 0.47), low, high];
         let fit = fit(
-            &frf_data(&truth, 0.0, QUIET_M_PER_N, 3),
+            &frf_data(&truth, 0.0, SIGMA_M_PER_N, 3),
             &MeasurementChain::Direct,
         )
         .unwrap();
         let modes = fit.modes();
         assert_eq!(modes.len(), 3, "{ratio}: {modes:?}");
         for (mode, truth) in modes.iter().zip(truth) {
-            let off = |estimate: bench::identify::modal::Estimate, truth: f64| {
+            let in_sigmas = |estimate: bench::identify::modal::Estimate, truth: f64| {
                 (estimate.value - truth).abs() / estimate.sigma
             };
-            // Nine normally distributed numbers: one exceeds 5 sigma once in 200,000.
+            // The probability that one of nine normally distributed errors exceeds 5 sigma is 1 in 200,000.
             assert!(
-                off(mode.omega_rad_s, truth.omega_rad_s) < 5.0,
+                in_sigmas(mode.omega_rad_s, truth.omega_rad_s) < 5.0,
                 "{ratio}: {mode:?}"
             );
             assert!(
-                off(mode.damping_ratio, truth.damping_ratio) < 5.0,
+                in_sigmas(mode.damping_ratio, truth.damping_ratio) < 5.0,
                 "{ratio}: {mode:?}"
             );
             assert!(
-                off(mode.residue_per_kg, truth.residue_per_kg) < 5.0,
+                in_sigmas(mode.residue_per_kg, truth.residue_per_kg) < 5.0,
                 "{ratio}: {mode:?}"
             );
             assert!(mode.sign_error_probability() < 1e-6);
@@ -54,7 +54,7 @@ fn finds_exactly_the_modes_of_a_close_pair_with_their_signs() {
 fn separates_a_delay_of_many_milliseconds_from_the_modes() {
     for delay_s in [0.0, 1e-4, 1.7e-3, 6e-3, -2e-3] {
         let fit = fit(
-            &frf_data(&stage(), delay_s, QUIET_M_PER_N, 5),
+            &frf_data(&stage(), delay_s, SIGMA_M_PER_N, 5),
             &MeasurementChain::Direct,
         )
         .unwrap();
@@ -70,11 +70,11 @@ fn separates_a_delay_of_many_milliseconds_from_the_modes() {
 
 #[test]
 fn does_not_report_a_mode_below_the_noise() {
-    // The peak of the second mode is 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, a twentieth of the noise of a block.
+    // The peak of the second mode is 1e-7/(2 x 0.004 x 515^2) = 5e-11 m/N, 1/20 of the noise of one frequency.
     let truth = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 1e-7)];
     for seed in 0..20 {
         let modes = fit(
-            &frf_data(&truth, 0.0, QUIET_M_PER_N, seed),
+            &frf_data(&truth, 0.0, SIGMA_M_PER_N, seed),
             &MeasurementChain::Direct,
         )
         .unwrap()
@@ -87,7 +87,7 @@ fn does_not_report_a_mode_below_the_noise() {
 fn free_body_with_flexible_mode_gives_one_double_integrator_and_one_mode() {
     let truth = [term(0.0, 0.0, 2.0), term(48.0, 0.01, -1.2)];
     let fit = fit(
-        &frf_data(&truth, 0.0, QUIET_M_PER_N, 8),
+        &frf_data(&truth, 0.0, SIGMA_M_PER_N, 8),
         &MeasurementChain::Direct,
     )
     .unwrap();
@@ -104,7 +104,7 @@ fn free_body_with_flexible_mode_gives_one_double_integrator_and_one_mode() {
 }
 
 #[test]
-fn rejects_noise_alone_and_too_few_frequencies() {
+fn rejects_noise_zero_response_and_too_few_frequencies() {
     let noise: Vec<FrfDatum> = frf_data(&[], 0.0, 1e-6, 4);
     assert!(
         matches!(
@@ -122,12 +122,12 @@ fn rejects_noise_alone_and_too_few_frequencies() {
         fit(&[], &MeasurementChain::Direct),
         Err(FitError::TooFew { frequencies: 0 })
     ));
-    let dead: Vec<FrfDatum> = noise
+    let zero: Vec<FrfDatum> = noise
         .iter()
-        .map(|b| FrfDatum {
+        .map(|datum| FrfDatum {
             response: Complex::new(0.0, 0.0),
-            ..*b
+            ..*datum
         })
         .collect();
-    assert!(fit(&dead, &MeasurementChain::Direct).is_err());
+    assert!(fit(&zero, &MeasurementChain::Direct).is_err());
 }

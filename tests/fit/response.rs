@@ -1,4 +1,4 @@
-//! The response and the poles of a fit whose parameters are known: closed form.
+//! Response and poles of a fit with given parameters, against closed forms.
 
 use bench::identify::modal::{MeasurementChain, ModalFit, ModalParameters};
 use bench::model::zeros::ModalTerm;
@@ -51,7 +51,7 @@ fn response_is_the_delayed_sum_of_modes_and_remainder() {
             .sum::<Complex<f64>>()
             + REMAINDER_M_PER_N;
         let truth = sum * (-s * DELAY_S).exp();
-        // The remainder stands for modes far above, at 1e6 rad/s: 2 s / 1e6 of it, of 2e-6 m/N.
+        // The library models the remainder, 2e-6 m/N, as modes at 1e6 rad/s, which change it by 2 |s|/1e6.
         assert!(
             (h - truth).norm() < 1e-14 * truth.norm() + 3.0 * s.norm() / 1e6 * REMAINDER_M_PER_N,
             "{f} Hz: {h} {truth}"
@@ -67,7 +67,7 @@ fn pole_and_covariance_follow_from_frequency_and_damping() {
     let [pole] = fit.poles()[..] else {
         panic!("one pole above the real axis")
     };
-    // s = w (-0.6 + 0.8 j); by w (-0.6, 0.8), by zeta (-500, -500 0.6/0.8).
+    // s = w (-0.6 + 0.8 j). Derivatives of (re, im): by w (-0.6, 0.8), by zeta (-500, -500 x 0.6/0.8).
     assert!((pole.s - Complex::new(-300.0, 400.0)).norm() < 1e-12);
     let expected = [
         [
@@ -81,7 +81,7 @@ fn pole_and_covariance_follow_from_frequency_and_damping() {
     ];
     for (row, truth) in pole.covariance.iter().zip(expected) {
         for (value, truth) in row.iter().zip(truth) {
-            // Sums of numbers of 1e-4, each rounded.
+            // The terms are about 1e-4; rounding is below 1e-4 * 2^-52 = 2e-20 per term.
             assert!((value - truth).abs() < 1e-17, "{:?}", pole.covariance);
         }
     }
@@ -93,11 +93,11 @@ fn overdamped_mode_has_two_real_poles_and_a_free_body_one_at_zero() {
         vec![term(0.0, 0.0, 1.0), term(100.0, 1.25, 1.0)],
         DMatrix::identity(6, 6),
     );
-    // -w (zeta -+ sqrt(zeta^2 - 1)) with the root 0.75.
+    // s = -w (zeta -+ sqrt(zeta^2 - 1)); the square root is 0.75.
     let poles: Vec<Complex<f64>> = fit.poles().iter().map(|pole| pole.s).collect();
     assert_eq!(poles, [0.0, -50.0, -200.0].map(|re| Complex::new(re, 0.0)));
     assert_eq!(fit.poles()[0].covariance, [[0.0; 2]; 2]);
-    // Of the first: by w -0.5, by zeta 100 (-1 + 1.25/0.75).
+    // Derivatives of the pole at -50: by w -0.5, by zeta 100 (-1 + 1.25/0.75) = 200/3.
     let truth = 0.25 + (200.0f64 / 3.0).powi(2);
     assert!((fit.poles()[1].covariance[0][0] / truth - 1.0).abs() < 1e-14);
     assert_eq!(fit.poles()[1].covariance[1], [0.0; 2]);

@@ -1,4 +1,4 @@
-//! Identification of a stage in closed loop with the fast controller: plant, loop, modes and zeros as in open loop.
+//! Identification in closed loop with the fast controller: plant, loop, modes and zeros equal those of the open loop.
 use std::f64::consts::TAU;
 
 use bench::config::{Config, ReferenceSettings, Source, load};
@@ -23,7 +23,7 @@ fn config(sets: &[&str]) -> Config {
     .expect("the profile is valid")
 }
 
-fn swept(sets: &[&str]) -> Analysis {
+fn identified_in_closed_loop(sets: &[&str]) -> Analysis {
     let config = config(
         &[
             &["control.reference={ kind = \"chirp\", travel_m = 20e-6 }"],
@@ -35,18 +35,18 @@ fn swept(sets: &[&str]) -> Analysis {
     simulated::analysed(&plan, &plan.config).expect("an analysis")
 }
 
-/// A frequency is compared if its sigma is below this part of the response: errors below 4 sigma are then below 1 %.
-const CARRIED: f64 = 0.0025;
+/// Upper limit of sigma/|H| for the comparison: errors below 4 sigma are then below 1 %.
+const MAX_RELATIVE_SIGMA: f64 = 0.0025;
 
 #[test]
 fn closed_loop_plant_equals_the_rig_and_the_open_loop_within_1_percent() {
-    let (closed, plain) = (swept(&[]), config(&[]));
+    let (closed, plain) = (identified_in_closed_loop(&[]), config(&[]));
     let open = analysed(&plain, &plain).frf;
     let rig = LoopPlant::with_mean_age(
         &plain,
         &simulated_modes(&plain.plant, &plain.sim).expect("modes"),
     );
-    let mut carried = 0;
+    let mut compared = 0;
     for (k, f) in closed
         .frf
         .frequency_hz
@@ -55,40 +55,41 @@ fn closed_loop_plant_equals_the_rig_and_the_open_loop_within_1_percent() {
         .filter(|(_, f)| (0.5..450.0).contains(*f))
     {
         let response = closed.frf.response[k];
-        // The records differ by half a second, and so do their bins: the nearest one, with the rig's own ratio between.
+        // The two records differ in length by half a second, and therefore in their bins. The open-loop response at the nearest bin is
+        // corrected by the ratio of the rig's responses at the two frequencies.
         let near = open
             .frequency_hz
             .partition_point(|other| other < f)
             .min(open.len() - 1);
-        let moved = rig.response(TAU * f) / rig.response(TAU * open.frequency_hz[near]);
-        let sure = closed.frf.magnitude_sigma[k] < CARRIED * response.norm()
-            && open.magnitude_sigma[near] < CARRIED * open.response[near].norm();
-        if !sure {
+        let ratio = rig.response(TAU * f) / rig.response(TAU * open.frequency_hz[near]);
+        let is_accurate = closed.frf.magnitude_sigma[k] < MAX_RELATIVE_SIGMA * response.norm()
+            && open.magnitude_sigma[near] < MAX_RELATIVE_SIGMA * open.response[near].norm();
+        if !is_accurate {
             continue;
         }
-        carried += 1;
+        compared += 1;
         assert!(
             (response / rig.response(TAU * f) - 1.0).norm() < 0.01,
-            "{f} Hz beside the rig: {response}"
+            "{f} Hz: {response} differs from the rig"
         );
-        // Two errors, each below 4 sigma of CARRIED.
+        // Two independent errors, each below 4 sigma = 1 %: 1.4 % together.
         assert!(
-            (response / (open.response[near] * moved) - 1.0).norm() < 0.014,
-            "{f} Hz beside the open loop"
+            (response / (open.response[near] * ratio) - 1.0).norm() < 0.014,
+            "{f} Hz: {response} differs from the open loop"
         );
     }
     assert!(
-        carried as f64 > 0.7 * closed.frf.len() as f64,
-        "{carried} of {}",
+        compared as f64 > 0.7 * closed.frf.len() as f64,
+        "{compared} of {}",
         closed.frf.len()
     );
 }
 
 #[test]
 fn closed_loop_record_gives_modes_zeros_and_margins() {
-    let closed = swept(&[]);
+    let closed = identified_in_closed_loop(&[]);
     let modes = closed.fit.as_ref().expect("modes").modes();
-    // The model of the thesis at 8 % and +10 %: tests/identify/stage.rs has them from masses and beams.
+    // Modes of the thesis model at Y1o = 8 % of L and D = +10 %, as in tests/support/src/stage.rs (computed from masses and beams).
     for (mode, (omega_rad_s, residue_per_kg)) in modes.iter().zip([
         (183.936_395, 0.471_522_5),
         (516.656_503, -0.031_943_85),
@@ -109,19 +110,19 @@ fn closed_loop_record_gives_modes_zeros_and_margins() {
         "{}",
         closed.verdict.why
     );
-    let around = closed.closed.expect("a loop");
+    let closed_loop = closed.closed.expect("a loop");
     let (measured, predicted) = (
-        around.margins.modulus_margin,
-        around.predicted.modulus_margin,
+        closed_loop.margins.modulus_margin,
+        closed_loop.predicted.modulus_margin,
     );
-    // 0.42 +- 0.0007; the unmodelled modes, which the prediction does not contain, reduce it by a thousandth.
+    // Measured 0.42 +- 0.0007. The unmodelled modes, which the prediction does not contain, reduce it by 0.001.
     assert!(
         measured.sigma < 0.005 && (measured.value - predicted).abs() < 4.0 * measured.sigma + 2e-3,
         "{measured:?}"
     );
-    let crossover = around.margins.crossover_rad_s.expect("a crossover");
+    let crossover = closed_loop.margins.crossover_rad_s.expect("a crossover");
     assert!(
-        (crossover / around.predicted.crossover_rad_s.expect("one") - 1.0).abs() < 2e-3,
+        (crossover / closed_loop.predicted.crossover_rad_s.expect("one") - 1.0).abs() < 2e-3,
         "{crossover}"
     );
 }
@@ -149,11 +150,11 @@ fn planned_sweep_stays_within_travel_and_current() {
         travel_m = travel_m.max(record.position_m.abs());
         current_a = current_a.max(record.command_a.abs());
     }
-    // The floor moves it by 5 sigma of 0.05 um, the probe reads in 0.04 um; a sweep through a resonance may overshoot the
-    // steady state it is planned by, by a tenth at this rate.
+    // Upper limit: 10 um, plus 5 sigma of 0.05 um of floor vibration, 0.04 um of probe noise, and 10 % because a sweep through a
+    // resonance at this rate may exceed the steady state for which it is planned.
     assert!((5e-6..11.5e-6).contains(&travel_m), "{travel_m}");
     assert!((0.5..3.3).contains(&current_a), "{current_a}");
-    let predicted_extremes = plan.predicted_extremes.expect("a course");
+    let predicted_extremes = plan.predicted_extremes.expect("a prediction");
     assert!(
         (predicted_extremes.travel_m - travel_m).abs() < 0.5e-6
             && (predicted_extremes.current_a / current_a - 1.0).abs() < 0.02
@@ -166,9 +167,9 @@ fn planned_sweep_stays_within_travel_and_current() {
     );
 }
 
-/// The slow controller hardly follows a reference at 450 Hz: an amplitude of 60 m would be needed for the chirp's current there.
+/// The slow controller hardly follows a reference at 450 Hz: the current of the chirp would need an amplitude of 60 m there.
 #[test]
-fn planned_sweep_is_read_from_its_recording_for_any_controller() {
+fn recorded_sweep_with_the_slow_controller_gives_the_same_plan() {
     let set = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
     let sets = [
         set,
@@ -181,7 +182,7 @@ fn planned_sweep_is_read_from_its_recording_for_any_controller() {
     else {
         panic!()
     };
-    // A reference given by the operator must stay within the soft limit of 0.9 mm; where the loop follows, it is the travel.
+    // The amplitude of the reference is limited to the soft limit of 0.9 mm. At low frequencies, where the loop follows, it is the travel.
     let largest_m = amplitude
         .iter()
         .map(|point| point.amplitude_m)
@@ -210,7 +211,7 @@ fn rejects_sweep_beyond_an_interlock_before_any_motion() {
             "{ frequency_hz = 1.0, amplitude_m = 800e-6 }",
             "the motor's peak current",
         ),
-        // A static displacement of 600 um needs 4 A; the motor allows 2.3 A.
+        // A static displacement of 600 um needs 4 A; the continuous current of the motor is 2.3 A.
         (
             "{ frequency_hz = 30.0, amplitude_m = 600e-6 }, { frequency_hz = 60.0, amplitude_m = 1e-6 }",
             "thermal current",
@@ -227,7 +228,7 @@ fn rejects_sweep_beyond_an_interlock_before_any_motion() {
 }
 
 #[test]
-fn rejects_loop_without_swept_reference_with_the_remedy() {
+fn rejects_analysis_without_swept_reference_and_names_the_remedy() {
     let plan = Plan::control(config(&["control.duration_s=1"])).expect("a plan");
     let error = simulated::analysed(&plan, &plan.config)
         .unwrap_err()
@@ -238,11 +239,11 @@ fn rejects_loop_without_swept_reference_with_the_remedy() {
     );
 }
 
-/// A recording that ends before the loop closed has neither command nor reference.
+/// A recording that ends before the loop closes has neither command nor reference.
 #[test]
-fn loop_that_never_closed_gives_no_response() {
+fn run_that_trips_before_the_loop_closes_gives_no_response() {
     let swept = "control.reference={ kind = \"chirp\", travel_m = 20e-6 }";
-    // A third of the soft limit: one reading in 370 lies beyond it, of 2500 before the loop closes.
+    // Sigma is a third of the soft limit: one reading in 370 exceeds it, of 2500 readings before the loop closes.
     let sets = [
         swept,
         "chirp.duration_s=10",
@@ -262,7 +263,7 @@ fn loop_that_never_closed_gives_no_response() {
         .ticks()
         .expect("ticks")
         .filter(|tick| tick.as_ref().expect("whole").state == State::Running);
-    assert!(running.count() > 10, "the program ran");
+    assert!(running.count() > 10, "the program did not run");
     let answer = analyse(&recording, &plan.config);
     assert!(
         matches!(answer, Err(AnalysisError::NothingRan)),

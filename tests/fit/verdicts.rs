@@ -1,4 +1,4 @@
-//! Verdicts on the simulated stage: none is wrong, and few are undecided.
+//! Verdicts: unknown delay, undefined numbers, missing modes, and zeros on the imaginary axis.
 use bench::identify::FrfDatum;
 use bench::identify::modal::{MeasurementChain, ModalFit, fit};
 use bench::identify::verdict::{Cnmp, Verdict, VerdictInput, verdict};
@@ -9,7 +9,7 @@ use crate::identified::{analysed, config, truth};
 use crate::synthetic::{frf_data, stage, term};
 
 #[test]
-fn unknown_delay_is_never_mistaken_for_cnmp_zeros() {
+fn unknown_delay_does_not_give_detected_cnmp_zeros() {
     for extra_s in [2e-4, 1e-3, 4e-3] {
         let sets = [
             "plant.operating_point_m=0.0032",
@@ -17,11 +17,11 @@ fn unknown_delay_is_never_mistaken_for_cnmp_zeros() {
             "interlock.probe_stale_s=0.02",
         ];
         let sets = sets.map(String::from).to_vec();
-        let believed = config(&sets);
-        let mut real = believed.clone();
-        real.probe.latency_s += extra_s;
-        assert_eq!(truth(&real), 0);
-        let analysis = analysed(&real, &believed);
+        let assumed = config(&sets);
+        let mut actual = assumed.clone();
+        actual.probe.latency_s += extra_s;
+        assert_eq!(truth(&actual), 0);
+        let analysis = analysed(&actual, &assumed);
         assert_ne!(
             analysis.verdict.cnmp,
             Cnmp::Detected,
@@ -29,7 +29,7 @@ fn unknown_delay_is_never_mistaken_for_cnmp_zeros() {
             analysis.verdict
         );
         let delay = analysis.fit.expect("modes").delay_s();
-        // The added delay, except for aliases of the 1 kHz chain, whose phase a delay turns the other way.
+        // The added delay, within the effect of the aliases at 1 kHz, whose phase changes in the opposite direction with a delay.
         assert!(
             (delay.value - extra_s).abs() < 1e-6 + 0.02 * extra_s,
             "{extra_s}: {delay:?}"
@@ -37,20 +37,20 @@ fn unknown_delay_is_never_mistaken_for_cnmp_zeros() {
     }
 }
 
-fn judged(
+fn verdict_on(
     modes: &[bench::model::zeros::ModalTerm],
     sigma_m_per_n: f64,
     expected: usize,
 ) -> Verdict {
     let frf_data = frf_data(modes, 0.0, sigma_m_per_n, 12);
-    judged_by(
+    verdict_from(
         &fit(&frf_data, &MeasurementChain::Direct).expect("modes"),
         &frf_data,
         expected,
     )
 }
 
-fn judged_by(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict {
+fn verdict_from(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict {
     let up_to_rad_s = std::f64::consts::TAU * 110.0;
     verdict(&VerdictInput {
         fit,
@@ -66,51 +66,51 @@ fn judged_by(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdict 
 fn verdict_from_non_finite_numbers_is_undecided() {
     let frf_data = frf_data(&stage(), 0.0, 1e-9, 12);
     let good = fit(&frf_data, &MeasurementChain::Direct).expect("modes");
-    assert_eq!(judged_by(&good, &frf_data, 3).cnmp, Cnmp::Detected);
+    assert_eq!(verdict_from(&good, &frf_data, 3).cnmp, Cnmp::Detected);
     let mut unknown = good.clone();
     unknown.covariance.fill(f64::NAN);
     let mut misfit = good.clone();
     misfit.chi2_per_freedom = f64::NAN;
     for fit in [unknown, misfit] {
-        assert_eq!(judged_by(&fit, &frf_data, 3).cnmp, Cnmp::Undecided);
+        assert_eq!(verdict_from(&fit, &frf_data, 3).cnmp, Cnmp::Undecided);
     }
     // A response of zero has neither a phase nor a logarithm of its magnitude.
-    let mut dead = frf_data.clone();
-    let valley = dead
+    let mut with_zero = frf_data.clone();
+    let valley = with_zero
         .iter()
-        .position(|block| block.frequency_hz > 84.0)
+        .position(|datum| datum.frequency_hz > 84.0)
         .expect("in the band");
-    dead[valley].response = Complex::new(0.0, 0.0);
-    assert_eq!(judged_by(&good, &dead, 3).cnmp, Cnmp::Undecided);
+    with_zero[valley].response = Complex::new(0.0, 0.0);
+    assert_eq!(verdict_from(&good, &with_zero, 3).cnmp, Cnmp::Undecided);
     // The same for a stage without CNMP zeros: an undefined phase must not lead to `excluded`.
-    let calm = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
-    let mut frf_data = crate::synthetic::frf_data(&calm, 0.0, 1e-9, 12);
+    let minimum_phase = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
+    let mut frf_data = crate::synthetic::frf_data(&minimum_phase, 0.0, 1e-9, 12);
     let fit = fit(&frf_data, &MeasurementChain::Direct).expect("modes");
-    assert_eq!(judged_by(&fit, &frf_data, 2).cnmp, Cnmp::Excluded);
+    assert_eq!(verdict_from(&fit, &frf_data, 2).cnmp, Cnmp::Excluded);
     frf_data[valley].response = Complex::new(0.0, 0.0);
-    assert_eq!(judged_by(&fit, &frf_data, 2).cnmp, Cnmp::Undecided);
+    assert_eq!(verdict_from(&fit, &frf_data, 2).cnmp, Cnmp::Undecided);
 }
 
 #[test]
 fn reason_of_an_undecided_verdict_names_what_is_missing() {
-    assert_eq!(judged(&stage(), 1e-9, 3).cnmp, Cnmp::Detected);
-    let unseen = judged(&stage(), 1e-9, 4);
+    assert_eq!(verdict_on(&stage(), 1e-9, 3).cnmp, Cnmp::Detected);
+    let missing = verdict_on(&stage(), 1e-9, 4);
     assert!(
-        unseen.cnmp == Cnmp::Undecided && unseen.why.contains("3 of the 4 modes"),
+        missing.cnmp == Cnmp::Undecided && missing.why.contains("3 of the 4 modes"),
         "{}",
-        unseen.why
+        missing.why
     );
-    let alone = judged(&[term(29.0, 0.009, 0.47)], 1e-9, 1);
+    let single = verdict_on(&[term(29.0, 0.009, 0.47)], 1e-9, 1);
     assert!(
-        alone.cnmp == Cnmp::Undecided && alone.why.contains("needs two modes"),
+        single.cnmp == Cnmp::Undecided && single.why.contains("needs two modes"),
         "{}",
-        alone.why
+        single.why
     );
 }
 
 #[test]
 fn verdict_is_undecided_for_zeros_on_the_imaginary_axis() {
-    // The asymmetry of the default stage at 8 % of L for which a damped zero is on the axis lies between 0 and 2 %.
+    // Bisection for the asymmetry of the default stage at 8 % of L at which a damped zero is on the imaginary axis.
     let structure = |d: f64| {
         let sets = [
             "plant.operating_point_m=0.0038".to_string(),
@@ -147,6 +147,6 @@ fn verdict_is_undecided_for_zeros_on_the_imaginary_axis() {
         })
         .collect();
     assert_eq!(terms.len(), 3);
-    let said = judged(&terms, 1e-9, 3);
-    assert_eq!(said.cnmp, Cnmp::Undecided, "{said:?}");
+    let verdict = verdict_on(&terms, 1e-9, 3);
+    assert_eq!(verdict.cnmp, Cnmp::Undecided, "{verdict:?}");
 }

@@ -1,12 +1,14 @@
+//! Bias of the local estimator on the stage.
+
 use bench::identify::{EstimatorSettings, Frf, LocalModel, Signals, local};
 
 use crate::stage::{self, SampledPlant};
 
 const BAND_HZ: (f64, f64) = (0.5, 450.0);
 
-/// Equivalent noise bandwidth of a parabola under cos^2 over its half-width. With the moments m2 = 1/3 - 2/pi^2 and m4 = 1/5 -
-/// 4/pi^2 + 24/pi^4 of the weights the kernel is cos^2(pi x/2) (m4 - m2 x^2)/(m4 - m2^2), and 1 over the integral of its
-/// square is 0.6894 (a constant's is 4/3).
+/// Equivalent noise bandwidth of a local parabola with cos^2 weights, divided by the half-width. With the moments of the weights
+/// m2 = 1/3 - 2/pi^2 and m4 = 1/5 - 4/pi^2 + 24/pi^4, the kernel is cos^2(pi x/2) (m4 - m2 x^2)/(m4 - m2^2). 1 over the integral
+/// of its square is 0.6894 (4/3 for a local constant).
 const PARABOLA: f64 = 0.6894;
 
 fn estimate(signals: &Signals) -> Frf {
@@ -15,9 +17,9 @@ fn estimate(signals: &Signals) -> Frf {
 
 /// The estimate is within 0.1 % and 0.06 degrees of the plant at all frequencies.
 ///
-/// A single mode is in the curve, exactly. Where three stand within 2.2 Hz (281.4, 282.0, 283.6 Hz, zeta = 0.005) the other two
-/// leave, beyond a parabola, some x^4 of theirs: x = 0.7 Hz/1.4 Hz, and 0.027 x^4 = 0.17 % of a third of the response. As
-/// many radians are 0.03 degrees. Twice that is left.
+/// The local model describes a single mode exactly. Three modes lie within 2.2 Hz (281.4, 282.0, 283.6 Hz, zeta = 0.005): the
+/// contribution of the other two, a third of the response each, deviates from a parabola by 0.027 x^4 = 0.17 % with
+/// x = 0.7 Hz/1.4 Hz, or 0.03 degrees. The bounds are twice these errors.
 fn assert_close(frf: &Frf, plant: &SampledPlant) {
     for (f, h) in frf.frequency_hz.iter().zip(&frf.response) {
         let ratio = h / plant.response(*f);
@@ -35,7 +37,7 @@ fn assert_close(frf: &Frf, plant: &SampledPlant) {
 }
 
 #[test]
-fn noiseless_estimate_equals_the_sampled_plant_at_resonances_too() {
+fn noiseless_estimate_equals_the_sampled_plant_including_resonances() {
     let signals = stage::clean_run();
     let start = std::time::Instant::now();
     let frf = estimate(&signals);
@@ -49,7 +51,7 @@ fn noiseless_estimate_equals_the_sampled_plant_at_resonances_too() {
 }
 
 #[test]
-fn bias_of_a_parabola_at_a_peak_is_within_two_sigma_without_noise() {
+fn sigma_of_the_local_parabola_covers_its_bias_at_peaks() {
     let settings = EstimatorSettings {
         curve: LocalModel::Polynomial,
         ..EstimatorSettings::default()
@@ -68,7 +70,7 @@ fn bias_of_a_parabola_at_a_peak_is_within_two_sigma_without_noise() {
 }
 
 #[test]
-fn frequencies_rise_in_steps_up_to_the_resolution() {
+fn frequencies_rise_in_steps_below_the_resolution() {
     let settings = EstimatorSettings {
         curve: LocalModel::Polynomial,
         ..EstimatorSettings::default()
@@ -78,7 +80,8 @@ fn frequencies_rise_in_steps_up_to_the_resolution() {
     let bin_hz = 1.0 / 120.0;
     assert!((frf.frequency_hz[0] - 0.5).abs() < 1e-9);
     assert!((449.4..=450.0).contains(&frf.frequency_hz[last]));
-    // A half-width of 16 bins below, of 0.0025 of the frequency above; the chirp's ripple makes 5 %.
+    // The half-width is 16 bins at low frequencies and 0.0025 of the frequency at high ones. The ripple of the chirp's spectrum changes it
+    // by up to 5 %.
     assert!((frf.resolution_hz[0] / (PARABOLA * 16.0 * bin_hz) - 1.0).abs() < 0.05);
     assert!((frf.resolution_hz[last] / (PARABOLA * 0.0025 * 450.0) - 1.0).abs() < 0.05);
     for (pair, width) in frf.frequency_hz.windows(2).zip(&frf.resolution_hz) {
@@ -95,8 +98,8 @@ fn offset_and_drift_leave_the_estimate_within_its_bounds() {
     );
 }
 
-/// Without correction the drift adds 5/(2 pi f) um s, 0.8 um s at 1 Hz, against 0.006 um s of probe noise: sigma would be a hundred times
-/// larger.
+/// Without correction the spectrum of the drift, 5/(2 pi f) um s, is 0.8 um s at 1 Hz, against 0.006 um s of probe noise: sigma would
+/// increase by a factor of 100.
 #[test]
 fn offset_and_drift_do_not_change_sigma() {
     let still = stage::with_noise(&stage::clean_run(), 2);
@@ -118,14 +121,18 @@ fn with_drift(mut signals: Signals) -> Signals {
     signals
 }
 
-/// An offset of 0.5 A added to the chirp gives bin 0 of the input more energy than any other bin. The record has no quiet
-/// interval from which the offset could be known, so that bin 0 of the output only holds the subtracted mean.
+/// A raised cosine of 0.5 A added to the chirp gives bin 0 of the input more energy than any other bin. The record has no quiet
+/// interval from which the probe offset could be determined: bin 0 of the output contains only the subtracted mean.
 #[test]
 fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     let chirp = stage::chirp_of(20.0, 0.0, 0.2);
     let turn = std::f64::consts::TAU / chirp.len() as f64;
-    let push = |k: usize| 0.25 - 0.25 * (turn * k as f64).cos();
-    let input_a: Vec<f64> = chirp.iter().enumerate().map(|(k, u)| u + push(k)).collect();
+    let raised_cosine = |k: usize| 0.25 - 0.25 * (turn * k as f64).cos();
+    let input_a: Vec<f64> = chirp
+        .iter()
+        .enumerate()
+        .map(|(k, u)| u + raised_cosine(k))
+        .collect();
     let plant = SampledPlant::stage();
     let output_m = plant.simulate(&input_a).iter().map(|y| y + 1e-3).collect();
     let signals = Signals {
@@ -136,7 +143,7 @@ fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     let frf = local::estimate(&signals, (0.0, 10.0), &EstimatorSettings::default()).unwrap();
     assert!((frf.frequency_hz[0] - 1.0 / 20.2).abs() < 1e-12);
     for (f, h) in frf.frequency_hz.iter().zip(&frf.response) {
-        // The curvature over 16 bins of 0.05 Hz is (0.8/29)^2, which a parabola follows.
+        // The response changes by (0.8/29)^2 over 16 bins of 0.05 Hz, which a parabola describes.
         assert!(
             (h / plant.response(*f) - 1.0).norm() < 0.01,
             "{h} at {f} Hz"
@@ -144,7 +151,7 @@ fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     }
 }
 
-/// 599,999 is odd, 99,991 a prime.
+/// 599,999 is odd, 99,991 is a prime.
 #[test]
 fn accepts_records_of_any_length() {
     let signals = stage::clean_run();

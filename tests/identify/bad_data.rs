@@ -1,8 +1,10 @@
+//! Signals and settings that cannot be used are rejected with value, limit and remedy.
+
 use bench::identify::{Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use proptest::prelude::*;
 
 /// Signals that any estimator can process.
-fn good() -> Signals {
+fn valid() -> Signals {
     let input_a: Vec<f64> = (0..200).map(|k| f64::from(k * k % 17) - 8.0).collect();
     let output_m = input_a.iter().map(|u| 1e-4 * u).collect();
     Signals {
@@ -12,10 +14,11 @@ fn good() -> Signals {
     }
 }
 
-fn refusal(signals: &Signals, band_hz: (f64, f64)) -> IdentifyError {
+/// The error of both estimators.
+fn rejection(signals: &Signals, band_hz: (f64, f64)) -> IdentifyError {
     let local = local::estimate(signals, band_hz, &EstimatorSettings::default()).unwrap_err();
     let welch = welch::estimate(signals, band_hz, 16, Estimator::H1).unwrap_err();
-    // Both messages agree, except for the distance of the bins.
+    // Both are the same error; only the spacing of the bins in the message differs.
     assert_eq!(
         std::mem::discriminant(&local),
         std::mem::discriminant(&welch),
@@ -24,7 +27,7 @@ fn refusal(signals: &Signals, band_hz: (f64, f64)) -> IdentifyError {
     local
 }
 
-fn assert_says(error: &IdentifyError, parts: &[&str]) {
+fn assert_contains(error: &IdentifyError, parts: &[&str]) {
     let text = error.to_string();
     for part in parts {
         assert!(text.contains(part), "{part:?} is not in {text:?}");
@@ -32,19 +35,19 @@ fn assert_says(error: &IdentifyError, parts: &[&str]) {
 }
 
 #[test]
-fn accepts_the_unchanged_signals() {
-    assert!(local::estimate(&good(), (10.0, 400.0), &EstimatorSettings::default()).is_ok());
-    assert!(welch::estimate(&good(), (70.0, 400.0), 16, Estimator::H1).is_ok());
+fn accepts_valid_signals() {
+    assert!(local::estimate(&valid(), (10.0, 400.0), &EstimatorSettings::default()).is_ok());
+    assert!(welch::estimate(&valid(), (70.0, 400.0), 16, Estimator::H1).is_ok());
 }
 
 #[test]
 fn rejects_constant_output() {
     let signals = Signals {
         output_m: vec![1.25e-3; 200],
-        ..good()
+        ..valid()
     };
-    assert_says(
-        &refusal(&signals, (10.0, 400.0)),
+    assert_contains(
+        &rejection(&signals, (10.0, 400.0)),
         &["output is 0.00125 m", "200 samples", "check its range"],
     );
 }
@@ -53,10 +56,10 @@ fn rejects_constant_output() {
 fn rejects_constant_input() {
     let signals = Signals {
         input_a: vec![0.0; 200],
-        ..good()
+        ..valid()
     };
-    assert_says(
-        &refusal(&signals, (10.0, 400.0)),
+    assert_contains(
+        &rejection(&signals, (10.0, 400.0)),
         &["input is 0 A", "200 samples", "amplifier was enabled"],
     );
 }
@@ -66,10 +69,10 @@ fn rejects_a_single_sample() {
     let signals = Signals {
         input_a: vec![1.0],
         output_m: vec![1e-4],
-        ..good()
+        ..valid()
     };
-    assert_says(
-        &refusal(&signals, (10.0, 400.0)),
+    assert_contains(
+        &rejection(&signals, (10.0, 400.0)),
         &["1 samples", "at least 64", "longer"],
     );
 }
@@ -78,33 +81,33 @@ fn rejects_a_single_sample() {
 fn rejects_columns_of_different_lengths() {
     let signals = Signals {
         output_m: vec![0.0; 199],
-        ..good()
+        ..valid()
     };
-    assert_says(
-        &refusal(&signals, (10.0, 400.0)),
+    assert_contains(
+        &rejection(&signals, (10.0, 400.0)),
         &["200 samples of the input", "199 of the output"],
     );
 }
 
 #[test]
 fn rejects_samples_that_are_not_finite_with_column_and_index() {
-    let mut signals = good();
+    let mut signals = valid();
     signals.output_m[37] = f64::NAN;
-    assert_says(
-        &refusal(&signals, (10.0, 400.0)),
+    assert_contains(
+        &rejection(&signals, (10.0, 400.0)),
         &["output_m is NaN at sample 37", "finite"],
     );
     signals.input_a[5] = f64::INFINITY;
-    assert_says(
-        &refusal(&signals, (10.0, 400.0)),
+    assert_contains(
+        &rejection(&signals, (10.0, 400.0)),
         &["input_a is inf at sample 5", "finite"],
     );
 }
 
 #[test]
 fn rejects_band_beyond_the_nyquist_frequency_with_the_limit() {
-    assert_says(
-        &refusal(&good(), (10.0, 501.0)),
+    assert_contains(
+        &rejection(&valid(), (10.0, 501.0)),
         &[
             "501 Hz",
             "Nyquist frequency of 500 Hz",
@@ -115,7 +118,7 @@ fn rejects_band_beyond_the_nyquist_frequency_with_the_limit() {
 
 #[test]
 fn accepts_band_up_to_the_nyquist_frequency() {
-    let frf = local::estimate(&good(), (10.0, 500.0), &EstimatorSettings::default()).unwrap();
+    let frf = local::estimate(&valid(), (10.0, 500.0), &EstimatorSettings::default()).unwrap();
     assert_eq!(frf.frequency_hz.last(), Some(&495.0));
 }
 
@@ -129,26 +132,26 @@ fn rejects_inverted_and_non_finite_bands() {
         (10.0, f64::NAN),
         (1.0, f64::INFINITY),
     ] {
-        assert_says(&refusal(&good(), band_hz), &["0 <= lower < upper"]);
+        assert_contains(&rejection(&valid(), band_hz), &["0 <= lower < upper"]);
     }
 }
 
 #[test]
 fn rejects_band_between_two_bins_with_their_distance() {
-    let error = local::estimate(&good(), (11.0, 14.0), &EstimatorSettings::default()).unwrap_err();
-    assert_says(
+    let error = local::estimate(&valid(), (11.0, 14.0), &EstimatorSettings::default()).unwrap_err();
+    assert_contains(
         &error,
         &["between 11 and 14 Hz", "5 Hz apart", "longer record"],
     );
-    let error = welch::estimate(&good(), (70.0, 100.0), 16, Estimator::H1).unwrap_err();
-    assert_says(&error, &["between 70 and 100 Hz", "62.5 Hz apart"]);
+    let error = welch::estimate(&valid(), (70.0, 100.0), 16, Estimator::H1).unwrap_err();
+    assert_contains(&error, &["between 70 and 100 Hz", "62.5 Hz apart"]);
 }
 
 #[test]
 fn rejects_invalid_sampling_rate() {
     for rate_hz in [0.0, -5000.0, f64::NAN, f64::INFINITY] {
-        assert_says(
-            &refusal(&Signals { rate_hz, ..good() }, (10.0, 400.0)),
+        assert_contains(
+            &rejection(&Signals { rate_hz, ..valid() }, (10.0, 400.0)),
             &["sampling rate", "greater than 0"],
         );
     }
@@ -160,32 +163,32 @@ fn rejects_settings_out_of_bounds_with_name_value_and_bounds() {
         resolution_ratio: 0.2,
         ..EstimatorSettings::default()
     };
-    assert_says(
-        &local::estimate(&good(), (10.0, 400.0), &wide).unwrap_err(),
+    assert_contains(
+        &local::estimate(&valid(), (10.0, 400.0), &wide).unwrap_err(),
         &["resolution_ratio is 0.2", "0 to 0.1"],
     );
     let one = EstimatorSettings {
         min_half_width_bins: 1,
         ..EstimatorSettings::default()
     };
-    assert_says(
-        &local::estimate(&good(), (10.0, 400.0), &one).unwrap_err(),
+    assert_contains(
+        &local::estimate(&valid(), (10.0, 400.0), &one).unwrap_err(),
         &["min_half_width_bins is 1", "2 to 10000"],
     );
-    assert_says(
-        &welch::estimate(&good(), (10.0, 400.0), 7, Estimator::H1).unwrap_err(),
+    assert_contains(
+        &welch::estimate(&valid(), (10.0, 400.0), 7, Estimator::H1).unwrap_err(),
         &["segment is 7", "8 to 200"],
     );
-    assert_says(
-        &welch::estimate(&good(), (10.0, 400.0), 201, Estimator::H1).unwrap_err(),
+    assert_contains(
+        &welch::estimate(&valid(), (10.0, 400.0), 201, Estimator::H1).unwrap_err(),
         &["segment is 201", "8 to 200"],
     );
 }
 
 #[test]
 fn rejects_a_single_segment_with_the_required_length() {
-    assert_says(
-        &welch::estimate(&good(), (10.0, 400.0), 150, Estimator::H1).unwrap_err(),
+    assert_contains(
+        &welch::estimate(&valid(), (10.0, 400.0), 150, Estimator::H1).unwrap_err(),
         &["200 samples", "at least 225"],
     );
 }
@@ -206,7 +209,7 @@ fn limit() -> impl Strategy<Value = f64> {
     prop_oneof![10 => 0.0..60.0, 1 => any::<f64>()]
 }
 
-fn assert_sound(frf: &Frf, band_hz: (f64, f64)) {
+fn assert_valid(frf: &Frf, band_hz: (f64, f64)) {
     assert!(!frf.is_empty());
     let columns = [
         &frf.frequency_hz,
@@ -240,7 +243,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_the_data_there_is_a_sound_response_or_an_error_and_never_a_panic(
+    fn any_data_give_a_valid_response_or_an_error(
         input_a in prop::collection::vec(sample(), 0..300),
         outputs in prop::collection::vec(sample(), 300),
         lengths_agree in prop::bool::weighted(0.95),
@@ -254,10 +257,10 @@ proptest! {
         let signals = Signals { rate_hz, input_a, output_m: outputs[..samples].to_vec() };
         let settings = EstimatorSettings { min_half_width_bins: half_width, resolution_ratio: ratio, ..EstimatorSettings::default() };
         if let Ok(frf) = local::estimate(&signals, band_hz, &settings) {
-            assert_sound(&frf, band_hz);
+            assert_valid(&frf, band_hz);
         }
         if let Ok(frf) = welch::estimate(&signals, band_hz, segment, Estimator::H1) {
-            assert_sound(&frf, band_hz);
+            assert_valid(&frf, band_hz);
         }
     }
 }

@@ -14,7 +14,7 @@ fn settings(curve: LocalModel) -> EstimatorSettings {
     }
 }
 
-/// A chirp of ten seconds on the stage: bins of 1/20 Hz, of which mode R is ten wide at half its power.
+/// A chirp of ten seconds on the stage. The bins are 1/20 Hz wide; the half-power width of mode R is ten bins.
 fn ten_seconds() -> Signals {
     let input_a = stage::chirp_of(10.0, 1.0, 9.0);
     let output_m = SampledPlant::stage().simulate(&input_a);
@@ -26,7 +26,7 @@ fn ten_seconds() -> Signals {
 }
 
 /// The largest relative error within a half-power width of the peaks.
-fn off_at_peaks(frf: &Frf) -> f64 {
+fn largest_error_at_peaks(frf: &Frf) -> f64 {
     let plant = SampledPlant::stage();
     let near = |f: &f64| PEAKS_HZ.iter().any(|peak| (f / peak - 1.0).abs() < 0.008);
     let at_peaks = frf
@@ -39,11 +39,13 @@ fn off_at_peaks(frf: &Frf) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The neighbourhood reaches 0.8 Hz to either side, zeta f0 is 0.26 Hz: a constant is a mean over the whole peak.
+/// The neighbourhood extends 0.8 Hz to either side, and zeta f0 is 0.26 Hz: a local constant averages over the whole peak.
 #[test]
 fn only_the_rational_model_resolves_the_peaks_of_a_ten_second_record() {
     let off = |curve| {
-        off_at_peaks(&local::estimate(&ten_seconds(), (10.0, 120.0), &settings(curve)).unwrap())
+        largest_error_at_peaks(
+            &local::estimate(&ten_seconds(), (10.0, 120.0), &settings(curve)).unwrap(),
+        )
     };
     let [constant, polynomial, rational] = [
         LocalModel::Constant,
@@ -62,7 +64,7 @@ fn only_the_rational_model_resolves_the_peaks_of_a_ten_second_record() {
 #[test]
 fn peaks_of_a_noisy_ten_second_record_are_within_two_sigma() {
     let (clean, plant) = (ten_seconds(), SampledPlant::stage());
-    let (mut held, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
+    let (mut covered, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
     for seed in 1..=40 {
         let frf = local::estimate(
             &stage::with_noise(&clean, seed),
@@ -73,7 +75,7 @@ fn peaks_of_a_noisy_ten_second_record_are_within_two_sigma() {
         for (k, f) in frf.frequency_hz.iter().enumerate() {
             if PEAKS_HZ.iter().any(|peak| (f / peak - 1.0).abs() < 0.008) {
                 let truth = plant.response(*f).norm();
-                held += f64::from(
+                covered += f64::from(
                     (frf.response[k].norm() - truth).abs() <= 2.0 * frf.magnitude_sigma[k],
                 );
                 count += 1.0;
@@ -83,13 +85,18 @@ fn peaks_of_a_noisy_ten_second_record_are_within_two_sigma() {
     }
     println!(
         "within two sigma {:.4} of {count}, off by up to {worst:.4}",
-        held / count
+        covered / count
     );
-    assert!((0.90..0.995).contains(&(held / count)), "{}", held / count);
+    assert!(
+        (0.90..0.995).contains(&(covered / count)),
+        "{}",
+        covered / count
+    );
     assert!(worst < 0.02, "{worst}");
 }
 
-/// The pole increases the variance, so it must not be used where the response is smooth. Fisher's test accepts it once in a thousand.
+/// The pole of the rational model increases the variance, so that it must not be used where the response is smooth. Fisher's F-test
+/// accepts it wrongly with a probability of 0.001.
 #[test]
 fn rational_model_equals_the_parabola_away_from_modes() {
     let mut dice = Dice::new(8);
@@ -140,7 +147,7 @@ fn logarithmic_grid_covers_the_band_at_a_constant_ratio() {
     assert!(off.fold(0.0, f64::max) < 0.001);
 }
 
-/// 4/3 of a half-width is the noise bandwidth of cos^2; the chirp's ripple makes 5 %.
+/// The noise bandwidth of cos^2 weights is 4/3 of the half-width; the ripple of the chirp's spectrum changes it by up to 5 %.
 #[test]
 fn half_widths_are_interpolated_between_the_points_of_the_list() {
     let point = |frequency_hz, half_width_hz| ResolutionPoint {
@@ -157,7 +164,7 @@ fn half_widths_are_interpolated_between_the_points_of_the_list() {
     for (f, width) in frf.frequency_hz.iter().zip(&frf.resolution_hz) {
         let half_width_hz = match f {
             f if *f < 50.0 => 0.5,
-            // From 0.5 to 8 over a factor of 4 in frequency: its square.
+            // The half-width rises from 0.5 to 8 Hz while the frequency rises by 4: proportional to f^2.
             f if *f < 200.0 => 0.5 * (f / 50.0).powi(2),
             _ => 8.0,
         };
@@ -185,10 +192,9 @@ fn rejects_half_widths_whose_frequencies_do_not_rise() {
     );
 }
 
-/// Twenty seconds from the middle of sixty seconds of white noise: the transients at both ends leak over the whole
-/// band.
+/// Twenty seconds from the middle of sixty seconds of white noise. The transients at both ends leak into the whole band.
 #[test]
-fn separates_the_transient_of_a_record_in_motion_at_both_ends() {
+fn transient_model_removes_leakage_of_a_record_cut_from_a_longer_one() {
     let mut dice = Dice::new(6);
     let input_a: Vec<f64> = (0..300_000).map(|_| 0.1 * dice.normal()).collect();
     let plant = SampledPlant::stage();

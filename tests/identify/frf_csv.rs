@@ -1,3 +1,5 @@
+//! The CSV file of a frequency response.
+
 use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
 use nalgebra::Complex;
@@ -72,7 +74,7 @@ fn measured_response_is_unchanged_after_writing_and_reading() {
     };
     assert_eq!(exact(&back), exact(&frf));
     for k in 0..frf.len() {
-        // Through magnitude and degrees: a few roundings of 1.1e-16, at up to pi rad.
+        // The file has magnitude and degrees: a few roundings of 1.1e-16 at angles up to pi rad.
         assert!((back.response[k] / frf.response[k] - 1.0).norm() < 2e-15);
         assert!((back.phase_sigma_rad[k] / frf.phase_sigma_rad[k] - 1.0).abs() < 1e-15);
     }
@@ -110,18 +112,18 @@ fn rejects_other_columns_and_invalid_rows_with_their_line() {
     }
 }
 
-/// A quarter of a turn at the first frequency.
+/// The delay is a quarter of the period of the first frequency.
 #[test]
 fn removing_a_delay_changes_phases_only() {
-    let late = frf(&[(0.0, -2e-4), (1e-4, 0.0)]);
-    let delay_s = 0.25 / late.frequency_hz[0];
-    let earlier = late.without_delay(delay_s);
-    assert!((earlier.response[0] - Complex::new(2e-4, 0.0)).norm() < 1e-18);
-    let turns = late.frequency_hz[1] * delay_s;
-    let expected = late.response[1] * Complex::from_polar(1.0, std::f64::consts::TAU * turns);
-    assert!((earlier.response[1] - expected).norm() < 1e-18);
+    let delayed = frf(&[(0.0, -2e-4), (1e-4, 0.0)]);
+    let delay_s = 0.25 / delayed.frequency_hz[0];
+    let undelayed = delayed.without_delay(delay_s);
+    assert!((undelayed.response[0] - Complex::new(2e-4, 0.0)).norm() < 1e-18);
+    let turns = delayed.frequency_hz[1] * delay_s;
+    let expected = delayed.response[1] * Complex::from_polar(1.0, std::f64::consts::TAU * turns);
+    assert!((undelayed.response[1] - expected).norm() < 1e-18);
     assert_eq!(
-        (earlier.magnitude_sigma, earlier.coherence),
-        (late.magnitude_sigma, late.coherence)
+        (undelayed.magnitude_sigma, undelayed.coherence),
+        (delayed.magnitude_sigma, delayed.coherence)
     );
 }

@@ -9,9 +9,9 @@ use bench::identify::periodic::Repetition;
 use realfft::RealFftPlanner;
 
 const PERIOD: usize = 500;
-/// Sums of three lines stay below half of the rate, 250, so that none is folded back.
+/// The sum of three lines is below half of the sampling rate, 250 Hz, so that there is no aliasing.
 const LAST: usize = 79;
-/// The filter behind the distortion: 1/(1 - (f/60)^2 + 0.1 i f/60), lines being hertz.
+/// The filter after the nonlinearity, 1/(1 - (f/60)^2 + 0.1 j f/60), with the line number as f in Hz: real and imaginary part.
 fn gain(line: f64) -> (f64, f64) {
     let (re, im) = (1.0 - (line / 60.0).powi(2), 0.1 * line / 60.0);
     let square = re * re + im * im;
@@ -22,13 +22,13 @@ fn uniform(random: &mut Pcg64) -> f64 {
     ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
 }
 
-/// By Box and Muller.
+/// A standard normal number (Box-Muller).
 fn normal(random: &mut Pcg64) -> f64 {
     let radius = (-2.0 * uniform(random).ln()).sqrt();
     radius * (std::f64::consts::TAU * uniform(random)).cos()
 }
 
-/// Odd lines up to [`LAST`] without the third of each four.
+/// Odd lines up to [`LAST`], with the third of every four omitted.
 fn excited_lines() -> Vec<usize> {
     (1..=LAST)
         .step_by(2)
@@ -38,7 +38,7 @@ fn excited_lines() -> Vec<usize> {
         .collect()
 }
 
-/// A record of `periods` of y = filter(u + a u^2 + b u^3), u of amplitude 1 a line, with white noise on every sample.
+/// `periods` periods of y = filter(u + a u^2 + b u^3) with white noise. The amplitude of every line of u is 1.
 fn record(seed: u64, (a, b): (f64, f64), noise_m: f64, periods: usize) -> Signals {
     let mut random = Pcg64::seed_from_u64(seed);
     let lines: Vec<(usize, f64)> = excited_lines()
@@ -98,11 +98,11 @@ fn omitted_lines(signals: &Signals) -> Harmonics {
     };
     harmonics(signals, (1.0, LAST as f64), repetition)
         .unwrap()
-        .expect("lines left out")
+        .expect("omitted lines")
 }
 
-/// E |Y|^2 as a square of an RMS at a line, of products of `order` lines: the sum over all unordered choices of signed lines
-/// that add up to it, each of a phase of its own, of (their orders x coefficient x amplitudes)^2.
+/// Expected squared RMS value at a line of the products of `order` excited lines. The phases of the products are independent, so that
+/// the squares (permutations x coefficient x amplitudes)^2 add, over all unordered sets of signed lines whose sum is `line`.
 fn by_products(line: usize, order: usize, coefficient: f64) -> f64 {
     let signed: Vec<i64> = excited_lines()
         .iter()
@@ -113,22 +113,22 @@ fn by_products(line: usize, order: usize, coefficient: f64) -> f64 {
     for (i, a) in signed.iter().enumerate() {
         for (j, b) in signed.iter().enumerate().skip(i) {
             if order == 2 {
-                let orders = if i == j { 1.0 } else { 2.0 };
+                let permutations = if i == j { 1.0 } else { 2.0 };
                 sum += if a + b == target {
-                    (orders * half * half * coefficient).powi(2)
+                    (permutations * half * half * coefficient).powi(2)
                 } else {
                     0.0
                 };
                 continue;
             }
             for (l, c) in signed.iter().enumerate().skip(j) {
-                let orders = match (i == j, j == l) {
+                let permutations = match (i == j, j == l) {
                     (true, true) => 1.0,
                     (false, false) => 6.0,
                     _ => 3.0,
                 };
                 sum += if a + b + c == target {
-                    (orders * half.powi(3) * coefficient).powi(2)
+                    (permutations * half.powi(3) * coefficient).powi(2)
                 } else {
                     0.0
                 };
@@ -136,12 +136,12 @@ fn by_products(line: usize, order: usize, coefficient: f64) -> f64 {
         }
     }
     let (re, im) = gain(line as f64);
-    // A complex amplitude C is an RMS of sqrt(2) |C|.
+    // The RMS value of a line with the complex amplitudes C and C* at +-f is sqrt(2) |C|.
     2.0 * sum * (re * re + im * im)
 }
 
 #[test]
-fn second_and_third_order_products_equal_their_closed_form_at_even_and_odd_lines() {
+fn distortion_power_equals_the_closed_form_of_second_and_third_order_products() {
     let (a, b) = (1e-3, 2e-5);
     let (mut odd, mut even) = (0.0, 0.0);
     let seeds = 300;
@@ -161,8 +161,8 @@ fn second_and_third_order_products_equal_their_closed_form_at_even_and_odd_lines
         .map(|k| by_products(k, 3, b))
         .sum();
     let expected_even: f64 = (2..=LAST).step_by(2).map(|k| by_products(k, 2, a)).sum();
-    // The power of a line is that of a sum of many random phases: its sigma equals its mean. Over 300 seeds: 1/sqrt(300) =
-    // 5.8 %; the bound is three sigma.
+    // The power of a line is that of a sum with many random phases: its standard deviation equals its mean. The standard error over
+    // 300 seeds is 1/sqrt(300) = 5.8 %; the bound is three times that.
     for (name, found, expected) in [("odd", odd, expected_odd), ("even", even, expected_even)] {
         let ratio = found / f64::from(seeds as u32) / expected;
         assert!((0.827..1.173).contains(&ratio), "{name}: {ratio}");
@@ -181,7 +181,7 @@ fn detects_even_distortion_at_even_lines_and_odd_at_odd_lines() {
             noise_probability(&harmonics.odd),
             noise_probability(&harmonics.even),
         );
-        // Existing distortion is found with a large margin; otherwise noise alone explains the lines, except once in a thousand.
+        // With distortion the probability is far below any threshold. Without, it is above 1e-3, except once in a thousand.
         assert_eq!(by_odd < 1e-9, odd, "{terms:?}: {by_odd}");
         assert_eq!(by_even < 1e-9, even, "{terms:?}: {by_even}");
         assert!(
@@ -210,30 +210,31 @@ fn noise_alone_gives_the_stated_rate_of_false_alarms() {
             .collect();
         level += high.iter().sum::<f64>() / high.len() as f64;
     }
-    // 400 probabilities: 40 are below 0.1, with a sigma of 6; the bound is three sigma. 0.4 are below 0.001; five or more occur once in
-    // 16,000 times.
+    // Of 400 probabilities, 40 +- 6 are expected below 0.1; the bound is three sigma. 0.4 are expected below 0.001; five or more have a
+    // probability of 1 in 16,000.
     assert!((22..=58).contains(&below[0]) && below[1] < 5, "{below:?}");
-    // White noise of variance 1e-4 a sample is 2 x 1e-4/500 a line; 200 seeds x 29 lines x 5 degrees: 0.6 %, three of them. What is
-    // taken off as drift, from 11 samples of noise, adds 500 x 2/11/(2 pi k)^2: below 0.6 % from line 20 on, 0.2 % on average.
+    // White noise with a variance of 1e-4 per sample gives 2 x 1e-4/500 per line. With 200 seeds x 29 lines x 5 degrees of freedom the
+    // standard error is 0.6 %; the bound is three times that. The correction of drift, estimated from 11 noisy samples, adds
+    // 500 x 2/11/(2 pi k)^2 at line k: below 0.6 % from line 20 on, 0.2 % on average.
     let ratio = level / f64::from(seeds as u32) / (2.0 * 1e-4 / PERIOD as f64);
     assert!((0.98..1.02).contains(&ratio), "{ratio}");
 }
 
 #[test]
-fn ignores_omitted_lines_with_input_and_needs_at_least_one() {
+fn ignores_omitted_lines_with_input_and_needs_at_least_one_omitted_line() {
     let mut signals = record(1, (0.0, 0.0), 1e-3, 6);
     let all = omitted_lines(&signals);
-    let (left_out, turn) = (5.0, std::f64::consts::TAU / PERIOD as f64);
+    let (omitted, turn) = (5.0, std::f64::consts::TAU / PERIOD as f64);
     for (n, u) in signals.input_a.iter_mut().enumerate() {
-        *u += 1e-3 * (turn * left_out * n as f64).cos();
+        *u += 1e-3 * (turn * omitted * n as f64).cos();
     }
     let fewer = omitted_lines(&signals);
     assert_eq!(
         (fewer.odd.len(), fewer.even.len()),
         (all.odd.len() - 1, all.even.len())
     );
-    assert!(fewer.odd.iter().all(|line| line.frequency_hz != left_out));
-    // Every line excited: a pulse.
+    assert!(fewer.odd.iter().all(|line| line.frequency_hz != omitted));
+    // A pulse excites every line.
     for (n, u) in signals.input_a.iter_mut().enumerate() {
         *u = f64::from(u8::from(n % PERIOD == 0));
     }
@@ -245,7 +246,7 @@ fn ignores_omitted_lines_with_input_and_needs_at_least_one() {
 }
 
 #[test]
-fn probability_is_that_of_a_sum_of_exponentials() {
+fn noise_probability_is_the_tail_of_a_sum_of_exponentials() {
     let level = |surprisal| LineLevel {
         frequency_hz: 1.0,
         input_a2: 0.0,
@@ -254,12 +255,12 @@ fn probability_is_that_of_a_sum_of_exponentials() {
         surprisal,
     };
     assert_eq!(noise_probability(&[]), 1.0);
-    // exp(-x), (1 + x) exp(-x): two roundings of numbers near 1.
+    // One line: exp(-x); two lines with the sum x: (1 + x) exp(-x). The error is two roundings of numbers near 1.
     assert!((noise_probability(&[level(2.0)]) - (-2.0f64).exp()).abs() < 1e-15);
     assert!((noise_probability(&[level(2.0), level(1.0)]) - 4.0 * (-3.0f64).exp()).abs() < 1e-15);
     assert_eq!(noise_probability(&[level(0.0)]), 1.0);
     assert_eq!(noise_probability(&[level(1e6), level(f64::INFINITY)]), 0.0);
-    // Of 1000 lines the sum is 1000 with a sigma of 31.6; half lies beyond 1000 - 1/3.
+    // The sum over 1000 lines has the mean 1000, the standard deviation 31.6 and the median 1000 - 1/3.
     let many = noise_probability(&vec![level(1.0 - 1.0 / 3000.0); 1000]);
     assert!((many - 0.5).abs() < 1e-3, "{many}");
 }

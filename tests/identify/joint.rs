@@ -1,4 +1,4 @@
-//! Identification under control, on a loop simulated apart from the library.
+//! Identification in closed loop, on a loop simulated independently of the library.
 
 use bench::identify::EstimatorSettings;
 use bench::identify::joint::estimate;
@@ -19,8 +19,8 @@ fn noiseless_plant_loop_and_sensitivities_equal_the_model() {
     ] {
         assert!(frf.len() > 1000, "{name}");
         for (k, f) in frf.frequency_hz.iter().enumerate() {
-            // A mean over the 16 bins of 0.05 Hz to either side would take two thirds off a mode of 0.4 Hz of half-width. What is
-            // left is what still rings at the end, exp(-0.02 * 2 pi 20 * 3.5) = 1.5e-4: twice that.
+            // An average over 16 bins of 0.05 Hz to either side would reduce a peak with a half-width of 0.4 Hz by two thirds. The
+            // remaining error is the transient at the end of the record, exp(-0.02 * 2 pi 20 * 3.5) = 1.5e-4; the bound is twice that.
             let off = (frf.response[k] / truth(*f) - one).norm();
             assert!(off < 3e-4, "{name} at {f} Hz: off by {off}");
         }
@@ -28,7 +28,7 @@ fn noiseless_plant_loop_and_sensitivities_equal_the_model() {
 }
 
 #[test]
-fn rejects_constant_reference() {
+fn rejects_constant_reference_and_columns_of_different_lengths() {
     let mut signals = run(1e-3, 3);
     signals.reference_m.fill(0.0);
     let error = estimate(&signals, BAND_HZ, &EstimatorSettings::default()).unwrap_err();

@@ -1,4 +1,4 @@
-//! The estimators of frequency responses, against analytic plants and against scipy.
+//! The estimators of frequency responses, against analytic plants and scipy.
 
 mod accuracy;
 mod bad_data;
@@ -7,8 +7,8 @@ mod frf_csv;
 mod harmonics;
 mod joint;
 mod noise;
-use bench_test_support::python;
-mod repeated;
 mod noise_sides;
-use bench_test_support::stage;
+mod repeated;
 mod welch;
+
+use bench_test_support::{python, stage};

@@ -1,3 +1,5 @@
+//! Sigma and coherence with noise, and frequencies without input.
+
 use bench::identify::{EstimatorSettings, Frf, PHASE_SIGMA_LIMIT_RAD, Signals, local};
 
 use crate::stage::{self, Dice, RATE_HZ};
@@ -11,7 +13,7 @@ fn sigma_is_above_zero_and_below_one_percent_from_1_to_200_hz() {
     let frf = estimate(&stage::with_noise(&stage::clean_run(), 3), (1.0, 200.0));
     for (k, f) in frf.frequency_hz.iter().enumerate() {
         let relative = frf.magnitude_sigma[k] / frf.response[k].norm();
-        // The least is that of 1 Hz: 50 nm of noise against 0.4 A of chirp, over 11 bins.
+        // The smallest is that at 1 Hz: 50 nm of noise against 0.4 A of chirp, over 11 bins.
         assert!(
             (5e-6..0.01).contains(&relative),
             "{} % at {f} Hz",
@@ -21,7 +23,7 @@ fn sigma_is_above_zero_and_below_one_percent_from_1_to_200_hz() {
 }
 
 #[test]
-fn output_of_noise_has_no_coherence() {
+fn coherence_is_low_if_the_output_is_only_noise() {
     let input_a = stage::chirp_of(20.0, 1.0, 2.0);
     let mut dice = Dice::new(9);
     let output_m = input_a.iter().map(|_| 1e-6 * dice.normal()).collect();
@@ -37,9 +39,10 @@ fn output_of_noise_has_no_coherence() {
     let beyond = (0..frf.len())
         .filter(|k| frf.response[*k].norm() > 4.0 * frf.magnitude_sigma[*k])
         .count() as f64;
-    // |H| is Rayleigh's then: beyond 4 sigma once in exp(8) = 3000, and somewhat more with sigma itself known to 15 %.
+    // |H| has a Rayleigh distribution: it exceeds 4 sigma with the probability exp(-8) = 1/3000, and somewhat more often because sigma
+    // itself has an error of 15 %.
     assert!(beyond / count < 0.01, "{beyond} of {count} exceed 4 sigma");
-    // The share of the output that a fit explains by chance: 3/16, and less with more bins.
+    // A fit with 3 parameters to 16 bins explains 3/16 of the output by chance, and less with more bins.
     let coherence = frf.coherence.iter().sum::<f64>() / count;
     assert!(
         (0.05..0.2).contains(&coherence),
@@ -52,7 +55,7 @@ fn output_of_noise_has_no_coherence() {
     );
 }
 
-/// Only whole cycles, of 20 to 40 Hz, in one second: the bins outside have exactly no input.
+/// Cosines of 20 to 40 Hz, with whole cycles in one second: all other bins have no input.
 fn band_of_cosines() -> Signals {
     let mut dice = Dice::new(4);
     let cosines = |k: usize| {
@@ -74,7 +77,7 @@ fn band_of_cosines() -> Signals {
 }
 
 #[test]
-fn gives_no_estimate_without_input() {
+fn omits_frequencies_without_input() {
     let frf = estimate(&band_of_cosines(), (1.0, 2000.0));
     assert_eq!(
         (frf.frequency_hz[0], frf.frequency_hz[frf.len() - 1]),

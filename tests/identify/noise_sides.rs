@@ -2,7 +2,7 @@
 
 use bench_test_support::gain_in_noise::{ESTIMATORS, GAIN, NOISE, every_way, signals};
 
-/// H1/H2 is the coherence; rounding is of sums of hundreds of terms.
+/// |H1|/|H2| is the coherence. The sums have hundreds of terms, so that rounding is below 1e-9.
 #[test]
 fn magnitudes_of_h1_hv_and_h2_differ_by_the_coherence() {
     for (name, estimate) in
@@ -41,7 +41,7 @@ fn magnitudes_of_h1_hv_and_h2_differ_by_the_coherence() {
     }
 }
 
-/// Rounding of 1e-16 of each sample, over the least bin of a white spectrum, is below 1e-12.
+/// Rounding of 1e-16 per sample, relative to the smallest bin of a white spectrum, is below 1e-12.
 #[test]
 fn all_estimators_agree_without_noise() {
     for (name, estimate) in every_way() {

@@ -7,7 +7,7 @@ use crate::stage::{self, Dice, RATE_HZ, SampledPlant};
 const BAND_HZ: (f64, f64) = (2.0, 60.0);
 const REPETITIONS: usize = 5;
 
-/// One chirp of four seconds and six of rest, without noise.
+/// One chirp of four seconds with six seconds of rest, without noise.
 fn once() -> Signals {
     let input_a = stage::chirp_of(4.0, 0.5, 5.5);
     let output_m = SampledPlant::stage().simulate(&input_a);
@@ -45,47 +45,47 @@ fn estimate(signals: &Signals) -> Frf {
 }
 
 /// Shares of magnitudes and phases within 1.96 sigma over seeds.
-fn held(seeds: u64, noise_a: f64, noise_m: f64) -> [f64; 2] {
+fn coverage(seeds: u64, noise_a: f64, noise_m: f64) -> [f64; 2] {
     let plant = SampledPlant::stage();
-    let (mut held, mut count) = ([0.0; 2], 0.0);
+    let (mut covered, mut count) = ([0.0; 2], 0.0);
     for seed in 1..=seeds {
         let frf = estimate(&repetitions(seed, noise_a, noise_m));
         for (k, f) in frf.frequency_hz.iter().enumerate() {
             let truth = plant.response(*f);
-            held[0] += f64::from(
+            covered[0] += f64::from(
                 (frf.response[k].norm() - truth.norm()).abs() <= 1.96 * frf.magnitude_sigma[k],
             );
-            held[1] +=
+            covered[1] +=
                 f64::from((frf.response[k] / truth).arg().abs() <= 1.96 * frf.phase_sigma_rad[k]);
             count += 1.0;
         }
     }
-    held.map(|held| held / count)
+    covered.map(|covered| covered / count)
 }
 
-/// 580 bins of 0.1 Hz, 11 to an estimate, and 40 seeds: 2,100 independent ones, 0.5 %.
+/// 580 bins of 0.1 Hz, 11 per estimate, and 40 seeds give 2,100 independent estimates: the standard deviation of the share is 0.5 %.
 #[test]
 fn confidence_intervals_of_the_mean_of_repetitions_contain_the_truth() {
-    let held = held(40, 0.0, 1e-6);
-    println!("{held:?}");
+    let coverage = coverage(40, 0.0, 1e-6);
+    println!("{coverage:?}");
     assert!(
-        held.iter().all(|share| (0.93..0.97).contains(share)),
-        "{held:?}"
+        coverage.iter().all(|share| (0.93..0.97).contains(share)),
+        "{coverage:?}"
     );
 }
 
 #[test]
 fn confidence_intervals_include_noise_of_the_measured_input() {
-    // The power of the noise is a ten thousandth of that of the chirp: the bias is negligible.
-    let held = held(40, 2e-3, 1e-9);
-    println!("{held:?}");
+    // The power of the input noise is 1e-4 of that of the chirp: the bias is negligible.
+    let coverage = coverage(40, 2e-3, 1e-9);
+    println!("{coverage:?}");
     assert!(
-        held.iter().all(|share| (0.92..0.975).contains(share)),
-        "{held:?}"
+        coverage.iter().all(|share| (0.92..0.975).contains(share)),
+        "{coverage:?}"
     );
 }
 
-/// One over the square root of five is 0.447; sigma of one record is known to a tenth, its mean over the band far better.
+/// 1/sqrt(5) = 0.447. The sigma of one record has an error of about 10 %; the median over the band is far more accurate.
 #[test]
 fn sigma_falls_with_the_square_root_of_the_number_of_repetitions() {
     let all = repetitions(7, 0.0, 1e-6);
@@ -110,7 +110,7 @@ fn sigma_falls_with_the_square_root_of_the_number_of_repetitions() {
 }
 
 #[test]
-fn omits_samples_after_the_last_whole_repetition() {
+fn ignores_samples_after_the_last_whole_repetition() {
     let mut all = repetitions(7, 0.0, 1e-6);
     let whole = estimate(&all);
     all.input_a.extend([1.0; 100]);

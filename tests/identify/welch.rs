@@ -1,10 +1,12 @@
+//! Welch's estimator against scipy.
+
 use bench::identify::{Estimator, Signals, welch};
 use nalgebra::Complex;
 
 use crate::python;
 use crate::stage::{self, Dice, SampledPlant};
 
-/// White input through the stage, with probe noise: every bin of every spectrum has energy.
+/// The stage with white input and probe noise: every bin of every spectrum has energy.
 fn noisy_run(samples: usize, noise_m: f64) -> Signals {
     let mut dice = Dice::new(11);
     let input_a: Vec<f64> = (0..samples).map(|_| 0.3 * dice.normal() + 0.05).collect();
@@ -61,7 +63,7 @@ fn simulated_stage_equals_the_discretisation_by_scipy() {
         return;
     };
     for (row, (omega, residue, damping)) in modes.iter().zip(stage::MODES) {
-        // The residue of the first mode is a difference of terms 1e5 times larger: some 1e-16 / 1e-5.
+        // The residue of the first mode is a difference of terms that are 1e5 times larger: its relative error is about 1e-16/1e-5.
         assert!(
             (row[0] / omega - 1.0).abs() < 1e-9
                 && (row[1] - residue).abs() < 1e-10
@@ -83,9 +85,9 @@ fn simulated_stage_equals_the_discretisation_by_scipy() {
     }
 }
 
-/// A flat plant, so that segments have no leakage: the error is noise, which sigma must describe.
+/// The plant is a constant, so that segments have no leakage and the error is noise only.
 #[test]
-fn error_of_welch_is_within_two_sigma_in_95_percent_of_the_bins() {
+fn welch_errors_are_within_two_sigma_in_95_percent_of_the_bins() {
     let mut dice = Dice::new(5);
     let input_a: Vec<f64> = (0..200_000).map(|_| dice.normal()).collect();
     let output_m = input_a
@@ -106,9 +108,9 @@ fn error_of_welch_is_within_two_sigma_in_95_percent_of_the_bins() {
     let within =
         |k: &usize| (frf.response[*k].norm() - 1e-4).abs() <= 2.0 * frf.magnitude_sigma[*k];
     let share = (0..frf.len()).filter(within).count() as f64 / frf.len() as f64;
-    // 95.4 % of 997 bins, two neighbours of which share some: +- 2.5 % is over three standard deviations.
+    // Expected: 95.4 % of 997 bins, of which neighbours are correlated. +- 2.5 % is more than three standard deviations.
     assert!((0.93..0.98).contains(&share), "{share} of the bins");
-    // Noise of a quarter of the output's power: coherence 1/(1 + 0.25), resolution 1.5 bins of 0.5 Hz.
+    // The noise has 1/4 of the power of the signal: the coherence is 1/(1 + 0.25). The resolution is 1.5 bins of 0.5 Hz.
     let coherence = frf.coherence.iter().sum::<f64>() / frf.len() as f64;
     assert!((0.79..0.81).contains(&coherence), "{coherence}");
     assert!(

@@ -6,28 +6,28 @@ use nalgebra::Complex;
 
 const SEEDS: u64 = 10;
 
-/// Mean of H over the gain, and the shares of magnitudes and phases within 1.96 of their sigmas, over frequencies and seeds.
+/// Mean of H divided by the gain, and the shares of magnitudes and phases within 1.96 sigma, over frequencies and seeds.
 fn over_seeds(
     estimate: &Estimate,
     estimator: Estimator,
     on_input: f64,
     on_output: f64,
 ) -> (Complex<f64>, [f64; 2]) {
-    let (mut sum, mut held, mut count) = (Complex::from(0.0), [0.0; 2], 0.0);
+    let (mut sum, mut covered, mut count) = (Complex::from(0.0), [0.0; 2], 0.0);
     for seed in 1..=SEEDS {
         let frf = estimate(&signals(seed, on_input, on_output), estimator).unwrap();
         for (k, h) in frf.response.iter().enumerate() {
             sum += h / GAIN;
-            held[0] += f64::from((h.norm() - GAIN).abs() <= 1.96 * frf.magnitude_sigma[k]);
-            held[1] += f64::from(h.arg().abs() <= 1.96 * frf.phase_sigma_rad[k]);
+            covered[0] += f64::from((h.norm() - GAIN).abs() <= 1.96 * frf.magnitude_sigma[k]);
+            covered[1] += f64::from(h.arg().abs() <= 1.96 * frf.phase_sigma_rad[k]);
             count += 1.0;
         }
     }
-    (sum / count, held.map(|held| held / count))
+    (sum / count, covered.map(|covered| covered / count))
 }
 
-/// One estimate has some 11 bins: a sigma of sqrt(0.05/11) = 7 %; so many independent ones in ten records are 4,900/11 10 =
-/// 4,400: 0.1 %. Four of that.
+/// One estimate uses about 11 bins and has a standard deviation of sqrt(0.05/11) = 7 %. Ten records have 10 x 4,900/11 = 4,400
+/// independent estimates: the standard error of the mean is 0.1 %. The bound is four times that.
 #[test]
 fn bias_of_each_estimator_equals_the_closed_form_for_input_and_output_noise() {
     let bias = |estimator, on_input: f64, on_output: f64| match estimator {
@@ -50,8 +50,8 @@ fn bias_of_each_estimator_equals_the_closed_form_for_input_and_output_noise() {
     }
 }
 
-/// The unbiased estimate of each case. 4,400 independent ones: a standard deviation of 0.3 %. Sigma of the magnitude of Hv is
-/// 1.05 times too large: 96 % in place of 95.
+/// Each estimator in the case in which it is unbiased. With 4,400 independent estimates the standard deviation of the coverage is
+/// 0.3 %. Sigma of the magnitude of Hv is too large by 5 %, so that its coverage is 96 % instead of 95 %.
 #[test]
 fn confidence_intervals_of_each_unbiased_estimator_contain_the_truth() {
     for (name, estimate) in every_way() {
@@ -60,11 +60,11 @@ fn confidence_intervals_of_each_unbiased_estimator_contain_the_truth() {
             (Estimator::H2, NOISE, 0.0),
             (Estimator::Hv, NOISE, NOISE),
         ] {
-            let (_, held) = over_seeds(&*estimate, estimator, on_input, on_output);
-            println!("{name} {estimator:?}: {held:?}");
+            let (_, coverage) = over_seeds(&*estimate, estimator, on_input, on_output);
+            println!("{name} {estimator:?}: {coverage:?}");
             assert!(
-                held.iter().all(|share| (0.93..0.975).contains(share)),
-                "{name} {estimator:?}: {held:?}"
+                coverage.iter().all(|share| (0.93..0.975).contains(share)),
+                "{name} {estimator:?}: {coverage:?}"
             );
         }
     }

@@ -1,5 +1,5 @@
-//! Bias and coverage over many seeds, of the default estimator on the simulated stage as configured by default: its noise, its
-//! floor, its quantisation, its unmodelled modes, at 5 kHz. The truth is written apart from the library.
+//! Bias and coverage of the default estimator over many seeds, on the default simulated stage at 5 kHz with noise, floor vibration,
+//! quantisation and unmodelled modes. The reference response is computed independently of the library.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,7 +11,7 @@ use bench_test_support::stage::SampledPlant;
 use bench_test_support::unrecorded;
 
 const BAND_HZ: (f64, f64) = (0.5, 450.0);
-/// Three of the stage's runs a second on a core: 200 are 30 to 60 seconds on two.
+/// A run takes about 1/3 s on one core, 200 runs 30 to 60 s on two.
 const SEEDS: u64 = 200;
 const SEEDS_OF_BIAS: usize = 50;
 const WORKERS: usize = 2;
@@ -26,10 +26,10 @@ fn config(sets: &[&str]) -> Config {
 
 fn estimated(sets: &[&str]) -> Frf {
     let config = config(sets);
-    response(&unrecorded::chirp(&config), BAND_HZ, &config.identify).expect("excited")
+    response(&unrecorded::chirp(&config), BAND_HZ, &config.identify).expect("a response")
 }
 
-/// What `of` makes of the seeds 1 to [`SEEDS`], in their order.
+/// The results of `of` for the seeds 1 to [`SEEDS`], in order.
 fn over_seeds<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let (next, all) = (AtomicU64::new(1), Mutex::new(Vec::new()));
     let work = || {
@@ -46,7 +46,7 @@ fn over_seeds<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
     all.into_iter().map(|(_, one)| one).collect()
 }
 
-/// Errors of one frequency: relative of the magnitude, in degrees of the phase, and both in their sigmas.
+/// Errors at one frequency: relative error of the magnitude, error of the phase in degrees, and both divided by their sigmas.
 #[derive(Clone, Copy)]
 struct Error {
     magnitude: f64,
@@ -71,7 +71,7 @@ fn errors(frf: &Frf, plant: &SampledPlant) -> Vec<Error> {
     frf.frequency_hz.iter().enumerate().map(error).collect()
 }
 
-/// The mean of so many errors at one frequency, and its own sigma by their scatter.
+/// The mean of the values and its standard error.
 fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let count = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / count;
@@ -88,7 +88,7 @@ const QUIET: [&str; 3] = [
 ];
 
 #[test]
-fn without_noise_the_default_estimate_is_within_0_2_percent_and_0_1_degrees_of_the_stage() {
+fn noiseless_estimate_is_within_0_2_percent_and_0_1_degrees() {
     let frf = estimated(&QUIET);
     let errors = errors(&frf, &SampledPlant::stage());
     let worst = |of: fn(&Error) -> f64| errors.iter().map(of).map(f64::abs).fold(0.0, f64::max);
@@ -110,8 +110,7 @@ fn without_noise_the_default_estimate_is_within_0_2_percent_and_0_1_degrees_of_t
 }
 
 #[test]
-fn over_seeds_the_bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_bands_hold_the_truth_as_often()
- {
+fn bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_intervals_are_valid() {
     let plant = SampledPlant::stage();
     let frequency_hz = estimated(&[]).frequency_hz;
     let all = over_seeds(|seed| errors(&estimated(&[&format!("sim.seed={seed}")]), &plant));
@@ -120,9 +119,9 @@ fn over_seeds_the_bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_bands
     assert_covered(&frequency_hz, &all);
 }
 
-/// The mean over 50 seeds still has a seventh of the noise. At the antiresonance near 250 Hz that is 0.1 % and 0.06 degrees, and
-/// the greatest of some thousand means lies at three to four of their sigmas: nowhere may a mean be beyond its bound by more
-/// than four, and 99 in a hundred are within it as they are.
+/// The mean over 50 seeds has 1/7 of the noise of one run. At the antiresonance near 250 Hz that is 0.1 % and 0.06 degrees, and the
+/// largest of some thousand means is three to four standard errors from its true value. Therefore no mean may exceed its bound by
+/// more than four standard errors, and 99 % of the means are within the bound itself.
 fn assert_unbiased(frequency_hz: &[f64], all: &[Vec<Error>]) {
     let (mut within, mut worst) = (0, (0.0_f64, 0.0_f64));
     for (k, f) in frequency_hz.iter().enumerate() {
@@ -151,13 +150,13 @@ fn assert_unbiased(frequency_hz: &[f64], all: &[Vec<Error>]) {
     assert!(share > 0.99, "{share}");
 }
 
-/// Ranges of frequency: between the modes, and around each of R, u, v and the unmodelled ones.
+/// Limits of frequency ranges: between the modes, and around R, u, v and the unmodelled modes.
 const RANGES_HZ: [f64; 16] = [
     0.5, 2.0, 5.0, 8.0, 12.0, 28.5, 30.0, 65.0, 75.0, 81.0, 87.0, 200.0, 233.0, 270.0, 286.0, 450.1,
 ];
 
-/// The share is of bins and seeds. A range of n independent bins and 200 seeds has a standard deviation of
-/// sqrt(0.95 0.05/(200 n)): 0.6 % of the five or so around a mode.
+/// Share of bins and seeds within 1.96 sigma. With n independent bins and 200 seeds its standard deviation is
+/// sqrt(0.95 x 0.05/(200 n)): 0.7 % with about five bins around a mode.
 fn assert_covered(frequency_hz: &[f64], all: &[Vec<Error>]) {
     let share = |low_hz: f64, high_hz: f64, of: usize| {
         let inside = |k: &usize| (low_hz..high_hz).contains(&frequency_hz[*k]);
@@ -171,7 +170,7 @@ fn assert_covered(frequency_hz: &[f64], all: &[Vec<Error>]) {
     for (low_hz, high_hz) in ranges.chain([(0.5, 450.1)]) {
         let (magnitude, phase) = (share(low_hz, high_hz, 0), share(low_hz, high_hz, 1));
         println!(
-            "{low_hz} to {high_hz} Hz: 95 % bands hold magnitude {magnitude:.4}, phase {phase:.4}"
+            "{low_hz} to {high_hz} Hz: coverage of the 95 % intervals: magnitude {magnitude:.4}, phase {phase:.4}"
         );
         assert!(
             (0.93..0.97).contains(&magnitude),

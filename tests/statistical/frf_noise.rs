@@ -1,4 +1,4 @@
-//! The standard deviations of a frequency response agree with its errors.
+//! The standard deviations of a frequency response match its errors.
 
 use bench::identify::{EstimatorSettings, Frf, Signals, local};
 use bench_test_support::stage::{self, RATE_HZ, SampledPlant};
@@ -22,9 +22,9 @@ fn share(errors: &[(f64, f64, f64)], of: impl Fn(&(f64, f64, f64)) -> f64) -> f6
     errors.iter().filter(|e| of(e).abs() <= 2.0).count() as f64 / errors.len() as f64
 }
 
-/// A normal error is within 2 sigma 95.4 times in a hundred; neighbours share some of their noise, so that some 2000 of
-/// the 8700 frequencies are independent: a standard deviation of 0.5 %. 90 % is promised, and no more than 99.9 %.
-fn assert_honest(errors: &[(f64, f64, f64)], what: &str) {
+/// Normally distributed errors are within 2 sigma with a probability of 95.4 %. Neighbouring frequencies are correlated: about 2000 of
+/// the 8700 are independent, so that the standard deviation of the share is 0.5 %. The requirement is 90 % to 99.9 %.
+fn assert_sigma_matches(errors: &[(f64, f64, f64)], what: &str) {
     let (magnitude, phase) = (share(errors, |e| e.1), share(errors, |e| e.2));
     println!(
         "{what}: {} frequencies, within 2 sigma: magnitude {magnitude:.4}, phase {phase:.4}",
@@ -41,15 +41,15 @@ fn assert_honest(errors: &[(f64, f64, f64)], what: &str) {
 }
 
 #[test]
-fn with_the_noise_of_the_stage_nine_errors_in_ten_are_within_two_sigma_for_every_seed() {
+fn at_least_90_percent_of_errors_are_within_two_sigma_for_every_seed() {
     let (clean, plant) = (stage::clean_run(), SampledPlant::stage());
     for seed in 1..=5 {
         let errors = errors(
             &estimate(&stage::with_noise(&clean, seed), (0.5, 450.0)),
             &plant,
         );
-        assert_honest(&errors, &format!("seed {seed}"));
-        // Sigma is neither timid nor bold: the root mean square of error/sigma is 1, within 10 %.
+        assert_sigma_matches(&errors, &format!("seed {seed}"));
+        // Sigma is neither too large nor too small: the root mean square of error/sigma is 1, within 10 %.
         let square = errors
             .iter()
             .map(|e| (e.1 * e.1 + e.2 * e.2) / 2.0)
@@ -63,9 +63,9 @@ fn with_the_noise_of_the_stage_nine_errors_in_ten_are_within_two_sigma_for_every
     }
 }
 
-/// Where a mode stands, a third of its width to either side: smoothing takes off more there than noise puts on.
+/// Frequencies within 3 zeta f0 of a mode: there the bias by smoothing would be larger than the noise.
 #[test]
-fn with_the_noise_of_the_stage_nine_errors_in_ten_are_within_two_sigma_around_every_resonance() {
+fn at_least_90_percent_of_errors_are_within_two_sigma_around_resonances() {
     let (clean, plant) = (stage::clean_run(), SampledPlant::stage());
     let mut near = Vec::new();
     for seed in 1..=5 {
@@ -81,10 +81,10 @@ fn with_the_noise_of_the_stage_nine_errors_in_ten_are_within_two_sigma_around_ev
         };
         stage::MODES.iter().skip(1).any(close)
     });
-    assert_honest(&near, "around resonances");
+    assert_sigma_matches(&near, "around resonances");
 }
 
-/// A chirp of two seconds and 1.2 mA, 185 nm of motion, in 50 nm of noise: the errors of so many runs of 8.5 seconds.
+/// The errors of runs of 8.5 s with a chirp of 2 s and 1.2 mA: 185 nm of motion in 50 nm of noise.
 fn short_runs(seeds: u64, min_half_width_bins: usize) -> Vec<(f64, f64, f64)> {
     let plant = SampledPlant::stage();
     let input_a: Vec<f64> = stage::chirp_of(2.0, 0.5, 6.0)
@@ -111,14 +111,15 @@ fn short_runs(seeds: u64, min_half_width_bins: usize) -> Vec<(f64, f64, f64)> {
 }
 
 #[test]
-fn a_short_noisy_record_has_large_sigmas_that_are_as_honest() {
-    assert_honest(&short_runs(8, 16), "short records");
+fn sigmas_of_short_noisy_record_match_errors() {
+    assert_sigma_matches(&short_runs(8, 16), "short records");
 }
 
-/// The floor's peak at 5 Hz is four bins wide to either side here, and the noise is taken from sixteen: sigma is too
-/// small by a quarter, no more. Of the default half-width of 16 bins it would be from 32: record longer, or ask for less.
+/// The noise of the floor has a peak at 5 Hz that is four bins wide to either side, while the noise is estimated from 16 bins: sigma is too
+/// small there by about a quarter. With the default half-width of 16 bins the noise would be estimated from 32 bins, and sigma would be
+/// smaller still.
 #[test]
-fn where_the_floor_peaks_in_a_short_record_eight_errors_in_ten_are_within_two_sigma() {
+fn at_least_80_percent_of_errors_are_within_two_sigma_at_the_floor_peak_of_a_short_record() {
     let mut peak = short_runs(100, 8);
     peak.retain(|(f, _, _)| (4.5..5.5).contains(f));
     let (magnitude, phase) = (share(&peak, |e| e.1), share(&peak, |e| e.2));

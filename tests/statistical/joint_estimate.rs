@@ -1,12 +1,12 @@
-//! Bias and confidence intervals of identification under control.
+//! Bias and confidence intervals of identification in closed loop.
 
 use bench::identify::joint::estimate;
 use bench::identify::{EstimatorSettings, local};
 use bench_test_support::feedback_loop::{BAND_HZ, POLE, plant, run};
 use nalgebra::Complex;
 
-/// Right below the resonance, where |L| is near 1, with noise of the size of the reference in a bin, H1 from command to position
-/// is biased from P towards -1/C; the estimate with the reference as instrument is not.
+/// Just below the resonance |L| is near 1, and noise and reference have the same magnitude in a bin. There H1 from command to position
+/// is biased from P towards -1/C. The estimate with the reference as instrumental variable is not biased.
 #[test]
 fn noise_fed_back_by_the_controller_does_not_bias_the_plant() {
     let (frequency_hz, seeds) = (19.5, 60);
@@ -27,14 +27,14 @@ fn noise_fed_back_by_the_controller_does_not_bias_the_plant() {
         direct_mean += direct.response[at] / plant(direct.frequency_hz[at]) / seeds as f64;
     }
     // Standard error of the mean of 60 values; the bound is three times that.
-    let room = 3.0 * (squares / seeds as f64).sqrt();
+    let bound = 3.0 * (squares / seeds as f64).sqrt();
     assert!(
-        (joint_mean - 1.0).norm() < room && room < 0.15,
-        "{joint_mean} within {room}"
+        (joint_mean - 1.0).norm() < bound && bound < 0.15,
+        "{joint_mean} within {bound}"
     );
     assert!(
-        (direct_mean - 1.0).norm() > 2.0 * room,
-        "H1 has no bias here: {direct_mean}"
+        (direct_mean - 1.0).norm() > 2.0 * bound,
+        "H1 is expected to be biased: {direct_mean}"
     );
 }
 

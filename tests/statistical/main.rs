@@ -1,4 +1,4 @@
-//! The statistical suite: claims about many seeds, such as the coverage of a 95 % confidence interval.
+//! The statistical suite: properties over many seeds, such as the coverage of a 95 % confidence interval.
 //!
 //! It takes minutes of processor time: `cargo test --features statistical --test statistical`. `.ci/run` runs it.
 

@@ -1,4 +1,4 @@
-//! Verdicts on the simulated stage over random points: none is wrong, and few are undecided.
+//! Verdicts on the simulated stage at random operating points and asymmetries: none is wrong, and few are undecided.
 
 use bench::config::Config;
 use bench::experiment::Analysis;
@@ -7,7 +7,7 @@ use bench::identify::verdict::Cnmp;
 use bench_test_support::identified::{analysed, config, model, stands_for, truth};
 use bench_test_support::synthetic::normal;
 
-/// Points of the plane of section 5.2.2, operating point from 0 to 8 % of L and asymmetry from -10 to +10 %, by seed.
+/// Random points in the range of section 5.2.2: operating point from 0 to 8 % of L, asymmetry from -10 to +10 %.
 fn points(count: usize, seed: u64) -> Vec<Vec<String>> {
     let mut normal = normal(seed);
     let mut uniform = move || {
@@ -28,7 +28,7 @@ fn points(count: usize, seed: u64) -> Vec<Vec<String>> {
     (0..count as u32).map(point).collect()
 }
 
-/// How many of the points were detected, excluded, undecided; none wrongly.
+/// Numbers of points with the verdicts detected, excluded and undecided; asserts that none is wrong.
 fn tally(count: usize, seed: u64, more: &[&str]) -> [usize; 3] {
     let mut tally = [0; 3];
     for mut sets in points(count, seed) {
@@ -36,26 +36,26 @@ fn tally(count: usize, seed: u64, more: &[&str]) -> [usize; 3] {
         let config = config(&sets);
         let analysis = analysed(&config, &config);
         if more.is_empty() {
-            modes_are_true(&config, &analysis);
+            assert_modes_match(&config, &analysis);
         }
-        let (said, pairs) = (analysis.verdict, truth(&config));
-        let index = match said.cnmp {
+        let (verdict, pairs) = (analysis.verdict, truth(&config));
+        let index = match verdict.cnmp {
             Cnmp::Detected => 0,
             Cnmp::Excluded => 1,
             Cnmp::Undecided => 2,
         };
         assert!(
             index == 2 || (index == 0) == (pairs > 0),
-            "{sets:?}: {pairs} pairs, {said:?}"
+            "{sets:?}: {pairs} pairs, {verdict:?}"
         );
         tally[index] += 1;
     }
     tally
 }
 
-/// Every mode of the model whose residue stands five sigma out is there, true to 0.05 % in frequency, 5 % in damping and 3 % in
-/// residue with its sign; of one that is not, the verdict says so.
-fn modes_are_true(config: &Config, analysis: &Analysis) {
+/// Every mode of the model whose residue exceeds five sigma is found, within 0.05 % of its frequency, 5 % of its damping ratio and 3 % of
+/// its residue, with the correct sign. If such a mode is missing, the reason of the verdict states it.
+fn assert_modes_match(config: &Config, analysis: &Analysis) {
     let modes = analysis.fit.as_ref().expect("modes").modes();
     let sigma = modes
         .iter()
@@ -63,9 +63,10 @@ fn modes_are_true(config: &Config, analysis: &Analysis) {
         .fold(0.0, f64::max);
     for [omega, damping, residue] in model(config) {
         let Some(mode) = stands_for(&modes, omega) else {
-            let told = analysis.verdict.why.contains("are found") || residue.abs() < 5.0 * sigma;
+            let is_reported_or_small =
+                analysis.verdict.why.contains("are found") || residue.abs() < 5.0 * sigma;
             assert!(
-                told,
+                is_reported_or_small,
                 "{omega} rad/s, {residue} 1/kg: {:?}",
                 analysis.verdict.why
             );
@@ -76,7 +77,7 @@ fn modes_are_true(config: &Config, analysis: &Analysis) {
         }
         let off = |e: Estimate, truth: f64| (e.value / truth - 1.0).abs();
         assert!(off(mode.omega_rad_s, omega) < 5e-4, "{omega}: {mode:?}");
-        // Of a mode that just shows, the figures are as good as they say.
+        // For a small mode the bound is four sigma.
         assert!(
             off(mode.damping_ratio, damping)
                 < 0.05_f64.max(4.0 * mode.damping_ratio.sigma / damping),
@@ -92,7 +93,7 @@ fn modes_are_true(config: &Config, analysis: &Analysis) {
 }
 
 #[test]
-fn with_the_default_chirp_none_is_wrong_and_few_are_undecided() {
+fn default_chirp_gives_no_wrong_and_few_undecided_verdicts() {
     let [detected, excluded, undecided] = tally(24, 1, &[]);
     assert!(
         detected >= 3 && excluded >= 8 && undecided <= 6,
@@ -101,7 +102,7 @@ fn with_the_default_chirp_none_is_wrong_and_few_are_undecided() {
 }
 
 #[test]
-fn with_half_the_current_a_tenth_of_the_time_or_a_micrometre_of_noise_none_is_wrong() {
+fn low_current_short_duration_or_large_noise_give_no_wrong_verdicts() {
     let half = "chirp.amplitude=[{frequency_hz=0.1,current_a=0.2},{frequency_hz=8.0,current_a=0.2},{frequency_hz=20.0,current_a=0.05},{frequency_hz=45.0,current_a=0.05},{frequency_hz=70.0,current_a=0.5}]";
     for more in [
         &[half][..],
@@ -109,7 +110,7 @@ fn with_half_the_current_a_tenth_of_the_time_or_a_micrometre_of_noise_none_is_wr
         &["sim.probe_noise_rms_m=1e-6"],
     ] {
         let [detected, excluded, _] = tally(8, 2, more);
-        // A verdict that is never given is never wrong: half of the points at least are decided.
+        // At least half of the points are decided, because undecided verdicts are never wrong.
         assert!(detected + excluded >= 4, "{more:?}: {detected} {excluded}");
     }
 }
