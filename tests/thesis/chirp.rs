@@ -1,4 +1,4 @@
-//! `bench chirp`: what it measures on the simulated stage is what the stage is.
+//! `bench chirp`: the measured response equals that of the simulated stage.
 
 use serde_json::{Value, json};
 
@@ -27,7 +27,7 @@ fn rows(bench: &Bench, answer: &Value) -> Vec<Row> {
     lines.map(row).collect()
 }
 
-/// A row against the truth: frequency, |H|, errors of magnitude (m/A) and phase (deg), and their stated sigmas.
+/// Error of a row: frequency, exact |H|, errors of magnitude (m/A) and phase (deg), and their sigmas.
 struct Error {
     frequency_hz: f64,
     truth_m_per_a: f64,
@@ -63,8 +63,7 @@ fn errors(bench: &Bench, settings: &str, rows: &[Row]) -> Option<Vec<Error>> {
 }
 
 #[test]
-fn without_noise_the_response_is_the_rigs_within_0_2_per_cent_and_0_1_degrees_resonances_included()
-{
+fn noiseless_response_is_within_0_2_percent_and_0_1_degrees_including_resonances() {
     let bench = Bench::new();
     let rows = rows(&bench, &bench.json(&format!("chirp {NOISE_FREE}")));
     let Some(errors) = errors(&bench, NOISE_FREE, &rows) else {
@@ -74,7 +73,7 @@ fn without_noise_the_response_is_the_rigs_within_0_2_per_cent_and_0_1_degrees_re
         .iter()
         .filter(|e| (0.5..=450.0).contains(&e.frequency_hz))
         .collect();
-    // Eight to a per cent of frequency at the top of the band: the modes' peaks, 0.8 % wide at half their power, are well sampled.
+    // At the top of the band there are eight rows per per cent of frequency, enough for the peaks with a half-power width of 0.8 %.
     assert!(inside.len() > 4000, "{}", inside.len());
     for e in inside {
         let relative = e.magnitude / e.truth_m_per_a;
@@ -94,15 +93,15 @@ fn without_noise_the_response_is_the_rigs_within_0_2_per_cent_and_0_1_degrees_re
 }
 
 #[test]
-fn with_noise_the_stated_sigmas_hold_and_are_small() {
+fn errors_of_noisy_response_match_sigma_and_sigma_is_below_1_percent() {
     for seed in [1, 2] {
         let (bench, settings) = (Bench::new(), format!("--seed {seed}"));
         let rows = rows(&bench, &bench.json(&format!("chirp {settings}")));
         let Some(errors) = errors(&bench, &settings, &rows) else {
             return;
         };
-        // Two sigma of a Gaussian hold 95.4 %. Neighbouring bins share data, so that the share varies by some per cent;
-        // a sigma that is too large by half would hold 99.7 %, twice too large 99.99 %.
+        // For a normal distribution 95.4 % of the errors are within two sigma. Neighbouring bins are correlated, so that the share varies
+        // by some per cent. With a sigma too large by 50 % the share would be 99.7 %, by 100 % 99.99 %.
         for (what, within) in [
             (
                 "magnitude",
@@ -133,7 +132,7 @@ fn with_noise_the_stated_sigmas_hold_and_are_small() {
 }
 
 #[test]
-fn the_answer_the_files_and_the_recording_are_as_promised() {
+fn answer_files_and_recording_are_complete() {
     let bench = Bench::new();
     let answer = bench.json("chirp");
     for key in [
@@ -164,20 +163,21 @@ fn the_answer_the_files_and_the_recording_are_as_promised() {
         (&json!(0), &json!(0))
     );
     assert!(
-        ["detected", "excluded", "undecided"].contains(&answer["cnmp"].as_str().expect("a word"))
+        ["detected", "excluded", "undecided"]
+            .contains(&answer["cnmp"].as_str().expect("a verdict"))
     );
-    // 2 s of quiet, 110 s of sweep, 8 s of quiet and 0.1 s after the motor went off, at 5 kHz.
+    // 2 s of quiet, 110 s of sweep, 8 s of quiet and 0.1 s after the motor is switched off, at 5 kHz.
     let ticks = number(&answer["ticks"]);
     assert!((600_500.0..=600_501.0).contains(&ticks), "{ticks}");
     let messages = Recording::open(&bench.path(answer["recording"].as_str().expect("a path")))
         .messages("/loop");
-    assert_eq!(messages.len() as f64, ticks, "a message a tick");
+    assert_eq!(messages.len() as f64, ticks, "one message per tick");
     assert!(
         messages
             .iter()
             .enumerate()
             .all(|(index, message)| message["tick"] == index),
-        "numbered without a gap"
+        "tick numbers have a gap"
     );
     let svg = bench.read(answer["plot"].as_str().expect("a path"));
     for text in ["<svg", "Hz", "m/A", "deg", "oherence"] {
@@ -185,9 +185,9 @@ fn the_answer_the_files_and_the_recording_are_as_promised() {
     }
 }
 
-/// One period of computing, 0.2 ms, stands in the phases: 36 degrees at 500 Hz. Hold and amplifier are no delay and stay.
+/// The delay is one computing period, 0.2 ms: 36 degrees at 500 Hz. Hold and current loop are not a delay and are not removed.
 #[test]
-fn the_phase_is_given_with_and_without_the_delay() {
+fn frf_without_delay_has_the_phase_corrected_by_one_period() {
     let bench = Bench::new();
     let mut answer = bench.json("chirp --duration 20 --start 5");
     let with = rows(&bench, &answer);
@@ -195,12 +195,12 @@ fn the_phase_is_given_with_and_without_the_delay() {
     let without = rows(&bench, &answer);
     assert_eq!(with.len(), without.len());
     for (with, without) in with.iter().zip(&without) {
-        let turned = (without[2] - with[2]).rem_euclid(360.0);
+        let difference = (without[2] - with[2]).rem_euclid(360.0);
         let expected = 360.0 * with[0] * 2e-4;
-        // What the phases show beyond the configuration is known to a microsecond: 0.2 degrees at 500 Hz.
+        // The estimate of the delay has an error of 1 us: 0.2 degrees at 500 Hz.
         assert!(
-            (turned - expected).abs() < 0.3,
-            "{} Hz: {turned} for {expected}",
+            (difference - expected).abs() < 0.3,
+            "{} Hz: {difference} for {expected}",
             with[0]
         );
         assert!((with[1] / without[1] - 1.0).abs() < 1e-12);
@@ -208,7 +208,7 @@ fn the_phase_is_given_with_and_without_the_delay() {
 }
 
 #[test]
-fn rows_rise_in_frequency_over_the_whole_band_and_are_sound() {
+fn rows_cover_the_band_with_rising_frequency_and_valid_values() {
     let bench = Bench::new();
     let rows = rows(
         &bench,
@@ -216,7 +216,7 @@ fn rows_rise_in_frequency_over_the_whole_band_and_are_sound() {
     );
     assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
     let (first, last) = (rows[0][0], rows[rows.len() - 1][0]);
-    // A bin is 1/50 s wide.
+    // A bin is 1/(50 s) = 0.02 Hz wide.
     assert!(
         (1.0..1.03).contains(&first) && (299.5..=300.0).contains(&last),
         "{first} to {last} Hz"
@@ -237,7 +237,7 @@ fn rows_rise_in_frequency_over_the_whole_band_and_are_sound() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_run_bit_for_bit_and_another_one_does_not() {
+fn equal_seeds_give_identical_runs_and_different_seeds_do_not() {
     let digest = |seed: u32| {
         let answer = Bench::new().json(&format!(
             "chirp --duration 10 --start 5 --stop 100 --amplitude 0.05 --seed {seed}"
@@ -253,13 +253,13 @@ fn the_same_seed_gives_the_same_run_bit_for_bit_and_another_one_does_not() {
 }
 
 #[test]
-fn identify_makes_the_same_csv_from_the_recording() {
+fn identify_writes_the_same_csv_as_chirp() {
     let bench = Bench::new();
     let chirp = bench.json("chirp --duration 20 --start 2 --stop 200");
     let recording = chirp["recording"].as_str().expect("a path");
     let text = |answer: &Value| bench.read(answer["frf_csv"].as_str().expect("a path"));
-    let of_the_run = text(&chirp);
+    let by_chirp = text(&chirp);
     let identified = bench.json(&format!("identify {recording}"));
     assert_eq!(chirp["frf_csv"], identified["frf_csv"], "replaced in place");
-    assert_eq!(of_the_run, text(&identified));
+    assert_eq!(by_chirp, text(&identified));
 }

@@ -22,7 +22,7 @@ fn propositions<'a>(answer: &'a Value, side: &str) -> [&'a Value; 3] {
     let found = list(answer, "sides")
         .iter()
         .find(|at| at["side"] == side)
-        .expect("that side");
+        .expect("the side of the veering point");
     [0, 1, 2].map(|which| &found["propositions"][which])
 }
 
@@ -40,7 +40,7 @@ fn propositions_predict_the_cnmp_band_at_1_percent_asymmetry() {
         number(&tally["appear"]) > 10.0 && tally["wrong_by_equation"] == 0,
         "{tally}"
     );
-    // The band by Eq. (4-1) ends within A4-5's ratio, 1e-4 of it, of the plant's: between two values of the grid.
+    // The ends of the band by Eq. (4-1) differ from those of the plant by the ratio of A4-5, 1e-4, which is below the grid spacing.
     assert_eq!(tally["wrong_by_plant"], 0, "{tally}");
     for proposition in propositions(&answer, "before") {
         assert_eq!(proposition["predicted"], "appear", "{proposition}");
@@ -123,8 +123,8 @@ fn p4_2y_predicts_the_zeros_of_section_4_4_1() {
         (&json!("appear"), &json!(true)),
         "{p4_2y}"
     );
-    // The body couples u and v by -k1 k2/(kb + k1 + k2 - mb w^2), which k undoes: with mb = 10 kg and w^2 near 1.2,
-    // 1/(12 - 3) = 0.11, beyond the printed range of 0.03, which is that of mb = 50 kg.
+    // The body couples u and v by -k1 k2/(kb + k1 + k2 - mb w^2). The veering point is where k cancels this coupling: with mb = 10 kg
+    // and w^2 near 1.2 at k = 1/(12 - 3) = 0.11. The range printed in the thesis, up to 0.03, is that of mb = 50 kg.
     assert!(
         (0.10..0.12).contains(&number(&answer["value"])),
         "{}",
@@ -155,10 +155,10 @@ fn zeros_of_section_4_4_3_are_complex_from_50_to_200() {
     ));
     let bands = list(&answer, "cnmp_bands");
     assert_eq!(bands.len(), 1, "{bands:?}");
-    // Bisected to rounding: two zeros that meet are one within the root of it.
-    near("leaves", number(&bands[0][0]), 50.0, 1e-6);
-    near("comes back", number(&bands[0][1]), 200.0, 1e-6);
-    // "One cannot easily determine whether A4-4 and A4-5 apply": they do not, and Eq. (4-1) has another band.
+    // The bisection is limited by the rounding of a double zero, whose error is the square root of the relative rounding.
+    near("the lower end", number(&bands[0][0]), 50.0, 1e-6);
+    near("the upper end", number(&bands[0][1]), 200.0, 1e-6);
+    // "One cannot easily determine whether A4-4 and A4-5 apply": they do not, and Eq. (4-1) gives a different band.
     assert!(
         number(&answer["assumptions"]["others_ratio"]) > 0.5,
         "{}",
@@ -167,7 +167,7 @@ fn zeros_of_section_4_4_3_are_complex_from_50_to_200() {
     assert!(
         number(&answer["p4_1"]["wrong_by_plant"]) > 0.0 && answer["p4_1"]["wrong_by_equation"] == 0
     );
-    // P4-2y needs neither.
+    // P4-2y requires neither A4-4 nor A4-5.
     let [.., p4_2y] = propositions(&answer, "after");
     assert_eq!(
         (&p4_2y["predicted"], &p4_2y["plant"]),
@@ -192,7 +192,7 @@ fn examples() -> Vec<(String, &'static str, &'static str)> {
         ("--config three-mass".to_string(), K, "--from 0 --to 0.3"),
         ("--config four-mass".to_string(), K23, "--from 1 --to 300"),
     ];
-    // Even steps of irrational ratio: as good as random, and the same in every run.
+    // Multiples of the golden ratio modulo 1: a reproducible, evenly spread sequence.
     let part = |index: usize| 2.0 * (0.6180339887498949 * index as f64).fract() - 1.0;
     for draw in 0..8 {
         let set = |(which, name): (usize, &str)| {
@@ -252,8 +252,8 @@ fn residues_signs_and_zeros_agree_with_python() {
                 .map(|key| number(&row[key]));
             let size = ours.iter().fold(0.0f64, |size, x| size.max(x.abs()));
             for (which, ours) in ours.into_iter().enumerate() {
-                // The solve at w0 loses the ratio of the pair's parts to the remainder's, some thousand, and shapes that of
-                // a gap, some thousand: 1e-16 to 1e-9 is a million to spare of both.
+                // The solution at w0 loses a factor of about 1000 (ratio of the pair's terms to the remainder), the mode shapes another
+                // one of about 1000 (small gap of the eigenvalues): 1e-16 x 1e6 = 1e-10.
                 near(
                     "a residue",
                     ours / size,
@@ -281,7 +281,7 @@ fn zeros_of_placements_agree_with_python() {
         "model placement --config four-mass --vary {K23} --from 1 --to 271 --count 10"
     ));
     let config = bench.json("config show --config four-mass");
-    // Those of the grid and the crossing.
+    // The values of the grid and the crossing.
     let values: Vec<f64> = (0..10)
         .map(|k| 1.0 + 30.0 * f64::from(k))
         .chain([number(&answer["value"])])
@@ -293,13 +293,13 @@ fn zeros_of_placements_agree_with_python() {
     let trials = list(&answer, "trials");
     assert_eq!(trials.len(), 16);
     for trial in trials {
-        let place = |key: &str| {
+        let node = |key: &str| {
             ["m1", "m2", "m3", "m4"]
                 .iter()
                 .position(|name| trial[key] == **name)
                 .expect("a node")
         };
-        let (i, j) = (place("actuator"), place("sensor"));
+        let (i, j) = (node("actuator"), node("sensor"));
         let counts = truth[0].as_array().expect("a list");
         let with_any = counts
             .iter()
@@ -335,7 +335,7 @@ fn recommended_and_collocated_placements_have_no_cnmp_zeros() {
             .filter(|trial| trial["actuator"] == trial["sensor"]);
         assert!(collocated.clone().count() >= 3, "{options}");
         for trial in collocated {
-            // Residues are squares: all positive, one zero between any two modes.
+            // Collocated residues are squares: all are positive, with one zero between two neighbouring modes.
             assert_eq!(
                 (&trial["with_any_cnmp"], &trial["alternating"]),
                 (&json!(0), &json!(0)),
@@ -378,7 +378,7 @@ fn probe_of_the_stage_is_in_the_quadrant_to_avoid() {
         assert!(svg.contains(text), "{text} is not in the picture");
     }
     assert!(!svg.contains("NaN"));
-    // The same from vectors as typed.
+    // The same placement, given as vectors on the command line.
     let typed = bench.json("model placement --actuator x4=2 --sensor x1=1");
     near(
         "the margin",

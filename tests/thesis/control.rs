@@ -22,7 +22,7 @@ fn run(arguments: &str) -> Value {
 }
 
 #[test]
-fn a_step_of_50_um_settles_as_predicted_the_fast_one_below_a_tenth_of_a_second() {
+fn settling_times_of_a_50_um_step_match_prediction_and_thesis() {
     for (controller, thesis_s) in [("fast", 0.0858), ("slow", 0.1663)] {
         let answer = run(&format!("--{controller} --duration 3"));
         let (predicted, found) = (
@@ -35,7 +35,7 @@ fn a_step_of_50_um_settles_as_predicted_the_fast_one_below_a_tenth_of_a_second()
             predicted,
             0.1 * predicted,
         );
-        // As measured on the stage that was built (section 6.2.3), whose modes are not exactly the model's.
+        // Measured on the built stage (section 6.2.3), whose modes differ from those of the model.
         near(
             &format!("settling of the {controller} loop in the thesis"),
             found,
@@ -50,7 +50,7 @@ fn a_step_of_50_um_settles_as_predicted_the_fast_one_below_a_tenth_of_a_second()
 }
 
 #[test]
-fn the_predicted_step_is_that_of_python() {
+fn predicted_step_equals_python() {
     let bench = Bench::new();
     let settings = [
         "--set control.controller=fast",
@@ -61,7 +61,7 @@ fn the_predicted_step_is_that_of_python() {
         return;
     };
     for (settings, truth) in settings.iter().zip(&answers) {
-        // The step comes 0.2 s after the loop closed: 2.8 s of 3 s are left.
+        // The step starts 0.2 s after the loop closes: 2.8 s of 3 s remain.
         let answer = bench.json(&format!("control {settings} --duration 3"));
         let predicted = &answer["predicted"];
         let settled = number(&truth["settling_time_s"]);
@@ -81,7 +81,7 @@ fn the_predicted_step_is_that_of_python() {
 }
 
 #[test]
-fn a_step_in_the_very_first_tick_is_measured_like_any_other() {
+fn step_in_the_first_tick_is_measured_correctly() {
     let answer = run("--fast --duration 3 --set control.reference.at_s=0");
     let predicted = number(&answer["predicted"]["settling_time_s"]);
     near(
@@ -91,7 +91,7 @@ fn a_step_in_the_very_first_tick_is_measured_like_any_other() {
         0.1 * predicted,
     );
     let overshoot = number(&answer["predicted"]["overshoot_percent"]);
-    // Six sigma of 0.05 um over a step of 50 um.
+    // Six sigma of 0.05 um relative to a step of 50 um: 0.6 %.
     near(
         "overshoot",
         measured(&answer, "overshoot_percent"),
@@ -100,9 +100,10 @@ fn a_step_in_the_very_first_tick_is_measured_like_any_other() {
     );
 }
 
-fn hold(arguments: &str) -> f64 {
+/// The standard deviation of the position in the steady state, in metres.
+fn sigma_of_hold(arguments: &str) -> f64 {
     let answer = run(&format!("--reference hold --duration 60 {arguments}"));
-    // What drifts by is slow: the mean over a minute is well below sigma.
+    // The integrator removes slow drift: the mean over a minute is well below sigma.
     near(
         "mean error",
         measured(&answer, "steady_state_mean_error_m"),
@@ -113,17 +114,17 @@ fn hold(arguments: &str) -> f64 {
 }
 
 #[test]
-fn holding_still_has_the_sigmas_of_the_thesis_with_the_same_floor() {
+fn steady_state_sigmas_match_the_thesis() {
     for seed in [1, 2, 3, 4] {
         near(
             "sigma of the fast loop",
-            hold(&format!("--fast --seed {seed}")),
+            sigma_of_hold(&format!("--fast --seed {seed}")),
             50e-9,
             3e-9,
         );
         near(
             "sigma of the slow loop",
-            hold(&format!("--slow --seed {seed}")),
+            sigma_of_hold(&format!("--slow --seed {seed}")),
             66e-9,
             4e-9,
         );
@@ -131,9 +132,9 @@ fn holding_still_has_the_sigmas_of_the_thesis_with_the_same_floor() {
 }
 
 #[test]
-fn the_fast_loop_holds_as_well_at_any_operating_point() {
+fn steady_state_sigma_does_not_depend_on_the_operating_point() {
     let sigmas: Vec<f64> = ["0%", "2%", "4%", "6%", "8%"]
-        .map(|point| hold(&format!("--fast --operating-point {point}")))
+        .map(|point| sigma_of_hold(&format!("--fast --operating-point {point}")))
         .into();
     let (lowest, highest) = sigmas
         .iter()
@@ -145,10 +146,10 @@ fn the_fast_loop_holds_as_well_at_any_operating_point() {
 }
 
 #[test]
-fn the_sigmas_are_those_of_the_spectra_by_python() {
+fn steady_state_sigmas_equal_those_of_the_spectra_by_python() {
     let bench = Bench::new();
     let runs = ["fast", "slow"].map(|name| format!("--set control.controller={name}"));
-    // The steady state begins 0.5 s after the loop closed.
+    // The steady state begins 0.5 s after the loop closes.
     let question = |s: &String| json!({"what": "sigma", "config": bench.json(&format!("config show {s}")), "seconds": 59.5});
     let Some(answers) = truth::ask(&runs.iter().map(question).collect::<Vec<_>>()) else {
         return;
@@ -157,13 +158,13 @@ fn the_sigmas_are_those_of_the_spectra_by_python() {
         let (sigma, spread) = (number(&truth["sigma_m"]), number(&truth["relative_spread"]));
         assert!(
             spread < 0.03,
-            "{spread}: a minute tells sigma to some per cent"
+            "relative standard deviation of sigma over a minute: {spread}"
         );
         for seed in [5, 6] {
-            // Four standard deviations, and half a per cent for the floor held over each tick and the sum over the lines.
+            // Four standard deviations, and 0.5 % because the floor vibration is held over each tick and the spectrum is a sum over lines.
             near(
                 settings,
-                hold(&format!("{settings} --seed {seed}")),
+                sigma_of_hold(&format!("{settings} --seed {seed}")),
                 sigma,
                 (4.0 * spread + 0.005) * sigma,
             );
@@ -172,7 +173,7 @@ fn the_sigmas_are_those_of_the_spectra_by_python() {
 }
 
 #[test]
-fn with_the_lighter_stage_2_the_fast_loop_trips_and_the_recording_says_why() {
+fn fast_loop_trips_with_the_lighter_stage_2_and_the_recording_states_the_reason() {
     let bench = Bench::new();
     let answer: Answer = bench.run("control --fast --asymmetry -10% --json");
     assert_eq!(answer.code, 1, "{}", answer.err);
@@ -180,7 +181,7 @@ fn with_the_lighter_stage_2_the_fast_loop_trips_and_the_recording_says_why() {
     assert_eq!(answer["outcome"], "tripped");
     assert_eq!(
         answer["predicted"]["stable"], false,
-        "and it was known before"
+        "the prediction must be unstable"
     );
     assert_eq!(answer["measured"], Value::Null);
     let trip = &answer["trip"];
@@ -192,14 +193,14 @@ fn with_the_lighter_stage_2_the_fast_loop_trips_and_the_recording_says_why() {
             .iter()
             .enumerate()
             .all(|(index, message)| message["tick"] == index),
-        "numbered without a gap"
+        "tick numbers have a gap"
     );
     let trips: Vec<Value> = recording
         .messages("/event")
         .into_iter()
         .filter(|e| e["kind"] == "trip")
         .collect();
-    assert_eq!(trips.len(), 1, "one trip, latched");
+    assert_eq!(trips.len(), 1, "exactly one trip");
     assert_eq!(
         (&trips[0]["reason"], &trips[0]["tick"]),
         (&trip["reason"], &trip["tick"])
@@ -211,7 +212,7 @@ fn with_the_lighter_stage_2_the_fast_loop_trips_and_the_recording_says_why() {
         trips[0]
     );
     let tripped_at = trip["tick"].as_u64().expect("a tick") as usize;
-    // In the tick of the trip the current is off, and it stays off: 0.1 s are recorded after it.
+    // The current is off from the tick of the trip on; 0.1 s are recorded after it.
     assert!(
         ticks[tripped_at..]
             .iter()
@@ -237,7 +238,7 @@ fn with_the_lighter_stage_2_the_fast_loop_trips_and_the_recording_says_why() {
 }
 
 #[test]
-fn with_the_lighter_stage_2_the_slow_loop_works() {
+fn slow_loop_is_stable_with_the_lighter_stage_2() {
     let answer = run("--slow --asymmetry -10% --duration 3");
     assert_eq!(answer["predicted"]["stable"], true);
     let predicted = number(&answer["predicted"]["settling_time_s"]);
@@ -250,7 +251,7 @@ fn with_the_lighter_stage_2_the_slow_loop_works() {
 }
 
 #[test]
-fn a_run_is_repeated_bit_for_bit_by_its_replay() {
+fn replay_repeats_a_run_bit_for_bit() {
     let bench = Bench::new();
     for arguments in ["--fast --duration 1", "--fast --asymmetry -10%"] {
         let answer = bench.run(&format!("control {arguments} --json")).json();
@@ -266,8 +267,8 @@ fn a_run_is_repeated_bit_for_bit_by_its_replay() {
     }
 }
 
-/// Reference and position, both relative to where the stage rested, from the tick at which the loop closed.
-fn followed(bench: &Bench, answer: &Value) -> Vec<(f64, f64)> {
+/// Reference and position relative to the rest position, from the tick in which the loop closes.
+fn reference_and_position(bench: &Bench, answer: &Value) -> Vec<(f64, f64)> {
     let ticks = Recording::open(&bench.path(answer["recording"].as_str().expect("a path")))
         .messages("/loop");
     let closed = |tick: &&Value| tick["flags"].as_u64().expect("flags") & 1 == 1;
@@ -286,15 +287,15 @@ fn followed(bench: &Bench, answer: &Value) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn every_kind_of_reference_is_followed_tick_by_tick() {
+fn loop_follows_every_kind_of_reference() {
     let bench = Bench::new();
     bench.write(
-        "way.csv",
+        "reference.csv",
         "time_s,reference_m\n0,0\n0.5,0\n1.5,20e-6\n2.0,-10e-6\n",
     );
     let ramp = |t: f64, from: f64, to: f64, length: f64| ((t - from) / length).clamp(0.0, 1.0) * to;
-    type Way = Box<dyn Fn(f64) -> f64>;
-    let ways: [(&str, Way); 5] = [
+    type Expected = Box<dyn Fn(f64) -> f64>;
+    let references: [(&str, Expected); 5] = [
         (
             "step --amplitude -30um",
             Box::new(|t| if t > 0.19999 { -30e-6 } else { 0.0 }),
@@ -309,32 +310,32 @@ fn every_kind_of_reference_is_followed_tick_by_tick() {
             Box::new(|t| 20e-6 * (std::f64::consts::TAU * 2.0 * t).sin()),
         ),
         (
-            "way.csv",
+            "reference.csv",
             Box::new(move |t| ramp(t, 0.5, 20e-6, 1.0) + ramp(t, 1.5, -30e-6, 0.5)),
         ),
     ];
-    for (arguments, way) in ways {
+    for (arguments, expected) in references {
         let answer = bench.json(&format!(
             "control --fast --duration 3 --reference {arguments}"
         ));
-        let run = followed(&bench, &answer);
+        let run = reference_and_position(&bench, &answer);
         assert_eq!(run.len(), 15_000, "{arguments}");
         for (tick, (reference, _)) in run.iter().enumerate() {
-            near(arguments, *reference, way(tick as f64 * 2e-4), 1e-15);
+            near(arguments, *reference, expected(tick as f64 * 2e-4), 1e-15);
         }
-        // All but the sine end at rest, where the integrator leaves no error: the mean over half a second is that of the
-        // floor's lowest line, 0.05 um at 8 Hz over four cycles.
+        // All references except the sine are constant at the end, and the integrator removes the static error. The mean over the last half
+        // second contains floor vibration of 0.05 um at 8 Hz and above, averaged over four cycles.
         let rest = &run[12_500..];
         let mean = rest.iter().map(|(r, y)| r - y).sum::<f64>() / rest.len() as f64;
         assert!(
             arguments.starts_with("sine") || mean.abs() < 2e-8,
-            "{arguments}: {mean} m left over"
+            "{arguments}: static error of {mean} m"
         );
     }
 }
 
 #[test]
-fn a_sine_is_followed_with_the_error_that_the_sensitivity_predicts() {
+fn error_of_a_sine_equals_sensitivity_times_amplitude() {
     let bench = Bench::new();
     let omega = std::f64::consts::TAU * 5.0;
     let question =
@@ -345,7 +346,8 @@ fn a_sine_is_followed_with_the_error_that_the_sensitivity_predicts() {
     let sensitivity = number(&answers[0]["sensitivity"][0]);
     let answer =
         bench.json("control --fast --duration 8.5 --reference sine --amplitude 20um --frequency 5");
-    // The error is a sine of |S| A; the 50 nm of the steady state add as squares. 0.5 s to settle leave 40 whole cycles.
+    // The error is a sine with the amplitude |S| A, plus the steady-state sigma of 50 nm; the squares add. After 0.5 s of settling, 40 whole
+    // cycles remain.
     let expected = (0.5 * (sensitivity * 20e-6).powi(2) + 50e-9f64.powi(2)).sqrt();
     near(
         "RMS error",
@@ -356,7 +358,7 @@ fn a_sine_is_followed_with_the_error_that_the_sensitivity_predicts() {
 }
 
 #[test]
-fn the_answer_has_the_promised_keys() {
+fn answer_has_all_documented_keys() {
     let answer = run("--fast --duration 1");
     for key in [
         "outcome",

@@ -1,4 +1,4 @@
-//! `bench model locus`, `bounds`, `step`, `sequence`, `critical-damping`: where zeros go and what they cost.
+//! `bench model locus`, `bounds`, `step`, `sequence`, `critical-damping`: loci of zeros and the limits that zeros impose.
 
 use serde_json::{Value, json};
 
@@ -28,7 +28,7 @@ fn zeros_are_complex_from_3_40_to_6_75_percent_of_l() {
         let answer = over_operating_point(&bench, count);
         let changes = list(&answer, "changes");
         assert_eq!(changes.len(), 2, "with {count} values: {answer}");
-        // Printed in steps of 0.05 %: the first and the last with zeros.
+        // The thesis prints the first and the last operating point with CNMP zeros, in steps of 0.05 %.
         near(
             "the lower end",
             number(&changes[0]["value"]) / 0.0475,
@@ -72,7 +72,8 @@ fn ends_of_the_band_agree_with_python() {
     let (ours, theirs) = (list(&answer, "changes"), list(&answers[0], "edges"));
     assert_eq!((ours.len(), theirs.len()), (2, 2));
     for (change, edge) in ours.iter().zip(theirs) {
-        // Both call a pair complex from 1e-7 of its size on: 1e-14 beside the end, and the rounding of either pencil.
+        // Both programs treat a pair as complex if its real part exceeds 1e-7 of its magnitude, which shifts the end by 1e-14. Rounding of the two
+        // matrix pencils adds to it.
         near(
             "an end of the band",
             number(&change["value"]) / 0.0475,
@@ -83,9 +84,9 @@ fn ends_of_the_band_agree_with_python() {
 }
 
 #[test]
-fn residue_of_mode_r_is_critical_where_zeros_meet() {
-    // Eq. (4-5) with frequencies shifted holds exactly for three modes. The Y mode, which it leaves out, shows by less than
-    // a thousandth of a peak at 0.1 % damping: a millionth of a residue, and ten times that of their differences.
+fn residue_of_mode_r_is_critical_at_the_ends_of_the_band() {
+    // Eq. (4-5) with shifted frequencies is exact for three modes. The Y mode, which it omits, contributes less than 0.1 % of a peak at
+    // 0.1 % damping: 1e-6 of a residue, and 1e-5 of differences of residues.
     for change in list(&over_operating_point(&Bench::new(), 30), "changes") {
         let form = &change["closed_form"];
         let of = |key: &str| number(&form[key]);
@@ -101,7 +102,7 @@ fn residue_of_mode_r_is_critical_where_zeros_meet() {
             1.0,
             1e-5,
         );
-        // As a double integrator mode R is too slow by (18/153)^2 = 1.4 % in the squares of frequencies.
+        // Without the shift mode R is treated as a double integrator, which changes the squares of the frequencies by (18/153)^2 = 1.4 %.
         near(
             "aR by Eq. (4-5)",
             of("eq_4_5") / of("residue_r"),
@@ -135,7 +136,7 @@ fn tracks_are_continuous_and_equal_the_zeros_of_modes() {
             near("the distance to a zero", nearest, 0.0, 1e-6);
         }
     }
-    // Where zeros meet they move as the root of the distance in the value: a step of 1 % of the range is at most some 3 %.
+    // Where zeros meet, they move with the square root of the distance in the varied setting: at most some 3 % in a step of 1 % of the range.
     for track in tracks {
         for k in 1..values.len() {
             let ((re, im), (next_re, next_im)) = (at(track, k - 1), at(track, k));
@@ -154,8 +155,8 @@ fn tracks_are_continuous_and_equal_the_zeros_of_modes() {
 
 #[test]
 fn damping_delays_the_change_to_cnmp_zeros() {
-    // READING: damping moves zeros left and delays the change from MMP to CNMP. The damped locus crosses the axis later
-    // than the undamped zeros meet, and comes back earlier.
+    // Damping moves zeros to the left: the damped locus crosses the axis after the point where the undamped zeros meet, and returns
+    // before the point where they meet again.
     let bench = Bench::new();
     let locus = |damped: &str| {
         let answer = bench.json(&format!(
@@ -186,9 +187,9 @@ fn damping_delays_the_change_to_cnmp_zeros() {
 fn critical_damping_is_0_2240() {
     let answer = Bench::new().json("model critical-damping");
     near("Eq. (3-16)", number(&answer["eq_3_16"]), 0.2240, 5e-5);
-    // The double root of the crossing condition, solved with scipy: 0.22438943.
+    // The double root of the crossing condition, computed with scipy: 0.22438943.
     near(
-        "the damping that touches",
+        "the damping at which the locus touches the axis",
         number(&answer["touching"]),
         0.224_389_43,
         1e-8,
@@ -236,8 +237,8 @@ fn opening_angle_is_the_integral_of_eq_1_2() {
 
 #[test]
 fn fast_loop_respects_the_bound_of_its_zeros() {
-    // Eq. (1-3) is a theorem for a loop that is stable with and without feedback, as the fast one is; |S| < 1/sqrt(2) up to
-    // the sensitivity's bandwidth, by its definition.
+    // Eq. (1-3) applies to a stable loop with a stable plant, as the fast one. By definition |S| < 1/sqrt(2) up to the bandwidth of
+    // the sensitivity.
     let bench = Bench::new();
     let margins = bench.json("margins --fast --continuous");
     assert_eq!(margins["stable"], true);
@@ -248,12 +249,12 @@ fn fast_loop_respects_the_bound_of_its_zeros() {
     let bounds = list(&answer, "damped_zeros");
     assert_eq!(bounds.len(), 1, "one CNMP pair: {answer}");
     let peak = 10f64.powf(number(&margins["sensitivity_peak_db"]) / 20.0);
-    let least = number(&bounds[0]["sensitivity_peak"]);
+    let bound = number(&bounds[0]["sensitivity_peak"]);
     assert!(
-        1.0 < least && least < peak,
-        "{least} is guaranteed, {peak} is there"
+        1.0 < bound && bound < peak,
+        "lower bound {bound}, actual peak {peak}"
     );
-    // The other way round: a band for a peak, and the peak of that band.
+    // The inverse: the bandwidth for a given peak, and the peak of that bandwidth.
     let answer = bench.json("model bounds --alpha 0.4 --peak 2.5");
     near(
         "the peak of the band",
@@ -264,7 +265,7 @@ fn fast_loop_respects_the_bound_of_its_zeros() {
 }
 
 #[test]
-fn modes_reports_the_bound_beside_the_zeros() {
+fn model_modes_reports_the_sensitivity_bound() {
     let bench = Bench::new();
     let (modes, bounds) = (bench.json("model modes"), bench.json("model bounds"));
     assert_eq!(modes["bounds"], bounds["zeros"]);
@@ -307,7 +308,7 @@ fn stage_as_built_is_in_table_3_3() {
         assert_eq!(answer["table"]["row"], row, "{answer}");
         assert_eq!(answer["agree"], true);
     }
-    // At rest in Y one mode shows: no table is about that.
+    // At Y1o = 0 only one mode is observed, which no table covers.
     let answer = bench.json("model sequence --operating-point 0%");
     assert_eq!(
         (&answer["dominant_sequence"], &answer["table"]),
@@ -324,8 +325,13 @@ fn step_of_the_stage_agrees_with_the_prediction_of_its_zeros() {
         ));
         assert_eq!(answer["predicted"]["agrees"], true, "{answer}");
         assert_eq!(answer["initial_undershoot"], false);
-        // k4 + k5 = 72 kN/m holds the motor at rest.
-        near("the end", number(&answer["end_m_per_n"]) * 72e3, 1.0, 1e-2);
+        // The static stiffness is k4 + k5 = 72 kN/m.
+        near(
+            "the final value",
+            number(&answer["end_m_per_n"]) * 72e3,
+            1.0,
+            1e-2,
+        );
         let csv = bench.read("step.csv");
         assert!(csv.starts_with(
             "time_s,displacement_m_per_n,mode_1_m_per_n,mode_2_m_per_n,mode_3_m_per_n\n0e0,0e0,"

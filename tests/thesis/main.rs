@@ -1,7 +1,7 @@
-//! The thesis as a specification of the program: its tables, controllers and experiments, at the process boundary.
+//! Requirements from the thesis: its tables, controllers and experiments, tested through the command line.
 //!
-//! Expected figures come from the thesis (its misprints corrected where they are used), from closed forms, or from
-//! `tests/python/truth.py`, which shares no line with the program.
+//! Expected values come from the thesis (misprints are corrected where they are used), from closed forms, or from
+//! `tests/python/truth.py`, which is independent of the program.
 
 mod chirp;
 mod conditions;
@@ -11,9 +11,9 @@ mod map;
 mod margins;
 mod model;
 mod plants;
-use bench_test_support::program;
 mod quadratic;
 mod recording;
 mod tables;
-use bench_test_support::truth;
 mod veering;
+
+use bench_test_support::{program, truth};

@@ -12,7 +12,7 @@ fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
         .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
 }
 
-/// The operating points with a CNMP pair at one of the asymmetries, by its place.
+/// The operating points with a CNMP pair at the asymmetry with this index.
 fn band(answer: &Value, column: usize) -> Vec<f64> {
     let rows = list(answer, "operating_points")
         .iter()
@@ -24,14 +24,14 @@ fn band(answer: &Value, column: usize) -> Vec<f64> {
 
 #[test]
 fn map_at_1_percent_has_the_band_of_the_locus() {
-    // Points 0.002 % apart: the first and the last with zeros stand at most so far inside of the printed ends.
+    // The points are 0.002 % apart: the first and the last with CNMP zeros are at most that far inside the ends.
     let answer = Bench::new().json(&format!(
         "model map {PRINTED} --operating-points 0%:15%:7501 --asymmetries 0%:1%:2"
     ));
     let band = band(&answer, 1);
     near("its lower end", band[0], 0.03399, 2.5e-5);
     near("its upper end", band[band.len() - 1], 0.06765, 2.5e-5);
-    // Without a gap: 3.366 % of L in steps of 0.002 %.
+    // The band is 3.366 % of L wide, without a gap, in steps of 0.002 %.
     near("its points", band.len() as f64, 1683.0, 2.0);
 }
 
@@ -54,13 +54,13 @@ fn map_has_no_cnmp_zeros_without_excess_mass() {
 }
 
 #[test]
-fn csv_has_every_point_and_text_draws_the_map() {
+fn csv_and_text_contain_the_map() {
     let bench = Bench::new();
     let answer = bench.run(&format!(
         "model map {PRINTED} --operating-points 3%:7%:5 --asymmetries -0.01:0.01:3 --csv map.csv"
     ));
     assert_eq!(answer.code, 0, "{}", answer.err);
-    // By the band above: at +1 % zeros at 4, 5 and 6 % of L.
+    // Expected from the band above: at D = +1 %, CNMP zeros at 4, 5 and 6 % of L.
     assert_eq!(answer.out.matches("..1").count(), 3, "{}", answer.out);
     assert_eq!(answer.out.matches("...\n").count(), 2, "{}", answer.out);
     let csv = bench.read("map.csv");

@@ -9,7 +9,7 @@ fn margins(arguments: &str) -> Value {
     Bench::new().json(&format!("margins {arguments}"))
 }
 
-/// Asserts a figure of the answer to a relative tolerance.
+/// Asserts a value of the answer within a relative tolerance.
 #[track_caller]
 fn within(answer: &Value, key: &str, expected: f64, relative: f64) {
     near(
@@ -21,8 +21,8 @@ fn within(answer: &Value, key: &str, expected: f64, relative: f64) {
 }
 
 #[test]
-fn the_fast_controller_in_continuous_time_has_the_margins_of_the_thesis() {
-    // Eq. (6-7) with the measured damping: 284.3 rad/s; 42 deg as section 6.2.2 prints it.
+fn fast_continuous_controller_has_the_margins_of_the_thesis() {
+    // Eq. (6-7) with the measured damping: crossover at 284.3 rad/s; section 6.2.2 prints a phase margin of 42 degrees.
     let found = margins("--fast --continuous");
     within(&found, "crossover_rad_s", 284.3, 0.01);
     within(&found, "phase_margin_deg", 42.0, 0.01);
@@ -34,7 +34,7 @@ fn the_fast_controller_in_continuous_time_has_the_margins_of_the_thesis() {
 }
 
 #[test]
-fn with_a_damping_ratio_of_0_004_in_every_mode_the_fast_controller_has_41_4_degrees() {
+fn fast_continuous_controller_has_41_4_degrees_with_a_damping_ratio_of_0_004() {
     let found = margins(
         "--fast --continuous --set plant.damping.kind=uniform --set plant.damping.ratio=0.004",
     );
@@ -44,14 +44,14 @@ fn with_a_damping_ratio_of_0_004_in_every_mode_the_fast_controller_has_41_4_degr
 }
 
 #[test]
-fn the_slow_controller_in_continuous_time_has_18_7_rad_s_and_72_9_degrees() {
+fn slow_continuous_controller_has_18_7_rad_s_and_72_9_degrees() {
     let found = margins("--slow --continuous");
     within(&found, "crossover_rad_s", 18.7, 0.01);
     assert_eq!(found["stable"], true);
-    // The ringing first mode crosses |L| = 1 again, further from -1 in phase: the margin is that of the first crossing.
+    // At the first mode |L| crosses 1 again, with a larger phase margin: the smallest margin is that of the first crossing.
     within(&found, "phase_margin_deg", 72.9, 0.01);
     near(
-        "of the first crossing",
+        "phase margin at the first crossing",
         number(&found["crossings"][0]["phase_margin_deg"]),
         72.9,
         0.729,
@@ -59,13 +59,13 @@ fn the_slow_controller_in_continuous_time_has_18_7_rad_s_and_72_9_degrees() {
 }
 
 #[test]
-fn sampling_costs_the_fast_controller_its_margin() {
+fn margins_of_the_fast_controller_decrease_with_the_sampling_rate() {
     for (rate_hz, phase_deg, phase_tolerance, modulus) in [
         (5000, 34.5, 1.0, Some(0.423)),
         (2000, 27.0, 1.0, None),
         (1000, 15.0, 1.0, Some(0.20)),
     ] {
-        // At 1 kHz the default excitation, up to 500 Hz, would reach half the rate.
+        // At 1 kHz the default excitation, up to 500 Hz, would reach half of the sampling rate.
         let found = margins(&format!(
             "--fast --set loop.rate_hz={rate_hz} --set chirp.stop_hz=400"
         ));
@@ -91,7 +91,7 @@ fn sampling_costs_the_fast_controller_its_margin() {
 }
 
 #[test]
-fn with_the_lighter_stage_2_the_fast_controller_is_unstable_and_the_slow_one_is_not() {
+fn with_the_lighter_stage_2_only_the_fast_controller_is_unstable() {
     for time in ["", "--continuous"] {
         let arguments = format!("margins --json --fast --asymmetry -10% {time}");
         let answer = Bench::new().run(&arguments);
@@ -108,20 +108,20 @@ fn with_the_lighter_stage_2_the_fast_controller_is_unstable_and_the_slow_one_is_
 }
 
 #[test]
-fn each_period_of_delay_turns_the_loop_by_omega_t_and_leaves_its_gain() {
-    let of = |delay: u32| {
+fn each_period_of_delay_reduces_the_phase_by_omega_t_at_the_same_crossover() {
+    let with_delay = |delay: u32| {
         margins(&format!(
             "--fast --set loop.computing_delay_periods={delay}"
         ))
     };
-    let (none, one, three) = (of(0), of(1), of(3));
+    let (none, one, three) = (with_delay(0), with_delay(1), with_delay(3));
     let (w, period_s) = (number(&none["crossover_rad_s"]), 2e-4);
     for (answer, periods) in [(&one, 1.0), (&three, 3.0)] {
         near("crossover", number(&answer["crossover_rad_s"]), w, 1e-9 * w);
-        let turned = number(&none["phase_margin_deg"]) - number(&answer["phase_margin_deg"]);
+        let lost_deg = number(&none["phase_margin_deg"]) - number(&answer["phase_margin_deg"]);
         near(
-            "the turn",
-            turned,
+            "the lost phase",
+            lost_deg,
             (w * period_s * periods).to_degrees(),
             1e-6,
         );
@@ -129,7 +129,7 @@ fn each_period_of_delay_turns_the_loop_by_omega_t_and_leaves_its_gain() {
 }
 
 #[test]
-fn the_peak_of_the_sensitivity_is_the_reciprocal_of_the_modulus_margin() {
+fn sensitivity_peak_is_the_reciprocal_of_the_modulus_margin() {
     for arguments in [
         "--fast",
         "--slow",
@@ -143,7 +143,7 @@ fn the_peak_of_the_sensitivity_is_the_reciprocal_of_the_modulus_margin() {
 }
 
 #[test]
-fn without_gain_there_is_no_crossing_and_the_loop_is_as_stable_as_the_stage() {
+fn controller_without_gain_has_no_crossover_and_a_stable_loop() {
     let bench = Bench::new();
     bench.write(
         "off.toml",
@@ -160,9 +160,9 @@ fn without_gain_there_is_no_crossing_and_the_loop_is_as_stable_as_the_stage() {
     }
 }
 
-/// A controller of all kinds of sections, stable in itself, that takes the loop through |L| = 1 near a drawn frequency.
+/// A random stable controller with sections of all kinds, with a crossover frequency near a random value.
 fn controller(draw: &mut Draw) -> String {
-    // The stage's static compliance is 154.4 um/A: an integrator of K A/um/s crosses at 154.4 K rad/s.
+    // The static response of the stage is 154.4 um/A: the crossover of an integrator with K A/um/s is at 154.4 K rad/s.
     let gain = draw.over_decades(3.0, 120.0) / 154.4;
     let (zero, pole, low_pass) = (
         draw.over_decades(20.0, 500.0),
@@ -181,7 +181,7 @@ fn controller(draw: &mut Draw) -> String {
     };
     let (w, zeta) = (draw.over_decades(400.0, 4000.0), draw.between(0.3, 1.2));
     let (a, b) = (draw.over_decades(300.0, 3000.0), draw.between(0.4, 1.5));
-    // Every section but the integrator has unit gain at rest: `low_pass` and `pole/zero` stand in the gain.
+    // All sections except the integrator have a static gain of 1 together: `low_pass` and `pole/zero` are compensated in the gain.
     let (static_gain, square, rate) = (low_pass * pole / zero, a * a, 2.0 * b * a);
     format!(
         "title = \"drawn\"\n\
@@ -196,7 +196,7 @@ fn controller(draw: &mut Draw) -> String {
 }
 
 #[test]
-fn margins_of_all_controllers_over_operating_points_and_rates_equal_those_of_python() {
+fn margins_of_random_loops_equal_python() {
     let (bench, mut draw) = (Bench::new(), Draw(31_415));
     let mut drawn = Vec::new();
     for index in 0..24 {
@@ -237,16 +237,16 @@ fn margins_of_all_controllers_over_operating_points_and_rates_equal_those_of_pyt
         .count();
     assert!(
         (8..=40).contains(&stable),
-        "both cases must be among the draws: {stable} of 48 are stable"
+        "the sample must contain stable and unstable loops: {stable} of 48 are stable"
     );
 }
 
-/// To 1e-4 relative; angles also to 1e-4 degrees, where they are small.
+/// Asserts equality within a relative tolerance of 1e-4, or absolute for values below 1.
 fn same_margins(ours: &Value, truth: &Value, settings: &str) {
-    // A pole that is 1e-6 rad/s from the border may be on either side by rounding.
+    // A pole within 1e-6 rad/s of the stability limit may be on either side because of rounding.
     assert!(
         number(&truth["border_rad_s"]) > 1e-6,
-        "draw another: {settings}"
+        "a pole is too close to the stability limit for this test: {settings}"
     );
     assert_eq!(ours["stable"], truth["stable"], "{settings}");
     let same = |what: &str, ours: &Value, truth: &Value| match truth.as_f64() {
@@ -271,7 +271,7 @@ fn same_margins(ours: &Value, truth: &Value, settings: &str) {
         "sensitivity_bandwidth_rad_s",
         "modulus_margin",
     ] {
-        // Margins of an unstable loop mean nothing: its poles are stated instead.
+        // Margins of an unstable loop are not defined: the answer has its poles instead.
         let expected = if stable { &truth[key] } else { &Value::Null };
         same(key, &ours[key], expected);
     }

@@ -1,4 +1,4 @@
-//! `bench model modes`: Chapter 2's tables, the signs of Chapter 6, and where the zeros are.
+//! `bench model modes`: the tables of Chapter 2, the signs of Chapter 6, and the zeros.
 
 use serde_json::{Value, json};
 
@@ -25,8 +25,8 @@ fn signs(answer: &Value) -> String {
         .collect()
 }
 
-/// `model modes` at an operating point and an asymmetry, both ratios.
-fn at(bench: &Bench, profile: &str, point: f64, asymmetry: f64) -> Value {
+/// `model modes` at an operating point (ratio to L) and an asymmetry (ratio).
+fn modes_at(bench: &Bench, profile: &str, point: f64, asymmetry: f64) -> Value {
     bench.json(&format!(
         "model modes --config {profile} --operating-point {}% --asymmetry {asymmetry}",
         point * 100.0
@@ -60,8 +60,8 @@ fn frequencies_match_table_2_2() {
 
 #[test]
 fn eigenvectors_match_table_2_2() {
-    // As printed, columns [x1, y1, y2, y3]; in mode 1 at 5 % the printed signs of y2 and y3 are flipped. Four digits are
-    // printed: half a digit is 5e-5, and the table's own masses are rounded to 0.1 %; 5e-4 covers both.
+    // Printed values of [x1, y1, y2, y3]. In mode 1 at D = 5 % the printed signs of y2 and y3 are inverted. Four digits are printed: half
+    // of the last one is 5e-5. The masses of the table are rounded to 0.1 %. 5e-4 covers both.
     let symmetric = [
         [0.9999, 0.0, 0.0068, -0.0068],
         [0.0, 0.8075, 0.4171, 0.4171],
@@ -79,7 +79,7 @@ fn eigenvectors_match_table_2_2() {
         for (number_of, (mode, printed)) in list(&answer, "modes").iter().zip(expected).enumerate()
         {
             let shape: Vec<f64> = list(mode, "shape").iter().map(number).collect();
-            let side = shape
+            let sign = shape
                 .iter()
                 .zip(printed)
                 .map(|(ours, theirs)| ours * theirs)
@@ -88,7 +88,7 @@ fn eigenvectors_match_table_2_2() {
             for (ours, theirs) in shape.iter().zip(printed) {
                 near(
                     &format!("an element of mode {} at {asymmetry}", number_of + 1),
-                    side * ours,
+                    sign * ours,
                     theirs,
                     5e-4,
                 );
@@ -103,7 +103,7 @@ fn signs_alternate_only_where_stage_2_is_heavier() {
     for (asymmetry, sequence) in [("10%", "+-+"), ("-10%", "++-")] {
         let answer = bench.json(&format!("model modes --asymmetry {asymmetry}"));
         assert_eq!(answer["sign_sequence"], sequence, "at {asymmetry}");
-        // The Y mode is the slowest, and between this motor and this probe it does not show.
+        // The Y mode is the slowest. It has no residue between motor and probe.
         assert_eq!(signs(&answer), format!("0{sequence}"), "at {asymmetry}");
         for mode in list(&answer, "modes")
             .iter()
@@ -116,14 +116,14 @@ fn signs_alternate_only_where_stage_2_is_heavier() {
 }
 
 #[test]
-fn a_symmetric_stage_hides_its_fourth_mode() {
+fn symmetric_stage_has_two_modes_without_residue() {
     let answer = table_2_2("0");
     assert_eq!(signs(&answer), "+0-0");
     assert_eq!(answer["sign_sequence"], "+-");
-    // By symmetry the even modes have x1 = 0 exactly: what is left is rounding, 1e-16 of the largest residue and some.
+    // By symmetry x1 = 0 in modes 2 and 4: the residue is rounding, about 1e-16 of the largest one.
     for index in [1, 3] {
         near(
-            "a hidden residue",
+            "a residue of zero",
             number(&list(&answer, "modes")[index]["residue"]),
             0.0,
             1e-12,
@@ -133,22 +133,23 @@ fn a_symmetric_stage_hides_its_fourth_mode() {
 
 #[test]
 fn only_the_rigid_body_mode_is_observed_at_rest_in_y() {
-    // At Y1o = 0 the X and Y motions are not coupled: one mode of compliance 1/(k4 + k5) carries everything.
+    // At Y1o = 0 X and Y are not coupled: a single mode has the whole static compliance 1/(k4 + k5).
     for profile in ["stage", "chapter2"] {
         for asymmetry in [-0.1, 0.0, 0.1] {
-            let answer = at(&Bench::new(), profile, 0.0, asymmetry);
+            let answer = modes_at(&Bench::new(), profile, 0.0, asymmetry);
             assert_eq!(answer["sign_sequence"], "+");
             assert_eq!(answer["cnmp_pairs"], 0);
-            let shown = list(&answer, "modes")
+            let observed = list(&answer, "modes")
                 .iter()
                 .find(|mode| mode["sign"] == "+")
-                .expect("the one mode");
+                .expect("the mode");
             let stiffness = if profile == "stage" {
                 72_000.0
             } else {
                 8_800.0
             };
-            let compliance = number(&shown["residue"]) / number(&shown["omega_rad_s"]).powi(2);
+            let compliance =
+                number(&observed["residue"]) / number(&observed["omega_rad_s"]).powi(2);
             near(
                 "the compliance times the stiffness",
                 compliance * stiffness,
@@ -172,7 +173,7 @@ fn stage_as_built_has_zeros_at_12_8_and_530_3_rad_s() {
     assert_eq!(quartet.len(), 4);
     for zero in quartet {
         let (re, im) = (number(&zero["re_rad_s"]), number(&zero["im_rad_s"]));
-        // Two digits behind the point are not printed: half of the last one.
+        // One decimal is printed: half of it is 0.05.
         near("the real part", re.abs(), 12.8, 0.05);
         near("the imaginary part", im.abs(), 530.3, 0.06);
         assert_eq!(zero["kind"], if re > 0.0 { "CNMP" } else { "CMP" });
@@ -186,7 +187,7 @@ fn no_cnmp_zeros_without_excess_mass_on_stage_2() {
         for asymmetry in [-0.2, -0.05, -0.01, -0.001, 0.0] {
             for step in 0..=30 {
                 let point = 0.005 * f64::from(step);
-                let answer = at(&bench, profile, point, asymmetry);
+                let answer = modes_at(&bench, profile, point, asymmetry);
                 assert_eq!(
                     answer["cnmp_pairs"], 0,
                     "{profile} at {point} of L, D = {asymmetry}"
@@ -203,7 +204,7 @@ fn no_cnmp_zeros_without_excess_mass_on_stage_2() {
 
 #[test]
 fn one_percent_excess_mass_gives_cnmp_zeros_from_3_40_to_6_75_percent() {
-    // Figures as printed, in steps of 0.05 %: the first and the last with zeros are inside, the next ones outside.
+    // The printed limits, in steps of 0.05 %, are the first and the last point with CNMP zeros; the next points have none.
     let bench = Bench::new();
     let pairs = |per_cent: f64| {
         let at = format!("--operating-point {per_cent}% --asymmetry 1%");
@@ -231,17 +232,17 @@ fn one_percent_excess_mass_gives_cnmp_zeros_from_3_40_to_6_75_percent() {
 
 #[test]
 fn close_modes_of_a_symmetric_stage_cross_at_6_580_percent() {
-    // Modes are sorted by frequency: where they cross, the hidden one changes its place from fourth to third.
+    // Modes are sorted by frequency: at the crossing the mode without residue changes from fourth to third.
     let bench = Bench::new();
-    let below = at(&bench, "chapter2", 0.06575, 0.0);
-    let above = at(&bench, "chapter2", 0.06585, 0.0);
+    let below = modes_at(&bench, "chapter2", 0.06575, 0.0);
+    let above = modes_at(&bench, "chapter2", 0.06585, 0.0);
     assert_eq!(
         (signs(&below), signs(&above)),
         ("+0-0".to_string(), "+00-".to_string())
     );
     for answer in [&below, &above] {
         for mode in &list(answer, "modes")[2..] {
-            // Both modes move by some 10 Hz over 1 % of L: 0.05 Hz over the 0.005 % to the crossing.
+            // The frequencies change by some 10 Hz per 1 % of L: 0.05 Hz over the 0.005 % to the crossing.
             near("a close mode", number(&mode["frequency_hz"]), 152.42, 0.06);
         }
     }
@@ -249,20 +250,20 @@ fn close_modes_of_a_symmetric_stage_cross_at_6_580_percent() {
 
 #[test]
 fn transfer_function_is_even_in_the_operating_point() {
-    // Y1o to -Y1o is y to -y in Eq. (2-5).
+    // In Eq. (2-5), replacing Y1o by -Y1o is the same as replacing y by -y.
     let bench = Bench::new();
     for (point, asymmetry) in [(0.08, 0.1), (0.034, -0.03)] {
-        let (here, there) = (
-            at(&bench, "stage", point, asymmetry),
-            at(&bench, "stage", -point, asymmetry),
+        let (positive, negative) = (
+            modes_at(&bench, "stage", point, asymmetry),
+            modes_at(&bench, "stage", -point, asymmetry),
         );
-        assert_eq!(here["sign_sequence"], there["sign_sequence"]);
+        assert_eq!(positive["sign_sequence"], negative["sign_sequence"]);
         for (key, field) in [
             ("modes", "residue"),
             ("modes", "omega_rad_s"),
             ("zeros", "im_rad_s"),
         ] {
-            for (a, b) in list(&here, key).iter().zip(list(&there, key)) {
+            for (a, b) in list(&positive, key).iter().zip(list(&negative, key)) {
                 near(
                     field,
                     number(&a[field]),
@@ -299,7 +300,7 @@ fn cnmp_band_and_crossing_agree_with_python() {
         )
     };
     for (edge, inwards) in [(edges[0], 1e-6), (edges[1], -1e-6)] {
-        // One part in 30,000 of the limit itself on either side.
+        // Checks 1e-6 of L inside and outside each limit (1/34,000 of the lower one).
         assert_eq!(
             (pairs(edge - inwards), pairs(edge + inwards)),
             (0.0, 1.0),
@@ -320,7 +321,7 @@ fn cnmp_band_and_crossing_agree_with_python() {
     );
 }
 
-/// Settings drawn around both profiles.
+/// Random settings around both profiles.
 fn settings(draw: &mut Draw) -> String {
     let mut sets = vec![format!("--config {}", draw.one_of(&["stage", "chapter2"]))];
     let mut set = |key: &str, value: String| sets.push(format!("--set plant.{key}={value}"));
@@ -395,11 +396,11 @@ fn random_stages_agree_with_python() {
     }
     assert!(
         (5..=43).contains(&with_cnmp),
-        "both cases must be among the draws: {with_cnmp} of 48 have CNMP zeros"
+        "the sample must contain stages with and without CNMP zeros: {with_cnmp} of 48 have them"
     );
 }
 
-/// Relative 1e-6; of a residue, or 1e-12 of the largest one (a mode that hardly shows is a difference of large numbers).
+/// Asserts equality within 1e-6; residues within 1e-6 or 1e-12 of the largest one (small residues are differences of large numbers).
 fn same_modes(ours: &[Value], truth: &[Value], settings: &str) {
     assert_eq!(ours.len(), truth.len());
     let largest = truth
@@ -427,7 +428,7 @@ fn same_modes(ours: &[Value], truth: &[Value], settings: &str) {
     }
 }
 
-/// Each zero of one list is one of the other's, to 1e-6 of its magnitude, and they are equally many.
+/// Asserts that both lists have the same zeros, within 1e-6 of their magnitude.
 fn same_zeros(ours: &[Value], truth: &[Value], what: &str) {
     assert_eq!(ours.len(), truth.len(), "{what}");
     let mut left: Vec<(f64, f64)> = truth

@@ -1,5 +1,5 @@
-//! The rig whose constraints are not linearised: it is what Lagrange says, it tends to the linear rig, and it shows how large
-//! a chirp may be.
+//! The simulated stage with nonlinear constraints: agreement with Lagrange multipliers, the limit of small amplitudes, and the amplitude
+//! up to which a chirp measures the linear response.
 
 use serde_json::json;
 
@@ -7,14 +7,14 @@ use crate::program::{Bench, near, number};
 use crate::recording::Recording;
 use crate::truth;
 
-/// No noise, no floor, and the plant alone.
+/// No noise, no quantisation, no floor vibration, no unmodelled modes.
 const CLEAN: &str = "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[] --set sim.unmodelled=[]";
 
 /// A short sweep through all modes at 1 kHz.
 const SHORT: &str = "--set loop.rate_hz=1000 --set chirp.quiet_before_s=0.05 --set chirp.quiet_after_s=0.05 --set chirp.fade_in_s=0.05 --set chirp.fade_out_s=0.05 --sweep linear --start 15 --stop 120 --duration 0.6";
 
-/// Commands in amperes and positions in metres, tick by tick.
-fn course(bench: &Bench, options: &str) -> (Vec<f64>, Vec<f64>) {
+/// Commands in amperes and positions in metres of all ticks.
+fn commands_and_positions(bench: &Bench, options: &str) -> (Vec<f64>, Vec<f64>) {
     let answer = bench.json(&format!("chirp {options}"));
     let recording = Recording::open(&bench.path(answer["recording"].as_str().expect("a path")));
     let ticks = recording.messages("/loop");
@@ -30,8 +30,8 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 fn quadratic_motion_agrees_with_lagrange_multipliers() {
     let bench = Bench::new();
     let options = format!("{CLEAN} {SHORT} --amplitude 0.7 --set sim.geometry=quadratic");
-    let (commands, positions) = course(&bench, &options);
-    // A command acts from the next tick on.
+    let (commands, positions) = commands_and_positions(&bench, &options);
+    // A command takes effect in the next tick.
     let held: Vec<f64> = std::iter::once(0.0)
         .chain(commands.iter().copied())
         .take(commands.len())
@@ -55,17 +55,18 @@ fn quadratic_motion_agrees_with_lagrange_multipliers() {
             .zip(&truth)
             .map(|(ours, truth)| ours - truth),
     );
-    let linear = course(&bench, &format!("{CLEAN} {SHORT} --amplitude 0.7")).1;
-    let bent = largest(
+    let linear = commands_and_positions(&bench, &format!("{CLEAN} {SHORT} --amplitude 0.7")).1;
+    let nonlinear_part = largest(
         positions
             .iter()
             .zip(&linear)
             .map(|(quadratic, linear)| quadratic - linear),
     );
-    // Steps of 20 us turn the close modes by 0.011 rad and shift their phase by (0.011)^4/120 of it: 5e-8 rad over the 380 rad
-    // of the sweep, 2e-12 m of the 40 um that they contribute. What is not linear is ten thousand times more.
+    // The reference integrates in steps of 20 us, in which the phase of the close modes advances by 0.011 rad with a relative error of
+    // (0.011)^4/120: 5e-8 rad over the 380 rad of the sweep, or 2e-12 m of the 40 um of these modes. The nonlinear part is 10,000 times
+    // larger.
     assert!(error < 1e-11, "{error} m");
-    assert!(bent > 1e-7, "{bent} m");
+    assert!(nonlinear_part > 1e-7, "{nonlinear_part} m");
 }
 
 #[test]
@@ -73,7 +74,7 @@ fn nonlinearity_is_quadratic_in_the_amplitude() {
     let bench = Bench::new();
     let difference = |amplitude: f64| {
         let at = |geometry: &str| {
-            course(
+            commands_and_positions(
                 &bench,
                 &format!("{CLEAN} {SHORT} --amplitude {amplitude} --set sim.geometry={geometry}"),
             )
@@ -87,7 +88,7 @@ fn nonlinearity_is_quadratic_in_the_amplitude() {
         )
     };
     let differences = [0.01, 0.02, 0.04].map(difference);
-    // The equations' first term beyond the linear ones is quadratic; the next one is 1e-3 of it at 0.04 A.
+    // The lowest nonlinear term of the equations is quadratic; the next one is 1e-3 of it at 0.04 A.
     for pair in differences.windows(2) {
         near(
             "the ratio at twice the amplitude",
@@ -99,8 +100,8 @@ fn nonlinearity_is_quadratic_in_the_amplitude() {
     assert!(differences[0] > 1e-12, "{differences:?}");
 }
 
-/// The largest change against the linear rig, per cent of the magnitude or degrees, whichever is more, at any frequency of a
-/// band; and the travel to expect in metres.
+/// The largest difference from the linear stage in a band, in per cent of the magnitude or in degrees, whichever is larger; and the
+/// predicted travel in metres.
 fn change(options: &str, (low_hz, high_hz): (f64, f64)) -> (f64, f64) {
     let bench = Bench::new();
     let run = |geometry: &str| {
@@ -133,8 +134,8 @@ fn change(options: &str, (low_hz, high_hz): (f64, f64)) -> (f64, f64) {
     (changes.fold(0.0, f64::max), travel_m)
 }
 
-/// A flat sweep so slow (0.5 Hz/s) that the modes swing fully.
-const SLOWLY: &str = "--set chirp.quiet_after_s=20 --set chirp.fade_in_s=1 --set chirp.fade_out_s=1 --sweep linear --duration 40";
+/// A sweep with constant amplitude at 0.5 Hz/s, slow enough that the modes reach their steady state.
+const SLOW_SWEEP: &str = "--set chirp.quiet_after_s=20 --set chirp.fade_in_s=1 --set chirp.fade_out_s=1 --sweep linear --duration 40";
 
 /// Around modes u and v.
 const CLOSE_MODES_HZ: (f64, f64) = (79.0, 90.0);
@@ -143,11 +144,11 @@ const CLOSE_MODES_HZ: (f64, f64) = (79.0, 90.0);
 fn response_changes_by_1_degree_at_17_um_around_modes_u_and_v() {
     let at = |amplitude_a: f64| {
         change(
-            &format!("{SLOWLY} --start 74 --stop 95 --amplitude {amplitude_a}"),
+            &format!("{SLOW_SWEEP} --start 74 --stop 95 --amplitude {amplitude_a}"),
             CLOSE_MODES_HZ,
         )
     };
-    // The change goes with the square of the amplitude, given with three digits.
+    // The change is proportional to the square of the amplitude. The amplitude of the limit has three digits.
     let ((limit, travel_m), (half, _)) = (at(0.114), at(0.057));
     near("the change in degrees or per cent", limit, 1.0, 0.02);
     near("the travel", travel_m, 16.9e-6, 0.1e-6);
@@ -162,10 +163,10 @@ fn response_changes_by_1_degree_at_17_um_around_modes_u_and_v() {
 #[test]
 fn response_around_mode_r_is_linear_within_the_soft_limit() {
     let (change, travel_m) = change(
-        &format!("{SLOWLY} --start 24 --stop 35 --amplitude 0.1"),
+        &format!("{SLOW_SWEEP} --start 24 --stop 35 --amplitude 0.1"),
         (27.5, 31.0),
     );
-    // All stages move alike in X: hardly a beam bends. 0.9 mm is the limit.
+    // In mode R all stages move together in X, so that the beams hardly bend. The soft limit is 0.9 mm.
     assert!(travel_m > 0.8e-3, "{travel_m}");
     assert!(change < 0.002, "{change}");
 }

@@ -1,4 +1,4 @@
-//! A recording read as any MCAP reader would: fields by the schema inside the file, not by this program's types.
+//! A reader of recordings that uses the schema in the file instead of the types of the program.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use prost_types::FileDescriptorSet;
 use prost_types::field_descriptor_proto::Type;
 use serde_json::{Map, Value, json};
 
-/// What is in a recording.
+/// The bytes of a recording.
 pub struct Recording {
     bytes: Vec<u8>,
 }
@@ -19,7 +19,7 @@ impl Recording {
         }
     }
 
-    /// All messages of a channel, a JSON object each.
+    /// All messages of a channel, each as a JSON object.
     pub fn messages(&self, topic: &str) -> Vec<Value> {
         let stream = mcap::MessageStream::new(&self.bytes).expect("a complete MCAP file");
         let messages = stream
@@ -38,7 +38,7 @@ impl Recording {
     pub fn attachment(&self, name: &str) -> String {
         let summary = mcap::Summary::read(&self.bytes)
             .expect("readable")
-            .expect("a summary: the file was closed");
+            .expect("a summary, which a closed file has");
         let index = summary
             .attachment_indexes
             .iter()
@@ -74,7 +74,7 @@ fn fields_of(descriptor: &[u8], message: &str) -> Vec<Field> {
     message.field.iter().map(field).collect()
 }
 
-/// Protobuf's wire format; a field that is left out has its default value.
+/// Decodes the protobuf wire format; a missing field has its default value.
 fn decoded(mut data: &[u8], fields: &[Field]) -> Value {
     let default = |field: &Field| match field.kind {
         Type::Double => json!(0.0),

@@ -1,7 +1,7 @@
-//! Tables 3-1 to 3-4 as a property: the kinds of zeros read from signs and sequence are those that are computed.
+//! Tables 3-1 to 3-4 with random plants: the kinds of zeros in the table equal the computed ones.
 //!
-//! Computed by the closed form of the numerator in x = s^2 (Eq. 4-3 and its like), and by Python with 60 digits; the
-//! sequence comes from the pencil and the definitions of section 3.2.1.
+//! The reference is the closed form of the numerator in x = s^2 (as in Eq. 4-3), and Python with 60 digits. The dominant sequence is
+//! computed by the library from the matrix pencil and the definitions of section 3.2.1.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ use serde_json::{Value, json};
 use crate::program::Draw;
 use crate::truth;
 
-/// What is true of a drawn plant.
+/// Kinds of zeros and locations of MMP zeros of a plant, by the closed form.
 struct Truth {
     kinds: ZeroCounts,
     mmp: Vec<MmpLocation>,
 }
 
-/// A plant of the class of one of the four tables, its slowest mode positive or negative.
-fn drawn(draw: &mut Draw, class: usize) -> ModalSum {
+/// A random plant of the class of one of the four tables. The residue of the slowest mode may have either sign.
+fn random_plant(draw: &mut Draw, class: usize) -> ModalSum {
     let mut residue = || draw.over_decades(1e-3, 1e3) * draw.one_of(&[1.0, -1.0]);
     let (a, b, c) = (residue(), residue(), residue());
     let u = draw.over_decades(0.3, 3.0);
@@ -36,8 +36,8 @@ fn drawn(draw: &mut Draw, class: usize) -> ModalSum {
     ModalSum::new(terms, constant).expect("residues that are not zero")
 }
 
-/// ZeroCounts and places by the quadratic b2 x^2 + b1 x + b0; `None` within 1e-9 of where zeros meet, or pass through the
-/// origin or infinity, where rounding decides.
+/// Kinds of zeros by the quadratic b2 x^2 + b1 x + b0. `None` if the plant is within 1e-9 of a change, where zeros meet or pass through
+/// the origin or infinity and rounding decides.
 fn truth_of(sum: &ModalSum) -> Option<Truth> {
     let terms = sum.terms();
     let squares: Vec<f64> = terms
@@ -58,11 +58,12 @@ fn truth_of(sum: &ModalSum) -> Option<Truth> {
     } else {
         terms.len()
     };
-    let well = numerator[0].is_well() && numerator[degree].is_well();
+    let is_well_conditioned =
+        numerator[0].is_well_conditioned() && numerator[degree].is_well_conditioned();
     let roots = if degree == 1 {
         vec![-numerator[0].value / numerator[1].value]
     } else {
-        quadratic(&numerator)?
+        real_roots(&numerator)?
     };
     let on_axis = roots.iter().filter(|x| **x < 0.0).map(|x| (-x).sqrt());
     let (wu, wv) = match terms {
@@ -89,10 +90,10 @@ fn truth_of(sum: &ModalSum) -> Option<Truth> {
         real,
         quartets: usize::from(roots.is_empty()),
     };
-    well.then_some(Truth { kinds, mmp })
+    is_well_conditioned.then_some(Truth { kinds, mmp })
 }
 
-/// A sum and the size of what was summed.
+/// A sum and the sum of the magnitudes of its terms.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     value: f64,
@@ -105,12 +106,12 @@ impl Sum {
         self.size += x.abs();
     }
 
-    fn is_well(&self) -> bool {
+    fn is_well_conditioned(&self) -> bool {
         self.value.abs() > 1e-9 * self.size
     }
 }
 
-/// Adds factor (x + a)(x + b).
+/// Adds the coefficients of factor times the product of (x + root) over all roots.
 fn add_product(to: &mut [Sum; 4], factor: f64, roots: &[f64]) {
     let mut product = vec![factor];
     for root in roots {
@@ -127,11 +128,15 @@ fn add_product(to: &mut [Sum; 4], factor: f64, roots: &[f64]) {
         .for_each(|(power, c)| to[power].add(*c));
 }
 
-/// The real roots, none where they are complex.
-fn quadratic(of: &[Sum; 4]) -> Option<Vec<f64>> {
-    let [c, b, a] = [of[0].value, of[1].value, of[2].value];
+/// The real roots; empty if they are complex, `None` if they are nearly equal.
+fn real_roots(coefficients: &[Sum; 4]) -> Option<Vec<f64>> {
+    let [c, b, a] = [
+        coefficients[0].value,
+        coefficients[1].value,
+        coefficients[2].value,
+    ];
     let discriminant = b * b - 4.0 * a * c;
-    let size = of[1].size * of[1].size + 4.0 * (a * c).abs();
+    let size = coefficients[1].size * coefficients[1].size + 4.0 * (a * c).abs();
     if discriminant.abs() < 1e-9 * size {
         return None;
     }
@@ -142,44 +147,48 @@ fn quadratic(of: &[Sum; 4]) -> Option<Vec<f64>> {
     Some(vec![c / half, half / a])
 }
 
-/// Whether a sequence is literally the printed one: `[uv]` any sequence of u and v, all else itself.
-fn is_as_printed(row: &TableRow, sequence: &Sequence, turned: bool) -> bool {
+/// Whether a sequence matches the printed one literally. `[uv]` matches any sequence of u and v. For a negative first residue the signs
+/// of DC and DI are inverted.
+fn is_as_printed(row: &TableRow, sequence: &Sequence, is_inverted: bool) -> bool {
     let printed: Vec<&str> = row.printed[1..row.printed.len() - 1].split("]-[").collect();
     let names: Vec<String> = sequence.names();
     let names: Vec<&str> = names
         .iter()
         .map(|name| match name.as_str() {
-            "DC" if turned => "-DC",
-            "DI" if turned => "-DI",
-            "-DC" if turned => "DC",
-            "-DI" if turned => "DI",
+            "DC" if is_inverted => "-DC",
+            "DI" if is_inverted => "-DI",
+            "-DC" if is_inverted => "DC",
+            "-DI" if is_inverted => "DI",
             name => name,
         })
         .collect();
-    literal(&printed, &names)
+    matches_literally(&printed, &names)
 }
 
-fn literal(printed: &[&str], names: &[&str]) -> bool {
+fn matches_literally(printed: &[&str], names: &[&str]) -> bool {
     match (printed.split_first(), names.split_first()) {
         (None, None) => true,
-        (Some((piece, rest)), Some((name, others))) if piece == name => literal(rest, others),
+        (Some((piece, rest)), Some((name, others))) if piece == name => {
+            matches_literally(rest, others)
+        }
         (Some((piece, rest)), Some((name, others))) => {
-            let any = !["DI", "DC", "-DC", "-DI"].contains(piece) && piece.len() > 1;
-            any && name.len() == 1
+            let is_any_order = !["DI", "DC", "-DC", "-DI"].contains(piece) && piece.len() > 1;
+            is_any_order
+                && name.len() == 1
                 && piece.contains(name)
-                && (literal(rest, others) || literal(printed, others))
+                && (matches_literally(rest, others) || matches_literally(printed, others))
         }
         _ => false,
     }
 }
 
 #[test]
-fn tables_predict_the_kinds_of_zeros_of_random_plants() {
+fn tables_give_the_kinds_of_zeros_of_random_plants() {
     let mut draw = Draw(1_618);
     let mut visits: BTreeMap<(&str, usize), [u32; 2]> = BTreeMap::new();
     let mut skipped = 0;
     for index in 0..120_000 {
-        let sum = drawn(&mut draw, index % 4);
+        let sum = random_plant(&mut draw, index % 4);
         let Some(truth) = truth_of(&sum) else {
             skipped += 1;
             continue;
@@ -196,14 +205,16 @@ fn tables_predict_the_kinds_of_zeros_of_random_plants() {
             truth.kinds
         );
         assert_eq!(row.mmp, truth.mmp, "{row:?}: {sequence}: {sum:?}");
-        let turned = sum.terms()[0].residue_per_kg < 0.0;
+        let is_inverted = sum.terms()[0].residue_per_kg < 0.0;
         let count = visits.entry((row.table, row.number)).or_default();
-        count[usize::from(!is_as_printed(row, &sequence, turned))] += 1;
+        count[usize::from(!is_as_printed(row, &sequence, is_inverted))] += 1;
     }
     for ((table, row), [printed, other]) in &visits {
-        eprintln!("Table {table}, row {row}: {printed} as printed, {other} by the wider reading");
+        eprintln!(
+            "Table {table}, row {row}: {printed} as printed, {other} by the wider interpretation"
+        );
     }
-    assert!(skipped < 100, "{skipped} draws within rounding of a change");
+    assert!(skipped < 100, "{skipped} plants too close to a change");
     let rows: usize = TABLES.iter().map(|table| table.rows.len()).sum();
     assert_eq!(
         (rows, visits.len()),
@@ -215,7 +226,7 @@ fn tables_predict_the_kinds_of_zeros_of_random_plants() {
         visits.values().all(often),
         "a row visited too rarely: {visits:?}"
     );
-    // The rows whose printed sequence is too narrow; everywhere else the words hold literally.
+    // Rows whose printed sequence does not cover all plants. In all other rows the printed sequence is literally correct.
     let wider: Vec<(&str, usize)> = visits
         .iter()
         .filter(|(_, count)| count[1] > 0)
@@ -235,11 +246,12 @@ fn tables_predict_the_kinds_of_zeros_of_random_plants() {
 }
 
 #[test]
-fn slow_mode_is_read_as_a_double_integrator() {
-    // Assumption A3-7 asks for a mode R well apart; by the sequence alone the kinds are right wherever a row has it.
-    let (mut draw, mut read, mut unread) = (Draw(2_236), 0, 0);
+fn table_of_a_double_integrator_applies_to_a_slow_mode() {
+    // Assumption A3-7 requires that mode R is far from u and v. If a row contains the sequence, its kinds of zeros are correct even without
+    // this assumption.
+    let (mut draw, mut with_row, mut without_row) = (Draw(2_236), 0, 0);
     for _ in 0..20_000 {
-        let free = drawn(&mut draw, 2);
+        let free = random_plant(&mut draw, 2);
         let mut terms = free.terms().to_vec();
         terms[0].omega_rad_s = terms[1].omega_rad_s * draw.over_decades(1e-2, 0.99);
         let sum = ModalSum::new(terms, 0.0).expect("residues that are not zero");
@@ -249,21 +261,24 @@ fn slow_mode_is_read_as_a_double_integrator() {
         let sequence = Sequence::of(&sum).expect("a sequence");
         match table_of(&sum).and_then(|table| table.row(&sum, &sequence)) {
             Some(row) => {
-                read += 1;
+                with_row += 1;
                 assert!(
                     row.kinds.contains(&truth.kinds),
                     "{row:?}: {} for {sequence}: {sum:?}",
                     truth.kinds
                 );
             }
-            // A zero below mode R: the sequence does not begin with it.
+            // A zero is below mode R, so that the sequence does not begin with R.
             None => {
-                unread += 1;
+                without_row += 1;
                 assert_ne!(sequence.names()[0], "R", "{sequence}: {sum:?}");
             }
         }
     }
-    assert!(read > 10_000 && unread > 100, "{read} {unread}");
+    assert!(
+        with_row > 10_000 && without_row > 100,
+        "{with_row} {without_row}"
+    );
 }
 
 #[test]
@@ -272,7 +287,7 @@ fn kinds_in_every_row_agree_with_60_digits() {
     let mut plants: Vec<(&TableRow, ModalSum)> = Vec::new();
     let mut visits: BTreeMap<(&str, usize), u32> = BTreeMap::new();
     for index in 0..60_000 {
-        let sum = drawn(&mut draw, index % 4);
+        let sum = random_plant(&mut draw, index % 4);
         let row = table_of(&sum)
             .and_then(|table| table.row(&sum, &Sequence::of(&sum).expect("a sequence")));
         let row = row.unwrap_or_else(|| panic!("no row: {sum:?}"));
@@ -312,8 +327,8 @@ fn question(sum: &ModalSum) -> Value {
     json!({"what": "modal", "terms": terms, "constant": sum.constant_m_per_n()})
 }
 
-/// Two to nine modes with damping, perhaps a constant.
-fn many_modes(draw: &mut Draw) -> ModalSum {
+/// Two to nine damped modes, in a third of the plants with a constant.
+fn random_damped_plant(draw: &mut Draw) -> ModalSum {
     let count = *draw.one_of(&[2, 3, 4, 6, 9]);
     let constant = *draw.one_of(&[0.0, 0.0, 1.0]) * draw.over_decades(1e-3, 1e3);
     let term = |_| ModalTerm {
@@ -327,7 +342,7 @@ fn many_modes(draw: &mut Draw) -> ModalSum {
 #[test]
 fn zeros_of_modal_plants_agree_with_60_digits() {
     let mut draw = Draw(141);
-    let plants: Vec<ModalSum> = (0..150).map(|_| many_modes(&mut draw)).collect();
+    let plants: Vec<ModalSum> = (0..150).map(|_| random_damped_plant(&mut draw)).collect();
     let Some(answers) = truth::ask(&plants.iter().map(question).collect::<Vec<_>>()) else {
         return;
     };
@@ -348,8 +363,8 @@ fn zeros_of_modal_plants_agree_with_60_digits() {
                     .iter()
                     .map(|zero| (zero.s.re - re).hypot(zero.s.im - im))
                     .fold(f64::MAX, f64::min);
-                // Two decades of frequencies: the pencil's rounding of 1e-16 on the largest square against the least, and
-                // the root of it where two zeros are near each other.
+                // The frequencies span two decades: rounding of 1e-16 of the largest square is 1e-12 of the smallest one, and close zeros
+                // have errors of the square root of it.
                 assert!(
                     nearest < 1e-7 * re.hypot(im),
                     "{key}: {re}{im:+}j of {sum:?}: {zeros:?}"
@@ -360,11 +375,11 @@ fn zeros_of_modal_plants_agree_with_60_digits() {
 }
 
 #[test]
-fn undershoot_needs_an_odd_number_of_rnmp_zeros() {
+fn undershoot_occurs_exactly_with_an_odd_number_of_rnmp_zeros() {
     let mut draw = Draw(299);
-    let (mut with, mut more) = ([0; 2], 0);
+    let (mut counts, mut more) = ([0; 2], 0);
     for index in 0..8000 {
-        let sum = drawn(&mut draw, index % 3);
+        let sum = random_plant(&mut draw, index % 3);
         let Some(truth) = truth_of(&sum) else {
             continue;
         };
@@ -374,17 +389,17 @@ fn undershoot_needs_an_odd_number_of_rnmp_zeros() {
             truth.kinds.real % 2 == 1,
             "{sum:?}: {initial:?}"
         );
-        with[usize::from(initial.has_undershoot())] += 1;
+        counts[usize::from(initial.has_undershoot())] += 1;
         if sum.is_free() {
-            // The window holds every zero crossing there is: each real zero s = x makes the integral of y exp(-x t) vanish.
+            // The time window contains all zero crossings. Each real zero s = x makes the integral of y exp(-x t) zero.
             let crossings = initial.zero_crossings_s.len();
             assert!(crossings >= truth.kinds.real, "{sum:?}: {initial:?}");
             assert_eq!(crossings % 2, truth.kinds.real % 2, "{sum:?}: {initial:?}");
             more += usize::from(crossings > truth.kinds.in_right_half_plane());
         }
     }
-    assert!(with[0] > 1000 && with[1] > 1000, "{with:?}");
-    // That there are no more crossings than such zeros (section 3.2.4, of its example) is no law: fast modes that outweigh
-    // a weak double integrator swing through zero many times before it prevails.
+    assert!(counts[0] > 1000 && counts[1] > 1000, "{counts:?}");
+    // There can be more crossings than RNMP zeros, unlike in the example of section 3.2.4: fast modes with large residues cause many
+    // crossings before a weak double integrator dominates.
     assert!(more > 100, "{more}");
 }

@@ -29,7 +29,8 @@ fn close_modes_cross_at_6_58_percent_without_asymmetry() {
         near("the crossing", ratio, 0.06580, 5e-6);
         near("its frequency", frequency_hz, 152.42, 5e-3);
         if let Some(truth) = &truth {
-            // Eigenvalues are equal within 1e-12 of the largest, and part by some 1 % of it per 1 % of L.
+            // Eigenvalues count as equal within 1e-12 of the largest one. Near the crossing their difference grows by about 1 % of the largest per
+            // 1 % of L.
             near(
                 "the crossing by scipy",
                 ratio,
@@ -43,14 +44,14 @@ fn close_modes_cross_at_6_58_percent_without_asymmetry() {
                 1e-7,
             );
         }
-        // The modes of a symmetric and an antisymmetric half: nothing of one is in the other, but rounding over a gap of 1e-12.
+        // One mode is symmetric, the other antisymmetric: the MAC is 0 except for rounding divided by the gap of 1e-12.
         near("3 to 4", number(&answer["mac_across"][0][1]), 0.0, 1e-6);
         near("4 to 3", number(&answer["mac_across"][1][0]), 0.0, 1e-6);
         let tracks = &answer["frequencies_hz"];
         let at = |mode: usize, k: usize| number(&tracks[mode][k]);
         assert!(
             at(2, 0) < at(3, 0) && at(2, count - 1) > at(3, count - 1),
-            "they did not cross: {tracks}"
+            "the loci do not cross: {tracks}"
         );
     }
 }
@@ -72,13 +73,13 @@ fn close_modes_veer_and_localise_with_asymmetry() {
                 (&json!("veering"), &json!([3, 4])),
                 "{asymmetry}"
             );
-            localised(&answer, asymmetry);
+            assert_localised(&answer, asymmetry);
             let Some(truth) = truth::ask(std::slice::from_ref(&question)) else {
                 continue;
             };
             let truth = &truth[0];
-            // The gap is flat at its minimum: relative rounding of 1e-13 leaves a point open by the root of it, 3e-7 of its
-            // width (here up to 0.06), in both programs; shapes turn by the same angle.
+            // The gap is flat at its minimum: with a relative rounding of 1e-13 the position of the minimum has an error of the square root,
+            // 3e-7 of the width (here up to 0.06), in both programs. The error of the mode shapes follows from it.
             near(
                 "the point",
                 number(&answer["value"]) / L_M,
@@ -116,9 +117,9 @@ fn close_modes_veer_and_localise_with_asymmetry() {
     }
 }
 
-/// Section 2.3: at the veering point y3 becomes zero and y2 one in the third mode, the opposite in the fourth, D > 0. The
-/// heavier stage has the lower frequency, so that D < 0 exchanges the two.
-fn localised(answer: &Value, asymmetry: &str) {
+/// Section 2.3: with D > 0, at the veering point y2 = 1 and y3 = 0 in the third mode, and the opposite in the fourth. The heavier stage has
+/// the lower frequency, so that D < 0 exchanges the two.
+fn assert_localised(answer: &Value, asymmetry: &str) {
     let share =
         |mode: usize, coordinate: usize| number(&answer["closest"]["shares"][mode][coordinate]);
     let (heavy, light) = if asymmetry.starts_with('-') {
@@ -149,7 +150,7 @@ fn csv_has_loci_and_shapes_over_any_setting() {
     ));
     assert_eq!(answer["vary"], "plant.springs.k23.stiffness_n_per_m");
     let csv = std::fs::read_to_string(bench.path("loci.csv")).expect("the file");
-    // The setting, four frequencies, two shapes of four.
+    // 13 columns: the setting, four frequencies, two mode shapes with four elements.
     assert!(
         csv.lines().count() == 21 && csv.lines().all(|line| line.split(',').count() == 13),
         "{csv}"

@@ -1,4 +1,4 @@
-//! The plants beside SR4DoF: the XY stage, masses and springs, and plants given by their modes.
+//! All plants except SR4DoF: the XY stage, masses and springs, and plants given by their modes.
 
 mod random;
 mod rejected;
@@ -22,7 +22,7 @@ fn kinds(answer: &Value) -> Vec<&str> {
         .collect()
 }
 
-/// The zero of the upper half plane that lies furthest to the right.
+/// The zero with the largest real part in the upper half plane.
 fn rightmost(answer: &Value) -> (f64, f64) {
     let at = |zero: &Value| (number(&zero["re_rad_s"]), number(&zero["im_rad_s"]));
     let upper = list(answer, "zeros")

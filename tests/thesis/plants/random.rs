@@ -8,7 +8,7 @@ use crate::truth;
 
 const PLACES: [&str; 8] = ["sL", "sR", "sT", "sB", "gL", "gR", "gT", "gB"];
 
-/// An XY stage with masses, operating point, layout and damping drawn.
+/// An XY stage with random masses, operating point, layout and damping.
 fn xy(draw: &mut Draw) -> String {
     let deviations: Vec<String> = PLACES
         .iter()
@@ -34,7 +34,7 @@ fn xy(draw: &mut Draw) -> String {
     )
 }
 
-/// A chain of masses with springs across, held to ground or floating.
+/// A chain of masses with an additional spring across it, with or without a spring to ground.
 fn lumped(bench: &Bench, draw: &mut Draw, floating: bool) -> String {
     let nodes: String = (0..5)
         .map(|i| {
@@ -75,7 +75,7 @@ fn lumped(bench: &Bench, draw: &mut Draw, floating: bool) -> String {
     "--config lumped.toml".into()
 }
 
-/// Four modes of random residues, the first one a double integrator in every second plant.
+/// Four modes with random residues. The first is a double integrator in half of the plants.
 fn modal(bench: &Bench, draw: &mut Draw) -> String {
     let mut text = "[plant]\nmodel = \"modal\"\n[plant.modes]\n".to_string();
     let floating = *draw.one_of(&[true, false]);
@@ -135,12 +135,12 @@ fn random_plants_agree_with_python() {
     for pairs in [0, 1] {
         assert!(
             ours.iter().any(|(ours, _)| ours["cnmp_pairs"] == pairs),
-            "no draw has {pairs} pairs"
+            "no plant of the sample has {pairs} pairs"
         );
     }
 }
 
-/// Frequencies, twice damping ratio times frequency, and residues. An eigenvalue comes with 1e-15 of the largest one.
+/// Asserts equal frequencies, damping rates 2 zeta w and residues. An eigenvalue has an error of 1e-15 of the largest one.
 fn same_modes(ours: &Value, truth: &Value, plant: &str) {
     let [omegas, rates, residues] =
         ["omega_rad_s", "damping_rate", "residue"].map(|key| list(truth, key));
@@ -171,7 +171,7 @@ fn same_modes(ours: &Value, truth: &Value, plant: &str) {
     }
 }
 
-/// Each zero of one list is one of the other's, to 1e-6 of its magnitude, and they are equally many.
+/// Asserts that both lists have the same zeros, within 1e-6 of their magnitude.
 fn same_zeros(ours: &[Value], truth: &[Value], what: &str) {
     assert_eq!(ours.len(), truth.len(), "{what}");
     let mut left: Vec<(f64, f64)> = truth

@@ -3,7 +3,7 @@
 use crate::program::{Bench, near, number};
 
 #[test]
-fn rejects_invalid_plants_with_place_and_remedy() {
+fn rejects_invalid_plants_with_key_and_remedy() {
     let lumped = |nodes: &str, springs: &str| {
         format!(
             "[plant]\nmodel = \"lumped\"\n[plant.nodes]\n{nodes}\n[plant.springs]\n{springs}\n[plant.damping]\nkind = \"uniform\"\nratio = 0.01\n"
@@ -104,7 +104,7 @@ fn rejects_invalid_plants_with_place_and_remedy() {
 }
 
 #[test]
-fn rejects_invalid_matrices_where_they_are_needed() {
+fn rejects_plants_that_a_command_cannot_use() {
     let bench = Bench::new();
     let two = "[plant]\nmodel = \"lumped\"\n[plant.nodes]\na = { mass_kg = 1.0, actuator = 1.0 }\nb = { mass_kg = 1.0, sensor = 1.0 }\n[plant.springs]\nka = { between = [\"a\", \"ground\"], stiffness_n_per_m = 1.0 }\nkb = { between = [\"b\", \"ground\"], stiffness_n_per_m = 2.0 }\n[plant.damping]\nkind = \"uniform\"\nratio = 0.01\n";
     bench.write("apart.toml", two);

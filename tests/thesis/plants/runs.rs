@@ -5,8 +5,8 @@ use serde_json::json;
 use crate::program::{Bench, near, number};
 use crate::truth;
 
-/// Share of the rows in a band that are within 1 % and 1 degree of the truth.
-fn share_that_is_true(profile: &str, (low_hz, high_hz): (f64, f64)) -> Option<f64> {
+/// Share of the rows in a band that are within 1 % and 1 degree of the exact response.
+fn share_of_accurate_rows(profile: &str, (low_hz, high_hz): (f64, f64)) -> Option<f64> {
     let (bench, clean) = (
         Bench::new(),
         "--set sim.probe_noise_rms_m=0 --set sim.probe_quantisation_m=0 --set sim.floor=[]",
@@ -44,13 +44,13 @@ fn share_that_is_true(profile: &str, (low_hz, high_hz): (f64, f64)) -> Option<f6
 }
 
 #[test]
-fn chirp_measures_each_plant() {
+fn noiseless_chirp_is_within_1_percent_and_1_degree_for_each_plant() {
     for (profile, band_hz) in [
         ("xy", (2.0, 350.0)),
         ("three-mass", (0.025, 0.28)),
         ("four-mass", (0.4, 8.0)),
     ] {
-        let Some(share) = share_that_is_true(profile, band_hz) else {
+        let Some(share) = share_of_accurate_rows(profile, band_hz) else {
             return;
         };
         println!("{profile} {share}");
@@ -62,7 +62,7 @@ fn chirp_measures_each_plant() {
 }
 
 #[test]
-fn each_plant_has_a_controller_and_rejects_the_fast_one() {
+fn each_plant_runs_with_its_controller_and_rejects_those_of_the_stage() {
     let bench = Bench::new();
     for profile in ["xy", "three-mass", "four-mass"] {
         let answer = bench.json(&format!("control --config {profile}"));
@@ -71,15 +71,15 @@ fn each_plant_has_a_controller_and_rejects_the_fast_one() {
             number(&answer["predicted"]["modulus_margin"]) > 0.5,
             "{profile}"
         );
-        let settling = |who: &str| number(&answer[who]["settling_time_s"]);
-        // Noise and what the first mode still rings with decide when the last 2 % are reached.
+        let settling = |source: &str| number(&answer[source]["settling_time_s"]);
+        // Noise and the residual oscillation of the first mode affect the time at which the error stays below 2 %.
         near(
-            "the settling time over the one predicted",
+            "the ratio of measured and predicted settling time",
             settling("measured") / settling("predicted"),
             1.0,
             0.1,
         );
-        // Made for the gain of another stage, and the fast one for a faster loop.
+        // The slow and the fast controller are designed for the gain of the SR4DoF stage; the fast one also needs a higher sampling rate.
         let refused = |choice: &str, words: &[&str]| {
             bench
                 .run(&format!("control --config {profile} {choice}"))

@@ -44,7 +44,7 @@ fn cnmp_pairs_of_the_xy_layouts_agree_with_python() {
             .filter(|pairs| number(pairs) > 0.0)
             .count()
     };
-    // Away from the motor: from 3.5 % of L on; towards it: from 0.5 to 4.5 %.
+    // Number of operating points with CNMP pairs. Mirrored away from the motor: from 3.5 % of L on; towards it: from 0.5 to 4.5 %.
     assert_eq!(answers.iter().map(with).collect::<Vec<_>>(), [0, 24, 9]);
 }
 
@@ -78,7 +78,7 @@ fn static_load_shifts_xy_frequencies_by_at_most_0_42_hz() {
         1e-9,
     );
     near(
-        "the largest element, in parts of K's",
+        "the largest element relative to that of K",
         number(&answers[0]["ratio"]),
         0.0568,
         0.00005,
@@ -101,7 +101,7 @@ fn zeros_of_three_masses_match_section_4_4_1() {
     );
     assert_eq!(answer["operating_point_m"], Value::Null);
     let (re, im) = rightmost(&answer);
-    // Four digits behind the point are printed.
+    // Four decimals are printed.
     near("the real part", re, 0.0183, 5e-5);
     near("the imaginary part", im, 1.0554, 5e-5);
     // "If one continues to increase k, the zeros move back onto the imaginary axis, with a frequency higher than mode v."
@@ -134,7 +134,7 @@ fn zeros_of_four_masses_are_complex_from_50_to_200_n_per_m() {
     ] {
         let answer = at(k);
         assert_eq!(answer["cnmp_pairs"], pairs, "k23 = {k}");
-        // The whole floats: a double integrator of 1/(22 kg).
+        // The rigid-body mode is a double integrator with the residue 1/(22 kg).
         let free = &list(&answer, "modes")[0];
         assert_eq!(
             (number(&free["omega_rad_s"]), free["sign"].as_str()),
@@ -158,7 +158,7 @@ fn double_integrator_and_mode_have_the_zeros_of_eq_3_3() {
         );
         bench.write("eq33.toml", text);
         let answer = bench.json("model modes --config eq33.toml");
-        // (1 + a) s^2 + w^2 = 0.
+        // The zeros satisfy (1 + a) s^2 + w^2 = 0.
         let square: f64 = -100.0 / (1.0 + residue);
         assert_eq!(
             kinds(&answer),
@@ -182,7 +182,7 @@ fn double_integrator_and_mode_have_the_zeros_of_eq_3_3() {
 }
 
 #[test]
-fn plants_of_section_6_1_have_their_zeros() {
+fn plants_of_section_6_1_have_the_zeros_of_the_closed_form() {
     let bench = Bench::new();
     let plant = |name: &str, modes: &str| {
         bench.write(
@@ -221,7 +221,7 @@ fn plants_of_section_6_1_have_their_zeros() {
             i32::from(discriminant < 0.0),
             "{discriminant}"
         );
-        // x x* = c/a of a pair: the magnitude of a zero is its fourth root.
+        // For a complex pair x x* = c/a: the magnitude of a zero is the fourth root of c/a.
         let (re, im) = rightmost(&answer);
         if discriminant < 0.0 {
             near("the magnitude", re.hypot(im), (c / a).powf(0.25), 1e-10);
