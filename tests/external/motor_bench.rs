@@ -1,5 +1,5 @@
-//! An external record of a two-mass bench, 20 periods of a multisine (`../shared/data/README.md`; `BENCH_SHARED_DATA` names another
-//! folder): antiresonance, resonance, damping and signs, beside the fit of an independent program to the same file.
+//! An external record of a two-mass motor bench, 20 periods of a multisine (`../shared/data/README.md`; `BENCH_SHARED_DATA` names
+//! another folder): antiresonance, resonance, damping and signs, compared with the fit of an independent program to the same file.
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::program::{Bench, number};
 use crate::python;
 
-/// The file; if it is missing, a message on standard error.
+/// The path of the record; `None` with a message on standard error if it is missing.
 fn data() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     let folder = std::env::var_os("BENCH_SHARED_DATA").map_or(beside, PathBuf::from);
@@ -22,8 +22,9 @@ fn data() -> Option<PathBuf> {
     Some(path)
 }
 
+/// The result of `bench identify` for the angle of one side, motor or load.
 struct Side {
-    /// The modes of the JSON object whose residue is at least a fifth of the largest: the others fit distortion.
+    /// The modes with a residue above 20 % of the largest; smaller ones fit the distortion.
     modes: Vec<Value>,
     answer: Value,
     frf: Vec<Vec<f64>>,
@@ -63,8 +64,8 @@ impl Side {
         self.frf.iter().find(|row| row[0] == hz).expect("a line")[1]
     }
 
-    /// The frequency between two others where |H| is smallest, or with -1 largest.
-    fn least(&self, from_hz: f64, to_hz: f64, sign: f64) -> f64 {
+    /// The frequency in a range where sign |H| is smallest: the minimum of |H| with 1, the maximum with -1.
+    fn extreme_hz(&self, from_hz: f64, to_hz: f64, sign: f64) -> f64 {
         let within = self
             .frf
             .iter()
@@ -75,13 +76,13 @@ impl Side {
     }
 }
 
-/// Rigid body and flexible mode, beside the other program's: residue; frequency, damping, residue.
+/// Compares the residue of the rigid-body mode and frequency, damping and residue of the flexible mode with those of the other program.
 fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
     assert_eq!(side.modes.len(), 2, "{}", side.answer["modes"]);
     let (rigid, flexible) = (&side.modes[0], &side.modes[1]);
     assert!(
         number(&rigid["frequency_hz"]) < 6.0,
-        "a free body with friction: {rigid}"
+        "the rigid-body mode with friction: {rigid}"
     );
     assert_eq!(
         (rigid["sign"].as_str(), flexible["sign"].as_str()),
@@ -91,20 +92,20 @@ fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
         assert!(number(&mode["sign_error_probability"]) < 1e-6, "{mode}");
     }
     let text = path.display().to_string();
-    let Some(theirs) = python::numbers("motor_bench.py", &[&text, output], "") else {
+    let Some(reference) = python::numbers("motor_bench.py", &[&text, output], "") else {
         return;
     };
-    // Friction and play are not described by a sum of modes. They bias both programs differently, by their weights; both treat the residual as
-    // noise. One of eight differences exceeds 3 sigma once in fifty.
-    let ours = [
+    // A sum of modes does not describe friction and play. They bias the two programs differently, because of different weights; both treat
+    // the residual as noise. The probability that one of eight differences exceeds 3 sigma is 1/50.
+    let compared = [
         (rigid, "residue"),
         (flexible, "frequency_hz"),
         (flexible, "damping_ratio"),
         (flexible, "residue"),
     ];
-    for ((mode, name), row) in ours.into_iter().zip(&theirs) {
+    for ((mode, name), row) in compared.into_iter().zip(&reference) {
         let (value, sigma) = (number(&mode[name]), number(&mode[&format!("{name}_sigma")]));
-        let wide = 3.0 * sigma.hypot(row[1]);
+        let bound = 3.0 * sigma.hypot(row[1]);
         eprintln!(
             "{output} {name}: {value} +- {:.2e}, by scipy {} +- {:.2e}",
             2.0 * sigma,
@@ -112,7 +113,7 @@ fn compare(path: &Path, output: &str, side: &Side, sign: &str) {
             2.0 * row[1]
         );
         assert!(
-            (value - row[0]).abs() < wide,
+            (value - row[0]).abs() < bound,
             "{output} {name}: {value} +- {sigma}, by scipy {row:?}"
         );
         assert!(
@@ -129,7 +130,7 @@ fn residues_have_equal_signs_at_the_motor_and_opposite_signs_at_the_load() {
         side(&path, "motor_angle_rad"),
         side(&path, "load_angle_rad"),
     );
-    // From the periodic average in the README of the data, with three digits.
+    // The README of the data states these values of the periodic average, with three digits.
     for (side, hz, expected) in [
         (&motor, 40.0, 1.03e-3),
         (&load, 40.0, 2.25e-3),
@@ -143,10 +144,10 @@ fn residues_have_equal_signs_at_the_motor_and_opposite_signs_at_the_load() {
         );
     }
     assert!(
-        (51.0..=55.0).contains(&motor.least(40.0, 65.0, 1.0)),
+        (51.0..=55.0).contains(&motor.extreme_hz(40.0, 65.0, 1.0)),
         "antiresonance at the motor"
     );
-    let valley = |side: &Side| -> Vec<f64> {
+    let zeros_hz = |side: &Side| -> Vec<f64> {
         let zeros = side.answer["zeros"].as_array().expect("zeros");
         let hz = |zero: &Value| {
             number(&zero["re_rad_s"]).hypot(number(&zero["im_rad_s"])) / std::f64::consts::TAU
@@ -158,23 +159,23 @@ fn residues_have_equal_signs_at_the_motor_and_opposite_signs_at_the_load() {
             .collect()
     };
     assert!(
-        matches!(valley(&motor)[..], [hz] if (52.0..55.0).contains(&hz)),
+        matches!(zeros_hz(&motor)[..], [hz] if (52.0..55.0).contains(&hz)),
         "{:?}",
-        valley(&motor)
+        zeros_hz(&motor)
     );
     assert_eq!(
-        valley(&load),
+        zeros_hz(&load),
         [0.0; 0],
         "between modes of opposite residues there is no zero"
     );
     for side in [&motor, &load] {
         assert!(
-            (75.0..=77.0).contains(&side.least(60.0, 90.0, -1.0)),
+            (75.0..=77.0).contains(&side.extreme_hz(60.0, 90.0, -1.0)),
             "resonance"
         );
         assert_eq!(side.answer["periods"], 17);
         assert_eq!(side.answer["frequencies"], 240);
-        // Friction and play are hundreds of times above the noise of 17 periods: the verdict is undecided, with the reason.
+        // The errors by friction and play are more than 100 times the noise of 17 periods: the verdict is undecided, with the reason.
         assert!(number(&side.answer["fit_chi2_per_freedom"]) > 10.0);
         assert_eq!(side.answer["cnmp"], "undecided");
         assert!(

@@ -1,4 +1,4 @@
-//! Averages over periods: exact without noise, with correct standard deviations.
+//! Averages over periods: exact without noise, and with correct standard deviations.
 use bench::identify::IdentifyError;
 use bench::identify::periodic::{Repetition, estimate};
 
@@ -7,7 +7,7 @@ use crate::signals::{PERIOD, multisine, response};
 
 const BAND_HZ: (f64, f64) = (5.0, 200.0);
 
-fn whole(skip: usize) -> Repetition {
+fn repetition(skip: usize) -> Repetition {
     Repetition {
         period: PERIOD,
         skip,
@@ -25,11 +25,11 @@ fn response_is_exact_despite_drift_and_a_settling_first_period() {
         .iter_mut()
         .enumerate()
         .for_each(|(n, y)| *y += 1e-2 * (-(n as f64) / 30.0).exp());
-    let periods = estimate(&signals, BAND_HZ, whole(1)).unwrap();
+    let periods = estimate(&signals, BAND_HZ, repetition(1)).unwrap();
     assert_eq!((periods.count, periods.frf.len()), (6, 196));
     for (f, h) in periods.frf.frequency_hz.iter().zip(&periods.frf.response) {
         let exact = response(*f);
-        // 1000 roundings of samples of 0.02, in a line of 1e-6 times 500: 1e-15 x 0.02 x sqrt(1000)/5e-4.
+        // 1000 samples of 0.02 with a rounding of 1e-15 each, relative to a line of 1e-6 x 500: 1e-15 x 0.02 x sqrt(1000)/5e-4.
         assert!(
             (h - exact).norm() < 1e-10 + 1e-9 * exact.norm(),
             "{f} Hz: {h} is not {exact}"
@@ -39,7 +39,12 @@ fn response_is_exact_despite_drift_and_a_settling_first_period() {
 
 #[test]
 fn reports_excited_lines_only() {
-    let periods = estimate(&multisine(&lines(5), 6, 0.0, 1e-7, 2), BAND_HZ, whole(0)).unwrap();
+    let periods = estimate(
+        &multisine(&lines(5), 6, 0.0, 1e-7, 2),
+        BAND_HZ,
+        repetition(0),
+    )
+    .unwrap();
     let hz: Vec<f64> = lines(5).iter().map(|f| *f as f64).collect();
     assert_eq!(periods.frf.frequency_hz, hz);
     assert!(periods.frf.resolution_hz.iter().all(|width| *width == 1.0));
@@ -52,16 +57,17 @@ fn errors_match_their_standard_deviations() {
         let periods = estimate(
             &multisine(&lines(1), 12, 0.0, 1e-6, seed),
             BAND_HZ,
-            whole(1),
+            repetition(1),
         )
         .unwrap();
-        for block in &periods.frf_data {
-            ratio += (block.response - response(block.frequency_hz)).norm_sqr() / block.variance;
+        for datum in &periods.frf_data {
+            ratio += (datum.response - response(datum.frequency_hz)).norm_sqr() / datum.variance;
             count += 1.0;
         }
     }
-    // Of P = 10 periods (P - 1)/(P - 2) = 1.125, with a relative error of 1.5/sqrt(3920) = 2.4 %; the drift that is taken off has
-    // an error of its own, shared by neighbouring periods, which the mean has less of than the scatter.
+    // Expected with P = 10 periods: (P - 1)/(P - 2) = 1.125, with a standard error of 1.5/sqrt(3920) = 2.4 %. The correction of drift adds
+    // an error that is correlated between neighbouring periods; it increases the variance estimate more than the error of the mean, so
+    // that the lower limit is wider.
     let mean: f64 = ratio / count;
     assert!((0.95..1.22).contains(&mean), "{mean}");
 }
@@ -83,22 +89,22 @@ fn response_and_variance_equal_numpy() {
         "3".into(),
     ];
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let Some(theirs) = python::numbers("periodic.py", &arguments, &rows) else {
+    let Some(reference) = python::numbers("periodic.py", &arguments, &rows) else {
         return;
     };
-    let ours = estimate(&signals, BAND_HZ, whole(2)).unwrap().frf_data;
-    assert_eq!(theirs.len(), ours.len());
-    for (row, block) in theirs.iter().zip(&ours) {
+    let ours = estimate(&signals, BAND_HZ, repetition(2)).unwrap().frf_data;
+    assert_eq!(reference.len(), ours.len());
+    for (row, datum) in reference.iter().zip(&ours) {
         let off =
-            (block.response.re - row[1]).hypot(block.response.im - row[2]) / row[1].hypot(row[2]);
-        // Two FFT libraries differ by roundings of the largest line, 1e3 times the smallest.
+            (datum.response.re - row[1]).hypot(datum.response.im - row[2]) / row[1].hypot(row[2]);
+        // The FFT libraries differ by the rounding of the largest line, which is 1e3 times the smallest.
         assert!(
-            block.frequency_hz == row[0] && off < 1e-9,
-            "{row:?}: {block:?}"
+            datum.frequency_hz == row[0] && off < 1e-9,
+            "{row:?}: {datum:?}"
         );
         assert!(
-            (block.variance / row[3] - 1.0).abs() < 1e-6,
-            "{row:?}: {block:?}"
+            (datum.variance / row[3] - 1.0).abs() < 1e-6,
+            "{row:?}: {datum:?}"
         );
     }
 }
@@ -123,6 +129,6 @@ fn rejects_invalid_periods() {
             "{period} {skip}"
         );
     }
-    // A band between lines that the period has.
-    assert!(estimate(&signals, (5.2, 5.8), whole(0)).is_err());
+    // A band between two lines.
+    assert!(estimate(&signals, (5.2, 5.8), repetition(0)).is_err());
 }

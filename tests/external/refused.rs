@@ -4,13 +4,13 @@ use bench::identify::Signals;
 use crate::program::{Answer, Bench};
 use crate::signals::{csv, multisine, normal};
 
-const ASKED: &str = "identify data.csv --input force_n --output position_m";
+const IDENTIFY: &str = "identify data.csv --input force_n --output position_m";
 
-/// The error message for `data.csv`.
-fn asked(text: impl AsRef<[u8]>, more: &str) -> Answer {
+/// The answer of `bench identify` for `data.csv`; asserts that a rejection leaves no other file.
+fn identify(text: impl AsRef<[u8]>, more: &str) -> Answer {
     let bench = Bench::new();
     bench.write("data.csv", text);
-    let answer = bench.run(&format!("{ASKED} {more}"));
+    let answer = bench.run(&format!("{IDENTIFY} {more}"));
     assert!(
         answer.code == 0 || bench.files() == ["data.csv"],
         "{:?}",
@@ -19,7 +19,8 @@ fn asked(text: impl AsRef<[u8]>, more: &str) -> Answer {
     answer
 }
 
-fn good() -> String {
+/// A valid file.
+fn valid() -> String {
     csv(&multisine(&(5..=200).collect::<Vec<_>>(), 7, 0.0, 1e-8, 1))
 }
 
@@ -32,7 +33,7 @@ fn with_line(number: usize, change: impl Fn(&str) -> String) -> String {
             format!("{line}\n")
         }
     };
-    good().lines().enumerate().map(line).collect()
+    valid().lines().enumerate().map(line).collect()
 }
 
 #[test]
@@ -63,10 +64,10 @@ fn rejects_options_that_do_not_match_the_file() {
         ),
         ("--rate 1000 --band 5-200", &["--band 5-200", "11Hz:250Hz"]),
     ] {
-        asked(good(), more).is_refused(words);
+        identify(valid(), more).is_refused(words);
     }
     let bench = Bench::new();
-    bench.write("data.csv", good());
+    bench.write("data.csv", valid());
     bench
         .run("identify data.csv")
         .is_refused(&["which columns", "time_s, force_n, position_m"]);
@@ -76,10 +77,10 @@ fn rejects_options_that_do_not_match_the_file() {
 }
 
 #[test]
-fn rejects_invalid_data_with_their_place() {
+fn rejects_invalid_data_with_line_and_column() {
     let gap = with_line(40, |_| String::new());
-    let lines: Vec<String> = good().lines().map(String::from).collect();
-    let still = |u: &str, y: &str| {
+    let lines: Vec<String> = valid().lines().map(String::from).collect();
+    let constant = |u: &str, y: &str| {
         let row = |n: usize| {
             format!(
                 "{},{},{}\n",
@@ -125,10 +126,10 @@ fn rejects_invalid_data_with_their_place() {
             lines[..20].join("\n"),
             &["19 samples are too few", "at least 64"],
         ),
-        (still("1", "n"), &["input is 1", "nothing was excited"]),
-        (still("n", "1"), &["output is 1", "did not see"]),
+        (constant("1", "n"), &["input is 1", "nothing was excited"]),
+        (constant("n", "1"), &["output is 1", "did not see"]),
     ] {
-        let answer = asked(text, "--time time_s");
+        let answer = identify(text, "--time time_s");
         assert_eq!(answer.code, 1, "{answer:?}");
         words.iter().for_each(|word| {
             assert!(
@@ -145,7 +146,7 @@ fn rejects_invalid_data_with_their_place() {
         b"force_n,position_m,time_s\n\xff,1,2\n",
         b"force_n,force_n\n1,2\n",
     ] {
-        let answer = asked(bytes, "--time time_s");
+        let answer = identify(bytes, "--time time_s");
         assert!(
             [1, 2].contains(&answer.code) && answer.err.contains("data.csv"),
             "{answer:?}"
@@ -155,11 +156,11 @@ fn rejects_invalid_data_with_their_place() {
 
 #[test]
 fn accepts_other_separators_and_a_rate_instead_of_times() {
-    for mark in [";", "\t"] {
+    for separator in [";", "\t"] {
         let bench = Bench::new();
-        bench.write("data.csv", good().replace(',', mark));
+        bench.write("data.csv", valid().replace(',', separator));
         let answer = bench.json(&format!(
-            "{ASKED} --rate 1000 --period 1s --band 5:200 --out results"
+            "{IDENTIFY} --rate 1000 --period 1s --band 5:200 --out results"
         ));
         assert_eq!(answer["periods"], 6);
         assert_eq!(
@@ -175,7 +176,7 @@ fn accepts_other_separators_and_a_rate_instead_of_times() {
 #[test]
 fn swapped_channels_give_an_undecided_verdict_with_the_reason() {
     let bench = Bench::new();
-    bench.write("data.csv", good());
+    bench.write("data.csv", valid());
     let swapped = "identify data.csv --input position_m --output force_n --time time_s --period 1000 --band 5:200";
     let answer = bench.json(swapped);
     assert_eq!(answer["cnmp"], "undecided", "{answer}");
@@ -198,7 +199,7 @@ fn unrelated_output_gives_an_undecided_verdict_with_the_reason() {
     };
     let bench = Bench::new();
     bench.write("data.csv", csv(&signals));
-    let answer = bench.json(&format!("{ASKED} --time time_s --band 5:200"));
+    let answer = bench.json(&format!("{IDENTIFY} --time time_s --band 5:200"));
     assert_eq!(answer["cnmp"], "undecided", "{answer}");
     assert!(
         answer["why"]

@@ -10,7 +10,7 @@ pub const PERIOD: usize = 1000;
 /// Modes: hertz, damping ratio, residue.
 pub const STAGE: [(f64, f64, f64); 2] = [(40.0, 0.02, 1.0), (90.0, 0.02, 0.6)];
 
-/// Approximately normal numbers of mean 0 and variance 1: sums of twelve.
+/// Approximately normal numbers of mean 0 and variance 1: sums of twelve uniform numbers.
 pub fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1;
     let mut uniform = move || {
@@ -30,8 +30,8 @@ pub fn response(hz: f64) -> Complex<f64> {
     STAGE.into_iter().map(part).sum()
 }
 
-/// `periods` of a multisine of `lines` (Hz, 1 Hz apart or more; Schroeder's phases) at 1 kHz and its answer in the steady state, drifting by
-/// `drift` a period, with white noise of `sigma`.
+/// `periods` periods of a multisine with `lines` in Hz (Schroeder phases) at 1 kHz and the steady-state response of the stage, with a
+/// drift of `drift` per period and white noise of `sigma`.
 pub fn multisine(lines: &[usize], periods: usize, drift: f64, sigma: f64, seed: u64) -> Signals {
     let mut normal = normal(seed);
     let tone = |j: usize, f: usize| {

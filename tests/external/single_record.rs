@@ -1,4 +1,4 @@
-//! A record that does not repeat: it begins and ends at rest, as every run of the bench does.
+//! A record without repetition that begins and ends at rest, like every run of the bench.
 use bench::identify::Signals;
 
 use crate::program::{Bench, near, number};
@@ -6,7 +6,7 @@ use crate::signals::{STAGE, csv};
 
 const RATE_HZ: f64 = 1000.0;
 
-/// One sample of a mode under a held force, by eight steps of the fourth-order Runge-Kutta method.
+/// Advances a mode by one sample with a constant force, in eight steps of the fourth-order Runge-Kutta method.
 fn step(state: (f64, f64), (hz, zeta, residue): (f64, f64, f64), force: f64) -> (f64, f64) {
     let (w, h) = (std::f64::consts::TAU * hz, 1.0 / RATE_HZ / 8.0);
     let slope = |(x, v): (f64, f64)| (v, residue * force - 2.0 * zeta * w * v - w * w * x);
@@ -39,7 +39,7 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
             .iter_mut()
             .zip(STAGE)
             .for_each(|(state, mode)| *state = step(*state, mode, *force));
-        // Below 1e-7 the curvature of sin(x)/x over the band exceeds the noise, and is fitted by another mode.
+        // With less than 1e-7 of noise, the curvature of sin(x)/x over the band exceeds the noise and would be fitted by an additional mode.
         position + 3e-7 * normal()
     });
     let signals = Signals {
@@ -54,7 +54,7 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     let modes = answer["modes"].as_array().expect("modes");
     assert_eq!(modes.len(), 2, "{answer}");
     for (mode, (hz, zeta, residue)) in modes.iter().zip(STAGE) {
-        // A held force lags its samples by half a sample and is smaller by sin(x)/x with x = pi f/rate: 1.3 % at 90 Hz.
+        // The zero-order hold delays the force by half a sample and reduces it by sin(x)/x with x = pi f/rate: 1.3 % at 90 Hz.
         near("frequency", number(&mode["frequency_hz"]), hz, 1e-3 * hz);
         near("damping", number(&mode["damping_ratio"]), zeta, 0.03 * zeta);
         near("residue", number(&mode["residue"]), residue, 0.03 * residue);
@@ -67,13 +67,12 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     );
 }
 
-/// The stage of [`sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold`] with another excitation: an impulse, to which the response
-/// of each mode is known in closed form.
+/// The stage of the test above with an impulse, for which the response of each mode has a closed form.
 #[test]
 fn external_record_gets_the_same_plots_and_page_as_a_run() {
-    let struck = |n: usize| if n == 100 { RATE_HZ } else { 0.0 };
-    let input_a: Vec<f64> = (0..20_000).map(struck).collect();
-    let ring = |t: f64| -> f64 {
+    let impulse = |n: usize| if n == 100 { RATE_HZ } else { 0.0 };
+    let input_a: Vec<f64> = (0..20_000).map(impulse).collect();
+    let impulse_response = |t: f64| -> f64 {
         let one = |(hz, zeta, residue): (f64, f64, f64)| {
             let w = std::f64::consts::TAU * hz;
             residue / w * (-zeta * w * t).exp() * (w * t).sin()
@@ -86,7 +85,7 @@ fn external_record_gets_the_same_plots_and_page_as_a_run() {
     };
     let mut normal = crate::signals::normal(5);
     let output_m = (0..20_000)
-        .map(|n| ring((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal())
+        .map(|n| impulse_response((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal())
         .collect();
     let bench = Bench::new();
     bench.write(
@@ -125,8 +124,8 @@ fn external_record_gets_the_same_plots_and_page_as_a_run() {
         .collect();
     assert!(
         places.is_sorted(),
-        "the verdict first, the pictures after the modes: {places:?}"
+        "the verdict must precede the modes, and the modes the plots: {places:?}"
     );
-    let elsewhere = page.matches("://").count() - page.matches("http://www.w3.org").count();
-    assert_eq!(elsewhere, 0, "no external references");
+    let external = page.matches("://").count() - page.matches("http://www.w3.org").count();
+    assert_eq!(external, 0, "no external references");
 }
