@@ -1,4 +1,4 @@
-//! All figures, made once.
+//! All figures, made once for all tests.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -6,29 +6,28 @@ use std::sync::OnceLock;
 use bench::report::{Chart, Mark};
 use thesis_figures::{Content, Figure, Runs, make_all, selected};
 
-/// Where they are kept, to look at.
+/// The folder of the figures, kept for inspection.
 pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("figures")
 }
 
-/// Every entry of the registry, as `thesis-figures` makes it.
+/// Every figure of the registry, as `thesis-figures` makes it.
 pub fn all() -> &'static [Figure] {
     static ALL: OnceLock<Vec<Figure>> = OnceLock::new();
     ALL.get_or_init(|| {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let entries = selected(&[]).expect("all");
-        make_all(&entries, &folder(), &Runs::new(runs.path()), &mut |_, _| {})
-            .expect("all can be made")
+        make_all(&entries, &folder(), &Runs::new(runs.path()), &mut |_, _| {}).expect("all figures")
     })
 }
 
-/// What one figure shows.
+/// The content of one figure.
 pub fn content(number: &str) -> &'static Content {
     let made = all()
         .iter()
         .find(|made| made.entry.number == number)
         .expect("in the registry");
-    made.content().expect("is computed")
+    made.content().expect("a computed figure")
 }
 
 /// A chart of a figure by the beginning of its heading.
@@ -40,7 +39,7 @@ pub fn chart(number: &str, heading: &str) -> &'static Chart {
         .expect("a chart of that heading")
 }
 
-/// The lines of a chart that carry a curve: not those that only mark the axes.
+/// The curves of a chart: lines with more than ten points.
 pub fn curves(chart: &Chart) -> Vec<(&str, &[(f64, f64)])> {
     chart.marks.iter().filter_map(curve).collect()
 }
@@ -52,8 +51,8 @@ fn curve(mark: &Mark) -> Option<(&str, &[(f64, f64)])> {
     }
 }
 
-/// Points of a curve, evenly picked.
-pub fn picked(points: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
+/// `count` evenly spaced points of a curve.
+pub fn sampled(points: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
     (0..count)
         .map(|k| points[(k * (points.len() - 1)) / (count - 1)])
         .collect()

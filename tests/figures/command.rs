@@ -1,4 +1,4 @@
-//! Every command that the page prints.
+//! The commands printed on the page.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use bench_test_support::program::Bench;
 use crate::all::{all, folder};
 
 #[test]
-fn runs_every_command_of_the_page_in_its_folder() {
+fn every_command_of_the_page_runs_in_its_folder() {
     let bench = Bench::new();
     let place = bench.path(".");
     let mut commands: Vec<&str> = Vec::new();
@@ -36,7 +36,7 @@ fn runs_every_command_of_the_page_in_its_folder() {
             .env("PATH", &path)
             .output()
             .expect("bash");
-        // The thesis shows unstable loops as well; `bench margins` exits with 1 for them.
+        // Some loops of the thesis are unstable, for which `bench margins` exits with 1.
         let unstable = String::from_utf8_lossy(&output.stdout).contains("UNSTABLE");
         assert!(
             output.status.success() || unstable,

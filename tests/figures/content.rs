@@ -1,4 +1,4 @@
-//! What is there, and what it says.
+//! The registry of figures and the text and comparisons of each figure.
 
 use std::collections::BTreeSet;
 
@@ -6,11 +6,11 @@ use thesis_figures::{FIGURES, Make, Verdict, selected};
 
 use crate::all::{all, content, folder};
 
-/// The figures and tables of the issue, `a-b` from one to another.
-const ASKED: &str = "1-3 1-4 2-3..2-6 3-2..3-6 3-8..3-16 4-1 4-2 4-4 4-6..4-10 5-2 6-2..6-13 \
+/// The required figures and tables; `a..b` is a range.
+const REQUIRED: &str = "1-3 1-4 2-3..2-6 3-2..3-6 3-8..3-16 4-1 4-2 4-4 4-6..4-10 5-2 6-2..6-13 \
                      table-2-2 table-2-3 table-3-1 table-3-2 table-3-3 table-3-4";
 
-fn asked() -> Vec<String> {
+fn required() -> Vec<String> {
     let range = |text: &str| match text.split_once("..") {
         None => vec![text.to_string()],
         Some((from, to)) => {
@@ -27,13 +27,13 @@ fn asked() -> Vec<String> {
                 .collect()
         }
     };
-    ASKED.split_whitespace().flat_map(range).collect()
+    REQUIRED.split_whitespace().flat_map(range).collect()
 }
 
 #[test]
 fn computes_all_required_figures_and_tables() {
-    assert_eq!(asked().len(), 47);
-    for number in asked() {
+    assert_eq!(required().len(), 47);
+    for number in required() {
         let entry = FIGURES
             .iter()
             .find(|entry| entry.number == number)
@@ -114,13 +114,13 @@ fn explains_every_difference_beyond_its_tolerance() {
     }
 }
 
-/// Which printed figures may differ, and no others: the frequency of the first mode (READING.md: 183.9 instead of 179 rad/s)
-/// and what hangs on it, misprints, and two round figures.
+/// All printed values that may differ: the frequency of the first mode (183.9 instead of 179 rad/s) and values that depend on it,
+/// misprints, and two rounded values.
 const DIFFER: &[(&str, &str)] = &[
     ("2-6", "its frequency"),
     ("table-2-2", "D = 5 %, mode 1, y2"),
     ("table-2-2", "D = 5 %, mode 1, y3"),
-    // A symmetric chain: its modes cross.
+    // The modes of a symmetric chain cross.
     ("4-9", "the loci are"),
     ("6-4", "modulus margin (printed: around 0.5)"),
     ("6-6", "ζ = 0.01"),
@@ -166,12 +166,12 @@ fn tolerances_are_half_of_the_last_printed_digit_or_explained() {
             let number = row.printed.split(' ').next().expect("a number");
             let digits = number.split('.').nth(1).map_or(0, str::len);
             let half = 0.5 * 10f64.powi(-(digits as i32));
-            // The eigenvectors of Table 2-2 have the tolerance of the issue, said in the settings.
+            // The eigenvectors of Table 2-2 have a tolerance of their own, which is stated in the settings.
             let known = made.entry.number == "table-2-2";
             let wide = tolerance > half * (1.0 + 1e-9);
-            let said = !row.remark.is_empty() || row.what.contains("printed:");
+            let is_explained = !row.remark.is_empty() || row.what.contains("printed:");
             assert!(
-                !wide || said || known,
+                !wide || is_explained || known,
                 "{}: {} within {tolerance}",
                 made.entry.number,
                 row.what
@@ -181,7 +181,7 @@ fn tolerances_are_half_of_the_last_printed_digit_or_explained() {
 }
 
 #[test]
-fn tables_of_chapter_3_hold_in_every_row() {
+fn tables_of_chapter_3_agree_in_every_row() {
     for (number, rows) in [
         ("table-3-1", 3),
         ("table-3-2", 4),
@@ -189,7 +189,7 @@ fn tables_of_chapter_3_hold_in_every_row() {
         ("table-3-4", 10),
     ] {
         let compared = &content(number).compared;
-        // One line says how many plants are in no row.
+        // One additional line states how many plants are in no row.
         assert_eq!(compared.len(), rows + 1, "{number}");
         assert!(
             compared.iter().all(|row| row.verdict == Verdict::Agrees),
@@ -199,7 +199,7 @@ fn tables_of_chapter_3_hold_in_every_row() {
 }
 
 #[test]
-fn rejects_an_unknown_number_and_lists_the_known() {
+fn rejects_unknown_figure_and_lists_the_valid_ones() {
     let error = selected(&["2-5".into(), "7-1".into()])
         .expect_err("no such figure")
         .to_string();
@@ -216,7 +216,7 @@ fn rejects_an_unknown_number_and_lists_the_known() {
 }
 
 #[test]
-fn leaves_only_complete_files() {
+fn folder_has_only_complete_files() {
     all();
     for entry in std::fs::read_dir(folder()).expect("the folder") {
         let name = entry

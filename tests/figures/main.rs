@@ -1,11 +1,10 @@
-//! The figures of the thesis: all present or with a reason, printed values beside computed ones, drawn within their frames,
-//! curves equal to those of Python. They are made once for all tests.
+//! The figures of the thesis: each is present or has a reason for its absence, computed values are compared with printed ones, curves are
+//! inside their frames and equal those of Python. The figures are made once for all tests.
 
 mod all;
 mod command;
 mod content;
 mod pictures;
-use bench_test_support::program;
-use bench_test_support::svg;
-use bench_test_support::truth;
 mod values;
+
+use bench_test_support::{program, svg, truth};

@@ -1,4 +1,4 @@
-//! Pictures and page: well-formed, labelled, within their frames, and complete in themselves.
+//! Pictures and page: well-formed, labelled, within their frames, and self-contained.
 
 use bench::report::{Chart, Mark, Pen, Row, Scale, ScaleKind, Symbol, colours, sheet_svg};
 use proptest::prelude::*;
@@ -27,8 +27,8 @@ fn frames(picture: &str) -> Vec<[f64; 4]> {
         .collect()
 }
 
-/// All coordinates are finite and on the page, curves and areas are inside a frame, and no text is cut off.
-fn assert_tidy(what: &str, picture: &str) {
+/// Asserts that all coordinates are finite and on the page, curves and areas are inside a frame, and no text is cut off.
+fn assert_within_page_and_frames(what: &str, picture: &str) {
     assert!(
         !picture.contains("NaN") && !picture.contains("inf"),
         "{what}"
@@ -54,7 +54,7 @@ fn assert_tidy(what: &str, picture: &str) {
                     .all(|(x, y)| (0.0..=width).contains(x) && (0.0..=height).contains(y)),
                 "{what}: {points:?}"
             );
-            // What has many points is a curve: no key, no tick.
+            // Lines with eight points and more are curves; shorter ones are legend samples and ticks.
             let within = |frame: &[f64; 4]| {
                 points.iter().all(|(x, y)| {
                     *x >= frame[0] - 1.0
@@ -75,14 +75,14 @@ fn assert_tidy(what: &str, picture: &str) {
 fn draws_all_figures_within_page_and_frames() {
     for made in all() {
         if let Some(picture) = made.svg() {
-            assert_tidy(made.entry.number, picture);
+            assert_within_page_and_frames(made.entry.number, picture);
         }
     }
 }
 
 #[test]
 fn labels_every_axis_with_quantity_and_unit() {
-    let bare = [
+    let without_unit = [
         "|L|",
         "|T|",
         "|S|",
@@ -101,8 +101,9 @@ fn labels_every_axis_with_quantity_and_unit() {
                 let unit = scale.label.contains('(') && scale.label.ends_with(')');
                 let of_g = scale.label.contains("part of G")
                     && (chart.heading.contains("m/N") || made.entry.number.starts_with("6-"));
-                let plain =
-                    bare.contains(&scale.label.as_str()) || of_g || scale.label.starts_with('Δ');
+                let plain = without_unit.contains(&scale.label.as_str())
+                    || of_g
+                    || scale.label.starts_with('Δ');
                 assert!(
                     unit || plain,
                     "{}: `{}` has no unit",
@@ -140,7 +141,7 @@ fn text_outside_frames_does_not_overlap() {
                 a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom
             };
             if let Some(b) = words[k + 1..].iter().find(|b| overlap(b)) {
-                panic!("{}: {a:?} runs into {b:?}", made.entry.number);
+                panic!("{}: {a:?} overlaps {b:?}", made.entry.number);
             }
         }
     }
@@ -162,7 +163,7 @@ fn figures_and_page_are_well_formed_by_other_programs() {
     };
     for (file, answer) in files.iter().zip(answers) {
         assert_eq!(answer["errors"], json!([]), "{file}");
-        // Curves, texts, frames; of the page: an anchor for each entry.
+        // A figure has curves, texts and frames, the page an anchor for each figure.
         assert!(
             answer["elements"].as_u64().is_some_and(|count| count > 20),
             "{file}: {answer}"
@@ -239,9 +240,9 @@ proptest! {
             .mark(Mark::Area { name: String::new(), colour: colours::GREEN, strength: 0.5, outline: near })
             .line("c", Pen::solid(colours::VERMILION), tame);
         chart.equal = equal && !logarithmic;
-        // The axes are those of the near points.
+        // The axes show the range of the near points only.
         chart.x = chart.x.within(0.1, 3.0);
         chart.y = chart.y.within(0.1, 3.0);
-        assert_tidy("any", &sheet_svg("Any", "", &[Row::new(220.0, vec![chart.clone(), chart])]).expect("a picture"));
+        assert_within_page_and_frames("any", &sheet_svg("Any", "", &[Row::new(220.0, vec![chart.clone(), chart])]).expect("a picture"));
     }
 }

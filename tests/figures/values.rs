@@ -1,9 +1,9 @@
-//! Curves and counts of several figures against Python, which shares no line with the program, and against closed forms.
+//! Curves and counts of several figures, against Python and closed forms, both independent of the program.
 
 use bench::report::Mark;
 use serde_json::{Value, json};
 
-use crate::all::{chart, curves, picked};
+use crate::all::{chart, curves, sampled};
 use crate::program::{Bench, near, number};
 use crate::truth;
 
@@ -34,7 +34,7 @@ fn open_loops_of_figs_6_8_and_6_10_equal_python() {
         let config = bench.json(&format!(
             "config show --set control.controller={controller}"
         ));
-        let points = picked(curve(figure, "(a)", ""), 40);
+        let points = sampled(curve(figure, "(a)", ""), 40);
         let omega: Vec<f64> = points.iter().map(|point| point.0).collect();
         let question =
             json!({"what": "points", "of": "loop", "config": config, "omega_rad_s": omega});
@@ -43,7 +43,7 @@ fn open_loops_of_figs_6_8_and_6_10_equal_python() {
         };
         for (point, truth) in points.iter().zip(pairs(&answers[0])) {
             let size = truth.0.hypot(truth.1);
-            // At a resonance of damping 0.004 a relative rounding of the frequency is 250 times as large in |L|.
+            // At a resonance with a damping ratio of 0.004, |L| amplifies the relative rounding of the frequency by 250.
             near(
                 &format!("|L| of Fig {figure} at {} rad/s", point.0),
                 point.1,
@@ -62,7 +62,7 @@ fn transfer_functions_of_fig_2_4_equal_eq_2_5() {
             let config = bench.json(&format!(
                 "config show --config chapter2 --operating-point {point}% --asymmetry {asymmetry}"
             ));
-            let points = picked(curve("2-4", heading, name), 30);
+            let points = sampled(curve("2-4", heading, name), 30);
             let omega: Vec<f64> = points
                 .iter()
                 .map(|point| point.0 * std::f64::consts::TAU)
@@ -74,7 +74,7 @@ fn transfer_functions_of_fig_2_4_equal_eq_2_5() {
             };
             for (point, truth) in points.iter().zip(pairs(&answers[0])) {
                 let size = truth.0.hypot(truth.1);
-                // Modes that do not show are left out: below a thousandth of all others at their own resonance.
+                // The figure omits negligible modes: those below 0.1 % of the other modes at their own resonance.
                 near(
                     &format!("|G| at {} Hz", point.0),
                     point.1,
@@ -103,7 +103,7 @@ fn step_responses_of_figs_3_5_and_3_12_equal_python() {
         ("3-12", "(b)", "α0 = 21", r_u_v(21.0)),
     ];
     for (figure, heading, name, terms) in cases {
-        let points = picked(curve(figure, heading, name), 60);
+        let points = sampled(curve(figure, heading, name), 60);
         let times: Vec<f64> = points.iter().map(|point| point.0).collect();
         let Some(answers) =
             truth::ask(&[json!({"what": "course", "terms": terms, "time_s": times})])
@@ -125,9 +125,9 @@ fn step_responses_of_figs_3_5_and_3_12_equal_python() {
 fn zeros_of_fig_3_12_equal_those_with_60_digits() {
     let map = chart("3-12", "(c)");
     for size in [0.5, 5.0, 10.0, 15.0, 21.0] {
-        let ring = |mark: &'_ Mark| matches!(mark, Mark::Points { name, .. } if *name == format!("α0 = {size}"));
-        let Some(Mark::Points { points, .. }) = map.marks.iter().find(|mark| ring(mark)) else {
-            panic!("no ring {size}")
+        let is_zeros = |mark: &'_ Mark| matches!(mark, Mark::Points { name, .. } if *name == format!("α0 = {size}"));
+        let Some(Mark::Points { points, .. }) = map.marks.iter().find(|mark| is_zeros(mark)) else {
+            panic!("no zeros of {size}")
         };
         let terms = json!([[0.0, 0.0, 1.0], [10.0, 0.0, -size], [11.0, 0.0, size]]);
         let Some(answers) =
@@ -141,7 +141,7 @@ fn zeros_of_fig_3_12_equal_those_with_60_digits() {
                 .iter()
                 .map(|zero| (zero.0 - re).hypot(zero.1 - im))
                 .fold(f64::MAX, f64::min);
-            // At 21 two zeros meet: they come apart by the root of the rounding.
+            // At 21 two zeros meet: their error is the square root of the rounding.
             assert!(
                 distance < 1e-6 * re.hypot(*im),
                 "{re} {im:+}j of α0 = {size} is {distance} off"
@@ -175,7 +175,7 @@ fn maps_of_figs_2_5_and_5_2_equal_python() {
         let mut questions = Vec::new();
         let mut expected = Vec::new();
         for k in 0..24 {
-            // Spread over both axes, never twice in a row or column.
+            // Cells spread over both axes, in different rows and columns.
             let (i, j) = ((17 * k + 61) % rows[0].len(), (29 * k + 7) % rows.len());
             let middle = |edges: &[f64], k: usize| 0.5 * (edges[k] + edges[k + 1]) / 100.0;
             let (asymmetry, point) = (middle(x, i), middle(y, j));
@@ -197,7 +197,7 @@ fn maps_of_figs_2_5_and_5_2_equal_python() {
         }
         assert!(
             (1..24).contains(&with),
-            "both must be among the cells: {with} of 24"
+            "the sample must contain cells with and without CNMP zeros: {with} of 24 have them"
         );
     }
 }
@@ -206,7 +206,7 @@ fn maps_of_figs_2_5_and_5_2_equal_python() {
 fn circles_of_fig_1_3_have_a_constant_angle() {
     for (heading, angle) in [("(a)", 90.0), ("(b)", 50.0)] {
         let circle = curve("1-3", heading, "same Θ");
-        for (x, y) in picked(circle, 97).into_iter().filter(|(x, _)| *x > 0.05) {
+        for (x, y) in sampled(circle, 97).into_iter().filter(|(x, _)| *x > 0.05) {
             // The angle between the two rays to +-j, by the cosine rule.
             let (a, b) = ((-x, 1.0 - y), (-x, -1.0 - y));
             let cosine = (a.0 * b.0 + a.1 * b.1) / (a.0.hypot(a.1) * b.0.hypot(b.1));
@@ -223,7 +223,7 @@ fn parabolas_of_fig_4_2_follow_eq_4_3_and_touch_zero() {
         ("αR = 2.0", 2.0),
         ("αR = 10.0", 10.0),
     ] {
-        for (x, y) in picked(curve("4-2", "(a)", name), 40) {
+        for (x, y) in sampled(curve("4-2", "(a)", name), 40) {
             // b2 x^2 + b1 x + b0 with au = -1, av = 1, wu^2 = 1, wv^2 = 2.
             let expected = residue * x * x + (3.0 * residue - 2.0 + 1.0) * x + 2.0 * residue;
             near("N(x)", y, expected, 1e-12 * (1.0 + expected.abs()));
@@ -237,7 +237,7 @@ fn parabolas_of_fig_4_2_follow_eq_4_3_and_touch_zero() {
             .iter()
             .map(|point| point.1.abs())
             .fold(f64::MAX, f64::min);
-        // A grid of 0.02 stands 0.01 beside the point of contact at most, where N is up to 5.83 times its square.
+        // With a grid of 0.02 the nearest point is at most 0.01 from the point of contact, where N is at most 5.83 x 0.01^2 = 6e-4.
         assert!(
             points.iter().all(|point| point.1 > -1e-9) && least < 4e-3,
             "{least}"
@@ -246,7 +246,7 @@ fn parabolas_of_fig_4_2_follow_eq_4_3_and_touch_zero() {
 }
 
 #[test]
-fn loci_of_fig_2_6_cross_where_python_says() {
+fn crossing_of_the_loci_of_fig_2_6_equals_python() {
     let bench = Bench::new();
     let config = bench.json("config show --config chapter2 --asymmetry 0");
     let Some(answers) = truth::ask(&[json!({"what": "crossing", "config": config})]) else {
@@ -256,7 +256,7 @@ fn loci_of_fig_2_6_cross_where_python_says() {
         .into_iter()
         .map(|(_, points)| points)
         .collect();
-    // The first two are modes 3 and 4 at asymmetry 0; they are closest at the crossing.
+    // The first two lines are modes 3 and 4 at asymmetry 0. They are closest at the crossing.
     let gap = |k: &usize| (lines[0][*k].1 - lines[1][*k].1).abs();
     let closest = (0..lines[0].len())
         .min_by(|a, b| gap(a).total_cmp(&gap(b)))

@@ -1,5 +1,6 @@
-use bench::identify::Frf;
-use bench::identify::Unit;
+//! The Bode plot.
+
+use bench::identify::{Frf, Unit};
 use bench::report::{Curve, ReportError, Trace, bode_svg};
 use nalgebra::Complex;
 use proptest::prelude::*;
@@ -34,8 +35,8 @@ fn assert_shows(svg: &str, expected: &[&str]) {
     }
 }
 
-/// Checks that no text is cut off or overlaps another text, that no curve leaves the page, and that all coordinates are finite.
-fn assert_tidy(svg: &str) {
+/// Asserts that no text is cut off or overlaps another text, that no curve leaves the page, and that all coordinates are finite.
+fn assert_layout(svg: &str) {
     let (width, height) = svg::page_size(svg);
     let words = svg::words(svg);
     for word in &words {
@@ -46,7 +47,7 @@ fn assert_tidy(svg: &str) {
     for (k, a) in words.iter().enumerate() {
         assert!(
             words[k + 1..].iter().all(|b| !overlap(a, b)),
-            "{a:?} runs into another"
+            "{a:?} overlaps another text"
         );
     }
     for kind in ["polyline", "polygon"] {
@@ -72,7 +73,7 @@ fn labels_axes_with_units_and_names_curves_in_a_legend() {
         Some(&SampledPlant::stage()),
         RUN,
     );
-    assert_tidy(&svg);
+    assert_layout(&svg);
     assert_shows(
         &svg,
         &[
@@ -114,7 +115,7 @@ fn plot_of_4000_frequencies_is_smaller_than_400_kilobytes() {
 fn draws_a_peak_narrower_than_a_pixel_to_its_top() {
     let frequency_hz = frequencies(1.0, 1000.0, 100_000);
     let mut response = vec![Complex::from(1e-4); 100_000];
-    // Neither the first nor the last of the 112 samples of its pixel column.
+    // The peak is neither the first nor the last of the 112 samples of its pixel column.
     response[50_050] = Complex::from(1e-3);
     let trace = [Trace {
         name: "peak",
@@ -125,7 +126,7 @@ fn draws_a_peak_narrower_than_a_pixel_to_its_top() {
     }];
     let svg = bode_svg(Unit::MetresPerAmpere, &trace, "", "").unwrap();
     let curves = svg::points(&svg, "polyline", MODEL);
-    // Legend, magnitude, phase. The axis is 1.12 decades high, the peak one decade of it.
+    // The lines are legend, magnitude and phase. The axis covers 1.12 decades, the peak one decade of it.
     let ys = curves[1].iter().map(|point| point.1);
     let (top, bottom) = ys.fold((f64::MAX, f64::MIN), |(top, bottom), y| {
         (y.min(top), y.max(bottom))
@@ -140,7 +141,7 @@ fn draws_a_peak_narrower_than_a_pixel_to_its_top() {
         "{} of {panel}",
         bottom - top
     );
-    // In the middle of the axis.
+    // The peak is in the middle of the axis.
     let peak = curves[1].iter().find(|point| point.1 == top).unwrap();
     assert!((peak.0 - 5290.0).abs() < 10.0, "{peak:?}");
     assert!(curves[1].len() < 4000);
@@ -154,7 +155,7 @@ fn draws_measured_curve_and_band_within_the_frame() {
         Some(&SampledPlant::stage()),
         "8 s at 4 mA and less",
     );
-    assert_tidy(&svg);
+    assert_layout(&svg);
     let frames = svg::points(&svg, "polyline", "#5A5A5A");
     assert_eq!(frames.len(), 3);
     let inside = |point: &(f64, f64), frame: &[(f64, f64)]| {
@@ -171,7 +172,7 @@ fn draws_measured_curve_and_band_within_the_frame() {
                 .all(|point| frames.iter().any(|frame| inside(point, frame)))
         );
     }
-    // One polygon in the legend, one each around magnitude and phase, none around coherence.
+    // One polygon is in the legend, one each around magnitude and phase; coherence has none.
     assert_eq!(svg::points(&svg, "polygon", MEASURED).len(), 3);
 }
 
@@ -203,7 +204,7 @@ fn draws_magnitudes_below_two_sigma_faint_and_ignores_them_in_the_axis() {
 #[test]
 fn axes_cover_at_least_a_decade_and_half_a_turn() {
     let svg = bode("bode-flat.svg", &flat(), None, "all equal");
-    assert_tidy(&svg);
+    assert_layout(&svg);
     assert_shows(
         &svg,
         &[
@@ -220,7 +221,7 @@ fn axes_cover_at_least_a_decade_and_half_a_turn() {
     );
 }
 
-/// The first column of the phase is that of the lowest frequency: at DC the stage follows the current.
+/// The phase starts at 0 at the lowest frequency, where the stage follows the current.
 #[test]
 fn unwraps_the_phase_of_a_non_minimum_phase_stage_from_0_to_below_minus_360_degrees() {
     let svg = bode(
@@ -249,7 +250,7 @@ fn unwraps_the_phase_of_a_non_minimum_phase_stage_from_0_to_below_minus_360_degr
 }
 
 #[test]
-fn leaves_a_gap_without_input_and_draws_a_lone_frequency_as_a_dot() {
+fn draws_a_gap_without_input_and_a_single_frequency_as_a_dot() {
     let mut frf = flat();
     frf.resolution_hz = frf.frequency_hz.iter().map(|f| 0.05 * f).collect();
     let keep_only = |column: &mut Vec<f64>| {
@@ -277,7 +278,7 @@ fn leaves_a_gap_without_input_and_draws_a_lone_frequency_as_a_dot() {
         None,
         "no input from 6 to 16 Hz but at one frequency",
     );
-    // Legend, then in each of three panels the stretches below, between (a point) and above.
+    // One line in the legend, and in each of three panels the parts below, in (one point) and above the gap.
     assert_eq!(svg::points(&svg, "polyline", MEASURED).len(), 1 + 3 * 3);
     assert!(svg.matches("<circle").count() >= 3);
 }
@@ -309,7 +310,7 @@ fn dashes_a_model_over_a_measured_curve_but_not_alone() {
         "",
     )
     .unwrap();
-    // 900 pixels in each of two panels, 26 in the legend; a dash every 12 pixels: 75 + 75 + 3, and 7 of the 12 drawn.
+    // The curve is 900 pixels wide in each of two panels, the legend sample 26. A dash of 7 pixels every 12 pixels: 75 + 75 + 3 dashes.
     let dashes = svg::points(&both, "polyline", MODEL);
     assert_eq!(dashes.len(), 153);
     assert!(
@@ -345,7 +346,7 @@ fn omits_the_coherence_without_a_measurement() {
     ];
     let svg = bode_svg(Unit::MetresPerAmpere, &traces, "Model", "stage, 8 % of L").unwrap();
     keep("bode-models.svg", &svg);
-    assert_tidy(&svg);
+    assert_layout(&svg);
     assert_shows(&svg, &["stage", "first mode", "1000"]);
     assert!(!texts(&svg).contains(&"Coherence".to_owned()));
 }
@@ -363,7 +364,7 @@ fn labels_a_narrow_band() {
     }];
     let svg = bode_svg(Unit::MetresPerAmpere, &trace, "Close modes", "").unwrap();
     keep("bode-narrow.svg", &svg);
-    assert_tidy(&svg);
+    assert_layout(&svg);
     assert_shows(&svg, &["80", "82", "84", "86", "88", "90"]);
 }
 
@@ -376,7 +377,7 @@ fn draws_a_single_frequency() {
             response: &[Complex::from(1e-4)],
         },
     }];
-    assert_tidy(&bode_svg(Unit::MetresPerAmpere, &trace, "One", "").unwrap());
+    assert_layout(&bode_svg(Unit::MetresPerAmpere, &trace, "One", "").unwrap());
 }
 
 #[test]
@@ -397,7 +398,7 @@ fn wraps_long_titles_and_legends_and_escapes_svg_characters() {
     )
     .unwrap();
     keep("bode-long.svg", &svg);
-    assert_tidy(&svg);
+    assert_layout(&svg);
     assert!(svg.contains("&lt;long&gt; name &amp; more") && !svg.contains("<long>"));
 }
 
@@ -468,7 +469,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
 
     #[test]
-    fn draws_any_finite_response_without_panic(
+    fn draws_any_finite_response(
         rows in prop::collection::vec((1e-3..1e3_f64, -12.0..2.0_f64, -4.0..4.0_f64, -14.0..3.0_f64, 0.0..1.0_f64), 1..80),
         from_hz in -3.0..3.0_f64,
     ) {
@@ -485,11 +486,11 @@ proptest! {
         }
         let model = Curve::Model { frequency_hz: &frf.frequency_hz, response: &frf.response };
         let traces = [Trace { name: "any", curve: Curve::Measured(&frf) }, Trace { name: "model", curve: model }];
-        assert_tidy(&bode_svg(Unit::MetresPerAmpere, &traces, "Any", "any").unwrap());
+        assert_layout(&bode_svg(Unit::MetresPerAmpere, &traces, "Any", "any").unwrap());
     }
 }
 
 #[test]
 fn draws_the_stage_without_its_model() {
-    assert_tidy(&pictures::bode("bode-measured.svg", &measured(), None, RUN));
+    assert_layout(&pictures::bode("bode-measured.svg", &measured(), None, RUN));
 }

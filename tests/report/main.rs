@@ -1,4 +1,4 @@
-//! Plots and pages of a record. The plots that these tests draw are left in `target/tmp`, for inspection.
+//! Plots and pages of a record. The plots of these tests are kept in `target/tmp` for inspection.
 
 mod bode;
 mod nyquist;
@@ -6,6 +6,5 @@ mod phase;
 mod pictures;
 mod pole_zero;
 mod run;
-use bench_test_support::stage;
-use bench_test_support::svg;
-use bench_test_support::truth;
+
+use bench_test_support::{stage, svg, truth};

@@ -11,7 +11,7 @@ use crate::svg;
 
 const BLUE: &str = "#0072B2";
 
-/// Circles of confidence of a measured response: a sample in the legend has four corners, they have more.
+/// Number of confidence circles of a measured response. They have more corners than the four of the legend sample.
 fn circles(frf: &Frf) -> usize {
     let measured = [Trace {
         name: "measured",
@@ -26,12 +26,13 @@ fn circles(frf: &Frf) -> usize {
 
 #[test]
 fn draws_overlapping_confidence_circles_once() {
-    let still = Frf {
+    let constant = Frf {
         magnitude_sigma: vec![1.5e-5; 100],
         ..flat()
     };
-    assert_eq!(circles(&still), 1, "more would hide the curve");
-    // A hundred points around the origin, of which every second can have a circle: they are 0.126 apart, with radii of 2.45 sigma = 0.049.
+    assert_eq!(circles(&constant), 1, "all circles coincide");
+    // 100 points on a circle around the origin, 0.063 of its radius apart. The confidence radius of 2.45 sigma is 0.049 of it, so that
+    // circles at every second point, 0.126 apart, do not overlap.
     let response = (0..100)
         .map(|k| Complex::from_polar(1.5e-4, TAU * f64::from(k) / 100.0))
         .collect();

@@ -1,3 +1,5 @@
+//! Unwrapping of the phase.
+
 use bench::report::phase::{offset_deg, unwrapped_deg};
 
 #[test]
@@ -21,13 +23,13 @@ fn unwraps_a_rising_phase() {
 fn noise_in_a_deep_notch_adds_no_turn() {
     // Unwrapped point by point, 120, -120 and 0 would add one turn.
     let wrapped = [-10.0, -10.0, 120.0, -120.0, -15.0, -15.0];
-    let trusted = [true, true, false, false, true, true];
-    assert_eq!(unwrapped_deg(&wrapped, &trusted)[4..], [-15.0, -15.0]);
+    let valid = [true, true, false, false, true, true];
+    assert_eq!(unwrapped_deg(&wrapped, &valid)[4..], [-15.0, -15.0]);
     assert_eq!(unwrapped_deg(&wrapped, &[true; 6])[4..], [345.0, 345.0]);
 }
 
 #[test]
-fn keeps_the_first_trusted_phase() {
+fn keeps_first_valid_phase() {
     assert_eq!(
         unwrapped_deg(&[-160.0, 30.0, 5.0], &[false, true, true]),
         [200.0, 30.0, 5.0]
@@ -36,7 +38,7 @@ fn keeps_the_first_trusted_phase() {
 }
 
 #[test]
-fn moves_a_curve_to_the_turn_of_another() {
+fn shifts_a_curve_by_whole_turns_to_match_another() {
     let reference = [(1.0, 0.0), (10.0, -200.0), (20.0, -340.0)];
     assert_eq!(
         offset_deg(&[(10.0, 160.0), (15.0, 100.0), (20.0, 20.0)], &reference),
@@ -52,7 +54,7 @@ fn moves_a_curve_to_the_turn_of_another() {
 
 #[test]
 fn responses_that_differ_by_a_turn_above_the_lowest_decade_keep_their_start() {
-    // S rises from 90 degrees to 0, T falls from 0 below -540: at most frequencies a turn apart, not where both begin.
+    // The phase of S goes from 90 degrees to 0, that of T from 0 to below -540: they differ by a turn at most frequencies, but not at the lowest.
     let s: Vec<(f64, f64)> = (0..40)
         .map(|k| (f64::from(1 + k), 90.0 / f64::from(1 + k)))
         .collect();

@@ -45,7 +45,7 @@ pub fn short_and_noisy() -> Frf {
     local::estimate(&signals, (1.0, 300.0), &EstimatorSettings::default()).unwrap()
 }
 
-/// The same value at every frequency, known exactly.
+/// A response with the same value at every frequency and no uncertainty.
 pub fn flat() -> Frf {
     let count = 100;
     Frf {

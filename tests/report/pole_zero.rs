@@ -1,4 +1,4 @@
-//! The map of poles and zeros at known places.
+//! The map of poles and zeros.
 
 use bench::report::{PoleZeroMap, ReportError, UncertainPoint, pole_zero_svg, stability_svg};
 use nalgebra::Complex;
@@ -20,7 +20,7 @@ fn none() -> [[f64; 2]; 2] {
     [[0.0; 2]; 2]
 }
 
-/// Two close modes, and a zero on either side between them.
+/// Three modes, two of them close, with a zero on either side of the imaginary axis between the close ones.
 fn map(covariance: [[f64; 2]; 2]) -> PoleZeroMap {
     PoleZeroMap {
         poles: vec![
@@ -53,7 +53,7 @@ fn closest_pair_ignores_poles_above_the_limit_and_on_the_real_axis() {
 fn draws_an_ellipse_to_the_scale_of_its_covariance() {
     let svg = pole_zero_svg(&map([[4.0, 0.0], [0.0, 1.0]]), "map", "").unwrap();
     keep("pole-zero.svg", &svg);
-    // Twice in the upper row, and alone: the last two polygons of each colour are the enlarged ones' legends and areas.
+    // The zeros are drawn in three maps: twice in the upper row, and enlarged below.
     let areas = |colour| svg::points(&svg, "polygon", colour);
     assert!(areas(VERMILION).len() >= 3 && areas(BLUE).len() >= 3);
     let extent = |outline: &[(f64, f64)]| {
@@ -64,8 +64,9 @@ fn draws_an_ellipse_to_the_scale_of_its_covariance() {
         };
         (of(|p| p.0), of(|p| p.1))
     };
-    // In the enlarged frame the right zero is 10.7/2 sigmas from the axis, which is within six half-widths of its ellipse: along
-    // x the frame of 400 px goes from 10.7 + 0.45 k 2 left of it to 1.45 k 2 right of it, along y over 2.9 k in 250 px.
+    // The half-width of the ellipse is k sigma, with sigma = 2 along x and 1 along y. In the enlarged map the axis is within six half-widths
+    // of the right zero and is therefore shown: along x the 400 px cover 10.7 + 0.45 k 2 to the left of the zero and 1.45 k 2 to its
+    // right; along y the 250 px cover 2.9 k.
     let k = (-2.0 * 0.05f64.ln()).sqrt();
     let width = 400.0 * 4.0 * k / (10.7 + 0.45 * 2.0 * k + 1.45 * 2.0 * k);
     let height = 250.0 * 2.0 / 2.9;
@@ -74,7 +75,7 @@ fn draws_an_ellipse_to_the_scale_of_its_covariance() {
         .filter(|outline| outline.len() > 10)
         .map(|outline| extent(outline))
         .collect();
-    // A page's coordinates are rounded to whole tenths of a pixel.
+    // Coordinates are rounded to tenths of a pixel.
     let found = ellipses
         .iter()
         .any(|e| (e.0 / 10.0 - width).abs() < 0.3 && (e.1 / 10.0 - height).abs() < 0.3);

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::{svg, truth};
 
-/// A title that breaks a page or plot that does not escape it.
+/// A title with characters that must be escaped.
 const TITLE: &str = "a <b> & \"c\"";
 const PLOT_KINDS: [&str; 5] = ["bode", "coherence", "nyquist", "pole_zero", "stability"];
 
@@ -90,7 +90,7 @@ fn writes_plots_and_page_beside_the_recording_under_its_name() {
 }
 
 #[test]
-fn identify_overwrites_neither_plots_nor_page() {
+fn identify_does_not_overwrite_the_page() {
     let again = Run::of(&[
         "identify",
         "--json",
@@ -151,7 +151,7 @@ fn draws_finite_coordinates_within_the_page() {
         for nothing in ["NaN", "inf"] {
             assert!(!picture.contains(nothing), "{kind}: {nothing}");
         }
-        // In tenths of a pixel.
+        // Coordinates are in tenths of a pixel.
         let (width, height) = svg::page_size(&picture);
         let inside = |(x, y): &(f64, f64)| (0.0..=width).contains(x) && (0.0..=height).contains(y);
         for element in ["polyline", "polygon"] {
@@ -187,7 +187,7 @@ fn every_plot_has_an_opaque_background_and_a_dark_style() {
             "{kind}: {first}"
         );
         let number = |name| svg::attribute(first, name).and_then(|text| text.parse::<f64>().ok());
-        // In tenths of a pixel; the last may be missing.
+        // Coordinates are in tenths of a pixel; a difference of one is allowed.
         for (name, whole) in [("x", 0.0), ("y", 0.0), ("width", width), ("height", height)] {
             assert!(
                 number(name).is_some_and(|is| (is - whole).abs() <= 1.0),
@@ -270,8 +270,8 @@ fn page_is_self_contained_and_escapes_the_title() {
 }
 
 #[test]
-fn page_without_modes_says_undecided_and_has_no_pole_zero_map() {
-    // A millionth of an ampere moves the stage by less than the probe's noise.
+fn page_without_modes_has_an_undecided_verdict_and_no_pole_zero_map() {
+    // 1 uA moves the stage by less than the noise of the probe.
     let run = Run::of(&[
         "chirp",
         "--amplitude",
