@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::program::{self, Bench};
 
 #[test]
-fn a_chirp_too_long_to_be_analysed_is_refused_at_once() {
-    // 1e5 s at 5 kHz are 5e8 ticks, which would be 37 GB of recording and as much memory to analyse it.
+fn rejects_a_chirp_too_long_to_be_analysed() {
+    // 1e5 s at 5 kHz are 5e8 ticks: a recording of 37 GB and as much memory to analyse it.
     let bench = Bench::new();
     bench
         .run("chirp --duration 1e5")
@@ -18,13 +18,18 @@ fn a_chirp_too_long_to_be_analysed_is_refused_at_once() {
 }
 
 #[test]
-fn the_memory_of_a_run_does_not_grow_with_its_duration() {
-    // A way that trips as it begins, out of eleven days, in a quarter of what one number a tick would take.
-    // `bench margins --fast --asymmetry -10%`: not stable. No amplitude is small enough.
+fn rejects_a_sweep_of_an_unstable_loop() {
+    // `bench margins --fast --asymmetry -10%`: the loop is unstable.
     let bench = Bench::new();
     let refused = bench.run("control --fast --reference chirp --asymmetry -10%");
     refused.is_refused(&["by the model this loop is unstable", "`bench margins`"]);
     assert_eq!(bench.files(), [""; 0]);
+}
+
+#[test]
+fn memory_of_a_run_does_not_grow_with_its_duration() {
+    // The reference lasts eleven days, 5e9 ticks, and trips at its start. The memory limit of 2 GB (`ulimit -v` is in kB) is less than a
+    // tenth of 40 GB, one f64 per tick.
     let bench = Bench::new();
     bench.write("far.csv", "0,0\n0.1,0.01\n");
     let run = format!(
@@ -45,7 +50,7 @@ fn the_memory_of_a_run_does_not_grow_with_its_duration() {
 }
 
 #[test]
-fn a_reference_file_that_cannot_be_followed_is_refused_with_its_line() {
+fn rejects_invalid_reference_file_with_its_line() {
     let cases: &[(&[u8], &[&str])] = &[
         (b"", &["line 1", "no point"]),
         (b"time_s,reference_m\n", &["no point"]),
@@ -59,11 +64,11 @@ fn a_reference_file_that_cannot_be_followed_is_refused_with_its_line() {
     ];
     for (text, words) in cases {
         let bench = Bench::new();
-        bench.write("way.csv", text);
+        bench.write("reference.csv", text);
         bench
-            .run("control --reference way.csv")
-            .is_refused(&[words, &["way.csv"][..]].concat());
-        assert_eq!(bench.files(), ["way.csv"]);
+            .run("control --reference reference.csv")
+            .is_refused(&[words, &["reference.csv"][..]].concat());
+        assert_eq!(bench.files(), ["reference.csv"]);
     }
     Bench::new()
         .run("control --reference .")
@@ -71,7 +76,7 @@ fn a_reference_file_that_cannot_be_followed_is_refused_with_its_line() {
 }
 
 #[test]
-fn a_reference_beyond_the_stage_is_refused_or_ends_in_a_trip() {
+fn reference_beyond_the_soft_limit_is_rejected_or_trips() {
     for options in [
         "--amplitude 0.91mm",
         "--amplitude -1m",
@@ -94,7 +99,7 @@ fn a_reference_beyond_the_stage_is_refused_or_ends_in_a_trip() {
 }
 
 #[test]
-fn what_is_no_recording_is_said_to_be_none() {
+fn rejects_files_that_are_not_recordings() {
     let bench = Bench::new();
     bench.write("text.mcap", "not a recording");
     bench.write("empty.mcap", "");
@@ -116,11 +121,15 @@ fn what_is_no_recording_is_said_to_be_none() {
 }
 
 #[test]
-fn everything_works_in_an_empty_folder() {
+fn commands_work_in_an_empty_folder() {
     let bench = Bench::new();
     bench.json("model modes");
     bench.json("margins");
-    assert_eq!(bench.files(), [""; 0], "looking leaves nothing behind");
+    assert_eq!(
+        bench.files(),
+        [""; 0],
+        "commands without a run write no files"
+    );
     let control = bench.json("control --duration 0.2");
     assert_eq!(bench.files(), ["recordings"]);
     let chirp = bench.json("chirp --duration 6 --start 5 --stop 50 --out elsewhere/deep");
@@ -138,7 +147,7 @@ fn everything_works_in_an_empty_folder() {
 }
 
 #[test]
-fn two_runs_in_one_second_do_not_overwrite_each_other() {
+fn runs_within_one_second_do_not_overwrite_each_other() {
     let bench = Bench::new();
     let names: Vec<String> = (0..4)
         .map(|_| bench.json("control --duration 0.05")["recording"].to_string())
@@ -150,15 +159,15 @@ fn two_runs_in_one_second_do_not_overwrite_each_other() {
 }
 
 #[test]
-fn where_nothing_can_be_written_nothing_moves_and_the_remedy_is_named() {
-    // No one can make a folder in /proc, not even root.
+fn unwritable_folder_prevents_motion_and_names_the_remedy() {
+    // Nobody can create a folder in /proc, not even root.
     let proc = Path::new("/proc");
     for arguments in ["control --duration 0.1", "chirp --duration 10"] {
         let answer = program::run_in(proc, arguments.split(' '));
         assert_eq!(answer.code, 1, "{}", answer.err);
         assert!(
             !answer.out.contains("overruns"),
-            "the plan, but no results: {}",
+            "the run must not have started: {}",
             answer.out
         );
         for word in ["recordings", "--out", "nothing was moved"] {
@@ -168,7 +177,7 @@ fn where_nothing_can_be_written_nothing_moves_and_the_remedy_is_named() {
     assert_eq!(
         program::run_in(proc, ["margins", "--fast"]).code,
         0,
-        "what writes nothing works"
+        "commands without output files work"
     );
     let bench = Bench::new();
     bench.write("taken", "");

@@ -3,7 +3,7 @@
 use crate::program::Bench;
 
 #[test]
-fn flags_out_of_reason_are_refused_with_value_and_limit() {
+fn rejects_invalid_flags_with_value_and_limit() {
     let cases: &[(&str, &[&str])] = &[
         (
             "margins --set loop.rate_hz=0",
@@ -219,7 +219,7 @@ fn flags_out_of_reason_are_refused_with_value_and_limit() {
 }
 
 #[test]
-fn nan_and_infinity_are_refused_in_every_flag_that_takes_a_number() {
+fn rejects_nan_and_infinity_in_every_numeric_flag() {
     let chirp =
         ["--start", "--stop", "--duration", "--amplitude"].map(|flag| format!("chirp {flag}"));
     let control = [
@@ -237,9 +237,9 @@ fn nan_and_infinity_are_refused_in_every_flag_that_takes_a_number() {
         for value in ["nan", "NaN", "inf", "-inf", "1e999"] {
             let bench = Bench::new();
             let answer = bench.run(&format!("{flag} {value}"));
-            let named = answer.err.contains(value);
+            let names_value = answer.err.contains(value);
             assert!(
-                answer.code == 2 && named && bench.files().is_empty(),
+                answer.code == 2 && names_value && bench.files().is_empty(),
                 "{flag} {value}: {answer:?}"
             );
         }

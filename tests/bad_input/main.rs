@@ -1,6 +1,6 @@
-//! Whatever it is fed, the program answers with an exit code and a sentence: it never panics, dies or hangs.
+//! Invalid input: the program ends with an exit code and a message; it does not panic, hang or die of a signal.
 //!
-//! `program::run_in` asserts that of every single call; the tests below say what the sentence must hold.
+//! `program::run_program` asserts this for every call. The tests below check the content of the message.
 
 mod files;
 mod flags;

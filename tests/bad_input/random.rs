@@ -5,12 +5,12 @@ use proptest::test_runner::RngSeed;
 
 use crate::program::{Answer, Bench};
 
-/// `bench margins` of an unstable loop: exit code 1, and an object that says so.
+/// Whether the answer is that of `bench margins` for an unstable loop: exit code 1 and `"stable": false`.
 fn is_unstable(answer: &Answer) -> bool {
     answer.code == 1 && answer.json()["stable"] == false
 }
 
-/// Cases are the same in every run; a call takes some 10 ms.
+/// A fixed seed, so that the cases are the same in every run. A call takes about 10 ms.
 fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
@@ -20,7 +20,7 @@ fn cases(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Something like a key of the configuration.
+/// A valid or nearly valid key of the configuration.
 fn key() -> impl Strategy<Value = String> {
     let keys = include_str!("../../bench-config/stage.toml")
         .lines()
@@ -48,7 +48,7 @@ fn key() -> impl Strategy<Value = String> {
     prop_oneof![6 => joined, 1 => "[a-z.]{0,12}", 1 => Just("plant.damping".to_string())]
 }
 
-/// Something like a value.
+/// A valid or invalid value.
 fn value() -> impl Strategy<Value = String> {
     prop_oneof![
         4 => (-12i32..14, -1.0..1.0f64).prop_map(|(power, x)| format!("{:?}", x * 10f64.powi(power))),
@@ -63,16 +63,16 @@ fn value() -> impl Strategy<Value = String> {
     ]
 }
 
-/// The default profile with some of its bytes changed, cut out or doubled.
+/// A text with some of its bytes replaced, removed or inserted.
 fn damaged(text: &'static str) -> impl Strategy<Value = Vec<u8>> {
-    let wound = (
+    let change = (
         0..text.len(),
         0usize..12,
         proptest::collection::vec(any::<u8>(), 0..4),
     );
-    proptest::collection::vec(wound, 1..4).prop_map(move |wounds| {
+    proptest::collection::vec(change, 1..4).prop_map(move |changes| {
         let mut bytes = text.as_bytes().to_vec();
-        for (at, length, new) in wounds {
+        for (at, length, new) in changes {
             let at = at.min(bytes.len());
             let end = (at + length).min(bytes.len());
             bytes.splice(at..end, new);
@@ -85,7 +85,7 @@ proptest! {
     #![proptest_config(cases(150))]
 
     #[test]
-    fn no_setting_whatever_makes_a_command_panic(sets in proptest::collection::vec((key(), value()), 1..5)) {
+    fn no_setting_causes_a_panic(sets in proptest::collection::vec((key(), value()), 1..5)) {
         let bench = Bench::new();
         let sets: Vec<String> = sets.iter().map(|(key, value)| format!("--set={key}={value}").replace('\0', " ")).collect();
         for command in ["config show", "model modes", "margins --fast", "margins --slow --continuous"] {
@@ -101,7 +101,7 @@ proptest! {
     }
 
     #[test]
-    fn no_file_whatever_makes_a_command_panic(
+    fn no_file_causes_a_panic(
         noise in proptest::collection::vec(any::<u8>(), 0..200),
         profile in damaged(include_str!("../../bench-config/stage.toml")),
         controller in damaged(include_str!("../../bench-config/controllers/fast.toml")),
