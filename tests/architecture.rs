@@ -1,5 +1,4 @@
-//! The structure of the sources, read from their imports: every import points in the direction of ARCHITECTURE.md, and no
-//! files import each other, directly or through others.
+//! The structure of the sources: every import points in the direction of ARCHITECTURE.md, and there are no cyclic imports between files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -7,8 +6,8 @@ use std::path::{Path, PathBuf};
 use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
-/// The modules of the library; a module imports only from those that stand before it. The settings of plants and excitations
-/// live with what they set, and `config` composes them: so `model::plant` stands before `config`, the rest of `model` after it.
+/// The modules of the library. A module imports only modules that precede it. The settings of plants and excitations are defined with the
+/// plants and excitations, and `config` composes them: therefore `model::plant` precedes `config`, and the rest of `model` follows it.
 const ORDER: [&str; 14] = [
     "util",
     "model::plant",
@@ -26,7 +25,7 @@ const ORDER: [&str; 14] = [
     "cli",
 ];
 
-/// A path as it is written, from the root of the crate.
+/// The segments of a path from the root of the crate.
 type ItemPath = Vec<String>;
 
 /// One file of the library.
@@ -35,15 +34,15 @@ struct Module {
     file: PathBuf,
     /// Names that are defined here.
     defined: BTreeSet<String>,
-    /// Names that are re-exported, and what they stand for.
+    /// Names that are re-exported, with the paths of the original items.
     exported: BTreeMap<String, ItemPath>,
     /// Modules all of whose names are re-exported.
     globs: Vec<ItemPath>,
-    /// All that its code refers to.
+    /// All paths to which the code refers.
     uses: Vec<ItemPath>,
 }
 
-/// Reads one file: definitions, re-exports and references outside tests.
+/// Visitor that collects re-exports and references of one file, without tests.
 struct Reader {
     path: ItemPath,
     is_facade: bool,
@@ -122,7 +121,7 @@ impl Reader {
         self.aliases.insert(to, path);
     }
 
-    /// A path that begins in this crate; `child::Item` of a re-export begins with a module of its own.
+    /// The path from the root of this crate; `None` for other crates. The first segment may be a child module, as in `child::Item`.
     fn local(&self, written: &[String]) -> Option<ItemPath> {
         match written.first()?.as_str() {
             "crate" | "self" | "super" => self.absolute(written),
@@ -170,7 +169,7 @@ impl<'ast> Visit<'ast> for Reader {
     }
 }
 
-fn names_of(item: &Item) -> Option<String> {
+fn name_of(item: &Item) -> Option<String> {
     let ident = match item {
         Item::Const(item) => &item.ident,
         Item::Enum(item) => &item.ident,
@@ -205,11 +204,11 @@ fn read(root: &Path, file: &Path) -> (ItemPath, Module) {
         aliases: BTreeMap::new(),
         module: Module {
             file: relative.to_path_buf(),
-            defined: syntax.items.iter().filter_map(names_of).collect(),
+            defined: syntax.items.iter().filter_map(name_of).collect(),
             ..Module::default()
         },
     };
-    // Imports first: a path may use a name that is imported further down.
+    // Imports are read first, because a path may use a name that is imported further down.
     for item in &syntax.items {
         if let Item::Use(item) = item {
             reader.visit_item_use(item);
@@ -238,7 +237,7 @@ fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The library as files and what each of them imports.
+/// The files of the library.
 struct Library {
     modules: BTreeMap<ItemPath, Module>,
 }
@@ -252,7 +251,7 @@ impl Library {
         Library { modules }
     }
 
-    /// The module whose file defines what `path` stands for, through re-exports.
+    /// The module whose file defines the item of `path`; re-exports are followed.
     fn definition(&self, path: &[String]) -> Option<ItemPath> {
         let mut module: ItemPath = Vec::new();
         for (index, segment) in path.iter().enumerate() {
@@ -288,7 +287,7 @@ impl Library {
             .then(|| module.to_vec())
     }
 
-    /// What each module imports, itself left out.
+    /// The modules that each module imports, without itself.
     fn imports(&self) -> BTreeMap<&ItemPath, BTreeSet<ItemPath>> {
         self.modules
             .iter()
@@ -309,16 +308,16 @@ impl Library {
     }
 }
 
-/// The place of a module in [`ORDER`]: that of its own path, or of the folder that it is in.
+/// The position of a module in [`ORDER`]: that of its path or of the nearest parent in the list.
 fn rank(module: &ItemPath) -> Option<usize> {
-    let place = |length: usize| {
+    let position = |length: usize| {
         let path = module[..length].join("::");
         ORDER.iter().position(|entry| *entry == path)
     };
-    let found = (1..=module.len()).rev().find_map(place);
+    let found = (1..=module.len()).rev().find_map(position);
     assert!(
         found.is_some() || module.is_empty(),
-        "{module:?} has no place in ORDER"
+        "{module:?} is not in ORDER"
     );
     found
 }
@@ -326,12 +325,12 @@ fn rank(module: &ItemPath) -> Option<usize> {
 #[test]
 fn imports_point_in_the_direction_of_the_architecture() {
     let library = Library::read("src");
-    let mut wrong = Vec::new();
+    let mut violations = Vec::new();
     for (from, targets) in library.imports() {
         let Some(own) = rank(from) else { continue };
         for to in &targets {
             if rank(to).is_some_and(|other| other > own) {
-                wrong.push(format!(
+                violations.push(format!(
                     "{} imports {}",
                     library.file(from),
                     library.file(to)
@@ -340,15 +339,15 @@ fn imports_point_in_the_direction_of_the_architecture() {
         }
     }
     assert!(
-        wrong.is_empty(),
-        "against the direction:\n{}",
-        wrong.join("\n")
+        violations.is_empty(),
+        "imports against the direction:\n{}",
+        violations.join("\n")
     );
 }
 
 type Graph = BTreeMap<ItemPath, BTreeSet<ItemPath>>;
 
-/// All that is imported by `start`, directly or through others.
+/// All modules that `start` imports directly or indirectly.
 fn reachable(graph: &Graph, start: &ItemPath) -> BTreeSet<ItemPath> {
     let mut found = BTreeSet::new();
     let mut waiting = vec![start];
@@ -362,16 +361,16 @@ fn reachable(graph: &Graph, start: &ItemPath) -> BTreeSet<ItemPath> {
     found
 }
 
-/// Sets of modules each of which imports all others of its set, directly or through others.
-fn circles(graph: &Graph) -> BTreeSet<BTreeSet<ItemPath>> {
+/// The sets of modules that import each other directly or indirectly.
+fn cycles(graph: &Graph) -> BTreeSet<BTreeSet<ItemPath>> {
     let reached: Graph = graph
         .keys()
         .map(|module| (module.clone(), reachable(graph, module)))
         .collect();
-    let in_circle = reached
+    let in_cycle = reached
         .iter()
         .filter(|(module, targets)| targets.contains(*module));
-    in_circle
+    in_cycle
         .map(|(module, targets)| {
             let back = |target: &&ItemPath| reached[*target].contains(module);
             targets.iter().filter(back).cloned().collect()
@@ -379,37 +378,37 @@ fn circles(graph: &Graph) -> BTreeSet<BTreeSet<ItemPath>> {
         .collect()
 }
 
-fn circles_of_files(sources: &str) -> Vec<String> {
+fn cycles_of_files(sources: &str) -> Vec<String> {
     let library = Library::read(sources);
     let imports = library.imports();
     let graph: Graph = imports
         .into_iter()
         .map(|(path, targets)| (path.clone(), targets))
         .collect();
-    circles(&graph)
+    cycles(&graph)
         .iter()
-        .map(|circle| {
-            let files: Vec<String> = circle.iter().map(|path| library.file(path)).collect();
+        .map(|cycle| {
+            let files: Vec<String> = cycle.iter().map(|path| library.file(path)).collect();
             files.join(", ")
         })
         .collect()
 }
 
 #[test]
-fn no_files_of_the_program_import_each_other() {
-    let found = circles_of_files("src");
-    assert!(found.is_empty(), "circles of files:\n{}", found.join("\n"));
+fn program_has_no_cyclic_imports_between_files() {
+    let found = cycles_of_files("src");
+    assert!(found.is_empty(), "cyclic imports:\n{}", found.join("\n"));
 }
 
 #[test]
-fn no_files_of_the_drivers_import_each_other() {
-    let found = circles_of_files("hal/src");
-    assert!(found.is_empty(), "circles of files:\n{}", found.join("\n"));
+fn drivers_have_no_cyclic_imports_between_files() {
+    let found = cycles_of_files("hal/src");
+    assert!(found.is_empty(), "cyclic imports:\n{}", found.join("\n"));
 }
 
-/// The two tests above have to be able to fail.
+/// Verifies that the tests above can fail.
 #[test]
-fn a_circle_of_three_files_is_found() {
+fn detects_a_cycle_of_three_files() {
     let name = |text: &str| vec![text.to_string()];
     let edges = [("a", "b"), ("b", "c"), ("c", "a"), ("d", "a"), ("c", "e")];
     let mut graph = Graph::new();
@@ -417,12 +416,12 @@ fn a_circle_of_three_files_is_found() {
         graph.entry(name(from)).or_default().insert(name(to));
         graph.entry(name(to)).or_default();
     }
-    let circle = BTreeSet::from([name("a"), name("b"), name("c")]);
-    assert_eq!(circles(&graph), BTreeSet::from([circle]));
+    let cycle = BTreeSet::from([name("a"), name("b"), name("c")]);
+    assert_eq!(cycles(&graph), BTreeSet::from([cycle]));
 }
 
 #[test]
-fn the_imports_of_a_known_file_are_found() {
+fn finds_the_imports_of_a_known_file() {
     let library = Library::read("src");
     let servo: ItemPath = ["rt", "servo"].map(String::from).into();
     let imports = library.imports();

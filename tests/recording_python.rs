@@ -1,6 +1,6 @@
-//! An independent program reads what bench records: Python with the public packages `mcap` and `mcap-protobuf-support`.
+//! An independent program reads a recording: Python with the public packages `mcap` and `mcap-protobuf-support`.
 //!
-//! `BENCH_PYTHON` names the interpreter (default `python3`). Without it or its packages the test says so and passes;
+//! `BENCH_PYTHON` names the interpreter (default `python3`). If it or its packages are missing, the test prints a message and passes;
 //! with `BENCH_REQUIRE_PYTHON=1`, as in CI, it fails.
 use std::path::Path;
 use std::process::Command;
@@ -53,7 +53,7 @@ fn tick(n: u64) -> TickRecord {
     }
 }
 
-/// The row that the Python program prints of a tick.
+/// The row that the Python program prints for a tick.
 fn row(t: &TickRecord) -> Value {
     let hex = |x: f64| format!("{:016x}", x.to_bits());
     let validity = match t.validity {
@@ -116,7 +116,7 @@ fn record(path: &Path) {
         .expect("a good disk");
 }
 
-/// What Python prints, or why there is none.
+/// The output of Python, or the reason why Python is not available.
 fn read_by_python(path: &Path) -> Result<Value, String> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
     let probe = Command::new(&python)
@@ -143,7 +143,7 @@ fn read_by_python(path: &Path) -> Result<Value, String> {
 }
 
 #[test]
-fn python_reads_every_tick_with_every_bit_by_the_embedded_schema() {
+fn python_reads_every_tick_bit_for_bit_with_the_embedded_schema() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("run.mcap");
     record(&path);
@@ -176,10 +176,10 @@ fn python_reads_every_tick_with_every_bit_by_the_embedded_schema() {
         read["metadata"]["bench"],
         json!({"host": "bench-1", "period_ns": "200000"})
     );
-    events_and_summaries_are_there(&read);
+    assert_events_and_summaries(&read);
 }
 
-fn events_and_summaries_are_there(read: &Value) {
+fn assert_events_and_summaries(read: &Value) {
     let trip = &read["events"][0];
     assert_eq!(
         (&trip["kind"], &trip["reason"], &trip["tick"]),
@@ -194,7 +194,7 @@ fn events_and_summaries_are_there(read: &Value) {
         (&state["from"], &state["to"]),
         (&json!("running"), &json!("tripped"))
     );
-    // 11,000 ticks at 5 kHz: two full seconds and 0.2 s; each woke 1000 ns late and computed 500 ns.
+    // 11,000 ticks at 5 kHz are two full seconds and 0.2 s. Each tick woke 1000 ns late and computed for 500 ns.
     let ticks: Vec<_> = (0..3)
         .map(|n| read["timings"][n]["ticks"].clone())
         .collect();
