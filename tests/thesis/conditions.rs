@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::answer::list;
 use crate::program::{Bench, near, number};
 use crate::truth;
 
@@ -10,12 +11,6 @@ const L_M: f64 = 0.0475;
 const PRINTED: &str = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018";
 const K: &str = "plant.springs.k.stiffness_n_per_m";
 const K23: &str = "plant.springs.k23.stiffness_n_per_m";
-
-fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key]
-        .as_array()
-        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
-}
 
 /// P4-2, P4-2x, P4-2y on one side of the veering point.
 fn propositions<'a>(answer: &'a Value, side: &str) -> [&'a Value; 3] {

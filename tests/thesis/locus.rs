@@ -2,14 +2,9 @@
 
 use serde_json::{Value, json};
 
+use crate::answer::list;
 use crate::program::{Bench, near, number};
 use crate::truth;
-
-fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key]
-        .as_array()
-        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
-}
 
 /// The stage of Chapter 2 with the printed m3 and D = 1 %.
 const ONE_PER_CENT: &str =

@@ -3,6 +3,7 @@
 //! Expected values come from the thesis (misprints are corrected where they are used), from closed forms, or from
 //! `tests/python/truth.py`, which is independent of the program.
 
+mod answer;
 mod chirp;
 mod conditions;
 mod control;

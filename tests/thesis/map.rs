@@ -2,15 +2,10 @@
 
 use serde_json::Value;
 
+use crate::answer::list;
 use crate::program::{Bench, near, number};
 
 const PRINTED: &str = "--config chapter2 --set plant.secondary_stage_mass_kg=0.018";
-
-fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key]
-        .as_array()
-        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
-}
 
 /// The operating points with a CNMP pair at the asymmetry with this index.
 fn band(answer: &Value, column: usize) -> Vec<f64> {

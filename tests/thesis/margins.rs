@@ -229,7 +229,7 @@ fn margins_of_random_loops_equal_python() {
         let answer = bench.run(&format!("margins {settings} {time} --json"));
         let exit_code = if truth["stable"] == true { 0 } else { 1 };
         assert_eq!(answer.code, exit_code, "{settings} {time}: {}", answer.err);
-        same_margins(&answer.json(), truth, &format!("{settings} {time}"));
+        assert_same_margins(&answer.json(), truth, &format!("{settings} {time}"));
     }
     let stable = answers
         .iter()
@@ -242,7 +242,7 @@ fn margins_of_random_loops_equal_python() {
 }
 
 /// Asserts equality within a relative tolerance of 1e-4, or absolute for values below 1.
-fn same_margins(ours: &Value, truth: &Value, settings: &str) {
+fn assert_same_margins(ours: &Value, truth: &Value, settings: &str) {
     // A pole within 1e-6 rad/s of the stability limit may be on either side because of rounding.
     assert!(
         number(&truth["border_rad_s"]) > 1e-6,

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::answer::{assert_same_zeros, list};
 use crate::program::{Bench, Draw, near, number};
 use crate::truth;
 
@@ -10,12 +11,6 @@ fn table_2_2(asymmetry: &str) -> Value {
     Bench::new().json(&format!(
         "model modes --config chapter2 --operating-point 5% --asymmetry {asymmetry}"
     ))
-}
-
-fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key]
-        .as_array()
-        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
 }
 
 fn signs(answer: &Value) -> String {
@@ -385,9 +380,9 @@ fn random_stages_agree_with_python() {
         let ours = bench.json(&format!("model modes {settings}"));
         assert_eq!(ours["cnmp_pairs"], truth["cnmp_pairs"], "{settings}");
         with_cnmp += usize::from(ours["cnmp_pairs"] == 1);
-        same_modes(list(&ours, "modes"), list(truth, "modes"), settings);
+        assert_same_modes(list(&ours, "modes"), list(truth, "modes"), settings);
         for kind in ["zeros", "damped_zeros"] {
-            same_zeros(
+            assert_same_zeros(
                 list(&ours, kind),
                 list(truth, kind),
                 &format!("{kind} of {settings}"),
@@ -401,7 +396,7 @@ fn random_stages_agree_with_python() {
 }
 
 /// Asserts equality within 1e-6; residues within 1e-6 or 1e-12 of the largest one (small residues are differences of large numbers).
-fn same_modes(ours: &[Value], truth: &[Value], settings: &str) {
+fn assert_same_modes(ours: &[Value], truth: &[Value], settings: &str) {
     assert_eq!(ours.len(), truth.len());
     let largest = truth
         .iter()
@@ -424,27 +419,6 @@ fn same_modes(ours: &[Value], truth: &[Value], settings: &str) {
             number(&mode["residue"]),
             expected,
             tolerance,
-        );
-    }
-}
-
-/// Asserts that both lists have the same zeros, within 1e-6 of their magnitude.
-fn same_zeros(ours: &[Value], truth: &[Value], what: &str) {
-    assert_eq!(ours.len(), truth.len(), "{what}");
-    let mut left: Vec<(f64, f64)> = truth
-        .iter()
-        .map(|z| (number(&z[0]), number(&z[1])))
-        .collect();
-    for zero in ours {
-        let (re, im) = (number(&zero["re_rad_s"]), number(&zero["im_rad_s"]));
-        let distance = |z: &(f64, f64)| (z.0 - re).hypot(z.1 - im);
-        let nearest = (0..left.len())
-            .min_by(|&a, &b| distance(&left[a]).total_cmp(&distance(&left[b])))
-            .expect("one");
-        let found = left.swap_remove(nearest);
-        assert!(
-            distance(&found) <= 1e-6 * re.hypot(im),
-            "{what}: {re} {im:+}j, Python has {found:?}"
         );
     }
 }

@@ -7,13 +7,8 @@ mod zeros;
 
 use serde_json::Value;
 
+use crate::answer::list;
 use crate::program::number;
-
-fn list<'a>(answer: &'a Value, key: &str) -> &'a [Value] {
-    answer[key]
-        .as_array()
-        .unwrap_or_else(|| panic!("{key} is not a list: {answer}"))
-}
 
 fn kinds(answer: &Value) -> Vec<&str> {
     list(answer, "zeros")

@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::{LAYOUTS, list};
+use super::LAYOUTS;
+use crate::answer::{assert_same_zeros, list};
 use crate::program::{Bench, Draw, near, number};
 use crate::truth;
 
@@ -123,9 +124,9 @@ fn random_plants_agree_with_python() {
     };
     for ((ours, plant), truth) in ours.iter().zip(&answers) {
         assert_eq!(ours["cnmp_pairs"], truth["cnmp_pairs"], "{plant}");
-        same_modes(ours, truth, plant);
+        assert_same_modes(ours, truth, plant);
         for key in ["zeros", "damped_zeros"] {
-            same_zeros(
+            assert_same_zeros(
                 list(ours, key),
                 list(truth, key),
                 &format!("{key} of {plant}"),
@@ -141,7 +142,7 @@ fn random_plants_agree_with_python() {
 }
 
 /// Asserts equal frequencies, damping rates 2 zeta w and residues. An eigenvalue has an error of 1e-15 of the largest one.
-fn same_modes(ours: &Value, truth: &Value, plant: &str) {
+fn assert_same_modes(ours: &Value, truth: &Value, plant: &str) {
     let [omegas, rates, residues] =
         ["omega_rad_s", "damping_rate", "residue"].map(|key| list(truth, key));
     let fastest = number(omegas.last().expect("a mode"));
@@ -167,27 +168,6 @@ fn same_modes(ours: &Value, truth: &Value, plant: &str) {
             number(&mode["residue"]),
             truth[2],
             1e-6 * truth[2].abs() + 1e-9 * largest,
-        );
-    }
-}
-
-/// Asserts that both lists have the same zeros, within 1e-6 of their magnitude.
-fn same_zeros(ours: &[Value], truth: &[Value], what: &str) {
-    assert_eq!(ours.len(), truth.len(), "{what}");
-    let mut left: Vec<(f64, f64)> = truth
-        .iter()
-        .map(|z| (number(&z[0]), number(&z[1])))
-        .collect();
-    for zero in ours {
-        let (re, im) = (number(&zero["re_rad_s"]), number(&zero["im_rad_s"]));
-        let distance = |z: &(f64, f64)| (z.0 - re).hypot(z.1 - im);
-        let nearest = (0..left.len())
-            .min_by(|&a, &b| distance(&left[a]).total_cmp(&distance(&left[b])))
-            .expect("one");
-        let found = left.swap_remove(nearest);
-        assert!(
-            distance(&found) <= 1e-6 * re.hypot(im),
-            "{what}: {re} {im:+}j, Python has {found:?}"
         );
     }
 }

@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::{LAYOUTS, kinds, list, rightmost};
+use super::{LAYOUTS, kinds, rightmost};
+use crate::answer::list;
 use crate::program::{Bench, near, number};
 use crate::truth;
 
