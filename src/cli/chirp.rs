@@ -161,7 +161,7 @@ fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
     ))
 }
 
-/// What the run will do, printed before it starts.
+/// The plan of the run, printed before it starts.
 fn plan_text(config: &Config, expected: &Extremes) -> String {
     let excitation = config.chosen_excitation().describe();
     let travel_um = expected.travel_m * 1e6;

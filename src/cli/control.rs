@@ -72,7 +72,7 @@ fn predicted(config: &Config, closed_loop: &ClosedLoop) -> Result<Predicted, Cli
     Ok(Predicted { margins, step })
 }
 
-/// What the run shows: tracking, or responses of a swept reference.
+/// The result of a run: tracking, or responses of a swept reference.
 fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, CliError> {
     let summary = RunSummary::of(run)?;
     let is_swept = plan.config.control.reference.is_swept();

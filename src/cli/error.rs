@@ -192,7 +192,7 @@ impl ErrorReport {
         ErrorReport::new(error.to_string(), error.kind(), error.place())
     }
 
-    /// Of a command line that cannot be parsed.
+    /// The report of a command line that cannot be parsed.
     pub(super) fn of_usage(error: &clap::Error) -> ErrorReport {
         let message = error.to_string();
         let argument = error.get(ContextKind::InvalidArg);

@@ -37,7 +37,7 @@ pub struct Biquad {
 pub struct BiquadState([f64; 2]);
 
 impl Biquad {
-    /// From coefficients by rising power of z^-1; all are divided by the first one of the denominator.
+    /// A section from coefficients by rising power of z^-1; all are divided by the first one of the denominator.
     pub fn new(numerator: [f64; 3], denominator: [f64; 3]) -> Self {
         let [a0, a1, a2] = denominator;
         Biquad {

@@ -72,7 +72,7 @@ pub struct SectionController {
 }
 
 impl SectionController {
-    /// At rest.
+    /// The control law at rest.
     pub fn new(controller: Controller) -> SectionController {
         let state = controller.at_rest();
         SectionController { controller, state }

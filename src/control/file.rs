@@ -93,10 +93,10 @@ pub enum SectionSettings {
     },
     /// Any section of second order or less, by falling powers of s.
     Coefficients {
-        /// Of the numerator: one to three numbers.
+        /// Coefficients of the numerator: one to three numbers.
         #[schemars(length(min = 1, max = 3))]
         numerator: Vec<f64>,
-        /// Of the denominator: one to three numbers.
+        /// Coefficients of the denominator: one to three numbers.
         #[schemars(length(min = 1, max = 3))]
         denominator: Vec<f64>,
         /// Frequency in rad/s at which the discrete section has exactly the continuous response.
@@ -287,7 +287,7 @@ fn pair(w: f64, zeta: f64) -> [f64; 3] {
     [w * w, 2.0 * zeta * w, 1.0]
 }
 
-/// From coefficients by falling powers to coefficients by rising powers.
+/// Converts coefficients by falling powers to coefficients by rising powers.
 fn rising(falling: &[f64]) -> [f64; 3] {
     let mut rising = [0.0; 3];
     for (slot, c) in rising.iter_mut().zip(falling.iter().rev()) {

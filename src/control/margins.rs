@@ -132,7 +132,7 @@ impl Tabulated<'_> {
         Some(self.bisect(rising, &refined))
     }
 
-    /// Where a function of L changes its sign between the points `i` and `i + 1` of the grid.
+    /// The frequency at which a function of L changes its sign between the points `i` and `i + 1` of the grid.
     fn bisect(&self, i: usize, of: &dyn Fn(Complex<f64>) -> f64) -> f64 {
         let (low, high) = (self.grid_rad_s[i], self.grid_rad_s[i + 1]);
         bisect(&|w| of((self.response)(w)), low, high)
@@ -184,7 +184,7 @@ fn sign_changes(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
         .map(|(i, _)| i)
 }
 
-/// Where `f` changes its sign between `low` and `high`, to the last bits.
+/// The argument at which `f` changes its sign between `low` and `high`, to the last bits.
 fn bisect(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let start = f(low) > 0.0;
     for _ in 0..60 {

@@ -19,7 +19,7 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
-    /// From A row by row, B and C.
+    /// A system from A row by row, B and C.
     fn new(a: &[f64], b: &[f64], c: &[f64], d: f64) -> Self {
         let n = b.len();
         StateSpace {

@@ -20,7 +20,7 @@ pub struct InterfaceFacts {
     pub bit_rate: u32,
     /// Whether the kernel supports CAN.
     pub kernel: Result<(), KernelError>,
-    /// What the name refers to.
+    /// The object that the name refers to.
     pub link: Link,
     /// The CAN interfaces of this machine.
     pub others: Vec<String>,
@@ -28,7 +28,7 @@ pub struct InterfaceFacts {
     pub queue_length: Option<u32>,
 }
 
-/// What an interface name refers to.
+/// The object that an interface name refers to.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Link {
     /// Nothing.

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::can_interface::CHECK_BUS;
 use super::finding::{Finding, Subject};
 
-/// What was received.
+/// The received traffic.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BusTraffic {
     /// Duration in seconds.

@@ -15,7 +15,7 @@ const DRIVE_PROFILE: u32 = 402;
 /// Half the resolution of 0x6075 and 0x6072. The driver refuses larger differences.
 const TOLERANCE: f64 = 0.5e-3;
 
-/// What the drive reports about itself; `null` for objects that it does not have.
+/// Properties that the drive reports; `null` for objects that it does not have.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DriveFigures {
     /// Name.

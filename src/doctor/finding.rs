@@ -1,4 +1,4 @@
-//! What was examined, what was found, and how severe it is.
+//! Findings: the examined subject, the observation, and the severity.
 
 use std::fmt::Display;
 
@@ -33,7 +33,7 @@ impl Severity {
 /// Defines the subjects, each with its name in the text output and in JSON.
 macro_rules! subjects {
     ($($(#[$doc:meta])* $variant:ident = $name:literal,)+) => {
-        /// What was examined.
+        /// The examined subject.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
         #[serde(into = "&'static str")]
         #[allow(missing_docs, reason = "the names of the variants are self-explanatory")]
@@ -119,14 +119,14 @@ impl Subject {
 /// A fact and its severity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was examined.
+    /// The examined subject.
     pub subject: Subject,
-    /// What was found, with its figures.
+    /// The observation, with its figures.
     pub what: String,
     /// How severe it is.
     #[serde(rename = "verdict")]
     pub severity: Severity,
-    /// What to do about it.
+    /// The remedy.
     pub remedy: Option<String>,
 }
 

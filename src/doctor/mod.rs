@@ -11,9 +11,9 @@
 //!                 configuration
 //! ```
 //!
-//! In each file one function gathers facts and another one judges them, so that the judgement can be tested with facts of any
-//! machine. A drive is read by SDO uploads only: no NMT command, controlword or set-point is sent. A probe is polled as
-//! in a run.
+//! In each file one function gathers facts and another one evaluates them, so that the evaluation can be tested with
+//! facts of any machine. A drive is read by SDO uploads only: no NMT command, controlword or set-point is sent. A
+//! probe is polled as in a run.
 //!
 //! A *failure* makes the run refuse to start, or trip at once. A *warning* impairs it.
 

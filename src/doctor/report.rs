@@ -32,9 +32,9 @@ pub struct Figures {
     pub lateness: Option<Lateness>,
     /// The bus load by the configuration.
     pub bus_load: Option<BusLoad>,
-    /// What was received on the bus.
+    /// The traffic received on the bus.
     pub bus: Option<BusFigures>,
-    /// What the drive reports about itself.
+    /// Properties that the drive reports.
     pub drive: Option<DriveFigures>,
     /// The readings of the probe.
     pub probe: Option<Readings>,

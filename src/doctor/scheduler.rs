@@ -10,10 +10,10 @@ use super::trial::Trial;
 use crate::config::LoopSettings;
 use crate::rt::thread::{Pace, Scheduling};
 
-/// What was requested, what was granted, and the limits behind it.
+/// The requested and the granted scheduling, and the limits that apply.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SchedulerFacts {
-    /// What the thread of the trial was granted.
+    /// The scheduling that the thread of the trial was granted.
     pub scheduling: Scheduling,
     /// The requested priority.
     pub priority: i32,
@@ -61,7 +61,7 @@ pub fn findings(facts: &SchedulerFacts, pace: Pace) -> Vec<Finding> {
     findings.map(|finding| finding.at_most(limit)).collect()
 }
 
-/// At virtual pace the loop does not wait for the clock, so its timing cannot suffer.
+/// At virtual pace the loop does not wait for the clock, so its timing is not affected.
 pub(super) fn severity_limit(pace: Pace) -> Severity {
     match pace {
         Pace::Virtual => Severity::Note,
@@ -116,7 +116,7 @@ fn yes_or_no(value: bool) -> &'static str {
     if value { "yes" } else { "no" }
 }
 
-/// What the system refused, and the remedy.
+/// The refusal of the system, and the remedy.
 fn refusal(scheduling: &Scheduling, request: &str) -> (String, String) {
     let refused = scheduling.refused.iter();
     let text = refused.into_iter().find(|text| text.starts_with(request));

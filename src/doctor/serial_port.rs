@@ -227,7 +227,7 @@ fn process_name(pid: &u32) -> String {
     }
 }
 
-/// Which line settings an open port accepted.
+/// Findings on the line settings that an open port accepted.
 pub fn opened(facts: &PortFacts, line: &PortSettings, notes: &[Note]) -> Vec<Finding> {
     let parity = match line.parity {
         Parity::None => "no",

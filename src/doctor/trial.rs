@@ -17,7 +17,7 @@ const DURATION: Duration = Duration::from_secs(1);
 /// The scheduling of the thread, and how late it woke up.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
-    /// What the system granted.
+    /// The scheduling that the system granted.
     pub scheduling: Scheduling,
     /// How late the thread woke up.
     pub lateness: Lateness,

@@ -267,13 +267,13 @@ mod tests {
             (ExcitationKind::Prbs, "prbs.amplitude_a"),
         ] {
             assert!(checked(&with(kind, 0.01)).is_ok(), "{kind:?}");
-            // By the motor's peak current, or by the travel.
+            // The limit is the motor's peak current, or the travel.
             for current_a in [12.0, 3.0] {
                 let error = checked(&with(kind, current_a)).unwrap_err().to_string();
                 assert!(error.contains(setting), "{kind:?}: {error}");
             }
         }
-        // From +a to -a within a tick of 0.2 ms: 22,000 A/s at 2.2 A, of 20,000.
+        // A step from +a to -a within a tick of 0.2 ms has 22,000 A/s at 2.2 A; the limit is 20,000.
         let slow = |config: &mut Config| {
             with(ExcitationKind::Prbs, 2.2)(config);
             config.interlock.soft_limit_m = 1.0;

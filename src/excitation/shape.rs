@@ -97,7 +97,7 @@ fn simplified(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept.iter().map(|(f, a)| (*f, a - above)).collect()
 }
 
-/// By how much the lines through `kept` lie above each point of the curve.
+/// Distances by which the lines through `kept` lie above each point of the curve.
 fn deviations(curve: &[(f64, f64)], kept: &[(f64, f64)]) -> impl Iterator<Item = f64> {
     curve.iter().map(|(f, a)| {
         let after = kept

@@ -21,7 +21,7 @@ const END_RATIO: f64 = 1.1;
 /// Frequency in hertz and |G| in metres per ampere, by rising frequency.
 type Gain = Vec<(f64, f64)>;
 
-/// Where the response of the stage is taken from. Its text is `model` or the path of a CSV file.
+/// The source of the response of the stage. Its text is `model` or the path of a CSV file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ResponseSource {
     /// The model of the plant.

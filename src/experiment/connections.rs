@@ -13,7 +13,7 @@ use crate::rt::servo::{Connections, Progress, Request};
 pub(super) struct OutsideEnds {
     /// Requests to the loop.
     pub(super) requests: Producer<Request>,
-    /// What the loop publishes.
+    /// The messages of the loop.
     pub(super) records: Consumer<LoopMessage>,
     /// Programs that ended, to be freed.
     pub(super) retired: Consumer<Box<dyn Program>>,

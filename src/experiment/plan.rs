@@ -55,7 +55,7 @@ impl RunKind {
 /// Everything that determines the commands of a run, except the readings of the probe.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What kind of run it is.
+    /// Kind of the run.
     pub kind: RunKind,
     /// The settings.
     pub config: Config,

@@ -190,7 +190,7 @@ fn is_amplifier_trip(event: &Event) -> bool {
     matches!(event.kind, EventKind::Trip(Trip::Amplifier { .. }))
 }
 
-/// What the loop decided in a tick, bit for bit.
+/// The decisions of the loop in a tick, bit for bit.
 fn decision(record: &TickRecord) -> ([u64; 3], State, u32) {
     let values = [record.command_a, record.requested_a, record.reference_m];
     (values.map(f64::to_bits), record.state, record.flags)

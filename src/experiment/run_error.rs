@@ -30,7 +30,7 @@ pub enum RunError {
     /// The operating system refused a thread or the supervisor, or a thread panicked.
     #[error("cannot {what}: {why}")]
     System {
-        /// What was to be done.
+        /// The action that failed.
         what: &'static str,
         /// The error of the operating system, or the cause.
         why: String,

@@ -10,7 +10,7 @@ pub const PHASE_SIGMA_LIMIT_RAD: f64 = PI / 1.732_050_807_568_877_2;
 /// Unit of the magnitude of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// From current to displacement.
+    /// Metres per ampere: from current to displacement.
     MetresPerAmpere,
     /// A ratio, or the units of the columns of an external record.
     Bare,

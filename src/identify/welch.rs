@@ -30,9 +30,9 @@ const HANN_BANDWIDTH_BINS: f64 = 1.5;
 pub struct PowerSpectra {
     /// Frequencies in hertz.
     pub frequency_hz: Vec<f64>,
-    /// Of the input in A^2/Hz.
+    /// Power spectral density of the input in A^2/Hz.
     pub input: Vec<f64>,
-    /// Of the output in m^2/Hz.
+    /// Power spectral density of the output in m^2/Hz.
     pub output: Vec<f64>,
     /// Cross spectral density conj(U) Y in A m/Hz.
     pub cross: Vec<Complex<f64>>,

@@ -1,4 +1,4 @@
-//! What can be computed without a bench.
+//! Computations on the model of the mechanics, without a bench.
 //!
 //! ```text
 //!  settings -> plant (structure, modes, sampled responses) -> zeros (kinds, loci, maps) -> veering -> study (tolerances)

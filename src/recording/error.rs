@@ -19,7 +19,7 @@ pub enum RecordingError {
     File {
         /// The file.
         path: PathBuf,
-        /// What was to be done.
+        /// The action that failed.
         action: &'static str,
         /// The error of the operating system.
         source: io::Error,

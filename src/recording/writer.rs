@@ -27,8 +27,8 @@ const CHUNK_NS: u64 = 500_000_000;
 /// A chunk is also closed at this size, so that its size is limited at any rate and with any number of events.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// What is known about a run before its first tick. It is written before [`Recorder::create`] returns, so that even a recording
-/// that is cut off later contains it.
+/// Properties of a run that are known before its first tick. They are written before [`Recorder::create`] returns, so
+/// that even a recording that is cut off later contains them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Header {
     /// The whole effective configuration.

@@ -17,7 +17,7 @@ pub struct OrderedMode {
     pub damping_ratio: f64,
 }
 
-/// What of a mode was present at the order before; more is greater.
+/// The properties of a mode that were present at the order before; more properties are greater.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Persistence {
     New,

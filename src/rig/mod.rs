@@ -1,5 +1,5 @@
-//! What the loop drives: a simulated stage, real devices, either of them corrected by a calibration, and emulated devices
-//! for a rehearsal without hardware.
+//! Rigs: a simulated stage or real devices, optionally corrected by a calibration; and emulated devices for a
+//! rehearsal without hardware.
 
 pub mod calibration;
 pub mod devices;

@@ -17,7 +17,7 @@ pub struct TickTiming {
     pub missed: u32,
 }
 
-/// Where ticks come from.
+/// The source of ticks.
 pub trait Clock {
     /// Waits for the tick `number`. If that is late by more than a period, it returns at once with the latest tick due and
     /// the number of missed ticks.

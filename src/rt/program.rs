@@ -1,4 +1,4 @@
-//! What the loop runs: an excitation, or a control law with a reference.
+//! Programs of the loop: an excitation, or a control law with a reference.
 //!
 //! A program is made before the run and passed to the loop as a whole. Its decisions depend on the tick of its run and
 //! the signals of [`ProgramInput`] alone, so that a recording can be replayed.
@@ -6,7 +6,7 @@
 use crate::control::{ControlLaw, LawInput};
 use crate::excitation::{Excitation, Reference};
 
-/// What a program may use in a tick.
+/// Input of a program in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProgramInput {
     /// Tick of the run, counted from 0.
@@ -17,7 +17,7 @@ pub struct ProgramInput {
     pub applied_a: f64,
 }
 
-/// What a program decides in a tick.
+/// Output of a program in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Decision {
     /// Reference in metres, 0 where there is none.

@@ -60,7 +60,7 @@ pub mod flag {
 pub struct Event {
     /// The tick at which it took effect.
     pub tick: u64,
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
 }
 
@@ -103,7 +103,7 @@ pub enum RequestKind {
     Clear,
 }
 
-/// What goes through the ring from the loop to the recorder.
+/// A message from the loop to the recorder, through the ring.
 #[derive(Clone, Copy, Debug)]
 pub enum LoopMessage {
     /// The signals of a tick.

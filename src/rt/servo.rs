@@ -71,7 +71,7 @@ pub struct Connections {
     pub requests: Consumer<Request>,
     /// Programs that ended, to be freed outside the loop.
     pub retired: Producer<Box<dyn Program>>,
-    /// To the recorder.
+    /// Publishes records and events to the recorder.
     pub publisher: Publisher,
     /// Progress for other threads.
     pub progress: Arc<Progress>,
@@ -94,7 +94,8 @@ impl Servo {
         }
     }
 
-    /// One tick. It does not allocate, lock or print; its only system calls are those of the clock and of the devices.
+    /// Executes one tick. It does not allocate, lock or print; its only system calls are those of the clock and of
+    /// the devices.
     ///
     /// A tick that takes [`Request::Arm`] or [`Request::Clear`] calls `enable` or `reset_fault`. These may block; the current
     /// is zero meanwhile, and the caller restarts the schedule afterwards (see [`Servo::took_slow_request`]).

@@ -42,7 +42,7 @@ pub struct Scheduling {
     pub memory_locked: bool,
     /// The processor it is bound to.
     pub cpu: Option<usize>,
-    /// What was refused, with the remedy.
+    /// The refused requests, with the remedy.
     pub refused: Vec<String>,
 }
 

@@ -82,7 +82,7 @@ impl Progress {
 /// The progress of a task at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Snapshot {
-    /// What is being done.
+    /// Name of the stage.
     pub stage: &'static str,
     /// Finished steps of the stage.
     pub done: u64,

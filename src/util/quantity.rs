@@ -426,7 +426,7 @@ impl Quantity {
 pub struct OperatingPoint(Quantity);
 
 impl OperatingPoint {
-    /// In metres, on a plant with beams of this length.
+    /// The operating point in metres, on a plant with beams of this length.
     ///
     /// # Errors
     /// If it is a percentage and the plant has no beams.

@@ -13,7 +13,7 @@ pub(crate) fn set_fifo(priority: i32) -> nix::Result<()> {
     nix::errno::Errno::result(result).map(drop)
 }
 
-/// What a thread that serves a device does first: it takes the priority directly below that of the loop.
+/// Setup of a thread that serves a device: it takes the priority directly below that of the loop.
 ///
 /// A refusal is ignored here, because the loop's own thread reports the same refusal.
 pub(crate) fn device_thread_setup(loop_priority: i32) -> impl Fn() + Send + Sync + Clone + use<> {

@@ -289,7 +289,7 @@ impl Decoder for Capancdt {
     }
 }
 
-/// What the bytes at the front of the window may be.
+/// A possible meaning of the bytes at the front of the window.
 enum Candidate {
     Incomplete,
     None,

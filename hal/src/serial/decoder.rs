@@ -10,8 +10,8 @@ pub struct Sample {
     pub position_m: f64,
 }
 
-/// What a decoder found in the bytes. The events have the order of the bytes and do not depend on how the bytes were
-/// divided into slices.
+/// An event that a decoder found in the bytes. The events have the order of the bytes and do not depend on how the
+/// bytes were divided into slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A measurement within the measuring range.

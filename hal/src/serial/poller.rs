@@ -34,7 +34,7 @@ struct Times {
     quiet_ns: u64,
 }
 
-/// What the reader thread has to do after it has read all bytes.
+/// The action that the reader thread has to execute after it has read all bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Action {
     /// Call [`Poller::sent`] and send the request.

@@ -33,7 +33,7 @@ pub(super) struct Args {
 struct Report {
     alpha: f64,
     peak: Option<f64>,
-    /// Of the plant without damping.
+    /// Bounds by the zeros of the plant without damping.
     zeros: Vec<Bound>,
     damped_zeros: Vec<Bound>,
 }

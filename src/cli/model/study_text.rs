@@ -39,7 +39,7 @@ fn tolerance(one: &Varied) -> Vec<String> {
     ]
 }
 
-/// To six digits.
+/// Rounds to six digits.
 fn rounded(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }

@@ -4,7 +4,7 @@ use crate::excitation::sweep::ChirpSettings;
 use crate::excitation::waveform::{Reference, ticks};
 use crate::util::finding::Finding;
 
-/// What a reference needs in addition to its own settings.
+/// The properties of a run that a reference needs in addition to its own settings.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceContext<'a> {
     /// The sweep that one kind follows.

@@ -42,7 +42,7 @@ pub fn settings(mut config: Config) -> Config {
     config
 }
 
-/// What the runs of a calibration would do, by the model of the whole rig.
+/// The predicted extremes of the runs of a calibration, by the model of the whole rig.
 #[derive(Clone, Copy, Debug)]
 pub struct CalibrationPlan {
     /// Extremes of the static steps.

@@ -21,7 +21,7 @@ use crate::config::Config;
 /// A question to the operator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
-    /// What to do, or what is wrong.
+    /// The instruction, or the error.
     pub text: String,
     /// Whether a displacement in Y may be entered.
     pub may_read: bool,
@@ -58,7 +58,7 @@ pub trait LoadedRig {
     fn rest_position(&mut self) -> Result<Option<RestPosition>, CampaignError>;
     /// Makes a chirp at a point; `None` if the run was stopped.
     fn measure(&mut self, point: GridPoint) -> Result<Option<PointResult>, CampaignError>;
-    /// Keeps the result of a point.
+    /// Stores the result of a point.
     fn keep(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError>;
 }
 

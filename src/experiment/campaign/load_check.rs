@@ -181,7 +181,7 @@ fn more_asymmetric(stage: &Sr4dofSettings, by: f64) -> Sr4dofSettings {
 struct ExpectedModes {
     loaded: Vec<Mode>,
     unloaded: Vec<Mode>,
-    /// With less and with more asymmetry than the load gives.
+    /// The modes with less and with more asymmetry than the load gives.
     more_asymmetric: [Vec<Mode>; 2],
     tolerance: f64,
 }

@@ -22,9 +22,9 @@ use super::region::Region;
 /// How exactly the operator can set asymmetry and operating point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tolerances {
-    /// Of the asymmetry, a ratio.
+    /// Tolerance of the asymmetry, a ratio.
     pub asymmetry: f64,
-    /// Of the operating point, a ratio of L.
+    /// Tolerance of the operating point, a ratio of L.
     pub operating_point: f64,
 }
 

@@ -46,7 +46,7 @@ impl Cause {
         }
     }
 
-    /// What reduces the loss.
+    /// The remedy that reduces the loss.
     fn remedy(self) -> &'static str {
         match self {
             Cause::Nonlinearity => {
@@ -110,7 +110,7 @@ pub struct Linearity {
     pub odd_lines_left_out: usize,
     /// Number of even lines.
     pub even_lines: usize,
-    /// By octaves, combined until each has 16 excited lines.
+    /// The same for bands of one octave, combined until each has 16 excited lines.
     pub bands: Vec<BandLinearity>,
     /// Line by line.
     #[serde(skip)]

@@ -98,7 +98,7 @@ impl Verdict {
     }
 }
 
-/// What a verdict is based on.
+/// Input of a verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictInput<'a> {
     /// The fitted modes.

@@ -161,7 +161,7 @@ fn rates(mode: &Mode, lag_rad_s: f64, force_constant_n_per_a: f64) -> Matrix5<f6
 }
 
 impl DiscreteMode {
-    /// From exp(F T).
+    /// The mode from exp(F T).
     fn new(mode: &Mode, over: &Matrix5<f64>) -> DiscreteMode {
         let column = |j: usize| [over[(0, j)], over[(1, j)]];
         DiscreteMode {

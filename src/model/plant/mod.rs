@@ -205,7 +205,7 @@ pub fn build(settings: &PlantSettings) -> Result<Structure, PlantError> {
     })
 }
 
-/// The same with C = 0, whatever the damping of the settings.
+/// The structure with C = 0, independently of the damping in the settings.
 pub fn undamped(settings: &PlantSettings) -> Structure {
     settings.as_model().undamped()
 }

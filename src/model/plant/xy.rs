@@ -108,7 +108,7 @@ pub struct SecondaryMassDeviation {
     pub gB: f64,
 }
 
-/// Where the secondary stages gT and gB sit in X beside their anchors.
+/// Side on which the secondary stages gT and gB are in X, relative to their anchors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum XyLayout {
@@ -337,7 +337,7 @@ impl Stages {
             .collect()
     }
 
-    /// Those of the four parallelograms of one side: 0 left, 1 right, 2 top, 3 bottom.
+    /// The elongations of the four parallelograms of one side: 0 left, 1 right, 2 top, 3 bottom.
     fn module_elongations(&self, place: usize) -> [Coordinate; 4] {
         let (inner, outer) = (&self.inner[place], &self.outer[place]);
         let (motion, intermediate) = (&self.motion, &self.intermediate[place]);

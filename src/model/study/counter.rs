@@ -8,9 +8,9 @@ use crate::model::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
 /// CNMP pairs of one draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Count {
-    /// Of the zeros without damping.
+    /// CNMP pairs of the zeros without damping.
     pub pairs: u32,
-    /// Of those with damping, if they are counted.
+    /// CNMP pairs of the zeros with damping, if they are counted.
     pub damped_pairs: Option<u32>,
 }
 

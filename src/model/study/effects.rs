@@ -17,13 +17,14 @@
 //! ```
 //!
 //! The term in `noise` removes the difference of C means of few draws by chance (Kelley's epsilon squared, Proc. Natl. Acad. Sci.
-//! 21, 554, 1935): without an effect S is 0 on average, with a standard deviation of sqrt(2 (C - 1))/N. Within a class the
-//! effect is averaged, so that S is a lower bound: a straight line loses 1/C^2 of its share; a step within a class up to 1/C of the
-//! variance, and so does a border between pairs and none that runs through C of an interaction's C x C classes.
+//! 21, 554, 1935): without an effect S is 0 on average, with a standard deviation of sqrt(2 (C - 1))/N. Within a
+//! class the effect is averaged, so that S is a lower bound. A linear effect loses 1/C^2 of its share. A step within
+//! a class loses up to 1/C of the variance; so does a border between draws with and without pairs that crosses C of
+//! the C x C classes of an interaction.
 
 /// Classes of one setting: a multiple of two and of three.
 const CLASSES: usize = 18;
-/// Classes of each setting of an interaction, even numbers: as many as leave this many draws in each.
+/// Number of classes of each setting of an interaction: even, and as large as this number of draws per class allows.
 const PAIR_CLASSES: std::ops::RangeInclusive<usize> = 4..=32;
 const DRAWS_IN_PAIR_CLASS: f64 = 50.0;
 /// With fewer draws than this in a class there is no estimate.

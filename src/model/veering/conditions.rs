@@ -2,21 +2,21 @@
 //!
 //! | condition | quantity | holds | margin |
 //! |---|---|---|---|
-//! | C4-1 | aR, au, av in a pattern of alternating signs | all three have the signs + - + or - + - | of the better of the two patterns, the worst fitting residue over the largest of the three: above 0 the least residue that would have to change its sign, below 0 the residue with the wrong sign |
+//! | C4-1 | aR, au, av in a pattern of alternating signs | all three have the signs + - + or - + - | for the better fitting of the two patterns, the ratio of the worst fitting residue to the largest of the three. Above 0: of the smallest residue that would have to change its sign; below 0: of the residue with the wrong sign |
 //! | C4-2 | b2-hat in the direction of av, Eqs. (4-11), (4-12) | between the sizes of b21-hat and b22-hat | distance to the nearer of the two over the larger: it fails at -1 where wv^2 - wu^2 is twice too large |
-//! | C4-3 | size of b2-hat over that of b22-hat where the modes are closest | below 1, and they veer or cross in the range | 1 less that |
+//! | C4-3 | size of b2-hat over that of b22-hat where the modes are closest | below 1, and they veer or cross in the range | 1 minus this ratio |
 //! | C4-4 | b2-hat in the direction of av, Eqs. (4-13), (4-14) | above the size of b21-hat | distance over the size of b22-hat |
 //! | C4-4y | pairs of MMP zeros between wu and wv | two | the least distance among the two zeros and the two modes, over wv - wu |
 //!
-//! Where au av >= 0, b21-hat and b22-hat do not exist. The margin of C4-2 and C4-4 is then minus the smaller residue of the
-//! two over the larger: the residue that would have to change its sign.
+//! Where au av >= 0, b21-hat and b22-hat do not exist. The margin of C4-2 and C4-4 is then minus the ratio of the
+//! smaller of the residues au and av to the larger: the smaller one would have to change its sign.
 //!
 //! Interpretation where the thesis leaves room:
 //!
 //! * *C4-2 implies C4-1.* With au av < 0 both critical residues of Eq. (4-5) have the sign of av, and so has any aR between
 //!   them. Both are stated nevertheless: C4-1 names the wrong sign.
 //! * *"Sufficiently close" in C4-3* is |b2-hat| < |b22-hat| where the modes are closest: with finite residues b2-hat goes
-//!   to 0 with wv - wu (Eq. 4-9), and this is how near to 0 it has to come for the proof of Proposition P4-2. Mode crossing is the
+//!   to 0 with wv - wu (Eq. 4-9), and this is the limit that the proof of Proposition P4-2 requires. Mode crossing is the
 //!   case of a gap 0. b22-hat is computed from the residues' sizes, so that C4-3 is a statement on the gap for any signs.
 //! * *C4-4y* refers to the plant's own zeros, with all its modes, as a measurement shows them.
 

@@ -181,7 +181,7 @@ pub struct Placements<'a> {
 /// Outcome of all placements.
 #[derive(Default)]
 struct PlacementTrials {
-    /// Those with a response, best first.
+    /// The placements with a response, best first.
     placements: Vec<Placement>,
     without_response: usize,
     /// Number of placements whose zeros do not converge: nearly all zeros are at infinity, as for a force in Y and a

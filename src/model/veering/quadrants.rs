@@ -182,11 +182,11 @@ pub struct QuadrantSummary {
     pub turn_deg: f64,
     /// Components of the actuator along phi_u and phi_v, as ratios of its length.
     pub actuator: [f64; 2],
-    /// Those of the probe.
+    /// Components of the probe, likewise.
     pub sensor: [f64; 2],
-    /// 1 to 4; `null` on the line between two.
+    /// Quadrant of the actuator, 1 to 4; `null` on the line between two.
     pub actuator_quadrant: Option<usize>,
-    /// That of the probe.
+    /// Quadrant of the probe, likewise.
     pub sensor_quadrant: Option<usize>,
     /// The quadrant in which the probe would make the signs alternate.
     pub avoid_quadrant: Option<usize>,

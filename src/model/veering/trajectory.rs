@@ -45,7 +45,7 @@ impl ZeroConfiguration {
         }
     }
 
-    /// Of the zeros of two modes; `None` where the modes cross.
+    /// The configuration of the zeros of two modes; `None` where the modes cross.
     fn of(modes: Option<&CloseModes>, zeros: &[Zero]) -> ZeroConfiguration {
         let [wu, wv] = modes.map_or([0.0; 2], |modes| [modes.u.omega_rad_s, modes.v.omega_rad_s]);
         let is_between =
@@ -137,7 +137,8 @@ fn own_zeros(terms: &[ModalTerm], pair: [usize; 2], zeros: &[Zero]) -> Vec<Zero>
 pub struct Trajectory {
     /// The behaviour of the loci where they are closest.
     pub meeting: Meeting,
-    /// In the order of the range: those of the loci's path, and further ones between that resolve the ends of quartets.
+    /// Samples in the order of the range: those of the path of the loci, and further ones between them that resolve
+    /// the ends of quartets.
     pub samples: Vec<Sample>,
     /// Index of the sample where the modes are closest.
     pub closest: usize,

@@ -216,7 +216,7 @@ impl Pencil {
     }
 }
 
-/// Of d + c u + b u^2 + a u^3: below zero for one real and two complex roots.
+/// Discriminant of d + c u + b u^2 + a u^3: below zero for one real and two complex roots.
 fn discriminant([d, c, b, a]: [Bounded; 4]) -> Bounded {
     let times = |factor: f64, x: Bounded| Bounded::of(factor) * x;
     let (bb, cc, ad) = (b * b, c * c, a * d);

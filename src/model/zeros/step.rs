@@ -56,11 +56,12 @@ impl StepFeatures {
 /// Prediction of the features from the number of zeros in the right half plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct StepPrediction {
-    /// An odd number of RNMP zeros.
+    /// Whether initial undershoot is predicted: the number of RNMP zeros is odd.
     pub initial_undershoot: bool,
-    /// One for each RNMP zero.
+    /// Smallest number of zero crossings: one for each RNMP zero.
     pub least_zero_crossings: usize,
-    /// One for each zero in the right half plane: true of the thesis's examples, not in general.
+    /// Number of zero crossings in the examples of the thesis: one for each zero in the right half plane. Not true in
+    /// general.
     pub usual_zero_crossings: usize,
     /// Whether the features have the predicted undershoot and at least the predicted number of crossings.
     pub agrees: bool,

@@ -91,7 +91,7 @@ fn cell_sample((_, colour): &(String, Colour)) -> Sample {
     Sample::Area(*colour, 1.0)
 }
 
-/// Where entries of these widths begin: side by side, in a new row where the right edge is reached.
+/// Start positions of entries of these widths: side by side, in a new row where the right edge is reached.
 fn flow(widths: impl Iterator<Item = f64>, (left, right): (f64, f64), top: f64) -> Vec<(f64, f64)> {
     let (mut x, mut y) = (left, top);
     let mut places = Vec::new();

@@ -1,4 +1,4 @@
-//! What is drawn in a chart.
+//! The marks of a chart.
 
 use super::colours::Colour;
 

@@ -17,7 +17,7 @@ pub(super) struct Sample {
     pub starts: bool,
 }
 
-/// What is drawn of a pixel column.
+/// The drawn part of a pixel column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
     points: Points,

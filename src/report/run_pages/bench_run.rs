@@ -92,7 +92,7 @@ impl<'a> BenchRun<'a> {
         })
     }
 
-    /// What is shown, excitation and time, in two lines.
+    /// The content of a plot, the excitation and the time, in two lines.
     fn subtitle(&self, shown: &str) -> String {
         let (excitation, rate_hz) = (&self.excitation, self.rate_hz);
         format!(

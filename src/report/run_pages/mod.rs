@@ -26,7 +26,7 @@ pub use outputs::{
 pub use page::page;
 pub use plots::{Plot, PlotKind, plots};
 
-/// What a report shows of an analysed record.
+/// The content of a report on an analysed record.
 #[derive(Clone, Debug)]
 pub struct RecordReport<'a> {
     /// Title of the page and of the plots.

@@ -170,7 +170,7 @@ pub struct LoopOutputs {
     pub modulus_margin: f64,
     /// Its standard deviation.
     pub modulus_margin_sigma: f64,
-    /// That of the model.
+    /// The modulus margin of the model.
     pub predicted_modulus_margin: f64,
 }
 

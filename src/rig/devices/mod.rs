@@ -73,7 +73,7 @@ pub enum DevicesError {
 
 /// An open rig.
 pub struct OpenRig {
-    /// What the loop drives.
+    /// The rig for the loop.
     pub rig: Box<dyn Rig>,
     /// Identity of the amplifier, as it reports it.
     pub amplifier: String,

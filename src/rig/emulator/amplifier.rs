@@ -27,7 +27,7 @@ pub struct AmplifierServer {
     _claim: Claim,
 }
 
-/// What an amplifier has received and given so far.
+/// Counts of an amplifier since its start.
 #[derive(Debug, Default)]
 pub struct AmplifierCounters {
     /// Frames received.
@@ -148,7 +148,7 @@ impl AmplifierServer {
         self.kind
     }
 
-    /// What it has received and given so far.
+    /// Its counts so far.
     pub fn counters(&self) -> &AmplifierCounters {
         &self.counters
     }

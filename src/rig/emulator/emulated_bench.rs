@@ -13,7 +13,7 @@ use super::stage::seconds;
 use super::{AmplifierServer, EmulatedDevice, EmulatorError, ProbeEndpoint, ProbeServer, Stage};
 use crate::config::{AmplifierDevice, Config};
 
-/// Which devices are emulated, and where.
+/// The devices to emulate, and their interfaces.
 #[derive(Clone, Debug, Default)]
 pub struct EmulatedDevices {
     /// The amplifier, on the configured interface.

@@ -1,4 +1,4 @@
-//! What happens to emulated devices: lines for the operator, and JSON objects for scripts.
+//! The log of emulated devices: lines for the operator, and JSON objects for scripts.
 
 use std::fmt;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -15,7 +15,7 @@ pub struct LogEntry {
     pub time_s: f64,
     /// The device that changed.
     pub device: EmulatedDevice,
-    /// What changed.
+    /// Kind of the change.
     pub what: LogEvent,
     /// The state, the fault or the place.
     pub text: String,
@@ -30,7 +30,7 @@ pub struct LogEntry {
     pub since_s: Option<f64>,
 }
 
-/// What changed.
+/// Kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LogEvent {
@@ -85,7 +85,7 @@ impl fmt::Display for LogEntry {
     }
 }
 
-/// Where devices report their changes; clones write to the same log.
+/// The log to which devices report their changes; clones write to the same log.
 #[derive(Clone, Debug)]
 pub struct EventLog(Sender<LogEntry>);
 

@@ -13,16 +13,16 @@ use crate::util::quantity::Length;
 pub enum EmulatedFault {
     /// All emulated devices work correctly again.
     None,
-    /// Of the amplifier.
+    /// A fault of the amplifier.
     Amplifier(AmplifierFault),
-    /// Of the probe.
+    /// A fault of the probe.
     Probe(Fault),
 }
 
 /// A fault of the amplifier, or of its bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AmplifierFault {
-    /// Of the device.
+    /// A fault of the device.
     Device(DeviceFault),
     /// The CAN controller of the host reports bus-off, and the device neither receives nor sends.
     BusOff,
@@ -44,7 +44,7 @@ pub enum FaultError {
         kind: String,
         /// The value.
         value: String,
-        /// What the kind accepts.
+        /// The values that the kind accepts.
         expected: &'static str,
     },
 }

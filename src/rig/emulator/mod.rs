@@ -71,7 +71,7 @@ pub enum EmulatorError {
         "{device}.device is `simulated`: there is no device to emulate; name real devices, as --config lab does"
     )]
     Simulated {
-        /// Which one.
+        /// The device.
         device: EmulatedDevice,
     },
     /// The model of the stage cannot be analysed.
@@ -127,7 +127,7 @@ pub enum EmulatorError {
         "cannot start the thread of the {device}: {source}; raise the limit of processes (ulimit -u)"
     )]
     Thread {
-        /// Which device.
+        /// The device.
         device: EmulatedDevice,
         /// The error of the system.
         source: std::io::Error,

@@ -20,7 +20,7 @@ pub struct EmulatedDriveSettings {
     pub rated_current_ma: u32,
     /// Maximum torque 0x6072, per mille of rated.
     pub maximum_per_mille: u16,
-    /// What 1000 counts of the target are.
+    /// The current that 1000 counts of the target represent.
     pub reference: Reference,
     /// Supported modes of operation, 0x6502: mode 4 is bit 3, mode 10 is bit 9.
     pub modes: u32,

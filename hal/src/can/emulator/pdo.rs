@@ -16,7 +16,7 @@ pub(super) struct Pdos {
     sent: [SentFrame; 4],
 }
 
-/// What was sent of a transmit PDO.
+/// The last frame that was sent of a transmit PDO.
 #[derive(Clone, Copy, Debug, Default)]
 struct SentFrame {
     /// SYNCs since the last frame.

@@ -88,7 +88,7 @@ fn crossing(low: &Sample, high: &Sample) -> (Crossing, Complex<f64>) {
     }
 }
 
-/// Where the two squares of a quartet become real: zeros of a positive square meet on the real axis.
+/// The place where the two squares of a quartet become real: zeros of a positive square meet on the real axis.
 fn meeting_of_squares(with_quartet: &Sample) -> (Crossing, Complex<f64>) {
     let square = meeting(with_quartet);
     let is_positive = square.re > 0.0;
