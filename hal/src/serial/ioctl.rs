@@ -49,6 +49,17 @@ pub(super) fn request_low_latency(terminal: &impl AsRawFd) -> Result<(), Note> {
     check(unsafe { libc::ioctl(terminal, TIOCSSERIAL, &serial) })
 }
 
+/// Lets reads and writes return at once instead of waiting (O_NONBLOCK): the serial library waits with `poll` before each of
+/// them, but a write of more bytes than fit would block beyond that time.
+pub(super) fn do_not_block(terminal: &impl AsRawFd) -> io::Result<()> {
+    // SAFETY: the descriptor is open as long as `terminal` is borrowed; F_SETFL takes an integer.
+    let result = unsafe { libc::fcntl(terminal.as_raw_fd(), libc::F_SETFL, libc::O_NONBLOCK) };
+    match result {
+        -1 => Err(io::Error::last_os_error()),
+        _ => Ok(()),
+    }
+}
+
 fn check(result: libc::c_int) -> Result<(), Note> {
     if result >= 0 {
         return Ok(());

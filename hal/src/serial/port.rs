@@ -106,6 +106,7 @@ impl Port {
             .map_err(|source| open_error(path, source.into()))?;
         let lock = PortLock::take(&settings.lock_dir, path, &device)?;
         let terminal = open_terminal(settings, &device).map_err(|e| open_error(path, e))?;
+        ioctl::do_not_block(&terminal).map_err(|source| open_error(path, source.into()))?;
         let mut notes = check_line(settings, &terminal, &device)?;
         // The age of bytes that arrived before is unknown.
         terminal
@@ -131,7 +132,7 @@ impl Port {
         }
     }
 
-    /// Writes all `bytes` within `wait` per write.
+    /// Writes all `bytes`; an error if there is no space within `wait`.
     pub(super) fn write(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
         set_timeout(&mut self.terminal, wait)?;
         self.terminal.write_all(bytes)

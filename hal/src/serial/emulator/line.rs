@@ -52,10 +52,12 @@ impl Line {
 
     /// Creates a pseudo terminal with the speed of the line of `settings`. The reader opens its slave, [`path`](Line::path).
     pub fn terminal(settings: PortSettings) -> Result<Line, SerialError> {
-        let (master, slave) = TTYPort::pair().map_err(|source| SerialError::Open {
+        let open_error = |source| SerialError::Open {
             path: "/dev/ptmx".into(),
             source,
-        })?;
+        };
+        let (master, slave) = TTYPort::pair().map_err(open_error)?;
+        ioctl::do_not_block(&master).map_err(|source| open_error(source.into()))?;
         let path = slave.name().unwrap_or_default().into();
         Ok(Line::new(End::Terminal { master, slave }, path, settings))
     }
@@ -151,5 +153,50 @@ impl Line {
             self.next_release_ns = now_ns + RELEASE_PERIOD_NS;
             ioctl::end_exclusive_use(slave);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Transmits bytes on an idle line and delivers them when all have passed it.
+    fn deliver(line: &mut Line, bytes: Vec<u8>) -> io::Result<u64> {
+        let now_ns = line.busy_until_ns;
+        line.transmit(bytes, 0, now_ns);
+        line.deliver(line.busy_until_ns)
+    }
+
+    /// More than the terminal can hold: 4 KiB of its line discipline and 64 KiB of its buffers.
+    const MORE_THAN_FITS: usize = 200_000;
+
+    #[test]
+    fn bytes_beyond_the_space_of_an_unread_terminal_are_lost_without_blocking() {
+        let mut line = Line::terminal(PortSettings::new("", 921_600)).unwrap();
+        for _ in 0..3 {
+            deliver(&mut line, vec![b'x'; MORE_THAN_FITS]).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_reader_of_a_terminal_that_was_full_receives_new_bytes() {
+        let mut line = Line::terminal(PortSettings::new("", 921_600)).unwrap();
+        deliver(&mut line, vec![b'x'; MORE_THAN_FITS]).unwrap();
+        let locks = tempfile::tempdir().unwrap();
+        let port = PortSettings {
+            lock_dir: locks.path().into(),
+            ..PortSettings::new(line.path(), 921_600)
+        };
+        let (mut port, _) = Port::open(&port).unwrap();
+        let mut buffer = [0; 4096];
+        // Each round either receives old bytes or delivers a new one; 200 kB take about 50 rounds.
+        for _ in 0..1000 {
+            let count = port.read(&mut buffer, Duration::from_millis(10)).unwrap();
+            if buffer[..count].contains(&b'n') {
+                return;
+            }
+            deliver(&mut line, vec![b'n']).unwrap();
+        }
+        panic!("no new byte was received");
     }
 }
