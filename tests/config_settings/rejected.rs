@@ -1,0 +1,316 @@
+//! Rejected settings: every command names the place, the value, the limit and the remedy.
+use crate::COMMANDS;
+use crate::program::Bench;
+
+/// Every command refuses the file, with all of the words, and leaves nothing behind.
+fn refused_file(text: &str, words: &[&str]) {
+    for command in COMMANDS {
+        let bench = Bench::new();
+        bench.write("mine.toml", text);
+        bench
+            .run(&format!("{command} --config mine.toml --json"))
+            .is_refused(words);
+        assert_eq!(bench.files(), ["mine.toml"], "bench {command}");
+    }
+}
+
+/// Every command refuses the setting, with all of the words, and leaves nothing behind.
+fn refused_set(set: &str, words: &[&str]) {
+    for command in COMMANDS {
+        let bench = Bench::new();
+        let arguments = command.split(' ').chain(["--set", set, "--json"]);
+        bench
+            .run_with(arguments)
+            .is_refused(&[words, &["--set"]].concat());
+        assert_eq!(bench.files(), [""; 0], "bench {command}");
+    }
+}
+
+#[test]
+fn an_unknown_key_is_refused_with_its_line_and_the_nearest_name() {
+    refused_file(
+        "[plant]\nmass_asymetry = 0.1\n",
+        &[
+            "mine.toml line 2",
+            "`plant.mass_asymetry`",
+            "`mass_asymmetry`",
+        ],
+    );
+    refused_file(
+        "\n[interlok]\nsoft_limit_m = 1e-4\n",
+        &["mine.toml line 2", "`interlok`", "`interlock`"],
+    );
+    refused_set(
+        "plant.mass_asymetry=0.1",
+        &["`plant.mass_asymetry`", "`mass_asymmetry`"],
+    );
+    refused_set(
+        "plant.damping.ratoi=0.1",
+        &["`plant.damping.ratoi`", "nearest is"],
+    );
+}
+
+#[test]
+fn measured_damping_ratios_without_positive_damping_are_refused() {
+    let second = "plant.damping.second.omega_rad_s";
+    // Two ratios at one frequency: the equations of the two Rayleigh coefficients have no solution.
+    refused_set(
+        &format!("{second}=179"),
+        &["plant.damping.second.omega_rad_s", "179 rad/s", "uniform"],
+    );
+    // Negative damping below z1 w1/w2 = 0.009 x 179/520 or above z1 w2/w1 = 0.009 x 520/179.
+    for ratio in ["0.003", "0.03"] {
+        refused_set(
+            &format!("plant.damping.second.ratio={ratio}"),
+            &["179 rad/s", "520 rad/s", ratio, "3.0981e-3", "2.6145e-2"],
+        );
+    }
+    // At nearly equal frequencies, z2 = 0.004 of the profile is not between z1 w1/w2 and z1 w2/w1, both near 0.009.
+    for (omega_rad_s, limit) in [("179.0000001", "9.0000e-3"), ("180", "8.9500e-3")] {
+        let set = format!("{second}={omega_rad_s}");
+        Bench::new()
+            .run_with(["chirp", "--plan", "--json", "--set", &set])
+            .is_refused(&["`plant.damping.second.ratio`", "0.004", omega_rad_s, limit]);
+    }
+}
+
+#[test]
+fn a_wrong_type_is_refused_with_what_is_there_and_what_belongs_there() {
+    refused_file(
+        "[loop]\nrate_hz = true\n",
+        &[
+            "mine.toml line 2",
+            "`loop.rate_hz`",
+            "true",
+            "a number is expected",
+        ],
+    );
+    refused_file(
+        "title = 3\n",
+        &[
+            "mine.toml line 1",
+            "`title`",
+            "is 3",
+            "a string is expected",
+        ],
+    );
+    refused_set(
+        "loop.computing_delay_periods=1.5",
+        &["is 1.5", "an integer is expected"],
+    );
+    refused_set(
+        "chirp.amplitude=3",
+        &["`chirp.amplitude`", "is 3", "an array is expected"],
+    );
+    refused_set(
+        "plant.mass_asymmetry=yes",
+        &["\"yes\"", "a number is expected"],
+    );
+}
+
+#[test]
+fn a_unit_in_a_file_is_refused_with_the_number_in_si_units() {
+    refused_file(
+        "[plant]\noperating_point_m = \"3.8mm\"\n",
+        &["mine.toml line 2", "\"3.8mm\"", "SI units", "write 0.0038"],
+    );
+}
+
+#[test]
+fn rejects_a_unit_that_does_not_belong_to_the_setting() {
+    refused_set(
+        "plant.operating_point_m=4s",
+        &["`4s` is a time in s", "50um"],
+    );
+    refused_set(
+        "interlock.soft_limit_m=4%",
+        &["`4%` is a percentage", "a length"],
+    );
+    refused_set(
+        "loop.rate_hz=5mm",
+        &["`loop.rate_hz`", "`5mm` is a length in m"],
+    );
+}
+
+#[test]
+fn a_value_out_of_range_is_refused_with_the_limits() {
+    refused_file(
+        "[loop]\nrate_hz = 0\n",
+        &["mine.toml line 2", "`loop.rate_hz` is 0", "1 to 100000"],
+    );
+    refused_set(
+        "plant.motion_stage_mass_kg=-1",
+        &["`plant.motion_stage_mass_kg` is -1", "0.000001 to 1000"],
+    );
+    refused_set(
+        "plant.mass_asymmetry=nan",
+        &["`plant.mass_asymmetry` is NaN", "-0.9 to 9"],
+    );
+    refused_set("plant.mass_asymmetry=inf", &["is inf", "-0.9 to 9"]);
+    refused_set("chirp.amplitude=[]", &["has 0 entries", "1 to 64"]);
+}
+
+/// What concerns the excitation alone stands in the way of a chirp and of a full check, and of nothing else.
+fn refused_chirp(set: &str, words: &[&str]) {
+    for command in ["chirp", "config check"] {
+        let bench = Bench::new();
+        bench
+            .run_with(command.split(' ').chain(["--set", set, "--json"]))
+            .is_refused(words);
+        assert_eq!(bench.files(), [""; 0], "bench {command}");
+    }
+    let answer = Bench::new().run_with(["margins", "--set", set]);
+    assert_eq!(answer.code, 0, "margins know no chirp: {}", answer.err);
+}
+
+#[test]
+fn settings_that_contradict_each_other_are_refused_with_both_figures() {
+    refused_chirp(
+        "chirp.stop_hz=2500",
+        &["`chirp.stop_hz`", "2500 Hz", "half the servo rate"],
+    );
+    refused_chirp(
+        "loop.rate_hz=1000",
+        &["`chirp.stop_hz`", "500 Hz", "half the servo rate"],
+    );
+    refused_chirp(
+        "chirp.stop_hz=0.1",
+        &["`chirp.stop_hz` is 0.1 Hz", "starts at 0.1 Hz"],
+    );
+    refused_set(
+        "interlock.soft_limit_m=0.001",
+        &["`interlock.soft_limit_m`", "0.001 m", "inside the stop"],
+    );
+    refused_file(
+        "[interlock]\nsoft_limit_m = 0.0009\n[probe]\nrange_m = 0.0017\n",
+        &[
+            "mine.toml line 2: `interlock.soft_limit_m`",
+            "0.00085 m",
+            "0.0009 m",
+            "probe.range_m",
+        ],
+    );
+    refused_set("motor.continuous_force_n=112", &["112 N", "111 N"]);
+    refused_chirp(
+        "chirp.duration_s=5.4",
+        &["`chirp.duration_s`", "5.4 s", "5.5 s"],
+    );
+    refused_set(
+        "plant.operating_point_m=-0.05",
+        &["`plant.operating_point_m`", "-0.05 m", "0.0475 m"],
+    );
+    refused_chirp(
+        "chirp.duration_s=4000",
+        &[
+            "`chirp.duration_s`",
+            "4000 s",
+            "20050000",
+            "20000000",
+            "shorten",
+        ],
+    );
+    refused_set(
+        "interlock.probe_stale_s=1e-4",
+        &[
+            "`interlock.probe_stale_s`",
+            "0.0001 s",
+            "a tick of 0.0002 s",
+        ],
+    );
+}
+
+#[test]
+fn settings_just_inside_the_limits_are_taken() {
+    for set in [
+        "chirp.stop_hz=2499",
+        "interlock.soft_limit_m=0.00099",
+        "probe.range_m=0.0018",
+        "motor.continuous_force_n=111",
+        "chirp.duration_s=5.5",
+        "plant.operating_point_m=-0.0475",
+        "chirp.duration_s=3990",
+        "loop.rate_hz=1001",
+        "interlock.probe_stale_s=2e-4",
+    ] {
+        let answer = Bench::new().run(&format!("config check --set {set}"));
+        assert_eq!(answer.code, 0, "{set}: {}", answer.err);
+    }
+}
+
+#[test]
+fn an_unknown_kind_is_refused_with_the_kinds_there_are() {
+    refused_file(
+        "[plant]\nmodel = \"sr5dof\"\n",
+        &["mine.toml line 2", "`plant.model`", "\"sr5dof\"", "sr4dof"],
+    );
+    refused_set(
+        "plant.damping.kind=foo",
+        &[
+            "`plant.damping.kind`",
+            "\"foo\"",
+            "measured, rayleigh, uniform",
+        ],
+    );
+    refused_set("chirp.sweep=up", &["`chirp.sweep`", "linear, logarithmic"]);
+    refused_set(
+        "control.reference.kind=foo",
+        &["hold, step, ramp, sine, chirp, file"],
+    );
+    refused_set("plant=3", &["`plant.model` is missing", "sr4dof"]);
+}
+
+#[test]
+fn a_key_that_is_missing_is_looked_for_where_its_table_stands() {
+    let file = "title = \"x\"\n[plant.damping]\nkind = \"uniform\"\n";
+    refused_file(
+        file,
+        &["mine.toml line 2", "`plant.damping.ratio` is missing"],
+    );
+    refused_set(
+        "control.reference.kind=ramp",
+        &["  --set: `control.reference.speed_m_per_s` is missing"],
+    );
+    // The list takes the place of the profile's: it is the one that lacks the key.
+    refused_set(
+        "sim.unmodelled=[{frequency_hz=200}]",
+        &["  --set: `sim.unmodelled.0.damping_ratio` is missing"],
+    );
+}
+
+#[test]
+fn all_that_is_wrong_is_told_at_once() {
+    let text = "[plant]\nmass_asymmetry = \"10%\"\n[loop]\nrate_hz = 0\n[plat]\n";
+    refused_file(
+        text,
+        &[
+            "line 2: `plant.mass_asymmetry`",
+            "line 4: `loop.rate_hz`",
+            "line 5: `plat`",
+        ],
+    );
+}
+
+#[test]
+fn text_that_is_not_toml_is_refused_with_line_and_column() {
+    refused_file("[plant]\nmodel = [\n", &["mine.toml", "line 2, column 10"]);
+    refused_file("[plant\n", &["mine.toml", "line 1, column 7"]);
+    refused_set("no equals sign", &["no equals sign", "KEY=VALUE"]);
+    refused_set("=3", &["empty part"]);
+    refused_set("plant..model=3", &["plant..model", "empty part"]);
+}
+
+#[test]
+fn a_configuration_that_is_not_there_is_refused_with_the_names_there_are() {
+    for command in COMMANDS {
+        let bench = Bench::new();
+        for name in ["nosuch", "nosuch.toml", "folder/nosuch.toml"] {
+            bench
+                .run(&format!("{command} --config {name}"))
+                .is_refused(&[name, "stage", "chapter2", "path"]);
+        }
+        bench
+            .run(&format!("{command} --config ."))
+            .is_refused(&["cannot read .", "directory"]);
+        assert_eq!(bench.files(), [""; 0]);
+    }
+}

@@ -1,0 +1,50 @@
+//! A tick allocates nothing and makes no system call: proven on the loop itself, whatever it runs and whatever goes wrong.
+mod allocation;
+mod programs;
+mod quiet;
+mod system_calls;
+
+use assert_no_alloc::AllocDisabler;
+use bench::config::{Config, Source, load};
+use bench_hal::Validity;
+use bench_test_support::faulty_rig;
+
+use faulty_rig::Fault;
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+fn stage() -> Config {
+    load(&Source::default()).expect("the profile is valid")
+}
+
+/// A trip of every kind: its reason, what goes wrong, and what is commanded.
+fn all_trips() -> Vec<(&'static str, Fault, f64)> {
+    vec![
+        ("travel", Fault::At(0.00095), 0.01),
+        ("peak_current", Fault::Offset(0.0), 9.99),
+        ("continuous_current", Fault::Offset(0.0), 9.0),
+        ("command_not_finite", Fault::Offset(0.0), f64::NAN),
+        ("probe_invalid", Fault::Says(Validity::Faulty), 0.01),
+        ("probe_stale", Fault::Old(2_000_000), 0.01),
+        ("probe_stale", Fault::Frozen, 0.01),
+        ("probe_stuck", Fault::Stuck, 0.3),
+        ("amplifier", Fault::Faulted(3), 0.01),
+        ("amplifier", Fault::Refuses(4), 0.01),
+        ("amplifier", Fault::DoesNotEnable(5), 0.01),
+        ("amplifier", Fault::Gives(f64::NAN), 0.01),
+        ("current_not_followed", Fault::MeasuresBeyond(1.0), 0.01),
+    ]
+}
+
+/// The stage would run away under a constant current: the motor's force is as good as none here.
+fn weak() -> Config {
+    let mut config = stage();
+    let (peak_a, rated_a) = (
+        config.motor.peak_current_a(),
+        config.motor.continuous_current_a(),
+    );
+    config.motor.force_constant_n_per_a = 1e-3;
+    (config.motor.peak_force_n, config.motor.continuous_force_n) = (peak_a * 1e-3, rated_a * 1e-3);
+    config
+}

@@ -1,0 +1,141 @@
+//! Programs of every kind, each for about a second.
+use bench::config::{
+    AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint,
+};
+use bench::control::{ControlDesign, ControllerText};
+use bench::excitation::{
+    Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,
+    StepReference, SweptReference, ZeroCurrent,
+};
+use bench::rt::program::{Control, Excite, Program};
+
+/// The program that commands nothing.
+pub const NO_CURRENT: &str = "no current";
+
+/// Whatever the loop can run, each with a few seconds of its own.
+pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
+    let period_s = config.servo.period_s();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let own = folder.path().join("own.toml");
+    let text = "title = \"own\"\n[[section]]\nkind = \"integrator\"\ngain_a_per_um = 0.05\n[[section]]\nkind = \"coefficients\"\n\
+                numerator = [1.0, 2.0, 90000.0]\ndenominator = [1.0, 400.0, 90000.0]\nprewarp_rad_s = 300.0\n";
+    std::fs::write(&own, text).expect("a file");
+    let references = [
+        ReferenceSettings::Hold(HoldReference {}),
+        ReferenceSettings::Step(StepReference {
+            amplitude_m: 50e-6,
+            at_s: 0.1,
+        }),
+        ReferenceSettings::Ramp(RampReference {
+            amplitude_m: 50e-6,
+            speed_m_per_s: 1e-4,
+            at_s: 0.1,
+        }),
+        ReferenceSettings::Sine(SineReference {
+            amplitude_m: 20e-6,
+            frequency_hz: 3.0,
+        }),
+        ReferenceSettings::Chirp(SweptReference {
+            amplitude: vec![TravelPoint {
+                frequency_hz: 1.0,
+                amplitude_m: 1e-6,
+            }],
+            travel_m: 20e-6,
+        }),
+        ReferenceSettings::File(FileReference {
+            path: "points.csv".into(),
+        }),
+    ];
+    let mut programs: Vec<(String, Box<dyn Program>)> = Vec::new();
+    for name in ["fast", "slow", own.to_str().expect("text")] {
+        let sections = ControllerText::find(name)
+            .expect("found")
+            .sections(config.servo.rate_hz)
+            .expect("valid");
+        for settings in &references {
+            let points = "time_s,reference_m\n0.0,0.0\n0.2,1e-5\n0.4,2e-5\n";
+            let context = ReferenceContext {
+                chirp: &config.chirp,
+                period_s,
+                file: Some(points),
+            };
+            let reference = settings.design().build(&context).expect("valid");
+            let program = Control::new(sections.law(period_s), reference, 500, 4500);
+            programs.push((format!("{name}, {settings:?}"), Box::new(program)));
+        }
+    }
+    for sweep in [Sweep::Linear, Sweep::Logarithmic] {
+        let mut chirp = config.chirp.clone();
+        (
+            chirp.sweep,
+            chirp.duration_s,
+            chirp.quiet_before_s,
+            chirp.quiet_after_s,
+        ) = (sweep, 0.8, 0.1, 0.1);
+        (chirp.fade_in_s, chirp.amplitude) = (
+            0.2,
+            vec![AmplitudePoint {
+                frequency_hz: 1.0,
+                current_a: 0.2,
+            }],
+        );
+        programs.push((
+            format!("{sweep:?} chirp"),
+            Box::new(Excite(Chirp::new(&chirp, period_s))),
+        ));
+    }
+    for &kind in ExcitationKind::ALL {
+        programs.push((
+            format!("{kind:?} by its settings"),
+            Box::new(Excite(short(config, kind).chosen_excitation().build())),
+        ));
+    }
+    let mut campaign = config.campaign.clone();
+    (campaign.settle_s, campaign.average_s) = (0.5, 0.5);
+    programs.push((
+        NO_CURRENT.into(),
+        Box::new(Excite(ZeroCurrent::new(
+            campaign.settle_s,
+            campaign.average_s,
+            period_s,
+        ))),
+    ));
+    programs
+}
+
+/// An excitation of nearly a second; the chirp comes twice.
+fn short(config: &Config, kind: ExcitationKind) -> Config {
+    let mut config = config.clone();
+    config.excitation.kind = kind;
+    let chirp = &mut config.chirp;
+    (
+        chirp.start_hz,
+        chirp.stop_hz,
+        chirp.duration_s,
+        chirp.repetitions,
+    ) = (50.0, 150.0, 0.4, 2);
+    (
+        chirp.quiet_before_s,
+        chirp.quiet_after_s,
+        chirp.fade_in_s,
+        chirp.fade_out_s,
+    ) = (0.02, 0.02, 0.05, 0.05);
+    chirp.amplitude = vec![AmplitudePoint {
+        frequency_hz: 1.0,
+        current_a: 0.2,
+    }];
+    let (multisine, prbs, sines) = (
+        &mut config.excitations.multisine,
+        &mut config.excitations.prbs,
+        &mut config.excitations.stepped_sine,
+    );
+    (multisine.period_s, multisine.periods) = (0.1, 7);
+    (
+        prbs.order,
+        prbs.clock_divider,
+        prbs.periods,
+        prbs.settle_periods,
+    ) = (8, 2, 7, 1);
+    (sines.count, sines.settle_s, sines.measure_s) = (3, 0.12, 0.12);
+    config
+}

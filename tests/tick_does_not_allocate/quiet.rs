@@ -1,0 +1,131 @@
+//! The loop with its rings, driven tick by tick without an allocation of its own.
+use std::ops::Range;
+use std::sync::Arc;
+
+use assert_no_alloc::assert_no_alloc;
+use bench::config::Config;
+use bench::rig::simulated::SimulatedRig;
+use bench::rt::clock::{Clock, TickTiming, Virtual};
+use bench::rt::interlock::Interlocks;
+use bench::rt::program::{Decision, Program, ProgramInput};
+use bench::rt::publisher::Publisher;
+use bench::rt::record::{EventKind, LoopMessage};
+use bench::rt::servo::{Connections, Progress, Request, Servo};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::faulty_rig::{Fault, FaultyRig};
+use crate::programs::NO_CURRENT;
+
+/// A loop with its rings, and what comes out of them.
+pub struct Quiet {
+    pub servo: Servo,
+    pub requests: Producer<Request>,
+    records: Consumer<LoopMessage>,
+    retired: Consumer<Box<dyn Program>>,
+    pub clock: Virtual,
+    next: u64,
+    pub trip: Option<&'static str>,
+    completed: bool,
+    pub commands: u64,
+}
+
+impl Quiet {
+    pub fn new(config: &Config, faults: &[(Range<u64>, Fault)]) -> Quiet {
+        let rig = FaultyRig::new(SimulatedRig::new(config).expect("a rig"), faults);
+        let (publisher, records) = RingBuffer::new(1024);
+        let (requests, taken) = RingBuffer::new(16);
+        let (hand_back, retired) = RingBuffer::new(4);
+        let connections = Connections {
+            requests: taken,
+            retired: hand_back,
+            publisher: Publisher::new(publisher),
+            progress: Arc::new(Progress::default()),
+        };
+        let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+        Quiet {
+            servo: Servo::new(Box::new(rig), interlocks, connections),
+            requests,
+            records,
+            retired,
+            clock: Virtual {
+                period_s: config.servo.period_s(),
+            },
+            next: 0,
+            trip: None,
+            completed: false,
+            commands: 0,
+        }
+    }
+
+    pub fn running(
+        config: &Config,
+        faults: &[(Range<u64>, Fault)],
+        program: Box<dyn Program>,
+    ) -> Quiet {
+        let mut quiet = Quiet::new(config, faults);
+        quiet.order(Request::Arm);
+        quiet.order(Request::Start(program));
+        quiet
+    }
+
+    pub fn order(&mut self, order: Request) {
+        assert!(self.requests.push(order).is_ok());
+    }
+
+    /// What the loop does in a tick, and nothing else.
+    pub fn bare_tick(&mut self, missed: u32) {
+        let moment = self
+            .clock
+            .wait(self.next + u64::from(missed), self.servo.publisher());
+        self.servo
+            .tick(&TickTiming { missed, ..moment }, &self.clock);
+        self.next = moment.tick.number + 1;
+    }
+
+    /// What others do between two ticks; allocates nothing either.
+    pub fn collect(&mut self) {
+        while let Ok(published) = self.records.pop() {
+            match published {
+                LoopMessage::Tick(record) => self.commands += u64::from(record.command_a != 0.0),
+                LoopMessage::Event(event) => match event.kind {
+                    EventKind::Trip(trip) => self.trip = Some(trip.reason()),
+                    EventKind::Completed => self.completed = true,
+                    _ => {}
+                },
+            }
+        }
+    }
+
+    /// Whether the program came to its end, and commanded what it is there for.
+    pub fn has_done(&self, name: &str) -> bool {
+        let commanded = if name == NO_CURRENT {
+            self.commands == 0
+        } else {
+            self.commands > 3500
+        };
+        self.completed && commanded
+    }
+
+    pub fn run(&mut self, ticks: u64) {
+        for _ in 0..ticks {
+            assert_no_alloc(|| self.bare_tick(0));
+            self.collect();
+        }
+        while self.retired.pop().is_ok() {}
+    }
+}
+
+pub struct Says(pub f64);
+
+impl Program for Says {
+    fn decide(&mut self, _input: &ProgramInput) -> Decision {
+        Decision {
+            reference_m: 0.0,
+            requested_a: self.0,
+            active: true,
+        }
+    }
+    fn ticks(&self) -> u64 {
+        u64::MAX
+    }
+}
