@@ -78,7 +78,7 @@ fn tick(drive: &mut CanopenDrive, swallow: &AtomicBool) {
 }
 
 #[test]
-fn command_status_and_disable_allocate_nothing() {
+fn command_status_and_disable_do_not_allocate() {
     for exchange in [
         Exchange::Asynchronous { status_hz: 500.0 },
         Exchange::Synchronous { status_every: 1 },

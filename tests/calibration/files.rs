@@ -32,7 +32,7 @@ fn calibrate(folder: &Path) -> (Value, String) {
 }
 
 #[test]
-fn a_calibration_names_its_date_its_devices_and_its_delay_and_is_never_overwritten() {
+fn calibration_file_has_date_devices_and_delay_and_is_not_overwritten() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (report, text) = calibrate(folder.path());
     let calibration = &report["calibration"];
@@ -66,7 +66,7 @@ fn a_calibration_names_its_date_its_devices_and_its_delay_and_is_never_overwritt
 }
 
 #[test]
-fn a_run_carries_the_calibration_it_used_and_replays() {
+fn run_records_its_calibration_and_replays() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     calibrate(folder.path());
     let run = [
@@ -90,7 +90,7 @@ fn a_run_carries_the_calibration_it_used_and_replays() {
 }
 
 #[test]
-fn an_expired_or_foreign_calibration_is_a_warning_or_a_refusal_as_set() {
+fn expired_or_mismatched_calibration_warns_or_fails_as_configured() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (_, text) = calibrate(folder.path());
     let old = text.lines().map(|l| {
@@ -139,7 +139,7 @@ fn an_expired_or_foreign_calibration_is_a_warning_or_a_refusal_as_set() {
 }
 
 #[test]
-fn a_file_that_is_no_calibration_is_refused_with_its_place() {
+fn rejects_invalid_calibration_file_with_its_name() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (_, text) = calibrate(folder.path());
     let cases = [

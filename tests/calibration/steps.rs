@@ -42,7 +42,7 @@ fn fitted(skew: Skew, config: &Config) -> Result<StaircaseFit, StaircaseError> {
 }
 
 #[test]
-fn the_compliance_of_the_stage_comes_out_with_its_sign_and_an_honest_sigma() {
+fn static_compliance_is_estimated_with_sign_and_sigma() {
     for probe_gain in [1.0, -1.0] {
         let fit = fitted(
             Skew {
@@ -71,7 +71,7 @@ fn the_compliance_of_the_stage_comes_out_with_its_sign_and_an_honest_sigma() {
 }
 
 #[test]
-fn scale_and_offset_of_amplifier_and_probe_come_out() {
+fn gain_and_offset_of_amplifier_and_probe_are_estimated() {
     let skew = Skew {
         current_gain: 1.04,
         current_offset_a: 0.006,
@@ -102,7 +102,7 @@ fn scale_and_offset_of_amplifier_and_probe_come_out() {
 }
 
 #[test]
-fn backlash_and_a_bent_probe_are_refused_with_their_figures() {
+fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
     let config = config();
     // The travel is 2 x 0.4 A x 154 um/A = 124 um; a play of 2 x 2 um is 3 % of it, a bend of 1 % of 62 um shows as one.
     let back = fitted(
@@ -147,7 +147,7 @@ fn backlash_and_a_bent_probe_are_refused_with_their_figures() {
 }
 
 #[test]
-fn a_stage_that_does_not_move_gives_no_calibration() {
+fn rejects_a_stage_that_does_not_move() {
     let mut config = config();
     // Noise alone: the interlock against a stuck probe sees it move.
     let still = fitted(
@@ -171,7 +171,7 @@ fn a_stage_that_does_not_move_gives_no_calibration() {
 }
 
 #[test]
-fn through_its_calibration_a_skewed_rig_is_the_stage_again() {
+fn calibrated_rig_has_unit_gain_and_no_offset() {
     let (config, folder) = (config(), tempfile::tempdir().expect("a temporary folder"));
     let skew = Skew {
         current_gain: 0.9,

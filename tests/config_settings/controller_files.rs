@@ -2,7 +2,7 @@
 use crate::program::Bench;
 
 #[test]
-fn a_controller_file_is_checked_like_a_configuration() {
+fn controller_files_are_checked_like_configurations() {
     let section = |body: &str| format!("title = \"x\"\n[[section]]\n{body}\n");
     let cases: &[(String, &[&str])] = &[
         (

@@ -5,7 +5,7 @@ use crate::program::{self, Bench, number};
 use crate::{bench_config, toml_files};
 
 #[test]
-fn a_unit_in_a_set_value_is_converted() {
+fn converts_units_of_set_values() {
     let bench = Bench::new();
     for (set, pointer, expected) in [
         (
@@ -38,7 +38,7 @@ fn a_unit_in_a_set_value_is_converted() {
 }
 
 #[test]
-fn what_is_shown_is_the_same_configuration_when_it_is_read_back() {
+fn config_show_output_reads_back_unchanged() {
     let bench = Bench::new();
     let others = [
         "--config chapter2 --operating-point 3.3% --seed 17",
@@ -57,7 +57,7 @@ fn what_is_shown_is_the_same_configuration_when_it_is_read_back() {
 }
 
 #[test]
-fn every_profile_and_controller_passes_and_is_found_by_its_name() {
+fn profiles_and_controllers_are_valid_and_found_by_name() {
     let bench = Bench::new();
     let profiles = toml_files(&bench_config());
     assert!(profiles.len() >= 2, "{profiles:?}");
@@ -87,7 +87,7 @@ fn every_profile_and_controller_passes_and_is_found_by_its_name() {
 }
 
 #[test]
-fn the_later_layer_wins_and_says_only_what_differs() {
+fn later_layer_overrides_only_the_keys_it_contains() {
     let bench = Bench::new();
     bench.write(
         "mine.toml",
@@ -113,7 +113,7 @@ fn the_later_layer_wins_and_says_only_what_differs() {
 }
 
 #[test]
-fn an_operating_point_may_be_typed_in_per_cent_of_l_in_millimetres_or_in_metres() {
+fn operating_point_accepts_percent_of_l_millimetres_and_metres() {
     let bench = Bench::new();
     let metres = |options: &str| {
         number(&bench.json(&format!("config show {options}"))["plant"]["operating_point_m"])
@@ -137,7 +137,7 @@ fn an_operating_point_may_be_typed_in_per_cent_of_l_in_millimetres_or_in_metres(
 }
 
 #[test]
-fn with_json_there_is_one_object_on_standard_output_and_nothing_else() {
+fn json_output_is_a_single_object() {
     let bench = Bench::new();
     let run = |arguments: &str| {
         bench.json(arguments)["recording"]

@@ -27,7 +27,7 @@ fn refused_set(set: &str, words: &[&str]) {
 }
 
 #[test]
-fn an_unknown_key_is_refused_with_its_line_and_the_nearest_name() {
+fn rejects_unknown_key_with_line_and_nearest_name() {
     refused_file(
         "[plant]\nmass_asymetry = 0.1\n",
         &[
@@ -51,7 +51,7 @@ fn an_unknown_key_is_refused_with_its_line_and_the_nearest_name() {
 }
 
 #[test]
-fn measured_damping_ratios_without_positive_damping_are_refused() {
+fn rejects_measured_damping_ratios_without_positive_damping() {
     let second = "plant.damping.second.omega_rad_s";
     // Two ratios at one frequency: the equations of the two Rayleigh coefficients have no solution.
     refused_set(
@@ -75,7 +75,7 @@ fn measured_damping_ratios_without_positive_damping_are_refused() {
 }
 
 #[test]
-fn a_wrong_type_is_refused_with_what_is_there_and_what_belongs_there() {
+fn rejects_wrong_type_with_value_and_expected_type() {
     refused_file(
         "[loop]\nrate_hz = true\n",
         &[
@@ -109,7 +109,7 @@ fn a_wrong_type_is_refused_with_what_is_there_and_what_belongs_there() {
 }
 
 #[test]
-fn a_unit_in_a_file_is_refused_with_the_number_in_si_units() {
+fn rejects_unit_in_file_and_suggests_si_value() {
     refused_file(
         "[plant]\noperating_point_m = \"3.8mm\"\n",
         &["mine.toml line 2", "\"3.8mm\"", "SI units", "write 0.0038"],
@@ -117,7 +117,7 @@ fn a_unit_in_a_file_is_refused_with_the_number_in_si_units() {
 }
 
 #[test]
-fn rejects_a_unit_that_does_not_belong_to_the_setting() {
+fn rejects_unit_of_another_quantity() {
     refused_set(
         "plant.operating_point_m=4s",
         &["`4s` is a time in s", "50um"],
@@ -133,7 +133,7 @@ fn rejects_a_unit_that_does_not_belong_to_the_setting() {
 }
 
 #[test]
-fn a_value_out_of_range_is_refused_with_the_limits() {
+fn rejects_value_out_of_range_with_limits() {
     refused_file(
         "[loop]\nrate_hz = 0\n",
         &["mine.toml line 2", "`loop.rate_hz` is 0", "1 to 100000"],
@@ -164,7 +164,7 @@ fn refused_chirp(set: &str, words: &[&str]) {
 }
 
 #[test]
-fn settings_that_contradict_each_other_are_refused_with_both_figures() {
+fn rejects_conflicting_settings_with_both_values() {
     refused_chirp(
         "chirp.stop_hz=2500",
         &["`chirp.stop_hz`", "2500 Hz", "half the servo rate"],
@@ -220,7 +220,7 @@ fn settings_that_contradict_each_other_are_refused_with_both_figures() {
 }
 
 #[test]
-fn settings_just_inside_the_limits_are_taken() {
+fn accepts_settings_just_inside_the_limits() {
     for set in [
         "chirp.stop_hz=2499",
         "interlock.soft_limit_m=0.00099",
@@ -238,7 +238,7 @@ fn settings_just_inside_the_limits_are_taken() {
 }
 
 #[test]
-fn an_unknown_kind_is_refused_with_the_kinds_there_are() {
+fn rejects_unknown_kind_and_lists_valid_kinds() {
     refused_file(
         "[plant]\nmodel = \"sr5dof\"\n",
         &["mine.toml line 2", "`plant.model`", "\"sr5dof\"", "sr4dof"],
@@ -260,7 +260,7 @@ fn an_unknown_kind_is_refused_with_the_kinds_there_are() {
 }
 
 #[test]
-fn a_key_that_is_missing_is_looked_for_where_its_table_stands() {
+fn missing_key_is_reported_at_line_of_its_table() {
     let file = "title = \"x\"\n[plant.damping]\nkind = \"uniform\"\n";
     refused_file(
         file,
@@ -278,7 +278,7 @@ fn a_key_that_is_missing_is_looked_for_where_its_table_stands() {
 }
 
 #[test]
-fn all_that_is_wrong_is_told_at_once() {
+fn reports_all_errors_together() {
     let text = "[plant]\nmass_asymmetry = \"10%\"\n[loop]\nrate_hz = 0\n[plat]\n";
     refused_file(
         text,
@@ -291,7 +291,7 @@ fn all_that_is_wrong_is_told_at_once() {
 }
 
 #[test]
-fn text_that_is_not_toml_is_refused_with_line_and_column() {
+fn rejects_invalid_toml_with_line_and_column() {
     refused_file("[plant]\nmodel = [\n", &["mine.toml", "line 2, column 10"]);
     refused_file("[plant\n", &["mine.toml", "line 1, column 7"]);
     refused_set("no equals sign", &["no equals sign", "KEY=VALUE"]);
@@ -300,7 +300,7 @@ fn text_that_is_not_toml_is_refused_with_line_and_column() {
 }
 
 #[test]
-fn a_configuration_that_is_not_there_is_refused_with_the_names_there_are() {
+fn rejects_unknown_configuration_and_lists_names() {
     for command in COMMANDS {
         let bench = Bench::new();
         for name in ["nosuch", "nosuch.toml", "folder/nosuch.toml"] {

@@ -8,7 +8,7 @@ use crate::program::Bench;
 use crate::{bench_config, toml_files};
 
 #[test]
-fn the_schema_file_is_current() {
+fn schema_file_is_current() {
     // To renew it: cargo run -- config schema > bench-config/schema.json
     let file = std::fs::read_to_string(bench_config().join("schema.json"))
         .expect("bench-config/schema.json");
@@ -21,7 +21,7 @@ fn the_schema_file_is_current() {
 }
 
 #[test]
-fn jsonschema_takes_every_profile_and_refuses_what_bench_refuses() {
+fn json_schema_accepts_and_rejects_as_the_program_does() {
     let bench = Bench::new();
     let show = |options: &str| bench.json(&format!("config show {options}"));
     let mut documents: Vec<Value> = toml_files(&bench_config())

@@ -179,7 +179,7 @@ fn successive_readers_read_the_position_of_the_stage() {
 }
 
 #[test]
-fn every_protocol_is_served_and_read_in_metres_of_the_stage() {
+fn serves_every_protocol_in_metres_of_the_stage() {
     let optoncdt = "{ kind = \"optoncdt\", sensor_range_m = 0.002, mounting = { gain = -1.0, offset_m = 0.001 }, line = { port = \"\", baud = 921600 } }";
     let ascii = "{ kind = \"ascii\", mounting = { gain = 1.0, offset_m = 0.0 }, pattern = \"{value:8.5}\", unit_m = 1e-3, lower_m = -1e-3, upper_m = 1e-3, line = { port = \"\", baud = 230400 } }";
     for probe in [optoncdt, ascii] {
@@ -232,7 +232,7 @@ fn planned_and_typed_faults_take_effect_and_are_logged() {
 }
 
 #[test]
-fn a_signal_or_the_duration_ends_it_and_removes_the_link() {
+fn signal_or_duration_ends_the_emulator_and_removes_the_link() {
     for signal in [Some(libc::SIGTERM), Some(libc::SIGINT), None] {
         let mut device = Device::start(if signal.is_some() {
             &[]

@@ -398,37 +398,37 @@ fn trips_and_runs_again(word: &str, reason: &str) {
 }
 
 #[test]
-fn a_probe_that_falls_silent_trips_as_stale() {
+fn silent_probe_causes_stale_trip() {
     trips_and_runs_again("probe.silence", "probe_stale");
 }
 
 #[test]
-fn a_probe_whose_every_byte_is_damaged_trips_as_stale() {
+fn damaged_bytes_cause_stale_trip() {
     trips_and_runs_again("probe.corrupt", "probe_stale");
 }
 
 #[test]
-fn a_probe_that_answers_late_trips_as_stale() {
+fn late_answers_cause_stale_trip() {
     trips_and_runs_again(LATE, "probe_stale");
 }
 
 #[test]
-fn a_value_that_does_not_move_while_the_current_does_trips_as_stuck() {
+fn constant_value_under_changing_current_causes_stuck_trip() {
     trips_and_runs_again("probe.stuck", "probe_stuck");
 }
 
 #[test]
-fn a_value_that_jumps_beyond_the_soft_limit_trips_as_travel() {
+fn jump_beyond_the_soft_limit_causes_travel_trip() {
     trips_and_runs_again("probe.jump=1.4mm", "travel");
 }
 
 #[test]
-fn a_target_out_of_range_trips_as_invalid() {
+fn target_out_of_range_causes_invalid_trip() {
     trips_and_runs_again("probe.out-of-range", "probe_invalid");
 }
 
 #[test]
-fn a_probe_that_restarts_is_read_on_without_a_trip() {
+fn probe_restart_causes_no_trip() {
     in_each_state(NEVER_STALE_S, |table, state| {
         table.begin("probe.reset");
         table.run(50);
@@ -445,7 +445,7 @@ fn a_probe_that_restarts_is_read_on_without_a_trip() {
 }
 
 #[test]
-fn a_closed_terminal_trips_and_is_reported_and_the_probe_can_be_opened_again() {
+fn closed_terminal_trips_and_the_probe_can_be_opened_again() {
     in_each_state(NEVER_STALE_S, |table, state| {
         table.begin(HANG_UP);
         table.go_on(state);

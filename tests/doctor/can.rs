@@ -52,7 +52,7 @@ fn heard(ear: &mut dyn CanBus) -> Vec<CanFrame> {
 }
 
 #[test]
-fn a_sound_drive_is_ok_and_asked_by_uploads_alone() {
+fn healthy_drive_is_ok_and_examined_by_uploads_only() {
     let (world, device, _running) = rig(EmulatedDriveSettings::default());
     let mut ear = world.bus().connect(&[]);
     let objects = format!("{:?}", device.lock().unwrap().objects());
@@ -81,7 +81,7 @@ fn a_sound_drive_is_ok_and_asked_by_uploads_alone() {
 }
 
 #[test]
-fn a_drive_that_runs_stays_as_it_is() {
+fn running_drive_is_not_changed() {
     let (world, device, _running) = rig(EmulatedDriveSettings::default());
     let mut drive = CanopenDrive::open(DriveSettings::default(), Box::new(world.clone())).unwrap();
     bench_hal::CurrentAmplifier::enable(&mut drive).unwrap();
@@ -101,7 +101,7 @@ fn a_drive_that_runs_stays_as_it_is() {
 }
 
 #[test]
-fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
+fn drive_fault_is_a_failure_with_the_emergency_text() {
     let (world, device, _running) = rig(EmulatedDriveSettings::default());
     device.lock().unwrap().inject(DeviceFault::Drive(0x4210));
     let report = examine(&world);
@@ -124,7 +124,7 @@ fn a_drive_in_fault_is_a_failure_with_its_emergency_in_words() {
 }
 
 #[test]
-fn a_drive_of_another_rating_is_refused_before_every_ampere_is_wrong() {
+fn rejects_drive_with_unexpected_rated_current() {
     let (world, _device, _running) = rig(EmulatedDriveSettings {
         rated_current_ma: 2000,
         ..EmulatedDriveSettings::default()
@@ -140,7 +140,7 @@ fn a_drive_of_another_rating_is_refused_before_every_ampere_is_wrong() {
 }
 
 #[test]
-fn silence_is_a_failure_that_says_what_to_check() {
+fn silent_drive_is_a_failure_with_remedy() {
     let report = examine(&SimulatedHost::default());
     let [finding] = bad(&report)[..] else {
         panic!("{report:?}")
@@ -163,7 +163,7 @@ fn silence_is_a_failure_that_says_what_to_check() {
 }
 
 #[test]
-fn a_stopped_node_is_told_from_an_absent_one_by_its_heartbeat() {
+fn stopped_node_is_recognised_by_its_heartbeat() {
     let (world, device, _running) = rig(EmulatedDriveSettings::default());
     let mut master = world.bus().connect(&[]);
     let write = [0x2B, 0x17, 0x10, 0, 50, 0, 0, 0]; // 0x1017 = 50 ms
@@ -218,7 +218,7 @@ impl Host for Taken {
 }
 
 #[test]
-fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
+fn node_in_use_by_another_process_receives_no_frame() {
     let (world, _device, _running) = rig(EmulatedDriveSettings::default());
     let mut ear = world.bus().connect(&[]);
     let report = examine(&Taken(world));
@@ -234,7 +234,7 @@ fn a_node_that_a_running_bench_holds_is_not_asked_anything() {
 }
 
 #[test]
-fn a_node_is_free_again_afterwards() {
+fn node_is_released_after_the_examination() {
     let (world, _device, _running) = rig(EmulatedDriveSettings::default());
     examine(&world);
     assert!(CanopenDrive::open(DriveSettings::default(), Box::new(world)).is_ok());
@@ -254,7 +254,7 @@ impl Task for Vesc {
 }
 
 #[test]
-fn a_vesc_is_listened_to_and_sent_nothing() {
+fn vesc_is_examined_by_listening_only() {
     let world = SimulatedHost::default();
     let _running = world
         .start("vesc", Box::new(Vesc(world.endpoint(&[]).unwrap(), 0)))
@@ -282,7 +282,7 @@ fn a_vesc_is_listened_to_and_sent_nothing() {
 }
 
 #[test]
-fn a_bus_that_is_down_is_a_failure() {
+fn bus_down_is_a_failure() {
     let world = SimulatedHost::default();
     world.bus().set_down(true);
     let report = examine(&world);

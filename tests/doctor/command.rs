@@ -77,7 +77,7 @@ pub fn on(report: &Value, subject: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_default_profile_is_ready_and_nothing_is_left_behind() {
+fn default_profile_is_ready_and_no_file_is_left() {
     let bench = Bench::new();
     let answer = bench.run("doctor");
     assert_eq!(
@@ -96,7 +96,7 @@ fn the_default_profile_is_ready_and_nothing_is_left_behind() {
 }
 
 #[test]
-fn the_command_that_is_offered_is_the_one_that_was_asked_about() {
+fn suggested_command_has_the_given_options() {
     let answer = Bench::new().run("doctor --asymmetry -2% --set loop.rate_hz=4000 --out monday");
     let offered =
         "`bench control --set loop.rate_hz=4000 --asymmetry -2% --out monday` could start now\n";
@@ -108,7 +108,7 @@ fn the_command_that_is_offered_is_the_one_that_was_asked_about() {
 }
 
 #[test]
-fn json_has_the_findings_and_the_figures_in_si_units_under_their_names() {
+fn json_has_findings_and_figures_in_si_units() {
     let report = sound(&Bench::new().run("doctor --json"));
     let lateness = &report["lateness"];
     assert_eq!(lateness["rate_hz"], 5000.0);
@@ -141,7 +141,7 @@ fn json_has_the_findings_and_the_figures_in_si_units_under_their_names() {
 }
 
 #[test]
-fn a_configuration_that_cannot_be_is_refused_like_by_every_command() {
+fn rejects_invalid_configuration_like_other_commands() {
     Bench::new()
         .run("doctor --set loop.rate=1")
         .is_refused(&["loop.rate", "rate_hz"]);
@@ -156,7 +156,7 @@ fn a_configuration_that_cannot_be_is_refused_like_by_every_command() {
 }
 
 #[test]
-fn a_loop_with_too_little_margin_stops_control_and_leaves_the_chirp() {
+fn too_small_margin_excludes_control_but_not_chirp() {
     let answer = Bench::new().run("doctor --set control.min_modulus_margin=0.9 --json");
     let report = sound(&answer);
     assert_eq!(
@@ -171,7 +171,7 @@ fn a_loop_with_too_little_margin_stops_control_and_leaves_the_chirp() {
 }
 
 #[test]
-fn a_chirp_that_would_trip_stops_the_chirp_and_leaves_control() {
+fn predicted_trip_excludes_chirp_but_not_control() {
     let flat = "chirp.amplitude=[{ frequency_hz = 1.0, current_a = 0.3 }]";
     let answer = Bench::new().run_with(["doctor", "--json", "--set", flat]);
     let report = sound(&answer);
@@ -183,7 +183,7 @@ fn a_chirp_that_would_trip_stops_the_chirp_and_leaves_control() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_a_failure() {
+fn unwritable_folder_is_a_failure() {
     let bench = Bench::new();
     bench.write("file", "");
     let report = sound(&bench.run("doctor --json --out file/in"));
@@ -203,7 +203,7 @@ fn a_folder_that_cannot_be_written_is_a_failure() {
 }
 
 #[test]
-fn one_real_device_and_one_simulated_make_no_loop() {
+fn mixing_a_real_and_a_simulated_device_is_a_failure() {
     let answer = Bench::new()
         .run("doctor --json --set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}");
     let found = on(&sound(&answer), "configuration");
@@ -215,7 +215,7 @@ fn one_real_device_and_one_simulated_make_no_loop() {
 }
 
 #[test]
-fn an_interface_that_is_not_there_is_a_failure_with_its_remedy() {
+fn missing_interface_is_reported_as_failure_with_remedy() {
     for device in [
         "",
         "--set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}",
@@ -244,7 +244,7 @@ fn an_interface_that_is_not_there_is_a_failure_with_its_remedy() {
 }
 
 #[test]
-fn a_processor_that_is_not_there_is_no_failure_for_a_run_starts_without() {
+fn unavailable_processor_is_not_a_failure() {
     let report = sound(&Bench::new().run("doctor --json --set loop.cpu=1023"));
     let found = on(&report, "processor");
     assert!(
@@ -261,7 +261,7 @@ fn a_processor_that_is_not_there_is_no_failure_for_a_run_starts_without() {
 }
 
 #[test]
-fn a_tick_takes_no_more_room_in_a_recording_than_is_reckoned_with() {
+fn recorded_tick_size_is_within_the_disk_space_estimate() {
     let bench = Bench::new();
     for command in [
         "control --fast --duration 4 --json --out a",

@@ -63,7 +63,7 @@ fn doctor(sets: &[String]) -> Value {
 }
 
 #[test]
-fn readings_are_judged_and_the_port_is_free_afterwards() {
+fn readings_are_assessed_and_the_port_is_released() {
     let rehearsal = rehearsal();
     let report = doctor(&sets(&rehearsal));
     let port = on(&report, "serial port");
@@ -95,7 +95,7 @@ fn readings_are_judged_and_the_port_is_free_afterwards() {
 }
 
 #[test]
-fn a_port_in_use_is_reported_with_the_process() {
+fn port_in_use_is_reported_with_the_process() {
     let rehearsal = rehearsal();
     let _holder =
         SerialProbe::open(driver_settings(&config(sets(&rehearsal)).probe).unwrap()).unwrap();
@@ -112,7 +112,7 @@ fn a_port_in_use_is_reported_with_the_process() {
 }
 
 #[test]
-fn a_process_without_a_lock_file_is_found_by_its_open_files() {
+fn process_without_lock_file_is_found_by_its_open_files() {
     let rehearsal = rehearsal();
     let terminal = std::fs::File::options()
         .read(true)
@@ -128,7 +128,7 @@ fn a_process_without_a_lock_file_is_found_by_its_open_files() {
 }
 
 #[test]
-fn a_silent_probe_is_a_failure_with_its_remedy() {
+fn silent_probe_is_a_failure() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::Silence);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
@@ -139,7 +139,7 @@ fn a_silent_probe_is_a_failure_with_its_remedy() {
 }
 
 #[test]
-fn a_target_out_of_range_is_a_failure() {
+fn target_out_of_range_is_a_failure() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::OutOfRange);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
@@ -151,7 +151,7 @@ fn a_target_out_of_range_is_a_failure() {
 }
 
 #[test]
-fn a_damaged_line_is_a_warning_with_the_count() {
+fn damaged_bytes_are_a_warning_with_the_count() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::Corrupt { every: 500 });
     let report = doctor(&sets(&rehearsal));
@@ -166,7 +166,7 @@ fn a_damaged_line_is_a_warning_with_the_count() {
 }
 
 #[test]
-fn a_stage_beyond_the_soft_limit_is_a_failure() {
+fn position_beyond_the_soft_limit_is_a_failure() {
     let rehearsal = Rehearsal::new(&protocol(), 650.0, |_| 1.95e-3);
     let found = on(&doctor(&sets(&rehearsal)), "readings");
     let tripping = found
@@ -180,7 +180,7 @@ fn a_stage_beyond_the_soft_limit_is_a_failure() {
 }
 
 #[test]
-fn distinguishes_a_missing_port_from_another_file() {
+fn distinguishes_missing_port_file_and_device() {
     let with = |port: &str| {
         let port = format!("probe.device.line.port={port}");
         on(

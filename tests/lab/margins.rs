@@ -40,7 +40,7 @@ fn slow(omega_rad_s: f64, period_s: f64) -> Complex<f64> {
 }
 
 #[test]
-fn the_margins_of_the_slow_controller_are_those_of_the_closed_form() {
+fn margins_of_the_slow_controller_match_the_closed_form() {
     let (config, ours) = (lab(&[]), margins(&["--slow"]));
     let (modes, period_s) = (modes(&config), config.servo.period_s());
     let open = |w: f64| response(&config, &modes, w, false) * slow(w, period_s);
@@ -66,7 +66,7 @@ fn the_margins_of_the_slow_controller_are_those_of_the_closed_form() {
 }
 
 #[test]
-fn each_part_of_the_delay_costs_phase_and_the_sum_is_stated() {
+fn each_delay_reduces_the_phase_margin_and_the_sum_is_reported() {
     let phase = |sets: &[&str]| {
         let ours = margins(&[&["--slow"], sets].concat());
         let number = |key: &str| ours[key].as_f64().expect("a number");
@@ -104,8 +104,7 @@ fn each_part_of_the_delay_costs_phase_and_the_sum_is_stated() {
 }
 
 #[test]
-fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_for_this_rate_runs()
-{
+fn rejects_controller_below_the_modulus_margin_limit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let control = |arguments: &[&str]| {
         let common = [
@@ -153,7 +152,7 @@ fn the_fast_controller_is_refused_with_the_modulus_margin_as_the_reason_and_one_
 }
 
 #[test]
-fn what_bus_and_line_cannot_carry_is_refused_with_the_figures() {
+fn rejects_rates_beyond_bus_and_line_capacity() {
     let refused = |sets: &[&str], words: &[&str]| {
         let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
         let (code, _, errors) = bench(
@@ -195,7 +194,7 @@ fn what_bus_and_line_cannot_carry_is_refused_with_the_figures() {
 }
 
 #[test]
-fn devices_keep_their_own_pace_and_one_device_alone_makes_no_loop() {
+fn rejects_virtual_pace_mixed_devices_and_missing_interfaces() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (code, _, errors) = bench(
         folder.path(),

@@ -45,7 +45,7 @@ fn share_beyond(ratios: &[Complex<f64>], percent: f64, deg: f64) -> f64 {
 }
 
 #[test]
-fn a_slow_probe_of_its_own_clock_blurs_nothing() {
+fn slow_free_running_probe_does_not_bias_the_response() {
     let config = lab(&QUIET);
     let (analysis, modes) = (
         measured(&config, &config),
@@ -69,7 +69,7 @@ fn a_slow_probe_of_its_own_clock_blurs_nothing() {
 }
 
 #[test]
-fn the_delay_that_the_phases_show_is_that_of_the_chain_wherever_it_sits() {
+fn phase_gives_the_delay_of_amplifier_or_probe() {
     for (set, extra_s) in [
         ("amplifier.latency_s=0.0004", 0.0),
         ("amplifier.latency_s=0.0011", 0.0007),

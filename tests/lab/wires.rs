@@ -187,12 +187,12 @@ const STEADY: Wires = Wires {
 const BY_ITSELF: Bound = Bound(0.3, 0.05, 0.0);
 
 #[test]
-fn readings_of_one_age_are_those_of_the_closed_form() {
+fn constant_age_gives_the_closed_form() {
     must_be_within(&STEADY, &BY_ITSELF);
 }
 
 #[test]
-fn a_first_tick_of_three_periods_in_which_the_drive_is_enabled_changes_nothing() {
+fn slow_enable_in_the_first_tick_has_no_effect() {
     must_be_within(
         &Wires {
             enabling_s: 6e-3,
@@ -203,7 +203,7 @@ fn a_first_tick_of_three_periods_in_which_the_drive_is_enabled_changes_nothing()
 }
 
 #[test]
-fn readings_that_arrive_just_before_or_after_the_tick_change_nothing() {
+fn varying_arrival_around_the_tick_has_no_effect() {
     // Now and then the reading of a millisecond earlier is the newest: 36 degrees at 100 Hz.
     must_be_within(
         &Wires {
@@ -220,7 +220,7 @@ fn readings_that_arrive_just_before_or_after_the_tick_change_nothing() {
 // average over a neighbourhood of 16 bins leaves a part of it, most where little answers, at the zero near 112 Hz.
 
 #[test]
-fn commands_that_go_out_at_any_time_within_a_fifth_of_a_period_are_undone() {
+fn command_jitter_of_a_fifth_of_a_period_is_corrected() {
     // Taken at the ticks they would be off by 40 % and 25 degrees.
     must_be_within(
         &Wires {
@@ -232,7 +232,7 @@ fn commands_that_go_out_at_any_time_within_a_fifth_of_a_period_are_undone() {
 }
 
 #[test]
-fn a_fast_probe_of_its_own_clock_is_undone() {
+fn varying_age_of_a_fast_free_running_probe_is_corrected() {
     let probe = Wires {
         command_s: (4e-5, 2e-5),
         probe_s: (0.25e-3 * 0.999_37, 0.0),
@@ -243,7 +243,7 @@ fn a_fast_probe_of_its_own_clock_is_undone() {
 }
 
 #[test]
-fn a_slow_probe_of_its_own_clock_is_undone() {
+fn varying_age_of_a_slow_free_running_probe_is_corrected() {
     // Ages of 1.3 to 2.9 ms: taken as of one age, 29 degrees at 100 Hz.
     let probe = Wires {
         command_s: (4e-5, 2e-5),

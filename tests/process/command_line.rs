@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::common::bench;
 
 #[test]
-fn quantities_take_units_and_bare_numbers_are_si() {
+fn quantities_accept_units_and_default_to_si() {
     let plan = |options: &str| Bench::new().json(&format!("chirp --plan {options}"));
     let expected = plan("--amplitude 0.05 --start 5 --stop 500 --duration 20");
     for options in [
@@ -29,7 +29,7 @@ fn quantities_take_units_and_bare_numbers_are_si() {
 }
 
 #[test]
-fn an_error_names_the_option_and_unit_as_typed_and_what_may_have_been_meant() {
+fn errors_name_option_and_unit_as_typed_and_suggest_a_correction() {
     let refused = |arguments: &str, words: &[&str]| {
         let answer = Bench::new().run(arguments);
         answer.is_refused(words);
@@ -64,7 +64,7 @@ fn an_error_names_the_option_and_unit_as_typed_and_what_may_have_been_meant() {
 }
 
 #[test]
-fn with_json_an_error_is_an_object_on_standard_output() {
+fn json_errors_are_objects_on_standard_output() {
     for (arguments, code, kind, place) in [
         ("margins --config nosuch", 2, "configuration", "nosuch"),
         ("margins --set loop.rate_hz=0", 2, "configuration", "--set"),
@@ -91,7 +91,7 @@ fn with_json_an_error_is_an_object_on_standard_output() {
 }
 
 #[test]
-fn names_of_recordings_tell_excitation_controller_and_reference() {
+fn recording_names_contain_controller_and_reference() {
     let bench = Bench::new();
     for (arguments, end) in [
         ("control --fast --duration 0.3", "_control-fast-step.mcap"),
@@ -108,7 +108,7 @@ fn names_of_recordings_tell_excitation_controller_and_reference() {
 }
 
 #[test]
-fn identify_in_place_refreshes_its_files() {
+fn identify_in_place_adds_no_files() {
     let bench = Bench::new();
     let chirp = bench.json("chirp --start 5 --stop 50 --duration 6");
     let recording = chirp["recording"].as_str().expect("a path");
@@ -124,7 +124,7 @@ fn identify_in_place_refreshes_its_files() {
 }
 
 #[test]
-fn margins_of_an_unstable_loop_are_its_unstable_poles_and_exit_code_1() {
+fn margins_of_an_unstable_loop_list_unstable_poles_and_exit_with_1() {
     let answer = Bench::new().run("margins --fast --asymmetry -10%");
     assert_eq!(answer.code, 1, "{}", answer.err);
     assert!(answer.out.contains("UNSTABLE") && !answer.out.contains("phase margin"));
@@ -146,7 +146,7 @@ fn margins_of_an_unstable_loop_are_its_unstable_poles_and_exit_code_1() {
 }
 
 #[test]
-fn a_file_for_an_own_stage_is_valid_and_found_by_its_name() {
+fn initial_file_of_own_stage_is_valid_and_found_by_name() {
     for plant in ["lumped", "modal"] {
         let bench = Bench::new();
         std::fs::create_dir(bench.path("bench-config")).expect("a folder");
@@ -173,7 +173,7 @@ fn a_file_for_an_own_stage_is_valid_and_found_by_its_name() {
 }
 
 #[test]
-fn completions_and_manual_pages_are_complete() {
+fn completions_and_manual_pages_are_generated() {
     for shell in ["bash", "zsh", "fish"] {
         let script = Bench::new().run(&format!("completions {shell}"));
         assert!(
@@ -211,14 +211,14 @@ fn help_fits_80_columns_and_shows_kinds_and_defaults() {
 }
 
 #[test]
-fn the_old_name_of_emulate_still_works_and_is_not_shown() {
+fn old_name_of_emulate_works_and_is_hidden() {
     let bench = Bench::new();
     assert!(bench.run("device --help").out.contains("emulate"));
     assert!(!bench.run("--help").out.contains("  device"));
 }
 
 #[test]
-fn a_full_or_closed_output_ends_without_a_panic() {
+fn full_output_device_causes_no_panic() {
     let full = || {
         File::options()
             .write(true)
@@ -252,7 +252,7 @@ fn a_full_or_closed_output_ends_without_a_panic() {
 }
 
 #[test]
-fn calibrate_and_linearity_print_their_plan_before_the_first_run() {
+fn calibrate_and_linearity_print_the_plan_before_the_first_run() {
     let bench = Bench::new();
     // A file in place of the folder: the run cannot begin.
     std::fs::write(bench.path("taken"), "").expect("a file");

@@ -26,7 +26,7 @@ fn with_little_room(blocks: u32, arguments: &[&str], out: &Path) -> Output {
 }
 
 #[test]
-fn a_disk_that_fills_up_stops_the_run_with_a_message_and_keeps_the_written_part() {
+fn disk_full_stops_the_run_and_keeps_the_written_part() {
     for arguments in [&["chirp"][..], &["control", "--fast", "--duration", "100"]] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         // 2048 blocks of 512 bytes (1024 in some shells): 1 or 2 MiB of some 25 MiB.
@@ -70,7 +70,7 @@ fn a_disk_that_fills_up_stops_the_run_with_a_message_and_keeps_the_written_part(
 }
 
 #[test]
-fn a_run_in_real_time_is_stopped_when_the_disk_fills_up() {
+fn disk_full_stops_a_real_time_run() {
     // The run takes an hour, and 64 blocks are full within seconds. If the run is not stopped, this test times out.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let arguments = [
@@ -92,7 +92,7 @@ fn a_run_in_real_time_is_stopped_when_the_disk_fills_up() {
 }
 
 #[test]
-fn with_a_disk_that_is_full_from_the_start_there_is_no_motion() {
+fn disk_full_at_start_prevents_motion() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = with_little_room(0, &["chirp"], folder.path());
     let said = stderr(&output);
@@ -104,7 +104,7 @@ fn with_a_disk_that_is_full_from_the_start_there_is_no_motion() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_to_is_reported_before_any_motion() {
+fn unwritable_folder_is_reported_before_any_motion() {
     // No user, not even root, can create a file in /proc.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a_file");

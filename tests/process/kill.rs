@@ -4,7 +4,7 @@ use bench::recording::Recording;
 use crate::common::{RATE_HZ, Running, bench, minute, recording_in, stderr};
 
 #[test]
-fn a_killed_run_is_recovered_except_for_the_last_second() {
+fn killed_run_is_recovered_except_for_the_last_second() {
     for what in ["control", "chirp"] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut running = Running::start(&minute(what), folder.path());

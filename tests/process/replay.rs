@@ -20,7 +20,7 @@ fn json(output: &Output) -> serde_json::Value {
 }
 
 #[test]
-fn a_run_in_real_time_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
+fn real_time_run_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let arguments = [
         &["control", "--slow", "--duration", "2", "--json"][..],
@@ -96,7 +96,7 @@ fn more_missed_ticks_than_allowed_trip_and_exit_with_1() {
 }
 
 #[test]
-fn an_altered_recording_exits_with_1_and_names_the_tick() {
+fn altered_recording_exits_with_1_and_names_the_tick() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = bench(&["control", "--fast", "--duration", "1", "--out"])
         .arg(folder.path())
@@ -149,7 +149,7 @@ fn an_altered_recording_exits_with_1_and_names_the_tick() {
 }
 
 #[test]
-fn other_files_than_recordings_are_refused_with_a_reason_and_without_a_panic() {
+fn rejects_invalid_recordings_with_reason_and_without_panic() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = bench(&["control", "--slow", "--duration", "1", "--out"])
         .arg(folder.path())

@@ -77,27 +77,27 @@ fn stopped_by(signal: i32, what: &str) {
 }
 
 #[test]
-fn ctrl_c_stops_a_closed_loop_with_zero_current_and_a_whole_recording_that_replays() {
+fn ctrl_c_stops_a_closed_loop_with_zero_current_and_complete_recording() {
     stopped_by(libc::SIGINT, "control");
 }
 
 #[test]
-fn ctrl_c_stops_a_chirp_with_zero_current_and_a_whole_recording_that_replays() {
+fn ctrl_c_stops_a_chirp_with_zero_current_and_complete_recording() {
     stopped_by(libc::SIGINT, "chirp");
 }
 
 #[test]
-fn sigterm_stops_a_closed_loop_with_zero_current_and_a_whole_recording_that_replays() {
+fn sigterm_stops_a_closed_loop_with_zero_current_and_complete_recording() {
     stopped_by(libc::SIGTERM, "control");
 }
 
 #[test]
-fn sigterm_stops_a_chirp_with_zero_current_and_a_whole_recording_that_replays() {
+fn sigterm_stops_a_chirp_with_zero_current_and_complete_recording() {
     stopped_by(libc::SIGTERM, "chirp");
 }
 
 #[test]
-fn a_second_ctrl_c_has_no_effect() {
+fn second_ctrl_c_has_no_effect() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut running = Running::start(&minute("control"), folder.path());
     running.until_slept(RATE_HZ);

@@ -87,7 +87,7 @@ fn nothing_is_false(recording: &Recording, of_bytes: usize) -> Result<(), TestCa
 }
 
 #[test]
-fn a_file_cut_at_any_byte_gives_what_stands_before_the_cut_or_an_error() {
+fn file_truncated_at_any_byte_gives_its_readable_part_or_an_error() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("cut.mcap");
     for length in 0..ORIGINAL.bytes.len() {
@@ -105,7 +105,7 @@ fn opened_truncated(path: &Path) -> bool {
 }
 
 #[test]
-fn no_single_altered_byte_is_handed_out_as_recorded() {
+fn single_altered_byte_is_never_returned_as_data() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("altered.mcap");
     let mut bytes = ORIGINAL.bytes.clone();
@@ -119,7 +119,7 @@ fn no_single_altered_byte_is_handed_out_as_recorded() {
 
 proptest! {
     #[test]
-    fn no_mix_of_cuts_and_altered_bytes_is_handed_out_as_recorded(
+    fn truncated_and_altered_files_never_return_altered_data(
         flips in prop::collection::vec((any::<prop::sample::Index>(), 1u8..), 0..6),
         zeroed in prop::option::of((any::<prop::sample::Index>(), 0usize..40)),
         length in prop::option::of(any::<prop::sample::Index>()),
@@ -135,7 +135,7 @@ proptest! {
     }
 
     #[test]
-    fn records_of_any_content_never_panic(
+    fn arbitrary_records_cause_no_panic(
         records in prop::collection::vec((0u8..18, prop::collection::vec(prop_oneof![Just(0u8), any::<u8>()], 0..80)), 0..6),
     ) {
         let mut bytes = mcap::MAGIC.to_vec();
@@ -182,7 +182,7 @@ fn open(bytes: &[u8]) -> Result<Recording, RecordingError> {
 }
 
 #[test]
-fn an_attachment_that_ends_before_its_crc_is_refused() {
+fn rejects_attachment_without_crc() {
     // Two times, an empty name, an empty media type, an empty content and no CRC.
     let bytes = [
         mcap::MAGIC,
@@ -199,7 +199,7 @@ fn an_attachment_that_ends_before_its_crc_is_refused() {
 }
 
 #[test]
-fn a_chunk_that_vanished_from_a_cut_file_is_noticed() {
+fn detects_a_missing_chunk_in_a_truncated_file() {
     let chunks = chunks(&ORIGINAL.bytes);
     let (at, length) = chunks[2]; // the first holds the schemas, the second the first half second
     let end = chunks[4].0;
@@ -216,7 +216,7 @@ fn a_chunk_that_vanished_from_a_cut_file_is_noticed() {
 }
 
 #[test]
-fn a_chunk_without_its_crc_is_refused() {
+fn rejects_chunk_without_crc() {
     let chunks = chunks(&ORIGINAL.bytes);
     let mut bytes = ORIGINAL.bytes[..chunks[4].0].to_vec(); // cut, so no CRC of the whole stands above
     let crc = chunks[2].0 + 9 + 8 + 8 + 8; // behind opcode, length, two times and a size
@@ -229,7 +229,7 @@ fn a_chunk_without_its_crc_is_refused() {
 }
 
 #[test]
-fn each_kind_of_useless_file_is_told_apart_with_a_remedy() {
+fn unusable_files_are_reported_by_kind_with_a_remedy() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let says = |name: &str, words: &str| {
         let error = Recording::open(&dir.path().join(name))

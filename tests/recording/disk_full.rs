@@ -40,7 +40,7 @@ impl Write for SmallDisk {
 }
 
 #[test]
-fn a_disk_that_is_full_from_the_start_is_told_at_once_with_a_remedy() {
+fn reports_full_disk_at_start_with_remedy() {
     let refused = Recorder::over(Box::new(dev_full()), Path::new("full.mcap"), &header())
         .err()
         .expect("full");
@@ -58,7 +58,7 @@ fn a_disk_that_is_full_from_the_start_is_told_at_once_with_a_remedy() {
 }
 
 #[test]
-fn a_disk_that_fills_up_stops_the_recording_but_neither_the_ring_nor_the_account() {
+fn disk_full_during_a_run_keeps_draining_and_counting() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("filled.mcap");
     let disk = SmallDisk {

@@ -27,7 +27,7 @@ fn read_back(published: &[LoopMessage]) -> (Recording, Vec<TickRecord>) {
 }
 
 #[test]
-fn every_field_of_a_tick_comes_back_with_every_bit() {
+fn tick_fields_round_trip_bit_for_bit() {
     let nan_with_payload = f64::from_bits(0x7ff8_0000_dead_beef);
     let doubles = [
         0.0,
@@ -80,7 +80,7 @@ fn every_field_of_a_tick_comes_back_with_every_bit() {
 }
 
 #[test]
-fn every_kind_of_event_comes_back_unchanged_and_in_order() {
+fn events_of_every_kind_round_trip_in_order() {
     let trips = [
         Trip::Travel {
             position_m: -4.1e-3,
@@ -150,7 +150,7 @@ fn every_kind_of_event_comes_back_unchanged_and_in_order() {
 }
 
 #[test]
-fn configuration_metadata_and_results_are_in_the_file() {
+fn file_contains_configuration_metadata_and_results() {
     let (recording, ticks) = read_back(&run(10));
     assert_eq!(recording.config_toml(), Some(CONFIG));
     assert_eq!(recording.metadata()["host"], "test");
@@ -172,7 +172,7 @@ fn configuration_metadata_and_results_are_in_the_file() {
 }
 
 #[test]
-fn an_existing_file_is_never_overwritten() {
+fn existing_file_is_not_overwritten() {
     let (_dir, path) = fresh();
     write(&path, &run(10));
     let before = std::fs::read(&path).expect("just written");
@@ -191,7 +191,7 @@ fn an_existing_file_is_never_overwritten() {
 }
 
 #[test]
-fn two_runs_in_virtual_pace_have_the_same_bytes_and_one_bit_makes_another_digest() {
+fn equal_runs_give_equal_bytes_and_one_bit_changes_the_digest() {
     let (dir, path) = fresh();
     let published = run(12_000);
     let (one, two) = (
@@ -220,7 +220,7 @@ fn two_runs_in_virtual_pace_have_the_same_bytes_and_one_bit_makes_another_digest
 }
 
 #[test]
-fn missing_ticks_are_overruns_if_the_loop_says_so_and_lost_otherwise() {
+fn missing_ticks_count_as_overruns_if_flagged_and_as_lost_otherwise() {
     let overrun = TickRecord {
         missed_ticks: 2,
         ..tick(13)
@@ -259,7 +259,7 @@ fn missing_ticks_are_overruns_if_the_loop_says_so_and_lost_otherwise() {
 }
 
 #[test]
-fn each_second_is_summed_up_and_the_whole_run_too() {
+fn timing_is_summarised_per_second_and_per_run() {
     // Lateness 1..=5000 ns in the first second, ten times that in the second; compute 700 ns throughout.
     let late = |n: u64| {
         let woke_ns = n * PERIOD_NS + (n % 5000 + 1) * if n < 5000 { 1 } else { 10 };
@@ -312,7 +312,7 @@ fn each_second_is_summed_up_and_the_whole_run_too() {
 }
 
 #[test]
-fn at_most_half_a_second_dies_with_the_process() {
+fn killed_process_loses_at_most_half_a_second() {
     let (_dir, path) = fresh();
     let mut recorder = Recorder::create(&path, &header()).expect("fresh");
     let published = run(7_499); // 1.4998 s: the chunks up to 0.5 and 1.0 s are full
@@ -337,7 +337,7 @@ fn at_most_half_a_second_dies_with_the_process() {
 }
 
 #[test]
-fn ticks_out_of_order_are_refused() {
+fn rejects_ticks_out_of_order() {
     let (_dir, path) = fresh();
     let mut recorder = Recorder::create(&path, &header()).expect("fresh");
     recorder.record(&LoopMessage::Tick(tick(5))).expect("first");
@@ -358,7 +358,7 @@ fn ticks_out_of_order_are_refused() {
 }
 
 #[test]
-fn what_was_recovered_from_a_cut_file_is_complete_and_tells_of_the_cut() {
+fn recovered_file_is_complete_and_reports_the_truncation() {
     let (dir, path) = fresh();
     let published = run(12_000);
     write(&path, &published);
@@ -403,7 +403,7 @@ fn what_was_recovered_from_a_cut_file_is_complete_and_tells_of_the_cut() {
 }
 
 #[test]
-fn a_tick_in_whose_place_three_were_missed_is_late_by_three_periods_more() {
+fn lateness_includes_the_missed_periods() {
     let folder = tempfile::tempdir().expect("temporary directory");
     let ticks = [0, 1, 5].map(|number| {
         let missed_ticks = if number == 5 { 3 } else { 0 };

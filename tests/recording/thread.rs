@@ -6,7 +6,7 @@ use rtrb::RingBuffer;
 use crate::common::{header, run, tick};
 
 #[test]
-fn all_that_was_pushed_before_the_loop_ended_is_in_the_recording() {
+fn recording_contains_all_messages_sent_before_the_loop_ended() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("run.mcap");
     let published = run(20_000);
@@ -41,7 +41,7 @@ fn all_that_was_pushed_before_the_loop_ended_is_in_the_recording() {
 }
 
 #[test]
-fn what_did_not_fit_into_the_ring_is_counted_as_lost() {
+fn messages_beyond_the_ring_capacity_are_counted_as_lost() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("lossy.mcap");
     let (mut ring, consumer) = RingBuffer::new(100);

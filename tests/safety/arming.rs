@@ -66,7 +66,7 @@ fn bench_in(state: State, trip: bool) -> Bench {
 }
 
 #[test]
-fn every_arrow_of_the_diagram_is_there_and_no_other() {
+fn transitions_match_the_state_diagram() {
     for (column, from) in STATES.into_iter().enumerate() {
         for (change, to) in ARROWS {
             let to = to[column];
@@ -120,7 +120,7 @@ fn is_move(kind: &EventKind) -> bool {
 }
 
 #[test]
-fn a_program_at_its_end_disarms_in_the_tick_after_its_last_command() {
+fn completed_program_disarms_in_the_tick_after_its_last_command() {
     let mut bench = Bench::running(&stage(), &[], Box::new(Says(|_| 0.1, 10)));
     bench.run(20);
     let commands: Vec<bool> = bench.ticks().iter().map(|r| r.command_a != 0.0).collect();
@@ -139,7 +139,7 @@ fn a_program_at_its_end_disarms_in_the_tick_after_its_last_command() {
 }
 
 #[test]
-fn a_second_program_does_not_push_aside_the_one_that_runs() {
+fn start_request_does_not_replace_the_running_program() {
     let mut bench = Bench::running(&stage(), &[], says(|tick| 0.1 + tick as f64 * 1e-3));
     bench.run(5);
     bench.order(Request::Start(says(|_| 5.0)));
@@ -148,7 +148,7 @@ fn a_second_program_does_not_push_aside_the_one_that_runs() {
 }
 
 #[test]
-fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
+fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
     let mut bench = bench_in(State::Tripped, false);
     let trip = bench.servo().last_trip().expect("tripped");
     let told = bench.told().len();
@@ -192,7 +192,7 @@ fn nothing_but_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start(
 }
 
 #[test]
-fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
+fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
     let faults = [(100..101, Fault::Faulted(5)), (0..200, Fault::Unclearable)];
     let mut bench = Bench::running(&stage(), &faults, says(|_| 0.1));
     bench.run(150);
@@ -211,7 +211,7 @@ fn a_clear_that_the_amplifier_refuses_leaves_the_trip() {
 }
 
 #[test]
-fn a_run_after_a_cleared_trip_does_not_carry_the_old_trip_along() {
+fn new_run_resets_the_last_trip() {
     let mut bench = bench_in(State::Tripped, false);
     for order in [
         Request::Clear,
@@ -229,7 +229,7 @@ fn a_run_after_a_cleared_trip_does_not_carry_the_old_trip_along() {
 }
 
 #[test]
-fn an_arm_order_that_changes_nothing_does_not_touch_the_amplifier() {
+fn arm_request_in_other_states_does_not_enable_the_amplifier() {
     for state in STATES.into_iter().filter(|state| *state != State::Disarmed) {
         let mut bench = bench_in(state, false);
         let told = bench.told().len();
@@ -265,7 +265,7 @@ impl Clock for Handing {
 }
 
 #[test]
-fn the_schedule_begins_anew_after_the_amplifier_was_enabled_and_at_no_other_order() {
+fn schedule_restarts_only_after_enabling_the_amplifier() {
     let (servo, requests, _records) = loop_around(Still::default());
     let restarts = Arc::new(AtomicU64::new(0));
     let program = Request::Start(Box::new(Says(|_| 0.1, 10)));
@@ -326,7 +326,7 @@ impl Program for Panics {
 }
 
 #[test]
-fn a_panic_in_the_loop_leaves_the_amplifier_off() {
+fn panic_in_the_loop_disables_the_amplifier() {
     let rig = Watched::new(Still::default());
     let log = Arc::clone(&rig.log);
     let (servo, mut requests, _records) = loop_around(rig);
@@ -345,7 +345,7 @@ fn a_panic_in_the_loop_leaves_the_amplifier_off() {
 }
 
 #[test]
-fn where_no_recording_can_be_made_the_amplifier_is_not_even_enabled() {
+fn amplifier_is_not_enabled_without_a_recording() {
     let mut config = stage();
     (
         config.chirp.quiet_before_s,

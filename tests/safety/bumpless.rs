@@ -117,7 +117,7 @@ fn makes_no_jump(config: &Config, records: &[TickRecord], offset_m: f64, what: &
 }
 
 #[test]
-fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
+fn closing_the_loop_with_probe_offset_is_bumpless() {
     for name in ["fast", "slow"] {
         for (seed, offset_m) in [(1, 300e-6), (2, -300e-6), (3, 0.0), (4, 850e-6)] {
             let mut config = config(name, seed);
@@ -142,7 +142,7 @@ fn closing_the_loop_on_a_probe_with_an_offset_makes_no_jump() {
 }
 
 #[test]
-fn no_current_flows_while_the_origin_is_found() {
+fn no_current_flows_during_settling() {
     let config = config("fast", 1);
     let rig = SimulatedRig::new(&config).expect("a rig");
     let mut bench = Bench::around(
@@ -168,7 +168,7 @@ fn no_current_flows_while_the_origin_is_found() {
 }
 
 #[test]
-fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point() {
+fn second_run_starts_from_rest_without_the_old_set_point() {
     for name in ["fast", "slow"] {
         // The first run ends on a step of 50 um, held by current; then the stage swings back and rests: 10 s are 16 time
         // constants of its first mode (zeta w = 1.66 1/s), 50 um e^-16 = 6 pm.
@@ -216,7 +216,7 @@ fn a_second_run_starts_as_the_first_did_from_rest_and_without_the_old_set_point(
 }
 
 #[test]
-fn a_controller_that_was_used_before_starts_from_rest() {
+fn reused_controller_starts_from_rest() {
     for name in ["fast", "slow"] {
         let mut config = config(name, 6);
         config.control.reference = ReferenceSettings::Hold(HoldReference {});

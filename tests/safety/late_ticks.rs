@@ -90,7 +90,7 @@ impl IntoChunk for Consumer<LoopMessage> {
 }
 
 #[test]
-fn missed_ticks_are_counted_flagged_and_leave_a_gap_in_the_numbers() {
+fn missed_ticks_are_counted_flagged_and_skipped_in_the_numbering() {
     let clock = Jerky {
         late: vec![(10, 1), (11, 7), (30, 20)],
         calls: 0,
@@ -148,7 +148,7 @@ impl Program for Asked {
 }
 
 #[test]
-fn a_program_goes_on_where_it_was_and_no_missed_tick_is_made_up_for() {
+fn program_continues_after_missed_ticks_without_catching_up() {
     // Were ticks caught up, there would be more ticks than calls of the clock, or the program would skip or repeat some.
     let asked = Arc::default();
     let clock = Jerky {
@@ -207,7 +207,7 @@ impl DisplacementProbe for Hangs {
 }
 
 #[test]
-fn in_real_time_every_scheduled_tick_is_either_served_or_counted_as_missed() {
+fn real_time_ticks_are_served_or_counted_as_missed() {
     // 500 Hz for a second. The probe hangs for 20 ms in one tick: ten periods, so the tick after it is due nine periods
     // before it can be served at the soonest.
     let clock = Realtime::new(0.002);
@@ -252,7 +252,7 @@ fn in_real_time_every_scheduled_tick_is_either_served_or_counted_as_missed() {
 }
 
 #[test]
-fn more_missed_ticks_than_allowed_stop_the_run_in_real_time() {
+fn too_many_missed_ticks_trip_in_real_time() {
     let clock = Realtime::new(0.002);
     let (ended, records) = run(
         Hangs(Still::default(), 100),
@@ -277,7 +277,7 @@ fn more_missed_ticks_than_allowed_stop_the_run_in_real_time() {
 }
 
 #[test]
-fn through_missed_ticks_the_simulated_amplifier_holds_the_last_command_after_its_delay() {
+fn simulated_amplifier_holds_the_delayed_command_during_missed_ticks() {
     for delay in 0..4 {
         let mut config = stage();
         config.servo.computing_delay_periods = delay;

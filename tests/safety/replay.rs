@@ -93,7 +93,7 @@ fn chirps_and_closed_loops_replay_bit_for_bit() {
 }
 
 #[test]
-fn a_run_that_tripped_replays_bit_for_bit_whatever_tripped_it() {
+fn tripped_runs_replay_bit_for_bit() {
     const AT: u64 = 4000;
     let once = |fault| [(AT..AT + 1, fault)];
     let lasting = |fault| [(AT..AT + 2000, fault)];
@@ -130,7 +130,7 @@ fn a_run_that_tripped_replays_bit_for_bit_whatever_tripped_it() {
 }
 
 #[test]
-fn a_trip_of_the_controllers_own_making_replays_bit_for_bit() {
+fn peak_current_trip_by_the_controller_replays_bit_for_bit() {
     // A step of 500 um through a controller of 0.1 A/um asks for 50 A.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("stiff.toml");
@@ -182,7 +182,7 @@ fn rewritten(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
 }
 
 #[test]
-fn one_altered_bit_of_the_probe_is_found_at_its_tick() {
+fn one_altered_bit_of_a_reading_is_found_at_its_tick() {
     // The first command of a closed loop to answer a change of the reading by d is that of the same tick, b d with b the
     // product of the sections' first coefficients. Bit 24 of a reading near 30 um is 30e-6 2^-28 = 1e-13 m; fast: b = 460 A/m
     // (K T/2 = 5.1, pole 9e-5, the others near one), slow: b = 0.12e6 T/2 (w T/2)^2 = 1e-3 A/m. That is 5e-11 A and 1e-16 A,
@@ -225,7 +225,7 @@ fn one_altered_bit_of_the_probe_is_found_at_its_tick() {
 }
 
 #[test]
-fn an_altered_command_order_or_flag_is_found_at_its_tick() {
+fn altered_command_request_flag_or_reference_is_found_at_its_tick() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = record(&short_chirp(Sweep::Logarithmic), &[], folder.path());
     let alterations: [fn(&mut TickRecord); 4] = [
@@ -251,7 +251,7 @@ fn an_altered_command_order_or_flag_is_found_at_its_tick() {
 }
 
 #[test]
-fn clears_that_the_amplifier_refused_and_took_replay_as_they_were() {
+fn refused_and_accepted_clear_requests_replay_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let plan = control("fast");
     let faults = [(100..101, Fault::Faulted(77)), (0..200, Fault::Unclearable)];
@@ -283,7 +283,7 @@ fn clears_that_the_amplifier_refused_and_took_replay_as_they_were() {
 }
 
 #[test]
-fn a_cut_off_recording_replays_up_to_its_cut() {
+fn truncated_recording_replays_up_to_its_end() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = record(&control("fast"), &[], folder.path());
     let bytes = std::fs::read(&path).expect("just written");
@@ -295,7 +295,7 @@ fn a_cut_off_recording_replays_up_to_its_cut() {
 }
 
 #[test]
-fn recordings_that_cannot_be_replayed_say_why() {
+fn recordings_that_cannot_be_replayed_name_the_reason() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str, header: &Header, ticks: &[TickRecord]| {
         let path = folder.path().join(name);
@@ -361,7 +361,7 @@ fn recordings_that_cannot_be_replayed_say_why() {
 }
 
 #[test]
-fn a_recording_whose_times_run_backwards_is_replayed_without_a_panic() {
+fn recording_with_decreasing_times_replays_without_panic() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = record(&control("fast"), &[], folder.path());
     let backwards = folder.path().join("backwards.mcap");

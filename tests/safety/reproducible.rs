@@ -38,7 +38,7 @@ fn digest(plan: &Plan) -> u64 {
 }
 
 #[test]
-fn the_same_seed_is_the_same_run_bit_for_bit_and_another_seed_is_another() {
+fn same_seed_gives_identical_run_and_other_seed_does_not() {
     let plans: [fn(u64) -> Plan; 4] = [
         |seed| control("fast", seed),
         |seed| control("slow", seed),
@@ -56,7 +56,7 @@ fn the_same_seed_is_the_same_run_bit_for_bit_and_another_seed_is_another() {
 }
 
 #[test]
-fn a_run_of_two_seconds_has_the_digest_that_it_has_on_every_machine() {
+fn two_second_run_has_the_reference_digest() {
     // A frozen value, and the one place for one: `bench control --fast --duration 2 --seed 1 --json` prints it as
     // `loop_digest`. It holds on any x86-64 or ARM machine, because no function of the platform's libm stands between the
     // settings and a command (the test below reads the code for it) and sums have a fixed order. It changes with the
@@ -149,7 +149,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 #[test]
-fn no_function_of_the_platforms_libm_stands_between_the_settings_and_a_command() {
+fn command_path_calls_no_platform_libm() {
     for (file, text) in PATH_OF_A_RUN.iter().flat_map(|of| sources(of)) {
         for (number, line) in lines(&text) {
             for name in OF_THE_PLATFORM {
@@ -176,7 +176,7 @@ fn no_function_of_the_platforms_libm_stands_between_the_settings_and_a_command()
 }
 
 #[test]
-fn no_lock_no_print_and_no_file_is_in_the_code_of_a_tick() {
+fn tick_code_contains_no_lock_print_or_file_access() {
     let tick = [
         "rt/servo.rs",
         "rt/interlock.rs",

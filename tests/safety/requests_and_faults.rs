@@ -159,7 +159,7 @@ proptest! {
     })]
 
     #[test]
-    fn current_flows_only_in_a_run_that_was_armed_and_started_after_the_last_trip(
+    fn current_flows_only_after_arm_and_start_since_the_last_trip(
         requests in requests(), faults in faults(), late in late(),
     ) {
         prove(&run(&requests, &faults, &late))?;
@@ -167,7 +167,7 @@ proptest! {
 }
 
 #[test]
-fn the_property_sees_runs_trips_clears_and_completions() {
+fn generators_cover_runs_trips_clears_and_completions() {
     // The same generators must reach all that the property speaks of, or it would prove nothing.
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
         rng_seed: RngSeed::Fixed(1),
@@ -208,7 +208,7 @@ fn the_property_sees_runs_trips_clears_and_completions() {
 }
 
 #[test]
-fn in_virtual_pace_nothing_is_lost_however_many_orders_a_tick_takes() {
+fn virtual_pace_loses_no_message_with_a_full_request_ring() {
     // All that the ring of requests holds, each with every event it can cause: an amplifier that does not enable.
     let mut bench = Bench::still(&stage(), &[(0..10, Fault::DoesNotEnable(1))]);
     bench.tick();

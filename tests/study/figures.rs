@@ -39,7 +39,7 @@ fn interaction(counted: &Value, keys: [&str; 2]) -> f64 {
 }
 
 #[test]
-fn xy_stage_has_the_probabilities_of_20_000_draws() {
+fn xy_stage_has_the_reference_probabilities() {
     for seed in [1, 2, 3] {
         let answer = Bench::new().json(&format!("{XY} --draws 20000 --seed {seed}"));
         assert_eq!(
@@ -77,7 +77,7 @@ fn xy_stage_has_the_probabilities_of_20_000_draws() {
 }
 
 #[test]
-fn none_of_100_000_draws_is_miscounted() {
+fn pair_counts_of_100_000_draws_agree_with_reference() {
     let bench = Bench::new();
     bench.json(&format!("{XY} --draws 100000 --csv draws.csv"));
     let config = bench.json("config show --config xy");
@@ -262,7 +262,7 @@ fn normal_tolerance_has_normal_tails() {
 }
 
 #[test]
-fn zeros_with_damping_are_counted_as_well() {
+fn damped_zeros_are_counted() {
     let bench = Bench::new();
     // Heavily damped, the XY stage keeps its zeros in the left half plane.
     let answer = bench.json(&format!(

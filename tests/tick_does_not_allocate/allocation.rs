@@ -9,7 +9,7 @@ use crate::quiet::{Quiet, Says};
 use crate::{all_trips, stage, weak};
 
 #[test]
-fn no_program_allocates_from_its_first_tick_to_its_completion() {
+fn programs_do_not_allocate() {
     let config = stage();
     for (name, program) in programs(&config) {
         let mut quiet = Quiet::running(&config, &[], program);
@@ -23,7 +23,7 @@ fn no_program_allocates_from_its_first_tick_to_its_completion() {
 }
 
 #[test]
-fn no_trip_allocates_nor_what_comes_after_it() {
+fn trips_and_later_ticks_do_not_allocate() {
     for (reason, fault, current_a) in all_trips() {
         let mut quiet = Quiet::running(&weak(), &[(0..10_000, fault)], Box::new(Says(current_a)));
         quiet.run(8000);
@@ -48,7 +48,7 @@ fn no_trip_allocates_nor_what_comes_after_it() {
 }
 
 #[test]
-fn no_order_allocates_whenever_it_comes_and_programs_are_freed_outside() {
+fn requests_do_not_allocate_and_programs_are_freed_outside_the_tick() {
     let config = weak();
     let mut quiet = Quiet::new(&config, &[]);
     for round in 0..20 {
@@ -78,7 +78,7 @@ fn no_order_allocates_whenever_it_comes_and_programs_are_freed_outside() {
 }
 
 #[test]
-fn a_full_ring_to_the_recorder_allocates_nothing_and_holds_nothing_up() {
+fn full_recorder_ring_does_not_allocate_or_block() {
     let mut quiet = Quiet::running(&weak(), &[], Box::new(Says(0.01)));
     for number in 0..5000u64 {
         let tick = Tick {

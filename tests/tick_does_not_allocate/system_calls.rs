@@ -104,7 +104,7 @@ fn chains() -> Vec<(&'static str, Config)> {
 }
 
 #[test]
-fn whatever_the_chain_a_tick_allocates_nothing_and_makes_no_system_call() {
+fn other_signal_chains_do_not_allocate_or_make_system_calls() {
     for (name, config) in chains() {
         let running = || {
             Quiet::running(
@@ -137,7 +137,7 @@ fn whatever_the_chain_a_tick_allocates_nothing_and_makes_no_system_call() {
 }
 
 #[test]
-fn twenty_thousand_ticks_make_no_system_call() {
+fn programs_make_no_system_calls() {
     let config = stage();
     for (name, program) in programs(&config) {
         let mut quiet = Quiet::running(&config, &[(6000..6001, Fault::At(0.00095))], program);
@@ -159,7 +159,7 @@ fn twenty_thousand_ticks_make_no_system_call() {
 }
 
 #[test]
-fn trips_orders_and_late_ticks_make_no_system_call() {
+fn trips_requests_and_late_ticks_make_no_system_calls() {
     for (reason, fault, current_a) in all_trips() {
         let config = weak();
         let mut quiet = Quiet::running(&config, &[(0..8000, fault)], Box::new(Says(current_a)));
@@ -190,7 +190,7 @@ fn trips_orders_and_late_ticks_make_no_system_call() {
 }
 
 #[test]
-fn in_real_time_the_clock_is_all_that_the_loop_asks_of_the_system() {
+fn real_time_loop_makes_only_clock_system_calls() {
     let config = weak();
     let mut quiet = Quiet::running(&config, &[], Box::new(Says(0.01)));
     let mut clock = Realtime::new(0.002);
@@ -213,7 +213,7 @@ fn in_real_time_the_clock_is_all_that_the_loop_asks_of_the_system() {
 }
 
 #[test]
-fn a_system_call_or_an_allocation_in_a_tick_would_be_seen() {
+fn detects_a_system_call_or_an_allocation() {
     let config = weak();
     let killed = Ended::Signal(libc::SIGSYS);
     let mut quiet = Quiet::running(&config, &[], Box::new(Says(0.01)));

@@ -24,7 +24,7 @@ fn condition(bus: &mut dyn CanBus) -> Condition {
 
 /// One test, since there is one adapter: the parts build upon each other.
 #[test]
-fn bus_off_is_a_fault_with_remedy_and_can_be_cleared_after_a_restart_of_the_interface() {
+fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
     let adapter = Adapter::new();
     let name = adapter.name.clone();
     let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // an unused identifier: conditions only

@@ -7,7 +7,7 @@ use crate::support::vcan::Vcan;
 use crate::support::{Rig, host, open, settings};
 
 #[test]
-fn the_drive_stops_when_the_interface_is_down_and_the_fault_can_be_cleared_when_it_is_up() {
+fn interface_down_stops_the_drive_and_can_be_cleared() {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     vcan.set_up(false);
@@ -26,7 +26,7 @@ fn the_drive_stops_when_the_interface_is_down_and_the_fault_can_be_cleared_when_
 }
 
 #[test]
-fn the_drive_stops_when_the_adapter_is_removed_and_can_be_opened_again() {
+fn removed_adapter_stops_the_drive_and_it_can_be_opened_again() {
     let mut vcan = Vcan::up();
     let mut rig = vcan.running();
     vcan.unplug();

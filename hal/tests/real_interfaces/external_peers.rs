@@ -52,7 +52,7 @@ fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
 }
 
 #[test]
-fn an_independent_drive_is_enabled_runs_reports_its_fault_is_cleared_and_left_off() {
+fn driver_operates_an_independent_drive() {
     let vcan = Vcan::up();
     let mut other = PythonDrive::new(&vcan.name);
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
@@ -85,7 +85,7 @@ fn an_independent_drive_is_enabled_runs_reports_its_fault_is_cleared_and_left_of
 }
 
 #[test]
-fn an_independent_master_runs_the_emulated_drive_which_detects_the_loss_of_its_heartbeat() {
+fn independent_master_operates_the_emulated_drive() {
     let vcan = Vcan::up();
     let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let output = script("canopen_master.py", &vcan.name).output().unwrap();

@@ -24,7 +24,7 @@ fn is_found_and_cleared(misbehaviour: DeviceFault, code: u32) {
 }
 
 #[test]
-fn a_fault_of_the_drive_is_reported_with_its_emergency_message() {
+fn reports_drive_fault_with_its_emergency_message() {
     is_found_and_cleared(DeviceFault::Drive(0x4210), faults::EMERGENCY + 0x4210);
     let text = fault_text(faults::EMERGENCY + 0x4210);
     assert_eq!(text.what, "drive too hot");
@@ -35,7 +35,7 @@ fn a_fault_of_the_drive_is_reported_with_its_emergency_message() {
 }
 
 #[test]
-fn detects_an_emergency_message_without_a_change_of_state() {
+fn detects_emergency_message_without_state_change() {
     is_found_and_cleared(
         DeviceFault::EmergencyOnly(0x2310),
         faults::EMERGENCY + 0x2310,
@@ -63,7 +63,7 @@ fn detects_a_statusword_without_a_state() {
 }
 
 #[test]
-fn detects_a_drive_that_does_not_follow_its_target() {
+fn detects_drive_that_ignores_its_target() {
     is_found_and_cleared(DeviceFault::TargetIgnored, faults::TARGET_IGNORED);
 }
 
@@ -90,7 +90,7 @@ fn detects_a_drive_with_late_frames() {
 }
 
 #[test]
-fn a_drive_that_ignores_disable_is_stopped_by_nmt_or_by_the_lost_heartbeat() {
+fn drive_that_ignores_disable_is_stopped_by_nmt_or_lost_heartbeat() {
     for misbehaviour in [DeviceFault::SetPointsIgnored, DeviceFault::CommandsIgnored] {
         let vcan = Vcan::up();
         let mut rig = vcan.running();

@@ -10,7 +10,7 @@ fn refusal(name: &str) -> String {
 }
 
 #[test]
-fn rejects_an_unknown_interface_and_says_how_to_list_them() {
+fn rejects_unknown_interface_with_command_to_list_them() {
     let refused = refusal("can77");
     assert!(refused.starts_with("CAN interface can77: "), "{refused}");
     assert!(
@@ -20,7 +20,7 @@ fn rejects_an_unknown_interface_and_says_how_to_list_them() {
 }
 
 #[test]
-fn rejects_an_interface_that_is_down_with_the_command_to_bring_it_up() {
+fn rejects_interface_that_is_down_with_command_to_bring_it_up() {
     let vcan = Vcan::down();
     let name = &vcan.name;
     let remedy = format!(
@@ -31,7 +31,7 @@ fn rejects_an_interface_that_is_down_with_the_command_to_bring_it_up() {
 }
 
 #[test]
-fn a_virtual_interface_is_up_and_healthy_and_has_no_bit_rate() {
+fn virtual_interface_is_healthy_and_has_no_bit_rate() {
     let vcan = Vcan::up();
     let interface = Interface::read(&vcan.name).unwrap();
     assert!(interface.is_up && interface.is_healthy, "{interface:?}");

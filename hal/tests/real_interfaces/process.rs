@@ -15,7 +15,7 @@ use crate::support::{FarEnd, Rig, host, open, refusal, settings, wait_for};
 const INTERFACE: &str = "BENCH_HAL_TO_BE_KILLED_ON";
 
 #[test]
-fn the_drive_stops_after_the_process_is_killed_and_the_node_is_free() {
+fn drive_stops_and_node_is_released_after_the_process_is_killed() {
     if let Ok(interface) = std::env::var(INTERFACE) {
         command_for_ever(&interface);
     }
@@ -51,7 +51,7 @@ fn the_drive_stops_after_the_process_is_killed_and_the_node_is_free() {
 }
 
 fn the_same_test_in_a_process_of_its_own(interface: &str) -> Child {
-    let name = "process::the_drive_stops_after_the_process_is_killed_and_the_node_is_free";
+    let name = "process::drive_stops_and_node_is_released_after_the_process_is_killed";
     let mut command = Command::new(std::env::current_exe().unwrap());
     command
         .args(["--exact", name, "--nocapture"])

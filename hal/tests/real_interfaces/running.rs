@@ -14,7 +14,7 @@ use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, Rig, host, refusal, settings, wait_for};
 
 #[test]
-fn a_drive_is_enabled_follows_quantised_currents_reports_its_current_and_is_disabled() {
+fn drive_follows_quantised_set_points_and_is_disabled() {
     for exchange in [
         Exchange::Asynchronous { status_hz: 500.0 },
         Exchange::Synchronous { status_every: 1 },
@@ -52,7 +52,7 @@ fn a_drive_is_enabled_follows_quantised_currents_reports_its_current_and_is_disa
 }
 
 #[test]
-fn closing_leaves_the_drive_off_pre_operational_and_without_heartbeat_monitoring() {
+fn closing_leaves_the_drive_off_and_pre_operational() {
     let vcan = Vcan::up();
     let Rig { drive, far_end } = vcan.running();
     drop(drive);
@@ -65,7 +65,7 @@ fn closing_leaves_the_drive_off_pre_operational_and_without_heartbeat_monitoring
 }
 
 #[test]
-fn reads_the_identity_and_rejects_another_drive_than_the_configured_one() {
+fn rejects_drive_with_unexpected_identity() {
     let vcan = Vcan::up();
     let _far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(3)).unwrap();
@@ -96,7 +96,7 @@ fn reads_the_identity_and_rejects_another_drive_than_the_configured_one() {
 }
 
 #[test]
-fn an_endpoint_receives_only_its_identifiers_in_their_format() {
+fn endpoint_receives_only_its_identifiers_in_their_format() {
     let vcan = Vcan::up();
     let host = host(&vcan.name);
     let (mut all, ids) = (

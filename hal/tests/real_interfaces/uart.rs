@@ -143,7 +143,7 @@ fn protocol() -> Arc<dyn Protocol> {
 
 /// One test, since there is one pair.
 #[test]
-fn a_probe_over_8e1_is_read_rightly_and_damage_silence_and_a_restart_never_give_a_false_value() {
+fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
     let protocol = protocol();
     let (far, locks) = (FarProbe::new(&protocol), tempfile::tempdir().unwrap());
     let mut probe = SerialProbe::open(settings(&protocol, locks.path())).unwrap();

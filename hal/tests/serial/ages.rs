@@ -106,7 +106,7 @@ fn answers_after_the_timeout_are_used_with_their_true_age() {
 }
 
 #[test]
-fn late_values_of_a_stream_are_used_because_their_delay_is_not_observable() {
+fn late_stream_values_are_used() {
     for protocol in [optoncdt(), keyence()] {
         let rehearsal = Rehearsal::new(&protocol, 1000.0, still);
         let mut probe = rehearsal.open();
@@ -154,20 +154,20 @@ fn old_bytes_are_discarded(protocol: Arc<dyn Protocol>, old: &[u8], new: &[u8]) 
 }
 
 #[test]
-fn discards_bytes_of_a_binary_stream_from_before_opening() {
+fn discards_binary_data_received_before_opening() {
     let message = |x| optoncdt::message(x, true);
     old_bytes_are_discarded(optoncdt(), &message(20_000), &message(30_000));
 }
 
 #[test]
-fn discards_lines_from_before_opening() {
+fn discards_lines_received_before_opening() {
     let format = ascii::LineFormat::new(ascii::Settings::keyence_lk_g(RANGE_M)).unwrap();
     let line = |position_m| format.write(ascii::Output::Position(position_m));
     old_bytes_are_discarded(keyence(), &line(50e-6), &line(60e-6));
 }
 
 #[test]
-fn bytes_found_after_a_suspension_of_the_reader_are_not_published() {
+fn does_not_publish_bytes_received_during_reader_suspension() {
     let rehearsal = Rehearsal::new(&optoncdt(), 1000.0, still);
     let suspend = || std::thread::sleep(Duration::from_millis(100));
     let mut probe = SerialProbe::open_with(rehearsal.settings(), suspend).unwrap();

@@ -110,7 +110,7 @@ fn rejects_lines_with_a_missing_or_additional_character() {
 }
 
 #[test]
-fn finds_the_line_after_an_endless_line() {
+fn resynchronises_after_an_endless_line() {
     let found = decode(keyence(), &format!("{}\r+00.5000\r", "9".repeat(1000)));
     assert_eq!((valid(&found), damaged(&found)), (vec![5000], 1001));
     let tail = decode(

@@ -113,7 +113,7 @@ fn reports_a_gap_when_the_counter_advances_more_than_the_batch() {
 }
 
 #[test]
-fn uses_a_repeated_value_once() {
+fn repeated_values_are_used_once() {
     let found = raws(&[
         settings().answer(7, &[1, 2]),
         settings().answer(7, &[1, 2]),
@@ -181,7 +181,7 @@ fn recognises_the_echo_of_the_request() {
 }
 
 #[test]
-fn finds_the_answer_after_a_cut_one() {
+fn resynchronises_after_truncated_answer() {
     let cut = settings().answer(1, &[1, 2, 3])[..20].to_vec();
     let found = raws(&[cut, settings().answer(2, &[7]), settings().answer(3, &[8])]);
     assert_eq!((valid(&found), damaged(&found)), (vec![7, 8], 20));

@@ -28,7 +28,7 @@ fn refusal(settings: ProbeSettings) -> SerialError {
 }
 
 #[test]
-fn second_opening_is_refused_with_the_process_number_until_the_first_is_dropped() {
+fn rejects_second_opening_with_process_id_until_the_first_is_dropped() {
     let rehearsal = rehearsal();
     let first = rehearsal.open();
     let error = refusal(rehearsal.settings()).to_string();
@@ -41,7 +41,7 @@ fn second_opening_is_refused_with_the_process_number_until_the_first_is_dropped(
 }
 
 #[test]
-fn link_to_an_open_port_is_refused() {
+fn rejects_link_to_an_open_port() {
     let rehearsal = rehearsal();
     let _first = rehearsal.open();
     let link = rehearsal.locks.path().join("by-id");
@@ -56,7 +56,7 @@ fn link_to_an_open_port_is_refused() {
 
 /// Not a test: the other process of the next test.
 #[test]
-fn other_process() {
+fn helper_process_holds_the_port() {
     let Ok(hold) = std::env::var(HOLD) else {
         return;
     };
@@ -71,7 +71,7 @@ fn other_process() {
 }
 
 #[test]
-fn port_of_another_process_is_refused_and_free_after_that_process_is_killed() {
+fn rejects_port_of_another_process_until_that_process_is_killed() {
     let rehearsal = rehearsal();
     let hold = format!(
         "{} {}",
@@ -80,7 +80,11 @@ fn port_of_another_process_is_refused_and_free_after_that_process_is_killed() {
     );
     let mut command = Command::new(std::env::current_exe().unwrap());
     command
-        .args(["--exact", "ownership::other_process", "--nocapture"])
+        .args([
+            "--exact",
+            "ownership::helper_process_holds_the_port",
+            "--nocapture",
+        ])
         .env(HOLD, hold)
         .stdout(Stdio::piped());
     let mut other = command.spawn().unwrap();
@@ -102,7 +106,7 @@ fn port_of_another_process_is_refused_and_free_after_that_process_is_killed() {
 }
 
 #[test]
-fn terminal_locked_by_another_program_is_refused() {
+fn rejects_terminal_locked_by_another_program() {
     let rehearsal = rehearsal();
     let terminal = std::fs::File::options()
         .read(true)
@@ -130,7 +134,7 @@ fn missing_port_is_reported() {
 }
 
 #[test]
-fn file_that_is_not_a_terminal_is_refused() {
+fn rejects_file_that_is_not_a_terminal() {
     let rehearsal = rehearsal();
     let mut settings = rehearsal.settings();
     settings.port.path = rehearsal.locks.path().join("file");
@@ -152,7 +156,7 @@ fn lock_file_error_names_the_setting() {
 }
 
 #[test]
-fn invalid_settings_are_refused_before_the_port_is_opened() {
+fn rejects_invalid_settings_before_opening_the_port() {
     let settings = || ProbeSettings::new(PortSettings::new("/dev/ttyNONE9", 921_600), protocol());
     let refused = |change: fn(&mut ProbeSettings)| {
         let mut settings = settings();

@@ -88,7 +88,7 @@ const CASES: [Case; 12] = [
 ];
 
 #[test]
-fn without_faults_nothing_trips_and_runs_complete() {
+fn runs_without_fault_complete_without_a_trip() {
     for run in [Run::Chirp, Run::Control] {
         let mut lab = Lab::new();
         lab.run_until_current_flows(run);
@@ -100,7 +100,7 @@ fn without_faults_nothing_trips_and_runs_complete() {
 }
 
 #[test]
-fn during_a_run_every_fault_ends_the_current_in_time_and_is_recorded_and_the_next_run_completes() {
+fn every_fault_during_a_run_ends_the_current_in_time_and_the_next_run_completes() {
     for run in [Run::Chirp, Run::Control] {
         for case in &CASES {
             let mut lab = Lab::new();
@@ -130,7 +130,7 @@ fn during_a_run_every_fault_ends_the_current_in_time_and_is_recorded_and_the_nex
 }
 
 #[test]
-fn armed_every_fault_switches_the_amplifier_off_in_time() {
+fn every_fault_while_armed_switches_the_amplifier_off_in_time() {
     for case in &CASES {
         let mut lab = Lab::new();
         lab.arm();
@@ -149,7 +149,7 @@ fn armed_every_fault_switches_the_amplifier_off_in_time() {
 }
 
 #[test]
-fn disarmed_a_fault_gives_no_current_and_prevents_arming() {
+fn every_fault_while_disarmed_gives_no_current_and_prevents_arming() {
     for case in &CASES {
         let mut lab = Lab::new();
         lab.bench.run(50);
@@ -180,7 +180,7 @@ fn disarmed_a_fault_gives_no_current_and_prevents_arming() {
 }
 
 #[test]
-fn the_same_fault_is_the_same_run_bit_for_bit() {
+fn same_fault_gives_an_identical_run() {
     let run = || {
         let mut lab = Lab::new();
         lab.run_until_current_flows(Run::Control);
@@ -196,8 +196,7 @@ fn the_same_fault_is_the_same_run_bit_for_bit() {
 }
 
 #[test]
-fn a_drive_that_ignores_set_points_is_stopped_by_nmt_and_one_that_ignores_nmt_by_the_lost_heartbeat()
- {
+fn disobedient_drive_is_stopped_by_nmt_or_by_the_lost_heartbeat() {
     // After 70 ms without confirmation and a repeat of 10 ms: NMT stop; 70 ms later the drive detects the lost heartbeat.
     for (word, off) in [
         ("amplifier.set-points-ignored", 85),
@@ -222,7 +221,7 @@ fn a_drive_that_ignores_set_points_is_stopped_by_nmt_and_one_that_ignores_nmt_by
 }
 
 #[test]
-fn a_drive_that_keeps_its_last_current_during_a_run_is_detected_by_its_measured_current() {
+fn drive_that_ignores_set_points_trips_on_its_measured_current() {
     for run in [Run::Chirp, Run::Control] {
         let mut lab = Lab::new();
         lab.run_until_current_flows(run);
@@ -244,7 +243,7 @@ fn a_drive_that_keeps_its_last_current_during_a_run_is_detected_by_its_measured_
 }
 
 #[test]
-fn a_loop_that_ends_unexpectedly_leaves_no_current() {
+fn dropped_loop_leaves_the_drive_without_current() {
     let mut lab = Lab::new();
     lab.run_until_current_flows(Run::Control);
     let Lab {

@@ -7,7 +7,7 @@ const VESC: &str =
     "amplifier.device={ kind = \"vesc\", interface = \"can0\", bit_rate = 500000, node = 23 }";
 
 #[test]
-fn a_vesc_loses_its_current_in_time_with_every_fault_in_every_state_and_runs_again() {
+fn every_vesc_fault_ends_the_current_in_time_and_the_next_run_completes() {
     let cases = [
         ("amplifier.silence", (122, 1), 122 + SWITCH_OFF),
         ("amplifier.short-frames", (122, 1), 122 + SWITCH_OFF),

@@ -2,7 +2,7 @@
 use super::*;
 
 #[test]
-fn a_fault_of_the_amplifier_trips_with_the_code_of_the_device() {
+fn amplifier_fault_trips_with_the_device_code() {
     let faults = [(AT..AT + 1, Fault::Faulted(0x2310))];
     let trip = trips(
         &mut Bench::running(&stage(), &faults, constant()),
@@ -16,7 +16,7 @@ fn a_fault_of_the_amplifier_trips_with_the_code_of_the_device() {
 }
 
 #[test]
-fn an_amplifier_that_refuses_a_command_is_switched_off_in_that_tick() {
+fn refused_command_switches_the_amplifier_off_in_the_same_tick() {
     let mut bench = Bench::running(&stage(), &[(AT..AT + 1, Fault::Refuses(-7))], constant());
     assert!(matches!(
         trips(&mut bench, AT, "amplifier"),
@@ -46,7 +46,7 @@ fn an_amplifier_that_refuses_a_command_is_switched_off_in_that_tick() {
 }
 
 #[test]
-fn an_amplifier_that_returns_a_current_that_is_not_finite_is_switched_off() {
+fn non_finite_returned_current_switches_the_amplifier_off() {
     for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut bench = Bench::running(
             &stage(),
@@ -77,7 +77,7 @@ fn an_amplifier_that_returns_a_current_that_is_not_finite_is_switched_off() {
 }
 
 #[test]
-fn an_amplifier_that_cannot_be_enabled_trips_and_the_program_behind_it_does_not_start() {
+fn failed_enable_trips_and_the_program_does_not_start() {
     let mut bench = Bench::still(&stage(), &[(AT..AT + 1, Fault::DoesNotEnable(31))]);
     bench.run(AT);
     bench.order(Request::Arm);

@@ -2,7 +2,7 @@
 use super::*;
 
 #[test]
-fn a_command_of_the_peak_current_goes_out_and_one_bit_more_trips() {
+fn allows_peak_current_and_trips_one_bit_above() {
     let config = stage();
     let limit_a = config.motor.peak_current_a();
     for side in [1.0, -1.0] {
@@ -26,7 +26,7 @@ fn a_command_of_the_peak_current_goes_out_and_one_bit_more_trips() {
 }
 
 #[test]
-fn continuous_current_trips_when_the_winding_is_warm_by_the_closed_form_and_not_a_tick_before() {
+fn continuous_current_trips_at_the_tick_of_the_closed_form() {
     let config = stage();
     let (rated_a, tau_s) = (
         config.motor.continuous_current_a(),
@@ -52,7 +52,7 @@ fn continuous_current_trips_when_the_winding_is_warm_by_the_closed_form_and_not_
 }
 
 #[test]
-fn the_trip_by_continuous_current_is_as_safe_as_any_other() {
+fn continuous_current_trip_switches_the_amplifier_off() {
     // 9.9 A and 2.338 A: 0.574 s, tick 2869 by the closed form of the test above.
     let config = stage();
     let rated_a = config.motor.continuous_current_a();
@@ -75,7 +75,7 @@ fn the_trip_by_continuous_current_is_as_safe_as_any_other() {
 }
 
 #[test]
-fn the_rated_current_flows_for_ever() {
+fn rated_current_does_not_trip_in_six_time_constants() {
     let config = stage();
     let rated_a = config.motor.continuous_current_a();
     let mut bench = Bench::running(&config, &[], says(move |_| rated_a * 0.9999));
@@ -88,7 +88,7 @@ fn the_rated_current_flows_for_ever() {
 }
 
 #[test]
-fn a_command_that_is_not_finite_is_no_current_and_a_trip() {
+fn non_finite_command_trips_and_is_not_sent() {
     for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN] {
         let program = says(move |tick| if tick == AT { nonsense } else { SOME_A });
         let mut bench = Bench::running(&stage(), &[], program);
@@ -114,7 +114,7 @@ fn a_command_that_is_not_finite_is_no_current_and_a_trip() {
 }
 
 #[test]
-fn a_hot_motor_stays_hot_through_clear_and_arm() {
+fn thermal_state_is_kept_after_clear_and_arm() {
     // Tripped at i_c; from there the same current trips again at once, long before a cold winding would.
     let config: Config = stage();
     let mut bench = Bench::running(&config, &[], says(|_| 9.9));
@@ -129,7 +129,7 @@ fn a_hot_motor_stays_hot_through_clear_and_arm() {
 }
 
 #[test]
-fn current_that_flows_through_missed_ticks_heats_the_motor_as_well() {
+fn thermal_model_includes_missed_ticks() {
     // 9.9 A with three of four ticks missed: the winding warms by the clock, not by the ticks that were served. Overruns
     // are allowed here. Closed form as above; what is seen only every fourth tick may be seen three ticks late.
     let mut config = stage();
@@ -148,8 +148,7 @@ fn current_that_flows_through_missed_ticks_heats_the_motor_as_well() {
 }
 
 #[test]
-fn a_measured_current_that_is_not_the_commanded_one_trips_within_its_time_and_a_close_one_does_not()
-{
+fn trips_on_measured_current_beyond_tolerance() {
     let config = stage();
     let (error_a, ticks) = (
         config.interlock.current_error_a,

@@ -130,7 +130,7 @@ fn constant() -> Box<dyn bench::rt::program::Program> {
 }
 
 #[test]
-fn as_many_missed_ticks_as_allowed_in_a_second_run_on_and_one_more_trips() {
+fn trips_above_the_allowed_missed_ticks_per_second() {
     let config = stage();
     assert_eq!(config.interlock.overruns_per_s, 50);
     for (missed, beyond) in [(vec![50], 51), (vec![20, 20, 10], 1)] {
@@ -162,7 +162,7 @@ fn as_many_missed_ticks_as_allowed_in_a_second_run_on_and_one_more_trips() {
 }
 
 #[test]
-fn overruns_are_counted_over_any_second_wherever_it_begins() {
+fn missed_ticks_are_counted_in_a_sliding_second() {
     let config = stage();
     // 30 ticks missed every 0.6 s: at most two such moments lie within a second, 60 ticks.
     let mut bench = Bench::running(&config, &[], constant());
@@ -199,7 +199,7 @@ fn overruns_are_counted_over_any_second_wherever_it_begins() {
 }
 
 #[test]
-fn an_armed_loop_without_a_program_trips_as_a_running_one() {
+fn armed_loop_trips_like_a_running_loop() {
     let cases = [
         (Fault::Says(Validity::Faulty), "probe_invalid"),
         (Fault::At(0.00095), "travel"),
@@ -218,7 +218,7 @@ fn an_armed_loop_without_a_program_trips_as_a_running_one() {
 }
 
 #[test]
-fn a_disarmed_loop_reads_and_records_whatever_the_probe_says_and_does_not_trip() {
+fn disarmed_loop_records_faults_without_a_trip() {
     let faults = [
         (10..20, Fault::Says(Validity::Missing)),
         (30..40, Fault::At(0.00095)),

@@ -2,7 +2,7 @@
 use super::*;
 
 #[test]
-fn travel_up_to_the_soft_limit_runs_on_and_one_bit_beyond_it_trips() {
+fn allows_travel_up_to_the_soft_limit_and_trips_one_bit_beyond() {
     let config = stage();
     for side in [1.0, -1.0] {
         let limit_m = config.interlock.soft_limit_m;
@@ -22,7 +22,7 @@ fn travel_up_to_the_soft_limit_runs_on_and_one_bit_beyond_it_trips() {
 }
 
 #[test]
-fn a_reading_that_is_not_valid_trips_whatever_its_position() {
+fn invalid_reading_trips_at_any_position() {
     for validity in [Validity::OutOfRange, Validity::Faulty, Validity::Missing] {
         let mut bench =
             Bench::running(&stage(), &[(AT..AT + 1, Fault::Says(validity))], constant());
@@ -48,7 +48,7 @@ fn a_reading_that_is_not_valid_trips_whatever_its_position() {
 }
 
 #[test]
-fn a_reading_as_old_as_allowed_is_used_and_one_nanosecond_older_trips() {
+fn allows_the_stale_limit_and_trips_one_nanosecond_above() {
     // interlock.probe_stale_s = 1 ms.
     let config = stage();
     assert_eq!(config.interlock.probe_stale_s, 0.001);
@@ -72,7 +72,7 @@ fn a_reading_as_old_as_allowed_is_used_and_one_nanosecond_older_trips() {
 }
 
 #[test]
-fn a_probe_that_repeats_its_last_measurement_trips_when_that_is_too_old_whatever_age_it_claims() {
+fn repeated_measurement_trips_as_stale_independent_of_stated_age() {
     // Last new measurement at tick 99; 1 ms are five ticks of 0.2 ms: tick 104 is the last that may use it.
     let config = stage();
     nothing_trips(
@@ -96,7 +96,7 @@ fn stepping(from_a: f64, to_a: f64) -> Box<dyn bench::rt::program::Program> {
 }
 
 #[test]
-fn a_position_that_does_not_move_while_the_current_does_trips_after_the_time_allowed() {
+fn constant_position_under_changing_current_trips_as_stuck() {
     // interlock: 0.1 s are 500 ticks; the last change is seen at tick 99, so tick 599 is within and tick 600 beyond.
     let mut config = stage();
     assert_eq!(config.interlock.probe_stuck_s, 0.1);
