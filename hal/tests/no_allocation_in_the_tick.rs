@@ -19,41 +19,41 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier};
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-/// A world whose endpoints can be made to swallow what is sent: the bus in memory itself allocates, a socket does not.
-struct Quiet {
-    world: SimulatedHost,
-    swallow: Arc<AtomicBool>,
+/// A host_in_memory whose endpoints can be made to discard what is sent: the bus in memory itself allocates, a socket does not.
+struct DiscardingHost {
+    host_in_memory: SimulatedHost,
+    discard: Arc<AtomicBool>,
 }
 
-impl Port for Quiet {
+impl Port for DiscardingHost {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
-        Ok(Box::new(QuietEndpoint {
-            inner: self.world.endpoint(ids)?,
-            swallow: Arc::clone(&self.swallow),
+        Ok(Box::new(DiscardingEndpoint {
+            inner: self.host_in_memory.endpoint(ids)?,
+            discard: Arc::clone(&self.discard),
         }))
     }
 }
 
-impl Host for Quiet {
+impl Host for DiscardingHost {
     fn now_ns(&self) -> u64 {
-        self.world.now_ns()
+        self.host_in_memory.now_ns()
     }
     fn sleep(&self, time: Duration) {
-        self.world.sleep(time);
+        self.host_in_memory.sleep(time);
     }
     fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
-        self.world.start(name, task)
+        self.host_in_memory.start(name, task)
     }
 }
 
-struct QuietEndpoint {
+struct DiscardingEndpoint {
     inner: Box<dyn CanBus>,
-    swallow: Arc<AtomicBool>,
+    discard: Arc<AtomicBool>,
 }
 
-impl CanBus for QuietEndpoint {
+impl CanBus for DiscardingEndpoint {
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        if self.swallow.load(Ordering::Acquire) {
+        if self.discard.load(Ordering::Acquire) {
             Ok(())
         } else {
             self.inner.send(frame)
@@ -65,8 +65,8 @@ impl CanBus for QuietEndpoint {
 }
 
 /// All calls of a tick, without a frame leaving.
-fn tick(drive: &mut CanopenDrive, swallow: &AtomicBool) {
-    swallow.store(true, Ordering::Release);
+fn tick(drive: &mut CanopenDrive, discard: &AtomicBool) {
+    discard.store(true, Ordering::Release);
     assert_no_alloc(|| {
         let _ = (drive.command(0.5), drive.command(f64::NAN));
         let _ = (drive.status(), drive.actual_current_a());
@@ -74,7 +74,7 @@ fn tick(drive: &mut CanopenDrive, swallow: &AtomicBool) {
             let _ = drive.explain(code);
         }
     });
-    swallow.store(false, Ordering::Release);
+    discard.store(false, Ordering::Release);
 }
 
 #[test]
@@ -83,29 +83,30 @@ fn command_status_and_disable_do_not_allocate() {
         Exchange::Asynchronous { status_hz: 500.0 },
         Exchange::Synchronous { status_every: 1 },
     ] {
-        let (world, swallow) = (SimulatedHost::default(), Arc::new(AtomicBool::new(false)));
+        let (host_in_memory, discard) =
+            (SimulatedHost::default(), Arc::new(AtomicBool::new(false)));
         let device = Arc::new(Mutex::new(EmulatedDrive::new(
             EmulatedDriveSettings::default(),
         )));
-        let _running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
-        let host = Quiet {
-            world: world.clone(),
-            swallow: Arc::clone(&swallow),
+        let _running = AmplifierTask::start(&host_in_memory, Arc::clone(&device)).unwrap();
+        let host = DiscardingHost {
+            host_in_memory: host_in_memory.clone(),
+            discard: Arc::clone(&discard),
         };
         let settings = DriveSettings {
             exchange,
             ..DriveSettings::default()
         };
         let mut drive = CanopenDrive::open(settings, Box::new(host)).unwrap();
-        tick(&mut drive, &swallow); // off
+        tick(&mut drive, &discard); // off
         drive.enable().unwrap();
-        tick(&mut drive, &swallow); // on
+        tick(&mut drive, &discard); // on
         device.lock().unwrap().inject(DeviceFault::Drive(0x2310));
-        world.sleep(Duration::from_millis(10));
+        host_in_memory.sleep(Duration::from_millis(10));
         assert_eq!(drive.status(), AmplifierStatus::Fault(0x0001_2310));
-        tick(&mut drive, &swallow); // in fault
-        swallow.store(true, Ordering::Release);
+        tick(&mut drive, &discard); // in fault
+        discard.store(true, Ordering::Release);
         assert_no_alloc(|| drive.disable());
-        swallow.store(false, Ordering::Release);
+        discard.store(false, Ordering::Release);
     }
 }

@@ -80,8 +80,8 @@ fn run_records_its_calibration_and_replays() {
     assert_eq!(code, 0, "{errors}");
     let path = report["recording"].as_str().expect("a path");
     let recording = Recording::open(&folder.path().join(path)).expect("a recording");
-    let carried = recording.attachment("calibration.toml").expect("carried");
-    assert!(String::from_utf8_lossy(&carried.data).contains("compliance_m_per_a"));
+    let attached = recording.attachment("calibration.toml").expect("carried");
+    assert!(String::from_utf8_lossy(&attached.data).contains("compliance_m_per_a"));
     assert_eq!(
         recording.metadata().get("amplifier").map(String::as_str),
         Some("simulated")
@@ -105,33 +105,33 @@ fn expired_or_mismatched_calibration_warns_or_fails_as_configured() {
         old.collect::<Vec<_>>().join("\n"),
     )
     .expect("a good disk");
-    let foreign = text.replacen("device = \"simulated\"", "device = \"canopen 0x1-0x2\"", 1);
-    std::fs::write(folder.path().join("foreign.toml"), foreign).expect("a good disk");
+    let mismatched = text.replacen("device = \"simulated\"", "device = \"canopen 0x1-0x2\"", 1);
+    std::fs::write(folder.path().join("mismatched.toml"), mismatched).expect("a good disk");
     let cases = [
         ("old.toml", "when_expired", "180", "days ago"),
         (
-            "foreign.toml",
+            "mismatched.toml",
             "when_other_devices",
             "another amplifier",
             "canopen 0x1-0x2",
         ),
     ];
     for (file, setting, first, second) in cases {
-        for (then, wanted) in [("warn", 0), ("refuse", 2)] {
+        for (then, expected) in [("warn", 0), ("refuse", 2)] {
             let (file, then) = (
                 format!("calibration.file={file}"),
                 format!("calibration.{setting}={then}"),
             );
             let run = ["control", "--duration", "1", "--set", &file, "--set", &then];
             let (code, _, errors) = bench(folder.path(), &run);
-            assert_eq!(code, wanted, "{file} {then}: {errors}");
+            assert_eq!(code, expected, "{file} {then}: {errors}");
             assert!(
                 errors.contains(first) && errors.contains(second),
                 "{errors}"
             );
             assert_eq!(
                 errors.contains("nothing was moved"),
-                wanted == 2,
+                expected == 2,
                 "{errors}"
             );
         }

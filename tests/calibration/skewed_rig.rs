@@ -13,7 +13,7 @@ pub struct Skew {
     /// The reading hangs back by so much in the direction of motion.
     pub backlash_m: f64,
     /// The reading bends: position + bend position^2.
-    pub bend_per_m: f64,
+    pub quadratic_per_m: f64,
 }
 
 impl Default for Skew {
@@ -25,7 +25,7 @@ impl Default for Skew {
             probe_gain: 1.0,
             probe_offset_m: 0.0,
             backlash_m: 0.0,
-            bend_per_m: 0.0,
+            quadratic_per_m: 0.0,
         }
     }
 }
@@ -34,7 +34,7 @@ pub struct SkewedRig {
     pub inner: SimulatedRig,
     pub skew: Skew,
     actual_a: f64,
-    held_m: f64,
+    play_m: f64,
 }
 
 impl SkewedRig {
@@ -43,17 +43,17 @@ impl SkewedRig {
             inner,
             skew,
             actual_a: 0.0,
-            held_m: 0.0,
+            play_m: 0.0,
         }
     }
 
     /// What a hand that drags something behind it reads (play of twice the backlash).
-    fn dragged_m(&mut self, position_m: f64) -> f64 {
-        self.held_m = self.held_m.clamp(
+    fn after_play_m(&mut self, position_m: f64) -> f64 {
+        self.play_m = self.play_m.clamp(
             position_m - self.skew.backlash_m,
             position_m + self.skew.backlash_m,
         );
-        self.held_m
+        self.play_m
     }
 }
 
@@ -79,10 +79,10 @@ impl CurrentAmplifier for SkewedRig {
 impl DisplacementProbe for SkewedRig {
     fn latest(&mut self, now: Tick) -> Reading {
         let reading = self.inner.latest(now);
-        let dragged_m = self.dragged_m(reading.position_m);
-        let bent_m = dragged_m + self.skew.bend_per_m * dragged_m * dragged_m;
+        let after_play_m = self.after_play_m(reading.position_m);
+        let curved_m = after_play_m + self.skew.quadratic_per_m * after_play_m * after_play_m;
         Reading {
-            position_m: self.skew.probe_gain * bent_m + self.skew.probe_offset_m,
+            position_m: self.skew.probe_gain * curved_m + self.skew.probe_offset_m,
             ..reading
         }
     }

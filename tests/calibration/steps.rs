@@ -52,10 +52,10 @@ fn static_compliance_is_estimated_with_sign_and_sigma() {
             &config(),
         )
         .expect("a fit");
-        let wanted = probe_gain * COMPLIANCE_M_PER_A;
+        let expected = probe_gain * COMPLIANCE_M_PER_A;
         // The modes that the model leaves out add 0.04 % to the static compliance.
         assert!(
-            (fit.compliance_m_per_a / wanted - 1.0).abs() < 1e-3,
+            (fit.compliance_m_per_a / expected - 1.0).abs() < 1e-3,
             "{fit:?}"
         );
         let ratio = fit.compliance_sigma_m_per_a / COMPLIANCE_M_PER_A;
@@ -105,7 +105,7 @@ fn gain_and_offset_of_amplifier_and_probe_are_estimated() {
 fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
     let config = config();
     // The travel is 2 x 0.4 A x 154 um/A = 124 um; a play of 2 x 2 um is 3 % of it, a bend of 1 % of 62 um shows as one.
-    let back = fitted(
+    let hysteresis = fitted(
         Skew {
             backlash_m: 2e-6,
             ..Skew::default()
@@ -115,8 +115,9 @@ fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
     .expect_err("hysteresis")
     .to_string();
     assert!(
-        back.contains("between rising and falling current") && back.contains("0.01 is allowed"),
-        "{back}"
+        hysteresis.contains("between rising and falling current")
+            && hysteresis.contains("0.01 is allowed"),
+        "{hysteresis}"
     );
     let mut generous = config.clone();
     generous.calibrate.max_hysteresis_ratio = 0.05;
@@ -131,18 +132,18 @@ fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
     .expect("allowed");
     // 4 um less what the floor shakes out of the play, of 123.6 um.
     assert!((0.025..0.0325).contains(&fit.hysteresis_ratio), "{fit:?}");
-    let bent = fitted(
+    let curved = fitted(
         Skew {
-            bend_per_m: 1000.0,
+            quadratic_per_m: 1000.0,
             ..Skew::default()
         },
         &config,
     )
-    .expect_err("bent")
+    .expect_err("curved")
     .to_string();
     assert!(
-        bent.contains("straight line") && bent.contains("max_nonlinearity_ratio"),
-        "{bent}"
+        curved.contains("straight line") && curved.contains("max_nonlinearity_ratio"),
+        "{curved}"
     );
 }
 

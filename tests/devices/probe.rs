@@ -22,7 +22,7 @@ const PERIOD: Duration = Duration::from_millis(5);
 /// Number of ticks within which a fault must trip and a current must flow: several times the longest time in the settings below.
 const TICKS: u64 = 2000;
 /// A test that waits longer than this has failed.
-const PATIENCE: Duration = Duration::from_secs(120);
+const TIME_LIMIT: Duration = Duration::from_secs(120);
 
 /// Lines of text, two millimetres to either side: a damaged byte spoils the line, and a jump of a millimetre is in range.
 fn ascii(folder: &std::path::Path) -> String {
@@ -39,7 +39,7 @@ fn ascii(folder: &std::path::Path) -> String {
 /// The profile `lab` with a slow loop and long time limits.
 fn config(folder: &std::path::Path, stale_s: f64) -> Config {
     // A test of one interlock must not reach the other one.
-    let stuck_s = if stale_s < NEVER_STALE_S {
+    let stuck_s = if stale_s < LONG_STALE_S {
         2.0 * stale_s
     } else {
         1.5
@@ -79,22 +79,22 @@ fn config(folder: &std::path::Path, stale_s: f64) -> Config {
 }
 
 /// An amplifier that moves the stage and never fails.
-struct Straight {
+struct IdealAmplifier {
     stage: Stage,
     start: Instant,
-    given_a: Arc<AtomicU64>,
+    current_a: Arc<AtomicU64>,
     is_on: bool,
 }
 
-impl Straight {
-    fn give(&mut self, current_a: f64) {
+impl IdealAmplifier {
+    fn set_current(&mut self, current_a: f64) {
         self.stage
             .command(self.start.elapsed().as_nanos() as u64, current_a);
-        self.given_a.store(current_a.to_bits(), Ordering::Relaxed);
+        self.current_a.store(current_a.to_bits(), Ordering::Relaxed);
     }
 }
 
-impl CurrentAmplifier for Straight {
+impl CurrentAmplifier for IdealAmplifier {
     fn enable(&mut self) -> Result<(), DeviceError> {
         self.is_on = true;
         Ok(())
@@ -104,12 +104,12 @@ impl CurrentAmplifier for Straight {
             self.is_on,
             "the loop commands an amplifier that it has switched off"
         );
-        self.give(current_a);
+        self.set_current(current_a);
         Ok(current_a)
     }
     fn disable(&mut self) {
         self.is_on = false;
-        self.give(0.0);
+        self.set_current(0.0);
     }
     fn status(&self) -> AmplifierStatus {
         if self.is_on {
@@ -130,25 +130,25 @@ enum Pace {
 }
 
 /// The loop with the serial driver, the emulated probe at the other end, and the stage between both.
-struct Table {
+struct ProbeRig {
     bench: Bench,
-    watch: StatisticsHandle,
+    statistics: StatisticsHandle,
     probe: Option<ProbeServer>,
     stage: Stage,
     start: Instant,
     pace: Pace,
     published: u64,
-    given_a: Arc<AtomicU64>,
+    current_a: Arc<AtomicU64>,
     config: Config,
     _folder: Arc<tempfile::TempDir>,
 }
 
-impl Table {
-    fn new(stale_s: f64) -> Table {
+impl ProbeRig {
+    fn new(stale_s: f64) -> ProbeRig {
         let folder = Arc::new(tempfile::tempdir().expect("a temporary folder"));
         let (config, start) = (config(folder.path(), stale_s), Instant::now());
         let stage = Stage::new(&config).expect("a stage");
-        Table::around(config, stage, start, folder)
+        ProbeRig::around(config, stage, start, folder)
     }
 
     fn around(
@@ -156,37 +156,37 @@ impl Table {
         stage: Stage,
         start: Instant,
         folder: Arc<tempfile::TempDir>,
-    ) -> Table {
+    ) -> ProbeRig {
         let end = ProbeEndpoint::Terminal(Some(folder.path().join("probe")));
         let now_ns = move || start.elapsed().as_nanos() as u64;
-        let acting = ProbeServer::start(&config, &end, None, stage.clone(), now_ns)
+        let server = ProbeServer::start(&config, &end, None, stage.clone(), now_ns)
             .expect("a pseudo terminal");
-        let given_a = Arc::<AtomicU64>::default();
-        let amplifier = Straight {
+        let current_a = Arc::<AtomicU64>::default();
+        let amplifier = IdealAmplifier {
             stage: stage.clone(),
             start,
-            given_a: Arc::clone(&given_a),
+            current_a: Arc::clone(&current_a),
             is_on: false,
         };
         let probe =
             devices::probe::open(&config.probe, config.servo.priority).expect("the emulated probe");
-        let watch = probe.statistics_handle();
+        let statistics = probe.statistics_handle();
         let bench = Bench::around(&config, Devices { amplifier, probe });
-        let (probe, pace, published, _folder) = (Some(acting), Pace::Readings, 0, folder);
-        let mut table = Table {
+        let (probe, pace, published, _folder) = (Some(server), Pace::Readings, 0, folder);
+        let mut rig = ProbeRig {
             bench,
-            watch,
+            statistics,
             probe,
             stage,
             start,
             pace,
             published,
-            given_a,
+            current_a,
             config,
             _folder,
         };
-        table.run(10);
-        table
+        rig.run(10);
+        rig
     }
 
     /// The next tick: with the next reading, or after a period.
@@ -200,65 +200,70 @@ impl Table {
 
     fn wait_for_a_reading(&mut self) {
         let begun = Instant::now();
-        while self.watch.statistics().published == self.published {
+        while self.statistics.statistics().published == self.published {
             assert!(
-                begun.elapsed() < PATIENCE,
+                begun.elapsed() < TIME_LIMIT,
                 "no readings: {:?}",
-                self.watch.statistics()
+                self.statistics.statistics()
             );
             std::thread::sleep(Duration::from_millis(1));
         }
-        self.published = self.watch.statistics().published;
+        self.published = self.statistics.statistics().published;
     }
 
     fn run(&mut self, ticks: u64) {
         (0..ticks).for_each(|_| self.tick());
     }
 
-    fn ask(&self, word: &str) {
-        let request: FaultRequest = word.parse().expect("a fault");
+    fn inject(&self, fault: &str) {
+        let request: FaultRequest = fault.parse().expect("a fault");
         let EmulatedFault::Probe(fault) = request.fault else {
-            panic!("{word} is not a fault of the probe")
+            panic!("{fault} is not a fault of the probe")
         };
         let probe = self.probe.as_ref().expect("the probe is connected");
         probe.inject(fault);
     }
 
     /// The fault begins. The pace depends on whether readings still arrive.
-    fn begin(&mut self, word: &str) {
-        let silent = ["probe.silence", "probe.corrupt", LATE, HANG_UP];
-        self.pace = if silent.contains(&word) {
+    fn begin_fault(&mut self, fault: &str) {
+        let silent = [
+            "probe.silence",
+            "probe.corrupt",
+            LATE_ANSWERS,
+            TERMINAL_CLOSED,
+        ];
+        self.pace = if silent.contains(&fault) {
             Pace::Time
         } else {
             Pace::Readings
         };
-        if word == HANG_UP {
+        if fault == TERMINAL_CLOSED {
             self.probe = None;
         } else {
-            self.ask(word);
+            self.inject(fault);
         }
     }
 
-    fn program(&self, of: StateOf) -> Box<dyn Program> {
+    fn program(&self, of: LoopState) -> Box<dyn Program> {
         let plan = match of {
-            StateOf::Control => Plan::control(self.config.clone()).expect("a plan"),
+            LoopState::Control => Plan::control(self.config.clone()).expect("a plan"),
             _ => Plan::chirp(self.config.clone()),
         };
         plan.program().expect("a program")
     }
 
     /// Brings the loop into a state; runs until a current flows.
-    fn enter(&mut self, state: StateOf) {
-        if state == StateOf::Disarmed {
+    fn enter(&mut self, state: LoopState) {
+        if state == LoopState::Disarmed {
             return;
         }
-        self.bench.order(Request::Arm);
+        self.bench.request(Request::Arm);
         self.run(2);
-        if state != StateOf::Armed {
-            self.bench.order(Request::Start(self.program(state)));
+        if state != LoopState::Armed {
+            self.bench.request(Request::Start(self.program(state)));
             for _ in 0..TICKS {
                 self.tick();
-                if self.given_a().abs() > 0.02 {
+                if self.current_a().abs() > 0.02 {
                     return;
                 }
             }
@@ -267,24 +272,24 @@ impl Table {
     }
 
     /// An operator who has not noticed the fault goes on to the next state, in which current would flow.
-    fn go_on(&mut self, state: StateOf) {
-        if state == StateOf::Disarmed {
-            self.bench.order(Request::Arm);
+    fn continue_to_run(&mut self, state: LoopState) {
+        if state == LoopState::Disarmed {
+            self.bench.request(Request::Arm);
         }
-        if matches!(state, StateOf::Disarmed | StateOf::Armed)
+        if matches!(state, LoopState::Disarmed | LoopState::Armed)
             && self.bench.state() != State::Tripped
         {
             self.bench
-                .order(Request::Start(self.program(StateOf::Chirp)));
+                .request(Request::Start(self.program(LoopState::Chirp)));
         }
     }
 
-    fn given_a(&self) -> f64 {
-        f64::from_bits(self.given_a.load(Ordering::Relaxed))
+    fn current_a(&self) -> f64 {
+        f64::from_bits(self.current_a.load(Ordering::Relaxed))
     }
 
     /// Waits for the trip, and proves what it promises.
-    fn trips(&mut self, reason: &str) {
+    fn assert_trips(&mut self, reason: &str) {
         for _ in 0..TICKS {
             self.tick();
             if self.bench.state() == State::Tripped {
@@ -294,12 +299,17 @@ impl Table {
         self.run(20);
         let trips = self.bench.trips();
         let [trip] = trips[..] else {
-            panic!("one trip: {trips:?} {:?}", self.watch.statistics())
+            panic!("one trip: {trips:?} {:?}", self.statistics.statistics())
         };
         let EventKind::Trip(why) = trip.kind else {
             unreachable!()
         };
-        assert_eq!(why.reason(), reason, "{why}: {:?}", self.watch.statistics());
+        assert_eq!(
+            why.reason(),
+            reason,
+            "{why}: {:?}",
+            self.statistics.statistics()
+        );
         assert!(
             self.bench
                 .ticks()
@@ -307,30 +317,29 @@ impl Table {
                 .all(|record| record.tick < trip.tick || record.command_a.to_bits() == 0)
         );
         assert!(
-            self.given_a() == 0.0 && !self.bench.is_on(),
+            self.current_a() == 0.0 && !self.bench.amplifier_is_on(),
             "{} A",
-            self.given_a()
+            self.current_a()
         );
-        self.bench
-            .prove_that_the_recording_is_complete(trip.tick, reason);
+        self.bench.assert_recording_complete(trip.tick, reason);
     }
 
     /// The cause is removed, the operator clears the trip, and the next run continues without a trip.
-    fn next_run_is_clean(&mut self) {
-        self.ask("probe.none");
+    fn assert_next_run_has_no_trip(&mut self) {
+        self.inject("probe.none");
         self.pace = Pace::Readings;
         self.run(50); // of these the first may be of the time before
         if self.bench.state() == State::Tripped {
-            self.bench.order(Request::Clear);
+            self.bench.request(Request::Clear);
             self.run(1);
         }
-        self.runs_cleanly();
+        self.assert_run_has_no_trip();
     }
 
-    fn runs_cleanly(&mut self) {
+    fn assert_run_has_no_trip(&mut self) {
         let trips = self.bench.trips().len();
-        assert!(!self.bench.is_on(), "cleared is not armed");
-        self.enter(StateOf::Control);
+        assert!(!self.bench.amplifier_is_on(), "cleared is not armed");
+        self.enter(LoopState::Control);
         self.run(50);
         assert_eq!(
             (self.bench.state(), self.bench.trips().len()),
@@ -343,102 +352,102 @@ impl Table {
 
 /// The states in which a fault begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum StateOf {
+enum LoopState {
     Disarmed,
     Armed,
     Chirp,
     Control,
 }
 
-const STATES: [StateOf; 4] = [
-    StateOf::Disarmed,
-    StateOf::Armed,
-    StateOf::Chirp,
-    StateOf::Control,
+const STATES: [LoopState; 4] = [
+    LoopState::Disarmed,
+    LoopState::Armed,
+    LoopState::Chirp,
+    LoopState::Control,
 ];
 
 /// Permitted age of a reading in the tests of old readings. A suspended thread must not reach it.
 const STALE_S: f64 = 3.0;
 /// Permitted age in the other tests, so that a slow machine causes no trip.
-const NEVER_STALE_S: f64 = 10.0;
+const LONG_STALE_S: f64 = 10.0;
 /// A delay longer than the permitted age of a reading.
-const LATE: &str = "probe.late=9s";
+const LATE_ANSWERS: &str = "probe.late=9s";
 /// Not a fault of the probe: its cable.
-const HANG_UP: &str = "the terminal is closed";
+const TERMINAL_CLOSED: &str = "the terminal is closed";
 
 /// Runs the test in each state, concurrently because it mostly waits.
-fn in_each_state(stale_s: f64, test: impl Fn(&mut Table, StateOf) + Sync) {
+fn in_each_state(stale_s: f64, test: impl Fn(&mut ProbeRig, LoopState) + Sync) {
     std::thread::scope(|scope| {
         for state in STATES {
             let test = &test;
             scope.spawn(move || {
-                let mut table = Table::new(stale_s);
-                table.enter(state);
-                test(&mut table, state);
+                let mut rig = ProbeRig::new(stale_s);
+                rig.enter(state);
+                test(&mut rig, state);
             });
         }
     });
 }
 
-fn trips_and_runs_again(word: &str, reason: &str) {
+fn assert_trip_and_next_run(fault: &str, reason: &str) {
     let stale_s = match reason {
         "probe_stale" => STALE_S,
-        _ => NEVER_STALE_S,
+        _ => LONG_STALE_S,
     };
-    in_each_state(stale_s, |table, state| {
-        table.begin(word);
-        if state == StateOf::Disarmed {
-            table.run(20);
-            assert_eq!(table.given_a(), 0.0);
+    in_each_state(stale_s, |rig, state| {
+        rig.begin_fault(fault);
+        if state == LoopState::Disarmed {
+            rig.run(20);
+            assert_eq!(rig.current_a(), 0.0);
         }
-        table.go_on(state);
-        table.trips(reason);
-        table.next_run_is_clean();
+        rig.continue_to_run(state);
+        rig.assert_trips(reason);
+        rig.assert_next_run_has_no_trip();
     });
 }
 
 #[test]
 fn silent_probe_causes_stale_trip() {
-    trips_and_runs_again("probe.silence", "probe_stale");
+    assert_trip_and_next_run("probe.silence", "probe_stale");
 }
 
 #[test]
 fn damaged_bytes_cause_stale_trip() {
-    trips_and_runs_again("probe.corrupt", "probe_stale");
+    assert_trip_and_next_run("probe.corrupt", "probe_stale");
 }
 
 #[test]
 fn late_answers_cause_stale_trip() {
-    trips_and_runs_again(LATE, "probe_stale");
+    assert_trip_and_next_run(LATE_ANSWERS, "probe_stale");
 }
 
 #[test]
 fn constant_value_under_changing_current_causes_stuck_trip() {
-    trips_and_runs_again("probe.stuck", "probe_stuck");
+    assert_trip_and_next_run("probe.stuck", "probe_stuck");
 }
 
 #[test]
 fn jump_beyond_the_soft_limit_causes_travel_trip() {
-    trips_and_runs_again("probe.jump=1.4mm", "travel");
+    assert_trip_and_next_run("probe.jump=1.4mm", "travel");
 }
 
 #[test]
 fn target_out_of_range_causes_invalid_trip() {
-    trips_and_runs_again("probe.out-of-range", "probe_invalid");
+    assert_trip_and_next_run("probe.out-of-range", "probe_invalid");
 }
 
 #[test]
 fn probe_restart_causes_no_trip() {
-    in_each_state(NEVER_STALE_S, |table, state| {
-        table.begin("probe.reset");
-        table.run(50);
-        assert_eq!(table.bench.trips(), []);
-        let damaged = table.watch.statistics().damaged_bytes;
+    in_each_state(LONG_STALE_S, |rig, state| {
+        rig.begin_fault("probe.reset");
+        rig.run(50);
+        assert_eq!(rig.bench.trips(), []);
+        let damaged = rig.statistics.statistics().damaged_bytes;
         assert!(damaged > 0, "the line that it was in is cut off");
-        table.go_on(state);
-        table.run(50);
+        rig.continue_to_run(state);
+        rig.run(50);
         assert_eq!(
-            (table.bench.trips(), table.bench.state()),
+            (rig.bench.trips(), rig.bench.state()),
             (vec![], State::Running)
         );
     });
@@ -446,25 +455,25 @@ fn probe_restart_causes_no_trip() {
 
 #[test]
 fn closed_terminal_trips_and_the_probe_can_be_opened_again() {
-    in_each_state(NEVER_STALE_S, |table, state| {
-        table.begin(HANG_UP);
-        table.go_on(state);
-        table.trips("probe_invalid");
-        let said = table
-            .watch
+    in_each_state(LONG_STALE_S, |rig, state| {
+        rig.begin_fault(TERMINAL_CLOSED);
+        rig.continue_to_run(state);
+        rig.assert_trips("probe_invalid");
+        let message = rig
+            .statistics
             .statistics()
             .last_error
             .expect("an error")
             .to_string();
         assert!(
-            said.contains("the serial port is gone") && said.contains("open the probe again"),
-            "{said}"
+            message.contains("the serial port is gone") && message.contains("open the probe again"),
+            "{message}"
         );
         let (config, stage, folder) = (
-            table.config.clone(),
-            table.stage.clone(),
-            Arc::clone(&table._folder),
+            rig.config.clone(),
+            rig.stage.clone(),
+            Arc::clone(&rig._folder),
         );
-        Table::around(config, stage, table.start, folder).runs_cleanly();
+        ProbeRig::around(config, stage, rig.start, folder).assert_run_has_no_trip();
     });
 }

@@ -18,13 +18,13 @@ use bench_hal::can::frame::{CanFrame, Id};
 use bench_hal::can::vesc::{VescSettings, status_id};
 use bench_hal::can::{nmt, sdo};
 
-/// A world with a drive that has just started.
+/// A host with a drive that has just started.
 fn rig(settings: EmulatedDriveSettings) -> (SimulatedHost, Arc<Mutex<EmulatedDrive>>, TaskHandle) {
-    let world = SimulatedHost::default();
+    let host = SimulatedHost::default();
     let device = Arc::new(Mutex::new(EmulatedDrive::new(settings)));
-    let running = AmplifierTask::start(&world, Arc::clone(&device)).unwrap();
-    world.sleep(Duration::from_millis(5));
-    (world, device, running)
+    let running = AmplifierTask::start(&host, Arc::clone(&device)).unwrap();
+    host.sleep(Duration::from_millis(5));
+    (host, device, running)
 }
 
 fn examine(host: &dyn Host) -> Report {
@@ -33,7 +33,7 @@ fn examine(host: &dyn Host) -> Report {
     report
 }
 
-fn bad(report: &Report) -> Vec<&Finding> {
+fn problems(report: &Report) -> Vec<&Finding> {
     report
         .findings
         .iter()
@@ -41,9 +41,9 @@ fn bad(report: &Report) -> Vec<&Finding> {
         .collect()
 }
 
-/// All frames that were sent on the bus of a world, with an ear that was there before.
-fn heard(ear: &mut dyn CanBus) -> Vec<CanFrame> {
-    let next = || ear.receive(Duration::ZERO).unwrap();
+/// All frames that were sent on the bus of a host, with an listener that was there before.
+fn received_frames(listener: &mut dyn CanBus) -> Vec<CanFrame> {
+    let next = || listener.receive(Duration::ZERO).unwrap();
     let frames = std::iter::from_fn(next).map(|event| match event {
         BusEvent::Frame(frame) => Some(frame),
         BusEvent::Condition(_) => None,
@@ -53,11 +53,11 @@ fn heard(ear: &mut dyn CanBus) -> Vec<CanFrame> {
 
 #[test]
 fn healthy_drive_is_ok_and_examined_by_uploads_only() {
-    let (world, device, _running) = rig(EmulatedDriveSettings::default());
-    let mut ear = world.bus().connect(&[]);
+    let (host, device, _running) = rig(EmulatedDriveSettings::default());
+    let mut listener = host.bus().connect(&[]);
     let objects = format!("{:?}", device.lock().unwrap().objects());
-    let report = examine(&world);
-    assert!(bad(&report).is_empty(), "{:?}", report.findings);
+    let report = examine(&host);
+    assert!(problems(&report).is_empty(), "{:?}", report.findings);
     assert_eq!(
         report.figures.drive.as_ref().unwrap().rated_current_a,
         Some(4.0)
@@ -72,7 +72,7 @@ fn healthy_drive_is_ok_and_examined_by_uploads_only() {
         (device.power_state(), device.nmt_state()),
         (State::SwitchOnDisabled, nmt::State::PreOperational)
     );
-    for frame in heard(&mut ear) {
+    for frame in received_frames(&mut listener) {
         // CiA 301: 2 initiates an upload, 3 asks for its next segment.
         let is_upload =
             frame.id() == sdo::request_id(5) && [2, 3].contains(&(frame.data()[0] >> 5));
@@ -82,13 +82,13 @@ fn healthy_drive_is_ok_and_examined_by_uploads_only() {
 
 #[test]
 fn running_drive_is_not_changed() {
-    let (world, device, _running) = rig(EmulatedDriveSettings::default());
-    let mut drive = CanopenDrive::open(DriveSettings::default(), Box::new(world.clone())).unwrap();
+    let (host, device, _running) = rig(EmulatedDriveSettings::default());
+    let mut drive = CanopenDrive::open(DriveSettings::default(), Box::new(host.clone())).unwrap();
     bench_hal::CurrentAmplifier::enable(&mut drive).unwrap();
     bench_hal::CurrentAmplifier::command(&mut drive, 0.0).unwrap();
     let mut report = Report::default();
     // A bus in memory knows no claims: this is how a drive of another program looks.
-    examine_canopen_drive(&world, &DriveSettings::default(), 1.5, &mut report);
+    examine_canopen_drive(&host, &DriveSettings::default(), 1.5, &mut report);
     assert!(
         report
             .findings
@@ -102,10 +102,10 @@ fn running_drive_is_not_changed() {
 
 #[test]
 fn drive_fault_is_a_failure_with_the_emergency_text() {
-    let (world, device, _running) = rig(EmulatedDriveSettings::default());
+    let (host, device, _running) = rig(EmulatedDriveSettings::default());
     device.lock().unwrap().inject(DeviceFault::Drive(0x4210));
-    let report = examine(&world);
-    let words: Vec<&str> = bad(&report)
+    let report = examine(&host);
+    let words: Vec<&str> = problems(&report)
         .iter()
         .map(|finding| finding.what.as_str())
         .collect();
@@ -115,7 +115,7 @@ fn drive_fault_is_a_failure_with_the_emergency_text() {
         words[1].starts_with("state FAULT (statusword 0x"),
         "{words:?}"
     );
-    assert_eq!(bad(&report)[1].severity, Severity::Failure);
+    assert_eq!(problems(&report)[1].severity, Severity::Failure);
     assert_eq!(
         device.lock().unwrap().power_state(),
         State::Fault,
@@ -125,14 +125,14 @@ fn drive_fault_is_a_failure_with_the_emergency_text() {
 
 #[test]
 fn rejects_drive_with_unexpected_rated_current() {
-    let (world, _device, _running) = rig(EmulatedDriveSettings {
+    let (host, _device, _running) = rig(EmulatedDriveSettings {
         rated_current_ma: 2000,
         ..EmulatedDriveSettings::default()
     });
-    let report = examine(&world);
-    assert_eq!(bad(&report).len(), 1);
+    let report = examine(&host);
+    assert_eq!(problems(&report).len(), 1);
     assert!(
-        bad(&report)[0]
+        problems(&report)[0]
             .what
             .contains("is 2 A, the configuration states 4 A"),
         "{report:?}"
@@ -142,7 +142,7 @@ fn rejects_drive_with_unexpected_rated_current() {
 #[test]
 fn silent_drive_is_a_failure_with_remedy() {
     let report = examine(&SimulatedHost::default());
-    let [finding] = bad(&report)[..] else {
+    let [finding] = problems(&report)[..] else {
         panic!("{report:?}")
     };
     assert_eq!(finding.severity, Severity::Failure);
@@ -164,16 +164,16 @@ fn silent_drive_is_a_failure_with_remedy() {
 
 #[test]
 fn stopped_node_is_recognised_by_its_heartbeat() {
-    let (world, device, _running) = rig(EmulatedDriveSettings::default());
-    let mut master = world.bus().connect(&[]);
+    let (host, device, _running) = rig(EmulatedDriveSettings::default());
+    let mut master = host.bus().connect(&[]);
     let write = [0x2B, 0x17, 0x10, 0, 50, 0, 0, 0]; // 0x1017 = 50 ms
     master
         .send(&CanFrame::new(sdo::request_id(5), write))
         .unwrap();
     master.send(&nmt::Command::Stop.frame(5)).unwrap();
-    world.sleep(Duration::from_millis(10));
-    let report = examine(&world);
-    let finding = bad(&report)[0];
+    host.sleep(Duration::from_millis(10));
+    let report = examine(&host);
+    let finding = problems(&report)[0];
     assert!(
         finding.what.ends_with("its heartbeat reports stopped"),
         "{}",
@@ -187,10 +187,10 @@ fn stopped_node_is_recognised_by_its_heartbeat() {
     );
 }
 
-/// A world in which another process has every node.
-struct Taken(SimulatedHost);
+/// A host in which another process has every node.
+struct OccupiedHost(SimulatedHost);
 
-impl Port for Taken {
+impl Port for OccupiedHost {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         self.0.endpoint(ids)
     }
@@ -203,7 +203,7 @@ impl Port for Taken {
     }
 }
 
-impl Host for Taken {
+impl Host for OccupiedHost {
     fn now_ns(&self) -> u64 {
         self.0.now_ns()
     }
@@ -219,9 +219,9 @@ impl Host for Taken {
 
 #[test]
 fn node_in_use_by_another_process_receives_no_frame() {
-    let (world, _device, _running) = rig(EmulatedDriveSettings::default());
-    let mut ear = world.bus().connect(&[]);
-    let report = examine(&Taken(world));
+    let (host, _device, _running) = rig(EmulatedDriveSettings::default());
+    let mut listener = host.bus().connect(&[]);
+    let report = examine(&OccupiedHost(host));
     let [finding] = &report.findings[..] else {
         panic!("{report:?}")
     };
@@ -230,14 +230,14 @@ fn node_in_use_by_another_process_receives_no_frame() {
         finding.what,
         "node 5 is used by process 4711; nothing was sent to it"
     );
-    assert_eq!(heard(&mut ear), []);
+    assert_eq!(received_frames(&mut listener), []);
 }
 
 #[test]
 fn node_is_released_after_the_examination() {
-    let (world, _device, _running) = rig(EmulatedDriveSettings::default());
-    examine(&world);
-    assert!(CanopenDrive::open(DriveSettings::default(), Box::new(world)).is_ok());
+    let (host, _device, _running) = rig(EmulatedDriveSettings::default());
+    examine(&host);
+    assert!(CanopenDrive::open(DriveSettings::default(), Box::new(host)).is_ok());
 }
 
 /// Sends STATUS of VESC 23 every 20 ms.
@@ -255,11 +255,11 @@ impl Task for Vesc {
 
 #[test]
 fn vesc_is_examined_by_listening_only() {
-    let world = SimulatedHost::default();
-    let _running = world
-        .start("vesc", Box::new(Vesc(world.endpoint(&[]).unwrap(), 0)))
+    let host = SimulatedHost::default();
+    let _running = host
+        .start("vesc", Box::new(Vesc(host.endpoint(&[]).unwrap(), 0)))
         .unwrap();
-    let mut ear = world.bus().connect(&[]);
+    let mut listener = host.bus().connect(&[]);
     let find = |node| {
         let settings = VescSettings {
             node,
@@ -267,7 +267,7 @@ fn vesc_is_examined_by_listening_only() {
             status_timeout: Duration::from_millis(100),
         };
         let mut report = Report::default();
-        examine_vesc(&world, &settings, 500_000, &mut report);
+        examine_vesc(&host, &settings, 500_000, &mut report);
         report.findings.iter().map(|finding| finding.severity).max()
     };
     assert_eq!(
@@ -275,7 +275,7 @@ fn vesc_is_examined_by_listening_only() {
         (Some(Severity::Ok), Some(Severity::Failure))
     );
     assert!(
-        heard(&mut ear)
+        received_frames(&mut listener)
             .iter()
             .all(|frame| frame.id() == status_id(23))
     );
@@ -283,8 +283,8 @@ fn vesc_is_examined_by_listening_only() {
 
 #[test]
 fn bus_down_is_a_failure() {
-    let world = SimulatedHost::default();
-    world.bus().set_down(true);
-    let report = examine(&world);
-    assert_eq!(bad(&report)[0].what, "the CAN interface is down");
+    let host = SimulatedHost::default();
+    host.bus().set_down(true);
+    let report = examine(&host);
+    assert_eq!(problems(&report)[0].what, "the CAN interface is down");
 }

@@ -5,10 +5,10 @@ use serde_json::Value;
 use crate::program::{Answer, Bench};
 
 /// So many ticks may be missed here: what is tested is not this machine's timing.
-const PATIENT: &str = "--set interlock.overruns_per_s=1000000";
+const NO_TIMING_LIMIT: &str = "--set interlock.overruns_per_s=1000000";
 
 /// Asserts the shape of the JSON object and that its parts agree, and returns it.
-pub fn sound(answer: &Answer) -> Value {
+pub fn checked_report(answer: &Answer) -> Value {
     let report = answer.json();
     let findings = report["findings"].as_array().expect("a list of findings");
     assert!(!findings.is_empty());
@@ -59,7 +59,7 @@ pub fn sound(answer: &Answer) -> Value {
 }
 
 /// `verdict: what` of the findings on a subject.
-pub fn on(report: &Value, subject: &str) -> Vec<String> {
+pub fn findings_on(report: &Value, subject: &str) -> Vec<String> {
     let findings = report["findings"]
         .as_array()
         .expect("findings")
@@ -98,10 +98,10 @@ fn default_profile_is_ready_and_no_file_is_left() {
 #[test]
 fn suggested_command_has_the_given_options() {
     let answer = Bench::new().run("doctor --asymmetry -2% --set loop.rate_hz=4000 --out monday");
-    let offered =
+    let suggested =
         "`bench control --set loop.rate_hz=4000 --asymmetry -2% --out monday` could start now\n";
     assert!(
-        answer.code == 0 && answer.out.ends_with(offered),
+        answer.code == 0 && answer.out.ends_with(suggested),
         "{}",
         answer.out
     );
@@ -109,7 +109,7 @@ fn suggested_command_has_the_given_options() {
 
 #[test]
 fn json_has_findings_and_figures_in_si_units() {
-    let report = sound(&Bench::new().run("doctor --json"));
+    let report = checked_report(&Bench::new().run("doctor --json"));
     let lateness = &report["lateness"];
     assert_eq!(lateness["rate_hz"], 5000.0);
     assert!(
@@ -158,12 +158,12 @@ fn rejects_invalid_configuration_like_other_commands() {
 #[test]
 fn too_small_margin_excludes_control_but_not_chirp() {
     let answer = Bench::new().run("doctor --set control.min_modulus_margin=0.9 --json");
-    let report = sound(&answer);
+    let report = checked_report(&answer);
     assert_eq!(
         (answer.code, &report["could_start"]),
         (1, &serde_json::json!(["chirp"]))
     );
-    let found = on(&report, "control");
+    let found = findings_on(&report, "control");
     assert!(
         found[0].starts_with("failure: refused:") && found[0].contains("at least 0.9"),
         "{found:?}"
@@ -174,27 +174,30 @@ fn too_small_margin_excludes_control_but_not_chirp() {
 fn predicted_trip_excludes_chirp_but_not_control() {
     let flat = "chirp.amplitude=[{ frequency_hz = 1.0, current_a = 0.3 }]";
     let answer = Bench::new().run_with(["doctor", "--json", "--set", flat]);
-    let report = sound(&answer);
+    let report = checked_report(&answer);
     assert_eq!(
         (answer.code, &report["could_start"]),
         (1, &serde_json::json!(["control"]))
     );
-    assert!(on(&report, "chirp")[0].contains("travel"), "{report}");
+    assert!(
+        findings_on(&report, "chirp")[0].contains("travel"),
+        "{report}"
+    );
 }
 
 #[test]
 fn unwritable_folder_is_a_failure() {
     let bench = Bench::new();
     bench.write("file", "");
-    let report = sound(&bench.run("doctor --json --out file/in"));
-    let found = on(&report, "recordings");
+    let report = checked_report(&bench.run("doctor --json --out file/in"));
+    let found = findings_on(&report, "recordings");
     assert!(
         found[0].starts_with("failure: ") && found[0].ends_with("file is not a folder"),
         "{found:?}"
     );
     assert_eq!(
-        on(
-            &sound(&bench.run("doctor --json --out /proc/recordings")),
+        findings_on(
+            &checked_report(&bench.run("doctor --json --out /proc/recordings")),
             "recordings"
         )
         .len(),
@@ -206,7 +209,7 @@ fn unwritable_folder_is_a_failure() {
 fn mixing_a_real_and_a_simulated_device_is_a_failure() {
     let answer = Bench::new()
         .run("doctor --json --set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}");
-    let found = on(&sound(&answer), "configuration");
+    let found = findings_on(&checked_report(&answer), "configuration");
     assert!(
         answer.code == 1
             && found[0].contains("amplifier.device is vesc, probe.device is simulated"),
@@ -221,10 +224,14 @@ fn missing_interface_is_reported_as_failure_with_remedy() {
         "--set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}",
     ] {
         let set = "--set amplifier.device.interface=no-such-can";
-        let report = sound(&Bench::new().run(&format!(
-            "doctor --config lab --json {PATIENT} {set} {device}"
+        let report = checked_report(&Bench::new().run(&format!(
+            "doctor --config lab --json {NO_TIMING_LIMIT} {set} {device}"
         )));
-        let found = [on(&report, "CAN kernel"), on(&report, "CAN interface")].concat();
+        let found = [
+            findings_on(&report, "CAN kernel"),
+            findings_on(&report, "CAN interface"),
+        ]
+        .concat();
         let known = [
             "failure: this kernel has no CAN",
             "failure: no-such-can does not exist",
@@ -245,17 +252,17 @@ fn missing_interface_is_reported_as_failure_with_remedy() {
 
 #[test]
 fn unavailable_processor_is_not_a_failure() {
-    let report = sound(&Bench::new().run("doctor --json --set loop.cpu=1023"));
-    let found = on(&report, "processor");
+    let report = checked_report(&Bench::new().run("doctor --json --set loop.cpu=1023"));
+    let found = findings_on(&report, "processor");
     assert!(
         found[0].starts_with("note: loop.cpu is 1023, this process may use"),
         "{found:?}"
     );
-    let lab = sound(&Bench::new().run(&format!(
-        "doctor --config lab --json {PATIENT} --set loop.cpu=1023"
+    let lab = checked_report(&Bench::new().run(&format!(
+        "doctor --config lab --json {NO_TIMING_LIMIT} --set loop.cpu=1023"
     )));
     assert!(
-        on(&lab, "processor")[0].starts_with("warning: loop.cpu is 1023"),
+        findings_on(&lab, "processor")[0].starts_with("warning: loop.cpu is 1023"),
         "{lab}"
     );
 }

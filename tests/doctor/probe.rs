@@ -9,12 +9,12 @@ use bench_hal::serial::{Protocol, SerialProbe};
 use nix::fcntl::{Flock, FlockArg};
 use serde_json::Value;
 
-use crate::command::{on, sound};
+use crate::command::{checked_report, findings_on};
 use crate::program::{Bench, number};
 use crate::rehearsal::Rehearsal;
 
 /// The lab's capaNCDT, with limits that a busy machine does not meet: what is tested is not its timing.
-const PATIENT: [&str; 3] = [
+const NO_TIMING_LIMIT: [&str; 3] = [
     "interlock.overruns_per_s=1000000",
     "interlock.probe_stale_s=10",
     "amplifier.device.interface=no-such-can",
@@ -26,7 +26,7 @@ fn sets(rehearsal: &Rehearsal) -> Vec<String> {
         "probe.device.line.lock_folder={}",
         rehearsal.locks.path().display()
     );
-    PATIENT
+    NO_TIMING_LIMIT
         .map(String::from)
         .into_iter()
         .chain([port, locks])
@@ -53,7 +53,7 @@ fn rehearsal() -> Rehearsal {
 
 fn doctor(sets: &[String]) -> Value {
     let sets = sets.iter().flat_map(|set| ["--set", set]);
-    sound(
+    checked_report(
         &Bench::new().run_with(
             ["doctor", "--config", "lab", "--json"]
                 .into_iter()
@@ -66,7 +66,7 @@ fn doctor(sets: &[String]) -> Value {
 fn readings_are_assessed_and_the_port_is_released() {
     let rehearsal = rehearsal();
     let report = doctor(&sets(&rehearsal));
-    let port = on(&report, "serial port");
+    let port = findings_on(&report, "serial port");
     assert!(
         port[0].starts_with("ok: ") && port[0].ends_with("may open it"),
         "{port:?}"
@@ -76,18 +76,20 @@ fn readings_are_assessed_and_the_port_is_released() {
         port[2].starts_with("note: ") && port[2].contains("a pseudo terminal has no parity"),
         "{port:?}"
     );
-    let seen = &report["probe"];
+    let probe = &report["probe"];
     assert!(
-        seen["came"] == true && number(&seen["rate_hz"]) > 0.0 && number(&seen["age_mean_s"]) > 0.0,
-        "{seen}"
+        probe["came"] == true
+            && number(&probe["rate_hz"]) > 0.0
+            && number(&probe["age_mean_s"]) > 0.0,
+        "{probe}"
     );
     // One count of 0xFFFFFF is 0.12 nm.
     assert!(
-        (number(&seen["position_mean_m"]) - 10e-6).abs() < 1e-9,
-        "{seen}"
+        (number(&probe["position_mean_m"]) - 10e-6).abs() < 1e-9,
+        "{probe}"
     );
     assert!(
-        on(&report, "readings").contains(&"note: all readings are equal".to_string()),
+        findings_on(&report, "readings").contains(&"note: all readings are equal".to_string()),
         "{report}"
     );
     let probe = SerialProbe::open(driver_settings(&config(sets(&rehearsal)).probe).unwrap());
@@ -99,7 +101,7 @@ fn port_in_use_is_reported_with_the_process() {
     let rehearsal = rehearsal();
     let _holder =
         SerialProbe::open(driver_settings(&config(sets(&rehearsal)).probe).unwrap()).unwrap();
-    let found = on(&doctor(&sets(&rehearsal)), "serial port");
+    let found = findings_on(&doctor(&sets(&rehearsal)), "serial port");
     let held = format!(
         "{} is used by process {} (",
         rehearsal.path.display(),
@@ -119,8 +121,8 @@ fn process_without_lock_file_is_found_by_its_open_files() {
         .write(true)
         .open(&rehearsal.path)
         .unwrap();
-    let _theirs = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
-    let found = on(&doctor(&sets(&rehearsal)), "serial port");
+    let _locked = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
+    let found = findings_on(&doctor(&sets(&rehearsal)), "serial port");
     assert!(
         found[1].contains(&format!("is used by process {} (", std::process::id())),
         "{found:?}"
@@ -131,7 +133,7 @@ fn process_without_lock_file_is_found_by_its_open_files() {
 fn silent_probe_is_a_failure() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::Silence);
-    let found = on(&doctor(&sets(&rehearsal)), "readings");
+    let found = findings_on(&doctor(&sets(&rehearsal)), "readings");
     assert!(
         found.len() == 1 && found[0].starts_with("failure: the probe sends nothing: 0 bytes"),
         "{found:?}"
@@ -142,7 +144,7 @@ fn silent_probe_is_a_failure() {
 fn target_out_of_range_is_a_failure() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::OutOfRange);
-    let found = on(&doctor(&sets(&rehearsal)), "readings");
+    let found = findings_on(&doctor(&sets(&rehearsal)), "readings");
     assert!(
         found.len() == 1
             && found[0].starts_with("failure: the target is outside the probe's range"),
@@ -155,7 +157,7 @@ fn damaged_bytes_are_a_warning_with_the_count() {
     let rehearsal = rehearsal();
     rehearsal.inject_fault(Fault::Corrupt { every: 500 });
     let report = doctor(&sets(&rehearsal));
-    let found = on(&report, "readings");
+    let found = findings_on(&report, "readings");
     assert!(
         found
             .iter()
@@ -168,14 +170,14 @@ fn damaged_bytes_are_a_warning_with_the_count() {
 #[test]
 fn position_beyond_the_soft_limit_is_a_failure() {
     let rehearsal = Rehearsal::new(&protocol(), 650.0, |_| 1.95e-3);
-    let found = on(&doctor(&sets(&rehearsal)), "readings");
-    let tripping = found
+    let found = findings_on(&doctor(&sets(&rehearsal)), "readings");
+    let failure = found
         .iter()
         .find(|f| f.starts_with("failure: "))
         .expect("a failure");
     assert!(
-        tripping.contains("farthest +950.0 um; the soft limit is 900.0 um"),
-        "{tripping}"
+        failure.contains("farthest +950.0 um; the soft limit is 900.0 um"),
+        "{failure}"
     );
 }
 
@@ -183,8 +185,8 @@ fn position_beyond_the_soft_limit_is_a_failure() {
 fn distinguishes_missing_port_file_and_device() {
     let with = |port: &str| {
         let port = format!("probe.device.line.port={port}");
-        on(
-            &doctor(&[PATIENT.map(String::from).to_vec(), vec![port]].concat()),
+        findings_on(
+            &doctor(&[NO_TIMING_LIMIT.map(String::from).to_vec(), vec![port]].concat()),
             "serial port",
         )
     };

@@ -15,8 +15,8 @@ const QUIET: [&str; 4] = [
     "chirp.duration_s=60",
 ];
 
-fn measured(config: &Config, believed: &Config) -> Analysis {
-    simulated::analysed(&Plan::chirp(config.clone()), believed).expect("an analysis")
+fn measured(config: &Config, assumed: &Config) -> Analysis {
+    simulated::analysed(&Plan::chirp(config.clone()), assumed).expect("an analysis")
 }
 
 /// Ratios of measured to exact response, between two frequencies; around the zeros, where little answers, the error is
@@ -76,9 +76,9 @@ fn phase_gives_the_delay_of_amplifier_or_probe() {
         ("probe.latency_s=0.0012", 0.0009),
     ] {
         let config = lab(&[&QUIET[..], &[set]].concat());
-        let mut believed = lab(&QUIET);
-        believed.amplifier.latency_s = 0.0004;
-        let analysis = measured(&config, &believed);
+        let mut assumed = lab(&QUIET);
+        assumed.amplifier.latency_s = 0.0004;
+        let analysis = measured(&config, &assumed);
         let beyond = analysis.excess_delay.expect("enough frequencies");
         // Modes that the model leaves out turn the phase by 0.1 degree at 100 Hz: 3 us.
         assert!((beyond.value - extra_s).abs() < 6e-6, "{set}: {beyond:?}");

@@ -111,7 +111,7 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
 
 /// Largest distances in percent and degrees from the closed form of the chain with the mean delays, 0.5 to 120 Hz, and the
 /// share of frequencies beyond one of either.
-fn off(config: &Config, wires: &Wires) -> (f64, f64, f64) {
+fn deviation(config: &Config, wires: &Wires) -> (f64, f64, f64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (recording, age_s) = recorded(config, wires, folder.path());
     let analysis = analyse(&recording, config).expect("an analysis");
@@ -168,8 +168,8 @@ fn quiet(more: &[&str]) -> Config {
 /// How far a run may be off: percent, degrees, and the share of its frequencies beyond one of either.
 struct Bound(f64, f64, f64);
 
-fn must_be_within(wires: &Wires, bound: &Bound) {
-    let (percent, degrees, beyond) = off(&quiet(&[]), wires);
+fn assert_within(wires: &Wires, bound: &Bound) {
+    let (percent, degrees, beyond) = deviation(&quiet(&[]), wires);
     assert!(
         percent < bound.0 && degrees < bound.1 && beyond <= bound.2,
         "{percent:.3} %, {degrees:.3} deg, {beyond:.4} beyond"
@@ -184,34 +184,34 @@ const STEADY: Wires = Wires {
 };
 
 // The estimator by itself: a chirp of 24 s resolves the slopes of the resonances to 0.2 %.
-const BY_ITSELF: Bound = Bound(0.3, 0.05, 0.0);
+const ESTIMATOR_ALONE: Bound = Bound(0.3, 0.05, 0.0);
 
 #[test]
 fn constant_age_gives_the_closed_form() {
-    must_be_within(&STEADY, &BY_ITSELF);
+    assert_within(&STEADY, &ESTIMATOR_ALONE);
 }
 
 #[test]
 fn slow_enable_in_the_first_tick_has_no_effect() {
-    must_be_within(
+    assert_within(
         &Wires {
             enabling_s: 6e-3,
             ..STEADY
         },
-        &BY_ITSELF,
+        &ESTIMATOR_ALONE,
     );
 }
 
 #[test]
 fn varying_arrival_around_the_tick_has_no_effect() {
     // Now and then the reading of a millisecond earlier is the newest: 36 degrees at 100 Hz.
-    must_be_within(
+    assert_within(
         &Wires {
             probe_s: (1e-3, 1.1e-4),
             arrival_s: (2e-4, 1e-4),
             ..STEADY
         },
-        &BY_ITSELF,
+        &ESTIMATOR_ALONE,
     );
 }
 
@@ -222,7 +222,7 @@ fn varying_arrival_around_the_tick_has_no_effect() {
 #[test]
 fn command_jitter_of_a_fifth_of_a_period_is_corrected() {
     // Taken at the ticks they would be off by 40 % and 25 degrees.
-    must_be_within(
+    assert_within(
         &Wires {
             command_s: (4e-5, 4e-4),
             ..STEADY
@@ -239,7 +239,7 @@ fn varying_age_of_a_fast_free_running_probe_is_corrected() {
         arrival_s: (2e-4, 1e-4),
         ..STEADY
     };
-    must_be_within(&probe, &Bound(1.2, 0.5, 0.01));
+    assert_within(&probe, &Bound(1.2, 0.5, 0.01));
 }
 
 #[test]
@@ -251,5 +251,5 @@ fn varying_age_of_a_slow_free_running_probe_is_corrected() {
         arrival_s: (1.3e-3, 1e-4),
         ..STEADY
     };
-    must_be_within(&probe, &Bound(1.6, 1.6, 0.06));
+    assert_within(&probe, &Bound(1.6, 1.6, 0.06));
 }

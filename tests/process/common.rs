@@ -7,10 +7,10 @@ use bench::recording::Recording;
 use bench::rt::record::TickRecord;
 
 /// Largest time that a test waits for an event. It only prevents endless waiting; it is no requirement.
-const PATIENCE: Duration = Duration::from_secs(120);
+const TIME_LIMIT: Duration = Duration::from_secs(120);
 
 /// More late ticks are allowed than a loaded machine has: timing is not tested here.
-pub const PATIENT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
+pub const NO_OVERRUN_LIMIT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
 /// The chirp's last frequency must lie below half the rate in any configuration.
 pub const AT_1_KHZ: [&str; 6] = [
     "--set",
@@ -51,7 +51,7 @@ pub fn minute(what: &str) -> Vec<&str> {
             "chirp.quiet_before_s=0.1",
         ],
     };
-    [own, &["--json"], &AT_1_KHZ, &PATIENT].concat()
+    [own, &["--json"], &AT_1_KHZ, &NO_OVERRUN_LIMIT].concat()
 }
 
 /// The running program. It is killed if a test ends early.
@@ -103,7 +103,7 @@ impl Running {
 
     /// Waits until the program ends by itself.
     pub fn until_ended(&mut self) {
-        let patience = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TIME_LIMIT;
         while self
             .0
             .as_mut()
@@ -112,14 +112,14 @@ impl Running {
             .expect("a child of ours")
             .is_none()
         {
-            assert!(Instant::now() < patience, "it goes on and on");
+            assert!(Instant::now() < deadline, "it goes on and on");
             std::thread::sleep(Duration::from_millis(20));
         }
     }
 
     /// Waits until the loop has slept at least `times` times; returns the number of sleeps.
     pub fn until_slept(&mut self, times: u64) -> u64 {
-        let patience = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TIME_LIMIT;
         loop {
             let sleeps = self.sleeps();
             if sleeps >= times {
@@ -135,7 +135,7 @@ impl Running {
                 panic!("it ended early: {:?}", self.end());
             }
             assert!(
-                Instant::now() < patience,
+                Instant::now() < deadline,
                 "the loop does not run: {sleeps} sleeps"
             );
             std::thread::sleep(Duration::from_millis(20));

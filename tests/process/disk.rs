@@ -5,10 +5,10 @@ use std::process::{Command, Output, Stdio};
 use bench::recording::Recording;
 use bench::rt::record::flag;
 
-use crate::common::{AT_1_KHZ, PATIENT, Running, bench, recording_in, stderr, stdout};
+use crate::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr, stdout};
 
 /// The program with a limit of `blocks` for the size of a file, so that writing fails half-way.
-fn little_room(blocks: u32, arguments: &[&str], out: &Path) -> Command {
+fn command_with_file_limit(blocks: u32, arguments: &[&str], out: &Path) -> Command {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
     let mut command = Command::new("sh");
     command
@@ -19,8 +19,8 @@ fn little_room(blocks: u32, arguments: &[&str], out: &Path) -> Command {
     command
 }
 
-fn with_little_room(blocks: u32, arguments: &[&str], out: &Path) -> Output {
-    little_room(blocks, arguments, out)
+fn run_with_file_limit(blocks: u32, arguments: &[&str], out: &Path) -> Output {
+    command_with_file_limit(blocks, arguments, out)
         .output()
         .expect("a shell")
 }
@@ -30,24 +30,24 @@ fn disk_full_stops_the_run_and_keeps_the_written_part() {
     for arguments in [&["chirp"][..], &["control", "--fast", "--duration", "100"]] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         // 2048 blocks of 512 bytes (1024 in some shells): 1 or 2 MiB of some 25 MiB.
-        let output = with_little_room(2048, arguments, folder.path());
-        let said = stderr(&output);
-        assert_eq!(output.status.code(), Some(1), "{said}");
+        let output = run_with_file_limit(2048, arguments, folder.path());
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(
             !stdout(&output).contains("overruns"),
             "the plan, but no results of a run that failed"
         );
         let path = recording_in(folder.path());
         assert!(
-            said.contains(path.to_str().expect("text")) && said.contains("File too large"),
-            "what and where: {said}"
+            message.contains(path.to_str().expect("text")) && message.contains("File too large"),
+            "what and where: {message}"
         );
-        assert!(said.contains("bench recover"), "the remedy: {said}");
+        assert!(message.contains("bench recover"), "the remedy: {message}");
         assert!(
-            said.contains("the run was stopped with zero current"),
-            "{said}"
+            message.contains("the run was stopped with zero current"),
+            "{message}"
         );
-        assert!(!said.contains("panicked"), "{said}");
+        assert!(!message.contains("panicked"), "{message}");
 
         let recover = bench(&["recover"]).arg(&path).output().expect("it runs");
         assert_eq!(recover.status.code(), Some(0), "{}", stderr(&recover));
@@ -76,30 +76,31 @@ fn disk_full_stops_a_real_time_run() {
     let arguments = [
         &["control", "--slow", "--duration", "3600"][..],
         &AT_1_KHZ,
-        &PATIENT,
+        &NO_OVERRUN_LIMIT,
     ]
     .concat();
-    let mut command = little_room(64, &arguments, folder.path());
+    let mut command = command_with_file_limit(64, &arguments, folder.path());
     let mut running = Running::of(command.stdout(Stdio::piped()).stderr(Stdio::piped()));
     running.until_ended();
     let output = running.end();
-    let said = stderr(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(
-        said.contains("File too large") && said.contains("the run was stopped with zero current"),
-        "{said}"
+        message.contains("File too large")
+            && message.contains("the run was stopped with zero current"),
+        "{message}"
     );
 }
 
 #[test]
 fn disk_full_at_start_prevents_motion() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let output = with_little_room(0, &["chirp"], folder.path());
-    let said = stderr(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let output = run_with_file_limit(0, &["chirp"], folder.path());
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(
-        said.contains("File too large") && said.contains("nothing was moved"),
-        "{said}"
+        message.contains("File too large") && message.contains("nothing was moved"),
+        "{message}"
     );
 }
 
@@ -121,19 +122,20 @@ fn unwritable_folder_is_reported_before_any_motion() {
                 .arg(out)
                 .output()
                 .expect("it runs");
-            let said = stderr(&output);
-            assert_eq!(output.status.code(), Some(1), "{said}");
+            let message = stderr(&output);
+            assert_eq!(output.status.code(), Some(1), "{message}");
             assert!(
-                said.contains(out.to_str().expect("text")) && said.contains("nothing was moved"),
-                "{said}"
+                message.contains(out.to_str().expect("text"))
+                    && message.contains("nothing was moved"),
+                "{message}"
             );
             assert!(
-                said.contains("--out") || said.contains("check that"),
-                "the remedy: {said}"
+                message.contains("--out") || message.contains("check that"),
+                "the remedy: {message}"
             );
             assert!(
-                !stdout(&output).contains("overruns") && !said.contains("panicked"),
-                "{said}"
+                !stdout(&output).contains("overruns") && !message.contains("panicked"),
+                "{message}"
             );
         }
     }

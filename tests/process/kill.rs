@@ -18,10 +18,10 @@ fn killed_run_is_recovered_except_for_the_last_second() {
             .arg(&path)
             .output()
             .expect("it runs");
-        let said: serde_json::Value =
+        let report: serde_json::Value =
             serde_json::from_slice(&output.stdout).expect("one JSON object");
         // 3 if the machine was too slow to pass on all records.
-        let lost = said["lost_records"].as_u64().expect("a count");
+        let lost = report["lost_records"].as_u64().expect("a count");
         assert_eq!(
             output.status.code(),
             Some(if lost == 0 { 0 } else { 3 }),
@@ -29,8 +29,8 @@ fn killed_run_is_recovered_except_for_the_last_second() {
             stderr(&output)
         );
         assert!(
-            said["cut"].is_object(),
-            "it says where the file ends: {said}"
+            report["cut"].is_object(),
+            "it says where the file ends: {report}"
         );
         assert_eq!(
             std::fs::read(&path).expect("still there"),
@@ -38,10 +38,10 @@ fn killed_run_is_recovered_except_for_the_last_second() {
             "the original is not touched"
         );
 
-        let recovered = Recording::open(said["recording"].as_str().expect("a path").as_ref())
+        let recovered = Recording::open(report["recording"].as_str().expect("a path").as_ref())
             .expect("whole again");
         assert!(!recovered.truncated());
-        assert_eq!(said["ticks"].as_u64(), Some(recovered.tick_count()));
+        assert_eq!(report["ticks"].as_u64(), Some(recovered.tick_count()));
         // At the kill the loop had slept so often, once for each tick at the most: at least as many ticks had begun (some
         // ten sleeps are of its start). Half a second is on its way to a chunk, half a second is in the open chunk.
         let begun = sleeps - 10;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use bench::recording::{Header, Recorder, Recording};
 use bench::rt::record::{LoopMessage, TickRecord};
 
-use crate::common::{AT_1_KHZ, PATIENT, Running, bench, recording_in, stderr};
+use crate::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr};
 
 fn replay(path: &Path) -> Output {
     bench(&["replay", "--json"])
@@ -25,7 +25,7 @@ fn real_time_run_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     let arguments = [
         &["control", "--slow", "--duration", "2", "--json"][..],
         &AT_1_KHZ,
-        &PATIENT,
+        &NO_OVERRUN_LIMIT,
     ]
     .concat();
     let mut running = Running::start(&arguments, folder.path());
@@ -35,29 +35,29 @@ fn real_time_run_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     std::thread::sleep(Duration::from_millis(50));
     running.signal(libc::SIGCONT);
     let output = running.end();
-    let said = json(&output);
+    let report = json(&output);
     assert_eq!(
-        (output.status.code(), said["outcome"].as_str()),
+        (output.status.code(), report["outcome"].as_str()),
         (Some(3), Some("completed")),
-        "{said}"
+        "{report}"
     );
     let path = recording_in(folder.path());
     let recording = Recording::open(&path).expect("a recording");
     assert!(recording.overruns() >= 45, "{}", recording.overruns());
-    assert_eq!(said["overruns"].as_u64(), Some(recording.overruns()));
+    assert_eq!(report["overruns"].as_u64(), Some(recording.overruns()));
     assert_eq!(
         recording.tick_count() + recording.overruns(),
         recording.last_tick() + 1
     );
 
     let output = replay(&path);
-    let said = json(&output);
+    let report = json(&output);
     assert_eq!(
-        (output.status.code(), said["identical"].as_bool()),
+        (output.status.code(), report["identical"].as_bool()),
         (Some(0), Some(true)),
-        "{said}"
+        "{report}"
     );
-    assert_eq!(said["ticks"].as_u64(), Some(recording.tick_count()));
+    assert_eq!(report["ticks"].as_u64(), Some(recording.tick_count()));
 }
 
 #[test]
@@ -76,16 +76,20 @@ fn more_missed_ticks_than_allowed_trip_and_exit_with_1() {
     std::thread::sleep(Duration::from_millis(200));
     running.signal(libc::SIGCONT);
     let output = running.end();
-    let said = json(&output);
+    let report = json(&output);
     assert_eq!(
-        (output.status.code(), said["outcome"].as_str()),
+        (output.status.code(), report["outcome"].as_str()),
         (Some(1), Some("tripped")),
-        "{said}"
+        "{report}"
     );
-    assert_eq!(said["trip"]["reason"].as_str(), Some("overruns"), "{said}");
+    assert_eq!(
+        report["trip"]["reason"].as_str(),
+        Some("overruns"),
+        "{report}"
+    );
     let path = recording_in(folder.path());
     let recording = Recording::open(&path).expect("a recording");
-    let at = said["trip"]["tick"].as_u64().expect("a tick");
+    let at = report["trip"]["tick"].as_u64().expect("a tick");
     let after = recording
         .ticks()
         .expect("readable")
@@ -133,13 +137,13 @@ fn altered_recording_exits_with_1_and_names_the_tick() {
     }
     new.finish(&[]).expect("a good disk");
     let output = replay(&altered);
-    let said = json(&output);
+    let report = json(&output);
     assert_eq!(
-        (output.status.code(), said["identical"].as_bool()),
+        (output.status.code(), report["identical"].as_bool()),
         (Some(1), Some(false)),
-        "{said}"
+        "{report}"
     );
-    assert_eq!(said["first"]["tick"].as_u64(), Some(6000), "{said}");
+    assert_eq!(report["first"]["tick"].as_u64(), Some(6000), "{report}");
     let output = bench(&["replay"]).arg(&altered).output().expect("it runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
@@ -157,19 +161,19 @@ fn rejects_invalid_recordings_with_reason_and_without_panic() {
         .expect("it runs");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let whole = std::fs::read(recording_in(folder.path())).expect("a file");
-    let foreign = folder.path().join("foreign.mcap");
-    mcap::Writer::new(std::fs::File::create(&foreign).expect("a file"))
+    let external = folder.path().join("external.mcap");
+    mcap::Writer::new(std::fs::File::create(&external).expect("a file"))
         .expect("room")
         .finish()
         .expect("room");
-    let foreign = std::fs::read(foreign).expect("a file");
+    let external = std::fs::read(external).expect("a file");
 
     let mut altered = whole.clone();
     altered[whole.len() / 2] ^= 1;
     let cases: [(&str, &[u8], &str); 6] = [
         ("empty", b"", ""),
         ("text", b"time_s,reference_m\n0,0\n", "not an MCAP file"),
-        ("foreign", &foreign, "without bench's channel /loop"),
+        ("external", &external, "without bench's channel /loop"),
         ("head", &whole[..200], "holds no ticks"),
         ("altered", &altered, "damaged"),
         ("directory", b"", ""),
@@ -183,15 +187,15 @@ fn rejects_invalid_recordings_with_reason_and_without_panic() {
         }
         for command in ["replay", "identify"] {
             let output = bench(&[command]).arg(&path).output().expect("it runs");
-            let said = stderr(&output);
-            assert_eq!(output.status.code(), Some(1), "{command} {name}: {said}");
+            let message = stderr(&output);
+            assert_eq!(output.status.code(), Some(1), "{command} {name}: {message}");
             assert!(
-                said.contains(name) && said.contains(expected),
-                "{command} {name}: {said}"
+                message.contains(name) && message.contains(expected),
+                "{command} {name}: {message}"
             );
             assert!(
-                !said.contains("panicked") && output.stdout.is_empty(),
-                "{command} {name}: {said}"
+                !message.contains("panicked") && output.stdout.is_empty(),
+                "{command} {name}: {message}"
             );
         }
     }
@@ -206,10 +210,10 @@ fn rejects_invalid_recordings_with_reason_and_without_panic() {
     let cut = folder.path().join("cut.mcap");
     std::fs::write(&cut, &whole[..whole.len() * 2 / 3]).expect("a file");
     let output = replay(&cut);
-    let said = json(&output);
+    let report = json(&output);
     assert_eq!(
-        (output.status.code(), said["truncated"].as_bool()),
+        (output.status.code(), report["truncated"].as_bool()),
         (Some(0), Some(true)),
-        "{said}"
+        "{report}"
     );
 }

@@ -14,9 +14,10 @@ fn stopped_by(signal: i32, what: &str) {
     running.signal(signal);
     let output = running.end();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let report: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert_eq!(
-        (said["outcome"].as_str(), said["trip"].is_null()),
+        (report["outcome"].as_str(), report["trip"].is_null()),
         (Some("stopped"), true)
     );
 
@@ -27,7 +28,10 @@ fn stopped_by(signal: i32, what: &str) {
         .attachment("results.json")
         .expect("the results are in the recording");
     let results: serde_json::Value = serde_json::from_slice(&results.data).expect("JSON");
-    assert_eq!(results, said, "the recording says what the program said");
+    assert_eq!(
+        results, report,
+        "the recording says what the program report"
+    );
     assert_eq!(results["ticks"].as_u64(), Some(recording.tick_count()));
 
     let stop = recording
@@ -59,10 +63,11 @@ fn stopped_by(signal: i32, what: &str) {
         "none from the order's tick on"
     );
     // A tenth of a second is recorded after the stop, including late ticks.
-    let watched = recording.last_tick() - stop.tick;
+    let after_stop = recording.last_tick() - stop.tick;
     assert!(
-        (RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&watched) && after.len() as u64 >= RATE_HZ / 10,
-        "{watched}"
+        (RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&after_stop)
+            && after.len() as u64 >= RATE_HZ / 10,
+        "{after_stop}"
     );
     assert_eq!(
         recording.tick_count() + recording.overruns(),

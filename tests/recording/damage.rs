@@ -40,23 +40,23 @@ static ORIGINAL: LazyLock<Original> = LazyLock::new(|| {
 });
 
 /// Reads `bytes` in both ways; what is handed out must have been recorded, all of it if the file claims to be complete.
-fn judge(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
+fn check(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
     std::fs::write(path, bytes).expect("temporary file");
     let opened = Recording::open(path);
     if let Ok(recording) = &opened {
-        nothing_is_false(recording, bytes.len())?;
+        check_contents(recording, bytes.len())?;
         let all = recording.tick_count() == ORIGINAL.ticks.len() as u64
             && *recording.events() == ORIGINAL.events;
         prop_assert!(all || recording.truncated(), "incomplete without saying so");
     }
     match Recording::salvage(path) {
-        Ok(recording) => nothing_is_false(&recording, bytes.len())?,
+        Ok(recording) => check_contents(&recording, bytes.len())?,
         Err(error) => prop_assert!(opened.is_err(), "opens, but is not salvaged: {error}"),
     }
     Ok(())
 }
 
-fn nothing_is_false(recording: &Recording, of_bytes: usize) -> Result<(), TestCaseError> {
+fn check_contents(recording: &Recording, of_bytes: usize) -> Result<(), TestCaseError> {
     let ticks: Vec<_> = recording
         .ticks()
         .and_then(Iterator::collect)
@@ -91,7 +91,7 @@ fn file_truncated_at_any_byte_gives_its_readable_part_or_an_error() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("cut.mcap");
     for length in 0..ORIGINAL.bytes.len() {
-        judge(&ORIGINAL.bytes[..length], &path).unwrap_or_else(|e| panic!("cut at {length}: {e}"));
+        check(&ORIGINAL.bytes[..length], &path).unwrap_or_else(|e| panic!("cut at {length}: {e}"));
         let opened = Recording::open(&path);
         assert!(
             opened.is_err_and(|e| !e.to_string().is_empty()) || opened_truncated(&path),
@@ -112,7 +112,7 @@ fn single_altered_byte_is_never_returned_as_data() {
     for at in 0..bytes.len() {
         let flip = 1 << (at % 8);
         bytes[at] ^= flip;
-        judge(&bytes, &path).unwrap_or_else(|e| panic!("byte {at} ^ {flip:#x}: {e}"));
+        check(&bytes, &path).unwrap_or_else(|e| panic!("byte {at} ^ {flip:#x}: {e}"));
         bytes[at] ^= flip;
     }
 }
@@ -131,7 +131,7 @@ proptest! {
         }
         bytes.truncate(length.map_or(usize::MAX, |l| l.index(ORIGINAL.bytes.len())));
         let dir = tempfile::tempdir().expect("temporary directory");
-        judge(&bytes, &dir.path().join("damaged.mcap"))?;
+        check(&bytes, &dir.path().join("damaged.mcap"))?;
     }
 
     #[test]
@@ -231,45 +231,45 @@ fn rejects_chunk_without_crc() {
 #[test]
 fn unusable_files_are_reported_by_kind_with_a_remedy() {
     let dir = tempfile::tempdir().expect("temporary directory");
-    let says = |name: &str, words: &str| {
+    let assert_error = |name: &str, words: &str| {
         let error = Recording::open(&dir.path().join(name))
             .expect_err(name)
             .to_string();
         assert!(error.contains(words) && error.contains(name), "{error}");
     };
-    let put = |name: &str, bytes: &[u8]| {
+    let write_file = |name: &str, bytes: &[u8]| {
         std::fs::write(dir.path().join(name), bytes).expect("temporary file")
     };
 
-    says("absent.mcap", "no such file; check the name");
-    put("table.csv", b"time,position\n0.0,1.0\n");
-    says(
+    assert_error("absent.mcap", "no such file; check the name");
+    write_file("table.csv", b"time,position\n0.0,1.0\n");
+    assert_error(
         "table.csv",
         "not an MCAP file; give a recording made by bench",
     );
-    put("nothing.mcap", b"");
-    says("nothing.mcap", "not an MCAP file");
-    put("foreign.mcap", &foreign());
-    says(
-        "foreign.mcap",
+    write_file("nothing.mcap", b"");
+    assert_error("nothing.mcap", "not an MCAP file");
+    write_file("external.mcap", &external());
+    assert_error(
+        "external.mcap",
         "without bench's channel /loop (it has /imu of none)",
     );
-    put("head.mcap", &ORIGINAL.bytes[..chunks(&ORIGINAL.bytes)[1].0]);
-    says("head.mcap", "holds no ticks (it was cut off");
-    put("barely.mcap", mcap::MAGIC);
-    says("barely.mcap", "holds no ticks (it was cut off");
+    write_file("head.mcap", &ORIGINAL.bytes[..chunks(&ORIGINAL.bytes)[1].0]);
+    assert_error("head.mcap", "holds no ticks (it was cut off");
+    write_file("barely.mcap", mcap::MAGIC);
+    assert_error("barely.mcap", "holds no ticks (it was cut off");
     let path = dir.path().join("idle.mcap");
     Recorder::create(&path, &Header::default())
         .expect("fresh")
         .finish(&[])
         .expect("good disk");
-    says("idle.mcap", "holds no ticks (it is complete)");
+    assert_error("idle.mcap", "holds no ticks (it is complete)");
     std::fs::create_dir(dir.path().join("folder")).expect("temporary");
-    says("folder", "cannot read the recording");
+    assert_error("folder", "cannot read the recording");
     assert!(Recorder::create(&dir.path().join("no/such/place.mcap"), &header()).is_err());
 }
 
-fn foreign() -> Vec<u8> {
+fn external() -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::Writer::new(&mut out).expect("memory");
     let schema = writer

@@ -93,15 +93,15 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
         "every record is accounted for"
     );
     assert!(health.thrown_away() >= 15_000, "{}", health.thrown_away());
-    what_was_written_is_readable(&path, health.written());
+    assert_written_part_readable(&path, health.written());
 }
 
 /// The loop's end: never waits for the recorder, so a full ring here means that the thread stopped draining.
 fn push(ring: &mut rtrb::Producer<LoopMessage>, published: LoopMessage) {
-    let patience = Instant::now() + Duration::from_secs(10);
+    let deadline = Instant::now() + Duration::from_secs(10);
     while ring.is_full() {
         assert!(
-            Instant::now() < patience,
+            Instant::now() < deadline,
             "the ring is not emptied any more"
         );
         std::thread::sleep(Duration::from_micros(100));
@@ -109,7 +109,7 @@ fn push(ring: &mut rtrb::Producer<LoopMessage>, published: LoopMessage) {
     ring.push(published).expect("has room");
 }
 
-fn what_was_written_is_readable(path: &Path, written: u64) {
+fn assert_written_part_readable(path: &Path, written: u64) {
     let recording = Recording::open(path).expect("readable up to where the disk was full");
     assert!(recording.truncated());
     // The chunk in which the disk filled up (2500 ticks) is lost.

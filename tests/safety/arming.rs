@@ -16,7 +16,9 @@ use bench_hal::{Rig, Tick, Validity};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::faulty_rig::Fault;
-use crate::rig::{Bench, Says, Still, Told, Watched, interlocks, says, stage};
+use crate::rig::{
+    AmplifierCall, Bench, CurrentProgram, LoggedRig, StillRig, endless, interlocks, stage,
+};
 
 const STATES: [State; 4] = [
     State::Disarmed,
@@ -45,20 +47,20 @@ const MAKE_TRIPPED: u64 = 5;
 fn bench_in(state: State, trip: bool) -> Bench {
     let mut faults = Vec::new();
     if trip {
-        faults.push((TRIP..TRIP + 1, Fault::Says(Validity::Faulty)));
+        faults.push((TRIP..TRIP + 1, Fault::Validity(Validity::Faulty)));
     }
     if state == State::Tripped {
         faults.push((
             MAKE_TRIPPED..MAKE_TRIPPED + 1,
-            Fault::Says(Validity::Faulty),
+            Fault::Validity(Validity::Faulty),
         ));
     }
     let mut bench = Bench::still(&stage(), &faults);
     if state != State::Disarmed {
-        bench.order(Request::Arm);
+        bench.request(Request::Arm);
     }
     if state == State::Running {
-        bench.order(Request::Start(says(|_| 0.1)));
+        bench.request(Request::Start(endless(|_| 0.1)));
     }
     bench.run(TRIP);
     assert_eq!(bench.state(), state);
@@ -73,10 +75,10 @@ fn transitions_match_the_state_diagram() {
             let mut bench = bench_in(from, change == Transition::Trip);
             let events = bench.events().len();
             match change {
-                Transition::Arm => bench.order(Request::Arm),
-                Transition::Start => bench.order(Request::Start(says(|_| 0.2))),
-                Transition::Stop => bench.order(Request::Stop),
-                Transition::Clear => bench.order(Request::Clear),
+                Transition::Arm => bench.request(Request::Arm),
+                Transition::Start => bench.request(Request::Start(endless(|_| 0.2))),
+                Transition::Stop => bench.request(Request::Stop),
+                Transition::Clear => bench.request(Request::Clear),
                 Transition::Trip => {}
             }
             let record = bench.tick();
@@ -97,7 +99,7 @@ fn transitions_match_the_state_diagram() {
             };
             assert_eq!(moved, expected, "{change:?} in {from:?}");
             assert_eq!(
-                bench.is_on(),
+                bench.amplifier_is_on(),
                 matches!(to, State::Armed | State::Running),
                 "{change:?} in {from:?}"
             );
@@ -121,12 +123,16 @@ fn is_move(kind: &EventKind) -> bool {
 
 #[test]
 fn completed_program_disarms_in_the_tick_after_its_last_command() {
-    let mut bench = Bench::running(&stage(), &[], Box::new(Says(|_| 0.1, 10)));
+    let mut bench = Bench::running(&stage(), &[], Box::new(CurrentProgram(|_| 0.1, 10)));
     bench.run(20);
     let commands: Vec<bool> = bench.ticks().iter().map(|r| r.command_a != 0.0).collect();
     assert_eq!(commands, [[true; 10], [false; 10]].concat());
     assert_eq!(
-        (bench.state(), bench.is_on(), bench.handed_back),
+        (
+            bench.state(),
+            bench.amplifier_is_on(),
+            bench.returned_programs
+        ),
         (State::Disarmed, false, 1)
     );
     assert!(
@@ -140,64 +146,70 @@ fn completed_program_disarms_in_the_tick_after_its_last_command() {
 
 #[test]
 fn start_request_does_not_replace_the_running_program() {
-    let mut bench = Bench::running(&stage(), &[], says(|tick| 0.1 + tick as f64 * 1e-3));
+    let mut bench = Bench::running(&stage(), &[], endless(|tick| 0.1 + tick as f64 * 1e-3));
     bench.run(5);
-    bench.order(Request::Start(says(|_| 5.0)));
+    bench.request(Request::Start(endless(|_| 5.0)));
     let record = bench.tick();
-    assert_eq!((record.command_a, bench.handed_back), (0.1 + 5.0 * 1e-3, 1));
+    assert_eq!(
+        (record.command_a, bench.returned_programs),
+        (0.1 + 5.0 * 1e-3, 1)
+    );
 }
 
 #[test]
 fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
     let mut bench = bench_in(State::Tripped, false);
     let trip = bench.servo().last_trip().expect("tripped");
-    let told = bench.told().len();
+    let before = bench.amplifier_calls().len();
     for _ in 0..50 {
-        bench.order(Request::Arm);
-        bench.order(Request::Start(says(|_| 0.1)));
-        bench.order(Request::Stop);
+        bench.request(Request::Arm);
+        bench.request(Request::Start(endless(|_| 0.1)));
+        bench.request(Request::Stop);
         assert_eq!(bench.tick().state, State::Tripped);
     }
     assert!(
-        bench.told()[told..]
+        bench.amplifier_calls()[before..]
             .iter()
-            .all(|(_, told)| *told == Told::Disable),
+            .all(|(_, call)| *call == AmplifierCall::Disable),
         "nothing but off, again and again"
     );
     assert_eq!(
-        (bench.servo().last_trip(), bench.handed_back),
+        (bench.servo().last_trip(), bench.returned_programs),
         (Some(trip), 50)
     );
 
-    bench.order(Request::Clear);
+    bench.request(Request::Clear);
     assert_eq!(
-        (bench.tick().state, bench.is_on()),
+        (bench.tick().state, bench.amplifier_is_on()),
         (State::Disarmed, false)
     );
-    bench.order(Request::Start(says(|_| 0.1)));
+    bench.request(Request::Start(endless(|_| 0.1)));
     assert_eq!(
-        (bench.tick().state, bench.is_on()),
+        (bench.tick().state, bench.amplifier_is_on()),
         (State::Disarmed, false),
         "start alone does nothing"
     );
-    bench.order(Request::Arm);
+    bench.request(Request::Arm);
     let armed = bench.tick();
     assert_eq!(
-        (armed.state, armed.command_a, bench.is_on()),
+        (armed.state, armed.command_a, bench.amplifier_is_on()),
         (State::Armed, 0.0, true)
     );
-    bench.order(Request::Start(says(|_| 0.1)));
+    bench.request(Request::Start(endless(|_| 0.1)));
     let running = bench.tick();
     assert_eq!((running.state, running.command_a), (State::Running, 0.1));
 }
 
 #[test]
 fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
-    let faults = [(100..101, Fault::Faulted(5)), (0..200, Fault::Unclearable)];
-    let mut bench = Bench::running(&stage(), &faults, says(|_| 0.1));
+    let faults = [
+        (100..101, Fault::AmplifierFault(5)),
+        (0..200, Fault::RefusedClear),
+    ];
+    let mut bench = Bench::running(&stage(), &faults, endless(|_| 0.1));
     bench.run(150);
     assert_eq!(bench.state(), State::Tripped);
-    bench.order(Request::Clear);
+    bench.request(Request::Clear);
     bench.tick();
     assert_eq!(
         bench.state(),
@@ -205,20 +217,23 @@ fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
         "the amplifier keeps its fault"
     );
     bench.run(100);
-    bench.order(Request::Clear);
+    bench.request(Request::Clear);
     bench.tick();
-    assert_eq!((bench.state(), bench.is_on()), (State::Disarmed, false));
+    assert_eq!(
+        (bench.state(), bench.amplifier_is_on()),
+        (State::Disarmed, false)
+    );
 }
 
 #[test]
 fn new_run_resets_the_last_trip() {
     let mut bench = bench_in(State::Tripped, false);
-    for order in [
+    for request in [
         Request::Clear,
         Request::Arm,
-        Request::Start(Box::new(Says(|_| 0.1, 5))),
+        Request::Start(Box::new(CurrentProgram(|_| 0.1, 5))),
     ] {
-        bench.order(order);
+        bench.request(request);
     }
     assert!(bench.servo().last_trip().is_some());
     bench.run(10);
@@ -232,12 +247,12 @@ fn new_run_resets_the_last_trip() {
 fn arm_request_in_other_states_does_not_enable_the_amplifier() {
     for state in STATES.into_iter().filter(|state| *state != State::Disarmed) {
         let mut bench = bench_in(state, false);
-        let told = bench.told().len();
-        bench.order(Request::Arm);
+        let before = bench.amplifier_calls().len();
+        bench.request(Request::Arm);
         bench.run(3);
-        let enabled = bench.told()[told..]
+        let enabled = bench.amplifier_calls()[before..]
             .iter()
-            .any(|(_, told)| matches!(told, Told::Enable { .. }));
+            .any(|(_, call)| matches!(call, AmplifierCall::Enable { .. }));
         assert!(!enabled, "enabled anew while {state:?}");
     }
 }
@@ -266,9 +281,9 @@ impl Clock for Handing {
 
 #[test]
 fn schedule_restarts_only_after_enabling_the_amplifier() {
-    let (servo, requests, _records) = loop_around(Still::default());
+    let (servo, requests, _records) = loop_around(StillRig::default());
     let restarts = Arc::new(AtomicU64::new(0));
-    let program = Request::Start(Box::new(Says(|_| 0.1, 10)));
+    let program = Request::Start(Box::new(CurrentProgram(|_| 0.1, 10)));
     let late = vec![
         (0, Request::Arm),
         (1, program),
@@ -327,7 +342,7 @@ impl Program for Panics {
 
 #[test]
 fn panic_in_the_loop_disables_the_amplifier() {
-    let rig = Watched::new(Still::default());
+    let rig = LoggedRig::new(StillRig::default());
     let log = Arc::clone(&rig.log);
     let (servo, mut requests, _records) = loop_around(rig);
     assert!(
@@ -336,12 +351,15 @@ fn panic_in_the_loop_disables_the_amplifier() {
     );
     let died = std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
     assert!(died.is_err(), "the program panics at its tenth tick");
-    let told = log.lock().expect("not poisoned").clone();
-    let currents = told
-        .iter()
-        .filter(|(_, t)| matches!(t, Told::Command { current_a, .. } if *current_a != 0.0));
+    let calls = log.lock().expect("not poisoned").clone();
+    let currents = calls.iter().filter(
+        |(_, t)| matches!(t, AmplifierCall::Command { current_a, .. } if *current_a != 0.0),
+    );
     assert_eq!(currents.count(), 10);
-    assert_eq!(told.last().map(|(_, told)| *told), Some(Told::Disable));
+    assert_eq!(
+        calls.last().map(|(_, call)| *call),
+        Some(AmplifierCall::Disable)
+    );
 }
 
 #[test]
@@ -359,7 +377,7 @@ fn amplifier_is_not_enabled_without_a_recording() {
     // Nobody, root included, can make a file in /proc.
     for out in [Path::new("/proc"), &file] {
         for pace in [Pace::Virtual, Pace::Realtime] {
-            let rig = Watched::new(Still::default());
+            let rig = LoggedRig::new(StillRig::default());
             let log = Arc::clone(&rig.log);
             let error = experiment::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
                 .err()
@@ -371,10 +389,12 @@ fn amplifier_is_not_enabled_without_a_recording() {
                 Arc::strong_count(&log) == 1
             });
             assert!(gone, "the loop runs without leave");
-            let told = log.lock().expect("not poisoned").clone();
+            let calls = log.lock().expect("not poisoned").clone();
             assert!(
-                told.iter().all(|(_, told)| *told == Told::Disable),
-                "{told:?}"
+                calls
+                    .iter()
+                    .all(|(_, call)| *call == AmplifierCall::Disable),
+                "{calls:?}"
             );
         }
     }

@@ -127,8 +127,8 @@ fn closing_the_loop_with_probe_offset_is_bumpless() {
                 &config,
                 FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(offset_m))]),
             );
-            bench.order(Request::Arm);
-            bench.order(Request::Start(Box::new(program(&config, 2500, 2500))));
+            bench.request(Request::Arm);
+            bench.request(Request::Start(Box::new(program(&config, 2500, 2500))));
             bench.run(5000);
             assert_eq!(bench.trips(), []);
             makes_no_jump(
@@ -149,8 +149,8 @@ fn no_current_flows_during_settling() {
         &config,
         FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(300e-6))]),
     );
-    bench.order(Request::Arm);
-    bench.order(Request::Start(Box::new(program(&config, 2500, 100))));
+    bench.request(Request::Arm);
+    bench.request(Request::Start(Box::new(program(&config, 2500, 100))));
     bench.run(2500);
     assert!(
         bench
@@ -178,8 +178,8 @@ fn second_run_starts_from_rest_without_the_old_set_point() {
             &config,
             FaultyRig::new(rig, &[(ALWAYS, Fault::Offset(100e-6))]),
         );
-        bench.order(Request::Arm);
-        bench.order(Request::Start(Box::new(program(&config, 2500, 10_000))));
+        bench.request(Request::Arm);
+        bench.request(Request::Start(Box::new(program(&config, 2500, 10_000))));
         bench.run(12_500);
         let end = *bench.ticks().last().expect("ticks");
         assert!(
@@ -190,8 +190,8 @@ fn second_run_starts_from_rest_without_the_old_set_point() {
 
         config.control.reference = ReferenceSettings::Hold(HoldReference {});
         let from = bench.ticks().last().expect("ticks").tick + 1;
-        bench.order(Request::Arm);
-        bench.order(Request::Start(Box::new(program(&config, 2500, 2500))));
+        bench.request(Request::Arm);
+        bench.request(Request::Start(Box::new(program(&config, 2500, 2500))));
         bench.run(5000);
         let second = closed(&bench, from);
         makes_no_jump(&config, &second, 100e-6, &format!("{name}, second run"));

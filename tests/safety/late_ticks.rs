@@ -14,7 +14,7 @@ use bench_hal::{
 };
 use rtrb::{Consumer, RingBuffer};
 
-use crate::rig::{Says, Still, interlocks, stage};
+use crate::rig::{CurrentProgram, StillRig, interlocks, stage};
 
 /// A clock by which some ticks are late: (call, ticks missed).
 struct Jerky {
@@ -96,8 +96,8 @@ fn missed_ticks_are_counted_flagged_and_skipped_in_the_numbering() {
         calls: 0,
     };
     let (ended, records) = run(
-        Still::default(),
-        Box::new(Says(|_| 0.1, 100)),
+        StillRig::default(),
+        Box::new(CurrentProgram(|_| 0.1, 100)),
         clock,
         50,
         10,
@@ -156,7 +156,7 @@ fn program_continues_after_missed_ticks_without_catching_up() {
         calls: 0,
     };
     let (ended, records) = run(
-        Still::default(),
+        StillRig::default(),
         Box::new(Asked(Arc::clone(&asked), 50)),
         clock,
         50,
@@ -179,7 +179,7 @@ fn program_continues_after_missed_ticks_without_catching_up() {
 }
 
 /// A probe that holds up the loop once.
-struct Hangs(Still, u64);
+struct Hangs(StillRig, u64);
 
 impl CurrentAmplifier for Hangs {
     fn enable(&mut self) -> Result<(), DeviceError> {
@@ -212,8 +212,8 @@ fn real_time_ticks_are_served_or_counted_as_missed() {
     // before it can be served at the soonest.
     let clock = Realtime::new(0.002);
     let (ended, records) = run(
-        Hangs(Still::default(), 100),
-        Box::new(Says(|_| 0.1, 500)),
+        Hangs(StillRig::default(), 100),
+        Box::new(CurrentProgram(|_| 0.1, 500)),
         clock,
         u32::MAX,
         20,
@@ -255,8 +255,8 @@ fn real_time_ticks_are_served_or_counted_as_missed() {
 fn too_many_missed_ticks_trip_in_real_time() {
     let clock = Realtime::new(0.002);
     let (ended, records) = run(
-        Hangs(Still::default(), 100),
-        Box::new(Says(|_| 0.1, 5000)),
+        Hangs(StillRig::default(), 100),
+        Box::new(CurrentProgram(|_| 0.1, 5000)),
         clock,
         4,
         0,

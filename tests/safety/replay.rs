@@ -98,15 +98,15 @@ fn tripped_runs_replay_bit_for_bit() {
     let once = |fault| [(AT..AT + 1, fault)];
     let lasting = |fault| [(AT..AT + 2000, fault)];
     let cases = [
-        (once(Fault::At(0.00095)), AT, "travel"),
-        (once(Fault::At(f64::NAN)), AT, "probe_invalid"),
-        (once(Fault::Says(Validity::Faulty)), AT, "probe_invalid"),
-        (once(Fault::Old(1_000_001)), AT, "probe_stale"),
-        (lasting(Fault::Frozen), AT + 5, "probe_stale"),
-        (once(Fault::Faulted(77)), AT, "amplifier"),
-        (once(Fault::Refuses(78)), AT, "amplifier"),
-        (once(Fault::Gives(f64::NAN)), AT, "amplifier"),
-        ([(0..1, Fault::DoesNotEnable(79))], 0, "amplifier"),
+        (once(Fault::Position(0.00095)), AT, "travel"),
+        (once(Fault::Position(f64::NAN)), AT, "probe_invalid"),
+        (once(Fault::Validity(Validity::Faulty)), AT, "probe_invalid"),
+        (once(Fault::Age(1_000_001)), AT, "probe_stale"),
+        (lasting(Fault::RepeatedSample), AT + 5, "probe_stale"),
+        (once(Fault::AmplifierFault(77)), AT, "amplifier"),
+        (once(Fault::RefusedCommand(78)), AT, "amplifier"),
+        (once(Fault::ReturnedCurrent(f64::NAN)), AT, "amplifier"),
+        ([(0..1, Fault::RefusedEnable(79))], 0, "amplifier"),
     ];
     for (faults, at, reason) in cases {
         for plan in [control("fast"), short_chirp(Sweep::Linear)] {
@@ -254,12 +254,15 @@ fn altered_command_request_flag_or_reference_is_found_at_its_tick() {
 fn refused_and_accepted_clear_requests_replay_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let plan = control("fast");
-    let faults = [(100..101, Fault::Faulted(77)), (0..200, Fault::Unclearable)];
+    let faults = [
+        (100..101, Fault::AmplifierFault(77)),
+        (0..200, Fault::RefusedClear),
+    ];
     let mut bench = Bench::running(&plan.config, &faults, plan.program().expect("a program"));
     bench.run(150);
-    bench.order(Request::Clear);
+    bench.request(Request::Clear);
     bench.run(100);
-    bench.order(Request::Clear);
+    bench.request(Request::Clear);
     bench.run(100);
     let metadata = [("run".to_string(), plan.kind.name().to_string())].into();
     let header = Header {

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 use crate::faulty_rig::Fault;
-use crate::rig::{Bench, Says, Told, stage};
+use crate::rig::{AmplifierCall, Bench, CurrentProgram, stage};
 
 const TICKS: u64 = 80;
 
@@ -40,16 +40,16 @@ fn requests() -> impl Strategy<Value = Vec<(u64, Given)>> {
 
 fn faults() -> impl Strategy<Value = Vec<(Range<u64>, Fault)>> {
     let fault = prop_oneof![
-        Just(Fault::Says(Validity::Faulty)),
-        Just(Fault::Says(Validity::OutOfRange)),
-        Just(Fault::At(f64::NAN)),
-        Just(Fault::At(0.00095)),
-        Just(Fault::Old(2_000_000)),
-        Just(Fault::Frozen),
+        Just(Fault::Validity(Validity::Faulty)),
+        Just(Fault::Validity(Validity::OutOfRange)),
+        Just(Fault::Position(f64::NAN)),
+        Just(Fault::Position(0.00095)),
+        Just(Fault::Age(2_000_000)),
+        Just(Fault::RepeatedSample),
         Just(Fault::Stuck),
-        Just(Fault::Faulted(9)),
-        Just(Fault::Refuses(8)),
-        Just(Fault::DoesNotEnable(7)),
+        Just(Fault::AmplifierFault(9)),
+        Just(Fault::RefusedCommand(8)),
+        Just(Fault::RefusedEnable(7)),
     ];
     prop::collection::vec(
         (0..TICKS, 1..12u64, fault).prop_map(|(at, ticks, f)| (at..at + ticks, f)),
@@ -66,10 +66,10 @@ fn run(requests: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, 
     for step in 0..TICKS {
         // No more than the ring takes.
         for (_, given) in requests.iter().filter(|(at, _)| *at == step).take(16) {
-            bench.order(match *given {
+            bench.request(match *given {
                 Given::Arm => Request::Arm,
                 Given::Start(current_a, ticks) => {
-                    Request::Start(Box::new(Says(move |_| current_a, ticks)))
+                    Request::Start(Box::new(CurrentProgram(move |_| current_a, ticks)))
                 }
                 Given::Stop => Request::Stop,
                 Given::Clear => Request::Clear,
@@ -82,7 +82,7 @@ fn run(requests: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, 
         );
         let off = matches!(bench.state(), State::Disarmed | State::Tripped);
         assert_eq!(
-            bench.is_on(),
+            bench.amplifier_is_on(),
             !off,
             "the amplifier is on in {:?}",
             bench.state()
@@ -113,7 +113,7 @@ fn may_flow(events: &[Event]) -> bool {
 }
 
 fn prove(bench: &Bench) -> Result<(), TestCaseError> {
-    let (told, events) = (bench.told(), bench.events());
+    let (calls, events) = (bench.amplifier_calls(), bench.events());
     for record in bench.ticks().iter() {
         // Completion is published after the record of its tick; everything else before it.
         let until = events.iter().filter(|e| e.tick <= record.tick).count();
@@ -121,13 +121,13 @@ fn prove(bench: &Bench) -> Result<(), TestCaseError> {
             .iter()
             .rposition(|e| e.kind == EventKind::Completed && e.tick == record.tick);
         let known = &events[..completed.unwrap_or(until)];
-        let went_out = told.iter().any(|(tick, told)| {
+        let went_out = calls.iter().any(|(tick, call)| {
             *tick == record.tick
-                && matches!(told, Told::Command { current_a, refused: false } if *current_a != 0.0)
+                && matches!(call, AmplifierCall::Command { current_a, refused: false } if *current_a != 0.0)
         });
-        let nonsense = told.iter().any(|(tick, told)| {
+        let nonsense = calls.iter().any(|(tick, call)| {
             *tick == record.tick
-                && matches!(told, Told::Command { current_a, .. } if !(-9.99..=9.99).contains(current_a))
+                && matches!(call, AmplifierCall::Command { current_a, .. } if !(-9.99..=9.99).contains(current_a))
         });
         prop_assert!(!nonsense, "beyond the motor's peak: {record:?}");
         if went_out {
@@ -210,11 +210,11 @@ fn generators_cover_runs_trips_clears_and_completions() {
 #[test]
 fn virtual_pace_loses_no_message_with_a_full_request_ring() {
     // All that the ring of requests holds, each with every event it can cause: an amplifier that does not enable.
-    let mut bench = Bench::still(&stage(), &[(0..10, Fault::DoesNotEnable(1))]);
+    let mut bench = Bench::still(&stage(), &[(0..10, Fault::RefusedEnable(1))]);
     bench.tick();
     for _ in 0..8 {
-        bench.order(Request::Arm);
-        bench.order(Request::Clear);
+        bench.request(Request::Arm);
+        bench.request(Request::Clear);
     }
     let before = bench.all.len();
     bench.tick();

@@ -153,10 +153,10 @@ fn truncated_file_continues_to_the_same_answer() {
             "cut at {length} of {all}: {}",
             answer.err
         );
-        let torn = length > header && length != last && length != all;
+        let damaged = length > header && length != last && length != all;
         assert_eq!(
             answer.err.contains("damaged lines"),
-            torn,
+            damaged,
             "cut at {length} of {all}: {}",
             answer.err
         );
@@ -196,13 +196,13 @@ fn ignores_a_changed_block() {
             .code,
         0
     );
-    let foreign = bench
+    let other_study = bench
         .read("other.study")
         .lines()
         .nth(2)
         .expect("a block")
         .to_string();
-    for wrong in changed.into_iter().chain([foreign]) {
+    for wrong in changed.into_iter().chain([other_study]) {
         bench.write("a.study", text.replace(&line, &wrong));
         let joined = bench.run("model study --json --join a.study");
         assert!(

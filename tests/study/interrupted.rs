@@ -10,7 +10,7 @@ use crate::program::Bench;
 /// More than any test waits for.
 const LONG: &str = "--draws 3000000 --threads 2";
 /// A guard against waiting for ever, no figure of merit.
-const PATIENCE: Duration = Duration::from_secs(120);
+const TIME_LIMIT: Duration = Duration::from_secs(120);
 
 fn start(bench: &Bench, arguments: &str) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
@@ -27,13 +27,13 @@ fn start(bench: &Bench, arguments: &str) -> Child {
 
 /// Waits until the file holds some blocks of about 1.1 kB, and header.
 fn until_written(child: &mut Child, file: &Path) {
-    let patience = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + TIME_LIMIT;
     while std::fs::metadata(file).map_or(0, |file| file.len()) < 10_000 {
         assert!(
             child.try_wait().expect("a child of ours").is_none(),
             "it ended early"
         );
-        assert!(Instant::now() < patience, "nothing is written");
+        assert!(Instant::now() < deadline, "nothing is written");
         std::thread::sleep(Duration::from_millis(10));
     }
 }
@@ -73,37 +73,37 @@ fn signals_leave_a_complete_file_and_report_how_to_continue() {
         until_written(&mut child, &bench.path("a.study"));
         signal(&child, number);
         let output = ended(child);
-        let said = String::from_utf8_lossy(&output.stderr);
+        let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(
             (output.status.code(), output.stdout.len()),
             (Some(1), 0),
-            "{said}"
+            "{message}"
         );
-        let (draws, torn) = lines(&bench.read("a.study"));
-        assert_eq!(torn, 0, "{said}");
+        let (draws, damaged) = lines(&bench.read("a.study"));
+        assert_eq!(damaged, 0, "{message}");
         assert!(
-            said.contains(&format!("stopped after {draws} of 3000000 draws")) && draws >= 1000,
-            "{said}"
+            message.contains(&format!("stopped after {draws} of 3000000 draws")) && draws >= 1000,
+            "{message}"
         );
         assert!(
-            said.contains("started again with the same arguments it continues from a.study"),
-            "{said}"
+            message.contains("started again with the same arguments it continues from a.study"),
+            "{message}"
         );
     }
-    // Without a file there is nothing to go on from, which is said.
+    // Without a file there is nothing to go on from, which is message.
     let bench = Bench::new();
     let child = start(&bench, &format!("{XY} {LONG} --csv draws.csv"));
     std::thread::sleep(Duration::from_millis(500));
     signal(&child, libc::SIGINT);
     let output = ended(child);
-    let said = String::from_utf8_lossy(&output.stderr);
+    let message = String::from_utf8_lossy(&output.stderr);
     // The signal may come before the program listens for it, on a machine that is busy; then it just ends.
     assert!(
         output
             .status
             .code()
-            .is_none_or(|code| code == 1 && said.contains("nothing was stored")),
-        "{said}"
+            .is_none_or(|code| code == 1 && message.contains("nothing was stored")),
+        "{message}"
     );
     assert_eq!(bench.files(), [""; 0]);
 }
@@ -116,8 +116,11 @@ fn continues_after_a_killed_process() {
     until_written(&mut child, &bench.path("a.study"));
     signal(&child, libc::SIGKILL);
     assert_eq!(ended(child).status.code(), None);
-    let (kept, torn) = lines(&bench.read("a.study"));
-    assert!((1000..40_000).contains(&kept) && torn <= 1, "{kept} {torn}");
+    let (kept, damaged) = lines(&bench.read("a.study"));
+    assert!(
+        (1000..40_000).contains(&kept) && damaged <= 1,
+        "{kept} {damaged}"
+    );
     let answer = bench.run(&format!("{arguments} --file a.study"));
     assert!(
         answer
@@ -168,8 +171,8 @@ fn reports_a_full_disk_and_keeps_completed_draws() {
         .args(arguments.split_whitespace())
         .output()
         .expect("a shell");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
     let stdout = String::from_utf8_lossy(&output.stdout);
     assert!(
         stdout.contains("\"error\"") && !stdout.contains("draws_done"),
@@ -180,9 +183,9 @@ fn reports_a_full_disk_and_keeps_completed_draws() {
         "File too large",
         "free some space and start it again with the same arguments",
     ] {
-        assert!(said.contains(words), "`{words}` is not in {said}");
+        assert!(message.contains(words), "`{words}` is not in {message}");
     }
-    assert!(!said.contains("panicked"), "{said}");
+    assert!(!message.contains("panicked"), "{message}");
     let (kept, _) = lines(&bench.read("a.study"));
     assert!((1000..30_000).contains(&kept), "{kept}");
     let answer = bench.run(&arguments);

@@ -1,8 +1,8 @@
 //! A tick allocates nothing and makes no system call: proven on the loop itself, whatever it runs and whatever goes wrong.
 mod allocation;
 mod programs;
-mod quiet;
 mod system_calls;
+mod test_loop;
 
 use assert_no_alloc::AllocDisabler;
 use bench::config::{Config, Source, load};
@@ -21,24 +21,24 @@ fn stage() -> Config {
 /// A trip of every kind: its reason, what goes wrong, and what is commanded.
 fn all_trips() -> Vec<(&'static str, Fault, f64)> {
     vec![
-        ("travel", Fault::At(0.00095), 0.01),
+        ("travel", Fault::Position(0.00095), 0.01),
         ("peak_current", Fault::Offset(0.0), 9.99),
         ("continuous_current", Fault::Offset(0.0), 9.0),
         ("command_not_finite", Fault::Offset(0.0), f64::NAN),
-        ("probe_invalid", Fault::Says(Validity::Faulty), 0.01),
-        ("probe_stale", Fault::Old(2_000_000), 0.01),
-        ("probe_stale", Fault::Frozen, 0.01),
+        ("probe_invalid", Fault::Validity(Validity::Faulty), 0.01),
+        ("probe_stale", Fault::Age(2_000_000), 0.01),
+        ("probe_stale", Fault::RepeatedSample, 0.01),
         ("probe_stuck", Fault::Stuck, 0.3),
-        ("amplifier", Fault::Faulted(3), 0.01),
-        ("amplifier", Fault::Refuses(4), 0.01),
-        ("amplifier", Fault::DoesNotEnable(5), 0.01),
-        ("amplifier", Fault::Gives(f64::NAN), 0.01),
-        ("current_not_followed", Fault::MeasuresBeyond(1.0), 0.01),
+        ("amplifier", Fault::AmplifierFault(3), 0.01),
+        ("amplifier", Fault::RefusedCommand(4), 0.01),
+        ("amplifier", Fault::RefusedEnable(5), 0.01),
+        ("amplifier", Fault::ReturnedCurrent(f64::NAN), 0.01),
+        ("current_not_followed", Fault::MeasuredOffset(1.0), 0.01),
     ]
 }
 
 /// The stage would run away under a constant current: the motor's force is as good as none here.
-fn weak() -> Config {
+fn weak_motor() -> Config {
     let mut config = stage();
     let (peak_a, rated_a) = (
         config.motor.peak_current_a(),

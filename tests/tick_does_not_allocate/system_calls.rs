@@ -6,18 +6,18 @@ use bench::rt::servo::Request;
 
 use crate::faulty_rig::Fault;
 use crate::programs::programs;
-use crate::quiet::{Quiet, Says};
-use crate::{all_trips, stage, weak};
+use crate::test_loop::{ConstantCurrent, TestLoop};
+use crate::{all_trips, stage, weak_motor};
 
 /// What became of a child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ended {
+enum Termination {
     Exit(i32),
     Signal(i32),
 }
 
 /// Runs `work` in a child of one thread and waits for its end; 0 is the exit code of a child that came to it.
-fn in_a_child(work: impl FnOnce()) -> Ended {
+fn in_child_process(work: impl FnOnce()) -> Termination {
     // SAFETY: the child has this thread alone. What it does before `_exit` takes no lock that another thread may hold: the
     // loop is made before the fork, and the ticks are here to be shown to need none.
     let child = unsafe { libc::fork() };
@@ -36,9 +36,9 @@ fn in_a_child(work: impl FnOnce()) -> Ended {
     let waited = unsafe { libc::waitpid(child, &raw mut status, 0) };
     assert_eq!(waited, child, "{}", std::io::Error::last_os_error());
     if libc::WIFSIGNALED(status) {
-        Ended::Signal(libc::WTERMSIG(status))
+        Termination::Signal(libc::WTERMSIG(status))
     } else {
-        Ended::Exit(libc::WEXITSTATUS(status))
+        Termination::Exit(libc::WEXITSTATUS(status))
     }
 }
 
@@ -107,30 +107,30 @@ fn chains() -> Vec<(&'static str, Config)> {
 fn other_signal_chains_do_not_allocate_or_make_system_calls() {
     for (name, config) in chains() {
         let running = || {
-            Quiet::running(
+            TestLoop::running(
                 &config,
-                &[(0..TICKS, Fault::MeasuresBeyond(0.0))],
-                Box::new(Says(0.05)),
+                &[(0..TICKS, Fault::MeasuredOffset(0.0))],
+                Box::new(ConstantCurrent(0.05)),
             )
         };
-        let mut quiet = running();
-        quiet.run(TICKS);
+        let mut test_loop = running();
+        test_loop.run(TICKS);
         assert!(
-            quiet.commands > TICKS - 10 && quiet.trip.is_none(),
+            test_loop.commands > TICKS - 10 && test_loop.trip.is_none(),
             "{name}: {:?}",
-            quiet.trip
+            test_loop.trip
         );
-        let mut quiet = running();
-        let ended = in_a_child(|| {
+        let mut test_loop = running();
+        let termination = in_child_process(|| {
             allow_only(&[]);
             for _ in 0..TICKS {
-                quiet.bare_tick(0);
-                quiet.collect();
+                test_loop.bare_tick(0);
+                test_loop.collect();
             }
         });
         assert_eq!(
-            ended,
-            Ended::Exit(0),
+            termination,
+            Termination::Exit(0),
             "{name}: a signal is a system call in a tick"
         );
     }
@@ -140,19 +140,20 @@ fn other_signal_chains_do_not_allocate_or_make_system_calls() {
 fn programs_make_no_system_calls() {
     let config = stage();
     for (name, program) in programs(&config) {
-        let mut quiet = Quiet::running(&config, &[(6000..6001, Fault::At(0.00095))], program);
-        let ended = in_a_child(|| {
+        let mut test_loop =
+            TestLoop::running(&config, &[(6000..6001, Fault::Position(0.00095))], program);
+        let termination = in_child_process(|| {
             allow_only(&[]);
             for _ in 0..TICKS {
-                quiet.bare_tick(0);
-                quiet.collect();
+                test_loop.bare_tick(0);
+                test_loop.collect();
             }
             // SAFETY: as in the parent; 1 says that the program did not run.
-            unsafe { libc::_exit(if quiet.has_done(&name) { 0 } else { 1 }) };
+            unsafe { libc::_exit(if test_loop.has_done(&name) { 0 } else { 1 }) };
         });
         assert_eq!(
-            ended,
-            Ended::Exit(0),
+            termination,
+            Termination::Exit(0),
             "{name}: a signal is a system call in a tick"
         );
     }
@@ -161,88 +162,92 @@ fn programs_make_no_system_calls() {
 #[test]
 fn trips_requests_and_late_ticks_make_no_system_calls() {
     for (reason, fault, current_a) in all_trips() {
-        let config = weak();
-        let mut quiet = Quiet::running(&config, &[(0..8000, fault)], Box::new(Says(current_a)));
+        let config = weak_motor();
+        let mut test_loop = TestLoop::running(
+            &config,
+            &[(0..8000, fault)],
+            Box::new(ConstantCurrent(current_a)),
+        );
         let mut others = [
             Some(Request::Clear),
             Some(Request::Arm),
-            Some(Request::Start(Box::new(Says(0.01)))),
+            Some(Request::Start(Box::new(ConstantCurrent(0.01)))),
             Some(Request::Stop),
         ];
-        let ended = in_a_child(|| {
+        let termination = in_child_process(|| {
             allow_only(&[]);
             for _ in 0..8000 {
-                quiet.bare_tick(0);
-                quiet.collect();
+                test_loop.bare_tick(0);
+                test_loop.collect();
             }
             for other in &mut others {
-                if let Some(order) = other.take() {
-                    let _ = quiet.requests.push(order);
+                if let Some(request) = other.take() {
+                    let _ = test_loop.requests.push(request);
                 }
-                quiet.bare_tick(2);
-                quiet.collect();
+                test_loop.bare_tick(2);
+                test_loop.collect();
             }
             // SAFETY: as above; 1 says that there was no such trip.
-            unsafe { libc::_exit(if quiet.trip == Some(reason) { 0 } else { 1 }) };
+            unsafe { libc::_exit(if test_loop.trip == Some(reason) { 0 } else { 1 }) };
         });
-        assert_eq!(ended, Ended::Exit(0), "{reason}, {fault:?}");
+        assert_eq!(termination, Termination::Exit(0), "{reason}, {fault:?}");
     }
 }
 
 #[test]
 fn real_time_loop_makes_only_clock_system_calls() {
-    let config = weak();
-    let mut quiet = Quiet::running(&config, &[], Box::new(Says(0.01)));
+    let config = weak_motor();
+    let mut test_loop = TestLoop::running(&config, &[], Box::new(ConstantCurrent(0.01)));
     let mut clock = Realtime::new(0.002);
-    let ended = in_a_child(|| {
+    let termination = in_child_process(|| {
         allow_only(&[libc::SYS_clock_nanosleep, libc::SYS_clock_gettime]);
         for number in 0..50 {
-            let moment = clock.wait(number, quiet.servo.publisher());
-            quiet.servo.tick(
+            let moment = clock.wait(number, test_loop.servo.publisher());
+            test_loop.servo.tick(
                 &TickTiming {
                     missed: 0,
                     ..moment
                 },
                 &clock,
             );
-            quiet.collect();
+            test_loop.collect();
         }
     });
-    assert_eq!(ended, Ended::Exit(0));
-    assert_eq!(quiet.commands, 0, "the child ran its own copy");
+    assert_eq!(termination, Termination::Exit(0));
+    assert_eq!(test_loop.commands, 0, "the child ran its own copy");
 }
 
 #[test]
 fn detects_a_system_call_or_an_allocation() {
-    let config = weak();
-    let killed = Ended::Signal(libc::SIGSYS);
-    let mut quiet = Quiet::running(&config, &[], Box::new(Says(0.01)));
-    let prints = in_a_child(|| {
+    let config = weak_motor();
+    let killed = Termination::Signal(libc::SIGSYS);
+    let mut test_loop = TestLoop::running(&config, &[], Box::new(ConstantCurrent(0.01)));
+    let prints = in_child_process(|| {
         allow_only(&[]);
-        quiet.bare_tick(0);
+        test_loop.bare_tick(0);
         // SAFETY: an empty text; the call itself is what the filter must see.
         unsafe { libc::write(2, std::ptr::null(), 0) };
     });
     assert_eq!(prints, killed, "a print is one system call");
-    let maps = in_a_child(|| {
+    let maps = in_child_process(|| {
         allow_only(&[]);
         // 64 MiB come from the system, never from what the process already has.
         let memory = vec![1u8; 64 << 20];
         std::hint::black_box(&memory);
     });
     assert_eq!(maps, killed, "so is a large allocation");
-    let waits = in_a_child(|| {
+    let waits = in_child_process(|| {
         allow_only(&[]);
         std::thread::sleep(std::time::Duration::from_millis(1));
     });
     assert_eq!(waits, killed, "so is a sleep");
-    let allocates = in_a_child(|| {
+    let allocates = in_child_process(|| {
         assert_no_alloc(|| std::hint::black_box(Box::new(1u8)));
     });
     assert_eq!(
         allocates,
-        Ended::Signal(libc::SIGABRT),
+        Termination::Signal(libc::SIGABRT),
         "and a single byte from the heap is an abort"
     );
-    assert_eq!(in_a_child(|| ()), Ended::Exit(0));
+    assert_eq!(in_child_process(|| ()), Termination::Exit(0));
 }

@@ -30,16 +30,16 @@ fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
     let mut listener = host(&name).endpoint(&[Id::standard(0x7FF)]).unwrap(); // an unused identifier: conditions only
     let mut rig = Rig::new(&name, &SystemHost::new(adapter.far_side()), settings()).enabled();
 
-    adapter.says("sw096000");
+    adapter.send("sw096000");
     assert_eq!(condition(listener.as_mut()), Condition::Warning);
-    rig.gives(-1.0, -1.0);
+    rig.assert_current(-1.0, -1.0);
     let seen = Interface::read(&name).unwrap();
     assert_eq!(
         (seen.state, seen.is_healthy, seen.bit_rate),
         (Some("error warning"), true, Some(BIT_RATE))
     );
 
-    adapter.goes_bus_off();
+    adapter.enter_bus_off();
     assert_eq!(condition(listener.as_mut()), Condition::BusOff);
     assert_eq!(rig.fault(), faults::BUS_OFF);
     let text = fault_text(faults::BUS_OFF);
@@ -59,12 +59,12 @@ fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
     assert!(rig.drive.reset_fault().is_err(), "still off");
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_OFF));
 
-    adapter.is_set_down_and_up();
-    rig.recovers();
+    adapter.restart_interface();
+    rig.assert_recovers();
 
-    adapter.says("sp128000");
+    adapter.send("sp128000");
     assert_eq!(condition(listener.as_mut()), Condition::Passive);
     assert_eq!(rig.fault(), faults::BUS_PASSIVE);
-    adapter.says("sa000000");
-    rig.recovers();
+    adapter.send("sa000000");
+    rig.assert_recovers();
 }

@@ -22,7 +22,7 @@ fn interface_down_stops_the_drive_and_can_be_cleared() {
     );
     assert!(rig.drive.reset_fault().is_err(), "still down");
     vcan.set_up(true);
-    rig.recovers();
+    rig.assert_recovers();
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn removed_adapter_stops_the_drive_and_it_can_be_opened_again() {
     let Rig { drive, far_end } = rig;
     drop(drive);
     vcan.plug_in();
-    let far_end = far_end.plugged_into(&host(&vcan.name));
+    let far_end = far_end.moved_to(&host(&vcan.name));
     let drive = open(&vcan.name, settings()).unwrap();
     Rig { drive, far_end }.enabled();
 }

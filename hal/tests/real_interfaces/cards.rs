@@ -16,7 +16,7 @@ fn drive_on_another_card_runs_and_cards_report_their_state() {
         interface.bring_up().unwrap();
     }
     let mut rig = Rig::new("can0", &host("can1"), settings()).enabled();
-    rig.gives(-2.0, -2.0);
+    rig.assert_current(-2.0, -2.0);
     for card in ["can0", "can1"] {
         let seen = Interface::read(card).unwrap();
         assert!(seen.is_up && seen.is_healthy, "{seen:?}");

@@ -13,20 +13,20 @@ use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, host, open, settings, wait_for};
 
 /// A loop at the pace of the script, until the drive shows `shown`.
-fn command_until(drive: &mut CanopenDrive, current_a: f64, other: &mut PythonDrive, shown: &str) {
+fn command_until(drive: &mut CanopenDrive, current_a: f64, peer: &mut PythonDrive, shown: &str) {
     wait_for(shown, || {
         let _ = drive.command(current_a); // refused in the tick in which a fault is found
         std::thread::sleep(Duration::from_millis(10));
-        other.shows() == shown
+        peer.state() == shown
     });
 }
 
 /// Enables the drive, commands both directions of current, and compares the reported current.
-fn runs(drive: &mut CanopenDrive, other: &mut PythonDrive) {
+fn assert_runs(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
     drive.enable().unwrap();
-    assert_eq!(other.shows(), "27 0 OPERATIONAL");
+    assert_eq!(peer.state(), "27 0 OPERATIONAL");
     for (current_a, shown) in [(1.0, "27 250 OPERATIONAL"), (-2.0, "27 -500 OPERATIONAL")] {
-        command_until(drive, current_a, other, shown);
+        command_until(drive, current_a, peer, shown);
         wait_for("the actual current", || {
             let _ = drive.command(current_a);
             drive.actual_current_a() == Some(current_a)
@@ -36,17 +36,17 @@ fn runs(drive: &mut CanopenDrive, other: &mut PythonDrive) {
 }
 
 /// A fault of the drive is reported, and cleared by the operator.
-fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
-    other.fails(0x4210);
-    command_until(drive, 1.0, other, "08 0 OPERATIONAL");
+fn assert_fault_is_cleared(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
+    peer.inject_fault(0x4210);
+    command_until(drive, 1.0, peer, "08 0 OPERATIONAL");
     let fault = AmplifierStatus::Fault(faults::EMERGENCY + 0x4210);
     wait_for("the fault", || drive.status() == fault);
     assert_eq!(fault_text(faults::EMERGENCY + 0x4210).what, "drive too hot");
     assert!(drive.enable().is_err(), "a fault is not left by enabling");
-    assert_eq!(other.shows(), "08 0 OPERATIONAL");
+    assert_eq!(peer.state(), "08 0 OPERATIONAL");
     drive.reset_fault().unwrap();
     assert_eq!(
-        (drive.status(), other.shows().as_str()),
+        (drive.status(), peer.state().as_str()),
         (AmplifierStatus::Disabled, "40 0 OPERATIONAL")
     );
 }
@@ -54,7 +54,7 @@ fn fails_and_recovers(drive: &mut CanopenDrive, other: &mut PythonDrive) {
 #[test]
 fn driver_operates_an_independent_drive() {
     let vcan = Vcan::up();
-    let mut other = PythonDrive::new(&vcan.name);
+    let mut peer = PythonDrive::new(&vcan.name);
     let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
     assert_eq!(seen.name.as_deref(), Some("a drive of other hands"));
     let identity = ExpectedIdentity {
@@ -74,12 +74,12 @@ fn driver_operates_an_independent_drive() {
         };
         let mut drive =
             open(&vcan.name, settings).unwrap_or_else(|error| panic!("{exchange:?}: {error}"));
-        runs(&mut drive, &mut other);
-        fails_and_recovers(&mut drive, &mut other);
-        runs(&mut drive, &mut other);
+        assert_runs(&mut drive, &mut peer);
+        assert_fault_is_cleared(&mut drive, &mut peer);
+        assert_runs(&mut drive, &mut peer);
         drop(drive);
         wait_for("off and pre-operational", || {
-            other.shows() == "40 0 PRE-OPERATIONAL"
+            peer.state() == "40 0 PRE-OPERATIONAL"
         });
     }
 }

@@ -9,14 +9,14 @@ use bench_hal::can::emulator::{DeviceFault, EmulatedAmplifier};
 use crate::support::vcan::Vcan;
 use crate::support::{Rig, open, settings, wait_for};
 
-/// `misbehaviour` is found as `code`, is cleared with its cause, and the drive can be opened anew, too.
-fn is_found_and_cleared(misbehaviour: DeviceFault, code: u32) {
+/// `fault` is found as `code`, is cleared with its cause, and the drive can be opened anew, too.
+fn assert_detected_and_cleared(fault: DeviceFault, code: u32) {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
-    rig.far_end.device().inject(misbehaviour);
+    rig.far_end.device().inject(fault);
     let found = rig.fault();
-    assert_eq!(found, code, "{misbehaviour:?}: {}", fault_text(found).what);
-    rig.recovers();
+    assert_eq!(found, code, "{fault:?}: {}", fault_text(found).what);
+    rig.assert_recovers();
     let Rig { drive, far_end } = rig;
     drop(drive);
     let drive = open(&vcan.name, settings()).unwrap();
@@ -25,7 +25,7 @@ fn is_found_and_cleared(misbehaviour: DeviceFault, code: u32) {
 
 #[test]
 fn reports_drive_fault_with_its_emergency_message() {
-    is_found_and_cleared(DeviceFault::Drive(0x4210), faults::EMERGENCY + 0x4210);
+    assert_detected_and_cleared(DeviceFault::Drive(0x4210), faults::EMERGENCY + 0x4210);
     let text = fault_text(faults::EMERGENCY + 0x4210);
     assert_eq!(text.what, "drive too hot");
     assert!(
@@ -36,7 +36,7 @@ fn reports_drive_fault_with_its_emergency_message() {
 
 #[test]
 fn detects_emergency_message_without_state_change() {
-    is_found_and_cleared(
+    assert_detected_and_cleared(
         DeviceFault::EmergencyOnly(0x2310),
         faults::EMERGENCY + 0x2310,
     );
@@ -44,37 +44,37 @@ fn detects_emergency_message_without_state_change() {
 
 #[test]
 fn detects_a_silent_drive() {
-    is_found_and_cleared(DeviceFault::Mute, faults::STATUS_LOST);
+    assert_detected_and_cleared(DeviceFault::Mute, faults::STATUS_LOST);
 }
 
 #[test]
 fn detects_a_disconnected_drive_which_switches_itself_off() {
-    is_found_and_cleared(DeviceFault::Unplugged, faults::STATUS_LOST);
+    assert_detected_and_cleared(DeviceFault::Unplugged, faults::STATUS_LOST);
 }
 
 #[test]
 fn detects_frames_of_a_wrong_length() {
-    is_found_and_cleared(DeviceFault::ShortFrames, faults::MALFORMED);
+    assert_detected_and_cleared(DeviceFault::ShortFrames, faults::MALFORMED);
 }
 
 #[test]
 fn detects_a_statusword_without_a_state() {
-    is_found_and_cleared(DeviceFault::InvalidStatusword, faults::MALFORMED);
+    assert_detected_and_cleared(DeviceFault::InvalidStatusword, faults::MALFORMED);
 }
 
 #[test]
 fn detects_drive_that_ignores_its_target() {
-    is_found_and_cleared(DeviceFault::TargetIgnored, faults::TARGET_IGNORED);
+    assert_detected_and_cleared(DeviceFault::TargetIgnored, faults::TARGET_IGNORED);
 }
 
 #[test]
 fn detects_a_drive_that_switches_itself_off() {
-    is_found_and_cleared(DeviceFault::SwitchesOff, faults::SWITCHED_OFF);
+    assert_detected_and_cleared(DeviceFault::SwitchesOff, faults::SWITCHED_OFF);
 }
 
 #[test]
 fn detects_a_restart_and_configures_the_drive_again_when_cleared() {
-    is_found_and_cleared(DeviceFault::Reset, faults::RESTARTED);
+    assert_detected_and_cleared(DeviceFault::Reset, faults::RESTARTED);
 }
 
 #[test]
@@ -86,24 +86,20 @@ fn detects_a_drive_with_late_frames() {
     assert_eq!(rig.fault(), faults::STATUS_LOST);
     rig.far_end.device().inject(DeviceFault::None);
     std::thread::sleep(2 * late); // what is on the way still comes
-    rig.recovers();
+    rig.assert_recovers();
 }
 
 #[test]
 fn drive_that_ignores_disable_is_stopped_by_nmt_or_lost_heartbeat() {
-    for misbehaviour in [DeviceFault::SetPointsIgnored, DeviceFault::CommandsIgnored] {
+    for fault in [DeviceFault::SetPointsIgnored, DeviceFault::CommandsIgnored] {
         let vcan = Vcan::up();
         let mut rig = vcan.running();
-        rig.far_end.device().inject(misbehaviour);
+        rig.far_end.device().inject(fault);
         rig.drive.disable();
-        assert_eq!(
-            rig.far_end.current_a(),
-            1.0,
-            "{misbehaviour:?}: it does not obey"
-        );
-        rig.far_end.goes_off();
-        assert_eq!(rig.fault(), faults::STILL_ENABLED, "{misbehaviour:?}");
-        rig.recovers();
+        assert_eq!(rig.far_end.current_a(), 1.0, "{fault:?}: it does not obey");
+        rig.far_end.wait_until_off();
+        assert_eq!(rig.fault(), faults::STILL_ENABLED, "{fault:?}");
+        rig.assert_recovers();
     }
 }
 
@@ -116,5 +112,5 @@ fn switches_off_when_the_loop_sends_no_commands() {
         rig.far_end.current_a() == 0.0
     });
     assert_eq!(rig.drive.enable().unwrap_err().code, code);
-    rig.recovers();
+    rig.assert_recovers();
 }

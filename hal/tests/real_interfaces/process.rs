@@ -17,12 +17,12 @@ const INTERFACE: &str = "BENCH_HAL_TO_BE_KILLED_ON";
 #[test]
 fn drive_stops_and_node_is_released_after_the_process_is_killed() {
     if let Ok(interface) = std::env::var(INTERFACE) {
-        command_for_ever(&interface);
+        command_until_killed(&interface);
     }
     let vcan = Vcan::up();
     let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let mut emergencies = host(&vcan.name).endpoint(&[emcy::cob_id(5)]).unwrap();
-    let mut child = the_same_test_in_a_process_of_its_own(&vcan.name);
+    let mut child = start_child_process(&vcan.name);
     wait_for("the other process drives 1 A", || {
         far_end.current_a() == 1.0
     });
@@ -37,7 +37,7 @@ fn drive_stops_and_node_is_released_after_the_process_is_killed() {
 
     child.kill().unwrap(); // SIGKILL
     child.wait().unwrap();
-    far_end.goes_off();
+    far_end.wait_until_off();
     assert_eq!(far_end.device().power_state(), State::SwitchOnDisabled);
     assert_eq!(
         first_emergency(emergencies.as_mut()),
@@ -50,7 +50,7 @@ fn drive_stops_and_node_is_released_after_the_process_is_killed() {
     Rig { drive, far_end }.enabled();
 }
 
-fn the_same_test_in_a_process_of_its_own(interface: &str) -> Child {
+fn start_child_process(interface: &str) -> Child {
     let name = "process::drive_stops_and_node_is_released_after_the_process_is_killed";
     let mut command = Command::new(std::env::current_exe().unwrap());
     command
@@ -61,7 +61,7 @@ fn the_same_test_in_a_process_of_its_own(interface: &str) -> Child {
 }
 
 /// What a user's process does, until it is killed. It dies with a parent that failed, too.
-fn command_for_ever(interface: &str) -> ! {
+fn command_until_killed(interface: &str) -> ! {
     // SAFETY: an integer goes in, nothing is pointed to.
     unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
     let mut drive = open(interface, settings()).unwrap();

@@ -38,11 +38,11 @@ fn drive_follows_quantised_set_points_and_is_disabled() {
             (-0.003, -0.004),
             (9.0, 4.0),
         ] {
-            rig.gives(wanted_a, given_a);
+            rig.assert_current(wanted_a, given_a);
         }
         rig.drive.disable();
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
-        rig.far_end.goes_off();
+        rig.far_end.wait_until_off();
         assert_eq!(
             rig.far_end.device().power_state(),
             State::SwitchOnDisabled,
@@ -61,7 +61,7 @@ fn closing_leaves_the_drive_off_and_pre_operational() {
         (device.nmt_state(), device.read(Address::new(0x1016, 1)))
             == (nmt::State::PreOperational, 0)
     });
-    far_end.goes_off();
+    far_end.wait_until_off();
 }
 
 #[test]
@@ -114,8 +114,8 @@ fn endpoint_receives_only_its_identifiers_in_their_format() {
         all.send(&CanFrame::new(id, [1, 2])).unwrap();
     }
     for id in ids {
-        let heard = some.receive(Duration::from_secs(3)).unwrap();
-        assert_eq!(heard, Some(BusEvent::Frame(CanFrame::new(id, [1, 2]))));
+        let received = some.receive(Duration::from_secs(3)).unwrap();
+        assert_eq!(received, Some(BusEvent::Frame(CanFrame::new(id, [1, 2]))));
     }
     assert_eq!(some.receive(Duration::from_millis(50)), Ok(None));
     assert_eq!(

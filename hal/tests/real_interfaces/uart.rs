@@ -84,10 +84,10 @@ fn serve(mut line: serialport::TTYPort, probe: &SharedProbe, stop: &AtomicBool) 
 }
 
 /// Looks until the statistics please; every reading on the way is either right or not valid.
-fn look_until(
+fn read_until(
     probe: &mut SerialProbe,
     what: &str,
-    mut pleases: impl FnMut(&Reading, &Statistics) -> bool,
+    mut condition: impl FnMut(&Reading, &Statistics) -> bool,
 ) -> Reading {
     let (mut seen, mut sequence) = (Reading::default(), 0);
     wait_for(what, || {
@@ -99,7 +99,7 @@ fn look_until(
         );
         assert!(seen.sequence >= sequence, "{sequence} before {seen:?}");
         sequence = seen.sequence;
-        pleases(&seen, &probe.statistics())
+        condition(&seen, &probe.statistics())
     });
     seen
 }
@@ -107,7 +107,7 @@ fn look_until(
 /// Waits for so many more valid readings.
 fn reads(probe: &mut SerialProbe, more: u64) {
     let goal = probe.statistics().published + more;
-    look_until(probe, "readings", |seen, statistics| {
+    read_until(probe, "readings", |seen, statistics| {
         statistics.published >= goal && seen.validity == Validity::Valid
     });
 }
@@ -161,13 +161,13 @@ fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
     far.inject_fault(Fault::Corrupt { every: 251 }); // after a pause an answer has up to 93 bytes
     let damaged = probe.statistics().damaged_bytes;
     let goal = probe.statistics().published + 10;
-    look_until(&mut probe, "damage, and values between", |_, statistics| {
+    read_until(&mut probe, "damage, and values between", |_, statistics| {
         statistics.damaged_bytes > damaged + 100 && statistics.published > goal
     });
 
     far.inject_fault(Fault::Silence);
     let before = probe.statistics().timeouts;
-    let last = look_until(&mut probe, "silence", |_, statistics| {
+    let last = read_until(&mut probe, "silence", |_, statistics| {
         statistics.timeouts >= before + 2
     });
     let error = probe.statistics().last_error.unwrap().to_string();
@@ -181,7 +181,7 @@ fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
     );
 
     far.inject_fault(Fault::Reset);
-    look_until(&mut probe, "the restart", |_, statistics| {
+    read_until(&mut probe, "the restart", |_, statistics| {
         statistics.restarts == 1
     });
     far.inject_fault(Fault::None);

@@ -97,7 +97,7 @@ impl Simulated<'_> {
         })
         .expect("a rig");
         let lost = (actual.loses_target && chirps)
-            .then_some((2000..u64::MAX, Fault::Says(Validity::OutOfRange)));
+            .then_some((2000..u64::MAX, Fault::Validity(Validity::OutOfRange)));
         let shift = (0..u64::MAX, Fault::Offset(actual.shift_x_m));
         Box::new(FaultyRig::new(
             rig,

@@ -157,9 +157,9 @@ fn every_fault_while_disarmed_gives_no_current_and_prevents_arming() {
         assert_eq!(lab.ticks_enabled(AFTER), 0, "{}", case.word);
         assert_eq!(lab.bench.state(), State::Disarmed);
         let begin = lab.last_tick();
-        lab.bench.order(Request::Arm);
+        lab.bench.request(Request::Arm);
         lab.bench
-            .order(Request::Start(program(&lab.config, Run::Chirp)));
+            .request(Request::Start(program(&lab.config, Run::Chirp)));
         // The run begins with 50 ms at zero current: the fault is found before a current flows.
         assert_eq!(lab.ticks_with_current(50), 0, "{}", case.word);
         match case.armed_into {
@@ -205,14 +205,14 @@ fn disobedient_drive_is_stopped_by_nmt_or_by_the_lost_heartbeat() {
         let mut lab = Lab::new();
         lab.run_until_current_flows(Run::Chirp);
         lab.begin(word);
-        lab.bench.order(Request::Stop);
+        lab.bench.request(Request::Stop);
         let zero = lab.ticks_with_current(AFTER);
         assert!(
             (60..=off).contains(&zero),
             "{word}: current for {zero} ticks"
         );
         assert!(!lab.drive.is_enabled());
-        lab.bench.order(Request::Arm);
+        lab.bench.request(Request::Arm);
         lab.bench.run(1);
         let at = lab.last_tick();
         lab.trips_naming(STILL_ENABLED, at..=at);

@@ -151,7 +151,7 @@ impl Lab {
 
     /// Armed, nothing running.
     fn arm(&mut self) {
-        self.bench.order(Request::Arm);
+        self.bench.request(Request::Arm);
         self.bench.run(50);
         assert_eq!(
             self.bench.state(),
@@ -170,7 +170,8 @@ impl Lab {
     /// Runs until a current flows.
     fn run_until_current_flows(&mut self, run: Run) {
         self.arm();
-        self.bench.order(Request::Start(program(&self.config, run)));
+        self.bench
+            .request(Request::Start(program(&self.config, run)));
         for _ in 0..2000 {
             self.bench.tick();
             if self.drive.current_a().abs() > 0.02 {
@@ -242,8 +243,7 @@ impl Lab {
         let names = |trip: &Trip| matches!(*trip, Trip::Amplifier { code: found, .. } if found == i64::from(code));
         assert!(names(&trip), "0x{code:x}: {trip:?}");
         assert!(at.contains(&tick), "tick {tick}, {at:?} was promised");
-        self.bench
-            .prove_that_the_recording_is_complete(tick, "amplifier");
+        self.bench.assert_recording_complete(tick, "amplifier");
         let (_folder, recording) = self.bench.recorded();
         assert!(
             recording
@@ -267,7 +267,7 @@ impl Lab {
         } else {
             Request::Stop
         };
-        self.bench.order(clearing);
+        self.bench.request(clearing);
         self.bench.run(100);
         self.run_completes();
     }
@@ -300,10 +300,10 @@ impl Lab {
     /// Only a request of the operator clears it: a new program is refused as well.
     fn a_fault_of_the_drive_outlives_the_program(&mut self) {
         self.bench.run(10);
-        self.bench.order(Request::Arm);
+        self.bench.request(Request::Arm);
         self.bench.run(1);
         self.trips_naming(DRIVE_FAULT, 10..=10);
-        self.bench.order(Request::Clear);
+        self.bench.request(Request::Clear);
         self.bench.run(100);
     }
 
@@ -314,7 +314,7 @@ impl Lab {
         config.control.duration_s = 0.3;
         self.arm();
         self.bench
-            .order(Request::Start(program(&config, Run::Control)));
+            .request(Request::Start(program(&config, Run::Control)));
         self.bench.run(450);
         assert_eq!(self.bench.trips().len(), trips, "{:x?}", self.trip());
         assert!(self.bench.servo().completed() && self.is_off());

@@ -6,9 +6,10 @@ fn allows_peak_current_and_trips_one_bit_above() {
     let config = stage();
     let limit_a = config.motor.peak_current_a();
     for side in [1.0, -1.0] {
-        let spike = |peak_a: f64| says(move |tick| if tick == AT { side * peak_a } else { SOME_A });
+        let spike =
+            |peak_a: f64| endless(move |tick| if tick == AT { side * peak_a } else { SOME_A });
         let mut bench = Bench::running(&config, &[], spike(limit_a));
-        nothing_trips(&mut bench, AT + 100);
+        runs_without_trip(&mut bench, AT + 100);
         assert_eq!(bench.ticks().at(AT).command_a, side * limit_a);
         let trip = trips(
             &mut Bench::running(&config, &[], spike(limit_a.next_up())),
@@ -42,7 +43,7 @@ fn continuous_current_trips_at_the_tick_of_the_closed_form() {
         );
         let warm_s = -tau_s * f64::ln(1.0 - square);
         let n = warm_s / period_s * (1.0 - period_s / tau_s / 2.0);
-        let mut bench = Bench::running(&config, &[], says(move |_| current_a));
+        let mut bench = Bench::running(&config, &[], endless(move |_| current_a));
         let at = first_trip(&mut bench, 0) as f64;
         assert!(
             (n - 1.01..=n + 0.01).contains(&at),
@@ -60,7 +61,7 @@ fn continuous_current_trip_switches_the_amplifier_off() {
         -config.motor.thermal_time_constant_s * f64::ln(1.0 - (rated_a / 9.9) * (rated_a / 9.9));
     let at = (warm_s / config.servo.period_s() - 1.0).ceil() as u64;
     let trip = trips(
-        &mut Bench::running(&config, &[], says(|_| 9.9)),
+        &mut Bench::running(&config, &[], endless(|_| 9.9)),
         at,
         "continuous_current",
     );
@@ -78,7 +79,7 @@ fn continuous_current_trip_switches_the_amplifier_off() {
 fn rated_current_does_not_trip_in_six_time_constants() {
     let config = stage();
     let rated_a = config.motor.continuous_current_a();
-    let mut bench = Bench::running(&config, &[], says(move |_| rated_a * 0.9999));
+    let mut bench = Bench::running(&config, &[], endless(move |_| rated_a * 0.9999));
     // Six time constants: the heat is at 99.75 % of where it settles.
     for _ in 0..300_000 {
         let record = bench.tick();
@@ -90,18 +91,18 @@ fn rated_current_does_not_trip_in_six_time_constants() {
 #[test]
 fn non_finite_command_trips_and_is_not_sent() {
     for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN] {
-        let program = says(move |tick| if tick == AT { nonsense } else { SOME_A });
+        let program = endless(move |tick| if tick == AT { nonsense } else { SOME_A });
         let mut bench = Bench::running(&stage(), &[], program);
         trips(&mut bench, AT, "command_not_finite");
         let asked = bench
-            .told()
+            .amplifier_calls()
             .iter()
-            .any(|(_, t)| matches!(t, Told::Command { current_a, .. } if !current_a.is_finite()));
+            .any(|(_, t)| matches!(t, AmplifierCall::Command { current_a, .. } if !current_a.is_finite()));
         assert!(!asked, "the amplifier never saw it");
         let largest = Bench::running(
             &stage(),
             &[],
-            says(|tick| {
+            endless(|tick| {
                 if tick == AT {
                     f64::MIN_POSITIVE
                 } else {
@@ -109,7 +110,7 @@ fn non_finite_command_trips_and_is_not_sent() {
                 }
             }),
         );
-        nothing_trips(&mut { largest }, AT + 10);
+        runs_without_trip(&mut { largest }, AT + 10);
     }
 }
 
@@ -117,10 +118,14 @@ fn non_finite_command_trips_and_is_not_sent() {
 fn thermal_state_is_kept_after_clear_and_arm() {
     // Tripped at i_c; from there the same current trips again at once, long before a cold winding would.
     let config: Config = stage();
-    let mut bench = Bench::running(&config, &[], says(|_| 9.9));
+    let mut bench = Bench::running(&config, &[], endless(|_| 9.9));
     let first = first_trip(&mut bench, 0);
-    for order in [Request::Clear, Request::Arm, Request::Start(says(|_| 9.9))] {
-        bench.order(order);
+    for request in [
+        Request::Clear,
+        Request::Arm,
+        Request::Start(endless(|_| 9.9)),
+    ] {
+        bench.request(request);
     }
     // The tick of the trip cooled the winding by i_c^2/50,000, one of 9.9 A heats it 17 times as much: one at most passes.
     bench.run(3);
@@ -138,7 +143,7 @@ fn thermal_model_includes_missed_ticks() {
     let warm_s =
         -config.motor.thermal_time_constant_s * f64::ln(1.0 - (rated_a / 9.9) * (rated_a / 9.9));
     let expected = warm_s / config.servo.period_s() - 1.0;
-    let mut bench = Bench::running(&config, &[], says(|_| 9.9));
+    let mut bench = Bench::running(&config, &[], endless(|_| 9.9));
     bench.tick();
     let at = first_trip(&mut bench, 3) as f64;
     assert!(
@@ -155,12 +160,12 @@ fn trips_on_measured_current_beyond_tolerance() {
         config.interlock.current_error_s * config.servo.rate_hz,
     );
     for sign in [-1.0, 1.0] {
-        let close = Fault::MeasuresBeyond(sign * 0.9 * error_a);
-        nothing_trips(
+        let close = Fault::MeasuredOffset(sign * 0.9 * error_a);
+        runs_without_trip(
             &mut Bench::running(&config, &[(0..u64::MAX, close)], constant()),
             2000,
         );
-        let far = Fault::MeasuresBeyond(sign * 1.1 * error_a);
+        let far = Fault::MeasuredOffset(sign * 1.1 * error_a);
         let mut bench = Bench::running(&config, &[(0..u64::MAX, far)], constant());
         bench.run(2 * ticks as u64);
         let at = bench.trips().first().map_or(0, |event| event.tick);
@@ -168,6 +173,6 @@ fn trips_on_measured_current_beyond_tolerance() {
             (ticks as u64..=ticks as u64 + 3).contains(&at),
             "{at}: judged at the end of a window of {ticks} ticks"
         );
-        prove_that_it_is_off(&bench, at, "current_not_followed");
+        assert_off_after_trip(&bench, at, "current_not_followed");
     }
 }

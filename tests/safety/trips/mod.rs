@@ -10,7 +10,7 @@ use bench::rt::servo::Request;
 use bench_hal::Validity;
 
 use crate::faulty_rig::Fault;
-use crate::rig::{Bench, Told, says, stage};
+use crate::rig::{AmplifierCall, Bench, endless, stage};
 
 /// When faults begin, unless a test says otherwise.
 const AT: u64 = 100;
@@ -19,7 +19,7 @@ const AFTER: u64 = 500;
 /// A current that disturbs no interlock, but is none.
 const SOME_A: f64 = 0.1;
 
-fn nothing_trips(bench: &mut Bench, ticks: u64) {
+fn runs_without_trip(bench: &mut Bench, ticks: u64) {
     bench.run(ticks);
     assert_eq!(bench.trips(), [], "nothing may trip inside the limits");
     let last = bench.tick();
@@ -31,13 +31,13 @@ fn nothing_trips(bench: &mut Bench, ticks: u64) {
 
 /// Runs up to the tick `at` with current and without a trip, through it, and on: there it must trip.
 fn trips(bench: &mut Bench, at: u64, reason: &str) -> Trip {
-    nothing_trips(bench, at - 1);
+    runs_without_trip(bench, at - 1);
     bench.run(1 + AFTER);
-    prove_that_it_is_off(bench, at, reason)
+    assert_off_after_trip(bench, at, reason)
 }
 
 /// What every trip promises, whatever its reason.
-fn prove_that_it_is_off(bench: &Bench, at: u64, reason: &str) -> Trip {
+fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
     let record = bench.ticks().at(at);
     assert_eq!(
         record.command_a.to_bits(),
@@ -64,29 +64,29 @@ fn prove_that_it_is_off(bench: &Bench, at: u64, reason: &str) -> Trip {
             .all(|r| r.command_a.to_bits() == 0)
     );
 
-    let told = bench.told();
-    let taken = |told: &Told| matches!(told, Told::Command { current_a, refused: false } if *current_a != 0.0);
+    let calls = bench.amplifier_calls();
+    let taken = |call: &AmplifierCall| matches!(call, AmplifierCall::Command { current_a, refused: false } if *current_a != 0.0);
     assert!(
-        !told.iter().any(|(tick, told)| *tick >= at && taken(told)),
+        !calls.iter().any(|(tick, call)| *tick >= at && taken(call)),
         "a current went out in or after the trip"
     );
-    let in_tick: Vec<Told> = told
+    let in_tick: Vec<AmplifierCall> = calls
         .iter()
         .filter(|(tick, _)| *tick == at)
-        .map(|(_, told)| *told)
+        .map(|(_, call)| *call)
         .collect();
     assert_eq!(
         in_tick.last(),
-        Some(&Told::Disable),
+        Some(&AmplifierCall::Disable),
         "disabled in the tick of the trip: {in_tick:?}"
     );
     assert!(
-        !told
+        !calls
             .iter()
-            .any(|(tick, told)| *tick > at && *told != Told::Disable),
+            .any(|(tick, call)| *tick > at && *call != AmplifierCall::Disable),
         "left alone after it"
     );
-    assert!(!bench.is_on());
+    assert!(!bench.amplifier_is_on());
 
     assert_eq!(bench.trips().len(), 1, "{:?}", bench.trips());
     let EventKind::Trip(trip) = bench.trips()[0].kind else {
@@ -109,7 +109,7 @@ fn prove_that_it_is_off(bench: &Bench, at: u64, reason: &str) -> Trip {
     };
     assert_eq!(bench.events().iter().filter(|e| tripped(e)).count(), 1);
     assert_eq!(bench.servo().last_trip(), Some((trip, at)));
-    bench.prove_that_the_recording_is_complete(at, reason);
+    bench.assert_recording_complete(at, reason);
     trip
 }
 
@@ -126,7 +126,7 @@ fn first_trip(bench: &mut Bench, missed: u32) -> u64 {
 }
 
 fn constant() -> Box<dyn bench::rt::program::Program> {
-    says(|_| SOME_A)
+    endless(|_| SOME_A)
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn trips_above_the_allowed_missed_ticks_per_second() {
         let mut bench = Bench::running(&config, &[], constant());
         bench.run(AT);
         late(&mut bench);
-        nothing_trips(&mut bench, 10);
+        runs_without_trip(&mut bench, 10);
         let mut bench = Bench::running(&config, &[], constant());
         bench.run(AT);
         if missed.len() > 1 {
@@ -150,7 +150,7 @@ fn trips_above_the_allowed_missed_ticks_per_second() {
         }
         let at = bench.late_tick(beyond).tick;
         bench.run(AFTER);
-        let trip = prove_that_it_is_off(&bench, at, "overruns");
+        let trip = assert_off_after_trip(&bench, at, "overruns");
         assert_eq!(
             trip,
             Trip::Overruns {
@@ -171,7 +171,7 @@ fn missed_ticks_are_counted_in_a_sliding_second() {
     bench.run(2999 - 30);
     let at = bench.late_tick(30).tick;
     bench.run(AFTER);
-    prove_that_it_is_off(&bench, at, "overruns");
+    assert_off_after_trip(&bench, at, "overruns");
     // One, then 49 after 0.9 s, then 49 more 0.2 s later: within the last second there are 98.
     let mut bench = Bench::running(&config, &[], constant());
     bench.run(AT);
@@ -181,7 +181,7 @@ fn missed_ticks_are_counted_in_a_sliding_second() {
     bench.run(1000);
     let at = bench.late_tick(49).tick;
     bench.run(AFTER);
-    let trip = prove_that_it_is_off(&bench, at, "overruns");
+    let trip = assert_off_after_trip(&bench, at, "overruns");
     assert_eq!(
         trip,
         Trip::Overruns {
@@ -201,32 +201,35 @@ fn missed_ticks_are_counted_in_a_sliding_second() {
 #[test]
 fn armed_loop_trips_like_a_running_loop() {
     let cases = [
-        (Fault::Says(Validity::Faulty), "probe_invalid"),
-        (Fault::At(0.00095), "travel"),
-        (Fault::Old(2_000_000), "probe_stale"),
-        (Fault::Faulted(1), "amplifier"),
-        (Fault::Refuses(2), "amplifier"),
+        (Fault::Validity(Validity::Faulty), "probe_invalid"),
+        (Fault::Position(0.00095), "travel"),
+        (Fault::Age(2_000_000), "probe_stale"),
+        (Fault::AmplifierFault(1), "amplifier"),
+        (Fault::RefusedCommand(2), "amplifier"),
     ];
     for (fault, reason) in cases {
         let mut bench = Bench::still(&stage(), &[(AT..AT + 1, fault)]);
-        bench.order(Request::Arm);
+        bench.request(Request::Arm);
         bench.run(AT);
         assert_eq!(bench.state(), State::Armed);
         bench.run(1 + AFTER);
-        prove_that_it_is_off(&bench, AT, reason);
+        assert_off_after_trip(&bench, AT, reason);
     }
 }
 
 #[test]
 fn disarmed_loop_records_faults_without_a_trip() {
     let faults = [
-        (10..20, Fault::Says(Validity::Missing)),
-        (30..40, Fault::At(0.00095)),
-        (50..60, Fault::Faulted(1)),
+        (10..20, Fault::Validity(Validity::Missing)),
+        (30..40, Fault::Position(0.00095)),
+        (50..60, Fault::AmplifierFault(1)),
     ];
     let mut bench = Bench::still(&stage(), &faults);
     bench.run(AT);
-    assert_eq!((bench.events(), bench.told()), (Vec::new(), Vec::new()));
+    assert_eq!(
+        (bench.events(), bench.amplifier_calls()),
+        (Vec::new(), Vec::new())
+    );
     assert_eq!(
         bench
             .ticks()

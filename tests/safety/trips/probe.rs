@@ -6,10 +6,14 @@ fn allows_travel_up_to_the_soft_limit_and_trips_one_bit_beyond() {
     let config = stage();
     for side in [1.0, -1.0] {
         let limit_m = config.interlock.soft_limit_m;
-        let faults = [(AT..AT + 200, Fault::At(side * limit_m))];
-        nothing_trips(&mut Bench::running(&config, &faults, constant()), AT + 400);
+        let faults = [(AT..AT + 200, Fault::Position(side * limit_m))];
+        runs_without_trip(&mut Bench::running(&config, &faults, constant()), AT + 400);
         let beyond_m = side * limit_m.next_up();
-        let mut bench = Bench::running(&config, &[(AT..AT + 1, Fault::At(beyond_m))], constant());
+        let mut bench = Bench::running(
+            &config,
+            &[(AT..AT + 1, Fault::Position(beyond_m))],
+            constant(),
+        );
         let trip = trips(&mut bench, AT, "travel");
         assert_eq!(
             trip,
@@ -24,8 +28,11 @@ fn allows_travel_up_to_the_soft_limit_and_trips_one_bit_beyond() {
 #[test]
 fn invalid_reading_trips_at_any_position() {
     for validity in [Validity::OutOfRange, Validity::Faulty, Validity::Missing] {
-        let mut bench =
-            Bench::running(&stage(), &[(AT..AT + 1, Fault::Says(validity))], constant());
+        let mut bench = Bench::running(
+            &stage(),
+            &[(AT..AT + 1, Fault::Validity(validity))],
+            constant(),
+        );
         trips(&mut bench, AT, "probe_invalid");
         let record = bench.ticks().at(AT);
         assert_eq!(
@@ -34,13 +41,17 @@ fn invalid_reading_trips_at_any_position() {
         );
     }
     for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let mut bench = Bench::running(&stage(), &[(AT..AT + 1, Fault::At(nonsense))], constant());
+        let mut bench = Bench::running(
+            &stage(),
+            &[(AT..AT + 1, Fault::Position(nonsense))],
+            constant(),
+        );
         trips(&mut bench, AT, "probe_invalid");
     }
-    nothing_trips(
+    runs_without_trip(
         &mut Bench::running(
             &stage(),
-            &[(AT..AT + 1, Fault::Says(Validity::Valid))],
+            &[(AT..AT + 1, Fault::Validity(Validity::Valid))],
             constant(),
         ),
         AT + 10,
@@ -52,11 +63,11 @@ fn allows_the_stale_limit_and_trips_one_nanosecond_above() {
     // interlock.probe_stale_s = 1 ms.
     let config = stage();
     assert_eq!(config.interlock.probe_stale_s, 0.001);
-    nothing_trips(
-        &mut Bench::running(&config, &[(AT..AT + 50, Fault::Old(1_000_000))], constant()),
+    runs_without_trip(
+        &mut Bench::running(&config, &[(AT..AT + 50, Fault::Age(1_000_000))], constant()),
         AT + 100,
     );
-    let faults = [(AT..AT + 1, Fault::Old(1_000_001))];
+    let faults = [(AT..AT + 1, Fault::Age(1_000_001))];
     let trip = trips(
         &mut Bench::running(&config, &faults, constant()),
         AT,
@@ -75,12 +86,12 @@ fn allows_the_stale_limit_and_trips_one_nanosecond_above() {
 fn repeated_measurement_trips_as_stale_independent_of_stated_age() {
     // Last new measurement at tick 99; 1 ms are five ticks of 0.2 ms: tick 104 is the last that may use it.
     let config = stage();
-    nothing_trips(
-        &mut Bench::running(&config, &[(AT..AT + 5, Fault::Frozen)], constant()),
+    runs_without_trip(
+        &mut Bench::running(&config, &[(AT..AT + 5, Fault::RepeatedSample)], constant()),
         AT + 100,
     );
     let trip = trips(
-        &mut Bench::running(&config, &[(AT..AT + 50, Fault::Frozen)], constant()),
+        &mut Bench::running(&config, &[(AT..AT + 50, Fault::RepeatedSample)], constant()),
         AT + 5,
         "probe_stale",
     );
@@ -92,7 +103,7 @@ fn repeated_measurement_trips_as_stale_independent_of_stated_age() {
 
 /// A current that steps from one to another in the middle of the time that a probe may be stuck.
 fn stepping(from_a: f64, to_a: f64) -> Box<dyn bench::rt::program::Program> {
-    says(move |tick| if tick < AT + 50 { from_a } else { to_a })
+    endless(move |tick| if tick < AT + 50 { from_a } else { to_a })
 }
 
 #[test]
@@ -102,7 +113,7 @@ fn constant_position_under_changing_current_trips_as_stuck() {
     assert_eq!(config.interlock.probe_stuck_s, 0.1);
     config.interlock.probe_stuck_current_a = 0.25;
     let stuck = |ticks: u64| [(AT..AT + ticks, Fault::Stuck)];
-    nothing_trips(
+    runs_without_trip(
         &mut Bench::running(&config, &stuck(500), stepping(SOME_A, 0.5)),
         AT + 1000,
     );
@@ -123,7 +134,7 @@ fn constant_position_under_changing_current_trips_as_stuck() {
         "{trip:?}"
     );
     // Changes of 0.25 A are exact in binary: at the limit nothing trips, one bit beyond it does.
-    nothing_trips(
+    runs_without_trip(
         &mut Bench::running(&config, &stuck(1000), stepping(0.25, 0.5)),
         AT + 1500,
     );

@@ -9,29 +9,29 @@ use bench_hal::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
     /// The probe says this of its reading.
-    Says(Validity),
+    Validity(Validity),
     /// The probe reads this position, in metres.
-    At(f64),
+    Position(f64),
     /// The probe reads so much more than there is, in metres.
     Offset(f64),
     /// The reading has this age, in nanoseconds.
-    Old(u64),
+    Age(u64),
     /// The probe hands out an old measurement under its old number.
-    Frozen,
+    RepeatedSample,
     /// New measurements, always of the same position.
     Stuck,
     /// The amplifier has switched itself off with this code.
-    Faulted(u32),
+    AmplifierFault(u32),
     /// The amplifier refuses commands with this code.
-    Refuses(i64),
+    RefusedCommand(i64),
     /// The amplifier cannot be enabled, with this code.
-    DoesNotEnable(i64),
+    RefusedEnable(i64),
     /// The amplifier keeps its fault, whoever clears it.
-    Unclearable,
+    RefusedClear,
     /// The amplifier says that it gives this current, whatever it was asked for.
-    Gives(f64),
+    ReturnedCurrent(f64),
     /// The amplifier measures the current that it was asked for last, in amperes, and this much more.
-    MeasuresBeyond(f64),
+    MeasuredOffset(f64),
 }
 
 /// A rig and what goes wrong with it, by tick.
@@ -82,7 +82,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     fn enable(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
         match self.find(tick, |fault| {
-            if let Fault::DoesNotEnable(code) = fault {
+            if let Fault::RefusedEnable(code) = fault {
                 Some(*code)
             } else {
                 None
@@ -96,7 +96,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         self.asked_a = current_a;
         if let Some(code) = self.find(self.now(), |fault| {
-            if let Fault::Refuses(code) = fault {
+            if let Fault::RefusedCommand(code) = fault {
                 Some(*code)
             } else {
                 None
@@ -106,7 +106,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
         }
         let given_a = self.inner.command(current_a)?;
         let claimed = self.find(self.now(), |fault| {
-            if let Fault::Gives(a) = fault {
+            if let Fault::ReturnedCurrent(a) = fault {
                 Some(*a)
             } else {
                 None
@@ -121,7 +121,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
 
     fn actual_current_a(&self) -> Option<f64> {
         let beyond_a = |fault: &Fault| {
-            if let Fault::MeasuresBeyond(a) = fault {
+            if let Fault::MeasuredOffset(a) = fault {
                 Some(*a)
             } else {
                 None
@@ -134,14 +134,14 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
         let kept = self.find(tick, |fault| {
-            (*fault == Fault::Unclearable).then_some(refusal(5))
+            (*fault == Fault::RefusedClear).then_some(refusal(5))
         });
         kept.map_or(Ok(()), Err)
     }
 
     fn status(&self) -> AmplifierStatus {
         let code = self.find(self.now(), |fault| {
-            if let Fault::Faulted(code) = fault {
+            if let Fault::AmplifierFault(code) = fault {
                 Some(*code)
             } else {
                 None
@@ -160,18 +160,18 @@ impl<R: Rig> DisplacementProbe for FaultyRig<R> {
             .filter(|(when, _)| when.contains(&now.number))
         {
             match *fault {
-                Fault::Says(validity) => reading.validity = validity,
-                Fault::At(position_m) => reading.position_m = position_m,
+                Fault::Validity(validity) => reading.validity = validity,
+                Fault::Position(position_m) => reading.position_m = position_m,
                 Fault::Offset(offset_m) => reading.position_m += offset_m,
-                Fault::Old(age_ns) => reading.age_ns = age_ns,
-                Fault::Frozen => reading.sequence = self.last.sequence,
+                Fault::Age(age_ns) => reading.age_ns = age_ns,
+                Fault::RepeatedSample => reading.sequence = self.last.sequence,
                 Fault::Stuck => reading.position_m = self.last.position_m,
-                Fault::Faulted(_)
-                | Fault::Refuses(_)
-                | Fault::DoesNotEnable(_)
-                | Fault::Gives(_)
-                | Fault::MeasuresBeyond(_)
-                | Fault::Unclearable => {}
+                Fault::AmplifierFault(_)
+                | Fault::RefusedCommand(_)
+                | Fault::RefusedEnable(_)
+                | Fault::ReturnedCurrent(_)
+                | Fault::MeasuredOffset(_)
+                | Fault::RefusedClear => {}
             }
         }
         self.now = Some(now.number);

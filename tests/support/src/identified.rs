@@ -19,9 +19,9 @@ pub fn config(sets: &[String]) -> Config {
     .expect("the profile is valid")
 }
 
-/// The analysis of a run with `config`, believing `believed`.
-pub fn analysed(config: &Config, believed: &Config) -> Analysis {
-    simulated::analysed(&Plan::chirp(config.clone()), believed).expect("an analysis")
+/// The analysis of a run with `config`, believing `assumed`.
+pub fn analysed(config: &Config, assumed: &Config) -> Analysis {
+    simulated::analysed(&Plan::chirp(config.clone()), assumed).expect("an analysis")
 }
 
 /// CNMP pairs of the model with damping.

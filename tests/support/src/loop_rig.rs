@@ -27,12 +27,12 @@ pub fn stage() -> Config {
 
 /// A stage that stands still but for a nanometre, and an amplifier that gives what it is asked for.
 #[derive(Debug, Default)]
-pub struct Still {
+pub struct StillRig {
     enabled: bool,
     sequence: u64,
 }
 
-impl CurrentAmplifier for Still {
+impl CurrentAmplifier for StillRig {
     fn enable(&mut self) -> Result<(), DeviceError> {
         self.enabled = true;
         Ok(())
@@ -61,7 +61,7 @@ impl CurrentAmplifier for Still {
     }
 }
 
-impl DisplacementProbe for Still {
+impl DisplacementProbe for StillRig {
     fn latest(&mut self, _now: Tick) -> Reading {
         self.sequence += 1;
         let position_m = if self.sequence.is_multiple_of(2) {
@@ -80,50 +80,50 @@ impl DisplacementProbe for Still {
 
 /// What the amplifier was told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Told {
+pub enum AmplifierCall {
     Enable { refused: bool },
     Command { current_a: f64, refused: bool },
     Disable,
 }
 
 /// All that the amplifier was told, each with its tick.
-pub type Log = Arc<Mutex<Vec<(u64, Told)>>>;
+pub type Log = Arc<Mutex<Vec<(u64, AmplifierCall)>>>;
 
 /// Writes down every call of the amplifier.
-pub struct Watched<R> {
+pub struct LoggedRig<R> {
     pub inner: R,
     pub log: Log,
     pub now: Arc<AtomicU64>,
 }
 
-impl<R> Watched<R> {
+impl<R> LoggedRig<R> {
     pub fn new(inner: R) -> Self {
-        Watched {
+        LoggedRig {
             inner,
             log: Log::default(),
             now: Arc::default(),
         }
     }
 
-    fn note(&self, told: Told) {
+    fn note(&self, call: AmplifierCall) {
         self.log
             .lock()
             .expect("no test panics with it")
-            .push((self.now.load(Ordering::Relaxed), told));
+            .push((self.now.load(Ordering::Relaxed), call));
     }
 }
 
-impl<R: Rig> CurrentAmplifier for Watched<R> {
+impl<R: Rig> CurrentAmplifier for LoggedRig<R> {
     fn enable(&mut self) -> Result<(), DeviceError> {
         let answer = self.inner.enable();
-        self.note(Told::Enable {
+        self.note(AmplifierCall::Enable {
             refused: answer.is_err(),
         });
         answer
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         let answer = self.inner.command(current_a);
-        self.note(Told::Command {
+        self.note(AmplifierCall::Command {
             current_a,
             refused: answer.is_err(),
         });
@@ -131,7 +131,7 @@ impl<R: Rig> CurrentAmplifier for Watched<R> {
     }
     fn disable(&mut self) {
         self.inner.disable();
-        self.note(Told::Disable);
+        self.note(AmplifierCall::Disable);
     }
     fn status(&self) -> AmplifierStatus {
         self.inner.status()
@@ -147,16 +147,16 @@ impl<R: Rig> CurrentAmplifier for Watched<R> {
     }
 }
 
-impl<R: Rig> DisplacementProbe for Watched<R> {
+impl<R: Rig> DisplacementProbe for LoggedRig<R> {
     fn latest(&mut self, now: Tick) -> Reading {
         self.inner.latest(now)
     }
 }
 
 /// A program that commands a function of its tick.
-pub struct Says<F>(pub F, pub u64);
+pub struct CurrentProgram<F>(pub F, pub u64);
 
-impl<F: FnMut(u64) -> f64 + Send> Program for Says<F> {
+impl<F: FnMut(u64) -> f64 + Send> Program for CurrentProgram<F> {
     fn decide(&mut self, input: &ProgramInput) -> Decision {
         Decision {
             reference_m: 0.0,
@@ -170,8 +170,8 @@ impl<F: FnMut(u64) -> f64 + Send> Program for Says<F> {
 }
 
 /// A program without an end.
-pub fn says(current_a: impl FnMut(u64) -> f64 + Send + 'static) -> Box<dyn Program> {
-    Box::new(Says(current_a, u64::MAX))
+pub fn endless(current_a: impl FnMut(u64) -> f64 + Send + 'static) -> Box<dyn Program> {
+    Box::new(CurrentProgram(current_a, u64::MAX))
 }
 
 /// The interlocks of a configuration.
@@ -192,12 +192,12 @@ pub struct Bench {
     /// All that the loop published, in its order.
     pub all: Vec<LoopMessage>,
     /// Programs that came back.
-    pub handed_back: usize,
+    pub returned_programs: usize,
 }
 
 impl Bench {
     pub fn around(config: &Config, rig: impl Rig + 'static) -> Bench {
-        let watched = Watched::new(rig);
+        let watched = LoggedRig::new(rig);
         let (log, now) = (Arc::clone(&watched.log), Arc::clone(&watched.now));
         let (publisher, published) = RingBuffer::new(256);
         let (requests, taken) = RingBuffer::new(16);
@@ -220,13 +220,13 @@ impl Bench {
             },
             next: 0,
             all: Vec::new(),
-            handed_back: 0,
+            returned_programs: 0,
         }
     }
 
     /// A stage that stands still, disarmed.
     pub fn still(config: &Config, faults: &[(Range<u64>, Fault)]) -> Bench {
-        Bench::around(config, FaultyRig::new(Still::default(), faults))
+        Bench::around(config, FaultyRig::new(StillRig::default(), faults))
     }
 
     /// A stage that stands still, with a program that runs from tick 0.
@@ -236,15 +236,15 @@ impl Bench {
         program: Box<dyn Program>,
     ) -> Bench {
         let mut bench = Bench::still(config, faults);
-        bench.order(Request::Arm);
-        bench.order(Request::Start(program));
+        bench.request(Request::Arm);
+        bench.request(Request::Start(program));
         bench
     }
 
     /// Taken at the next tick.
-    pub fn order(&mut self, order: Request) {
+    pub fn request(&mut self, request: Request) {
         assert!(
-            self.requests.push(order).is_ok(),
+            self.requests.push(request).is_ok(),
             "the ring of requests is full"
         );
     }
@@ -275,7 +275,7 @@ impl Bench {
             self.all.push(published);
         }
         while self.retired.pop().is_ok() {
-            self.handed_back += 1;
+            self.returned_programs += 1;
         }
         *self
             .ticks()
@@ -324,18 +324,17 @@ impl Bench {
     }
 
     /// All that the amplifier was told so far.
-    pub fn told(&self) -> Vec<(u64, Told)> {
+    pub fn amplifier_calls(&self) -> Vec<(u64, AmplifierCall)> {
         self.log.lock().expect("no test panics with it").clone()
     }
 
     /// Whether the amplifier is on after all it was told.
-    pub fn is_on(&self) -> bool {
-        let told = self.told();
-        let last = told
-            .iter()
-            .rev()
-            .find(|(_, told)| matches!(told, Told::Enable { .. } | Told::Disable));
-        matches!(last, Some((_, Told::Enable { refused: false })))
+    pub fn amplifier_is_on(&self) -> bool {
+        let calls = self.amplifier_calls();
+        let last = calls.iter().rev().find(|(_, call)| {
+            matches!(call, AmplifierCall::Enable { .. } | AmplifierCall::Disable)
+        });
+        matches!(last, Some((_, AmplifierCall::Enable { refused: false })))
     }
 
     /// All that was published so far, written as a recording and read back; with the folder that it lies in.
@@ -355,7 +354,7 @@ impl Bench {
     }
 
     /// Every tick is there or counted as missed, and the trip with its reason.
-    pub fn prove_that_the_recording_is_complete(&self, at: u64, reason: &str) {
+    pub fn assert_recording_complete(&self, at: u64, reason: &str) {
         let (_folder, recording) = self.recorded();
         let last = self.ticks().last().expect("ticks").tick;
         assert!(!recording.truncated());

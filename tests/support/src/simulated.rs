@@ -23,11 +23,11 @@ pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
     path
 }
 
-/// The analysis of a run by `plan`, believing `believed`.
-pub fn analysed(plan: &Plan, believed: &Config) -> Result<Analysis, AnalysisError> {
+/// The analysis of a run by `plan`, believing `assumed`.
+pub fn analysed(plan: &Plan, assumed: &Config) -> Result<Analysis, AnalysisError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     analyse(
         &Recording::open(&recorded(plan, folder.path())).expect("a recording"),
-        believed,
+        assumed,
     )
 }

@@ -48,7 +48,7 @@ impl Adapter {
         cfmakeraw(&mut raw);
         tcsetattr(&pty.slave, SetArg::TCSANOW, &raw).unwrap();
         let (master, terminal) = (File::from(pty.master), File::from(pty.slave));
-        let heard = master.try_clone().unwrap();
+        let received = master.try_clone().unwrap();
         let far_side = FarSide {
             line: Arc::new(Mutex::new(master)),
             node: Arc::default(),
@@ -56,7 +56,7 @@ impl Adapter {
         };
         std::thread::spawn({
             let far_side = far_side.clone();
-            move || far_side.hear(heard)
+            move || far_side.read_frames(received)
         });
         let name = attach(&terminal);
         let interface = CanInterface::open(&name).unwrap();
@@ -75,18 +75,18 @@ impl Adapter {
     }
 
     /// What the adapter tells the kernel.
-    pub fn says(&self, line: &str) {
+    pub fn send(&self, line: &str) {
         self.far_side.write(line);
     }
 
     /// The controller leaves the bus: 255 errors of the transmitter, and nothing passes in either direction.
-    pub fn goes_bus_off(&self) {
+    pub fn enter_bus_off(&self) {
         self.far_side.is_off.store(true, Ordering::Release);
-        self.says("sb000255");
+        self.send("sb000255");
     }
 
     /// `ip link set IFACE down` and up again: slcan has no other way out of bus-off.
-    pub fn is_set_down_and_up(&self) {
+    pub fn restart_interface(&self) {
         self.interface.bring_down().unwrap();
         self.far_side.is_off.store(false, Ordering::Release);
         self.interface.bring_up().unwrap();
@@ -115,18 +115,18 @@ impl FarSide {
     }
 
     /// Reads what the kernel sends to the adapter, always: it waits for its bytes to leave the terminal.
-    fn hear(self, mut line: File) {
+    fn read_frames(self, mut line: File) {
         let (mut bytes, mut text) = ([0; 256], String::new());
         while let Ok(count) = line.read(&mut bytes) {
             text.push_str(std::str::from_utf8(&bytes[..count]).unwrap());
             while let Some(end) = text.find('\r') {
                 let line: String = text.drain(..=end).collect();
-                self.pass_on(&line);
+                self.forward(&line);
             }
         }
     }
 
-    fn pass_on(&self, line: &str) {
+    fn forward(&self, line: &str) {
         let frame = parse(line).filter(|_| !self.is_off.load(Ordering::Acquire));
         if let (Some(frame), Some(node)) = (frame, &*self.node.lock().unwrap()) {
             let _ = node.send(frame); // there may be no receiver

@@ -74,7 +74,7 @@ impl FarEnd {
     /// hears it takes it for a restart.
     pub fn new(name: &str, host: &dyn Host) -> FarEnd {
         let mut bus = self::host(name).endpoint(&[heartbeat::cob_id(5)]).unwrap();
-        let far_end = FarEnd::again(
+        let far_end = FarEnd::start(
             host,
             Arc::new(Mutex::new(EmulatedDrive::new(
                 EmulatedDriveSettings::default(),
@@ -87,13 +87,13 @@ impl FarEnd {
     }
 
     /// The same drive, plugged into another bus.
-    pub fn plugged_into(self, host: &dyn Host) -> FarEnd {
+    pub fn moved_to(self, host: &dyn Host) -> FarEnd {
         let FarEnd { device, running } = self;
         drop(running);
-        FarEnd::again(host, device)
+        FarEnd::start(host, device)
     }
 
-    fn again(host: &dyn Host, device: Arc<Mutex<EmulatedDrive>>) -> FarEnd {
+    fn start(host: &dyn Host, device: Arc<Mutex<EmulatedDrive>>) -> FarEnd {
         let running = AmplifierTask::start(host, Arc::clone(&device)).unwrap();
         FarEnd { device, running }
     }
@@ -107,7 +107,7 @@ impl FarEnd {
     }
 
     /// Waits until no current flows because the drive itself is off.
-    pub fn goes_off(&self) {
+    pub fn wait_until_off(&self) {
         wait_for("the drive is off", || {
             let device = self.device();
             device.current_a() == 0.0 && !matches!(device.power_state(), State::OperationEnabled)
@@ -138,7 +138,7 @@ impl Rig {
     }
 
     /// The drive gives the commanded current and reports it.
-    pub fn gives(&mut self, wanted_a: f64, given_a: f64) {
+    pub fn assert_current(&mut self, wanted_a: f64, given_a: f64) {
         assert_eq!(self.drive.command(wanted_a), Ok(given_a));
         let near = |current_a: f64| (current_a - given_a).abs() < 1e-9;
         self.command_until(
@@ -151,7 +151,7 @@ impl Rig {
 
     pub fn enabled(mut self) -> Rig {
         self.drive.enable().unwrap();
-        self.gives(1.0, 1.0);
+        self.assert_current(1.0, 1.0);
         self
     }
 
@@ -163,7 +163,7 @@ impl Rig {
         let AmplifierStatus::Fault(code) = self.drive.status() else {
             panic!("the fault did not stay")
         };
-        self.far_end.goes_off();
+        self.far_end.wait_until_off();
         assert!(
             self.drive.command(1.0).is_err(),
             "a heedless loop is refused"
@@ -176,7 +176,7 @@ impl Rig {
     }
 
     /// After the cause is removed: the operator clears the fault; the drive is off, and is enabled only on request.
-    pub fn recovers(&mut self) {
+    pub fn assert_recovers(&mut self) {
         self.far_end.device().inject(DeviceFault::None);
         self.drive
             .reset_fault()
@@ -191,6 +191,6 @@ impl Rig {
             0.0,
             "an old command does not come back"
         );
-        self.gives(0.5, 0.5);
+        self.assert_current(0.5, 0.5);
     }
 }

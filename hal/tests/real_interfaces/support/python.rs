@@ -57,12 +57,12 @@ impl PythonDrive {
     }
 
     /// Statusword's state (hexadecimal), target that is followed (per mille), NMT state.
-    pub fn shows(&mut self) -> String {
+    pub fn state(&mut self) -> String {
         self.ask("show")
     }
 
     /// Emergency message and Fault.
-    pub fn fails(&mut self, code: u16) {
+    pub fn inject_fault(&mut self, code: u16) {
         self.ask(&format!("fault {code:x}"));
     }
 }

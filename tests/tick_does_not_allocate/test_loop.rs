@@ -17,7 +17,7 @@ use crate::faulty_rig::{Fault, FaultyRig};
 use crate::programs::NO_CURRENT;
 
 /// A loop with its rings, and what comes out of them.
-pub struct Quiet {
+pub struct TestLoop {
     pub servo: Servo,
     pub requests: Producer<Request>,
     records: Consumer<LoopMessage>,
@@ -29,8 +29,8 @@ pub struct Quiet {
     pub commands: u64,
 }
 
-impl Quiet {
-    pub fn new(config: &Config, faults: &[(Range<u64>, Fault)]) -> Quiet {
+impl TestLoop {
+    pub fn new(config: &Config, faults: &[(Range<u64>, Fault)]) -> TestLoop {
         let rig = FaultyRig::new(SimulatedRig::new(config).expect("a rig"), faults);
         let (publisher, records) = RingBuffer::new(1024);
         let (requests, taken) = RingBuffer::new(16);
@@ -42,7 +42,7 @@ impl Quiet {
             progress: Arc::new(Progress::default()),
         };
         let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
-        Quiet {
+        TestLoop {
             servo: Servo::new(Box::new(rig), interlocks, connections),
             requests,
             records,
@@ -61,15 +61,15 @@ impl Quiet {
         config: &Config,
         faults: &[(Range<u64>, Fault)],
         program: Box<dyn Program>,
-    ) -> Quiet {
-        let mut quiet = Quiet::new(config, faults);
-        quiet.order(Request::Arm);
-        quiet.order(Request::Start(program));
-        quiet
+    ) -> TestLoop {
+        let mut test_loop = TestLoop::new(config, faults);
+        test_loop.request(Request::Arm);
+        test_loop.request(Request::Start(program));
+        test_loop
     }
 
-    pub fn order(&mut self, order: Request) {
-        assert!(self.requests.push(order).is_ok());
+    pub fn request(&mut self, request: Request) {
+        assert!(self.requests.push(request).is_ok());
     }
 
     /// What the loop does in a tick, and nothing else.
@@ -115,9 +115,9 @@ impl Quiet {
     }
 }
 
-pub struct Says(pub f64);
+pub struct ConstantCurrent(pub f64);
 
-impl Program for Says {
+impl Program for ConstantCurrent {
     fn decide(&mut self, _input: &ProgramInput) -> Decision {
         Decision {
             reference_m: 0.0,
